@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from tyro.conf import Positional, arg
 from tyro.extras import SubcommandApp
 
-from finlab.cli.json_file import JsonFile, check_json_file, put_json
+from finlab.cli.json_file import STDOUT, JsonFile, check_json_file, put_json
 from finlab.errors import DataError
 
 if TYPE_CHECKING:
     from finlab.evaluation.experiment import Experiment
+    from finlab.evaluation.report.document import Row
 
 
-def add_experiments(verbs: SubcommandApp, argv: Sequence[str]) -> Sequence[str]:
+def add_experiments(verbs: SubcommandApp, argv: Sequence[str]) -> None:
     """Add a verb for each experiment.
 
     Only the one that is asked for is imported, or all for `finlab eval --help`; the others have no options
@@ -26,9 +27,6 @@ def add_experiments(verbs: SubcommandApp, argv: Sequence[str]) -> Sequence[str]:
     Args:
         verbs: those of `finlab eval`.
         argv: the arguments after `finlab`.
-
-    Returns:
-        Their names.
     """
     from finlab.evaluation.experiment import EXPERIMENTS, load_experiment
 
@@ -38,7 +36,6 @@ def add_experiments(verbs: SubcommandApp, argv: Sequence[str]) -> Sequence[str]:
             verbs.command(verb_of(load_experiment(name)), name=name)
         else:
             verbs.command(_not_asked, name=name)
-    return list(EXPERIMENTS)
 
 
 def _not_asked() -> None:
@@ -57,10 +54,13 @@ def verb_of(experiment: Experiment) -> Callable[..., None]:
         check_json_file(json)
         begin(experiment.name)
         chosen = {name: _parsed(name, options[name], value) for name, value in given.items()}
-        rows = experiment.rows(**chosen)
+        found = experiment.run(**experiment.check(chosen))
+        coming = isinstance(found, Iterator) and json != STDOUT
+        rows = _as_they_come(experiment, found, json) if coming else list(found)
         if picture is not None and experiment.draw is not None:
             experiment.draw(rows).save(picture)
-        put_json({"rows": rows}, json, to_text(*experiment.words(), *experiment.results(rows)))
+        blocks = [f"*{experiment.note}*"] if coming else [*experiment.words(), *experiment.results(rows)]
+        put_json({"rows": rows}, json, to_text(*blocks))
 
     shown = {name: _shown(each) for name, each in options.items()}
     shown["json"] = _file("json", JsonFile, "file for the rows, {'rows': [...]}; the rows alone without one")
@@ -72,6 +72,22 @@ def verb_of(experiment: Experiment) -> Callable[..., None]:
     verb.__signature__ = inspect.Signature(list(shown.values()))  # type: ignore[attr-defined]
     verb.__annotations__ = {name: each.annotation for name, each in shown.items()}
     return verb
+
+
+def _as_they_come(experiment: Experiment, found: Iterable[Row], json: Path | None) -> list[Row]:
+    """All rows, each printed and written as soon as it is there."""
+    from finlab.evaluation.report.text import to_text
+
+    print(to_text(*experiment.words()), end="\n\n", flush=True)
+    rows: list[Row] = []
+    for row in found:
+        rows.append(row)
+        if json is not None:
+            put_json({"rows": rows}, json)
+        lines = to_text(experiment.table(rows)).splitlines()
+        print("\n".join(lines[-1 if len(rows) > 1 else 0 :]), flush=True)
+    print()
+    return rows
 
 
 def _shown(option: inspect.Parameter) -> inspect.Parameter:

@@ -7,7 +7,6 @@ from typing import Annotated
 from tyro.conf import arg
 from tyro.extras import SubcommandApp
 
-from finlab.cli import eval_closed_loop, eval_fit, eval_robots, eval_swims
 from finlab.cli.eval_verb import add_experiments
 from finlab.cli.inputs import check_positive
 from finlab.errors import DataError
@@ -44,24 +43,9 @@ def report(
     print(make_report(out, size=size, seed=seed, names=names, processes=processes))
 
 
-OTHERS = (
-    eval_closed_loop.trajectory,
-    eval_closed_loop.faults,
-    eval_closed_loop.velocity,
-    eval_closed_loop.monitor,
-    eval_swims.swims,
-    eval_fit.fit,
-    eval_robots.robots,
-    report,
-)
-"""Verbs that are no experiment yet, and the report."""
-
-
 def verbs(argv: Sequence[str]) -> SubcommandApp:
     """All verbs of `finlab eval`, from the arguments after `finlab`."""
     found = SubcommandApp()
-    known = add_experiments(found, argv)
-    for verb in OTHERS:
-        if verb.__name__ not in known:
-            found.command(verb)
+    add_experiments(found, argv)
+    found.command(report)
     return found

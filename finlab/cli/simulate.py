@@ -165,7 +165,7 @@ def _write(log: RunLog, output: Path) -> list[str]:
 
 def summary(log: RunLog) -> str:
     """The run in a few lines."""
-    from finlab.evaluation.experiments.closed_loop_runs import LOST_M, RTE_DELTA_S, follow_row
+    from finlab.evaluation.experiments.closed_loop import LOST_M, RTE_DELTA_S, follow_row
 
     row = follow_row(log)
     lost = [name for name, works in zip(log.fins, log.alive[-1], strict=True) if not works]

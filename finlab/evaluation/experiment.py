@@ -6,7 +6,7 @@ asked for.
 """
 
 import inspect
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import import_module
 from types import NoneType
@@ -24,6 +24,13 @@ EXPERIMENTS = {
     "latency": "latency",
     "ablation": "ablation",
     "temperature": "temperature",
+    "trajectory": "trajectory",
+    "faults": "faults",
+    "velocity": "velocity",
+    "swims": "swims",
+    "monitor": "monitor",
+    "fit": "fit",
+    "robots": "robots",
 }
 """Name -> module in `finlab.evaluation.experiments`, in the order of the report."""
 
@@ -39,8 +46,8 @@ class Experiment:
     columns: tuple[Column, ...]
     """Of the table. Rows may have more keys, which are in the JSON alone; intervals [low, high] are under
     `<key>_interval`."""
-    run: Callable[..., list[Row]]
-    """From keyword options to rows of plain values. The options of the verb are its parameters: their types
+    run: Callable[..., Iterable[Row]]
+    """From keyword options to rows of plain values; those of a generator are printed as they come. The options of the verb are its parameters: their types
     (int, float, bool, str, Literal, a tuple of str, int or float, each perhaps None), their defaults and
     their words under `Args` in its docstring. An int whose default is 0 may be 0, any other is at least 1. A
     parameter `layout` is given by position. Times depend on the machine; all other values on the options
@@ -91,7 +98,7 @@ class Experiment:
 
     def rows(self, **chosen: Any) -> list[Row]:
         """Run it; options as in `check`."""
-        return self.run(**self.check(chosen))
+        return list(self.run(**self.check(chosen)))
 
     def parts(self, chosen: Mapping[str, Any]) -> list[dict[str, Any]]:
         """Options of runs whose rows, one after the other, are those of one run."""

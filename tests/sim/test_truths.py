@@ -156,4 +156,4 @@ def test_what_learns_never_sees_the_truth(room: str) -> None:
 
 
 def test_the_check_of_imports_sees_through_other_modules() -> None:
-    assert _reached({"finlab.evaluation.experiments.closed_loop_runs"}) >= TRUTHS
+    assert _reached({"finlab.evaluation.experiments.closed_loop"}) >= TRUTHS

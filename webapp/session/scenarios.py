@@ -10,7 +10,6 @@ from finlab.sim import SteadyCurrent, TurningCurrent, Water, Waves
 LOST_IN_CURRENT = HardDay(
     "lost-in-current",
     "In a current of 7 cm/s a fin is lost half-way, and a monitor has to find out.",
-    "hard",
     water=SteadyCurrent(CURRENT),
     lost=1,
     announced=False,

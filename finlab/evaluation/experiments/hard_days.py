@@ -1,7 +1,7 @@
 """Hard days: named swims in which something is not as the designer of the robot assumed. Plain data.
 
-What a day says is what is true; allocator, controller and monitor believe the layout, but for fins that are
-the robot's own (`fins`) and for what is announced.
+What a day says is true of the robot and its surroundings; allocator, controller and monitor know the layout,
+the laws of the fins (`fins`), and what is announced.
 """
 
 from collections.abc import Mapping
@@ -12,7 +12,6 @@ from typing import Any, Literal, NamedTuple
 from finlab.allocation.allocator import Allocator
 from finlab.assets import PAPER_LAYOUTS
 from finlab.control import PATH_CONTROLLERS, Completion, FaultMonitor, TrackingController
-from finlab.errors import DataError
 from finlab.evaluation.splits import make_split
 from finlab.layout import Layout, load_layout
 from finlab.layout.fin import FinModelSpec
@@ -37,10 +36,6 @@ CURRENT = (0.05, -0.05, 0.0)
 MEASURED_SOFT = FinModelSpec("soft", (("d", 0.1), ("e", 0.15), ("phi_e", 0.5), ("x0", 1.0)))
 """Saturates within reach, and is uneven and askew, as fins of silicone are when measured."""
 
-Kind = Literal["nominal", "law kept", "hard"]
-"""As believed; fins that obey the law that methods were given, while body, water or sensors do not; and fins
-that do not obey it, are lost, or cannot do what is asked."""
-
 
 @dataclass(frozen=True)
 class HardDay:
@@ -50,8 +45,6 @@ class HardDay:
     """For `--scenarios`."""
     about: str
     """What is hard, in a sentence."""
-    kind: Kind
-    """Which goal counts."""
     layouts: tuple[str, ...] = TWO
     """Names of shipped layouts that swim it."""
     trajectory: str = "lissajous"
@@ -75,8 +68,6 @@ class HardDay:
     """How many fins are lost half-way, each and each pair in its turn."""
     announced: bool = True
     """Whether allocator and controller are told of a loss; else a `FaultMonitor` has to find it."""
-    reason: str = ""
-    """Why `search` need not lead there, as far as known: a sentence."""
 
     def path(self) -> Trajectory:
         """What is followed."""
@@ -116,12 +107,7 @@ class HardDay:
         )
 
     def swim(
-        self,
-        case: "Case",
-        allocator: Allocator,
-        seed: int,
-        *,
-        controller: str = "tracking",
+        self, case: "Case", allocator: Allocator, seed: int, *, controller: str = "tracking"
     ) -> ClosedLoop:
         """The swim, ready to start.
 
@@ -161,129 +147,69 @@ class Case(NamedTuple):
 
 
 HARD_DAYS = (
-    HardDay(
-        "nominal",
-        "Everything is as drawn; sensors are noisy, biased and late.",
-        "nominal",
-        PAPER_LAYOUTS,
-        reason=(
-            "On A and D the pseudo-inverse takes hardly more than the least power of any exact answer, and "
-            "most of the error comes from controller and sensors, whatever method allocates."
-        ),
-    ),
-    HardDay("damping-half", "The body is damped half as much.", "law kept", truth={"damping": 0.5}),
-    HardDay("damping-double", "The body is damped twice as much.", "law kept", truth={"damping": 2.0}),
+    HardDay("nominal", "Everything is as drawn; sensors are noisy, biased and late.", PAPER_LAYOUTS),
+    HardDay("damping-half", "The body is damped half as much.", truth={"damping": 0.5}),
+    HardDay("damping-double", "The body is damped twice as much.", truth={"damping": 2.0}),
     HardDay(
         "parameters-low",
         "Damping, added mass and inertia are 30 % less than drawn.",
-        "law kept",
         PAPER_LAYOUTS,
         truth={"damping": 0.7, "added_mass": 0.7, "inertia": 0.7},
     ),
     HardDay(
         "parameters-high",
         "Damping, added mass and inertia are 30 % more than drawn.",
-        "law kept",
         PAPER_LAYOUTS,
         truth={"damping": 1.3, "added_mass": 1.3, "inertia": 1.3},
     ),
-    HardDay(
-        "current",
-        "A current of 7 cm/s.",
-        "law kept",
-        water=SteadyCurrent(CURRENT),
-        reason=(
-            "There, answering the wrench that is expected takes more power than answering the present one "
-            "and does not lessen the error."
-        ),
-    ),
+    HardDay("current", "A current of 7 cm/s.", water=SteadyCurrent(CURRENT)),
     HardDay(
         "current-turns",
         "A current of 7 cm/s that turns by a right angle within 5 s.",
-        "law kept",
         water=TurningCurrent(CURRENT),
-        reason="As in the steady current.",
     ),
-    HardDay("buoyant", "The robot is 1 % too buoyant.", "law kept", truth={"buoyancy": 1.01}),
-    HardDay("heavy", "The robot is 1 % too heavy for its buoyancy.", "law kept", truth={"buoyancy": 0.99}),
+    HardDay("buoyant", "The robot is 1 % too buoyant.", truth={"buoyancy": 1.01}),
+    HardDay("heavy", "The robot is 1 % too heavy for its buoyancy.", truth={"buoyancy": 0.99}),
     HardDay(
         "gravity-off",
         "The centre of gravity is 2 cm ahead of where it is drawn; weights have brought the robot level.",
-        "law kept",
         truth={"gravity_offset_m": (0.02, 0.0, 0.0), "ballasted": True},
     ),
-    HardDay("late", "All sensors are 100 ms later.", "law kept", sensors=SensorSettings().later(0.1)),
-    HardDay("circle", "A circle.", "law kept", trajectory="circle"),
-    HardDay("dive", "Down by a metre and up again.", "law kept", trajectory="dive"),
-    HardDay("square", "A square with stops at its corners.", "law kept", trajectory="square"),
-    HardDay("waves", "Keep a place in waves of 0.2 m.", "law kept", trajectory="station", water=Waves()),
-    HardDay("hexa", "Six fins.", "law kept", ("hexa",)),
-    HardDay("octo", "Eight fins.", "law kept", ("octo",)),
+    HardDay("late", "All sensors are 100 ms later.", sensors=SensorSettings().later(0.1)),
+    HardDay("circle", "A circle.", trajectory="circle"),
+    HardDay("dive", "Down by a metre and up again.", trajectory="dive"),
+    HardDay("square", "A square with stops at its corners.", trajectory="square"),
+    HardDay("waves", "Keep a place in waves of 0.2 m.", trajectory="station", water=Waves()),
+    HardDay("hexa", "Six fins.", ("hexa",)),
+    HardDay("octo", "Eight fins.", ("octo",)),
     HardDay(
         "fins-mixed",
         "Each fin of A follows a law of its own, which all methods but `paper` know.",
-        "law kept",
         ("A",),
         fins="mixed",
-        reason="The fins are others for each seed, which makes intervals wide.",
     ),
-    HardDay(
-        "fins-soft",
-        "A has soft fins; all methods but `paper` know their law.",
-        "law kept",
-        ("A",),
-        fins="soft",
-    ),
-    HardDay("weak", "One fin gives 70 % of its thrust; no method is given that.", "hard", ("A",), weak=0.7),
-    HardDay("lost-one", "One fin is lost half-way, announced.", "hard", ("A",), lost=1),
+    HardDay("fins-soft", "A has soft fins; all methods but `paper` know their law.", ("A",), fins="soft"),
+    HardDay("weak", "One fin gives 70 % of its thrust; no method is given that.", ("A",), weak=0.7),
+    HardDay("lost-one", "One fin is lost half-way, announced.", ("A",), lost=1),
     HardDay(
         "lost-one-unannounced",
         "One fin is lost half-way, and a monitor has to find out.",
-        "hard",
         ("A",),
         lost=1,
         announced=False,
     ),
-    HardDay("lost-two", "Two fins are lost half-way, announced.", "hard", ("A",), lost=2),
+    HardDay("lost-two", "Two fins are lost half-way, announced.", ("A",), lost=2),
     HardDay(
         "lost-two-unannounced",
         "Two fins are lost half-way, and a monitor has to find out.",
-        "hard",
         ("A",),
         lost=2,
         announced=False,
     ),
-    HardDay(
-        "restricted",
-        "Stops keep the fins within arcs.",
-        "hard",
-        ("restricted",),
-        reason=(
-            "`analytic` heeds arcs by clipping alone, but the observer takes what is missing for a "
-            "disturbance and makes up for it."
-        ),
-    ),
-    HardDay("saturated", "The path asks for more than the fins can give.", "hard", duration_s=36.0),
-    HardDay(
-        "flexible",
-        "Fins have soft tips, which no method is given.",
-        "hard",
-        plant="flexible",
-        reason="All methods were given the law of stiff fins, so what fins give is not what they intend.",
-    ),
-    HardDay("wake", "Fins weaken each other by their jets.", "hard", plant="wake"),
-    HardDay("inflow", "Thrust falls with speed.", "hard", plant="inflow"),
+    HardDay("restricted", "Stops keep the fins within arcs.", ("restricted",)),
+    HardDay("saturated", "The path asks for more than the fins can give.", duration_s=36.0),
+    HardDay("flexible", "Fins have soft tips, which no method is given.", plant="flexible"),
+    HardDay("wake", "Fins weaken each other by their jets.", plant="wake"),
+    HardDay("inflow", "Thrust falls with speed.", plant="inflow"),
 )
 """The suite, in the order in which it is printed."""
-
-
-def choose_days(names: str) -> list[HardDay]:
-    """The days of some names with commas between, or `all`; a `DataError` where there is none of a name."""
-    known = {day.name: day for day in HARD_DAYS}
-    chosen = [name.strip() for name in names.split(",") if name.strip()]
-    if chosen == ["all"]:
-        return list(HARD_DAYS)
-    if not chosen or (unknown := [name for name in chosen if name not in known]):
-        got = unknown[0] if chosen else names
-        raise DataError(f"scenarios: expected all, or some of {', '.join(known)}, got {got!r:.60}")
-    return [known[name] for name in dict.fromkeys(chosen)]

@@ -12,12 +12,6 @@ from finlab.sim import NO_NOISE, ClosedLoop, RunLog, Trajectory
 pytest.importorskip("matplotlib")
 
 from finlab.evaluation.plots import closed_loop_run  # noqa: E402
-from finlab.evaluation.plots.closed_loop_experiments import (  # noqa: E402
-    draw_faults,
-    draw_layouts,
-    draw_velocity,
-    track_of,
-)
 
 WRENCH = ("Fx [N]", "Tx [N m]", "Fy [N]", "Ty [N m]", "Fz [N]", "Tz [N m]")
 
@@ -77,44 +71,3 @@ def test_each_axis_of_the_wrench_has_its_own_place(log: RunLog) -> None:
         axis = view.axes[WRENCH.index(name)]
         assert _line(axis, "asked")[:, 1] == pytest.approx(log.asked[:, k])
         assert _line(axis, "delivered")[:, 1] == pytest.approx(log.delivered[:, k])
-
-
-def test_layouts_have_a_column_each(log: RunLog) -> None:
-    runs = (("A", "search"), ("B", "search"), ("B", "on-board"))
-    tracks = [(names, track_of(log)) for names in runs]
-    rows = [{"layout": name, "ate": ate} for name, ate in (("A", 0.012), ("B", 0.034))]
-    view = draw_layouts(tracks, rows)
-    above_a, above_b, _, depth_b = view.axes
-    assert (
-        above_a.get_title(loc="left") == "A: ATE 1.2 cm" and above_b.get_title(loc="left") == "B: ATE 3.4 cm"
-    )
-    assert (len(above_a.lines), len(above_b.lines)) == (2, 3)
-    assert _line(above_b, "on-board") == pytest.approx(log.position[:, :2])
-    assert depth_b.lines[1].get_xydata() == pytest.approx(np.column_stack([log.time, log.position[:, 2]]))
-
-
-def test_faults_stand_in_order_with_the_allowed_growth_and_the_printed_below() -> None:
-    rows = [
-        {"fault": fault, "controllable": controllable, "method": "search", "ate": ate, "ate_std": 0.01}
-        for fault, controllable, ate in (("healthy", True, 0.04), ("bow lost", True, 0.05), ("all", False, 9))
-    ]
-    (axis,) = draw_faults(rows, {"healthy (printed)": 0.13}).axes
-    (container,) = axis.containers
-    assert container[0].get_xydata() == pytest.approx(np.array([[0.04, 0.0], [0.05, 1.0]]))
-    assert container[2][0].get_segments()[0][:, 0] == pytest.approx([0.03, 0.05])
-    assert any(np.allclose(line.get_xdata(), 1.15 * 0.04) for line in axis.lines)
-    assert any(
-        np.allclose(line.get_xydata(), [[0.13, 2.0]]) for line in axis.lines if len(line.get_xdata()) == 1
-    )
-    shown = [label.get_text() for label in axis.get_yticklabels()]
-    assert shown == ["healthy", "bow lost", "healthy (printed)"] and axis.yaxis_inverted()
-
-
-def test_speed_over_time_and_power_against_error(log: RunLog) -> None:
-    over_time, trade = draw_velocity([((0.1, "search"), log), ((0.1, "analytic"), log)]).axes
-    speed = log.motion[:, 0]
-    assert sum(np.array_equal(line.get_ydata(), speed) for line in over_time.lines) == 2
-    ((error, power),) = _line(trade, "search, 0.10 m/s")
-    assert error == pytest.approx(np.abs(speed - log.reference_surge).mean())
-    assert power == pytest.approx(log.inertial_power.sum(axis=1).mean())
-    assert trade.get_xlim()[0] == trade.get_ylim()[0] == 0.0

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from finlab.errors import DataError
-from finlab.evaluation.experiments.closed_loop_runs import absolute_error, depth_error, relative_error
+from finlab.evaluation.experiments.closed_loop import absolute_error, depth_error, relative_error
 
 
 def test_a_constant_offset_has_no_relative_error() -> None:

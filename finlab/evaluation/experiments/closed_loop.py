@@ -1,13 +1,11 @@
-"""What the closed-loop experiments share: errors of single runs as rows, means over seeds.
+"""What the closed-loop experiments share: figures of single swims as rows, and means over seeds.
 
 Absolute and relative trajectory error after J. Sturm et al., A Benchmark for the Evaluation of RGB-D SLAM
 Systems, IROS 2012. Robot and reference share one world frame and one clock, so nothing is aligned and samples
 are paired by time. Only positions count: the reference prescribes no attitude.
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from itertools import product
-from typing import Any, NamedTuple
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -15,12 +13,9 @@ from finlab.allocation.allocator import Allocator
 from finlab.arrays import Array
 from finlab.control import PATH_CONTROLLERS, VelocityController
 from finlab.errors import DataError
-from finlab.evaluation.progress import progress
+from finlab.evaluation.report.document import Column, Row
 from finlab.layout import Layout
 from finlab.sim import ClosedLoop, Cruise, RunLog, Task
-
-Row = dict[str, Any]
-
 
 RTE_DELTA_S = 5.0
 """Time between the two ends of a piece of path that the relative error compares [s]."""
@@ -83,72 +78,54 @@ def over_seeds(rows: Sequence[Row]) -> Row:
     return means
 
 
-class Scenario(NamedTuple):
-    """One case of an experiment, swum by every method."""
-
-    label: Any
-    """What is varied: the layout's name, a fault, a speed."""
-    layout: Layout
-    """The robot."""
-    task: Task
-    """What it swims."""
-    failures: tuple[tuple[str, float], ...] = ()
-    """Fins, each with the time [s] at which it is lost."""
-
-
-Run = tuple[tuple[Any, str], RunLog]
-"""Under (label of the scenario, name of the method)."""
-
-
-def run_all(
-    scenarios: Sequence[Scenario],
-    allocators: Mapping[str, Allocator],
-    seeds: Sequence[int],
-    plant: str = "mean",
+def swim(
+    layout: Layout,
+    method: Allocator,
+    task: Task,
+    seed: int,
+    plant: str,
     controller: str = "waypoint",
-) -> list[Run]:
-    """Every scenario with every method and seed, one after the other.
+    faults: Sequence[tuple[str, float]] = (),
+) -> RunLog:
+    """One swim.
 
     Args:
-        scenarios: what is swum.
-        allocators: methods by name.
-        seeds: of the sensors' noise.
+        layout: the robot.
+        method: who allocates.
+        task: a trajectory, or a cruise.
+        seed: of the sensors' noise.
         plant: how fin forces are simulated.
-        controller: of paths, one of `finlab.control.PATH_CONTROLLERS`, the paper's by default; speeds are
-            kept by the paper's other one.
+        controller: of trajectories, one of `finlab.control.PATH_CONTROLLERS`; cruises have one of their own.
+        faults: fins, each with the time [s] at which it is lost.
     """
-    done = []
-    every = list(product(scenarios, allocators.items(), seeds))
-    for (label, layout, task, failures), (name, allocator), seed in progress(every, "run"):
-        options: dict[str, Any] = {"failures": failures, "plant": plant, "seed": seed}
-        pilot = VelocityController() if isinstance(task, Cruise) else PATH_CONTROLLERS[controller](layout)
-        done.append(((label, name), ClosedLoop(layout, allocator, task, pilot, **options).run()))
-    return done
+    pilot = VelocityController() if isinstance(task, Cruise) else PATH_CONTROLLERS[controller](layout)
+    return ClosedLoop(layout, method, task, pilot, failures=faults, plant=plant, seed=seed).run()
 
 
-def group_runs(runs: Sequence[Run], row: Callable[[RunLog], Row]) -> dict[tuple[Any, str], list[Row]]:
-    """Rows of single runs by scenario and method."""
-    groups: dict[tuple[Any, str], list[Row]] = {}
-    for key, log in runs:
-        groups.setdefault(key, []).append(row(log))
-    return groups
+def check_names(option: str, names: Sequence[str], known: Collection[str]) -> None:
+    """Refuse unknown names before the work.
 
-
-def rows_and_totals(
-    runs: Sequence[Run], row: Callable[[RunLog], Row], key: str, total: str | None
-) -> list[Row]:
-    """One row per scenario and method, and one per method over all scenarios: mean and spread over runs.
-
-    Args:
-        runs: at least one.
-        row: figures of one run.
-        key: what the scenario's label is called.
-        total: label of the rows over all scenarios.
+    Raises:
+        DataError: one of the names is not known.
     """
-    groups = group_runs(runs, row)
-    for method in dict.fromkeys(method for _, method in groups):
-        groups[total, method] = [one for (_, name), rows in groups.items() if name == method for one in rows]
-    return [
-        {key: label, "method": method, "runs": len(rows), **over_seeds(rows)}
-        for (label, method), rows in groups.items()
-    ]
+    if unknown := [name for name in names if name not in known]:
+        raise DataError(f"{option}: expected some of {', '.join(known)}, got {unknown[0]!r:.60}")
+
+
+POWER = (
+    Column("inertial_w", "inertial power", "three", unit="W"),
+    Column("driving_w", "with motor losses", "three", unit="W"),
+)
+"""Columns of `power_row`."""
+ERRORS = (
+    Column("ate", "ATE", "metres", unit="m"),
+    Column("ate_std", "spread", "error", unit="m"),
+    Column("rte", "RTE", "metres", unit="m"),
+    Column("depth_rmse", "depth RMSE", "metres", unit="m"),
+)
+"""Columns of `follow_row`."""
+ABOUT_ERRORS = (
+    "ATE: root mean square distance to the reference, nothing aligned; RTE: of displacements over "
+    f"{RTE_DELTA_S:g} s; spread: standard deviation over runs. Inertial power is the paper's sum of I alpha "
+    "omega, of its magnitudes."
+)

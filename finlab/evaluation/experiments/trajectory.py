@@ -1,0 +1,87 @@
+"""Several layouts follow a trajectory with one controller and one checkpoint, as in the paper."""
+
+from collections.abc import Sequence
+from itertools import product
+from typing import Literal
+
+from finlab.evaluation.experiment import Experiment
+from finlab.evaluation.experiments.closed_loop import (
+    ABOUT_ERRORS,
+    ERRORS,
+    POWER,
+    follow_row,
+    over_seeds,
+    swim,
+)
+from finlab.evaluation.method_specs import load_method_specs
+from finlab.evaluation.paper_figures import paper_figures
+from finlab.evaluation.progress import progress
+from finlab.evaluation.report.document import Column, Row
+from finlab.layout import load_layout
+from finlab.sim import make_trajectory
+
+Controller = Literal["waypoint", "tracking"]
+
+
+def run(
+    layouts: tuple[str, ...] = ("A", "B", "C", "D"),
+    trajectory: str = "lissajous",
+    methods: tuple[str, ...] = ("search", "paper"),
+    runs: int = 3,
+    plant: str = "mean",
+    controller: Controller = "waypoint",
+    checkpoint: str | None = None,
+    seed: int = 0,
+) -> list[Row]:
+    """One row for each layout and method, and one for each method over all layouts.
+
+    Args:
+        layouts: names or files.
+        trajectory: circle, lissajous, square, dive, station, or a CSV file with the columns t, x, y, z.
+        methods: names; on-board is U-CAT's own law at a fixed frequency.
+        runs: of each, with other noise.
+        plant: what the fins really do; see finlab simulate --help.
+        controller: waypoint (heads for a point ahead, as in the paper), or tracking.
+        checkpoint: of the learned methods, a shipped name or a folder.
+        seed: of the first run's noise.
+    """
+    robots, path = [load_layout(name) for name in layouts], make_trajectory(trajectory)
+    allocators = load_method_specs(methods, checkpoint)
+    done: dict[tuple[str, str], list[Row]] = {}
+    for robot, (name, method), k in progress(list(product(robots, allocators.items(), range(runs))), "swim"):
+        row = follow_row(swim(robot, method, path, seed + k, plant, controller))
+        done.setdefault((robot.name, name), []).append(row)
+        done.setdefault(("all", name), []).append(row)
+    order = sorted(done, key=lambda key: key[0] == "all")
+    return [
+        {"layout": layout, "method": name, "runs": len(done[layout, name]), **over_seeds(done[layout, name])}
+        for layout, name in order
+    ]
+
+
+def _printed(rows: Sequence[Row]) -> list[Row]:
+    table, swum = paper_figures()["trajectory"], {row["layout"] for row in rows}
+    return [
+        {"layout": name, "method": "paper's method, printed", **row}
+        for name, row in table.items()
+        if name in swum
+    ]
+
+
+experiment = Experiment(
+    name="trajectory",
+    question="How closely do the paper's layouts follow a path, with one controller for all?",
+    columns=(
+        Column("layout", "layout"),
+        Column("method", "method", "code"),
+        Column("runs", "runs", "count"),
+        *ERRORS,
+        *POWER,
+    ),
+    run=run,
+    note=f"{ABOUT_ERRORS} The paper's runs took place in another simulator, on paths that it does not print.",
+    quick={"layouts": ("A", "C"), "methods": ("search",), "runs": 1},
+    full={"runs": 2},
+    printed=_printed,
+    less_is_better=("ate", "driving_w"),
+)

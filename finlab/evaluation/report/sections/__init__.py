@@ -1,1 +1,0 @@
-"""The report's sections: results in, blocks of the document out."""
