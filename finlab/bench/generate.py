@@ -128,4 +128,4 @@ def _columns(kind: Any, rows: list[tuple[Any, ...]]) -> Any:
 
 
 if __name__ == "__main__":
-    print(save_problems(make_problems(), sys.argv[1]))
+    save_problems(make_problems(), sys.argv[1])

@@ -1,7 +1,7 @@
 """The problems of the benchmark: robots, wrenches asked of them, and the best that is known, in one NPZ file.
 
 Arrays hold what is numeric, the member `index` holds the rest as JSON (UTF-8 bytes), so that the file can be
-read without finlab; `problems.schema.json` describes the index. A checksum guards all of it.
+read without finlab; `problems.schema.json` describes the index.
 """
 
 import hashlib
@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from finlab.arrays import AnyArray, Array
 from finlab.errors import DataError
 from finlab.files.archive import json_of, read_arrays
+from finlab.files.guarded import read_file
 from finlab.layout import Layout
 from finlab.layout.file import parse_layout
 from finlab.physics import TableLaw, write_table
@@ -97,7 +98,7 @@ class Problems:
     forces: dict[str, AnyArray]
     """Force tables by name."""
     checksum: str = ""
-    """SHA-256 of the file that they came from."""
+    """SHA-256 of the file that they came from, which says whether results are comparable."""
 
     @cached_property
     def _folder(self) -> "TemporaryDirectory[str]":
@@ -140,36 +141,30 @@ class Problems:
         return replace(self, targets=targets, sequences=paths)
 
 
-def save_problems(problems: Problems, path: str | os.PathLike[str]) -> str:
-    """Write the file whole; returns its checksum."""
+def save_problems(problems: Problems, path: str | os.PathLike[str]) -> None:
+    """Write the file whole."""
     robots = [asdict(robot) | {"sigma": list(robot.sigma)} for robot in problems.robots]
     index: dict[str, Any] = {"format": FORMAT, "version": VERSION, "kinds": list(KINDS), "robots": robots}
-    index |= problems.about
-    arrays: dict[str, AnyArray] = dict(problems.forces)
+    text = json.dumps(index | problems.about, separators=(",", ":")).encode()
+    arrays: dict[str, AnyArray] = {"index": np.frombuffer(text, np.uint8), **problems.forces}
     arrays |= {f"target_{name}": values for name, values in problems.targets._asdict().items()}
     arrays |= {f"sequence_{name}": values for name, values in problems.sequences._asdict().items()}
-    index["checksum"] = checksum_of(index, arrays)
-    text = np.frombuffer(json.dumps(index, separators=(",", ":")).encode(), np.uint8)
     buffer = io.BytesIO()
-    np.savez_compressed(buffer, allow_pickle=False, index=text, **arrays)
+    np.savez_compressed(buffer, allow_pickle=False, **arrays)
     write_whole(path, buffer.getvalue(), DataError)
-    return str(index["checksum"])
 
 
 def open_problems(path: str | os.PathLike[str] = FILE) -> Problems:
     """Read a file of problems, by default the shipped one.
 
     Raises:
-        DataError: it cannot be read, is of another format or version, or was changed.
+        DataError: it cannot be read, or is of another format or version.
     """
     index, arrays = _read(Path(path))
     about = [index.get(key) for key in ("format", "version")]
     if about != [FORMAT, VERSION]:
         got = " ".join(f"{value!r:.60}" for value in about)
         raise DataError(f"{path}: expected {FORMAT} of version {VERSION}, got {got}")
-    checksum = index.pop("checksum", None)
-    if checksum != checksum_of(index, arrays):
-        raise DataError(f"{path}: the checksum does not fit the contents; the file was changed, get it again")
     try:
         robots = tuple(Robot(**{**robot, "sigma": tuple(robot["sigma"])}) for robot in index["robots"])
         targets = Targets(*(arrays[f"target_{name}"] for name in Targets._fields))
@@ -181,7 +176,8 @@ def open_problems(path: str | os.PathLike[str] = FILE) -> Problems:
         raise DataError(f"{path}: a force table would be written outside of its folder: {foreign[0]!r:.80}")
     forces = {name: values for name, values in arrays.items() if name.startswith("table_")}
     rest = {key: index[key] for key in index.keys() - {"format", "version", "kinds", "robots"}}
-    return Problems(rest, robots, targets, paths, forces, checksum)
+    digest = hashlib.sha256(read_file(path, MAX_BYTES, "a file of problems")).hexdigest()
+    return Problems(rest, robots, targets, paths, forces, f"sha256:{digest}")
 
 
 def _read(path: Path) -> tuple[dict[str, Any], dict[str, AnyArray]]:
@@ -192,12 +188,3 @@ def _read(path: Path) -> tuple[dict[str, Any], dict[str, AnyArray]]:
     if not isinstance(index, dict):
         raise DataError(f"{path}: index: expected an object, got {type(index).__name__}")
     return index, arrays
-
-
-def checksum_of(index: dict[str, Any], arrays: dict[str, AnyArray]) -> str:
-    """SHA-256 of an index without its checksum and of arrays, independent of how the file is packed."""
-    digest = hashlib.sha256(json.dumps(index, sort_keys=True, separators=(",", ":")).encode())
-    for name, values in sorted(arrays.items()):
-        digest.update(f"{name} {values.dtype.str} {values.shape} ".encode())
-        digest.update(np.ascontiguousarray(values).tobytes())
-    return f"sha256:{digest.hexdigest()}"

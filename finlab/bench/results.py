@@ -8,20 +8,13 @@ from typing import Any
 
 from finlab import __version__
 from finlab.bench.problems import Problems
-from finlab.errors import DataError
 from finlab.evaluation.report.provenance import machine
-from finlab.whole_file import write_whole
 
 FORMAT, VERSION = "finlab-bench-results", 2
 
 
 def results(
-    methods: list[dict[str, Any]],
-    problems: Problems,
-    *,
-    quick: bool,
-    limit_s: float,
-    command: str,
+    methods: list[dict[str, Any]], problems: Problems, *, quick: bool, limit_s: float, command: str
 ) -> dict[str, Any]:
     """Figures of methods, with what is needed to make them again."""
     return {
@@ -37,11 +30,6 @@ def results(
         "machine": {**machine(), "load": f"{os.getloadavg()[0]:.1f}"},
         "methods": methods,
     }
-
-
-def save_results(found: dict[str, Any], path: str | os.PathLike[str]) -> None:
-    """Write results whole."""
-    write_whole(path, json.dumps(found, indent=1, allow_nan=False) + "\n", DataError)
 
 
 def stored(problems: Problems, *, quick: bool) -> dict[str, Any] | None:

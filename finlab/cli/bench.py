@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional, UseAppendAction, arg
 
-from finlab.cli.eval_arguments import Names, Output
-from finlab.cli.json_file import STDOUT, JsonFile, put_json
+from finlab.cli.json_file import JsonFile, check_json_file, put_json
 from finlab.errors import DataError
 
 if TYPE_CHECKING:
@@ -21,7 +20,7 @@ def bench(
     methods: Annotated[Positional[tuple[str, ...]], arg(metavar="METHOD")] = (),
     command: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="COMMAND")] = (),
     quick: bool = False,
-    sets: Names = "all",
+    sets: Annotated[str, arg(metavar="A,B,...")] = "all",
     limit: Annotated[float, arg(metavar="SECONDS")] = 1.0,
     cpu: bool = False,
     problems: Annotated[Path | None, arg(metavar="FILE")] = None,
@@ -46,7 +45,7 @@ def bench(
 
     if not limit > 0.0:
         raise DataError(f"limit: expected a number of seconds above 0, got {limit}")
-    Output(json)
+    check_json_file(json)
     with tqdm(desc="bench", unit="target", disable=None, leave=False, file=sys.stderr) as bar:
         from finlab.bench.metrics import figures
         from finlab.bench.problems import FILE, open_problems
@@ -61,7 +60,7 @@ def bench(
             bar.reset(len(chosen.targets.robot) + chosen.sequences.best_error.size)
             found.append(figures(chosen, run_method(method, chosen, limit, bar.update)))
 
-    from finlab.bench.results import results, save_results, stored
+    from finlab.bench.results import results, stored
     from finlab.bench.table import text
 
     words = ["finlab", "bench", *methods, *(word for each in command for word in ("--command", each))]
@@ -69,11 +68,12 @@ def bench(
     words += ["--cpu"] * cpu + ["--limit", f"{limit:g}"] * (limit != LIMIT_S)
     run = results(found, asked, quick=quick, limit_s=limit, command=shlex.join(words))
     beside = stored(asked, quick=quick) if part is asked else None
+    table = text(run, beside)
     try:
-        if json is not None and json != STDOUT:
-            save_results(run, json)
-    finally:  # a full disk does not cost the table
-        put_json(run, STDOUT if json == STDOUT else None, text(run, beside))
+        put_json(run, json, table)
+    except DataError:  # a full disk does not cost the table
+        print(table)
+        raise
 
 
 def _tested(methods: tuple[str, ...], commands: tuple[str, ...], cpu: bool) -> list[Method]:
