@@ -47,11 +47,11 @@ class Experiment:
     """Of the table. Rows may have more keys, which are in the JSON alone; intervals [low, high] are under
     `<key>_interval`."""
     run: Callable[..., Iterable[Row]]
-    """From keyword options to rows of plain values; those of a generator are printed as they come. The options of the verb are its parameters: their types
-    (int, float, bool, str, Literal, a tuple of str, int or float, each perhaps None), their defaults and
-    their words under `Args` in its docstring. An int whose default is 0 may be 0, any other is at least 1. A
-    parameter `layout` is given by position. Times depend on the machine; all other values on the options
-    alone."""
+    """From keyword options to rows of plain values; those of a generator are printed as they come. The
+    options of the verb are its parameters: their types (int, float, bool, str, Literal, a tuple of str, int
+    or float, each perhaps None), their defaults and their words under `Args` in its docstring. An int whose
+    default is 0 may be 0, any other is at least 1. A parameter `layout` is given by position. Times depend on
+    the machine; all other values on the options alone."""
     note: str = ""
     """How the columns are to be read, in Markdown."""
     quick: Mapping[str, Any] = field(default_factory=dict)

@@ -4,9 +4,9 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.layout import Layout
-from finlab.vehicle.fin_motion import FinMotion
 from finlab.sim.fin_force import FinForce, FlexibleForce
 from finlab.sim.plants import make_plant
+from finlab.vehicle.fin_motion import FinMotion
 
 SETTLE_S, MEAN_S = 2.0, 10.0
 """Time after which, and over which, forces are averaged that swing within the beat."""
