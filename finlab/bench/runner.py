@@ -20,7 +20,7 @@ LIMIT_S = 1.0
 """Longest time for one target [s]; a later answer is a failure."""
 PATIENCE = 4.0
 """How many times the limit is waited for an answer before the process is ended."""
-FIRST_S = 60.0
+START_S, FIRST_S = 60.0, 60.0
 """Longest time for a process to start, and for the first answer about a robot [s]."""
 GIVE_UP = 3
 """Processes that end or hang one after the other before no further question is asked."""
@@ -155,7 +155,7 @@ class Asker:
         self.child.start()
         if not self.method.greets:
             return
-        hello = self.child.ask("", FIRST_S)
+        hello = self.child.ask("", START_S)
         said = parse_answer(hello.line or b"", GREETING)
         if isinstance(said, Failure) and self.number == 0:
             words = said.words if hello.line else self.child.last_words()
