@@ -128,13 +128,13 @@ def test_water_and_buoyancy_change_at_once(swimming: Swimming) -> None:
     swimming.step()
     until(lambda: swimming.time > 0.0)
     swim = swimming.swimmers[0].swim
-    damping = swim.vehicle._linear
+    damping = swim.vehicle.dynamics.linear
     settings = settings.with_value("current_cm_s", 12.0).with_value("buoyancy_percent", 2.0)
     swimming.meet(settings.water, settings.truth["buoyancy"])
     until(lambda: isinstance(swim.water, Changing))
     assert swim.water == Changing(Still(), SteadyCurrent((0.12, 0.0, 0.0)), 0.1)
     assert swim.vehicle.lift == pytest.approx(1.02 * swim.vehicle.weight)
-    assert swim.vehicle._linear == damping, "what else is true of the body stays"
+    assert swim.vehicle.dynamics.linear == damping, "what else is true of the body stays"
     swimmer = swimming.swimmers[0]
     while swim.time < 3.0:
         swimmer.step()
