@@ -1,4 +1,4 @@
-"""`finlab fit fin|plan|robot`: from measurements to a fin that layouts can name, from a swim to a robot."""
+"""`finlab fit fin|robot`: from measurements to a fin that layouts can name, from a swim to a robot."""
 
 import sys
 from collections.abc import Callable, Iterator
@@ -71,47 +71,6 @@ def fin(
     print(f"{output}: name it in a layout, model: {{type: table, path: {output.name}}}")
     if page:
         print(output.with_suffix(".html"))
-
-
-@verbs.command
-def plan(
-    output: Annotated[Path, arg(metavar="PLAN.csv", aliases=["-o"])],
-    layout: str | None = None,
-    fin: str | None = None,
-    samples: int = 300,
-    fixed: bool = False,
-    seed: int = 0,
-) -> None:
-    """Write a plan of measurements for a rig: commands in an efficient order, some of them twice.
-
-    Args:
-        output: the plan; with its forces filled in, `finlab fit fin` reads it.
-        layout: whose limits count; the nominal ones by default.
-        fin: name of the fin of that layout; the first one by default.
-        samples: how many measurements.
-        fixed: the rig cannot turn the fin's zero direction.
-        seed: scrambles the commands.
-    """
-    from finlab.cli.inputs import open_robot
-    from finlab.errors import DataError, FinlabError
-    from finlab.fit.rig_plan import plan_measurements
-    from finlab.layout import Limits
-    from finlab.whole_file import write_whole
-
-    limits = Limits()
-    if layout is not None:
-        fins = {found.name: found for found in open_robot(layout).layout.fins}
-        if fin is not None and fin not in fins:
-            raise FinlabError(f"{layout} has no fin {fin!r:.60}, expected one of {', '.join(fins)}")
-        limits = fins[fin or next(iter(fins))].limits
-    elif fin is not None:
-        raise FinlabError("--fin names a fin of a layout; give --layout, too")
-    plan = plan_measurements(limits, samples, not fixed, seed)
-    write_whole(output, plan.csv(), DataError)
-    minutes = plan.duration / 60.0
-    print(
-        f"{output}: {len(plan.command)} measurements, {plan.repeats} of them repeats, about {minutes:.0f} min"
-    )
 
 
 @verbs.command

@@ -26,7 +26,6 @@ EXAMPLES = {
     "bench": "finlab bench search analytic --quick --json bench.json",
     "fit": "finlab fit fin cell.csv -o fin.csv",
     "fit fin": "finlab fit fin cell.csv -o fin.csv",
-    "fit plan": "finlab fit plan -o plan.csv",
     "fit robot": "finlab fit robot my_robot.yaml swim.npz -o fitted.yaml",
     "simulate": "finlab simulate A --duration 30 -o swim",
     "export": "finlab export A -o my_robot",

@@ -33,8 +33,7 @@ def simulate(
     objective: Literal["power", "effort"] = "power",
     duration: Annotated[float | None, arg(metavar="SECONDS")] = None,
     plant: Annotated[str, arg(metavar="NAME")] = "mean",
-    controller: Literal["tracking", "waypoint"] = "tracking",
-    gains: Annotated[str | None, arg(metavar="NAME|FILE")] = None,
+    controller: Literal["tracking", "waypoint", "waypoint-paper"] = "tracking",
     current: Annotated[tuple[float, float, float], arg(metavar="VX VY VZ")] = (0.0, 0.0, 0.0),
     waves: Annotated[tuple[float, float], arg(metavar="HEIGHT SECONDS")] = (0.0, 3.0),
     noise: bool = True,
@@ -52,7 +51,7 @@ def simulate(
         excite: shake every axis and fin on the spot instead, for at most 300 s, within bounds of depth and
             attitude; `finlab fit robot` learns the robot from the log.
         fail: a fin and when it is lost, such as front_left@30; or what else becomes of it:
-            front_left@30:weak=0.5 (half of its thrust is left), front_left@30:stuck (it no longer turns),
+            front_left@30:torn=0.5 (half of its thrust is left), front_left@30:stuck (it no longer turns),
             front_left@60:whole (it is repaired).
         announced: whether the allocator is told of what happens to fins.
         monitor: let a FaultMonitor watch the robot and tell the allocator what it finds.
@@ -64,9 +63,8 @@ def simulate(
             with soft tips), wake (fins in each other's jets), inflow (thrust falls with speed) or offset
             (centre of gravity and fins not where the layout says).
         controller: tracking (follows velocity and acceleration, learns current and unknown forces; its gains
-            follow from the robot) or waypoint (heads for a point ahead, as in the paper).
-        gains: of the waypoint controller alone: waypoint, waypoint_paper (proportional terms alone), or a
-            YAML file.
+            follow from the robot), waypoint (heads for a point ahead) or waypoint-paper (the same with the
+            paper's proportional terms alone).
         current: velocity of the water in the world [m/s].
         waves: significant height [m] and peak period [s] of waves that run along the world's x.
         noise: whether the sensors are noisy.
@@ -83,7 +81,7 @@ def simulate(
         from finlab.sim import FinFault
 
         robot, water = open_robot(layout), _water(current, waves, seed)
-        faults = [*(FinFault(name, 0.0) for name in robot.failed), *map(_fault, fail)]
+        faults = [*(FinFault(name, 0.0) for name in robot.failed), *map(FinFault.parse, fail)]
         if excite:
             if fail or monitor:
                 raise FinlabError(
@@ -95,7 +93,7 @@ def simulate(
             from finlab.evaluation.method_specs import load_method_spec
             from finlab.sim import NO_NOISE, ClosedLoop, make_trajectory
 
-            pilot = _controller(robot.layout, controller, gains)
+            pilot = _controller(robot.layout, controller)
             loop = ClosedLoop(
                 robot.layout,
                 load_method_spec(method, checkpoint, objective),
@@ -138,18 +136,13 @@ def _excitation(
     return excitation(layout, seconds, plant=plant, sensors=sensors, water=water, seed=seed)
 
 
-def _controller(layout: Layout, name: str, gains: str | None) -> Controller:
+def _controller(layout: Layout, name: str) -> Controller:
     """The controller of a path."""
-    from finlab.control import TrackingController, WaypointController, WaypointGains, load_gains
+    from finlab.control import PAPER_WAYPOINT_GAINS, TrackingController, WaypointController
 
-    if name == "waypoint":
-        return WaypointController(load_gains(WaypointGains, gains or "waypoint"))
-    if gains is not None:
-        raise FinlabError(
-            "--gains: those of the tracking controller follow from the robot; leave it out, or add "
-            "--controller waypoint"
-        )
-    return TrackingController(layout)
+    if name == "tracking":
+        return TrackingController(layout)
+    return WaypointController(PAPER_WAYPOINT_GAINS if name == "waypoint-paper" else None)
 
 
 def _write(log: RunLog, output: Path) -> list[str]:
@@ -200,30 +193,14 @@ def excitation_summary(log: RunLog) -> str:
 
 def monitored(loop: ClosedLoop) -> str:
     """What a monitor takes the fins for, in words."""
-    words = [] if loop.verdict is None else [f"{name} lost" for name in loop.verdict.failed]
-    if loop.verdict is not None and (health := loop.verdict.health) is not None:
-        words += [f"{name} weak" for name, _ in health.thrust]
+    from finlab.layout.damage import Damage
+
+    failed, health = Damage() if loop.verdict is None else loop.verdict.damage
+    words = [f"{name} lost" for name in failed]
+    if health is not None:
+        words += [f"{name} torn" for name, _ in health.thrust]
         words += [f"{name} stuck at {math.degrees(angle):.0f} deg" for name, angle in health.stuck]
     return ", ".join(words) or "all fins whole"
-
-
-def _fault(text: str) -> FinFault:
-    """What `NAME@SECONDS`, `NAME@SECONDS:KIND` or `NAME@SECONDS:weak=SHARE` says."""
-    from finlab.sim import FinFault
-
-    name, at, rest = text.rpartition("@")
-    number, _, what = rest.partition(":")
-    kind, equals, share = what.partition("=")
-    try:
-        fault = FinFault(name, float(number), kind or "lost", float(share) if equals else 0.5).checked()
-    except (ValueError, FinlabError):
-        fault = None
-    if not at or not name or fault is None or (equals and kind != "weak"):
-        raise FinlabError(
-            "--fail: expected NAME@SECONDS such as front_left@30, with :weak=0.5, :stuck or :whole after it "
-            f"for what is no loss, got {text!r:.60}"
-        )
-    return fault
 
 
 def _water(current: tuple[float, float, float], waves: tuple[float, float], seed: int) -> Water:

@@ -8,10 +8,9 @@ from finlab.control.controllers import VelocityController as VelocityController
 from finlab.control.controllers import WaypointController as WaypointController
 from finlab.control.fault_monitor import FaultMonitor as FaultMonitor
 from finlab.control.fault_monitor import Verdict as Verdict
-from finlab.control.gains import WAYPOINT_GAINS as WAYPOINT_GAINS
+from finlab.control.gains import PAPER_WAYPOINT_GAINS as PAPER_WAYPOINT_GAINS
 from finlab.control.gains import VelocityGains as VelocityGains
 from finlab.control.gains import WaypointGains as WaypointGains
-from finlab.control.gains import load_gains as load_gains
 from finlab.control.measurement import Controller as Controller
 from finlab.control.measurement import Foresighted as Foresighted
 from finlab.control.measurement import Measurement as Measurement

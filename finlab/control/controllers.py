@@ -7,7 +7,7 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.control.filters import LowPass, Pid
-from finlab.control.gains import VelocityGains, WaypointGains, load_gains
+from finlab.control.gains import VelocityGains, WaypointGains
 from finlab.control.measurement import NO_WRENCH, Measurement, Setpoint
 from finlab.layout.angles import wrapped
 from finlab.vehicle.attitude import in_world
@@ -23,8 +23,8 @@ class VelocityController:
     lead_s = 0.0
 
     def __init__(self, gains: VelocityGains | None = None) -> None:
-        """Takes gains; the shipped file `velocity` by default."""
-        self.gains = load_gains(VelocityGains, "velocity") if gains is None else gains
+        """Takes gains; those for U-CAT by default."""
+        self.gains = VelocityGains() if gains is None else gains
         self.period_s = self.gains.period_s
         self.reset()
 
@@ -48,7 +48,7 @@ class WaypointController:
     """Heads for a waypoint: Fx = k d max(0, cos e), Fz = k dz, Tz = k e, with e the wrapped yaw error.
 
     To the paper's law we add damping of the climb and of the yaw rate; both gains are zero in
-    `waypoint_paper`. Pose and climb come from `Odometry`.
+    `PAPER_WAYPOINT_GAINS`. Pose and climb come from `Odometry`.
     """
 
     name = "waypoint"
@@ -57,8 +57,8 @@ class WaypointController:
     needs_given = False
 
     def __init__(self, gains: WaypointGains | None = None) -> None:
-        """Takes gains; the shipped file `waypoint` by default."""
-        self.gains = load_gains(WaypointGains, "waypoint") if gains is None else gains
+        """Takes gains; those for U-CAT by default."""
+        self.gains = WaypointGains() if gains is None else gains
         self.lead_s = self.gains.lead_s
         self.period_s = self.gains.period_s
         self.reset()

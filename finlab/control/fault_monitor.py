@@ -1,4 +1,4 @@
-"""Notices fins that are weak, lost or stuck, from how the robot moves, and takes repaired ones back."""
+"""Notices fins that are torn, lost or stuck, from how the robot moves, and takes repaired ones back."""
 
 import math
 from typing import NamedTuple
@@ -14,12 +14,12 @@ from finlab.control.probe import Probe
 from finlab.control.servo_reports import report_evidence
 from finlab.layout import Body, Layout
 from finlab.layout.angles import TURN
-from finlab.layout.damage import Health
+from finlab.layout.damage import Damage, Health
 
 LOST_BELOW = 0.2
 """A strength below which a fin is given up as lost."""
 WHOLE_ABOVE = 0.9
-"""A strength from which a fin that was weak is whole again."""
+"""A strength from which a fin that was torn is whole again."""
 HOLD_S = 0.2
 """A belief is acted on once it has been certain for so long [s]: a single odd sample decides nothing."""
 COARSE = 0.05
@@ -29,10 +29,8 @@ COARSE = 0.05
 class Verdict(NamedTuple):
     """What a monitor believes of n fins."""
 
-    failed: tuple[str, ...]
-    """Names of the fins that are lost: `failed=` of an allocator."""
-    health: Health | None
-    """What is known of weak and stuck ones: `health=` of an allocator; None where there are none."""
+    damage: Damage
+    """The fins that are lost, torn or stuck, as an allocator is told: `allocate(..., **damage._asdict())`."""
     probability: Array
     """Of each fin not being whole (n,), 0 to 1."""
     strength: Array
@@ -47,7 +45,7 @@ class FaultMonitor:
         monitor = FaultMonitor(layout)
         while swimming:
             verdict = monitor.step(measurement, command)  # the command that was in force until now
-            answer = allocator.allocate(layout, wrench, failed=verdict.failed, health=verdict.health)
+            answer = allocator.allocate(layout, wrench, **verdict.damage._asdict())
             command = monitor.probed(answer.command)
 
     A fin that rests cannot be told from one that is lost: its probability stays where it was.
@@ -75,7 +73,7 @@ class FaultMonitor:
         self._beliefs = Hypotheses(layout.n_fins, self._model.inertia, self.settings)
         self._probe = Probe(layout, self.settings, period_s)
         n = layout.n_fins
-        self._weak = np.zeros(n, dtype=bool)
+        self._torn = np.zeros(n, dtype=bool)
         self._lost = np.zeros(n, dtype=bool)
         self._told = np.zeros(n, dtype=bool)
         self._silent = True
@@ -87,8 +85,8 @@ class FaultMonitor:
 
     @property
     def broken(self) -> tuple[str, ...]:
-        """Names of the fins that are taken for lost, weak or stuck."""
-        marked = self._lost | self._weak | ~np.isnan(self._held)
+        """Names of the fins that are taken for lost, torn or stuck."""
+        marked = self._lost | self._torn | ~np.isnan(self._held)
         return tuple(self.layout.names[k] for k in np.flatnonzero(marked))
 
     def step(self, measurement: Measurement, command: Array | None, reported: Array | None = None) -> Verdict:
@@ -149,7 +147,7 @@ class FaultMonitor:
         stuck = ~np.isnan(self._held)
         failed: tuple[str, ...] = ()
         health = None
-        broken = self._lost | self._weak | stuck
+        broken = self._lost | self._torn | stuck
         if True in broken.tolist():
             names = self.layout.names
             # The last but one belief is a whole fin, the last one of a stuck fin that it turns again.
@@ -157,19 +155,19 @@ class FaultMonitor:
             probability = np.where(broken, 1.0 - whole, probability)
             failed = tuple(names[k] for k in np.flatnonzero(self._lost))
             health = self._health(strength, stuck & ~self._lost)
-        return Verdict(failed, health, probability, strength, beliefs.strength_std)
+        return Verdict(Damage(failed, health), probability, strength, beliefs.strength_std)
 
     def _health(self, strength: Array, stuck: Array) -> Health | None:
         """What an allocator should know of fins that still push; a table's thrust cannot be scaled."""
         fins = self.layout.fins
-        weak = [k for k in np.flatnonzero(self._weak) if fins[k].model.type != "table"]
-        if not weak and not stuck.any():
+        torn = [k for k in np.flatnonzero(self._torn) if fins[k].model.type != "table"]
+        if not torn and not stuck.any():
             return None
         far = np.abs(strength - self._coarse) > 0.75 * COARSE
         steps = np.clip(np.round(strength / COARSE), 1, round(1 / COARSE)) * COARSE
         self._coarse = np.where(far, steps, self._coarse)
         return Health(
-            thrust=tuple((fins[k].name, float(self._coarse[k])) for k in weak),
+            thrust=tuple((fins[k].name, float(self._coarse[k])) for k in torn),
             stuck=tuple((fins[k].name, float(self._held[k])) for k in np.flatnonzero(stuck)),
         )
 
@@ -189,15 +187,15 @@ class FaultMonitor:
     def _judge(self, other: Array) -> None:
         """Acts on what has become all but certain."""
         beliefs = self._beliefs
-        if True in self._weak.tolist():
+        if True in self._torn.tolist():
             strength = beliefs.strength
-            gone = self._weak & (strength < LOST_BELOW)
+            gone = self._torn & (strength < LOST_BELOW)
             if gone.any() and (self._lost | gone).sum() < self.layout.n_fins:
                 self._lost |= gone
-                self._weak &= ~gone
+                self._torn &= ~gone
                 for index in np.flatnonzero(gone):
                     beliefs.believe(int(index), 0.0)
-            self._weak &= strength < WHOLE_ABOVE
+            self._torn &= strength < WHOLE_ABOVE
         if beliefs.doubt < self.settings.threshold or not beliefs.settled:
             self._sure = 0
             return
@@ -230,5 +228,5 @@ class FaultMonitor:
 
     def _mark(self, fin: int, strength: float, stuck: float) -> None:
         self._lost[fin] = strength < LOST_BELOW
-        self._weak[fin] = LOST_BELOW <= strength < WHOLE_ABOVE
+        self._torn[fin] = LOST_BELOW <= strength < WHOLE_ABOVE
         self._held[fin] = stuck if strength >= LOST_BELOW else math.nan

@@ -30,7 +30,7 @@ class MonitorSettings:
     strength: float = 0.05
     """Of the strength of a whole or a lost fin, and the most that is ever unknown of one that rests."""
     new_strength: float = 0.25
-    """The same of a fin that has just become weak."""
+    """The same of a fin that has just been torn."""
     strength_drift: float = 0.005
     """Of its change, per root of a second."""
     failures: float = 1e-5

@@ -23,10 +23,10 @@ from finlab.control import (
 )
 from finlab.control.measurement import NO_WRENCH
 from finlab.layout import Layout
-from finlab.layout.damage import Health
+from finlab.layout.damage import Damage, Kind
 from finlab.physics import plant_of
 from finlab.physics.blade import COPPER_LOSS
-from finlab.sim.fin_fault import FinFault, names_of
+from finlab.sim.fin_fault import FinFault, damage_of
 from finlab.sim.hanging_fin import HangingFins
 from finlab.sim.log import RunLog, Tick, log_of_ticks
 from finlab.sim.perturbed import checked_truth
@@ -179,7 +179,7 @@ class ClosedLoop:
     @property
     def lost(self) -> tuple[str, ...]:
         """Names of the fins that are lost now, whoever knows of it."""
-        return names_of(self.broken, "lost")
+        return tuple(name for name, fault in self.broken.items() if fault.kind == "lost")
 
     @property
     def told(self) -> tuple[str, ...]:
@@ -187,29 +187,22 @@ class ClosedLoop:
         return tuple(self._told)
 
     @property
-    def failed(self) -> tuple[str, ...]:
-        """Names of the fins that the allocator takes for lost."""
-        return names_of(self._told, "lost") if self.verdict is None else self.verdict.failed
-
-    @property
-    def health(self) -> Health | None:
-        """What the allocator takes for damaged."""
+    def damage(self) -> Damage:
+        """What the allocator is told of the fins: what somebody said, or what the monitor believes."""
         if self.verdict is not None:
-            return self.verdict.health
-        weak = {name: self._told[name].share for name in names_of(self._told, "weak")}
-        stuck = {name: float(self._held[self.layout.index(name)]) for name in names_of(self._told, "stuck")}
-        return Health.of(thrust=weak, stuck=stuck) if weak or stuck else None
+            return self.verdict.damage
+        return damage_of(self._told, dict(zip(self.layout.names, self._held.tolist(), strict=True)))
 
     def fail(
-        self, name: str, kind: str = "lost", share: float = 0.5, *, announced: bool | None = None
+        self, name: str, kind: Kind = "lost", share: float = 0.5, *, announced: bool | None = None
     ) -> None:
         """Something becomes of a fin, now.
 
         Args:
             name: of the fin.
-            kind: lost (hangs still and drags), weak (gives a share of its thrust), stuck (beats but no longer
+            kind: lost (hangs still and drags), torn (gives a share of its thrust), stuck (beats but no longer
                 turns) or whole.
-            share: of the thrust that a weak fin gives.
+            share: of the thrust that a torn fin gives.
             announced: whether the allocator knows at once; by default as the swim was made.
 
         Raises:
@@ -228,7 +221,7 @@ class ClosedLoop:
             if kind != "whole":
                 known[name] = fault
         if self._tells(announced) and self.monitor is not None:
-            strength = {"lost": 0.0, "weak": share}.get(kind, 1.0)
+            strength = {"lost": 0.0, "torn": share}.get(kind, 1.0)
             self.verdict = self.monitor.tell(name, strength, self._held[index])
 
     def mend(self, name: str, *, announced: bool | None = None) -> None:
@@ -255,11 +248,10 @@ class ClosedLoop:
         answer = self.allocator.allocate(
             self.layout.moving((*now.velocity, *now.rates)),  # what speed takes from fins, where known
             asked,
-            failed=self.failed,
+            **self.damage._asdict(),
             previous=self._answered,
             reference=self._reference(time, whole),
             policy=self.policy,
-            health=self.health,
             seed=self.seed,
         )
         self._answered = command = answer.command
@@ -300,7 +292,7 @@ class ClosedLoop:
 
     def _complete(self) -> Completion:
         """What completes the controller's wrench for the fins that work now."""
-        failed = self.failed
+        failed = self.damage.failed
         if failed not in self._completion:
             controller = self.controller
             self._completion[failed] = Completion(self.layout, failed, controller.axes, controller.free)
@@ -330,9 +322,9 @@ class ClosedLoop:
         hangs = np.isnan(moved[:, 0])
         some_hang = bool(hangs.any())
         share = np.ones((self.layout.n_fins, 1))
-        weak = names_of(self.broken, "weak")
-        for name in weak:
-            share[self.layout.index(name)] *= self.broken[name].share
+        torn = [fault for fault in self.broken.values() if fault.kind == "torn"]
+        for fault in torn:
+            share[self.layout.index(fault.fin)] = fault.share
         mean = np.zeros((self.layout.n_fins, 6))
         turning = np.empty((n_steps, 2, self.layout.n_fins))
         for k in range(n_steps):
@@ -342,7 +334,7 @@ class ClosedLoop:
             )
             water = self.vehicle.velocity_in_water(self.state)
             force = self._fin_force.step(self.fins, dt, water)
-            if weak:
+            if torn:
                 force = force * share
             if some_hang:
                 force[hangs] = self._hanging.force(self.fins.direction, water)[hangs]

@@ -7,7 +7,6 @@ fades until it is back.
 """
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -23,8 +22,9 @@ from finlab.layout.arrays import layout_effectiveness
 from finlab.physics import plant_of
 from finlab.sim.closed_loop import ClosedLoop
 from finlab.sim.sensors import SensorSettings
+from finlab.sim.task import station
 from finlab.sim.water import Water
-from finlab.vehicle.body import complete_body
+from finlab.vehicle.body import complete_body, dynamics_of
 
 LONGEST_S = 300.0
 """Longest swim [s]."""
@@ -49,31 +49,10 @@ TURN_RAD_S = 0.8
 """Fastest that a fin is turned [rad/s]: one that turns fast paddles, which hides what its beat gives."""
 BOUNDS = (1.5, 0.5, 0.35)
 """Horizontal distance [m], change of depth [m] and roll or pitch [rad] at which the excitation has faded."""
+DEPTH_M = 1.5
+"""Where the robot is held [m]."""
 PERIOD_S = 0.1
 """Of the controller [s]."""
-
-
-@dataclass(frozen=True)
-class Stay:
-    """Stay where the swim began, at depth."""
-
-    duration_s: float = LONGEST_S
-    """How long [s]."""
-    depth: float = 1.5
-    """Below the world's origin [m]."""
-
-    @property
-    def name(self) -> str:
-        """What it is called."""
-        return "excitation"
-
-    def setpoint(self, time: float) -> Setpoint:
-        """The same at all times."""
-        return Setpoint(np.array([0.0, 0.0, -self.depth]), 0.0)
-
-    def start(self) -> tuple[Array, float]:
-        """There, heading along x."""
-        return np.array([0.0, 0.0, -self.depth]), 0.0
 
 
 class ExcitingController:
@@ -87,15 +66,14 @@ class ExcitingController:
     period_s = PERIOD_S
 
     def __init__(self, layout: Layout, seed: int = 0) -> None:
-        plant, body = plant_of(layout), complete_body(layout)
+        plant = plant_of(layout)
         largest = np.linalg.norm(plant.forces(plant.upper), axis=-1)
         # Each axis as far as all fins could push it, were they all aimed at it.
         reach = np.linalg.norm(plant.columns[:, 1:], axis=1)
         self._size = np.array(SHARE) * (reach * largest[:, None]).sum(axis=0)
         rng = np.random.default_rng(seed)
         self._phase = rng.uniform(0.0, 2 * math.pi, (6, len(PERIODS_S[0])))
-        own = np.array([body.mass_kg or 1.0] * 3 + list(body.inertia_kgm2 or (1.0,) * 3))
-        inertia = own + np.array(body.added_mass or (0.0,) * 6)
+        inertia = np.array(dynamics_of(complete_body(layout)).inertia)
         # A position loop of 0.25 rad/s, one of 0.4 rad/s for depth and heading; damping of about 0.8.
         pace = np.array([0.25, 0.25, 0.4, 0.0, 0.0, 0.4])
         self._stiff, self._damp = inertia * pace**2, inertia * np.array([0.2, 0.2, 0.6, 0.5, 0.5, 0.6])
@@ -211,7 +189,7 @@ def excitation(
     return ClosedLoop(
         layout,
         ExcitingAllocator(layout, seed),
-        Stay(duration_s),
+        station(duration_s, DEPTH_M, "excitation"),
         ExcitingController(layout, seed),
         plant=plant,
         sensors=sensors,

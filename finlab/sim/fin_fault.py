@@ -1,14 +1,15 @@
-"""What breaks on the way: a fin that is lost, weak or stuck, or whole again, and when."""
+"""What breaks on the way: which fin, when, and what becomes of it, in the words of `finlab.layout.damage`."""
 
 import math
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 from finlab.errors import FinlabError
+from finlab.layout.damage import Damage, Health, Kind
 
-KINDS = ("lost", "weak", "stuck", "whole")
-"""What can become of a fin: it hangs still and drags; it gives a share of its thrust; it beats but no longer
-turns; it works again as it should."""
+KINDS: tuple[Kind, ...] = ("lost", "torn", "stuck", "whole")
+"""What can become of a fin in a swim: it hangs still and drags; it gives a share of its thrust; it beats but
+no longer turns; it works again as it should."""
 
 
 class FinFault(NamedTuple):
@@ -18,10 +19,29 @@ class FinFault(NamedTuple):
     """Its name."""
     time_s: float
     """When [s]."""
-    kind: str = "lost"
+    kind: Kind = "lost"
     """One of `KINDS`."""
     share: float = 0.5
-    """Share of the thrust that is left of a weak fin, above 0 and below 1; of no meaning for the others."""
+    """Share of the thrust that is left of a torn fin, above 0 and below 1; of no meaning for the others."""
+
+    @classmethod
+    def parse(cls, text: str) -> "FinFault":
+        """What `NAME@SECONDS`, `NAME@SECONDS:KIND` or `NAME@SECONDS:torn=SHARE` says; else
+        a `FinlabError`."""
+        name, at, rest = text.rpartition("@")
+        number, _, what = rest.partition(":")
+        kind, equals, share = what.partition("=")
+        try:
+            known = cast(Kind, kind or "lost")
+            fault = cls(name, float(number), known, float(share) if equals else 0.5).checked()
+        except (ValueError, FinlabError):
+            fault = None
+        if not at or not name or fault is None or (equals and kind != "torn"):
+            raise FinlabError(
+                "--fail: expected NAME@SECONDS such as front_left@30, with :torn=0.5, :stuck or :whole after "
+                f"it for what is no loss, got {text!r:.60}"
+            )
+        return fault
 
     def checked(self) -> "FinFault":
         """Itself; a `FinlabError` where a time, a kind or a share is none."""
@@ -36,6 +56,9 @@ class FinFault(NamedTuple):
         return self
 
 
-def names_of(faults: Mapping[str, FinFault], kind: str) -> tuple[str, ...]:
-    """Fins to which that has happened, in order."""
-    return tuple(name for name, fault in faults.items() if fault.kind == kind)
+def damage_of(faults: Mapping[str, FinFault], held: Mapping[str, float]) -> Damage:
+    """What faults, by fin, leave of a robot; `held` are the zero directions [rad] of fins that are stuck."""
+    torn = {name: fault.share for name, fault in faults.items() if fault.kind == "torn"}
+    stuck = {name: held[name] for name, fault in faults.items() if fault.kind == "stuck"}
+    lost = tuple(name for name, fault in faults.items() if fault.kind == "lost")
+    return Damage(lost, Health.of(thrust=torn, stuck=stuck) if torn or stuck else None)

@@ -45,7 +45,7 @@ def perturbed(
         ballasted: whether weights have brought it level again, the centre of buoyancy as far above the true
             centre of gravity as the layout says.
         thrust: share of its law's thrust that each named fin gives; fins that are tables take a
-            `FinFault(name, 0.0, "weak", share)` instead.
+            `FinFault(name, 0.0, "torn", share)` instead.
 
     Raises:
         LayoutError: a factor is not above 0, a fin is unknown, or a fin that is a table is to be scaled.

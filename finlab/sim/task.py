@@ -202,9 +202,9 @@ def dive(duration_s: float = 60.0) -> Trajectory:
     return Trajectory("dive", time, np.stack([6.0 * share, np.zeros_like(share), -depth], axis=-1))
 
 
-def station(duration_s: float = 60.0) -> Trajectory:
-    """Stay where it began, at 1 m depth."""
-    return Trajectory("station", np.array([0.0, duration_s]), np.tile([0.0, 0.0, -1.0], (2, 1)))
+def station(duration_s: float = 60.0, depth_m: float = 1.0, name: str = "station") -> Trajectory:
+    """Stay where it began, at that depth."""
+    return Trajectory(name, np.array([0.0, duration_s]), np.tile([0.0, 0.0, -depth_m], (2, 1)))
 
 
 SHIPPED: dict[str, Callable[..., Trajectory]] = {

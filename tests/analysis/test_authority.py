@@ -33,12 +33,6 @@ def test_no_yaw_has_no_yaw(shipped: Layouts) -> None:
     assert held.reachable == ("surge", "sway", "heave", "roll", "pitch")
 
 
-def test_layout_d_has_no_sway(shipped: Layouts) -> None:
-    held = authority(shipped("D"))
-    assert held.without_authority == ("sway",)
-    assert held.largest[1] == held.beside_others[1] == 0.0
-
-
 @pytest.mark.parametrize("name", ["A", "B", "mixed", "restricted", "hexa"])
 def test_extremes_are_those_of_all_directions(shipped: Layouts, name: str) -> None:
     sets = fin_sets(shipped(name))
@@ -67,12 +61,6 @@ def test_failures_never_help(shipped: Layouts, name: str) -> None:
         assert np.all(np.array(after.largest) <= np.array(before.largest) + 1e-4)
         assert np.all(np.array(after.beside_others) <= np.array(before.beside_others) + 1e-9)
         assert all(share is None or 0.0 <= share <= 1.0 for share in loss.share_left)
-
-
-def test_layout_a_keeps_half_after_any_failure(shipped: Layouts) -> None:
-    for loss in losses(shipped("A")):
-        assert loss.lost == ()
-        assert loss.share_left == pytest.approx([0.5] * 6, abs=1e-4)
 
 
 def test_a_last_fin_has_no_loss_to_tell(shipped: Layouts) -> None:

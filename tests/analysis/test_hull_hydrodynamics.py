@@ -84,13 +84,6 @@ def test_a_flat_disc_carries_the_mass_of_lambs_disc() -> None:
     assert mass[3] == 0.0
 
 
-def test_axes_may_be_in_any_order() -> None:
-    a, b, c = 0.3, 0.2, 0.1
-    one, two = ellipsoid_added_mass((a, b, c)), ellipsoid_added_mass((c, a, b))
-    assert (one[0], one[1], one[2]) == pytest.approx((two[1], two[2], two[0]))
-    assert (one[3], one[4], one[5]) == pytest.approx((two[4], two[5], two[3]))
-
-
 def test_a_spheres_drag_is_the_measured_one_and_none_around() -> None:
     radius, speed = 0.25, 0.2  # Re = 1e5, where a smooth sphere is measured to have C = 0.47
     quadratic = pressure_damping((radius,) * 3)
@@ -99,14 +92,3 @@ def test_a_spheres_drag_is_the_measured_one_and_none_around() -> None:
     assert drag / (0.5 * 1000.0 * math.pi * radius**2 * speed**2) == pytest.approx(0.47, abs=0.02)
     assert quadratic[3:] == (0.0, 0.0, 0.0) and min(linear[3:]) > 0.0
     assert linear[3] == pytest.approx(linear[0] * 2 / 3 * radius**2, rel=1e-2)
-
-
-def test_a_plate_across_the_flow_is_a_disc_and_a_torpedo_is_slender() -> None:
-    plate = pressure_damping((0.01, 0.3, 0.3))
-    assert plate[0] == pytest.approx(0.5 * 1000.0 * 1.17 * math.pi * 0.3**2)
-    torpedo = pressure_damping((0.5, 0.08, 0.08))
-    assert torpedo[0] < 0.05 * torpedo[1] and torpedo[3] == 0.0
-    assert torpedo[4] == pytest.approx(torpedo[5]) and torpedo[5] > 0.0
-    # A long thin hull that turns: nearly all of 1/2 rho C 8/15 h a^4.
-    strips = 0.5 * 1000.0 * min(1.17, 0.44 * math.sqrt(0.5 / 0.08)) * 8 / 15 * 0.08 * 0.5**4
-    assert torpedo[5] == pytest.approx(strips, rel=1e-3)

@@ -50,13 +50,6 @@ def test_sets_are_those_of_the_moved_layout(shipped: Layouts) -> None:
     assert still.columns == pytest.approx(fin_sets(layout).columns)
 
 
-def test_angles_come_back_within_half_a_turn(shipped: Layouts) -> None:
-    layout = shipped("A")
-    bounds = {"back_left": Bounds((-0.3, -0.2), (0.1, 0.2), (0.0, 0.0), (2.0, 4.0))}
-    moved = Moves(layout, ["back_left"], bounds).moved(np.array([-0.25, 0.15, 3.5]))
-    assert moved.fins[2].mounting_angle == pytest.approx(3.5 - 2 * math.pi)
-
-
 @pytest.mark.parametrize(
     ("fins", "pairs", "message"),
     [
@@ -75,12 +68,6 @@ def test_wrong_questions(
     bounds = {"front_left": Bounds.around(layout.fins[1])}
     with pytest.raises(LayoutError, match=message):
         Moves(layout, fins, bounds, pairs)
-
-
-def test_bounds_that_leave_nothing_free(shipped: Layouts) -> None:
-    layout = shipped("A")
-    with pytest.raises(LayoutError, match="nothing free to move"):
-        Moves(layout, ["front_left"], {"front_left": Bounds.around(layout.fins[1], 0.0, 0.0)})
 
 
 @pytest.mark.parametrize("wrong", [(1.0, 0.0), (0.0, math.inf), (math.nan, 1.0)])

@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 
 from finlab.analysis import GOALS, Bounds, Progress, authority, mirror_pairs, optimize_layout
-from finlab.analysis.goals import UNREACHED, make_goal
 from finlab.errors import LayoutError
-from finlab.forces.fin_sets import fin_sets
 from finlab.layout import Layout
 
 Layouts = Callable[[str], Layout]
@@ -38,17 +36,6 @@ def test_no_yaw_learns_to_yaw(shipped: Layouts) -> None:
     found = optimize_layout(layout, ["front"], rounds=2)
     assert found.value_before == 0.0
     assert authority(found.layout).rank == 6
-
-
-def test_same_seed_same_layout(shipped: Layouts) -> None:
-    layout = shipped("A")
-    seen: list[Progress] = []
-    runs = [
-        optimize_layout(layout, ["front_right"], rounds=1, seed=3, progress=seen.append) for _ in range(2)
-    ]
-    assert runs[0].layout == runs[1].layout
-    assert [step.round for step in seen] == [1, 1]
-    assert seen[0].before <= seen[0].best == seen[1].best
 
 
 def test_it_stops_when_told(shipped: Layouts) -> None:
@@ -81,14 +68,6 @@ def test_fins_keep_their_distance(shipped: Layouts) -> None:
     )
     places = found.layout.position
     assert np.linalg.norm(places[1] - np.delete(places, 1, axis=0), axis=1).min() >= 0.2 - 1e-9
-
-
-def test_an_unreachable_mission_costs_by_what_is_missing(shipped: Layouts) -> None:
-    layout = shipped("no_yaw")
-    goal = make_goal("mission_power", layout, [[0, 0, 0, 0, 0, 1.0]])
-    assert goal(fin_sets(layout))[0] == pytest.approx(-2 * UNREACHED)
-    half = make_goal("mission_power", layout, [[26.6432, 0, 0, 0, 0, 0]])
-    assert half(fin_sets(layout))[0] == pytest.approx(-1.5 * UNREACHED, rel=1e-3)
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,5 @@
 """Open axes are filled with what the fins give along with the wanted ones."""
 
-from itertools import combinations
-
 import numpy as np
 import pytest
 
@@ -40,13 +38,6 @@ def test_any_one_fin_lost_leaves_them_controllable_and_the_target_reachable(name
         np.testing.assert_allclose(rest, 0.0, atol=1e-8)
 
 
-def test_pairs_of_layout_a() -> None:
-    """Two fins on one side give surge and yaw in a fixed ratio; all other pairs are free."""
-    robot = layout("A")
-    tied = {pair for pair in combinations(robot.names, 2) if not Completion(robot, pair, AXES).controllable}
-    assert tied == {("front_right", "back_right"), ("front_left", "back_left")}
-
-
 def test_open_axes_are_as_small_as_they_can_be() -> None:
     """Against a search over all forces that give the wanted axes exactly."""
     robot, lost = layout("A"), ("front_left", "front_right")
@@ -63,19 +54,3 @@ def test_open_axes_are_as_small_as_they_can_be() -> None:
     rng = np.random.default_rng(0)
     others = [size(planar @ (particular + null @ (5 * rng.standard_normal(1)))) for _ in range(500)]
     assert size(full) <= min(others) + 1e-9
-
-
-def test_a_free_axis_is_what_the_least_force_gives() -> None:
-    """C pushes sideways whenever it pushes ahead; A does not."""
-    wrench = np.array([4.0, 0, 1.0, 0, 0, 0.3])
-    for name in ("A", "C"):
-        planar = layout_effectiveness(layout(name))
-        held, free = (
-            Completion(layout(name), (), AXES)(wrench),
-            Completion(layout(name), (), AXES, ("Fy",))(wrench),
-        )
-        np.testing.assert_allclose(free[[0, 2, 3, 4, 5]], held[[0, 2, 3, 4, 5]], atol=1e-9)
-        least, pressed = (np.linalg.norm(np.linalg.pinv(planar) @ each) for each in (free, held))
-        assert (abs(free[1]) > 0.5 and least < 0.9 * pressed) if name == "C" else abs(free[1]) < 1e-9
-        for sway in np.linspace(-1.0, 1.0, 21):
-            assert np.linalg.norm(np.linalg.pinv(planar) @ (free + [0, sway, 0, 0, 0, 0])) >= least - 1e-9

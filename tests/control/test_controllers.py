@@ -1,64 +1,41 @@
 """Controllers one law at a time, by hand."""
 
 import math
-from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from finlab.control import (
-    WAYPOINT_GAINS,
+    PAPER_WAYPOINT_GAINS,
     Measurement,
     Setpoint,
     VelocityController,
-    VelocityGains,
     WaypointController,
-    WaypointGains,
-    load_gains,
 )
 from finlab.control.controllers import Odometry
 from finlab.control.filters import Pid
 from finlab.control.gains import PidGains
-from finlab.errors import DataError
 from finlab.layout.angles import wrapped
 
 STILL = Measurement(0.0, np.array([0.0, 0.0, -1.0]), 0.0, np.zeros(3), 1.0, np.zeros(3), 0.0, 0.0)
 
 
 def towards(x: float, y: float, z: float, measurement: Measurement = STILL) -> np.ndarray:
-    controller = WaypointController(load_gains(WaypointGains, "waypoint_paper"))
+    controller = WaypointController(PAPER_WAYPOINT_GAINS)
     return controller.wrench(measurement, Setpoint(np.array([x, y, z]), 0.0))
 
 
-def test_straight_ahead_is_pure_surge() -> None:
-    gains = load_gains(WaypointGains, "waypoint_paper")
-    np.testing.assert_allclose(towards(0.4, 0.0, -1.0), [gains.surge * 0.4, 0, 0, 0, 0, 0], atol=1e-12)
-
-
 def test_surge_is_scaled_by_the_cosine_of_the_yaw_error() -> None:
-    gains = load_gains(WaypointGains, "waypoint_paper")
+    gains = PAPER_WAYPOINT_GAINS
     angle, distance = 0.6, 0.3
     wrench = towards(distance * math.cos(angle), distance * math.sin(angle), -1.0)
     assert wrench[0] == pytest.approx(gains.surge * distance * math.cos(angle))
     assert wrench[5] == pytest.approx(min(gains.yaw * angle, gains.max_yaw))
 
 
-def test_behind_means_turn_and_do_not_push() -> None:
-    wrench = towards(-0.4, 0.1, -1.0)
-    assert wrench[0] == 0.0 and wrench[5] > 0.0
-
-
 def test_the_yaw_error_is_wrapped() -> None:
     wrench = towards(-1.0, 0.1, -1.0, STILL._replace(yaw=-3.0))
     assert -0.5 < wrapped(math.atan2(0.1, -1.0) + 3.0) < 0.0 and wrench[5] < 0.0
-
-
-def test_too_deep_means_up() -> None:
-    gains = load_gains(WaypointGains, "waypoint_paper")
-    assert towards(0.4, 0.0, -0.9)[2] == pytest.approx(0.1 * gains.heave)
-    assert towards(0.4, 0.0, 50.0)[2] == gains.max_heave
-    assert towards(90.0, 0.0, -1.0)[0] == gains.max_surge
 
 
 def test_damping_acts_against_the_motion() -> None:
@@ -97,12 +74,6 @@ def test_odometry_follows_steady_motion_without_lag_and_averages_noise() -> None
     assert pose.climb == pytest.approx(0.01, abs=1e-6)
 
 
-def test_odometry_turns_velocities_as_the_body_is_turned() -> None:
-    odometry = Odometry(1.5, 0.0, 0.1)
-    nose_down = STILL._replace(pitch=0.3, velocity=np.array([0.2, 0.0, 0.0]))
-    assert odometry.step(nose_down).climb == pytest.approx(-0.2 * math.sin(0.3))
-
-
 def test_pid_reaches_its_limit_without_winding_up() -> None:
     pid = Pid(PidGains(kp=1.0, ki=1.0, kd=0.0, rate_filter_s=0.0), limit=2.0, period_s=0.1)
     assert [pid.step(10.0) for _ in range(100)][-1] == 2.0
@@ -136,37 +107,3 @@ def test_velocity_controller_pushes_dives_and_damps() -> None:
     for _ in range(1000):
         wrench = controller.wrench(moving, Setpoint(np.array([np.nan, np.nan, -9.0]), 2.0))
     assert wrench[0] == controller.gains.max_surge and wrench[2] == -controller.gains.max_heave
-
-
-def test_shipped_gains_load_and_the_papers_have_no_damping() -> None:
-    ours, paper = (load_gains(WaypointGains, name) for name in WAYPOINT_GAINS)
-    assert paper.heave_damping == paper.yaw_damping == 0.0 < min(ours.heave_damping, ours.yaw_damping)
-    assert replace(ours, surge=1.0) != ours
-    load_gains(VelocityGains, "velocity")
-
-
-@pytest.mark.parametrize(
-    ("content", "message"),
-    [
-        ("period_s: 0.1\n", "expected the keys"),
-        ("- 1\n", "expected the keys"),
-        ("{", "is not valid YAML"),
-    ],
-)
-def test_bad_gains_are_one_sentence(tmp_path: Path, content: str, message: str) -> None:
-    file = tmp_path / "gains.yaml"
-    file.write_text(content)
-    with pytest.raises(DataError, match=message):
-        load_gains(WaypointGains, file)
-    with pytest.raises(DataError, match="no such file"):
-        load_gains(WaypointGains, tmp_path / "missing.yaml")
-
-
-def test_a_gain_that_is_no_number_is_named(tmp_path: Path) -> None:
-    from importlib.resources import files
-
-    good = files("finlab.control").joinpath("gains", "velocity.yaml").read_text("utf-8")
-    file = tmp_path / "gains.yaml"
-    file.write_text(good.replace("ki: 25.0", "ki: much"))
-    with pytest.raises(DataError, match="surge.ki: expected a number from 0, got 'much'"):
-        load_gains(VelocityGains, file)

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from finlab import load_layout
-from finlab.control import Foresighted, Measurement, TrackingController, WaypointController
 from finlab.control.feed_forward import wrenches_along
 from finlab.control.observer import MotionObserver
 from finlab.evaluation.method_specs import load_method_spec
@@ -29,19 +28,6 @@ def test_a_body_that_is_given_it_follows_a_path_of_changing_speed() -> None:
         for _ in range(5):
             state = vehicle.step(state, wrench.tolist(), 0.02)
     assert state[0] == pytest.approx(path.position(12.0)[0], rel=0.03)
-
-
-def test_it_is_told_what_will_be_asked_for() -> None:
-    """Halfway round a circle nothing changes; in the first seconds what is told grows with what is asked."""
-    robot, path = load_layout("A"), make_trajectory("circle")
-    still = Measurement(0.0, path.position(0.0), 0.0, np.zeros(3), 1.0, np.zeros(3), 0.0, 0.0)
-    controller = TrackingController(robot)
-    asked = controller.wrench(still, path.setpoint(0.0), np.zeros(6))
-    told = controller.ahead([path.setpoint(0.1 * k) for k in range(31)])
-    assert told.shape == (30, 6) and (np.diff(told[:15, 0]) > 0.0).all() and told[14, 0] > asked[0] + 0.5
-    steady = controller.ahead([path.setpoint(30.0 + 0.1 * k) for k in range(31)])
-    np.testing.assert_allclose(steady, np.broadcast_to(asked, (30, 6)), atol=0.05)
-    assert isinstance(controller, Foresighted) and not isinstance(WaypointController(), Foresighted)
 
 
 def test_fins_that_turn_before_the_wrench_comes_keep_nearer_to_a_square() -> None:

@@ -1,7 +1,6 @@
 """Where the model expects the robot to go, against the simulated body, and its slopes against differences."""
 
 import numpy as np
-import pytest
 
 from finlab.control.motion_model import FIRST_FIN, MotionModel
 from finlab.layout import Layout
@@ -65,14 +64,3 @@ def test_a_fin_that_is_told_to_turn_about_may_go_either_way(layout_a: Layout) ->
     for _ in range(14):
         step = model.step(z, 0.0, about, None, free, free)
     assert step.noise is None and not model.unsure.any()
-
-
-def test_reported_motion_replaces_what_is_expected(layout_a: Layout) -> None:
-    model, free = MotionModel(layout_a, None, 0.1), np.full(4, np.nan)
-    command = np.tile([0.5, 1.5, 0.0], (4, 1))
-    reported = np.full((4, 3), np.nan)
-    reported[2] = 0.0, 0.0, 0.0
-    for _ in range(20):
-        wrench, turned = model._wrenches(command, reported, free, np.full(4, np.pi))
-    assert (wrench[2] == 0.0).all() and np.linalg.norm(wrench[1]) > 1.0
-    assert turned[1] == pytest.approx(-2.0 * wrench[1], rel=1e-6), "about face, the force is the opposite"

@@ -1,7 +1,6 @@
 """The observer against robots that are simulated exactly, so that what it should find is known."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,8 +8,7 @@ import pytest
 from finlab import load_layout
 from finlab.control import Measurement, MotionObserver
 from finlab.control.observer import Estimate, strongest_wrench
-from finlab.layout import FinModelSpec, Layout
-from finlab.physics import plant_of
+from finlab.layout import Layout
 from finlab.sim.perturbed import perturbed
 from finlab.vehicle.attitude import euler
 from finlab.vehicle.body import complete_body
@@ -85,26 +83,6 @@ def test_what_fins_could_not_give_is_not_taken_for_a_current(robot: Layout) -> N
     assert found.drift[0] == pytest.approx(drag, rel=0.05)
     assert misled.drift[0] < 1.5 * drag
     assert found.velocity[0] == pytest.approx(state[7], abs=2e-3)
-
-
-def test_an_old_velocity_counts_once(robot: Layout) -> None:
-    observer, velocity = MotionObserver(robot, PERIOD_S), np.array([0.1, 0.0, 0.0])
-    held = Measurement(0.0, np.zeros(3), 0.0, velocity, 1.0, np.zeros(3), 0.0, 0.0)
-    for _ in range(30):
-        found = observer.step(held, np.zeros(6))
-    # Nothing drives the robot and no new velocity comes: by its own model it has all but stopped.
-    assert 0.0 < found.velocity[0] < 0.04
-
-
-def test_a_fin_that_saturates_counts_with_what_it_pushes_at_its_best(robot: Layout) -> None:
-    soft = FinModelSpec("soft", {})
-    weak = replace(robot, fins=tuple(replace(fin, model=soft) for fin in robot.fins))
-    plant = plant_of(weak)
-    size, beat = np.meshgrid(np.linspace(0.05, 0.6, 60), np.linspace(0.1, 2.1, 60))
-    command = np.zeros((size.size, 4, 3))
-    command[:, :, 0], command[:, :, 1] = size.ravel()[:, None], beat.ravel()[:, None]
-    most = np.linalg.norm(plant.force(command)[..., 1:], axis=-1).max()
-    assert strongest_wrench(weak)[2] == pytest.approx(4 * most, rel=0.01)
 
 
 def test_the_strongest_wrench_is_what_the_plant_gives_along_each_axis(robot: Layout) -> None:

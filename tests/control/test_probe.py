@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from finlab.control import FaultMonitor, Measurement, MonitorSettings
+from finlab.control import FaultMonitor, MonitorSettings
 from finlab.control.probe import FORCE_N, Probe
 from finlab.layout import Layout
 from finlab.physics import plant_of
@@ -34,27 +34,6 @@ def test_fins_that_all_but_rest_push_up_and_down(layout_a: Layout) -> None:
     np.testing.assert_allclose(again[1], after[1] * [-1.0, 1.0], atol=1e-6)
 
 
-def test_no_push_where_none_is_wanted(layout_a: Layout) -> None:
-    command = np.tile([0.5, 0.3, 0.0], (4, 1))
-    none = Probe(layout_a, replace(MonitorSettings(), least_push=0.0), 0.1)
-    assert none.added(command, NONE, np.zeros(4), steadily=True) is command
-    assert Probe(layout_a, MonitorSettings(), 0.1).added(command, NONE, np.zeros(4)) is command
-    still = Measurement(0.0, np.zeros(3), 0.0, np.zeros(3), 0.0, np.zeros(3), 0.0, 0.0)
-    monitor = FaultMonitor(layout_a)
-    assert (monitor.probed(command) != command).any()
-    monitor.step(still, command, np.zeros((4, 3)))
-    assert monitor.probed(command) is command, "servos that report give fins at rest away"
-
-
-def test_two_fins_push_no_more_than_they_are_told(layout_a: Layout) -> None:
-    command = np.tile([0.5, 0.3, 0.0], (4, 1))
-    command[:2] = np.nan
-    probe = Probe(layout_a, MonitorSettings(), 0.1)
-    assert probe.added(command, NONE, np.zeros(4), steadily=True) is command
-    command[1] = command[2]
-    assert probe.added(command, NONE, np.zeros(4), steadily=True) is not command
-
-
 def test_a_lost_fin_is_probed_unless_somebody_said_that_it_is_lost(layout_a: Layout) -> None:
     settings = replace(MonitorSettings(), probe_every_s=3.0, least_push=0.0)
     command = np.tile([0.5, 1.0, 0.0], (4, 1))
@@ -70,13 +49,3 @@ def test_a_lost_fin_is_probed_unless_somebody_said_that_it_is_lost(layout_a: Lay
         probed = found.probed(command)
     push = forces(layout_a, probed)[2]
     assert push[1] == pytest.approx(FORCE_N, rel=0.05) and abs(push[0]) < 1e-9
-
-
-def test_a_push_stays_within_the_fins_arc(layout_a: Layout) -> None:
-    narrow = replace(layout_a.fins[0].limits, zero_direction=(-0.4, 0.6))
-    layout = replace(layout_a, fins=(replace(layout_a.fins[0], limits=narrow), *layout_a.fins[1:]))
-    probe = Probe(layout, MonitorSettings(), 0.1)
-    command = np.tile([0.5, 0.2, 0.0], (4, 1))
-    for _ in range(3):
-        pushed = probe.added(command, NONE, np.zeros(4), steadily=True)
-        assert (pushed >= layout.lower - 1e-12).all() and (pushed <= layout.upper + 1e-12).all()

@@ -16,7 +16,7 @@ from finlab.fit.fin_file import summary, write_fin
 from finlab.fit.fin_fit import FinFit, fit_fin
 from finlab.layout import Fin, FinModelSpec, Layout
 from finlab.layout.angles import wrapped
-from finlab.physics import TableLaw, make_law
+from finlab.physics import TableLaw
 from finlab.physics.table_file import DOUBT, read_table
 from tests.fit.cell import commands, measured, samples, soft
 
@@ -109,16 +109,6 @@ def robot_with(path: Path) -> Layout:
     return Layout(layout.name, tuple(fins))
 
 
-def test_allocation_on_a_fitted_fin_comes_near_on_the_true_one(fit: FinFit, tmp_path: Path) -> None:
-    write_fin(fit, tmp_path / "fin.csv")
-    answer = load_allocator().allocate(robot_with(tmp_path / "fin.csv"), [0.8, 0, 0.3, 0, 0, 0.1])
-    assert answer.err_norm < 1e-5
-    table, size = make_law(FinModelSpec("table", (("path", str(tmp_path / "fin.csv")),))), 0.0
-    for command in answer.command:
-        size = max(size, float(np.linalg.norm(table.force(command) - LAW.force(command))))
-    assert size < 0.06 * fit.largest
-
-
 def test_deviations_that_are_told_count() -> None:
     command = commands(150)
     true, wild = LAW.force(command), np.arange(150) % 3 == 0
@@ -128,16 +118,6 @@ def test_deviations_that_are_told_count() -> None:
     found = fit_fin(type(told)(command, force, deviation, None, told.places, ()))
     assert found.outliers == (), "a sample that is known to be bad contradicts nothing"
     assert np.sqrt(np.mean(error_of(found) ** 2)) < 0.03
-
-
-def test_samples_at_rest_tell_nothing() -> None:
-    command = commands(60)
-    force = measured(LAW, command)
-    still = np.array([[0.0, 1.0, 0.0], [0.3, 0.0, 1.0]])
-    both = samples(np.concatenate([command, still]), np.concatenate([force, np.zeros((2, 3))]))
-    found = fit_fin(both)
-    assert len(found.measurements) == 60 and "2 samples at rest" in " ".join(found.notes)
-    np.testing.assert_allclose(found.predict(TEST)[0], fit_fin(samples(command, force)).predict(TEST)[0])
 
 
 def test_one_zero_direction_speaks_for_all() -> None:
@@ -169,17 +149,6 @@ def test_advice_leads_to_where_nothing_was_measured() -> None:
 
     elsewhere = np.array([[0.2, 0.5, phi] for phi in (-2.0, -1.0, 0.0, 1.0, 2.0)])
     assert uncertain_with(advised) < 0.9 * uncertain_with(elsewhere)
-
-
-def test_directions_of_an_arc_stay_an_arc() -> None:
-    command = commands(80)
-    command[:, 2] *= 0.3
-    found = fit_fin(samples(command, measured(LAW, command)))
-    directions = found.directions(9)
-    assert directions[0] == pytest.approx(command[:, 2].min()) and directions[-1] == pytest.approx(
-        command[:, 2].max()
-    )
-    assert np.ptp(wrapped(found.grid()[..., 2])) < 2.0
 
 
 def test_many_samples_are_thinned_and_it_is_said(monkeypatch: pytest.MonkeyPatch) -> None:

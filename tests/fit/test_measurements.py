@@ -102,12 +102,6 @@ def test_one_zero_direction_is_filled_by_symmetry_and_said(tmp_path: Path, colum
     assert not read(tmp_path, columns | {"phi": 0.0 * columns["phi"] + 0.3}).turned
 
 
-def test_deviations_and_power_are_kept(tmp_path: Path, columns: Columns) -> None:
-    found = read(tmp_path, columns | {"P": columns["A"], "sFy": 0.1 + 0.0 * columns["A"]})
-    assert found.power is not None and found.deviation is not None
-    assert found.power == pytest.approx(columns["A"]) and (found.deviation == pytest.approx(0.1))
-
-
 def emptied(columns: Columns, tmp_path: Path) -> Path:
     path = write(tmp_path / "bad.csv", columns)
     lines = path.read_text().splitlines()
@@ -167,28 +161,10 @@ def test_a_gap_a_short_line_and_no_file(tmp_path: Path, columns: Columns) -> Non
         read_measurements([tmp_path / "huge.csv"])
 
 
-def test_other_delimiters_and_remarks_above_the_header(tmp_path: Path, columns: Columns) -> None:
-    plain = read(tmp_path, columns)
-    for delimiter in ";\t":
-        text = (tmp_path / "cell.csv").read_text().replace(",", delimiter)
-        (tmp_path / "other.csv").write_text(f"# rig 3\n# 5 May\n{text}")
-        found = read_measurements([tmp_path / "other.csv"])
-        np.testing.assert_array_equal(found.force, plain.force)
-        assert found.places[0] == "other.csv line 4"
-
-
 def test_a_coarse_sensor_is_no_saturated_one(tmp_path: Path, columns: Columns) -> None:
     step = 0.1 * np.ptp(columns["Fy"])
     coarse = columns | {name: np.round(columns[name] / step) * step for name in ("Fy", "Fz")}
     assert len(read(tmp_path, coarse)) == 40
-
-
-def test_several_files_are_one_set(tmp_path: Path, columns: Columns) -> None:
-    half = [{k: v[:20] for k, v in columns.items()}, {k: v[20:] for k, v in columns.items()}]
-    paths = [write(tmp_path / f"{k}.csv", part) for k, part in enumerate(half)]
-    found = read_measurements(paths)
-    np.testing.assert_allclose(found.force, read(tmp_path, columns).force)
-    assert found.places[20] == "1.csv line 2"
 
 
 @pytest.mark.parametrize(

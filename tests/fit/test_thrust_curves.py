@@ -6,7 +6,7 @@ import pytest
 from finlab.evaluation.report.fin_fit_page import fin_fit_page
 from finlab.evaluation.report.pages import to_html
 from finlab.fit.fin_fit import FinFit, fit_fin
-from finlab.fit.thrust_curves import all_round, thrust_curves
+from finlab.fit.thrust_curves import thrust_curves
 from tests.fit.cell import commands, measured, samples, soft
 
 LAW = soft(k=4.0, p=1.4, x0=0.9, q=4.0, e=0.15, phi_e=1.0, d=0.12)
@@ -36,16 +36,6 @@ def test_curves_are_the_laws_and_samples_stand_by_them(fit: FinFit) -> None:
         own = np.interp(curve.samples[:, 0], curve.amplitude, curve.thrust)
         assert np.abs(curve.samples[:, 1] - own).max() < 0.1 * fit.largest
         assert curve.deviation[0] == 0.0 and (curve.deviation[1:] > 0.0).all()
-
-
-def test_means_alone_are_those_with_deviations(fit: FinFit) -> None:
-    command = commands(20, seed=4)
-    np.testing.assert_allclose(fit.mean_thrust(command), fit.thrust(command)[0], atol=1e-12)
-    turned = np.hypot(*fit.thrust(command)[0][:, :2].T)
-    np.testing.assert_allclose(turned, np.linalg.norm(fit.predict(command)[0][:, 1:], axis=-1))
-    assert all_round(fit, np.array([[0.3, 1.0]])) == pytest.approx(truth(0.3, 1.0), rel=0.05)
-    kept = np.linalg.norm(fit.measurements.force, axis=-1)
-    np.testing.assert_allclose(np.linalg.norm(fit.measured, axis=-1), kept)
 
 
 def test_the_page_says_what_the_fit_is_worth(fit: FinFit) -> None:

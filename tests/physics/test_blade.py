@@ -2,13 +2,10 @@
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
-from finlab.layout import Fin, FinModelSpec, Layout
-from finlab.physics import Plant, make_law
+from finlab.layout import FinModelSpec
+from finlab.physics import make_law
 from finlab.physics.blade import OWN_INERTIA, Blade
-
-Array = NDArray[np.float64]
 
 BLADES = [
     Blade(),
@@ -65,12 +62,6 @@ def test_slopes_are_differences(blade: Blade, loss: float) -> None:
         np.testing.assert_array_equal(blade.power_slopes(a, f), blade.driving_slopes(a, f, 0.0))
 
 
-def test_a_fin_at_rest_takes_nothing() -> None:
-    for a, f in ((0.0, 1.0), (0.5, 0.0), (0.0, 0.0)):
-        assert Blade().power(np.float64(a), np.float64(f)) == 0.0
-        assert Blade().driving_slopes(np.float64(a), np.float64(f), 1.0)[1] == 0.0
-
-
 @pytest.mark.parametrize(
     ("spec", "blade"),
     [
@@ -91,39 +82,3 @@ def test_each_law_knows_its_plate(spec: FinModelSpec, blade: Blade, loss: float)
     np.testing.assert_array_equal(slopes[:, 2], 0.0)
     by = blade.driving_slopes(command[:, 0], command[:, 1], loss)
     np.testing.assert_allclose(slopes[:, :2].T, by, rtol=1e-12)
-
-
-def test_a_plant_asks_each_fin_for_its_own_power() -> None:
-    specs = [FinModelSpec(), FinModelSpec("lighthill"), FinModelSpec("drag", (("area", 0.03),))]
-    fins = tuple(Fin(f"f{i}", (0.1 * i, 0.0, 0.0), 0.0, model=spec) for i, spec in enumerate(specs))
-    plant = Plant(Layout("mixed", fins))
-    command = plant.sample(np.random.default_rng(1), (5,))
-    for i, spec in enumerate(specs):
-        law = make_law(spec)
-        np.testing.assert_allclose(plant.power(command, 0.3)[:, i], law.power(command[:, i], 0.3))
-        np.testing.assert_allclose(
-            plant.power_slopes(command, 0.3)[:, i], law.power_slopes(command[:, i], 0.3)
-        )
-        without_loss = law.power_slopes(command[:, i], 0.0)
-        np.testing.assert_array_equal(plant.power_slopes(command)[:, i], without_loss)
-    lost = command.copy()
-    lost[:, 1] = np.nan
-    assert np.isnan(plant.power(lost)[:, 1]).all() and np.isfinite(plant.power(lost)[:, [0, 2]]).all()
-
-
-@pytest.mark.parametrize(
-    ("spec", "uniform"),
-    [
-        (FinModelSpec(), True),
-        (FinModelSpec("lighthill"), True),
-        (FinModelSpec("soft"), True),
-        (FinModelSpec("soft", (("d", 0.1),)), True),
-        (FinModelSpec("soft", (("e", 0.1),)), False),
-    ],
-)
-def test_a_fin_is_the_same_all_round_or_says_so(spec: FinModelSpec, uniform: bool) -> None:
-    law = make_law(spec)
-    turn = np.linspace(-3.0, 3.0, 13)
-    command = np.stack([np.full(13, 0.4), np.full(13, 1.5), turn], axis=-1)
-    size = np.linalg.norm(law.force(command), axis=-1)
-    assert law.uniform is uniform and bool(np.ptp(size) < 1e-12) is uniform

@@ -52,16 +52,6 @@ def test_speed_by_hand() -> None:
     np.testing.assert_allclose(found, alone * kept[:, None], rtol=1e-12)
 
 
-def test_without_speed_only_jets_count(coupled: Layout) -> None:
-    assert coupled.moving(np.zeros(6)) != coupled
-    command = Plant(coupled).sample(np.random.default_rng(0), (5,))
-    at_rest = plant_of(coupled.moving(np.zeros(6))).force(command)
-    assert np.abs(at_rest - plant_of(coupled).force(command)).max() > 0.01
-    jets_alone = _with(coupled, Interaction(coupled.interaction.jets, 0.4))  # type: ignore[union-attr]
-    np.testing.assert_allclose(at_rest, plant_of(jets_alone).force(command), atol=1e-12)
-    assert jets_alone.moving(VELOCITY) is jets_alone
-
-
 def test_derivatives_agree_with_differences(coupled: Layout) -> None:
     plant = plant_of(coupled)
     assert isinstance(plant, CoupledPlant)

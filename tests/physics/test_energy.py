@@ -3,9 +3,6 @@
 import numpy as np
 import pytest
 
-import finlab
-from finlab.layout import layout_effectiveness
-from finlab.physics import Plant
 from finlab.physics.energy import (
     DEFAULT_WEIGHTS,
     EnergyMeter,
@@ -34,10 +31,6 @@ def test_each_term_by_hand() -> None:
     )
 
 
-def test_limits_below_zero_count_by_their_size_and_none_is_divided_by_zero() -> None:
-    np.testing.assert_allclose(energy_scale(UPPER)[:, 2], [np.pi, 0.5, 1e-3])
-
-
 @pytest.mark.parametrize("weights", [DEFAULT_WEIGHTS, INERTIAL, MIXED])
 def test_a_robots_energy_is_the_sum_over_fins(weights: EnergyWeights) -> None:
     command = commands(5)
@@ -47,12 +40,6 @@ def test_a_robots_energy_is_the_sum_over_fins(weights: EnergyWeights) -> None:
     command[2, 1] = np.nan  # a failed fin costs nothing
     fins[2, 1] = 0.0
     np.testing.assert_allclose(command_energy(command, UPPER, weights), fins.sum(1))
-
-
-def test_single_precision_says_the_same() -> None:
-    command = commands(5)
-    rough = EnergyMeter(UPPER, MIXED)(command.astype(np.float32))
-    np.testing.assert_allclose(rough, EnergyMeter(UPPER, MIXED)(command), rtol=1e-5)
 
 
 @pytest.mark.parametrize("weights", [DEFAULT_WEIGHTS, INERTIAL, MIXED])
@@ -66,15 +53,3 @@ def test_slopes_are_those_of_differences(weights: EnergyWeights) -> None:
             step[i, k] = 1e-6 * energy_scale(upper)[i, k]
             difference = (meter(command + step) - meter(command - step)) / (2.0 * step[i, k])
             np.testing.assert_allclose(slopes[:, i, k], difference, rtol=1e-5, atol=1e-6)
-
-
-def test_planar_columns_are_what_a_newton_of_each_fin_does() -> None:
-    layout = finlab.load_layout("penta")
-    plant = Plant(layout)
-    command = plant.sample(np.random.default_rng(1), (4,))
-    force = plant.fin_forces(command)
-    across = np.stack([(-np.sin(fin.mounting_angle), np.cos(fin.mounting_angle), 0.0) for fin in layout.fins])
-    planar = np.stack([(force * across).sum(-1), force[..., 2]], axis=-1)
-    columns = layout_effectiveness(layout)
-    assert columns.shape == (6, 2 * plant.n_fins)
-    np.testing.assert_allclose(planar.reshape(4, -1) @ columns.T, plant.wrench(command), atol=1e-9)

@@ -10,7 +10,7 @@ from scipy.special import j0, j1
 
 from finlab.layout import FinModelSpec
 from finlab.layout.fin import FIN_MODELS
-from finlab.physics import make_law, stack_laws
+from finlab.physics import make_law
 from finlab.physics.fin_model import PLANAR_LAWS
 from finlab.physics.lighthill import bessel_j0, bessel_j1
 
@@ -88,35 +88,11 @@ def test_slopes_are_those_of_the_tensors_own_differentiation(law):
 
 
 @every_law
-def test_tensors_can_be_differentiated_twice(law):
-    u = torch.from_numpy(commands(5)).requires_grad_()
-    assert torch.autograd.gradgradcheck(law.force, u)
-
-
-@every_law
 def test_symbols_give_the_same_thrust(law):
     a, f, d = casadi.SX.sym("a"), casadi.SX.sym("f"), casadi.SX.sym("d")
     formula = casadi.Function("thrust", [a, f, d], [law.thrust(a, f, d)])
     for command in commands(10):
         assert float(formula(*command)) == pytest.approx(float(law.thrust(*command)), rel=1e-12)
-
-
-@every_law
-def test_single_precision_and_any_batch_shape(law):
-    u = commands(24)
-    rough = law.force(u.astype(np.float32))
-    assert rough.dtype == np.float32
-    assert law.force(torch.from_numpy(u).float()).dtype == torch.float32
-    np.testing.assert_allclose(rough, law.force(u), rtol=2e-5, atol=2e-5)
-    np.testing.assert_array_equal(law.force(u.reshape(2, 3, 4, 3)), law.force(u).reshape(2, 3, 4, 3))
-
-
-@pytest.mark.parametrize("law", [DRAG, LIGHTHILL], ids=NAMES[:2])
-def test_thrust_grows_with_amplitude_and_with_the_square_of_frequency(law):
-    amplitude = np.linspace(0.0, math.pi / 2, 50)
-    thrust = law.thrust(amplitude, np.ones_like(amplitude))
-    assert thrust[0] == 0.0 and (np.diff(thrust) > 0).all()
-    np.testing.assert_allclose(law.thrust(amplitude, 3.0), 9.0 * thrust)
 
 
 @every_law
@@ -135,19 +111,3 @@ def test_every_parameter_of_a_description_reaches_its_law(name):
         assert changed or (name, key) == ("soft", "phi_e")  # the angle of an unevenness that is zero
     doubled = make_law(FinModelSpec("drag", (("area", 0.04),)))
     np.testing.assert_allclose(doubled.force(u), 2.0 * DRAG.force(u))
-
-
-def test_fins_of_one_formula_are_evaluated_together_whatever_their_numbers():
-    specs = [SPECS[0], FinModelSpec("drag", (("area", 0.01),)), *SPECS[1:], SPECS[0]]
-    u = commands(12).reshape(2, 6, 3)
-    found = np.full((2, 6, 3), np.nan)
-    groups = stack_laws(specs)
-    assert len(groups) == 3
-    for places, law in groups:
-        force, slopes = law.force_and_slopes(u[:, places])
-        found[:, places] = force
-        for k, place in enumerate(places):
-            alone = make_law(specs[place]).force_and_slopes(u[:, place])
-            np.testing.assert_allclose(force[:, k], alone[0], rtol=1e-13)
-            np.testing.assert_allclose(slopes[:, k], alone[1], rtol=1e-13)
-    assert np.isfinite(found).all()

@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from finlab.layout import FinModelSpec, Limits, load_layout
-from finlab.physics import Plant, make_law, plant_of
+from finlab.layout import FinModelSpec, Limits
+from finlab.physics import Plant, make_law
 from finlab.physics.energy import DEFAULT_WEIGHTS, EnergyWeights, command_energy
-from finlab.physics.objective import Name, Objective
+from finlab.physics.objective import Objective
 from tests.random_fins import KINDS, random_robot, write_fin_table
 
 INERTIAL = EnergyWeights(0.0, 0.0, 0.0, 0.0, 1.0)
@@ -37,19 +37,6 @@ def test_a_meters_slopes_are_differences(objective: Objective, tmp_path: Path) -
             np.testing.assert_allclose(slopes[:, i, axis], difference, rtol=1e-5, atol=1e-6)
 
 
-@pytest.mark.parametrize("objective", OBJECTIVES)
-def test_a_robots_cost_is_the_sum_over_its_fins(objective: Objective) -> None:
-    layout = random_robot(np.random.default_rng(4), KINDS[:3], n_fins=4, limits="varied")
-    plant = Plant(layout)
-    command = plant.sample(np.random.default_rng(0), (9,))
-    by_fin = sum(
-        objective.fin_cost(make_law(fin.model), layout.upper[i])(command[:, i])
-        for i, fin in enumerate(layout.fins)
-    )
-    turned = (objective.direction_cost(layout.upper) * command[..., 2] ** 2).sum(-1)
-    np.testing.assert_allclose(objective.meter(plant)(command), by_fin + turned, rtol=1e-12)
-
-
 def test_what_each_objective_counts() -> None:
     layout = random_robot(np.random.default_rng(4), ("drag",), n_fins=3)
     plant = Plant(layout)
@@ -76,11 +63,3 @@ def test_measured_power_is_told_as_it_is(loss: float, tmp_path: Path) -> None:
             step = np.eye(3)[axis] * 1e-6
             difference = (table.power(command + step, loss) - table.power(command - step, loss)) / 2e-6
             np.testing.assert_allclose(slopes[:, axis], difference, rtol=1e-4, atol=1e-5)
-
-
-@pytest.mark.parametrize("name", ["power", "effort"])
-def test_no_commands_have_no_costs(name: Name) -> None:
-    plant = plant_of(load_layout("mixed"))
-    meter = Objective(name).meter(plant)
-    assert meter(np.empty((0, 4, 3))).shape == (0,)
-    assert meter.slopes(np.empty((0, 4, 3))).shape == (0, 4, 3)

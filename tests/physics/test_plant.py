@@ -101,30 +101,6 @@ def test_derivatives_agree_with_differences(name, of_four_kinds):
             np.testing.assert_allclose(matrix[:, :, fin, entry], slope, rtol=1e-6, atol=2e-6)
 
 
-def test_each_fin_gives_what_its_own_law_says(of_four_kinds):
-    command = random_commands(of_four_kinds, 5)
-    forces = Plant(of_four_kinds).forces(command)
-    for i, fin in enumerate(of_four_kinds.fins):
-        np.testing.assert_allclose(forces[:, i], make_law(fin.model).force(command[:, i]), rtol=1e-13)
-    size = Plant(of_four_kinds).thrust(command[..., 0], command[..., 1])
-    command[..., 2] = 0.0
-    np.testing.assert_allclose(
-        size, np.linalg.norm(Plant(of_four_kinds).fin_forces(command), axis=-1), atol=1e-12
-    )
-
-
-def test_lists_and_leading_shapes_are_welcome_and_left_alone():
-    layout = Layout("one", (Fin("a", (0.1, 0.0, 0.0), 0.0, model=FinModelSpec("lighthill")),))
-    plant = Plant(layout)
-    single = plant.wrench([[0.3, 1.0, 0.2]])
-    assert single.shape == (6,)
-    assert plant.wrench(np.full((2, 5, 1, 3), 0.3)).shape == (2, 5, 6)
-    failed = np.full((1, 3), np.nan)
-    plant.wrench(failed)
-    assert np.isnan(failed).all()
-    assert plant.wrench(np.zeros((0, 1, 3))).shape == (0, 6)
-
-
 @pytest.mark.parametrize(
     ("command", "why"),
     [

@@ -5,7 +5,6 @@ import os
 
 import numpy as np
 import pytest
-import torch
 
 from finlab.errors import DataError
 from finlab.layout import Fin, FinModelSpec, Layout
@@ -50,12 +49,6 @@ def test_slopes_agree_with_differences_and_with_the_original(table):
     assert np.abs(slopes - original).max() < 0.15 * np.abs(original).max()
 
 
-def test_beyond_the_table_nothing_changes_any_more(table):
-    _, slopes = table.force_and_slopes(np.array([[0.9, 1.0, 0.3], [0.3, 3.0, 0.3]]))
-    assert not slopes[0, 0].any() and slopes[0, 1].any()
-    assert not slopes[1, 1].any() and slopes[1, 0].any()
-
-
 def test_force_and_slope_are_continuous_across_cells_and_around_the_circle(table):
     for axis, knot in [(0, AMPLITUDE[4]), (1, FREQUENCY[4]), (2, CIRCLE[4]), (2, math.pi)]:
         u = np.array([[0.31, 1.37, 0.4]] * 2)
@@ -83,30 +76,10 @@ def test_an_arc_is_not_periodic_and_holds_at_its_ends(tmp_path):
     np.testing.assert_allclose(force[1:], np.tile(force[0], (2, 1)), atol=1e-12)
 
 
-def test_a_stop_itself_has_the_slope_of_its_side(tmp_path):
-    arc = np.array([-1.5, -1.25, -0.6])
-    write_table(tmp_path / "arc.csv", DRAG, AMPLITUDE, FREQUENCY, arc)
-    law = read_table(tmp_path / "arc.csv")
-    for stop, inwards in ((arc[0], 1e-9), (arc[-1], -1e-9)):
-        at, near = (law.force_and_slopes(np.array([0.4, 1.2, d]))[1] for d in (stop, stop + inwards))
-        np.testing.assert_allclose(at, near, atol=1e-6)
-        assert np.abs(at[2]).max() > 0.1
-
-
 def test_beyond_the_table_is_its_edge(table):
     edge = np.array([0.7, 2.4, 0.3])
     beyond = np.array([1.5, 9.0, 0.3])
     np.testing.assert_array_equal(table.force(beyond), table.force(edge))
-
-
-def test_single_precision_tensors_and_batch_shapes(table):
-    u = commands(12)
-    force = table.force(u.astype(np.float32).reshape(3, 4, 3))
-    assert force.dtype == np.float32 and force.shape == (3, 4, 3)
-    np.testing.assert_allclose(force.reshape(12, 3), table.force(u), rtol=1e-4, atol=1e-4)
-    tensor = table.force(torch.from_numpy(u).float())
-    assert tensor.dtype == torch.float32
-    np.testing.assert_allclose(tensor.numpy(), table.force(u), rtol=1e-4, atol=1e-4)
 
 
 def test_a_table_that_was_written_anew_is_read_anew(tmp_path):
@@ -206,24 +179,6 @@ def test_a_bad_table_is_refused_with_file_and_place(lines, why, tmp_path):
     assert why in str(caught.value)
 
 
-def test_a_good_table_with_power_is_read(tmp_path):
-    (tmp_path / "t.csv").write_text("\n".join(scaled(power=0.5)))
-    law, at = read_table(tmp_path / "t.csv"), np.array([[0.2, 2.0, 0.5], [0.1, 1.0, 1.0]])
-    assert law.has_power and law.power(at) == pytest.approx([2.0, 0.5])
-
-
-def test_a_table_may_end_at_the_highest_frequency_and_amplitude(tmp_path):
-    path = tmp_path / "t.csv"
-    path.write_text("\n".join(scaled(frequency=10.0, amplitude=2.5 * math.pi)))
-    assert read_table(path).covers[:2] == (
-        pytest.approx((0.25 * math.pi, 0.5 * math.pi)),
-        pytest.approx((10.0, 20.0)),
-    )
-    path.write_text("\n".join(scaled(frequency=10.001)))
-    with pytest.raises(DataError, match="f goes up to 20, expected Hz up to 20; these look like beats"):
-        read_table(path)
-
-
 def circle_with_power(path, force_at_end, extra):
     """A table around the circle, whose end has another force, and extra power, beside its beginning."""
     angles = np.linspace(-math.pi, math.pi, 9)
@@ -263,13 +218,6 @@ def test_power_never_falls_below_zero_between_points_near_zero(tmp_path):
     assert not found[dips].any() and not slopes[dips].any() and slopes[:, 1].max() > 0.5
 
 
-def test_one_turn_apart_forces_must_agree(tmp_path):
-    rows = [f"{a},{f},{d},0,{d},0" for a in (0, 1) for f in (1, 2) for d in (-3.14159265, 0, 3.14159265)]
-    (tmp_path / "t.csv").write_text("\n".join([HEADER, *rows]))
-    with pytest.raises(DataError, match="one turn later differ"):
-        read_table(tmp_path / "t.csv")
-
-
 @pytest.mark.parametrize(("share", "good"), [(0.04, True), (0.07, False)])
 def test_one_turn_apart_noise_may_be_a_twentieth_of_the_largest_force(share, good, tmp_path):
     angles = np.linspace(-math.pi, math.pi, 9)
@@ -285,15 +233,6 @@ def test_one_turn_apart_noise_may_be_a_twentieth_of_the_largest_force(share, goo
         return
     with pytest.raises(DataError, match="one turn later differ"):
         read_table(tmp_path / "t.csv")
-
-
-def test_of_several_holes_the_first_is_named(tmp_path):
-    grid = [(a, f, d) for a in (0.1, 0.2, 0.3) for f in (1, 2) for d in (0, 1)]
-    kept = [row for row in grid if row not in ((0.1, 2, 1), (0.3, 1, 0))]
-    (tmp_path / "t.csv").write_text("\n".join([HEADER, *(f"{a},{f},{d},0,1,2" for a, f, d in kept)]))
-    with pytest.raises(DataError, match="10 rows do not fill the grid of 3 amplitudes, 2 ") as caught:
-        read_table(tmp_path / "t.csv")
-    assert "A = 0.1, f = 2, phi = 1" in str(caught.value)
 
 
 def test_a_missing_or_binary_file_is_refused(tmp_path):

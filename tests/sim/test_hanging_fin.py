@@ -32,12 +32,6 @@ def test_a_plate_drags_broadside_and_slips_edge_on() -> None:
     assert abs(half[2]) == pytest.approx(along * math.cos(math.pi / 4)), "it lifts or presses, too"
 
 
-def test_a_robot_that_turns_drags_its_fin_along() -> None:
-    turning = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.5])
-    braked = wrench(SIDE, math.pi / 2, turning)  # the fin's foot moves backwards at 0.2 m times the yaw rate
-    assert braked[0] == pytest.approx(FULL * (0.2 * 1.5) ** 2) and braked[5] < 0.0
-
-
 def test_drag_never_drives(layout_a: Layout) -> None:
     rng = np.random.default_rng(3)
     for _ in range(50):

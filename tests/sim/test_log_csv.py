@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from finlab.allocation.allocator import Allocator
-from finlab.errors import DataError
 from finlab.fit.robot.swim_file import read_swim
 from finlab.layout import Layout
 from finlab.sim import ClosedLoop, RunLog, SteadyCurrent, make_trajectory
@@ -59,8 +58,3 @@ def test_a_fit_reads_it(log: RunLog, layout_a: Layout, tmp_path: Path) -> None:
     kept = np.isfinite(log.command[: len(swim.command)])
     assert (np.isfinite(swim.command) == kept).all()
     assert swim.command[kept] == pytest.approx(log.command[: len(swim.command)][kept], rel=1e-5, abs=1e-9)
-
-
-def test_a_folder_that_is_not_there_is_told(log: RunLog, tmp_path: Path) -> None:
-    with pytest.raises(DataError, match="cannot be written"):
-        save_csv(log, tmp_path / "nowhere" / "log.csv")

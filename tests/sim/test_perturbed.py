@@ -10,19 +10,10 @@ from finlab.allocation.allocator import Allocator
 from finlab.errors import LayoutError
 from finlab.layout import FinModelSpec, Layout, load_layout
 from finlab.physics import plant_of
-from finlab.sim import NO_NOISE, ClosedLoop, make_trajectory, perturbed
+from finlab.sim import ClosedLoop, make_trajectory, perturbed
 from finlab.vehicle.attitude import euler
 from finlab.vehicle.body import complete_body
 from finlab.vehicle.vehicle import Vehicle
-
-
-def test_nothing_changed_is_the_same_robot(layout_a: Layout) -> None:
-    same = perturbed(layout_a)
-    assert same.fins == layout_a.fins
-    believed, true = Vehicle(complete_body(layout_a)), Vehicle(complete_body(same))
-    rng = np.random.default_rng(0)
-    state, wrench = rng.standard_normal(13).tolist(), rng.standard_normal(6).tolist()
-    assert true.derivative(state, wrench) == believed.derivative(state, wrench)
 
 
 def test_each_factor_scales_what_it_names(layout_a: Layout) -> None:
@@ -61,14 +52,6 @@ def test_a_torn_fin_gives_a_share_of_its_thrust(layout_a: Layout) -> None:
     share /= np.linalg.norm(plant_of(layout_a).forces(command), axis=1)
     expected = np.where(np.arange(4) == layout_a.index("back_left"), 0.7, 1.0)
     np.testing.assert_allclose(share, expected)
-
-
-def test_the_robot_swims_otherwise_than_believed(layout_a: Layout, analytic: Allocator) -> None:
-    paths = []
-    for truth in (None, perturbed(layout_a, damping=2.0)):
-        loop = ClosedLoop(layout_a, analytic, make_trajectory("circle", 20.0), sensors=NO_NOISE, truth=truth)
-        paths.append(loop.run().position)
-    assert np.abs(paths[0] - paths[1]).max() > 0.05
 
 
 def test_what_makes_no_sense_is_refused(layout_a: Layout, analytic: Allocator) -> None:

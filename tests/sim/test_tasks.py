@@ -21,16 +21,6 @@ def test_shipped_trajectories_start_gently_and_stay_slow(name: str) -> None:
     np.testing.assert_allclose(path.position(path.duration_s + 9.0), path.samples[-1])
 
 
-def test_a_dive_goes_down_and_up_again_and_a_station_nowhere() -> None:
-    down = make_trajectory("dive").samples
-    assert down[:, 2].max() == pytest.approx(-1.0) and down[:, 2].min() == pytest.approx(-2.0, abs=1e-3)
-    assert down[0, 2] == pytest.approx(down[-1, 2]) and down[-1, 0] == pytest.approx(6.0)
-    step = np.diff(down, axis=0)
-    assert np.degrees(np.arctan2(np.abs(step[:, 2]), step[:, 0])).max() == pytest.approx(27.6, abs=0.1)
-    place = make_trajectory("station", 30.0)
-    assert place.length_m == 0.0 and place.setpoint(12.0).surge == 0.0 and place.duration_s == 30.0
-
-
 def test_a_path_says_where_it_goes_on_while_it_rests() -> None:
     path = make_trajectory("square")
     turns = [path.setpoint(time) for time in (5.0, 18.0, 41.0, 63.0, 89.0)]
@@ -48,16 +38,6 @@ def test_coarse_samples_of_a_smooth_path_have_a_smooth_acceleration() -> None:
         setpoint, done = path.setpoint(time), time / leg
         assert setpoint.velocity[0] == pytest.approx(12.0 / leg * done * (1.0 - done), abs=2e-3)
         assert setpoint.acceleration[0] == pytest.approx(12.0 / leg**2 * (1.0 - 2.0 * done), abs=1e-3)
-
-
-def test_a_path_that_ends_under_way_is_not_braked_for() -> None:
-    """What stops there is the swim, not the robot; after it everything rests."""
-    path = make_trajectory("lissajous")
-    last, before = path.setpoint(path.duration_s - 0.1), path.setpoint(path.duration_s - 1.0)
-    assert last.surge == pytest.approx(before.surge, rel=0.05)
-    assert np.linalg.norm(last.acceleration - before.acceleration) < 0.01
-    after = path.setpoint(path.duration_s + 0.1)
-    assert after.surge == 0.0 and not after.velocity.any() and not after.acceleration.any()
 
 
 def test_a_file_of_positions(tmp_path: Path) -> None:

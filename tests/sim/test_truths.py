@@ -1,27 +1,19 @@
 """What layouts do not say: jets, inflow, and a robot that is not built as drawn."""
 
-import ast
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from finlab import load_allocator
 from finlab.layout import Layout, load_layout
-from finlab.sim import PLANTS, ClosedLoop, make_trajectory
+from finlab.sim import ClosedLoop, make_trajectory
 from finlab.sim.fin_force import MeanForce
 from finlab.sim.inflow import InflowForce
 from finlab.sim.offset import OffsetForce
-from finlab.sim.plants import make_plant
 from finlab.sim.wake import MOST, WakeForce
 from finlab.vehicle.attitude import euler
-from finlab.vehicle.body import complete_body
 from finlab.vehicle.fin_motion import FinMotion
-from finlab.vehicle.vehicle import Vehicle
-
-ROOT = Path(__file__).resolve().parents[2]
-TRUTHS = {f"finlab.sim.{name}" for name in ("plants", "wake", "inflow", "offset", "fin_force")}
 
 
 @pytest.fixture(scope="module")
@@ -43,23 +35,6 @@ def test_fins_behind_a_jet_lose_thrust_and_those_before_it_none(robot: Layout) -
     behind = robot.position[:, 0] < 0.0  # all push ahead
     assert (left[~behind] > 0.98).all() and (left[behind] < 0.95).all()
     assert (left >= 1.0 - MOST).all()
-
-
-def test_a_jet_aimed_at_a_near_fin_takes_up_to_the_most_and_none_flows_from_a_fin_at_rest() -> None:
-    pair = load_layout("pair")
-    fins = [fin.name for fin in pair.fins]
-    pair = pair.replace_fin(fins[0], position=(0.1, 0.0, 0.0), mounting_angle=-math.pi / 2)
-    pair = pair.replace_fin(fins[1], position=(-0.1, 0.0, 0.0), mounting_angle=-math.pi / 2)
-    wake = WakeForce(pair)
-    forward = np.array([[0.0, 50.0, 0.0], [0.0, 1.0, 0.0]])
-    assert MeanForce(pair).columns[0, 1, 0] == pytest.approx(1.0)
-    assert 0.9 * MOST < wake.loss(forward)[1] <= MOST and wake.loss(forward)[0] < 1e-6
-    aside = np.array([[0.0, 0.0, 50.0], [0.0, 1.0, 0.0]])
-    assert wake.loss(aside)[1] < 0.01
-    assert not wake.loss(forward * [[0.0], [1.0]])[1] > 1e-9
-    assert wake.loss(np.vstack([forward[0] * 0.006, forward[1]]))[1] == pytest.approx(
-        wake.loss(forward)[1] / 2, rel=0.02
-    )
 
 
 def test_thrust_falls_with_the_speed_along_it(robot: Layout) -> None:
@@ -89,18 +64,6 @@ def test_a_robot_built_askew_feels_its_fins_elsewhere(robot: Layout) -> None:
     )
 
 
-def test_the_water_moves_past_a_robot_that_drifts(robot: Layout) -> None:
-    vehicle = Vehicle(complete_body(robot), (0.1, -0.05, 0.02))
-    rng = np.random.default_rng(5)
-    state = rng.standard_normal(13)
-    state[3:7] /= np.linalg.norm(state[3:7])
-    # The world's axes in the body by the derivative of the position at unit speeds.
-    turn = np.array([vehicle.derivative([*state[:7], *row, 0, 0, 0], [0.0] * 6)[:3] for row in np.eye(3)])
-    seen = vehicle.velocity_in_water(state)
-    np.testing.assert_allclose(seen[:3], state[7:10] - turn @ np.array(vehicle.current), atol=1e-12)
-    np.testing.assert_array_equal(seen[3:], state[10:])
-
-
 @pytest.mark.parametrize("name", ["wake", "inflow", "offset"])
 def test_robots_stay_afoot_on_every_truth(name: str, robot: Layout) -> None:
     loop = ClosedLoop(robot, load_allocator(), make_trajectory("circle"), plant=name)
@@ -110,50 +73,3 @@ def test_robots_stay_afoot_on_every_truth(name: str, robot: Layout) -> None:
     assert np.linalg.norm(loop.log.position[-1] - loop.log.reference[-1]) < 0.5
     given = loop.log.allocated - loop.log.delivered
     assert np.linalg.norm(given[60:].mean(axis=0)) > 0.01
-
-
-def test_every_truth_is_named() -> None:
-    assert list(PLANTS) == ["mean", "ripple", "flexible", "wake", "inflow", "offset"]
-    assert isinstance(make_plant("offset", load_layout("pair")), OffsetForce)
-
-
-def _imported(module: str) -> set[str]:
-    """Modules of finlab that a module imports, anywhere in its file."""
-    path = ROOT / (module.replace(".", "/") + ".py")
-    path = path if path.exists() else ROOT / module.replace(".", "/") / "__init__.py"
-    found: set[str] = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.Import):
-            found |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom) and node.module:
-            found |= {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
-    modules = {name for name in found if name.split(".")[0] == "finlab"}
-    base = ROOT
-    return {
-        name
-        for name in modules
-        if (base / (name.replace(".", "/") + ".py")).exists() or (base / name.replace(".", "/")).is_dir()
-    }
-
-
-def _reached(modules: set[str]) -> set[str]:
-    """Those modules and all that they import, and so on; not the front door, which imports on demand."""
-    known: set[str] = set()
-    left = set(modules)
-    while left:
-        module = left.pop()
-        known.add(module)
-        left |= _imported(module) - known - {"finlab"}
-    return known
-
-
-@pytest.mark.parametrize("room", ["fit", "control"])
-def test_what_learns_never_sees_the_truth(room: str) -> None:
-    files = (ROOT / "finlab" / room).rglob("*.py")
-    own = {".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__") for path in files}
-    assert len(own) > 4
-    assert not {name for name in _reached(own) if name.startswith("finlab.sim")}
-
-
-def test_the_check_of_imports_sees_through_other_modules() -> None:
-    assert _reached({"finlab.evaluation.experiments.closed_loop"}) >= TRUTHS

@@ -45,15 +45,6 @@ def test_a_current_turns_and_keeps_its_speed() -> None:
     assert np.linalg.norm(velocity(water, PLACE, 32.0)) == pytest.approx(0.05)
 
 
-def test_water_becomes_another() -> None:
-    before, after = SteadyCurrent((0.1, 0.0, 0.0)), SteadyCurrent((0.0, 0.0, -0.2))
-    water = Changing(before, after, 3.0, 2.0)
-    assert water.flow(PLACE, 2.9) == before.flow(PLACE, 2.9) and water.name == "current"
-    assert water.flow(PLACE, 5.1) == after.flow(PLACE, 5.1) and water.end_s == 5.0
-    np.testing.assert_allclose(velocity(water, PLACE, 4.0), (0.05, 0.0, -0.1))
-    assert water.flow(PLACE, 4.0).acceleration[2] == pytest.approx(-0.2 * 1.5 / 2.0)
-
-
 def test_one_wave_is_that_of_linear_theory() -> None:
     """Deep water: w^2 = g k, circles whose radius falls with exp(k z), and no divergence."""
     pace = 2 * math.pi / 3.0 * (1.25 / math.log(2.0)) ** 0.25
@@ -109,16 +100,6 @@ def test_a_body_as_heavy_as_water_goes_with_it() -> None:
     moved = np.array((0.2, 0.1)) * (1.0 - math.cos(w * 4.0)) / w
     np.testing.assert_allclose(state[:3], [*moved, 0.0], atol=2e-4)
     np.testing.assert_allclose(state[10:], 0.0, atol=1e-6)
-
-
-def test_a_righting_body_leans_with_water_that_accelerates() -> None:
-    vehicle = Vehicle(Body(mass_kg=20.0, inertia_kgm2=(0.5, 0.6, 0.7), center_of_buoyancy_m=(0.0, 0.0, 0.05)))
-    state = [0.0, 0.0, 0.0, 1.0, *[0.0] * 9]
-    assert not np.any(vehicle.derivative(state, [0.0] * 6))
-    vehicle.acceleration = (0.5, 0.0, 0.0)
-    rate = vehicle.derivative(state, [0.0] * 6)
-    assert rate[7] == pytest.approx(0.5), "it is carried along"
-    assert rate[11] == pytest.approx(20.0 * 0.05 * 0.5 / 0.6), "and pitches, its buoyancy pulling ahead"
 
 
 @pytest.mark.parametrize(

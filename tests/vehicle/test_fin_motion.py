@@ -93,28 +93,6 @@ def test_speed_limit_cuts_fast_flapping_and_turning(pair: Layout) -> None:
     assert slow.direction[0] < free.direction[0] - 0.5
 
 
-def test_a_lost_fin_stops_where_it_is(pair: Layout) -> None:
-    motion = flapping(pair, 0.4, 1.5, 0.8)
-    command = motion.command.copy()
-    command[0] = np.nan
-    motion.step(command, DT)
-    assert motion.amplitude[0] == motion.frequency[0] == motion.speed[0] == 0.0
-    assert motion.direction[0] == 0.8
-
-
-def test_means_over_steps_are_of_second_order(pair: Layout) -> None:
-    """Long steps tell as much of what fins did meanwhile as short ones."""
-    command, means = np.array([[0.5, 1.7, 1.8], [0.1, 0.4, -0.9]]), []
-    for steps in (10, 1000):
-        motion = FinMotion(pair)
-        seen = []
-        for _ in range(steps):
-            motion.step(command, 0.2 / steps)
-            seen.append(motion.mean_command)
-        means.append(np.mean(seen, axis=0))
-    np.testing.assert_allclose(means[0], means[1], atol=3e-3)
-
-
 def test_accelerations_are_those_of_the_speed(pair: Layout) -> None:
     """Fins that beat, grow, gather speed and turn at once."""
     motion, dt = flapping(pair, 0.2, 1.0, 0.3), 1e-4

@@ -46,17 +46,6 @@ def test_surge_under_quadratic_drag_is_a_hyperbolic_tangent(ucat: Body) -> None:
     assert state[0] == pytest.approx(mass / drag * math.log(math.cosh(rate * time)), abs=1e-8)
 
 
-def test_yaw_under_linear_drag_is_exponential(ucat: Body) -> None:
-    vehicle = Vehicle(replace(ucat, quadratic_damping=(0.0,) * 6))
-    torque, time = 0.2, 5.0
-    inertia, drag = vehicle.inertia[5], ucat.linear_damping[5]
-    state = swim(vehicle, at_rest(), (0, 0, 0, 0, 0, torque), time, 0.01)
-    rate = torque / drag * (1 - math.exp(-drag * time / inertia))
-    yaw = torque / drag * (time - inertia / drag * (1 - math.exp(-drag * time / inertia)))
-    assert state[12] == pytest.approx(rate, abs=1e-9)
-    assert euler(state[3:7])[2] == pytest.approx(yaw, abs=1e-8)
-
-
 def test_a_robot_without_thrust_ends_up_drifting_with_the_water(ucat: Body) -> None:
     current = (0.15, -0.1, 0.0)
     state = at_rest()
@@ -119,13 +108,6 @@ def test_a_heavy_robot_sinks_and_a_tilted_one_rights_itself(ucat: Body) -> None:
     tilted[3:7] = (math.cos(0.3), math.sin(0.3), 0.0, 0.0)
     roll = euler(swim(Vehicle(ucat), tilted, STILL, 60.0, 0.02)[3:7])[0]
     assert abs(roll) < 0.02
-
-
-def test_a_layout_with_its_own_mass_keeps_ucats_drag(layout_a: Layout) -> None:
-    own = complete_body(replace(layout_a, body=Body(mass_kg=7.0)))
-    assert own.mass_kg == 7.0
-    assert own.linear_damping == complete_body(layout_a).linear_damping
-    assert Vehicle(own).lift == Vehicle(own).weight
 
 
 def test_water_that_holds_a_light_body_fast_does_not_shake_it(ucat: Body) -> None:

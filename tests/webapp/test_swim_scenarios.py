@@ -114,9 +114,9 @@ def test_what_is_true_is_not_what_is_believed(swimming: Swimming) -> None:
     until(lambda: bool(swimming.swimmers))
     swim = swimming.swimmers[0].swim
     assert swim.vehicle.lift == pytest.approx(1.01 * swim.vehicle.weight)
-    assert swim.layout == UCAT and swim.failed == ("back_right",)
+    assert swim.layout == UCAT and swim.damage.failed == ("back_right",)
     (weak,) = plan.weak
-    assert swim.broken[weak] == FinFault(weak, 0.0, "weak", 0.7) and weak not in swim.told
+    assert swim.broken[weak] == FinFault(weak, 0.0, "torn", 0.7) and weak not in swim.told
     assert swim.controller.name == "tracking"
 
 

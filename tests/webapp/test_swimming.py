@@ -160,7 +160,7 @@ def test_a_fin_that_breaks_without_a_word_is_found(swimming: Swimming) -> None:
     until(lambda: swimming.swimmers[0].shown.lost == ("front_left",))
     assert swimmer.shown.failed == () and swimmer.shown.found == ()
     assert "does not know yet" in swim_card(swimming, SwimSettings())
-    while not swimmer.swim.failed and swimmer.swim.time < 20.0:
+    while not swimmer.swim.damage.failed and swimmer.swim.time < 20.0:
         swimmer.step()
     swimmer.shown = swimmer.moment()
     ((name, seconds),) = swimmer.shown.found
@@ -170,7 +170,7 @@ def test_a_fin_that_breaks_without_a_word_is_found(swimming: Swimming) -> None:
     assert doubts[-1, UCAT.index("front_left")] > 0.99 and doubts[0].max() < 0.1
     assert swimmer.shown.doubted == ("front_left",)
     blind = swimmer.shown._replace(failed=(), found=())
-    assert "front_left is lost, and the monitor takes it for weak or stuck" in findings_words(blind)[0]
+    assert "front_left is lost, and the monitor takes it for torn or stuck" in findings_words(blind)[0]
     wrong = blind._replace(lost=())
     assert "The monitor takes front_left for weak or stuck" in findings_words(wrong)[0]
     swimming.toggle("front_left", announced=False)

@@ -44,7 +44,7 @@ def _true(settings: SwimSettings) -> Iterator[str]:
         yield f"damping × {factor:g}"
     if "gravity_offset_m" in day.truth:
         yield f"centre of gravity {100 * day.truth['gravity_offset_m'][0]:g} cm ahead"
-    if (late := day.sensors.marker_delay_s - SensorSettings().marker_delay_s) > 1e-9:
+    if (late := day.sensors.marker.delay_s - SensorSettings().marker.delay_s) > 1e-9:
         yield f"sensors {1000 * late:.0f} ms later"
     if FINS[settings.plant]:
         yield FINS[settings.plant]

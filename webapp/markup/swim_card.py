@@ -38,10 +38,10 @@ def findings_words(shown: Moment) -> list[str]:
     for name in shown.lost:
         if name not in shown.failed:
             known = name in shown.doubted
-            rest = "the monitor takes it for weak or stuck" if known else "the allocator does not know yet"
+            rest = "the monitor takes it for torn or stuck" if known else "the allocator does not know yet"
             sentences.append(f"<span class='missing'>{escape(name)} is lost, and {rest}.</span>")
     sentences += [
-        f"<span class='missing'>The monitor takes {escape(name)} for weak or stuck.</span>"
+        f"<span class='missing'>The monitor takes {escape(name)} for torn or stuck.</span>"
         for name in shown.doubted
         if name not in (*shown.failed, *shown.lost)
     ]

@@ -75,7 +75,7 @@ class Swimmer:
         self._found = {
             name: self._found.get(name, swim.time - self.period_s - swim.broken[name].time_s)
             for name in unknown
-            if name in swim.failed
+            if name in swim.damage.failed
         }
 
     def recorded(self) -> Recorded:
@@ -106,7 +106,7 @@ class Swimmer:
             reference=swim.task.setpoint(swim.time).position,
             flow=np.array(swim.water.flow(swim.state[:3].tolist(), swim.time).velocity),
             lost=swim.lost,
-            failed=swim.failed,
+            failed=swim.damage.failed,
             found=tuple(self._found.items()),
             doubted=() if last is None else doubted(last.fault_probability, self.fins),
             controllable=swim.controllable,
@@ -135,5 +135,5 @@ def closed_loop(plan: Plan, allocator: Allocator) -> ClosedLoop:
     for name in plan.failed:
         swim.fail(name, announced=True)
     for name in plan.weak:
-        swim.fail(name, "weak", plan.share, announced=False)
+        swim.fail(name, "torn", plan.share, announced=False)
     return swim

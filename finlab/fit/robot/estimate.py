@@ -8,7 +8,7 @@ normal equations. Each unknown is believed to lie within its scale of what the l
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +19,7 @@ from finlab.fit.robot.model import RobotModel
 from finlab.fit.robot.swim import ANGLES, STEP_S
 from finlab.fit.robot.unknowns import Unknowns
 from finlab.layout.angles import wrapped
+from finlab.least_squares import Damping, levenberg_marquardt
 from finlab.vehicle.fossen import Dynamics
 from finlab.vehicle.many_bodies import integrate
 
@@ -30,8 +31,10 @@ START_DEVIATION = np.array([0.1] * 3 + [0.1] * 3 + [0.1] * 3 + [0.2] * 3)
 """How far a window may begin from the smoothed measurements."""
 DIFFERENCE = 1e-3
 """Step of the differences, in scales."""
-MOST_STEPS = 12
-"""Most Gauss-Newton steps."""
+MOST_STEPS = 16
+"""Most Gauss-Newton steps, those included that are undone."""
+DAMPING = Damping(first=1e-3, better=0.1, worse=(10.0, 0.0), least=1e-6, most=1e6)
+"""Levenberg's."""
 SETTLED = 1e-4
 """Relative gain below which they end."""
 FOLDS = 6
@@ -106,26 +109,17 @@ def fit_windows(
         start: states of the windows to begin with, instead of the smoothed ones.
         tell: called with the number of each step before it.
     """
-    start = windows.start.copy() if start is None else start.copy()
-    damping, at = 1e-3, _Linear.at(model, unknowns, windows, deviation, vector, start)
-    for k in range(MOST_STEPS):
-        tell(k)
-        change, moved = at.step(damping)
-        new_vector, new_start = vector + change, start + moved
-        cost = _cost(model, unknowns, windows, deviation, new_vector, new_start)
-        while not cost < at.cost and damping < 1e6:
-            damping *= 10.0
-            change, moved = at.step(damping)
-            new_vector, new_start = vector + change, start + moved
-            cost = _cost(model, unknowns, windows, deviation, new_vector, new_start)
-        if not cost < at.cost:
-            break
-        gain = (at.cost - cost) / at.cost
-        vector, start, damping = new_vector, new_start, max(0.1 * damping, 1e-6)
-        at = _Linear.at(model, unknowns, windows, deviation, vector, start)
-        if gain < SETTLED:
-            break
-    return Fitted(unknowns, vector, start, at.information, at.scores, at.residual, at.state)
+    problem = _Problem(model, unknowns, windows, deviation)
+    begin = windows.start if start is None else start
+    steps = iter(range(MOST_STEPS))
+
+    def moved(at: _Linear, damping: Array, last: bool) -> _Linear:
+        tell(next(steps))
+        change, shift = at.step(float(damping[0]))
+        return problem.after(at, at.vector + change, at.start + shift)
+
+    at = levenberg_marquardt(problem.at(vector, begin), moved, MOST_STEPS, DAMPING, SETTLED)
+    return Fitted(unknowns, at.vector, at.start, at.information, at.scores, at.residual, at.state)
 
 
 def unseen_gains(
@@ -141,8 +135,7 @@ def unseen_gains(
     """
     whole = Unknowns(model.blocks, (*fitted.unknowns.names, *names))
     vector = whole.taken_over(fitted.unknowns, fitted.vector)
-    at = _Linear.at(model, whole, windows, deviation, vector, fitted.start)
-    believed = np.eye(whole.size) + np.outer(whole.gauge, whole.gauge)
+    at, believed = _Problem(model, whole, windows, deviation).at(vector, fitted.start), whole.believed
     fold = np.arange(windows.start.shape[1]) % FOLDS
     known = np.zeros(whole.size, bool)
     for name in fitted.unknowns.names:
@@ -173,7 +166,10 @@ def unseen_gains(
 class _Linear:
     """The problem near some unknowns, the windows' beginnings eliminated."""
 
-    cost: float
+    cost: Array
+    """(1,)."""
+    vector: Array
+    start: Array
     gradient: Array
     information: Array
     own_information: Array
@@ -189,60 +185,6 @@ class _Linear:
     pull: Array
     """(W, 12)."""
 
-    @classmethod
-    def at(
-        cls,
-        model: RobotModel,
-        unknowns: Unknowns,
-        windows: Windows,
-        deviation: Array,
-        vector: Array,
-        start: Array,
-    ) -> "_Linear":
-        n = unknowns.size
-        vectors = np.concatenate([vector[None], vector + DIFFERENCE * np.eye(n)])
-        n_all, w = 1 + n + 12, start.shape[1]
-        wrench = _wrenches(model, unknowns, windows, vectors)
-        wrench = np.concatenate([wrench, np.repeat(wrench[:, :, :1], 12, axis=2)], axis=2)
-        vectors = np.concatenate([vectors, np.repeat(vector[None], 12, axis=0)])
-        begin = np.repeat(start[:, None], n_all, axis=1)
-        for k in range(12):
-            begin[k, 1 + n + k] += DIFFERENCE * START_DEVIATION[k]
-        bodies = Dynamics(*(part[..., None] for part in model.bodies(unknowns, vectors)))
-        current = unknowns.of("current", vectors).T[..., None]
-        state = integrate(begin, wrench, bodies, current, STEP_S)
-        sensed = model.sensed(unknowns, vectors, state)
-        residual = _residual(windows, sensed[:, :, 0], deviation)
-        weighted = _clipped(residual)
-        with np.errstate(invalid="ignore"):  # an outlier pulls with constant force
-            weight = np.where(np.abs(weighted) > CLIP, CLIP / np.abs(weighted), 1.0) / deviation[:, None]
-        known = np.isfinite(residual)
-        slopes = (sensed[:, :, 1:] - sensed[:, :, :1]) / DIFFERENCE
-        slopes *= np.where(known, weight, 0.0)[:, :, None]
-        left = np.where(known, weighted, 0.0)
-        by = np.moveaxis(slopes, (2, 3), (0, 1)).reshape(n + 12, w, -1).swapaxes(0, 1)  # (W, n + 12, L 12)
-        r = np.moveaxis(left, 2, 0).reshape(w, -1)
-        scaled = by[:, n:]
-        pull = np.einsum("wkm,wm->wk", scaled, r) - (start - windows.start).T / START_DEVIATION
-        inner = np.asarray(np.linalg.inv(scaled @ scaled.swapaxes(1, 2) + np.eye(12)), np.float64)
-        mixed = scaled @ by[:, :n].swapaxes(1, 2)
-        own = by[:, :n] @ by[:, :n].swapaxes(1, 2)
-        whole = own - mixed.swapaxes(1, 2) @ inner @ mixed
-        scores = np.einsum("wkm,wm->wk", by[:, :n], r) - np.einsum("wkn,wkl,wl->wn", mixed, inner, pull)
-        believed = np.eye(n) + np.outer(unknowns.gauge, unknowns.gauge)
-        return cls(
-            cost=_half(left, start, windows, unknowns, vector),
-            gradient=scores.sum(axis=0) - believed @ vector,
-            information=whole.sum(axis=0) + believed,
-            own_information=whole,
-            scores=scores,
-            residual=residual,
-            state=state[:, :, 0],
-            inner=inner,
-            mixed=mixed,
-            pull=pull,
-        )
-
     def step(self, damping: float) -> tuple[Array, Array]:
         """Changes of the unknowns (size,) and of the beginnings (12, W)."""
         damped = self.information + damping * np.diag(np.diag(self.information))
@@ -256,32 +198,103 @@ class _Linear:
         return result
 
 
-def _wrenches(model: RobotModel, unknowns: Unknowns, windows: Windows, vectors: Array) -> Array:
-    """Wrenches (L, 6, B, W) of B vectors (B, size) that differ from the first in one entry each."""
-    first = model.wrench(unknowns, vectors[0])[windows.step]
-    wrench = np.empty((*first.shape, len(vectors)))
-    wrench[:] = first[..., None]
-    for k, vector in enumerate(vectors[1:], start=1):
-        if unknowns.force[np.argmax(vector != vectors[0])]:
-            wrench[..., k] = model.wrench(unknowns, vector)[windows.step]
-    return np.ascontiguousarray(wrench.transpose(1, 2, 3, 0))
+@dataclass(frozen=True)
+class _Problem:
+    """What is looked for, and what it is held against."""
 
+    model: RobotModel
+    unknowns: Unknowns
+    windows: Windows
+    deviation: Array
 
-def _simulated(model: RobotModel, unknowns: Unknowns, windows: Windows, vector: Array, start: Array) -> Array:
-    """What sensors see of simulated states (L, 12, W)."""
-    wrench = _wrenches(model, unknowns, windows, vector[None])[:, :, 0]
-    with np.errstate(all="ignore"):  # a step too far may make a robot take off
-        current = unknowns.of("current", vector[None]).T
-        state = integrate(start, wrench, model.bodies(unknowns, vector[None]), current, STEP_S)
-        return model.sensed(unknowns, vector[None], state[:, :, None])[:, :, 0]
+    def after(self, at: _Linear, vector: Array, start: Array) -> _Linear:
+        """The problem at other unknowns (size,) and beginnings (12, W); where those cost more, none of it but
+        that is worked out."""
+        cost = self.cost(vector, start)
+        return self.at(vector, start) if cost < at.cost[0] else replace(at, cost=np.array([np.inf]))
 
+    def at(self, vector: Array, start: Array) -> _Linear:
+        """The problem at unknowns (size,) and beginnings (12, W), derivatives by differences."""
+        n, windows, unknowns = self.unknowns.size, self.windows, self.unknowns
+        vectors = np.concatenate([vector[None], vector + DIFFERENCE * np.eye(n)])
+        n_all, w = 1 + n + 12, start.shape[1]
+        wrench = self._wrenches(vectors)
+        wrench = np.concatenate([wrench, np.repeat(wrench[:, :, :1], 12, axis=2)], axis=2)
+        vectors = np.concatenate([vectors, np.repeat(vector[None], 12, axis=0)])
+        begin = np.repeat(start[:, None], n_all, axis=1)
+        for k in range(12):
+            begin[k, 1 + n + k] += DIFFERENCE * START_DEVIATION[k]
+        state, sensed = self._simulated(vectors, wrench, begin)
+        residual = self._residual(sensed[:, :, 0])
+        weighted = _clipped(residual)
+        with np.errstate(invalid="ignore"):  # an outlier pulls with constant force
+            weight = np.where(np.abs(weighted) > CLIP, CLIP / np.abs(weighted), 1.0) / self.deviation[:, None]
+        known = np.isfinite(residual)
+        slopes = (sensed[:, :, 1:] - sensed[:, :, :1]) / DIFFERENCE
+        slopes *= np.where(known, weight, 0.0)[:, :, None]
+        left = np.where(known, weighted, 0.0)
+        by = np.moveaxis(slopes, (2, 3), (0, 1)).reshape(n + 12, w, -1).swapaxes(0, 1)  # (W, n + 12, L 12)
+        r = np.moveaxis(left, 2, 0).reshape(w, -1)
+        scaled = by[:, n:]
+        pull = np.einsum("wkm,wm->wk", scaled, r) - (start - windows.start).T / START_DEVIATION
+        inner = np.asarray(np.linalg.inv(scaled @ scaled.swapaxes(1, 2) + np.eye(12)), np.float64)
+        mixed = scaled @ by[:, :n].swapaxes(1, 2)
+        own = by[:, :n] @ by[:, :n].swapaxes(1, 2)
+        whole = own - mixed.swapaxes(1, 2) @ inner @ mixed
+        scores = np.einsum("wkm,wm->wk", by[:, :n], r) - np.einsum("wkn,wkl,wl->wn", mixed, inner, pull)
+        believed = unknowns.believed
+        return _Linear(
+            cost=np.array([self._half(left, vector, start)]),
+            vector=vector,
+            start=start,
+            gradient=scores.sum(axis=0) - believed @ vector,
+            information=whole.sum(axis=0) + believed,
+            own_information=whole,
+            scores=scores,
+            residual=residual,
+            state=state[:, :, 0],
+            inner=inner,
+            mixed=mixed,
+            pull=pull,
+        )
 
-def _residual(windows: Windows, state: Array, deviation: Array) -> Array:
-    """Measured less simulated (L, 12, W), in deviations."""
-    away = windows.measured - state
-    away[:, ANGLES] = wrapped(away[:, ANGLES])
-    result: Array = away / deviation[:, None]
-    return result
+    def cost(self, vector: Array, start: Array) -> float:
+        """Half the sum of squares at unknowns (size,) and beginnings (12, W)."""
+        with np.errstate(all="ignore"):  # a step too far may make a robot take off
+            _, sensed = self._simulated(vector[None], self._wrenches(vector[None]), start[:, None])
+        if not np.isfinite(sensed).all():  # what is not a number would count as not measured
+            return float("inf")
+        return self._half(_clipped(self._residual(sensed[:, :, 0])), vector, start)
+
+    def _simulated(self, vectors: Array, wrench: Array, start: Array) -> tuple[Array, Array]:
+        """States (L, 12, B, W) of B vectors (B, size) under wrenches (L, 6, B, W) from beginnings (12, B, W),
+        and what sensors see of them."""
+        bodies = Dynamics(*(part[..., None] for part in self.model.bodies(self.unknowns, vectors)))
+        current = self.unknowns.of("current", vectors).T[..., None]
+        state = integrate(start, wrench, bodies, current, STEP_S)
+        return state, self.model.sensed(self.unknowns, vectors, state)
+
+    def _wrenches(self, vectors: Array) -> Array:
+        """Wrenches (L, 6, B, W) of B vectors (B, size) that differ from the first in one entry each."""
+        first = self.model.wrench(self.unknowns, vectors[0])[self.windows.step]
+        wrench = np.empty((*first.shape, len(vectors)))
+        wrench[:] = first[..., None]
+        for k, vector in enumerate(vectors[1:], start=1):
+            if self.unknowns.force[np.argmax(vector != vectors[0])]:
+                wrench[..., k] = self.model.wrench(self.unknowns, vector)[self.windows.step]
+        return np.ascontiguousarray(wrench.transpose(1, 2, 3, 0))
+
+    def _residual(self, sensed: Array) -> Array:
+        """Measured less simulated (L, 12, W), in deviations."""
+        away = self.windows.measured - sensed
+        away[:, ANGLES] = wrapped(away[:, ANGLES])
+        return np.asarray(away / self.deviation[:, None])
+
+    def _half(self, weighted: Array, vector: Array, start: Array) -> float:
+        """Half the cost: residuals, beginnings, and what was believed."""
+        begun = (start - self.windows.start) / START_DEVIATION[:, None]
+        residuals = np.nansum(weighted**2) + (begun**2).sum()
+        return 0.5 * float(residuals + vector @ self.unknowns.believed @ vector)
 
 
 def _clipped(residual: Array) -> Array:
@@ -291,20 +304,3 @@ def _clipped(residual: Array) -> Array:
         far = np.sqrt(np.maximum(2.0 * CLIP * size - CLIP**2, 0.0))
         result: Array = np.sign(residual) * np.where(size > CLIP, far, size)
     return result
-
-
-def _half(weighted: Array, start: Array, windows: Windows, unknowns: Unknowns, vector: Array) -> float:
-    """Half the cost: residuals, beginnings, and what was believed."""
-    begun = (start - windows.start) / START_DEVIATION[:, None]
-    return 0.5 * float(
-        np.nansum(weighted**2) + (begun**2).sum() + vector @ vector + (unknowns.gauge @ vector) ** 2
-    )
-
-
-def _cost(
-    model: RobotModel, unknowns: Unknowns, windows: Windows, deviation: Array, vector: Array, start: Array
-) -> float:
-    state = _simulated(model, unknowns, windows, vector, start)
-    if not np.isfinite(state).all():  # a robot that takes off; what is NaN would count as not measured
-        return float("inf")
-    return _half(_clipped(_residual(windows, state, deviation)), start, windows, unknowns, vector)

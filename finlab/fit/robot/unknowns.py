@@ -116,13 +116,13 @@ class Unknowns:
         """Whether the wrench of the fins depends on each (size,)."""
 
     @cached_property
-    def gauge(self) -> Array:
-        """Its product with a vector (size,) is believed to be 0 +- 1, too: that the common scale of all
-        inertia is as the layout says. Motion cannot tell it, so nothing else must move it."""
+    def believed(self) -> Array:
+        """Inverse covariance (size, size) of what is believed before a swim: each is 0 +- 1, and the common
+        scale of all inertia is as the layout says. Motion cannot tell it, so nothing else must move it."""
         place = self._where["inertia"]
         gauge = np.zeros(self.size)
         gauge[place] = self.scale[place] / (place.stop - place.start) / SAME_SCALE
-        return gauge
+        return np.eye(self.size) + np.outer(gauge, gauge)
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -8,13 +8,12 @@ import pytest
 
 from finlab import load_allocator
 from finlab.cli import main
-from finlab.errors import DataError
-from finlab.fit.robot.fitted_layout import fitted_layout, write_robot
+from finlab.fit.robot.fitted_layout import write_robot
 from finlab.fit.robot.report import strengths, summary, table
 from finlab.fit.robot.robot_fit import RobotFit, fit_robot
 from finlab.fit.robot.swim import Swim, only_new, replay
 from finlab.fit.robot.swim_file import read_swim
-from finlab.layout import Fin, FinModelSpec, Interaction, Layout, load_layout, save_layout
+from finlab.layout import Fin, FinModelSpec, Layout, load_layout, save_layout
 from finlab.layout.angles import wrapped
 from finlab.physics import plant_of
 from tests.fit.robot.swims import swim, write_csv
@@ -84,12 +83,6 @@ def test_the_fitted_layout_allocates_for_the_true_robot(fit: RobotFit, truth: La
     assert missed[1] < missed[0] / 4.0
 
 
-def test_the_hull_moves_with_the_centre(fit: RobotFit, tmp_path: Path) -> None:
-    fitted, tables = fitted_layout(fit, tmp_path / "x.yaml")
-    assert tables == {} and fitted.body is not None and fitted.body.hull is not None
-    np.testing.assert_allclose(fitted.body.hull.center_m, -CENTER, atol=0.004)
-
-
 def test_late_sensors_are_found_out(drawn: Layout, truth: Layout) -> None:
     command, measured = swim(truth, 60.0, seed=1)
     late = measured.copy()
@@ -115,14 +108,6 @@ def test_a_fin_that_never_works_is_said_to_be_unknown(drawn: Layout) -> None:
     assert any("front_left" in doubt for doubt in found.doubts())
     assert "strength of front_left, logarithm" in found.untold()
     assert summary(found)[0].startswith("not to be trusted")
-
-
-def test_a_layout_with_an_interaction_is_not_fitted_again(drawn: Layout) -> None:
-    with pytest.raises(DataError, match="has an interaction already"):
-        fit_robot(
-            replace(drawn, interaction=Interaction()),
-            [Swim("x", np.zeros((1, 2, 3, 3)), np.zeros((1, 12)), np.zeros((1, 3, 3)))],
-        )
 
 
 def test_the_command_reads_a_csv_file(

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from finlab.fit.robot.swim import STEP_S, replay
+from finlab.fit.robot.swim import STEP_S
 from finlab.fit.robot.swing import KINDS, MOMENTS, TERMS, swing_forces
 from finlab.layout import Layout, load_layout
 from finlab.sim.fin_force import MeanForce, RippleForce
@@ -29,21 +29,6 @@ def test_fins_that_beat_steadily_have_no_mean(pair: Layout) -> None:
     assert (np.abs(swings[:, 0, :, KINDS : 2 * KINDS]) < 1e-9).all(), (
         "what changes with the frequency counts from 1 Hz"
     )
-
-
-def test_a_fin_that_turns_meets_drag_square_to_its_direction(pair: Layout) -> None:
-    steps = np.arange(60) * STEP_S
-    command = np.tile([[0.4, 1.5, 0.0], [0.4, 1.5, 0.0]], (60, 1, 1))
-    command[:, 0, 2] = 0.5 * steps
-    command[:, 1, 2] = -0.5 * steps
-    turning = swing_forces(pair, command)[40:, ..., KINDS - 3 : KINDS]
-    angle = replay(pair, command)[40:, ..., 2].mean(axis=1)  # the servo lags
-    along = np.stack([np.cos(angle), np.sin(angle)], axis=-1)[..., None]
-    across = np.stack([-np.sin(angle), np.cos(angle)], axis=-1)[..., None]
-    sideways, ahead = (turning * across).sum(axis=2), (turning * along).sum(axis=2)
-    assert (sideways[:, 0] > 0).all() and (sideways[:, 1] < 0).all()
-    assert (np.abs(ahead) < 0.02 * np.abs(sideways)).all()
-    np.testing.assert_allclose(sideways[:, 0], -sideways[:, 1], rtol=1e-6)
 
 
 def test_a_plates_water_and_drag_are_those_of_the_simulation(pair: Layout) -> None:
