@@ -8,7 +8,7 @@ import numpy as np
 from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.physics.energy import EnergyMeter
-from finlab.physics.plant import plant_of
+from finlab.physics.known_plants import plant_of
 from finlab.physics.wrench import wrench_of_forces
 
 REACHED = 0.01

@@ -86,7 +86,7 @@ class StandardStreams:
                 except BlockingIOError:
                     continue
                 except OSError as error:
-                    raise Unsent(error.strerror) from None
+                    raise Unsent(str(error.strerror)) from None
 
     def _wait(self, wanted: int, timeout: float | None) -> int:
         """Wait for a request, a signal or what is `wanted` of the sink; what came of it, 0 if nothing."""
@@ -135,7 +135,7 @@ class LoopbackUdp:
     def newest(self, timeout: float | None) -> bytes | None:
         """See `Transport`."""
         if not self._stop.came:
-            select.select([self._socket, self._stop], [], [], timeout)
+            select.select([self._socket.fileno(), self._stop.fileno()], [], [], timeout)
         if self._stop.came:
             raise EOFError
         line = None

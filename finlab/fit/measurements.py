@@ -139,6 +139,14 @@ def _repeated(names: list[str]) -> str:
     return next(name for name in names if names.count(name) > 1)
 
 
+def _check_several(name: str, values: Array, unit: str, source: str) -> None:
+    if np.ptp(values) < SAME:
+        raise DataError(
+            f"{source}: column {name} has the one value {values[0]:.4g} {unit}, expected several; a "
+            "fin's force cannot be told from one amplitude or one frequency"
+        )
+
+
 def _checked(read: list[tuple[Columns, tuple[str, ...]]], source: str) -> Measurements:
     """The samples of all files, with what is wrong with them as a whole said in a sentence."""
     files = [columns.values for columns, _ in read]
@@ -153,12 +161,8 @@ def _checked(read: list[tuple[Columns, tuple[str, ...]]], source: str) -> Measur
         raise DataError(f"{source}: {n} samples, expected at least {MIN_SAMPLES}; 300 are a good number")
     amplitude, frequency = gathered("A"), gathered("f")
     assert amplitude is not None and frequency is not None
-    for name, values, unit in (("A", amplitude, "rad"), ("f", frequency, "Hz")):
-        if np.ptp(values) < SAME:
-            raise DataError(
-                f"{source}: column {name} has the one value {values[0]:.4g} {unit}, expected several; a "
-                "fin's force cannot be told from one amplitude or one frequency"
-            )
+    _check_several("A", amplitude, "rad", source)
+    _check_several("f", frequency, "Hz", source)
     phi, sideways = gathered("phi"), gathered("Fx")
     turned = phi is not None and bool(np.ptp(phi) >= SAME_DIRECTION)
     if not turned:

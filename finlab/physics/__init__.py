@@ -4,8 +4,8 @@ from finlab.physics.fin_law import FinLaw as FinLaw
 from finlab.physics.fin_law import PlanarLaw as PlanarLaw
 from finlab.physics.fin_model import make_law as make_law
 from finlab.physics.fin_model import stack_laws as stack_laws
+from finlab.physics.known_plants import plant_of as plant_of
 from finlab.physics.plant import Plant as Plant
-from finlab.physics.plant import plant_of as plant_of
 from finlab.physics.table import TableLaw as TableLaw
 from finlab.physics.table_file import read_table as read_table
 from finlab.physics.table_file import write_table as write_table

@@ -4,7 +4,7 @@ It judges every allocation method, and the model-based methods optimize over it.
 """
 
 from dataclasses import astuple
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,7 @@ from finlab.layout.angles import TURN, is_full_turn
 from finlab.layout.arrays import force_columns
 from finlab.layout.layout import Layout
 from finlab.physics.blade import Blade
-from finlab.physics.fin_model import file_stamps, make_law, stack_laws
+from finlab.physics.fin_model import make_law, stack_laws
 from finlab.physics.wrench import body_force, wrench_of_forces
 
 
@@ -163,22 +163,3 @@ class Plant:
                 "a failed fin has NaN in all three entries, any other has none"
             )
         return values, failed
-
-
-def plant_of(layout: Layout) -> Plant:
-    """Returns the plant of a layout, kept from the last time it was asked for.
-
-    Raises:
-        DataError: a fin's force table cannot be read.
-    """
-    return _made(layout, file_stamps(layout))
-
-
-@lru_cache(maxsize=256)
-def _made(layout: Layout, stamps: tuple[tuple[int, int] | None, ...]) -> Plant:
-    """A plant; tables whose files have changed are read again."""
-    if layout.interaction is None:
-        return Plant(layout)
-    from finlab.physics.coupled_plant import CoupledPlant  # one that few layouts need, built on this one
-
-    return CoupledPlant(layout)

@@ -14,8 +14,9 @@ from finlab.forces.convex_parts import arcs_to_search
 from finlab.forces.envelopes import layout_envelopes
 from finlab.forces.force_space import PlanarProblem, planar_problem
 from finlab.layout import Layout
+from finlab.physics.known_plants import plant_of
 from finlab.physics.objective import CostMeter, Objective
-from finlab.physics.plant import Plant, plant_of
+from finlab.physics.plant import Plant
 
 
 @dataclass(frozen=True)
