@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -33,9 +33,9 @@ def add_experiments(verbs: SubcommandApp, argv: Sequence[str]) -> None:
     asked = argv[1] if argv[:1] == ["eval"] and len(argv) > 1 else ""
     for name in EXPERIMENTS:
         if name == asked or asked.startswith("-"):
-            verbs.command(verb_of(load_experiment(name)), name=name)
+            verbs.command(name=name)(verb_of(load_experiment(name)))
         else:
-            verbs.command(_not_asked, name=name)
+            verbs.command(name=name)(_not_asked)
 
 
 def _not_asked() -> None:
@@ -52,10 +52,12 @@ def verb_of(experiment: Experiment) -> Callable[..., None]:
     def verb(**given: Any) -> None:
         json, picture = given.pop("json"), given.pop("picture", None)
         check_json_file(json)
+        if picture is not None and not picture.absolute().parent.is_dir():
+            raise DataError(f"picture: expected a file in an existing folder, got {picture}")
         begin(experiment.name)
         chosen = {name: _parsed(name, options[name], value) for name, value in given.items()}
-        found = experiment.run(**experiment.check(chosen))
-        coming = isinstance(found, Iterator) and json != STDOUT
+        found = experiment.stream(**chosen)
+        coming = inspect.isgeneratorfunction(experiment.run) and json != STDOUT
         rows = _as_they_come(experiment, found, json) if coming else list(found)
         if picture is not None and experiment.draw is not None:
             experiment.draw(rows).save(picture)
@@ -97,14 +99,13 @@ def _shown(option: inspect.Parameter) -> inspect.Parameter:
     kind, default = option.annotation, option.default
     if is_list(kind):
         text = None if default is None else ",".join(map(str, default))
-        kind, default = (str | None if default is None else str), text
-        kind = Annotated[kind, arg(metavar="A,B,...")]
+        kind, default = Annotated[str if text else str | None, arg(metavar="A,B,...")], text
     else:
         names = {int: "N", float: "X", str: "NAME"}
         if (word := names.get(plain_type(kind))) is not None:
             kind = Annotated[kind, arg(metavar=word)]
     if option.name == "layout":
-        kind = Positional[Annotated[kind, arg(metavar="LAYOUT")]]
+        kind = Annotated[kind, Positional, arg(metavar="LAYOUT")]
     return option.replace(kind=inspect.Parameter.KEYWORD_ONLY, annotation=kind, default=default)
 
 

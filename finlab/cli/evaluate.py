@@ -39,8 +39,7 @@ def report(
     from finlab.evaluation.report.make import make_report
 
     names = [name.strip() for name in sections.split(",") if name.strip()]
-    size = "quick" if quick else "full"
-    print(make_report(out, size=size, seed=seed, names=names, processes=processes))
+    print(make_report(out, size="quick" if quick else "full", seed=seed, names=names, processes=processes))
 
 
 def verbs(argv: Sequence[str]) -> SubcommandApp:

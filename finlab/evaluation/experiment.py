@@ -6,7 +6,8 @@ asked for.
 """
 
 import inspect
-from collections.abc import Callable, Iterable, Mapping, Sequence
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import import_module
 from types import NoneType
@@ -16,23 +17,13 @@ from finlab.errors import DataError
 from finlab.evaluation.plots.style import Picture
 from finlab.evaluation.report.document import Block, Column, Figure, Row, Table
 
-EXPERIMENTS = {
-    "wrench": "wrench",
-    "cost": "cost",
-    "unreachable": "unreachable",
-    "sequences": "sequences",
-    "latency": "latency",
-    "ablation": "ablation",
-    "temperature": "temperature",
-    "trajectory": "trajectory",
-    "faults": "faults",
-    "velocity": "velocity",
-    "swims": "swims",
-    "monitor": "monitor",
-    "fit": "fit",
-    "robots": "robots",
-}
-"""Name -> module in `finlab.evaluation.experiments`, in the order of the report."""
+EXPERIMENTS = (
+    *("wrench", "cost", "unreachable", "sequences", "latency", "ablation", "temperature"),
+    *("trajectory", "faults", "velocity", "swims", "monitor", "fit", "robots"),
+)
+"""Names, which are those of their modules in `finlab.evaluation.experiments`, in the order of the report."""
+MOST, MOST_SEED = 1_000_000, 2**63 - 1
+"""Largest whole number of an option, and of a seed."""
 
 
 @dataclass(frozen=True)
@@ -83,22 +74,29 @@ class Experiment:
         """All options: those chosen, and the defaults of the others.
 
         Raises:
-            DataError: an unknown option, or a whole number below its least.
+            DataError: an unknown option, or a number out of range.
         """
         options = self.options()
         if unknown := [name for name in chosen if name not in options]:
             raise DataError(f"{self.name}: expected options among {', '.join(options)}, got {unknown[0]!r}")
         values = {name: chosen.get(name, each.default) for name, each in options.items()}
         for name, value in values.items():
-            least = 0 if options[name].default == 0 else 1
-            if isinstance(value, int) and not isinstance(value, bool) and value < least:
-                at_least = f"expected a number of at least {least}, got {value}"
-                raise DataError(f"{name.replace('_', '-')}: {at_least}")
+            least, most = 0 if options[name].default == 0 else 1, MOST_SEED if name == "seed" else MOST
+            if type(value) is int and not least <= value <= most:
+                said = f"at least {least}" if value < least else f"at most {most}"
+                raise DataError(f"{name.replace('_', '-')}: expected a number of {said}, got {value}")
+            for number in value if isinstance(value, tuple) else (value,):
+                if isinstance(number, float) and not math.isfinite(number):
+                    raise DataError(f"{name.replace('_', '-')}: expected a finite number, got {number}")
         return values
 
     def rows(self, **chosen: Any) -> list[Row]:
         """Run it; options as in `check`."""
-        return list(self.run(**self.check(chosen)))
+        return list(self.stream(**chosen))
+
+    def stream(self, **chosen: Any) -> Iterator[Row]:
+        """Run it, row by row; options as in `check`. A number that is not finite becomes None."""
+        return map(_finite, self.run(**self.check(chosen)))
 
     def parts(self, chosen: Mapping[str, Any]) -> list[dict[str, Any]]:
         """Options of runs whose rows, one after the other, are those of one run."""
@@ -127,6 +125,15 @@ class Experiment:
         return [*blocks, f"*{self.note}*"] if self.note else blocks
 
 
+def _finite(value: Any) -> Any:
+    """Rows and lists without numbers that JSON does not know."""
+    if isinstance(value, dict):
+        return {key: _finite(each) for key, each in value.items()}
+    if isinstance(value, list):
+        return [_finite(each) for each in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
 def is_list(kind: Any) -> bool:
     """Whether the values of an option of this type are several."""
     return any(getattr(part, "__origin__", part) is tuple for part in (kind, *get_args(kind)))
@@ -145,6 +152,6 @@ def load_experiment(name: str) -> Experiment:
     """The experiment of that name; `DataError` for an unknown one."""
     if name not in EXPERIMENTS:
         raise DataError(f"eval: expected one of {', '.join(EXPERIMENTS)}, got {name!r}")
-    found = import_module(f"finlab.evaluation.experiments.{EXPERIMENTS[name]}").experiment
+    found = import_module(f"finlab.evaluation.experiments.{name}").experiment
     assert isinstance(found, Experiment)
     return found

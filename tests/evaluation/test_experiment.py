@@ -2,6 +2,7 @@
 
 import io
 import json
+import math
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -89,6 +90,11 @@ def test_a_terminal_is_told_before_the_work(monkeypatch: pytest.MonkeyPatch) -> 
         ("wrench --layouts 0 --methods qp", "layouts: expected a number of at least 1, got 0"),
         ("wrench --subsample 0 --methods qp", "subsample: expected a number of at least 1, got 0"),
         ("wrench --seed -1 --methods qp", "seed: expected a number of at least 0, got -1"),
+        ("wrench --targets 1000000000", "targets: expected a number of at most 1000000, got 1000000000"),
+        ("sequences --noise nan", "noise: expected a finite number, got nan"),
+        ("temperature --temperatures 1,x", "temperatures: expected numbers with commas between, got '1,x'"),
+        ("temperature --temperatures 1,inf", "temperatures: expected a finite number, got inf"),
+        ("wrench --methods qp --picture missing/dots.png", "picture: expected a file in an existing folder"),
         (
             "wrench --methods qp --json missing/folder/rows.json",
             "json: expected a file in an existing folder",
@@ -99,6 +105,22 @@ def test_bad_input_is_one_sentence(arguments: str, message: str, capsys: pytest.
     assert main(["eval", *arguments.split()]) == 2
     error = capsys.readouterr().err
     assert error.startswith("finlab: error: ") and message in error and error.count("\n") == 1
+
+
+def test_numbers_that_json_lacks_are_null(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    row = {
+        "split": "id",
+        "method": "qp",
+        "err_norm_mean": math.nan,
+        "err_norm_mean_interval": [0.0, math.inf],
+    }
+    monkeypatch.setattr(wrench, "experiment", replace(load_experiment("wrench"), run=lambda: [row]))
+    assert main(["eval", "wrench", "--json"]) == 0
+    (found,) = json.loads(capsys.readouterr().out)["rows"]
+    assert found == row | {"err_norm_mean": None, "err_norm_mean_interval": [0.0, None]}
+    assert main(["eval", "wrench"]) == 0
 
 
 def test_an_unknown_option_is_named() -> None:

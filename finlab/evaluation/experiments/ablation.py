@@ -1,5 +1,6 @@
 """The paper's ablation: one stage of its pipeline changed at a time, scored by surrogate and plant."""
 
+from collections.abc import Sequence
 from itertools import cycle, islice
 from typing import Any
 
@@ -91,7 +92,7 @@ def run(
     return rows
 
 
-def _printed(rows: list[Row]) -> list[Row]:
+def _printed(rows: Sequence[Row]) -> list[Row]:
     return [
         {
             "variant": variant,

@@ -25,7 +25,7 @@ TRACKED = 1e-3
 """Normalized error up to which a method counts as delivering a target."""
 CHEAPER = 1.0 - 1e-4
 """Cost over the reference's below which a method has won."""
-UNITS = {"power": "W", "effort": "J_en"}
+UNITS: dict[Name, str] = {"power": "W", "effort": "J_en"}
 """What may be kept least, and what its cost is counted in."""
 
 
@@ -76,7 +76,7 @@ def _rows(
     seed: int,
 ) -> list[Row]:
     allocators = load_method_specs(methods, checkpoint, objective, patient=True)
-    aim, best = Objective(objective), []
+    aim, best = Objective(objective), list[Array]()
     found: dict[str, list[tuple[Array, Array]]] = {name: [] for name in allocators}
     for case in progress(cases, "layout", f"{split}, {objective}"):
         sigma = next(iter(allocators.values())).normalization.std if case.sigma is None else case.sigma
@@ -87,11 +87,12 @@ def _rows(
         for name, allocator in allocators.items():
             found[name].append(_answers(allocator, case, aim, sigma))
     group = np.repeat(np.arange(len(cases)), [len(case.targets) for case in cases])
-    return [
-        {"split": split, "objective": f"{objective} [{UNITS[objective]}]", "method": name}
-        | _figures(*(np.concatenate(part) for part in zip(*parts, strict=True)), np.concatenate(best), group)
-        for name, parts in found.items()
-    ]
+    rows: list[Row] = []
+    for name, parts in found.items():
+        cost, error = (np.concatenate(part) for part in zip(*parts, strict=True))
+        about: Row = {"split": split, "objective": f"{objective} [{UNITS[objective]}]", "method": name}
+        rows.append(about | _figures(cost, error, np.concatenate(best), group))
+    return rows
 
 
 def _answers(allocator: Allocator, case: Case, aim: Objective, sigma: Array) -> tuple[Array, Array]:

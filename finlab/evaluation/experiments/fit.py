@@ -218,5 +218,4 @@ experiment = Experiment(
     "out.",
     quick={"fins": 4, "targets": 5},
     full={"fins": 20},
-    timed=True,
 )

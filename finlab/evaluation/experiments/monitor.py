@@ -254,5 +254,4 @@ experiment = Experiment(
     f"nearly rest. Per tick: processor's time of the monitor. {GOALS}",
     quick={"layouts": ("A",), "seeds": 1},
     full={"layouts": ("A", "C"), "seeds": 1},
-    timed=True,
 )

@@ -108,5 +108,4 @@ experiment = Experiment(
     "what fins then truly give. Time: the processor's, the swim included.",
     quick={"plants": ("offset",), "targets": 20},
     each="plants",
-    timed=True,
 )

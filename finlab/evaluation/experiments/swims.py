@@ -160,7 +160,8 @@ def paired_interval(own: Swims, other: Swims, key: str) -> tuple[float, float] |
     if len(by_seed) < 2:
         return None
     means = np.array([np.mean(values) for values in by_seed.values()])
-    return tuple(spread_interval(float(means.mean()), float(means.std(ddof=1)), len(means)))
+    low, high = spread_interval(float(means.mean()), float(means.std(ddof=1)), len(means))
+    return low, high
 
 
 experiment = Experiment(

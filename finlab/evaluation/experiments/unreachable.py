@@ -69,9 +69,8 @@ def run(
         known = [_boundary(case, sigma, factors) for case in progress(cases, "layout", f"{name}, boundary")]
         for method, allocator in allocators.items():
             for policy in KINDS if method in WITH_POLICIES else KINDS[:1]:
-                told = {} if policy == "closest" else {"policy": policy}
                 found = [
-                    _missed(allocator, case, each, sigma, factors, policy, told)
+                    _missed(allocator, case, each, sigma, factors, policy)
                     for case, each in zip(progress(cases, "layout", method), known, strict=True)
                 ]
                 rows += [
@@ -103,11 +102,12 @@ def _missed(
     sigma: Array,
     factors: tuple[float, ...],
     policy: str,
-    told: dict[str, str],
 ) -> Array:
     """What is missed beyond the least (F, D) under a policy."""
     shape = known.targets.shape[:2]
-    answer = allocator.allocate_batch(case.layout, known.targets.reshape(-1, 6), failed=case.failed, **told)
+    answer = allocator.allocate_batch(
+        case.layout, known.targets.reshape(-1, 6), failed=case.failed, policy=policy
+    )
     works = [fin not in case.failed for fin in case.layout.names]
     given = plant_of(case.healthy).wrench(answer.command[:, works]).reshape(*shape, 6) / sigma
     wanted = known.targets / sigma

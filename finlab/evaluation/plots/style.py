@@ -8,6 +8,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from finlab.errors import DataError
+from finlab.whole_file import write_whole
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -88,14 +91,18 @@ class Picture:
         self.figure, self.axes = figure, axes
 
     def save(self, path: Path) -> Path:
-        """Write a PNG with a palette, a third of the size of one with full colours."""
+        """Write a PNG with a palette, a third of the size of one with full colours.
+
+        Raises:
+            DataError: the file cannot be written.
+        """
         from PIL import Image  # comes with matplotlib
 
-        canvas = io.BytesIO()
+        canvas, found = io.BytesIO(), io.BytesIO()
         self.figure.savefig(canvas, format="png", dpi=DPI)
-        Image.open(canvas).convert("RGB").quantize(COLOURS_IN_PNG, Image.Quantize.MAXCOVERAGE).save(
-            path, format="PNG", optimize=True
-        )
+        image = Image.open(canvas).convert("RGB").quantize(COLOURS_IN_PNG, Image.Quantize.MAXCOVERAGE)
+        image.save(found, format="PNG", optimize=True)
+        write_whole(path, found.getvalue(), DataError)
         return path
 
     def svg(self, name: str) -> str:

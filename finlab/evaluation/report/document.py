@@ -67,7 +67,7 @@ class Table:
         value, ends = row.get(column.key), row.get(column.interval or "")
         if value is None:
             return "", ""
-        small = f"{show(ends[0])} – {show(ends[1])}" if ends else ""
+        small = f"{show(ends[0])} – {show(ends[1])}" if ends and None not in ends else ""
         return show(value), small
 
     def in_one_cell(self, row: Row, column: Column) -> str:

@@ -54,7 +54,7 @@ class Part:
         return self.path(folder).is_file()
 
     def record(self, folder: Path) -> dict[str, Any]:
-        """Its `options`, `rows`, and the `seconds` that it took.
+        """Its `options`, `rows`, and the `seconds` of the processor that it took.
 
         Raises:
             DataError: no file, or not one that `run` wrote.
@@ -77,10 +77,10 @@ class Part:
         Raises:
             DataError: the file cannot be written.
         """
-        start = time.perf_counter()
+        start = time.process_time()
         with threadpool_limits(THREADS):
             rows = load_experiment(self.experiment).rows(**self.options)
-        found = {"options": self.options, "rows": rows, "seconds": round(time.perf_counter() - start, 1)}
+        found = {"options": self.options, "rows": rows, "seconds": round(time.process_time() - start, 1)}
         write_whole(self.path(folder), json.dumps(found, indent=1, allow_nan=False) + "\n", DataError)
 
 

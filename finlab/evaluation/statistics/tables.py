@@ -1,5 +1,0 @@
-"""Rows of tables."""
-
-from typing import Any
-
-Row = dict[str, Any]
