@@ -6,13 +6,14 @@ in which one types is made by the other half, `editables.js`.
 
 from collections.abc import Callable
 from functools import partial
-from html import escape
 from importlib.resources import files
 
 import viser
+from markupsafe import Markup
 
 from finlab.errors import FinlabError
 from webapp.mailbox import Mailbox
+from webapp.markup.html import html
 
 SCRIPT = files("webapp").joinpath("editables.js").read_text("utf-8")
 """What runs in the page."""
@@ -25,7 +26,7 @@ Attempt = Callable[[Callable[[], object]], FinlabError | None]
 """Carries out an intent, and gives back why it was refused."""
 
 
-def edit(kind: str, key: str, value: str, label: str, rows: int = 1, at_once: bool = False) -> str:
+def edit(kind: str, key: str, value: str, label: str, rows: int = 1, at_once: bool = False) -> Markup:
     """Attributes of an element whose text can be edited.
 
     Args:
@@ -36,16 +37,21 @@ def edit(kind: str, key: str, value: str, label: str, rows: int = 1, at_once: bo
         rows: lines of the box; more than one take line ends, too.
         at_once: whether one click opens the box, else two.
     """
-    return (
-        f"data-edit='{escape(kind)}' data-key='{escape(key)}' data-value='{escape(value)}' "
-        f"data-rows='{rows}' data-open='{'click' if at_once else 'double'}' tabindex='0' role='button' "
-        f"aria-label='{escape(label)}'"
+    return html(
+        "data-edit='{}' data-key='{}' data-value='{}' data-rows='{}' data-open='{}' tabindex='0' "
+        "role='button' aria-label='{}'",
+        kind,
+        key,
+        value,
+        rows,
+        "click" if at_once else "double",
+        label,
     )
 
 
-def press(kind: str, key: str) -> str:
+def press(kind: str, key: str) -> Markup:
     """Attributes of an element that can be pressed; its text is "", "shift" or "ctrl", what was held."""
-    return f"data-press='{escape(kind)}' data-key='{escape(key)}'"
+    return html("data-press='{}' data-key='{}'", kind, key)
 
 
 class Editables:

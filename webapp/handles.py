@@ -5,13 +5,24 @@ from typing import Any
 
 import numpy as np
 import viser
+from markupsafe import escape
 
 PLAIN = (str, int, float)
 
 
+def add_html(gui: viser.GuiApi, content: str) -> viser.GuiHtmlHandle:
+    """Markup in the page; what is not marked as such is text."""
+    return gui.add_html(str(escape(content)))
+
+
 def put(handle: Any, **values: Any) -> None:
-    """Set properties of a handle, but only those that differ, so that an unchanged page gets no message."""
+    """Set properties of a handle, but only those that differ, so that an unchanged page gets no message.
+
+    Content that is not marked as markup is text.
+    """
     for key, value in values.items():
+        if key == "content":
+            value = str(escape(value))
         if not _same(getattr(handle, key), value):
             setattr(handle, key, value)
 

@@ -7,7 +7,8 @@ from typing import Any
 
 import viser
 
-from webapp.handles import on_user_change
+from webapp.handles import add_html, on_user_change
+from webapp.markup.html import html
 from webapp.markup.picking import marker
 from webapp.viser_internals import run_script, uuid_of
 
@@ -37,7 +38,8 @@ class Mailbox:
         self._gui, self._name, self._script = gui, name, script
         self._kinds, self._hear = [int, *kinds], hear
         self._last = 0
-        gui.add_html(f"<style>div:has(>.{name}) + div {{ display: none; }}</style>{marker(name)}")
+        hidden = "<style>div:has(>.{}) + div {{ display: none; }}</style>{}"
+        add_html(gui, html(hidden, name, marker(name)))
         self._box = gui.add_text(name, "")
         on_user_change(self._box, lambda text: self.read(text) if 0 < len(text) <= longest else None)
 

@@ -4,7 +4,6 @@ or refused in place. The other half, which keeps a box to the user while he type
 import re
 from collections.abc import Callable
 from functools import partial
-from html import escape
 from importlib.resources import files
 from typing import Any, NamedTuple, TypeVar
 
@@ -13,6 +12,7 @@ import viser
 from finlab.errors import FinlabError
 from webapp.handles import on_user_change, put
 from webapp.mailbox import Mailbox
+from webapp.markup.html import html
 from webapp.session.quantities import read_number
 from webapp.viser_internals import uuid_of
 
@@ -154,10 +154,10 @@ class NumberField:
         for place in stale:
             del self._notes[place]
         lines = [
-            f"<div class='{'missing' if note.refused else 'dim'}' role='alert'>{escape(note.text)}</div>"
+            html("<div class='{}' role='alert'>{}</div>", "missing" if note.refused else "dim", note.text)
             for _, note in sorted(self._notes.items())
         ]
-        put(self._note, content=f"<div class='fl note'>{''.join(lines)}</div>")
+        put(self._note, content=html("<div class='fl note'>{}</div>", lines))
         put(self._note, visible=bool(lines) and self.handle.visible)
         return bool(stale)
 

@@ -1,20 +1,21 @@
 """What is asked and delivered: six bars, and the table of commands with one row per fin."""
 
 import math
-from html import escape
 
 import numpy as np
+from markupsafe import Markup
 from numpy.typing import ArrayLike, NDArray
 
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.policy import AXES
 from finlab.arrays import Array
+from webapp.markup.html import html
 from webapp.markup.words import damage_words, saturated
 from webapp.session.state import AXIS_WORDS, State
 from webapp.session.targets import nice_limit
 from webapp.theme import DEAD, css, fin_color, ink
 
-HEADER = (
+HEADER = Markup(
     "<tr><th>fin</th><th title='half amplitude'>A [°]</th><th title='frequency'>f [Hz]</th>"
     "<th title='zero direction'>dir. [°]</th><th>force [N]</th>"
     "<th title='share of the full thrust'>load</th></tr>"
@@ -40,22 +41,28 @@ def wrench_bars(asked: ArrayLike, given: ArrayLike | None, sentence: str) -> str
     rows = [_header(scales)]
     for k in range(6):
         scale = scales[k // 3]
-        rows.append(f"<span>{AXIS_WORDS[k]} <span class='dim'>{AXES[k]}</span></span>")
+        rows.append(html("<span>{} <span class='dim'>{}</span></span>", AXIS_WORDS[k], AXES[k]))
         rows.append(_track(asked[k] / scale, None if given is None else given[k] / scale))
-        rows.append(f"<span class='right asked'>{_value(asked[k], k)}</span>")
-        rows.append(f"<span class='right given'>{'–' if given is None else _value(given[k], k)}</span>")
+        rows.append(html("<span class='right asked'>{}</span>", _value(asked[k], k)))
+        rows.append(
+            html("<span class='right given'>{}</span>", "–" if given is None else _value(given[k], k))
+        )
         rest = None if given is None else _value(asked[k] - given[k], k)
         kind = "missing" if rest is not None and float(rest.replace("−", "-")) else "dim"
-        rows.append(f"<span class='right {kind}'>{'–' if rest is None else rest}</span>")
-    return f"<div class='fl'><div class='bars'>{''.join(rows)}</div><div class='said'>{sentence}</div></div>"
+        rows.append(html("<span class='right {}'>{}</span>", kind, "–" if rest is None else rest))
+    return html(
+        "<div class='fl'><div class='bars'>{}</div><div class='said'>{}</div></div>",
+        rows,
+        sentence,
+    )
 
 
 def _header(scales: list[float]) -> str:
     scale = f"±{scales[0]:g} N, ±{scales[1]:g} N m"
-    return (
-        f"<span class='dim scale'>{scale}</span>"
-        "<b class='right asked'>asked</b><b class='right given'>delivered</b>"
-        "<b class='right missing'>missing</b>"
+    return html(
+        "<span class='dim scale'>{}</span><b class='right asked'>asked</b><b class='right "
+        "given'>delivered</b><b class='right missing'>missing</b>",
+        scale,
     )
 
 
@@ -66,27 +73,33 @@ def _value(value: float, axis: int) -> str:
 
 
 def _track(asked: float, given: float | None) -> str:
-    parts = ["<i style='left:50%;top:0;width:1px;height:14px;background:rgba(128,128,128,.55)'></i>"]
+    parts = [Markup("<i style='left:50%;top:0;width:1px;height:14px;background:rgba(128,128,128,.55)'></i>")]
     parts.append(_bar(0.0, asked, 1, 5, "var(--fl-asked)"))
     if given is not None:
         parts.append(_bar(0.0, given, 8, 5, "var(--fl-delivered)"))
         if abs(asked - given) > 0.02:
             parts.append(_bar(given, asked, 8, 5, "var(--fl-missing)"))
-    return f"<div class='track'>{''.join(parts)}</div>"
+    return html("<div class='track'>{}</div>", parts)
 
 
 def _bar(start: float, end: float, top: int, height: int, color: str) -> str:
     low, high = sorted((float(np.clip(start, -1, 1)), float(np.clip(end, -1, 1))))
-    return (
-        f"<i style='left:{50 + 50 * low:.2f}%;width:{50 * (high - low):.2f}%;"
-        f"top:{top}px;height:{height}px;background:{color}'></i>"
+    return html(
+        "<i style='left:{:.2f}%;width:{:.2f}%;top:{}px;height:{}px;background:{}'></i>",
+        50 + 50 * low,
+        50 * (high - low),
+        top,
+        height,
+        color,
     )
 
 
 def swatch(index: int, failed: bool = False) -> str:
     """The fin's number on its colour."""
     color = DEAD if failed else fin_color(index)
-    return f"<span class='swatch' style='background:{css(color)};color:{ink(color)}'>{index + 1}</span>"
+    return html(
+        "<span class='swatch' style='background:{};color:{}'>{}</span>", css(color), ink(color), index + 1
+    )
 
 
 def fin_table(state: State, allocation: Allocation | None, full: Array, selected: str | None) -> str:
@@ -103,18 +116,18 @@ def fin_table(state: State, allocation: Allocation | None, full: Array, selected
     for i, fin in enumerate(state.layout.fins):
         failed = allocation is not None and not np.isfinite(allocation.command[i, 0])
         kind = " ".join(["dead"] * failed + ["chosen"] * (fin.name == selected))
-        first = f"{swatch(i, failed)}<span class='name' title='{escape(fin.name)}'>{escape(fin.name)}</span>"
+        first = html("{}<span class='name' title='{}'>{}</span>", swatch(i, failed), fin.name, fin.name)
         if not failed and (told := damage_words(state, fin.name)):
-            first += f"<div class='missing damage'>{told}</div>"
+            first += html("<div class='missing damage'>{}</div>", told)
         if allocation is None or limits is None:
-            cells = "<td>–</td>" * 5
+            cells = Markup("<td>–</td>") * 5
         elif failed:
-            cells = "<td colspan='5'>failed</td>"
+            cells = Markup("<td colspan='5'>failed</td>")
         else:
             force = float(np.linalg.norm(allocation.fin_forces[i]))
             cells = _cells(allocation.command[i], limits[i], force, full[i], i)
-        rows.append(f"<tr class='{kind}'><td>{first}</td>{cells}</tr>")
-    return f"<div class='fl'><table class='fins'>{HEADER}{''.join(rows)}</table></div>"
+        rows.append(html("<tr class='{}'><td>{}</td>{}</tr>", kind, first, cells))
+    return html("<div class='fl'><table class='fins'>{}{}</table></div>", HEADER, rows)
 
 
 def _cells(command: Array, limits: NDArray[np.bool_], force: float, full: float, index: int) -> str:
@@ -122,19 +135,27 @@ def _cells(command: Array, limits: NDArray[np.bool_], force: float, full: float,
     degrees = f"{round(math.degrees(direction)):+d}".replace("-", "−")
     share = min(force / max(full, 1e-9), 1.0)
     bar = f"width:{100 * share:.0f}%;background:{css(fin_color(index))}"
-    meter = f"<span class='meter'><i style='{bar}'></i></span>"
-    return (
-        f"<td class='{'full' if limits[0] else ''}'>{math.degrees(amplitude):.1f}</td>"
-        f"<td class='{'full' if limits[1] else ''}'>{frequency:.2f}</td>"
-        f"<td>{_dial(direction)} {degrees}</td><td>{force:.2f}</td><td>{meter}</td>"
+    meter = html("<span class='meter'><i style='{}'></i></span>", bar)
+    return html(
+        "<td class='{}'>{:.1f}</td><td class='{}'>{:.2f}</td><td>{} {}</td><td>{:.2f}</td><td>{}</td>",
+        "full" if limits[0] else "",
+        math.degrees(amplitude),
+        "full" if limits[1] else "",
+        frequency,
+        _dial(direction),
+        degrees,
+        force,
+        meter,
     )
 
 
 def _dial(direction: float) -> str:
     """A small circle with a hand; right is the fin's horizontal thrust axis, up is up."""
     x, y = 7 + 5.5 * math.cos(direction), 7 - 5.5 * math.sin(direction)
-    return (
-        "<svg width='14' height='14' style='vertical-align:-3px'><circle cx='7' cy='7' r='6' fill='none' "
-        "stroke='currentColor' stroke-opacity='.35'/>"
-        f"<line x1='7' y1='7' x2='{x:.1f}' y2='{y:.1f}' stroke='currentColor' stroke-width='1.6'/></svg>"
+    return html(
+        "<svg width='14' height='14' style='vertical-align:-3px'><circle cx='7' cy='7' "
+        "r='6' fill='none' stroke='currentColor' stroke-opacity='.35'/><line x1='7' y1='7' "
+        "x2='{:.1f}' y2='{:.1f}' stroke='currentColor' stroke-width='1.6'/></svg>",
+        x,
+        y,
     )

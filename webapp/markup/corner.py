@@ -1,12 +1,13 @@
 """What lies over the 3D view: the status line, and the legend of colours and scales."""
 
 import math
-from html import escape
 
 import numpy as np
+from markupsafe import Markup
 
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.policy import AXES
+from webapp.markup.html import html
 from webapp.markup.swim_card import pace_words, robots
 from webapp.markup.verdict import WORKING, verdict_of, verdict_sentence
 from webapp.markup.words import error_digits, objective_of, three_digits
@@ -34,23 +35,28 @@ def legend(newtons: float, torque: float, cut: bool, also: tuple[str, ...]) -> s
     """
     # By name, so that the dark theme can lighten them.
     rows = [_key(_arrow(f"var(--fl-{word})", alpha), word) for word, alpha in ARROWS]
-    ring = f"<i>ring </i>{math.degrees(HALF_TURN):.0f}° = {torque:g} N m{', cut off' if cut else ''}"
-    return (
-        f"<div class='fl-legend'>{''.join(rows)}{''.join(also)}</div><div class='dim scales'>"
-        f"<span>{_length(newtons)}</span><span>{ring}</span></div>"
+    ring = html(
+        "<i>ring </i>{:.0f}° = {:g} N m{}", math.degrees(HALF_TURN), torque, ", cut off" if cut else ""
+    )
+    return html(
+        "<div class='fl-legend'>{}{}</div><div class='dim scales'><span>{}</span><span>{}</span></div>",
+        rows,
+        also,
+        _length(newtons),
+        ring,
     )
 
 
 def _length(newtons: float) -> str:
     """What the length of an arrow says; where there is little room, without the word in it."""
-    return f"<i>arrow </i>0.1 m = {newtons:g} N"
+    return html("<i>arrow </i>0.1 m = {:g} N", newtons)
 
 
 def overlay_row(other: Allocation | None, dark: bool) -> str:
     """Whose forces lie over those of the robot."""
     if other is None:
         return ""
-    return _key(_arrow(css(look(dark).overlay), 1.0), f"fins, {escape(other.method)}")
+    return _key(_arrow(css(look(dark).overlay), 1.0), f"fins, {other.method}")
 
 
 def set_rows(findings: Findings | None) -> str:
@@ -62,28 +68,32 @@ def set_rows(findings: Findings | None) -> str:
         asked = findings.question
         other = "before" if asked.beside.name == asked.layout.name else asked.beside.name
         word = "all fins" if asked.failed else other
-        rows.append(_key(_patch(css(DEAD, 0.45)), escape(word)))
-    ball = f"<svg width='44' height='12'><circle cx='22' cy='6' r='5' fill='{css(ASKED)}'/></svg>"
+        rows.append(_key(_patch(css(DEAD, 0.45)), word))
+    ball = html("<svg width='44' height='12'><circle cx='22' cy='6' r='5' fill='{}'/></svg>", css(ASKED))
     unit = "N" if findings.now.kind == "force" else "N m"
     scale = f"body 0.1 m = {three_digits(0.1 / set_scale(findings))} {unit}"
-    rows.append(f"{_key(ball, 'asked in it')}<span class='dim wide'>{scale}</span>")
-    return "".join(rows)
+    rows.append(html("{}<span class='dim wide'>{}</span>", _key(ball, "asked in it"), scale))
+    return Markup().join(rows)
 
 
 def _key(sign: str, words: str) -> str:
     """A row of the legend, which stays together where rows stand beside each other."""
-    return f"<div class='key'>{sign}<span>{words}</span></div>"
+    return html("<div class='key'>{}<span>{}</span></div>", sign, words)
 
 
 def _patch(color: str) -> str:
-    return f"<svg width='44' height='12'><rect x='8' width='28' height='12' rx='3' fill='{color}'/></svg>"
+    return html(
+        "<svg width='44' height='12'><rect x='8' width='28' height='12' rx='3' fill='{}'/></svg>", color
+    )
 
 
 def _arrow(color: str, opacity: float) -> str:
-    return (
-        f"<svg width='44' height='10' opacity='{opacity}'>"
-        f"<rect x='0' y='3' width='33' height='4' fill='{color}'/>"
-        f"<path d='M32 0 L44 5 L32 10 Z' fill='{color}'/></svg>"
+    return html(
+        "<svg width='44' height='10' opacity='{}'><rect x='0' y='3' width='33' height='4' "
+        "fill='{}'/><path d='M32 0 L44 5 L32 10 Z' fill='{}'/></svg>",
+        opacity,
+        color,
+        color,
     )
 
 
@@ -108,12 +118,12 @@ def corner(
         in_reach: whether any command of the working fins gives what is asked.
     """
     fins = f"{len(state.healthy)} of {state.layout.n_fins} fins"
-    parts = [f"<span class='aside'>{fins}</span>"]
+    parts = [html("<span class='aside'>{}</span>", fins)]
     if error is not None:
-        parts.append(f"<span class='missing'>{escape(error)}</span>")
+        parts.append(html("<span class='missing'>{}</span>", error))
     elif busy or allocation is None:  # an old verdict would be taken for that of the new question
-        parts.append(f"<span class='aside'><span class='dim'>{state.method}</span></span>")
-        parts.append(f"<span class='pill' style='background:{css(DEAD)}'>{WORKING}</span>")
+        parts.append(html("<span class='aside'><span class='dim'>{}</span></span>", state.method))
+        parts.append(html("<span class='pill' style='background:{}'>{}</span>", css(DEAD), WORKING))
     else:
         parts += _figures(allocation, least, in_reach)
     return _cards(legend, parts)
@@ -130,26 +140,33 @@ def _figures(allocation: Allocation, least: bool, in_reach: bool) -> list[str]:
     costs = []
     for word, value, unit in (("power", allocation.power, " W"), ("effort", allocation.energy, "")):
         kept = f"least {word}" if word == objective_of(allocation) and least else word
-        cost = f"<b class='{word}'>{three_digits(value)}</b>{unit}"
-        costs.append(f"<span><span class='dim'>{kept}</span> {cost}</span>")
-    method, ms = escape(allocation.method), allocation.solve_ms
+        cost = html("<b class='{}'>{}</b>{}", word, three_digits(value), unit)
+        costs.append(html("<span><span class='dim'>{}</span> {}</span>", kept, cost))
+    method, ms = allocation.method, allocation.solve_ms
     time = f"{ms:.2g}" if ms < 10.0 else f"{ms:.0f}"  # no measurement repeats to a third digit
     return [
-        f"<span title='missing, by the fins’ own laws: {rest}'><span class='dim'>error</span> "
-        f"<b class='err'>{error_digits(allocation.err_norm)}</b> σ</span>",
+        html(
+            "<span title='missing, by the fins’ own laws: {}'><span class='dim'>error</span> <b "
+            "class='err'>{}</b> σ</span>",
+            rest,
+            error_digits(allocation.err_norm),
+        ),
         *costs,
-        f"<span class='aside'><span class='dim'>{method}</span> {time} ms</span>",
-        f"<span class='{pill}' style='background:{css(color)}'>{escape(verdict)}</span>",
+        html("<span class='aside'><span class='dim'>{}</span> {} ms</span>", method, time),
+        html("<span class='{}' style='background:{}'>{}</span>", pill, css(color), verdict),
     ]
 
 
 def swim_corner(swimming: Swimming, newtons: float) -> str:
     """The same while robots swim."""
     first, shown = swimming.swimmers[0], swimming.seen[0]
-    trails = "".join(
+    trails = Markup().join(
         _key(
-            f"<svg width='44' height='10'><path d='M0 5H44' stroke='{css(color)}' stroke-width='3.5'/></svg>",
-            escape(word),
+            html(
+                "<svg width='44' height='10'><path d='M0 5H44' stroke='{}' stroke-width='3.5'/></svg>",
+                css(color),
+            ),
+            word,
         )
         for word, color in (
             ("the path", ASKED),
@@ -163,18 +180,20 @@ def swim_corner(swimming: Swimming, newtons: float) -> str:
     off = f"{100 * float(shown.record[-1, ERROR]):.1f}" if len(shown.record) else "–"
     power = "–" if shown.figures is None else f"{shown.figures.now_w:.1f}"
     parts = [
-        f"<span>{alive} of {len(first.fins)} fins</span>",
-        f"<span><b>{shown.time:.1f}</b> s of {first.duration_s:.0f} s</span>",
-        f"<span><span class='dim'>off the path</span> <b>{off}</b> cm</span>",
-        f"<span><span class='dim'>power</span> <b>{power}</b> W</span>",
-        f"<span>{pace_words(swimming)}</span>",
+        html("<span>{} of {} fins</span>", alive, len(first.fins)),
+        html("<span><b>{:.1f}</b> s of {:.0f} s</span>", shown.time, first.duration_s),
+        html("<span><span class='dim'>off the path</span> <b>{}</b> cm</span>", off),
+        html("<span><span class='dim'>power</span> <b>{}</b> W</span>", power),
+        html("<span>{}</span>", pace_words(swimming)),
     ]
-    scale = f"<div class='dim scales'><span>{_length(newtons)}</span></div>"
-    return _cards(f"<div class='fl-legend'>{trails}</div>{scale}", parts)
+    scale = html("<div class='dim scales'><span>{}</span></div>", _length(newtons))
+    return _cards(html("<div class='fl-legend'>{}</div>{}", trails, scale), parts)
 
 
 def _cards(legend: str, status: list[str]) -> str:
-    return (
-        f"<div class='fl-corner'><div class='fl fl-card fl-legend-card'>{legend}</div>"
-        f"<div class='fl fl-card fl-status'>{''.join(status)}</div></div>"
+    return html(
+        "<div class='fl-corner'><div class='fl fl-card fl-legend-card'>{}</div><div "
+        "class='fl fl-card fl-status'>{}</div></div>",
+        legend,
+        status,
     )

@@ -2,25 +2,36 @@
 
 import time
 from collections.abc import Sequence
-from html import escape
+
+from markupsafe import Markup
 
 from webapp.editables import edit, press
+from webapp.markup.html import html
 from webapp.tasks.designs import Recent
 
 
 def design_card(name: str, about: str, recent: Sequence[Recent]) -> str:
     """The name to save under, what is said of the design, and the recent ones."""
     box = edit("save-as", "", name, "save under this name", at_once=True)
-    rows = "".join(
-        f"<div class='pick recent' role='button' tabindex='0' {press('design-recent', str(k))}>"
-        f"<b>{escape(one.name)}</b><span class='dim'>{one.fins} fins, {_ago(one.when)}</span></div>"
+    rows = Markup().join(
+        html(
+            "<div class='pick recent' role='button' tabindex='0' {}><b>{}</b><span "
+            "class='dim'>{} fins, {}</span></div>",
+            press("design-recent", str(k)),
+            one.name,
+            one.fins,
+            _ago(one.when),
+        )
         for k, one in enumerate(recent)
     )
-    lately = f"<div class='dim said'>Lately in this browser</div>{rows}" if rows else ""
-    return (
-        f"<div class='fl'><div class='save-as'><span class='dim'>Save as</span>"
-        f"<span class='edit box' {box}>{escape(name)}</span></div>"
-        f"<div class='dim said'>{escape(about)}</div>{lately}</div>"
+    lately = html("<div class='dim said'>Lately in this browser</div>{}", rows) if rows else ""
+    return html(
+        "<div class='fl'><div class='save-as'><span class='dim'>Save as</span><span "
+        "class='edit box' {}>{}</span></div><div class='dim said'>{}</div>{}</div>",
+        box,
+        name,
+        about,
+        lately,
     )
 
 

@@ -2,9 +2,11 @@
 while files are dragged over it."""
 
 from collections.abc import Sequence
-from html import escape
+
+from markupsafe import Markup
 
 from webapp.editables import press
+from webapp.markup.html import html
 
 TRIES = (
     ("Ask for a wrench", "Drag Fx: the fins change, and green follows blue.", "Allocate"),
@@ -16,17 +18,23 @@ TRIES = (
 
 def welcome() -> str:
     """The card of the first visit; `habits.js` shows it once."""
-    tries = "".join(
-        f"<li><button {press('task', task)} onclick='finlabFrame.met()'>{escape(title)}</button>"
-        f"<span>{escape(text)}</span></li>"
+    tries = Markup().join(
+        html(
+            "<li><button {} onclick='finlabFrame.met()'>{}</button><span>{}</span></li>",
+            press("task", task),
+            title,
+            text,
+        )
         for title, text, task in TRIES
     )
-    return (
-        "<section class='fl fl-welcome' aria-label='Welcome'><h2>finlab</h2>"
-        "<p>For robots that swim with fins: say which force and torque the body shall feel, and see "
-        f"how each fin has to flap.</p><ol>{tries}</ol><div class='row'>"
-        f"<button class='primary' {press('tour', '')} onclick='finlabFrame.met()'>Take the tour</button>"
-        "<button onclick='finlabFrame.met()'>Close</button></div></section>"
+    return html(
+        "<section class='fl fl-welcome' aria-label='Welcome'><h2>finlab</h2><p>For robots "
+        "that swim with fins: say which force and torque the body shall feel, and see how "
+        "each fin has to flap.</p><ol>{}</ol><div class='row'><button class='primary' {} "
+        "onclick='finlabFrame.met()'>Take the tour</button><button "
+        "onclick='finlabFrame.met()'>Close</button></div></section>",
+        tries,
+        press("tour", ""),
     )
 
 
@@ -38,8 +46,10 @@ def drop_card() -> str:
         ("A hull", "STL, OBJ, GLB or PLY", "becomes this robot's"),
         ("A path", "CSV with t, x, y, z", "is swum"),
     )
-    rows = "".join(f"<li><b>{a}</b> {c}<span>{b}</span></li>" for a, b, c in kinds)
-    return f"<div class='fl fl-drop' aria-hidden='true'><div><h2>Drop to open</h2><ul>{rows}</ul></div></div>"
+    rows = Markup().join(html("<li><b>{}</b> {}<span>{}</span></li>", a, c, b) for a, b, c in kinds)
+    return html(
+        "<div class='fl fl-drop' aria-hidden='true'><div><h2>Drop to open</h2><ul>{}</ul></div></div>", rows
+    )
 
 
 def key_sheet(rows: Sequence[tuple[str, str, str]]) -> str:
@@ -50,11 +60,13 @@ def key_sheet(rows: Sequence[tuple[str, str, str]]) -> str:
     for group, label, keys in (*rows, *camera, *about):
         if keys:
             keys = "Ctrl+Y" if label == "Redo" else keys
-            groups.setdefault(group, []).append(f"<dt><kbd>{escape(keys)}</kbd></dt><dd>{escape(label)}</dd>")
-    lists = "".join(
-        f"<div><h3>{escape(group)}</h3><dl>{''.join(found)}</dl></div>" for group, found in groups.items()
+            groups.setdefault(group, []).append(html("<dt><kbd>{}</kbd></dt><dd>{}</dd>", keys, label))
+    lists = Markup().join(
+        html("<div><h3>{}</h3><dl>{}</dl></div>", group, found) for group, found in groups.items()
     )
-    return (
-        "<div class='fl fl-sheet' role='dialog' aria-label='Keys' onclick='finlabFrame.sheet(false)'>"
-        f"<div class='sheet'><h2>Keys</h2><div class='groups'>{lists}</div></div></div>"
+    return html(
+        "<div class='fl fl-sheet' role='dialog' aria-label='Keys' "
+        "onclick='finlabFrame.sheet(false)'><div class='sheet'><h2>Keys</h2><div "
+        "class='groups'>{}</div></div></div>",
+        lists,
     )

@@ -1,12 +1,13 @@
 """What a fit of a fin is worth: the verdict first, samples and fit in a plot, and what to measure next."""
 
 import math
-from html import escape
 
 import numpy as np
+from markupsafe import Markup
 
 from finlab.fit.fin_fit import BAND, FinFit
 from finlab.fit.thrust_curves import ThrustCurve
+from webapp.markup.html import html
 from webapp.markup.mode_plot import BOTTOM, RIGHT, TOP, WIDTH, axes, cost_axis
 from webapp.markup.words import three_digits
 from webapp.tasks.fitting import Fitted
@@ -22,26 +23,33 @@ MOST_NAMED = 8
 
 def fit_card(found: Fitted) -> str:
     """What came of a file that was dropped on a fin."""
-    name, fin = escape(found.upload.name), escape(found.upload.fin)
+    name, fin = found.upload.name, found.upload.fin
     if found.fit is None:
-        said = f"<b>{name} is a finished force table.</b> It is on {fin} as it stands. Fit it if it is noisy."
-        return f"<div class='fl said'>{said}</div>"
+        said = html(
+            "<b>{} is a finished force table.</b> It is on {} as it stands. Fit it if it is noisy.", name, fin
+        )
+        return html("<div class='fl said'>{}</div>", said)
     fit = found.fit
     if fit.doubts:
-        verdict = f"<b class='missing'>Not to be trusted: {escape('; '.join(fit.doubts))}.</b>"
+        verdict = html("<b class='missing'>Not to be trusted: {}.</b>", "; ".join(fit.doubts))
     else:
-        verdict = "<b class='given'>May be trusted within what was measured.</b>"
-    parts = [f"<div class='said'>{verdict}</div>", _figures(fit), thrust_plot(found.curves), _left_out(fit)]
+        verdict = Markup("<b class='given'>May be trusted within what was measured.</b>")
+    parts = [
+        html("<div class='said'>{}</div>", verdict),
+        _figures(fit),
+        thrust_plot(found.curves),
+        _left_out(fit),
+    ]
     if found.thin:
-        parts.append(f"<div class='said missing'>Data are thin at {escape('; '.join(found.thin))}.</div>")
+        parts.append(html("<div class='said missing'>Data are thin at {}.</div>", "; ".join(found.thin)))
     if found.advice is not None:
         parts.append(_advice(found))
-    parts += [f"<div class='said dim'>{_sentence(note)}</div>" for note in fit.measurements.notes]
-    return f"<div class='fl'>{''.join(parts)}</div>"
+    parts += [html("<div class='said dim'>{}</div>", _sentence(note)) for note in fit.measurements.notes]
+    return html("<div class='fl'>{}</div>", parts)
 
 
 def _sentence(note: str) -> str:
-    return f"{escape(note[:1].upper() + note[1:])}."
+    return f"{note[:1].upper() + note[1:]}."
 
 
 def _figures(fit: FinFit) -> str:
@@ -51,27 +59,39 @@ def _figures(fit: FinFit) -> str:
         ("unseen samples within the 95 % band", f"{100.0 * fit.coverage():.0f} %"),
         (f"largest force of {len(fit.measurements)} samples", f"{three_digits(fit.largest)} N"),
     )
-    return f"<table>{''.join(f'<tr><td>{a}</td><td>{b}</td></tr>' for a, b in rows)}</table>"
+    return html(
+        "<table>{}</table>", Markup().join((html("<tr><td>{}</td><td>{}</td></tr>", a, b) for a, b in rows))
+    )
 
 
 def _left_out(fit: FinFit) -> str:
     if not fit.outliers:
-        return "<div class='said'>No sample was left out.</div>"
+        return Markup("<div class='said'>No sample was left out.</div>")
     named = ", ".join(fit.outliers[:MOST_NAMED]) + (" …" if len(fit.outliers) > MOST_NAMED else "")
     many = "sample contradicts" if len(fit.outliers) == 1 else "samples contradict"
-    return f"<div class='said'>{len(fit.outliers)} {many} the others: {escape(named)}.</div>"
+    return html("<div class='said'>{} {} the others: {}.</div>", len(fit.outliers), many, named)
 
 
 def _advice(found: Fitted) -> str:
     assert found.fit is not None and found.advice is not None
     force = np.linalg.norm(found.fit.predict(found.advice)[0], axis=-1)
-    rows = "".join(
-        f"<tr><td>{k}</td><td>{a:.2f}</td><td>{f:.2f}</td><td>{math.degrees(phi):.0f}</td>"
-        f"<td>{three_digits(float(size))}</td></tr>".replace("-", "−")
+    rows = Markup().join(
+        html(
+            "<tr><td>{}</td><td>{:.2f}</td><td>{:.2f}</td><td>{:.0f}</td><td>{}</td></tr>",
+            k,
+            a,
+            f,
+            math.degrees(phi),
+            three_digits(float(size)),
+        ).replace("-", "−")
         for k, ((a, f, phi), size) in enumerate(zip(found.advice, force, strict=True), start=1)
     )
-    head = "<tr><th></th><th>A [rad]</th><th>f [Hz]</th><th>direction [°]</th><th>expected [N]</th></tr>"
-    return f"<div class='said'>Measure next, the most telling first:</div><table>{head}{rows}</table>"
+    head = Markup(
+        "<tr><th></th><th>A [rad]</th><th>f [Hz]</th><th>direction [°]</th><th>expected [N]</th></tr>"
+    )
+    return html(
+        "<div class='said'>Measure next, the most telling first:</div><table>{}{}</table>", head, rows
+    )
 
 
 def thrust_plot(curves: tuple[ThrustCurve, ...]) -> str:
@@ -93,17 +113,23 @@ def thrust_plot(curves: tuple[ThrustCurve, ...]) -> str:
 
     parts = [axes(across, up, LEFT, HEIGHT, upright=False)]
     for curve, color in zip(curves, COLORS, strict=False):
-        dots = "".join(f"<circle cx='{x(a):.1f}' cy='{y(v):.1f}' r='1.7'/>" for a, v in curve.samples)
-        parts.append(f"<g fill='{css(color, 0.5)}'>{dots}</g>")
+        dots = Markup().join(
+            html("<circle cx='{:.1f}' cy='{:.1f}' r='1.7'/>", x(a), y(v)) for a, v in curve.samples
+        )
+        parts.append(html("<g fill='{}'>{}</g>", css(color, 0.5), dots))
     for k, (curve, color) in enumerate(zip(curves, COLORS, strict=False)):
         band, a = BAND * curve.deviation, curve.amplitude
         outline = f"{path(curve.thrust + band, a)} {path((curve.thrust - band)[::-1], a[::-1])}"
-        parts.append(f"<polygon points='{outline}' fill='{css(color, 0.22)}'/>")
+        parts.append(html("<polygon points='{}' fill='{}'/>", outline, css(color, 0.22)))
         parts.append(
-            f"<polyline points='{path(curve.thrust, a)}' fill='none' stroke='{css(color)}' stroke-width='2'/>"
+            html(
+                "<polyline points='{}' fill='none' stroke='{}' stroke-width='2'/>",
+                path(curve.thrust, a),
+                css(color),
+            )
         )
         place = LEFT + 116 * k
-        parts.append(f"<rect x='{place}' y='7' width='14' height='5' rx='2' fill='{css(color)}'/>")
+        parts.append(html("<rect x='{}' y='7' width='14' height='5' rx='2' fill='{}'/>", place, css(color)))
         low, high = curve.band
-        parts.append(f"<text x='{place + 19}' y='14'>{low:.1f} to {high:.1f} Hz</text>")
-    return f"<svg class='plot' viewBox='0 0 {WIDTH} {HEIGHT}'>{''.join(parts)}</svg>"
+        parts.append(html("<text x='{}' y='14'>{:.1f} to {:.1f} Hz</text>", place + 19, low, high))
+    return html("<svg class='plot' viewBox='0 0 {} {}'>{}</svg>", WIDTH, HEIGHT, parts)

@@ -1,8 +1,9 @@
 """The cards of the tour and of lessons: what is to be seen, what to do, and the way on."""
 
-from html import escape
+from markupsafe import Markup
 
 from webapp.editables import press
+from webapp.markup.html import html
 from webapp.session.lessons import LESSONS, Lesson
 from webapp.session.tour import STEPS
 
@@ -14,7 +15,7 @@ def tour_card(index: int) -> str:
     ways.append(_button("Finish" if last else "Next", "tour", primary=True))
     ways += [] if last else [_button("End the tour", "end")]
     title = f"{index + 1} of {len(STEPS)} · {step.title}"
-    return _card("fl-tour tour", title, f"<p>{escape(step.text)}</p>", ways)
+    return _card("fl-tour tour", title, html("<p>{}</p>", step.text), ways)
 
 
 def lesson_card(lesson: Lesson, solved: bool) -> str:
@@ -22,10 +23,13 @@ def lesson_card(lesson: Lesson, solved: bool) -> str:
     place = LESSONS.index(lesson) + 1
     mark, praise = "○", ""
     if solved:
-        mark, praise = "✓", f"<p role='status'>{escape(lesson.praise)}</p>"
-    text = (
-        f"<p>{escape(lesson.text)}</p>"
-        f"<p class='exercise'><span class='mark'>{mark}</span>{escape(lesson.exercise)}</p>{praise}"
+        mark, praise = "✓", html("<p role='status'>{}</p>", lesson.praise)
+    text = html(
+        "<p>{}</p><p class='exercise'><span class='mark'>{}</span>{}</p>{}",
+        lesson.text,
+        mark,
+        lesson.exercise,
+        praise,
     )
     onward = "Finish" if place == len(LESSONS) else "Next lesson"
     ways = [_button(onward, "lesson-next", primary=solved), _button("Close", "lesson-close")]
@@ -34,9 +38,9 @@ def lesson_card(lesson: Lesson, solved: bool) -> str:
 
 
 def _card(kind: str, title: str, text: str, ways: list[str]) -> str:
-    buttons = "".join(ways)
-    return f"<div class='fl {kind}'><b>{escape(title)}</b>{text}<div class='row'>{buttons}</div></div>"
+    buttons = Markup().join(ways)
+    return html("<div class='fl {}'><b>{}</b>{}<div class='row'>{}</div></div>", kind, title, text, buttons)
 
 
 def _button(label: str, word: str, primary: bool = False) -> str:
-    return f"<button {'class=primary' * primary} {press(word, '')}>{label}</button>"
+    return html("<button {} {}>{}</button>", "class=primary" * primary, press(word, ""), label)

@@ -4,10 +4,12 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from markupsafe import Markup
 
 from finlab.allocation.allocation import Allocation
 from finlab.arrays import Array
 from webapp.editables import press
+from webapp.markup.html import html
 from webapp.markup.words import objective_of
 from webapp.tasks.mode_names import Modes
 from webapp.theme import DEAD, Rgb, css, mode_color
@@ -70,7 +72,7 @@ def error_axis(logs: Array) -> Axis:
     for power in range(low, high + 1, max(1, round((high - low) / 5))):
         below = "≤" if 10.0**power <= EXACT else ""
         raised = str(power).replace("-", "−")
-        ticks.append((float(power), f"{below}10<tspan dy='-4' font-size='8'>{raised}</tspan>"))
+        ticks.append((float(power), html("{}10<tspan dy='-4' font-size='8'>{}</tspan>", below, raised)))
     margin = 0.06 * (high - low)
     return Axis("error [σ]", low - margin, high + margin, tuple(ticks))
 
@@ -117,7 +119,7 @@ def mode_plot(
         dots = [place(point) if close else None for point, close in zip(raw, near, strict=True)]
         parts.append(_sample_dots(dots, modes))
     parts += _mode_dots([place(point) for point in refined], height - BOTTOM, shown)
-    return f"<div class='fl'><svg class='plot' viewBox='0 0 {WIDTH} {height}'>{''.join(parts)}</svg></div>"
+    return html("<div class='fl'><svg class='plot' viewBox='0 0 {} {}'>{}</svg></div>", WIDTH, height, parts)
 
 
 def _mode_dots(places: list[Point], floor: float, shown: int) -> list[str]:
@@ -126,14 +128,25 @@ def _mode_dots(places: list[Point], floor: float, shown: int) -> list[str]:
     labels = _labels(places, floor)
     for k, ((x, y), (u, v)) in reversed(list(enumerate(zip(places, labels, strict=True)))):
         color = css(mode_color(k))
-        way = f"d='M{x:.1f} {y:.1f}L{u:.1f} {v:.1f}'"
-        line = f"<path {way} stroke='{color}'/>" if math.dist((x, y), (u, v)) > FAR_PX else ""
+        way = html("d='M{:.1f} {:.1f}L{:.1f} {:.1f}'", x, y, u, v)
+        line = html("<path {} stroke='{}'/>", way, color) if math.dist((x, y), (u, v)) > FAR_PX else ""
         parts.append(
             # What is between a dot and its number can be clicked, too.
-            f"<g class='pick' {press('mode', str(k))}>"
-            f"<path {way} stroke='transparent' stroke-width='12'/>{line}"
-            f"<circle cx='{x:.1f}' cy='{y:.1f}' r='{DOT}' class='mode' fill='{color}'/>"
-            f"<text x='{u:.1f}' y='{v + 3.8:.1f}' class='digit' text-anchor='middle'>{k + 1}</text></g>"
+            html(
+                "<g class='pick' {}><path {} stroke='transparent' stroke-width='12'/>{}<circle "
+                "cx='{:.1f}' cy='{:.1f}' r='{}' class='mode' fill='{}'/><text x='{:.1f}' y='{:.1f}' "
+                "class='digit' text-anchor='middle'>{}</text></g>",
+                press("mode", str(k)),
+                way,
+                line,
+                x,
+                y,
+                DOT,
+                color,
+                u,
+                v + 3.8,
+                k + 1,
+            )
         )
         if k == shown:
             parts.append(_ring(x, y, DOT + 3.0))
@@ -153,17 +166,21 @@ def _logarithm(error: Array) -> Array:
 def _sample_dots(places: list[Point | None], modes: Modes) -> str:
     """Raw samples, and how many have no place in the plot."""
     dots = [
-        f"<circle cx='{place[0]:.1f}' cy='{place[1]:.1f}' r='3' fill='{css(color, 0.6)}'/>"
+        html("<circle cx='{:.1f}' cy='{:.1f}' r='3' fill='{}'/>", place[0], place[1], css(color, 0.6))
         for place, color in zip(places, sample_colors(modes, len(places)), strict=True)
         if place is not None
     ]
     beyond = len(places) - len(dots)
-    told = f"<text x='{WIDTH - RIGHT}' y='14' text-anchor='end'>{beyond} dearer →</text>" if beyond else ""
-    return f"<g class='samples'>{''.join(dots)}</g>{told}"
+    told = (
+        html("<text x='{}' y='14' text-anchor='end'>{} dearer →</text>", WIDTH - RIGHT, beyond)
+        if beyond
+        else ""
+    )
+    return html("<g class='samples'>{}</g>{}", dots, told)
 
 
 def _ring(x: float, y: float, radius: float) -> str:
-    return f"<circle class='ring' cx='{x:.1f}' cy='{y:.1f}' r='{radius:g}'/>"
+    return html("<circle class='ring' cx='{:.1f}' cy='{:.1f}' r='{:g}'/>", x, y, radius)
 
 
 def _labels(places: list[Point], floor: float) -> list[Point]:
@@ -191,10 +208,10 @@ def _labels(places: list[Point], floor: float) -> list[Point]:
 def _legend(sampled: bool) -> str:
     parts = []
     for word, radius, place in LEGEND if sampled else LEGEND[:-1]:
-        dot = f"<circle cx='{LEFT + place}' cy='10' r='{radius}' fill='currentColor' opacity='.55'/>"
+        dot = html("<circle cx='{}' cy='10' r='{}' fill='currentColor' opacity='.55'/>", LEFT + place, radius)
         parts.append(dot if radius else _ring(LEFT + place, 10, 5.5))
-        parts.append(f"<text x='{LEFT + place + 9}' y='14'>{word}</text>")
-    return "".join(parts)
+        parts.append(html("<text x='{}' y='14'>{}</text>", LEFT + place + 9, word))
+    return Markup().join(parts)
 
 
 def axes(across: Axis, up: Axis, left: float, height: float, *, upright: bool = True) -> str:
@@ -203,14 +220,18 @@ def axes(across: Axis, up: Axis, left: float, height: float, *, upright: bool = 
     floor, parts = height - BOTTOM, []
     for value, label in up.ticks:
         at = floor - up.share(value) * (floor - TOP)
-        parts.append(f"<path d='M{left} {at:.1f}H{WIDTH - RIGHT}' class='grid'/>")
-        parts.append(f"<text x='{left - 5}' y='{at + 4:.1f}' text-anchor='end'>{label}</text>")
+        parts.append(html("<path d='M{} {:.1f}H{}' class='grid'/>", left, at, WIDTH - RIGHT))
+        parts.append(html("<text x='{}' y='{:.1f}' text-anchor='end'>{}</text>", left - 5, at + 4, label))
     for value, label in across.ticks:
         at = left + across.share(value) * (WIDTH - left - RIGHT)
         if upright:
-            parts.append(f"<path d='M{at:.1f} {TOP}V{floor}' class='grid'/>")
-        parts.append(f"<text x='{at:.1f}' y='{floor + 14}' text-anchor='middle'>{label}</text>")
+            parts.append(html("<path d='M{:.1f} {}V{}' class='grid'/>", at, TOP, floor))
+        parts.append(html("<text x='{:.1f}' y='{}' text-anchor='middle'>{}</text>", at, floor + 14, label))
     turned = f"translate(10 {(TOP + floor) / 2}) rotate(-90)"
-    parts.append(f"<text x='{(left + WIDTH) / 2}' y='{height - 5}' text-anchor='middle'>{across.word}</text>")
-    parts.append(f"<text transform='{turned}' text-anchor='middle'>{up.word}</text>")
-    return "".join(parts)
+    parts.append(
+        html(
+            "<text x='{}' y='{}' text-anchor='middle'>{}</text>", (left + WIDTH) / 2, height - 5, across.word
+        )
+    )
+    parts.append(html("<text transform='{}' text-anchor='middle'>{}</text>", turned, up.word))
+    return Markup().join(parts)

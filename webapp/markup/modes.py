@@ -1,8 +1,9 @@
 """The modes of an answer as a table."""
 
-from html import escape
+from markupsafe import Markup
 
 from webapp.editables import press
+from webapp.markup.html import html
 from webapp.markup.words import error_digits, source_words, three_digits
 from webapp.tasks.mode_names import Modes
 from webapp.theme import css, mode_color
@@ -17,26 +18,35 @@ def mode_table(modes: Modes, searching: bool, shown: int) -> str:
         shown: which mode moves the fins.
     """
     if not modes.shown:
-        return "<div class='fl dim'>This method gives one answer and no candidates.</div>"
+        return Markup("<div class='fl dim'>This method gives one answer and no candidates.</div>")
     rows = []
     for k, (mode, name) in enumerate(modes.shown):
         kind = "chosen" if k == shown else ""
-        origin = f"<div class='dim'>{escape(source_words(mode.sources))}</div>"
+        origin = html("<div class='dim'>{}</div>", source_words(mode.sources))
         rows.append(
-            f"<tr class='{kind} pick' {press('mode', str(k))} tabindex='0'><td>{_swatch(k)}</td>"
-            f"<td class='words'>{escape(name)}{origin}</td>"
-            f"<td>{error_digits(mode.err_norm)}</td><td>{three_digits(mode.power)}</td>"
-            f"<td>{three_digits(mode.energy)}</td><td>{100 * mode.saturation:.0f} %</td></tr>"
+            html(
+                "<tr class='{} pick' {} tabindex='0'><td>{}</td><td class='words'>{}{}</td><td>{}"
+                "</td><td>{}</td><td>{}</td><td>{:.0f} %</td></tr>",
+                kind,
+                press("mode", str(k)),
+                _swatch(k),
+                name,
+                origin,
+                error_digits(mode.err_norm),
+                three_digits(mode.power),
+                three_digits(mode.energy),
+                100 * mode.saturation,
+            )
         )
-    header = (
+    header = Markup(
         "<tr><th>#</th><th class='words'>mode</th><th>error [σ]</th><th>power&nbsp;[W]</th><th>effort</th>"
         "<th title='largest share of a range of amplitude or frequency that is used'>used</th></tr>"
     )
     left = modes.count - len(modes.shown)
     told = "looking for more …" if searching else f"{left} more are known; they come after these."
-    more = f"<div class='said dim'>{told}</div>" if searching or left > 0 else ""
-    return f"<div class='fl'><table class='modes'>{header}{''.join(rows)}</table>{more}</div>"
+    more = html("<div class='said dim'>{}</div>", told) if searching or left > 0 else ""
+    return html("<div class='fl'><table class='modes'>{}{}</table>{}</div>", header, rows, more)
 
 
 def _swatch(k: int) -> str:
-    return f"<span class='swatch mode' style='border-color:{css(mode_color(k))}'>{k + 1}</span>"
+    return html("<span class='swatch mode' style='border-color:{}'>{}</span>", css(mode_color(k)), k + 1)

@@ -1,9 +1,9 @@
 """What is true of a swim, and what the robot believes, in a line each."""
 
 from collections.abc import Iterator
-from html import escape
 
 from finlab.sim import SensorSettings, TurningCurrent
+from webapp.markup.html import html
 from webapp.session.swim_plan import SwimSettings
 
 FINS = {
@@ -23,9 +23,12 @@ def scenario_card(settings: SwimSettings) -> str:
     true = "; ".join(_true(settings)) or "as drawn"
     believed = "the layout, in still water" if true != "as drawn" else "the same"
     losses = "Broken fins are announced." if settings.announced else "A monitor has to detect broken fins."
-    return (
-        f"<div class='fl scenario'><div>{escape(day.about)}</div>"
-        f"<div class='dim'>True: {escape(true)}. Believed: {believed}. {losses}</div></div>"
+    return html(
+        "<div class='fl scenario'><div>{}</div><div class='dim'>True: {}. Believed: {}. {}</div></div>",
+        day.about,
+        true,
+        believed,
+        losses,
     )
 
 

@@ -1,15 +1,16 @@
 """What a layout can do, as one card, and the quick checks below its editor."""
 
 from collections.abc import Callable
-from html import escape
 from itertools import combinations
 
 import numpy as np
+from markupsafe import Markup
 
 from finlab.analysis import AXES, Authority, ScoreCard
 from finlab.analysis.score_card import QuickCheck
 from finlab.layout import Layout
 from webapp.markup.answer import swatch
+from webapp.markup.html import html
 from webapp.markup.words import listed, three_digits
 from webapp.scene.meshes.fin import SPAN
 from webapp.scene.meshes.hull import hull_of
@@ -32,41 +33,45 @@ def score_table(layout: Layout, card: ScoreCard, before: ScoreCard | None, name:
         before: what the layout beside it can do, None where it is the same.
         name: what that one is called.
     """
-    name = escape(name)
+    name = name
     parts = [_summary(card, before, name), _axes(card, before, name), _losses(layout, card)]
-    parts += [f"<div class='said dim'>{escape(note)}</div>" for note in card.notes]
-    return f"<div class='fl score'>{''.join(parts)}</div>"
+    parts += [html("<div class='said dim'>{}</div>", note) for note in card.notes]
+    return html("<div class='fl score'>{}</div>", parts)
 
 
 def rank_sentence(a: Authority | QuickCheck) -> str:
     """Rank, conditioning and what is missing, in words."""
-    text = f"<b>{a.rank} of 6</b> axes independent"
+    text = html("<b>{} of 6</b> axes independent", a.rank)
     if a.condition is not None:
         text += f", condition number {three_digits(a.condition)}"
     text += "."
     if a.without_authority:
-        text += f" <span class='missing'>It cannot {listed(a.without_authority)}.</span>"
+        text += html(" <span class='missing'>It cannot {}.</span>", listed(a.without_authority))
     if a.coupled:
-        text += f" <span class='missing'>{listed(a.coupled).capitalize()} only together with others.</span>"
+        text += html(
+            " <span class='missing'>{} only together with others.</span>", listed(a.coupled).capitalize()
+        )
     return text
 
 
 def _summary(card: ScoreCard, before: ScoreCard | None, name: str) -> str:
     head = ""
     if before is not None:
-        ranks = f"<td>{before.authority.rank} of 6</td><td>{card.authority.rank} of 6</td><td></td>"
-        head = (
-            f"<tr><th></th><th>{name}</th><th>now</th><th></th></tr><tr><td>axes independent</td>{ranks}</tr>"
+        ranks = html("<td>{} of 6</td><td>{} of 6</td><td></td>", before.authority.rank, card.authority.rank)
+        head = html(
+            "<tr><th></th><th>{}</th><th>now</th><th></th></tr><tr><td>axes independent</td>{}</tr>",
+            name,
+            ranks,
         )
-    rows = "".join(
+    rows = Markup().join(
         _alone(words, of(card)) if before is None else _beside(words, of(card), of(before))
         for words, of in FIGURES.items()
     )
-    return f"<div class='said'>{rank_sentence(card.authority)}</div><table>{head}{rows}</table>"
+    return html("<div class='said'>{}</div><table>{}{}</table>", rank_sentence(card.authority), head, rows)
 
 
 def _alone(words: str, now: float | None) -> str:
-    return "" if now is None else f"<tr><td>{words}</td><td>{three_digits(now)}</td></tr>"
+    return "" if now is None else html("<tr><td>{}</td><td>{}</td></tr>", words, three_digits(now))
 
 
 def _beside(words: str, now: float | None, old: float | None) -> str:
@@ -79,8 +84,10 @@ def _beside(words: str, now: float | None, old: float | None) -> str:
         same = abs(change) < 1e-3 * max(abs(now), abs(old), 1e-9)
         kind = "" if same else "given" if change > 0 else "missing"
         sign = "=" if same else "▲" if change > 0 else "▼"
-    cells = "".join(f"<td>{'–' if value is None else three_digits(value)}</td>" for value in (old, now))
-    return f"<tr><td>{words}</td>{cells}<td class='{kind}'>{sign}</td></tr>"
+    cells = Markup().join(
+        html("<td>{}</td>", "–" if value is None else three_digits(value)) for value in (old, now)
+    )
+    return html("<tr><td>{}</td>{}<td class='{}'>{}</td></tr>", words, cells, kind, sign)
 
 
 def _axes(card: ScoreCard, before: ScoreCard | None, name: str) -> str:
@@ -91,30 +98,38 @@ def _axes(card: ScoreCard, before: ScoreCard | None, name: str) -> str:
         old = ""
         if before is not None:
             a = before.authority
-            old = f"<td>{_both(a.largest[k], a.most_negative[k])}</td>"
+            old = html("<td>{}</td>", _both(a.largest[k], a.most_negative[k]))
         shares = [loss.share_left[k] for loss in card.losses]
         left = [share for share in shares if share is not None]
         least = f"{100 * min(left):.0f} %" if left else "–"
         power = card.unit_power[k]
         rows.append(
-            f"<tr><td>{word} <span class='dim'>{AXIS_UNITS[k]}</span></td>{old}<td>{largest}</td>"
-            f"<td>{least}</td><td>{'–' if power is None else three_digits(power)}</td></tr>"
+            html(
+                "<tr><td>{} <span class='dim'>{}</span></td>{}<td>{}</td><td>{}</td><td>{}</td></tr>",
+                word,
+                AXIS_UNITS[k],
+                old,
+                largest,
+                least,
+                "–" if power is None else three_digits(power),
+            )
         )
-    old = f"<th>{name}</th>" if before is not None else ""
+    old = html("<th>{}</th>", name) if before is not None else ""
     column = "" if before is None else "now"
-    head = (
-        f"<tr><th>largest on its own</th>{old}<th>{column}</th>"
-        "<th title='after the worst loss of a fin'>one lost</th>"
-        "<th title='least power for 1 N, or 0.1 N m'>power [W]</th></tr>"
+    head = html(
+        "<tr><th>largest on its own</th>{}<th>{}</th><th title='after the worst loss of a "
+        "fin'>one lost</th><th title='least power for 1 N, or 0.1 N m'>power [W]</th></tr>",
+        old,
+        column,
     )
-    return f"<table>{head}{''.join(rows)}</table>"
+    return html("<table>{}{}</table>", head, rows)
 
 
 def _both(positive: float, negative: float) -> str:
     """Both signs; one number where they are equal to what is shown of them."""
     a, b = three_digits(positive), three_digits(negative)
     if positive == negative == 0.0:
-        return "<span class='missing'>none</span>"
+        return Markup("<span class='missing'>none</span>")
     return f"±{a}" if a == b else f"+{a} −{b}"
 
 
@@ -123,11 +138,13 @@ def _losses(layout: Layout, card: ScoreCard) -> str:
         return ""
     rows = []
     for loss in card.losses:
-        cost = f"<span class='missing'>loses {escape(listed(loss.lost))}</span>" if loss.lost else ""
-        name = f"{swatch(layout.index(loss.fin))}{escape(loss.fin)}"
-        weakest = f"<td>{three_digits(loss.weakest)} N</td>"
-        rows.append(f"<tr><td>without {name}</td>{weakest}<td class='words'>{cost}</td></tr>")
-    return f"<table><tr><th>one fin lost</th><th>weakest</th><th></th></tr>{''.join(rows)}</table>"
+        cost = html("<span class='missing'>loses {}</span>", listed(loss.lost)) if loss.lost else ""
+        name = html("{}{}", swatch(layout.index(loss.fin)), loss.fin)
+        weakest = html("<td>{} N</td>", three_digits(loss.weakest))
+        rows.append(html("<tr><td>without {}</td>{}<td class='words'>{}</td></tr>", name, weakest, cost))
+    return html(
+        "<table><tr><th>one fin lost</th><th>weakest</th><th></th></tr>{}</table>", Markup().join(rows)
+    )
 
 
 def check_card(quick: QuickCheck, several: bool, warnings: tuple[str, ...]) -> str:
@@ -138,12 +155,14 @@ def check_card(quick: QuickCheck, several: bool, warnings: tuple[str, ...]) -> s
         several: whether more than one fin works.
         warnings: sentences about fins in the way.
     """
-    texts = "".join(f"<div class='missing'>{escape(text)}</div>" for text in warnings)
+    texts = Markup().join(html("<div class='missing'>{}</div>", text) for text in warnings)
     costs = "No single failure costs an axis." if several else ""
     if quick.lost:
         lost = "; ".join(f"{name}: {', '.join(axes)}" for name, axes in quick.lost)
-        costs = f"<span class='missing'>A failure costs axes: {escape(lost)}.</span>"
-    return f"<div class='fl check'>{texts}<div class='said'>{rank_sentence(quick)} {costs}</div></div>"
+        costs = html("<span class='missing'>A failure costs axes: {}.</span>", lost)
+    return html(
+        "<div class='fl check'>{}<div class='said'>{} {}</div></div>", texts, rank_sentence(quick), costs
+    )
 
 
 def warnings(layout: Layout) -> tuple[str, ...]:

@@ -1,8 +1,10 @@
 """How a swim goes, in a few words and a row per robot."""
 
 from collections.abc import Iterator
-from html import escape
 
+from markupsafe import Markup
+
+from webapp.markup.html import html
 from webapp.markup.words import fins_words, three_digits, unlearned_sentence
 from webapp.session.swim_plan import SwimSettings
 from webapp.tasks.moment import Figures, Moment
@@ -26,27 +28,26 @@ def pace_words(swimming: Swimming) -> str:
     rate, speed = swimming.pace.rate, swimming.pace.speed
     if rate is None or rate > 0.9 * speed:
         return f"running at {speed:.2g}×"
-    return f"<span class='missing'>running at {rate:.1g}×, as fast as this machine can</span>"
+    return html("<span class='missing'>running at {:.1g}×, as fast as this machine can</span>", rate)
 
 
 def findings_words(shown: Moment) -> list[str]:
     """Which unannounced losses the monitor has detected, and which it has not."""
     sentences = [
-        f"The monitor found {escape(name)} lost {seconds:.1f} s after it broke."
-        for name, seconds in shown.found
+        f"The monitor found {name} lost {seconds:.1f} s after it broke." for name, seconds in shown.found
     ]
     for name in shown.lost:
         if name not in shown.failed:
             known = name in shown.doubted
             rest = "the monitor takes it for torn or stuck" if known else "the allocator does not know yet"
-            sentences.append(f"<span class='missing'>{escape(name)} is lost, and {rest}.</span>")
+            sentences.append(html("<span class='missing'>{} is lost, and {}.</span>", name, rest))
     sentences += [
-        f"<span class='missing'>The monitor takes {escape(name)} for torn or stuck.</span>"
+        html("<span class='missing'>The monitor takes {} for torn or stuck.</span>", name)
         for name in shown.doubted
         if name not in (*shown.failed, *shown.lost)
     ]
     sentences += [
-        f"<span class='missing'>{escape(name)} works, but the allocator takes it for lost.</span>"
+        html("<span class='missing'>{} works, but the allocator takes it for lost.</span>", name)
         for name in shown.failed
         if name not in shown.lost
     ]
@@ -65,20 +66,20 @@ def robots(swimming: Swimming) -> Iterator[tuple[Swimmer | Recorded, Moment, Rgb
 def swim_card(swimming: Swimming, settings: SwimSettings) -> str:
     """Time, pace, and per robot: distance from where it should be, depth error, power, what a pack lasts."""
     if not swimming.active:
-        return "<div class='fl dim'>Start lets this robot swim, with the fins that work.</div>"
+        return Markup("<div class='fl dim'>Start lets this robot swim, with the fins that work.</div>")
     if not swimming.swimmers:
-        return "<div class='fl dim'>making ready …</div>"
+        return Markup("<div class='fl dim'>making ready …</div>")
     first = swimming.swimmers[0]
     shown = swimming.seen[0]
-    head = f"<b>{shown.time:.1f} s</b> of {first.duration_s:.0f} s, {pace_words(swimming)}"
+    head = html("<b>{:.1f} s</b> of {:.0f} s, {}", shown.time, first.duration_s, pace_words(swimming))
     head += f"; least {swimming.objective}"
     rows, packs = [], []
     for robot, moment, color, name in robots(swimming):
-        dot = f"<span class='swatch' style='background:{css(color)};min-width:10px'>&nbsp;</span>"
-        title = f"<td title='{escape(robot.about)}'>{dot}{escape(name)}</td>"
-        rows.append(f"<tr>{title}{_cells(_errors(moment.figures))}</tr>")
-        packs.append(f"<tr>{title}{_cells(_pack(moment.figures, settings))}</tr>")
-    header = (
+        dot = html("<span class='swatch' style='background:{};min-width:10px'>&nbsp;</span>", css(color))
+        title = html("<td title='{}'>{}{}</td>", robot.about, dot, name)
+        rows.append(html("<tr>{}{}</tr>", title, _cells(_errors(moment.figures))))
+        packs.append(html("<tr>{}{}</tr>", title, _cells(_pack(moment.figures, settings))))
+    header = Markup(
         "<tr><th>method</th>"
         "<th title='root mean square distance from where it should be'>off the path</th>"
         "<th title='the same of the depth'>depth</th>"
@@ -86,15 +87,21 @@ def swim_card(swimming: Swimming, settings: SwimSettings) -> str:
         "<th title='the same over the last second'>now</th></tr>"
     )
     other = "the fins alone" if not settings.electronics_w else f"fins and {settings.electronics_w:g} W"
-    pack_header = (
-        f"<tr><th>{settings.pack_wh:g} Wh, {other}</th>"
-        "<th title='by all fins so far, with motor losses'>used</th>"
-        "<th title='at the mean power so far'>lasts</th>"
-        "<th title='at the mean speed over ground so far'>range</th></tr>"
+    pack_header = html(
+        "<tr><th>{:g} Wh, {}</th><th title='by all fins so far, with motor losses'>used</th>"
+        "<th title='at the mean power so far'>lasts</th><th title='at the mean speed over "
+        "ground so far'>range</th></tr>",
+        settings.pack_wh,
+        other,
     )
-    return (
-        f"<div class='fl swim'><div class='said'>{head}</div><table>{header}{''.join(rows)}</table>"
-        f"<table>{pack_header}{''.join(packs)}</table>{_warnings(swimming, shown)}</div>"
+    return html(
+        "<div class='fl swim'><div class='said'>{}</div><table>{}{}</table><table>{}{}</table>{}</div>",
+        head,
+        header,
+        rows,
+        pack_header,
+        packs,
+        _warnings(swimming, shown),
     )
 
 
@@ -120,22 +127,23 @@ def _pack(figures: Figures | None, settings: SwimSettings) -> tuple[str, ...]:
 
 
 def _cells(texts: tuple[str, ...]) -> str:
-    return "".join(f"<td>{text}</td>" for text in texts)
+    return Markup().join(html("<td>{}</td>", text) for text in texts)
 
 
 def _warnings(swimming: Swimming, shown: Moment) -> str:
     """What should not be overlooked, and what the monitor has found."""
     first = swimming.swimmers[0]
-    warning = "".join(
-        f"<div class='missing'>{escape(s.method)}: {unlearned_sentence(s.layout, s.unknown_fins)}.</div>"
+    warning = Markup().join(
+        html("<div class='missing'>{}: {}.</div>", s.method, unlearned_sentence(s.layout, s.unknown_fins))
         for s in swimming.swimmers
         if s.unknown_fins
     )
     if not shown.controllable:
         lost = [first.fins.index(name) for name in shown.failed]
         fins = f"Without {fins_words(lost)}" if lost else "With these fins"
-        warning += (
-            f"<div class='missing'>{fins} surge, heave and yaw are not free of each other: "
-            "expect it to drift off.</div>"
+        warning += html(
+            "<div class='missing'>{} surge, heave and yaw are not free of each other: expect it "
+            "to drift off.</div>",
+            fins,
         )
-    return warning + "".join(f"<div>{sentence}</div>" for sentence in findings_words(shown))
+    return warning + Markup().join(html("<div>{}</div>", sentence) for sentence in findings_words(shown))

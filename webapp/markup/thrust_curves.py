@@ -9,6 +9,7 @@ from finlab.errors import DataError
 from finlab.layout import Fin
 from finlab.layout.fin import FinModelSpec, Limits
 from finlab.physics import make_law
+from webapp.markup.html import html
 from webapp.markup.mode_plot import BOTTOM, RIGHT, TOP, WIDTH, axes, cost_axis
 from webapp.theme import BLUE, GREEN, ORANGE, css
 
@@ -41,11 +42,18 @@ def thrust_curves(fin: Fin) -> str:
     parts = [axes(across, up, LEFT, HEIGHT, upright=False)]
     for k, (size, curve, color) in enumerate(zip(amplitude, thrust, COLORS, strict=True)):
         way = " ".join(f"{x(f):.1f},{y(t):.1f}" for f, t in zip(frequency, curve, strict=True))
-        parts.append(f"<polyline points='{way}' fill='none' stroke='{css(color)}' stroke-width='2'/>")
+        parts.append(
+            html("<polyline points='{}' fill='none' stroke='{}' stroke-width='2'/>", way, css(color))
+        )
         place = LEFT + 104 * k
-        parts.append(f"<rect x='{place}' y='7' width='14' height='5' rx='2' fill='{css(color)}'/>")
-        parts.append(f"<text x='{place + 19}' y='14'>A {size:.2f} rad</text>")
-    return f"<div class='fl'><svg class='plot' viewBox='0 0 {WIDTH} {HEIGHT}'>{''.join(parts)}</svg></div>"
+        parts.append(html("<rect x='{}' y='7' width='14' height='5' rx='2' fill='{}'/>", place, css(color)))
+        parts.append(html("<text x='{}' y='14'>A {:.2f} rad</text>", place + 19, size))
+    return html(
+        "<div class='fl'><svg class='plot' viewBox='0 0 {} {}'>{}</svg></div>",
+        WIDTH,
+        HEIGHT,
+        parts,
+    )
 
 
 @lru_cache(maxsize=64)

@@ -129,4 +129,4 @@ def _amount(value: float, axis: int) -> str:
 
 
 def _warning(text: str) -> Markup:
-    return Markup("<span class='missing'>{}</span>").format(text)
+    return Markup(Markup("<span class='missing'>{}</span>")).format(text)

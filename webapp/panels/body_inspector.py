@@ -2,15 +2,16 @@
 
 from collections.abc import Callable
 from functools import partial
-from html import escape
 from typing import Any
 
 import viser
+from markupsafe import Markup
 
 from finlab.layout import Body
 from finlab.vehicle.body import GRAVITY
 from webapp.editables import edit
 from webapp.handles import put
+from webapp.markup.html import html
 from webapp.markup.words import three_digits
 from webapp.page import Page
 from webapp.scene.meshes.hull import hull_of
@@ -108,12 +109,15 @@ class BodyInspector:
         layout = self._page.session.state.layout
         name = edit("robot-name", "", layout.name, "name of the robot", at_once=True)
         about = edit("robot-about", "", layout.description, "description", rows=7, at_once=True)
-        text = escape(layout.description) or "<span class='dim'>Press to describe it.</span>"
-        boxes = (
-            f"<span class='edit box' {name}>{escape(layout.name)}</span>"
-            f"<span class='edit box text' {about}>{text}</span>"
+        text = layout.description or Markup("<span class='dim'>Press to describe it.</span>")
+        boxes = html(
+            "<span class='edit box' {}>{}</span><span class='edit box text' {}>{}</span>",
+            name,
+            layout.name,
+            about,
+            text,
         )
-        put(self._head, content=f"<div class='fl head'>{boxes}{self._facts()}</div>")
+        put(self._head, content=html("<div class='fl head'>{}{}</div>", boxes, self._facts()))
 
     def _facts(self) -> str:
         """The hull in figures, and what a swim would miss."""
@@ -130,4 +134,4 @@ class BodyInspector:
         missing = [word for key, word in KNOWN.items() if getattr(body, key) is None]
         if missing:
             lines.append(f"Not said: {', '.join(missing)}.")
-        return f"<div class='dim'>{' '.join(lines)}</div>"
+        return html("<div class='dim'>{}</div>", " ".join(lines))

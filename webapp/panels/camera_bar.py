@@ -1,9 +1,11 @@
 """How the view is looked at: the axes as they stand, sides to look from, framing."""
 
 import viser
+from markupsafe import Markup
 
 from webapp.editables import press
 from webapp.handles import put
+from webapp.markup.html import html
 from webapp.page import Page
 from webapp.scene.robot_scene import CAMERAS
 
@@ -20,20 +22,27 @@ class CameraBar:
 
     def refresh(self) -> None:
         """Nothing changes."""
-        looks = "".join(
-            f"<button {press('look', name)} title='{key}'>{name}</button>"
+        looks = Markup().join(
+            html("<button {} title='{}'>{}</button>", press("look", name), key, name)
             for key, name in enumerate(CAMERAS, 1)
         )
-        frame = f"<button {press('frame', '')} title='what is selected fills the view (F)'>Frame</button>"
-        rows = f"<div><div>{looks}</div><div>{frame}</div></div>"
-        put(self._content, content=f"<div class='fl fl-camera'>{triad()}{rows}</div>")
+        frame = html(
+            "<button {} title='what is selected fills the view (F)'>Frame</button>", press("frame", "")
+        )
+        rows = html("<div><div>{}</div><div>{}</div></div>", looks, frame)
+        put(self._content, content=html("<div class='fl fl-camera'>{}{}</div>", triad(), rows))
 
 
 def triad() -> str:
     """The axes of the body, which a script turns with the camera; a click on a tip looks from it."""
-    arms = "".join(
-        f"<g class='axis {axis}' {press('look', view)}><title>{view}</title>"
-        f"<line/><circle r='9'/><text>{axis}</text></g>"
+    arms = Markup().join(
+        html(
+            "<g class='axis {}' {}><title>{}</title><line/><circle r='9'/><text>{}</text></g>",
+            axis,
+            press("look", view),
+            view,
+            axis,
+        )
         for axis, view in AXES
     )
-    return f"<svg class='triad' viewBox='-36 -36 72 72' role='img' aria-label='Axes'>{arms}</svg>"
+    return html("<svg class='triad' viewBox='-36 -36 72 72' role='img' aria-label='Axes'>{}</svg>", arms)

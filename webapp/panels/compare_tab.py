@@ -2,7 +2,7 @@
 
 import viser
 
-from webapp.handles import put
+from webapp.handles import add_html, put
 from webapp.markup.comparison import comparison_table
 from webapp.markup.picking import marker
 from webapp.page import Page
@@ -15,7 +15,7 @@ class ComparePanel:
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         """Build the widgets."""
         self._page = page
-        gui.add_html(marker("fl-primary"))
+        add_html(gui, marker("fl-primary"))
         self._run = page.add_button(
             "Compare the methods",
             lambda: page.comparison.start(page.session.state),

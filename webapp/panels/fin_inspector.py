@@ -2,17 +2,18 @@
 
 import math
 from functools import partial
-from html import escape
 from typing import Any
 
 import viser
+from markupsafe import Markup
 
 from finlab.layout import Fin
 from finlab.layout.fin import MAX_AMPLITUDE, MAX_FREQUENCY
 from finlab.layout.servo import Servo
 from webapp.editables import edit
-from webapp.handles import put
+from webapp.handles import add_html, put
 from webapp.markup.answer import swatch
+from webapp.markup.html import html
 from webapp.markup.words import listed
 from webapp.page import Page
 from webapp.panels.fin_model import FinModelPanel
@@ -29,7 +30,7 @@ DRIVE = {
     "direction_rate": ("Direction rate [rad/s]", "How fast the asked zero direction changes at most."),
 }
 """Fields of `Servo`: labels and hints."""
-LIMITS = "<div class='fl dim'>Least and most of A, f and the zero direction φ.</div>"
+LIMITS = Markup("<div class='fl dim'>Least and most of A, f and the zero direction φ.</div>")
 NOMINAL = Fin("nominal", (0.0, 0.0, 0.0), 0.0)
 """What stands in the boxes while no fin is selected."""
 
@@ -76,7 +77,7 @@ class FinInspector:
 
     def _add_limits(self, gui: viser.GuiApi) -> None:
         page, session = self._page, self._page.session
-        gui.add_html(LIMITS)
+        add_html(gui, LIMITS)
         about = f"Least and most, up to {MAX_AMPLITUDE:.2f} rad; 30 deg may be typed, too."
         page.bind_number(
             gui.add_vector2("A [rad]", (0.0, 0.0), step=0.05, hint=about),
@@ -129,20 +130,26 @@ class FinInspector:
         session = self._page.session
         layout, names = session.state.layout, session.selection
         if not names:
-            return "<div class='fl dim'>Press a fin in the list or in the view to see all about it.</div>"
+            return Markup(
+                "<div class='fl dim'>Press a fin in the list or in the view to see all about it.</div>"
+            )
         if len(names) == 1:
             (name,) = names
             cell = edit("fin-called", str(layout.index(name)), name, f"name of {name}", at_once=True)
-            called = f"<span class='edit box' {cell}>{escape(name)}</span>"
+            called = html("<span class='edit box' {}>{}</span>", cell, name)
             is_locked = name in session.state.locked
-            said = "<div class='dim'>Locked: unlock it in the list.</div>" if is_locked else ""
-            return f"<div class='fl head'>{swatch(layout.index(name))}{called}{said}</div>"
-        badges = "".join(swatch(layout.index(name)) for name in names)
+            said = Markup("<div class='dim'>Locked: unlock it in the list.</div>") if is_locked else ""
+            return html("<div class='fl head'>{}{}{}</div>", swatch(layout.index(name)), called, said)
+        badges = Markup().join(swatch(layout.index(name)) for name in names)
         differ = differences([layout.fins[layout.index(name)] for name in names])
         said = f"They differ in {differ}. " if differ else "They are alike but for their place. "
-        return (
-            f"<div class='fl head'>{badges}<b>{len(names)} fins</b><div class='dim'>{said}The boxes show "
-            f"{escape(str(session.selected))}; what you change counts for all.</div></div>"
+        return html(
+            "<div class='fl head'>{}<b>{} fins</b><div class='dim'>{}The boxes show {}; what "
+            "you change counts for all.</div></div>",
+            badges,
+            len(names),
+            said,
+            str(session.selected),
         )
 
 

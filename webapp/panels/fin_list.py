@@ -7,7 +7,7 @@ import viser
 
 from finlab.errors import FinlabError
 from finlab.layout.layout import MAX_FINS
-from webapp.handles import hold_kind, put
+from webapp.handles import add_html, hold_kind, put
 from webapp.markup.fin_list import AXES, fin_list
 from webapp.markup.picking import marker
 from webapp.page import Page
@@ -36,7 +36,7 @@ class FinList:
         page.editables.on("fin-shaft", self._turn)
         for axis in AXES:
             page.editables.on(f"fin-{axis}", partial(self._place, axis))
-        gui.add_html(marker("fl-primary"))
+        add_html(gui, marker("fl-primary"))
         page.add_button("Add a fin", session.add_fin, icon=viser.Icon.PLUS, hint=f"Up to {MAX_FINS} fins.")
         edits: dict[str, Callable[[], object]] = {
             "Mirror": session.mirror_fin,

@@ -1,7 +1,6 @@
 """What the selected fins are known by: a formula with its numbers, or a table fitted to measurements."""
 
 from functools import partial
-from html import escape
 
 import viser
 
@@ -9,6 +8,7 @@ from finlab.errors import FinlabError
 from finlab.layout.fin import FIN_MODELS
 from webapp.handles import Changes, put
 from webapp.markup.fin_model import model_card
+from webapp.markup.html import html
 from webapp.markup.thrust_curves import thrust_curves
 from webapp.page import Page
 from webapp.session.files import file_stem
@@ -150,9 +150,9 @@ class FinModelPanel:
     def _written(self, found: Fitted | None) -> str:
         fitting = self._page.fitting
         if fitting.busy:
-            return f"<div class='fl dim'>{escape(fitting.progress)} …</div>"
+            return html("<div class='fl dim'>{} …</div>", fitting.progress)
         if fitting.error is not None:
-            return f"<div class='fl'><div class='said missing'>{escape(fitting.error)}</div></div>"
+            return html("<div class='fl'><div class='said missing'>{}</div></div>", fitting.error)
         if found is None:
             return ""
         from webapp.markup.fit_card import fit_card  # scipy comes with it

@@ -6,13 +6,14 @@ here. So widgets that were seen once stay mounted, and a change of task is one m
 """
 
 from collections.abc import Callable
-from html import escape
 from importlib.resources import files
 
 import viser
+from markupsafe import Markup
 
 from webapp.editables import press
-from webapp.handles import put
+from webapp.handles import add_html, put
+from webapp.markup.html import html
 from webapp.markup.picking import marker
 from webapp.page import Page, Panel
 from webapp.panels.places import DRAWER, LEFT, PLACES, REGIONS, RIGHT, SIMULATE, Place
@@ -35,23 +36,32 @@ _VARIABLES = (
 )
 
 
-def _sheet(name: str) -> str:
-    return files("webapp.markup").joinpath(name).read_text("utf-8")
+def _sheet(name: str) -> Markup:
+    return Markup(files("webapp.markup").joinpath(name).read_text("utf-8"))
 
 
 NARROW = _sheet("narrow.css")
-_MEDIA = f"@media (max-width: 1099px) {{ {NARROW} }}"
-STYLE = f"<style>{_VARIABLES}{_sheet('style.css')}{_sheet('frame.css')}{_MEDIA}{_sheet('single.css')}</style>"
+_MEDIA = html("@media (max-width: 1099px) {{ {} }}", NARROW)
+STYLE = html(
+    "<style>{}{}{}{}{}</style>",
+    _VARIABLES,
+    _sheet("style.css"),
+    _sheet("frame.css"),
+    _MEDIA,
+    _sheet("single.css"),
+)
 """A style element, to be put into the page once."""
 _SMALL = ("(max-width: 1340px)", "(max-height: 780px)")
 _SMALL_VIEW = ", ".join(f"(min-width: 720px) and {side}" for side in _SMALL)
-COMPACT = f"@media {_SMALL_VIEW} {{ :root {{ {_sheet('compact.css')} }} }}"
+COMPACT = html("@media {} {{ :root {{ {} }} }}", _SMALL_VIEW, _sheet("compact.css"))
 """Rules of a page with a small view."""
-PANES = "".join(
-    f"<button class='to-{region}' onclick='finlabFrame.pane(\"{region}\")'>{word}</button>"
-    for region, word in ((LEFT, "Fins"), (RIGHT, "Settings"), (DRAWER, "Plots"))
+PANES = html(
+    "<nav class='fl-panes' aria-label='Regions'>{}</nav>",
+    (
+        html("<button class='to-{}' onclick='finlabFrame.pane(\"{}\")'>{}</button>", region, region, word)
+        for region, word in ((LEFT, "Fins"), (RIGHT, "Settings"), (DRAWER, "Plots"))
+    ),
 )
-PANES = f"<nav class='fl-panes' aria-label='Regions'>{PANES}</nav>"
 """On a narrow page one region is seen at a time; these choose it."""
 LOW = ":root { --tall: calc(var(--z) * 92px); }"
 """Height of a drawer in which nothing but a sentence stands."""
@@ -69,7 +79,7 @@ class Section:
         """Build the panel, and take over the widgets that it binds to the session."""
         self.place, self.name, self._page = place, f"at-{index}", page
         with gui.add_folder(place.title, expand_by_default=not place.folded):
-            gui.add_html(marker(f"fl-section fl-{self.name}"))
+            add_html(gui, marker(f"fl-section fl-{self.name}"))
             self._sentence = gui.add_html("", visible=False)
             with gui.add_folder(None, visible=False) as self._folder:
                 self._panel = place.make(gui, page)
@@ -92,8 +102,8 @@ class Section:
                 write()
             self._panel.refresh()
         except Exception as error:
-            name = escape(self._page.session.state.layout.name)
-            text = f"<div class='fl missing'>This cannot be shown of {name}: {escape(str(error))}</div>"
+            name = self._page.session.state.layout.name
+            text = html("<div class='fl missing'>This cannot be shown of {}: {}</div>", name, str(error))
             put(self._sentence, content=text, visible=True)
             put(self._folder, visible=False)
             self._page.fault(error)
@@ -109,7 +119,7 @@ class Frame:
         """Build everything; `over` is markup that may lie over the page for a while."""
         self._page = page
         run_script(gui, NAMED)
-        gui.add_html(f"{STYLE}{marker('fl-chrome')}{over}{PANES}")
+        add_html(gui, html("{}{}{}{}", STYLE, marker("fl-chrome"), over, PANES))
         self._shown = gui.add_html("")
         self._listen()
         self._corner = Corner(gui, page)
@@ -117,7 +127,7 @@ class Frame:
         self._sections: list[Section] = []
         for region in REGIONS:
             with gui.add_folder(region):
-                gui.add_html(marker(f"fl-region fl-{region}"))
+                add_html(gui, marker(f"fl-region fl-{region}"))
                 if region == DRAWER:
                     self._strip = gui.add_html("")
                 self._sections += [
@@ -180,24 +190,31 @@ def _style(sections: list[Section], session: Session, plots: bool) -> str:
         "open": drawer is not None,
         "guide": session.guided,
     }
-    variables = "".join(f"--has-{name}: {int(there)};" for name, there in counts.items())
+    variables = Markup().join(f"--has-{name}: {int(there)};" for name, there in counts.items())
     height = LOW if not plots else TALL if task == SIMULATE else ""
-    hidden = f"{', '.join(gone)} {{ display: none !important; }}"
-    return f"<style>:root {{ {variables} }} {COMPACT} {height} {hidden}</style>"
+    hidden = Markup(f"{', '.join(gone)} {{ display: none !important; }}")
+    return html("<style>:root {{ {} }} {} {} {}</style>", variables, COMPACT, height, hidden)
 
 
 def _strip(task: str, opened: str, folded: bool, plots: bool) -> str:
     """The upper edge of the drawer: its handle, unless it is low, its tabs, and the button that folds it."""
-    tabs = "".join(
-        f"<button aria-pressed='{str(name == opened and not folded).lower()}' "
-        f"{press('drawer', name)}>{escape(name)}</button>"
+    tabs = Markup().join(
+        html(
+            "<button aria-pressed='{}' {}>{}</button>",
+            str(name == opened and (not folded)).lower(),
+            press("drawer", name),
+            name,
+        )
         for name in DRAWERS[task]
     )
     word = "Open the drawer" if folded else "Fold the drawer"
-    fold = (
-        f"<button class='fold' aria-label='{word}' title='{word}' "
-        f"{press('fold', '')}>{'▴' if folded else '▾'}</button>"
+    fold = html(
+        "<button class='fold' aria-label='{}' title='{}' {}>{}</button>",
+        word,
+        word,
+        press("fold", ""),
+        "▴" if folded else "▾",
     )
     tall = plots and not folded
-    handle = "<div class='fl-handle' title='drag to make the drawer taller'></div>" if tall else ""
-    return f"{handle}<nav class='fl-strip' aria-label='Drawer'>{tabs}{fold}</nav>"
+    handle = Markup("<div class='fl-handle' title='drag to make the drawer taller'></div>") if tall else ""
+    return html("{}<nav class='fl-strip' aria-label='Drawer'>{}{}</nav>", handle, tabs, fold)

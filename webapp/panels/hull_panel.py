@@ -6,11 +6,13 @@ from functools import partial
 from typing import Any
 
 import viser
+from markupsafe import Markup
 from scipy.spatial.transform import Rotation
 
 from finlab.errors import FinlabError
 from finlab.layout.body import HULL_SHAPES, MESH_SUFFIXES, Hull
 from webapp.handles import put
+from webapp.markup.html import html
 from webapp.page import Page
 from webapp.scene.meshes.hull import hull_of
 from webapp.scene.meshes.mesh import Mesh
@@ -180,6 +182,6 @@ def _report(hull: MeshHull) -> str:
     """What was found in the hull's file, and mended."""
     report = hull.report
     size = " × ".join(f"{2.0 * half:.3g}" for half in hull.half)
-    closed = "watertight" if report.is_watertight else "<span class='missing'>not quite closed</span>"
+    closed = "watertight" if report.is_watertight else Markup("<span class='missing'>not quite closed</span>")
     mended = f" Mended: {'; '.join(report.mended)}." if report.mended else " Nothing had to be mended."
-    return f"<div class='fl'>{size} m, {report.triangles:,} triangles, {closed}.{mended}</div>"
+    return html("<div class='fl'>{} m, {:,} triangles, {}.{}</div>", size, report.triangles, closed, mended)

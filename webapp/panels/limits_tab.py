@@ -3,13 +3,14 @@
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from html import escape
 from typing import Any
 
 import viser
+from markupsafe import Markup
 
 from finlab.analysis import Improvement
-from webapp.handles import Changes, put
+from webapp.handles import Changes, add_html, put
+from webapp.markup.html import html
 from webapp.markup.picking import marker
 from webapp.markup.score_card import score_table
 from webapp.markup.words import fins_words, three_digits
@@ -61,16 +62,16 @@ class ReachPanel:
         analyst, beside = self._page.analyst, self._page.session.beside
         found = analyst.findings
         if analyst.error is not None:
-            return "<div class='fl missing'>This layout cannot be analysed.</div>"
+            return Markup("<div class='fl missing'>This layout cannot be analysed.</div>")
         if found is None:
-            return "<div class='fl dim'>computing …</div>"
-        note = "<span class='dim'>computing …</span> " if analyst.busy else ""
+            return Markup("<div class='fl dim'>computing …</div>")
+        note = Markup("<span class='dim'>computing …</span> ") if analyst.busy else ""
         if found.now is not None:
             unit = "N" if found.now.kind == "force" else "N m"
             gap = three_digits(found.now.gap)
-            note += f"<span class='dim'>The body lacks at most {gap} {unit} of the true set.</span>"
+            note += html("<span class='dim'>The body lacks at most {} {} of the true set.</span>", gap, unit)
         table = score_table(found.question.layout, found.card, found.before, beside or "before")
-        return f"<div class='fl'>{note}</div>{table}"
+        return html("<div class='fl'>{}</div>{}", note, table)
 
 
 class ImprovePanel:
@@ -131,7 +132,7 @@ class ImprovePanel:
             "Cancel", page.improver.cancel, icon=viser.Icon.X, visible=False, hint=offered
         )
         self._card = gui.add_html("")
-        gui.add_html(marker("fl-verdict"))
+        add_html(gui, marker("fl-verdict"))
         hint = "Where the fins would stand, in green; off: as they stand now."
         self._proposed = page.bind_display(gui.add_checkbox("Show after", True, hint=hint), "proposed")
         verdicts = {"Accept": self._accept, "Leave": page.improver.forget}
@@ -180,15 +181,15 @@ class ImprovePanel:
         put(self._proposed, visible=found is not None and found.improved)
         text = ""
         if improver.error is not None:
-            text = f"<div class='missing'>{escape(improver.error)}</div>"
+            text = html("<div class='missing'>{}</div>", improver.error)
         elif found is not None:
             text = _before_and_after(found)
         elif progress is not None:
             best, before = (three_digits(abs(v)) for v in (progress.best, progress.before))
-            text = f"Best so far <b>{best}</b>, {before} before, round {progress.round}."
+            text = html("Best so far <b>{}</b>, {} before, round {}.", best, before, progress.round)
         elif running:
             text = "Searching …"
-        put(self._card, content=f"<div class='fl'>{text}</div>")
+        put(self._card, content=html("<div class='fl'>{}</div>", text))
 
     def _refresh_request(self) -> None:
         """Write which fins may move, and how far."""
@@ -207,7 +208,9 @@ def _before_and_after(found: Improvement) -> str:
     goal = next(words for words, name in GOAL_WORDS.items() if name == found.goal)
     stopped = " The search was stopped early." if found.cancelled else ""
     unit = " W" if found.goal == "mission_power" else " N"
-    heading = f"<b>{goal.capitalize()}: {before}{unit} before, {after}{unit} after.</b>{stopped}"
+    heading = html(
+        "<b>{}: {}{} before, {}{} after.</b>{}", goal.capitalize(), before, unit, after, unit, stopped
+    )
     moved = fins_words([found.layout.index(name) for name in found.moved]).capitalize()
     table = score_table(found.layout, found.card_after, found.card_before)
-    return f"{heading} {moved} moved; the view shows them in green, with all fins whole.{table}"
+    return html("{} {} moved; the view shows them in green, with all fins whole.{}", heading, moved, table)

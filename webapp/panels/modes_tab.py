@@ -5,7 +5,8 @@ from functools import partial
 import viser
 
 from finlab.errors import FinlabError
-from webapp.handles import Changes, put
+from webapp.handles import Changes, add_html, put
+from webapp.markup.html import html
 from webapp.markup.mode_plot import mode_plot
 from webapp.markup.modes import mode_table
 from webapp.markup.picking import marker
@@ -54,7 +55,7 @@ class CandidatesPanel:
                     ("gamma", "Effort weight γ", GAMMA_RANGE, 0.005, 4, weight),
                 )
             }
-        gui.add_html(marker("fl-column"))
+        add_html(gui, marker("fl-column"))
         self._table = gui.add_html("")
         self._origin = gui.add_html("")
 
@@ -75,7 +76,7 @@ class CandidatesPanel:
     def refresh(self) -> None:
         """Write settings and candidates."""
         page, state = self._page, self._page.session.state
-        put(self._origin, content=f"<div class='fl dim'>{_origin_words(state.method)}</div>")
+        put(self._origin, content=html("<div class='fl dim'>{}</div>", _origin_words(state.method)))
         drawing = state.drawing
         put(self._draws, visible=bool(drawing))
         for key, widget in self._settings.items():

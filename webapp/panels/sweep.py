@@ -4,8 +4,10 @@ import time
 
 import numpy as np
 import viser
+from markupsafe import Markup
 
 from webapp.handles import option_index, put
+from webapp.markup.html import html
 from webapp.markup.words import error_digits, three_digits
 from webapp.page import Page
 from webapp.panels.line_plot import FIN_LINES, LinePlot, top_of
@@ -72,7 +74,7 @@ class SweepPanel:
         self._plot.show(True)
         self._plot.name("fin forces [N]", f"{AXIS_WORDS[sweep.axis]} asked [{AXIS_UNITS[sweep.axis]}]")
         self._plot.draw(sweep.values, list(sweep.force), (0.0, top_of(sweep.force, 0.0)))
-        put(self._said, content=f"<div class='fl'>{_sentence(sweep)}</div>")
+        put(self._said, content=html("<div class='fl'>{}</div>", _sentence(sweep)))
 
 
 def _sentence(sweep: Sweep) -> str:
@@ -82,11 +84,11 @@ def _sentence(sweep: Sweep) -> str:
         return ""
     exact = known & (sweep.error <= EXACT)
     if not exact.any():
-        return "<span class='missing'>Nowhere along the way is the wrench delivered exactly.</span>"
+        return Markup("<span class='missing'>Nowhere along the way is the wrench delivered exactly.</span>")
     if exact[known].all():
         low, high = (three_digits(float(value)) for value in (np.nanmin(sweep.power), np.nanmax(sweep.power)))
         error = error_digits(float(np.nanmax(sweep.error)))
         return f"Exact all the way: the largest error is {error} σ; power from {low} to {high} W."
     low, high = (f"{value:.3g}".replace("-", "−") for value in sweep.values[exact][[0, -1]])
-    beyond = "<span class='missing'>beyond, something is missing.</span>"
+    beyond = Markup("<span class='missing'>beyond, something is missing.</span>")
     return f"Exact from {low} to {high} {AXIS_UNITS[sweep.axis]}; {beyond}"

@@ -1,13 +1,13 @@
 """Let the robot swim: a scenario, a method or two, what goes wrong on the way, and what it took."""
 
 from functools import partial
-from html import escape
 from typing import Any
 
 import viser
 
 from finlab.sim import PLANTS, SHIPPED, Trajectory
-from webapp.handles import put
+from webapp.handles import add_html, put
+from webapp.markup.html import html
 from webapp.markup.picking import marker
 from webapp.markup.scenario import scenario_card
 from webapp.markup.swim_card import swim_card
@@ -121,7 +121,7 @@ class RunPanel(SwimPanel):
     def _add_run(self) -> None:
         page = self._page
         gui = self._gui
-        gui.add_html(marker("fl-primary"))
+        add_html(gui, marker("fl-primary"))
         page.add_button("Start", self._start, icon=viser.Icon.PLAYER_PLAY, hint="From the beginning.")
         runs = {
             "Pause": self._hold,
@@ -195,7 +195,7 @@ class SwimCardPanel:
         """Write the figures, and whether the fins hold its weight at all."""
         state = self._page.session.state
         trim = trim_sentence(state.layout, axis_reach(state.able, state.failed))
-        warning = "" if trim is None else f"<div class='fl missing'>{trim}</div>"
+        warning = "" if trim is None else html("<div class='fl missing'>{}</div>", trim)
         put(self._card, content=swim_card(self._page.swimming, self._page.session.swim) + warning)
         making = self._page.swim_files.making
-        put(self._making, content=f"<div class='fl dim'>making {escape(making)} …</div>" if making else "")
+        put(self._making, content=html("<div class='fl dim'>making {} …</div>", making) if making else "")

@@ -6,7 +6,8 @@ import numpy as np
 import viser
 
 from finlab.arrays import Array
-from webapp.handles import Changes, hold_kind, option_index, put
+from webapp.handles import Changes, add_html, hold_kind, option_index, put
+from webapp.markup.html import html
 from webapp.markup.picking import marker
 from webapp.page import Page
 from webapp.panels.line_plot import FIN_LINES, LinePlot, top_of, with_cursor
@@ -44,8 +45,8 @@ class Timeline:
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         """Build the widgets."""
         self._page, swimming = page, page.swimming
-        gui.add_html(marker("fl-timeline"))
-        self._none = gui.add_html(f"<div class='fl dim fl-unswum'>{UNSWUM}</div>")
+        add_html(gui, marker("fl-timeline"))
+        self._none = add_html(gui, html("<div class='fl dim fl-unswum'>{}</div>", UNSWUM))
         hint = "Hold the swim, and look at any moment of it again."
         self._slider = page.bind_number(
             gui.add_slider("At [s]", 0.0, 90.0, 0.1, 0.0, hint=hint),

@@ -1,13 +1,14 @@
 """The bar above all: whose design it is, its file, what can be undone, the tasks, who answers, and help."""
 
 from functools import partial
-from html import escape
 
 import viser
+from markupsafe import Markup
 
 from finlab.allocation.methods import METHODS
 from webapp.editables import press
-from webapp.handles import put
+from webapp.handles import add_html, put
+from webapp.markup.html import html
 from webapp.markup.picking import marker
 from webapp.page import Page
 from webapp.session.design_links import MAX_LINK
@@ -37,9 +38,12 @@ class RobotBar:
         """Write the name, and whether it has been changed since it was opened or saved."""
         session = self._page.session
         layout = session.state.layout
-        changed = "" if layout == session.saved else "<span class='dim'>edited</span>"
-        name = escape(layout.name)
-        put(self._name, content=f"<div class='fl-robot' title='{name}'><h1>{name}</h1>{changed}</div>")
+        changed = "" if layout == session.saved else Markup("<span class='dim'>edited</span>")
+        name = layout.name
+        put(
+            self._name,
+            content=html("<div class='fl-robot' title='{}'><h1>{}</h1>{}</div>", name, name, changed),
+        )
 
 
 class FileBar:
@@ -48,7 +52,7 @@ class FileBar:
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         """Build the buttons."""
         self._page, designs = page, page.designs
-        gui.add_html(marker("fl-file"))
+        add_html(gui, marker("fl-file"))
         page.add_button("New", designs.new, icon=viser.Icon.FILE_PLUS, hint="One hull with one fin.")
         page.opening.add(DESIGNS, designs.open)
         hint = f"{KINDS[0].upper()}{KINDS[1:]}. Files can be dropped on the page as well."
@@ -93,11 +97,11 @@ class TaskBar:
     def refresh(self) -> None:
         """Mark the task that is open."""
         here = self._page.session.task
-        buttons = "".join(
-            f"<button {'aria-current=page ' * (task == here)}{press('task', task)}>{task}</button>"
+        buttons = Markup().join(
+            html("<button {}{}>{}</button>", "aria-current=page " * (task == here), press("task", task), task)
             for task in TASKS
         )
-        put(self._tasks, content=f"<nav class='fl-tasks' aria-label='Tasks'>{buttons}</nav>")
+        put(self._tasks, content=html("<nav class='fl-tasks' aria-label='Tasks'>{}</nav>", buttons))
 
 
 class AnsweringBar:
@@ -111,13 +115,19 @@ class AnsweringBar:
         about = "Power in watts, or the paper's effort: for all answers, comparisons, sweeps and swims."
         least = gui.add_dropdown("Keep least", OBJECTIVES, hint=about)
         page.bind(least, partial(session.set_setting, "objective"), lambda: session.state.objective)
-        gui.add_html(
-            "<div class='fl-help'>"
-            f'<button title="all commands (Ctrl+K)" onclick="{PALETTE}">Commands</button>'
-            f"<button title='a tour in {len(STEPS)} stops (T)' {press('tour', '')}>Tour</button>"
-            f"<button title='{len(LESSONS)} lessons with a task each' "
-            f"{press('lesson', LESSONS[0].name)}>Lessons</button>"
-            '<button aria-label="Keys" title="all keys (?)" onclick="finlabFrame.sheet()">?</button></div>'
+        add_html(
+            gui,
+            html(
+                '<div class=\'fl-help\'><button title="all commands (Ctrl+K)" onclick="{}">Commands'
+                "</button><button title='a tour in {} stops (T)' {}>Tour</button><button title='{} "
+                'lessons with a task each\' {}>Lessons</button><button aria-label="Keys" title="all '
+                'keys (?)" onclick="finlabFrame.sheet()">?</button></div>',
+                PALETTE,
+                len(STEPS),
+                press("tour", ""),
+                len(LESSONS),
+                press("lesson", LESSONS[0].name),
+            ),
         )
 
     def refresh(self) -> None:

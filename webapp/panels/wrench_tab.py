@@ -1,14 +1,14 @@
 """The question and its answer: the target wrench, bars, failures, and the table of commands."""
 
 from functools import partial
-from html import escape
 
 import numpy as np
 import viser
 
 from finlab.allocation.policy import AXES, KINDS
-from webapp.handles import Changes, put
+from webapp.handles import Changes, add_html, put
 from webapp.markup.answer import fin_table, wrench_bars
+from webapp.markup.html import html
 from webapp.markup.picking import marker
 from webapp.markup.verdict import answer_sentence
 from webapp.markup.words import three_digits
@@ -74,9 +74,9 @@ class TargetPanel:
             {axis: partial(page.session.set_only_axis, k) for k, axis in enumerate(AXES)},
             hint="This axis alone, at a quarter of what the fins can give; press again to reverse it.",
         )
-        gui.add_html(marker("fl-reach"))
+        add_html(gui, marker("fl-reach"))
         self._sliders = [self._add_slider(gui, k) for k in range(6)]
-        self._end = gui.add_html(marker("fl-reach-end"))
+        self._end = add_html(gui, marker("fl-reach-end"))
         policies = "Come closest, keep the direction, or serve axes by priority, heave first."
         page.bind(
             gui.add_dropdown("Out of reach", KINDS, hint=policies),
@@ -104,7 +104,7 @@ class TargetPanel:
         ranges, error = self._page.ranging.findings, self._page.ranging.error
         if not self._changes(ranges, error):
             return
-        sentence = "" if error is None else f"<div class='fl missing'>What is in reach: {escape(error)}</div>"
+        sentence = "" if error is None else html("<div class='fl missing'>What is in reach: {}</div>", error)
         put(self._end, content=marker("fl-reach-end") + sentence)
         for k, slider in enumerate(self._sliders):
             if ranges is None:
