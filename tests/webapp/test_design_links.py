@@ -106,7 +106,8 @@ def designs_of(session: Session, browser: Browser) -> Designs:
         reading=ReadAtOnce(lambda act: act()),
     )
     exports: Any = SimpleNamespace(download=lambda name, _: browser.sent.append(name))
-    editables: Any = SimpleNamespace(on=browser.heard.__setitem__)
+    hear = browser.heard.__setitem__
+    editables: Any = SimpleNamespace(on=hear, on_press=hear)
     return Designs(context, exports, editables)
 
 
