@@ -49,6 +49,9 @@ def check_new_folder(path: str | os.PathLike[str]) -> None:
         raise FinlabError(f"{path}: expected a new or empty folder, got a file")
     if folder.exists() and any(folder.iterdir()) and not (folder / UNFINISHED).exists():
         raise FinlabError(f"{path}: expected a new or empty folder; name another one")
+    there = next(each for each in (folder.absolute(), *folder.absolute().parents) if each.exists())
+    if not there.is_dir() or not os.access(there, os.W_OK):
+        raise FinlabError(f"{path}: cannot be made in {there}; name another folder")
 
 
 @contextmanager

@@ -31,8 +31,10 @@ PER_SPLIT = 4
 """Robots of each split."""
 SHIPPED = ("asymmetric", "hexa", "mixed", "no_yaw", "octo", "pair", "penta", "restricted")
 """Shipped layouts beside those of the paper; `ucat` has the fins of A."""
-DRAWN = ("id", "ood", "ood-fins", "limits", "failure", "near-singular")
-DRAWN += ("fins", "fins-mixed", "tables", "many-fins", "big", "tiny")
+DRAWN = (
+    *("id", "ood", "ood-fins", "limits", "failure", "near-singular"),
+    *("fins", "fins-mixed", "tables", "many-fins", "big", "tiny"),
+)
 """Held-out splits that robots are drawn from."""
 STARTS = 32
 """Random starts of IPOPT for each target and objective; twice as many of SLSQP where fins are tables."""
@@ -98,8 +100,8 @@ def make_problems(seed: int = SEED, per_split: int = PER_SPLIT, costs: bool = Tr
         for noisy in (False, True):
             wrenches = path(problems.layout(k), problems.sigma(k), seed + k, noisy)
             paths.append((k, noisy, wrenches, best[k].least_errors(wrenches)))
-    asked = {"targets": _columns(Targets, rows), "sequences": _columns(Sequences, paths)}
-    return replace(problems, about={"seed": seed, "starts": STARTS}, **asked)
+    whole = {"targets": _columns(Targets, rows), "sequences": _columns(Sequences, paths)}
+    return replace(problems, about={"seed": seed, "starts": STARTS}, **whole)
 
 
 def _robot(name: str, layout: Layout, forces: dict[str, AnyArray], seed: int, index: int) -> Robot:

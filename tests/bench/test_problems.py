@@ -44,7 +44,7 @@ def test_best_errors_are_what_ipopt_finds(shipped: Problems) -> None:
         for row in np.flatnonzero((asked.robot == robot) & (asked.kind >= BEYOND)):
             wanted = asked.wrench[row] / shipped.sigma(robot)
             least = reach.least_error(wanted, np.ones(6, dtype=bool))
-            assert asked.best_error[row] == pytest.approx(least, abs=1e-3 * np.linalg.norm(wanted))
+            assert asked.best_error[row] == pytest.approx(least, abs=1e-3 * float(np.linalg.norm(wanted)))
 
 
 def test_no_random_command_beats_what_is_known(shipped: Problems) -> None:

@@ -17,7 +17,7 @@ from finlab.evaluation.experiments.hard_days import HARD_DAYS, HardDay
 from finlab.evaluation.method_specs import load_method_specs
 from finlab.evaluation.progress import progress
 from finlab.evaluation.report.document import Column, Row
-from finlab.evaluation.statistics.bootstrap import spread_interval
+from finlab.evaluation.statistics.bootstrap import Interval, spread_interval
 from finlab.layout.angles import command_change
 from finlab.sim import RunLog
 
@@ -151,7 +151,7 @@ def _against(row: Row, baselines: Sequence[Row], done: Mapping[str, Swims]) -> R
     return {**found, "verdict": ", ".join(words)}
 
 
-def paired_interval(own: Swims, other: Swims, key: str) -> tuple[float, float] | None:
+def paired_interval(own: Swims, other: Swims, key: str) -> Interval | None:
     """Where another seed should land: by how much a figure of one method is more than another's, each swim
     against that of the same case and seed, by Student's t over seeds; None for a single seed."""
     by_seed: dict[int, list[float]] = {}
@@ -160,8 +160,7 @@ def paired_interval(own: Swims, other: Swims, key: str) -> tuple[float, float] |
     if len(by_seed) < 2:
         return None
     means = np.array([np.mean(values) for values in by_seed.values()])
-    low, high = spread_interval(float(means.mean()), float(means.std(ddof=1)), len(means))
-    return low, high
+    return spread_interval(float(means.mean()), float(means.std(ddof=1)), len(means))
 
 
 experiment = Experiment(
