@@ -1,17 +1,15 @@
 """How near fits to a few noisy samples come to the fins that were measured, and what their errors cost.
 
-An answer for a fitted fin misses by what the fit got wrong. It is held against a noise floor: the same
+An answer for a fitted fin misses by the errors of the fit. It is compared with a noise floor: the same
 targets, the same allocator, and a *full grid* of 864 forces of the same fin, measured with the same noise and
-taken as it stands. That is what a builder could hand over without a fit, and the best that an allocation can
-do on measurements of this quality; the true fin scores both.
+not fitted. The true fin scores both.
 """
 
 import tempfile
 import time
-from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
@@ -25,7 +23,7 @@ from finlab.evaluation.progress import progress
 from finlab.evaluation.report.document import Column, Row
 from finlab.evaluation.splits import Case, make_split, own_sigma
 from finlab.fit.fin_file import write_fin
-from finlab.fit.fin_fit import BAND, FinFit, fit_fin
+from finlab.fit.fin_fit import BAND, fit_fin
 from finlab.fit.measurements import MIN_SAMPLES, Measurements
 from finlab.layout import FinModelSpec, Layout
 from finlab.layout.random_fins import random_fin_model
@@ -36,53 +34,9 @@ DOMAIN = 0xF17
 HELD_OUT = 2000
 """Commands at which a fit is compared with the true fin."""
 KINDS = ("fins", "soft")
-"""Fins of split `fins`, and soft fins."""
-
-Noise = Callable[[np.random.Generator, Array], Array]
-"""From a generator and true forces (..., 3) [N]: measured ones."""
-
-
-def of_each(share: float) -> Noise:
-    """Noise whose standard deviation is a share of each force's size."""
-
-    def measured(rng: np.random.Generator, force: Array) -> Array:
-        size = np.linalg.norm(force, axis=-1, keepdims=True)
-        return np.asarray(force + share * size * rng.standard_normal(force.shape))
-
-    return measured
-
-
-def of_largest(share: float) -> Noise:
-    """Noise whose standard deviation is a share of the largest force."""
-
-    def measured(rng: np.random.Generator, force: Array) -> Array:
-        size = np.linalg.norm(force, axis=-1).max()
-        return np.asarray(force + share * size * rng.standard_normal(force.shape))
-
-    return measured
-
-
-NOISES: dict[str, Callable[[float], Noise]] = {"each force": of_each, "the largest": of_largest}
-"""What the noise is a share of."""
-
-
-class Fitted(NamedTuple):
-    """One fin, fitted and tried."""
-
-    error: Array
-    """Error of the force over the largest one at held-out commands (n,)."""
-    covered: float
-    """Share of the forces across the shaft that lie in their 95 % band."""
-    outliers: int
-    """Samples that were left out; none of them was wrong."""
-    trusted: bool
-    """Whether the fit says that it may be trusted."""
-    missed: Array
-    """Normalized error of answers for the fitted fin, scored by the true one (t,)."""
-    floor: Array
-    """The same for a full grid with the same noise (t,)."""
-    fit_s: float
-    """The processor's time of the fit [s]."""
+"""Fins of split `fins`, and soft fins, in turn."""
+NOISES = ("each force", "the largest")
+"""What noise is a share of."""
 
 
 def run(
@@ -110,16 +64,25 @@ def run(
     allocator = load_method_spec(method)
     cases = [_case(case, k, seed) for k, case in enumerate(make_split("fins", fins, targets, seed))]
     rows: list[Row] = []
-    for of, make in NOISES.items():
+    for of in NOISES:
         found = [
-            _fitted(allocator, case, samples, make(noise), np.random.default_rng([DOMAIN, seed, k]))
+            _fitted(allocator, case, samples, noise, of, np.random.default_rng([DOMAIN, seed, k]))
             for k, case in enumerate(progress(cases, "fin", f"noise of {of}"))
         ]
-        for i, kind in enumerate(KINDS):
-            if found[i :: len(KINDS)]:
-                rows.append({"noise_of": of, "fins": kind, **_figures(found[i :: len(KINDS)])})
-        rows.append({"noise_of": of, "fins": "all", **_figures(found)})
+        for kind, chosen in (
+            *((kind, found[i :: len(KINDS)]) for i, kind in enumerate(KINDS)),
+            ("all", found),
+        ):
+            rows += [{"noise_of": of, "fins": kind, **_figures(chosen)}] if chosen else []
     return rows
+
+
+def measured(rng: np.random.Generator, force: Array, share: float, of: str) -> Array:
+    """Forces (..., 3) with noise of a standard deviation that is a share of each one's size, or of the
+    largest."""
+    size = np.linalg.norm(force, axis=-1, keepdims=True)
+    deviation = share * (size.max() if of == "the largest" else size)
+    return np.asarray(force + deviation * rng.standard_normal(force.shape))
 
 
 def _case(case: Case, k: int, seed: int) -> Case:
@@ -133,63 +96,62 @@ def _case(case: Case, k: int, seed: int) -> Case:
     return Case(layout, targets, (), own_sigma(plant, rng))
 
 
-def _fitted(allocator: Allocator, case: Case, samples: int, noise: Noise, rng: np.random.Generator) -> Fitted:
+def _fitted(
+    allocator: Allocator, case: Case, samples: int, noise: float, of: str, rng: np.random.Generator
+) -> Row:
+    """Figures of one fin, fitted and tried."""
     fin = case.layout.fins[0]  # all fins of the robot are alike
     law, plant = make_law(fin.model), Plant(Layout("one", (fin,)))
     command, held_out = (plant.sample(rng, (n,))[:, 0] for n in (samples, HELD_OUT))
     places = tuple(f"sample {i}" for i in range(samples))
-    measurements = Measurements(command, noise(rng, law.force(command)), None, None, places, ())
+    noisy = measured(rng, law.force(command), noise, of)
     start = time.process_time()
-    fit = fit_fin(measurements)
-    fit_s = time.process_time() - start
-    error, covered = _against(fit, held_out, law.force(held_out))
+    fit = fit_fin(Measurements(command, noisy, None, None, places, ()))
+    seconds = time.process_time() - start
+    (force, deviation), truth = fit.predict(held_out), law.force(held_out)
+    error = np.linalg.norm(force - truth, axis=-1) / np.linalg.norm(truth, axis=-1).max()
+    covered = np.abs(force - truth)[:, 1:] <= BAND * deviation[:, 1:]
     with tempfile.TemporaryDirectory() as folder:
         write_fin(fit, Path(folder) / "fin.csv")
         fitted = FinModelSpec("table", (("path", str(Path(folder) / "fin.csv")),))
         missed = _missed(allocator, case, fitted)
-        grid = noisy_table(rng, fin, f"fit-{rng.integers(1 << 62):x}", noise)
-        floor = _missed(allocator, case, grid.model)
-    return Fitted(error, covered, len(fit.outliers), not fit.doubts, missed, floor, fit_s)
+    grid = noisy_table(rng, fin, f"fit-{rng.integers(1 << 62):x}", partial(measured, share=noise, of=of))
+    return {
+        "error": float(np.sqrt(np.mean(error**2))),
+        "covered": float(covered.mean()),
+        "outliers": len(fit.outliers),
+        "trusted": not fit.doubts,
+        "missed": missed,
+        "floor": _missed(allocator, case, grid.model),
+        "fit_s": seconds,
+    }
 
 
-def _against(fit: FinFit, command: Array, truth: Array) -> tuple[Array, float]:
-    """Error over the largest force at commands (n,), and the share of true forces within the band."""
-    force, deviation = fit.predict(command)
-    error = np.linalg.norm(force - truth, axis=-1) / np.linalg.norm(truth, axis=-1).max()
-    covered = np.abs(force - truth)[:, 1:] <= BAND * deviation[:, 1:]
-    return error, float(covered.mean())
-
-
-def _missed(allocator: Allocator, case: Case, model: FinModelSpec) -> Array:
-    """Normalized errors (t,) of answers for a robot with fins of a model, scored by its own."""
+def _missed(allocator: Allocator, case: Case, model: FinModelSpec) -> float:
+    """Mean normalized error of answers for a robot with fins of a model, scored by its own."""
     answer = allocator.allocate_batch(_with_model(case.layout, model), case.targets)
     delivered = Plant(case.layout).wrench(answer.command)
-    assert case.sigma is not None, "robots of split fins have a yardstick of their own"
-    return np.asarray(np.linalg.norm((delivered - case.targets) / case.sigma, axis=-1))
+    assert case.sigma is not None, "robots of split fins have a sigma of their own"
+    return float(np.linalg.norm((delivered - case.targets) / case.sigma, axis=-1).mean())
 
 
 def _with_model(layout: Layout, model: FinModelSpec) -> Layout:
     return replace(layout, fins=tuple(replace(fin, model=model) for fin in layout.fins))
 
 
-def _figures(found: list[Fitted]) -> Row:
-    error = [float(np.sqrt(np.mean(fit.error**2))) for fit in found]
-    missed, floor = (np.mean([np.mean(getattr(fit, name)) for fit in found]) for name in ("missed", "floor"))
-    covered = [fit.covered for fit in found]
+def _figures(found: list[Row]) -> Row:
+    each = {key: np.array([row[key] for row in found]) for key in found[0]}
     return {
         "n": len(found),
-        "error_median": float(np.median(error)),
-        "error_worst": max(error),
-        "error_largest": float(np.median([fit.error.max() for fit in found])),
-        "covered": float(np.mean(covered)),
-        "covered_least": min(covered),
-        "covered_most": max(covered),
-        "outliers": sum(fit.outliers for fit in found),
-        "trusted": float(np.mean([fit.trusted for fit in found])),
-        "err_norm": float(missed),
-        "err_norm_floor": float(floor),
-        "ratio": float(missed / floor),
-        "fit_s": max(fit.fit_s for fit in found),
+        "error_median": float(np.median(each["error"])),
+        "error_worst": float(each["error"].max()),
+        "covered": float(each["covered"].mean()),
+        "covered_least": float(each["covered"].min()),
+        "outliers": int(each["outliers"].sum()),
+        "trusted": float(each["trusted"].mean()),
+        "err_norm": float(each["missed"].mean()),
+        "err_norm_floor": float(each["floor"].mean()),
+        "fit_s": float(each["fit_s"].max()),
     }
 
 

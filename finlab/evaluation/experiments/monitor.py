@@ -1,4 +1,4 @@
-"""How soon and how surely a `FaultMonitor` finds a fin that is lost without a word, and what that costs."""
+"""How soon and how surely a `FaultMonitor` finds a loss that is not announced, and what that costs."""
 
 import math
 import time
@@ -26,7 +26,7 @@ QUIET_S = 10.0
 CURRENT_M_S = 0.05
 """Fastest current, whatever its heading [m/s]."""
 PUSHES_N = 0.2
-"""A fin that is told to push less than this on average until it should be found all but rests [N]."""
+"""A fin that is commanded to push less than this on average until it should be found nearly rests [N]."""
 GOALS = (
     "Aimed at: 95 % found within 3 s, 99 % of them the right fin, at most one false alarm an hour, an error "
     "of at most 1.1 times that of the announced loss, 0.1 ms per tick."
@@ -34,30 +34,19 @@ GOALS = (
 
 
 class Loss(NamedTuple):
-    """One swim with a monitor, and beside it the same swim with the loss announced."""
+    """One swim with a monitor; times in s, errors in m."""
 
     layout: str
-    """The robot."""
-    feedback: bool
-    """Whether the servos report their motion."""
-    fin: str | None
-    """The fin that is lost; None where none is."""
-    found_s: float
-    """Time from the loss until a fin is called broken [s]; infinite where none is."""
-    right: bool
-    """Whether it is the one."""
-    pushes: bool
-    """Whether the fin is told to push when it is lost."""
-    false_alarms: int
-    """How often a whole fin is called broken."""
-    whole_s: float
-    """Time during which nothing is broken [s]."""
-    ate: float
-    """Absolute trajectory error of the whole swim [m]."""
-    ate_announced: float
-    """That of the announced loss [m]; NaN where nothing is lost."""
-    tick_ms: float
-    """Processor's time of the monitor per tick [ms]."""
+    feedback: bool  # whether the servos report their motion
+    fin: str | None  # the fin that is lost, if one is
+    found_s: float  # from the loss until a fin is called lost; infinite where none is
+    right: bool  # whether it is the one
+    pushes: bool  # whether the fin is commanded to push when it is lost
+    false_alarms: int  # how often a whole fin is called lost
+    whole_s: float  # time during which all fins are whole
+    ate: float  # absolute trajectory error
+    ate_announced: float  # that of the same swim with the loss announced; NaN where nothing is lost
+    tick_ms: float  # processor's time of the monitor per tick [ms]
 
 
 class TimedMonitor(FaultMonitor):
@@ -173,20 +162,13 @@ def _loss(
         soon = (log.time >= at) & (log.time < at + FOUND_WITHIN_S) & np.isfinite(log.command[:, 0, 0])
         force = plant_of(swim.layout).forces(log.command[soon])[:, swim.layout.index(fin)]
         pushes = bool(np.linalg.norm(force, axis=-1).mean() >= PUSHES_N) if soon.any() else True
+    errors = [
+        math.nan if each is None else absolute_error(each.position, each.reference)
+        for each in (log, announced)
+    ]
+    seen = (found, right, pushes, false_alarms, min(at, swim.time))
     return Loss(
-        layout=swim.layout.name,
-        feedback=swim.servo_feedback,
-        fin=fin,
-        found_s=found,
-        right=right,
-        pushes=pushes,
-        false_alarms=false_alarms,
-        whole_s=min(at, swim.time),
-        ate=absolute_error(log.position, log.reference),
-        ate_announced=math.nan
-        if announced is None
-        else absolute_error(announced.position, announced.reference),
-        tick_ms=1e3 * monitor.spent_s / log.n_ticks,
+        swim.layout.name, swim.servo_feedback, fin, *seen, *errors, 1e3 * monitor.spent_s / log.n_ticks
     )
 
 
