@@ -8,6 +8,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from finlab.arrays import Array
+from finlab.errors import DataError
 from finlab.fit.gaussian_process import Component
 from finlab.fit.measurements import MIN_SAMPLES, Measurements
 from finlab.fit.outliers import ROUNDS, find_outliers
@@ -148,15 +149,23 @@ def fit_fin(measurements: Measurements, seed: int = 0, progress: Progress = say_
     The linear algebra runs on one thread: on matrices of this size several wait for each other.
 
     Args:
-        measurements: at least `MIN_SAMPLES`.
+        measurements: at least `MIN_SAMPLES` of a fin that beats.
         seed: draws the samples that are kept where there are more than `MOST_SAMPLES`.
         progress: called before each step.
+
+    Raises:
+        DataError: there are fewer.
     """
     notes = list(measurements.notes)
     rest = measurements.command[:, 0] * measurements.command[:, 1] == 0.0
     if rest.any():
         notes.append(f"{rest.sum()} samples at rest tell nothing and are left out")
         measurements = measurements.without(rest)
+    if len(measurements) < MIN_SAMPLES:
+        raise DataError(
+            f"{len(measurements)} samples of a fin that beats, expected at least {MIN_SAMPLES}; 300 are "
+            "a good number"
+        )
     if len(measurements) > MOST_SAMPLES:
         drawn = np.random.default_rng(seed).permutation(len(measurements)) >= MOST_SAMPLES
         notes.append(f"{MOST_SAMPLES} of {len(measurements)} samples, drawn at random, are used")
@@ -164,6 +173,8 @@ def fit_fin(measurements: Measurements, seed: int = 0, progress: Progress = say_
     stages = Stages(progress, 2 * ROUNDS + 4)
     with threadpool_limits(limits=1, user_api="blas"):
         bad = find_outliers(measurements, stages.begin)
+        if not measurements.force[~bad].any():  # a fin that hardly ever pushes: what it gives is no outlier
+            bad[:] = False
         stages.skip_to(2 * ROUNDS)
         outliers = tuple(place for place, out in zip(measurements.places, bad, strict=True) if out)
         if outliers:

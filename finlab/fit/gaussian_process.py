@@ -125,7 +125,7 @@ def _tuned(inputs: Array, values: Array, variance: Array | None) -> GaussianProc
     start, bounds = list(ThrustKernel()), list(BOUNDS)
     if known is None:
         start, bounds = [*start, FIRST_NOISE], [*bounds, NOISE]
-    logs = minimize(unlikely, np.log(start), jac=True, method="L-BFGS-B", bounds=np.log(bounds)).x
+    logs = minimize(unlikely, np.log(start), jac=True, method="L-BFGS-B", bounds=np.log(bounds).tolist()).x
     noise = np.full(len(values), np.exp(logs[5])) if variance is None else variance
     return GaussianProcess(ThrustKernel(*np.exp(logs[:5])), inputs, values, noise)
 

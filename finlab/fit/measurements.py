@@ -139,65 +139,65 @@ def _repeated(names: list[str]) -> str:
     return next(name for name in names if names.count(name) > 1)
 
 
-def _check_several(name: str, values: Array, unit: str, source: str) -> None:
-    if np.ptp(values) < SAME:
-        raise DataError(
-            f"{source}: column {name} has the one value {values[0]:.4g} {unit}, expected several; a "
-            "fin's force cannot be told from one amplitude or one frequency"
-        )
-
-
 def _checked(read: list[tuple[Columns, tuple[str, ...]]], source: str) -> Measurements:
     """The samples of all files, with what is wrong with them as a whole said in a sentence."""
-    files = [columns.values for columns, _ in read]
     places = tuple(place for _, own in read for place in own)
     notes = [note for columns, _ in read for note in columns.notes]
-
-    def gathered(name: str) -> Array | None:
-        return np.concatenate([f[name] for f in files]) if all(name in f for f in files) else None
-
-    n = len(places)
-    if n < MIN_SAMPLES:
-        raise DataError(f"{source}: {n} samples, expected at least {MIN_SAMPLES}; 300 are a good number")
-    amplitude, frequency = gathered("A"), gathered("f")
-    assert amplitude is not None and frequency is not None
-    _check_several("A", amplitude, "rad", source)
-    _check_several("f", frequency, "Hz", source)
-    phi, sideways = gathered("phi"), gathered("Fx")
-    turned = phi is not None and bool(np.ptp(phi) >= SAME_DIRECTION)
-    if not turned:
-        said = "there is no column phi" if phi is None else f"phi is {phi[0]:.3f} rad throughout"
-        notes.append(
-            f"{said}: the other zero directions are filled by symmetry, as a fin that is the same all round"
-        )
-    if phi is None:
-        phi = np.zeros(n)
-    elif np.ptp(phi) > TURN + FILE_TURN_TOLERANCE:
+    if len(places) < MIN_SAMPLES:
         raise DataError(
-            f"{source}: the zero directions span {np.ptp(phi):.4g} rad; say their unit with --angles"
+            f"{source}: {len(places)} samples, expected at least {MIN_SAMPLES}; 300 are a good number"
         )
-    if sideways is None:
-        sideways = np.zeros(n)
+    files = [columns.values for columns, _ in read]
+    shared = [name for name in files[0] if all(name in values for values in files)]
+    columns = {name: np.concatenate([values[name] for values in files]) for name in shared}
+    for name, unit in (("A", "rad"), ("f", "Hz")):
+        if np.ptp(columns[name]) < SAME:
+            raise DataError(
+                f"{source}: column {name} has the one value {columns[name][0]:.4g} {unit}, expected several; "
+                "a fin's force cannot be told from one amplitude or one frequency"
+            )
+    phi, turned = _directions(columns, source, notes)
+    if "Fx" not in columns:
+        columns["Fx"] = np.zeros(len(places))
         notes.append("there is no column Fx: no force along the shaft is assumed")
-    command = np.stack([amplitude, frequency, phi], axis=-1)
-    across = [gathered(name) for name in ("Fy", "Fz")]
-    force = np.stack([sideways, *[column for column in across if column is not None]], axis=-1)
+    command = np.stack([columns["A"], columns["f"], phi], axis=-1)
+    force = np.stack([columns[name] for name in ("Fx", "Fy", "Fz")], axis=-1)
     if not force[:, 1:].any():
         raise DataError(f"{source}: Fy and Fz are 0 throughout; such a fin drives nothing")
-    power = gathered("P")
+    power = columns.get("P")
     check_sensors(source, command, force, power, places, turned)
     if power is not None and power.min() < -0.02 * np.abs(power).max():
         raise DataError(
             f"{source}: column P has {power.min():.4g} W, expected the mean power that drives the fin"
         )
-    spread = [gathered(name) for name in ("sFx", "sFy", "sFz")]
-    given = [column for column in spread if column is not None]
-    deviation = None
-    if given:
-        wrong = (np.min(given, axis=0) <= 0.0) & (amplitude * frequency > 0.0)  # at rest all is known
-        if wrong.any():
-            place = places[int(np.argmax(wrong))]
-            raise DataError(f"{place}: a standard deviation is 0 or less; leave out what is not known")
-        mean = np.mean(given, axis=0)
-        deviation = np.stack([mean if column is None else column for column in spread], axis=-1)
-    return Measurements(command, force, deviation, power, places, tuple(notes), turned)
+    return Measurements(command, force, _deviation(columns, places), power, places, tuple(notes), turned)
+
+
+def _directions(columns: dict[str, Array], source: str, notes: list[str]) -> tuple[Array, bool]:
+    """Zero directions (n,) [rad], and whether there are several; a note where there are not."""
+    phi = columns.get("phi")
+    if phi is not None and np.ptp(phi) > TURN + FILE_TURN_TOLERANCE:
+        raise DataError(
+            f"{source}: the zero directions span {np.ptp(phi):.4g} rad; say their unit with --angles"
+        )
+    if phi is not None and np.ptp(phi) >= SAME_DIRECTION:
+        return phi, True
+    said = "there is no column phi" if phi is None else f"phi is {phi[0]:.3f} rad throughout"
+    notes.append(
+        f"{said}: the other zero directions are filled by symmetry, as a fin that is the same all round"
+    )
+    return np.zeros(len(columns["A"])) if phi is None else phi, False
+
+
+def _deviation(columns: dict[str, Array], places: tuple[str, ...]) -> Array | None:
+    """Standard deviations (n, 3) of the forces [N]; an axis of which nothing is told has the others' mean."""
+    given = [columns[name] for name in ("sFx", "sFy", "sFz") if name in columns]
+    if not given:
+        return None
+    wrong = (np.min(given, axis=0) <= 0.0) & (columns["A"] * columns["f"] > 0.0)  # at rest all is known
+    if wrong.any():
+        place = places[int(np.argmax(wrong))]
+        raise DataError(f"{place}: a standard deviation is 0 or less; leave out what is not known")
+    mean = np.mean(given, axis=0)
+    told = [columns[name] if name in columns else mean for name in ("sFx", "sFy", "sFz")]
+    return np.stack(told, axis=-1)

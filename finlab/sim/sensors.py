@@ -59,7 +59,7 @@ class SensorSettings:
     """How long losses last on average [s]; at 0 each sample is lost by itself."""
 
     def __post_init__(self) -> None:
-        checked = {"burst_s": (self.burst_s,)}
+        checked: dict[str, tuple[float, ...]] = {"burst_s": (self.burst_s,)}
         for name in NAMES:
             sensor: Sensor = getattr(self, name)
             if sensor.rate_hz == 0.0:
@@ -73,7 +73,8 @@ class SensorSettings:
 
     def each(self, change: Callable[[Sensor], Sensor]) -> "SensorSettings":
         """The same, each sensor changed."""
-        return replace(self, **{name: change(getattr(self, name)) for name in NAMES})
+        marker, pressure, dvl, imu = (change(getattr(self, name)) for name in NAMES)
+        return SensorSettings(marker, pressure, dvl, imu, self.burst_s)
 
     def later(self, seconds: float) -> "SensorSettings":
         """The same sensors, each so much later [s]."""

@@ -18,7 +18,8 @@ def derivative(state: Array, wrench: Array, body: Bodies, current: Array) -> Arr
     """Rate of change (12, ...) of states under wrenches (6, ...) [N, N m], in a current (2, ...) [m/s]."""
     rotation = rotation_of_angles(state[3:6])
     u, v, w, p, q, r = state[6:]
-    cu, cv, cw = to_body(rotation, *current, 0.0)
+    east, north = current
+    cu, cv, cw = to_body(rotation, east, north, 0.0)
     up = rotation[2::3]
     pace = np.empty_like(state)
     pace[:3] = to_world(rotation, u, v, w)

@@ -65,7 +65,7 @@ class Vehicle:
             return 1  # as nearly always: known from a bound, which takes less time
         u, v, w, p, q, r = map(abs, motion)
         speeds = (u + stream, v + stream, w + stream, p, q, r)
-        damping = max(damping_slopes(self.dynamics, speeds))
+        damping: float = max(damping_slopes(self.dynamics, speeds))
         often = damping + self._munk * max(speeds[:3]) + max(speeds[3:])
         most = MOST_STEPS * LONGEST / dt
         if not often <= most:  # nor where it is no number any more

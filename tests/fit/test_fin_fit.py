@@ -212,3 +212,17 @@ def test_no_measurement_is_proposed_twice(turned: bool, noise: float) -> None:
     away[..., 2] = wrapped(away[..., 2])
     near = (np.abs(away) < APART).all(axis=-1)
     assert near.sum() == 8, "each is near itself alone"
+
+
+def test_few_forces_among_many_zeros_are_no_outliers() -> None:
+    command = commands(60)
+    force = np.where((np.arange(60) < 3)[:, None], LAW.force(command), 0.0)
+    found = fit_fin(samples(command, force))
+    assert found.outliers == () and found.largest > 0.0
+
+
+def test_a_fin_that_hardly_ever_beats_is_refused() -> None:
+    command = commands(60)
+    command[5:, 0] = 0.0
+    with pytest.raises(DataError, match="5 samples of a fin that beats"):
+        fit_fin(samples(command, LAW.force(command)))

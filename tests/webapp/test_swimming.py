@@ -172,7 +172,7 @@ def test_a_fin_that_breaks_without_a_word_is_found(swimming: Swimming) -> None:
     blind = swimmer.shown._replace(failed=(), found=())
     assert "front_left is lost, and the monitor takes it for torn or stuck" in findings_words(blind)[0]
     wrong = blind._replace(lost=())
-    assert "The monitor takes front_left for weak or stuck" in findings_words(wrong)[0]
+    assert "The monitor takes front_left for torn or stuck" in findings_words(wrong)[0]
     swimming.toggle("front_left", announced=False)
     until(lambda: swimming.swimmers[0].shown.lost == ())
     assert "front_left works, but the allocator takes it for lost" in swim_card(swimming, SwimSettings())
