@@ -198,6 +198,5 @@ def _deviation(columns: dict[str, Array], places: tuple[str, ...]) -> Array | No
     if wrong.any():
         place = places[int(np.argmax(wrong))]
         raise DataError(f"{place}: a standard deviation is 0 or less; leave out what is not known")
-    mean = np.mean(given, axis=0)
-    told = [columns[name] if name in columns else mean for name in ("sFx", "sFy", "sFz")]
-    return np.stack(told, axis=-1)
+    mean: Array = np.asarray(np.mean(given, axis=0))
+    return np.stack([columns.get(name, mean) for name in ("sFx", "sFy", "sFz")], axis=-1)
