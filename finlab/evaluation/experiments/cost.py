@@ -159,8 +159,9 @@ experiment = Experiment(
     full={
         "split": ("id", "ood-fins", "limits", "failure", "fins-mixed", "axes", "axes-mixed"),
         "methods": ("search", "mdn", "sqp", "analytic"),
-        "layouts": 15,
+        "layouts": 12,
         "targets": 2,
+        "starts": 16,
     },
     each="split",
     needs=("casadi",),

@@ -35,6 +35,8 @@ class Boundary(NamedTuple):
     least: dict[str, Array]
     """The least normalized errors (F, D): under `closest` on all axes, under `priority` on the first
     group."""
+    share: Array
+    """The largest shares (F, D) of the targets that can be had alone."""
 
 
 def run(
@@ -70,7 +72,7 @@ def run(
         for method, allocator in allocators.items():
             for policy in KINDS if method in WITH_POLICIES else KINDS[:1]:
                 found = [
-                    _missed(allocator, case, each, sigma, factors, policy)
+                    _missed(allocator, case, each, sigma, policy)
                     for case, each in zip(progress(cases, "layout", method), known, strict=True)
                 ]
                 rows += [
@@ -92,17 +94,11 @@ def _boundary(case: Case, sigma: Array, factors: tuple[float, ...]) -> Boundary:
         policy: np.array([[reach.least_error(each / sigma, axes) for each in row] for row in asked])
         for policy, axes in (("closest", np.full(6, True)), ("priority", first))
     }
-    return Boundary(asked, least)
+    share = np.array([[reach.largest_share(each / sigma) for each in row] for row in asked])
+    return Boundary(asked, least, share)
 
 
-def _missed(
-    allocator: Allocator,
-    case: Case,
-    known: Boundary,
-    sigma: Array,
-    factors: tuple[float, ...],
-    policy: str,
-) -> Array:
+def _missed(allocator: Allocator, case: Case, known: Boundary, sigma: Array, policy: str) -> Array:
     """What is missed beyond the least (F, D) under a policy."""
     shape = known.targets.shape[:2]
     answer = allocator.allocate_batch(
@@ -113,7 +109,7 @@ def _missed(
     wanted = known.targets / sigma
     if policy == "direction":
         share = (given * wanted).sum(axis=-1) / (wanted**2).sum(axis=-1)
-        return np.asarray(1.0 / np.asarray(factors)[:, None] - share)
+        return np.asarray(known.share - share)
     axes = np.full(6, True) if policy == "closest" else np.isin(AXES, Policy("priority").order[0])
     return np.asarray(np.linalg.norm((given - wanted)[..., axes], axis=-1) - known.least[policy])
 

@@ -12,7 +12,7 @@ from finlab.evaluation.report.document import Block, Document, Row, Table, figur
 from finlab.evaluation.report.jobs import THREADS, Part, run_parts
 from finlab.evaluation.report.pages import to_html, to_markdown
 from finlab.evaluation.report.provenance import machine, source_commit, source_digest
-from finlab.evaluation.report.standings import COLUMNS, standings
+from finlab.evaluation.report.standings import COLUMNS, LEVEL, standings
 from finlab.whole_file import write_whole
 
 PAGE, TWIN, TABLES, PICTURES = "index.html", "report.md", "tables.json", "pictures"
@@ -29,8 +29,8 @@ ABOUT = (
     f"controllers were developed on other seeds than {SEED}."
 )
 LEADS = (
-    "Method `search` against the others: a method leads where its interval and the other's do not overlap. "
-    "Mean errors below 1e-5 say where a method stops refining, not whether it delivers the wrench."
+    "Method `search` against the others: a method leads where its interval and the other's lie apart by more "
+    f"than {LEVEL:g}, which is the solvers' rounding."
 )
 Size = Literal["quick", "full"]
 

@@ -110,11 +110,13 @@ def _text_block(block: Block, pictures: str) -> str:
 
 
 def _text_table(table: Table) -> str:
+    keys = [column.key for column in table.columns]
+    named = keys.index("method") if "method" in keys else 0
     lines = [[column.heading for column in table.columns]]
     lines.append(["---:" if column.is_number else "---" for column in table.columns])
     for row in table.rows:
         cells = [table.in_one_cell(row, column) for column in table.columns]
         if row.get("_kind") == "ours":
-            cells[0] = f"**{cells[0]}**"
+            cells[named] = f"**{cells[named]}**"
         lines.append(cells)
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)

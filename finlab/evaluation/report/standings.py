@@ -1,6 +1,7 @@
 """Who leads: the default method against every other one, case by case.
 
-A method leads another only where their intervals, in which another seed lands, do not overlap.
+A method leads another only where their intervals, in which another seed lands, lie apart by more than
+`LEVEL`.
 """
 
 from collections.abc import Sequence
@@ -9,6 +10,8 @@ from finlab.evaluation.experiment import Experiment
 from finlab.evaluation.report.document import Column, Row
 
 OURS = "search"
+LEVEL = 1e-5
+"""Differences up to this are the solvers' rounding: normalized errors, ratios of costs, metres or watts."""
 COLUMNS = (
     Column("experiment", "experiment", "code"),
     Column("measure", "less is better"),
@@ -39,8 +42,8 @@ def standings(experiment: Experiment, rows: Sequence[Row]) -> list[Row]:
             pairs = [
                 (ends[OURS, case], e) for (m, case), e in ends.items() if m == other and (OURS, case) in ends
             ]
-            leads = sum(mine[1] < theirs[0] for mine, theirs in pairs)
-            trails = sum(theirs[1] < mine[0] for mine, theirs in pairs)
+            leads = sum(mine[1] < theirs[0] - LEVEL for mine, theirs in pairs)
+            trails = sum(theirs[1] < mine[0] - LEVEL for mine, theirs in pairs)
             row: Row = {"experiment": experiment.name, "measure": titles[measure], "against": other}
             counts = {
                 "cases": len(pairs),

@@ -126,7 +126,8 @@ def test_nobody_errs_less_than_possible_and_the_search_hardly_more() -> None:
     least = [found[factor, "search", "closest"]["least_mean"] for factor in (1.0, 2.0)]
     assert least[0] < 1e-3 < least[1]
     assert all(row["excess_median"] > -1e-3 for row in rows)
-    assert all(row["excess_max"] < 0.01 for row in rows if row["method"] == "search")
+    ours = [row for row in rows if row["method"] == "search"]
+    assert all(row["excess_median"] > -1e-3 and row["excess_max"] < 0.01 for row in ours)
     assert found[2.0, "analytic", "closest"]["excess_mean"] > 0.1  # it does not know what to give up
     with pytest.raises(DataError, match="split: expected one whose fins follow the law drag"):
         experiment.rows(split=("fins",), layouts=2, targets=1)
