@@ -143,31 +143,22 @@ def test_each_question_sees_its_own_damage(robot: Robot) -> None:
     """Every finding of a healthy robot is good; a changed number shows up as large as it is."""
     assert all(found.good for found in self_check(robot))
     first, *others = robot.graph.self_test
-    moved = np.array(first.delivered_wrench) + 0.5 * robot.graph.normalization.std
-    cases = (replace(first, delivered_wrench=tuple(moved.tolist())), *others)
-    damaged = Robot(replace(robot.graph, self_test=cases), robot.allocator)
-    error = finding(damaged, "wrench of the stored commands").value
-    assert error == pytest.approx(
-        float(robot.graph.normalization.error(moved, np.array(first.delivered_wrench))), abs=1e-6
-    )
-    assert not finding(damaged, "wrench of the stored commands").good
-    # Stored answers that were better, and cheaper, than this computer's.
-    away = np.array(first.wrench) + 0.1 * robot.graph.normalization.std
-    cases = (
-        replace(first, wrench=tuple((1e3 * away).tolist()), delivered_wrench=tuple(away.tolist())),
-        *others,
-    )
-    assert not finding(
-        Robot(replace(robot.graph, self_test=cases), robot.allocator), "own answers, judged"
-    ).good
+    error, std = robot.graph.normalization.error, robot.graph.normalization.std
+
+    def stored(question: str, **changes: object) -> Finding:
+        cases = (replace(first, **changes), *others)  # type: ignore[arg-type]
+        return finding(Robot(replace(robot.graph, self_test=cases), robot.allocator), question)
+
+    delivered = np.array(first.delivered_wrench)
+    found = stored("wrench of the stored commands", delivered_wrench=tuple(delivered + 0.5 * std))
+    assert not found.good
+    assert found.value == pytest.approx(float(error(delivered + 0.5 * std, delivered)), abs=1e-6)
+    assert not stored("own answers, judged", wrench=tuple(1e3 * delivered)).good
+    far = (90.0, *first.wrench[1:])
+    assert not stored("own answers, more error", wrench=far, delivered_wrench=far).good
     idle = tuple(None if row is None else (0.5 * row[0], *row[1:]) for row in first.command)
-    cases = (replace(first, command=idle), *others)
-    damaged = Robot(replace(robot.graph, self_test=cases), robot.allocator)
-    dearer = finding(damaged, "own answers, more cost")
-    assert not dearer.good and dearer.value > 1.0, "half the strokes take less than half the power"
-    first = replace(first, wrench=(90.0, *first.wrench[1:]), delivered_wrench=(90.0, *first.wrench[1:]))
-    damaged = Robot(replace(robot.graph, self_test=(first, *others)), robot.allocator)
-    assert not finding(damaged, "own answers, more error").good
+    found = stored("own answers, more cost", command=idle)
+    assert not found.good and found.value > 1.0, "half the strokes take less than half the power"
 
 
 def test_without_self_tests_there_is_nothing_to_check(robot: Robot) -> None:
