@@ -1,6 +1,7 @@
 """Long tables of cases: one in ten runs every day, the others with `make test-all`."""
 
 from collections.abc import Iterable
+from itertools import product
 from typing import Any
 
 import pytest
@@ -18,3 +19,8 @@ def sampled(cases: Iterable[Any], every: int = 10) -> list[Any]:
         extra = [pytest.mark.exhaustive] if number % every else []
         marked.append(pytest.param(*param.values, marks=[*param.marks, *extra], id=param.id))
     return marked
+
+
+def crossed(*values: Iterable[Any], every: int = 10) -> list[Any]:
+    """`sampled` cases of several parameters: each of their combinations."""
+    return sampled((pytest.param(*each) for each in product(*values)), every)

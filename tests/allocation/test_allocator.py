@@ -14,7 +14,6 @@ from finlab.cli.allocate import allocate
 from finlab.errors import AllocationError, CommandError, LayoutError
 from finlab.inference.normalization import Normalization
 from finlab.layout import Fin, Layout
-from finlab.physics import Plant
 from finlab.physics.blade import Blade
 
 SIGMA = np.array([1.0, 2.0, 1.0, 0.5, 0.5, 0.5])
@@ -158,18 +157,6 @@ def test_the_target_is_a_copy(method: Drawn) -> None:
     result = method.allocate(ROBOT, target)
     target[0] = 99.0
     assert result.target[0] == 1.0
-
-
-def test_an_answer_judges_itself_by_the_plant(method: Drawn) -> None:
-    result = method.allocate(ROBOT, SURGE, failed=["left"])
-    delivered = Plant(ROBOT).wrench(result.command)
-    np.testing.assert_allclose(result.wrench, delivered, atol=1e-12)
-    np.testing.assert_allclose(result.fin_forces, Plant(ROBOT).fin_forces(result.command))
-    np.testing.assert_allclose(result.fin_forces.sum(0), delivered[:3], atol=1e-12)
-    np.testing.assert_allclose(result.unallocated, np.array(SURGE) - delivered, atol=1e-12)
-    assert result.err_norm == pytest.approx(np.linalg.norm((delivered - SURGE) / SIGMA))
-    np.testing.assert_array_equal(result.wrench_surrogate, 0.5 * np.array(SURGE))
-    assert result.method == "drawn" and result.checkpoint is None and result.solve_ms >= 0.0
 
 
 def test_energy_counts_the_working_fins(method: Drawn) -> None:

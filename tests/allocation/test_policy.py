@@ -1,7 +1,5 @@
 """What the allocator does when a wrench is out of reach: closest, same direction, or in order of priority."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
@@ -19,7 +17,7 @@ from finlab.allocation.policy import (
 from finlab.allocation.search.search_allocator import SearchAllocator
 from finlab.assets import shipped_layouts
 from finlab.errors import AllocationError, CommandError
-from finlab.layout import Fin, Layout, Limits, load_layout
+from finlab.layout import Layout, load_layout
 from finlab.layout.arrays import layout_effectiveness
 from finlab.physics import Plant
 
@@ -193,31 +191,6 @@ def test_nothing_binds_where_the_target_is_delivered(search: SearchAllocator) ->
         assert search.allocate(shipped("A"), np.zeros(6), failed=failed).binding == ()
 
 
-def test_sentences_about_commands() -> None:
-    names = ("full", "rest", "fast", "stop", "lost", "free", "turned away", "at a stop it needs")
-    lower, upper = np.tile([0.0, 0.0, -1.0], (8, 1)), np.tile([1.0, 2.0, 1.0], (8, 1))
-    lower[5, 2], upper[5, 2] = -np.pi, np.pi
-    command = np.array(
-        [
-            [1, 2, 0],
-            [0, 0, 0],
-            [0.5, 2, 0],
-            [0.5, 1, -1],
-            [np.nan] * 3,
-            [0.5, 1, np.pi],
-            [0, 0, 0],
-            [0.5, 1, 1],
-        ]
-    )
-    wanted = np.array([0.0, 0.5, 0.0, -2.0, 0.0, 0.0, 3.0, 0.5])
-    pull = np.stack([np.cos(wanted), np.sin(wanted)], axis=-1)
-    assert describe_binding(names, command, lower, upper, pull) == [
-        "full at full thrust",
-        "stop at the end of its arc",
-        "turned away cannot point where it is needed",
-    ]
-
-
 def test_methods_without_weights_say_so() -> None:
     layout = shipped("pair")
     for name in METHODS:
@@ -278,57 +251,12 @@ def test_the_largest_share_is_found(share: float) -> None:
     assert found <= share < found + 1e-3
 
 
-def test_fins_of_several_kinds_are_asked_by_their_own_laws(search: SearchAllocator) -> None:
-    far = search.allocate(shipped("mixed"), np.array(FAR), policy="priority")
-    assert far.notes == () and far.unknown_fins == () and far.wrench_surrogate is None
-    first = search.allocate(shipped("mixed"), np.array(FAR))
-    assert first.err_norm < 1.001 * least_error(shipped("mixed"), np.array(FAR), 1.0 / first.sigma)
-    assert abs(far.unallocated[2]) <= abs(first.unallocated[2]) + 1e-6
-
-
-def test_a_fin_without_freedom_still_gets_an_answer(search: SearchAllocator) -> None:
-    stiff = Limits((0.3, 0.3), (1.0, 1.0), (0.5, 0.5))
-    pair = shipped("pair")
-    layout = replace(pair, fins=(replace(pair.fins[0], limits=stiff), Fin("b", (0.1, 0.1, 0.0), 1.0)))
-    for policy in ("closest", "direction", "priority"):
-        result = search.allocate(layout, FAR, policy=policy)
-        np.testing.assert_array_equal(result.command[0], [0.3, 1.0, 0.5])
-        assert np.isfinite(result.command).all()
-
-
 @pytest.mark.parametrize(
     "wrong", [{"axis_weights": "abc"}, {"axis_weights": None}, {"order": 5}, {"order": ("Fz",)}]
 )
 def test_policies_of_the_wrong_type_are_refused_in_a_sentence(wrong: dict[str, object]) -> None:
     with pytest.raises(CommandError, match=r"axis weights|groups of axes"):
         Policy("priority", **wrong)  # type: ignore[arg-type]
-
-
-@pytest.mark.parametrize(
-    ("limit", "rounds", "width", "found"),
-    [
-        (0.3, 1, 4, 0.25),  # asks 1/4, 1/2, 3/4, 1
-        (0.3, 2, 4, 0.25),  # then 5/16, ...: none
-        (0.3, 3, 4, 0.296875),  # then quarters of that first interval: 17/64, 18/64, 19/64, 20/64
-        (0.5, 1, 4, 0.5),
-        (0.74, 2, 4, 0.6875),
-        (1.0, 3, 4, 1.0),
-        (9.0, 3, 4, 1.0),
-        (0.0, 3, 4, 0.0),
-        (-1.0, 3, 4, 0.0),
-    ],
-)
-def test_each_round_narrows_the_interval(limit: float, rounds: int, width: int, found: float) -> None:
-    asked: list[np.ndarray] = []
-
-    def reached(shares: np.ndarray) -> np.ndarray:
-        asked.append(shares)
-        return np.asarray(shares <= limit)
-
-    assert largest_share(reached, rounds, width) == found
-    np.testing.assert_array_equal(asked[0], [0.25, 0.5, 0.75, 1.0])
-    assert len(asked) == (1 if limit >= 1.0 else rounds)
-    assert all(len(shares) == width and shares.min() > 0.0 and shares.max() <= 1.0 for shares in asked)
 
 
 @pytest.mark.parametrize(

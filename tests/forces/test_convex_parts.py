@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from finlab.arrays import Array
-from finlab.forces.convex_parts import MOST_SPLIT, MOST_STARTS, arcs_to_search
+from finlab.forces.convex_parts import arcs_to_search
 from finlab.forces.envelopes import layout_envelopes
 from finlab.layout import load_layout
 from finlab.physics.objective import Objective
@@ -39,17 +39,3 @@ def test_the_parts_are_all_combinations_of_halves() -> None:
     others = [0, 2, 4, 5, 6, 7]
     np.testing.assert_array_equal(middle[:, others], np.tile(own[others], (5, 1)))
     np.testing.assert_array_equal(half[:, others], np.tile(half[0, others], (5, 1)))
-
-
-@pytest.mark.parametrize("n_seeds", [1, 13, 26, 65, MOST_STARTS])
-def test_the_widest_arcs_are_split_as_far_as_starts_allow(n_seeds: int) -> None:
-    wide = [1.7, 1.8, 1.9, 2.0, 2.1, 2.2, 2.3, 2.35]
-    found = arcs_of(wide, n_seeds)
-    if n_seeds == MOST_STARTS:
-        assert found is None
-        return
-    assert found is not None
-    n_split = int((found[1][1] < wide).sum())
-    assert len(found[0]) == 1 + 2**n_split and len(found[0]) * n_seeds <= MOST_STARTS
-    assert n_split == MOST_SPLIT or n_seeds * (1 + 2 ** (n_split + 1)) > MOST_STARTS
-    assert (found[1][1] < wide).tolist() == [False] * (8 - n_split) + [True] * n_split

@@ -9,14 +9,10 @@ from numpy.typing import NDArray
 from finlab.forces.fin_envelope import (
     AMPLITUDE,
     COST,
-    DIRECTIONS,
-    DRIFT,
     FREQUENCY,
     LEAN,
     LEVELS,
-    MOBILITY,
     SHAFT,
-    STIFFNESS,
     FinEnvelope,
     compile_fin,
     fin_envelope,
@@ -25,6 +21,7 @@ from finlab.forces.fin_envelope import (
 from finlab.layout import FinModelSpec, Limits
 from finlab.physics import FinLaw, make_law
 from finlab.physics.objective import Name, Objective
+from tests.exhaustive import crossed
 from tests.random_fins import write_fin_table
 
 Array = NDArray[np.float64]
@@ -81,14 +78,7 @@ def brute(law: FinLaw, limits: Limits, turn: float) -> tuple[Array, Array]:
     return np.hypot(force[..., 1], force[..., 2]), command
 
 
-def test_levels_rise_from_nothing_to_all() -> None:
-    share = levels()
-    assert share.shape == (LEVELS,) and share[0] == 0.0 and share[-1] == pytest.approx(1.0)
-    assert (np.diff(share) > 0.0).all()
-
-
-@pytest.mark.parametrize("objective", ["power", "effort"])
-@pytest.mark.parametrize("name", FINS)
+@pytest.mark.parametrize(("objective", "name"), crossed(["power", "effort"], FINS, every=5))
 def test_each_entrys_command_gives_the_promised_force(name: str, objective: Name) -> None:
     law, limits, envelope = compiled(name, Objective(objective))
     command, angle = commands(envelope), directions(envelope)
@@ -106,8 +96,10 @@ def test_each_entrys_command_gives_the_promised_force(name: str, objective: Name
     np.testing.assert_allclose(envelope.table[..., COST], cost(command), rtol=1e-12)
 
 
-@pytest.mark.parametrize("objective", ["power", "effort"])
-@pytest.mark.parametrize("name", ["drag", "weak", "lighthill", "soft", "uneven", "declining"])
+@pytest.mark.parametrize(
+    ("objective", "name"),
+    crossed(["power", "effort"], ["drag", "weak", "lighthill", "soft", "uneven", "declining"], every=5),
+)
 def test_no_cheaper_command_gives_the_same_force(name: str, objective: Name) -> None:
     """Brute force: for each amplitude of a fine grid, each frequency at which the force passes the level."""
     law, limits, envelope = compiled(name, Objective(objective))
@@ -139,43 +131,6 @@ def test_the_ends_are_those_of_brute_force(name: str) -> None:
         assert envelope.smallest[k] == pytest.approx(size, rel=2e-3, abs=1e-5 * envelope.largest[k])
 
 
-@pytest.mark.parametrize("objective", ["power", "effort"])
-@pytest.mark.parametrize("name", ["drag", "lighthill", "soft", "uneven"])
-def test_marginal_costs_are_differences(name: str, objective: Name) -> None:
-    """Mobility is size over marginal cost; stiffness the elasticity of the latter, where cost is convex."""
-    _, _, envelope = compiled(name, Objective(objective))
-    size, table = sizes(envelope), envelope.table
-    inner = slice(12, LEVELS - 6)
-    marginal = (table[:, 2:, COST] - table[:, :-2, COST]) / (size[:, 2:] - size[:, :-2])
-    assert (marginal[:, inner] > 0.0).all()
-    found = size[:, 1:-1] / np.exp(table[:, 1:-1, MOBILITY])
-    apart = np.abs(found / marginal - 1.0)[:, inner]
-    assert np.median(apart) < 0.02 and np.quantile(apart, 0.9) < 0.1
-    assert (table[..., STIFFNESS] > 0.3).all() and (table[..., STIFFNESS] <= 10.0).all()
-    if objective == "power":
-        elastic = np.diff(np.log(marginal), axis=1) / np.diff(np.log(size[:, 1:-1]), axis=1)
-        between = 0.5 * (table[:, 1:-2, STIFFNESS] + table[:, 2:-1, STIFFNESS])
-        off = np.abs(between / elastic - 1.0)[:, inner][(elastic > 0.35)[:, inner]]
-        assert len(off) > 10 and np.median(off) < 0.03 and np.quantile(off, 0.8) < 0.2
-
-
-@pytest.mark.parametrize("name", ["uneven", "leaning"])
-def test_drift_is_what_turning_costs(name: str) -> None:
-    """Cost at a size by the direction, over the marginal cost; none of a fin that is the same all round."""
-    _, _, plain = compiled("drag", Objective())
-    np.testing.assert_array_equal(plain.table[..., DRIFT], 0.0)
-    _, _, envelope = compiled(name, Objective())
-    size, table, angle = sizes(envelope), envelope.table, directions(envelope)
-    level = LEVELS // 2
-    for k in range(1, DIRECTIONS - 1, 5):
-        marginal = size[k, level] / np.exp(table[k, level, MOBILITY])
-        around = [float(np.interp(size[k, level], size[j], table[j, :, COST])) for j in (k - 1, k + 1)]
-        turning = (around[1] - around[0]) / (angle[k + 1] - angle[k - 1])
-        assert table[k, level, DRIFT] * marginal == pytest.approx(
-            turning, rel=0.1, abs=1e-3 * table[k, level, COST]
-        )
-
-
 def test_a_table_is_compiled_like_its_law(tmp_path: Path) -> None:
     limits = Limits(zero_direction=(-1.0, 2.0))
     law = make_law(FinModelSpec())
@@ -190,28 +145,6 @@ def test_a_table_is_compiled_like_its_law(tmp_path: Path) -> None:
     force = make_law(spec).force(command)
     np.testing.assert_allclose(table.table[..., SHAFT], force[..., 0], atol=1e-12)
     assert np.abs(table.table[..., SHAFT]).max() > 0.05 * table.largest.max()
-
-
-@pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize("arc", [(-np.pi, np.pi), (-1.0, 2.0), (-2.6, 2.6)])
-@pytest.mark.parametrize("objective", ["power", "effort"])
-def test_noise_gives_finite_tables_that_hold_what_they_promise(
-    objective: Name, arc: tuple[float, float], tmp_path: Path
-) -> None:
-    limits, law = Limits(zero_direction=arc), make_law(FinModelSpec())
-    rng = np.random.default_rng(0)
-    spec = write_fin_table(tmp_path / "fin.csv", law, limits, rng=rng, noise=0.03, sideways=0.1, power=True)
-    measured = make_law(spec)
-    envelope = compile_fin(measured, limits, Objective(objective))
-    assert np.isfinite(envelope.table).all() and (envelope.largest >= envelope.smallest).all()
-    angle = directions(envelope)
-    promised = sizes(envelope)[..., None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)[:, None]
-    missing = np.linalg.norm(measured.force(commands(envelope))[..., 1:] - promised, axis=-1)
-    strong = sizes(envelope) > 0.2 * envelope.largest.max()
-    assert np.quantile(missing[strong], 0.9) < 2e-3 * envelope.largest.max()
-    # No slope is that of the noise.
-    if objective == "power" and arc[1] > 3.0:
-        assert np.abs(np.diff(envelope.table[..., MOBILITY], axis=1))[:, 15:-6].max() < 1.0
 
 
 @pytest.mark.filterwarnings("error")

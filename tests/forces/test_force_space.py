@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from finlab.forces.envelopes import LEAST
-from finlab.forces.force_space import RIDGE, Planar, PlanarProblem, _gram, descend, polar, realize
+from finlab.forces.force_space import PlanarProblem, descend, polar, realize
 from finlab.layout import Layout
 from finlab.physics import Plant
 from finlab.physics.objective import Name, Objective
@@ -34,16 +33,6 @@ def full(problem: PlanarProblem, rows: int) -> Array:
     return np.tile(problem.fins.maximum, (rows, 1))
 
 
-def forces_of(planar: Planar) -> Array:
-    """Planar forces (R, n, 2)."""
-    unit = np.stack([np.cos(planar.direction), np.sin(planar.direction)], axis=-1)
-    return planar.size[..., None] * unit
-
-
-def wrench_of(problem: PlanarProblem, force: Array) -> Array:
-    return np.einsum("rnc,cni->ri", force, np.stack(np.split(problem.columns, 2)))
-
-
 @pytest.mark.parametrize("objective", ["power", "effort"])
 @pytest.mark.parametrize("kinds", [("drag", "lighthill"), LAWS])
 def test_reaches_what_can_be_reached(kinds: tuple[str, ...], objective: Name) -> None:
@@ -57,14 +46,6 @@ def test_reaches_what_can_be_reached(kinds: tuple[str, ...], objective: Name) ->
     if objective == "power":
         assert np.quantile(errors, 0.97) < 1e-6
         assert "soft" in kinds or errors.max() < 1e-5
-
-
-@pytest.mark.parametrize("limits", ["nominal", "varied"])
-def test_the_residual_is_what_the_forces_leave(limits: str) -> None:
-    for layout in robots(limits, LAWS):
-        problem, target = problem_of(layout), reachable(layout)
-        planar = descend(problem, target, full(problem, len(target)), 6)
-        np.testing.assert_allclose(planar.residual, target - wrench_of(problem, forces_of(planar)), atol=1e-9)
 
 
 @pytest.mark.parametrize("objective", ["power", "effort"])
@@ -103,18 +84,3 @@ def test_is_cheaper_than_the_pseudo_inverse() -> None:
             ratio.append(change[inside & exact])
     ratios = np.concatenate(ratio)
     assert len(ratios) > 200 and ratios.mean() < 0.95
-
-
-def test_systems_are_sums_over_fins() -> None:
-    problem = problem_of(robots("varied", n_fins=4)[0])
-    rng = np.random.default_rng(2)
-    mobility = rng.random((5, 3, 4))
-    gram = _gram(problem, mobility).reshape(5, 6, 6)
-    columns = np.stack(np.split(problem.columns, 2), axis=1)
-    for row in range(5):
-        whole = np.zeros((6, 6))
-        for i in range(4):
-            a, b, c = mobility[row, :, i]
-            whole += columns[i].T @ np.array([[a, b], [b, c]]) @ columns[i]
-        whole += (RIDGE * np.trace(whole) + LEAST) * np.eye(6)
-        np.testing.assert_allclose(gram[row], whole, rtol=1e-9, atol=1e-12)

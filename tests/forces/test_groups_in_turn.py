@@ -1,23 +1,16 @@
 """Groups of axes in order, the search over starts, and systems solved without the usual wrapper: details."""
 
-import importlib.util
-import sys
-from collections.abc import Callable
-from typing import Any
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from finlab.forces import attainable, small_systems
-from finlab.forces.attainable import MAX_ROUNDS, N_DIRECTIONS, attainable_set
+from finlab.forces.attainable import attainable_set
 from finlab.forces.fin_sets import FinSets
 from finlab.forces.nearest import nearest_in_turn
 from finlab.layout import Fin, Layout, Limits
 from tests.forces.conftest import THRUST
 
 Array = NDArray[np.float64]
-Layouts = Callable[[str], Layout]
 X, Y, Z = (np.arange(6) == k for k in range(3))
 
 
@@ -66,51 +59,3 @@ def test_one_wide_arc_makes_a_set_a_hull(arc: tuple[float, float]) -> None:
     assert body.hull is (arc[0] == -2.0)
     assert body.dimension == 2
     assert np.linalg.norm(body.vertices, axis=1).max() == pytest.approx(THRUST, rel=1e-9)
-
-
-def test_directions_are_added_a_limited_number_of_times(
-    shipped: Layouts, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    asked: list[int] = []
-    free_support = attainable._free_support
-
-    def spied(sets: FinSets, kind: Any) -> Any:
-        support = free_support(sets, kind)
-
-        def spy(directions: Array) -> tuple[Array, Array]:
-            asked.append(len(directions))
-            return support(directions)
-
-        return spy
-
-    monkeypatch.setattr(attainable, "_free_support", spied)
-    one = Layout("one", (Fin("a", (0.2, 0.1, 0.0), 0.7),))
-    attainable_set(one, "force", alone=False, tolerance=1e-9)
-    # The axes, the first directions, and each round's faces; those of the last are only looked at.
-    assert asked[:2] == [6, 6 + N_DIRECTIONS] and len(asked) == 2 + MAX_ROUNDS + 1
-    gaps = []
-    for tolerance in (0.2, 0.03):
-        asked.clear()
-        body = attainable_set(shipped("A"), "force", alone=False, tolerance=tolerance)
-        gaps.append(body.gap)
-        if len(asked) < 2 + MAX_ROUNDS + 1:
-            assert body.gap <= tolerance * np.linalg.norm(body.vertices, axis=1).max()
-    assert gaps[0] >= gaps[1]
-
-
-def test_a_numpy_that_keeps_its_loop_elsewhere_answers_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delattr(np.linalg, "_umath_linalg")
-    monkeypatch.setitem(sys.modules, "numpy.linalg._umath_linalg", None)
-    spec = importlib.util.spec_from_file_location("small_systems_without", small_systems.__file__)
-    assert spec is not None and spec.loader is not None
-    without = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(without)
-    assert without._lapack is np.linalg
-    rng = np.random.default_rng(0)
-    matrix, right = rng.standard_normal((5, 6, 6)) + 4.0 * np.eye(6), rng.standard_normal((5, 6, 1))
-    truth = np.stack([np.linalg.inv(a) @ b for a, b in zip(matrix, right, strict=True)])
-    for module in (small_systems, without):
-        assert module.solve(matrix, right) == pytest.approx(truth, rel=1e-9)
-        assert module.solve(matrix, right[:1])[3, :, 0] == pytest.approx(
-            np.linalg.inv(matrix[3]) @ right[0, :, 0]
-        )

@@ -7,6 +7,7 @@ from scipy.optimize import minimize as scipy_minimize
 
 from finlab.forces.fin_sets import FinSets
 from finlab.forces.interior_point import minimize
+from tests.exhaustive import crossed
 from tests.forces.test_fin_sets import HALVES, fins, sector
 
 Array = NDArray[np.float64]
@@ -19,9 +20,10 @@ def robots(half: float, rows: int = 40, n: int = 5, scale: float = 1.0) -> FinSe
     return FinSets(columns, rng.uniform(0.5, 3.0, (rows, n)), middle, np.full((rows, n), half))
 
 
-@pytest.mark.parametrize("half", HALVES)
-@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
-@pytest.mark.parametrize("far", [0.2, 5.0, 1e4])
+@pytest.mark.parametrize(
+    ("half", "scale", "far"),
+    crossed(HALVES, [1e-3, 1.0, 1e3], [0.2, 5.0, 1e4], every=5),
+)
 def test_no_force_within_the_sets_gains_more(half: float, scale: float, far: float) -> None:
     """At the optimum each fin's force, less its own cost, is the farthest that its set has along the pull."""
     sets = robots(half, scale=scale)

@@ -17,6 +17,7 @@ from finlab.errors import AllocationError
 from finlab.layout import Fin, FinModelSpec, Layout, Limits
 from finlab.physics import make_law, plant_of
 from finlab.physics.objective import Name, Objective
+from tests.exhaustive import crossed
 
 METHODS = ("analytic", "qp", "sqp", "ipopt")
 EXACT = METHODS[2:]
@@ -122,9 +123,10 @@ def make(method: str, objective: Name) -> Allocator:
     return load_allocator(method, objective=objective, **FEW_STARTS.get(method, {}))
 
 
-@pytest.mark.parametrize("objective", ["power", "effort"])
-@pytest.mark.parametrize("name", MODELS)
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize(
+    ("objective", "name", "method"),
+    crossed(["power", "effort"], MODELS, METHODS, every=9),
+)
 def test_every_method_on_every_fin(
     method: str, name: str, objective: Name, model: Callable[[str], list[FinModelSpec]]
 ) -> None:
@@ -146,8 +148,10 @@ def test_every_method_on_every_fin(
             assert answer.err_norm < 0.5
 
 
-@pytest.mark.parametrize("name", ["drag", "soft", "noisy table with power", "mixed"])
-@pytest.mark.parametrize("method", ["analytic", "sqp", "ipopt"])
+@pytest.mark.parametrize(
+    ("name", "method"),
+    crossed(["drag", "soft", "noisy table with power", "mixed"], ["analytic", "sqp", "ipopt"], every=5),
+)
 def test_each_objective_is_kept_lower_by_its_own_setting(
     method: str, name: str, model: Callable[[str], list[FinModelSpec]]
 ) -> None:
@@ -162,9 +166,15 @@ def test_each_objective_is_kept_lower_by_its_own_setting(
     assert easy.energy.mean() <= 1.001 * sparing.energy.mean()
 
 
-@pytest.mark.parametrize("copper_loss", [0.0, 0.6])
-@pytest.mark.parametrize("objective", ["power", "effort"])
-@pytest.mark.parametrize("name", ["mixed", "noisy table with power", "lighthill", "soft"])
+@pytest.mark.parametrize(
+    ("copper_loss", "objective", "name"),
+    crossed(
+        [0.0, 0.6],
+        ["power", "effort"],
+        ["mixed", "noisy table with power", "lighthill", "soft"],
+        every=5,
+    ),
+)
 def test_ipopt_minimizes_what_the_plant_says(
     name: str, objective: Name, copper_loss: float, model: Callable[[str], list[FinModelSpec]]
 ) -> None:

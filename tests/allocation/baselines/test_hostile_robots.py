@@ -6,9 +6,7 @@ import warnings
 import numpy as np
 import pytest
 
-from finlab.allocation.baselines.box_least_squares import solve_box_quadratics
 from finlab.allocation.baselines.sqp import Sqp
-from finlab.errors import AllocationError
 from finlab.inference.normalization import Normalization
 from finlab.layout import Fin, FinModelSpec, Layout, Limits
 from finlab.physics import Plant
@@ -58,18 +56,3 @@ def test_when_the_time_is_up_the_best_so_far_is_the_answer() -> None:
     assert ((hasty.command >= layout.lower) & (hasty.command <= layout.upper)).all()
     patient = Sqp(NORMALIZATION, time_limit_s=60.0).allocate(layout, target)
     assert patient.err_norm < hasty.err_norm
-
-
-def test_a_time_limit_is_a_time() -> None:
-    with pytest.raises(AllocationError, match="time_limit_s: expected a number above 0 up to 3600 s, got 0"):
-        Sqp(NORMALIZATION, time_limit_s=0.0)
-
-
-def test_box_quadratics_stop_where_they_are_told_to() -> None:
-    rng = np.random.default_rng(0)
-    matrix = rng.normal(size=(3, 12, 12))
-    hessian, gradient = matrix @ matrix.swapaxes(1, 2), rng.normal(size=(3, 12))
-    lower, upper = np.full((3, 12), -0.1), np.full((3, 12), 0.1)
-    stopped = solve_box_quadratics(hessian, gradient, lower, upper, is_over=lambda: True)
-    np.testing.assert_array_equal(stopped, np.zeros((3, 12)))
-    assert np.abs(solve_box_quadratics(hessian, gradient, lower, upper)).max() > 0.0

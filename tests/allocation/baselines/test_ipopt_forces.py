@@ -10,6 +10,7 @@ from finlab.allocation import Allocator, load_allocator
 from finlab.errors import AllocationError
 from finlab.layout import FinModelSpec, Layout, Limits, load_layout, random_layout
 from finlab.physics import plant_of
+from tests.exhaustive import crossed, sampled
 
 pytest.importorskip("casadi", reason="method ipopt is an optional extra")
 UNEVEN = FinModelSpec("soft", (("d", 0.12), ("e", 0.15), ("p", 1.5), ("phi_e", 0.4)))
@@ -29,7 +30,7 @@ def timed(allocator: Allocator, layout: Layout, targets: np.ndarray) -> tuple[np
     return np.array([a.power for a in answers]), np.array([a.err_norm for a in answers]), spent
 
 
-@pytest.mark.parametrize("name", ["ucat", "hexa", "restricted"])
+@pytest.mark.parametrize("name", sampled(["ucat", "hexa", "restricted"], 3))
 def test_it_agrees_with_ipopt_in_commands_and_with_the_search(name: str) -> None:
     layout = load_layout(name)
     targets = targets_of(layout)
@@ -45,8 +46,14 @@ def test_it_agrees_with_ipopt_in_commands_and_with_the_search(name: str) -> None
     assert quick < 0.2 * slow
 
 
-@pytest.mark.parametrize("arc", [(-np.pi, np.pi), (-1.0, 0.6), (0.3, 0.3), (-2.5, 2.0)])
-@pytest.mark.parametrize("model", [FinModelSpec("drag"), FinModelSpec("lighthill"), UNEVEN])
+@pytest.mark.parametrize(
+    ("arc", "model"),
+    crossed(
+        [(-np.pi, np.pi), (-1.0, 0.6), (0.3, 0.3), (-2.5, 2.0)],
+        [FinModelSpec("drag"), FinModelSpec("lighthill"), UNEVEN],
+        every=5,
+    ),
+)
 def test_it_agrees_with_the_search_on_any_fin_and_arc(model: FinModelSpec, arc: tuple[float, float]) -> None:
     drawn = random_layout(np.random.default_rng(5), n_fins=5)
     fins = [replace(fin, model=model, limits=Limits(zero_direction=arc)) for fin in drawn.fins]

@@ -12,11 +12,11 @@ from finlab.allocation.search.cheaper_commands import DESCENT, cheaper_commands
 from finlab.allocation.search.levenberg_marquardt import CommandProblem, refine
 from finlab.arrays import Array
 from finlab.evaluation.splits import make_split
-from finlab.layout import FinModelSpec, Layout
-from finlab.physics import make_law, plant_of, write_table
+from finlab.layout import Layout
+from finlab.physics import plant_of
 from finlab.physics.objective import CostMeter, Name, Objective
 from tests.allocation.search.reference import least_cost
-from tests.hostile_robots import hostile_robot, hostile_targets
+from tests.exhaustive import crossed
 from tests.random_fins import random_robot
 
 EXACT = 1e-5
@@ -36,9 +36,10 @@ def question(layout: Layout, objective: Name) -> tuple[CommandProblem, CostMeter
     return problem, Objective(objective).meter(plant), problem.wrench(command), command
 
 
-@pytest.mark.parametrize("objective", OBJECTIVES)
-@pytest.mark.parametrize("limits", ["nominal", "varied"])
-@pytest.mark.parametrize("kind", ["drag", "soft", "table"])
+@pytest.mark.parametrize(
+    ("objective", "limits", "kind"),
+    crossed(OBJECTIVES, ["nominal", "varied"], ["drag", "soft", "table"], every=5),
+)
 def test_is_as_exact_and_never_dearer(kind: str, limits: str, objective: Name, tmp_path: Path) -> None:
     saved = []
     for seed in range(3):
@@ -68,13 +69,6 @@ def test_where_it_ends_is_a_minimum(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     assert np.median(left) < 1e-3
 
 
-def test_one_target_may_stand_for_all_rows(tmp_path: Path) -> None:
-    problem, cost, target, command = question(robot("table", 0, tmp_path), "power")
-    starts = refine(problem, target[:1], command, 20).command
-    alike = cheaper_commands(problem, cost, target[:1], starts, EXACT)
-    np.testing.assert_array_equal(alike, cheaper_commands(problem, cost, target[[0] * 12], starts, EXACT))
-
-
 @pytest.mark.parametrize(("objective", "most", "mean"), [("power", 1.06, 1.01), ("effort", 1.05, 1.01)])
 def test_tables_cost_what_many_starts_find(objective: Name, most: float, mean: float) -> None:
     method, aim, ratio = load_allocator(objective=objective), Objective(objective), []
@@ -101,15 +95,3 @@ def test_what_is_far_out_of_reach_is_left_alone(size: float, tmp_path: Path) -> 
     hopeless = cheaper_commands(problem, cost, far, command, EXACT)
     start = refine(problem, far, command, DESCENT.lm_steps[0]).command
     np.testing.assert_allclose(hopeless, start, atol=1e-9)
-
-
-@pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize("number", [5, 46])
-def test_hostile_robots_are_answered_in_numbers(number: int, tmp_path: Path) -> None:
-    """One was driven by targets far out of reach; on the other one curvature is nothing beside another."""
-    table = str(tmp_path / "forces.csv")
-    axes = np.linspace(0.0, 0.6, 7), np.linspace(0.0, 2.1, 6), np.linspace(-np.pi, np.pi, 13)
-    write_table(table, make_law(FinModelSpec()), *axes)
-    layout = hostile_robot(number, 2026, table)
-    answer = load_allocator().allocate_batch(layout, hostile_targets(layout, 300, number, 2026))
-    assert np.isfinite(answer.command).all() and np.isfinite(answer.err_norm).all()

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from finlab.allocation import Allocation
 from finlab.allocation.modes import force_sizes, mode_signature, same_signature
 from finlab.allocation.search.search_allocator import SearchAllocator
-from finlab.layout import Fin, Layout, Limits, random_layout
+from finlab.layout import Layout, random_layout
 from finlab.physics import Plant
 
 GOOD = 1e-5
@@ -177,50 +177,3 @@ def test_a_small_change_of_the_layout_changes_the_answer_little(search: SearchAl
     ways = [mode_signature(a.command, force_sizes(a.layout, a.command)) for a in (one, other)]
     if same_signature(*ways):
         np.testing.assert_allclose(one.fin_forces, other.fin_forces, atol=0.05)
-
-
-@st.composite
-def degenerate_layouts(draw: st.DrawFn) -> Layout:
-    """Layouts in which fins coincide, are parallel, cannot move, or are alone."""
-    kind = draw(st.sampled_from(["coincident", "parallel", "stiff", "alone", "line"]))
-    n = 1 if kind == "alone" else draw(st.integers(2, 5))
-    layout = random_layout(np.random.default_rng(draw(SEEDS)), n_fins=n)
-    first = layout.fins[0]
-    fins: list[Fin] = []
-    for i, fin in enumerate(layout.fins):
-        if kind == "coincident":
-            fin = replace(fin, position=first.position, mounting_angle=first.mounting_angle)
-        elif kind == "parallel":
-            fin = replace(fin, mounting_angle=first.mounting_angle)
-        elif kind == "line":
-            fin = replace(fin, position=(0.1 * i, 0.0, 0.0), mounting_angle=0.0)
-        elif kind == "stiff" and draw(st.booleans()):
-            amplitude, frequency, direction = draw(
-                st.tuples(st.floats(0.01, 1.0), st.floats(0.01, 3.0), st.floats(-3.0, 3.0))
-            )
-            fin = replace(fin, limits=Limits((amplitude,) * 2, (frequency,) * 2, (direction,) * 2))
-        fins.append(fin)
-    return replace(layout, fins=tuple(fins))
-
-
-@few(25)
-@given(layout=degenerate_layouts(), seed=SEEDS, size=st.sampled_from([0.0, 1.0, 10.0]))
-def test_degenerate_layouts_get_numbers_inside_the_limits(
-    search: SearchAllocator, layout: Layout, seed: int, size: float
-) -> None:
-    target = size * np.random.default_rng(seed).normal(size=6)
-    first = search.allocate(layout, target)
-    again = search.allocate(layout, -target, previous=first.command)
-    for result in (first, again):
-        assert inside(layout, result.command)
-        assert np.isfinite(result.wrench).all() and math.isfinite(result.energy)
-        assert math.isfinite(result.err_norm) and math.isfinite(result.scale)
-
-
-@few(5)
-@given(layout=degenerate_layouts(), seed=SEEDS, policy=st.sampled_from(["direction", "priority"]))
-def test_degenerate_layouts_out_of_reach(
-    search: SearchAllocator, layout: Layout, seed: int, policy: str
-) -> None:
-    target = 10.0 * np.random.default_rng(seed).normal(size=6)
-    assert inside(layout, search.allocate(layout, target, policy=policy).command)

@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import replace
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,14 +9,11 @@ import pytest
 
 from finlab.allocation import load_allocator
 from finlab.allocation.search import search_allocator
-from finlab.allocation.search.rate_limits import planar_force, within_rates
 from finlab.allocation.search.search_allocator import SearchAllocator
-from finlab.errors import CommandError
 from finlab.forces.force_space import SETTLED
 from finlab.layout import Layout, load_layout
 from finlab.layout.angles import wrapped
 from finlab.physics import Plant
-from tests.random_fins import random_robot
 
 TICKS = np.arange(150) * 0.1
 """15 s at 10 Hz."""
@@ -186,13 +182,6 @@ def test_the_first_tick_knows_no_past(free: Drive, steady: Drive) -> None:
     np.testing.assert_array_equal(steady.command[0], free.command[0])
 
 
-def test_what_nothing_is_known_of_is_free(search: SearchAllocator, penta: Layout) -> None:
-    alone = search.allocate(penta, TARGET)
-    unknown = search.allocate(penta, TARGET, previous=np.full((5, 3), np.nan))
-    assert unknown.err_norm < 1e-5
-    np.testing.assert_allclose(unknown.command, alone.command, rtol=1e-4, atol=1e-4)
-
-
 def test_a_failed_fin_comes_back(search: SearchAllocator, penta: Layout) -> None:
     lost = search.allocate(penta, TARGET, failed=["port_back"])
     still = search.allocate(penta, TARGET, failed=["port_back"], previous=lost.command)
@@ -213,85 +202,3 @@ def test_a_target_that_needs_a_turn_is_reached_tick_by_tick(method: SearchAlloca
         missing.append(result.err_norm)
     assert missing[0] > 1.0 and (np.diff(missing) <= 1e-9).all()
     assert missing[-1] < 1e-5
-
-
-@pytest.mark.parametrize(
-    ("previous", "sentence"),
-    [
-        (np.zeros((4, 3)), "previous: expected a command of shape (5, 3) for layout 'penta'"),
-        (np.full((5, 3), np.inf), "previous: expected finite commands"),
-        ("yesterday", "previous: expected a command of shape (5, 3)"),
-    ],
-)
-def test_a_previous_that_is_no_command_is_refused(
-    previous: object, sentence: str, search: SearchAllocator, penta: Layout
-) -> None:
-    with pytest.raises(CommandError) as caught:
-        search.allocate(penta, TARGET, previous=previous)  # type: ignore[arg-type]
-    assert sentence in str(caught.value)
-
-
-def test_boxes_are_around_what_the_fins_were_told(search: SearchAllocator) -> None:
-    layout = load_layout("restricted")
-    prepared = search.pipeline.prepare(layout)
-    before = np.column_stack([[0.3, 0.08, 0.2, 0.5], [1.0, 2.0, 0.1, 0.4], [0.0, 1.6, np.nan, -0.6]])
-    near = within_rates(prepared, before, 0.1)
-    expected_lower = np.maximum(before - STEP, layout.lower)
-    expected_upper = np.minimum(before + STEP, layout.upper)
-    expected_lower[2], expected_upper[2] = layout.lower[2], layout.upper[2]
-    np.testing.assert_allclose(near.commands.lower, expected_lower)
-    np.testing.assert_allclose(near.commands.upper, expected_upper)
-    assert within_rates(prepared, np.full((4, 3), np.nan), 0.1) is prepared
-
-
-def test_arcs_go_over_the_seam_and_unknown_fins_stay_free(search: SearchAllocator, penta: Layout) -> None:
-    prepared = search.pipeline.prepare(penta)
-    direction = np.array([3.0, -2.5, 0.4, np.nan, -3.1])
-    near = within_rates(prepared, np.column_stack([np.full(5, 0.3), np.full(5, 1.0), direction]), 0.1)
-    known = [0, 1, 2, 4]
-    np.testing.assert_allclose(near.commands.lower[known, 2], direction[known] - 0.5)
-    np.testing.assert_allclose(near.commands.upper[known, 2], direction[known] + 0.5)
-    assert near.commands.full_turn.tolist() == [False, False, False, True, False]
-    np.testing.assert_allclose(near.planar.fins.half, [0.5, 0.5, 0.5, math.pi, 0.5])
-    assert near.arcs is None and prepared.commands.full_turn.all()
-
-
-def test_in_a_long_tick_a_fin_may_turn_anywhere(search: SearchAllocator, penta: Layout) -> None:
-    prepared = search.pipeline.prepare(penta)
-    near = within_rates(prepared, np.tile([0.3, 1.0, 0.5], (5, 1)), 0.7)
-    assert near.commands.full_turn.all() and near.planar.fins.turns_fully
-    np.testing.assert_array_equal(near.commands.lower[:, 2], penta.lower[:, 2])
-
-
-def test_arcs_of_forces_lean_as_measured_fins_do(search: SearchAllocator, tmp_path: Path) -> None:
-    """A measured fin's force points a little beside its zero direction."""
-    layout = random_robot(np.random.default_rng(4), ("table",), tmp_path, n_fins=(3, 5), limits="nominal")
-    prepared = search.pipeline.prepare(layout)
-    direction = np.linspace(-1.0, 1.0, layout.n_fins)
-    near = within_rates(prepared, np.column_stack([np.full((layout.n_fins, 2), 0.4), direction]), 0.06)
-    lean = prepared.planar.fins.lean(direction)
-    assert np.abs(lean).max() > 1e-3
-    np.testing.assert_allclose(near.planar.fins.middle, direction + lean, atol=1e-9)
-
-
-def test_a_full_circle_that_starts_elsewhere_is_kept(search: SearchAllocator, penta: Layout) -> None:
-    limits_of = replace(penta.fins[0].limits, zero_direction=(0.0, 2.0 * math.pi))
-    turned = replace(penta, fins=tuple(replace(fin, limits=limits_of) for fin in penta.fins))
-    previous = None
-    for surge in (1.0, 0.5, -0.5, -1.0):
-        for _ in range(8):
-            result = search.allocate(turned, [surge, 0.3, 0.5, 0.0, 0.0, 0.1], previous=previous)
-            previous = result.command
-            assert ((previous[:, 2] >= 0.0) & (previous[:, 2] <= 2.0 * math.pi)).all()
-        assert result.err_norm < 1e-5
-
-
-def test_planar_forces_of_a_command(search: SearchAllocator, penta: Layout) -> None:
-    command = np.tile([0.6, 2.1, 0.4], (5, 1))
-    command[4] = np.nan
-    force = planar_force(search.pipeline.prepare(penta), command)
-    command[4] = penta.lower[4]
-    np.testing.assert_allclose(force.T, Plant(penta).forces(command)[:, 1:], rtol=1e-12)
-    beyond = np.tile([9.0, 99.0, 0.4 + 2.0 * math.pi], (5, 1))
-    strongest = planar_force(search.pipeline.prepare(penta), beyond)
-    np.testing.assert_allclose(strongest, np.tile(force[:, :1], 5), rtol=1e-12)

@@ -22,7 +22,6 @@ INERTIAL = EnergyWeights(0.0, 0.0, 0.0, 0.0, 1.0)
 
 GOOD = 1e-5
 """Normalized error below which an answer counts as exact, as in the search itself."""
-HEAVE = [0.0, 0.0, 2.0, 0.0, 0.0, 0.0]
 
 
 def reachable(layout: Layout, n: int, seed: int = 0) -> np.ndarray:
@@ -102,17 +101,6 @@ HOSTILE = {
     "far out": Layout("far", (Fin("a", (10.0, 10.0, 10.0), 0.0), Fin("b", (-10.0, 0.0, 0.0), 1.0))),
     "sixteen": Layout("many", tuple(Fin(f"f{i}", (0.1, 0.02 * i, 0.0), 0.4 * i) for i in range(16))),
 }
-
-
-@pytest.mark.parametrize("name", list(HOSTILE))
-def test_hostile_layouts_get_numbers_inside_the_limits(name: str, search: SearchAllocator) -> None:
-    layout = HOSTILE[name]
-    easy = reachable(layout, 5)
-    targets = np.concatenate([easy, -3.0 * easy, np.zeros((1, 6)), np.eye(6) * 1e6])
-    command = search.allocate_batch(layout, targets).command
-    assert keeps_limits(layout, command)
-    for target in (np.array(HEAVE), np.full(6, -1e6)):
-        assert keeps_limits(layout, search.allocate(layout, target).command)
 
 
 @pytest.mark.parametrize("name", ["one fin", "two at one place", "all parallel", "may rest", "sixteen"])
