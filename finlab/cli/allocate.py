@@ -48,7 +48,7 @@ def allocate(
         health: a weak fin: share that is left of its largest amplitude and frequency, such as bow=0.5.
         stuck: a fin that no longer turns: the zero direction at which it stays [deg].
         running: a fin that no longer listens: the command that it keeps [rad, Hz, deg].
-        bound: tell as well what no answer can cost less than, by the objective; effort may take seconds.
+        bound: tell as well the power [W] that no answer can undercut.
         seed: same target, layout and seed, same answer.
         json: file for one JSON object; it is printed in place of the table where no file is named.
     """

@@ -6,9 +6,44 @@ double precision and regularized, so there is nothing to check. The loop is no p
 another numpy keeps it elsewhere, the public function answers the same, a little later.
 """
 
+from collections.abc import Callable
+
 import numpy as np
+from numpy.typing import NDArray
 
 from finlab.arrays import AnyArray, Array
+
+Held = NDArray[np.bool_]
+
+
+def step_within(
+    free_step: Callable[[Array, Held], Array],
+    low: Array,
+    high: Array,
+    passes: int,
+    held: Held | None = None,
+) -> Array:
+    """A step whose variables stay within limits: solve, hold what crosses a limit there, solve again.
+
+    Args:
+        free_step: the step (R, ...), from values for all variables, which count for the held ones alone, and
+            which those are (R, ...).
+        low: least step of each variable, 0 or below.
+        high: largest step, 0 or above.
+        passes: most times that the step is solved; what still crosses a limit then is cut off.
+        held: variables that are held at no step from the start.
+    """
+    step: Array = np.zeros(low.shape)
+    held = np.zeros(low.shape, bool) if held is None else held.copy()
+    for _ in range(passes):
+        free = free_step(np.where(held, step, 0.0), held)
+        out = ((free < low) | (free > high)) & ~held
+        step = np.minimum(np.maximum(free, low), high)
+        if not out.any():
+            break
+        held |= out
+    return step
+
 
 try:
     from numpy.linalg import _umath_linalg as _lapack

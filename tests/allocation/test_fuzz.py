@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from finlab.allocation import Allocator, Health, Policy, load_allocator
+from finlab.errors import LayoutError
 from finlab.layout import Layout
 from finlab.physics import plant_of
 from tests.exhaustive import sampled
@@ -81,7 +82,11 @@ def ask(seed: int) -> None:
     )
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        result = allocator.allocate(robot, target, policy=how, **asked)
+        try:
+            result = allocator.allocate(robot, target, policy=how, **asked)
+        except LayoutError as error:  # what damage leaves of a fin may be below all bounds
+            assert "must be at least" in str(error) and "health" in asked
+            return
         modes = allocator.explore(result) if name == "search" and seed % 5 == 0 else ()
         if name == "search" and result.reachable:
             assert 0.0 <= allocator.bound(result) <= result.power * (1 + 1e-6) + 1e-12

@@ -8,11 +8,12 @@ after a finite number of steps; tests compare it with SciPy's active-set solver 
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from finlab.arrays import Array
-from finlab.forces.small_systems import solve_symmetric
+from finlab.forces.small_systems import Held, solve_symmetric, step_within
 
 
 @dataclass(frozen=True)
@@ -71,18 +72,18 @@ def solve_box_quadratics(
         busy, h, low, high = busy[unsolved], h[unsolved], low[unsolved], high[unsolved]
         at, slope = at[unsolved], slope[unsolved]
         held = ((at <= low) & (slope > 0)) | ((at >= high) & (slope < 0))
-        for _ in range(settings.passes):
-            pair_free = ~(held[:, :, None] | held[:, None, :])
-            free_slope = np.where(held, 0.0, slope)
-            reduced = np.where(pair_free, h, identity)
-            step = -solve_symmetric(reduced, free_slope[..., None])[..., 0]
-            # A variable at a limit that the others' steps push outwards would block the whole path.
-            blocked = ((at <= low) & (step < 0)) | ((at >= high) & (step > 0))
-            if not blocked.any():
-                break
-            held |= blocked
+        # A variable at a limit that the others' steps push outwards would block the whole path.
+        newton = partial(_newton_step, h, slope, identity)
+        least, most = np.where(at <= low, 0.0, -np.inf), np.where(at >= high, 0.0, np.inf)
+        step = step_within(newton, least, most, settings.passes, held)
         x[busy] = _search(h, slope, at, step, low, high, settings)
     return x
+
+
+def _newton_step(h: Array, slope: Array, identity: Array, _: Array, held: Held) -> Array:
+    """The Newton step (B, m) of the variables that are not held."""
+    reduced = np.where(held[:, :, None] | held[:, None, :], identity, h)
+    return np.asarray(-solve_symmetric(reduced, np.where(held, 0.0, slope)[..., None])[..., 0])
 
 
 def _search(

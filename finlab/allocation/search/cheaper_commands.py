@@ -18,7 +18,7 @@ import numpy as np
 
 from finlab.allocation.search.levenberg_marquardt import CommandProblem, refine
 from finlab.arrays import AnyArray, Array
-from finlab.forces.small_systems import solve
+from finlab.forces.small_systems import Held, solve, step_within
 from finlab.physics.objective import CostMeter
 
 
@@ -162,16 +162,14 @@ def _step(
     span = np.where(problem.width > 0.0, problem.width, 1.0)
     low, high = (problem.lower - command) / span, (problem.upper - command) / span
     low[:, problem.full_turn, 2], high[:, problem.full_turn, 2] = -np.inf, np.inf
-    step: Array = np.zeros(command.shape)
-    held: AnyArray = np.zeros(command.shape, bool)
     answer = multiplier
-    for _ in range(DESCENT.passes):
-        free, answer = _free_step(model, curvature, np.where(held, step, 0.0), held)
-        out = ((free < low) | (free > high)) & ~held
-        step = np.clip(free, low, high)
-        if not out.any():
-            break
-        held |= out
+
+    def free_step(fixed: Array, held: Held) -> Array:
+        nonlocal answer
+        free, answer = _free_step(model, curvature, fixed, held)
+        return free
+
+    step = step_within(free_step, low, high, DESCENT.passes)
     longest = np.abs(step).max((1, 2))
     return step * np.minimum(1.0, DESCENT.longest / np.maximum(longest, 1e-12))[:, None, None], answer
 

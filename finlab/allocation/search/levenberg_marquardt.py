@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.arrays import AnyArray, Array
-from finlab.forces.small_systems import solve
+from finlab.forces.small_systems import solve, step_within
 from finlab.inference.surrogate import FinForces
 from finlab.least_squares import Damping, levenberg_marquardt
 from finlab.physics.plant import Plant
@@ -194,15 +194,15 @@ def _step(problem: CommandProblem, at: _Evaluated, jacobian: AnyArray, damping: 
     rows, n, _ = at.command.shape
     free = jacobian.reshape(rows, 3 * n, 6)
     right = at.residual[..., None]
-    change = _smallest_change(free, right, damping)
-    # Hold what is at a limit and would leave it, then solve again with the rest.
+
+    def free_step(_: AnyArray, held: AnyArray) -> AnyArray:
+        moving = free * ~held.reshape(rows, 3 * n, 1) if held.any() else free
+        return _smallest_change(moving, right, damping).reshape(rows, n, 3)
+
+    # What is at a limit may not leave it; the rest is cut off afterwards.
     low, high = problem.edges
-    moved = change.reshape(rows, n, 3)
-    out = (at.command <= low) & (moved < 0)
-    out |= (at.command >= high) & (moved > 0)
-    if out.any():
-        change = _smallest_change(free * ~out.reshape(rows, 3 * n, 1), right, damping)
-    return change.reshape(rows, n, 3)
+    least = np.where(at.command <= low, 0.0, -np.inf)
+    return step_within(free_step, least, np.where(at.command >= high, 0.0, np.inf), 2)
 
 
 def _smallest_change(free: AnyArray, right: AnyArray, damping: AnyArray) -> AnyArray:

@@ -39,7 +39,6 @@ from finlab.allocation.search.refined_candidates import (
 from finlab.allocation.search.settings import SearchSettings
 from finlab.arrays import Array
 from finlab.forces import force_space
-from finlab.forces.branch_and_bound import bound_by_branching
 from finlab.forces.compiled_fins import CompiledFins
 from finlab.forces.cost_bound import cost_bound
 from finlab.layout import Layout
@@ -170,10 +169,8 @@ class Pipeline:
         return self.settings.search_steps or (SEARCH.convex_steps if self.objective.convex else usual)
 
     def bound(self, prepared: Prepared, target: Array, best: float) -> float:
-        """A lower bound on the cost of a wrench (6,) [N, N m]; `best` is that of the answer."""
+        """A lower bound on the power for a wrench (6,) [N, N m]; `best` is that of the answer."""
         wanted = target / self.std
-        if not self.objective.convex:
-            return bound_by_branching(prepared.planar, wanted, best).bound
         planar = force_space.descend(prepared.planar, wanted[None], prepared.seeds[:1], SEARCH.bound_steps)
         return min(cost_bound(prepared.planar, wanted, planar.multiplier[0]), best)
 

@@ -162,15 +162,17 @@ class SearchAllocator(Allocator):
         return Candidates(command, wrench * std, error, effort_of(layout, command), power, source)
 
     def bound(self, result: Allocation) -> float:
-        """A lower bound on the cost of any answer to the question of a result: on power [W], or effort.
+        """A lower bound on the power [W] of any answer to the question of a result, by the convex dual.
 
-        Power takes milliseconds, by the convex dual; effort seconds, by branch and bound, and from seven fins
-        on little is proven. Both hold as far as the compiled fins do: to about one part in a thousand, and in
-        a hundred where weak forces are asked of soft fins.
+        It holds as far as the compiled fins do: to about one part in a thousand, and in a hundred where weak
+        forces are asked of soft fins.
 
         Raises:
-            AllocationError: the wrench is out of reach, so that there is no exact answer.
+            AllocationError: effort is kept least, which has no such bound, or the wrench is out of reach, so
+                that there is no exact answer.
         """
+        if not self.objective.convex:
+            raise AllocationError("bound: proven for power alone; take objective 'power'")
         if not result.reachable:
             raise AllocationError("bound: the wrench is out of reach, so no answer has a cost to bound")
         fins = usable_fins(result.layout, result.failed)

@@ -35,7 +35,7 @@ def test_it_agrees_with_ipopt_in_commands_and_with_the_search(name: str) -> None
     layout = load_layout(name)
     targets = targets_of(layout)
     least, _, _ = timed(load_allocator(), layout, targets)
-    by_commands, _, slow = timed(load_allocator("ipopt", time_limit_s=3.0), layout, targets)
+    by_commands, _, slow = timed(load_allocator("ipopt", n_starts=2, time_limit_s=3.0), layout, targets)
     by_forces, error, quick = timed(load_allocator("ipopt", space="forces"), layout, targets)
     print(
         f"{name}: {1e3 * quick:.1f} ms in forces, {1e3 * slow:.0f} ms in commands: {slow / quick:.0f} times"

@@ -72,7 +72,7 @@ def test_where_it_ends_is_a_minimum(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 @pytest.mark.parametrize(("objective", "most", "mean"), [("power", 1.06, 1.01), ("effort", 1.05, 1.01)])
 def test_tables_cost_what_many_starts_find(objective: Name, most: float, mean: float) -> None:
     method, aim, ratio = load_allocator(objective=objective), Objective(objective), []
-    for case in make_split("tables", 5, 2, 40):
+    for case in make_split("tables", 2, 1, 40):
         batch, sigma = method.allocate_batch(case.layout, case.targets), case.sigma
         assert sigma is not None
         for target, command in zip(case.targets, batch.command, strict=True):
