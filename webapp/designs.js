@@ -21,7 +21,7 @@
     return Promise.resolve(document.execCommand('copy'));
   }
 
-  function share(fragment, name, rounded) {
+  function share(fragment, name) {
     document.querySelector('.fl-share')?.remove();
     const card = document.createElement('div');
     card.className = 'fl-share';
@@ -30,7 +30,7 @@
     card.innerHTML = '<b></b><p></p><input readonly aria-label="link"><div class="row"><button class="primary">Copy the link</button>'
       + '<button>Close</button></div>';
     card.querySelector('b').textContent = `Share ${name}`;
-    card.querySelector('p').textContent = `The link carries the ${rounded ? '' : 'whole '}design. Whoever opens it gets a copy, on a finlab of their own. ${rounded}`.trim();
+    card.querySelector('p').textContent = 'The link carries the whole design. Whoever opens it gets a copy, on a finlab of their own.';
     const box = card.querySelector('input'), [take, close] = card.querySelectorAll('button');
     // Without a query viser's page would take what stands behind the # for a part of its server's name.
     box.value = `${location.origin}${location.pathname}?shared#${fragment}`;

@@ -3,9 +3,6 @@
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from finlab.physics import plant_of
 from tests.fit.cell import columns_of, commands, measured, soft, write
 
 
@@ -26,18 +23,8 @@ def test_a_noisy_file_becomes_a_fin(page: Any, tmp_path: Path) -> None:
     page.until(lambda: [fin.model.type for fin in session.state.layout.fins] == ["table"] * 4)
     page.page.get_by_text("Exact", exact=True).first.wait_for()
 
-    fitted = session.state.layout
     page.press("Share")
-    page.page.locator(".fl-share p", has_text="rounded, to 0.0015 % of their largest force").wait_for()
-    link = page.page.locator(".fl-share input").input_value()
-    page.page.keyboard.press("Escape")
-    page.page.evaluate("hash => { location.hash = hash; }", link.partition("#")[2])
-    page.until(lambda: session.history.undo_name == "Open ucat")
-    command = np.random.default_rng(0).uniform((0.05, 0.1, -3.1), (0.6, 2.1, 3.1), (100, 4, 3))
-    wrench, there = (plant_of(one).wrench(command) for one in (fitted, session.state.layout))
-    assert 0.0 < np.abs(there - wrench).max() < 2e-4 * np.abs(wrench).max(), "within what the card says"
-    page.press("Undo")
-    page.until(lambda: session.state.layout == fitted)
+    page.until(lambda: any("share the ZIP" in note for note in page.notes()))
 
     page.download("Save", tmp_path / "robot.zip")
     page.press("Undo")

@@ -22,7 +22,7 @@ from tests.webapp.hands import move_fin
 from tests.webapp.loops import ReadAtOnce
 from webapp.session import Session
 from webapp.session.companions import stored_table
-from webapp.session.design_links import ARCHIVE, FRAGMENT, MAX_LINK, PLAIN, linked, packed, unpacked
+from webapp.session.design_links import ARCHIVE, FRAGMENT, MAX_LINK, PLAIN, packed, unpacked
 from webapp.session.files import stored_hull, table_folder
 from webapp.tasks.designs import MOST, Designs
 
@@ -57,8 +57,8 @@ def test_a_small_hull_and_table_travel_and_large_ones_are_refused(tmp_path: Path
     rough = trimesh.creation.icosphere(subdivisions=4, radius=0.2)
     rough.vertices *= 1 + 0.05 * np.random.default_rng(0).random((len(rough.vertices), 1))
     session.import_hull(stored_hull("hull.stl", rough.export(file_type="stl"), "m"))
-    with pytest.raises(FinlabError, match=r"with its hull needs [\d,]+ characters, .* share the ZIP"):
-        linked(session.state.layout)
+    with pytest.raises(FinlabError, match=r"with its files needs [\d,]+ characters, .* share the ZIP"):
+        packed(session.state.layout)
 
 
 WHOLE = packed(load_layout("ucat"))

@@ -88,7 +88,10 @@ def test_an_honest_link_opens_beside_hostile_ones(server: viser.ViserServer, vie
 
 
 def test_a_page_has_few_files_read_at_once(server: viser.ViserServer, view: View) -> None:
-    for _ in range(reading.MOST_WAITING + 3):
-        on_loop(server, lambda: view.do(lambda: view.reading.read(partial(time.sleep, 0.5), print)))
+    def ask() -> None:
+        for _ in range(reading.MOST_WAITING + 3):
+            view.do(lambda: view.reading.read(int, print))
+
+    on_loop(server, ask)
     assert sum("being read; wait" in note for note in view.client.notes) == 3
     until(lambda: view.reading._waiting == 0)

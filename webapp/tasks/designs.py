@@ -14,7 +14,7 @@ from webapp.editables import Editables
 from webapp.scene.meshes.hull import hull_of
 from webapp.session import files
 from webapp.session.companions import Opened
-from webapp.session.design_links import FRAGMENT, Link, linked, packed, unpacked
+from webapp.session.design_links import FRAGMENT, packed, unpacked
 from webapp.tasks.context import Context
 from webapp.tasks.exports import Exports
 from webapp.viser_internals import run_script
@@ -103,10 +103,10 @@ class Designs:
     def share(self) -> None:
         """Show the link that carries the design, and take it to the clipboard where the browser lets us."""
         layout = self._session.state.layout
-        self._context.reading.make(partial(linked, layout), partial(self._show, layout))
+        self._context.reading.make(partial(packed, layout), partial(self._show, layout))
 
-    def _show(self, layout: Layout, link: Link) -> None:
-        card = json.dumps([FRAGMENT + link.text, layout.name, link.rounded])
+    def _show(self, layout: Layout, text: str) -> None:
+        card = json.dumps([FRAGMENT + text, layout.name])
         run_script(self._context.client.gui, f"finlabDesigns.share(...{card});")
         self._remember(layout)
 
