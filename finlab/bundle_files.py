@@ -3,7 +3,7 @@
 Nothing is unpacked, no link is followed, nothing is read beyond its largest size, and no content is believed
 before its checksum fits. What the files mean is known to the rooms that read them: layout graph and force
 tables to `finlab.layout` and `finlab.physics`, compiled fins to `finlab.forces`, weights to
-`finlab.inference`, settings to `finlab.allocation`.
+`finlab.networks`, settings to `finlab.allocation`.
 """
 
 import hashlib

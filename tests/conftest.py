@@ -20,29 +20,25 @@ def untrained_checkpoint(tmp_path_factory: pytest.TempPathFactory) -> Path:
     same whatever the network has learned."""
     # Here, so that tests of layouts do not wait for torch.
     import numpy as np
-    import torch
 
-    from finlab.inference.normalization import Normalization
-    from finlab.inference.weights import TrainedWeights
-    from finlab.training.networks.allocator_network import AllocatorNetwork
-    from finlab.training.networks.surrogate import Surrogate
-    from finlab.training.presets import PAPER_RECIPES
-    from finlab.training.saving import save_checkpoint, state_of
+    from finlab.networks.normalization import Normalization
+    from finlab.networks.trained import TrainedWeights, sizes_for_file
+    from finlab.paper.training.recipes import RECIPES
+    from finlab.training.first_weights import first_weights
+    from finlab.training.saving import arrays_of, save_checkpoint
 
-    recipe = PAPER_RECIPES["smoke"]
+    recipe = RECIPES["smoke"]
     folder = tmp_path_factory.mktemp("checkpoints") / "untrained"
-    with torch.random.fork_rng():
-        torch.manual_seed(0)
-        checkpoint = TrainedWeights(
-            name=folder.name,
-            surrogate_config=recipe.surrogate,
-            surrogate=state_of(Surrogate(recipe.surrogate).state_dict()),
-            normalization=Normalization(np.zeros(6), np.array([1.0, 1.0, 1.0, 0.1, 0.2, 0.3])),
-            fin_model={"type": "drag"},
-            network_config=recipe.network,
-            network=state_of(AllocatorNetwork(recipe.network).state_dict()),
-            preset="smoke",
-        )
+    checkpoint = TrainedWeights(
+        name=folder.name,
+        surrogate_sizes=recipe.surrogate.for_file(),
+        surrogate=arrays_of(first_weights(recipe.surrogate.shapes(), 0)),
+        normalization=Normalization(np.zeros(6), np.array([1.0, 1.0, 1.0, 0.1, 0.2, 0.3])),
+        fin_model={"type": "drag"},
+        network_sizes=sizes_for_file(recipe.network),
+        network=arrays_of(first_weights(recipe.network.shapes(), 0)),
+        preset="smoke",
+    )
     save_checkpoint(folder, checkpoint)
     return folder
 
@@ -50,20 +46,17 @@ def untrained_checkpoint(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="session")
 def untrained_mdn(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Folder of a checkpoint for method `mdn`, preset `smoke`, with random weights."""
-    import torch
+    from finlab.mdn.training.recipes import RECIPES
+    from finlab.networks.checkpoint import read_normalization, resolve_checkpoint
+    from finlab.networks.trained import TrainedWeights, sizes_for_file
+    from finlab.training.first_weights import first_weights
+    from finlab.training.saving import arrays_of, save_checkpoint
 
-    from finlab.inference.checkpoint import read_normalization, resolve_checkpoint
-    from finlab.inference.weights import TrainedWeights
-    from finlab.training.networks.force_network import ForceNetwork
-    from finlab.training.presets import MDN_RECIPES
-    from finlab.training.saving import save_checkpoint, state_of
-
-    sizes = MDN_RECIPES["smoke"].network
+    network = RECIPES["smoke"].network
     folder = tmp_path_factory.mktemp("checkpoints") / "untrained-mdn"
-    with torch.random.fork_rng():
-        torch.manual_seed(0)
-        state = state_of(ForceNetwork(sizes).state_dict())
+    state = arrays_of(first_weights(network.shapes(), 0))
     normalization = read_normalization(resolve_checkpoint("paper"))
+    sizes = sizes_for_file(network)
     save_checkpoint(folder, TrainedWeights(folder.name, normalization, sizes, state, preset="smoke"))
     return folder
 

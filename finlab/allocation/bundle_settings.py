@@ -5,13 +5,12 @@ from collections.abc import Mapping
 from dataclasses import asdict, is_dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from finlab.allocation.learned.settings import MdnSettings
-from finlab.allocation.search.settings import SearchSettings
+from finlab.allocation.search.settings import MdnSettings, SearchSettings
 from finlab.bundle_files import ABOUT, VERSION, Files
 from finlab.errors import AllocationError, DataError
 from finlab.files.guarded import decoded
 from finlab.files.plain_values import parse_json
-from finlab.inference.normalization import Normalization
+from finlab.networks.normalization import Normalization
 from finlab.physics.energy import EnergyWeights
 
 if TYPE_CHECKING:

@@ -15,9 +15,9 @@ from finlab.allocation.settings import Settings
 from finlab.allocation.solution import Insight, Solution
 from finlab.arrays import Array
 from finlab.errors import AllocationError
-from finlab.inference.normalization import Normalization
-from finlab.inference.weights import TrainedWeights
 from finlab.layout import FinModelSpec, Layout
+from finlab.networks.normalization import Normalization
+from finlab.networks.trained import TrainedWeights
 from finlab.physics import plant_of
 
 

@@ -22,26 +22,26 @@ from finlab.bundle_files import (
 )
 from finlab.errors import AllocationError, DataError
 from finlab.forces.compiled_fins import CompiledFins, parse_compiled
-from finlab.inference.checkpoint import (
+from finlab.networks.checkpoint import (
     parse_checkpoint,
     read_checkpoint,
     read_normalization,
     resolve_checkpoint,
 )
-from finlab.inference.normalization import Normalization
-from finlab.inference.weights import TrainedWeights
+from finlab.networks.normalization import Normalization
+from finlab.networks.trained import TrainedWeights
 
 if TYPE_CHECKING:
-    from finlab.allocation.learned.mdn import MdnAllocator
-    from finlab.allocation.learned.paper import PaperAllocator
-    from finlab.allocation.learned.settings import MdnOptions, PaperOptions
     from finlab.allocation.search.search_allocator import SearchAllocator
-    from finlab.allocation.search.settings import SearchOptions
+    from finlab.allocation.search.settings import MdnOptions, SearchOptions
+    from finlab.mdn.allocator import MdnAllocator
+    from finlab.paper.pipeline import PaperAllocator
+    from finlab.paper.settings import PaperOptions
 
 METHODS: dict[str, tuple[str, str]] = {
     "search": ("finlab.allocation.search.search_allocator", "SearchAllocator"),
-    "mdn": ("finlab.allocation.learned.mdn", "MdnAllocator"),
-    "paper": ("finlab.allocation.learned.paper", "PaperAllocator"),
+    "mdn": ("finlab.mdn.allocator", "MdnAllocator"),
+    "paper": ("finlab.paper.pipeline", "PaperAllocator"),
     "qp": ("finlab.allocation.baselines.qp", "Qp"),
     "sqp": ("finlab.allocation.baselines.sqp", "Sqp"),
     "analytic": ("finlab.allocation.baselines.analytic", "Analytic"),

@@ -19,9 +19,9 @@ from finlab.evaluation.cheapest_commands import CheapestCommands, has_formulas
 from finlab.evaluation.progress import progress
 from finlab.evaluation.splits import make_split, own_sigma
 from finlab.forces.fin_sets import planar_sets
-from finlab.inference.normalization import Normalization
 from finlab.layout import Layout, load_layout
 from finlab.layout.file import layout_to_dict
+from finlab.networks.normalization import Normalization
 from finlab.physics import plant_of, read_table
 from finlab.physics.objective import Name, Objective
 

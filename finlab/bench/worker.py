@@ -25,9 +25,9 @@ from finlab.arrays import Array
 from finlab.bench.protocol import CPU, GREETING
 from finlab.errors import DataError, FinlabError
 from finlab.evaluation.method_specs import load_method_spec
-from finlab.inference.normalization import Normalization
 from finlab.layout import Layout
 from finlab.layout.file import parse_layout
+from finlab.networks.normalization import Normalization
 
 KNOWN = ("targets", "layout", "robot", "sigma", "previous")
 """Parameters that a function may have."""

@@ -1,8 +1,7 @@
 """`finlab train mdn|surrogate|allocator`: train the networks of a checkpoint.
 
 All go on from the last saved state when they are called again with the same arguments. `mdn` is the network
-of the method of that name; `surrogate` and `allocator` are the paper's, and run on several processes or
-machines under `torchrun ... -m finlab train ...`.
+of the method of that name; `surrogate` and `allocator` are the paper's.
 """
 
 from pathlib import Path
@@ -14,8 +13,8 @@ from tyro.extras import SubcommandApp
 from finlab.cli.inputs import check_positive
 
 if TYPE_CHECKING:
-    from finlab.inference.weights import TrainedWeights
     from finlab.layout import FinModelSpec
+    from finlab.networks.trained import TrainedWeights
 
 verbs = SubcommandApp()
 
@@ -38,14 +37,14 @@ def mdn(
     One process writes the answers, another learns from them: two cores are busy.
 
     Args:
-        output: folder for checkpoint, answers, log, loss curves and resume state.
+        output: folder for checkpoint, answers, log and resume state.
         preset: recipe: default or smoke.
         seed: seed of the answers and of the first weights.
         minutes: time after which the training ends, instead of the recipe's.
         steps: most optimizer steps instead of the recipe's.
         stop_after: stop after so many steps; call again to go on.
     """
-    from finlab.training.mdn.train import train_mdn
+    from finlab.mdn.training.train import train_mdn
 
     check_positive(minutes=minutes, steps=steps, stop_after=stop_after)
     seconds = None if minutes is None else 60.0 * minutes
@@ -65,14 +64,14 @@ def surrogate(
     """Train the paper's learned fin physics and write a checkpoint folder with it alone.
 
     Args:
-        output: folder for checkpoint, log, loss curve and resume state.
+        output: folder for checkpoint, log and resume state.
         preset: recipe: paper or smoke.
         seed: seed of the data and of the first weights.
         steps: optimizer steps instead of the recipe's.
         stop_after: stop after so many steps; call again to go on.
         fin_model: what to learn: drag, lighthill, or a table of measured forces.
     """
-    from finlab.training.surrogate import train_surrogate
+    from finlab.paper.training.surrogate import train_surrogate
 
     check_positive(steps=steps, stop_after=stop_after)
     spec = _fin_model(fin_model)
@@ -99,19 +98,19 @@ def allocator(
     """Train the paper's network on a trained surrogate and write a whole checkpoint folder.
 
     Args:
-        output: folder for checkpoint, log, loss curves and resume state.
+        output: folder for checkpoint, log and resume state.
         surrogate: checkpoint whose surrogate guides the training.
         preset: recipe: paper, annealed (to go on from a trained network) or smoke.
         start: checkpoint whose network the training begins with, instead of random weights.
         seed: seed of the data and of the first weights.
         steps: optimizer steps instead of the recipe's.
-        batch_size: samples per step, over all processes, instead of the recipe's.
+        batch_size: samples per step instead of the recipe's.
         learning_rate: peak learning rate instead of the recipe's.
         layouts: random layouts of the data set instead of the recipe's.
         commands: random commands on each of them instead of the recipe's.
         stop_after: stop after so many steps; call again to go on.
     """
-    from finlab.training.allocator import train_allocator
+    from finlab.paper.training.network import train_allocator
 
     check_positive(
         steps=steps, batch_size=batch_size, layouts=layouts, commands=commands, stop_after=stop_after

@@ -35,8 +35,8 @@ from finlab.deploy.graph_file import graph_bytes, write_graph
 from finlab.distribution import NAME
 from finlab.errors import AllocationError, DataError
 from finlab.forces.compiled_fins import compiled_bytes, compiled_fins
-from finlab.inference.checkpoint import checkpoint_files
 from finlab.layout import FinModelSpec, Layout
+from finlab.networks.checkpoint import checkpoint_files
 from finlab.physics.table_file import table_bytes
 from finlab.whole_file import write_whole
 

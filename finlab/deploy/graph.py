@@ -6,8 +6,8 @@ import numpy as np
 
 from finlab.allocation import Allocator
 from finlab.arrays import Array
-from finlab.inference.normalization import Normalization
 from finlab.layout import Layout
+from finlab.networks.normalization import Normalization
 from finlab.physics import plant_of
 
 N_SELF_TEST = 4

@@ -16,7 +16,6 @@ from msgspec import to_builtins
 
 from finlab.deploy.graph import SELF_TEST_TOLERANCE, LayoutGraph, SelfTest
 from finlab.errors import LayoutError
-from finlab.inference.normalization import Normalization
 from finlab.layout import layout_to_dict
 from finlab.layout.file import FRAME, under
 from finlab.layout.graph_form import Units
@@ -30,6 +29,7 @@ from finlab.layout.load import (
     parse_graph_document,
     read_graph_text,
 )
+from finlab.networks.normalization import Normalization
 from finlab.whole_file import write_whole
 
 

@@ -15,10 +15,10 @@ from finlab.allocation.solution import Solution
 from finlab.arrays import Array
 from finlab.control import Measurement, Setpoint
 from finlab.errors import DataError
-from finlab.inference.normalization import Normalization
 from finlab.layout import Layout
 from finlab.layout.angles import wrapped
 from finlab.layout.arrays import layout_effectiveness
+from finlab.networks.normalization import Normalization
 from finlab.physics import plant_of
 from finlab.sim.closed_loop import ClosedLoop
 from finlab.sim.sensors import SensorSettings

@@ -1,4 +1,5 @@
-"""Training: recipes, losses and the loop. The one room that needs PyTorch."""
+"""Training: the loop, its state and its device. It needs PyTorch, as do `finlab.paper.training` and
+`finlab.mdn.training`, which say what is learned."""
 
 from finlab.distribution import install
 from finlab.errors import DataError
@@ -9,7 +10,3 @@ except ImportError as error:
     raise DataError(
         f"training needs PyTorch, which cannot be imported ({error}); run: {install('train')}"
     ) from error
-
-from finlab.training.allocator import train_allocator as train_allocator
-from finlab.training.mdn.train import train_mdn as train_mdn
-from finlab.training.surrogate import train_surrogate as train_surrogate

@@ -1,4 +1,4 @@
-"""The plain training loop shared by surrogate and allocator."""
+"""The plain training loop that all networks share: Adam on the weights of a function."""
 
 import csv
 import math
@@ -9,23 +9,21 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import torch
-import torch.distributed as dist
 from torch import Tensor, nn
 from tqdm import tqdm
 
 from finlab.errors import DataError
-from finlab.inference.weights import State
-from finlab.training.saving import load_state, save_state, state_of
+from finlab.networks.trained import State
+from finlab.training.saving import Tensors, arrays_of, load_state, make_folder, save_state
 from finlab.whole_file import write_whole
 
 LOG_FILE = "log.csv"
 """One row per logged step: the columns below and every loss term."""
 _FIXED = ("step", "samples", "seconds", "learning_rate")
 
-Terms = Callable[[nn.Module, int], dict[str, Tensor]]
-"""Loss terms of a step of training, `loss` among them, as means over this process's share of the batch."""
+Terms = Callable[[Tensors, int], dict[str, Tensor]]
+"""Loss terms of a step of training with some weights, `loss` among them, as means over the batch."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +33,7 @@ class LoopSettings:
     steps: int
     """Optimizer steps in all."""
     batch_size: int
-    """Samples per step, over all processes."""
+    """Samples per step."""
     learning_rate: float
     """Peak learning rate of Adam."""
     warmup: int = 0
@@ -70,7 +68,7 @@ def learning_rate(settings: LoopSettings, step: int, elapsed: float = 0.0) -> fl
 
 
 def train(
-    model: nn.Module,
+    weights: Tensors,
     terms_of_step: Terms,
     settings: LoopSettings,
     folder: Path,
@@ -78,109 +76,74 @@ def train(
     *,
     stop_after: int | None = None,
     on_save: Callable[[State, dict[str, Any]], None] | None = None,
-) -> dict[str, Tensor]:
-    """Minimize the term `loss` of `terms_of_step(model, step)`; resume from `folder` where it holds a state.
+) -> State:
+    """Minimize the term `loss` of `terms_of_step(weights, step)`; go on from the state in `folder`, if any.
 
     Args:
-        model: what is trained, already on its device.
+        weights: what is trained, already on its device; changed in place.
         terms_of_step: see `Terms`.
         settings: see `LoopSettings`.
-        folder: where log and state are written (by the first process only).
+        folder: where log and state are written.
         identity: settings that a resumed run must share.
         stop_after: stop (resumable) once this many steps are done in all.
         on_save: called at each save with the shipped weights, and with `identity` and how far the run is.
 
     Returns:
         The weights to ship: the running average, or the last ones where none is kept.
+
+    Raises:
+        DataError: a file cannot be written, or the folder holds a run with other settings.
     """
-    folder.mkdir(parents=True, exist_ok=True)
-    first = not dist.is_initialized() or dist.get_rank() == 0
-    fused = next(model.parameters()).is_cuda  # one kernel for all parameters, where there is such a kernel
-    optimizer = torch.optim.Adam(model.parameters(), lr=settings.learning_rate, fused=fused)
-    average = {k: v.detach().clone() for k, v in model.named_parameters()} if settings.ema else {}
-    done, before = load_state(folder, model, optimizer, average, identity)
-    _share_weights(model)
-    log = _Log(folder / LOG_FILE, done) if first else None
+    make_folder(folder)
+    fused = next(iter(weights.values())).is_cuda  # one kernel for all weights, where there is such a kernel
+    optimizer = torch.optim.Adam(weights.values(), lr=settings.learning_rate, fused=fused)
+    average = {k: v.detach().clone() for k, v in weights.items()} if settings.ema else {}
+    done, before = load_state(folder, weights, optimizer, average, identity)
+    log = _Log(folder / LOG_FILE, done)
     limit = math.inf if settings.seconds is None else settings.seconds
     end = min(settings.steps, stop_after or settings.steps)
+    shipped = average or weights
     bar = tqdm(
-        total=settings.steps,
-        initial=done,
-        disable=not (first and sys.stderr.isatty()),
-        unit="step",
-        smoothing=0.05,
+        total=settings.steps, initial=done, disable=not sys.stderr.isatty(), unit="step", smoothing=0.05
     )
     started = saved = time.monotonic()
     for step in range(done, end):
         elapsed = before + time.monotonic() - started
         last = step == end - 1 or elapsed >= limit
-        rate = learning_rate(settings, step, elapsed)
         for group in optimizer.param_groups:
-            group["lr"] = rate
+            group["lr"] = rate = learning_rate(settings, step, elapsed)
         optimizer.zero_grad(set_to_none=True)
-        terms = terms_of_step(model, step)
+        terms = terms_of_step(weights, step)
         terms["loss"].backward()
-        _share_gradients(model)
-        nn.utils.clip_grad_norm_(model.parameters(), CLIP)
+        nn.utils.clip_grad_norm_(weights.values(), CLIP)
         optimizer.step()
-        if average:
-            # The average starts short and grows, so that early weights are soon forgotten.
-            decay = min(settings.ema, (1 + step) / (10 + step))
-            with torch.no_grad():
-                for name, parameter in model.named_parameters():
-                    average[name].lerp_(parameter, 1 - decay)
+        _follow(average, weights, settings.ema, step)
         bar.update()
         if step % LOG_EVERY == 0 or last:
-            values = _mean_over_processes(terms)
-            if log is not None:
-                seconds, samples = time.monotonic() - started, (step + 1) * settings.batch_size
-                speed = (step + 1 - done) * settings.batch_size / seconds
-                log.write(step, samples, before + seconds, rate, values)
-                bar.set_postfix_str(f"loss {values['loss']:.4g}, {speed / 1e3:.1f} k samples/s")
-        if first and (time.monotonic() - saved > SAVE_EVERY_S or last):
+            values = {name: float(value.detach()) for name, value in terms.items()}
+            seconds, samples = time.monotonic() - started, (step + 1) * settings.batch_size
+            log.write(step, samples, before + seconds, rate, values)
+            speed = (step + 1 - done) * settings.batch_size / seconds
+            bar.set_postfix_str(f"loss {values['loss']:.4g}, {speed / 1e3:.1f} k samples/s")
+        if time.monotonic() - saved > SAVE_EVERY_S or last:
             # The state comes last: a run killed in between repeats a few steps and ships them after all.
             if on_save is not None:
                 progress = {"steps_done": step + 1, "samples": (step + 1) * settings.batch_size}
-                on_save(state_of(average or _weights(model)), identity | progress)
-            plot_log(folder)
+                on_save(arrays_of(shipped), identity | progress)
             saved = time.monotonic()
-            save_state(folder, (step + 1, before + saved - started), model, optimizer, average, identity)
+            save_state(folder, (step + 1, before + saved - started), weights, optimizer, average, identity)
         if last:
             break
     bar.close()
-    return average or _weights(model)
+    return arrays_of(shipped)
 
 
-def _weights(model: nn.Module) -> dict[str, Tensor]:
-    return {k: v.detach().clone() for k, v in model.named_parameters()}
-
-
-# PyTorch's DistributedDataParallel would do these two, but it keeps the threads of the group alive beyond its
-# end, and those abort the process now and then when the interpreter leaves.
-
-
-def _share_weights(model: nn.Module) -> None:
-    """Those of the first process, for all."""
-    if dist.is_initialized():
-        for values in (*model.parameters(), *model.buffers()):
-            dist.broadcast(values.data, 0)
-
-
-def _share_gradients(model: nn.Module) -> None:
-    """Their mean over all processes, in one message."""
-    if dist.is_initialized():
-        gradients = [values.grad for values in model.parameters() if values.grad is not None]
-        flat = nn.utils.parameters_to_vector(gradients)
-        dist.all_reduce(flat)
-        nn.utils.vector_to_parameters(flat / dist.get_world_size(), gradients)
-
-
-def _mean_over_processes(terms: dict[str, Tensor]) -> dict[str, float]:
-    stacked = torch.stack([value.detach().float() for value in terms.values()])
-    if dist.is_initialized():
-        dist.all_reduce(stacked)
-        stacked /= dist.get_world_size()
-    return dict(zip(terms, stacked.tolist(), strict=True))
+def _follow(average: Tensors, weights: Tensors, decay: float, step: int) -> None:
+    """Move the running average; it starts short and grows, so that early weights are soon forgotten."""
+    decay = min(decay, (1 + step) / (10 + step))
+    with torch.no_grad():
+        for name, value in average.items():
+            value.lerp_(weights[name], 1 - decay)
 
 
 class _Log:
@@ -193,42 +156,14 @@ class _Log:
         write_whole(path, "".join(lines[:1] + kept), DataError)
 
     def write(self, step: int, samples: int, seconds: float, rate: float, values: dict[str, float]) -> None:
+        """Add a row."""
         fixed = (step, samples, f"{seconds:.1f}", f"{rate:.6g}")
         row = dict(zip(_FIXED, fixed, strict=True)) | {name: f"{x:.8g}" for name, x in values.items()}
-        with self.path.open("a", newline="") as file:
-            writer = csv.DictWriter(file, list(row), lineterminator="\n")
-            if file.tell() == 0:
-                writer.writeheader()
-            writer.writerow(row)
-
-
-CURVES_FILE = "curves.png"
-"""Name of the picture beside the log."""
-
-
-def plot_log(folder: Path) -> Path | None:
-    """Draw every loss term of `folder/log.csv` against samples seen; None without matplotlib."""
-    try:
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-    except ImportError:
-        return None
-    with (folder / LOG_FILE).open(newline="") as file:
-        rows = list(csv.DictReader(file))
-    terms = [name for name in rows[0] if name not in _FIXED]
-    samples = np.array([float(row["samples"]) for row in rows]) / 1e6
-    figure = Figure(figsize=(3.4 * len(terms), 2.8), layout="constrained", dpi=110)
-    FigureCanvasAgg(figure)
-    for axis, name in zip(np.atleast_1d(figure.subplots(1, len(terms))), terms, strict=True):
-        values = np.array([float(row[name]) for row in rows])
-        window = max(1, len(values) // 100)
-        smooth = np.convolve(values, np.ones(window) / window, mode="valid")
-        axis.plot(samples, values, color="#56B4E9", linewidth=0.5, alpha=0.5)
-        axis.plot(samples[window - 1 :], smooth, color="#0072B2", linewidth=1.5)
-        axis.set(title=name.replace("_", " "), xlabel="samples seen [million]")
-        axis.grid(alpha=0.3)
-        if (values > 0).all():
-            axis.set_yscale("log")
-    path = folder / CURVES_FILE
-    figure.savefig(path)
-    return path
+        try:
+            with self.path.open("a", newline="") as file:
+                writer = csv.DictWriter(file, list(row), lineterminator="\n")
+                if file.tell() == 0:
+                    writer.writeheader()
+                writer.writerow(row)
+        except OSError as error:
+            raise DataError(f"{self.path}: cannot be written: {error.strerror}") from None

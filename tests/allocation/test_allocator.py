@@ -12,8 +12,8 @@ from finlab.allocation import METHODS, Allocation, Allocator, Candidates, Soluti
 from finlab.allocation.methods import Method
 from finlab.cli.allocate import allocate
 from finlab.errors import AllocationError, CommandError, LayoutError
-from finlab.inference.normalization import Normalization
 from finlab.layout import Fin, Layout
+from finlab.networks.normalization import Normalization
 from finlab.physics.blade import Blade
 
 SIGMA = np.array([1.0, 2.0, 1.0, 0.5, 0.5, 0.5])

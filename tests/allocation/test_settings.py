@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from finlab.allocation import METHODS, load_allocator
-from finlab.allocation.learned.paper import PaperSettings
-from finlab.allocation.learned.settings import MdnOptions, MdnSettings, PaperOptions
-from finlab.allocation.search.settings import SearchOptions, SearchSettings
+from finlab.allocation.search.settings import MdnOptions, MdnSettings, SearchOptions, SearchSettings
 from finlab.assets import shipped_checkpoints, shipped_layouts
 from finlab.errors import AllocationError
 from finlab.layout import load_layout
+from finlab.paper.pipeline import PaperSettings
+from finlab.paper.settings import PaperOptions
 from finlab.physics.energy import EnergyWeights
 
 SURGE = [1.0, 0.0, 0.5, 0.0, 0.0, 0.1]

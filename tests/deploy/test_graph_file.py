@@ -21,10 +21,10 @@ from finlab.cli import main
 from finlab.deploy.graph import N_SELF_TEST, LayoutGraph, SelfTest, build_graph
 from finlab.deploy.graph_file import graph_bytes, parse_graph, read_graph, write_graph
 from finlab.errors import FinlabError, LayoutError
-from finlab.inference.checkpoint import read_checkpoint
-from finlab.inference.normalization import Normalization
 from finlab.layout import Fin, Layout, load_layout, save_layout
 from finlab.layout.load import GraphText, checksum_of
+from finlab.networks.checkpoint import read_checkpoint
+from finlab.networks.normalization import Normalization
 from tests.exhaustive import sampled
 
 SCHEMA = json.loads((Path(__file__).parents[2] / "finlab/deploy/graph.schema.json").read_text())

@@ -5,7 +5,7 @@ import pytest
 
 from finlab.allocation.baselines.qp import LinearMap, Qp
 from finlab.evaluation.splits import make_split
-from finlab.inference.normalization import Normalization
+from finlab.networks.normalization import Normalization
 from finlab.physics import plant_of
 
 NORMALIZATION = Normalization(np.zeros(6), np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.35]))

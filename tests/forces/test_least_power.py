@@ -9,8 +9,8 @@ import pytest
 from finlab.allocation.search.search_allocator import SearchAllocator
 from finlab.forces.fin_sets import FinSets, fin_sets
 from finlab.forces.least_power import cheapest, least_power, power_problem, variant
-from finlab.inference.normalization import Normalization
 from finlab.layout import FinModelSpec, Layout
+from finlab.networks.normalization import Normalization
 from finlab.physics.blade import Blade
 
 Layouts = Callable[[str], Layout]

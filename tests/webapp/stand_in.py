@@ -13,8 +13,8 @@ from finlab.allocation.methods import METHODS
 from finlab.allocation.settings import Settings, number
 from finlab.allocation.solution import Candidates, Solution
 from finlab.errors import AllocationError
-from finlab.inference.normalization import Normalization
 from finlab.layout import Layout
+from finlab.networks.normalization import Normalization
 from finlab.physics import Plant
 
 NORMALIZATION = Normalization(np.zeros(6), np.array([1.4, 1.4, 2.0, 0.3, 0.3, 0.35]))

@@ -6,12 +6,13 @@ from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any, get_args
 
-from finlab.allocation.learned.settings import MdnSettings, PaperSettings
 from finlab.allocation.methods import METHODS, method_class
 from finlab.allocation.policy import AXES, KINDS
+from finlab.allocation.search.settings import MdnSettings
 from finlab.errors import FinlabError
 from finlab.layout import Layout
 from finlab.layout.damage import Health
+from finlab.paper.settings import PaperSettings
 from finlab.physics.objective import Name as Objective
 from webapp.session.links import Links, kept, linked
 

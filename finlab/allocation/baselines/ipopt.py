@@ -20,7 +20,7 @@ from finlab.allocation.settings import choice, number
 from finlab.arrays import Array
 from finlab.distribution import install
 from finlab.errors import AllocationError
-from finlab.inference.normalization import Normalization
+from finlab.networks.normalization import Normalization
 from finlab.physics import PlanarLaw, Plant, make_law
 
 SOLVER_OPTIONS = {

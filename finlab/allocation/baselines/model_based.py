@@ -13,8 +13,8 @@ from finlab.allocation.command_cost import CommandCost, command_cost
 from finlab.allocation.settings import AimSettings, number
 from finlab.allocation.solution import Solution
 from finlab.arrays import Array
-from finlab.inference.normalization import Normalization
 from finlab.layout import Layout
+from finlab.networks.normalization import Normalization
 from finlab.physics import Plant, plant_of
 
 ENERGY_TRADEOFF = 1e-4

@@ -10,7 +10,7 @@ from scipy.optimize import lsq_linear
 from finlab.allocation.baselines.model_based import CACHE_SIZE, ModelBased
 from finlab.allocation.settings import AimSettings, number
 from finlab.arrays import Array
-from finlab.inference.normalization import Normalization
+from finlab.networks.normalization import Normalization
 from finlab.physics import Plant
 
 DIFFERENCE_STEP = 1e-4

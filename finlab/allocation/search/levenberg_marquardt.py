@@ -6,14 +6,13 @@ error that the compiled fins' tables leave. The paper's method uses it with its 
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple, Self
+from typing import Any, NamedTuple, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from finlab.arrays import AnyArray, Array
 from finlab.forces.small_systems import solve, step_within
-from finlab.inference.surrogate import FinForces
 from finlab.least_squares import Damping, levenberg_marquardt
 from finlab.physics.plant import Plant
 
@@ -37,6 +36,18 @@ class Limits(NamedTuple):
     """A whole turn [rad]."""
     half: AnyArray
     """Half of each range (n, 3)."""
+
+
+class FinForces(Protocol):
+    """The forces of one robot's fins, each in a frame of its own choice."""
+
+    def force(self, command: AnyArray) -> AnyArray:
+        """Forces (..., n, 3) [N] of commands (..., n, 3)."""
+        ...
+
+    def force_and_slopes(self, command: AnyArray) -> tuple[AnyArray, AnyArray]:
+        """Forces and, for each of the three commands in turn, their derivative by it (..., n, 3, 3)."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)

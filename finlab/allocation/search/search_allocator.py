@@ -30,9 +30,9 @@ from finlab.forces.compiled_fins import CompiledFins
 from finlab.forces.fin_sets import planar_sets
 from finlab.forces.force_space import PlanarProblem
 from finlab.forces.nearest import Nearest, nearest, nearest_along, nearest_in_turn
-from finlab.inference.normalization import Normalization
-from finlab.inference.threads import single_threaded_products
 from finlab.layout import Layout
+from finlab.networks.normalization import Normalization
+from finlab.networks.threads import single_threaded_products
 from finlab.physics.objective import Objective
 
 CHUNK = 512

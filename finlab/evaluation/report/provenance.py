@@ -12,7 +12,7 @@ from pathlib import Path
 from threadpoolctl import threadpool_info
 
 import finlab
-from finlab.inference.checkpoint import resolve_checkpoint
+from finlab.networks.checkpoint import resolve_checkpoint
 
 CHECKPOINTS = ("default", "paper")
 """Shipped networks that methods use."""

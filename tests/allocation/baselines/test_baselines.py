@@ -13,8 +13,8 @@ from finlab.allocation.baselines.qp import Qp
 from finlab.allocation.baselines.sqp import Sqp
 from finlab.allocation.methods import load_allocator
 from finlab.errors import LayoutError
-from finlab.inference.normalization import Normalization
 from finlab.layout import Fin, FinModelSpec, Layout, Limits, random_layout
+from finlab.networks.normalization import Normalization
 from finlab.physics import Plant
 from finlab.physics.objective import Name
 

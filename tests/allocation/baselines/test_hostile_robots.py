@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from finlab.allocation.baselines.sqp import Sqp
-from finlab.inference.normalization import Normalization
 from finlab.layout import Fin, FinModelSpec, Layout, Limits
+from finlab.networks.normalization import Normalization
 from finlab.physics import Plant
 
 NORMALIZATION = Normalization(np.zeros(6), np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.35]))

@@ -18,8 +18,8 @@ from finlab.evaluation.experiments.temperature import diversity
 from finlab.evaluation.ipopt_reach import IpoptReach
 from finlab.evaluation.scoring import run_method
 from finlab.evaluation.splits import make_split
-from finlab.inference.normalization import Normalization
 from finlab.layout import Fin, Layout, Limits
+from finlab.networks.normalization import Normalization
 from finlab.physics import Plant
 
 SIGMA = np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.35])

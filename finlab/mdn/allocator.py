@@ -1,0 +1,101 @@
+"""Method `mdn`: a mixture density network proposes ways to deliver a wrench, and each is searched to its end.
+
+The paper's idea with exact physics behind it. The network gives a joint mixture over the planar forces of all
+fins; its components stand for different ways. Each proposal is where a search in force space of its own
+begins, with the fins' own laws, and so is each answer's name. What no component stands for is not found: that
+is what the method is compared for. The answers are exact because of the search, not because of the network.
+"""
+
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from finlab.allocation.judging import costs
+from finlab.allocation.search.pipeline import Pipeline
+from finlab.allocation.search.prepared import Prepared
+from finlab.allocation.search.search_allocator import Beginning, SearchAllocator
+from finlab.allocation.search.settings import MdnSettings
+from finlab.allocation.solution import Candidates, Insight
+from finlab.arrays import Array
+from finlab.forces.force_space import polar, realize
+from finlab.layout import Layout
+from finlab.mdn.features import RobotView, Seen, robot_view, see
+from finlab.mdn.network import ForceMixture, ForceNetworkConfig
+from finlab.mdn.proposal import Proposal, propose, shares
+from finlab.networks.layers import single_precision
+from finlab.networks.trained import TrainedWeights
+
+
+class MdnAllocator(SearchAllocator):
+    """The search, started from what a network proposes and from nowhere else."""
+
+    name = "mdn"
+    settings_class = MdnSettings
+    settings: MdnSettings
+    weights: TrainedWeights
+
+    def __init__(self, weights: TrainedWeights, **options: Any) -> None:
+        """Make it from the weights of a checkpoint.
+
+        Args:
+            weights: trained weights.
+            options: objective and its numbers as for `SearchAllocator`, and fields of `MdnSettings`.
+
+        Raises:
+            AllocationError: settings that leave nothing to answer with.
+            CheckpointError: the checkpoint's network is of another kind.
+        """
+        self.config = weights.network_of(ForceNetworkConfig)
+        super().__init__(weights.normalization, **options)
+        self.weights, self.checkpoint = weights, weights.name
+        self._network = single_precision(weights.network)
+        self._view = lru_cache(maxsize=128)(_view)
+
+    def proposals(self, prepared: Prepared, targets: Array, seed: int) -> Proposal:
+        """The network's proposals for targets (N, 6)."""
+        view = self._view(self.pipeline, prepared.plant.layout)
+        seen = see(view, targets / self.normalization.std)
+        drawn = self.settings.n_candidates, self.settings.temperature, seed
+        return propose(self.mixture(seen), view, seen, *drawn)
+
+    def mixture(self, seen: Seen) -> ForceMixture:
+        """What the network gives for what it sees of some targets."""
+        return self.config(self._network, seen.nodes, seen.pairs)
+
+    def _beginning(self, prepared: Prepared, targets: Array, seed: int) -> Beginning:
+        proposal = self.proposals(prepared, targets, seed)
+        names = tuple(f"component {k + 1}" for k in proposal.component[0].tolist())
+        return Beginning(
+            proposal.force,
+            names,
+            lambda: _samples(prepared, proposal.force[0], targets / self.normalization.std, names),
+        )
+
+    def insight(self, layout: Layout, wrench: ArrayLike) -> Insight:
+        """What the network makes of a target (6,) [N, N m] for a layout whose fins all work."""
+        view = self._view(self.pipeline, layout)
+        seen = see(view, np.asarray(wrench, dtype=float)[None] / self.normalization.std)
+        weight, root, std = self.mixture(seen).complex_parts()
+        mean = shares(root[0]) * seen.frame[0]
+        parts = np.stack([mean.real, mean.imag], axis=-1).swapaxes(0, 1)
+        attention = self.config.attention(self._network, seen.nodes, seen.pairs)[0]
+        arrays = (weight[0], parts, std[0].T, attention)
+        return Insight(*(np.asarray(values, dtype=float) for values in arrays))
+
+
+def _view(pipeline: Pipeline, layout: Layout) -> RobotView:
+    """What the network sees of a layout under a pipeline's objective."""
+    return robot_view(pipeline.prepare(layout).planar, not pipeline.objective.convex)
+
+
+def _samples(prepared: Prepared, force: Array, target: Array, names: tuple[str, ...]) -> Candidates:
+    """Proposed forces (K, 2, n) [N] for a single target (1, 6), normalized, as the cheapest commands with
+    them."""
+    command, _ = realize(prepared.planar, polar(prepared.planar, force.swapaxes(1, 2)))
+    command = prepared.commands.feasible(command)
+    wrench = prepared.commands.wrench(command)
+    error = np.linalg.norm(wrench - target, axis=-1)
+    layout = prepared.plant.layout
+    return Candidates(command, prepared.plant.wrench(command), error, *costs(layout, command), names)

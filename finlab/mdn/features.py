@@ -1,0 +1,160 @@
+"""What the network of method `mdn` sees of a robot: what each fin can do, and what it is asked for.
+
+The cheapest forces y_i = F_i x_i, F_i the largest force of fin i, solve min sum c_i(x_i) s.t. C x = w, where
+C holds the normalized wrenches of full forces. The same forces solve it when P x = p is asked for instead,
+with P = C^T (C C^T)^-1 C, which says how fins can stand in for each other, and p = C^T (C C^T)^-1 w, the
+least shares that give w. Neither knows of sizes, levers or axes any more, so one network serves robots of any
+size.
+
+Each fin is described in a frame of its own that turns with the direction of its p_i; planar vectors are
+complex
+numbers, and the 2 x 2 blocks of P are pairs (a, b) with x -> a x + b conj(x). Node features:
+
+=====  ============================================================================================
+index  meaning
+=====  ============================================================================================
+0-2    size of p_i: root, saturating, logarithm
+3-5    block of P of the fin itself: a, b
+6      logarithm of the cost at the top beside the other fins'
+7-10   cost at `SHARES` of the largest force over the cost at the top, mean over directions
+11-13  largest force by direction over the largest of all: mean, first Fourier term
+14-15  first Fourier term of the cost at the top by direction, over its mean
+16     root of the smallest force over the largest
+17-19  arc of directions: half of it over pi, its middle where it is no full circle
+20-22  cost of turning by a radian over the cost at the top, and where turning costs nothing
+23     1 for objective `effort`, 0 for `power`
+24-25  fixed numbers by which fins that are the same in all else are told apart
+26     number of fins
+=====  ============================================================================================
+
+Pair features are the block (a, b) of P between two fins, in their frames.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from finlab.arrays import AnyArray
+from finlab.forces.fin_envelope import COST
+from finlab.forces.force_space import PlanarProblem
+from finlab.mdn.network import NODE_SIZE
+
+SHARES = (0.02, 0.1, 0.3, 0.6)
+"""Shares of the largest force at which a fin's cost is looked up."""
+AROUND = 16
+"""Directions in which it is looked up."""
+RIDGE = 1e-6
+"""Regularization of C C^T, relative to its trace."""
+GOLDEN = 0.6180339887498949
+"""Its multiples spread evenly between whole numbers."""
+
+
+class RobotView(NamedTuple):
+    """One robot of n fins as the network sees it, whatever the target."""
+
+    static: AnyArray
+    """Node features 6-26 (n, 21) before their vectors are turned."""
+    blocks: AnyArray
+    """a and b (2, n, n) of the blocks of P, complex."""
+    solver: AnyArray
+    """Normalized wrenches to p (6, n), complex."""
+    largest: AnyArray
+    """F (n,) [N]."""
+
+
+class Seen(NamedTuple):
+    """N targets on one robot as the network sees them."""
+
+    nodes: AnyArray
+    """Node features (N, n, 27)."""
+    pairs: AnyArray
+    """Pair features (N, n, n, 4), from the last but one axis (seen) to the one before (seeing)."""
+    frame: AnyArray
+    """Unit vectors (N, n), complex, along each fin's p_i."""
+
+
+VECTORS = (6, 8, 12, 15)
+"""Where among the static features planar vectors begin."""
+
+
+def robot_view(problem: PlanarProblem, effort: bool) -> RobotView:
+    """What the network sees of one robot; `effort` tells the objective."""
+    fins, n = problem.fins, len(problem.fins.maximum)
+    full = fins.half >= np.pi
+    evenly = np.linspace(-1.0, 1.0, AROUND + 1)[:-1, None]  # around a circle, no direction counts twice
+    direction = fins.middle + fins.half * np.where(full, evenly, np.linspace(-1.0, 1.0, AROUND)[:, None])
+    rim, unit = fins.rim(direction), np.exp(1j * direction)
+    largest, smallest = (np.broadcast_to(values, unit.shape) for values in (rim.largest, rim.smallest))
+    top = fins.lookup(rim, largest)[..., COST]
+    mean_top = np.maximum(top.mean(0), 1e-12)
+    shares = [fins.lookup(rim, share * largest)[..., COST].mean(0) / mean_top for share in SHARES]
+    reach = largest / fins.maximum
+    idle = problem.idle_direction + fins.lean(problem.idle_direction)
+    counted = np.arange(n)
+    columns = [
+        np.log(mean_top / mean_top.mean()),
+        *shares,
+        reach.mean(0),
+        *_parts(2.0 * (reach * unit).mean(0)),
+        *_parts(2.0 * (top * unit).mean(0) / mean_top),
+        np.sqrt(smallest.mean(0) / fins.maximum),
+        fins.half / np.pi,
+        *_parts(np.where(full, 0.0, np.exp(1j * fins.middle))),
+        problem.direction_cost / mean_top,
+        *_parts(np.where(problem.direction_cost > 0.0, np.exp(1j * idle), 0.0)),
+        np.full(n, float(effort)),
+        2.0 * np.mod(0.5 + counted * GOLDEN, 1.0) - 1.0,
+        2.0 * np.mod(0.25 + counted * GOLDEN**2, 1.0) - 1.0,
+        np.full(n, n / 12.0),
+    ]
+    scaled = problem.columns * np.tile(fins.maximum, 2)[:, None]
+    gram = scaled.T @ scaled
+    gram += (RIDGE * np.trace(gram) + 1e-300) * np.eye(6)
+    solver = np.linalg.solve(gram, scaled.T)
+    across = scaled @ solver
+    xx, xz, zx, zz = across[:n, :n], across[:n, n:], across[n:, :n], across[n:, n:]
+    a = 0.5 * ((xx + zz) + 1j * (zx - xz))
+    b = 0.5 * ((xx - zz) + 1j * (zx + xz))
+    return RobotView(
+        np.stack(columns, axis=-1), np.stack([a, b]), solver[:, :n] + 1j * solver[:, n:], fins.maximum
+    )
+
+
+def see(view: RobotView, target: AnyArray) -> Seen:
+    """What the network sees of normalized targets (N, 6) on one robot."""
+    asked = target @ view.solver
+    many = (np.broadcast_to(part, (len(target), *part.shape)) for part in (view.static, *view.blocks))
+    return features(asked, *many)
+
+
+def features(asked: AnyArray, static: AnyArray, a: AnyArray, b: AnyArray) -> Seen:
+    """The features of N targets, each on a robot of its own.
+
+    Args:
+        asked: p (N, n), complex.
+        static: as in `RobotView`, (N, n, 21).
+        a: first part of the blocks of P (N, n, n), complex.
+        b: second part.
+    """
+    rows, n = asked.shape
+    size = np.abs(asked)
+    frame = np.where(size > 1e-9, asked, 1.0)
+    frame = frame / np.abs(frame)
+    back = frame.conj()
+    nodes = np.empty((rows, n, NODE_SIZE), dtype=np.float32)
+    nodes[..., 0], nodes[..., 1] = np.sqrt(size), size / (1.0 + size)
+    nodes[..., 2] = np.log(size + 1e-3) / 7.0
+    nodes[..., 6:] = static
+    for place in VECTORS:
+        turned = (static[..., place] + 1j * static[..., place + 1]) * back
+        nodes[..., 6 + place], nodes[..., 7 + place] = turned.real, turned.imag
+    a = a * back[:, :, None] * frame[:, None]
+    b = b * back[:, :, None] * back[:, None]
+    pairs = np.stack([a.real, a.imag, b.real, b.imag], axis=-1).astype(np.float32)
+    own = np.arange(n)
+    nodes[..., 3], nodes[..., 4:6] = pairs[:, own, own, 0], pairs[:, own, own, 2:]
+    return Seen(nodes, pairs, frame)
+
+
+def _parts(values: AnyArray) -> tuple[AnyArray, AnyArray]:
+    return values.real, values.imag

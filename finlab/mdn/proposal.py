@@ -1,0 +1,70 @@
+"""What the network of method `mdn` proposes: K ways to share a target among the fins, as planar forces."""
+
+import math
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.arrays import AnyArray
+from finlab.mdn.features import RobotView, Seen
+from finlab.mdn.network import ForceMixture
+
+
+class Proposal(NamedTuple):
+    """K proposals for each of N targets, none of them exact yet."""
+
+    force: AnyArray
+    """Planar forces (N, K, 2, n) [N], horizontal and vertical."""
+    component: NDArray[np.intp]
+    """Mixture component of each (N, K)."""
+
+
+def propose(
+    mixture: ForceMixture, view: RobotView, seen: Seen, n_candidates: int, temperature: float, seed: int
+) -> Proposal:
+    """K proposals for N targets on one robot, from the network's mixture for what it sees of them.
+
+    The components' means come first, by falling weight. Where K exceeds their number M, the rest are drawn by
+    the components' weights, with variances times the temperature.
+    """
+    component, root = _drawn(*mixture.complex_parts(), n_candidates, temperature, seed)
+    force = shares(root) * (seen.frame * view.largest)[:, None]
+    return Proposal(np.stack([force.real, force.imag], axis=2), component)
+
+
+def shares(root: AnyArray) -> AnyArray:
+    """Shares of the largest forces, none above one, from what the mixture gives: their roots."""
+    size = np.abs(root)
+    return np.asarray(root * np.minimum(size, 1.0 / np.maximum(size, 1e-9)))
+
+
+def _drawn(
+    weight: AnyArray, mean: AnyArray, std: AnyArray, count: int, temperature: float, seed: int
+) -> tuple[NDArray[np.intp], AnyArray]:
+    """Components (N, K) and roots of shares (N, K, n), complex, of a mixture's complex parts."""
+    rows, m, n = mean.shape
+    place = np.arange(rows)[:, None]
+    component = np.argsort(-weight, axis=1)[:, :count]
+    first = mean[place, component]
+    if count <= m:
+        return component, first
+    uniform, normal = _draws(seed, rows, count - m, n)
+    cumulative = weight.cumsum(1)
+    more = (uniform * cumulative[:, None, -1:] > cumulative[:, None, :-1]).sum(-1)
+    drawn = mean[place, more] + math.sqrt(temperature) * std[place, more] * normal
+    return np.concatenate([component, more], axis=1), np.concatenate([first, drawn], axis=1)
+
+
+@lru_cache(maxsize=16)
+def _draws(seed: int, rows: int, count: int, n: int) -> tuple[AnyArray, AnyArray]:
+    """Uniform (rows, count, 1) and complex normal (rows, count, n) random numbers of a seed, kept: a control
+    loop uses one seed for every tick."""
+    rng = np.random.default_rng(seed)
+    uniform = rng.random((rows, count, 1), dtype=np.float32)
+    parts = rng.standard_normal((rows, count, n, 2), dtype=np.float32)
+    normal = parts[..., 0] + 1j * parts[..., 1]
+    for array in (uniform, normal):
+        array.setflags(write=False)
+    return uniform, normal

@@ -1,0 +1,1 @@
+"""What the network of method `mdn` learns from: torch."""

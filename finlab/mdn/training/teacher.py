@@ -1,0 +1,97 @@
+"""The teacher: the exact search from many seeds, and the different ways it finds to deliver a target."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from finlab.allocation.search.prepared import resting_fins, resting_seeds
+from finlab.arrays import Array
+from finlab.forces.force_space import Planar, descend, realize
+from finlab.mdn.training.random_robots import RandomRobot
+
+RANDOM_SEEDS = 24
+"""Random seeds beside those that rest single fins and pairs."""
+FIRST_STEPS, LAST_STEPS = 10, 20
+"""Quadratic problems solved from every seed, and then from the best."""
+KEPT = 14
+"""Forces that are followed further."""
+MODES = 8
+"""Most ways that are told apart."""
+APART = 0.08
+"""Mean difference over the fins, in roots of shares, from which two answers are two ways."""
+DEAREST = 1.2
+"""Cost over the cheapest one's up to which an answer is worth telling."""
+EXACT = 0.01
+"""Largest residual beside the target or, for small ones, a hundredth of what all fins can give."""
+
+
+class Ways(NamedTuple):
+    """Up to L ways to deliver each of N targets with n fins, cheapest first."""
+
+    force: Array
+    """Planar forces (N, L, n) [N], complex."""
+    cost: Array
+    """Their costs (N, L); infinite where there are no more ways."""
+
+
+def ways_to_deliver(rng: np.random.Generator, robot: RandomRobot, target: Array) -> Ways:
+    """What the search finds for normalized targets (N, 6)."""
+    problem, n = robot.problem, robot.layout.n_fins
+    rows, maximum = len(target), robot.problem.fins.maximum
+    convex = robot.objective.convex
+    seeds = resting_seeds(maximum, ((),) if convex else resting_fins(n))
+    if not convex:
+        seeds = np.concatenate([seeds, rng.random((RANDOM_SEEDS, n)) ** 2 * maximum])
+    count = len(seeds)
+    found = descend(problem, np.repeat(target, count, axis=0), np.tile(seeds, (rows, 1)), FIRST_STEPS)
+    force, cost = _told(robot, target, found, count)
+    if not convex:
+        best = np.argsort(cost, axis=1)[:, :KEPT]
+        flat = np.take_along_axis(found.size.reshape(rows, count, n), best[..., None], axis=1)
+        found = descend(problem, np.repeat(target, best.shape[1], axis=0), flat.reshape(-1, n), LAST_STEPS)
+        more, further = _told(robot, target, found, best.shape[1])
+        force, cost = np.concatenate([more, force], axis=1), np.concatenate([further, cost], axis=1)
+    return _different(force, cost, maximum)
+
+
+def _told(robot: RandomRobot, target: Array, found: Planar, count: int) -> tuple[Array, Array]:
+    """Forces (N, S, n), complex, and costs (N, S), infinite where the target is missed."""
+    _, cost = realize(robot.problem, found)
+    missed = np.linalg.norm(found.residual, axis=1)
+    strength = np.linalg.norm(np.tile(robot.problem.fins.maximum, 2)[:, None] * robot.problem.columns)
+    allowed = EXACT * np.minimum(np.linalg.norm(target, axis=1) + 1e-2 * strength, strength)
+    cost = np.where(missed <= np.repeat(allowed, count), cost, np.inf)
+    force = found.size * np.exp(1j * found.direction)
+    return force.reshape(len(target), count, -1), cost.reshape(len(target), count)
+
+
+def root_share(force: Array, largest: Array) -> Array:
+    """Forces (..., n), complex, as roots of shares of the largest ones (n,): small ones count, too."""
+    share = force / largest
+    return np.asarray(share / np.sqrt(np.abs(share) + 1e-12))
+
+
+def _different(force: Array, cost: Array, largest: Array) -> Ways:
+    """The cheapest of each group of answers that are nearly the same."""
+    rows, _, n = force.shape
+    place, cost = np.arange(rows), cost.copy()
+    root = root_share(force, largest)
+    kept, costs = np.zeros((rows, MODES, n), dtype=complex), np.full((rows, MODES), np.inf)
+    limit = DEAREST * cost.min(1)
+    cost[cost > limit[:, None]] = np.inf
+    for k in range(MODES):
+        best = cost.argmin(1)
+        costs[:, k] = cost[place, best]
+        kept[:, k] = force[place, best]
+        near = np.abs(root - root[place, best][:, None]).mean(-1) < APART
+        cost[near] = np.inf
+    return Ways(kept, costs)
+
+
+def shares_of_ways(ways: Ways, sharpness: float) -> Array:
+    """Weights (N, L) of the ways, zero where there are none: exp(-(cost - best) / (sharpness best))."""
+    best = ways.cost[:, :1]
+    with np.errstate(invalid="ignore"):
+        weight = np.exp(-(ways.cost / np.maximum(best, 1e-12) - 1.0) / sharpness)
+    weight = np.where(np.isfinite(ways.cost), weight, 0.0)
+    return np.asarray(weight / np.maximum(weight.sum(1, keepdims=True), 1e-12))

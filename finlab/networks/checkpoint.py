@@ -1,0 +1,171 @@
+"""Reads checkpoints: a folder with `model.safetensors` and `config.json`. No torch, no pickle; strict.
+
+`config.json` holds everything needed to rebuild the networks and to trust them: format and version,
+sizes, normalization, fin model, training settings, metrics and the SHA-256 of the weights. The weights of a
+deployment bundle are the same files.
+"""
+
+import hashlib
+import json
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from finlab.assets import checkpoint_path, shipped_checkpoints
+from finlab.errors import CheckpointError, LayoutError
+from finlab.files.guarded import decoded, read_file
+from finlab.files.plain_values import parse_json
+from finlab.layout import FinModelSpec
+from finlab.networks.normalization import Normalization
+from finlab.networks.trained import State, TrainedWeights, check_arrays
+
+FORMAT = "finlab-checkpoint"
+"""Value of the key `format`."""
+VERSION = 1
+"""Value of the key `version`."""
+WEIGHTS_FILE = "model.safetensors"
+"""Weights, with the prefixes `surrogate.` and `network.`."""
+CONFIG_FILE = "config.json"
+"""Everything else."""
+LARGEST = {CONFIG_FILE: 1_000_000, WEIGHTS_FILE: 50_000_000}
+"""Largest size of each file [bytes]."""
+
+
+_UNFIT = (ArithmeticError, AttributeError, LayoutError, LookupError, TypeError, ValueError)
+"""What reading a configuration ends with that does not fit."""
+
+
+def read_checkpoint(folder: Path) -> TrainedWeights:
+    """The contents of a checkpoint folder.
+
+    Raises:
+        CheckpointError: missing, corrupt, of an unknown version, or made by something else.
+    """
+    return parse_checkpoint(_files(folder), str(folder), folder.name)
+
+
+def parse_checkpoint(files: Mapping[str, bytes], source: str, name: str) -> TrainedWeights:
+    """The contents of a checkpoint's files by name; errors as in `read_checkpoint`."""
+    from safetensors import SafetensorError
+    from safetensors.numpy import load
+
+    config = _config(files, source)
+    if WEIGHTS_FILE not in files:
+        raise _missing(source, WEIGHTS_FILE)
+    sha256 = hashlib.sha256(files[WEIGHTS_FILE]).hexdigest()
+    if sha256 != config.get("sha256"):
+        raise CheckpointError(
+            f"{source}/{WEIGHTS_FILE}: its SHA-256 is not the one in {CONFIG_FILE}; the file was changed or "
+            "cut off"
+        )
+    try:
+        tensors = load(files[WEIGHTS_FILE])
+        if config["surrogate"] is not None:
+            FinModelSpec.from_values(config["fin_model"])
+        check_arrays(tensors)
+        if known := {key.split(".")[0] for key in tensors} - {"surrogate", "network"}:
+            raise ValueError(f"{min(known)!r:.80} is not expected")
+        return TrainedWeights(
+            name=name,
+            normalization=Normalization.parse(config["normalization"]),
+            network_sizes=_sizes(config["network"]),
+            network=_part("network", tensors),
+            surrogate_sizes=_sizes(config["surrogate"]),
+            surrogate=_part("surrogate", tensors),
+            fin_model=dict(config["fin_model"]),
+            preset=str(config["preset"]),
+            training=dict(config["training"]),
+            metrics=dict(config["metrics"]),
+            sha256=sha256,
+        )
+    except (*_UNFIT, SafetensorError) as error:
+        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise CheckpointError(
+            f"{source}: {CONFIG_FILE} and {WEIGHTS_FILE} do not fit together ({reason})"
+        ) from error
+
+
+def checkpoint_files(weights: TrainedWeights) -> dict[str, bytes]:
+    """The files of a checkpoint, by name; the same weights give the same bytes."""
+    from safetensors.numpy import save
+
+    tensors = {f"surrogate.{key}": value for key, value in weights.surrogate.items()}
+    tensors |= {f"network.{key}": value for key, value in weights.network.items()}
+    content = save({key: np.ascontiguousarray(value) for key, value in tensors.items()})
+    config = {
+        "format": FORMAT,
+        "version": VERSION,
+        "preset": weights.preset,
+        "sha256": hashlib.sha256(content).hexdigest(),
+        "fin_model": dict(weights.fin_model),
+        "normalization": {k: v.tolist() for k, v in weights.normalization._asdict().items()},
+        "surrogate": weights.surrogate_sizes,
+        "network": weights.network_sizes,
+        "training": dict(weights.training),
+        "metrics": dict(weights.metrics),
+    }
+    return {CONFIG_FILE: (json.dumps(config, indent=2) + "\n").encode(), WEIGHTS_FILE: content}
+
+
+def _sizes(values: Any) -> dict[str, Any] | None:
+    """The sizes of a network from a file; what they must be is known to the method that uses it."""
+    return None if values is None else {str(key): value for key, value in dict(values).items()}
+
+
+def read_normalization(folder: Path) -> Normalization:
+    """Only the wrench statistics of a checkpoint, for methods that need no network."""
+    config = _config(_files(folder, (CONFIG_FILE,)), str(folder))
+    try:
+        return Normalization.parse(config.get("normalization"))
+    except ValueError as error:
+        raise CheckpointError(f"{folder}/{CONFIG_FILE}: normalization is missing or malformed") from error
+
+
+def resolve_checkpoint(checkpoint: str | os.PathLike[str]) -> Path:
+    """The folder of a checkpoint: a shipped one by its bare name, any other by its path.
+
+    A bare name is never looked up in the current folder, so that a folder called `default` there does
+    not take the shipped one's place; write `./default` for it.
+    """
+    path = Path(checkpoint)
+    if path.name == str(checkpoint) and (str(checkpoint) in shipped_checkpoints() or not path.is_dir()):
+        return checkpoint_path(str(checkpoint))
+    if not path.is_dir():
+        raise CheckpointError(f"{path}: no such checkpoint folder")
+    return path
+
+
+def _files(folder: Path, names: tuple[str, ...] = tuple(LARGEST)) -> dict[str, bytes]:
+    """Those of a checkpoint's files that are there."""
+    there = [name for name in names if os.path.lexists(folder / name)]
+    return {n: read_file(folder / n, LARGEST[n], "a checkpoint's file", CheckpointError) for n in there}
+
+
+def _config(files: Mapping[str, bytes], source: str) -> dict[str, Any]:
+    place = f"{source}/{CONFIG_FILE}"
+    if CONFIG_FILE not in files:
+        raise _missing(source, CONFIG_FILE)
+    text = decoded(files[CONFIG_FILE], place, "JSON", CheckpointError)
+    config = parse_json(text, place, CheckpointError)
+    if not isinstance(config, dict) or config.get("format") != FORMAT:
+        raise CheckpointError(f"{place}: not a finlab checkpoint (expected format {FORMAT!r})")
+    if type(config.get("version")) is not int or config["version"] != VERSION:
+        raise CheckpointError(
+            f"{place}: checkpoint version {config.get('version')!r}, this finlab reads version {VERSION}; "
+            "use the finlab that made it, or train again"
+        )
+    return config
+
+
+def _part(prefix: str, tensors: State) -> dict[str, Any]:
+    """The arrays of one network, by their names inside it."""
+    return {k.removeprefix(prefix + "."): v for k, v in tensors.items() if k.startswith(prefix + ".")}
+
+
+def _missing(source: str, name: str) -> CheckpointError:
+    return CheckpointError(
+        f"{source}/{name}: no such file; a checkpoint folder holds {CONFIG_FILE} and {WEIGHTS_FILE}"
+    )

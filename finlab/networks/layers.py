@@ -1,0 +1,106 @@
+"""The layers of the networks, each written once: numpy answers with them, PyTorch trains through them.
+
+A network is a function of its weights, a mapping from PyTorch's names to arrays or tensors, and of its
+inputs. On a robot the weights are numpy arrays in single precision and no tensor library is needed.
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from finlab.arrays import Values, library_of
+
+Weights = Mapping[str, Values]
+"""Arrays of a network by name: numpy arrays or tensors."""
+EPSILON = 1e-5
+"""Added to the variance by a layer normalization, as by PyTorch's."""
+LEAK = 0.2
+"""Slope of the leaky rectifier of GATv2 below zero."""
+
+
+def linear(w: Weights, name: str, x: Values) -> Values:
+    """Features (..., out) of features (..., in); a layer without a bias has none to add."""
+    weight = w[f"{name}.weight"]
+    # One product of two matrices is much faster than numpy's loop over stacked small ones.
+    y = x.reshape(-1, x.shape[-1]) @ weight.T
+    if f"{name}.bias" in w:
+        y = y + w[f"{name}.bias"]
+    return y.reshape(*x.shape[:-1], weight.shape[0])
+
+
+def layer_norm(w: Weights, name: str, x: Values) -> Values:
+    """Layer normalization of features (..., width), with scale and shift."""
+    weight, bias = w[f"{name}.weight"], w[f"{name}.bias"]
+    xp = library_of(x)
+    if xp is not np:
+        return xp.nn.functional.layer_norm(x, x.shape[-1:], weight, bias, EPSILON)
+    width = np.float32(x.shape[-1])
+    y = x - np.add.reduce(x, axis=-1, keepdims=True) / width
+    variance = np.einsum("...i,...i->...", y, y) / width + np.float32(EPSILON)
+    y /= np.sqrt(variance)[..., None]
+    y *= weight
+    y += bias
+    return y
+
+
+def feed_forward(w: Weights, up: str, down: str, x: Values) -> Values:
+    """Two linear layers with a rectifier between them."""
+    return linear(w, down, relu(linear(w, up, x)))
+
+
+def head_scores(attention: Values, hidden: Values) -> Values:
+    """Scores (..., heads) of features (..., heads c) by the attention vectors (heads, c)."""
+    split = hidden.reshape(*hidden.shape[:-1], *attention.shape)
+    return library_of(hidden).einsum("...hc,hc->...h", split, attention)
+
+
+def relu(x: Values) -> Values:
+    """max(x, 0)."""
+    return np.maximum(x, 0) if library_of(x) is np else x.relu()
+
+
+def leaky_relu(x: Values) -> Values:
+    """x above zero, a fifth of it below."""
+    return library_of(x).maximum(x, LEAK * x)
+
+
+def elu(x: Values) -> Values:
+    """x above zero, exp(x) - 1 below."""
+    xp = library_of(x)
+    return np.maximum(x, 0) + np.expm1(np.minimum(x, 0)) if xp is np else xp.nn.functional.elu(x)
+
+
+def sigmoid(x: Values) -> Values:
+    """1 / (1 + exp(-x)), by way of a tangent, which never overflows."""
+    return 0.5 * library_of(x).tanh(0.5 * x) + 0.5
+
+
+def softmax(x: Values, axis: int = -1) -> Values:
+    """exp(x) over its sum along an axis."""
+    if library_of(x) is not np:
+        return x.softmax(axis)
+    y = np.exp(x - np.maximum.reduce(x, axis=axis, keepdims=True))
+    y /= np.add.reduce(y, axis=axis, keepdims=True)
+    return y
+
+
+def log_sum_exp(x: Values, axis: int = -1) -> Values:
+    """log(sum(exp(x))) along an axis."""
+    return np.logaddexp.reduce(x, axis=axis) if library_of(x) is np else x.logsumexp(axis)
+
+
+def log_softmax(x: Values) -> Values:
+    """Logarithm of the softmax along the last axis."""
+    return x - log_sum_exp(x)[..., None]
+
+
+def take(x: Values, index: Values, axis: int) -> Values:
+    """Entries of x along an axis, as numpy's `take_along_axis`."""
+    xp = library_of(x)
+    return np.take_along_axis(x, index, axis) if xp is np else xp.take_along_dim(x, index, axis)
+
+
+def single_precision(weights: Mapping[str, Any]) -> dict[str, Any]:
+    """The weights of a network as numpy arrays in single precision."""
+    return {name: np.asarray(value, dtype=np.float32) for name, value in weights.items()}

@@ -1,0 +1,124 @@
+"""The contents of a checkpoint: weights, the sizes of the networks they belong to, and their history."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, Protocol, TypeVar
+
+import numpy as np
+
+from finlab.arrays import AnyArray
+from finlab.errors import CheckpointError
+from finlab.networks.normalization import Normalization
+
+State = Mapping[str, AnyArray]
+"""Arrays of a network by PyTorch's names."""
+Shapes = dict[str, tuple[int, ...]]
+
+LARGEST_SIZE = 4096
+"""Largest width or count that a network may have."""
+LARGEST_WEIGHT = 1e6
+"""Largest magnitude of a weight; training stays below 100, and far beyond this answers would be NaN."""
+
+
+class Sizes(Protocol):
+    """The sizes of a network: a frozen dataclass of whole numbers, with the shapes that follow from them."""
+
+    features: ClassVar[str]
+    """What the network is fed, by its name in files."""
+    joint: ClassVar[bool]
+    """Whether one component is chosen for all fins together."""
+    verb: ClassVar[str]
+    """What `finlab train` calls it."""
+
+    def shapes(self) -> Shapes:
+        """Shape of each array; a `ValueError` where there is no network of these sizes."""
+        ...
+
+
+Kind = TypeVar("Kind", bound=Sizes)
+
+
+@dataclass(frozen=True)
+class TrainedWeights:
+    """The contents of a checkpoint."""
+
+    name: str
+    """Name shown to users; the checkpoint folder's."""
+    normalization: Normalization
+    """Per-axis statistics of the wrench."""
+    network_sizes: Mapping[str, Any] | None = None
+    """Sizes of the network and what it is fed, as in the file; None where only a surrogate was trained."""
+    network: State = field(default_factory=dict)
+    """The network; empty where there is none."""
+    surrogate_sizes: Mapping[str, Any] | None = None
+    """Sizes of the paper's surrogate, as in the file; None where there is none."""
+    surrogate: State = field(default_factory=dict)
+    """The paper's surrogate, learned fin physics; empty where there is none."""
+    fin_model: Mapping[str, Any] = field(default_factory=dict)
+    """Fin model that the surrogate learned, as in a layout file: {type, parameters}."""
+    preset: str = "default"
+    """Name of the training recipe."""
+    training: Mapping[str, Any] = field(default_factory=dict)
+    """Settings of the runs that made it."""
+    metrics: Mapping[str, Any] = field(default_factory=dict)
+    """Measured figures, each with what scored it."""
+    sha256: str = ""
+    """SHA-256 of the file of the weights; empty for what was not read from a file."""
+
+    def network_of(self, kind: type[Kind]) -> Kind:
+        """The sizes of the network; a `CheckpointError` where there is none, or one of another kind."""
+        known = self.network_sizes or {}
+        if (known.get("features"), known.get("joint")) != (kind.features, kind.joint):
+            has = f"a network that is fed {known.get('features')!r:.40}" if known else "no network"
+            raise CheckpointError(
+                f"checkpoint {self.name!r} holds {has}, expected one that is fed {kind.features!r}; train it "
+                f"with `finlab train {kind.verb}`"
+            )
+        try:
+            sizes = kind(**{key: value for key, value in known.items() if key not in ("features", "joint")})
+            check_state(self.network, sizes.shapes())
+        except (TypeError, ValueError) as error:
+            raise CheckpointError(f"checkpoint {self.name!r}: its network is damaged ({error})") from error
+        return sizes
+
+
+def sizes_for_file(sizes: Sizes) -> dict[str, Any]:
+    """The sizes of a network, and what tells its kind, for a file."""
+    return {"features": sizes.features, "joint": sizes.joint} | vars(sizes)
+
+
+def check_state(state: State, shapes: Shapes) -> None:
+    """Raise a `ValueError` unless a network has exactly these arrays."""
+    if wrong := sorted(set(shapes) ^ set(state)):
+        raise ValueError(f"{wrong[0]!r:.80} is missing or not expected")
+    for name, shape in shapes.items():
+        if state[name].shape != shape:
+            raise ValueError(f"{name}: expected shape {shape}, got {state[name].shape}")
+
+
+def check_arrays(state: State) -> None:
+    """Raise a `ValueError` unless all arrays are of float32 and of sane size."""
+    for name, array in state.items():
+        if array.dtype != np.float32:
+            raise ValueError(f"{name:.80}: expected float32, got {array.dtype}")
+        if not (np.abs(array) <= LARGEST_WEIGHT).all():  # false for NaN as well
+            raise ValueError(f"{name:.80}: holds NaN or a number beyond {LARGEST_WEIGHT:g}")
+
+
+def check_sizes(*sizes: object, heads: tuple[int, int] = (1, 1)) -> None:
+    """Raise a `ValueError` unless all are whole numbers in range, and `heads` a width and a divisor of it."""
+    for size in sizes:
+        if isinstance(size, bool) or not isinstance(size, int) or not 1 <= size <= LARGEST_SIZE:
+            raise ValueError(f"expected whole numbers from 1 to {LARGEST_SIZE} as sizes, got {size!r:.40}")
+    if heads[0] % heads[1]:
+        raise ValueError(f"width {heads[0]} is no multiple of heads {heads[1]}")
+
+
+def linear_shapes(name: str, n_in: int, n_out: int) -> Shapes:
+    """The shapes of a linear layer."""
+    return {f"{name}.weight": (n_out, n_in), f"{name}.bias": (n_out,)}
+
+
+def norm_shapes(name: str, width: int) -> Shapes:
+    """The shapes of a layer normalization."""
+    return {f"{name}.weight": (width,), f"{name}.bias": (width,)}

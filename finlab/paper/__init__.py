@@ -1,0 +1,1 @@
+"""The paper in one room: features, network, surrogate, pipeline, training."""

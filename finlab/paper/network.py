@@ -1,0 +1,169 @@
+"""The paper's network: node features and a target wrench in, a mixture over each fin's commands out.
+
+GATv2 layers (Brody, Alon, Yahav, ICLR 2022) on complete graphs of fins, then Transformer layers, then a
+mixture of diagonal Gaussians per fin. Graphs are small and complete, so that a dense form with a mask serves
+in place of lists of edges. Commands are in coordinates in which every range of limits is [-1, 1].
+"""
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+
+from finlab.arrays import Values, library_of
+from finlab.networks import layers
+from finlab.networks.layers import Weights
+from finlab.networks.trained import Shapes, check_sizes, linear_shapes, norm_shapes
+from finlab.paper.features import RAW_SIZE
+
+LOG_STD_BOUND = 3.0
+"""Largest size of the components' log standard deviation (paper, implementation details)."""
+
+
+@dataclass(frozen=True)
+class NetworkConfig:
+    """Sizes of the paper's network."""
+
+    features: ClassVar[str] = "raw"
+    """What it is fed, by its name in files."""
+    joint: ClassVar[bool] = False
+    """Whether one component is chosen for all fins together."""
+    verb: ClassVar[str] = "allocator"
+    """What `finlab train` calls it."""
+    width: int = 128
+    """Width of every hidden layer."""
+    heads: int = 4
+    """Attention heads of GATv2 and of the Transformer."""
+    graph_layers: int = 2
+    """Number of GATv2 layers."""
+    transformer_layers: int = 3
+    """Number of Transformer encoder layers."""
+    feedforward: int = 512
+    """Hidden width of the Transformer's feed-forward blocks; not printed."""
+    n_components: int = 8
+    """Number M of mixture components."""
+
+    def shapes(self) -> Shapes:
+        """Shape of each array; a `ValueError` where there is no network of these sizes."""
+        check_sizes(*vars(self).values(), heads=(self.width, self.heads))
+        width, m = self.width, self.n_components
+        shapes = linear_shapes("enter", RAW_SIZE, width) | linear_shapes("wrench", 6, width)
+        shapes |= linear_shapes("join", 2 * width, width)
+        for name in self._named("graph", self.graph_layers):
+            shapes |= {f"{name}.attention": (self.heads, width // self.heads), f"{name}.bias": (width,)}
+            shapes |= linear_shapes(f"{name}.source", width, width)
+            shapes |= linear_shapes(f"{name}.target", width, width)
+        for name in self._named("transformer.layers", self.transformer_layers):
+            look = f"{name}.self_attn"
+            shapes |= {f"{look}.in_proj_weight": (3 * width, width), f"{look}.in_proj_bias": (3 * width,)}
+            shapes |= linear_shapes(f"{look}.out_proj", width, width)
+            shapes |= linear_shapes(f"{name}.linear1", width, self.feedforward)
+            shapes |= linear_shapes(f"{name}.linear2", self.feedforward, width)
+            shapes |= norm_shapes(f"{name}.norm1", width) | norm_shapes(f"{name}.norm2", width)
+        return (
+            shapes
+            | norm_shapes("norm", width)
+            | linear_shapes("head", width, 6 * m)
+            | linear_shapes("weight", width, m)
+        )
+
+    def __call__(self, w: Weights, x: Values, target: Values, mask: Values | None = None) -> "Mixture":
+        """The mixtures that a network of these sizes gives.
+
+        Args:
+            w: its weights.
+            x: node features (B, n, 10).
+            target: normalized, centred targets (B, 6).
+            mask: (B, n), True where a fin exists; None where all do.
+        """
+        xp = library_of(x)
+        hidden = layers.linear(w, "enter", x)
+        for name in self._named("graph", self.graph_layers):
+            hidden = hidden + layers.elu(graph_attention(w, name, self.heads, hidden, mask))
+        wrench = layers.linear(w, "wrench", target)[:, None]
+        wrench = xp.broadcast_to(wrench, (*hidden.shape[:-1], wrench.shape[-1]))
+        hidden = layers.linear(w, "join", xp.concatenate([hidden, wrench], -1))
+        for name in self._named("transformer.layers", self.transformer_layers):
+            seen = layers.layer_norm(w, f"{name}.norm1", hidden)
+            hidden = hidden + self_attention(w, f"{name}.self_attn", self.heads, seen, mask)
+            seen = layers.layer_norm(w, f"{name}.norm2", hidden)
+            hidden = hidden + layers.feed_forward(w, f"{name}.linear1", f"{name}.linear2", seen)
+        hidden = layers.layer_norm(w, "norm", hidden)
+        raw, logits = (_single(layers.linear(w, end, hidden)) for end in ("head", "weight"))
+        raw = raw.reshape(*raw.shape[:-1], self.n_components, 6)
+        return Mixture(logits, raw[..., :3], LOG_STD_BOUND * xp.tanh(0.5 * raw[..., 3:]))
+
+    @staticmethod
+    def _named(kind: str, count: int) -> list[str]:
+        return [f"{kind}.{i}" for i in range(count)]
+
+
+class Mixture(NamedTuple):
+    """A mixture of M diagonal Gaussians over the commands of each of n fins, for B robots or targets."""
+
+    logits: Values
+    """Unnormalized log weights (B, n, M)."""
+    mean: Values
+    """Means (B, n, M, 3)."""
+    log_std: Values
+    """Log standard deviations (B, n, M, 3)."""
+
+    def expected(self) -> Values:
+        """Mean command (B, n, 3) of the whole mixture."""
+        return (layers.softmax(self.logits)[..., None] * self.mean).sum(2)
+
+    def log_prob(self, x: Values) -> Values:
+        """Log likelihoods (B, K, n) of commands (B, K, n, 3); zero directions are numbers as in the paper,
+        no angles."""
+        xp = library_of(x)
+        deviation = (x[:, :, :, None] - self.mean[:, None]) * xp.exp(-self.log_std)[:, None]
+        log_normal = -(0.5 * deviation * deviation + self.log_std[:, None]).sum(-1)
+        log_weight = layers.log_softmax(self.logits)[:, None] - 1.5 * math.log(2.0 * math.pi)
+        return layers.log_sum_exp(log_weight + log_normal)
+
+    def sample(self, uniform: Values, normal: Values, temperature: float = 1.0) -> Values:
+        """Commands (B, K, n, 3) drawn at a temperature T from 0: the weights are raised to the power 1/T, the
+        Gaussians keep their deviations (paper, command generation).
+
+        Numbers uniform in [0, 1) (B, n, K) choose components, standard normal ones (B, n, K, 3) the rest.
+        """
+        weight = layers.softmax(layers.log_softmax(self.logits) * (1.0 / max(temperature, 1e-6)))
+        cumulative = weight.cumsum(-1)[..., None, :-1]
+        choice = (uniform[..., None] > cumulative).sum(-1)[..., None]
+        mean, log_std = (layers.take(part, choice, 2) for part in (self.mean, self.log_std))
+        return (mean + library_of(log_std).exp(log_std) * normal).swapaxes(1, 2)
+
+
+def graph_attention(w: Weights, name: str, heads: int, x: Values, mask: Values | None = None) -> Values:
+    """A GATv2 layer on complete graphs with self loops: features (B, n, width) of features (B, n, F); heads
+    are concatenated. `mask` (B, n) is True where a node exists, None where all do."""
+    source, target = layers.linear(w, f"{name}.source", x), layers.linear(w, f"{name}.target", x)
+    hidden = layers.leaky_relu(source[:, None] + target[:, :, None])  # (B, n, n, width)
+    score = layers.head_scores(w[f"{name}.attention"], hidden)
+    weight = layers.softmax(_masked(score, mask, (slice(None), None, slice(None), None)), 2)
+    split = source.reshape(*source.shape[:2], heads, -1)
+    seen = library_of(x).einsum("bijh,bjhc->bihc", weight, split)
+    return seen.reshape(source.shape) + w[f"{name}.bias"]
+
+
+def self_attention(w: Weights, name: str, heads: int, x: Values, mask: Values | None = None) -> Values:
+    """Scaled dot-product attention of a Transformer: features (B, n, width) of the same."""
+    width = x.shape[-1]
+    packed = {"in.weight": w[f"{name}.in_proj_weight"], "in.bias": w[f"{name}.in_proj_bias"]}
+    qkv = layers.linear(packed, "in", x)
+    parts = (qkv[..., k * width : (k + 1) * width] for k in range(3))
+    q, k, v = (part.reshape(*x.shape[:2], heads, -1).swapaxes(1, 2) for part in parts)
+    score = (q @ k.swapaxes(2, 3)) * (width // heads) ** -0.5
+    weight = layers.softmax(_masked(score, mask, (slice(None), None, None)))
+    return layers.linear(w, f"{name}.out_proj", (weight @ v).swapaxes(1, 2).reshape(x.shape))
+
+
+def _masked(score: Values, mask: Values | None, place: tuple[slice | None, ...]) -> Values:
+    """Scores, minus infinity where what is looked at does not exist."""
+    return score if mask is None else library_of(score).where(mask[place], score, -math.inf)
+
+
+def _single(x: Values) -> Values:
+    """In single precision: training runs the layers in less."""
+    return x if library_of(x) is np else x.float()

@@ -1,0 +1,222 @@
+"""The paper's own pipeline: sample the mixture, rank by the surrogate, refine with Adam. numpy only."""
+
+from functools import lru_cache
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+
+from finlab.allocation.allocator import Allocator
+from finlab.allocation.judging import costs
+from finlab.allocation.search.levenberg_marquardt import CommandProblem, refine
+from finlab.allocation.solution import Candidates, Solution
+from finlab.arrays import AnyArray
+from finlab.layout import FinModelSpec, Layout
+from finlab.layout.angles import is_full_turn
+from finlab.networks.layers import single_precision
+from finlab.networks.normalization import clamp_to_limits, to_command, to_normalized
+from finlab.networks.threads import single_threaded_products
+from finlab.networks.trained import TrainedWeights
+from finlab.paper.features import raw_features
+from finlab.paper.network import Mixture, NetworkConfig
+from finlab.paper.settings import STEPS, PaperSettings
+from finlab.paper.surrogate import LayoutSurrogate, SurrogateConfig, blocks_of
+from finlab.physics.energy import EnergyMeter
+
+CHUNK = 250
+"""Targets that are solved together; keeps memory flat for any number of targets."""
+ADAM_RATE = 0.03
+"""Adam's first step, in units of half a limit range; it falls to a twentieth of that."""
+ADAM_DECAY = (0.9, 0.999)
+"""Decays of Adam's running means of the gradient and of its square (Kingma and Ba, 2015)."""
+LM_DAMPING = 4e-4
+"""First damping of Levenberg-Marquardt, in squared normalized error per squared limit range."""
+
+
+class _Robot(NamedTuple):
+    """One layout of n healthy fins, ready for the pipeline."""
+
+    layout: Layout
+    """The fins."""
+    surrogate: LayoutSurrogate
+    """Learned fin physics."""
+    problem: CommandProblem
+    """The surrogate in normalized wrenches, and the limits."""
+    limits: tuple[AnyArray, AnyArray]
+    """Lower and upper limits (n, 3), in single precision as all else here."""
+    features: AnyArray
+    """The network's node features (1, n, 10)."""
+    energy: EnergyMeter
+    """J_en."""
+
+
+class PaperAllocator(Allocator):
+    """Mixture density network, physics-guided ranking and gradient refinement, by the printed equations."""
+
+    name = "paper"
+    settings_class = PaperSettings
+    settings: PaperSettings
+    weights: TrainedWeights
+
+    def __init__(self, weights: TrainedWeights, **settings: Any) -> None:
+        """Make it from trained weights; settings are fields of `PaperSettings`.
+
+        Raises:
+            AllocationError: a setting is unknown or leaves nothing to answer with.
+            CheckpointError: the checkpoint's network is of another kind.
+        """
+        self.weights, self.config = weights, weights.network_of(NetworkConfig)
+        SurrogateConfig.of(weights)
+        self.checkpoint, self.normalization = weights.name, weights.normalization
+        self.fin_model = FinModelSpec.from_values(weights.fin_model)
+        self.settings = PaperSettings(**settings)
+        self._network = single_precision(weights.network)
+        self._one_thread = single_threaded_products()
+        self._prepared = lru_cache(maxsize=128)(self._prepare)
+
+    def _made_with(self, options: dict[str, Any]) -> Self:
+        return type(self)(self.weights, **options)
+
+    def _solve(self, layout: Layout, targets: AnyArray, *, seed: int, previous: AnyArray | None) -> Solution:
+        robot = self._prepared(layout)
+        if len(targets) == 1:
+            with self._one_thread():
+                return self._solve_chunk(robot, targets, seed)
+        starts = range(0, len(targets), CHUNK)
+        parts = [self._solve_chunk(robot, targets[k : k + CHUNK], seed + k) for k in starts]
+        wrench = [part.wrench_surrogate for part in parts if part.wrench_surrogate is not None]
+        return Solution(np.concatenate([part.command for part in parts]), np.concatenate(wrench))
+
+    def _solve_chunk(self, robot: _Robot, targets: AnyArray, seed: int) -> Solution:
+        settings = self.settings
+        sampled, wanted = self._sampled(robot, targets, seed)
+        chosen = sampled[:, : settings.n_refined]
+        if not settings.mean_only:
+            chosen = self._refine(robot, chosen, wanted)
+        if not self._by_likelihood:  # without physics in the ranking the likeliest candidate stays the answer
+            chosen = _take(chosen, np.argsort(self._score(robot, chosen, wanted), axis=1, kind="stable"))
+        return Solution(
+            _inside(robot, chosen[:, 0]),
+            robot.surrogate.wrench(chosen[:, 0]).astype(np.float64),
+            candidates=lambda: self._candidates(robot, chosen[0], targets[0], "refined"),
+            samples=lambda: self._candidates(robot, sampled[0], targets[0], "sample"),
+        )
+
+    @property
+    def _by_likelihood(self) -> bool:
+        return self.settings.ranking == "nll" and not self.settings.mean_only
+
+    def _sampled(self, robot: _Robot, targets: AnyArray, seed: int) -> tuple[AnyArray, AnyArray]:
+        """Raw candidates (N, K, n, 3) for targets (N, 6), best first, and what they are to give (N, 6)."""
+        std = self.normalization.std
+        wanted = ((targets - robot.surrogate.bias) / std).astype(np.float32)
+        mixture = self._predict(robot, (targets - self.normalization.mean) / std)
+        sampled = clamp_to_limits(to_command(self._draw(mixture, seed), *robot.limits), *robot.limits)
+        if self._by_likelihood:
+            score = -mixture.log_prob(to_normalized(sampled, *robot.limits)).sum(-1)
+        else:
+            score = self._score(robot, sampled, wanted)
+        return _take(sampled, np.argsort(score, axis=1, kind="stable")), wanted
+
+    def _prepare(self, layout: Layout) -> _Robot:
+        surrogate, std = LayoutSurrogate(layout, self.weights), self.normalization.std
+        lower, upper = layout.lower, layout.upper
+        turns_fully = np.asarray(is_full_turn(upper[:, 2] - lower[:, 2]))
+        problem = CommandProblem(surrogate, surrogate.columns / std, lower, upper, turns_fully)
+        place = layout.position[None], layout.mounting_angle[None], lower[None], upper[None]
+        limits = lower.astype(np.float32), upper.astype(np.float32)
+        return _Robot(layout, surrogate, problem, limits, raw_features(*place), EnergyMeter(upper))
+
+    def _predict(self, robot: _Robot, centred: AnyArray) -> Mixture:
+        """The network's mixture for normalized, centred targets (N, 6)."""
+        x = np.repeat(robot.features, len(centred), axis=0)
+        return self.config(self._network, x.astype(np.float32), centred.astype(np.float32))
+
+    def _draw(self, mixture: Mixture, seed: int) -> AnyArray:
+        """Candidates (N, K, n, 3) in normalized coordinates."""
+        rows, n, k = *mixture.mean.shape[:2], self.settings.n_candidates
+        rng = np.random.default_rng(seed)
+        if self.settings.mean_only:
+            return np.asarray(mixture.expected()[:, None])
+        if self.settings.warm_start == "random":
+            return np.float32(2.0) * rng.random((rows, k, n, 3), dtype=np.float32) - np.float32(1.0)
+        uniform = rng.random((rows, n, k), dtype=np.float32)
+        normal = rng.standard_normal((rows, n, k, 3), dtype=np.float32)
+        return np.asarray(mixture.sample(uniform, normal, self.settings.temperature))
+
+    def _score(self, robot: _Robot, command: AnyArray, wanted: AnyArray) -> AnyArray:
+        """J = J_norm + gamma J_en (N, K) of commands (N, K, n, 3), by the surrogate."""
+        rows, k, n, _ = command.shape
+        flat = command.reshape(-1, n, 3)
+        error = robot.problem.wrench(flat).reshape(rows, k, 6) - wanted[:, None]
+        energy = robot.energy(flat).reshape(rows, k)
+        return np.asarray(np.einsum("rki,rki->rk", error, error) + self.settings.gamma * energy)
+
+    def _refine(self, robot: _Robot, command: AnyArray, wanted: AnyArray) -> AnyArray:
+        """Refined commands (N, K, n, 3), inside the limits."""
+        shape, kind = command.shape, self.settings.refinement
+        steps = STEPS[kind] if self.settings.n_steps is None else self.settings.n_steps
+        flat, target = command.reshape(-1, *shape[2:]), np.repeat(wanted, shape[1], axis=0)
+        if kind == "none":
+            return command
+        if kind == "adam":
+            parts = [self._adam(robot, flat[k], target[k], steps) for k in blocks_of(len(flat))]
+            return np.concatenate(parts).reshape(shape)
+        return refine(robot.problem, target, flat, steps, damping=LM_DAMPING).command.reshape(shape)
+
+    def _adam(self, robot: _Robot, command: AnyArray, target: AnyArray, steps: int) -> AnyArray:
+        """Adam on J for commands (R, n, 3) and normalized targets (R, 6); the best step of each.
+
+        It works in normalized coordinates, inside the limits, with a step that falls linearly. Zero
+        directions that turn fully go on beyond the seam.
+        """
+        lower, upper = robot.limits
+        x, half = to_normalized(command, lower, upper), np.float32(0.5) * (upper - lower)
+        mean, square = np.zeros_like(x), np.zeros_like(x)
+        keep_mean, keep_square = ADAM_DECAY
+        best, least = x.copy(), np.full(len(x), np.inf, np.float32)
+        for step in range(steps + 1):
+            score, slopes = self._score_and_slopes(robot, to_command(x, lower, upper), target)
+            better = score < least
+            best[better], least[better] = x[better], score[better]
+            if step == steps:
+                break
+            gradient = half * slopes
+            mean += (1.0 - keep_mean) * (gradient - mean)
+            square += (1.0 - keep_square) * (gradient * gradient - square)
+            rate = ADAM_RATE * (1.0 - 0.95 * step / steps) / (1.0 - keep_mean ** (step + 1))
+            size = np.sqrt(square / np.float32(1.0 - keep_square ** (step + 1)))
+            x -= np.float32(rate) * mean / (size + np.float32(1e-8))
+            # A full turn is two units wide.
+            turned = np.remainder(x[..., 2] + np.float32(1.0), np.float32(2.0)) - np.float32(1.0)
+            x[..., 2] = np.where(robot.problem.full_turn, turned, x[..., 2])
+            np.clip(x, -1.0, 1.0, out=x)
+        return np.asarray(to_command(best, lower, upper))
+
+    def _score_and_slopes(
+        self, robot: _Robot, command: AnyArray, target: AnyArray
+    ) -> tuple[AnyArray, AnyArray]:
+        """J (R,) of commands (R, n, 3), and its derivatives (R, n, 3) by them."""
+        rows = len(command)
+        columns = robot.problem.columns_float32
+        force, pull = robot.surrogate.force_and_pullback(command)
+        error = force.reshape(rows, -1) @ columns - target
+        gamma = np.float32(self.settings.gamma)
+        energy, by_energy = robot.energy.with_slopes(command)
+        score = np.einsum("ri,ri->r", error, error) + gamma * energy
+        return score, pull(2.0 * error @ columns.T) + gamma * by_energy
+
+    def _candidates(self, robot: _Robot, command: AnyArray, target: AnyArray, source: str) -> Candidates:
+        """Candidates (K, n, 3) of a single target (6,), in their order."""
+        wrench = robot.surrogate.wrench(command).astype(np.float64)
+        error, inside = self.normalization.error(wrench, target), _inside(robot, command)
+        return Candidates(inside, wrench, error, *costs(robot.layout, inside), (source,) * len(command))
+
+
+def _take(command: AnyArray, index: AnyArray) -> AnyArray:
+    """Of commands (N, K, n, 3) those with the numbers (N, k)."""
+    return np.asarray(np.take_along_axis(command, index[..., None, None], axis=1))
+
+
+def _inside(robot: _Robot, command: AnyArray) -> AnyArray:
+    """Commands in double precision, inside the limits to the last bit."""
+    return np.clip(command.astype(np.float64), robot.problem.lower, robot.problem.upper)

@@ -1,0 +1,47 @@
+"""What can be set of method `paper`, and the same names for editors and type checkers.
+
+A test holds the typed options against the settings.
+"""
+
+from dataclasses import dataclass
+from typing import TypedDict
+
+from finlab.allocation.search.settings import MOST_CANDIDATES
+from finlab.allocation.settings import Settings, choice, number, switch
+
+STEPS = {"none": 0, "adam": 160, "levenberg-marquardt": 20}
+"""Refinement -> its number of steps where the settings name none."""
+
+
+@dataclass(frozen=True)
+class PaperSettings(Settings):
+    """The stages of the paper's pipeline.
+
+    What the paper does not print is a choice made here: gamma and the weights of J_en, Adam's rate, the
+    number of refined candidates and steps, that the best step is kept, and that zero directions turn on
+    beyond the seam.
+    """
+
+    n_candidates: int = number(64, 1, MOST_CANDIDATES, "candidates K drawn from the mixture")
+    temperature: float = number(0.02, 0.0, 100.0, "T of the sampling; 0.02 in the paper")
+    gamma: float = number(1e-4, 0.0, 1e6, "weight of the effort in J = J_norm + gamma J_en")
+    n_refined: int = number(4, 1, 256, "best-ranked candidates that are refined")
+    refinement: str = choice("adam", tuple(STEPS), "how candidates are refined; all but adam are ablations")
+    n_steps: int | None = number(None, 0, 10_000, "steps of the refinement; None for its usual number")
+    warm_start: str = choice("mdn", ("mdn", "random"), "where candidates come from; random is an ablation")
+    ranking: str = choice("physics", ("physics", "nll"), "by J, or by likelihood, which is an ablation")
+    mean_only: bool = switch(False, "take the mixture's mean and nothing else, which is an ablation")
+
+
+class PaperOptions(TypedDict, total=False):
+    """Settings of the method `paper`."""
+
+    n_candidates: int
+    temperature: float
+    gamma: float
+    n_refined: int
+    refinement: str
+    n_steps: int | None
+    warm_start: str
+    ranking: str
+    mean_only: bool

@@ -1,0 +1,196 @@
+"""The paper's surrogate: learned fin physics, commands and node features in, a wrench out.
+
+A perceptron gives each fin's force in the body frame, F_i = f([x_i, u_i]); the wrench is the sum of
+(F_i, r_i x F_i), then stretched and shifted by what a descriptor of the whole layout says. The perceptron is
+written once: training differentiates through it, and on one layout (`LayoutSurrogate`) it brings its gradient
+itself, so that the paper's method needs no tensor library.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from finlab.arrays import AnyArray, Values, library_of
+from finlab.errors import CheckpointError
+from finlab.layout import Layout
+from finlab.layout.arrays import force_columns
+from finlab.networks import layers
+from finlab.networks.layers import Weights
+from finlab.networks.normalization import to_normalized
+from finlab.networks.trained import Shapes, TrainedWeights, check_sizes, check_state, linear_shapes
+from finlab.paper.features import RAW_SIZE, raw_features
+from finlab.physics.wrench import wrench_of_forces
+
+FORCE_UNIT = 4.0
+"""Force [N] of order one for the perceptron's outputs."""
+DESCRIPTOR = 64
+"""Width of the layout descriptor."""
+BLOCK = 64
+"""Robots whose fins are worked on at once: some hundred rows of the hidden layers, half a megabyte."""
+
+
+@dataclass(frozen=True)
+class SurrogateConfig:
+    """Sizes of the surrogate."""
+
+    hidden: tuple[int, ...] = (512, 128)
+    """Widths of the hidden layers; the first is printed, the second is not."""
+
+    def shapes(self) -> Shapes:
+        """Shape of each array; a `ValueError` where there is no surrogate of these sizes."""
+        check_sizes(*self.hidden)
+        shapes: Shapes = {}
+        for name, (n_in, n_out) in zip(self.layers(), pairwise([RAW_SIZE + 3, *self.hidden, 3]), strict=True):
+            shapes |= linear_shapes(name, n_in, n_out)
+        shapes |= linear_shapes("descriptor.0", RAW_SIZE, DESCRIPTOR)
+        return shapes | linear_shapes("affine", DESCRIPTOR, 12)
+
+    def layers(self) -> list[str]:
+        """Names of the perceptron's layers, between which activations stand."""
+        return [f"net.{2 * i}" for i in range(len(self.hidden) + 1)]
+
+    def for_file(self) -> dict[str, object]:
+        """The sizes for a file, and what tells their kind."""
+        return {"kind": "mlp", "hidden": list(self.hidden)}
+
+    @classmethod
+    def of(cls, weights: TrainedWeights) -> "SurrogateConfig":
+        """The sizes of the surrogate of a checkpoint; a `CheckpointError` where it holds none."""
+        sizes = weights.surrogate_sizes
+        if sizes is None:
+            raise CheckpointError(
+                f"checkpoint {weights.name!r} holds no surrogate; train one with `finlab train surrogate`"
+            )
+        try:
+            if set(sizes) != {"kind", "hidden"} or sizes["kind"] != "mlp":
+                raise ValueError("expected the kind 'mlp' and the widths of its hidden layers")
+            config = cls(tuple(sizes["hidden"]))
+            check_state(weights.surrogate, config.shapes())
+        except (TypeError, ValueError) as error:
+            raise CheckpointError(f"checkpoint {weights.name!r}: damaged surrogate ({error})") from error
+        return config
+
+    def wrench(
+        self,
+        w: Weights,
+        command: Values,
+        position: Values,
+        mounting_angle: Values,
+        lower: Values,
+        upper: Values,
+        mask: Values | None = None,
+    ) -> Values:
+        """Wrenches (..., 6) [N, N m] of commands (..., n, 3) on layouts broadcastable to them, by a surrogate
+        with these weights; `mask` (..., n) is True where a fin exists."""
+        xp = library_of(command)
+        x = raw_features(position, mounting_angle, lower, upper)
+        x = xp.broadcast_to(x, (*command.shape[:-1], x.shape[-1]))
+        force = perceptron(self, w, of_fins(w, x), to_normalized(command, lower, upper))
+        if mask is not None:
+            force = force * mask[..., None]
+        # The perceptron answers in the body frame, that of a fin whose shaft points forward.
+        wrench = wrench_of_forces(force, force_columns(position, 0.0 * mounting_angle))
+        here = xp.ones_like(x[..., 0]) if mask is None else mask * xp.ones_like(x[..., 0])
+        scale, bias = correction(w, x, here)
+        return wrench * (1.0 + scale) + bias
+
+
+def of_fins(w: Weights, features: Values) -> Values:
+    """What the first layer (..., width) adds up of node features (..., 10), which no command changes."""
+    return features @ w["net.0.weight"][:, :RAW_SIZE].T + w["net.0.bias"]
+
+
+def perceptron(
+    config: SurrogateConfig, w: Weights, fins: Values, x: Values, slopes: list[Values] | None = None
+) -> Values:
+    """Forces (..., 3) [N] in the body frame of commands x (..., 3) in normalized coordinates.
+
+    Args:
+        config: sizes of the surrogate.
+        w: its weights.
+        fins: see `of_fins`.
+        x: commands.
+        slopes: takes the derivatives of the activations, layer by layer.
+    """
+    z = layers.linear({"command.weight": w["net.0.weight"][:, RAW_SIZE:]}, "command", x) + fins
+    for name in config.layers()[1:]:
+        gate = layers.sigmoid(z)
+        silu = z * gate
+        if slopes is not None:
+            slopes.append(gate + silu * (1.0 - gate))
+        z = layers.linear(w, name, silu)
+    return z * FORCE_UNIT
+
+
+def correction(w: Weights, features: Values, here: Values) -> tuple[Values, Values]:
+    """By how much a layout's wrench is stretched, and what is added to it, (..., 6) each.
+
+    `here` (..., n) is 1 where a fin exists, else 0.
+    """
+    described = library_of(features).tanh(layers.linear(w, "descriptor.0", features)) * here[..., None]
+    pooled = described.sum(-2) / here.sum(-1)[..., None]
+    both = layers.linear(w, "affine", pooled)
+    return both[..., :6], both[..., 6:]
+
+
+class LayoutSurrogate:
+    """A surrogate on one layout of n fins, with the gradient of its forces; in single precision."""
+
+    def __init__(self, layout: Layout, weights: TrainedWeights) -> None:
+        """Take over the surrogate of a checkpoint; a `CheckpointError` where it holds none."""
+        self.config = SurrogateConfig.of(weights)
+        self._w = layers.single_precision(weights.surrogate)
+        place = layout.position, layout.mounting_angle, layout.lower, layout.upper
+        features = raw_features(*place).astype(np.float32)
+        self._fins = of_fins(self._w, features)
+        self._lower, self._upper = (limit.astype(np.float32) for limit in (layout.lower, layout.upper))
+        self._half = np.maximum(0.5 * (self._upper - self._lower), np.float32(1e-9))
+        scale, self.bias = correction(self._w, features, np.ones(len(features), np.float32))
+        """Wrench (6,) [N, N m] of fins that give no force."""
+        columns = force_columns(layout.position, np.zeros_like(layout.mounting_angle))
+        self.columns: AnyArray = columns * (1.0 + scale)
+        """Wrench per newton (n, 3, 6) of each fin's force along the three axes of the body."""
+
+    def force(self, command: AnyArray) -> AnyArray:
+        """Forces (R, n, 3) [N] of commands (R, n, 3)."""
+        return np.concatenate([self._forward(command[rows]) for rows in blocks_of(len(command))])
+
+    def force_and_slopes(self, command: AnyArray) -> tuple[AnyArray, AnyArray]:
+        """Forces (R, n, 3) and, for each of the three commands in turn, their derivatives (R, n, 3, 3)."""
+        force, pull = self.force_and_pullback(command)
+        axes = (np.broadcast_to(axis, force.shape) for axis in np.eye(3, dtype=np.float32))
+        return force, np.stack([pull(axis) for axis in axes], axis=-1)
+
+    def force_and_pullback(self, command: AnyArray) -> tuple[AnyArray, Callable[[AnyArray], AnyArray]]:
+        """Forces (R, n, 3) [N], and what turns derivatives of a number by them into those by the commands,
+        (R, n, 3) each."""
+        slopes: list[AnyArray] = []
+        force = self._forward(command, slopes)
+
+        def pull(by_force: AnyArray) -> AnyArray:
+            by_layer = FORCE_UNIT * by_force.reshape(-1, 3)
+            for name, slope in zip(reversed(self.config.layers()[1:]), reversed(slopes), strict=True):
+                by_layer = by_layer @ self._w[f"{name}.weight"]
+                by_layer *= slope.reshape(by_layer.shape)
+            by_command = by_layer @ self._w["net.0.weight"][:, RAW_SIZE:]
+            return np.asarray(by_command.reshape(command.shape) / self._half)
+
+        return force, pull
+
+    def wrench(self, command: AnyArray) -> AnyArray:
+        """Wrenches (..., 6) [N, N m] of commands (..., n, 3)."""
+        force = self.force(command.reshape(-1, *command.shape[-2:]))
+        wrench = force.reshape(len(force), -1) @ self.columns.reshape(-1, 6) + self.bias
+        return np.asarray(wrench.reshape(*command.shape[:-2], 6))
+
+    def _forward(self, command: AnyArray, slopes: list[AnyArray] | None = None) -> AnyArray:
+        # Rounded first: where a range has no width, any remainder would be blown up.
+        x = to_normalized(command.astype(np.float32), self._lower, self._upper)
+        return np.asarray(perceptron(self.config, self._w, self._fins, x, slopes))
+
+
+def blocks_of(rows: int) -> list[slice]:
+    """Slices of so few robots that a hidden layer of their fins stays in the processor's cache."""
+    return [slice(k, k + BLOCK) for k in range(0, rows, BLOCK)]

@@ -1,1 +1,0 @@
-"""Networks only: they see tensors, never a layout."""

@@ -1,0 +1,143 @@
+"""What the network of method `mdn` sees: it decides the problem, and knows of no size, axis or frame."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from finlab.forces.envelopes import layout_envelopes
+from finlab.forces.force_space import PlanarProblem, planar_problem
+from finlab.layout import Fin, FinModelSpec, Layout, Limits, random_layout
+from finlab.mdn.features import SHARES, VECTORS, RobotView, features, robot_view, see
+from finlab.mdn.network import NODE_SIZE
+from finlab.physics.objective import Objective
+
+STD = np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.34])
+EFFORT = Objective("effort")
+
+
+def problem_of(layout: Layout, objective: Objective = EFFORT, std: np.ndarray = STD) -> PlanarProblem:
+    return planar_problem(layout, layout_envelopes(layout, objective), std, objective)
+
+
+@pytest.fixture(params=[2, 5, 12])
+def layout(request: pytest.FixtureRequest) -> Layout:
+    """Fins with limits of their own, one of which pushes unevenly and leans."""
+    layout = random_layout(np.random.default_rng(request.param), n_fins=request.param, limits="varied")
+    uneven = FinModelSpec("soft", (("d", 0.2), ("e", 0.25), ("phi_e", 1.0)))
+    return layout.replace_fin("fin_1", model=uneven)
+
+
+def acted(view: RobotView, share: np.ndarray) -> np.ndarray:
+    """P x for shares (n,), complex."""
+    a, b = view.blocks
+    return np.asarray(a @ share + b @ share.conj())
+
+
+def test_forces_that_give_the_wrench_are_those_that_give_the_least_shares(layout: Layout) -> None:
+    problem = problem_of(layout)
+    view, rng = robot_view(problem, True), np.random.default_rng(0)
+    share = rng.normal(size=(4, layout.n_fins)) + 1j * rng.normal(size=(4, layout.n_fins))
+    force = share * view.largest
+    target = np.concatenate([force.real, force.imag], axis=1) @ problem.columns
+    for row in range(4):
+        # P x = p for every x that gives the target, and P is a projection up to its regularization.
+        np.testing.assert_allclose(acted(view, share[row]), target[row] @ view.solver, atol=1e-3)
+        twice = acted(view, acted(view, share[row]))
+        np.testing.assert_allclose(twice, acted(view, share[row]), atol=1e-3)
+
+
+def seen(layout: Layout, target: np.ndarray, std: np.ndarray = STD) -> list[np.ndarray]:
+    """What is seen of a target (6,) [N, N m]."""
+    found = see(robot_view(problem_of(layout, std=std), True), target[None] / std)
+    return [found.nodes[0], found.pairs[0]]
+
+
+def test_a_fins_own_vectors_are_turned_to_its_force() -> None:
+    """Two fins by hand: what is asked of them, and what they are, in the frame of that."""
+    rng, angle, size = np.random.default_rng(1), np.array([0.5, -2.0]), np.array([2.0, 0.3])
+    static, none = rng.normal(size=(1, 2, NODE_SIZE - 6)), np.zeros((1, 2, 2), complex)
+    found = features((size * np.exp(1j * angle))[None], static, none, none)
+    np.testing.assert_allclose(found.frame[0], np.exp(1j * angle))
+    nodes, own = found.nodes[0].astype(np.float64), static[0]
+    np.testing.assert_allclose(nodes[:, 0], np.sqrt(size), rtol=1e-6)
+    np.testing.assert_allclose(nodes[:, 1], size / (1.0 + size), rtol=1e-6)
+    np.testing.assert_allclose(nodes[:, 2], np.log(size + 1e-3) / 7.0, rtol=1e-6)
+    plain = np.ones(NODE_SIZE - 6, bool)
+    for place in VECTORS:
+        plain[[place, place + 1]] = False
+        x, y = own[:, place], own[:, place + 1]
+        turned = np.cos(angle) * x + np.sin(angle) * y, np.cos(angle) * y - np.sin(angle) * x
+        np.testing.assert_allclose(nodes[:, 6 + place], turned[0], atol=1e-6)
+        np.testing.assert_allclose(nodes[:, 7 + place], turned[1], atol=1e-6)
+    np.testing.assert_allclose(nodes[:, 6:][:, plain], own[:, plain], rtol=1e-6)
+
+
+def test_a_fin_with_stops_is_seen_within_them() -> None:
+    """The mean direction of an arc of half h is sin(h) / h ahead of its middle; an even fin reaches all."""
+    arc = Limits(zero_direction=(-0.5, 1.7))
+    layout = Layout("arc", (Fin("a", (0.2, 0.1, 0.0), 0.3, arc), Fin("b", (-0.2, 0.1, 0.0), 2.0)))
+    static, half = robot_view(problem_of(layout), True).static, 1.1
+    reach = 1 + len(SHARES)
+    np.testing.assert_allclose(static[:, reach], 1.0, rtol=1e-6)
+    ahead = static[:, reach + 1] + 1j * static[:, reach + 2]
+    assert ahead[0] == pytest.approx(2.0 * np.sin(half) / half * np.exp(0.6j), abs=0.12)
+    assert ahead[1] == pytest.approx(0.0, abs=1e-6), "a circle has no middle"
+    assert VECTORS[0] == reach + 1
+
+
+def test_turning_the_robot_changes_nothing(layout: Layout) -> None:
+    target, yaw = np.array([1.0, -0.4, 0.6, 0.02, -0.05, 0.1]), 0.8
+    c, s = np.cos(yaw), np.sin(yaw)
+    rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    fins = tuple(
+        replace(
+            fin,
+            position=tuple((rotation @ fin.position).tolist()),
+            mounting_angle=float(np.angle(np.exp(1j * (fin.mounting_angle + yaw)))),
+        )
+        for fin in layout.fins
+    )
+    turned = np.concatenate([rotation @ target[:3], rotation @ target[3:]])
+    even = np.array([1.0, 1.0, 1.0, 0.2, 0.2, 0.2])  # a yardstick that turns along
+    before, after = seen(layout, target, even), seen(replace(layout, fins=fins), turned, even)
+    for a, b in zip(before, after, strict=True):
+        np.testing.assert_allclose(a, b, atol=2e-3)
+
+
+def test_a_robot_with_fins_of_another_size_is_seen_as_the_same() -> None:
+    target = np.array([1.0, -0.4, 0.6, 0.02, -0.05, 0.1])
+    layout = random_layout(np.random.default_rng(3), n_fins=5)
+    larger = layout
+    for name in layout.names:
+        larger = larger.replace_fin(name, model=FinModelSpec("drag", (("area", 0.06),)))
+    for a, b in zip(seen(layout, target), seen(larger, 3.0 * target), strict=True):
+        np.testing.assert_allclose(a, b, atol=1e-5)
+
+
+def test_documented_features_of_a_hand_made_fin() -> None:
+    layout = random_layout(np.random.default_rng(1), n_fins=1)
+    problem = problem_of(layout)
+    top = problem.fins.maximum[0]
+    target = 0.25 * top * problem.columns[1]  # a quarter of its force, straight up
+    found = see(robot_view(problem, True), target[None])
+    node = found.nodes[0, 0]
+    assert node.shape == (NODE_SIZE,) and found.frame[0, 0] == pytest.approx(1j, abs=1e-4)
+    np.testing.assert_allclose(node[:3], [0.5, 0.2, np.log(0.251) / 7.0], atol=1e-3)
+    np.testing.assert_allclose(node[3:6], [1.0, 0.0, 0.0], atol=1e-3)  # the only fin: all depends on it
+    assert node[6] == 0.0 and (np.diff(node[7:11]) > 0).all()
+    np.testing.assert_allclose(node[11:16], [1.0, 0.0, 0.0, 0.0, 0.0], atol=1e-6)  # the same all round
+    rest = problem.fins.minimum[0] / top
+    assert node[16] == pytest.approx(np.sqrt(rest), rel=1e-6)
+    np.testing.assert_allclose(node[17:20], [1.0, 0.0, 0.0], atol=1e-6)  # a full circle
+    # Zero direction 0 is a quarter of a turn behind straight up.
+    assert node[20] > 0.0 and node[21:23] == pytest.approx([0.0, -1.0], abs=1e-3)
+    assert node[23] == 1.0 and node[26] == pytest.approx(1 / 12)
+    power = see(robot_view(problem_of(layout, Objective("power")), False), target[None]).nodes[0, 0]
+    assert power[23] == 0.0 and (power[20:23] == 0.0).all()
+
+
+def test_no_target_is_no_trouble(layout: Layout) -> None:
+    found = see(robot_view(problem_of(layout), True), np.zeros((2, 6)))
+    assert np.isfinite(found.nodes).all() and np.isfinite(found.pairs).all()
+    np.testing.assert_array_equal(found.frame, 1.0)

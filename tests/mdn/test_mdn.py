@@ -1,0 +1,205 @@
+"""Method `mdn`: proposals of the mixture, each searched to its end, whatever the network has learned."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from finlab.allocation import load_allocator
+from finlab.assets import checkpoint_path
+from finlab.errors import AllocationError, CheckpointError
+from finlab.layout import FinModelSpec, Layout, load_layout, random_layout
+from finlab.mdn.allocator import MdnAllocator
+from finlab.mdn.features import see
+from finlab.mdn.proposal import propose, shares
+from finlab.networks.checkpoint import read_checkpoint
+from finlab.physics import Plant
+from finlab.physics.energy import command_energy
+
+TARGET = [0.5, -0.3, 1.0, 0.05, -0.02, 0.1]
+
+
+@pytest.fixture(scope="module")
+def untrained(untrained_mdn: Path) -> MdnAllocator:
+    return load_allocator("mdn", checkpoint=untrained_mdn)
+
+
+@pytest.fixture(scope="module")
+def shipped() -> MdnAllocator:
+    return load_allocator("mdn", objective="effort")
+
+
+def same_forces(layout: Layout, one: np.ndarray, other: np.ndarray) -> None:
+    """What matters of commands: those of fins that nearly rest take long to settle."""
+    plant = Plant(layout)
+    np.testing.assert_allclose(plant.force(one), plant.force(other), atol=5e-3)
+
+
+@pytest.fixture(scope="module")
+def settled(shipped: MdnAllocator) -> MdnAllocator:
+    """With so many steps that every search comes to its end, whatever goes on beside it."""
+    return shipped.with_settings(search_steps=60)
+
+
+def reachable(layout: Layout, count: int, seed: int = 0) -> np.ndarray:
+    plant = Plant(layout)
+    return plant.wrench(plant.sample(np.random.default_rng(seed), (count,)))
+
+
+@pytest.mark.parametrize("objective", ["power", "effort"])
+@pytest.mark.parametrize("n", [2, 4, 8, 12])
+def test_answers_are_exact_even_where_nothing_was_learned(
+    n: int, objective: str, untrained: MdnAllocator
+) -> None:
+    layout = random_layout(np.random.default_rng(n), n_fins=n, limits="varied")
+    layout = layout.replace_fin("fin_1", model=FinModelSpec("soft", (("e", 0.2), ("d", 0.1))))
+    targets = reachable(layout, 20)
+    answer = untrained.with_settings(objective=objective).allocate_batch(layout, targets)
+    error = untrained.normalization.error(Plant(layout).wrench(answer.command), targets)
+    assert np.mean(error < 1e-4) >= 0.95 and error.max() < 0.05
+
+
+def test_a_batch_costs_what_single_calls_do(settled: MdnAllocator, layout_a: Layout) -> None:
+    targets = reachable(layout_a, 6)
+    together = settled.allocate_batch(layout_a, targets)
+    np.testing.assert_allclose(Plant(layout_a).wrench(together.command), targets, atol=1e-4)
+    alone = [settled.allocate(layout_a, target).energy for target in targets]
+    np.testing.assert_allclose(together.energy, alone, rtol=0.01)
+
+
+def test_candidates_keep_the_name_of_their_component(settled: MdnAllocator, layout_a: Layout) -> None:
+    answer, insight = settled.allocate(layout_a, TARGET), settled.insight(layout_a, TARGET)
+    count = settled.settings.n_candidates
+    expected = [f"component {k + 1}" for k in np.argsort(-insight.weight)[:count]]
+    assert answer.samples is not None and answer.candidates is not None
+    assert list(answer.samples.source) == expected
+    assert set(answer.candidates.source) <= set(expected)
+    # A candidate is what the search makes of its own component's proposal, and of no other one.
+    view, target = settled._view(settled.pipeline, layout_a), np.array([TARGET])
+    seen = see(view, target / settled.normalization.std)
+    force = propose(settled.mixture(seen), view, seen, count, 1.0, 0).force
+    prepared = settled.pipeline.prepare(layout_a)
+    for command, source in zip(answer.candidates.command, answer.candidates.source, strict=True):
+        k = expected.index(source)
+        alone = settled.pipeline.solve(prepared, target, seeds=force[:, k : k + 1])
+        same_forces(layout_a, command, alone.command[0, 0])
+
+
+def test_from_tick_to_tick_candidates_keep_it_too(shipped: MdnAllocator) -> None:
+    layout, all_kept = load_layout("octo"), shipped.with_settings(n_refined=100, subsets=False)
+    alone = all_kept.allocate(layout, TARGET)
+    again = all_kept.allocate(layout, TARGET, previous=alone.command)
+    assert alone.candidates is not None and again.candidates is not None
+    # What is within the servos' rates is answered as without a past, component by component.
+    assert again.candidates.source == alone.candidates.source
+    np.testing.assert_array_equal(again.candidates.command, alone.candidates.command)
+    away = all_kept.allocate(layout, -0.5 * np.array(TARGET), previous=alone.command).candidates
+    assert away is not None and "the way it moves now" in away.source
+
+
+def test_insight_is_what_proposals_are_drawn_from(shipped: MdnAllocator, layout_a: Layout) -> None:
+    insight = shipped.insight(layout_a, TARGET)
+    m, n = len(insight.weight), layout_a.n_fins
+    assert insight.mean.shape == (n, m, 2) and insight.std.shape == (n, m)
+    assert insight.attention.shape == (n, n)
+    assert insight.weight.sum() == pytest.approx(1.0, abs=1e-5)
+    assert insight.attention.sum(1) == pytest.approx(np.ones(n), abs=1e-5)
+    view = shipped._view(shipped.pipeline, layout_a)
+    seen = see(view, np.array([TARGET]) / shipped.normalization.std)
+    proposal = propose(shipped.mixture(seen), view, seen, m, 1.0, 0)
+    largest = shipped.pipeline.prepare(layout_a).planar.fins.maximum
+    for force, component in zip(proposal.force[0], proposal.component[0], strict=True):
+        np.testing.assert_allclose(force.T / largest[:, None], insight.mean[:, component], atol=1e-6)
+
+
+def test_more_candidates_than_components_are_drawn_by_a_seed(shipped: MdnAllocator, layout_a: Layout) -> None:
+    many = shipped.with_settings(n_candidates=40)
+    first, again, other = (many.allocate(layout_a, TARGET, seed=seed).samples for seed in (0, 0, 1))
+    assert first is not None and other is not None
+    assert len(first) == 40 and first == again and first != other
+    still = shipped.with_settings(n_candidates=40, temperature=0.0)
+    means = still.allocate(layout_a, TARGET).samples
+    assert means is not None and len({command.tobytes() for command in means.command.round(9)}) <= 16
+
+
+def test_components_are_drawn_as_often_as_they_weigh(shipped: MdnAllocator, layout_a: Layout) -> None:
+    """Behind the means, 8,000 draws; and their spread is the component's own, by the temperature."""
+    insight = shipped.insight(layout_a, TARGET)
+    view, m = shipped._view(shipped.pipeline, layout_a), len(insight.weight)
+    seen = see(view, np.array([TARGET]) / shipped.normalization.std)
+    proposal = propose(shipped.mixture(seen), view, seen, m + 8000, 1.0, 3)
+    drawn = proposal.component[0, m:]
+    share = np.bincount(drawn, minlength=m) / len(drawn)
+    np.testing.assert_allclose(share, insight.weight / insight.weight.sum(), atol=0.02)
+    assert sorted(proposal.component[0, :m]) == list(range(m))
+    assert (np.diff(insight.weight[proposal.component[0, :m]]) <= 0.0).all()
+
+
+def test_it_goes_on_from_the_previous_command(shipped: MdnAllocator, layout_a: Layout) -> None:
+    before = shipped.allocate(layout_a, TARGET)
+    near = np.array(TARGET) + [0.02, 0.0, 0.01, 0.0, 0.0, 0.0]
+    answer = shipped.allocate(layout_a, near, previous=before.command)
+    turned = np.angle(np.exp(1j * (answer.command - before.command)[:, 2]))
+    assert np.abs(turned).max() < 0.4
+    np.testing.assert_allclose(answer.wrench, near, atol=1e-4)
+
+
+def test_objectives_do_not_share_what_is_seen(shipped: MdnAllocator) -> None:
+    layout = load_layout("octo")
+    target = [2.0, 0.0, 1.0, 0.0, 0.0, 0.1]
+    effort = shipped.allocate(layout, target)
+    power = shipped.with_settings(objective="power").allocate(layout, target)
+    assert power.power < effort.power and effort.energy < power.energy
+
+
+def test_shares_are_squares_of_roots_and_at_most_one() -> None:
+    root = np.array([0.0, 0.5j, -1.0, 2.0 + 0j])
+    np.testing.assert_allclose(shares(root), [0.0, 0.25j, -1.0, 1.0])
+
+
+def test_refuses_other_networks_and_settings() -> None:
+    with pytest.raises(CheckpointError, match="fed 'raw', expected one that is fed 'forces'; .*train mdn`"):
+        MdnAllocator(read_checkpoint(checkpoint_path("paper")))
+    with pytest.raises(AllocationError, match="n_candidates: expected"):
+        load_allocator("mdn", n_candidates=0)
+    with pytest.raises(AllocationError, match="temperature: expected"):
+        load_allocator("mdn", temperature=-1.0)
+
+
+def test_it_needs_no_torch() -> None:
+    code = (
+        "import sys; sys.modules['torch'] = None\n"
+        "import finlab\n"
+        "a = finlab.load_allocator('mdn').allocate(finlab.load_layout('A'), [1, 0, 0.5, 0, 0, 0.1])\n"
+        "assert a.err_norm < 1e-4"
+    )
+    subprocess.run([sys.executable, "-c", code], timeout=60, check=True)
+
+
+@pytest.mark.parametrize("objective", ["power", "effort"])
+def test_samples_tell_what_the_plant_says_of_them(
+    objective: str, shipped: MdnAllocator, layout_a: Layout
+) -> None:
+    method, plant = shipped.with_settings(objective=objective), Plant(layout_a)
+    told = method.allocate(layout_a, TARGET).samples
+    assert told is not None and len(told) == 16
+    assert ((told.command >= plant.lower) & (told.command <= plant.upper)).all()
+    np.testing.assert_allclose(told.wrench, plant.wrench(told.command), atol=1e-9)
+    error = np.linalg.norm((told.wrench - TARGET) / method.normalization.std, axis=-1)
+    np.testing.assert_allclose(told.err_norm, error, rtol=1e-9)
+    np.testing.assert_allclose(told.energy, command_energy(told.command, plant.upper), rtol=1e-9)
+    np.testing.assert_allclose(told.power, plant.power(told.command).sum(-1), rtol=1e-9)
+
+
+def test_samples_are_the_proposed_forces(shipped: MdnAllocator, layout_a: Layout) -> None:
+    """As near as the compiled fins come, where a fin can give what is proposed."""
+    prepared, target = shipped.pipeline.prepare(layout_a), np.array([TARGET])
+    told, proposal = shipped.allocate(layout_a, TARGET).samples, shipped.proposals(prepared, target, 0)
+    assert told is not None
+    force, given = proposal.force[0].swapaxes(1, 2), Plant(layout_a).force(told.command)[..., 1:]
+    size, fins = np.linalg.norm(force, axis=-1), prepared.planar.fins
+    able = (size > 2.0 * fins.minimum) & (size < 0.99 * fins.maximum)
+    assert able.mean() > 0.5
+    np.testing.assert_allclose(given[able], force[able], atol=0.02 * fins.maximum.max())

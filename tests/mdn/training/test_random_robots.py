@@ -1,0 +1,68 @@
+"""Random fins and robots to learn from: what they are meant to be, and never a shipped one."""
+
+import numpy as np
+import pytest
+
+from finlab.forces.fin_sets import planar_sets
+from finlab.forces.nearest import nearest
+from finlab.layout import Limits, stack_layouts
+from finlab.mdn.training.random_fins import SHARES, random_fin, random_law, varied_limits
+from finlab.mdn.training.random_robots import FIN_COUNTS, FinPool, RandomRobot, random_robot, random_targets
+from finlab.paper.training.sampling import find_reserved, shipped_reserved
+
+STD = np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.34])
+
+
+@pytest.fixture(scope="module")
+def pool() -> FinPool:
+    return FinPool(np.random.default_rng(4), 3)
+
+
+@pytest.mark.parametrize("family", SHARES)
+def test_every_family_pushes_and_takes_power(family: str) -> None:
+    for seed in range(5):
+        law = random_law(np.random.default_rng(seed), family)
+        command = np.array([[0.3, 1.2, 0.4], [0.6, 2.1, -2.0]])
+        force = law.force(command)
+        assert np.isfinite(force).all() and np.hypot(force[..., 1], force[..., 2]).min() > 0.0
+        assert (law.power(command) > 0.0).all()
+
+
+def test_a_fin_is_compiled_for_both_objectives() -> None:
+    rng = np.random.default_rng(0)
+    fin = random_fin(rng, varied_limits(rng))
+    assert set(fin.envelopes) == {"power", "effort"}
+    assert fin.envelopes["power"].largest.max() == pytest.approx(fin.envelopes["effort"].largest.max())
+    assert fin.limits != Limits()
+
+
+def robots(pool: FinPool, count: int = 60) -> list[RandomRobot]:
+    rng = np.random.default_rng(1)
+    return [random_robot(rng, pool, int(rng.choice(list(FIN_COUNTS))), "effort", STD) for _ in range(count)]
+
+
+def test_robots_are_of_all_kinds_and_none_is_shipped(pool: FinPool) -> None:
+    made = robots(pool)
+    assert {robot.layout.n_fins for robot in made} == set(range(2, 13))
+    assert not any(find_reserved(stack_layouts([r.layout]), shipped_reserved())[0] for r in made)
+    one_kind = [len(set(map(id, robot.fins))) == 1 for robot in made]
+    assert any(one_kind) and not all(one_kind)
+    # Some robots have a fin whose mirror image, or whose twin above it, is a fin as well.
+    symmetric = 0
+    for robot in made:
+        place = robot.layout.position
+        for mirror in ([1, -1, 1], [1, 1, -1]):
+            twins = np.abs(place[:, None] - place * mirror).max(-1) < 1e-9
+            symmetric += bool((twins.any(1) & (np.abs(place * mirror - place).max(-1) > 1e-9)).any())
+    assert symmetric >= 5
+
+
+def test_targets_are_within_reach_of_fins_that_turn_fully(pool: FinPool) -> None:
+    rng = np.random.default_rng(2)
+    for robot in robots(pool, 12):
+        target = random_targets(rng, robot, 24)
+        assert target.shape == (24, 6) and np.isfinite(target).all()
+        if not robot.problem.fins.turns_fully:
+            continue
+        found = nearest(planar_sets(robot.problem), target[:18])  # the last quarter are axes
+        assert np.linalg.norm(found.wrench - target[:18], axis=1).max() < 1e-3

@@ -1,0 +1,70 @@
+"""What the teacher tells: exact ways, told apart, the cheapest first, with weights by their cost."""
+
+import numpy as np
+import pytest
+
+from finlab.forces.force_space import polar, realize
+from finlab.mdn.training.random_robots import FinPool, RandomRobot, random_robot, random_targets
+from finlab.mdn.training.teacher import APART, DEAREST, Ways, root_share, shares_of_ways, ways_to_deliver
+from finlab.physics.objective import Name
+
+STD = np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.34])
+
+
+def told(objective: Name) -> tuple[RandomRobot, np.ndarray, Ways]:
+    rng = np.random.default_rng(6)
+    robot = random_robot(rng, FinPool(rng, 2), 6, objective, STD)
+    target = random_targets(rng, robot, 12)
+    return robot, target, ways_to_deliver(rng, robot, target)
+
+
+@pytest.fixture(scope="module")
+def effort() -> tuple[RandomRobot, np.ndarray, Ways]:
+    return told("effort")
+
+
+def test_ways_deliver_the_target_at_the_cost_that_is_told(
+    effort: tuple[RandomRobot, np.ndarray, Ways],
+) -> None:
+    robot, target, ways = effort
+    known = np.isfinite(ways.cost)
+    assert known[:, 0].mean() > 0.8
+    for row, k in np.argwhere(known):
+        force = ways.force[row, k]
+        wrench = np.concatenate([force.real, force.imag]) @ robot.problem.columns
+        assert np.linalg.norm(wrench - target[row]) < 0.05
+        planar = polar(robot.problem, np.stack([force.real, force.imag], axis=-1)[None])
+        _, cost = realize(robot.problem, planar)
+        assert cost[0] == pytest.approx(ways.cost[row, k], rel=0.02)
+
+
+def test_ways_differ_and_the_cheapest_comes_first(effort: tuple[RandomRobot, np.ndarray, Ways]) -> None:
+    robot, _, ways = effort
+    root = root_share(ways.force, robot.problem.fins.maximum)
+    assert np.isfinite(ways.cost[:, 1]).any()
+    for row, cost in enumerate(ways.cost):
+        found = np.flatnonzero(np.isfinite(cost))
+        if not len(found):
+            continue
+        assert (np.diff(cost[found]) >= 0).all() and cost[found[-1]] <= DEAREST * cost[0]
+        for k in found[1:]:
+            assert np.abs(root[row, k] - root[row, :k]).mean(-1).min() >= APART
+
+
+def test_power_has_but_one_way() -> None:
+    _, _, ways = told("power")
+    assert np.isfinite(ways.cost[:, 0]).mean() > 0.8
+    assert not np.isfinite(ways.cost[:, 1:]).any()
+
+
+def test_weights_fall_with_the_cost() -> None:
+    cost = np.array([[1.0, 1.03, 1.06, np.inf], [2.0, np.inf, np.inf, np.inf], [np.inf] * 4])
+    weight = shares_of_ways(Ways(np.zeros((3, 4, 1), complex), cost), 0.03)
+    np.testing.assert_allclose(weight[0, 1] / weight[0, 0], np.exp(-1.0))
+    np.testing.assert_allclose(weight[0, 2] / weight[0, 0], np.exp(-2.0))
+    np.testing.assert_allclose(weight.sum(1), [1.0, 1.0, 0.0])
+
+
+def test_roots_of_shares_keep_the_direction() -> None:
+    root = root_share(np.array([4j, -1.0, 0.0]), np.array([16.0, 1.0, 2.0]))
+    np.testing.assert_allclose(root, [0.5j, -1.0, 0.0], atol=1e-5)

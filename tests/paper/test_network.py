@@ -1,0 +1,178 @@
+"""The paper's network against PyTorch Geometric and PyTorch's own layers, in numpy and in torch."""
+
+import math
+
+import numpy as np
+import pytest
+import torch
+from torch.distributions import Categorical, Independent, MixtureSameFamily, Normal
+from torch_geometric.nn import GATv2Conv
+
+from finlab.layout import Fin, Layout, Limits, random_layouts, stack_layouts
+from finlab.networks.checkpoint import read_checkpoint, resolve_checkpoint
+from finlab.paper.features import RAW_SIZE, raw_features
+from finlab.paper.network import LOG_STD_BOUND, Mixture, NetworkConfig, graph_attention
+
+CONFIG = NetworkConfig(width=32, heads=4, transformer_layers=2, feedforward=40, n_components=6)
+B, N, M = 4, 3, 5
+
+
+def random_weights(config: NetworkConfig = CONFIG) -> dict[str, torch.Tensor]:
+    """Weights of which none is zero or one, which would hide one that is misplaced."""
+    draw = torch.Generator().manual_seed(2)
+    return {name: 0.3 * torch.randn(shape, generator=draw) for name, shape in config.shapes().items()}
+
+
+def arrays(weights: dict[str, torch.Tensor]) -> dict[str, np.ndarray]:
+    return {name: value.numpy() for name, value in weights.items()}
+
+
+def random_robots() -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+    """Features of 12 robots of 2 to 5 fins, targets, and the mask of fins that exist."""
+    drawn = [torch.from_numpy(part) for part in random_layouts(np.random.default_rng(5), 12, limits="mixed")]
+    target = torch.randn(12, 6, generator=torch.Generator().manual_seed(5))
+    return raw_features(*drawn[:4]).float(), target, drawn[4]
+
+
+@pytest.mark.parametrize("n", [2, 5])
+def test_graph_attention_is_that_of_pytorch_geometric(n: int) -> None:
+    weights = random_weights()
+    reference = GATv2Conv(CONFIG.width, CONFIG.width // CONFIG.heads, heads=CONFIG.heads)
+    with torch.no_grad():
+        for ours, theirs in (("source", reference.lin_l), ("target", reference.lin_r)):
+            theirs.weight.copy_(weights[f"graph.0.{ours}.weight"])
+            theirs.bias.copy_(weights[f"graph.0.{ours}.bias"])
+        reference.att.copy_(weights["graph.0.attention"][None])
+        reference.bias.copy_(weights["graph.0.bias"])
+    edges = torch.tensor([(i, j) for i in range(n) for j in range(n) if i != j]).T
+    x = torch.randn(3, 6, CONFIG.width)
+    mask = torch.arange(6).expand(3, -1) < n
+    padded = graph_attention(weights, "graph.0", CONFIG.heads, x, mask)
+    alone = graph_attention(weights, "graph.0", CONFIG.heads, x[:, :n])
+    for row in range(3):
+        expected = reference(x[row, :n], edges).detach()
+        torch.testing.assert_close(padded[row, :n], expected, atol=1e-4, rtol=1e-4)
+        torch.testing.assert_close(alone[row], expected, atol=1e-4, rtol=1e-4)
+
+
+def reference_network(
+    w: dict[str, torch.Tensor], x: torch.Tensor, target: torch.Tensor, mask: torch.Tensor
+) -> tuple[torch.Tensor, torch.Tensor]:
+    """Raw outputs and logits of PyTorch's own layers, but for the graph's."""
+
+    def linear(name: str, value: torch.Tensor) -> torch.Tensor:
+        return torch.nn.functional.linear(value, w[f"{name}.weight"], w[f"{name}.bias"])
+
+    hidden = linear("enter", x)
+    for name in ("graph.0", "graph.1"):
+        seen = graph_attention(w, name, CONFIG.heads, hidden, mask)
+        hidden = hidden + torch.nn.functional.elu(seen)
+    wrench = linear("wrench", target)[:, None].expand(-1, x.shape[1], -1)
+    hidden = linear("join", torch.cat([hidden, wrench], dim=-1))
+    layer = torch.nn.TransformerEncoderLayer(
+        CONFIG.width, CONFIG.heads, CONFIG.feedforward, dropout=0.0, batch_first=True, norm_first=True
+    )
+    encoder = torch.nn.TransformerEncoder(layer, CONFIG.transformer_layers, enable_nested_tensor=False)
+    named = {k.removeprefix("transformer."): v for k, v in w.items() if k.startswith("transformer.")}
+    encoder.load_state_dict(named, strict=True)
+    hidden = encoder.eval()(hidden, src_key_padding_mask=~mask).detach()
+    hidden = torch.nn.functional.layer_norm(hidden, (CONFIG.width,), w["norm.weight"], w["norm.bias"])
+    return linear("head", hidden), linear("weight", hidden)
+
+
+def test_the_whole_network_is_that_of_pytorchs_layers() -> None:
+    weights, (x, target, mask) = random_weights(), random_robots()
+    got = CONFIG(weights, x, target, mask)
+    raw, logits = reference_network(weights, x, target, mask)
+    raw = raw.unflatten(-1, (CONFIG.n_components, 6))
+    torch.testing.assert_close(got.logits[mask], logits[mask], atol=1e-4, rtol=1e-4)
+    torch.testing.assert_close(got.mean[mask], raw[..., :3][mask], atol=1e-4, rtol=1e-4)
+    log_std = LOG_STD_BOUND * torch.tanh(0.5 * raw[..., 3:])
+    torch.testing.assert_close(got.log_std[mask], log_std[mask], atol=1e-4, rtol=1e-4)
+
+
+def test_numpy_and_torch_agree_with_the_shipped_weights() -> None:
+    weights = read_checkpoint(resolve_checkpoint("paper"))
+    config = weights.network_of(NetworkConfig)
+    x, target, _ = random_robots()
+    got = config(weights.network, x.numpy(), target.numpy())
+    expected = config({k: torch.tensor(v) for k, v in weights.network.items()}, x, target)
+    for a, b in zip(got, expected, strict=True):
+        assert a.dtype == np.float32
+        np.testing.assert_allclose(a, b.numpy(), atol=2e-3, rtol=1e-3)
+
+
+def test_padding_does_not_leak_and_fins_may_come_in_any_order() -> None:
+    weights, (x, target, mask) = random_weights(), random_robots()
+    clean = CONFIG(weights, x, target, mask)
+    garbage = torch.where(mask[..., None], x, 1e3 * torch.randn(x.shape))
+    order = torch.tensor([3, 0, 4, 1, 2])
+    turned = CONFIG(weights, x[:, order], target, mask[:, order])
+    for got, dirty, expected in zip(turned, CONFIG(weights, garbage, target, mask), clean, strict=True):
+        torch.testing.assert_close(dirty[mask], expected[mask], atol=1e-5, rtol=1e-5)
+        seen = mask[:, order]
+        torch.testing.assert_close(got[seen], expected[:, order][seen], atol=1e-4, rtol=1e-4)
+
+
+def test_huge_inputs_are_no_warning(recwarn: pytest.WarningsRecorder) -> None:
+    x = np.full((2, 3, RAW_SIZE), 1e4, dtype=np.float32)
+    target = np.array([[1e6] * 6, [-1e6] * 6], dtype=np.float32)
+    assert all(np.isfinite(part).all() for part in CONFIG(arrays(random_weights()), x, target))
+    assert not recwarn.list
+
+
+def test_documented_meaning_of_the_features() -> None:
+    limits = Limits((0.06, 0.3), (0.21, 2.1), (-1.0, 2.0))
+    layout = Layout("one", (Fin("bow", (0.3, -0.15, 0.06), math.pi / 2, limits),))
+    expected = [1.0, -0.5, 0.2, 0.5, 0.1, 0.5, 0.1, 1.0, -1.0 / math.pi, 2.0 / math.pi]
+    np.testing.assert_allclose(raw_features(*stack_layouts([layout])[:4])[0, 0], expected)
+
+
+def random_mixture() -> Mixture:
+    draw = np.random.default_rng(11)
+    mean = 1.8 * draw.random((B, N, M, 3)) - 0.9
+    return Mixture(2.0 * draw.normal(size=(B, N, M)), mean, 0.3 * draw.normal(size=(B, N, M, 3)) - 1.0)
+
+
+def drawn(mixture: Mixture, count: int, temperature: float = 1.0) -> np.ndarray:
+    rng = np.random.default_rng(0)
+    uniform, normal = rng.random((B, N, count)), rng.standard_normal((B, N, count, 3))
+    return np.asarray(mixture.sample(uniform, normal, temperature))
+
+
+def distribution(mixture: Mixture, temperature: float = 1.0) -> MixtureSameFamily:
+    logits, mean, log_std = map(torch.from_numpy, mixture)
+    return MixtureSameFamily(
+        Categorical(logits=logits / temperature), Independent(Normal(mean, log_std.exp()), 1)
+    )
+
+
+def test_likelihoods_are_those_of_torchs_distributions() -> None:
+    mixture, x = random_mixture(), np.random.default_rng(2).uniform(-1.2, 1.2, (B, 7, N, 3))
+    expected = distribution(mixture).log_prob(torch.from_numpy(x).transpose(0, 1)).transpose(0, 1)
+    np.testing.assert_allclose(mixture.log_prob(x), expected.numpy(), rtol=1e-9)
+    tensors = Mixture(*map(torch.from_numpy, mixture))
+    np.testing.assert_allclose(tensors.log_prob(torch.from_numpy(x)).numpy(), expected.numpy(), rtol=1e-9)
+
+
+@pytest.mark.parametrize("temperature", [1.0, 0.3])
+def test_samples_have_the_moments_of_the_mixture_and_a_temperature_sharpens_weights_alone(
+    temperature: float,
+) -> None:
+    mixture = random_mixture()
+    x, expected = drawn(mixture, 40_000, temperature), distribution(mixture, temperature)
+    np.testing.assert_allclose(x.mean(1), expected.mean.numpy(), atol=0.03)
+    np.testing.assert_allclose(x.std(1), expected.stddev.numpy(), atol=0.03)
+    if temperature == 1.0:
+        np.testing.assert_allclose(mixture.expected(), expected.mean.numpy(), rtol=1e-9)
+
+
+def test_no_temperature_takes_the_likeliest_component(recwarn: pytest.WarningsRecorder) -> None:
+    mixture = random_mixture()
+    mixture = mixture._replace(log_std=np.full_like(mixture.log_std, -30.0))
+    best = mixture.logits.argmax(-1)[..., None, None]
+    expected = np.take_along_axis(mixture.mean, best, axis=2)[:, :, 0]
+    for temperature in (0.0, 1e-12):
+        got = drawn(mixture, 7, temperature)
+        np.testing.assert_allclose(got, np.repeat(expected[:, None], 7, axis=1), atol=1e-5)
+    assert not recwarn.list
