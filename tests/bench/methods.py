@@ -53,10 +53,10 @@ def leaves_limits(robot: dict[str, Any], targets: np.ndarray) -> list[Any]:
     return [[[0.61, 1.0, 0.0] for _ in robot["fins"]] for _ in targets]
 
 
-def ends_at_third(layout: finlab.Layout, targets: np.ndarray) -> np.ndarray:
+def ends_at_eighth(layout: finlab.Layout, targets: np.ndarray) -> np.ndarray:
     global calls
     calls += 1
-    if calls == 3:
+    if calls == 8:
         os._exit(3)
     return rests(layout, targets)
 

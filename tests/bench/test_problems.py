@@ -38,6 +38,7 @@ def test_card_counts_what_is_there(shipped: Problems) -> None:
 def test_best_errors_are_what_ipopt_finds(shipped: Problems) -> None:
     asked = shipped.targets
     assert (asked.best_error[asked.kind == 0] == 0.0).all()
+    assert np.isfinite(asked.power_best[asked.kind == 0]).all()
     for set_ in ("paper", "limits", "big"):  # tiny forces are below what IPOPT allows constraints to miss
         robot = next(k for k, robot in enumerate(shipped.robots) if robot.set == set_)
         reach = IpoptReach(shipped.layout(robot), shipped.sigma(robot))
@@ -56,13 +57,7 @@ def test_no_random_command_beats_what_is_known(shipped: Problems) -> None:
         assert asked.best_error[row] <= best + 1e-6
 
 
-def test_costs_are_known_inside_alone(shipped: Problems) -> None:
-    asked = shipped.targets
-    for cost in (asked.power_best, asked.effort_best):
-        assert np.isfinite(cost[asked.kind == 0]).mean() > 0.97
-        assert np.isnan(cost[asked.kind > 0]).all()
-
-
+@pytest.mark.exhaustive
 def test_shipped_file_is_what_its_seed_makes(shipped: Problems) -> None:
     """Robots and what is asked of them; costs take minutes."""
     made = make_problems(costs=False)
@@ -85,14 +80,6 @@ def test_what_is_written_is_read_and_later_versions_are_refused(
     save_problems(few, path)
     monkeypatch.undo()
     with pytest.raises(DataError, match=r"version 2, got 'finlab-bench-problems' 3"):
-        open_problems(path)
-
-
-@pytest.mark.parametrize("content", [b"", b"PK\x03\x04 nothing", b"1,2,3"])
-def test_other_files_are_refused(content: bytes, tmp_path: Path) -> None:
-    path = tmp_path / "p.npz"
-    path.write_bytes(content)
-    with pytest.raises(DataError, match=r"p\.npz"):
         open_problems(path)
 
 
