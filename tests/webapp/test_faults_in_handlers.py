@@ -10,7 +10,7 @@ import pytest
 import viser
 
 from finlab.layout import load_layout
-from tests.webapp.bench import SilentClient
+from tests.webapp.silent_client import SilentClient
 from tests.webapp.test_app import app, on_loop, server, until, view
 from webapp.app import App
 from webapp.session import Session
