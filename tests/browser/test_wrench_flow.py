@@ -74,13 +74,10 @@ def test_candidates_of_search_and_network(page: Any) -> None:
     page.choose("Method", "mdn")
     page.until(lambda: session.state.method == "mdn" and not page.view.busy)
     page.until(lambda: "from component" in page.text("table.modes"))
-    page.page.locator("svg.plot:visible .samples circle").nth(7).dispatch_event("click")
-    page.until(lambda: session.sample is not None and "Raw sample" in page.text(".step"))
     page.type("Candidates K", "24")
     page.until(lambda: session.state.n_candidates == 24 and not page.view.busy)
     assert len(answering.best.samples.energy) == 24
-    page.unfold("What the network proposes", "nothing")
-    page.until(lambda: page.page.locator(".discs svg").count() == 4)
+    page.until(lambda: page.page.locator("svg.plot:visible .samples circle").count() > 4)
     assert page.problems == []
 
 
