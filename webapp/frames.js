@@ -60,8 +60,9 @@
     const view = viewer();
     fins.forEach((fin, k) => {
       const angle = !fin ? LIMP : frozen ? fin[2] : fin[2] + fin[0] * Math.sin(phases[k]);
-      const told = { type: 'SetOrientationMessage', name: `/robot/fins/${k}/turn/blade`, wxyz: [Math.cos(angle / 2), Math.sin(angle / 2), 0, 0] };
-      view.messageQueue.push(told);
+      const blade = view.nodePoseData[`/robot/fins/${k}/turn/blade`] ??= { position: [0, 0, 0] };
+      blade.wxyz = [Math.cos(angle / 2), Math.sin(angle / 2), 0, 0];
+      if (blade.poseUpdateState !== 'waitForMakeObject') blade.poseUpdateState = 'needsUpdate';
     });
     due = Math.max(due, performance.now() + 1);
     root()?.invalidate();

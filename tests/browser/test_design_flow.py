@@ -83,7 +83,7 @@ def test_a_robot_from_nothing_to_another_browser(
     def others() -> list[Any]:
         return [view.session for key, view in served.app.views.items() if key not in known]
 
-    page.until(lambda: others() != [] and others()[0].state.layout.fins == layout.fins)
+    page.until(lambda: others() != [] and others()[0].state.layout.names == layout.names)
     assert tab.evaluate("location.hash") == "" and others()[0].history.undo_name == "Open Manta <b>"
     there.close()
 

@@ -170,7 +170,7 @@ def test_the_camera_frames_turns_and_leaves_ctrl_alone(page: Any) -> None:
     page.session.select("back_left")
     page.key("f")
     page.until(lambda: off() < 6.0)
-    page.page.locator(".triad .axis.y circle").click()
+    page.page.locator(".triad .axis.y text").click()
     page.until(lambda: off() > 30.0)
     before = page.page.evaluate(CAMERA)
     page.page.keyboard.down("Control")
