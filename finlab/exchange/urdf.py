@@ -6,6 +6,7 @@ centre of gravity.
 """
 
 import io
+import logging
 import math
 import os
 import re
@@ -51,7 +52,7 @@ def read_urdf(path: str | os.PathLike[str], fins: Sequence[str], origin: str = "
         if not fins:
             raise LayoutError("name the links that are fins: --fins LINK...")
         robot = _robot(text)
-        joints = {joint.child: joint for joint in robot.joints}
+        joints = {str(joint.child): joint for joint in robot.joints}
         poses = _poses(robot, joints)
         mass, center, inertia = _masses(robot, poses)
         if origin == "gravity" and mass <= 0:
@@ -61,8 +62,8 @@ def read_urdf(path: str | os.PathLike[str], fins: Sequence[str], origin: str = "
         start = center if origin == "gravity" else np.zeros(3)
         made = []
         for name in fins:
-            if name not in joints:
-                links = ", ".join(sorted(joints)) or "none"
+            if name not in joints or name not in poses:
+                links = ", ".join(sorted(set(joints) & set(poses))) or "none"
                 raise LayoutError(f"has no link {name!r:.60} that a joint moves; such links: {links}")
             made.append(_fin(joints[name], poses[name], start))
         # The inertia is about the centre of gravity; a layout keeps its diagonal.
@@ -81,6 +82,7 @@ def _robot(text: str) -> Any:
         from yourdfpy import URDF
     except ImportError:
         raise LayoutError(f"reading URDF needs yourdfpy; run: {install('urdf')}") from None
+    logging.getLogger("yourdfpy.urdf").setLevel(logging.CRITICAL)  # what it prints is in the sentence
     # Entities could pull in other files or grow without bound; robot descriptions have no use for them. No
     # other encoding can hide them: the text is UTF-8, whatever its first line says.
     text = re.sub(r"^\s*<\?xml[^>]*\?>", "", text)
@@ -107,9 +109,20 @@ def _poses(robot: Any, joints: dict[str, Any]) -> dict[str, Array]:
                 raise LayoutError(f"has joints in a circle around link {link.name!r:.60}")
         pose = poses.setdefault(name, np.eye(4))
         for joint in reversed(chain):
-            pose = pose @ (np.eye(4) if joint.origin is None else np.asarray(joint.origin, dtype=np.float64))
-            poses[joint.child] = pose
+            pose = pose @ _numbers(joint.origin, np.eye(4), f"the origin of joint {joint.name!r:.60}")
+            poses[str(joint.child)] = pose
     return poses
+
+
+def _numbers(value: Any, usual: Array, what: str) -> Array:
+    """A value of the description as an array of the shape of the usual one, which is taken for None."""
+    try:
+        array = usual if value is None else np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        array = np.empty(0)
+    if array.shape != usual.shape or not (np.abs(array) < 1e9).all():
+        raise LayoutError(f"{what} is not {usual.size} numbers of ordinary size")
+    return array
 
 
 def _masses(robot: Any, poses: dict[str, Array]) -> tuple[float, Array, Array]:
@@ -119,9 +132,11 @@ def _masses(robot: Any, poses: dict[str, Array]) -> tuple[float, Array, Array]:
         inertial = link.inertial
         if inertial is None or not inertial.mass:
             continue
-        pose = poses[link.name] @ (np.eye(4) if inertial.origin is None else np.asarray(inertial.origin))
-        own = np.zeros((3, 3)) if inertial.inertia is None else np.asarray(inertial.inertia, dtype=np.float64)
-        parts.append((float(inertial.mass), pose[:3, 3], pose[:3, :3] @ own @ pose[:3, :3].T))
+        of = f"of link {link.name!r:.60}"
+        pose = poses[link.name] @ _numbers(inertial.origin, np.eye(4), f"the centre {of}")
+        own = _numbers(inertial.inertia, np.zeros((3, 3)), f"the inertia {of}")
+        mass = float(_numbers(inertial.mass, np.zeros(()), f"the mass {of}"))
+        parts.append((mass, pose[:3, 3], pose[:3, :3] @ own @ pose[:3, :3].T))
     mass = sum(part[0] for part in parts)
     if mass <= 0:
         return 0.0, np.zeros(3), np.zeros((3, 3))
@@ -139,7 +154,7 @@ def _fin(joint: Any, pose: Array, origin: Array) -> Fin:
         raise LayoutError(
             f"joint {joint.name!r:.60} is {joint.type}; a fin's joint turns: revolute or continuous"
         )
-    axis = pose[:3, :3] @ np.asarray((1.0, 0.0, 0.0) if joint.axis is None else joint.axis, dtype=np.float64)
+    axis = pose[:3, :3] @ _numbers(joint.axis, np.eye(3)[0], f"the axis of joint {joint.name!r:.60}")
     size = float(np.linalg.norm(axis))
     tilt = math.asin(min(abs(axis[2]) / size, 1.0)) if size > 0 else math.pi / 2
     if tilt > MAX_TILT:

@@ -81,15 +81,19 @@ def _loaded(name: str, content: bytes) -> trimesh.Trimesh:
         mesh = trimesh.load_mesh(BytesIO(content), file_type=kind[1:], process=False)
         if isinstance(mesh, trimesh.Scene):
             mesh = mesh.to_mesh()
-        faces, corners = len(mesh.faces), np.asarray(mesh.vertices, dtype=float)
+        faces, corners = np.asarray(mesh.faces), np.asarray(mesh.vertices, dtype=float)
     except Exception as error:  # trimesh's readers raise whatever went wrong inside them
-        raise FinlabError(f"{name}: is not a {kind[1:].upper()} mesh that can be read ({error})") from None
-    if faces == 0:
+        reason = str(error).split("\n")[0][:120]
+        raise FinlabError(f"{name}: is not a {kind[1:].upper()} mesh that can be read ({reason})") from None
+    if len(faces) == 0:
         raise FinlabError(f"{name}: holds no triangles")
-    wrong = int((~np.isfinite(corners).all(axis=1)).sum())
+    if faces.shape[1:] != (3,) or corners.shape[1:] != (3,) or faces.min() < 0 or faces.max() >= len(corners):
+        raise FinlabError(f"{name}: holds triangles whose corners are not there; export it again")
+    # Beyond any unit's size, what trimesh makes of corners overflows.
+    wrong = int((~(np.abs(corners) < 1e9).all(axis=1)).sum())
     if wrong:
         raise FinlabError(
-            f"{name}: {wrong} of its {len(corners)} corners are not finite numbers; export it again"
+            f"{name}: {wrong} of its {len(corners)} corners are not finite, or too far; export it again"
         )
     return mesh
 
