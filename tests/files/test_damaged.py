@@ -28,9 +28,9 @@ from finlab.errors import FinlabError
 from finlab.exchange import read_csv, read_urdf, write_csv, write_urdf
 from finlab.fit.measurements import read_measurements
 from finlab.fit.robot.swim_file import read_swim
-from finlab.inference.checkpoint import read_checkpoint
 from finlab.layout import FinModelSpec, load_layout, save_layout
 from finlab.layout.load import checksum_of
+from finlab.networks.checkpoint import read_checkpoint
 from finlab.physics import make_law, write_table
 from finlab.physics.table_file import read_table
 from finlab.sim import load_log
