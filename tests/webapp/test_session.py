@@ -136,3 +136,15 @@ def test_starting_over_is_as_at_first_sight_and_can_be_undone(session: Session) 
     assert session.mesh_unit == "m"
     session.undo()
     assert session.state.layout.name == "B"
+
+
+@pytest.mark.parametrize(
+    "key, value", [("n_candidates", 0), ("n_candidates", 2.5), ("temperature", float("nan"))]
+)
+def test_settings_have_the_ranges_of_their_method(key: str, value: float) -> None:
+    session = Session(load_layout("A"))
+    session.set_setting("method", "paper")
+    with pytest.raises(FinlabError, match=f"{key}: expected a"):
+        session.set_setting(key, value)
+    session.set_setting("n_candidates", 64.0)
+    assert session.state.drawing["n_candidates"] == 64

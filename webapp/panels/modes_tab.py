@@ -11,7 +11,7 @@ from webapp.markup.mode_plot import mode_plot
 from webapp.markup.modes import mode_table
 from webapp.markup.picking import marker
 from webapp.page import Page
-from webapp.session.state import CANDIDATE_RANGE, GAMMA_RANGE, TEMPERATURE_RANGE, knows_objective
+from webapp.session.state import knows_objective
 
 ORIGINS = {
     "search": "The search knows each fin's own law and draws nothing. It begins with all fins at work and, "
@@ -50,9 +50,9 @@ class CandidatesPanel:
                     digits,
                 )
                 for key, label, ends, step, digits, hint in (
-                    ("n_candidates", "Candidates K", CANDIDATE_RANGE, 1.0, 0, count),
-                    ("temperature", "Temperature T", TEMPERATURE_RANGE, 0.01, 4, stray),
-                    ("gamma", "Effort weight γ", GAMMA_RANGE, 0.005, 4, weight),
+                    ("n_candidates", "Candidates K", (4, 256), 1.0, 0, count),
+                    ("temperature", "Temperature T", (0.0, 2.0), 0.01, 4, stray),
+                    ("gamma", "Effort weight γ", (0.0, 1.0), 0.005, 4, weight),
                 )
             }
         add_html(gui, marker("fl-column"))

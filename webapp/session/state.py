@@ -23,12 +23,6 @@ AXIS_UNITS = ("N", "N", "N", "N m", "N m", "N m")
 
 MAX_TARGET = 1000.0
 """Largest target component that the page may ask for [N, N m]."""
-CANDIDATE_RANGE = (4, 256)
-"""How many candidates K the mixture may be asked for."""
-TEMPERATURE_RANGE = (0.0, 2.0)
-"""Temperatures T of the mixture."""
-GAMMA_RANGE = (0.0, 1.0)
-"""Weights gamma of the effort in the ranking."""
 STRENGTH_RANGE = (0.05, 1.0)
 """Shares that may be left of a weak fin's largest amplitude and frequency."""
 COMPARED = ("search", "mdn", "paper", "analytic", "qp", "sqp")
@@ -37,15 +31,11 @@ OBJECTIVES: tuple[str, ...] = get_args(Objective)
 """What answers may keep least."""
 CHOICES: dict[str, tuple[str, ...]] = {"method": tuple(METHODS), "objective": OBJECTIVES, "policy": KINDS}
 """Settings that are one of some words."""
-RANGES = {
-    "n_candidates": ("candidates K", *CANDIDATE_RANGE),
-    "temperature": ("temperature T", *TEMPERATURE_RANGE),
-    "gamma": ("effort weight gamma", *GAMMA_RANGE),
-}
-"""Settings that are numbers: what they are called, and their ends. None stands for the method's own value."""
-DRAWING = {"mdn": vars(MdnSettings()), "paper": vars(PaperSettings())}
+NUMBERS = ("n_candidates", "temperature", "gamma")
+"""Settings that are numbers, which the methods check. None stands for the method's own value."""
+DRAWING: dict[str, MdnSettings | PaperSettings] = {"mdn": MdnSettings(), "paper": PaperSettings()}
 """Methods that draw candidates from a mixture, with their own settings."""
-SETTINGS = (*CHOICES, *RANGES)
+SETTINGS = (*CHOICES, *NUMBERS)
 """Fields of `State` that say how the question is answered."""
 
 
@@ -94,8 +84,8 @@ class State:
     @property
     def drawing(self) -> dict[str, Any]:
         """K, T and gamma that are in force, those that the method has; none where it draws no candidates."""
-        shipped = DRAWING.get(self.method, {})
-        chosen = {key: getattr(self, key) for key in RANGES if key in shipped}
+        shipped = vars(DRAWING[self.method]) if self.method in DRAWING else {}
+        chosen = {key: getattr(self, key) for key in NUMBERS if key in shipped}
         return {key: shipped[key] if value is None else value for key, value in chosen.items()}
 
     @property
@@ -211,8 +201,12 @@ class State:
         if key in CHOICES:
             checked = chosen(value, key, CHOICES[key])
         elif value is not None:
-            checked = number(value, *RANGES[key])
-            checked = round(checked) if key == "n_candidates" else checked
+            known = [DRAWING[self.method]] if self.method in DRAWING else []
+            settings = next(s for s in (*known, *DRAWING.values()) if hasattr(s, key))
+            whole = (
+                isinstance(value, float) and value.is_integer() and isinstance(getattr(settings, key), int)
+            )
+            checked = getattr(replace(settings, **{key: int(value) if whole else value}), key)
         return replace(self, **{key: checked})
 
 
