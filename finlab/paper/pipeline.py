@@ -133,7 +133,8 @@ class PaperAllocator(Allocator):
 
     def _draw(self, mixture: Mixture, seed: int) -> AnyArray:
         """Candidates (N, K, n, 3) in normalized coordinates."""
-        rows, n, k = *mixture.mean.shape[:2], self.settings.n_candidates
+        rows, n, _, _ = mixture.mean.shape
+        k = self.settings.n_candidates
         rng = np.random.default_rng(seed)
         if self.settings.mean_only:
             return np.asarray(mixture.expected()[:, None])
