@@ -26,23 +26,23 @@ def step_within(
     """A step whose variables stay within limits: solve, hold what crosses a limit there, solve again.
 
     Args:
-        free_step: the step (R, ...), from values for all variables, which count for the held ones alone, and
-            which those are (R, ...).
+        free_step: the step (R, ...), from values for the held variables and which those are (R, ...); it
+            leaves them as they are.
         low: least step of each variable, 0 or below.
         high: largest step, 0 or above.
         passes: most times that the step is solved; what still crosses a limit then is cut off.
         held: variables that are held at no step from the start.
     """
     step: Array = np.zeros(low.shape)
-    held = np.zeros(low.shape, bool) if held is None else held.copy()
+    held = np.zeros(low.shape, bool) if held is None else held
     for _ in range(passes):
-        free = free_step(np.where(held, step, 0.0), held)
-        out = ((free < low) | (free > high)) & ~held
-        step = np.minimum(np.maximum(free, low), high)
+        free = free_step(step, held)
+        out = (free < low) | (free > high)
         if not out.any():
-            break
-        held |= out
-    return step
+            return free
+        held = held | out
+        step = np.where(held, np.minimum(np.maximum(free, low), high), 0.0)
+    return np.where(out, step, free)
 
 
 try:

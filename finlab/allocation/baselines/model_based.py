@@ -1,6 +1,5 @@
 """What the methods that know the fin model share: limits, starts, the objective by which starts compete."""
 
-import math
 import time
 from abc import abstractmethod
 from dataclasses import dataclass
@@ -27,11 +26,11 @@ class TimeLimit:
     """Processor time of this thread, which other work on the machine does not shorten.
 
     Args:
-        seconds: how long from now; None for as long as it takes.
+        seconds: how long from now.
     """
 
-    def __init__(self, seconds: float | None = None) -> None:
-        self._end = math.inf if seconds is None else time.thread_time() + seconds
+    def __init__(self, seconds: float) -> None:
+        self._end = time.thread_time() + seconds
 
     @property
     def over(self) -> bool:
