@@ -86,4 +86,4 @@ def _better(old: At, new: At, worse: AnyArray) -> At:
         np.where(worse.reshape(-1, *(1,) * (kept.ndim - 1)), kept, tried)
         for kept, tried in zip(cast(tuple[AnyArray, ...], old), cast(tuple[AnyArray, ...], new), strict=True)
     ]
-    return cast(At, type(old)(*fields))
+    return type(old)(*fields)

@@ -87,10 +87,10 @@ def _within(setting: "Field[Any]", limits: Range, value: Any) -> float | None:
     if value is None and setting.default is None:
         return None
     whole = isinstance(limits.low, int)
-    if not isinstance(value, bool) and isinstance(value, Integral if whole else Real):
-        kept = int(value) if whole else float(value)
-        if limits.low <= kept <= limits.high and not (limits.above and kept == limits.low):
-            return kept
+    kind: Any = Integral if whole else Real
+    if not isinstance(value, bool) and isinstance(value, kind):
+        if limits.low <= value <= limits.high and not (limits.above and value == limits.low):
+            return int(value) if whole else float(value)
     raise AllocationError(f"{setting.name}: expected {limits}, got {value!r:.60} ({limits.meaning})")
 
 
@@ -98,8 +98,8 @@ def _weights(name: str, value: Any) -> EnergyWeights:
     if not isinstance(value, EnergyWeights):
         raise AllocationError(f"{name}: expected EnergyWeights, got {value!r:.60}")
     for key, weight in vars(value).items():
-        good = isinstance(weight, Real) and not isinstance(weight, bool) and 0.0 <= weight <= LARGEST_WEIGHT
-        if not good:
+        plain = isinstance(weight, int | float) and not isinstance(weight, bool)
+        if not (plain and 0.0 <= weight <= LARGEST_WEIGHT):
             raise AllocationError(
                 f"{name}: {key} must be a number from 0 to {LARGEST_WEIGHT:g}, got {weight!r:.60}"
             )

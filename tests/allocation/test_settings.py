@@ -83,6 +83,7 @@ def test_unknown_settings_are_refused(method: str) -> None:
         ("search", {"subsets": 1}, "subsets: expected true or false, got 1"),
         ("search", {"objective": "speed"}, "objective: expected one of power, effort, got 'speed'"),
         ("mdn", {"copper_loss": float("nan")}, "copper_loss: expected a number .* W/.N m.\\^2, got nan"),
+        ("mdn", {"copper_loss": 10**400}, "copper_loss: expected a number .*, got 1000"),
         ("mdn", {"energy_weights": 3}, "energy_weights: expected EnergyWeights, got 3"),
         ("mdn", {"energy_weights": EnergyWeights(-1.0)}, "energy_weights: amplitude must be .*, got -1.0"),
         ("paper", {"refinement": "magic"}, "refinement: expected one of none, adam, lev"),

@@ -127,8 +127,8 @@ def test_the_ends_are_those_of_brute_force(name: str) -> None:
         size, _ = brute(law, limits, float(directions(envelope)[k] - envelope.table[k, -1, LEAN]))
         assert envelope.largest[k] == pytest.approx(size.max(), rel=2e-3, abs=1e-9)
         at_rest = np.array([*limits.lower[:2], directions(envelope)[k] - envelope.table[k, 0, LEAN]])
-        size = float(np.linalg.norm(law.force(at_rest)))
-        assert envelope.smallest[k] == pytest.approx(size, rel=2e-3, abs=1e-5 * envelope.largest[k])
+        least = float(np.linalg.norm(law.force(at_rest)))
+        assert envelope.smallest[k] == pytest.approx(least, rel=2e-3, abs=1e-5 * envelope.largest[k])
 
 
 def test_a_table_is_compiled_like_its_law(tmp_path: Path) -> None:
