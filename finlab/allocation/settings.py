@@ -88,9 +88,9 @@ def _within(setting: "Field[Any]", limits: Range, value: Any) -> float | None:
         return None
     whole = isinstance(limits.low, int)
     kind: Any = Integral if whole else Real
-    if not isinstance(value, bool) and isinstance(value, kind):
-        if limits.low <= value <= limits.high and not (limits.above and value == limits.low):
-            return int(value) if whole else float(value)
+    right = isinstance(value, kind) and not isinstance(value, bool)
+    if right and limits.low <= value <= limits.high and not (limits.above and value == limits.low):
+        return int(value) if whole else float(value)
     raise AllocationError(f"{setting.name}: expected {limits}, got {value!r:.60} ({limits.meaning})")
 
 
