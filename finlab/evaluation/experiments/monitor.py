@@ -162,13 +162,19 @@ def _loss(
         soon = (log.time >= at) & (log.time < at + FOUND_WITHIN_S) & np.isfinite(log.command[:, 0, 0])
         force = plant_of(swim.layout).forces(log.command[soon])[:, swim.layout.index(fin)]
         pushes = bool(np.linalg.norm(force, axis=-1).mean() >= PUSHES_N) if soon.any() else True
-    errors = [
+    ate, announced_ate = (
         math.nan if each is None else absolute_error(each.position, each.reference)
         for each in (log, announced)
-    ]
+    )
     seen = (found, right, pushes, false_alarms, min(at, swim.time))
     return Loss(
-        swim.layout.name, swim.servo_feedback, fin, *seen, *errors, 1e3 * monitor.spent_s / log.n_ticks
+        swim.layout.name,
+        swim.servo_feedback,
+        fin,
+        *seen,
+        ate,
+        announced_ate,
+        1e3 * monitor.spent_s / log.n_ticks,
     )
 
 

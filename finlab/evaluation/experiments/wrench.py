@@ -147,8 +147,8 @@ experiment = Experiment(
     full={
         "split": HARD,
         "methods": ("search", "mdn", "paper", "qp", "sqp", "analytic"),
-        "layouts": 50,
-        "targets": 10,
+        "layouts": 40,
+        "targets": 8,
     },
     each="split",
     draw=_draw,

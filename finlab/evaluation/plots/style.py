@@ -117,13 +117,6 @@ class Picture:
         return text.getvalue()
 
 
-def mark_printed(axis: Axes, value: float, words: str) -> None:
-    """Dashes at a figure that the paper prints, with words above them."""
-    axis.axvline(value, **DASHES)
-    place, above = (value, 1.02), ("data", "axes fraction")
-    axis.annotate(words, place, xycoords=above, fontsize=8, color=SOFT, ha="center", annotation_clip=False)
-
-
 def clean(axis: Axes, grid: str) -> None:
     axis.grid(True, axis=grid, color=LINE, linewidth=0.7)  # type: ignore[arg-type]
     axis.set_axisbelow(True)

@@ -93,17 +93,7 @@ class Figure:
         return self.draw().svg(self.name)
 
 
-@dataclass(frozen=True)
-class Fold:
-    """Blocks that are hidden until one asks for them."""
-
-    title: str
-    """What is inside."""
-    blocks: "tuple[Block, ...]"
-    """What is inside."""
-
-
-Block = str | tuple[Card, ...] | Table | Figure | Fold
+Block = str | tuple[Card, ...] | Table | Figure
 """A string is Markdown; cards, at most four in a line, are the numbers that stand on top."""
 
 
@@ -117,25 +107,3 @@ class Document:
     """One line about it."""
     blocks: tuple[Block, ...]
     """From top to bottom."""
-
-
-def figures_of(blocks: Sequence[Block]) -> list[Figure]:
-    """Every picture, folded ones included."""
-    found: list[Figure] = []
-    for block in blocks:
-        if isinstance(block, Figure):
-            found.append(block)
-        elif isinstance(block, Fold):
-            found += figures_of(block.blocks)
-    return found
-
-
-def method_row(row: Row) -> Row:
-    """A row with its method's name as code, which stands out where it is the default."""
-    kind = {"_kind": "ours"} if row["method"].startswith("search") else {}
-    return {**row, "method": f"`{row['method']}`", **kind}
-
-
-def printed_row(method: str, values: Row, **about: str) -> Row:
-    """A row of figures that the paper prints for a method."""
-    return {"method": method, "_kind": "printed", **about, **values}

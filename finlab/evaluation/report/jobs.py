@@ -115,8 +115,9 @@ def run_parts(parts: Sequence[Part], folder: Path, *, processes: int | None = No
 def _run_pool(parts: Sequence[Part], folder: Path, processes: int, bar: "tqdm[Any]") -> None:
     # A fork would copy the threads of BLAS in whatever state they are.
     context = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(processes, mp_context=context, initializer=_begin_worker)
+    pool = None
     try:
+        pool = ProcessPoolExecutor(processes, mp_context=context, initializer=_begin_worker)
         waiting = {pool.submit(part.run, folder): part for part in parts}
         for done in as_completed(waiting):
             done.result()
@@ -124,8 +125,11 @@ def _run_pool(parts: Sequence[Part], folder: Path, processes: int, bar: "tqdm[An
             bar.update()
     except BrokenProcessPool:
         raise DataError(f"{folder}: a process that ran a part was ended; the same command goes on") from None
+    except OSError as error:
+        raise DataError(f"{folder}: parts cannot run beside each other: {error}") from None
     finally:
-        pool.shutdown(cancel_futures=True)
+        if pool is not None:
+            pool.shutdown(cancel_futures=True)
 
 
 def _begin_worker() -> None:

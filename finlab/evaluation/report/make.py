@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 from finlab.errors import DataError
 from finlab.evaluation.experiment import EXPERIMENTS, Experiment, load_experiment
-from finlab.evaluation.report.document import Block, Document, Row, Table, figures_of
+from finlab.evaluation.report.document import Block, Document, Figure, Row, Table
 from finlab.evaluation.report.jobs import THREADS, Part, run_parts
 from finlab.evaluation.report.pages import to_html, to_markdown
 from finlab.evaluation.report.provenance import machine, source_commit, source_digest
@@ -126,7 +126,7 @@ def write_report(out: Path, document: Document, rows: dict[str, list[Row]]) -> N
         pictures.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise DataError(f"{pictures}: cannot be made: {error.strerror}") from None
-    for figure in figures_of(document.blocks):
+    for figure in (block for block in document.blocks if isinstance(block, Figure)):
         write_whole(pictures / f"{figure.name}.svg", figure.svg, DataError)
     write_whole(out / PAGE, to_html(document), DataError)
     write_whole(out / TWIN, to_markdown(document, PICTURES), DataError)

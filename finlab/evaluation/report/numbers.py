@@ -26,11 +26,6 @@ def three(value: float) -> str:
     return f"{value:.{digits}f}" if digits < 7 else f"{value:.2e}"
 
 
-def near(value: float) -> str:
-    """Three decimals where values lie near one, so that 1.000 and 1.016 differ, else as an error."""
-    return f"{value:.3f}" if 0.1 <= abs(value) < 10.0 else error(value)
-
-
 def share(value: float) -> str:
     """As a percentage, with more digits the nearer it is to 100: 48.8 %, 99.97 %, 100 %."""
     if value >= 1.0:
@@ -40,21 +35,13 @@ def share(value: float) -> str:
     return f"{100 * value:.{digits}f} %"
 
 
-def change(value: float) -> str:
-    """A ratio less one as a percentage: +82.0 %, 0.0 %."""
-    percent = round(100.0 * value, 1)
-    return f"{percent:+.1f} %" if percent else "0.0 %"
-
-
 FORMATS: dict[str, Callable[[Any], str]] = {
     "error": error,
-    "near": near,
     "three": three,
     "share": share,
     "count": "{:,}".format,
     "ratio": "{:.3f}".format,
     "metres": "{:.4f}".format,
-    "change": change,
     "text": str,
     "code": "`{}`".format,
 }

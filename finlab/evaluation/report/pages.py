@@ -8,7 +8,7 @@ from itertools import pairwise
 
 from markdown_it import MarkdownIt
 
-from finlab.evaluation.report.document import Block, Document, Figure, Fold, Table
+from finlab.evaluation.report.document import Block, Document, Figure, Table
 
 MARKDOWN = MarkdownIt("commonmark", {"html": False})
 
@@ -54,8 +54,6 @@ def _html_block(block: Block) -> str:
         case Figure(caption=caption, svg=svg):
             # The picture without what only a file of its own needs.
             return f"<figure>{svg[svg.index('<svg') :]}<figcaption>{_inline(caption)}</figcaption></figure>"
-        case Fold(title, hidden):
-            return f"<details><summary>{_inline(title)}</summary>{_html(hidden)}</details>"
 
 
 def _html_table(table: Table) -> str:
@@ -104,9 +102,6 @@ def _text_block(block: Block, pictures: str) -> str:
             return _text_table(block)
         case Figure(name=name, caption=caption):
             return f"![{caption}]({pictures}/{name}.svg)\n\n*{caption}*"
-        case Fold(title, hidden):
-            inside = _text_blocks(hidden, pictures)
-            return f"<details><summary>{title}</summary>\n\n{inside}\n\n</details>"
 
 
 def _text_table(table: Table) -> str:

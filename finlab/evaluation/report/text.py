@@ -3,14 +3,14 @@
 import textwrap
 from collections.abc import Sequence
 
-from finlab.evaluation.report.document import Block, Figure, Fold, Table
+from finlab.evaluation.report.document import Block, Figure, Table
 
 WIDTH = 110
 """Columns of a paragraph."""
 
 
 def to_text(*blocks: Block) -> str:
-    """Headings without their marks, paragraphs in lines, tables with aligned columns, folds opened."""
+    """Headings without their marks, paragraphs in lines, tables with aligned columns."""
     return "\n\n".join(text for text in map(_block, blocks) if text)
 
 
@@ -25,8 +25,6 @@ def _block(block: Block) -> str:
             cells = [[block.in_one_cell(row, column) for column in block.columns] for row in block.rows]
             lines = [[cell.replace("`", "") for cell in line] for line in cells]
             return aligned(head, lines, [not column.is_number for column in block.columns])
-        case Fold(title, hidden):
-            return to_text(title, *hidden)
         case Figure():
             return ""
         case tuple(cards):
