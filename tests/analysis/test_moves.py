@@ -9,7 +9,6 @@ import pytest
 from finlab.analysis import Bounds, mirror_pairs
 from finlab.analysis.moves import Moves, is_mirrored
 from finlab.errors import LayoutError
-from finlab.forces.fin_sets import fin_sets
 from finlab.layout import Layout
 
 Layouts = Callable[[str], Layout]
@@ -33,21 +32,6 @@ def test_a_twin_follows_and_the_rest_stays(shipped: Layouts) -> None:
     assert (left.mounting_angle, right.mounting_angle) == pytest.approx((0.7, -0.7))
     assert is_mirrored(left, right)
     assert tuple(rest) == layout.fins[2:]
-
-
-def test_sets_are_those_of_the_moved_layout(shipped: Layouts) -> None:
-    layout = shipped("mixed")
-    bounds = {fin.name: Bounds.around(fin) for fin in layout.fins}
-    moves = Moves(layout, layout.names, bounds, mirror_pairs(layout))
-    vectors = np.random.default_rng(0).uniform(moves.lower, moves.upper, (5, len(moves.lower)))
-    for row, vector in enumerate(vectors):
-        expected = fin_sets(moves.moved(vector))
-        sets = moves.sets(vectors)
-        for name in ("columns", "radius", "middle", "half"):
-            assert getattr(sets, name)[row] == pytest.approx(getattr(expected, name)[0])
-        assert sets.rim is expected.rim is None
-    still = moves.sets(moves.start[None])
-    assert still.columns == pytest.approx(fin_sets(layout).columns)
 
 
 @pytest.mark.parametrize(

@@ -25,14 +25,6 @@ def towards(x: float, y: float, z: float, measurement: Measurement = STILL) -> n
     return controller.wrench(measurement, Setpoint(np.array([x, y, z]), 0.0))
 
 
-def test_surge_is_scaled_by_the_cosine_of_the_yaw_error() -> None:
-    gains = PAPER_WAYPOINT_GAINS
-    angle, distance = 0.6, 0.3
-    wrench = towards(distance * math.cos(angle), distance * math.sin(angle), -1.0)
-    assert wrench[0] == pytest.approx(gains.surge * distance * math.cos(angle))
-    assert wrench[5] == pytest.approx(min(gains.yaw * angle, gains.max_yaw))
-
-
 def test_the_yaw_error_is_wrapped() -> None:
     wrench = towards(-1.0, 0.1, -1.0, STILL._replace(yaw=-3.0))
     assert -0.5 < wrapped(math.atan2(0.1, -1.0) + 3.0) < 0.0 and wrench[5] < 0.0
@@ -79,12 +71,6 @@ def test_pid_reaches_its_limit_without_winding_up() -> None:
     assert [pid.step(10.0) for _ in range(100)][-1] == 2.0
     assert pid.integral <= 2.0
     assert pid.step(-0.5) < 1.6, "it leaves the limit at once"
-
-
-def test_pid_terms_by_hand() -> None:
-    pid = Pid(PidGains(kp=2.0, ki=0.5, kd=3.0, rate_filter_s=0.0), limit=100.0, period_s=0.1)
-    assert pid.step(1.0) == pytest.approx(2.0 + 0.05)
-    assert pid.step(1.2) == pytest.approx(2.4 + 0.05 + 0.06 + 3.0 * 2.0)
 
 
 @pytest.mark.parametrize("kind", [VelocityController, WaypointController])

@@ -7,7 +7,7 @@ import pytest
 
 from finlab import load_layout
 from finlab.control import Measurement, MotionObserver
-from finlab.control.observer import Estimate, strongest_wrench
+from finlab.control.observer import Estimate
 from finlab.layout import Layout
 from finlab.sim.perturbed import perturbed
 from finlab.vehicle.attitude import euler
@@ -73,22 +73,6 @@ def test_a_force_that_nobody_told_of_becomes_drift(robot: Layout) -> None:
     # the drawn robot alone would have it slowed down.
     assert state[9] > 0.03
     assert abs(found.drift[2]) < 0.15 * lift / observer.inertia[2]
-
-
-def test_what_fins_could_not_give_is_not_taken_for_a_current(robot: Layout) -> None:
-    """Twice the wrench is asked for; the observer hears of what is given."""
-    found, state = watched(robot, [3.0, 0.0, 0.0, 0.0, 0.0, 0.0], 30.0)
-    misled, _ = watched(robot, [3.0, 0.0, 0.0, 0.0, 0.0, 0.0], 30.0, said=[6.0, 0.0, 0.0, 0.0, 0.0, 0.0])
-    drag = -3.0 / MotionObserver(robot, PERIOD_S).inertia[0]
-    assert found.drift[0] == pytest.approx(drag, rel=0.05)
-    assert misled.drift[0] < 1.5 * drag
-    assert found.velocity[0] == pytest.approx(state[7], abs=2e-3)
-
-
-def test_the_strongest_wrench_is_what_the_plant_gives_along_each_axis(robot: Layout) -> None:
-    reach = strongest_wrench(robot)
-    assert reach[2] == pytest.approx(4 * 4.737 * 2.1**2 * math.sin(0.6) ** 2, rel=1e-3)
-    assert reach[0] == pytest.approx(reach[2] * math.sin(math.radians(60.0)), rel=1e-3)
 
 
 def test_a_steady_turn_carries_the_robot_out_of_it(robot: Layout) -> None:

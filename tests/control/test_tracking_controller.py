@@ -46,13 +46,6 @@ def test_it_pushes_towards_a_point_ahead_and_above(robot: Layout) -> None:
     assert abs(wrench[5]) < 1e-9
 
 
-def test_near_its_place_it_backs_rather_than_turns_about(robot: Layout) -> None:
-    behind = Setpoint(np.array([-0.05, 0.0, -1.0]), 0.0)
-    wrench = first_wrench(robot, behind)
-    assert wrench[0] < 0.0
-    assert abs(wrench[5]) < 0.02
-
-
 def test_where_the_path_rests_it_turns_to_where_the_path_goes_on(robot: Layout) -> None:
     here = Setpoint(np.array([0.0, 0.0, -1.0]), 0.0, onward=0.5 * math.pi)
     wrench = first_wrench(robot, here)

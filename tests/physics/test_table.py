@@ -67,15 +67,6 @@ def test_full_circle_is_periodic_with_or_without_its_end_point(table, tmp_path):
     np.testing.assert_allclose(table.force(u), without_end.force(u), atol=1e-12)
 
 
-def test_an_arc_is_not_periodic_and_holds_at_its_ends(tmp_path):
-    write_table(tmp_path / "arc.csv", LIGHTHILL, AMPLITUDE, FREQUENCY, np.linspace(-1.0, 1.0, 9))
-    model = read_table(tmp_path / "arc.csv")
-    assert not model.periodic
-    u = np.array([[0.3, 1.0, 1.0], [0.3, 1.0, 1.4], [0.3, 1.0, 1.0 - 2 * math.pi]])
-    force = model.force(u)
-    np.testing.assert_allclose(force[1:], np.tile(force[0], (2, 1)), atol=1e-12)
-
-
 def test_beyond_the_table_is_its_edge(table):
     edge = np.array([0.7, 2.4, 0.3])
     beyond = np.array([1.5, 9.0, 0.3])
@@ -93,13 +84,6 @@ def test_a_table_that_was_written_anew_is_read_anew(tmp_path):
         wrench.append(plant_of(layout).wrench([[0.4, 1.1, 0.9]]))
         assert plant_of(layout) is plant_of(layout)
     assert np.abs(wrench[0] - wrench[1]).max() > 0.01
-
-
-def test_forces_along_the_shaft_are_kept(tmp_path):
-    rows = [f"{a},{f},{d},{a * f},{f},{d}" for a in (0, 1) for f in (1, 2) for d in (-1, 0, 1)]
-    (tmp_path / "t.csv").write_text("\n".join(["A,f,phi,Fx,Fy,Fz", *rows]))
-    force = read_table(tmp_path / "t.csv").force(np.array([0.5, 1.5, 0.25]))
-    np.testing.assert_allclose(force, [0.75, 1.5, 0.25])
 
 
 def test_a_layout_may_use_a_table(tmp_path):

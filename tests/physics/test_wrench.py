@@ -50,18 +50,6 @@ def test_turning_the_whole_robot_turns_the_wrench(robots):
     torch.testing.assert_close(turned[:, 3:], wrench[:, 3:] @ rotation.T)
 
 
-def test_mirroring_left_and_right_mirrors_the_wrench(robots):
-    """y -> -y: the azimuth of the shaft changes sign, so e_h is reversed, and cos(zero direction) with it."""
-    command, position, angle = robots
-    mirrored = command.clone()
-    mirrored[..., 2] = math.pi - command[..., 2]
-    flip = torch.tensor([1.0, -1.0, 1.0], dtype=F64)
-    wrench = drag_wrench(command, position, angle)
-    other = drag_wrench(mirrored, position * flip, -angle)
-    torch.testing.assert_close(other[:, :3], wrench[:, :3] * flip)
-    torch.testing.assert_close(other[:, 3:], -wrench[:, 3:] * flip)  # a torque is an axial vector
-
-
 @pytest.mark.parametrize("rubbish", [1e6, float("inf"), float("nan")])
 def test_padding_never_leaks_into_wrench_or_gradient(robots, rubbish):
     command, position, angle = robots

@@ -9,19 +9,16 @@ import pytest
 
 from finlab.allocation import load_allocator
 from finlab.allocation.allocator import Allocator
-from finlab.allocation.search.search_allocator import SearchAllocator
 from finlab.control import FaultMonitor, TrackingController
 from finlab.errors import DataError, FinlabError, LayoutError
-from finlab.layout import Layout, load_layout
+from finlab.layout import Layout
 from finlab.sim import (
     NO_NOISE,
     ClosedLoop,
     Cruise,
     FinFault,
     RunLog,
-    SteadyCurrent,
     Tick,
-    Waves,
     load_log,
     make_trajectory,
 )
@@ -75,26 +72,6 @@ def test_fins_fail_and_mend(layout_a: Layout, analytic: Allocator) -> None:
         swim.fail("front_right")
     with pytest.raises(LayoutError, match="no fin 'tail'"):
         swim.mend("tail")
-
-
-def test_a_robot_is_carried_by_a_current_but_tracks(layout_a: Layout, analytic: Allocator) -> None:
-    log = swum(
-        ClosedLoop(layout_a, analytic, make_trajectory("circle"), water=SteadyCurrent((0.04, 0.0, 0.0))), 20.0
-    )
-    assert np.linalg.norm(log.position - log.reference, axis=1).max() < 0.4
-
-
-def test_waves_carry_a_robot_to_and_fro_but_not_away(layout_a: Layout, analytic: Allocator) -> None:
-    waves = Waves(height_m=0.15, period_s=2.5, seed=1)
-    calm, rough = (
-        swum(ClosedLoop(layout_a, analytic, Cruise(0.1), sensors=NO_NOISE, water=water), 15.0)
-        for water in (None, waves)
-    )
-    late = calm.time > 5.0
-    assert (calm.water, rough.water) == ("still", "waves")
-    shaken = (rough.position - calm.position)[late]
-    assert 0.003 < shaken[:, 2].std() < 0.1 and np.abs(shaken[:, :2]).max() < 0.4
-    np.testing.assert_allclose(rough.flow[-1], waves.flow(rough.position[-1], rough.time[-1]).velocity)
 
 
 def test_bad_swims_are_refused(layout_a: Layout, analytic: Allocator) -> None:
@@ -175,24 +152,6 @@ def test_no_such_failures(layout_a: Layout, analytic: Allocator, kind: str, shar
         FinFault("front_left", 1.0, kind, share).checked()
     with pytest.raises(FinlabError, match="failure of front_left: expected"):
         ClosedLoop(layout_a, analytic, make_trajectory("circle")).fail("front_left", kind, share)
-
-
-def test_a_monitors_pushes_are_no_past_of_the_allocator() -> None:
-    """Fins that it makes push are answered as if they had not, so their next commands are not bound by it."""
-    layout, answers, given = load_layout("A"), [], []
-
-    class Watched(SearchAllocator):
-        def allocate(self, *args: Any, **options: Any) -> Any:
-            given.append(options["previous"])
-            answers.append(super().allocate(*args, **options))
-            return answers[-1]
-
-    allocator = Watched(load_allocator().normalization)
-    loop = ClosedLoop(layout, allocator, make_trajectory("lissajous"), monitor=FaultMonitor(layout))
-    told = [loop.step().command for _ in range(200)]
-    assert sum((command != answer.command).any() for command, answer in zip(told, answers, strict=True)) > 3
-    for before, after in zip(answers, given[1:], strict=False):
-        assert after is before.command
 
 
 @pytest.mark.filterwarnings("error")

@@ -16,19 +16,6 @@ from finlab.vehicle.body import complete_body
 from finlab.vehicle.vehicle import Vehicle
 
 
-def test_each_factor_scales_what_it_names(layout_a: Layout) -> None:
-    true = complete_body(perturbed(layout_a, damping=2.0, added_mass=0.7, inertia=1.3, buoyancy=1.01))
-    body = complete_body(layout_a)
-    for key, factor in (
-        ("linear_damping", 2.0),
-        ("quadratic_damping", 2.0),
-        ("added_mass", 0.7),
-        ("inertia_kgm2", 1.3),
-    ):
-        np.testing.assert_allclose(getattr(true, key), factor * np.array(getattr(body, key)))
-    assert Vehicle(true).lift == pytest.approx(1.01 * Vehicle(body).lift) and true.mass_kg == body.mass_kg
-
-
 def test_weight_elsewhere_is_felt_by_fins_and_buoyancy(layout_a: Layout) -> None:
     """A robot whose weight lies 2 cm ahead hangs with its nose down, its buoyancy above its weight."""
     true = perturbed(layout_a, gravity_offset_m=(0.02, 0.0, 0.0))

@@ -38,13 +38,6 @@ def test_accelerations_are_those_of_the_velocity(water: Water) -> None:
         np.testing.assert_allclose(water.flow(PLACE, time).acceleration, slope, atol=1e-7)
 
 
-def test_a_current_turns_and_keeps_its_speed() -> None:
-    water = TurningCurrent((0.05, 0.0, 0.0), math.pi / 2, 30.0, 5.0)
-    np.testing.assert_allclose(velocity(water, PLACE, 29.0), (0.05, 0.0, 0.0))
-    np.testing.assert_allclose(velocity(water, PLACE, 40.0), (0.0, 0.05, 0.0), atol=1e-12)
-    assert np.linalg.norm(velocity(water, PLACE, 32.0)) == pytest.approx(0.05)
-
-
 def test_one_wave_is_that_of_linear_theory() -> None:
     """Deep water: w^2 = g k, circles whose radius falls with exp(k z), and no divergence."""
     pace = 2 * math.pi / 3.0 * (1.25 / math.log(2.0)) ** 0.25

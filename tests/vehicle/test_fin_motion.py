@@ -55,19 +55,6 @@ def test_the_filters_are_critically_damped_and_exact(pair: Layout) -> None:
             assert value[i] == pytest.approx(exact.y[0, -1], abs=1e-8)
 
 
-def test_the_phase_is_the_integral_of_the_frequency(pair: Layout) -> None:
-    """Told another frequency, a fin gathers speed and goes on from where it is in its beat."""
-    motion = flapping(pair, 0.3, 1.0, 0.0)
-    turned, last = 0.0, motion.phase.copy()
-    for k in range(200):
-        motion.step(np.tile([0.3, 1.0 if k < 20 else 2.0, 0.0], (2, 1)), DT)
-        step = float(np.mod(motion.phase - last, 2 * math.pi)[0])
-        assert step <= 2 * math.pi * 2.0 * DT + 1e-9
-        turned, last = turned + step, motion.phase.copy()
-    # The area between a step of 1 Hz and its answer through a double pole p is 2 / p.
-    assert turned == pytest.approx(2 * math.pi * (0.2 + 1.8 * 2.0 - 2.0 / 7.5), rel=1e-3)
-
-
 def test_fins_turn_the_short_way_over_the_seam(pair: Layout) -> None:
     motion = FinMotion(pair)
     motion.direction[:] = 3.0
