@@ -2,6 +2,8 @@
 
 from collections.abc import Sequence
 
+from finlab.bench.problems import open_problems
+from finlab.bench.results import stored
 from finlab.evaluation.report.document import Column, Row, Table
 from finlab.evaluation.report.text import to_text
 
@@ -27,15 +29,15 @@ LEGEND = (
 )
 
 
-def text(found: Row, stored: Row | None) -> str:
+def text(found: Row, beside: Row | None) -> str:
     """What a terminal shows: the methods of a run, stored ones that it did not run, and what failed."""
     named = [row["method"] for row in found["methods"]]
-    kept = [row for row in stored["methods"] if row["method"] not in named] if stored else []
+    kept = [row for row in beside["methods"] if row["method"] not in named] if beside else []
     blocks: list[str | Table] = [table([*found["methods"], *kept]), LEGEND]
-    if stored and kept:
-        about, names = stored["machine"], ", ".join(row["method"] for row in kept)
+    if beside and kept:
+        about, names = beside["machine"], ", ".join(row["method"] for row in kept)
         where = f"{about['processor']}, {about['cores']} cores"
-        blocks.append(f"Stored, not of this run: {names}; by {stored['command']} on {where}.")
+        blocks.append(f"Stored, not of this run: {names}; by {beside['command']} on {where}.")
     blocks += [
         f"{row['method']}: {count} calls failed ({kind}){_example(row, kind)}"
         for row in found["methods"]
@@ -45,7 +47,7 @@ def text(found: Row, stored: Row | None) -> str:
 
 
 def markdown(found: Row) -> str:
-    """The table of results for the documentation."""
+    """The table of results; `python -m finlab.bench.table > finlab/bench/results.md` makes the stored one."""
     whole = table(found["methods"])
     lines = [[whole.in_one_cell(row, column) for column in COLUMNS] for row in whole.rows]
     head = [[column.heading for column in COLUMNS], ["---"] * len(COLUMNS)]
@@ -61,3 +63,7 @@ def _example(row: Row, kind: str) -> str:
     """What was seen of a kind of failure."""
     seen = [words.partition(": ")[2] for words in row["examples"] if words.startswith(f"{kind}: ")]
     return f": {seen[0]}" if seen else ""
+
+
+if __name__ == "__main__":
+    print(markdown(stored(open_problems(), quick=False) or {"methods": []}))

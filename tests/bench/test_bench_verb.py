@@ -10,8 +10,13 @@ from pathlib import Path
 
 import pytest
 
+import finlab.bench
+from finlab.bench.problems import Problems
+from finlab.bench.results import stored
+from finlab.bench.table import markdown, text
 from finlab.cli import main
 
+FOLDER = Path(finlab.bench.__file__).parent
 METHODS = Path(__file__).with_name("methods.py")
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -59,6 +64,21 @@ def test_progress_is_shown_at_once() -> None:
     assert "bench" in shown
     spent = (int(user) + int(system)) / os.sysconf("SC_CLK_TCK")
     assert spent < 1.5, "the processor's time until a bar is there [s]"
+
+
+def test_stored_results_belong_to_the_shipped_problems(shipped: Problems) -> None:
+    for quick in (True, False):
+        found = stored(shipped, quick=quick)
+        assert found is not None and found["quick"] == quick
+        asked = shipped.quick() if quick else shipped
+        calls = len(asked.targets.robot) + asked.sequences.best_error.size
+        assert {row["summary"]["calls"] for row in found["methods"]} == {calls}
+        search = next(row["summary"] for row in found["methods"] if row["method"] == "search")
+        assert search["failed"] == 0.0 and search["solved"] > 0.99
+        assert "Stored, not of this run: " in text({"methods": found["methods"][:1]}, found)
+        assert "Stored" not in text(found, found)
+    whole = stored(shipped, quick=False)
+    assert whole is not None and markdown(whole) + "\n" == FOLDER.joinpath("results.md").read_text()
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,7 @@ from finlab.evaluation.progress import progress
 from finlab.evaluation.report.document import Column, Row
 from finlab.layout import Layout, load_layout
 from finlab.physics import plant_of
-from finlab.sim import ClosedLoop, FinFault, RunLog, SteadyCurrent, Trajectory, make_trajectory
+from finlab.sim import ClosedLoop, FinFault, SteadyCurrent, Trajectory, make_trajectory
 
 FOUND_WITHIN_S = 3.0
 """Time in which a loss should be found [s]."""
@@ -133,17 +133,18 @@ def swim_loss(
             seed=seed,
         )
 
-    announced = None if fin is None else loop(None, False).run()
-    losses = []
+    announced_ate = math.nan
+    if fin is not None:
+        log = loop(None, False).run()
+        announced_ate = absolute_error(log.position, log.reference)
+    losses, from_s = [], math.inf if fin is None else at
     for reports in (False, True):
         monitor = TimedMonitor(layout)
-        losses.append(_loss(loop(monitor, reports), monitor, fin, math.inf if fin is None else at, announced))
+        losses.append(_loss(loop(monitor, reports), monitor, fin, from_s, announced_ate))
     return losses
 
 
-def _loss(
-    swim: ClosedLoop, monitor: TimedMonitor, fin: str | None, at: float, announced: RunLog | None
-) -> Loss:
+def _loss(swim: ClosedLoop, monitor: TimedMonitor, fin: str | None, at: float, announced_ate: float) -> Loss:
     """Swims to the end and counts."""
     called: set[str] = set()
     found, right, false_alarms = math.inf, False, 0
@@ -162,19 +163,18 @@ def _loss(
         soon = (log.time >= at) & (log.time < at + FOUND_WITHIN_S) & np.isfinite(log.command[:, 0, 0])
         force = plant_of(swim.layout).forces(log.command[soon])[:, swim.layout.index(fin)]
         pushes = bool(np.linalg.norm(force, axis=-1).mean() >= PUSHES_N) if soon.any() else True
-    ate, announced_ate = (
-        math.nan if each is None else absolute_error(each.position, each.reference)
-        for each in (log, announced)
-    )
-    seen = (found, right, pushes, false_alarms, min(at, swim.time))
     return Loss(
         swim.layout.name,
         swim.servo_feedback,
         fin,
-        *seen,
-        ate,
-        announced_ate,
-        1e3 * monitor.spent_s / log.n_ticks,
+        found,
+        right,
+        pushes,
+        false_alarms,
+        whole_s=min(at, swim.time),
+        ate=absolute_error(log.position, log.reference),
+        ate_announced=announced_ate,
+        tick_ms=1e3 * monitor.spent_s / log.n_ticks,
     )
 
 
