@@ -13,7 +13,7 @@ from webapp.session.search_request import SearchRequest
 from webapp.session.swim_plan import SwimSettings
 from webapp.viser_internals import run_script
 
-WAIT_MS = 40_000
+WAIT_MS = 120_000
 """Longest wait for the page: software rendering on a busy machine is slow."""
 PAUSE_S = 0.12
 """Between two inputs: the page sends at most one change in 50 ms, a quicker one would overwrite the last."""
@@ -107,7 +107,7 @@ class Page:
     def until(
         self,
         condition: Callable[[], bool],
-        seconds: float = 40.0,
+        seconds: float = 120.0,
         told: Callable[[], str] = lambda: "what was waited for did not happen",
     ) -> None:
         """Wait for the server or the page to come round, longer on a page that needs patience; `told` says

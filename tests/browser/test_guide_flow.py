@@ -57,20 +57,12 @@ def test_a_lesson_sees_when_its_task_is_done(page: Any) -> None:
     assert page.session.desk == desk and page.problems == []
 
 
-def test_commands_are_found_by_their_words(page: Any) -> None:
-    display = page.session.display
-    page.page.evaluate("document.activeElement?.blur()")
-    page.page.keyboard.press("Control+k")
-    page.page.keyboard.type("preset nmx")  # shortcuts all: freeze, swim, tour, next fin, mirror, fail
+def test_a_command_is_found_by_its_words(page: Any) -> None:
+    page.key("Control+k")
     box = page.page.get_by_placeholder("Search commands")
     box.wait_for()
-    page.until(lambda: box.input_value() == "preset nmx")
-    page.page.keyboard.press("Escape")
-    box.wait_for(state="hidden")
-    page.catch_up()
-    assert page.session.selected is None and page.session.display == display
-    page.page.keyboard.press("Control+k")
     page.page.keyboard.type("heave alone")
+    page.page.get_by_text("Ask for heave alone").wait_for()
     page.page.keyboard.press("Enter")
     page.until(lambda: page.session.state.target[2] != 0.0 and page.session.state.target[0] == 0.0)
     box.wait_for(state="hidden")
