@@ -124,11 +124,6 @@ class Trajectory:
         dx, dy = self.samples[first, :2] - self.samples[0, :2]
         return self.samples[0].copy(), math.atan2(dy, dx)
 
-    @property
-    def length_m(self) -> float:
-        """Length of the path [m]."""
-        return float(np.linalg.norm(np.diff(self.samples, axis=0), axis=1).sum())
-
 
 class Task(Protocol):
     """What a `ClosedLoop` can be given."""
