@@ -159,7 +159,7 @@ def test_a_noisy_full_grid_can_be_fitted_all_the_same(tmp_path: Path, worker: Wo
             "cell.csv: line 2, column Fz, holds 'x', which is not a number",
         ),
         ("cell.csv", b"A,f,Fy,Fz\n0.1,1,1,1\n", "cell.csv: 1 samples, expected at least 20"),
-        ("picture.png", b"\x89PNG\x0d\x0a\xff\xfe", "picture.png: cannot be read as CSV text"),
+        ("picture.png", b"\x89PNG\x0d\x0a\xff\xfe", "picture.png: is not UTF-8 text"),
         ("empty.csv", b"", "empty.csv: "),
     ],
 )
@@ -323,7 +323,7 @@ def test_a_bundle_opens_in_the_app(tmp_path: Path, cache: Path) -> None:
     layout = robot(tmp_path, cache)
     content = make_bundle(layout, load_allocator()).zip_bytes()
     assert files.read_layout("robot.zip", content).layout.fins[2].model == layout.fins[2].model
-    with pytest.raises(DataError, match=r"^robot\.zip: is neither"):
+    with pytest.raises(DataError, match=r"^robot\.zip: is damaged"):
         files.read_layout("robot.zip", content.replace(b"finlab-graph", b"finlab-gr@ph"))
 
 
