@@ -39,7 +39,8 @@ from finlab.sim.task import make_trajectory
 from tests.fit.cell import columns_of, commands, measured, soft, write
 from tests.fit.robot.swims import write_csv as write_swim
 from webapp.scene.meshes.mesh_hull import MeshHull
-from webapp.session.design_links import linked, unpacked
+from webapp.session.design_links import packed as design
+from webapp.session.design_links import unpacked
 from webapp.session.files import read_layout
 
 ROOT = Path(__file__).parents[2]
@@ -238,7 +239,7 @@ def kinds(tmp_path_factory: pytest.TempPathFactory, untrained_mdn: Path) -> list
         return found if isinstance(found, bytes) else found.encode()
 
     yaml = (ROOT / "layouts/ucat.yaml").read_bytes()
-    links = {name: linked(robot).text.encode() for name, robot in (("y", PAIR), ("t", layout))}
+    links = {name: design(robot, 60_000).encode() for name, robot in (("y", PAIR), ("t", layout))}
     fin_table = (place / "fin.csv").read_bytes()
     travelling = packed({"a.yaml": yaml, "tables/fin.csv": fin_table, "h.stl": export("stl")})
     shapes = {
