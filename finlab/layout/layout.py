@@ -105,6 +105,11 @@ class Layout(Checked):
         return _read_only([fin.servo.speed_limit for fin in self.fins])
 
     @property
+    def has_inflow(self) -> bool:
+        """Whether the layout says what speed through the water takes from the fins."""
+        return self.interaction is not None and any(self.interaction.inflow)
+
+    @property
     def names(self) -> tuple[str, ...]:
         """Names of the fins, in order."""
         return tuple(fin.name for fin in self.fins)
@@ -145,16 +150,19 @@ class Layout(Checked):
         return replace(self, fins=fins, interaction=left)
 
     def moving(self, velocity: ArrayLike) -> "Layout":
-        """Returns the layout as it is at a velocity relative to the water (6,) [m/s, rad/s], body frame: only
-        where speed takes something from the fins is it another one.
+        """Returns the layout as it is at a velocity relative to the water (6,) [m/s, rad/s], body frame.
 
         The velocity is rounded to 0.01, so that what is prepared for a layout serves again.
 
         Raises:
-            LayoutError: the velocity is not six finite numbers.
+            LayoutError: the velocity is not six finite numbers, or the layout does not say what speed takes
+                from its fins (`has_inflow`), so that it would be without effect.
         """
-        if self.interaction is None or not any(self.interaction.inflow):
-            return self
+        if self.interaction is None or not self.has_inflow:
+            raise LayoutError(
+                f"layout {self.name} does not say what speed takes from its fins, so a velocity is without "
+                "effect; give interaction.inflow, as `finlab fit robot` finds it, or leave the velocity out"
+            )
         rounded = tuple(np.round(np.asarray(velocity, np.float64), 2).tolist())
         return replace(self, interaction=replace(self.interaction, velocity=rounded))
 

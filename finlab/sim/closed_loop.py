@@ -245,8 +245,11 @@ class ClosedLoop:
         whole = self._complete()
         followed = self.task.setpoint(time + lead) if lead else setpoint
         asked = whole(self.controller.wrench(now, followed, self._given()))
+        layout = self.layout
+        if layout.has_inflow:
+            layout = layout.moving((*now.velocity, *now.rates))
         answer = self.allocator.allocate(
-            self.layout.moving((*now.velocity, *now.rates)),  # what speed takes from fins, where known
+            layout,
             asked,
             **self.damage._asdict(),
             previous=self._answered,

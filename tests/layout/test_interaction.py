@@ -50,7 +50,9 @@ def test_bundles_take_it_along(coupled: Layout, tmp_path: Path) -> None:
 def test_layouts_with_and_without_it_are_two(coupled: Layout) -> None:
     plain = replace(coupled, interaction=None)
     assert plain != coupled and hash(plain) != hash(coupled)
-    assert plain.moving((1, 0, 0, 0, 0, 0)) is plain
+    assert coupled.has_inflow and not plain.has_inflow
+    with pytest.raises(LayoutError, match="does not say what speed takes from its fins"):
+        plain.moving((1, 0, 0, 0, 0, 0))
 
 
 def test_velocities_are_rounded_so_that_what_is_prepared_serves_again(coupled: Layout) -> None:
