@@ -101,7 +101,7 @@ def _document(content: str) -> Any:
     inside: list[_Collection] = [_Collection(document)]
     # libyaml's parser is ten times as fast, but PyYAML may have been built without it.
     for count, event in enumerate(yaml.parse(content, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader))):
-        line = event.start_mark.line + 1
+        line = event.start_mark.line + 1 if event.start_mark else 0
         if count > MAX_EVENTS:
             raise ValueError(f"line {line}: has more than {MAX_EVENTS} entries, too many to be read")
         if isinstance(event, yaml.AliasEvent) or getattr(event, "anchor", None):

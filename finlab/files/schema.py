@@ -77,8 +77,9 @@ def _sentence(said: str, place: str, values: Any, kind: Any) -> tuple[str, str]:
         return f"unknown key, expected one of {', '.join(_keys(known))}", name
     if found := re.fullmatch(r"Expected `(\w+)` of length (>=|<=)? ?(\d+)(?:, got \d+)?", said):
         unit = "characters" if found[1] == "str" else "values"
-        ends = getattr(known, "min_length", None), getattr(known, "max_length", None)
-        few, many = (int(found[3]), int(found[3])) if None in ends else ends
+        few, many = getattr(known, "min_length", None), getattr(known, "max_length", None)
+        if few is None or many is None:
+            few = many = int(found[3])
         number = f"{few} to {many}" if few < many else f"{many}"
         return f"expected {_TYPES[found[1]]} of {number} {unit}, got {len(value)}", ""
     if said.startswith("Expected `str` matching regex"):
@@ -144,4 +145,5 @@ def _choices(known: Any) -> list[str]:
     """The values that a type leaves to choose from, or the kinds of structure."""
     if isinstance(known, inspect.LiteralType):
         return [str(value) for value in known.values]
-    return [str(kind.tag) for kind in known.types] if isinstance(known, inspect.UnionType) else []
+    kinds: Any = known.types if isinstance(known, inspect.UnionType) else ()
+    return [str(kind.tag) for kind in kinds]

@@ -8,16 +8,19 @@ flips signs in pairs.
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal, get_args
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from msgspec import Meta
 
 from finlab.errors import LayoutError
 from finlab.layout.checked import Checked
 
-HullShape = Literal["box", "ellipsoid", "torpedo", "ucat"]
-HULL_SHAPES: tuple[str, ...] = get_args(HullShape)
+HULL_SHAPES = ("box", "ellipsoid", "torpedo", "ucat")
 """Parametric hulls that can be drawn without a mesh file."""
+if TYPE_CHECKING:
+    HullShape = str
+else:
+    HullShape = Literal[HULL_SHAPES]
 
 MESH_SUFFIXES = (".stl", ".obj", ".glb", ".ply")
 """Mesh files a hull may name."""

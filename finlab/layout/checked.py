@@ -4,10 +4,10 @@ One declaration serves three: construction in code is checked by it, files are r
 JSON Schemas are made of it.
 """
 
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping
 from dataclasses import MISSING, fields
 from functools import cache
-from typing import Annotated, Any, ClassVar, get_args, get_type_hints
+from typing import Annotated, Any, ClassVar, cast, get_args, get_type_hints
 
 import msgspec
 from msgspec import Meta
@@ -30,7 +30,7 @@ class Checked:
     """Fields -> their keys in a file, where the two differ."""
 
     def __post_init__(self) -> None:
-        shape = _plain_fields(type(self))
+        shape = _plain_fields(cast(Hashable, type(self)))
         given = {key: getattr(self, name) for name, key in shape.keys.items()}
         values = checked(given, shape.kind)
         for name, key in shape.keys.items():

@@ -56,7 +56,7 @@ LAYOUT = form(
     Layout,
     format=Literal["finlab-layout"],
     version=Literal[1],
-    fins=Annotated[list[FIN], Meta(min_length=1, max_length=MAX_FINS)],
+    fins=Annotated[list[FIN], Meta(min_length=1, max_length=MAX_FINS)],  # type: ignore[valid-type]
     body=BODY,
     interaction=INTERACTION,
     frame=Frame | None,

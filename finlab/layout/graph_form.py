@@ -57,7 +57,7 @@ class NodeLink(Struct, forbid_unknown_fields=True):
     directed: bool
     multigraph: bool
     graph: dict[str, str]
-    nodes: Annotated[list[NODE], Meta(min_length=1, max_length=MAX_FINS)]  # type: ignore[valid-type]
+    nodes: Annotated[list[NODE], Meta(min_length=1, max_length=MAX_FINS)]
     edges: list[Edge]
 
     def __post_init__(self) -> None:
@@ -100,8 +100,8 @@ class About(Struct, forbid_unknown_fields=True):
 
     name: Name
     description: Annotated[str, Meta(max_length=MAX_DESCRIPTION_LENGTH)] | None = None
-    body: BODY | None = None  # type: ignore[valid-type]
-    interaction: INTERACTION | None = None  # type: ignore[valid-type]
+    body: BODY | None = None
+    interaction: INTERACTION | None = None
 
 
 class Graph(Struct, forbid_unknown_fields=True):
