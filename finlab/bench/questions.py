@@ -7,7 +7,7 @@ from finlab.bench.problems import KINDS
 from finlab.evaluation.smooth_paths import smooth_path
 from finlab.forces.envelopes import largest_forces
 from finlab.forces.fin_sets import FinSets
-from finlab.forces.nearest import nearest_along
+from finlab.forces.out_of_reach import nearest_along
 from finlab.layout import Layout, layout_effectiveness
 from finlab.physics import plant_of
 

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 
 from finlab.forces.attainable import attainable_set
 from finlab.forces.fin_sets import FinSets
-from finlab.forces.nearest import nearest_in_turn
+from finlab.forces.out_of_reach import nearest_in_turn
 from finlab.layout import Fin, Layout, Limits
 from tests.forces.conftest import THRUST
 

@@ -14,7 +14,7 @@ from finlab.allocation.search.prepared import Prepared
 from finlab.arrays import Array
 from finlab.forces.fin_sets import planar_sets
 from finlab.forces.force_space import PlanarProblem, polar, realize
-from finlab.forces.nearest import nearest, wrench_of
+from finlab.forces.out_of_reach import nearest, wrench_of
 
 
 @dataclass(frozen=True)

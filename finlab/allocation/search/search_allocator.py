@@ -29,7 +29,7 @@ from finlab.errors import AllocationError
 from finlab.forces.compiled_fins import CompiledFins
 from finlab.forces.fin_sets import planar_sets
 from finlab.forces.force_space import PlanarProblem
-from finlab.forces.nearest import Nearest, nearest, nearest_along, nearest_in_turn
+from finlab.forces.out_of_reach import Nearest, nearest, nearest_along, nearest_in_turn
 from finlab.layout import Layout
 from finlab.networks.normalization import Normalization
 from finlab.networks.threads import single_threaded_products

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from finlab.forces.fin_sets import planar_sets
-from finlab.forces.nearest import nearest
+from finlab.forces.out_of_reach import nearest
 from finlab.layout import Limits, stack_layouts
 from finlab.mdn.training.random_fins import SHARES, random_fin, random_law, varied_limits
 from finlab.mdn.training.random_robots import FIN_COUNTS, FinPool, RandomRobot, random_robot, random_targets

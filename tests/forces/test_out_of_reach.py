@@ -9,7 +9,7 @@ from scipy.optimize import minimize
 from finlab.assets import shipped_layouts
 from finlab.forces.fin_sets import planar_sets
 from finlab.forces.force_space import PlanarProblem
-from finlab.forces.nearest import Nearest, nearest, nearest_along, nearest_in_turn
+from finlab.forces.out_of_reach import Nearest, nearest, nearest_along, nearest_in_turn
 from finlab.layout import load_layout, random_layout
 from tests.forces.conftest import problem_of
 
@@ -143,7 +143,7 @@ def test_a_group_that_would_spoil_an_earlier_one_ends_the_turns(monkeypatch: pyt
         found = nearest(*arguments)
         return found._replace(force=0.5 * found.force) if len(asked) == 2 else found
 
-    monkeypatch.setattr("finlab.forces.nearest.nearest", spoiling)
+    monkeypatch.setattr("finlab.forces.out_of_reach.nearest", spoiling)
     found = nearest_in_turn(sets, target, groups)
     assert len(asked) == 2
     np.testing.assert_array_equal(found.force, nearest(*asked[0]).force)
