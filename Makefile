@@ -8,7 +8,7 @@ HOST_PORT ?= 8080
 THREADS := OMP_NUM_THREADS=1 MKL_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
 .DEFAULT_GOAL := help
-.PHONY: schemas help setup app test test-all test-near test-fast check format checkpoint checkpoint-default checkpoint-paper wheel wheel-check clean
+.PHONY: schemas figures help setup app test test-all test-near test-fast check format checkpoint checkpoint-default checkpoint-paper wheel wheel-check clean
 
 help:
 	@echo "make setup        make .venv with everything pinned in constraints.txt"
@@ -19,9 +19,9 @@ help:
 	@echo "make test-fast    every test but those of the browser and the packaging"
 	@echo "make check        ruff, ruff format and mypy"
 	@echo "make schemas      write the JSON Schemas of layout and graph files"
+	@echo "make figures      the tables of figures in docs/*.md, or of one page: make figures PAGE=evaluation"
 	@echo "make format       let ruff mend what it can"
 	@echo "make checkpoint   train what is shipped, PRESET=default or PRESET=paper (hours)"
-	@echo "make     the app in a real browser: a random walk over every control, and how quick it is"
 	@echo "make wheel-check  build the wheel, install it in an empty environment of each Python here and try it"
 
 setup: $(STAMP)
@@ -53,6 +53,9 @@ check: setup
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+
+figures: setup
+	$(THREADS) $(BIN)/python tools/figures.py $(PAGE)
 
 schemas: setup
 	$(BIN)/python -m finlab.layout.json_schema

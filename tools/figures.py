@@ -1,0 +1,64 @@
+#!/usr/bin/env python3
+"""Make the tables of figures in the documentation again: `make figures`, or `make figures PAGE=evaluation`.
+
+A page holds a table between two marks,
+
+    <!-- figures: NAME KEY... -->
+    <!-- end of figures -->
+
+where NAME is an experiment of `finlab eval`, which runs with the sizes of its quick report, and KEY... are
+the columns to show, by default all. What stands between the marks is replaced.
+"""
+
+import re
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+from finlab.evaluation.experiment import Experiment, load_experiment
+from finlab.evaluation.progress import begin
+from finlab.evaluation.report.document import Document, Table
+from finlab.evaluation.report.pages import to_markdown
+
+ROOT = Path(__file__).resolve().parents[1]
+PAGES = {path.stem: path for path in sorted((ROOT / "docs").glob("*.md"))}
+MARKS = re.compile(r"(<!-- figures: (\w+)((?: [\w.]+)*) -->\n).*?(<!-- end of figures -->)", re.DOTALL)
+
+
+def main(names: list[str]) -> int:
+    """Make the tables of the pages of these names, of all pages without any."""
+    if unknown := [name for name in names if name not in PAGES]:
+        print(f"figures: expected pages among {', '.join(PAGES)}, got {unknown[0]!r}", file=sys.stderr)
+        return 2
+    for name in names or PAGES:
+        text = PAGES[name].read_text(encoding="utf-8")
+        made = MARKS.sub(lambda found: found[1] + table_of(found[2], found[3].split()) + found[4], text)
+        if made != text:
+            PAGES[name].write_text(made, encoding="utf-8")
+            print(f"docs/{name}.md", flush=True)
+    return 0
+
+
+def table_of(name: str, keys: list[str]) -> str:
+    """The command and the table, in Markdown, of an experiment's quick sizes."""
+    experiment, began = load_experiment(name), time.monotonic()
+    begin(name)
+    table = experiment.table(experiment.rows(**experiment.quick))
+    columns = {column.key: replace(column, interval=None) for column in table.columns}
+    shown = Table(tuple(columns[key] for key in keys or columns), table.rows)
+    print(f"{name}: {time.monotonic() - began:.0f} s", flush=True)
+    return f"\n`{command_of(experiment)}`:\n\n{to_markdown(Document("", "", (shown,)), "").strip("# \n")}\n\n"
+
+
+def command_of(experiment: Experiment) -> str:
+    """The command line that prints the table."""
+    words = ["finlab eval", experiment.name]
+    for key, value in experiment.quick.items():
+        listed = ",".join(map(str, value)) if isinstance(value, tuple) else str(value)
+        words += [f"--{key.replace('_', '-')}", listed]
+    return " ".join(words)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
