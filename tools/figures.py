@@ -48,7 +48,8 @@ def table_of(name: str, keys: list[str]) -> str:
     columns = {column.key: replace(column, interval=None) for column in table.columns}
     shown = Table(tuple(columns[key] for key in keys or columns), table.rows)
     print(f"{name}: {time.monotonic() - began:.0f} s", flush=True)
-    return f"\n`{command_of(experiment)}`:\n\n{to_markdown(Document("", "", (shown,)), "").strip("# \n")}\n\n"
+    made = to_markdown(Document("", "", (shown,)), "")
+    return f"\n`{command_of(experiment)}`:\n\n{made[made.index('|') :].rstrip()}\n\n"
 
 
 def command_of(experiment: Experiment) -> str:
