@@ -35,22 +35,15 @@ def test_the_block_blocks() -> None:
 
 
 def test_eval_wrench() -> None:
-    methods = "search,analytic,qp,sqp,on-board"
-    sizes = ("--split", "limits", "--layouts", "2", "--targets", "3", "--subsample", "1")
+    methods = "search,analytic,qp,on-board"
+    sizes = ("--split", "limits", "--layouts", "2", "--targets", "3")
     shown = _run("eval", "wrench", *sizes, "--methods", methods)
     assert all(name in shown for name in methods.split(","))
 
 
-@pytest.mark.parametrize("plant", ["mean", "ripple", "flexible"])
+@pytest.mark.parametrize("plant", ["mean", pytest.param("flexible", marks=pytest.mark.exhaustive)])
 def test_simulate(plant: str, tmp_path: Path) -> None:
     path = tmp_path / "line.csv"
     path.write_text("t,x,y,z\n0,0,0,-1\n3,0.3,0,-1\n")
     shown = _run("simulate", "A", "--trajectory", str(path), "--method", "search", "--plant", plant)
     assert "ATE" in shown and f"plant {plant}" in shown
-
-
-def test_eval_latency_and_velocity() -> None:
-    few = ("--methods", "analytic,qp", "--calls", "3", "--robots", "1")
-    assert "99th percentile" in _run("eval", "latency", *few)
-    few = ("--methods", "analytic", "--runs", "1", "--duration", "11")
-    assert "speed error" in _run("eval", "velocity", *few)
