@@ -32,6 +32,10 @@ POWER_COLUMN = "P"
 """Column of the mean power [W], which may be left out."""
 DOUBT = "not to be trusted"
 """How a table's note begins that every answer repeats."""
+LEAST, MOST = 1e-6, 1e6
+"""Least size of the largest thrust [N], and largest of any force [N] and power [W]."""
+LEAST_STEP = 1e-6
+"""Least spacing of amplitudes [rad], frequencies [Hz] and zero directions [rad]."""
 MAX_BYTES = 25_000_000
 """Largest table that is read [bytes]."""
 
@@ -56,6 +60,11 @@ def parse_table(content: bytes, source: str) -> TableLaw:
     for name, axis in zip(COLUMNS, axes, strict=False):
         if len(axis) < 2:
             raise DataError(f"{source}: column {name} has one value, expected at least 2 to interpolate")
+        if np.diff(axis).min() < LEAST_STEP:
+            raise DataError(
+                f"{source}: two values of column {name} are {np.diff(axis).min():.2g} apart, expected "
+                f"{LEAST_STEP:g} or more; write equal values with equal digits"
+            )
     return TableLaw(axes, values, periodic, notes)
 
 
@@ -127,6 +136,12 @@ def _check_units(rows: Array, source: str) -> None:
         hint = "; these look like degrees; write radians" if span > 2 * TURN else ""
         raise DataError(
             f"{source}: the zero directions phi span {span:.4g} rad, expected at most one turn (6.283){hint}"
+        )
+    largest, thrust = np.abs(rows[:, 3:]).max(), np.abs(rows[:, 4:6]).max()
+    if largest > MOST or 0.0 < thrust < LEAST:
+        raise DataError(
+            f"{source}: thrust goes up to {thrust:.3g}, the largest value is {largest:.3g}, expected "
+            f"{LEAST:g} to {MOST:g} N and W"
         )
     if not rows[:, 4:6].any():
         raise DataError(f"{source}: the thrust is 0 everywhere, Fy as well as Fz; such a fin drives nothing")

@@ -4,13 +4,11 @@ import math
 from pathlib import Path
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 import finlab
 from finlab.assets import shipped_layouts
 from finlab.cli import main
-from finlab.errors import FinlabError, LayoutError
+from finlab.errors import LayoutError
 from finlab.exchange import read_csv, write_csv
 
 
@@ -53,18 +51,6 @@ def test_shipped_layouts_survive_the_way_there_and_back(name: str, tmp_path: Pat
 def test_refusals_name_row_and_column(text: str, message: str, tmp_path: Path) -> None:
     with pytest.raises(LayoutError, match=message):
         read(text, tmp_path)
-
-
-@given(text=st.text(max_size=200))
-def test_any_text_ends_in_a_layout_or_an_error_of_ours(
-    text: str, tmp_path_factory: pytest.TempPathFactory
-) -> None:
-    path = tmp_path_factory.mktemp("csv") / "x.csv"
-    path.write_bytes(("x_m,y_m,z_m\n" + text).encode("utf-8", "surrogatepass"))
-    try:
-        read_csv(path)
-    except FinlabError:
-        return
 
 
 def test_verb_imports(tmp_path: Path) -> None:

@@ -5,13 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 import finlab
 from finlab.assets import shipped_layouts
 from finlab.cli import main
-from finlab.errors import FinlabError, LayoutError
+from finlab.errors import LayoutError
 from finlab.exchange import read_urdf, write_urdf
 
 TURTLE = Path(__file__).parent / "turtle.urdf"
@@ -81,15 +79,6 @@ def test_refusals_say_what_is_wrong(
     with pytest.raises(LayoutError, match=message) as caught:
         read_urdf(path, fins)
     assert str(caught.value).startswith(f"{path}: ")
-
-
-@settings(max_examples=40)
-@given(data=st.binary(max_size=300))
-def test_any_bytes_end_in_an_error_of_ours(data: bytes, tmp_path_factory: pytest.TempPathFactory) -> None:
-    path = tmp_path_factory.mktemp("urdf") / "x.urdf"
-    path.write_bytes(data)
-    with pytest.raises(FinlabError):
-        read_urdf(path, ("a",))
 
 
 def test_verbs_import_and_export(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
