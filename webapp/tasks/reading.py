@@ -42,7 +42,8 @@ class Reading:
 
         def work() -> Found:
             found = self._readers.read(read)
-            prepare(found)
+            if prepare is not None:
+                prepare(found)
             return found
 
         self.make(work, use)
