@@ -9,7 +9,6 @@ from functools import partial
 from importlib.resources import files
 
 import viser
-from markupsafe import Markup
 
 from finlab.errors import FinlabError
 from webapp.mailbox import Mailbox
@@ -26,7 +25,7 @@ Attempt = Callable[[Callable[[], object]], FinlabError | None]
 """Carries out an intent, and gives back why it was refused."""
 
 
-def edit(kind: str, key: str, value: str, label: str, rows: int = 1, at_once: bool = False) -> Markup:
+def edit(kind: str, key: str, value: str, label: str, rows: int = 1, at_once: bool = False) -> str:
     """Attributes of an element whose text can be edited.
 
     Args:
@@ -49,7 +48,7 @@ def edit(kind: str, key: str, value: str, label: str, rows: int = 1, at_once: bo
     )
 
 
-def press(kind: str, key: str) -> Markup:
+def press(kind: str, key: str) -> str:
     """Attributes of an element that can be pressed; its text is "", "shift" or "ctrl", what was held."""
     return html("data-press='{}' data-key='{}'", kind, key)
 

@@ -77,7 +77,7 @@ def _guarded(guard: Guard) -> Iterator[None]:
 def enter(client: viser.ClientHandle) -> None:
     """A connection is a page from now on."""
     server = client._viser_server._websock_server
-    connection = server._live_connections.get(client.client_id)  # type: ignore[call-overload]
+    connection = server._live_connections.get(client.client_id)
     if isinstance(connection, Connection):
         connection.enter()
 

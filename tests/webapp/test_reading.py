@@ -88,10 +88,13 @@ def test_an_honest_link_opens_beside_hostile_ones(server: viser.ViserServer, vie
 
 
 def test_a_page_has_few_files_read_at_once(server: viser.ViserServer, view: View) -> None:
+    found: list[int] = []
+
     def ask() -> None:
         for _ in range(reading.MOST_WAITING + 3):
-            view.do(lambda: view.reading.read(int, print))
+            view.do(lambda: view.reading.read(int, found.append))
 
     on_loop(server, ask)
     assert sum("being read; wait" in note for note in view.client.notes) == 3
     until(lambda: view.reading._waiting == 0)
+    assert found == [0] * reading.MOST_WAITING and len(view.client.notes) == 3

@@ -73,7 +73,9 @@ def _value(value: float, axis: int) -> str:
 
 
 def _track(asked: float, given: float | None) -> str:
-    parts = [Markup("<i style='left:50%;top:0;width:1px;height:14px;background:rgba(128,128,128,.55)'></i>")]
+    parts: list[str] = [
+        Markup("<i style='left:50%;top:0;width:1px;height:14px;background:rgba(128,128,128,.55)'></i>")
+    ]
     parts.append(_bar(0.0, asked, 1, 5, "var(--fl-asked)"))
     if given is not None:
         parts.append(_bar(0.0, given, 8, 5, "var(--fl-delivered)"))
@@ -120,7 +122,7 @@ def fin_table(state: State, allocation: Allocation | None, full: Array, selected
         if not failed and (told := damage_words(state, fin.name)):
             first += html("<div class='missing damage'>{}</div>", told)
         if allocation is None or limits is None:
-            cells = Markup("<td>–</td>") * 5
+            cells: str = Markup("<td>–</td>") * 5
         elif failed:
             cells = Markup("<td colspan='5'>failed</td>")
         else:

@@ -5,9 +5,9 @@ from collections.abc import Iterable
 from markupsafe import Markup
 
 
-def html(template: str, *values: object) -> Markup:
-    """Markup with values in the place of `{}`, which may have formats, as `str.format` has them. Of several
-    things in one, all stand one after the other."""
+def html(template: str, *values: object) -> str:
+    """Markup, a text that is marked as such, with values in the place of `{}`, which may have formats, as
+    `str.format` has them. Of several things in one, all stand one after the other."""
     return Markup(template).format(*map(_one, values))
 
 

@@ -103,7 +103,7 @@ def answer_sentence(state: State, allocation: Allocation | None, busy: bool) -> 
         allocation: the newest answer, None while there is none.
         busy: whether it answers an earlier question.
     """
-    sentences = []
+    sentences: list[str] = []
     if allocation is not None and not busy:
         if allocation.unknown_fins:
             sentences.append(_warning("; ".join(allocation.notes) + "."))

@@ -202,7 +202,7 @@ class State:
             checked = chosen(value, key, CHOICES[key])
         elif value is not None:
             known = [DRAWING[self.method]] if self.method in DRAWING else []
-            settings = next(s for s in (*known, *DRAWING.values()) if hasattr(s, key))
+            settings: Any = next(s for s in (*known, *DRAWING.values()) if hasattr(s, key))
             whole = (
                 isinstance(value, float) and value.is_integer() and isinstance(getattr(settings, key), int)
             )

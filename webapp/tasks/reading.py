@@ -27,7 +27,7 @@ class Reading:
         self,
         read: Read[Found],
         use: Callable[[Found], object],
-        prepare: Callable[[Found], object] | None = None,
+        prepare: Callable[[Found], object] = bool,
     ) -> None:
         """Read what a stranger has made, and use it on the loop.
 
