@@ -34,8 +34,6 @@ class Limits(NamedTuple):
     """Zero direction (n,) [rad], half a turn before the middle of the arc, from where angles are counted."""
     turn: np.floating[Any]
     """A whole turn [rad]."""
-    half: AnyArray
-    """Half of each range (n, 3)."""
 
 
 class FinForces(Protocol):
@@ -85,19 +83,18 @@ class CommandProblem:
         return low, high
 
     @cached_property
-    def float64(self) -> Limits:
-        """The limits in double precision."""
-        return self._limits(np.float64)
-
-    @cached_property
-    def float32(self) -> Limits:
-        """The limits in single precision."""
-        return self._limits(np.float32)
-
-    def _limits(self, kind: type[np.floating[Any]]) -> Limits:
-        middle = (0.5 * (self.lower[:, 2] + self.upper[:, 2])).astype(kind)
-        lower, upper = self.lower.astype(kind), self.upper.astype(kind)
-        return Limits(lower, upper, middle - kind(np.pi), kind(2 * np.pi), kind(0.5) * (upper - lower))
+    def _limits(self) -> dict[str, Limits]:
+        """The limits by the name of a type: double precision, and single precision."""
+        middle = 0.5 * (self.lower[:, 2] + self.upper[:, 2])
+        return {
+            kind.__name__: Limits(
+                self.lower.astype(kind),
+                self.upper.astype(kind),
+                middle.astype(kind) - kind(np.pi),
+                kind(2 * np.pi),
+            )
+            for kind in (np.float64, np.float32)
+        }
 
     @cached_property
     def columns_float32(self) -> AnyArray:
@@ -115,7 +112,7 @@ class CommandProblem:
 
     def make_feasible(self, command: AnyArray) -> AnyArray:
         """`feasible` that overwrites its argument."""
-        limits = self.float32 if command.dtype == np.float32 else self.float64
+        limits = self._limits[command.dtype.name]
         direction = command[..., 2]
         direction -= limits.seam
         np.mod(direction, limits.turn, out=direction)

@@ -40,7 +40,6 @@ from finlab.allocation.search.settings import SearchSettings
 from finlab.arrays import Array
 from finlab.forces import force_space
 from finlab.forces.compiled_fins import CompiledFins
-from finlab.forces.cost_bound import cost_bound
 from finlab.layout import Layout
 from finlab.physics.fin_model import file_stamps
 
@@ -167,12 +166,6 @@ class Pipeline:
         """Most quadratic problems of a search with n fins."""
         usual = SEARCH.few_fins_steps if n < SEEDS.many else SEARCH.many_fins_steps
         return self.settings.search_steps or (SEARCH.convex_steps if self.objective.convex else usual)
-
-    def bound(self, prepared: Prepared, target: Array, best: float) -> float:
-        """A lower bound on the power for a wrench (6,) [N, N m]; `best` is that of the answer."""
-        wanted = target / self.std
-        planar = force_space.descend(prepared.planar, wanted[None], prepared.seeds[:1], SEARCH.bound_steps)
-        return min(cost_bound(prepared.planar, wanted, planar.multiplier[0]), best)
 
     def _descend_from_previous(
         self, prepared: Prepared, target: Array, start: _Start, previous: Array

@@ -27,8 +27,9 @@ from finlab.allocation.solution import Candidates, Solution
 from finlab.arrays import Array
 from finlab.errors import AllocationError
 from finlab.forces.compiled_fins import CompiledFins
+from finlab.forces.cost_bound import cost_bound
 from finlab.forces.fin_sets import planar_sets
-from finlab.forces.force_space import PlanarProblem
+from finlab.forces.force_space import PlanarProblem, descend
 from finlab.forces.out_of_reach import Nearest, nearest, nearest_along, nearest_in_turn
 from finlab.layout import Layout
 from finlab.networks.normalization import Normalization
@@ -177,9 +178,10 @@ class SearchAllocator(Allocator):
             raise AllocationError("bound: the wrench is out of reach, so no answer has a cost to bound")
         fins = usable_fins(result.layout, result.failed)
         prepared = self.pipeline.prepare(fins.healthy)
-        return self.pipeline.bound(
-            prepared, result.target, float(prepared.cost(result.command[None, fins.alive])[0])
-        )
+        wanted, seed = result.target / self.normalization.std, prepared.seeds[:1]
+        planar = descend(prepared.planar, wanted[None], seed, SEARCH.bound_steps)
+        least = cost_bound(prepared.planar, wanted, planar.multiplier[0])
+        return min(least, float(prepared.cost(result.command[None, fins.alive])[0]))
 
     def _in_time(self, layout: Layout, target: Array, reference: Array) -> Array:
         return in_time(layout, target, reference, self.settings.period_s)
