@@ -57,6 +57,7 @@ class Exports:
     def __init__(self, context: Context) -> None:
         """Send what the page's session holds to its browser."""
         self._context, self._session = context, context.session
+        self._picturing = False
 
     def graph(self) -> None:
         """Send the layout graph file; where fins are known by tables, an archive with them."""
@@ -97,6 +98,9 @@ class Exports:
 
     def picture(self) -> None:
         """Send a picture of the 3D view; the page has to make it, so not on the event loop."""
+        if self._picturing:
+            raise FinlabError("a picture is being made; wait for it")
+        self._picturing = True
         name = f"{file_stem(self._session.state.layout.name)}.png"
         threading.Thread(target=self._take_picture, args=(name,), daemon=True).start()
 
@@ -124,5 +128,7 @@ class Exports:
         except Exception as error:  # nobody else would hear of it on this thread
             loop.post(partial(self._context.notify, "No picture", str(error) or type(error).__name__))
             return
+        finally:
+            self._picturing = False
         content = iio.imwrite("<bytes>", picture, extension=".png")
         loop.post(partial(self.download, name, content))
