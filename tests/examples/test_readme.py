@@ -1,4 +1,4 @@
-"""The README's Python runs as printed, its output has the printed form, and what it names exists."""
+"""The README's Python runs as printed, and what it and the other pages name exists."""
 
 import re
 from pathlib import Path
@@ -8,6 +8,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 BLOCKS = re.findall(r"```(\w*)\n(.*?)```", (ROOT / "README.md").read_text(), re.DOTALL)
 NUMBER = re.compile(r"-?\d+\.?\d*(?:e-?\d+)?")
+PAGES = [*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("checkpoints/**/*.md")]
 
 
 def test_python_gives_output_of_the_printed_form(
@@ -24,14 +25,43 @@ def test_python_gives_output_of_the_printed_form(
     assert float(out.split()[-1]) < 0.01
 
 
-def test_files_and_pictures_it_names_exist() -> None:
-    links = re.findall(r"\]\(([^)#:]+)\)", (ROOT / "README.md").read_text())
-    assert [link for link in links if not (ROOT / link).exists()] == []
+def _headings(page: Path) -> set[str]:
+    """The anchors of a page, as GitHub makes them."""
+    found = re.findall(r"^#+ (.*)", page.read_text(), re.MULTILINE)
+    return {re.sub(r"[^\w -]", "", title.lower()).replace(" ", "-") for title in found}
 
 
-def test_make_targets_it_names_exist() -> None:
-    targets = re.findall(r"\bmake ([a-z-]+)", (ROOT / "README.md").read_text())
+def test_links_and_files_of_all_pages_exist() -> None:
+    wrong = []
+    for page in PAGES:
+        text = page.read_text()
+        for link, anchor in re.findall(r"\]\(([^)#:]*)#?([^):]*)\)", text):
+            target = page.parent / link if link else page
+            if not target.exists() or (anchor and anchor not in _headings(target)):
+                wrong.append(f"{page.name}: {link}#{anchor}")
+        wrong += [
+            f"{page.name}: {path}"
+            for path in re.findall(r"`((?:finlab|webapp|tests|tools|layouts|examples)/[\w./-]+)`", text)
+            if page.name != "CHANGELOG.md" and not (ROOT / path).exists()
+        ]
+    assert wrong == []
+
+
+def test_make_targets_of_all_pages_exist() -> None:
+    targets = {
+        name for page in PAGES for name in re.findall(r"(?:^|`)make ([a-z-]+)", page.read_text(), re.MULTILINE)
+    }
     makefile = (ROOT / "Makefile").read_text()
-    assert {"app", "test", "bench"} <= set(targets)
-    for target in targets:
-        assert re.search(rf"^{target}:", makefile, re.MULTILINE), target
+    gone = {"mutate", "bench", "bench-runtime"}  # which the changelog says
+    assert {name for name in targets - gone if not re.search(rf"^{name}:", makefile, re.MULTILINE)} == set()
+
+
+def test_figures_of_pages_are_columns_of_experiments() -> None:
+    from finlab.evaluation.experiment import load_experiment
+
+    marks = [
+        mark for page in PAGES for mark in re.findall(r"<!-- figures: (\w+) ?([^>]*) -->", page.read_text())
+    ]
+    assert marks
+    for name, keys in marks:
+        assert set(keys.split()) <= {column.key for column in load_experiment(name).columns}, name
