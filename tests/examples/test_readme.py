@@ -49,7 +49,9 @@ def test_links_and_files_of_all_pages_exist() -> None:
 
 def test_make_targets_of_all_pages_exist() -> None:
     targets = {
-        name for page in PAGES for name in re.findall(r"(?:^|`)make ([a-z-]+)", page.read_text(), re.MULTILINE)
+        name
+        for page in PAGES
+        for name in re.findall(r"(?:^|`)make ([a-z-]+)", page.read_text(), re.MULTILINE)
     }
     makefile = (ROOT / "Makefile").read_text()
     gone = {"mutate", "bench", "bench-runtime"}  # which the changelog says
