@@ -86,6 +86,7 @@ class CommandProblem:
     def _limits(self) -> dict[str, Limits]:
         """The limits by the name of a type: double precision, and single precision."""
         middle = 0.5 * (self.lower[:, 2] + self.upper[:, 2])
+        kinds: tuple[Any, ...] = (np.float64, np.float32)
         return {
             kind.__name__: Limits(
                 self.lower.astype(kind),
@@ -93,7 +94,7 @@ class CommandProblem:
                 middle.astype(kind) - kind(np.pi),
                 kind(2 * np.pi),
             )
-            for kind in (np.float64, np.float32)
+            for kind in kinds
         }
 
     @cached_property
