@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 """Numbers in double precision."""
 AnyArray = NDArray[Any]
-"""Numbers of a type that is told elsewhere: of single precision, complex, whole or truth values, too."""
+"""Numbers of a type that is given elsewhere: of single precision, complex, whole or truth values, too."""
 Values = Any
 """A numpy array, a tensor or a symbol."""
 

@@ -9,7 +9,7 @@ from contextlib import suppress
 from finlab.errors import FinlabError
 
 FAILED = 2
-"""Exit code after an error that is told in one sentence."""
+"""Exit code after an error that is printed in one sentence."""
 INTERRUPTED = 130
 """128 + SIGINT, as shells report it."""
 BROKEN_PIPE = 141
@@ -19,7 +19,7 @@ BROKEN_PIPE = 141
 def exit_code(program: str, work: Callable[[], int]) -> int:
     """The exit code of a command: that of its work, or one of the above after one sentence on stderr.
 
-    Standard output that is closed or full, or that nobody reads any more, is an error like any other.
+    Standard output that is closed or full, or that is no longer read, is an error like any other.
     """
     try:
         if sys.stdout is None:  # the command was started without it; only those that print are refused

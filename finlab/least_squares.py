@@ -56,7 +56,7 @@ def levenberg_marquardt(
     Args:
         at: where they begin.
         moved: the problems after one step, from where they are, the damping (R,) of each, and whether it is
-            the last step, after which nobody asks for derivatives.
+            the last step, after which no derivatives are needed.
         steps: most steps, those included that are undone.
         rule: of the damping.
         settled: relative gain at or below which a step that helps is the last one; 0 to take all steps.

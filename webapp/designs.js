@@ -9,7 +9,7 @@
     history.replaceState(null, '', location.pathname + location.search); // a reload goes on with what was made of it
   }
 
-  // viser writes the address anew before anything of ours runs; how the page was entered is remembered elsewhere.
+  // viser rewrites the address before anything of ours runs; how the page was entered is remembered elsewhere.
   function enteredWith() {
     const [entry] = performance.getEntriesByType('navigation');
     return location.hash || new URL(entry?.name ?? location.href).hash;

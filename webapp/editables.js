@@ -1,6 +1,6 @@
 // Words in the app's own markup that can be edited where they stand, and pressed. A cell says what it is by
-// data-edit or data-press, and of whom by data-key; the server (editables.py) hears of both on one channel. The box in
-// which one types lies over the cell and belongs to nobody else: however often the panel is written anew, it stays.
+// data-edit or data-press, and of which item by data-key; both go to the server (editables.py) on one channel. The box in
+// which one types lies over the cell and is not viser's: it stays when the panel is rendered again.
 (() => {
   if (window.finlabEditables) return;
   const AGAIN_MS = 700, TRIES = 40; // a page that is just connecting may lose what it is told to send

@@ -1,6 +1,6 @@
 """Words in the app's own markup that can be edited where they stand, and pressed.
 
-`edit` and `press` give the attributes of such an element; who hears of it is told by `Editables.on`. The box
+`edit` and `press` give the attributes of such an element; its handler is given to `Editables.on`. The box
 in which one types is made by the other half, `editables.js`.
 """
 
@@ -68,15 +68,15 @@ class Editables:
         """Where the page tells what was edited or pressed."""
 
     def on(self, kind: str, act: Act) -> None:
-        """Who hears of edits of a kind."""
+        """The handler of edits of a kind."""
         self._edits[kind] = act
 
     def on_press(self, kind: str, act: Act) -> None:
-        """Who hears of presses of a kind."""
+        """The handler of presses of a kind."""
         self._presses[kind] = act
 
     def _hear(self, kind: str, key: str, text: str) -> tuple[str | None] | None:
-        """Why something was refused, None where it was not; no answer where nobody hears of it."""
+        """Why something was refused, None where it was not; no answer without a handler."""
         if kind in self._presses:
             self._do(partial(self._presses[kind], key, text))
             return (None,)

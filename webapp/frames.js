@@ -1,6 +1,6 @@
 // Frames of the 3D view: fins flap here, and only what has changed is drawn. viser draws for a quarter of a second after
 // each message, and once a second in any case; on a machine without a graphics card one frame takes as long. A page that
-// nobody touches comes to rest: after REST_MS the fins stand still, until somebody moves the mouse or asks something.
+// is not used comes to rest: after REST_MS the fins stand still, until the mouse moves or something is asked.
 (() => {
   if (window.finlabFrames) return;
   const REST_MS = 30000, LOOKED_AT_MS = 4000; // after the last touch

@@ -36,7 +36,7 @@ def _same(old: Any, new: Any) -> bool:
 
 
 class Changes:
-    """Tells whether something must be made anew: it remembers what it was made from last.
+    """Says whether something must be made again: it keeps what it was made from last.
 
     Objects count by identity (comparing their arrays would cost more than it saves), plain values by value.
     """

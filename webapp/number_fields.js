@@ -73,7 +73,7 @@
     else box.removeAttribute('aria-invalid');
     if (how === 'pause') return; // the number is taken, the text is still the user's
     hand.dirty = hand.rested = false;
-    if (refused) return; // the text stays to be mended
+    if (refused) return; // the text stays to be corrected
     if (document.activeElement === box) value.set.call(box, shown);
     else release(box, shown);
   }

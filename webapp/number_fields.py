@@ -1,5 +1,5 @@
 """Boxes for numbers: what is typed comes here as text, is read with units and arithmetic, and is taken whole
-or refused in place. The other half, which keeps a box to the user while he types, is `number_fields.js`."""
+or refused in place. The other half, which keeps a box to the user who types, is `number_fields.js`."""
 
 import re
 from collections.abc import Callable

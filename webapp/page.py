@@ -99,11 +99,11 @@ class Page(ABC):
         self.swimming = Swimming(context, self._swam)
         """A robot that swims."""
         self.swim_files = SwimFiles(context, self.swimming, self._swam)
-        """What can be taken home of that."""
+        """What can be downloaded of that."""
         self.sweep = Sweep(context)
         """A component of the target on its way through a range."""
         self.exports = Exports(context)
-        """Files to take home."""
+        """Files to download."""
         self.scenery = Scenery(context, self.swimming)
         """What is seen beside the panel."""
         self.bound: list[Callable[[], None]] = []

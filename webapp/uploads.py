@@ -60,7 +60,7 @@ class Uploads:
         Args:
             gui: the page's.
             most: largest file that is taken [bytes].
-            refuse: is told in a sentence why a file is not taken.
+            refuse: is called with a sentence that says why a file is not taken.
         """
         self._gui, self._most, self._refuse = gui, most, refuse
         self._takers: dict[str, Take] = {}

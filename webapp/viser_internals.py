@@ -153,7 +153,7 @@ def stop_server(server: viser.ViserServer) -> None:
 
 
 def disable_sharing(server: viser.ViserServer) -> None:
-    """Nobody may open the public share tunnel: viser lets every connected page ask for it."""
+    """The public share tunnel stays closed: viser lets every connected page ask for it."""
     for message in (_messages.ShareUrlRequest, _messages.ShareUrlDisconnect):
         server._websock_server.unregister_handler(message)
 

@@ -1,4 +1,4 @@
-"""What a method hands over before anybody has judged it, and what makes a result plain data."""
+"""What a method hands over before it has been evaluated, and what makes a result plain data."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields

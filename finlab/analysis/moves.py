@@ -1,4 +1,4 @@
-"""Which fins may move, how far, and who follows whom across the robot's mirror plane."""
+"""Which fins may move, how far, and which fin is the mirror image of which."""
 
 from __future__ import annotations
 

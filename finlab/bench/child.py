@@ -1,4 +1,4 @@
-"""A method in a process of its own, asked one line at a time: it may hang or die without harm."""
+"""A method in a process of its own, asked one line at a time: it may stop answering or die without harm."""
 
 import contextlib
 import os

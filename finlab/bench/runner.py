@@ -151,7 +151,7 @@ class Asker:
         return Answer(command, seconds, None)
 
     def _start(self) -> None:
-        """Start the process; what keeps finlab's worker from starting at all is the user's to mend."""
+        """Start the process; what keeps finlab's worker from starting at all is for the user to correct."""
         self.child.start()
         if not self.method.greets:
             return

@@ -1,4 +1,4 @@
-"""`finlab export`: write what a robot takes home, the whole bundle or the layout graph file alone."""
+"""`finlab export`: write what a robot needs, the whole bundle or the layout graph file alone."""
 
 from pathlib import Path
 from typing import Annotated, Literal

@@ -83,8 +83,8 @@ def robot(
     """Learn a robot from swims: its fins' strengths and directions, its body, what fins take from each other.
 
     A log is log.npz of `finlab simulate`, or a CSV file: t, what was measured (x, y, z, roll, pitch, yaw, u,
-    v, w, p, q, r), and FIN.A, FIN.f, FIN.phi for each fin as it was told. `finlab simulate --excite` shows a
-    swim that tells much.
+    v, w, p, q, r), and FIN.A, FIN.f, FIN.phi for each fin as it was commanded. `finlab simulate --excite`
+    makes a swim that determines much.
 
     Args:
         layout: the robot as it is believed to be: layout file or the name of a shipped layout.

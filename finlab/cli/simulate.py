@@ -53,7 +53,7 @@ def simulate(
         fail: a fin and when it is lost, such as front_left@30; or what else becomes of it:
             front_left@30:torn=0.5 (half of its thrust is left), front_left@30:stuck (it no longer turns),
             front_left@60:whole (it is repaired).
-        announced: whether the allocator is told of what happens to fins.
+        announced: whether what happens to fins is announced to the allocator.
         monitor: let a FaultMonitor watch the robot and tell the allocator what it finds.
         servo_feedback: let the servos report their motion to the monitor.
         method: search, mdn, paper, qp, sqp, analytic, ipopt or on-board.

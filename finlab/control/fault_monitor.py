@@ -23,14 +23,14 @@ WHOLE_ABOVE = 0.9
 HOLD_S = 0.2
 """A belief is acted on once it has been certain for so long [s]: a single odd sample decides nothing."""
 COARSE = 0.05
-"""The allocator is told of strengths in steps of this size, so that it need not think anew at every tick."""
+"""The allocator is given strengths in steps of this size, so that its problem is the same for many ticks."""
 
 
 class Verdict(NamedTuple):
     """What a monitor believes of n fins."""
 
     damage: Damage
-    """The fins that are lost, torn or stuck, as an allocator is told: `allocate(..., **damage._asdict())`."""
+    """The fins that are lost, torn or stuck, for an allocator: `allocate(..., **damage._asdict())`."""
     probability: Array
     """Of each fin not being whole (n,), 0 to 1."""
     strength: Array
@@ -48,7 +48,7 @@ class FaultMonitor:
             answer = allocator.allocate(layout, wrench, **verdict.damage._asdict())
             command = monitor.probed(answer.command)
 
-    A fin that rests cannot be told from one that is lost: its probability stays where it was.
+    A fin that rests cannot be distinguished from one that is lost: its probability stays where it was.
     """
 
     def __init__(
@@ -116,9 +116,9 @@ class FaultMonitor:
         return self.verdict()
 
     def tell(self, name: str, strength: float = 1.0, stuck: float = math.nan) -> Verdict:
-        """Somebody knows what has become of a fin: its strength, and where it is stuck [rad] if it is.
+        """The state of a fin is known: its strength, and where it is stuck [rad] if it is.
 
-        A fin that is said to be lost is left alone until somebody says otherwise: no probe moves it.
+        A fin that is said to be lost is left alone until another state is said: no probe moves it.
 
         Raises:
             LayoutError: there is no fin of that name.

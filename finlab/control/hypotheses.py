@@ -181,7 +181,7 @@ class Hypotheses:
         """Takes velocity, rates, roll and pitch (8,); without the velocity where it is no new one.
 
         `besides` holds the logarithms (n, m) of what else speaks for each belief. Where the model says
-        nothing of the motion any more, or what it says is no number, all beliefs begin anew.
+        nothing of the motion any more, or what it says is no number, all hypotheses are initialized again.
         """
         if not max(self.covariance.diagonal()[MOTION].tolist()) < MOST_VARIANCE:
             return self._begin_anew(seen)
@@ -231,18 +231,18 @@ class Hypotheses:
         return std
 
     def adopt(self, fin: int, kind: int) -> None:
-        """One belief is now taken for true, and all begin anew."""
+        """One hypothesis is now taken for true, and all are initialized again."""
         self.state = self.state + self.off[fin, kind]
         self._doubt(fin, self.settings.new_strength if 0 < kind < len(LEVELS) - 1 else self.settings.strength)
 
     def adopt_both(self, pair: int) -> None:
-        """Two fins are now taken for lost, and all beliefs begin anew."""
+        """Two fins are now taken for lost, and all hypotheses are initialized again."""
         self.state = self.state + self.both_off[pair]
         for fin in self.pairs[pair].tolist():
             self._doubt(fin, self.settings.strength)
 
     def believe(self, fin: int, strength: float) -> None:
-        """Somebody knows the strength of a fin."""
+        """The strength of a fin is known."""
         self.state[FIRST_FIN + fin] = strength
         self._doubt(fin, self.settings.strength)
 

@@ -68,7 +68,7 @@ class Controller(Protocol):
     period_s: float
     """Time between calls [s]."""
     needs_given: bool
-    """Whether `wrench` wants to know what the fins have given; else it is told zero, which costs no time."""
+    """Whether `wrench` wants to know what the fins have given; else it is given zero, which costs no time."""
 
     def reset(self) -> None:
         """Forget everything, as before the first call."""

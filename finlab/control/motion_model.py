@@ -27,7 +27,7 @@ FIRST_FIN = 14
 STRENGTH = slice(FIRST_FIN, None)
 """Where what is in the state."""
 ABOUT_FACE = -0.9
-"""Cosine of the angle to a direction below which a fin that is told to turn there may go either way round."""
+"""Cosine of the angle to a direction below which a fin that is to turn there may go either way round."""
 UNSURE_S = 1.2
 """How long its direction is unknown then [s]."""
 
@@ -153,7 +153,7 @@ class MotionModel:
         return mean[0], mean[1] - mean[0]
 
     def _either_way(self) -> Array | None:
-        """What the velocities may gain besides (6, 6), a covariance, by fins that were told to turn about."""
+        """What the velocities may gain besides (6, 6), a covariance, by fins that had to turn around."""
         if not self._any_unsure or not self._unknown.any():
             return None
         most = 2.0 * np.linalg.norm(self._thrust[self._unknown], axis=-1)

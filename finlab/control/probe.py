@@ -16,7 +16,7 @@ FORCE_N = 0.6
 LENGTH_S = 2.0
 """How long a probe lasts [s]; a fin takes half a second to swing up, and a whole one to turn."""
 BUSY = 1.5
-"""A fin is busy when it is told to push this many times the least."""
+"""A fin is busy when it is commanded to push this many times the least."""
 FEWEST = 3
 """Working fins from which on those that would rest push a little: two have none to spare, and would
 lead the robot off its course."""
@@ -71,8 +71,8 @@ class Probe:
         return result
 
     def _pushing(self, command: Array) -> Array:
-        """Fins that are told to push less than is needed to be known push more, each the other way than those
-        before it, so that together they lift little; a side is kept until a fin is busy again."""
+        """Fins that are commanded to push less than is needed to be known push more, each the other way than
+        those before it, so that together they lift little; a side is kept until a fin is busy again."""
         known = np.isfinite(command[:, 0])
         force = self._plant.force(np.where(known[:, None], command, 0.0))
         ahead, size = force[:, 1], np.hypot(force[:, 1], force[:, 2])

@@ -1,1 +1,1 @@
-"""What a robot takes home: layout graph and bundle with the fins' physics, and the runtime that answers."""
+"""What the robot runs: the bundle (layout graph, the fins' physics, settings) and the runtime."""

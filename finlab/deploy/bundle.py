@@ -1,4 +1,4 @@
-"""The bundle that a robot takes home: layout graph, the fins' physics, settings, a README and checksums.
+"""The bundle that a robot runs: layout graph, the fins' physics, settings, a README and checksums.
 
 `finlab.load_layout` and `finlab.load_allocator` read it, so the robot runs the library itself. The same
 layout and settings give the same bytes, as a folder and as a zip archive.

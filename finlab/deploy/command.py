@@ -28,7 +28,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _run(argv: Sequence[str] | None) -> int:
     try:
         arguments = _parser().parse_args(argv)
-    except SystemExit as end:  # help, version, or a wrong call, of which argparse has told
+    except SystemExit as end:  # help, version, or a wrong call, which argparse has printed
         return end.code if isinstance(end.code, int) else FAILED
     # Before numpy is loaded: every product here is too small to be shared among cores.
     for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
@@ -127,7 +127,7 @@ def _within(low: float, high: float) -> Callable[[str], float]:
 
 
 class _Parser(argparse.ArgumentParser):
-    """Pages of help are at most 100 columns wide and end with an example; what cannot be printed is told."""
+    """Pages of help are at most 100 columns wide and end with an example."""
 
     def __init__(self, *, example: str, **others: Any) -> None:
         width = min(shutil.get_terminal_size().columns, 100) - 2
@@ -187,7 +187,7 @@ def _parser() -> argparse.ArgumentParser:
         help="silence before the fins rest, 1 s if not said",
     )
     silence.add_argument(
-        "--no-watchdog", action="store_true", help="keep the last commands however long nobody speaks"
+        "--no-watchdog", action="store_true", help="keep the last commands however long no target comes"
     )
     return parser
 

@@ -1,4 +1,4 @@
-"""`finlab-runtime serve`: targets in, commands out, as lines of JSON; safe when nobody speaks any more.
+"""`finlab-runtime serve`: targets in, commands out, as lines of JSON; safe when no targets come any more.
 
 A request is `{"wrench": [Fx, Fy, Fz, Tx, Ty, Tz]}`, with `id`, `failed`, `policy` and `reference`, the
 wrenches that are expected at the next ticks of 0.1 s, if wanted. Each answer says in `status` what it is:
@@ -64,7 +64,7 @@ class Server:
         """Serve until the requests end or a signal asks to stop; then the fins rest.
 
         Raises:
-            Unsent: nobody takes the answers any more.
+            Unsent: answers are no longer taken.
         """
         try:
             self._loop(transport)
@@ -72,7 +72,7 @@ class Server:
             transport.send(_line(self._rest()))
         except Unsent:
             raise
-        except BaseException:  # what nobody foresaw is told after the fins rest
+        except BaseException:  # an unforeseen error is raised after the fins rest
             transport.send(_line(self._rest()))
             raise
         finally:

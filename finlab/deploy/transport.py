@@ -14,7 +14,7 @@ from finlab.deploy.stopping import StopSignals
 from finlab.errors import FinlabError
 
 PATIENCE = 1.0
-"""How long [s] a reader that takes nothing is waited for once the service is told to stop."""
+"""How long [s] a reader that takes nothing is waited for once the service has to stop."""
 CHUNK = 65_536
 """Bytes that are read at once."""
 BURST = 16
@@ -31,11 +31,11 @@ class Transport(Protocol):
 
         Raises:
             EOFError: the requests have ended, or a signal asks to stop.
-            Unsent: nobody reads answers any more.
+            Unsent: answers are no longer read.
         """
 
     def send(self, line: bytes) -> None:
-        """Send one answer to whoever asked last; `Unsent` where nobody takes it."""
+        """Send one answer to whoever asked last; `Unsent` where it is not taken."""
 
 
 class Unsent(FinlabError):
@@ -152,5 +152,5 @@ class LoopbackUdp:
             return
         try:
             self._socket.sendto(line, self._sender)
-        except OSError:  # nobody there any more; the watchdog speaks to whoever comes next
+        except OSError:  # no reader any more; the watchdog sends to the next one
             self._sender = None

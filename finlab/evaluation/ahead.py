@@ -1,4 +1,4 @@
-"""The pseudo-inverse with the one thing told to it that the default method takes from a reference.
+"""The pseudo-inverse with the one thing that the default method takes from a reference.
 
 It divides what there is to gain: what comes of knowing how late fins are, and what of dividing forces well.
 """

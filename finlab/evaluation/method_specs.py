@@ -78,7 +78,7 @@ def load_method_spec(
 
     Args:
         name: a method; `ipopt-32`, say, for 32 starts; `search-effort`, say, for an objective of its own; or
-            `on-board`, U-CAT's own method; or `analytic-ahead`, the pseudo-inverse told how late fins are.
+            `on-board`, U-CAT's own method; or `analytic-ahead`, the pseudo-inverse with the lag of the fins.
         checkpoint: as in `load_allocator`.
         objective: what the methods that can choose keep least; each one's default where None.
 

@@ -104,7 +104,7 @@ def _a(value: Any) -> str:
 
 
 def _at(place: str, value: Any, known: Any) -> tuple[Any, Any]:
-    """The value at a place, and what msgspec knows of its type; None where that cannot be told."""
+    """The value at a place, and what msgspec knows of its type; None where that is not known."""
     for name, index, _ in _STEP.findall(place):
         known = _step_into(_one(known, value), name, index)
         if name:

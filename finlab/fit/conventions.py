@@ -1,4 +1,4 @@
-"""Units and conventions of a load cell's file: told by its header, recognized, or said by the user.
+"""Units and conventions of a load cell's file: given by its header, recognized, or set by the user.
 
 Inside finlab an amplitude is half the stroke in radians, a frequency is in Hz, and forces are in the fin
 frame: x' along the shaft, y' the horizontal thrust axis, z' up.

@@ -19,7 +19,7 @@ from finlab.layout.angles import FILE_TURN_TOLERANCE, TURN
 MAX_BYTES = 500_000_000
 """Largest file that is read [bytes]; a raw series of an hour at 1 kHz has half of it."""
 MIN_SAMPLES = 20
-"""Fewest samples from which a fin can be told at all."""
+"""Fewest samples from which a fin can be fitted."""
 SAME = 1e-3
 """Amplitudes [rad] or frequencies [Hz] all closer than this are one and the same."""
 SAME_DIRECTION = 0.05
@@ -154,7 +154,7 @@ def _checked(read: list[tuple[Columns, tuple[str, ...]]], source: str) -> Measur
         if np.ptp(columns[name]) < SAME:
             raise DataError(
                 f"{source}: column {name} has the one value {columns[name][0]:.4g} {unit}, expected several; "
-                "a fin's force cannot be told from one amplitude or one frequency"
+                "a fin's force cannot be determined from one amplitude or one frequency"
             )
     phi, turned = _directions(columns, source, notes)
     if "Fx" not in columns:
@@ -190,7 +190,7 @@ def _directions(columns: dict[str, Array], source: str, notes: list[str]) -> tup
 
 
 def _deviation(columns: dict[str, Array], places: tuple[str, ...]) -> Array | None:
-    """Standard deviations (n, 3) of the forces [N]; an axis of which nothing is told has the others' mean."""
+    """Standard deviations (n, 3) of the forces [N]; an axis that is not known has the others' mean."""
     given = [columns[name] for name in ("sFx", "sFy", "sFz") if name in columns]
     if not given:
         return None

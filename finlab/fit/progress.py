@@ -14,7 +14,7 @@ class Stages:
     """Stages of a fit of about the same length, each of some steps."""
 
     def __init__(self, progress: Progress, count: int, steps: int = 1) -> None:
-        """Takes who is told, how many stages there are at most, and how many steps a stage has at most."""
+        """Takes what is called, how many stages there are at most, and how many steps a stage has at most."""
         self._progress, self._count, self._steps = progress, count, steps
         self._words, self._stage = "", -1
 

@@ -340,7 +340,7 @@ def _table(law: FinLaw, cost: Array, command: Array, grid: _Grid, wanted: Array,
 
 def _smooth(cost: Array, wanted: Array, grid: _Grid) -> tuple[Array, Array]:
     """Cost and size (K, LEVELS) as the search shall see them: those of a measured fin rise and fall with the
-    noise, from which no slope can be told, so they are taken for polynomials of the level and few waves of
+    noise, from which no slope follows, so they are taken for polynomials of the level and few waves of
     the direction. The commands stay what they are."""
     across = np.linspace(-1.0, 1.0, len(cost))
     if grid.half < np.pi:

@@ -252,8 +252,8 @@ def realize(problem: PlanarProblem, planar: Planar, rests: float | None = None) 
         problem: the layout.
         planar: the forces.
         rests: share of its largest force up to which a fin rests altogether and turns to where that costs
-            least; with 0, only those that do their least turn. Refinement has to mend the little force that
-            is then missing, or turned. None leaves all as they are.
+            least; with 0, only those that do their least turn. Refinement has to correct the little force
+            that is then missing, or turned. None leaves all as they are.
     """
     fins = problem.fins
     least = fins.minimum * (1.0 + REST)
@@ -272,7 +272,7 @@ def realize(problem: PlanarProblem, planar: Planar, rests: float | None = None) 
 
 
 def _direction(found: Projected) -> Array:
-    """Directions (R, n) [rad], where nobody has asked for angles yet, too."""
+    """Directions (R, n) [rad], also where angles have not been asked for yet."""
     if found.stopped is None and found.rim.part is None:
         return np.asarray(np.arctan2(found.unit[:, 1], found.unit[:, 0]))
     return found.direction

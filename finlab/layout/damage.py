@@ -34,7 +34,7 @@ Command = tuple[float, float, float]
 
 
 class Damage(NamedTuple):
-    """What is known of a robot's fins, as an allocator is told it: `allocate(..., **damage._asdict())`."""
+    """What is known of a robot's fins, as an allocator takes it: `allocate(..., **damage._asdict())`."""
 
     failed: tuple[str, ...] = ()
     """Names of the fins that are lost."""

@@ -105,7 +105,7 @@ class About(Struct, forbid_unknown_fields=True):
 
 
 class Graph(Struct, forbid_unknown_fields=True):
-    """A robot's fins and who works with whom, with what is needed to check an answer. SI units and radians.
+    """A robot's fins, which pairs of them work together, and what is needed to check an answer. SI, radians.
 
     `checksum` is the SHA-256 of all else, as JSON with sorted keys, without white space, in UTF-8.
     """

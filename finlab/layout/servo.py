@@ -51,5 +51,5 @@ class Servo(Checked):
     frequency_rate: Rate = 3.0
     """The same of the commanded frequency [Hz/s]."""
     direction_rate: Rate = 5.0
-    """The same of the commanded zero direction [rad/s]. A fin that is told to turn back all at once pushes
-    wherever it points meanwhile; one that is told step by step leaves the others time to make up for it."""
+    """The same of the commanded zero direction [rad/s]. A fin that is commanded to turn back at once pushes
+    wherever it points meanwhile; one that is commanded step by step gives the others time to compensate."""

@@ -23,7 +23,7 @@ index  meaning
 17-19  arc of directions: half of it over pi, its middle where it is no full circle
 20-22  cost of turning by a radian over the cost at the top, and where turning costs nothing
 23     1 for objective `effort`, 0 for `power`
-24-25  fixed numbers by which fins that are the same in all else are told apart
+24-25  fixed numbers by which fins that are the same in all else are distinguished
 26     number of fins
 =====  ============================================================================================
 

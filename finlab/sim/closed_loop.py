@@ -41,7 +41,7 @@ from finlab.vehicle.fin_motion import FinMotion, fin_power
 from finlab.vehicle.vehicle import STATE_SIZE, Vehicle
 
 AHEAD = 10
-"""Ticks of which the allocator is told before."""
+"""Ticks whose wrenches the allocator is given in advance."""
 
 
 class ClosedLoop:
@@ -88,9 +88,9 @@ class ClosedLoop:
             sensors: rates and noise; the defaults of `SensorSettings`.
             water: how it moves, such as `SteadyCurrent` or `Waves`; it is still by default.
             failures: what becomes of fins, and when; (name, time [s]) is a fin that is lost.
-            announced: whether the allocator is told of what happens; else it goes on as before, unless a
+            announced: whether what happens is announced to the allocator; else it goes on as before, unless a
                 monitor notices.
-            monitor: watches the robot, tells the allocator what it finds, and is told what is announced.
+            monitor: watches the robot, gives the allocator what it finds, and takes what is announced.
             servo_feedback: whether the servos report their motion to the monitor.
             truth: the robot that really swims, such as `perturbed(layout, damping=2.0)`, where `layout` is
                 only what allocator, controller and monitor believe of it; it has the same fins.
@@ -183,12 +183,12 @@ class ClosedLoop:
 
     @property
     def told(self) -> tuple[str, ...]:
-        """Names of the fins that somebody said are broken."""
+        """Names of the fins that were announced as broken."""
         return tuple(self._told)
 
     @property
     def damage(self) -> Damage:
-        """What the allocator is told of the fins: what somebody said, or what the monitor believes."""
+        """What the allocator is given of the fins: what was announced, or what the monitor has found."""
         if self.verdict is not None:
             return self.verdict.damage
         return damage_of(self._told, dict(zip(self.layout.names, self._held.tolist(), strict=True)))
@@ -284,7 +284,7 @@ class ClosedLoop:
         return whole(expected)
 
     def _given(self) -> Array:
-        """Wrench (6,) of the fins over the last period, if they do what they were told [N, N m]."""
+        """Wrench (6,) of the fins over the last period, if they do what they were commanded [N, N m]."""
         if self._command is None or not self.controller.needs_given:
             return NO_WRENCH
         self._lag.step(self._command, self.period_s)

@@ -61,7 +61,7 @@ class Tick(NamedTuple):
     driving_power: AnyArray
     """The same with the heat in the motors' windings (n,), mean over the period [W]."""
     alive: AnyArray
-    """Which fins move as told, stuck and torn ones among them (n,)."""
+    """Which fins move as commanded, stuck and torn ones among them (n,)."""
     fault_probability: AnyArray
     """What the monitor gives for each fin not being whole (n,), 0 to 1; NaN without a monitor."""
     strength: AnyArray

@@ -1,7 +1,7 @@
 """A swim as a table for spreadsheets and other programs: one row per control period, units in the header.
 
 `finlab fit robot` reads it, too: `x` to `r` are what the sensors said, `FIN.A`, `FIN.f` and `FIN.phi` what
-each fin was told. What is true of the simulated robot says so in its name.
+each fin was commanded. What is true of the simulated robot says so in its name.
 """
 
 import csv
@@ -24,7 +24,7 @@ MEASURED = (
 WRENCH = ("Fx [N]", "Fy [N]", "Fz [N]", "Tx [N m]", "Ty [N m]", "Tz [N m]")
 """Columns of a wrench in the body frame."""
 COMMAND = ("A [rad]", "f [Hz]", "phi [rad]")
-"""Columns of what a fin is told: half amplitude, frequency, zero direction."""
+"""Columns of what a fin is commanded: half amplitude, frequency, zero direction."""
 
 
 def csv_of(log: RunLog) -> str:

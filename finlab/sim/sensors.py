@@ -159,7 +159,7 @@ class Sensors:
         return held
 
     def sample(self, time: float, state: Array) -> None:
-        """Let the sensors sample a state (13,) that nobody asks about yet."""
+        """Let the sensors sample a state (13,) whose measurement is not needed yet."""
         x, y, z, qw, qx, qy, qz, *motion = state.tolist()
         if self._marker.is_due(time):
             yaw = math.atan2(2 * (qw * qz + qx * qy), 1 - 2 * (qy * qy + qz * qz))

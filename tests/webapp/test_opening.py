@@ -1,4 +1,4 @@
-"""Files that a browser sends, whatever they are: each goes to whom it is for, or a sentence says why not."""
+"""Files that a browser sends, whatever they are: each is opened by its kind, or a sentence says why not."""
 
 import json
 from collections.abc import Callable

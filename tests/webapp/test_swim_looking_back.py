@@ -1,4 +1,4 @@
-"""Swims that are looked at again, put aside, compared and taken home."""
+"""Swims that are looked at again, put aside, compared and downloaded."""
 
 import io
 import zipfile

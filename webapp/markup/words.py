@@ -40,7 +40,7 @@ def small(value: float) -> str:
 
 
 def error_digits(value: float) -> str:
-    """An error [σ] as `small` has it; what lies below `ROUNDING` is none that anybody could name."""
+    """An error [σ] as `small` has it; what lies below `ROUNDING` is rounding."""
     return "≤ 1e−9" if value < ROUNDING else small(value)
 
 

@@ -26,7 +26,7 @@ from webapp.viser_internals import run_script
 NAMED = files("webapp").joinpath("places.js").read_text("utf-8")
 """Script that gives regions and sections their names, for the styles."""
 HABITS = files("webapp").joinpath("habits.js").read_text("utf-8")
-"""Script that mends what viser's page does otherwise."""
+"""Script that changes what viser's page does otherwise."""
 FRAMES = files("webapp").joinpath("frames.js").read_text("utf-8")
 """Script that lets fins flap, and draws only what has changed."""
 NAMES = files("webapp").joinpath("names.js").read_text("utf-8")

@@ -50,7 +50,7 @@ class SwimPanel:
 
 
 class ScenarioPanel(SwimPanel):
-    """What is swum, in which water, by whom."""
+    """What is swum, in which water, by which methods."""
 
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         """Build the widgets."""
@@ -176,7 +176,7 @@ class RunPanel(SwimPanel):
 
 
 class SwimCardPanel:
-    """What the swim took, and what can be taken home of it."""
+    """What the swim took, and what can be downloaded of it."""
 
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         """Build the widgets."""

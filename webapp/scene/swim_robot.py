@@ -80,7 +80,7 @@ class SwimRobot:
         return np.array(self._root.position, dtype=np.float64)
 
     def hide(self) -> None:
-        """Nobody swims."""
+        """No robot swims."""
         self._ahead = None
         put(self._root, visible=False)
         put(self._trail, visible=False)

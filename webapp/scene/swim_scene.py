@@ -33,7 +33,7 @@ DEPTH_BELOW = 0.6
 
 
 class SwimScene:
-    """Draws a swim; nothing of it is there while nobody swims."""
+    """Draws a swim; nothing of it is there while no robot swims."""
 
     def __init__(self, client: viser.ClientHandle, swimming: Swimming) -> None:
         """Build the nodes, hidden."""

@@ -1,6 +1,6 @@
 """A design in a link: its layout's file, compressed, as text that stands behind the # of an address.
 
-Browsers do not send that part to a server, so a link shows a design to whoever opens it, and to nobody on the
+Browsers do not send that part to a server, so a link shows a design to whoever opens it, and not to the
 way. What comes out of a link is treated like any file that a browser sends.
 """
 

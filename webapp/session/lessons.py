@@ -117,7 +117,7 @@ LESSONS = (
         "no-yaw",
         "What a layout cannot do",
         "All shafts of this robot lie along one line, so no fin can push where it would turn the robot left "
-        "or right. No method can mend that; a wrench is won or lost when fins are placed.",
+        "or right. No method can change that: the placement of the fins decides.",
         "Under Design, select a fin and turn its shaft until the yaw is delivered.",
         "One turned shaft gave the robot an axis. The card of the design says what each fin is worth.",
         "no_yaw",

@@ -188,7 +188,7 @@ class Plan(NamedTuple):
     layout: Layout
     """The robot as all believe it to be."""
     failed: tuple[str, ...]
-    """Fins that are lost from the start, as everybody knows."""
+    """Fins that are lost from the start, announced from the start."""
     path: Trajectory
     """Where to swim."""
     methods: tuple[str, ...]
@@ -208,7 +208,7 @@ class Plan(NamedTuple):
     sensors: SensorSettings = SensorSettings()
     """Noise, bias and delay."""
     weak: tuple[str, ...] = ()
-    """Fins that are weak, which nobody knows."""
+    """Fins that are weak, unannounced."""
     share: float = 1.0
     """Of their thrust that these give."""
     losses: tuple[FinFault, ...] = ()

@@ -65,7 +65,7 @@ STEPS = (
     ),
     Step(
         "A fin fails",
-        "Fin 2 hangs limp. The search leaves it out and answers at once with the other three. Fail another "
+        "Fin 2 hangs down. The search leaves it out and answers at once with the other three. Fail another "
         "one in the list, and read below the bars what is left undone.",
         "ucat",
         PRESETS["Turn"],

@@ -51,7 +51,7 @@ class EventLoop:
 class Worker:
     """Runs jobs on a thread of its own. A job that waits is replaced by a newer one with the same key.
 
-    Askers take turns in the order in which they began to wait, so that nobody starves and nothing queues up.
+    Askers take turns in the order in which they began to wait, so that nothing queues up.
     """
 
     def __init__(self) -> None:

@@ -19,7 +19,7 @@ class Comparison:
     """The answers of one run."""
 
     def __init__(self, context: Context) -> None:
-        """The page is written anew after every answer."""
+        """The page is rendered after every answer."""
         self._solver, self._changed = context.solver, context.changed
         # One question per method: those of this and other pages are answered in between.
         self._asked = Newest(context.loop, context.workers.answers, self._quickest, self._take)

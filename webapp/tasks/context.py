@@ -30,6 +30,6 @@ class Context:
     do: Callable[[Callable[[], object]], None]
     """Carries out an intent of the user."""
     changed: Callable[[], None]
-    """Writes the page anew; called on the loop when there is something new to show."""
+    """Renders the page; called on the loop when there is something new to show."""
     notify: Callable[[str, str], None]
     """Shows a note: title and sentence; called on the loop."""

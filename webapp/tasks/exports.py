@@ -125,7 +125,7 @@ class Exports:
         client, loop = self._context.client, self._context.loop
         try:
             picture = client.get_render(*PICTURE_SIZE, transport_format="png", timeout=30.0)
-        except Exception as error:  # nobody else would hear of it on this thread
+        except Exception as error:  # it would be lost on this thread
             loop.post(partial(self._context.notify, "No picture", str(error) or type(error).__name__))
             return
         finally:

@@ -65,7 +65,7 @@ class Fitting(Newest[Upload, Fitted]):
     """One file at a time for one page; what came of it goes on the fin at once, and undo takes it off."""
 
     def __init__(self, context: Context) -> None:
-        """The page is written anew when there is progress."""
+        """The page is rendered when there is progress."""
         super().__init__(context.loop, context.workers.fits, self._fit, self._put_on)
         self._context = context
         self.progress = ""
@@ -164,7 +164,7 @@ class Fitting(Newest[Upload, Fitted]):
         return Fitted(done, model, fit, curves, thin_regions(fit), next_measurements(fit))
 
     def _tell(self, upload: Upload, words: str, done: float = 1.0) -> None:
-        """On the worker's thread, before each step: a fit for which nobody waits any more ends here."""
+        """On the worker's thread, before each step: a fit whose result is not waited for ends here."""
         if upload is not self.question:
             raise FinlabError("cancelled")
         self._loop.post(partial(self._note, upload, words))

@@ -43,7 +43,7 @@ class Improver(Newest[Search, Improvement]):
     """One search at a time for one page."""
 
     def __init__(self, context: Context) -> None:
-        """The page is written anew when there is progress."""
+        """The page is rendered when there is progress."""
         super().__init__(context.loop, context.workers.searches, self._improve, context.changed)
         self.progress: Progress | None = None
         """How far it is."""

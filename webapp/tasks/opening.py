@@ -1,4 +1,4 @@
-"""Files of any kind that a browser sends, by *Open* or dropped on the page: each goes to whom it is for."""
+"""Files of any kind that a browser sends, by *Open* or dropped on the page: each is opened by its kind."""
 
 import json
 from collections.abc import Callable
@@ -23,18 +23,18 @@ Take = Callable[[str, bytes], object]
 
 
 class Taker(NamedTuple):
-    """Whom files are for."""
+    """What files are for."""
 
     suffixes: tuple[str, ...]
     """How their names end."""
     take: Take
     """Opens one, from its name and its content."""
     knows: Callable[[bytes], bool] | None
-    """Whether a file of such a name is for it; None where it takes what nobody else knows."""
+    """Whether a file of such a name is for it; None where it takes what no other one does."""
 
 
 class Opening:
-    """Whom files are for; several that are dropped at once are one design with its tables and its mesh."""
+    """What files are for; several that are dropped at once are one design with its tables and its mesh."""
 
     def __init__(
         self,

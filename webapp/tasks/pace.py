@@ -20,7 +20,7 @@ class Pace:
         self._past: deque[tuple[float, float]] = deque()
 
     def set_speed(self, speed: float) -> None:
-        """Another speed; the true one is measured anew."""
+        """Another speed; the true one is measured again."""
         self.speed = speed
         self._past.clear()
 

@@ -186,7 +186,7 @@ _NO_SLOPES = np.empty((1, 1, 1, 1))
 def _evaluated(
     problem: CommandProblem, target: AnyArray, command: AnyArray, slopes: AnyArray | None
 ) -> _Evaluated:
-    """Errors of commands; slopes that are given are not computed anew."""
+    """Errors of commands; slopes that are given are not computed again."""
     rows, n, _ = command.shape
     if slopes is None:
         force, slopes = problem.fin.force_and_slopes(command)

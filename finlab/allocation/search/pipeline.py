@@ -150,7 +150,7 @@ class Pipeline:
         return found.with_first(answer)
 
     def own_seeds(self, prepared: Prepared) -> Array:
-        """Sizes of forces (S, n) [N] from which every search begins, unless it is told others."""
+        """Sizes of forces (S, n) [N] from which every search begins, unless others are given."""
         return prepared.seeds if self.settings.subsets else prepared.seeds[:1]
 
     def wide_seeds(self, prepared: Prepared) -> tuple[Array, Array | None]:
@@ -206,7 +206,7 @@ class Pipeline:
         """Search from seeds, refine, and go on where that did not reach the target."""
         # Fins that rest have hardly any slope: two steps where there are such.
         steps = self.settings.refine_steps + (not self.objective.convex)
-        steps += prepared.arcs is not None or keep_mode  # fins at stops are slower to mend
+        steps += prepared.arcs is not None or keep_mode  # fins at stops take more steps
         command, origin, expected = self._search(
             prepared, target, start.seeds, keep_mode, near_best=start.near_best
         )
@@ -278,11 +278,11 @@ class Pipeline:
         if keep_mode:
             score = score.copy()  # it may be the cost itself
             score[:, 0] = -1.0
-        # With fins at rest, what refinement mends changes the order of the costs: twice as many are tried.
+        # With fins at rest, what refinement corrects changes the order of the costs: twice as many are tried.
         ways = ends.command.shape[2]
         chosen = _distinct(score)[:, : keep or self.settings.n_refined * min(ways, 2)]
         row = np.arange(rows)[:, None]
-        # What resting fins leave undone cannot always be mended: all ways are refined.
+        # What resting fins leave undone cannot always be corrected: all ways are refined.
         kept = ends.command[row, chosen].swapaxes(1, 2).reshape(rows, -1, n, 3)
         return kept, np.tile(origin[chosen], (1, ways)), ends.cost[row[:, 0], chosen[:, 0]]
 

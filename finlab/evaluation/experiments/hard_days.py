@@ -63,11 +63,11 @@ class HardDay:
     sensors: SensorSettings = SensorSettings()
     """Noise, bias, delay and losses."""
     weak: float | None = None
-    """Share of its thrust that one fin gives, each in its turn, without anybody knowing."""
+    """Share of its thrust that one fin gives, each in its turn, without an announcement."""
     lost: int = 0
     """How many fins are lost half-way, each and each pair in its turn."""
     announced: bool = True
-    """Whether allocator and controller are told of a loss; else a `FaultMonitor` has to find it."""
+    """Whether a loss is announced to allocator and controller; else a `FaultMonitor` has to find it."""
 
     def path(self) -> Trajectory:
         """What is followed."""

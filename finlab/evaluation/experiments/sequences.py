@@ -1,8 +1,8 @@
 """Wrenches that follow each other, as a controller's: how far commands move from tick to tick.
 
 A smooth path with white noise on every axis, as estimates from sensors bring it. Each tick is one call that
-is given the previous command; a method that takes no heed of it answers anew. The plant scores every tick,
-once as commanded and once as fins deliver it that follow late.
+is given the previous command; a method that ignores it starts again at every tick. The plant scores every
+tick, once as commanded and once as fins deliver it that follow late.
 """
 
 import numpy as np

@@ -25,7 +25,7 @@ def summary(fit: RobotFit) -> tuple[str, ...]:
         f"fitted to {seconds:.0f} s of swimming, of whose motion simulated swims explain {fit.explained:.1%}",
         *([f"used, since it helps on parts not seen: {'; '.join(used)}"] if used else []),
         *([f"tried, and no help: {'; '.join(unused)}"] if unused else []),
-        "a common scale of all forces, damping and inertia cannot be told from motion; it rests on the mass "
+        "a common scale of all forces, damping and inertia does not follow from motion; it rests on the mass "
         "and added mass that the layout gave",
     ]
     untold = fit.untold()
@@ -41,7 +41,7 @@ def table(fit: RobotFit) -> str:
     lines = [f"{'':{width}}  {'found':>10}  {'+-':>9}  doubt left"]
     rows = zip(unknowns.labels, unknowns.units, vector, error, unknowns.scale, strict=True)
     for label, unit, value, own, scale in rows:
-        said = "  not told by the data" if own > UNTOLD else ""
+        said = "  not determined by the data" if own > UNTOLD else ""
         lines.append(
             f"{label:{width}}  {value * scale:10.4f}  {own * scale:9.4f}  {min(own, 1.0):9.0%} {unit}{said}"
         )

@@ -23,7 +23,7 @@ from finlab.vehicle.many_bodies import body_velocity
 SURE = 3.0
 """Standard errors by which what is kept must lessen the error on windows not seen."""
 UNTOLD = 0.7
-"""Share of what was doubtful before that must be left for the data to have told nothing."""
+"""Share of what was doubtful before that must be left for the data to have determined nothing."""
 SOUND = 0.5
 """Least share of the motion that simulated swims should explain."""
 WEAKLY_KNOWN = 0.1

@@ -27,7 +27,7 @@ class RandomRobot:
     """One robot, ready for the search."""
 
     layout: Layout
-    """Positions, angles and limits; the fins' models are not told in it."""
+    """Positions, angles and limits; the fins' models are not part of it."""
     fins: tuple[RandomFin, ...]
     """What its fins do."""
     problem: PlanarProblem

@@ -16,7 +16,7 @@ FIRST_STEPS, LAST_STEPS = 10, 20
 KEPT = 14
 """Forces that are followed further."""
 MODES = 8
-"""Most ways that are told apart."""
+"""Most ways that are distinguished."""
 APART = 0.08
 """Mean difference over the fins, in roots of shares, from which two answers are two ways."""
 DEAREST = 1.2
