@@ -6,6 +6,7 @@ here. So widgets that were seen once stay mounted, and a change of task is one m
 """
 
 from collections.abc import Callable
+from functools import partial
 from importlib.resources import files
 
 import viser
@@ -171,7 +172,12 @@ class Frame:
             "frame": lambda _: robot.frame(),
         }
         for kind, act in acts.items():
-            self._page.editables.on_press(kind, lambda key, _held, act=act: act(key))
+            self._page.editables.on_press(kind, partial(_by_key, act))
+
+
+def _by_key(act: Callable[[str], object], key: str, _held: str) -> object:
+    """An act that does not ask which keys were held."""
+    return act(key)
 
 
 def _style(sections: list[Section], session: Session, plots: bool) -> str:
