@@ -50,11 +50,7 @@ def wrench_bars(asked: ArrayLike, given: ArrayLike | None, sentence: str) -> str
         rest = None if given is None else _value(asked[k] - given[k], k)
         kind = "missing" if rest is not None and float(rest.replace("−", "-")) else "dim"
         rows.append(html("<span class='right {}'>{}</span>", kind, "–" if rest is None else rest))
-    return html(
-        "<div class='fl'><div class='bars'>{}</div><div class='said'>{}</div></div>",
-        rows,
-        sentence,
-    )
+    return html("<div class='fl'><div class='bars'>{}</div><div class='said'>{}</div></div>", rows, sentence)
 
 
 def _header(scales: list[float]) -> str:

@@ -77,12 +77,7 @@ def error_axis(logs: Array) -> Axis:
     return Axis("error [σ]", low - margin, high + margin, tuple(ticks))
 
 
-def mode_plot(
-    answer: Allocation,
-    modes: Modes,
-    shown: int,
-    height: int,
-) -> str:
+def mode_plot(answer: Allocation, modes: Modes, shown: int, height: int) -> str:
     """What the method keeps least, against the error where samples are drawn, else against the other cost.
 
     Samples are small dots, modes numbered ones, which can be clicked.

@@ -48,12 +48,7 @@ def thrust_curves(fin: Fin) -> str:
         place = LEFT + 104 * k
         parts.append(html("<rect x='{}' y='7' width='14' height='5' rx='2' fill='{}'/>", place, css(color)))
         parts.append(html("<text x='{}' y='14'>A {:.2f} rad</text>", place + 19, size))
-    return html(
-        "<div class='fl'><svg class='plot' viewBox='0 0 {} {}'>{}</svg></div>",
-        WIDTH,
-        HEIGHT,
-        parts,
-    )
+    return html("<div class='fl'><svg class='plot' viewBox='0 0 {} {}'>{}</svg></div>", WIDTH, HEIGHT, parts)
 
 
 @lru_cache(maxsize=64)

@@ -53,7 +53,6 @@ class BodyInspector:
     """Widgets about the robot."""
 
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
-        """Build the widgets."""
         self._page, session = page, page.session
         self._head = gui.add_html("")
         page.editables.on("robot-name", lambda _, text: session.rename_robot(text))
@@ -105,7 +104,6 @@ class BodyInspector:
         self._page.session.set_dynamics(key, tuple(whole))
 
     def refresh(self) -> None:
-        """Write the name, and what is known of the body."""
         layout = self._page.session.state.layout
         name = edit("robot-name", "", layout.name, "name of the robot", at_once=True)
         about = edit("robot-about", "", layout.description, "description", rows=7, at_once=True)

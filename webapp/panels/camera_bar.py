@@ -17,11 +17,9 @@ class CameraBar:
     """The triad and the buttons beside it."""
 
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
-        """Build it."""
         self._page, self._content = page, gui.add_html("")
 
     def refresh(self) -> None:
-        """Nothing changes."""
         looks = Markup().join(
             html("<button {} title='{}'>{}</button>", press("look", name), key, name)
             for key, name in enumerate(CAMERAS, 1)

@@ -12,11 +12,9 @@ class CheckPanel:
     """One card."""
 
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
-        """Build it, empty."""
         self._page, self._card, self._changes = page, gui.add_html(""), Changes()
 
     def refresh(self) -> None:
-        """Write the card of the layout."""
         state = self._page.session.state
         if self._changes(state.layout, state.weak, state.stuck, state.failed):
             quick = quick_check(state.able, state.failed)

@@ -13,7 +13,6 @@ class ComparePanel:
     """A button and a table, whose rows say whose arrows are shown."""
 
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
-        """Build the widgets."""
         self._page = page
         add_html(gui, marker("fl-primary"))
         self._run = page.add_button(
@@ -30,7 +29,6 @@ class ComparePanel:
         session.set_overlay(method if method in COMPARED and method != session.overlay else None)
 
     def refresh(self) -> None:
-        """Write the answers."""
         session, comparison = self._page.session, self._page.comparison
         stale = comparison.state is not None and comparison.state != session.state
         put(self._run, disabled=comparison.running)

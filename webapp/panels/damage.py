@@ -31,7 +31,6 @@ class FinButtons:
             self._page.do(partial(self._act, self._names[index]))
 
     def refresh(self, names: Sequence[str], failed: Sequence[str] = (), held: Sequence[str] = ()) -> None:
-        """Write the row for fins in their order."""
         self._names = names
         put(
             self._buttons,
@@ -52,7 +51,6 @@ class DamagePanel:
     """What is wrong with the selected fin."""
 
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
-        """Build the widgets."""
         self._page = page
         left = "What is left of its largest amplitude and frequency: a worn motor, a torn fin."
         flaps = "It no longer turns: it flaps about one direction only."
@@ -94,6 +92,5 @@ class DamagePanel:
         self._page.session.jam(self._name, math.radians(degrees) if stuck else None)
 
     def refresh(self) -> None:
-        """Write the damage of the fin."""
         put(self._fin, options=self._page.session.state.layout.names, value=self._name)
         put(self._angle, visible=self._stop is not None)

@@ -18,7 +18,6 @@ class DesignPanel:
     """The list of shipped designs, what is said of this one, and the recent ones."""
 
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
-        """Build the widgets."""
         self._page, designs = page, page.designs
         self._layouts = gui.add_dropdown("Layout", tuple(shipped()), hint="Shipped layouts to start from.")
         page.on_change(self._layouts, self._open)
@@ -37,7 +36,6 @@ class DesignPanel:
             self._page.session.open_layout(shipped()[name])
 
     def refresh(self) -> None:
-        """Write where the layout comes from, and what was had lately."""
         session, layout, designs = self._page.session, self._page.session.state.layout, self._page.designs
         designs.note()
         name = shipped_name(layout)

@@ -24,7 +24,6 @@ class FilesTab:
     """Buttons for files, and the same question as a command."""
 
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
-        """Build the widgets."""
         self._page = page
         about = "Graph, the fins' physics, README and checksums: what finlab export makes."
         add_html(gui, marker("fl-primary"))
@@ -46,17 +45,13 @@ class FilesTab:
         page.exports.download("candidates.csv", files.candidates_csv(page.answering.best))
 
     def refresh(self) -> None:
-        """Write the command that asks the same question."""
         state = self._page.session.state
         texts = {
             "The same question on the command line": command_line(state),
             "The same in Python": python_lines(state),
             "The bundle for the robot": export_line(state),
         }
-        put(
-            self._command,
-            content=html("<div class='fl'>{}</div>", map(_copied, texts, texts.values())),
-        )
+        put(self._command, content=html("<div class='fl'>{}</div>", map(_copied, texts, texts.values())))
 
 
 def _copied(title: str, text: str) -> str:

@@ -39,7 +39,6 @@ class FinInspector:
     """Widgets about the selected fins."""
 
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
-        """Build the widgets."""
         self._page, session = page, page.session
         self._head = gui.add_html("")
         with gui.add_folder(None) as self._all:
@@ -120,7 +119,6 @@ class FinInspector:
         self._page.session.limit_selected("zero_direction", (low, high))
 
     def refresh(self) -> None:
-        """Write the selected fins."""
         session = self._page.session
         put(self._all, visible=session.selected is not None)
         put(self._head, content=self._headline())

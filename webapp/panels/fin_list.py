@@ -24,7 +24,6 @@ class FinList:
     """A table, and below it what can be done with the fins that are selected in it."""
 
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
-        """Build the widgets."""
         self._page, session = page, page.session
         self._table = gui.add_html("")
         page.editables.on_press("fin", self._select)
@@ -88,6 +87,5 @@ class FinList:
         self._page.session.ring_of_fins(count, RINGS.get(self._axis.value, "z"))
 
     def refresh(self) -> None:
-        """Write the table."""
         session = self._page.session
         put(self._table, content=fin_list(session.state, session.selection))

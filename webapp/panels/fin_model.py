@@ -23,7 +23,6 @@ class FinModelPanel:
     """Widgets of one folder."""
 
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
-        """Build the widgets."""
         self._page = page
         self._numbers: dict[tuple[str, str], viser.GuiInputHandle[float]] = {}
         with gui.add_folder("Fin model"):
@@ -74,9 +73,7 @@ class FinModelPanel:
             label, step = f"{words(key)}{unit}", (abs(rule.default) or 1.0) / 20
             handle = gui.add_number(label, rule.default, step=step, hint=hint, visible=False)
             self._page.bind_number(
-                handle,
-                partial(self._page.session.set_parameter, key),
-                partial(self._value, kind, key),
+                handle, partial(self._page.session.set_parameter, key), partial(self._value, kind, key)
             )
             self._numbers[kind, key] = handle
 
@@ -125,7 +122,6 @@ class FinModelPanel:
         self._page.exports.send_made(f"{file_stem(found.upload.fin)}.html", page)
 
     def refresh(self) -> None:
-        """Write the model of the selected fin, and how far a fit is."""
         session, fitting = self._page.session, self._page.fitting
         layout = session.state.layout
         fin = None if session.selected is None else layout.fins[layout.index(session.selected)]

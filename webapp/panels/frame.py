@@ -145,7 +145,6 @@ class Frame:
         return [self, self._corner, *self._sections], [self._corner, *follow]
 
     def refresh(self) -> None:
-        """Show what belongs to the task."""
         session = self._page.session
         plots = session.task != SIMULATE or bool(self._page.swimming.swimmers)
         put(self._shown, content=_style(self._sections, session, plots))

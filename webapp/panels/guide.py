@@ -11,11 +11,9 @@ class GuidePanel:
     """Whichever is under way."""
 
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
-        """Build it, empty."""
         self._session, self._card = page.session, gui.add_html("")
 
     def refresh(self) -> None:
-        """Write the card."""
         session, card = self._session, ""
         if session.lesson is not None:
             card = lesson_card(session.lesson, session.solved)

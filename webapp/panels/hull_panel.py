@@ -42,7 +42,6 @@ class HullPanel:
     """Widgets about the hull."""
 
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
-        """Build the widgets."""
         self._page = page
         shapes = gui.add_dropdown("Shape", (*HULL_SHAPES, MESH), hint="For looks and for sticking.")
         page.bind(shapes, self._choose_shape, lambda: self._shape or MESH)
@@ -61,9 +60,7 @@ class HullPanel:
         )
         hint = "What 1 means in the mesh file; of one that is here, too."
         self._unit = page.bind(
-            gui.add_dropdown("Unit of file", tuple(UNITS), hint=hint),
-            self._choose_unit,
-            self._unit_now,
+            gui.add_dropdown("Unit of file", tuple(UNITS), hint=hint), self._choose_unit, self._unit_now
         )
         page.opening.add(MESHES, self._import)
         page.add_upload(
@@ -168,7 +165,6 @@ class HullPanel:
             self._page.session.set_hull(self._shape, size)
 
     def refresh(self) -> None:
-        """Write the hull."""
         is_mesh = self._shape is None
         put(self._size, disabled=is_mesh)
         for widget in (self._turns, self._length, self._faces):

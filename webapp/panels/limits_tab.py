@@ -29,7 +29,6 @@ class ReachPanel:
     """Switches and the card."""
 
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
-        """Build the widgets."""
         self._page = page
         about = "Everything that the fins can give, as a body in the view."
         page.bind_display(gui.add_dropdown("Draw the set of", tuple(DRAWN), hint=about), "drawn")
@@ -48,7 +47,6 @@ class ReachPanel:
         self._page.session.compare_with(None if name == SAVED else name)
 
     def refresh(self) -> None:
-        """Write the findings."""
         session = self._page.session
         names = (SAVED, *((PINNED,) if session.pinned is not None else ()), *shipped())
         put(self._beside, options=names, value=session.beside or SAVED)
@@ -78,7 +76,6 @@ class ImprovePanel:
     """What to look for, and what was found."""
 
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
-        """Build the widgets."""
         self._page = page
         goals = gui.add_dropdown("Goal", tuple(GOAL_WORDS), hint="What to raise.")
         page.bind(goals, partial(self._draft, SearchRequest.with_goal), lambda: page.session.draft.goal)
@@ -168,7 +165,6 @@ class ImprovePanel:
             self._page.session.accept_layout(found.layout)
 
     def refresh(self) -> None:
-        """Write how far the search is."""
         self._refresh_request()
         improver = self._page.improver
         running, progress, found = improver.busy, improver.progress, improver.findings

@@ -34,7 +34,6 @@ class CandidatesPanel:
     """Plot and table, and what is drawn from a mixture."""
 
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
-        """Build the widgets."""
         self._page = page
         stray, count = "How far draws stray from the mixture's means.", "Draws from the mixture."
         weight = "How much effort counts in the ranking."
@@ -74,7 +73,6 @@ class CandidatesPanel:
         return min(self._page.session.mode, max(self._modes - 1, 0))
 
     def refresh(self) -> None:
-        """Write settings and candidates."""
         page, state = self._page, self._page.session.state
         put(self._origin, content=html("<div class='fl dim'>{}</div>", _origin_words(state.method)))
         drawing = state.drawing

@@ -12,12 +12,10 @@ class Corner:
     """Both, in a corner of the view."""
 
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
-        """Build it, empty."""
         self._page = page
         self._content = gui.add_html("")
 
     def refresh(self) -> None:
-        """Write the status line and the legend."""
         try:
             content = self._written()
         except Exception as error:

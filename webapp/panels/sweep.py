@@ -24,7 +24,6 @@ class SweepPanel:
     """Which axis, how far, and the plot."""
 
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
-        """Build the widgets."""
         self._page = page
         self._drawn = 0.0
         self._ends = (-5.0, 5.0)

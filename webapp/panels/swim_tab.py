@@ -25,7 +25,6 @@ class SwimPanel:
     """A panel with settings of swims."""
 
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
-        """Nothing is built yet."""
         self._page, self._gui = page, gui
 
     def _bind(self, key: str, widget: Any, live: bool = False, digits: int | None = None) -> None:
@@ -53,7 +52,6 @@ class ScenarioPanel(SwimPanel):
     """What is swum, in which water, by which methods."""
 
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
-        """Build the widgets."""
         super().__init__(gui, page)
         day = "A day that is not as the designer assumed; it sets path, water, body, sensors and fins."
         self._bind("scenario", gui.add_dropdown("Scenario", tuple(SCENARIOS), hint=day), live=True)
@@ -113,7 +111,6 @@ class RunPanel(SwimPanel):
     """Start, stop, and what can go wrong at any moment."""
 
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
-        """Build the widgets."""
         super().__init__(gui, page)
         self._add_run()
         self._add_disturbances()
@@ -163,7 +160,6 @@ class RunPanel(SwimPanel):
         self._page.swimming.start(session.swim.plan(session.state, self._page.swimming.own_path))
 
     def refresh(self) -> None:
-        """Write how the swim goes."""
         swimming, settings = self._page.swimming, self._page.session.swim
         if swimming.pace.speed != settings.speed:
             swimming.pace.set_speed(settings.speed)
@@ -179,20 +175,15 @@ class SwimCardPanel:
     """What the swim took, and what can be downloaded of it."""
 
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
-        """Build the widgets."""
         self._page = page
         self._card = gui.add_html("")
         keeps = {"Keep this swim": page.swimming.keep, "Forget it": page.swimming.forget_kept}
         page.add_buttons("Compare", keeps, hint="Keep it in orange, and swim again with something changed.")
-        files = {
-            "Table (CSV)": page.swim_files.table,
-            "Plots (PNG)": page.swim_files.pictures,
-        }
+        files = {"Table (CSV)": page.swim_files.table, "Plots (PNG)": page.swim_files.pictures}
         page.add_buttons("Save", files, hint="The log with units, and pictures; made on the server.")
         self._making = gui.add_html("")
 
     def refresh(self) -> None:
-        """Write the figures, and whether the fins hold its weight at all."""
         state = self._page.session.state
         trim = trim_sentence(state.layout, axis_reach(state.able, state.failed))
         warning = "" if trim is None else html("<div class='fl missing'>{}</div>", trim)

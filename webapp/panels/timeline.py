@@ -43,7 +43,6 @@ class Timeline:
     """The slider and the plots."""
 
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
-        """Build the widgets."""
         self._page, swimming = page, page.swimming
         add_html(gui, marker("fl-timeline"))
         self._none = add_html(gui, html("<div class='fl dim fl-unswum'>{}</div>", UNSWUM))
@@ -60,7 +59,6 @@ class Timeline:
         self._plots = SwimPlots(gui)
 
     def refresh(self) -> None:
-        """Write the time, and draw."""
         swimming = self._page.swimming
         there = bool(swimming.swimmers)
         put(self._none, visible=not there)
@@ -76,7 +74,6 @@ class SwimPlots:
     """Six plots over time."""
 
     def __init__(self, gui: viser.GuiApi) -> None:
-        """Build them, empty."""
         self._drawn = 0.0
         self._changes = Changes()
         robots, wrench = (css(DELIVERED), css(OTHER), css(KEPT)), (css(ASKED), css(DELIVERED))

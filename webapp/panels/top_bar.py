@@ -31,11 +31,9 @@ class RobotBar:
     """The robot's name."""
 
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
-        """Build it."""
         self._page, self._name = page, gui.add_html("")
 
     def refresh(self) -> None:
-        """Write the name, and whether it has been changed since it was opened or saved."""
         session = self._page.session
         layout = session.state.layout
         changed = "" if layout == session.saved else Markup("<span class='dim'>edited</span>")
@@ -50,7 +48,6 @@ class FileBar:
     """The design as a file: a new one, one that is opened, and this one saved or shared."""
 
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
-        """Build the buttons."""
         self._page, designs = page, page.designs
         add_html(gui, marker("fl-file"))
         page.add_button("New", designs.new, icon=viser.Icon.FILE_PLUS, hint="One hull with one fin.")
@@ -71,14 +68,12 @@ class HistoryBar:
     """Undo and redo, by name."""
 
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
-        """Build the widgets."""
         self._page, session = page, page.session
         back, forth = viser.Icon.ARROW_BACK_UP, viser.Icon.ARROW_FORWARD_UP
         self._undo = page.add_button("Undo", session.undo, icon=back, hint="Ctrl+Z")
         self._redo = page.add_button("Redo", session.redo, icon=forth, hint="Ctrl+Y or Ctrl+Shift+Z")
 
     def refresh(self) -> None:
-        """Write what can be undone and redone."""
         history = self._page.session.history
         for button, word, name in (
             (self._undo, "Undo", history.undo_name),
@@ -91,11 +86,9 @@ class TaskBar:
     """What is being done: one of four tasks."""
 
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
-        """Build it."""
         self._page, self._tasks = page, gui.add_html("")
 
     def refresh(self) -> None:
-        """Mark the task that is open."""
         here = self._page.session.task
         buttons = Markup().join(
             html("<button {}{}>{}</button>", "aria-current=page " * (task == here), press("task", task), task)
@@ -108,7 +101,6 @@ class AnsweringBar:
     """Who answers, what is kept least, and where help is found."""
 
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
-        """Build the widgets."""
         session = page.session
         methods = gui.add_dropdown("Method", tuple(METHODS), hint="Who answers.")
         page.bind(methods, partial(session.set_setting, "method"), lambda: session.state.method)

@@ -31,7 +31,6 @@ class ViewPanel:
     """Switches."""
 
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
-        """Build the widgets."""
         speed = gui.add_slider("Motion speed", 0.05, 1.0, 0.05, 0.5, hint="1 is real time.")
         page.bind_number(
             speed, partial(page.session.set_display, "speed"), lambda: page.session.display.speed, digits=3

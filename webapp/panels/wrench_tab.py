@@ -26,7 +26,6 @@ class FinsPanel:
     """What each fin does, and which have failed."""
 
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
-        """Build the widgets."""
         self._page = page
         self._failures = FinButtons(
             page,
@@ -38,7 +37,6 @@ class FinsPanel:
         self._table = gui.add_html("")
 
     def refresh(self) -> None:
-        """Write failures and commands."""
         state, answer = self._page.session.state, self._page.shown
         self._failures.refresh(state.layout.names, state.failed)
         fitting = answer if answer is not None and answer.layout.names == state.layout.names else None
@@ -50,7 +48,6 @@ class AnswerPanel:
     """What is asked, what the fins give, and what is left undone."""
 
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
-        """Build it, empty."""
         self._page, self._bars = page, gui.add_html("")
 
     def refresh(self) -> None:
@@ -65,7 +62,6 @@ class TargetPanel:
     """Buttons and sliders."""
 
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
-        """Build the widgets."""
         self._page = page
         presets = gui.add_button_group("Preset", tuple(PRESETS), hint="Target wrenches to start from.")
         page.on_change(presets, page.session.set_preset)
@@ -95,7 +91,6 @@ class TargetPanel:
         )
 
     def refresh(self) -> None:
-        """Write the target, the sliders' ends and the marks on them."""
         state = self._page.session.state
         most = axis_reach(state.able, state.failed)  # with the others free
         for slider, value, reach in zip(self._sliders, state.target, most, strict=True):

@@ -35,7 +35,6 @@ class Flapping:
     """Where each blade is at the moment."""
 
     def __init__(self) -> None:
-        """No fins yet."""
         self._phase: NDArray[np.floating] = np.zeros(0)
         self.command: Array = np.zeros((0, 3))
         """What they do (n, 3), NaN for failed ones."""

@@ -21,7 +21,6 @@ class Ghost:
     def __init__(
         self, scene: viser.SceneApi, name: str, color: Rgb = DEAD, opacity: float | None = 0.3
     ) -> None:
-        """Build the node, showing nothing."""
         self._shape = Shape(scene, name, color, opacity=opacity, visible=False, cast_shadow=False)
 
     def show(self, fins: tuple[Fin, ...]) -> None:
@@ -52,7 +51,6 @@ class Overlay:
     """Forces of the fins by another method, as plain arrows beside the robot's own."""
 
     def __init__(self, scene: viser.SceneApi) -> None:
-        """Build the node, showing nothing."""
         self._shape = Shape(scene, "/robot/overlay", LIGHT.overlay, visible=False, cast_shadow=False)
 
     def refresh(self, answer: Allocation | None, scale: float, dark: bool) -> None:

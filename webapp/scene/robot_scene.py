@@ -16,13 +16,7 @@ from webapp.scene.meshes.hull import hull_of
 from webapp.scene.meshes.mesh import LONGEST_TURN
 from webapp.scene.overlays import Ghost, Overlay, moved_fins
 from webapp.scene.stage import Stage, aim_camera
-from webapp.scene.wrench_nodes import (
-    LENGTH,
-    AttainableNodes,
-    WrenchNodes,
-    fitting_newtons,
-    fitting_torque,
-)
+from webapp.scene.wrench_nodes import LENGTH, AttainableNodes, WrenchNodes, fitting_newtons, fitting_torque
 from webapp.session.state import State, chosen
 from webapp.tasks.analyst import Findings
 from webapp.tasks.context import Context
@@ -42,7 +36,6 @@ class RobotScene:
     """Draws a session, and makes intents of clicks and drags."""
 
     def __init__(self, context: Context) -> None:
-        """Build the nodes of the scene of a page's browser."""
         self._client, self._session, self._do = context.client, context.session, context.do
         scene, session = self._client.scene, self._session
         self._root = scene.add_frame("/robot", show_axes=False)

@@ -25,7 +25,6 @@ class Scenery:
     """Both scenes of one page, of which one is shown, and the theme."""
 
     def __init__(self, context: Context, swimming: Swimming) -> None:
-        """Build the nodes of the scene of a page's browser."""
         self._client, self._session, self._swimming = context.client, context.session, swimming
         self._dark: bool | None = None
         self._guide: tuple[int | None, Lesson | None] = NOWHERE
@@ -55,10 +54,7 @@ class Scenery:
             self.robot.newtons,
             self.robot.torque,
             self.robot.cut,
-            (
-                overlay_row(other, display.dark),
-                set_rows(findings if display.drawn != "none" else None),
-            ),
+            (overlay_row(other, display.dark), set_rows(findings if display.drawn != "none" else None)),
         )
         self.refresh_swim()
 

@@ -36,7 +36,6 @@ class SwimScene:
     """Draws a swim; nothing of it is there while no robot swims."""
 
     def __init__(self, client: viser.ClientHandle, swimming: Swimming) -> None:
-        """Build the nodes, hidden."""
         self._client, self._swimming = client, swimming
         scene = client.scene
         self._goal = Shape(scene, "/swim/goal", ASKED, opacity=0.45, visible=False, cast_shadow=False)

@@ -62,7 +62,6 @@ class WrenchNodes:
     """Arrows and rings over a stalk that stands on the centre of gravity."""
 
     def __init__(self, scene: viser.SceneApi) -> None:
-        """Build the nodes, showing nothing."""
         self._root = scene.add_frame("/robot/wrench", show_axes=False)
         stalk = tube(np.array([[0, 0, -HEIGHT - 0.2], [0, 0, 0.0]]), 0.0025, 10)
         Shape(scene, "/robot/wrench/stalk", LIGHT.line, stalk, cast_shadow=False)
@@ -123,7 +122,6 @@ class AttainableNodes:
     """Green for the working fins, grey for all fins where one has failed, a blue ball for what is asked."""
 
     def __init__(self, scene: viser.SceneApi) -> None:
-        """Build the nodes, showing nothing."""
 
         def glass(name: str, color: tuple[int, int, int], opacity: float) -> Shape:
             return Shape(scene, name, color, opacity=opacity, side="double", visible=False, cast_shadow=False)
