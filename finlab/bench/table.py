@@ -49,7 +49,7 @@ def text(found: Row, beside: Row | None) -> str:
 def markdown(found: Row) -> str:
     """The table of results; `python -m finlab.bench.table > finlab/bench/results.md` makes the stored one."""
     whole = table(found["methods"])
-    lines = [[whole.in_one_cell(row, column) for column in COLUMNS] for row in whole.rows]
+    lines = [[whole.cell(row, column) for column in COLUMNS] for row in whole.rows]
     head = [[column.heading for column in COLUMNS], ["---"] * len(COLUMNS)]
     return "\n".join(f"| {' | '.join(line)} |" for line in head + lines)
 

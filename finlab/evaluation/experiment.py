@@ -18,7 +18,7 @@ from finlab.evaluation.plots.style import Picture
 from finlab.evaluation.report.document import Block, Column, Figure, Row, Table
 
 EXPERIMENTS = (
-    *("wrench", "cost", "unreachable", "sequences", "latency", "ablation", "temperature"),
+    *("wrench", "cost", "latency", "ablation", "temperature"),
     *("trajectory", "faults", "velocity", "swims", "monitor", "fit", "robots"),
 )
 """Names, which are those of their modules in `finlab.evaluation.experiments`, in the order of the report."""
@@ -109,7 +109,7 @@ class Experiment:
         """The rows of the default method stand out; below them are those that the paper prints."""
         ours = [{**row, "_kind": "ours"} if str(row.get("method")) == "search" else row for row in rows]
         printed = [] if self.printed is None else self.printed(rows)
-        return Table(self.columns, [*ours, *({**row, "_kind": "printed"} for row in printed)])
+        return Table(self.columns, [*ours, *printed])
 
     def words(self) -> list[Block]:
         """Heading and question."""

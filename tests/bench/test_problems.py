@@ -12,8 +12,8 @@ from finlab.bench import problems as module
 from finlab.bench.generate import SEED, make_problems
 from finlab.bench.problems import FILE, KINDS, Problems, open_problems, save_problems
 from finlab.errors import DataError
-from finlab.evaluation.ipopt_reach import IpoptReach
 from finlab.physics import plant_of
+from tests.ipopt_reach import IpoptReach
 
 BEYOND = KINDS.index("beyond-1.2")
 

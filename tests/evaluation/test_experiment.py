@@ -91,7 +91,6 @@ def test_a_terminal_is_told_before_the_work(monkeypatch: pytest.MonkeyPatch) -> 
         ("wrench --subsample 0 --methods qp", "subsample: expected a number of at least 1, got 0"),
         ("wrench --seed -1 --methods qp", "seed: expected a number of at least 0, got -1"),
         ("wrench --targets 1000000000", "targets: expected a number of at most 1000000, got 1000000000"),
-        ("sequences --noise nan", "noise: expected a finite number, got nan"),
         ("temperature --temperatures 1,x", "temperatures: expected numbers with commas between, got '1,x'"),
         ("temperature --temperatures 1,inf", "temperatures: expected a finite number, got inf"),
         ("wrench --methods qp --picture missing/dots.png", "picture: expected a file in an existing folder"),

@@ -15,18 +15,6 @@ Row = dict[str, Any]
 
 
 @dataclass(frozen=True)
-class Card:
-    """One number of the summary."""
-
-    value: str
-    """The number, in a few characters."""
-    label: str
-    """What it is."""
-    detail: str
-    """What it is compared with."""
-
-
-@dataclass(frozen=True)
 class Column:
     """A column of a table."""
 
@@ -37,7 +25,7 @@ class Column:
     format: str = "text"
     """Key of `FORMATS`."""
     interval: str | None = None
-    """Key of an interval [low, high] that stands below the number in small."""
+    """Key of an interval [low, high] that stands behind the number."""
     unit: str = ""
     """Of the numbers; none where they are shares, ratios or counts."""
 
@@ -54,26 +42,22 @@ class Column:
 
 @dataclass(frozen=True)
 class Table:
-    """A table; a row may carry `_kind`: `ours` (stands out) or `printed` (figures from the paper)."""
+    """A table; a row with `_kind` `ours` stands out."""
 
     columns: tuple[Column, ...]
     """From left to right."""
     rows: Sequence[Row]
     """From top to bottom."""
 
-    def cell(self, row: Row, column: Column) -> tuple[str, str]:
-        """A cell's text and the small text below it."""
+    def cell(self, row: Row, column: Column) -> str:
+        """A cell's text, its interval in brackets."""
         show = FORMATS[column.format]
         value, ends = row.get(column.key), row.get(column.interval or "")
         if value is None:
-            return "", ""
-        small = f"{show(ends[0])} – {show(ends[1])}" if ends and None not in ends else ""
-        return show(value), small
-
-    def in_one_cell(self, row: Row, column: Column) -> str:
-        """The same with the small text in brackets."""
-        big, small = self.cell(row, column)
-        return f"{big} ({small})" if small else big
+            return ""
+        return (
+            f"{show(value)} ({show(ends[0])} – {show(ends[1])})" if ends and None not in ends else show(value)
+        )
 
 
 @dataclass(frozen=True)
@@ -93,8 +77,8 @@ class Figure:
         return self.draw().svg(self.name)
 
 
-Block = str | tuple[Card, ...] | Table | Figure
-"""A string is Markdown; cards, at most four in a line, are the numbers that stand on top."""
+Block = str | Table | Figure
+"""A string is Markdown."""
 
 
 @dataclass(frozen=True)

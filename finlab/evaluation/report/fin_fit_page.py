@@ -6,7 +6,7 @@ import numpy as np
 
 from finlab.errors import DataError
 from finlab.evaluation.plots.fin_fits import draw_errors, draw_thrust
-from finlab.evaluation.report.document import Card, Column, Document, Figure, Table
+from finlab.evaluation.report.document import Column, Document, Figure, Table
 from finlab.evaluation.report.pages import to_html
 from finlab.fit.advice import next_measurements, thin_regions
 from finlab.fit.fin_file import summary
@@ -45,23 +45,17 @@ def fin_fit_page(fit: FinFit, name: str) -> Document:
         if doubts
         else "May be trusted within what was measured."
     )
-    cards = (
-        Card(
-            f"{fit.error():.1%}", "cross-validated error", "of the largest force, the samples' noise included"
-        ),
-        Card(f"{fit.noise():.1%}", "noise of a sample", "of the largest force"),
-        Card(f"{fit.coverage():.0%}", "within the 95 % band", "of samples that the fit had not seen"),
-        Card(
-            f"{fit.largest:.3g} N",
-            "largest force",
-            f"{len(fit.measurements)} samples, {len(fit.outliers)} left out",
-        ),
+    figures = (
+        f"**{fit.error():.1%}** cross-validated error, of the largest force, the samples' noise included",
+        f"**{fit.noise():.1%}** noise of a sample, of the largest force",
+        f"**{fit.coverage():.0%}** within the 95 % band, of samples that the fit had not seen",
+        f"**{fit.largest:.3g} N** largest force, of {len(fit.measurements)} samples",
     )
     return Document(
         f"Fin {name}, fitted",
         verdict,
         (
-            cards,
+            "\n".join(f"- {line}" for line in figures),
             "## Thrust",
             Figure(
                 "thrust",

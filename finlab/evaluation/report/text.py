@@ -22,13 +22,11 @@ def _block(block: Block) -> str:
             )
         case Table():
             head = [column.heading for column in block.columns]
-            cells = [[block.in_one_cell(row, column) for column in block.columns] for row in block.rows]
+            cells = [[block.cell(row, column) for column in block.columns] for row in block.rows]
             lines = [[cell.replace("`", "") for cell in line] for line in cells]
             return aligned(head, lines, [not column.is_number for column in block.columns])
         case Figure():
             return ""
-        case tuple(cards):
-            return "\n".join(f"{card.label}: {card.value} ({card.detail})" for card in cards)
 
 
 def aligned(head: Sequence[str], rows: Sequence[Sequence[str]], words: Sequence[bool]) -> str:

@@ -15,7 +15,6 @@ from finlab.evaluation import method_specs
 from finlab.evaluation.experiment import Row, load_experiment
 from finlab.evaluation.experiments.latency import first_times
 from finlab.evaluation.experiments.temperature import diversity
-from finlab.evaluation.ipopt_reach import IpoptReach
 from finlab.evaluation.scoring import run_method
 from finlab.evaluation.splits import make_split
 from finlab.layout import Fin, Layout, Limits
@@ -23,7 +22,6 @@ from finlab.networks.normalization import Normalization
 from finlab.physics import Plant
 
 SIGMA = np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.35])
-ALL = np.ones(6, dtype=bool)
 
 
 def by(rows: list[Row], *keys: str) -> dict[Any, Row]:
@@ -94,56 +92,6 @@ def surge_robot(arc: tuple[float, float] = (-math.pi, math.pi)) -> tuple[Layout,
     layout = Layout("pair", tuple(fins))
     full = np.array([[*limits.upper[:2], 0.5 * sum(arc)]] * 2)
     return layout, float(np.linalg.norm(Plant(layout).fin_forces(full)[0]))
-
-
-def test_ipopt_knows_a_reach_by_hand() -> None:
-    pytest.importorskip("casadi")
-    layout, thrust = surge_robot()
-    reach = IpoptReach(layout, SIGMA)
-    wanted = np.array([4.0 * thrust, 0, 0, 0, 0, 0]) / SIGMA
-    assert reach.largest_share(wanted) == pytest.approx(0.5, abs=1e-5)
-    assert reach.least_error(wanted, ALL) == pytest.approx(2.0 * thrust / SIGMA[0], rel=1e-5)
-    assert reach.least_error(np.array([0, 5.0, 0, 0, 0, 0]), ALL) == pytest.approx(5.0, rel=1e-5)  # no sway
-
-
-def test_arcs_wider_than_half_a_turn_are_tried_in_halves() -> None:
-    pytest.importorskip("casadi")
-    layout, thrust = surge_robot((-math.radians(130), math.radians(130)))
-    reach = IpoptReach(layout, SIGMA)
-    back = np.array([-2.0 * thrust, 0, 0, 0, 0, 0]) / SIGMA
-    # Neither fin can point straight back; both at their stops, one up and one down, would roll the robot.
-    surge = np.array([True, False, False, False, False, False])
-    missing = 2.0 * thrust * (1.0 - math.cos(math.radians(50))) / SIGMA[0]
-    assert reach.least_error(back, surge) == pytest.approx(missing, rel=1e-4)
-
-
-def test_nobody_errs_less_than_possible_and_the_search_hardly_more() -> None:
-    pytest.importorskip("casadi")
-    experiment = load_experiment("unreachable")
-    rows = experiment.rows(layouts=3, targets=2, seed=11, methods=("search", "analytic"), factors=(1.0, 2.0))
-    found = by(rows, "factor", "method", "policy")
-    assert len(found) == 2 * (3 + 1) and all(row["n"] == 6 for row in rows)
-    least = [found[factor, "search", "closest"]["least_mean"] for factor in (1.0, 2.0)]
-    assert least[0] < 1e-3 < least[1]
-    assert all(row["excess_median"] > -1e-3 for row in rows)
-    ours = [row for row in rows if row["method"] == "search"]
-    assert all(row["excess_median"] > -1e-3 and row["excess_max"] < 0.01 for row in ours)
-    assert found[2.0, "analytic", "closest"]["excess_mean"] > 0.1  # it does not know what to give up
-    with pytest.raises(DataError, match="split: expected one whose fins follow the law drag"):
-        experiment.rows(split=("fins",), layouts=2, targets=1)
-
-
-def test_only_methods_that_know_the_previous_command_keep_to_the_servos() -> None:
-    rows = load_experiment("sequences").rows(
-        layouts=("D",), methods=("search", "qp"), paths=1, ticks=12, noise=0.3
-    )
-    found = by(rows, "method")
-    assert found["search"]["ticks"] == 12 and found["search"]["frequency_p99"] < 0.35
-    assert found["search"]["turn_p99"] < found["qp"]["turn_p99"] + math.pi
-    calm = load_experiment("sequences").rows(
-        layouts=("D",), methods=("search",), paths=1, ticks=12, noise=0.0
-    )
-    assert calm[0]["err_norm"] < 1e-3 and calm[0]["turn_mean"] < found["search"]["turn_mean"]
 
 
 def test_latency_compares_with_search() -> None:

@@ -30,7 +30,6 @@ pytest.importorskip("casadi")
 TINY: dict[str, dict[str, Any]] = {
     "wrench": {"split": ("id", "tables"), "methods": ("search", "qp"), "layouts": 2, "targets": 2},
     "cost": {"split": ("id",), "methods": ("search",), "layouts": 2, "targets": 1, "starts": 4},
-    "sequences": {"layouts": ("D",), "methods": ("search", "sqp"), "paths": 1, "ticks": 4},
     "latency": {"methods": ("search", "qp"), "calls": 2, "robots": 1},
     "ablation": {"variants": ("ours",), "layouts": 2, "targets": 1, "candidates": 4},
     "temperature": {"temperatures": (0.01, 1.0), "layouts": 2, "targets": 1, "candidates": 4},
@@ -81,7 +80,7 @@ def test_page_markdown_pictures_and_rows_say_the_same(folder: Path) -> None:
 def test_two_reports_of_one_seed_have_the_same_rows(folder: Path, tmp_path: Path) -> None:
     """In another order, and with parts in one run that were parts of another."""
     again = tmp_path / "again"
-    for names in (["temperature", "sequences"], ["cost"], ["all"]):
+    for names in (["temperature", "latency"], ["cost"], ["all"]):
         make_report(again, size="quick", seed=3, names=names, processes=0)
     first, second = (json.loads((out / TABLES).read_text("utf-8")) for out in (folder, again))
     assert without_times(first) == without_times(second)

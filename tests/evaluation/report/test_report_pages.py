@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from finlab.evaluation.report.document import Card, Column, Document, Figure, Table
+from finlab.evaluation.report.document import Column, Document, Figure, Table
 from finlab.evaluation.report.numbers import FORMATS
 from finlab.evaluation.report.pages import to_html, to_markdown
 from finlab.evaluation.report.text import to_text
@@ -12,7 +12,7 @@ from finlab.evaluation.report.text import to_text
 COLUMNS = (Column("name", "method"), Column("value", "error <", "error", "ends"))
 ROWS = [
     {"name": "`ours`", "value": 0.00029, "ends": [0.0002, 0.0004], "_kind": "ours"},
-    {"name": "theirs", "_kind": "printed"},
+    {"name": "theirs"},
 ]
 
 
@@ -32,7 +32,6 @@ DOCUMENT = Document(
     "A title & more",
     "One **line**.",
     (
-        (Card("1.8 ms", "a call", "others 90"),),
         "## First section",
         "See [the docs](docs/x.md), `code` and 1 < 2.",
         Table(COLUMNS, ROWS),
@@ -47,8 +46,7 @@ def test_html() -> None:
     assert "<title>A title &amp; more</title>" in page and "<strong>line</strong>" in page
     assert '<a href="#first-section">First section</a>' in page and '<h2 id="first-section">' in page
     assert '<a href="docs/x.md">the docs</a>, <code>code</code> and 1 &lt; 2.' in page
-    assert '<tr class="ours">' in page and "0.00029<small>0.00020 – 0.00040</small>" in page
-    assert '<tr class="printed"><td class="name">theirs</td><td></td></tr>' in page
+    assert "<strong><code>ours</code></strong>" in page and ">0.00029 (0.00020 – 0.00040)</td>" in page
     assert '<figure><svg><path id="dots"/></svg>' in page
     for outside in ("<?xml", "<script", "http://", "src=", "@import", "url("):
         assert outside not in page
@@ -58,7 +56,7 @@ def test_markdown() -> None:
     text = to_markdown(DOCUMENT, "pictures")
     assert text.startswith("# A title & more\n\nOne **line**.")
     assert "| method | error < |\n| --- | ---: |\n| **`ours`** | 0.00029 (0.00020 – 0.00040) |" in text
-    assert "![Some dots.](pictures/dots.svg)" in text and "- **1.8 ms** a call: others 90" in text
+    assert "![Some dots.](pictures/dots.svg)" in text
 
 
 def test_text_has_words_and_tables_but_draws_nothing() -> None:
@@ -68,7 +66,6 @@ def test_text_has_words_and_tables_but_draws_nothing() -> None:
     text = to_text(*DOCUMENT.blocks, Figure("dots", refuse, "Some dots."))
     assert "First section\n\nSee" in text and "\n- one\n- two" in text and "Some dots" not in text
     assert "method                      error <\nours    0.00029 (0.00020 – 0.00040)\ntheirs\n" in text
-    assert "a call: 1.8 ms (others 90)" in text
 
 
 @pytest.mark.parametrize(
