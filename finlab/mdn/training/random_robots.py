@@ -10,10 +10,9 @@ from finlab.forces.envelopes import Envelopes
 from finlab.forces.force_space import PlanarProblem, planar_problem
 from finlab.layout import Fin, Layout, Limits
 from finlab.layout.angles import wrapped
-from finlab.layout.arrays import force_columns, stack_layouts
+from finlab.layout.arrays import force_columns
 from finlab.layout.random import TRAINING_BOX
 from finlab.mdn.training.random_fins import RandomFin, random_fin, varied_limits
-from finlab.paper.training.sampling import find_reserved, shipped_reserved
 from finlab.physics.objective import Name, Objective
 
 FIN_COUNTS = dict(zip(range(2, 13), (1, 2, 8, 9, 9, 8, 8, 7, 7, 7, 7), strict=True))
@@ -68,8 +67,6 @@ def random_robot(
             for i, (place, turn, fin) in enumerate(zip(position, angle, fins, strict=True))
         ),
     )
-    if find_reserved(stack_layouts([layout]), shipped_reserved())[0]:
-        return random_robot(rng, pool, n, objective, scale)
     aim = Objective(objective)
     envelopes = Envelopes.of([fin.envelopes[objective] for fin in fins])
     return RandomRobot(layout, fins, planar_problem(layout, envelopes, scale, aim), aim, scale)

@@ -18,8 +18,7 @@ from finlab.paper.network import NetworkConfig
 from finlab.paper.surrogate import SurrogateConfig
 from finlab.paper.training import losses
 from finlab.paper.training.recipes import RECIPES, AllocatorTraining
-from finlab.paper.training.recorded import recorded_samples
-from finlab.paper.training.sampling import Batch, seeded_generator
+from finlab.paper.training.sampling import Batch, RecordedSamples, seeded_generator
 from finlab.paper.training.surrogate import TRAIN_SEED
 from finlab.physics import make_law
 from finlab.training.device import autocast_dtype, training_device
@@ -103,7 +102,7 @@ def make_terms(
     model = make_law(FinModelSpec.from_values(base.fin_model))
     fixed = {name: value.to(device) for name, value in tensors_of(base.surrogate).items()}
     surrogate = losses.Surrogate(SurrogateConfig.of(base), fixed)
-    samples = recorded_samples(model, training, TRAIN_SEED + seed, device)
+    samples = RecordedSamples(model, training, TRAIN_SEED + seed, device)
     mean, std = (torch.tensor(v, dtype=torch.float32, device=device) for v in base.normalization)
     # Only the network runs in reduced precision; statistics, losses and physics stay in float32.
     dtype = autocast_dtype(device.type)

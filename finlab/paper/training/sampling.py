@@ -1,27 +1,23 @@
-"""Forward sampling: random layouts, random commands within their limits, and the wrenches these cause.
+"""The paper's data set: random layouts, random commands within their limits, and the wrenches these cause.
 
-This is all the knowledge of physics that training needs: no inverse is ever solved for. It is fast
-enough to draw fresh samples for each step instead of reading them from a disk.
+This is all the knowledge of physics that training needs: no inverse is ever solved for.
 """
 
-import functools
-import math
-from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
 from finlab.arrays import AnyArray
-from finlab.assets import shipped_layouts
-from finlab.layout.angles import wrapped
-from finlab.layout.arrays import LayoutArrays, stack_layouts
-from finlab.layout.fin import FinModelSpec
-from finlab.layout.load import load_layout
-from finlab.layout.random import TRAINING_FINS, random_layouts
-from finlab.physics import FinLaw, assemble_wrench, make_law
+from finlab.errors import DataError
+from finlab.layout.arrays import LayoutArrays
+from finlab.layout.random import random_layouts
+from finlab.paper.training.recipes import SampledTraining
+from finlab.physics import FinLaw, assemble_wrench
+
+CHUNK = 200_000
+"""Samples that are drawn together, in double precision."""
 
 
 class Batch(NamedTuple):
@@ -46,48 +42,69 @@ class Batch(NamedTuple):
     """(B, 6) that the command causes [N, N m]."""
 
 
-@dataclass(frozen=True)
-class ForwardSampler:
-    """An endless stream of fresh training batches.
+def fresh_batch(law: FinLaw, size: int, seed: int, varied_limits: float = 0.5) -> Batch:
+    """Samples of one law, each on a layout of its own; such a share of them has limits of its own."""
+    rng = np.random.default_rng([seed, 0])
+    layouts = random_layouts(rng, size, limits=varied_limits)
+    command, wrench = _random_commands(rng, law, layouts, 1)
+    return Batch._make(map(_tensor, (*layouts, command[:, 0], wrench[:, 0])))
 
-    Batch k depends on (seed, k) alone, so a run that resumes at step k sees what it would have seen.
+
+class RecordedSamples:
+    """The data set of a training, and its batches.
+
+    It is drawn once and kept in the memory of the device that trains (the printed 5 million samples take half
+    a gigabyte), and walked through in a new order in each epoch. What it holds depends on the seed alone, the
+    order of its batches on seed and kind of device.
     """
 
-    seed: int
-    """Of all draws."""
-    batch_size: int
-    """Samples in each batch."""
-    n_fins: tuple[int, int] = TRAINING_FINS
-    """Least and most fins, uniform; arrays are padded to the most."""
-    fin_model: FinLaw = field(default_factory=lambda: make_law(FinModelSpec()))
-    """Law of all fins; `drag` by default."""
-    varied_limits: float = 0.5
-    """Share of layouts whose fins get limits of their own; the rest keep the nominal."""
+    def __init__(self, law: FinLaw, training: SampledTraining, seed: int, device: torch.device) -> None:
+        """Draw everything; a `DataError` where a batch holds more samples than there are."""
+        self.size, self.batch_size = training.layouts * training.commands, training.batch_size
+        if self.batch_size > self.size:
+            raise DataError(
+                f"batches of {self.batch_size} samples need at least as many, got {training.layouts} layouts "
+                f"x {training.commands} commands; draw more or take smaller batches"
+            )
+        self._seed, self._device, self._commands = seed, device, training.commands
+        rng = np.random.default_rng(seed)
+        robots = random_layouts(rng, training.layouts, limits=training.varied_limits)
+        # Columns of a sample: commands of all fins, then the wrench.
+        n = robots.mask.shape[1]
+        self._samples = torch.empty(self.size, 3 * n + 6, device=device)
+        together = max(1, CHUNK // self._commands)
+        for first in range(0, training.layouts, together):
+            some = LayoutArrays._make(part[first : first + together] for part in robots)
+            rows = slice(first * self._commands, (first + len(some.mask)) * self._commands)
+            command, wrench = _random_commands(rng, law, some, self._commands)
+            self._samples[rows, :-6] = _tensor(command.reshape(-1, 3 * n)).to(device)
+            self._samples[rows, -6:] = _tensor(wrench.reshape(-1, 6)).to(device)
+        self._robots = [_tensor(part).to(device) for part in robots]
+        self._epoch, self._order = -1, torch.empty(0)
 
     def batch(self, step: int) -> Batch:
-        """Returns batch number `step`."""
-        rng = np.random.default_rng([self.seed, step])
-        layouts = training_layouts(rng, self.batch_size, self.n_fins, self.varied_limits)
-        command, wrench = random_commands(rng, self.fin_model, layouts, 1)
-        arrays = (*layouts, command[:, 0], wrench[:, 0])
-        return Batch._make(to_tensor(part) for part in arrays)
+        """Batch number `step`; what does not fill a batch is left out of an epoch."""
+        epoch, place = divmod(step, self.size // self.batch_size)
+        if epoch != self._epoch:
+            generator = seeded_generator(self._seed, epoch, self._device)
+            self._order = torch.randperm(self.size, generator=generator, device=self._device)
+            self._epoch = epoch
+        chosen = self._order[place * self.batch_size : (place + 1) * self.batch_size]
+        sample = self._samples[chosen]
+        robots = [part[chosen // self._commands] for part in self._robots]
+        return Batch._make([*robots, sample[:, :-6].unflatten(-1, (-1, 3)), sample[:, -6:]])
 
 
-def training_layouts(
-    rng: np.random.Generator, n: int, n_fins: tuple[int, int] = TRAINING_FINS, varied_limits: float = 0.5
-) -> LayoutArrays:
-    """Returns n random layouts, none of them shipped; so large a share has limits of its own."""
-    layouts = random_layouts(rng, n, n_fins, limits=varied_limits)
-    # The first fin of any reserved layout moves to the body's other side, where it is uniform as well.
-    layouts.position[find_reserved(layouts, shipped_reserved()), 0] *= -1.0
-    return layouts
+def seeded_generator(seed: int, stream: int, device: torch.device) -> torch.Generator:
+    """A generator whose numbers depend on (seed, stream) alone, unrelated between streams."""
+    state = np.random.SeedSequence([seed, stream]).generate_state(1, np.uint64)[0]
+    return torch.Generator(device=device).manual_seed(int(state >> np.uint64(1)))
 
 
-def random_commands(
+def _random_commands(
     rng: np.random.Generator, law: FinLaw, layouts: LayoutArrays, n: int
 ) -> tuple[AnyArray, AnyArray]:
-    """Returns n commands (B, n, fins, 3) uniform within the limits of each layout, and their wrenches
-    (B, n, 6)."""
+    """Commands (B, n, fins, 3) uniform within the limits of each layout, and their wrenches (B, n, 6)."""
     lower, upper, mask = (part[:, None] for part in (layouts.lower, layouts.upper, layouts.mask))
     share = rng.random((len(mask), n, *lower.shape[2:]))
     command = (lower + share * (upper - lower)) * mask[..., None]
@@ -95,54 +112,6 @@ def random_commands(
     return command, assemble_wrench(law, command, *place)
 
 
-def seeded_generator(seed: int, stream: int, device: torch.device | str = "cpu") -> torch.Generator:
-    """Returns a generator whose numbers depend on (seed, stream) alone, unrelated between streams."""
-    state = np.random.SeedSequence([seed, stream]).generate_state(1, np.uint64)[0]
-    return torch.Generator(device=device).manual_seed(int(state >> np.uint64(1)))
-
-
-def to_tensor(values: AnyArray) -> Tensor:
+def _tensor(values: AnyArray) -> Tensor:
     """The same values in single precision; truth values as they are."""
     return torch.from_numpy(values if values.dtype == bool else values.astype(np.float32))
-
-
-POSITION_TOLERANCE = 2e-3
-"""Fins closer than this count as the same place [m]."""
-ANGLE_TOLERANCE = math.radians(1.0)
-"""Shafts closer than this count as the same direction [rad]."""
-
-
-@functools.cache
-def shipped_reserved() -> LayoutArrays:
-    """Returns the layouts shipped with finlab, read once."""
-    return stack_layouts([load_layout(path) for path in shipped_layouts().values()])
-
-
-def find_reserved(layouts: LayoutArrays, reserved: LayoutArrays) -> NDArray[np.bool_]:
-    """Returns which layouts of a batch (B,) are reserved, fins in any order.
-
-    A layout is one of the reserved ones when it has as many fins, each of its fins lies at one of
-    theirs, and each of theirs at one of its own.
-    """
-    # Such a layout is all but impossible to draw. Only where the first fin lies at a reserved one is it
-    # compared in full.
-    places = reserved.position[reserved.mask]
-    away = np.abs(layouts.position[:, :1] - places)
-    found = np.asarray((away <= POSITION_TOLERANCE).all(-1).any(-1))
-    suspects = LayoutArrays._make(part[found] for part in layouts)
-    found[found] = _same(suspects, reserved)
-    return found
-
-
-def _same(layouts: LayoutArrays, reserved: LayoutArrays) -> NDArray[np.bool_]:
-    """`find_reserved`, by looking at each pair of fins."""
-    # Axes: layouts of the batch, reserved layouts, fins of the first, fins of the second.
-    place, angle = (part[:, None, :, None] for part in (layouts.position, layouts.mounting_angle))
-    here = layouts.mask[:, None, :, None]
-    away = np.linalg.norm(place - reserved.position[:, None], axis=-1)
-    turn = np.abs(wrapped(angle - reserved.mounting_angle[:, None]))
-    near = (away <= POSITION_TOLERANCE) & (turn <= ANGLE_TOLERANCE) & here & reserved.mask[:, None]
-    every_own = (near.any(axis=3) | ~here[..., 0]).all(axis=2)
-    every_theirs = (near.any(axis=2) | ~reserved.mask).all(axis=2)
-    as_many = here.sum(axis=(2, 3)) == reserved.mask.sum(axis=1)
-    return np.asarray((as_many & every_own & every_theirs).any(axis=1))

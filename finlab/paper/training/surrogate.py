@@ -12,8 +12,7 @@ from finlab.networks.normalization import Normalization
 from finlab.networks.trained import TrainedWeights
 from finlab.paper.surrogate import SurrogateConfig
 from finlab.paper.training.recipes import RECIPES, SampledTraining
-from finlab.paper.training.recorded import recorded_samples
-from finlab.paper.training.sampling import Batch, ForwardSampler
+from finlab.paper.training.sampling import Batch, RecordedSamples, fresh_batch
 from finlab.physics import FinLaw, make_law
 from finlab.training.device import training_device
 from finlab.training.first_weights import first_weights
@@ -83,8 +82,8 @@ def first_surrogate(config: SurrogateConfig, seed: int) -> Tensors:
 
 def measure_normalization(model: FinLaw, seed: int) -> Normalization:
     """Wrench statistics over layouts of 2-5 fins with nominal limits."""
-    sampler = ForwardSampler(TRAIN_SEED + seed, NORMALIZATION_SAMPLES, fin_model=model, varied_limits=0.0)
-    return Normalization.of(sampler.batch(0).wrench.numpy())
+    batch = fresh_batch(model, NORMALIZATION_SAMPLES, TRAIN_SEED + seed, varied_limits=0.0)
+    return Normalization.of(batch.wrench.numpy())
 
 
 def surrogate_metrics(
@@ -92,7 +91,7 @@ def surrogate_metrics(
 ) -> dict[str, float]:
     """Mean normalized error of the wrench by the fin model, on fresh samples, half of them with varied
     limits."""
-    batch = ForwardSampler(TRAIN_SEED + 7_000 + seed, 50_000, fin_model=model).batch(0)
+    batch = fresh_batch(model, 50_000, TRAIN_SEED + 7_000 + seed)
     std = torch.tensor(measure_normalization(model, seed).std)
     with torch.inference_mode():
         error = ((_wrench(config, weights, batch) - batch.wrench) / std).norm(dim=-1)
@@ -108,7 +107,7 @@ def _wrench_terms(
     device: torch.device,
 ) -> Terms:
     """The paper's L_phys: squared error of the normalized wrench of whole robots."""
-    samples = recorded_samples(model, training, TRAIN_SEED + seed, device)
+    samples = RecordedSamples(model, training, TRAIN_SEED + seed, device)
     std = torch.tensor(normalization.std, dtype=torch.float32, device=device)
 
     def terms(w: Tensors, step: int) -> dict[str, Tensor]:

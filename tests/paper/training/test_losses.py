@@ -10,12 +10,12 @@ from finlab.layout import FinModelSpec
 from finlab.networks.normalization import to_normalized
 from finlab.paper.network import Mixture
 from finlab.paper.training import losses
-from finlab.paper.training.sampling import Batch, ForwardSampler
+from finlab.paper.training.sampling import Batch, fresh_batch
 from finlab.physics import assemble_wrench, make_law
 
 DRAG = make_law(FinModelSpec())
 
-B, N, M = 6, 4, 3
+B, N, M = 6, 5, 3
 STD = torch.tensor([1.4, 1.4, 2.0, 0.35, 0.35, 0.34])
 DRAW = torch.Generator().manual_seed(0)
 NOISE = torch.rand((B, N, 1), generator=DRAW), torch.randn((B, N, 1, 3), generator=DRAW)
@@ -33,7 +33,7 @@ physics = Physics()
 
 @pytest.fixture
 def batch() -> Batch:
-    return ForwardSampler(seed=1, batch_size=B, n_fins=(2, N)).batch(0)
+    return fresh_batch(DRAG, B, seed=1)
 
 
 def make_mixture(batch: Batch, exact: int | None = None) -> Mixture:

@@ -6,15 +6,16 @@ import torch
 
 from finlab.errors import DataError
 from finlab.layout import FinModelSpec
-from finlab.paper.training.recorded import RecordedSamples
-from finlab.paper.training.sampling import Batch
+from finlab.paper.training.recipes import SampledTraining
+from finlab.paper.training.sampling import Batch, RecordedSamples
 from finlab.physics import assemble_wrench, make_law
 
 DRAG = make_law(FinModelSpec())
 
 
 def samples(seed: int = 3, batch_size: int = 12, layouts: int = 8, commands: int = 6) -> RecordedSamples:
-    return RecordedSamples(seed, DRAG, layouts, commands, 0.5, batch_size)
+    training = SampledTraining(1, batch_size, 1e-3, layouts=layouts, commands=commands)
+    return RecordedSamples(DRAG, training, seed, torch.device("cpu"))
 
 
 def whole_epoch(data: RecordedSamples, epoch: int = 0) -> Batch:
@@ -57,15 +58,9 @@ def test_batches_depend_on_seed_and_number_alone() -> None:
     assert not torch.equal(samples(seed=4).batch(9).wrench, wanted.wrench)
 
 
-def test_processes_share_a_batch() -> None:
-    data = samples()
-    parts = [data.batch(5, rows).wrench for rows in (slice(0, 5), slice(5, 12))]
-    assert torch.equal(torch.cat(parts), data.batch(5).wrench)
-
-
 def test_layouts_do_not_depend_on_how_many_are_drawn_together(monkeypatch: pytest.MonkeyPatch) -> None:
     expected = samples().batch(0)
-    monkeypatch.setattr("finlab.paper.training.recorded.CHUNK", 12)
+    monkeypatch.setattr("finlab.paper.training.sampling.CHUNK", 12)
     got = samples().batch(0)
     torch.testing.assert_close(got.position, expected.position)
     assert got.command.shape == expected.command.shape

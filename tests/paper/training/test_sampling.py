@@ -8,27 +8,15 @@ import torch
 
 from finlab.layout import FinModelSpec, LayoutArrays, Limits, layout_from_arrays
 from finlab.layout.random import TRAINING_BOX
-from finlab.paper.training.sampling import ForwardSampler
+from finlab.paper.training.sampling import fresh_batch
 from finlab.physics import Plant, make_law
 
-BATCH = ForwardSampler(seed=1, batch_size=20_000).batch(0)
+DRAG = make_law(FinModelSpec())
+BATCH = fresh_batch(DRAG, 20_000, seed=1)
 
 
 def layouts_of(batch):
     return LayoutArrays(*(part.numpy() for part in batch[:5]))
-
-
-def test_a_batch_depends_on_seed_and_step_alone():
-    one, other = ForwardSampler(5, 64), ForwardSampler(5, 64)
-    wanted = one.batch(17)
-    other.batch(3)
-    for a, b in zip(wanted, other.batch(17), strict=True):
-        assert torch.equal(a, b)
-    assert not torch.equal(wanted.command, one.batch(18).command)
-    assert not torch.equal(wanted.command, ForwardSampler(6, 64).batch(17).command)
-    # Neither sum nor difference of seed and step may make two streams meet.
-    assert not torch.equal(wanted.command, ForwardSampler(17, 64).batch(5).command)
-    assert not torch.equal(wanted.command, ForwardSampler(6, 64).batch(16).command)
 
 
 def test_shapes_and_types():
@@ -69,7 +57,7 @@ def test_commands_fill_their_limits_and_never_leave_them():
 def test_half_of_the_layouts_have_limits_of_their_own():
     nominal = (BATCH.upper == torch.tensor(Limits().upper)).all(-1).all(-1)
     assert nominal.float().mean().item() == pytest.approx(0.5, abs=0.02)
-    never = ForwardSampler(0, 500, varied_limits=0.0).batch(0)
+    never = fresh_batch(DRAG, 500, seed=0, varied_limits=0.0)
     assert (never.upper == torch.tensor(Limits().upper)).all()
 
 
@@ -81,7 +69,6 @@ def test_the_plant_confirms_the_wrenches():
         np.testing.assert_allclose(Plant(layout).wrench(command), BATCH.wrench[row], rtol=1e-4, atol=1e-4)
 
 
-def test_another_fin_model_and_another_range_of_fins():
-    batch = ForwardSampler(0, 100, n_fins=(6, 8), fin_model=make_law(FinModelSpec("lighthill"))).batch(0)
-    assert batch.mask.shape == (100, 8) and batch.mask.sum(1).min() >= 6
-    assert not torch.equal(batch.wrench, ForwardSampler(0, 100, n_fins=(6, 8)).batch(0).wrench)
+def test_another_fin_model():
+    batch = fresh_batch(make_law(FinModelSpec("lighthill")), 100, seed=0)
+    assert not torch.equal(batch.wrench, fresh_batch(DRAG, 100, seed=0).wrench)
