@@ -79,6 +79,7 @@ def test_it_learns_and_goes_on_where_it_stopped(tmp_path: Path, monkeypatch: pyt
     monkeypatch.setattr("finlab.training.loop.LOG_EVERY", 20)
     # All answers are there from the beginning, so that what is learned does not depend on the machine's load.
     scale = read_normalization(resolve_checkpoint("paper")).std
+    (tmp_path / "answers").mkdir()
     write_answers(tmp_path / "answers", SMOKE.answers, scale, 0)
     stopped = train_mdn("smoke", tmp_path, stop_after=10)
     assert stopped.training["mdn"]["steps_done"] == 10
