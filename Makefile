@@ -58,7 +58,7 @@ figures: setup
 	$(THREADS) $(BIN)/python tools/figures.py $(PAGE)
 
 schemas: setup
-	$(BIN)/python -m finlab.layout.json_schema
+	$(BIN)/python tools/schemas.py
 
 format: setup
 	$(BIN)/ruff check --fix .

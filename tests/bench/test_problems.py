@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from finlab.bench import problems as module
-from finlab.bench.generate import SEED, make_problems
 from finlab.bench.problems import FILE, KINDS, Problems, open_problems, save_problems
 from finlab.errors import DataError
 from finlab.physics import plant_of
 from tests.ipopt_reach import IpoptReach
+from tools.bench_problems import SEED, make_problems
 
 BEYOND = KINDS.index("beyond-1.2")
 

@@ -8,8 +8,8 @@ import pytest
 import yaml
 
 from finlab.assets import shipped_layouts
-from finlab.layout.json_schema import PACKAGE, schemas
 from tests.layout.test_file import BAD, GOOD
+from tools.schemas import PACKAGE, schemas
 
 VALIDATOR = jsonschema.Draft202012Validator(json.loads((PACKAGE / "layout/layout.schema.json").read_text()))
 BEYOND_A_SCHEMA = (

@@ -1,4 +1,5 @@
-"""Makes the file of problems: `python -m finlab.bench.generate problems.npz` (some minutes).
+#!/usr/bin/env python3
+"""Makes the file of problems: `tools/bench_problems.py problems.npz` (some minutes).
 
 Needs CasADi (extra `ipopt`) for the best costs that are known; running the benchmark does not.
 """
@@ -14,12 +15,14 @@ from finlab.allocation.search.search_allocator import SearchAllocator
 from finlab.arrays import AnyArray, Array
 from finlab.assets import PAPER_LAYOUTS
 from finlab.bench.problems import KINDS, Problems, Robot, Sequences, Targets, save_problems
-from finlab.bench.questions import ASKED, path, targets
 from finlab.evaluation.cheapest_commands import CheapestCommands, has_formulas
 from finlab.evaluation.progress import progress
+from finlab.evaluation.smooth_paths import smooth_path
 from finlab.evaluation.splits import make_split, own_sigma
-from finlab.forces.fin_sets import planar_sets
-from finlab.layout import Layout, load_layout
+from finlab.forces.envelopes import largest_forces
+from finlab.forces.fin_sets import FinSets, planar_sets
+from finlab.forces.out_of_reach import nearest_along
+from finlab.layout import Layout, layout_effectiveness, load_layout
 from finlab.layout.file import layout_to_dict
 from finlab.networks.normalization import Normalization
 from finlab.physics import plant_of, read_table
@@ -40,8 +43,16 @@ STARTS = 32
 """Random starts of IPOPT for each target and objective; twice as many of SLSQP where fins are tables."""
 WALKED = ("A", "C", "hexa", "ood-fins", "limits", "fins-mixed", "big", "tiny")
 """Layouts, or sets whose first robot is meant, that follow paths."""
-DOMAIN = 0xBE9E
-"""Leads the seed of sigma."""
+ASKED = np.repeat(np.arange(len(KINDS)), (6, 2, 1, 1, 1))
+"""Kind of each target of a robot."""
+FAR = 1e3
+"""How many times a robot's usual wrench lies beyond its reach for certain."""
+TICKS = 60
+"""Wrenches of a path, ten in a second."""
+NOISE = 0.02
+"""Standard deviation of the noise on each fin's force along a path, as a share of the fin's largest force."""
+DOMAIN, SIGMA_DOMAIN = 0xBE9D, 0xBE9E
+"""Lead the seeds of every draw, and of sigma."""
 
 
 def robots(seed: int, per_split: int) -> Iterator[tuple[str, Layout]]:
@@ -51,6 +62,38 @@ def robots(seed: int, per_split: int) -> Iterator[tuple[str, Layout]]:
         yield from ((group, replace(load_layout(name), body=None, description="")) for name in names)
     for split in DRAWN:
         yield from ((split, case.healthy) for case in make_split(split, per_split, 1, seed))
+
+
+def targets(layout: Layout, sets: FinSets, sigma: Array, seed: tuple[int, ...]) -> Array:
+    """Wrenches (N, 6) [N, N m] of the kinds `ASKED`, of single precision.
+
+    Args:
+        layout: the robot.
+        sets: what its fins can push, in wrenches over sigma.
+        sigma: what errors are divided by (6,).
+        seed: of the draws.
+    """
+    rng, plant = np.random.default_rng((DOMAIN, 0, *seed)), plant_of(layout)
+    wrenches = plant.wrench(plant.sample(rng, (len(ASKED),)))
+    for row in np.flatnonzero(ASKED):
+        farthest = nearest_along(sets, FAR * wrenches[row] / sigma).wrench[0] * sigma
+        wrenches[row] = farthest * float(KINDS[ASKED[row]].partition("beyond-")[2] or 1.0)
+    return single(wrenches)
+
+
+def path(layout: Layout, sigma: Array, seed: int, noisy: bool) -> Array:
+    """A path (T, 6) [N, N m] that the robot can follow; with noise, the same one with noise on its forces."""
+    smooth = smooth_path(layout, sigma, seed, TICKS)
+    if not noisy:
+        return single(smooth)
+    size = NOISE * np.repeat(largest_forces(layout), 2)
+    draws = np.random.default_rng((DOMAIN, 1, seed)).standard_normal((TICKS, len(size)))
+    return single(smooth + (draws * size) @ layout_effectiveness(layout).T)
+
+
+def single(values: Array) -> Array:
+    """Values that the file, which holds wrenches with single precision, does not change."""
+    return values.astype(np.float32).astype(np.float64)
 
 
 class BestKnown:
@@ -118,7 +161,7 @@ def _robot(name: str, layout: Layout, forces: dict[str, AnyArray], seed: int, in
             fin["model"] = {"type": "table", "path": file}
     robot = Robot(name, description, (1.0,) * 6, tables)
     alone = Problems({}, (robot,), _columns(Targets, []), _columns(Sequences, []), forces)
-    rng = np.random.default_rng((DOMAIN, seed, index))
+    rng = np.random.default_rng((SIGMA_DOMAIN, seed, index))
     return replace(robot, sigma=tuple(own_sigma(plant_of(alone.layout(0)), rng).tolist()))
 
 

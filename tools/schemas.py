@@ -1,3 +1,4 @@
+#!/usr/bin/env python3
 """The published JSON Schemas, made of the types that files are read with: `make schemas` writes them."""
 
 import json
@@ -8,7 +9,7 @@ import msgspec
 from finlab.layout.file import LAYOUT
 from finlab.layout.graph_form import Graph
 
-PACKAGE = Path(__file__).parents[1]
+PACKAGE = Path(__file__).parents[1] / "finlab"
 
 
 def schemas() -> dict[Path, str]:
