@@ -12,11 +12,8 @@ from webapp.session.lessons import LESSONS
 from webapp.session.looking import TASKS
 from webapp.session.state import AXIS_WORDS, OBJECTIVES
 from webapp.session.targets import PRESETS
-from webapp.viser_internals import run_script
 
 CTRL, CTRL_SHIFT, ALT = "cmd/ctrl", "cmd/ctrl+shift", "alt"
-WRITTEN = {CTRL: "Ctrl+", CTRL_SHIFT: "Ctrl+Shift+", ALT: "Alt+", "delete": "Del", "escape": "Esc"}
-"""How keys are written for people."""
 
 
 class Command(NamedTuple):
@@ -32,11 +29,6 @@ class Command(NamedTuple):
     """As viser calls it; none where it is done from the list alone."""
     modifier: str = ""
     """What is held with it."""
-
-    @property
-    def keys(self) -> str:
-        """The keys for people."""
-        return WRITTEN.get(self.modifier, "") + WRITTEN.get(self.key, self.key) if self.key else ""
 
 
 def commands(page: Page) -> list[Command]:
@@ -57,9 +49,6 @@ def commands(page: Page) -> list[Command]:
 
     def swim_on() -> None:
         page.swimming.set_running(not page.swimming.running)
-
-    def keys() -> None:
-        run_script(page.client.gui, "finlabFrame.sheet();")
 
     return [
         *(
@@ -99,7 +88,6 @@ def commands(page: Page) -> list[Command]:
         Command("Wrench", "Compare the methods", compare),
         Command("Wrench", "Stop the sweep", page.sweep.stop),
         Command("Swim", "Swim: pause or go on", swim_on, "B"),
-        Command("Swim", "Swim: keep it to compare others with", page.swimming.keep),
         Command("Swim", "Swim: back to the design", page.scenery.end_swim),
         Command("View", "Frame what is selected", robot.frame, "F"),
         *(
@@ -114,7 +102,6 @@ def commands(page: Page) -> list[Command]:
             Command("Help", f"Lesson: {lesson.title}", partial(session.open_lesson, lesson.name))
             for lesson in LESSONS
         ),
-        Command("Help", "Show all keys", keys),
         Command("Files", "Export the bundle for the robot", page.exports.bundle),
     ]
 

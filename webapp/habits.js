@@ -1,5 +1,5 @@
 // What the page of viser does otherwise: with Ctrl the camera stays where it is, keys have their usual second names,
-// buttons have hints, the drawer is dragged taller, and the first card and the sheet of keys come and go.
+// buttons have hints, the drawer is dragged taller, and the first card comes and goes.
 (() => {
   if (window.finlabFrame) return;
   const page = document.documentElement;
@@ -11,9 +11,7 @@
   function keep(name, value) { try { localStorage.setItem(name, value); } catch { /* a browser that forbids it */ } }
 
   window.finlabFrame = {
-    sheet(open = !page.classList.contains('fl-keys')) { page.classList.toggle('fl-keys', open); },
     met() { page.classList.remove('fl-first'); keep(MET, '1'); },
-    pane(name) { page.dataset.pane = name; },
   };
   if (!kept(MET)) page.classList.add('fl-first');
   if (/^\d+px$/.test(kept(TALL) ?? '')) page.style.setProperty('--fl-drawer', kept(TALL));
@@ -21,11 +19,7 @@
   window.addEventListener('keydown', (event) => {
     const held = event.ctrlKey || event.metaKey;
     if (typing(event.target)) return;
-    if (event.key === '?') { window.finlabFrame.sheet(); event.stopImmediatePropagation(); }
-    else if (event.key === 'Escape' && page.classList.contains('fl-keys')) {
-      window.finlabFrame.sheet(false);
-      event.stopImmediatePropagation();
-    } else if (held && !event.shiftKey && event.key.toLowerCase() === 'y') {
+    if (held && !event.shiftKey && event.key.toLowerCase() === 'y') {
       event.preventDefault();
       event.stopImmediatePropagation();
       page.dispatchEvent(new KeyboardEvent('keydown', { key: 'z', code: 'KeyZ', ctrlKey: true, shiftKey: true, bubbles: true }));

@@ -72,9 +72,7 @@ class Page(ABC):
     ) -> None:
         """Build the page and ask for a first answer; `loop` is viser's, on `workers` all is computed."""
         self.client = client
-        """The browser."""
         self.session = session
-        """What it shows."""
         self._loop = page = EventLoop(loop, self.fault)
         self._robot = _robot(session)
         self._faults: set[str] = set()
@@ -82,40 +80,26 @@ class Page(ABC):
         self._note: viser.NotificationHandle | None = None
         changed = self._refresh
         self.reading = Reading(workers.readers, page, self.do)
-        """What is read and made beside the event loop."""
         context = Context(client, session, solver, workers, page, self.reading, self.do, changed, self.notify)
         self.answering = Answering(context)
-        """The newest answer, its modes and what of it is on the robot."""
         self.ranging = Newest(page, workers.marks, find_ranges, changed, REST_S)
-        """How far each component of the target can go."""
         self.analyst = Newest(page, workers.cards, find, changed, CARD_REST_S)
-        """What the layout can do."""
         self.improver = Improver(context)
-        """The search for a better layout."""
         self.fitting = Fitting(context)
-        """Measurements that become a fin."""
         self.comparison = Comparison(context)
-        """Other methods on the same question."""
         self.swimming = Swimming(context, self._swam)
-        """A robot that swims."""
         self.swim_files = SwimFiles(context, self.swimming, self._swam)
         """What can be downloaded of that."""
         self.sweep = Sweep(context)
-        """A component of the target on its way through a range."""
         self.exports = Exports(context)
         """Files to download."""
         self.scenery = Scenery(context, self.swimming)
-        """What is seen beside the panel."""
         self.bound: list[Callable[[], None]] = []
         """Each writes what the session holds into a widget; the panel that is being built takes them."""
         self.fields = NumberFields(client.gui, self.fault)
-        """The boxes for numbers."""
         self.editables = Editables(client.gui, self.attempt, self.do)
-        """Names and cells that are edited where they stand."""
         self.designs = Designs(context, self.exports, self.editables)
-        """Designs as a whole."""
         self.opening = Opening(client.gui, self.editables, self.do, self.designs.open_together)
-        """Files of any kind."""
         self._uploads = Uploads(client.gui, MAX_UPLOAD, partial(self.notify, "Not possible"))
         self._panels: list[Panel] = []
         self._panels, self._swim_panels = self._build()

@@ -22,8 +22,6 @@ MISSING = VERMILLION
 """What is left undone, and every warning."""
 OTHER: Rgb = (170, 68, 153)
 """The second of two robots that swim the same way."""
-KEPT: Rgb = (214, 131, 0)
-"""A swim that was kept to compare others with."""
 WATER = SKY
 """How the water flows."""
 NEARLY: Rgb = (150, 112, 0)

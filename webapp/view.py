@@ -1,7 +1,7 @@
 """One browser's page with everything on it: the frame with its panels, and commands by key or from a list."""
 
 from webapp.commands import commands, register
-from webapp.markup.first_sight import drop_card, key_sheet, welcome
+from webapp.markup.first_sight import drop_card, welcome
 from webapp.page import Page, Panel
 from webapp.panels.frame import Frame
 
@@ -13,7 +13,5 @@ class View(Page):
         gui = self.client.gui
         gui.main_panel.dock_right()
         gui.set_panel_label("finlab")
-        table = commands(self)
-        register(gui, self, table)
-        sheet = key_sheet([(command.group, command.label, command.keys) for command in table])
-        return Frame(gui, self, sheet + welcome() + drop_card()).panels
+        register(gui, self, commands(self))
+        return Frame(gui, self, welcome() + drop_card()).panels

@@ -1,4 +1,4 @@
-"""Swims that are looked at again, put aside, compared and downloaded."""
+"""Swims that are looked at again and downloaded."""
 
 import io
 import zipfile
@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from finlab.errors import FinlabError
-from finlab.layout import Layout, load_layout
+from finlab.layout import load_layout
 from finlab.sim import make_trajectory
 from tests.webapp.loops import page_of
 from tests.webapp.test_swimming import until
 from webapp.markup.corner import swim_corner
-from webapp.markup.swim_card import robots, swim_card
+from webapp.markup.swim_card import swim_card
 from webapp.panels.line_plot import with_cursor
 from webapp.session.swim_plan import Plan, SwimSettings
 from webapp.tasks.background import Worker
@@ -36,8 +36,8 @@ class Shelf:
         self.swimming = Swimming(context, lambda: None)
         self.files = SwimFiles(context, self.swimming, lambda: None)
 
-    def swim(self, seconds: float, *methods: str, scenario: str = "nominal", layout: Layout = UCAT) -> None:
-        plan = Plan(layout, (), make_trajectory("circle"), methods, scenario=scenario)
+    def swim(self, seconds: float, *methods: str) -> None:
+        plan = Plan(UCAT, (), make_trajectory("circle"), methods)
         self.swimming.start(plan)
         until(lambda: bool(self.swimming.swimmers))
         self.swimming.set_running(False)
@@ -117,45 +117,6 @@ def test_watts_and_what_a_pack_lasts(shelf: Shelf) -> None:
     assert "<td>25.0 h</td><td>–</td>" in swim_card(shelf.swimming, SwimSettings(pack_wh=50.0))
 
 
-def test_a_swim_is_put_aside_and_stays_as_it_was(shelf: Shelf) -> None:
-    swimming = shelf.swimming
-    with pytest.raises(FinlabError, match="nothing has been swum"):
-        swimming.keep()
-    shelf.swim(4.0, "analytic", scenario="first")
-    swimming.keep()
-    kept = swimming.kept
-    assert kept is not None and kept.log.n_ticks == 40
-    swimming.swimmers[0].step()
-    assert swimming.kept is kept and kept.log.n_ticks == 40
-    shelf.swim(2.0, "qp", scenario="second")
-    assert swimming.kept is kept
-    card, corner = swim_card(swimming, SwimSettings()), swim_corner(swimming, 1.0)
-    assert "kept: analytic" in card and "qp" in card
-    assert "kept: analytic, first, tracking" in corner and "qp, second, tracking" in corner
-    at_two = kept.moment(2.0)
-    assert f"{100 * at_two.figures.track_m:.1f} cm" in card, "both up to the same time"  # type: ignore[union-attr]
-    assert kept.moment(99.0).time == pytest.approx(3.9)
-    assert [record.method for record in swimming.records()] == ["qp", "analytic"]
-    swimming.forget_kept()
-    assert "kept" not in swim_card(swimming, SwimSettings())
-
-
-def test_another_robot_can_be_compared_with(shelf: Shelf) -> None:
-    shelf.swim(2.0, "analytic")
-    shelf.swimming.keep()
-    shelf.swim(3.0, "analytic", layout=load_layout("hexa"))
-    moments = [moment for _, moment, _, _ in robots(shelf.swimming)]
-    assert [len(moment.angle) for moment in moments] == [6, 4]
-    assert moments[1].time == pytest.approx(1.9), "it has swum no further"
-    shelf.files.table()
-    until(lambda: bool(shelf.sent))
-    (content,) = shelf.sent.values()
-    archive = zipfile.ZipFile(io.BytesIO(content))
-    headers = [archive.read(name).decode().splitlines()[0] for name in archive.namelist()]
-    assert archive.namelist()[1] == "ucat_analytic_nominal_tracking_2.csv"
-    assert [header.count(".A [rad]") for header in headers] == [6, 4]
-
-
 def test_the_cursor_of_a_plot_stands_upright() -> None:
     x, line = np.array([0.0, 1.0, 2.0]), np.array([0.0, 10.0, 20.0])
     shown, (upright, drawn) = with_cursor(x, [line], 1.5, (-1.0, 9.0))
@@ -177,15 +138,10 @@ def test_the_log_is_sent_as_a_table(shelf: Shelf) -> None:
 
 def test_several_robots_are_sent_as_an_archive(shelf: Shelf) -> None:
     shelf.swim(1.0, "analytic", "qp")
-    shelf.swimming.keep()
     shelf.files.table()
     until(lambda: bool(shelf.sent))
     names = zipfile.ZipFile(io.BytesIO(shelf.sent["ucat_analytic_nominal_tracking_csv.zip"])).namelist()
-    assert names == [
-        "ucat_analytic_nominal_tracking.csv",
-        "ucat_qp_nominal_tracking.csv",
-        "ucat_analytic_nominal_tracking_3.csv",
-    ]
+    assert names == ["ucat_analytic_nominal_tracking.csv", "ucat_qp_nominal_tracking.csv"]
 
 
 def test_pictures_are_made_beside_the_page(shelf: Shelf) -> None:

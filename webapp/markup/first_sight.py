@@ -1,7 +1,5 @@
-"""What lies over the page for a while: the card of the first visit, the sheet of all keys, and what is said
-while files are dragged over it."""
-
-from collections.abc import Sequence
+"""What lies over the page for a while: the card of the first visit, and what is said while files are dragged
+over it."""
 
 from markupsafe import Markup
 
@@ -49,24 +47,4 @@ def drop_card() -> str:
     rows = Markup().join(html("<li><b>{}</b> {}<span>{}</span></li>", a, c, b) for a, b, c in kinds)
     return html(
         "<div class='fl fl-drop' aria-hidden='true'><div><h2>Drop to open</h2><ul>{}</ul></div></div>", rows
-    )
-
-
-def key_sheet(rows: Sequence[tuple[str, str, str]]) -> str:
-    """The sheet of keys, from groups, labels and keys; rows without a key are left out."""
-    groups: dict[str, list[str]] = {}
-    camera = [("View", "Move the camera", "W A S D Q E")]
-    about = [("Help", "All commands", "Ctrl+K"), ("Help", "This sheet", "?")]
-    for group, label, keys in (*rows, *camera, *about):
-        if keys:
-            keys = "Ctrl+Y" if label == "Redo" else keys
-            groups.setdefault(group, []).append(html("<dt><kbd>{}</kbd></dt><dd>{}</dd>", keys, label))
-    lists = Markup().join(
-        html("<div><h3>{}</h3><dl>{}</dl></div>", group, found) for group, found in groups.items()
-    )
-    return html(
-        "<div class='fl fl-sheet' role='dialog' aria-label='Keys' "
-        "onclick='finlabFrame.sheet(false)'><div class='sheet'><h2>Keys</h2><div "
-        "class='groups'>{}</div></div></div>",
-        lists,
     )

@@ -8,10 +8,9 @@ from webapp.markup.html import html
 from webapp.markup.words import fins_words, three_digits, unlearned_sentence
 from webapp.session.swim_plan import SwimSettings
 from webapp.tasks.moment import Figures, Moment
-from webapp.tasks.recorded import Recorded
 from webapp.tasks.swimmer import Swimmer
 from webapp.tasks.swimming import Swimming
-from webapp.theme import DELIVERED, KEPT, OTHER, Rgb, css
+from webapp.theme import DELIVERED, OTHER, Rgb, css
 
 SLOWEST = 0.01
 """Mean speed over ground [m/s] below which a robot keeps a place, and its range means nothing."""
@@ -54,13 +53,10 @@ def findings_words(shown: Moment) -> list[str]:
     return sentences
 
 
-def robots(swimming: Swimming) -> Iterator[tuple[Swimmer | Recorded, Moment, Rgb, str]]:
+def robots(swimming: Swimming) -> Iterator[tuple[Swimmer, Moment, Rgb, str]]:
     """Everyone on the page: the robot, its moment, its colour and its name in words."""
     for swimmer, moment, color in zip(swimming.swimmers, swimming.seen, (DELIVERED, OTHER), strict=False):
         yield swimmer, moment, color, swimmer.method
-    if swimming.kept is not None and swimming.swimmers:
-        kept = swimming.kept
-        yield kept, kept.moment(swimming.seen_time), KEPT, f"kept: {kept.method}"
 
 
 def swim_card(swimming: Swimming, settings: SwimSettings) -> str:

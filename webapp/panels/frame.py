@@ -44,26 +44,17 @@ def _sheet(name: str) -> Markup:
 NARROW = _sheet("narrow.css")
 _MEDIA = html("@media (max-width: 1099px) {{ {} }}", NARROW)
 STYLE = html(
-    "<style>{}{}{}{}{}</style>",
+    "<style>{}{}{}{}</style>",
     _VARIABLES,
     _sheet("style.css"),
     _sheet("frame.css"),
     _MEDIA,
-    _sheet("single.css"),
 )
 """A style element, to be put into the page once."""
 _SMALL = ("(max-width: 1340px)", "(max-height: 780px)")
 _SMALL_VIEW = ", ".join(f"(min-width: 720px) and {side}" for side in _SMALL)
 COMPACT = html("@media {} {{ :root {{ {} }} }}", _SMALL_VIEW, _sheet("compact.css"))
 """Rules of a page with a small view."""
-PANES = html(
-    "<nav class='fl-panes' aria-label='Regions'>{}</nav>",
-    (
-        html("<button class='to-{}' onclick='finlabFrame.pane(\"{}\")'>{}</button>", region, region, word)
-        for region, word in ((LEFT, "Fins"), (RIGHT, "Settings"), (DRAWER, "Plots"))
-    ),
-)
-"""On a narrow page one region is seen at a time; these choose it."""
 LOW = ":root { --tall: calc(var(--z) * 92px); }"
 """Height of a drawer in which nothing but a sentence stands."""
 TALL = ":root { --fl-usual: 344px; }"
@@ -120,7 +111,7 @@ class Frame:
         """Build everything; `over` is markup that may lie over the page for a while."""
         self._page = page
         run_script(gui, NAMED)
-        add_html(gui, html("{}{}{}{}", STYLE, marker("fl-chrome"), over, PANES))
+        add_html(gui, html("{}{}{}", STYLE, marker("fl-chrome"), over))
         self._shown = gui.add_html("")
         self._listen()
         self._corner = Corner(gui, page)

@@ -177,8 +177,6 @@ class SwimCardPanel:
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         self._page = page
         self._card = gui.add_html("")
-        keeps = {"Keep this swim": page.swimming.keep, "Forget it": page.swimming.forget_kept}
-        page.add_buttons("Compare", keeps, hint="Keep it in orange, and swim again with something changed.")
         files = {"Table (CSV)": page.swim_files.table, "Plots (PNG)": page.swim_files.pictures}
         page.add_buttons("Save", files, hint="The log with units, and pictures; made on the server.")
         self._making = gui.add_html("")

@@ -16,7 +16,7 @@ from webapp.tasks.moment import ASKED as ASKED_COLUMN
 from webapp.tasks.moment import DELIVERED as DELIVERED_COLUMN
 from webapp.tasks.moment import DEPTH_ERROR, ERROR, FORCES, POWER, TIME
 from webapp.tasks.swimming import Swimming
-from webapp.theme import ASKED, DELIVERED, KEPT, OTHER, css
+from webapp.theme import ASKED, DELIVERED, OTHER, css
 
 EVERY_S = 0.2
 """Least time between two drawings [s]."""
@@ -76,7 +76,7 @@ class SwimPlots:
     def __init__(self, gui: viser.GuiApi) -> None:
         self._drawn = 0.0
         self._changes = Changes()
-        robots, wrench = (css(DELIVERED), css(OTHER), css(KEPT)), (css(ASKED), css(DELIVERED))
+        robots, wrench = (css(DELIVERED), css(OTHER)), (css(ASKED), css(DELIVERED))
 
         def plot(colors: tuple[str, ...], title: str, below: str = "") -> LinePlot:
             height = PLOT_PX + (24 if below else 0)
@@ -97,27 +97,23 @@ class SwimPlots:
     def refresh(self, swimming: Swimming, axis: int) -> None:
         """Draw errors, power, one axis of the wrench, forces and the monitor's doubts, but no more often than
         an eye can follow."""
-        swimmers, kept, at = swimming.swimmers, swimming.kept, swimming.at
+        swimmers, at = swimming.swimmers, swimming.at
         moments = tuple(swimmer.shown for swimmer in swimmers)
         soon = time.monotonic() - self._drawn < EVERY_S and swimming.running
-        if soon or not len(moments[0].record) or not self._changes(axis, at, kept, *moments):
+        if soon or not len(moments[0].record) or not self._changes(axis, at, *moments):
             return
         self._drawn = time.monotonic()
         record = moments[0].record
         records = [moment.record for moment in moments if len(moment.record)]
-        others = [None] * (2 - len(records)) + [None if kept is None else kept.line]
         seconds = np.ascontiguousarray(record[:, TIME])
-        if kept is not None:  # which may have swum for longer
-            seconds = np.append(seconds, kept.line[kept.line[:, TIME] > seconds[-1], TIME])
         end = shown_until(float(seconds[-1]), swimmers[0].duration_s)
         for plot, column, scale in (
             (self._error, ERROR, 100.0),
             (self._depth, DEPTH_ERROR, 100.0),
             (self._power, POWER, 1.0),
         ):
-            lines = [_line(rows, column, seconds, scale) for rows in (*records, *others)]
+            lines = [_line(rows, column, seconds, scale) for rows in records]
             self._draw(plot, seconds, lines, (0.0, top_of(lines, SMALL)), at, end)
-        seconds = np.ascontiguousarray(record[:, TIME])
         both = [record[:, column + axis] for column in (ASKED_COLUMN, DELIVERED_COLUMN)]
         self._wrench.name(f"{AXIS_WORDS[axis]} [{AXIS_UNITS[axis]}]", "time [s]")
         ends = (-top_of([-both[0], -both[1]], SMALL), top_of(both, SMALL))
@@ -149,10 +145,8 @@ def shown_until(time: float, duration: float) -> float:
     return min(step, duration) if time <= duration else time
 
 
-def _line(rows: Array | None, column: int, seconds: Array, scale: float) -> Array:
-    """A column of a record at some times; NaN after its end, or where there is no record."""
-    if rows is None:
-        return np.full(len(seconds), np.nan)
+def _line(rows: Array, column: int, seconds: Array, scale: float) -> Array:
+    """A column of a record at some times; NaN after its end."""
     values = rows[:, column]
     if column == POWER and len(rows) > 1:
         ones = np.ones(max(1, min(len(rows), round(SMOOTH / float(rows[1, TIME] - rows[0, TIME])))))

@@ -107,20 +107,13 @@ class AnsweringBar:
         about = "Power in watts, or the paper's effort: for all answers, comparisons, sweeps and swims."
         least = gui.add_dropdown("Keep least", OBJECTIVES, hint=about)
         page.bind(least, partial(session.set_setting, "objective"), lambda: session.state.objective)
-        add_html(
-            gui,
-            html(
-                '<div class=\'fl-help\'><button title="all commands (Ctrl+K)" onclick="{}">Commands'
-                "</button><button title='a tour in {} stops (T)' {}>Tour</button><button title='{} "
-                'lessons with a task each\' {}>Lessons</button><button aria-label="Keys" title="all '
-                'keys (?)" onclick="finlabFrame.sheet()">?</button></div>',
-                PALETTE,
-                len(STEPS),
-                press("tour", ""),
-                len(LESSONS),
-                press("lesson", LESSONS[0].name),
-            ),
+        template = (
+            "<div class='fl-help'><button title='{} lessons with a task each' {}>Lessons</button>"
+            "<button title='a tour in {} stops (T)' {}>Tour</button>"
+            "<button title='all commands and their keys (Ctrl+K)' onclick='{}'>Commands</button></div>"
         )
+        lessons, tour = press("lesson", LESSONS[0].name), press("tour", "")
+        add_html(gui, html(template, len(LESSONS), lessons, len(STEPS), tour, PALETTE))
 
     def refresh(self) -> None:
         """Nothing but what is bound."""

@@ -85,25 +85,25 @@ class SwimRobot:
         put(self._root, visible=False)
         put(self._trail, visible=False)
 
-    def take(self, moment: Moment, scale: float, trail: bool = True) -> None:
+    def take(self, moment: Moment, scale: float) -> None:
         """Swim on to a moment; arrows are `scale` [m/N] long. Where it stood, it is there at once."""
         if self._stood:
-            self.stand(moment, scale, trail)
+            self.stand(moment, scale)
             self._stood = False
         if self._is_at(moment) or self._ahead is None:
             return
         self._behind, self._ahead = self._ahead, moment
         self._clock = self._behind.time
-        self._draw(moment, scale, trail)
+        self._draw(moment, scale)
 
-    def stand(self, moment: Moment, scale: float, trail: bool = True) -> None:
-        """Be at a moment at once, with the blades as they were; without a `trail` that of before stays."""
+    def stand(self, moment: Moment, scale: float) -> None:
+        """Be at a moment at once, with the blades as they were."""
         if self._stood and self._is_at(moment):
             return
         self._stood = True
         self._behind = self._ahead = moment
         self._clock = moment.time
-        self._draw(moment, scale, trail)
+        self._draw(moment, scale)
         put(self._root, position=moment.pose[:3], wxyz=moment.pose[3:])
         for node, angle, name in zip(self._fins, moment.angle.tolist(), self._names, strict=False):
             node.pose(LIMP if name in moment.lost else angle)
@@ -113,7 +113,7 @@ class SwimRobot:
         ahead = self._ahead
         return ahead is not None and (moment.time, moment.lost) == (ahead.time, ahead.lost)
 
-    def _draw(self, moment: Moment, scale: float, trail: bool = True) -> None:
+    def _draw(self, moment: Moment, scale: float) -> None:
         """Everything but pose and blades."""
         top = np.array([0.0, 0.0, self._top])
         for shape, wrench, thickness in zip(
@@ -123,11 +123,7 @@ class SwimRobot:
         self._flap(moment)
         for node, force, angle in zip(self._fins, moment.force, self._angles, strict=False):
             node.push(force * scale, angle, 0.006)
-        if trail:
-            self.draw_trail(moment.record[:, PLACE : PLACE + 3])
-
-    def draw_trail(self, places: Array) -> None:
-        """Where it was (N, 3) [m]."""
+        places = moment.record[:, PLACE : PLACE + 3]
         places = places[:: max(1, len(places) // TRAIL_POINTS)]
         if len(places) > 1:
             points = np.stack([places[:-1], places[1:]], axis=1).astype(np.float32)

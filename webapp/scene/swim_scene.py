@@ -1,4 +1,4 @@
-"""The water while robots swim: the way to go, where they should be, up to two of them, and a kept one."""
+"""The water while robots swim: the way to go, where they should be, and up to two of them."""
 
 from typing import Any
 
@@ -12,16 +12,15 @@ from webapp.scene.shape import Shape
 from webapp.scene.stage import add_floor, aim_camera, paint_floor
 from webapp.scene.swim_robot import SwimRobot, goal
 from webapp.scene.wrench_nodes import LENGTH
-from webapp.tasks.moment import PLACE, Moment
-from webapp.tasks.recorded import Recorded
+from webapp.tasks.moment import Moment
 from webapp.tasks.swimmer import Swimmer
 from webapp.tasks.swimming import Swimming
-from webapp.theme import ASKED, DELIVERED, KEPT, OTHER, WATER
+from webapp.theme import ASKED, DELIVERED, OTHER, WATER
 
 ARROWS_N = 1.0
 """Force that an arrow of 0.1 m stands for while robots swim [N]: one for all, so that they compare."""
-ROBOTS = ((DELIVERED, None), (OTHER, 0.45), (KEPT, 0.35))
-"""Colours of the robots' trails, and how opaque the robots are; the last one is that of the kept swim."""
+ROBOTS = ((DELIVERED, None), (OTHER, 0.45))
+"""Colours of the robots' trails, and how opaque the robots are."""
 SCALE = LENGTH / ARROWS_N
 """Length of arrows [m/N]."""
 FLOW_S = 6.0
@@ -47,7 +46,6 @@ class SwimScene:
         self._floor = add_floor(scene, "/swim/floor", 14.0, 0.25, 1.0, visible=False, **fade)
         self._robots: dict[int, SwimRobot] = {}
         self._shown: tuple[Swimmer, ...] = ()
-        self._kept: Recorded | None = None
         self._followed: np.ndarray | None = None
 
     def refresh(self, dark: bool) -> None:
@@ -63,7 +61,7 @@ class SwimScene:
         if not visible:
             for robot in self._robots.values():
                 robot.hide()
-            self._shown, self._kept = (), None
+            self._shown = ()
             return
         moments = swimming.seen
         if swimmers != self._shown:
@@ -75,7 +73,6 @@ class SwimScene:
                 self._robots[k].take(moment, SCALE)
             else:
                 self._robots[k].stand(moment, SCALE)
-        self._refresh_kept()
 
     def _begin(self, moments: tuple[Moment, ...]) -> None:
         """Another swim: its robots, its way, and the camera where all of it can be seen."""
@@ -83,7 +80,6 @@ class SwimScene:
         for k, robot in self._robots.items():
             if k >= len(self._shown):
                 robot.hide()
-        self._kept = None
         for k, (swimmer, moment) in enumerate(zip(self._shown, moments, strict=True)):
             self._robot(k, swimmer.layout, moment)
         path = self._shown[0].path
@@ -103,23 +99,6 @@ class SwimScene:
         path = self._shown[0].path
         place = np.array([path[:, 0].min() - BEYOND_M, path[:, 1].max() + BEYOND_M, path[:, 2].mean()])
         self._water.show(force_arrow, np.round(FLOW_S * flow, 2), place, 0.03)
-
-    def _refresh_kept(self) -> None:
-        """The swim that was kept: its whole trail, and its robot where it was at this time."""
-        swimming, last = self._swimming, len(ROBOTS) - 1
-        kept = swimming.kept
-        if kept is None:
-            if self._kept is not None:
-                self._robots[last].hide()
-        else:
-            moment = kept.moment(swimming.seen_time)
-            if kept is not self._kept:
-                self._robot(last, kept.layout, moment).draw_trail(kept.line[:, PLACE : PLACE + 3])
-            if swimming.at is None:
-                self._robots[last].take(moment, SCALE, trail=False)
-            else:
-                self._robots[last].stand(moment, SCALE, trail=False)
-        self._kept = kept
 
     def look(self, follow: bool) -> None:
         """Let the camera go along with the first robot, or stand where the whole path can be seen."""

@@ -21,7 +21,7 @@ SHORTEST = 5
 
 
 class SwimFiles:
-    """Makes files of the swim that a page shows, and of the one that was kept."""
+    """Makes files of the swim that a page shows."""
 
     def __init__(self, context: Context, swimming: Swimming, changed: Callable[[], None]) -> None:
         """`changed` is called on the loop when there is something new to tell."""

@@ -49,8 +49,6 @@ class Swimming:
         """At what speed it is to go, and goes."""
         self.at: float | None = None
         """The moment that is looked at again [s]; None for the newest one."""
-        self.kept: Recorded | None = None
-        """A swim that was put aside to compare others with."""
         self.own_path: Trajectory | None = None
         """A path that was uploaded."""
         self._acts: deque[Callable[[Swimmer], None]] = deque()
@@ -81,7 +79,7 @@ class Swimming:
         return self.swimmers[0].shown.time if self.swimmers else 0.0
 
     def start(self, plan: Plan) -> None:
-        """Begin at the beginning; a swim that is under way is given up, one that was kept stays."""
+        """Begin at the beginning; a swim that is under way is given up."""
         self.stop()
         self.running = True
         self._start.ask(plan)
@@ -166,28 +164,14 @@ class Swimming:
         """Their time [s]."""
         return self.time if self.at is None else self.at
 
-    def keep(self) -> None:
-        """Put the first robot's swim aside, so far as it has come, to compare others with.
-
-        Raises:
-            FinlabError: nothing has been swum yet.
-        """
-        self._check_swum()
-        self.kept = self.swimmers[0].recorded()
-
-    def forget_kept(self) -> None:
-        """Compare with nothing."""
-        self.kept = None
-
     def records(self) -> tuple[Recorded, ...]:
-        """All robots' swims so far, and last the one that was kept.
+        """All robots' swims so far.
 
         Raises:
             FinlabError: nothing has been swum yet.
         """
         self._check_swum()
-        kept = () if self.kept is None else (self.kept,)
-        return (*(swimmer.recorded() for swimmer in self.swimmers), *kept)
+        return tuple(swimmer.recorded() for swimmer in self.swimmers)
 
     def _check_swum(self) -> None:
         if self.time == 0.0:
