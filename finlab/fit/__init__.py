@@ -1,6 +1,6 @@
-"""From measurements to models: a fin from a load cell.
+"""From measurements to models: a fin from a load cell, and in `robot` a layout from swims.
 
-Nothing here knows the truth that `finlab.sim` swims in; what is fitted comes from data alone. Needs the extra
+Nothing here uses what `finlab.sim` knows to be true; fits come from data alone. Fits of fins need the extra
 `[fit]`.
 """
 

@@ -127,7 +127,7 @@ def _checked(arc: Array, sizes: Array, table: Array) -> FinEnvelope:
         if array.dtype != np.float64 or not (np.abs(array) <= LARGEST_NUMBER).all():
             raise ValueError("expected finite numbers of ordinary size in double precision")
     if not (abs(arc[0]) <= 4.0 * np.pi and 0.0 <= arc[1] <= np.pi):
-        raise ValueError("an arc that is none")
+        raise ValueError("an impossible arc")
     if not (sizes[0] >= 0.0).all() or not (sizes[0] <= sizes[1]).all():
         raise ValueError("forces that are negative, or larger at rest than at most")
     if not (table[..., (AMPLITUDE, FREQUENCY)] >= 0.0).all():

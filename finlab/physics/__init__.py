@@ -1,4 +1,4 @@
-"""Command to force to wrench, and what it costs: the fins' laws, the plant, energy."""
+"""Command to force to wrench, and what it costs: the fins' laws, the plant, power and effort."""
 
 from finlab.physics.fin_law import FinLaw as FinLaw
 from finlab.physics.fin_law import PlanarLaw as PlanarLaw

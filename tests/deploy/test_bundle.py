@@ -203,7 +203,7 @@ def _all(part: str, value: Any) -> Callable[[dict[str, np.ndarray]], None]:
         (_all("table", -1.0), "negative amplitudes or frequencies"),
         (_all("table", lambda a: a.astype(np.float32)), "double precision"),
         (_all("sizes", lambda a: a[::-1].copy()), "larger at rest than at most"),
-        (_all("arc", 4.0), "an arc that is none"),
+        (_all("arc", 4.0), "an impossible arc"),
         (lambda a: a.pop(next(iter(a))), "holds no compiled fins"),
         (lambda a: a.update(extra=np.zeros(3)), "'extra' is not expected"),
         (lambda a: a.update({"0" * 64 + ".arc": np.zeros(2)}), "holds no compiled fins"),

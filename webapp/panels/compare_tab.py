@@ -19,7 +19,7 @@ class ComparePanel:
             "Compare the methods",
             lambda: page.comparison.start(page.session.state),
             icon=viser.Icon.SCALE,
-            hint="On the wrench and the failures of now.",
+            hint="For the present wrench and failures.",
         )
         page.editables.on_press("overlay", lambda method, _held: self._choose(method))
         self._table = gui.add_html("")

@@ -75,7 +75,7 @@ class DamagePanel:
             digits=1,
         )
         mends = {"This fin": lambda: page.session.mend(self._name), "All fins": page.session.mend_all}
-        page.add_buttons("Repair", mends, hint="Whole again; can be undone like all else.")
+        page.add_buttons("Repair", mends, hint="Repairs the fin; can be undone.")
 
     @property
     def _name(self) -> str:

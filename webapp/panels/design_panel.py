@@ -25,7 +25,7 @@ class DesignPanel:
             "Duplicate the design",
             page.session.duplicate_layout,
             icon=viser.Icon.COPY,
-            hint="A copy under another name; the next changes are the copy's.",
+            hint="Makes a copy under another name and goes on with the copy.",
         )
         self._card = gui.add_html("")
         page.editables.on("save-as", lambda _, text: designs.save_as(text))

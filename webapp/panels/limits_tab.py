@@ -86,9 +86,7 @@ class ImprovePanel:
             "fl-movers",
             partial(self._draft, SearchRequest.with_held_toggled),
         )
-        self._whose = gui.add_dropdown(
-            "Bounds of", (ALL,), hint="All fins, or one that gets bounds of its own."
-        )
+        self._whose = gui.add_dropdown("Bounds of", (ALL,), hint="All fins, or one fin with its own bounds.")
         page.on_change(self._whose, lambda _: None)
         page.bind_number(
             gui.add_vector3("Reach ± [m]", WAY[:3], step=0.01, hint="Along x, y and z."),

@@ -36,7 +36,7 @@ class SweepPanel:
             self._set_ends,
             lambda: self._ends,
         )
-        self._play = page.add_button("Play the sweep", self._toggle, hint="To and fro until you stop it.")
+        self._play = page.add_button("Play the sweep", self._toggle, hint="Back and forth until you stop it.")
         self._plot = LinePlot(gui, FIN_LINES, "fin forces [N]", height=170, widths=(2.0,))
         self._said = gui.add_html("")
 

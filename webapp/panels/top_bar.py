@@ -102,7 +102,7 @@ class AnsweringBar:
 
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         session = page.session
-        methods = gui.add_dropdown("Method", tuple(METHODS), hint="Who answers.")
+        methods = gui.add_dropdown("Method", tuple(METHODS), hint="The method that answers.")
         page.bind(methods, partial(session.set_setting, "method"), lambda: session.state.method)
         about = "Power in watts, or the paper's effort: for all answers, comparisons, sweeps and swims."
         least = gui.add_dropdown("Keep least", OBJECTIVES, hint=about)

@@ -30,7 +30,7 @@ class Editing(Core):
         self.selected = self.state.layout.names[0]
 
     def duplicate_layout(self) -> None:
-        """A copy under another name; the next changes are the copy's."""
+        """Makes a copy under another name and goes on with the copy."""
         layout = self.state.layout
         self.open_layout(replace(layout, name=f"{layout.name[:56]} copy"))
 

@@ -151,7 +151,7 @@ def added(layout: Layout) -> tuple[Layout, str]:
                     else math.radians(degrees)
                 )
                 return _added(layout, Fin("fin", (x, y, z), float(wrapped(azimuth))), "fin")
-    raise AssertionError("any place is free of none")
+    raise AssertionError("no place is free")
 
 
 def blank() -> Layout:

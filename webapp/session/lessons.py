@@ -82,7 +82,7 @@ LESSONS = (
         "two-ways",
         "One wrench, several ways",
         "Four fins have twelve numbers, a wrench has six. With the paper's effort kept least, the search "
-        "finds several valleys: the numbered dots below, each another way to push and turn the robot.",
+        "finds several minima: the numbered dots below, each another way to push and turn the robot.",
         "Show another dot than the first. Which fins change, and what stays?",
         "The fins changed, the green arrows did not: the robot feels the same force and torque.",
         "ucat",

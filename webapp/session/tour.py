@@ -25,7 +25,7 @@ class Step:
     mode: int = 0
     """Which mode is shown."""
     method: str = "search"
-    """Who answers."""
+    """Method that answers."""
     swims: bool = False
     """Whether the robot swims."""
     drawer: str = "Candidates"
@@ -74,7 +74,7 @@ STEPS = (
     Step(
         "What a layout cannot do",
         "This robot has no way to turn left or right, however its fins flap: the yaw that is asked stays "
-        "missing. Select a fin, turn its shaft by the ring, and watch yaw come alive.",
+        "missing. Select a fin, turn its shaft by the ring, and yaw becomes possible.",
         "no_yaw",
         (1.0, 0.0, 0.0, 0.0, 0.0, 0.2),
         drawer="Reach",
