@@ -21,10 +21,9 @@ def fin(
     frequency: Literal["hz", "rpm"] | None = None,
     sensor_turn: Annotated[tuple[float, float, float], arg(metavar="X Y Z")] = (0.0, 0.0, 0.0),
     lever: float | None = None,
-    page: bool = True,
     seed: int = 0,
 ) -> None:
-    """Fit a fin to a load cell's measurements, and write it for layouts to name, with a page beside it.
+    """Fit a fin to a load cell's measurements, and write it for layouts to name.
 
     Files hold cycle means (A, f, Fy, Fz and perhaps phi, Fx, P and standard deviations sFx, sFy, sFz) or raw
     series (t, angle, Fy, Fz and perhaps Fx, P); A is half the stroke, phi the zero direction, forces are in
@@ -32,17 +31,16 @@ def fin(
 
     Args:
         data: CSV files of one fin.
-        output: the fitted fin; the page is FIN.html beside it.
+        output: the fitted fin.
         angles: unit of amplitudes, zero directions and angles; recognized where it is not given.
         amplitude: whether amplitudes are half the stroke or the whole; recognized where it is beyond doubt.
         frequency: unit of frequencies; recognized where it is beyond doubt.
         sensor_turn: how the load cell is turned against the fin frame, about x', then y', then z' [deg].
         lever: distance along the shaft from the load cell to the fin's centre [m], for moments My, Mz.
-        page: write the page.
         seed: draws samples where there are too many.
     """
     with _progress_bar() as tell:
-        from finlab.fit.advice import next_measurements, thin_regions
+        from finlab.fit.advice import next_measurements
         from finlab.fit.conventions import Conventions
         from finlab.fit.fin_file import check_fin_path, summary, write_fin
         from finlab.fit.fin_fit import fit_fin
@@ -52,25 +50,16 @@ def fin(
         conventions = Conventions(angles, amplitude, frequency, sensor_turn, lever)
         tell("reading", 0.05)
         measurements = read_measurements(data, conventions)
-        fit = fit_fin(measurements, seed, lambda words, share: tell(words, 0.1 + 0.5 * share))
-        tell("writing the table", 0.6)
+        fit = fit_fin(measurements, seed, lambda words, share: tell(words, 0.1 + 0.7 * share))
+        tell("writing the table", 0.8)
         write_fin(fit, output)
-        if page:
-            tell("writing the page", 0.65)
-            from finlab.evaluation.report.fin_fit_page import write_fin_fit_page
-
-            write_fin_fit_page(fit, output.with_suffix(".html"))
-        tell("looking for what to measure next", 0.95)
-        thin, advice = thin_regions(fit), next_measurements(fit)
+        tell("looking for what to measure next", 0.9)
+        advice = next_measurements(fit)
     print("\n".join(summary(fit)))
-    for clause in thin:
-        print(f"data are thin: {clause}")
     print("measure next, A [rad], f [Hz], zero direction [rad]:")
     for command in advice:
         print("  " + "  ".join(f"{value:7.3f}" for value in command))
     print(f"{output}: name it in a layout, model: {{type: table, path: {output.name}}}")
-    if page:
-        print(output.with_suffix(".html"))
 
 
 @verbs.command

@@ -28,7 +28,6 @@ def simulate(
     fail: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME@SECONDS[:KIND]")] = (),
     announced: bool = True,
     monitor: bool = False,
-    servo_feedback: bool = False,
     method: Annotated[str, arg(metavar="NAME")] = "search",
     objective: Literal["power", "effort"] = "power",
     duration: Annotated[float | None, arg(metavar="SECONDS")] = None,
@@ -55,7 +54,6 @@ def simulate(
             front_left@60:whole (it is repaired).
         announced: whether what happens to fins is announced to the allocator.
         monitor: let a FaultMonitor watch the robot and tell the allocator what it finds.
-        servo_feedback: let the servos report their motion to the monitor.
         method: search, mdn, paper, qp, sqp, analytic, ipopt or on-board.
         objective: what the method keeps least: power in watts, or effort, the paper's J_en.
         duration: time for a shipped trajectory.
@@ -105,7 +103,6 @@ def simulate(
                 failures=faults,
                 announced=announced,
                 monitor=FaultMonitor(robot.layout, period_s=pilot.period_s) if monitor else None,
-                servo_feedback=servo_feedback,
                 seed=seed,
             )
             for sentence in _uncontrollable(loop, faults):

@@ -11,7 +11,6 @@ from finlab.control.measurement import Measurement
 from finlab.control.monitor_settings import MonitorSettings
 from finlab.control.motion_model import MotionModel
 from finlab.control.probe import Probe
-from finlab.control.servo_reports import report_evidence
 from finlab.layout import Body, Layout
 from finlab.layout.angles import TURN
 from finlab.layout.damage import Damage, Health
@@ -76,7 +75,6 @@ class FaultMonitor:
         self._torn = np.zeros(n, dtype=bool)
         self._lost = np.zeros(n, dtype=bool)
         self._told = np.zeros(n, dtype=bool)
-        self._silent = True
         self._suspect, self._sure = 0, 0
         self._held = np.full(n, np.nan)
         self._since = self._model.fins.direction.copy()
@@ -89,29 +87,24 @@ class FaultMonitor:
         marked = self._lost | self._torn | ~np.isnan(self._held)
         return tuple(self.layout.names[k] for k in np.flatnonzero(marked))
 
-    def step(self, measurement: Measurement, command: Array | None, reported: Array | None = None) -> Verdict:
+    def step(self, measurement: Measurement, command: Array | None) -> Verdict:
         """Takes what has been measured and says what is believed.
 
         Args:
             measurement: of now. A velocity counts as new where its array is another one than last time.
             command: (n, 3) [rad, Hz, rad] in force since the last call, NaN for fins at rest; None before the
                 first.
-            reported: what the servos say that the fins did (n, 3) [rad, Hz, rad]; NaN where they are silent.
         """
         beliefs, m = self._beliefs, measurement
         seen = np.array([*m.velocity.tolist(), *m.rates.tolist(), m.roll, m.pitch])
         last, self._velocity = self._velocity, m.velocity
-        self._silent = reported is None
         if last is None or command is None:
             beliefs.state[:8] = seen
             return self.verdict()
         other = self._other_direction(beliefs.feed(self.period_s))
-        step = self._model.step(beliefs.state, m.yaw, command, reported, self._held, other)
+        step = self._model.step(beliefs.state, m.yaw, command, self._held, other)
         beliefs.predict(step, self.period_s)
-        besides = None
-        if reported is not None:
-            besides = report_evidence(reported, self._expected(reported), other, len(LEVELS) + 1)
-        beliefs.update(seen, m.velocity is last, besides)
+        beliefs.update(seen, m.velocity is last)
         self._judge(other)
         return self.verdict()
 
@@ -133,11 +126,11 @@ class FaultMonitor:
         """The command (n, 3) with what keeps the fins known.
 
         Now and then a fin that the monitor has called lost beats for two seconds: if it gives nothing by it,
-        it is lost, and of one that has been repaired the robot feels it, and takes it back. Where servos do
-        not report, fins that all but rest push a little, see `MonitorSettings.least_push`.
+        it is lost, and of one that has been repaired the robot feels it, and takes it back. Fins that all but
+        rest push a little, see `MonitorSettings.least_push`.
         """
         lost, direction = self._lost & ~self._told, self._model.fins.direction
-        return self._probe.added(command, lost, direction, steadily=self._silent)
+        return self._probe.added(command, lost, direction)
 
     def verdict(self) -> Verdict:
         """What is believed now."""
@@ -176,13 +169,6 @@ class FaultMonitor:
         turn = self._model.fins.direction - self._since
         self._since += fresh[:, -1] * (turn - TURN * np.round(turn / TURN))
         return np.where(np.isnan(self._held), self._since, np.nan)
-
-    def _expected(self, reported: Array) -> Array:
-        """What the fins should do (n, 3) if they are what they are taken for, whichever way they turn."""
-        expected = self._model.fins.command
-        expected[:, 2] = np.where(self._model.unsure, reported[:, 2], expected[:, 2])
-        expected[:, 2] = np.where(np.isnan(self._held), expected[:, 2], self._held)
-        return expected
 
     def _judge(self, other: Array) -> None:
         """Acts on what has become all but certain."""

@@ -177,11 +177,11 @@ class Hypotheses:
             self.covariance[:, STRENGTH] *= scale
             self.covariance[STRENGTH] *= scale[:, None]
 
-    def update(self, seen: Array, slow: bool, besides: Array | None) -> None:
+    def update(self, seen: Array, slow: bool) -> None:
         """Takes velocity, rates, roll and pitch (8,); without the velocity where it is no new one.
 
-        `besides` holds the logarithms (n, m) of what else speaks for each belief. Where the model says
-        nothing of the motion any more, or what it says is no number, all hypotheses are initialized again.
+        Where the model says nothing of the motion any more, or what it says is no number, all hypotheses are
+        initialized again.
         """
         if not max(self.covariance.diagonal()[MOTION].tolist()) < MOST_VARIANCE:
             return self._begin_anew(seen)
@@ -206,8 +206,6 @@ class Hypotheses:
         left = self.covariance - seen_by.T @ (inverse @ seen_by)
         self.covariance = 0.5 * (left + left.T)  # what rounding makes uneven would grow
         better = 0.5 * (self.distance - distance[1:])
-        if besides is not None:
-            better += np.append(besides.ravel(), besides[self.pairs, 0].sum(axis=1))
         best = max(0.0, *better.tolist())
         weight = self._probability * np.exp(better - best)
         total = sum(weight.tolist())

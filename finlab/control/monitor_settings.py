@@ -43,6 +43,6 @@ class MonitorSettings:
     """Time after which a fin that is taken for lost is tried again [s]; 0 for never."""
     least_push: float = 0.5
     """Force [N] that every fin gives at least, up or down where it would rest, so that its loss shows; 0 for
-    none. Only where servos do not report. Costs power, where fins would rest."""
+    none. Costs power, where fins would rest."""
     threshold: float = 0.97
     """Probability of a fin's failure from which it is acted on, if it holds for two tenths of a second."""

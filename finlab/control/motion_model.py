@@ -76,23 +76,20 @@ class MotionModel:
         self._thrust = np.zeros((layout.n_fins, 3))
         self._turns_fully = is_full_turn(layout.upper[:, 2] - layout.lower[:, 2])
         self._unsure_s, self._any_unsure = np.zeros(layout.n_fins), False
-        self.unsure = self._unknown = np.zeros(layout.n_fins, dtype=bool)
+        self.unsure = np.zeros(layout.n_fins, dtype=bool)
         """Which fins (n,) turn about by command just now; which way round is unknown."""
 
-    def step(
-        self, state: Array, yaw: float, command: Array, reported: Array | None, held: Array, other: Array
-    ) -> Step:
+    def step(self, state: Array, yaw: float, command: Array, held: Array, other: Array) -> Step:
         """Carries a state on over a period.
 
         Args:
             state: z (14 + n) at the beginning.
             yaw: heading at its end [rad], as measured.
             command: (n, 3) in force over the period; NaN rows rest.
-            reported: what the servos say that they do (n, 3), NaN where they say nothing; or nothing.
             held: zero directions (n,) that are believed [rad]; NaN where fins turn as commanded.
             other: zero directions (n,) as they might be instead [rad]; NaN likewise.
         """
-        wrench, turned = self._wrenches(command, reported, held, other)
+        wrench, turned = self._wrenches(command, held, other)
         motion, current = state[MOTION].tolist(), state[CURRENT].tolist()
         roll, pitch = state[TILT].tolist()
         quaternion = quaternion_of(roll, pitch, yaw - self._dt * motion[5])
@@ -124,9 +121,7 @@ class MotionModel:
         by_flow[range(6), range(6)] = decay
         return by_flow
 
-    def _wrenches(
-        self, command: Array, reported: Array | None, held: Array, other: Array
-    ) -> tuple[Array, Array]:
+    def _wrenches(self, command: Array, held: Array, other: Array) -> tuple[Array, Array]:
         """Wrench (n, 6) of each fin at full strength, mean over the period, and what it gains turned."""
         facing = (np.cos(command[:, 2] - self.fins.direction) < ABOUT_FACE) & self._turns_fully
         self.fins.step(command, self._dt)
@@ -136,11 +131,6 @@ class MotionModel:
             self._unsure_s[facing] = UNSURE_S
             self.unsure = self._unsure_s > 1e-9
             self._any_unsure = True in self.unsure.tolist()
-        self._unknown = self.unsure
-        if reported is not None:
-            silent = np.isnan(reported)
-            does = np.where(silent, does, reported)
-            self._unknown = self.unsure & silent[:, 2]
         both = np.empty((2, *does.shape))
         both[:] = does
         directions = np.array([held, other])
@@ -154,9 +144,9 @@ class MotionModel:
 
     def _either_way(self) -> Array | None:
         """What the velocities may gain besides (6, 6), a covariance, by fins that had to turn around."""
-        if not self._any_unsure or not self._unknown.any():
+        if not self._any_unsure:
             return None
-        most = 2.0 * np.linalg.norm(self._thrust[self._unknown], axis=-1)
-        gained = (most[:, None, None] * self._plant.columns[self._unknown, 1:] * self._gain).reshape(-1, 6)
+        most = 2.0 * np.linalg.norm(self._thrust[self.unsure], axis=-1)
+        gained = (most[:, None, None] * self._plant.columns[self.unsure, 1:] * self._gain).reshape(-1, 6)
         noise: Array = gained.T @ gained
         return noise

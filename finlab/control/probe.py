@@ -42,20 +42,15 @@ class Probe:
         self._side = np.zeros(layout.n_fins)
         self._count = 0
 
-    def added(
-        self, command: Array, lost: NDArray[np.bool_], direction: Array, steadily: bool = False
-    ) -> Array:
+    def added(self, command: Array, lost: NDArray[np.bool_], direction: Array) -> Array:
         """The command (n, 3) with what is added to it.
 
         Args:
             command: of the allocator; NaN rows are left alone but for probes.
             lost: fins (n,) that are probed, one at a time.
             direction: where the fins point (n,) [rad].
-            steadily: whether fins that all but rest push a little.
         """
-        result = command
-        if steadily and self._least > 0.0:
-            result = self._pushing(command)
+        result = self._pushing(command) if self._least > 0.0 else command
         if self._every == 0 or not lost.any():
             self._count = 0
             return result

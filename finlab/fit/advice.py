@@ -1,4 +1,4 @@
-"""What to measure next: where a fit knows least, and the few measurements that would help it most."""
+"""What to measure next: the few measurements that would help a fit most."""
 
 import numpy as np
 
@@ -6,10 +6,6 @@ from finlab.arrays import Array
 from finlab.fit.fin_fit import FinFit
 from finlab.layout.angles import wrapped
 
-THIN = 2.0
-"""A region is thin where the force is this many times as uncertain as it is on average ..."""
-WORTH_SAYING = 0.02
-"""... and by more than this share of the largest force."""
 CANDIDATES = (6, 6, 8)
 """Amplitudes, frequencies and zero directions among which the next measurements are chosen."""
 APART = (0.1, 0.1, 0.3)
@@ -43,22 +39,3 @@ def next_measurements(fit: FinFit, count: int = 5) -> Array:
             for c, noise in zip(covariances, noises, strict=True)
         ]
     return np.asarray(commands[chosen])
-
-
-def thin_regions(fit: FinFit) -> tuple[str, ...]:
-    """Returns where measurements are thin, a clause each, the worst first: a corner of amplitudes and
-    frequencies in which the force is much less certain than elsewhere."""
-    grid = fit.grid((8, 8, 12))
-    uncertain = fit.uncertainty(grid).mean(axis=2)
-    usual = float(np.sqrt(np.mean(uncertain**2)))
-    amplitude, frequency = grid[:, 0, 0, 0], grid[0, :, 0, 1]
-    found = []
-    for low_a, low_f in ((False, False), (False, True), (True, False), (True, True)):
-        corner = uncertain[:3, :] if low_a else uncertain[-3:, :]
-        corner = corner[:, :3] if low_f else corner[:, -3:]
-        worst = float(corner.mean())
-        if worst > max(THIN * usual, WORTH_SAYING):
-            a = f"below {amplitude[2]:.2f}" if low_a else f"above {amplitude[-3]:.2f}"
-            f = f"below {frequency[2]:.2f}" if low_f else f"above {frequency[-3]:.2f}"
-            found.append((worst, f"amplitudes {a} rad with frequencies {f} Hz (uncertain by {worst:.0%})"))
-    return tuple(clause for _, clause in sorted(found, reverse=True))

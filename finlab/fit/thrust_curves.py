@@ -50,11 +50,6 @@ def thrust_curves(fit: FinFit, count: int) -> list[ThrustCurve]:
     return curves
 
 
-def all_round(fit: FinFit, command: Array) -> Array:
-    """Returns the thrust [N] (n,) at amplitudes and frequencies (n, 2 or 3), averaged over directions."""
-    return np.asarray(fit.mean_thrust(_turned(fit, command))[..., 0].mean(axis=1))
-
-
 def _turned(fit: FinFit, command: Array) -> Array:
     """Commands (n, `DIRECTIONS`, 3) with these amplitudes and frequencies."""
     turn = fit.directions(DIRECTIONS)

@@ -69,7 +69,6 @@ class ClosedLoop:
         failures: Sequence[FinFault | tuple[str, float]] = (),
         announced: bool = True,
         monitor: FaultMonitor | None = None,
-        servo_feedback: bool = False,
         truth: Layout | None = None,
         copper_loss: float = COPPER_LOSS,
         seed: int = 0,
@@ -91,7 +90,6 @@ class ClosedLoop:
             announced: whether what happens is announced to the allocator; else it goes on as before, unless a
                 monitor notices.
             monitor: watches the robot, gives the allocator what it finds, and takes what is announced.
-            servo_feedback: whether the servos report their motion to the monitor.
             truth: the robot that really swims, such as `perturbed(layout, damping=2.0)`, where `layout` is
                 only what allocator, controller and monitor believe of it; it has the same fins.
             copper_loss: heat in the fins' motors [W/(N m)^2] that counts as `driving_power`.
@@ -125,7 +123,7 @@ class ClosedLoop:
         self._blade, self._copper_loss = plant_of(truth).blade, copper_loss
         self._sensors = Sensors(SensorSettings() if sensors is None else sensors, np.random.default_rng(seed))
         self._pending = sorted(events, key=lambda event: event.time_s)
-        self.announced, self.monitor, self.servo_feedback = announced, monitor, servo_feedback
+        self.announced, self.monitor = announced, monitor
         self.broken: dict[str, FinFault] = {}
         """What is true: the fins that are not whole now, by name."""
         self._told: dict[str, FinFault] = {}
@@ -239,8 +237,7 @@ class ClosedLoop:
             self.fail(event.fin, event.kind, event.share)
         now = self._sensors.measure(time, self.state)
         if self.monitor is not None:
-            reported = self.fins.command if self.servo_feedback else None
-            self.verdict = self.monitor.step(now, self._command, reported)
+            self.verdict = self.monitor.step(now, self._command)
         setpoint, lead = self.task.setpoint(time), self.controller.lead_s
         whole = self._complete()
         followed = self.task.setpoint(time + lead) if lead else setpoint

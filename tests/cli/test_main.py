@@ -118,7 +118,7 @@ def test_files_are_written_before_anything_is_printed(tmp_path: Path) -> None:
     )
     os.close(write_end)
     assert done.returncode == 141
-    assert (tmp_path / "fin.csv").exists() and "</html>" in (tmp_path / "fin.html").read_text()
+    assert (tmp_path / "fin.csv").exists()
 
 
 def test_unwritable_output_is_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

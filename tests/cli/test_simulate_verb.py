@@ -99,7 +99,7 @@ def test_a_monitor_says_what_it_finds(
 ) -> None:
     (tmp_path / "line.csv").write_text("t,x,y,z\n0,0,0,-1\n16,2,0,-1\n")
     argv = [*line, "--fail", "front_left@10", "--no-announced"]
-    assert main([*argv, "--monitor", "--servo-feedback", "-o", str(tmp_path / "swim")]) == 0
+    assert main([*argv, "--monitor", "-o", str(tmp_path / "swim")]) == 0
     assert "s: the monitor takes front_left lost" in capsys.readouterr().out
     log = load_log(tmp_path / "swim" / "log.npz")
     assert log.fault_probability[-1].argmax() == log.fins.index("front_left")

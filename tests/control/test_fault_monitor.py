@@ -87,7 +87,7 @@ def test_a_weak_fin_keeps_its_share(layout_a: Layout, analytic: Allocator) -> No
 
 
 def test_a_stuck_fin_is_told_from_a_lost_one(layout_a: Layout, analytic: Allocator) -> None:
-    loop = swim(layout_a, analytic, [FinFault("front_left", 12.0, "stuck")], servo_feedback=True)
+    loop = swim(layout_a, analytic, [FinFault("front_left", 12.0, "stuck")])
     log = until(loop, 20.0)
     assert loop.damage.failed == () and loop.damage.health is not None
     held = log.fin_motion[-1, layout_a.index("front_left"), 2]
@@ -128,12 +128,6 @@ def test_fins_at_rest_cannot_be_told(layout_a: Layout, analytic: Allocator) -> N
     assert max(v.probability[fin] for v in verdicts) < PRIOR
     assert verdicts[-1].strength[fin] == pytest.approx(1.0, abs=1e-9)
     assert verdicts[-1].strength_std[fin] == pytest.approx(MonitorSettings().strength, rel=1e-6)
-
-
-def test_servos_that_report_give_a_resting_fin_away(layout_a: Layout, analytic: Allocator) -> None:
-    loop = swim(layout_a, analytic, [FinFault("front_right", 12.0)], servo_feedback=True)
-    until(loop, 12.6)
-    assert loop.damage.failed == ("front_right",)
 
 
 def test_what_somebody_knows_is_believed(layout_a: Layout) -> None:

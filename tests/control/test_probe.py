@@ -22,7 +22,7 @@ def test_fins_that_all_but_rest_push_up_and_down(layout_a: Layout) -> None:
     probe = Probe(layout_a, MonitorSettings(), 0.1)
     command = np.array([[0.5, 1.5, 0.2], [0.5, 0.3, 0.0], [np.nan] * 3, [0.5, 0.2, 1.0]])
     before = forces(layout_a, command)
-    after = forces(layout_a, probe.added(command, NONE, np.zeros(4), steadily=True))
+    after = forces(layout_a, probe.added(command, NONE, np.zeros(4)))
     np.testing.assert_array_equal(after[[0, 2]], before[[0, 2]])
     for fin in (1, 3):
         assert np.linalg.norm(before[fin]) < LEAST
@@ -30,7 +30,7 @@ def test_fins_that_all_but_rest_push_up_and_down(layout_a: Layout) -> None:
         assert after[fin, 0] == pytest.approx(before[fin, 0], abs=0.02), "what it pushes ahead is kept"
     assert after[1, 1] * after[3, 1] < 0.0, "together they lift little"
     command[1, 2] = np.pi  # now it is told to push astern: the side stays
-    again = forces(layout_a, probe.added(command, NONE, np.zeros(4), steadily=True))
+    again = forces(layout_a, probe.added(command, NONE, np.zeros(4)))
     np.testing.assert_allclose(again[1], after[1] * [-1.0, 1.0], atol=1e-6)
 
 

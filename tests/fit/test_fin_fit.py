@@ -11,7 +11,7 @@ from threadpoolctl import threadpool_info
 from finlab import load_allocator, load_layout
 from finlab.arrays import Array
 from finlab.errors import DataError
-from finlab.fit.advice import APART, next_measurements, thin_regions
+from finlab.fit.advice import APART, next_measurements
 from finlab.fit.fin_file import summary, write_fin
 from finlab.fit.fin_fit import FinFit, fit_fin
 from finlab.layout import Fin, FinModelSpec, Layout
@@ -136,8 +136,6 @@ def test_advice_leads_to_where_nothing_was_measured() -> None:
     command = command[(command[:, 0] < 0.35) | (command[:, 1] < 1.1) | (np.arange(160) == 0)]
     command[0] = [0.6, 2.1, 0.0]
     thin = fit_fin(samples(command, measured(LAW, command, 0.03)))
-    clauses = thin_regions(thin)
-    assert clauses and "amplitudes above" in clauses[0] and "frequencies above" in clauses[0]
     advised = next_measurements(thin)
     assert advised.shape == (5, 3)
     assert ((advised[:, 0] > 0.35) & (advised[:, 1] > 1.1)).sum() >= 4

@@ -1,10 +1,8 @@
-"""What pictures of a fit draw, beside the law that was measured; and the page that draws it."""
+"""What pictures of a fit draw, beside the law that was measured"""
 
 import numpy as np
 import pytest
 
-from finlab.evaluation.report.fin_fit_page import fin_fit_page
-from finlab.evaluation.report.pages import to_html
 from finlab.fit.fin_fit import FinFit, fit_fin
 from finlab.fit.thrust_curves import thrust_curves
 from tests.fit.cell import commands, measured, samples, soft
@@ -36,9 +34,3 @@ def test_curves_are_the_laws_and_samples_stand_by_them(fit: FinFit) -> None:
         own = np.interp(curve.samples[:, 0], curve.amplitude, curve.thrust)
         assert np.abs(curve.samples[:, 1] - own).max() < 0.1 * fit.largest
         assert curve.deviation[0] == 0.0 and (curve.deviation[1:] > 0.0).all()
-
-
-def test_the_page_says_what_the_fit_is_worth(fit: FinFit) -> None:
-    html = to_html(fin_fit_page(fit, "bench"))
-    assert "Fin bench, fitted" in html and "May be trusted within what was measured." in html
-    assert html.count("<svg") >= 2 and "What to measure next" in html

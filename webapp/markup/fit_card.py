@@ -40,8 +40,6 @@ def fit_card(found: Fitted) -> str:
         thrust_plot(found.curves),
         _left_out(fit),
     ]
-    if found.thin:
-        parts.append(html("<div class='said missing'>Data are thin at {}.</div>", "; ".join(found.thin)))
     if found.advice is not None:
         parts.append(_advice(found))
     parts += [html("<div class='said dim'>{}</div>", _sentence(note)) for note in fit.measurements.notes]

@@ -56,7 +56,6 @@ class FinModelPanel:
             results = {
                 "On all like it": page.fitting.put_on_all,
                 "Table (CSV)": self._send_table,
-                "Page (HTML)": self._send_page,
                 "Fit it": page.fitting.fit_table,
                 "Close": page.fitting.forget,
             }
@@ -107,20 +106,6 @@ class FinModelPanel:
         path = str(found.model.values()["path"])
         self._page.exports.download(f"{file_stem(found.upload.fin)}.csv", table_bytes(path))
 
-    def _send_page(self) -> None:
-        found = self._found()
-        fit = found.fit
-        if fit is None:
-            raise FinlabError("a finished table has no page; only a fit has")
-
-        def page() -> bytes:
-            from finlab.evaluation.report.fin_fit_page import fin_fit_page
-            from finlab.evaluation.report.pages import to_html
-
-            return to_html(fin_fit_page(fit, found.upload.fin)).encode()
-
-        self._page.exports.send_made(f"{file_stem(found.upload.fin)}.html", page)
-
     def refresh(self) -> None:
         session, fitting = self._page.session, self._page.fitting
         layout = session.state.layout
@@ -137,8 +122,8 @@ class FinModelPanel:
         put(self._cancel, visible=fitting.busy)
         found = fitting.findings
         if found is not None:
-            middle = ("Fit it",) if found.fit is None else ("Table (CSV)", "Page (HTML)")
-            put(self._results, options=("On all like it", *middle, "Close"))
+            middle = "Fit it" if found.fit is None else "Table (CSV)"
+            put(self._results, options=("On all like it", middle, "Close"))
         put(self._results, visible=found is not None)
         if self._changes(found, fitting.busy, fitting.progress, fitting.error):
             put(self._card, content=self._written(found))

@@ -106,10 +106,7 @@ class Exports:
 
     def _send(self, suffix: str, make: Callable[[], bytes]) -> None:
         """Have the worker make a file, and send it; of each kind only the newest that is asked for."""
-        self.send_made(f"{file_stem(self._session.state.layout.name)}{suffix}", make)
-
-    def send_made(self, name: str, make: Callable[[], bytes]) -> None:
-        """Have the worker make a file of this name, and send it; of each name only the newest."""
+        name = f"{file_stem(self._session.state.layout.name)}{suffix}"
         loop, notify = self._context.loop, self._context.notify
         self._context.workers.answers.submit(
             (id(self), name),

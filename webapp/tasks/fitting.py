@@ -55,8 +55,6 @@ class Fitted:
     """The fit; None where the file was a finished table."""
     curves: "tuple[ThrustCurve, ...]" = ()
     """What the plot shows."""
-    thin: tuple[str, ...] = ()
-    """Where measurements are thin, a clause each."""
     advice: Array | None = None
     """Commands (5, 3) to measure next."""
 
@@ -149,7 +147,7 @@ class Fitting(Newest[Upload, Fitted]):
 
     def _fit_measurements(self, path: Path, upload: Upload, done: Upload) -> Fitted:
         try:
-            from finlab.fit.advice import next_measurements, thin_regions
+            from finlab.fit.advice import next_measurements
             from finlab.fit.fin_file import fin_csv
             from finlab.fit.fin_fit import fit_fin
             from finlab.fit.measurements import read_measurements
@@ -161,7 +159,7 @@ class Fitting(Newest[Upload, Fitted]):
         tell("writing the table")
         model = stored_table(fin_csv(fit).encode(), table_folder())
         curves = tuple(thrust_curves(fit, CURVES))
-        return Fitted(done, model, fit, curves, thin_regions(fit), next_measurements(fit))
+        return Fitted(done, model, fit, curves, next_measurements(fit))
 
     def _tell(self, upload: Upload, words: str, done: float = 1.0) -> None:
         """On the worker's thread, before each step: a fit whose result is not waited for ends here."""

@@ -37,7 +37,6 @@ class Loss(NamedTuple):
     """One swim with a monitor; times in s, errors in m."""
 
     layout: str
-    feedback: bool  # whether the servos report their motion
     fin: str | None  # the fin that is lost, if one is
     found_s: float  # from the loss until a fin is called lost; infinite where none is
     right: bool  # whether it is the one
@@ -55,10 +54,10 @@ class TimedMonitor(FaultMonitor):
     spent_s = 0.0
     """So far [s]."""
 
-    def step(self, measurement: Measurement, command: Array | None, reported: Array | None = None) -> Verdict:
+    def step(self, measurement: Measurement, command: Array | None) -> Verdict:
         """As `FaultMonitor.step`."""
         start = time.process_time()
-        verdict = super().step(measurement, command, reported)
+        verdict = super().step(measurement, command)
         self.spent_s += time.process_time() - start
         return verdict
 
@@ -73,9 +72,9 @@ def run(
     controller: Literal["tracking", "waypoint"] = "tracking",
     seed: int = 0,
 ) -> list[Row]:
-    """One row for each layout, and one over all, without and with what servos report.
+    """One row for each layout, and one over all.
 
-    A seed takes about three minutes with four layouts.
+    A seed takes about two minutes with four layouts.
 
     Args:
         layouts: names or files.
@@ -98,7 +97,7 @@ def run(
     ]
     losses = []
     for each, robot, fin in progress(cases, "swim"):
-        losses += swim_loss(robot, fin, path, allocator, each, plant, controller)
+        losses.append(swim_loss(robot, fin, path, allocator, each, plant, controller))
     return monitoring_rows(losses)
 
 
@@ -110,15 +109,15 @@ def swim_loss(
     seed: int,
     plant: str = "mean",
     controller: str = "tracking",
-) -> list[Loss]:
-    """One loss, or none, without and with what servos report; the seed draws time, current and noise."""
+) -> Loss:
+    """One loss, or none; the seed draws time, current and noise."""
     rng = np.random.default_rng([seed, 14, 0 if fin is None else 1 + layout.index(fin)])
     at = float(rng.uniform(QUIET_S, trajectory.duration_s - QUIET_S))
     speed, heading = rng.uniform(0.0, CURRENT_M_S), rng.uniform(0.0, 2 * math.pi)
     current = SteadyCurrent((speed * math.cos(heading), speed * math.sin(heading), 0.0))
     steer = PATH_CONTROLLERS[controller]
 
-    def loop(monitor: FaultMonitor | None, reports: bool) -> ClosedLoop:
+    def loop(monitor: FaultMonitor | None) -> ClosedLoop:
         return ClosedLoop(
             layout,
             allocator,
@@ -129,19 +128,15 @@ def swim_loss(
             failures=[] if fin is None else [FinFault(fin, at)],
             announced=monitor is None,
             monitor=monitor,
-            servo_feedback=reports,
             seed=seed,
         )
 
     announced_ate = math.nan
     if fin is not None:
-        log = loop(None, False).run()
+        log = loop(None).run()
         announced_ate = absolute_error(log.position, log.reference)
-    losses, from_s = [], math.inf if fin is None else at
-    for reports in (False, True):
-        monitor = TimedMonitor(layout)
-        losses.append(_loss(loop(monitor, reports), monitor, fin, from_s, announced_ate))
-    return losses
+    monitor = TimedMonitor(layout)
+    return _loss(loop(monitor), monitor, fin, math.inf if fin is None else at, announced_ate)
 
 
 def _loss(swim: ClosedLoop, monitor: TimedMonitor, fin: str | None, at: float, announced_ate: float) -> Loss:
@@ -165,7 +160,6 @@ def _loss(swim: ClosedLoop, monitor: TimedMonitor, fin: str | None, at: float, a
         pushes = bool(np.linalg.norm(force, axis=-1).mean() >= PUSHES_N) if soon.any() else True
     return Loss(
         swim.layout.name,
-        swim.servo_feedback,
         fin,
         found,
         right,
@@ -179,17 +173,14 @@ def _loss(swim: ClosedLoop, monitor: TimedMonitor, fin: str | None, at: float, a
 
 
 def monitoring_rows(losses: Sequence[Loss]) -> list[Row]:
-    """One row per layout, and one over all, without and with what servos report.
+    """One row per layout, and one over all.
 
     `found` is the share within `FOUND_WITHIN_S`, `right` that of the right fin among those found at any time.
     """
-    rows = []
-    for feedback in dict.fromkeys(loss.feedback for loss in losses):
-        chosen = [loss for loss in losses if loss.feedback == feedback]
-        for layout in (*dict.fromkeys(loss.layout for loss in chosen), "all"):
-            mine = [loss for loss in chosen if layout in (loss.layout, "all")]
-            rows.append({"layout": layout, "servos": "report" if feedback else "silent", **_figures(mine)})
-    return rows
+    return [
+        {"layout": layout, **_figures([loss for loss in losses if layout in (loss.layout, "all")])}
+        for layout in (*dict.fromkeys(loss.layout for loss in losses), "all")
+    ]
 
 
 def _figures(losses: Sequence[Loss]) -> Row:
@@ -224,7 +215,6 @@ experiment = Experiment(
     question="How soon and how surely is a fin found that is lost without an announcement?",
     columns=(
         Column("layout", "layout"),
-        Column("servos", "servos"),
         Column("losses", "losses", "count"),
         Column("found", f"found within {FOUND_WITHIN_S:g} s", "share"),
         Column("found_pushing", "of pushing fins", "share"),
