@@ -6,31 +6,25 @@ onto the target, and SciPy's SLSQP goes on from there with the plant's exact fir
 local minimum; the cheapest one is the yardstick.
 """
 
-from collections.abc import Callable
 from functools import lru_cache
 from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
-from scipy.optimize import minimize
 
 from finlab.allocation.baselines.ipopt import SOLVER_OPTIONS, import_casadi
 from finlab.allocation.baselines.plant_in_casadi import plant_formulas
+from finlab.allocation.baselines.sqp import Solve, cheapest_program, pushed_axes
 from finlab.allocation.search.levenberg_marquardt import CommandProblem, refine
 from finlab.arrays import Array
-from finlab.layout import Layout, layout_effectiveness
+from finlab.layout import Layout
 from finlab.physics import PlanarLaw, Plant, make_law, plant_of
 from finlab.physics.objective import Objective
 
 EXACT = 1e-5
 """Normalized error up to which an end counts as tracking exactly."""
-SAME_DIRECTION = 1e-6
-"""Singular values of the fins' effectiveness below this share of the largest count as no authority."""
 DESCENT_STEPS = 40
 """From a random command onto the target."""
-
-Solve = Callable[[Array, Array], Array]
-"""From a normalized target (6,) and a start (n, 3) to the command (n, 3) where the solver ends."""
 
 
 class CheapestCommands:
@@ -72,17 +66,11 @@ class CheapestCommands:
     def _prepare(self, layout: Layout) -> Solve:
         return (self._by_ipopt if has_formulas(layout) else self._by_slsqp)(plant_of(layout))
 
-    def _independent(self, plant: Plant) -> Array:
-        """Directions (r, 6) of the normalized wrench in which the fins push at all: no constraint says what
-        another one says."""
-        axes, size, _ = np.linalg.svd(layout_effectiveness(plant.layout) / self.sigma[:, None])
-        return np.asarray(axes[:, : int((size > SAME_DIRECTION * size[0]).sum())].T)
-
     def _by_ipopt(self, plant: Plant) -> Solve:
         casadi: Any = import_casadi()
         command, wrench, cost = plant_formulas(casadi, plant, self.objective)
         target = casadi.SX.sym("target", 6)
-        missing = casadi.DM(self._independent(plant)) @ (wrench / casadi.DM(self.sigma) - target)
+        missing = casadi.DM(pushed_axes(plant, self.sigma)) @ (wrench / casadi.DM(self.sigma) - target)
         program = {"x": command, "p": target, "f": cost, "g": missing}
         solver = casadi.nlpsol("cheapest", "ipopt", program, SOLVER_OPTIONS)
         limits = {"lbx": plant.lower.ravel(), "ubx": plant.upper.ravel(), "lbg": 0.0, "ubg": 0.0}
@@ -94,37 +82,7 @@ class CheapestCommands:
         return solve
 
     def _by_slsqp(self, plant: Plant) -> Solve:
-        meter, axes = self.objective.meter(plant), self._independent(plant)
-        free = plant.width.ravel() > 0.0
-        usual = float(meter(plant.sample(np.random.default_rng(0), (16,))).mean())
-
-        def command_at(x: Array) -> Array:
-            share = np.zeros(free.size)
-            share[free] = x
-            return np.asarray(plant.lower + share.reshape(-1, 3) * plant.width)
-
-        def cost(x: Array) -> float:
-            return float(meter(command_at(x)[None])[0]) / usual
-
-        def cost_slopes(x: Array) -> Array:
-            return np.asarray((meter.slopes(command_at(x)[None])[0] * plant.width).ravel()[free]) / usual
-
-        def solve(wanted: Array, start: Array) -> Array:
-            def missing(x: Array) -> Array:
-                return np.asarray(axes @ (plant.wrench(command_at(x)) / self.sigma - wanted))
-
-            def slopes(x: Array) -> Array:
-                _, jacobian = plant.linearize(command_at(x))
-                return np.asarray(axes @ (jacobian / self.sigma[:, None] * plant.width.ravel())[:, free])
-
-            first = ((start - plant.lower) / np.where(plant.width > 0.0, plant.width, 1.0)).ravel()[free]
-            exactly: Any = {"type": "eq", "fun": missing, "jac": slopes}
-            how: dict[str, Any] = {"method": "SLSQP", "options": {"maxiter": 100, "ftol": 1e-9}}
-            limits = [(0.0, 1.0)] * len(first)
-            answer = minimize(cost, first, jac=cost_slopes, bounds=limits, constraints=exactly, **how)
-            return command_at(np.clip(answer.x, 0.0, 1.0))
-
-        return solve
+        return cheapest_program(plant, self.objective.meter(plant), self.sigma, steps=100, settled=1e-9)
 
 
 def has_formulas(layout: Layout) -> bool:

@@ -21,7 +21,6 @@ def step_within(
     low: Array,
     high: Array,
     passes: int,
-    held: Held | None = None,
 ) -> Array:
     """A step whose variables stay within limits: solve, hold what crosses a limit there, solve again.
 
@@ -31,10 +30,9 @@ def step_within(
         low: least step of each variable, 0 or below.
         high: largest step, 0 or above.
         passes: most times that the step is solved; what still crosses a limit then is cut off.
-        held: variables that are held at no step from the start.
     """
     step: Array = np.zeros(low.shape)
-    held = np.zeros(low.shape, bool) if held is None else held
+    held = np.zeros(low.shape, bool)
     for _ in range(passes):
         free = free_step(step, held)
         out = (free < low) | (free > high)
@@ -49,22 +47,6 @@ try:
     from numpy.linalg import _umath_linalg as _lapack
 except ImportError:
     _lapack = np.linalg  # type: ignore[misc]
-
-
-RANK = 1e-13
-"""Eigenvalues of a matrix below this share of the largest one are rounding."""
-
-
-def solve_symmetric(matrix: Array, right: Array) -> Array:
-    """Solutions (..., m, k) of symmetric systems (..., m, m), singular ones among them.
-
-    A regularization that is smaller than what rounding has lost of a matrix leaves it singular, as large fins
-    far out in one line may do. The shortest of the best solutions is then taken, of all systems at once.
-    """
-    try:
-        return np.asarray(np.linalg.solve(matrix, right), np.float64)
-    except np.linalg.LinAlgError:
-        return np.asarray(np.linalg.pinv(matrix, rcond=RANK, hermitian=True) @ right)
 
 
 def solve(matrix: Array, right: Array) -> AnyArray:

@@ -1,172 +1,134 @@
-"""Method `sqp`: re-linearize at the iterate, box QP on residual and cost, backtracking line search."""
+"""Method `sqp`: sequential quadratic programming by SciPy, the least cost under the wrench as constraint."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from scipy.optimize import minimize
 
-from finlab.allocation.baselines.box_least_squares import EXACTLY, BoxSettings, solve_box_quadratics
-from finlab.allocation.baselines.model_based import ModelBased, TimeLimit, TimeLimitedSettings
-from finlab.allocation.command_cost import CommandCost
+from finlab.allocation.baselines.model_based import CACHE_SIZE, ModelBased, TimeLimit, TimeLimitedSettings
+from finlab.allocation.search.levenberg_marquardt import CommandProblem, refine
 from finlab.allocation.settings import number
 from finlab.arrays import Array
+from finlab.layout import layout_effectiveness
+from finlab.networks.normalization import Normalization
 from finlab.physics import Plant
+from finlab.physics.objective import CostMeter
 
-CHUNK = 2048
-"""Rows stepped together; more would not fit the caches."""
-SOLVED = 1e-8
-"""Normalized error at which a row stops."""
-LEAST_GAIN = 1e-4
-"""Share of J by which a whole step must lower it, half a step by half of that; or the row stops."""
-STAGES = ((300.0, 8), (3.0, 4))
-"""How many times the cost counts in J, and for how many steps: much at first, or the way along the exact
-commands, which bends, would be cut into short steps."""
-NEARLY = BoxSettings(max_steps=5, tolerance=1e-2)
-"""How exactly steps on J are found: their model of the cost is no better."""
-RIDGE = 1e-13
-"""Least weight of a step's length, relative to the squared derivatives: that the quadratic programs have one
-solution must not be lost to rounding where fins are strong."""
+SOLVED = 1e-5
+"""Normalized error up to which an answer is exact."""
+NEAR = 1e-3
+"""Normalized error from which on a start is no way to the target: its cost does not matter."""
+APPROACH, POLISH = 30, 2
+"""Levenberg-Marquardt steps from a start onto the target, and after the last quadratic program."""
+SETTLED = 1e-8
+"""Change of the cost, as a share of a usual one, at which the programs end."""
+SAME_DIRECTION = 1e-6
+"""Singular values of the fins' effectiveness below this share of the largest count as no authority."""
+
+Solve = Callable[[Array, Array], Array]
+"""From a normalized target (6,) and a start (n, 3) to the command (n, 3) where the solver ends."""
 
 
 @dataclass(frozen=True)
 class SqpSettings(TimeLimitedSettings):
     """Settings of method `sqp`."""
 
-    n_steps: int = number(30, 0, 10_000, "most steps per start on the error alone")
+    n_steps: int = number(100, 1, 10_000, "most quadratic programs per start")
     n_starts: int = number(
-        4, 1, 10_000, "starts per target beside the pseudo-inverse's: the middle of the limits, random ones"
-    )
-    regularization: float = number(
-        1e-4, 0.0, 1e6, "weight of a step's length, as a share of the squared error at the iterate"
+        2, 1, 10_000, "starts per target beside the pseudo-inverse's: the middle of the limits, random ones"
     )
 
 
 class Sqp(ModelBased):
-    """Sequential quadratic programming after the paper's, all targets of a layout stepped together.
+    """Sequential quadratic programming, as the paper's; but the paper's keeps the normalized error least.
 
-    The paper's solves for the normalized error alone. Here steps first lower J, the squared error and the
-    cost, which counts more at first, then the error alone: each minimizes
-    `||r + J d||^2` plus a convex quadratic for the cost plus `regularization ||d||^2` within the limits, over
-    commands as positions between their limits. Starts are the pseudo-inverse's answer, whose fins give their
-    forces by the cheapest commands, the middle of the limits and random commands; of the ends that meet the
-    target the cheapest one wins, else the smallest error.
+    Starts are brought onto the target, or as near as they come; from those that reach it the cost falls along
+    it. The cheapest end that meets the target is the answer, else the one with the smallest error.
     """
 
     name = "sqp"
     settings_class = SqpSettings
     settings: SqpSettings
 
+    def __init__(self, normalization: Normalization, **settings: Any) -> None:
+        super().__init__(normalization, **settings)
+        self._program = lru_cache(CACHE_SIZE)(self._build)
+
+    def _build(self, plant: Plant) -> tuple[CommandProblem, CostMeter, Solve]:
+        meter, sigma = self.aim.meter(plant), self.normalization.std
+        solve = cheapest_program(plant, meter, sigma, self.settings.n_steps, SETTLED)
+        return CommandProblem.of(plant, sigma), meter, solve
+
     def _commands(self, plant: Plant, targets: Array, seed: int) -> Array:
-        first = self._inverse(plant).command(targets)  # a fin is compiled once, which no target pays for
-        limit, cost = TimeLimit(self.settings.time_limit_s * len(targets)), self._cost(plant)
-        others = [(plant.lower + plant.upper) / 2]
-        others += [*plant.sample(np.random.default_rng(seed), (self.settings.n_starts - 1,))]
-        starts = np.concatenate([first[:, None], np.tile(others, (len(targets), 1, 1, 1))], axis=1)
-        many, n = len(others) + 1, plant.n_fins
-        ends, error = self._from(
-            plant, starts.reshape(-1, n, 3), np.repeat(targets, many, axis=0), cost, limit
-        )
-        met = (error <= SOLVED).reshape(-1, many)
-        value = np.where(met, cost(ends).reshape(-1, many), np.inf)
-        chosen = np.where(met.any(axis=1), value.argmin(axis=1), error.reshape(-1, many).argmin(axis=1))
-        answer: Array = ends.reshape(-1, many, n, 3)[np.arange(len(targets)), chosen]
+        problem, meter, solve = self._program(plant)
+        answer = self._inverse(plant).command(targets)
+        random = plant.sample(np.random.default_rng(seed), (self.settings.n_starts - 1,))
+        for i, target in enumerate(targets / self.normalization.std):
+            limit = TimeLimit(self.settings.time_limit_s)
+            starts = np.array([answer[i], (plant.lower + plant.upper) / 2, *random])
+            near = refine(problem, target[None], starts, APPROACH)
+            tried = [*near.command]
+            for start in near.command[near.error <= NEAR]:
+                if not limit.over:
+                    tried.append(solve(target, start))
+            ends = refine(problem, target[None], np.array(tried), POLISH)
+            missed = ends.error > SOLVED
+            answer[i] = ends.command[
+                np.lexsort((np.where(missed, ends.error, meter(ends.command)), missed))[0]
+            ]
         return answer
 
-    def _from(
-        self, plant: Plant, start: Array, targets: Array, cost: CommandCost, limit: TimeLimit
-    ) -> tuple[Array, Array]:
-        """Where starts (B, n, 3) end for targets (B, 6), and the normalized errors (B,) there; as many rows
-        together as fit the caches."""
-        command = start.copy()
-        for first in range(0, len(targets), CHUNK):
-            rows = slice(first, first + CHUNK)
-            for weight, n_steps in (*STAGES, (0.0, self.settings.n_steps)):
-                j = _J(plant, targets[rows], self.normalization.std, cost, weight)
-                command[rows] = self._descend(j, command[rows], n_steps, limit)
-        return command, self.normalization.error(plant.wrench(command), targets)
 
-    def _descend(self, j: "_J", start: Array, n_steps: int, limit: TimeLimit) -> Array:
-        """Commands (B, n, 3) after at most so many steps that lower J."""
-        command, value = start.copy(), j(start)
-        busy = np.arange(len(command))
-        least, exactness = (0.0, NEARLY) if j.weight else (SOLVED**2, EXACTLY)
-        for _ in range(n_steps):
-            busy = busy[value[busy] > least]
-            if not len(busy) or limit.over:
-                break
-            hessian, gradient = j.model(command[busy], busy, self.settings.regularization)
-            low, high = _room(j.plant, command[busy])
-            step = solve_box_quadratics(hessian, gradient, low, high, exactness, lambda: limit.over)
-            step = step.reshape(len(busy), -1, 3) * j.plant.width
-            busy = busy[_search(j, command, value, busy, step)]
-        return command
+def cheapest_program(plant: Plant, meter: CostMeter, sigma: Array, steps: int, settled: float) -> Solve:
+    """Returns what finds the cheapest commands near a start that deliver a target, by SciPy's SLSQP.
 
+    Args:
+        plant: the robot.
+        meter: what commands cost.
+        sigma: per-axis standard deviation (6,) of the error.
+        steps: most quadratic programs.
+        settled: change of the cost, as a share of a usual one, at which they end.
+    """
+    axes, width = pushed_axes(plant, sigma), plant.width
+    free = width.ravel() > 0.0
+    usual = max(float(meter(plant.sample(np.random.default_rng(0), (16,))).mean()), 1e-300)
 
-@dataclass(frozen=True, eq=False)
-class _J:
-    """What steps lower, for B targets."""
+    def command_at(x: Array) -> Array:
+        share = np.zeros(free.size)
+        share[free] = x
+        return np.asarray(plant.lower + share.reshape(-1, 3) * width)
 
-    plant: Plant
-    """The robot."""
-    targets: Array
-    """Wrenches (B, 6)."""
-    sigma: Array
-    """Per-axis standard deviation (6,) of the error."""
-    cost: CommandCost
-    """Of the commands."""
-    weight: float
-    """Times that it counts beside the squared normalized error; 0 for that alone."""
+    def cost(x: Array) -> float:
+        return float(meter(command_at(x)[None])[0]) / usual
 
-    def __call__(self, command: Array, rows: NDArray[np.intp] | slice = slice(None)) -> Array:
-        """J (R,) of commands (R, n, 3) for these rows of the targets."""
-        residual = (self.plant.wrench(command) - self.targets[rows]) / self.sigma
-        square: Array = (residual**2).sum(axis=-1)
-        return square + self.weight * self.cost(command) if self.weight else square
+    def cost_slopes(x: Array) -> Array:
+        return np.asarray((meter.slopes(command_at(x)[None])[0] * width).ravel()[free]) / usual
 
-    def model(self, command: Array, rows: NDArray[np.intp], regularization: float) -> tuple[Array, Array]:
-        """Half the Hessian (R, 3 n, 3 n), made convex, and half the gradient (R, 3 n), by positions between
-        the limits."""
-        width, plant = self.plant.width, self.plant
-        wrench, jacobian = plant.linearize(command)
-        residual = (wrench - self.targets[rows]) / self.sigma
-        slope = jacobian * width.ravel() / self.sigma[:, None]
-        hessian = slope.transpose(0, 2, 1) @ slope
-        each = np.arange(width.size)
-        least = 1e-12 + RIDGE * np.einsum("bij,bij->b", slope, slope)
-        hessian[:, each, each] += np.maximum(regularization * (residual**2).sum(axis=1), least)[:, None]
-        gradient = np.einsum("bij,bi->bj", slope, residual)
-        if self.weight:
-            bowl = self.cost.bowl(command).in_units(width)
-            gradient += self.weight * bowl.slope.reshape(gradient.shape)
-            hessian[:, each, each] += self.weight * bowl.diagonal.reshape(gradient.shape)
-            hessian[:, each[0::3], each[1::3]] += self.weight * bowl.mixed
-            hessian[:, each[1::3], each[0::3]] += self.weight * bowl.mixed
-        return hessian, gradient
+    def solve(target: Array, start: Array) -> Array:
+        def missing(x: Array) -> Array:
+            return np.asarray(axes @ (plant.wrench(command_at(x)) / sigma - target))
+
+        def slopes(x: Array) -> Array:
+            _, jacobian = plant.linearize(command_at(x))
+            return np.asarray(axes @ (jacobian / sigma[:, None] * width.ravel())[:, free])
+
+        if not free.any():
+            return start
+        first = ((start - plant.lower) / np.where(width > 0.0, width, 1.0)).ravel()[free]
+        exactly: Any = {"type": "eq", "fun": missing, "jac": slopes}
+        how: dict[str, Any] = {"method": "SLSQP", "options": {"maxiter": steps, "ftol": settled}}
+        limits = [(0.0, 1.0)] * len(first)
+        end = minimize(cost, first, jac=cost_slopes, bounds=limits, constraints=exactly, **how).x
+        return command_at(np.clip(end, 0.0, 1.0)) if np.isfinite(end).all() else start
+
+    return solve
 
 
-def _room(plant: Plant, command: Array) -> tuple[Array, Array]:
-    """How far each command may step (B, 3 n), as a share of its range; a free turn, half a turn."""
-    safe = np.where(plant.width > 0, plant.width, 1.0)
-    low, high = (plant.lower - command) / safe, (plant.upper - command) / safe
-    low[:, plant.full_turn, 2], high[:, plant.full_turn, 2] = -0.5, 0.5
-    shape = (len(command), -1)
-    return np.minimum(low, 0.0).reshape(shape), np.maximum(high, 0.0).reshape(shape)
-
-
-def _search(j: _J, command: Array, value: Array, rows: NDArray[np.intp], step: Array) -> NDArray[np.bool_]:
-    """Halve each row's step until J falls; updates in place, says which rows (R,) moved."""
-    moved = np.zeros(len(rows), dtype=bool)
-    pending = np.arange(len(rows))
-    length = 1.0
-    for _ in range(8):
-        trial = j.plant.feasible(command[rows[pending]] + length * step[pending])
-        reached = j(trial, rows[pending])
-        good = reached < value[rows[pending]] * (1 - LEAST_GAIN * length)
-        done = rows[pending[good]]
-        command[done], value[done] = trial[good], reached[good]
-        moved[pending[good]] = True
-        pending = pending[~good]
-        if not len(pending):
-            break
-        length /= 2
-    return moved
+def pushed_axes(plant: Plant, sigma: Array) -> Array:
+    """Directions (r, 6) of the normalized wrench in which the fins push at all: no constraint says what
+    another one says."""
+    axes, size, _ = np.linalg.svd(layout_effectiveness(plant.layout) / sigma[:, None])
+    return np.asarray(axes[:, : int((size > SAME_DIRECTION * size[0]).sum())].T)

@@ -38,14 +38,15 @@ def test_strong_fins_on_long_levers_are_no_singular_problem(layout: Layout) -> N
 
 
 def many_fins() -> tuple[Layout, np.ndarray]:
-    """A robot on which every one of the methods takes long, and a wrench out of its reach."""
+    """A robot on which every one of the methods takes long, and a wrench within its reach."""
     arc = Limits((0.05, 0.6), (0.1, 2.1), (-1.0, 0.5))
     rng = np.random.default_rng(0)
     fins = (
         Fin(f"f{i}", tuple(rng.uniform(-0.3, 0.3, 3).tolist()), float(rng.uniform(-3, 3)), arc)
         for i in range(16)
     )
-    return Layout("many", tuple(fins)), np.array([30.0, -20.0, 40.0, 3.0, -4.0, 5.0])
+    layout = Layout("many", tuple(fins))
+    return layout, Plant(layout).wrench(Plant(layout).sample(rng, ()))
 
 
 def test_when_the_time_is_up_the_best_so_far_is_the_answer() -> None:
@@ -55,4 +56,4 @@ def test_when_the_time_is_up_the_best_so_far_is_the_answer() -> None:
     assert time.thread_time() - start < 0.3
     assert ((hasty.command >= layout.lower) & (hasty.command <= layout.upper)).all()
     patient = Sqp(NORMALIZATION, time_limit_s=60.0).allocate(layout, target)
-    assert patient.err_norm < hasty.err_norm
+    assert patient.err_norm < 1e-5 and patient.power < hasty.power
