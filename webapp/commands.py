@@ -6,7 +6,6 @@ from typing import Any, NamedTuple
 
 import viser
 
-from finlab.errors import FinlabError
 from webapp.page import Page
 from webapp.session.lessons import LESSONS
 from webapp.session.looking import TASKS
@@ -38,11 +37,6 @@ def commands(page: Page) -> list[Command]:
     def fail_selected() -> None:
         session.toggle_failure(session.selected or session.state.layout.names[0])
 
-    def mark(kind: str) -> None:
-        if not session.selection:
-            raise FinlabError("no fin is selected; click one, or choose it in the list")
-        session.toggle_mark(kind, session.selection)
-
     def compare() -> None:
         session.show_drawer("Comparison")
         page.comparison.start(session.state)
@@ -65,8 +59,6 @@ def commands(page: Page) -> list[Command]:
         Command("Design", "Delete the selected fin", session.delete_fin, "delete"),
         Command("Design", "Add a fin", session.add_fin, "I"),
         Command("Design", "Select all fins", session.select_all, "A", CTRL),
-        Command("Design", "Lock or unlock the selected fins", partial(mark, "locked")),
-        Command("Design", "Hide or show the selected fins", partial(mark, "hidden"), "H"),
         Command("Design", "New design", page.designs.new),
         Command("Design", "Save the design", page.designs.save, "S", CTRL),
         Command("Design", "Share the design by a link", page.designs.share),

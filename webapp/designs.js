@@ -1,11 +1,8 @@
-// Designs of this browser: the one in the address it was opened with, those it had lately, and the link that shares one.
+// Designs in links: the one in the address that the page was opened with, and the link that shares one.
 (() => {
-  const KEPT = 'finlab-designs';
-  const tell = (kind, text) => window.finlabEditables.tell(kind, '', text);
-
   function openLinked(hash) {
     if (!hash.startsWith('#design=')) return;
-    tell('design-link', hash.slice(1));
+    window.finlabPresses.tell('design-link', '', hash.slice(1));
     history.replaceState(null, '', location.pathname + location.search); // a reload goes on with what was made of it
   }
 
@@ -48,10 +45,8 @@
   if (isFirst) window.addEventListener('hashchange', () => openLinked(location.hash));
   window.finlabDesigns = { share };
   const begin = () => {
-    if (!window.finlabEditables?.ready()) return setTimeout(begin, 50);
-    const kept = localStorage.getItem(KEPT);
-    if (kept) tell('designs-kept', kept);
-    if (isFirst) openLinked(enteredWith());
+    if (!window.finlabPresses?.ready()) return setTimeout(begin, 50);
+    openLinked(enteredWith());
   };
-  begin();
+  if (isFirst) begin();
 })();

@@ -32,7 +32,7 @@
     event.preventDefault();
     event.stopPropagation();
     show(false);
-    const { tell } = window.finlabEditables;
+    const { tell } = window.finlabPresses;
     const row = event.target.closest?.('.fin-list [data-press=fin]');
     if (row) tell('fin', row.dataset.key, '');
     const items = [...event.dataTransfer.items].filter((item) => item.kind === 'file');

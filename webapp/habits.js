@@ -26,6 +26,12 @@
     }
   }, { capture: true });
 
+  // What is typed counts when it is whole: with Enter, or when the box is left. Viser would send every key.
+  const BOXES = '.mantine-NumberInput-input, .mantine-TextInput-input, .mantine-Textarea-input';
+  window.addEventListener('input', (event) => {
+    if (event.target.matches?.(BOXES) && event.target.closest('.mantine-Flex-root')) event.stopImmediatePropagation();
+  }, { capture: true });
+
   // Commands listen on the root of the document, the camera on the document, which comes after.
   page.addEventListener('keydown', (event) => {
     if ((event.ctrlKey || event.metaKey || event.altKey) && MOVES.test(event.code)) event.stopPropagation();

@@ -16,9 +16,8 @@ import viser
 from finlab.allocation.allocation import Allocation
 from finlab.bundle_files import LARGEST_BUNDLE
 from finlab.errors import FinlabError
-from webapp.editables import Editables
 from webapp.handles import Changes, on_user_change, put
-from webapp.number_fields import NumberField, NumberFields
+from webapp.presses import Presses
 from webapp.scene.scenery import Scenery
 from webapp.session import Session
 from webapp.session.state import State
@@ -96,15 +95,13 @@ class Page(ABC):
         self.scenery = Scenery(context, self.swimming)
         self.bound: list[Callable[[], None]] = []
         """Each writes what the session holds into a widget; the panel that is being built takes them."""
-        self.fields = NumberFields(client.gui, self.fault)
-        self.editables = Editables(client.gui, self.attempt, self.do)
-        self.designs = Designs(context, self.exports, self.editables)
-        self.opening = Opening(client.gui, self.editables, self.do, self.designs.open_together)
+        self.presses = Presses(client.gui, self.do)
+        self.designs = Designs(context, self.exports, self.presses)
+        self.opening = Opening(client.gui, self.presses, self.designs.open_together)
         self._uploads = Uploads(client.gui, MAX_UPLOAD, partial(self.notify, "Not possible"))
         self._panels: list[Panel] = []
         self._panels, self._swim_panels = self._build()
-        self.fields.start()
-        self.editables.mailbox.start()
+        self.presses.start()
         self._refresh()
         self._ask()
 
@@ -158,21 +155,25 @@ class Page(ABC):
         return handle
 
     def bind_number(
-        self, handle: Input, act: Callable[[Any], object], value: Callable[[], object], digits: int = 4
+        self, handle: Input, act: Callable[[Any], object], value: Callable[[], Any], digits: int = 4
     ) -> Input:
-        """A slider, number or vector for numbers, made just now: its boxes take texts with units and
-        arithmetic, and say below them what was refused. `digits` are shown behind the point."""
-        session = self.session
-        field = NumberField(
-            handle,
-            self.client.gui.add_html("", visible=False),
-            lambda asked: self.attempt(partial(act, asked)),
-            value,
-            lambda: (session.selected, session.state.layout.name),
-            digits,
-        )
-        self.bound.append(self.fields.add(field))
-        return handle
+        """A slider, number or vector; `digits` are shown behind the point. What the page only shows rounded
+        stays as exact as it is."""
+
+        def shown() -> Any:
+            now = value()
+            if isinstance(now, (tuple, list)):
+                return tuple(round(v, digits) + 0.0 for v in now)
+            return round(float(now), digits) + 0.0
+
+        def meant(asked: Any) -> None:
+            if isinstance(asked, (tuple, list)):
+                pairs = zip(asked, shown(), value(), strict=True)
+                asked = tuple(exact if new == old else new for new, old, exact in pairs)
+            act(asked)
+
+        handle.precision = digits  # type: ignore[attr-defined]
+        return self.bind(handle, meant, shown)
 
     def bind_display(self, handle: Input, key: str) -> Input:
         """An input for a field of the session's `Display`."""

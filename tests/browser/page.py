@@ -195,14 +195,6 @@ class Page:
         box.press("Enter")
         self._pause()
 
-    def write(self, kind: str, text: str, end: str = "Enter") -> None:
-        """Type with real keys into a word that is edited where it stands."""
-        self.page.locator(f"[data-edit={kind}]:visible").first.click()
-        self.page.locator(".fl-editor").wait_for()
-        self.page.keyboard.type(text, delay=10)
-        self.page.keyboard.press(end)
-        self.until(lambda: self.page.locator(".fl-editor").count() == 0)
-
     def choose(self, label: str, entry: str) -> None:
         """Choose from a list."""
         self.row(label).first.click()

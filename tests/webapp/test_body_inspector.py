@@ -30,7 +30,7 @@ def body(session: Session) -> Body:
 
 
 def test_all_is_estimated_in_one_step_and_is_neutral(session: Session) -> None:
-    session.estimate("all")
+    session.estimate()
     found = body(session)
     volume = 4 / 3 * math.pi * 0.3 * 0.2 * 0.1
     assert found.mass_kg == pytest.approx(1000 * volume, rel=0.01) and found.buoyancy_n is None
@@ -45,7 +45,7 @@ def test_all_is_estimated_in_one_step_and_is_neutral(session: Session) -> None:
 
 def test_a_given_mass_stays_and_buoyancy_tells_the_volume(session: Session) -> None:
     session.set_dynamics("mass_kg", 12.0)
-    session.estimate("all")
+    session.estimate()
     found = body(session)
     assert found.mass_kg == 12.0 and found.inertia_kgm2 is not None
     displaced = 1000 * solid_of(hull_of(session.state.layout)).volume
@@ -53,20 +53,10 @@ def test_a_given_mass_stays_and_buoyancy_tells_the_volume(session: Session) -> N
     assert session.history.past[0][0] == "Mass of the robot"
 
 
-def test_inertia_needs_the_mass(session: Session) -> None:
-    before = session.state
-    with pytest.raises(FinlabError, match="needs the mass"):
-        session.estimate("inertia")
-    assert session.state == before
-
-
 def test_the_inertia_of_ucats_hull_is_near_that_of_its_drawings_and_a_bare_hull_drags_less() -> None:
     layout = load_layout("ucat")
     known = layout.body
-    guess = layout
-    for what in ("inertia", "added mass", "damping"):
-        guess = estimated(guess, what)
-    found = guess.body
+    found = estimated(layout).body
     assert known is not None and found is not None
     assert found.inertia_kgm2 == pytest.approx(known.inertia_kgm2, rel=0.2)
     # What was identified has fins, wires and ports on it.
@@ -79,12 +69,12 @@ def test_the_water_is_that_of_the_fins(session: Session) -> None:
     session.select_all()
     session.set_parameter("density", 1025.0)
     assert water_density(session.state.layout) == 1025.0
-    session.estimate("mass")
+    session.estimate()
     assert body(session).mass_kg == pytest.approx(1025 * 4 / 3 * math.pi * 0.006, rel=0.01)
 
 
 def test_forgetting_leaves_the_hull(session: Session) -> None:
-    session.estimate("all")
+    session.estimate()
     session.forget_dynamics()
     assert all(getattr(body(session), key) is None for key in DYNAMICS) and body(session).hull is not None
 

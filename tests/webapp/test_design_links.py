@@ -1,7 +1,6 @@
 """Designs in links: whole there and back, treated like any upload, refused when they are too large."""
 
 import base64
-import json
 import zlib
 from pathlib import Path
 from types import SimpleNamespace
@@ -18,13 +17,12 @@ from finlab.layout import FinModelSpec, layout_to_dict, load_layout
 from finlab.layout.load import MAX_BYTES
 from finlab.physics import make_law
 from finlab.physics.table_file import write_table
-from tests.webapp.hands import move_fin
 from tests.webapp.loops import ReadAtOnce
 from webapp.session import Session
 from webapp.session.companions import stored_table
 from webapp.session.design_links import ARCHIVE, FRAGMENT, MAX_LINK, PLAIN, packed, unpacked
 from webapp.session.files import stored_hull, table_folder
-from webapp.tasks.designs import MOST, Designs
+from webapp.tasks.designs import Designs
 
 
 @pytest.fixture(autouse=True)
@@ -89,26 +87,22 @@ def test_a_link_opens_no_file_of_the_server(path: str) -> None:
 
 
 class Browser:
-    """What a page keeps and is sent."""
+    """What a page is sent."""
 
     def __init__(self) -> None:
-        self.kept: dict[str, str] = {}
         self.sent: list[str] = []
         self.heard: dict[str, Any] = {}
 
 
 def designs_of(session: Session, browser: Browser) -> Designs:
-    store = SimpleNamespace(set_item=browser.kept.__setitem__)
     context: Any = SimpleNamespace(
         session=session,
-        client=SimpleNamespace(local_storage=store, gui=None),
         notify=lambda *_: None,
         reading=ReadAtOnce(lambda act: act()),
     )
     exports: Any = SimpleNamespace(download=lambda name, _: browser.sent.append(name))
-    hear = browser.heard.__setitem__
-    editables: Any = SimpleNamespace(on=hear, on_press=hear)
-    return Designs(context, exports, editables)
+    presses: Any = SimpleNamespace(on=browser.heard.__setitem__)
+    return Designs(context, exports, presses)
 
 
 def test_a_new_design_is_whole_and_can_be_taken_back() -> None:
@@ -121,48 +115,13 @@ def test_a_new_design_is_whole_and_can_be_taken_back() -> None:
     session.undo()
     session.undo()
     assert session.state.layout.name == "ucat"
-    session.duplicate_layout()
-    assert session.state.layout.name == "ucat copy" and session.state.layout.fins == load_layout("ucat").fins
 
 
-def test_designs_that_made_room_are_kept_newest_first_and_opened_again() -> None:
+def test_saving_sends_the_design_and_notes_it() -> None:
     session, browser = Session(load_layout("ucat")), Browser()
-    designs = designs_of(session, browser)
-    for k in range(MOST + 2):
-        session.new_layout()
-        session.rename_robot(f"robot {k}")
-        move_fin(session, "left", (0.01 * k, 0.2, 0.0))
-        designs.note()
-    assert [one.name for one in designs.recent] == [f"robot {k}" for k in range(MOST, 0, -1)]
-    again = designs_of(session, browser)
-    browser.heard["designs-kept"]("", browser.kept["finlab-designs"])
-    assert again.recent == designs.recent
-    again.open_recent("2")
-    assert session.state.layout.name == "robot 6" and session.state.layout.fins[0].position[0] == 0.06
-    with pytest.raises(FinlabError, match="not kept any more"):
-        again.open_recent("99")
-
-
-def test_saving_under_another_name_renames_and_keeps() -> None:
-    session, browser = Session(load_layout("ucat")), Browser()
-    designs = designs_of(session, browser)
-    designs.save_as("My turtle")
+    session.rename_robot("My turtle")
+    designs_of(session, browser).save()
     assert browser.sent == ["My_turtle.yaml"] and session.saved == session.state.layout
-    assert session.state.layout.name == "My turtle" and designs.recent[0].name == "My turtle"
-    with pytest.raises(FinlabError):
-        designs.save_as("")
-    assert browser.sent == ["My_turtle.yaml"]
-
-
-@pytest.mark.parametrize("kept", ["", "{}", '[1, [], [1, 2, 3, 4], ["a", 1, "b", "c"]]', "[" * 5000])
-def test_a_browsers_storage_may_hold_anything(kept: str) -> None:
-    browser = Browser()
-    designs = designs_of(Session(load_layout("ucat")), browser)
-    browser.heard["designs-kept"]("", kept)
-    assert designs.recent == []
-    browser.heard["designs-kept"]("", json.dumps([["x", 4, 0, "yrubbish"]]))
-    with pytest.raises(FinlabError):
-        designs.open_recent("0")
 
 
 def test_a_measured_fin_travels_with_its_table(tmp_path: Path) -> None:

@@ -85,8 +85,9 @@ def test_copies_around_other_axes_are_refused(session: Session, axis: str, name:
 
 
 def test_stuck_fin_stands_off_the_surface_along_its_normal(session: Session) -> None:
-    session.set_display("stick", True)
     move_fin(session, "front_left", (0.1, 0.4, 0.0))
+    session.select("front_left")
+    session.stick_fin()
     fin = session.state.layout.fins[1]
     point, normal = hull_of(session.state.layout).nearest(np.array(fin.position))
     assert np.linalg.norm(np.subtract(fin.position, point)) == pytest.approx(0.02, abs=2e-3)

@@ -1,7 +1,6 @@
 """A fault in whatever a widget does: the page says so in a sentence, and goes on."""
 
 import asyncio
-import json
 import types
 from collections.abc import Iterator
 from typing import Any
@@ -101,7 +100,7 @@ def test_every_widget_survives_a_fault_in_what_it_does(
     on_loop(server, lambda: view.do(lambda: session.set_target(0, 0.4)))
     until(lambda: not view.busy)
     assert view.shown is not None and view.shown.target[0] == 0.4
-    shown = [field.handle.value for field in view.fields._fields.values() if field.handle.label == "Fx [N]"]
+    shown = [handle.value for handle in handles(server) if getattr(handle, "label", "") == "Fx [N]"]
     assert shown == [0.4]
     view.close()
     on_loop(server, lambda: (server.gui.reset(), server.scene.reset()))
@@ -117,7 +116,6 @@ def test_every_widget_survives_a_fault_in_what_it_does(
         "webapp.panels.swim_tab.swim_card",
         "webapp.panels.swim_tab.scenario_card",
         "webapp.panels.fin_model.model_card",
-        "webapp.number_fields.read_number",
     ],
 )
 def test_every_widget_survives_a_fault_in_what_is_written(
@@ -129,8 +127,6 @@ def test_every_widget_survives_a_fault_in_what_is_written(
         for handle in handles(server):
             if not isinstance(handle, viser.GuiUploadButtonHandle):
                 use(server, view, handle, others(handle)[0])
-        word = [[1, next(iter(view.fields._fields)), 0, "enter", "0.1"]]
-        on_loop(server, lambda: view.fields.mailbox.read(json.dumps(word)))
         assert any(WORDS in note for note in faults(view))
     view.client.notes.clear()
     on_loop(server, lambda: view.do(view.session.start_over))

@@ -1,20 +1,15 @@
 """Several fins selected and changed in one step, names, limits, models, order, locks."""
 
-import json
 import math
 
 import pytest
 
 from finlab.assets import shipped_layouts
 from finlab.errors import FinlabError
-from finlab.layout import FinModelSpec, Layout, load_layout
-from tests.webapp.hands import move_fin
+from finlab.layout import FinModelSpec, load_layout
 from webapp.markup.fin_list import fin_list
-from webapp.markup.thrust_curves import thrust_within
-from webapp.panels.fin_inspector import differences
 from webapp.session import Session
-from webapp.session.fin_edits import modelled, reordered
-from webapp.session.session_files import restore, to_dict
+from webapp.session.fin_edits import modelled
 
 FRONT = ("front_right", "front_left")
 
@@ -95,7 +90,7 @@ def test_usual_values_are_not_written_and_shared_ones_stay(session: Session) -> 
         (lambda s: s.set_parameter("area", float("nan")), "must lie within"),
         (lambda s: s.set_servo("amplitude_pole", 0.0), "must lie within"),
         (lambda s: s.set_servo("__class__", 1.0), "expected one of"),
-        (lambda s: s.place_one("front_right", "x", 55.0), "x of front_right"),
+        (lambda s: s.place_selected((55.0, 0.0, 0.0)), "x of front_right"),
         (lambda s: s.rename_fin("front_right", "front_left"), "there is a fin 'front_left' already"),
         (lambda s: s.rename_fin("front_right", "  "), "name"),
         (lambda s: s.rename_fin("front_right", "x" * 65), "name"),
@@ -110,50 +105,18 @@ def test_what_makes_no_sense_is_refused_and_changes_nothing(session: Session, ac
     assert session.state == before
 
 
-def test_a_renamed_fin_keeps_its_damage_link_lock_and_selection(session: Session) -> None:
+def test_a_renamed_fin_keeps_its_damage_link_and_selection(session: Session) -> None:
     session.select("front_left")
     session.mirror_fin()
     session.select("front_left")
     session.toggle_failure("front_left")
-    session.toggle_mark("hidden", ["front_left"])
     session.rename_fin("front_left", " bow <b> ")
     state = session.state
     assert state.failed == ("bow <b>",) and ("bow <b>", "front_right") in state.links
-    assert state.hidden == ("bow <b>",) and session.selected == "bow <b>"
+    assert session.selected == "bow <b>"
     assert "<b>" not in fin_list(state, session.selection).split("<table>")[1].split("bow")[1][:12]
     session.undo()
     assert session.selected == "front_left" and session.state.failed == ("front_left",)
-
-
-def test_a_locked_fin_stays_until_it_is_unlocked(session: Session) -> None:
-    choose(session, *FRONT)
-    session.toggle_mark("locked", ["front_left", "front_right"])
-    assert session.history.undo_name == "Lock 2 fins"
-    for act in (
-        lambda: move_fin(session, "front_left", (0.0, 0.1, 0.0)),
-        lambda: session.drag_fin("front_left", (0.0, 0.1, 0.0), 0.0),
-        lambda: session.turn_selected(0.1),
-        lambda: session.set_parameter("area", 0.05),
-        lambda: session.rename_fin("front_left", "x"),
-        session.stick_fin,
-        session.delete_fin,
-    ):
-        with pytest.raises(FinlabError, match="is locked; unlock it"):
-            act()
-    session.toggle_mark("locked", ["front_left"])
-    assert session.state.locked == ("front_right",)
-    session.select("front_left")
-    session.delete_fin()
-    assert session.state.locked == ("front_right",)
-
-
-def test_a_linked_twin_that_is_locked_holds_its_pair(session: Session) -> None:
-    session.select("front_left")
-    session.mirror_fin()
-    session.toggle_mark("locked", ["front_right"])
-    session.select("front_left")
-    with pytest.raises(FinlabError, match="front_right, the mirror image of front_left, is locked"):
-        session.place_selected((0.1, 0.15, 0.0))
 
 
 def test_linked_fins_that_are_both_selected_move_once(session: Session) -> None:
@@ -163,37 +126,3 @@ def test_linked_fins_that_are_both_selected_move_once(session: Session) -> None:
     session.place_selected((0.2, 0.2, 0.0))
     assert fin(session, "front_left").position == (0.2, 0.2, 0.0)
     assert fin(session, "front_right").position == (0.2, -0.2, 0.0)
-
-
-def test_order_moves_blocks_and_stops_at_the_ends(session: Session) -> None:
-    layout: Layout = session.state.layout
-    names = layout.names
-    assert reordered(layout, names[:2], 1).names == (names[2], *names[:2], names[3])
-    assert reordered(layout, names[:2], -1) == layout
-    assert reordered(layout, (names[3], names[1]), -1).names == (names[1], names[0], names[3], names[2])
-    session.select(names[0])
-    session.reorder(1)
-    assert session.state.layout.names[1] == session.selected == names[0]
-
-
-def test_marks_are_kept_with_the_session(session: Session) -> None:
-    session.toggle_mark("locked", ["back_left"])
-    session.toggle_mark("hidden", ["front_right", "back_left"])
-    again = Session(load_layout(shipped_layouts()["pair"]))
-    restore(again, json.loads(json.dumps(to_dict(session))))
-    assert again.state == session.state
-
-
-def test_curves_show_the_fins_own_law_within_its_limits(session: Session) -> None:
-    one = fin(session, "front_right")
-    amplitude, frequency, thrust = thrust_within(one.model, one.limits)
-    assert amplitude[0] == 0.6 and (frequency[0], frequency[-1]) == (0.1, 2.1)
-    assert thrust[0, -1] == pytest.approx(4.737 * 2.1**2 * math.sin(0.6) ** 2, rel=1e-3)
-
-
-def test_differences_are_told_in_words(session: Session) -> None:
-    fins = list(session.state.layout.fins)
-    assert differences(fins) == "shaft"
-    session.select("back_left")
-    session.limit_selected("frequency", (0.1, 1.0))
-    assert differences(list(session.state.layout.fins)) == "shaft and limits"

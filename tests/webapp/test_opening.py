@@ -29,9 +29,9 @@ class Taken:
         interface = SimpleNamespace(queue_message=lambda message: self.scripts.append(message.source))
         gui: Any = SimpleNamespace(_websock_interface=interface)
         heard: dict[str, Callable[[str, str], object]] = {}
-        editables: Any = SimpleNamespace(on=heard.__setitem__)
+        presses: Any = SimpleNamespace(on=lambda kind, act: heard.update({kind: self._heard(act)}))
         self.together: list[dict[str, bytes]] = []
-        self.opening = Opening(gui, editables, self._do, self.together.append)
+        self.opening = Opening(gui, presses, self.together.append)
         self.drop = lambda *told: heard["dropped"]("", json.dumps(told))
         self.tell = lambda text: heard["dropped"]("", text)
         self.opening.add(".csv,.txt", self._taker("fin"))
@@ -43,6 +43,9 @@ class Taken:
             act()
         except FinlabError as error:
             self.refused.append(str(error))
+
+    def _heard(self, act: Callable[[str, str], object]) -> Callable[[str, str], object]:
+        return lambda key, text: self._do(lambda: act(key, text))
 
     def _taker(self, who: str) -> Callable[[str, bytes], object]:
         return lambda name, content: self.files.append((who, name, content))

@@ -1,7 +1,6 @@
 """Ways to ask: one axis alone, a sweep; and what is seen of a fin on its way."""
 
 import asyncio
-import math
 from typing import Any
 
 import pytest
@@ -120,24 +119,7 @@ def test_a_sweep_goes_to_and_fro(session: Session, monkeypatch: pytest.MonkeyPat
 def test_landing_tells_where_a_held_fin_would_go(session: Session) -> None:
     name = session.state.layout.names[0]
     assert session.landing(name, (0.3, -0.2, 0.0), 0.1) is None
-    session.set_display("stick", True)
     session.set_display("angle_snap", "45°")
     landing = session.landing(name, (0.3, -0.2, 0.0), 0.1)
     session.end_drag(name, (0.3, -0.2, 0.0), 0.1)
     assert landing == session.state.layout.fins[0], "the ghost tells the truth"
-
-
-@pytest.mark.parametrize("axis", ["x", "y", "z"])
-def test_copies_stand_evenly_around_any_axis(session: Session, axis: str) -> None:
-    session.select("front_left")
-    session.ring_of_fins(3, axis)
-    layout = session.state.layout
-    fins = [layout.fins[1], *layout.fins[4:]]
-    assert len(fins) == 3
-    across = [k for k in range(3) if "xyz"[k] != axis]
-    turns = sorted(math.atan2(*(fin.position[k] for k in reversed(across))) for fin in fins)
-    gaps = [(b - a) % (2 * math.pi) for a, b in zip(turns, turns[1:] + turns[:1], strict=True)]
-    assert gaps == pytest.approx([2 * math.pi / 3] * 3)
-    assert len({round(math.hypot(*(fin.position[k] for k in across)), 6) for fin in fins}) == 1
-    with pytest.raises(FinlabError, match="axis"):
-        session.ring_of_fins(3, "w")

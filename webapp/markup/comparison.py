@@ -6,10 +6,10 @@ from markupsafe import Markup
 
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.judging import REACHED
-from webapp.editables import press
 from webapp.markup.html import html
 from webapp.markup.verdict import verdict_of
 from webapp.markup.words import error_digits, listed, objective_of, three_digits, unlearned_sentence
+from webapp.presses import press
 from webapp.session.state import COMPARED
 from webapp.tasks.comparison import Comparison
 from webapp.theme import NEARLY, css

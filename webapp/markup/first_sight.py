@@ -3,8 +3,8 @@ over it."""
 
 from markupsafe import Markup
 
-from webapp.editables import press
 from webapp.markup.html import html
+from webapp.presses import press
 
 TRIES = (
     ("Ask for a wrench", "Drag Fx: the fins change, and green follows blue.", "Allocate"),

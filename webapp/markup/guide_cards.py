@@ -2,8 +2,8 @@
 
 from markupsafe import Markup
 
-from webapp.editables import press
 from webapp.markup.html import html
+from webapp.presses import press
 from webapp.session.lessons import LESSONS, Lesson
 from webapp.session.tour import STEPS
 

@@ -8,9 +8,9 @@ from markupsafe import Markup
 
 from finlab.allocation.allocation import Allocation
 from finlab.arrays import Array
-from webapp.editables import press
 from webapp.markup.html import html
 from webapp.markup.words import objective_of
+from webapp.presses import press
 from webapp.tasks.mode_names import Modes
 from webapp.theme import DEAD, Rgb, css, mode_color
 

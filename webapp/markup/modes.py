@@ -2,9 +2,9 @@
 
 from markupsafe import Markup
 
-from webapp.editables import press
 from webapp.markup.html import html
 from webapp.markup.words import error_digits, source_words, three_digits
+from webapp.presses import press
 from webapp.tasks.mode_names import Modes
 from webapp.theme import css, mode_color
 

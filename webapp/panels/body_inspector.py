@@ -1,21 +1,18 @@
 """What a layout says of the robot as a whole: its name, what it is, its mass, damping and buoyancy."""
 
-from collections.abc import Callable
 from functools import partial
 from typing import Any
 
 import viser
-from markupsafe import Markup
 
 from finlab.layout import Body
 from finlab.vehicle.body import GRAVITY
-from webapp.editables import edit
 from webapp.handles import put
 from webapp.markup.html import html
 from webapp.markup.words import three_digits
 from webapp.page import Page
 from webapp.scene.meshes.hull import hull_of
-from webapp.session.body_edits import ESTIMATES, solid_of, water_density
+from webapp.session.body_edits import solid_of, water_density
 
 KNOWN = {
     "mass_kg": "mass",
@@ -55,12 +52,11 @@ class BodyInspector:
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         self._page, session = page, page.session
         self._head = gui.add_html("")
-        page.editables.on("robot-name", lambda _, text: session.rename_robot(text))
-        page.editables.on("robot-about", lambda _, text: session.describe_robot(text))
-        acts: dict[str, Callable[[], object]] = {
-            what[0].upper() + what[1:]: partial(session.estimate, what) for what in ESTIMATES
-        }
-        page.add_buttons("From the hull", {**acts, "Forget": session.forget_dynamics}, hint=FORMULAS)
+        page.bind(gui.add_text("Name", ""), session.rename_robot, lambda: session.state.layout.name)
+        about = gui.add_text("About", "", multiline=True)
+        page.bind(about, session.describe_robot, lambda: session.state.layout.description)
+        acts = {"Estimate": session.estimate, "Forget": session.forget_dynamics}
+        page.add_buttons("From the hull", acts, hint=FORMULAS)
         page.bind_number(
             gui.add_number("Mass [kg]", 0.0, step=0.5, hint="From the hull: of the water that it displaces."),
             partial(session.set_dynamics, "mass_kg"),
@@ -104,18 +100,7 @@ class BodyInspector:
         self._page.session.set_dynamics(key, tuple(whole))
 
     def refresh(self) -> None:
-        layout = self._page.session.state.layout
-        name = edit("robot-name", "", layout.name, "name of the robot", at_once=True)
-        about = edit("robot-about", "", layout.description, "description", rows=7, at_once=True)
-        text = layout.description or Markup("<span class='dim'>Press to describe it.</span>")
-        boxes = html(
-            "<span class='edit box' {}>{}</span><span class='edit box text' {}>{}</span>",
-            name,
-            layout.name,
-            about,
-            text,
-        )
-        put(self._head, content=html("<div class='fl head'>{}{}</div>", boxes, self._facts()))
+        put(self._head, content=html("<div class='fl head'>{}</div>", self._facts()))
 
     def _facts(self) -> str:
         """The hull in figures, and what a swim would miss."""

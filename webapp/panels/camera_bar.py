@@ -2,10 +2,10 @@
 
 import viser
 
-from webapp.editables import press
 from webapp.handles import add_html
 from webapp.markup.html import html
 from webapp.page import Page
+from webapp.presses import press
 from webapp.scene.robot_scene import CAMERAS
 
 

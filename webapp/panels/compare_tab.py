@@ -21,7 +21,7 @@ class ComparePanel:
             icon=viser.Icon.SCALE,
             hint="For the present wrench and failures.",
         )
-        page.editables.on_press("overlay", lambda method, _held: self._choose(method))
+        page.presses.on("overlay", lambda method, _held: self._choose(method))
         self._table = gui.add_html("")
 
     def _choose(self, method: str) -> None:

@@ -1,11 +1,11 @@
-"""Where designs come from: the shipped ones, a copy of this one, and those that this browser had lately."""
+"""Where designs come from: the shipped ones, and what is said of this one."""
 
 from importlib.resources import files
 
 import viser
 
 from webapp.handles import put
-from webapp.markup.design_list import design_card
+from webapp.markup.html import html
 from webapp.page import Page
 from webapp.session.files import shipped, shipped_name
 from webapp.viser_internals import run_script
@@ -15,20 +15,13 @@ SCRIPT = files("webapp").joinpath("designs.js").read_text("utf-8")
 
 
 class DesignPanel:
-    """The list of shipped designs, what is said of this one, and the recent ones."""
+    """The list of shipped designs, and what is said of this one."""
 
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
-        self._page, designs = page, page.designs
+        self._page = page
         self._layouts = gui.add_dropdown("Layout", tuple(shipped()), hint="Shipped layouts to start from.")
         page.on_change(self._layouts, self._open)
-        page.add_button(
-            "Duplicate the design",
-            page.session.duplicate_layout,
-            icon=viser.Icon.COPY,
-            hint="Makes a copy under another name and goes on with the copy.",
-        )
         self._card = gui.add_html("")
-        page.editables.on("save-as", lambda _, text: designs.save_as(text))
         run_script(gui, SCRIPT)
 
     def _open(self, name: str) -> None:
@@ -36,8 +29,7 @@ class DesignPanel:
             self._page.session.open_layout(shipped()[name])
 
     def refresh(self) -> None:
-        session, layout, designs = self._page.session, self._page.session.state.layout, self._page.designs
-        designs.note()
+        session, layout = self._page.session, self._page.session.state.layout
         name = shipped_name(layout)
         own = f"{layout.name}, {'yours' if layout == session.saved else 'edited'}"
         put(self._layouts, options=tuple(shipped()) if name else (*shipped(), own), value=name or own)
@@ -45,4 +37,4 @@ class DesignPanel:
         known = {shipped_layout.description for shipped_layout in shipped().values()}
         if name is None and layout.description in known:  # which is about another robot
             first = f"Made from {layout.name}, and changed."
-        put(self._card, content=design_card(layout.name, first, designs.recent))
+        put(self._card, content=html("<div class='fl dim said'>{}</div>", first))

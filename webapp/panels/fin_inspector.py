@@ -10,7 +10,6 @@ from markupsafe import Markup
 from finlab.layout import Fin
 from finlab.layout.fin import MAX_AMPLITUDE, MAX_FREQUENCY
 from finlab.layout.servo import Servo
-from webapp.editables import edit
 from webapp.handles import add_html, put
 from webapp.markup.answer import swatch
 from webapp.markup.html import html
@@ -42,6 +41,7 @@ class FinInspector:
         self._page, session = page, page.session
         self._head = gui.add_html("")
         with gui.add_folder(None) as self._all:
+            page.bind(gui.add_text("Name", ""), self._rename, lambda: session.selected or "")
             with gui.add_folder("Place"):
                 about = "x forward, y left, z up, from the centre of gravity."
                 page.bind_number(
@@ -56,12 +56,10 @@ class FinInspector:
                     lambda: math.degrees(self._fin.mounting_angle),
                     digits=2,
                 )
-                slides = "Fins slide on the hull's surface, shafts along its normal."
                 snap_m = gui.add_dropdown("Snap place", tuple(POSITION_STEPS), hint="Grid for positions.")
                 snap_deg = gui.add_dropdown("Snap turn", tuple(ANGLE_STEPS), hint="Grid for the shaft.")
                 page.bind_display(snap_m, "position_snap")
                 page.bind_display(snap_deg, "angle_snap")
-                page.bind_display(gui.add_checkbox("Stick to hull", False, hint=slides), "stick")
             with gui.add_folder("Limits"):
                 self._add_limits(gui)
             self._model = FinModelPanel(gui, page)
@@ -77,7 +75,7 @@ class FinInspector:
     def _add_limits(self, gui: viser.GuiApi) -> None:
         page, session = self._page, self._page.session
         add_html(gui, LIMITS)
-        about = f"Least and most, up to {MAX_AMPLITUDE:.2f} rad; 30 deg may be typed, too."
+        about = f"Least and most, up to {MAX_AMPLITUDE:.2f} rad."
         page.bind_number(
             gui.add_vector2("A [rad]", (0.0, 0.0), step=0.05, hint=about),
             partial(session.limit_selected, "amplitude"),
@@ -103,6 +101,10 @@ class FinInspector:
         session = self._page.session
         layout = session.state.layout
         return NOMINAL if session.selected is None else layout.fins[layout.index(session.selected)]
+
+    def _rename(self, name: str) -> None:
+        if self._page.session.selected is not None:
+            self._page.session.rename_fin(self._page.session.selected, name)
 
     def _drive(self, key: str) -> float:
         return float(getattr(self._fin.servo, key))
@@ -133,11 +135,7 @@ class FinInspector:
             )
         if len(names) == 1:
             (name,) = names
-            cell = edit("fin-called", str(layout.index(name)), name, f"name of {name}", at_once=True)
-            called = html("<span class='edit box' {}>{}</span>", cell, name)
-            is_locked = name in session.state.locked
-            said = Markup("<div class='dim'>Locked: unlock it in the list.</div>") if is_locked else ""
-            return html("<div class='fl head'>{}{}{}</div>", swatch(layout.index(name)), called, said)
+            return html("<div class='fl head'>{}<b>{}</b></div>", swatch(layout.index(name)), name)
         badges = Markup().join(swatch(layout.index(name)) for name in names)
         differ = differences([layout.fins[layout.index(name)] for name in names])
         said = f"They differ in {differ}. " if differ else "They are alike but for their place. "

@@ -12,13 +12,13 @@ from importlib.resources import files
 import viser
 from markupsafe import Markup
 
-from webapp.editables import press
 from webapp.handles import add_html, put
 from webapp.markup.html import html
 from webapp.markup.picking import marker
 from webapp.page import Page, Panel
 from webapp.panels.places import DRAWER, LEFT, PLACES, REGIONS, RIGHT, SIMULATE, Place
 from webapp.panels.status import Corner
+from webapp.presses import press
 from webapp.session import Session
 from webapp.session.looking import DRAWERS
 from webapp.theme import ASKED, DELIVERED, MISSING, css
@@ -162,7 +162,7 @@ class Frame:
             "frame": lambda _: robot.frame(),
         }
         for kind, act in acts.items():
-            self._page.editables.on_press(kind, partial(_by_key, act))
+            self._page.presses.on(kind, partial(_by_key, act))
 
 
 def _by_key(act: Callable[[str], object], key: str, _held: str) -> object:

@@ -1,7 +1,6 @@
 """What this layout can do (attainable sets, the score card), and a search for a better one."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -153,8 +152,7 @@ class ImprovePanel:
 
     def _search(self) -> None:
         session = self._page.session
-        held = (*session.draft.held, *session.state.locked)
-        self._page.improver.start(session.state.layout, replace(session.draft, held=held))
+        self._page.improver.start(session.state.layout, session.draft)
 
     def _accept(self) -> None:
         found = self._page.improver.findings

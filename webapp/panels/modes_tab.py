@@ -39,7 +39,7 @@ class CandidatesPanel:
         weight = "How much effort counts in the ranking."
         session = page.session
         self._plot, self._plotted = gui.add_html(""), Changes()
-        page.editables.on_press("mode", lambda key, _held: session.show_mode(placed(key, self._modes)))
+        page.presses.on("mode", lambda key, _held: session.show_mode(placed(key, self._modes)))
         with gui.add_folder("Draws from the mixture") as self._draws:
             self._settings = {
                 key: page.bind_number(

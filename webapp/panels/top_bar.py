@@ -6,11 +6,11 @@ import viser
 from markupsafe import Markup
 
 from finlab.allocation.methods import METHODS
-from webapp.editables import press
 from webapp.handles import add_html, put
 from webapp.markup.html import html
 from webapp.markup.picking import marker
 from webapp.page import Page
+from webapp.presses import press
 from webapp.session.design_links import MAX_LINK
 from webapp.session.lessons import LESSONS
 from webapp.session.looking import TASKS

@@ -123,10 +123,7 @@ class RobotScene:
         for i, fin in enumerate(state.layout.fins):
             selected = fin.name == self._session.selected
             label = _label(state, i, fin.name in self._session.selection) if display.labels else None
-            if fin.name in state.hidden:
-                self._fins[i].hide()
-                continue
-            gizmos = selected and self.editing and not display.grips and fin.name not in state.locked
+            gizmos = selected and self.editing and not display.grips
             self._fins[i].place(fin, hull, gizmos, label, i == self.dragged)
             if fin.name in state.failed or allocation is None:
                 self._fins[i].command(None, np.zeros(3), 0.0, False)

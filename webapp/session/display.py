@@ -39,8 +39,6 @@ class Display:
     """Key of `POSITION_STEPS`."""
     angle_snap: str = "off"
     """Key of `ANGLE_STEPS`."""
-    stick: bool = False
-    """Fins slide on the hull, shafts along its normal."""
     ghost: bool = True
     """Show where moved fins stood when the layout was opened or saved."""
     proposed: bool = True

@@ -29,11 +29,6 @@ class Editing(Core):
         self.open_layout(layout_edits.blank(), "New design")
         self.selected = self.state.layout.names[0]
 
-    def duplicate_layout(self) -> None:
-        """Makes a copy under another name and goes on with the copy."""
-        layout = self.state.layout
-        self.open_layout(replace(layout, name=f"{layout.name[:56]} copy"))
-
     def accept_layout(self, layout: Layout) -> None:
         """A better layout that was found for this one."""
         self._edit("Improve the layout", layout)
@@ -53,17 +48,16 @@ class Editing(Core):
 
     def landing(self, name: str, position: Vector, angle: float) -> Fin | None:
         """Where a fin would come to stand if it were let go now; None if that is where it is held."""
-        if not self.display.stick and self._step_m == 0.0 and self._step_rad == 0.0:
+        if self._step_m == 0.0 and self._step_rad == 0.0:
             return None
         layout = self._placed(name, position, angle, self._step_m, self._step_rad)
         return layout.fins[layout.index(name)]
 
     def _placed(self, name: str, position: Vector, angle: float, step_m: float, step_rad: float) -> Layout:
-        """The layout with a fin let go at a place, snapped to steps and stuck to the hull where wanted."""
+        """The layout with a fin let go at a place, snapped to steps."""
         before = self._untouched(name)
         layout = layout_edits.moved(self.state.layout, name, position, step_m, before)
-        layout = layout_edits.turned(layout, name, angle, step_rad, before)
-        return layout_edits.stuck(layout, name) if self.display.stick else layout
+        return layout_edits.turned(layout, name, angle, step_rad, before)
 
     def _untouched(self, name: str) -> Fin | None:
         """The fin before it was taken into the hand; None where it is not."""
@@ -74,7 +68,6 @@ class Editing(Core):
         return layout.fins[layout.index(name)]
 
     def _drag(self, name: str, layout: Layout) -> None:
-        self.state.check_free([name])
         whole = layout_edits.keeping_hull(self.state.layout, followed(layout, self.state.links, name))
         state = self.state.with_layout(whole)
         self._commit(f"Move {name}", state, f"drag {name}", timed=False)
@@ -100,12 +93,12 @@ class Editing(Core):
         self._edit(f"Duplicate {source}", layout)
         self.selected = name
 
-    def mirror_fin(self, linked: bool = True) -> None:
-        """The selected fin's image on the other side; the image is selected. Linked ones move together."""
+    def mirror_fin(self) -> None:
+        """The selected fin's image on the other side, which is selected; they move together."""
         source = self._selected_name()
         layout, name = layout_edits.mirrored(self.state.layout, source)
         state = self.state.with_layout(layout)
-        self._commit(f"Mirror {source}", state.with_link(source, name) if linked else state)
+        self._commit(f"Mirror {source}", state.with_link(source, name))
         self.selected = name
 
     def unlink_fin(self) -> None:
@@ -123,7 +116,6 @@ class Editing(Core):
     def stick_fin(self) -> None:
         """The selected fin onto the hull."""
         name = self._selected_name()
-        self.state.check_free([name])
         layout = layout_edits.stuck(self.state.layout, name)
         self._edit(f"Stick {name} to the hull", followed(layout, self.state.links, name))
 
@@ -131,13 +123,11 @@ class Editing(Core):
         """The selected fins go."""
         self._selected_name()
         names = self.selection
-        self.state.check_free(names)
         which = names[0] if len(names) == 1 else f"{len(names)} fins"
         self._edit(f"Delete {which}", layout_edits.deleted(self.state.layout, names))
 
     def set_model(self, names: Sequence[str], model: FinModelSpec) -> None:
         """Another model for some fins."""
-        self.state.check_free(names)
         which = names[0] if len(names) == 1 else f"{len(names)} fins"
         self._edit(f"Fit {which}", layout_edits.with_model(self.state.layout, names, model))
 

@@ -90,15 +90,3 @@ def with_servo(fin: Fin, key: str, value: Any) -> Fin:
     """
     chosen(key, "drive", vars(fin.servo))
     return replace(fin, servo=replace(fin.servo, **{key: value}))
-
-
-def reordered(layout: Layout, names: Sequence[str], step: int) -> Layout:
-    """The layout with some fins one place up (-1) or down (1); those at the end stay there."""
-    fins = list(layout.fins)
-    wanted = set(names)
-    places = [layout.index(name) for name in names]
-    for place in sorted(places, reverse=step > 0):
-        other = place + (1 if step > 0 else -1)
-        if 0 <= other < len(fins) and fins[other].name not in wanted:
-            fins[place], fins[other] = fins[other], fins[place]
-    return replace(layout, fins=tuple(fins))

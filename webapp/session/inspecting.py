@@ -1,15 +1,12 @@
 """Intents about what a layout says of its fins: for one of them, or for all that are selected at once."""
 
-import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from typing import Any
 
-from finlab.errors import FinlabError
 from finlab.layout import Fin, Layout
 from webapp.session import body_edits, fin_edits, layout_edits
 from webapp.session.editing import Editing, Vector
 from webapp.session.links import followed, partner
-from webapp.session.state import number
 
 UNITS = ("kg", "kgm2", "m", "n")
 """How keys of a body end."""
@@ -21,7 +18,6 @@ class Inspecting(Editing):
     def rename_fin(self, name: str, wanted: str) -> None:
         """A fin with another name; whatever is known of it goes on under that."""
         if wanted.strip() != name:
-            self.state.check_free([name])
             renamed = fin_edits.checked_name(self.state.layout, name, wanted)
             self._commit(f"Rename {name} to {renamed}", self.state.with_renamed(name, renamed))
 
@@ -34,8 +30,7 @@ class Inspecting(Editing):
         def placed(layout: Layout, name: str) -> Layout:
             own = layout.fins[layout.index(name)].position
             x, y, z = (new if c else old for new, old, c in zip(position, own, changed, strict=True))
-            layout = layout_edits.moved(layout, name, (x, y, z), self._step_m)
-            return layout_edits.stuck(layout, name) if self.display.stick else layout
+            return layout_edits.moved(layout, name, (x, y, z), self._step_m)
 
         self._for_each("Move", names, placed, f"move {names}")
 
@@ -47,15 +42,6 @@ class Inspecting(Editing):
             return layout_edits.turned(layout, name, angle, self._step_rad)
 
         self._for_each("Turn", names, turned, f"turn {names}")
-
-    def place_one(self, name: str, axis: str, value: Any) -> None:
-        """One coordinate of a fin [m], as it is typed into the list: never snapped."""
-        self.state.check_free([name])
-        position = list(self.state.layout.fins[self.state.layout.index(name)].position)
-        position["xyz".index(axis)] = value
-        x, y, z = position
-        layout = layout_edits.moved(self.state.layout, name, (x, y, z))
-        self._edit(f"Move {name}", followed(layout, self.state.links, name))
 
     def limit_selected(self, quantity: str, ends: tuple[float, float]) -> None:
         """Other limits of all selected fins; `quantity` is a field of `Limits`, in radians or hertz."""
@@ -81,27 +67,6 @@ class Inspecting(Editing):
             lambda fin: fin_edits.with_servo(fin, key, value),
         )
 
-    def turn_one(self, name: str, degrees: Any) -> None:
-        """The shaft of a fin [deg], as it is typed into the list: never snapped."""
-        self.state.check_free([name])
-        angle = math.radians(number(degrees, f"shaft of {name} [°]", -3600.0, 3600.0))
-        layout = layout_edits.turned(self.state.layout, name, angle)
-        self._edit(f"Turn {name}", followed(layout, self.state.links, name))
-
-    def reorder(self, step: int) -> None:
-        """The selected fins one place up (-1) or down (1) in the list, hence in commands."""
-        names = self._selected_names()
-        layout = fin_edits.reordered(self.state.layout, names, step)
-        self._edit(f"{_which(names)} {'up' if step < 0 else 'down'}", layout)
-
-    def toggle_mark(self, mark: str, names: Iterable[str]) -> None:
-        """Fins locked or free again, hidden or shown again: `mark` is one of `MARKS`."""
-        given = tuple(names)
-        state = self.state.with_mark_toggled(mark, given)
-        done = set(getattr(state, mark)) > set(getattr(self.state, mark))
-        word = {"locked": ("Unlock", "Lock"), "hidden": ("Show", "Hide")}[mark][done]
-        self._commit(f"{word} {_which(given)}", state)
-
     def rename_robot(self, wanted: str) -> None:
         """Another name of the robot."""
         layout = self.state.layout
@@ -124,15 +89,13 @@ class Inspecting(Editing):
         nothing: dict[str, Any] = dict.fromkeys(body_edits.DYNAMICS)
         self._edit("Forget mass and damping", body_edits.with_dynamics(self.state.layout, **nothing))
 
-    def estimate(self, what: str) -> None:
-        """What the hull says of the body, by a key of `ESTIMATES`."""
-        word = "mass and damping" if what == "all" else what
-        self._edit(f"Estimate {word} from the hull", body_edits.estimated(self.state.layout, what))
+    def estimate(self) -> None:
+        """What the hull says of the body; a mass that is known stays."""
+        self._edit("Estimate mass and damping from the hull", body_edits.estimated(self.state.layout))
 
     def _selected_names(self) -> tuple[str, ...]:
-        """The selected fins, in the order in which they were chosen; none of them is locked."""
+        """The selected fins, in the order in which they were chosen."""
         self._selected_name()
-        self.state.check_free(self._chosen)
         return self._chosen
 
     def _change(self, what: str, names: tuple[str, ...], change: Callable[[Fin], Fin]) -> None:
@@ -157,8 +120,6 @@ class Inspecting(Editing):
                 continue
             layout = change(layout, name)
             done.add(name)
-            if twin is not None and twin in self.state.locked:
-                raise FinlabError(f"{twin}, the mirror image of {name}, is locked; unlock or unlink it first")
             layout = followed(layout, links, name)
         self._edit(f"{what} {_which(names)}", layout, merge_key)
 

@@ -14,9 +14,9 @@ from finlab.files.plain_values import parse_json
 from finlab.layout import Layout, layout_to_dict, parse_layout
 from webapp.session import Session
 from webapp.session.search_request import restored_request
-from webapp.session.state import MARKS, SETTINGS, State
+from webapp.session.state import SETTINGS, State
 
-VERSION = 6
+VERSION = 7
 """Of what stands in the files; others are not read."""
 MAX_FILES = 64
 """Sessions that are kept; the oldest go first."""
@@ -24,7 +24,7 @@ MAX_BYTES = 3_000_000
 """Largest session file that is read."""
 MAX_STEPS = 100
 """Steps of undo, and of redo, that are kept."""
-KEPT = ("failed", "weak", "stuck", "target", "links", *MARKS)
+KEPT = ("failed", "weak", "stuck", "target", "links")
 """Fields of a state that are written as they are."""
 _KEY = re.compile(r"[A-Za-z0-9_-]{8,64}")
 
@@ -152,7 +152,4 @@ def _state(values: dict[str, Any], layouts: list[Layout]) -> State:
         state = state.with_setting(key, values["settings"][key])
     for a, b in values["links"]:
         state = state.with_link(str(a), str(b))
-    for mark in MARKS:
-        if values[mark]:
-            state = state.with_mark_toggled(mark, map(str, values[mark]))
     return state

@@ -39,10 +39,6 @@ SETTINGS = (*CHOICES, *NUMBERS)
 """Fields of `State` that say how the question is answered."""
 
 
-MARKS = ("locked", "hidden")
-"""What a fin can be marked as in the list of fins."""
-
-
 @dataclass(frozen=True)
 class State:
     """A layout, its failures and the question asked of it."""
@@ -71,10 +67,6 @@ class State:
     """What to do about a wrench that is out of reach: one of `KINDS`."""
     links: Links = ()
     """Mirror pairs of fins that move together."""
-    locked: tuple[str, ...] = ()
-    """Names of fins that stay as they are, in the order of the layout."""
-    hidden: tuple[str, ...] = ()
-    """Names of fins that are not drawn, likewise."""
 
     @property
     def healthy(self) -> tuple[str, ...]:
@@ -142,12 +134,10 @@ class State:
             weak=tuple(pair for pair in self.weak if pair[0] in layout.names),
             stuck=tuple(pair for pair in self.stuck if pair[0] in layout.names),
             links=kept(self.links, layout),
-            locked=tuple(name for name in layout.names if name in self.locked),
-            hidden=tuple(name for name in layout.names if name in self.hidden),
         )
 
     def with_renamed(self, name: str, wanted: str) -> "State":
-        """A fin with another name; its damage, its link, its lock go on with it.
+        """A fin with another name; its damage and its link go on with it.
 
         Raises:
             LayoutError: there is no such fin, the name is none, or another fin has it.
@@ -163,29 +153,7 @@ class State:
             weak=tuple((new(old), share) for old, share in self.weak),
             stuck=tuple((new(old), angle) for old, angle in self.stuck),
             links=tuple((new(a), new(b)) for a, b in self.links),
-            locked=tuple(new(old) for old in self.locked),
-            hidden=tuple(new(old) for old in self.hidden),
         )
-
-    def with_mark_toggled(self, mark: str, names: Iterable[str]) -> "State":
-        """Fins locked or free again (`mark` is "locked"), hidden or shown again ("hidden"); together, so that
-        all come to be what the first one was not."""
-        given = list(names)
-        self.layout.indices(given)
-        marked = set(getattr(self, chosen(mark, "mark", MARKS)))
-        marked = marked - set(given) if given[0] in marked else marked | set(given)
-        names = tuple(name for name in self.layout.names if name in marked)
-        return replace(self, locked=names) if mark == "locked" else replace(self, hidden=names)
-
-    def check_free(self, names: Iterable[str]) -> None:
-        """Refuse to touch a fin that is locked.
-
-        Raises:
-            FinlabError: one is.
-        """
-        for name in names:
-            if name in self.locked:
-                raise FinlabError(f"{name} is locked; unlock it in the list of fins first")
 
     def with_link(self, a: str, b: str) -> "State":
         """Two fins become a mirror pair that moves together."""

@@ -10,7 +10,7 @@ import viser
 
 from finlab.bundle_files import LARGEST_BUNDLE, MOST_FILES
 from finlab.errors import FinlabError
-from webapp.editables import Editables
+from webapp.presses import Presses
 from webapp.viser_internals import run_script
 
 SCRIPT = files("webapp").joinpath("dropping.js").read_text("utf-8")
@@ -39,8 +39,7 @@ class Opening:
     def __init__(
         self,
         gui: viser.GuiApi,
-        editables: Editables,
-        do: Callable[[Callable[[], object]], None],
+        presses: Presses,
         together: Callable[[dict[str, bytes]], object],
     ) -> None:
         """Hear from the page what is dropped on it; `together` takes what is dropped at once."""
@@ -48,7 +47,7 @@ class Opening:
         self._takers: list[Taker] = []
         self._dropped: tuple[str, ...] = ()
         self._came: dict[str, bytes] = {}
-        editables.on("dropped", lambda _, text: do(lambda: self._hear(text)))
+        presses.on("dropped", lambda _, text: self._hear(text))
         run_script(gui, SCRIPT)
 
     @property

@@ -1,0 +1,71 @@
+"""Words in the app's own markup that can be pressed, and what else scripts in the page tell the server.
+
+The other half is `presses.js`. Each word is numbered, sent until it is heard, and heard once.
+"""
+
+import json
+from collections.abc import Callable
+from functools import partial
+from importlib.resources import files
+
+import viser
+
+from webapp.handles import add_html, on_user_change
+from webapp.markup.html import html
+from webapp.markup.picking import marker
+from webapp.viser_internals import run_script, uuid_of
+
+SCRIPT = files("webapp").joinpath("presses.js").read_text("utf-8")
+"""What runs in the page."""
+MAX_MESSAGE = 100_000
+"""Longest message of the page that is read; a link with a design is the longest honest one."""
+KINDS = [int, str, str, str]
+"""Number, kind, key and text of a word."""
+
+Act = Callable[[str, str], object]
+"""Carries out what was meant with a key and a text, or raises a `FinlabError`."""
+
+
+def press(kind: str, key: str) -> str:
+    """Attributes of an element that can be pressed; its text is "", "shift" or "ctrl", what was held."""
+    return html("data-press='{}' data-key='{}'", kind, key)
+
+
+class Presses:
+    """All of one page."""
+
+    def __init__(self, gui: viser.GuiApi, do: Callable[[Callable[[], object]], None]) -> None:
+        """Listen to the page; `do` carries out what was meant."""
+        self._gui, self._do = gui, do
+        self._acts: dict[str, Act] = {}
+        self._last = 0
+        hidden = "<style>div:has(>.fl-presses) + div {{ display: none; }}</style>{}"
+        add_html(gui, html(hidden, marker("fl-presses")))
+        self._box = gui.add_text("presses", "")
+        on_user_change(self._box, self.read)
+
+    def on(self, kind: str, act: Act) -> None:
+        """Who hears of a kind."""
+        self._acts[kind] = act
+
+    def start(self) -> None:
+        """Let the page's half begin."""
+        run_script(self._gui, f"{SCRIPT}\nfinlabPresses.start({json.dumps(uuid_of(self._box))});")
+
+    def read(self, message: str) -> None:
+        """Words that were not heard yet, oldest first; the page may send anything."""
+        if not 0 < len(message) <= MAX_MESSAGE:
+            return
+        try:
+            words = json.loads(message)
+        except (ValueError, RecursionError):
+            return
+        for word in words if isinstance(words, list) else []:
+            if not (isinstance(word, list) and [type(part) for part in word] == KINDS):
+                continue
+            number, kind, key, text = word
+            if number > self._last:
+                self._last = number
+                if kind in self._acts:
+                    self._do(partial(self._acts[kind], key, text))
+        run_script(self._gui, f"finlabPresses.heard({self._last});")
