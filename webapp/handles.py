@@ -77,7 +77,7 @@ def on_user_change(handle: Any, act: Callable[[Any], None]) -> None:
         value = event.target.value
         if _alike(honest, value):
             act(value)
-            honest = event.target.value  # what the session has refused is mended by now
+            honest = event.target.value  # what the session has refused is corrected by now
         elif not buttons:
             handle.value = honest
 

@@ -86,7 +86,7 @@ class Server:
                 patience = max(patience - (time.monotonic() - fresh), 0.0)
             line = transport.newest(patience)
             reply = self._rest() if line is None else self.answer(line)
-            if reply["status"] != "error":  # nonsense does not keep the fins beating
+            if reply["status"] != "error":  # an invalid request does not keep the fins beating
                 fresh = time.monotonic()
             transport.send(_line(reply))
 

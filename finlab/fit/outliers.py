@@ -17,14 +17,14 @@ ROUNDS = 3
 def find_outliers(measurements: Measurements, tell: Callable[[str], None]) -> NDArray[np.bool_]:
     """Returns which samples (n,) lie far off a fit to the others.
 
-    Wild samples bend the first fit, so that their neighbours look wild, too: those that a fit without the
-    suspects explains are taken back. `tell` is called before each step.
+    Outliers bend the first fit, so that their neighbours look like outliers, too: those that a fit without all
+    of them explains are kept. `tell` is called before each step.
     """
     turned, _ = measurements.thrust()
     sizes = np.linalg.norm(measurements.force, axis=-1)
     largest = float(np.quantile(sizes, 0.98)) or float(sizes.max())
     values = turned / largest
-    # Who knows that a sample is bad has not been contradicted by it.
+    # A sample whose known deviation is large does not contradict the fit.
     told = 0.0 if measurements.deviation is None else measurements.deviation[:, 1:].max(axis=1) / largest
     inputs = measurements.scaled(measurements.command)
     out = np.zeros(len(inputs), dtype=bool)

@@ -317,7 +317,7 @@ def _table(law: FinLaw, cost: Array, command: Array, grid: _Grid, wanted: Array,
         share = MEASURED if noisy else MARGINAL
         least = share * max(float(cost[k].max() - cost[k].min()), 1e-12) / span
         marginal[k] = np.maximum(np.gradient(cost[k], size), least)
-        if noisy:  # what is left of the noise must not look like gifts
+        if noisy:  # noise that is left must not look like falling cost
             marginal[k] = np.maximum.accumulate(marginal[k])
         height = np.log(np.maximum(size, 1e-9 * size[-1])) + np.arange(len(size)) * 1e-9
         stiffness[k] = np.gradient(np.log(marginal[k]), height)

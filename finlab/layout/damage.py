@@ -26,7 +26,7 @@ MEANING: dict[Kind, str] = {
     "weak": "reaches a share of its largest amplitude and frequency",
     "torn": "gives a share of its law's thrust at every command",
     "stuck": "beats, but no longer turns",
-    "running": "keeps its last command, come what may",
+    "running": "keeps its last command whatever is asked",
     "whole": "works as it should",
 }
 """The kinds in words."""
@@ -51,7 +51,7 @@ class Health:
     stuck: tuple[tuple[str, float], ...] = ()
     """Zero direction [rad] at which a fin no longer turns; it still flaps."""
     running: tuple[tuple[str, Command], ...] = ()
-    """Command (amplitude [rad], frequency [Hz], zero direction [rad]) that a fin keeps, come what may."""
+    """Command (amplitude [rad], frequency [Hz], zero direction [rad]) that a fin keeps whatever is asked."""
     thrust: tuple[tuple[str, float], ...] = ()
     """Share, above 0 and up to 1, of its law's thrust that a fin gives at every command, as one with a torn
     blade does."""

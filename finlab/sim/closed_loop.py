@@ -45,7 +45,7 @@ AHEAD = 10
 
 
 class ClosedLoop:
-    """One robot under way. Make it, then call `step` until `done`; `fail` and `mend` fins as you like.
+    """One robot under way. Make it, then call `step` until `done`, and `fail` and `mend` in between.
 
         loop = ClosedLoop(layout, finlab.load_allocator(), make_trajectory("lissajous"))
         while not loop.done:

@@ -96,7 +96,7 @@ def rest_sentence(allocation: Allocation) -> str:
 
 
 def answer_sentence(state: State, allocation: Allocation | None, busy: bool) -> Markup:
-    """What is left undone, why, and what the method does not heed.
+    """What is left undone, why, and what the method ignores.
 
     Args:
         state: what is asked now.

@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 from finlab.errors import FinlabError
 
 READ_S = 15.0
-"""How long a file may be read [s]; the largest honest ones take a fifth of it."""
+"""How long a file may be read [s]; the largest valid ones take a fifth of it."""
 MOST_MEMORY = 3_000_000_000
 """Address space that a file may take while it is read [bytes]."""
 MOST_AT_ONCE = 3

@@ -173,7 +173,7 @@ class Pipeline:
         """Answers within what the servos allow after a previous command (n, 3): mostly the cheapest one of
         all is among them.
 
-        Where cost grows faster than force there is but one valley, and the search goes on from where the
+        Where cost grows faster than force there is but one minimum, and the search goes on from where the
         robot is. Otherwise the way that it moves now is kept, fins at rest turn to where they would be
         cheapest, and where another way is worth it, all fins go towards that, dear as the steps may be.
         """
