@@ -17,8 +17,8 @@ ROUNDS = 3
 def find_outliers(measurements: Measurements, tell: Callable[[str], None]) -> NDArray[np.bool_]:
     """Returns which samples (n,) lie far off a fit to the others.
 
-    Outliers bend the first fit, so that their neighbours look like outliers, too: those that a fit without all
-    of them explains are kept. `tell` is called before each step.
+    Outliers bend the first fit, so that their neighbours look like outliers, too: those that a fit
+    without all of them explains are kept. `tell` is called before each step.
     """
     turned, _ = measurements.thrust()
     sizes = np.linalg.norm(measurements.force, axis=-1)
