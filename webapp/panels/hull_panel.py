@@ -43,9 +43,7 @@ class HullPanel:
 
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         self._page = page
-        shapes = gui.add_dropdown(
-            "Shape", (*HULL_SHAPES, MESH), hint="For the picture, and for To hull."
-        )
+        shapes = gui.add_dropdown("Shape", (*HULL_SHAPES, MESH), hint="For the picture, and for To hull.")
         page.bind(shapes, self._choose_shape, lambda: self._shape or MESH)
         ends: dict[str, Any] = {"min": (0.02,) * 3, "max": (5.0,) * 3, "step": 0.01}
         sides = "Length, width and height of a shape."
