@@ -23,7 +23,8 @@ from finlab.evaluation.report.pages import to_markdown
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = {path.stem: path for path in sorted((ROOT / "docs").glob("*.md"))}
-MARKS = re.compile(r"(<!-- figures: (\w+)((?: [\w.]+)*) -->\n).*?(<!-- end of figures -->)", re.DOTALL)
+MARK = re.compile(r"(<!-- figures: (\w+)((?: [\w.]+)*) -->\n)")
+END = "<!-- end of figures -->"
 
 
 def main(names: list[str]) -> int:
@@ -31,12 +32,12 @@ def main(names: list[str]) -> int:
     if unknown := [name for name in names if name not in PAGES]:
         print(f"figures: expected pages among {', '.join(PAGES)}, got {unknown[0]!r}", file=sys.stderr)
         return 2
-    for name in names or PAGES:
-        text = PAGES[name].read_text(encoding="utf-8")
-        made = MARKS.sub(lambda found: found[1] + table_of(found[2], found[3].split()) + found[4], text)
-        if made != text:
-            PAGES[name].write_text(made, encoding="utf-8")
-            print(f"docs/{name}.md", flush=True)
+    for page in [PAGES[name] for name in names or PAGES]:
+        for mark, name, keys in re.findall(MARK, page.read_text(encoding="utf-8")):
+            made, text = table_of(name, keys.split()), page.read_text(encoding="utf-8")  # changed meanwhile
+            before, _, rest = text.partition(mark)
+            page.write_text(before + mark + made + END + rest.partition(END)[2], encoding="utf-8")
+            print(f"docs/{page.name}", flush=True)
     return 0
 
 
