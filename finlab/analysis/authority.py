@@ -6,12 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from finlab.arrays import Array
-from finlab.forces.envelopes import layout_envelopes
 from finlab.forces.extent import RANK_TOLERANCE, singular_values, strongest, weakest
 from finlab.forces.fin_sets import SCALE, fin_sets
 from finlab.forces.reach import max_wrench_along_exactly
 from finlab.layout import Layout
-from finlab.physics.objective import Objective
 
 AXES = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 """Names of the six axes, in the order of a wrench."""
@@ -49,8 +47,6 @@ class Authority(HeldAxes):
     """Largest wrench along each axis with the other five at zero (6,) [N, N m]."""
     most_negative: tuple[float, ...]
     """The same along the negative axes, as a size (6,) [N, N m]."""
-    beside_others: tuple[float, ...]
-    """Largest wrench along each axis with the others free (6,) [N, N m], the larger of the two signs."""
     weakest: float
     """Scaled wrench [N] that is within reach in every direction; 0 below rank 6."""
     weakest_direction: tuple[float, ...]
@@ -123,9 +119,7 @@ def _authorities(layout: Layout, failures: Sequence[Collection[str]]) -> list[Au
     values, vectors = singular_values(sets)
     axes = np.concatenate([np.eye(6), -np.eye(6)])
     size, gap = max_wrench_along_exactly(sets, axes)
-    rows = sets.repeat(12)
-    free = rows.farthest(np.tile(axes, (len(failures), 1)))[0].reshape(-1, 2, 6).max(axis=1)
-    size, free = (np.where(value > NOTHING, value, 0.0) for value in (size, free))
+    size = np.where(size > NOTHING, size, 0.0)
     least, most = weakest(sets), strongest(sets)
     isotropy = np.divide(least.size, most.size, out=np.zeros_like(least.size), where=most.size > 0.0)
     return [
@@ -134,7 +128,6 @@ def _authorities(layout: Layout, failures: Sequence[Collection[str]]) -> list[Au
             singular_values=_floats(values[k]),
             largest=_floats(size[k, :6] * SCALE),
             most_negative=_floats(size[k, 6:] * SCALE),
-            beside_others=_floats(free[k] * SCALE),
             weakest=float(least.size[k]),
             weakest_direction=_floats(least.direction[k]),
             isotropy=float(isotropy[k]),
@@ -171,19 +164,6 @@ def _loss(before: Authority, name: str, after: Authority) -> Loss:
         share_left=tuple(None if np.isinf(value) else float(min(value, 1.0)) for value in share),
         weakest=after.weakest,
     )
-
-
-def model_error(layout: Layout, failed: Collection[str] = ()) -> Array:
-    """Returns by how much (6,) [N, N m] the fins may depart from their convex sets, at most.
-
-    A fin cannot go below its least thrust where its set lets it rest, and a table may give less in some
-    directions than in its strongest one.
-    """
-    sets = fin_sets(layout, failed)
-    fins = layout_envelopes(layout, Objective())
-    off = (fins.minimum + fins.maximum - fins.largest.min(axis=1)) * (sets.radius[0] > 0.0)
-    lever = np.linalg.norm(sets.columns[0], axis=1)
-    return np.asarray((lever * off[:, None]).sum(axis=0) * SCALE)
 
 
 def _floats(values: Array) -> tuple[float, ...]:

@@ -14,7 +14,6 @@ from finlab.analysis.authority import (
     authority,
     held_axes,
     losses,
-    model_error,
 )
 from finlab.forces.extent import singular_values
 from finlab.forces.fin_sets import MAX_CUT, fin_sets, wide_fins
@@ -43,11 +42,6 @@ class ScoreCard:
     """Size of the wrench along each axis whose least power follows (6,) [N, N m]."""
     unit_power: tuple[float | None, ...]
     """Least power [W] for it along each positive axis (6,), other axes zero; None where out of reach."""
-    unit_power_negative: tuple[float | None, ...]
-    """The same along the negative axes."""
-    model_error: tuple[float, ...]
-    """By how much each entry of a wrench may differ because fins cannot rest fully, or a table is uneven
-    (6,) [N, N m]."""
     notes: tuple[str, ...]
     """Sentences on where these numbers are not exact; none when they are."""
 
@@ -71,11 +65,7 @@ def score_card(layout: Layout, failed: Collection[str] = ()) -> ScoreCard:
         LayoutError: there is no fin of a name in `failed`.
     """
     held = authority(layout, failed)
-    wrenches = np.diag(UNIT)
-    power = [
-        None if np.isnan(value) else float(value)
-        for value in least_power(layout, np.concatenate([wrenches, -wrenches]), failed=failed)
-    ]
+    power = least_power(layout, np.diag(UNIT), failed=failed)
     return ScoreCard(
         layout=layout.name,
         failed=tuple(name for name in layout.names if name in failed),
@@ -83,9 +73,7 @@ def score_card(layout: Layout, failed: Collection[str] = ()) -> ScoreCard:
         authority=held,
         losses=losses(layout, failed, held),
         unit_wrench=UNIT,
-        unit_power=tuple(power[:6]),
-        unit_power_negative=tuple(power[6:]),
-        model_error=tuple(float(value) for value in model_error(layout, failed)),
+        unit_power=tuple(None if np.isnan(value) else float(value) for value in power),
         notes=_notes(layout, failed),
     )
 

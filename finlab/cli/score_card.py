@@ -18,17 +18,8 @@ def score_card_text(card: ScoreCard) -> str:
         rows = [_loss_row(loss, loss is card.worst_loss) for loss in card.losses]
         lines += ["", "Share of the largest wrench that is left without one fin (* the worst to lose):"]
         lines += table(("without", "rank", "weakest [N]", *_axes(), "lost"), rows)
-    error = max(a / unit for a, unit in zip(card.model_error, _LEVERS, strict=True))
-    lines += [
-        "",
-        f"Largest wrenches are exact to {max(card.authority.gap, 1e-6):.0e} N. Fins at rest may still push "
-        f"{error:.0e} N together.",
-        *card.notes,
-    ]
+    lines += ["", f"Largest wrenches are exact to {max(card.authority.gap, 1e-6):.0e} N.", *card.notes]
     return "\n".join(lines)
-
-
-_LEVERS = (1.0, 1.0, 1.0, 0.2, 0.2, 0.2)
 
 
 def comparison_text(before: ScoreCard, after: ScoreCard) -> str:
@@ -66,17 +57,15 @@ def _span_lines(card: ScoreCard) -> list[str]:
 
 def _axis_table(card: ScoreCard) -> list[str]:
     held = card.authority
-    head = ("axis", "largest +", "largest -", "others free", "", "power for", "+", "-")
+    head = ("axis", "largest +", "largest -", "", "for", "power [W]")
     rows = [
         (
             axis,
             f"{held.largest[k]:.3f}",
             f"{held.most_negative[k]:.3f}",
-            f"{held.beside_others[k]:.3f}",
             _UNITS[k],
             f"{card.unit_wrench[k]:g} {_UNITS[k]}",
             _number(card.unit_power[k]),
-            _number(card.unit_power_negative[k]),
         )
         for k, axis in enumerate(_axes())
     ]

@@ -1,6 +1,5 @@
 """Fins as they would be known from a tank: a grid of forces with noise, in a CSV file."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -8,7 +7,6 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from finlab.arrays import Array
 from finlab.layout import Fin, FinModelSpec
 from finlab.physics import TableLaw, make_law, write_table
 
@@ -19,17 +17,7 @@ NOISE = 0.03
 """Standard deviation of each component of a force, as a share of it."""
 
 
-def share_of_components(rng: np.random.Generator, force: Array) -> Array:
-    """Forces (..., 3) with noise on each component that is a share of it."""
-    return np.asarray(force * (1.0 + NOISE * rng.standard_normal(force.shape)))
-
-
-def noisy_table(
-    rng: np.random.Generator,
-    fin: Fin,
-    name: str,
-    measure: Callable[[np.random.Generator, Array], Array] = share_of_components,
-) -> Fin:
+def noisy_table(rng: np.random.Generator, fin: Fin, name: str) -> Fin:
     """A fin with a table of its model in place of the model; the file of that name is written once."""
     path = Path(_folder().name) / f"{name}.csv"
     if not path.exists():
@@ -37,7 +25,8 @@ def noisy_table(
         axes = [np.linspace(*ends, count) for ends, count in ranges]
         axes.append(np.linspace(-np.pi, np.pi, GRID[2], endpoint=False))
         force = make_law(fin.model).force(np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1))
-        write_table(path, TableLaw(axes, measure(rng, force), periodic=True), *axes)
+        noisy = np.asarray(force * (1.0 + NOISE * rng.standard_normal(force.shape)))
+        write_table(path, TableLaw(axes, noisy, periodic=True), *axes)
     return replace(fin, model=FinModelSpec("table", (("path", str(path)),)))
 
 

@@ -25,7 +25,6 @@ from finlab.sim.water import Changing as Changing
 from finlab.sim.water import Flow as Flow
 from finlab.sim.water import SteadyCurrent as SteadyCurrent
 from finlab.sim.water import Still as Still
-from finlab.sim.water import TurningCurrent as TurningCurrent
 from finlab.sim.water import Water as Water
 from finlab.sim.water import Waves as Waves
 from finlab.vehicle.vehicle import Vehicle as Vehicle

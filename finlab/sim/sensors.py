@@ -55,11 +55,9 @@ class SensorSettings:
     """Velocity [m/s]; late by the way of the sound and by averaging."""
     imu: Sensor = Sensor(50.0, (0.01,) * 5, (0.01,) * 2 + (0.001,) * 3)
     """Roll, pitch [rad] and angular rates [rad/s]."""
-    burst_s: float = 0.0
-    """How long losses last on average [s]; at 0 each sample is lost by itself."""
 
     def __post_init__(self) -> None:
-        checked: dict[str, tuple[float, ...]] = {"burst_s": (self.burst_s,)}
+        checked: dict[str, tuple[float, ...]] = {}
         for name in NAMES:
             sensor: Sensor = getattr(self, name)
             if sensor.rate_hz == 0.0:
@@ -73,16 +71,11 @@ class SensorSettings:
 
     def each(self, change: Callable[[Sensor], Sensor]) -> "SensorSettings":
         """The same, each sensor changed."""
-        marker, pressure, dvl, imu = (change(getattr(self, name)) for name in NAMES)
-        return SensorSettings(marker, pressure, dvl, imu, self.burst_s)
+        return SensorSettings(*(change(getattr(self, name)) for name in NAMES))
 
     def later(self, seconds: float) -> "SensorSettings":
         """The same sensors, each so much later [s]."""
         return self.each(lambda sensor: replace(sensor, delay_s=sensor.delay_s + seconds))
-
-    def losing(self, share: float, burst_s: float = 0.0) -> "SensorSettings":
-        """The same sensors, each of which loses this share of its samples, in bursts of so long [s]."""
-        return replace(self.each(lambda sensor: replace(sensor, dropout=share)), burst_s=burst_s)
 
 
 NO_NOISE = SensorSettings().each(Sensor.perfect)
@@ -94,13 +87,9 @@ NOISE_ALONE = SensorSettings().each(lambda sensor: replace(sensor.perfect(), noi
 class Channel:
     """One sensor at work."""
 
-    def __init__(self, sensor: Sensor, burst_s: float, rng: np.random.Generator) -> None:
-        """Takes the sensor, how long its losses last on average [s], and where its noise comes from."""
+    def __init__(self, sensor: Sensor, rng: np.random.Generator) -> None:
+        """Takes the sensor, and where its noise comes from."""
         self._sensor, self._period = sensor, 1.0 / sensor.rate_hz
-        # Losses as a chain of two states: how likely one begins and how likely it ends at a sample.
-        self._ends = min(1.0 - sensor.dropout, self._period / max(burst_s, 1e-9))
-        self._begins = self._ends * sensor.dropout / (1.0 - sensor.dropout)
-        self._lost = False
         # Another stream than the noise's, so that a run has the same noise with and without the rest.
         self._rng, self._fate, self._noise = rng, rng.spawn(1)[0], np.array(sensor.noise)
         self.bias: Array = np.array(sensor.bias) * self._fate.standard_normal(len(sensor.bias))
@@ -117,10 +106,9 @@ class Channel:
         """Sample what is true now."""
         self._due = max(self._due + self._period, time)
         sample = true + self.bias + self._noise * self._rng.standard_normal(len(true))
-        if self._sensor.dropout:
-            self._lost = self._fate.random() < (1.0 - self._ends if self._lost else self._begins)
+        lost = self._sensor.dropout > 0.0 and self._fate.random() < self._sensor.dropout
         # The robot has waited at rest for its first samples.
-        if self._first or not self._lost:
+        if self._first or not lost:
             self._waiting.append((time if self._first else time + self._sensor.delay_s, sample))
         self._first = False
 
@@ -138,7 +126,7 @@ class Sensors:
     def __init__(self, settings: SensorSettings, rng: np.random.Generator) -> None:
         """Draws the biases of this run."""
         self._marker, self._pressure, self._dvl, self._imu = (
-            Channel(getattr(settings, name), settings.burst_s, rng) for name in NAMES
+            Channel(getattr(settings, name), rng) for name in NAMES
         )
         zeros = np.zeros(3)
         self._held = Measurement(0.0, zeros, 0.0, zeros, 0.0, zeros, 0.0, 0.0)

@@ -1,5 +1,5 @@
-"""How the water moves in which a robot swims: not at all, as a current, as one that turns, in waves, or as
-one of these that becomes another.
+"""How the water moves in which a robot swims: not at all, as a current, in waves, or as one of these
+that becomes another.
 
 World frame, z up, the still water's surface at z = 0. A robot is small beside what the water does, so it
 feels the velocity at its own place, without shear or rotation.
@@ -70,37 +70,6 @@ class SteadyCurrent:
     def flow(self, position: Sequence[float], time: float) -> Flow:
         """That velocity."""
         return Flow(self.velocity, REST)  # type: ignore[arg-type]
-
-
-@dataclass(frozen=True)
-class TurningCurrent:
-    """A current that turns about the vertical once, as where a tide or an eddy passes."""
-
-    velocity: Sequence[float]
-    """Before it turns (3,) [m/s]."""
-    turn_rad: float = 0.5 * math.pi
-    """By how much it turns, counter-clockwise [rad]."""
-    time_s: float = 45.0
-    """When it begins to turn [s]."""
-    over_s: float = 5.0
-    """How long that takes [s], above 0; a smoothstep."""
-
-    name = "turning current"
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "velocity", _vector(self.velocity))
-        _finite("turn_rad", self.turn_rad)
-        _finite("time_s", self.time_s)
-        _positive("over_s", self.over_s)
-
-    def flow(self, position: Sequence[float], time: float) -> Flow:
-        """The velocity of now, and how it turns."""
-        x, y, z = self.velocity
-        share, slope = _smoothstep((time - self.time_s) / self.over_s)
-        angle, rate = self.turn_rad * share, self.turn_rad * slope / self.over_s
-        c, s = math.cos(angle), math.sin(angle)
-        u, v = c * x - s * y, s * x + c * y
-        return Flow((u, v, z), (-rate * v, rate * u, 0.0))
 
 
 @dataclass(frozen=True)

@@ -7,12 +7,13 @@ import pytest
 from numpy.typing import NDArray
 
 from finlab.analysis import AttainableSet, attainable_set
-from finlab.analysis.authority import model_error
 from finlab.errors import LayoutError
 from finlab.forces.attainable import _sphere
+from finlab.forces.envelopes import layout_envelopes
 from finlab.forces.fin_sets import SCALE, fin_sets
 from finlab.layout import Layout
 from finlab.physics import Plant
+from finlab.physics.objective import Objective
 from tests.forces.conftest import THRUST
 
 Array = NDArray[np.float64]
@@ -45,11 +46,14 @@ def test_no_sampled_wrench_lies_outside(shipped: Layouts, name: str, kind: str) 
     layout = shipped(name)
     body = attainable_set(layout, kind, alone=False)
     points = sampled(layout)[:, OWN[kind]]
-    error = model_error(layout)[OWN[kind]].max()
+    # Fins may depart from their convex sets: they cannot rest, and tables are uneven.
+    fins = layout_envelopes(layout, Objective())
+    off = fins.minimum + fins.maximum - fins.largest.min(axis=1)
+    error = (np.linalg.norm(fin_sets(layout).columns[0], axis=1) * off[:, None]).sum(axis=0) * SCALE
     assert body.dimension == 3
     assert not body.hull
     assert body.gap <= 0.011 * np.linalg.norm(body.vertices, axis=-1).max()
-    assert outside(body, points) <= body.gap + 2 * error
+    assert outside(body, points) <= body.gap + 2 * error[OWN[kind]].max()
     # Random commands come near the surface where few fins must agree, and always beyond half of it.
     assert outside(body, 2.5 * points) > body.gap
 

@@ -8,7 +8,7 @@ import pytest
 
 from finlab.errors import FinlabError
 from finlab.layout import Body
-from finlab.sim import Changing, SteadyCurrent, Still, TurningCurrent, Water, Waves
+from finlab.sim import Changing, SteadyCurrent, Still, Water, Waves
 from finlab.vehicle.body import GRAVITY
 from finlab.vehicle.vehicle import Vehicle
 
@@ -25,9 +25,8 @@ def velocity(water: Water, place: Sequence[float], time: float) -> np.ndarray:
     [
         Still(),
         SteadyCurrent((0.1, 0.2, 0.0)),
-        TurningCurrent((0.1, 0.0, 0.02), 1.2, 3.0, 4.0),
         Waves(seed=3),
-        Changing(TurningCurrent((0.1, 0.0, 0.02), 1.2, 3.0, 4.0), Waves(seed=2), 2.0, 5.0),
+        Changing(SteadyCurrent((0.1, 0.0, 0.02)), Waves(seed=2), 2.0, 5.0),
     ],
     ids=lambda water: water.name,
 )
@@ -99,8 +98,8 @@ def test_a_body_as_heavy_as_water_goes_with_it() -> None:
     "make",
     [
         lambda: SteadyCurrent((0.1, 0.2)),
-        lambda: TurningCurrent((0.1, math.nan, 0.0)),
-        lambda: TurningCurrent((0.1, 0.0, 0.0), over_s=0.0),
+        lambda: SteadyCurrent((0.1, math.nan, 0.0)),
+        lambda: Changing(Still(), Still(), 1.0, over_s=0.0),
         lambda: Waves(height_m=0.0),
         lambda: Waves(period_s=-1.0),
         lambda: Waves(components=0),

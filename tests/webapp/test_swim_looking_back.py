@@ -157,7 +157,7 @@ def test_pictures_are_made_beside_the_page(shelf: Shelf) -> None:
     until(lambda: not shelf.files.making)
     archive = zipfile.ZipFile(io.BytesIO(shelf.sent["ucat_analytic_nominal_tracking_plots.zip"]))
     pictures = {name.rpartition("/")[2] for name in archive.namelist()}
-    assert pictures == {"path.png", "errors.png", "commands.png", "wrench.png", "compared.png"}
+    assert pictures == {"path.png", "errors.png", "commands.png", "wrench.png"}
 
 
 def test_what_fails_is_told(shelf: Shelf, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,7 +9,7 @@ import pytest
 from finlab.errors import FinlabError
 from finlab.evaluation.experiments.hard_days import HARD_DAYS
 from finlab.layout import Layout, load_layout
-from finlab.sim import Changing, FinFault, SteadyCurrent, Still, TurningCurrent, Waves
+from finlab.sim import Changing, FinFault, SteadyCurrent, Still, Waves
 from tests.webapp.loops import page_of
 from tests.webapp.test_swimming import SHORT, until
 from webapp.markup.scenario import scenario_card
@@ -44,7 +44,7 @@ def test_every_scenario_plans_what_its_day_says(name: str) -> None:
 
 def test_days_of_robots_of_their_own_are_left_out() -> None:
     left = {day.name for day in HARD_DAYS} - set(SCENARIOS)
-    assert left == {"hexa", "octo", "restricted", "fins-mixed", "fins-soft"}
+    assert left == {"hexa", "octo", "restricted", "fins-mixed"}
 
 
 @pytest.mark.parametrize("layout", ["hexa", "pair", "penta"])
@@ -61,7 +61,7 @@ def test_a_fin_is_lost_without_which_an_own_robot_can_be_steered(layout: str) ->
 
 def test_the_user_changes_what_the_day_says() -> None:
     turning = chosen("current-turns")
-    assert isinstance(turning.water, TurningCurrent) and "turns on the way" in scenario_card(turning)
+    assert isinstance(turning.water, Changing) and "turns on the way" in scenario_card(turning)
     steady = turning.with_value("current_cm_s", 10.0).with_value("heading_deg", 90.0)
     assert isinstance(steady.water, SteadyCurrent)
     assert steady.water.velocity == pytest.approx((0.0, 0.1, 0.0))

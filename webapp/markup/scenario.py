@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from finlab.sim import SensorSettings, TurningCurrent
+from finlab.sim import Changing, SensorSettings
 from webapp.markup.html import html
 from webapp.session.swim_plan import SwimSettings
 
@@ -36,7 +36,7 @@ def _true(settings: SwimSettings) -> Iterator[str]:
     """What is not as drawn, piece by piece."""
     day = settings.day
     if settings.current_cm_s:
-        turns = ", which turns on the way" if isinstance(settings.water, TurningCurrent) else ""
+        turns = ", which turns on the way" if isinstance(settings.water, Changing) else ""
         yield f"current {settings.current_cm_s:g} cm/s towards {_minus(settings.heading_deg)}°{turns}"
     if settings.waves_cm:
         yield f"waves of {settings.waves_cm:g} cm"

@@ -5,7 +5,7 @@ from typing import Any
 
 from finlab.assets import PAPER_LAYOUTS
 from finlab.evaluation.experiments.hard_days import CURRENT, HARD_DAYS, TWO, HardDay
-from finlab.sim import SteadyCurrent, TurningCurrent, Water, Waves
+from finlab.sim import Changing, SteadyCurrent, Water, Waves
 
 LOST_IN_CURRENT = HardDay(
     "lost-in-current",
@@ -17,7 +17,7 @@ LOST_IN_CURRENT = HardDay(
 SCENARIOS: dict[str, HardDay] = {
     day.name: day
     for day in (*HARD_DAYS, LOST_IN_CURRENT)
-    if day.fins == "own" and day.layouts in (PAPER_LAYOUTS, TWO, PAPER_LAYOUTS[:1])
+    if not day.mixed_fins and day.layouts in (PAPER_LAYOUTS, TWO, PAPER_LAYOUTS[:1])
 }
 """Scenarios by name."""
 
@@ -36,6 +36,8 @@ def conditions(day: HardDay) -> dict[str, Any]:
 
 def _velocity(water: Water) -> tuple[float, ...]:
     """Velocity (3,) of a current at the start [m/s]."""
+    if isinstance(water, Changing):
+        return _velocity(water.before)
     if isinstance(water, Waves):
         return tuple(water.current)
-    return tuple(water.velocity) if isinstance(water, (SteadyCurrent, TurningCurrent)) else (0.0, 0.0, 0.0)
+    return tuple(water.velocity) if isinstance(water, SteadyCurrent) else (0.0, 0.0, 0.0)

@@ -9,7 +9,6 @@ from pathlib import Path
 
 from finlab.errors import FinlabError
 from finlab.evaluation.plots.closed_loop_run import save_pictures
-from finlab.evaluation.plots.compared_runs import draw_compared
 from finlab.sim.log_csv import csv_of
 from webapp.session.files import file_stem
 from webapp.tasks.context import Context
@@ -44,7 +43,7 @@ class SwimFiles:
         self._make(f"{names[0]}_csv.zip", archive)
 
     def pictures(self) -> None:
-        """Send path, errors, commands and wrench of each robot as pictures, and all robots in one."""
+        """Send path, errors, commands and wrench of each robot as pictures."""
         records = self._records()
         names = _names(records)
 
@@ -54,8 +53,6 @@ class SwimFiles:
                 for name, record in zip(names, records, strict=True):
                     (folder / name).mkdir()
                     save_pictures(record.log, folder / name)
-                logs = {words: record.log for words, record in zip(_words(records), records, strict=True)}
-                draw_compared(logs).save(folder / "compared.png")
                 files = sorted(folder.rglob("*.png"))
                 return _archive({str(path.relative_to(folder)): path.read_bytes() for path in files})
 

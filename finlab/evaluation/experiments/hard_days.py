@@ -1,28 +1,27 @@
 """Hard days: named swims in which something is not as the designer of the robot assumed. Plain data.
 
 What a day says is true of the robot and its surroundings; allocator, controller and monitor know the layout,
-the laws of the fins (`fins`), and what is announced.
+the laws of its fins, and what is announced.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from itertools import combinations, islice
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 from finlab.allocation.allocator import Allocator
 from finlab.assets import PAPER_LAYOUTS
 from finlab.control import PATH_CONTROLLERS, Completion, FaultMonitor, TrackingController
 from finlab.evaluation.splits import make_split
 from finlab.layout import Layout, load_layout
-from finlab.layout.fin import FinModelSpec
 from finlab.sim import (
+    Changing,
     ClosedLoop,
     FinFault,
     SensorSettings,
     SteadyCurrent,
     Still,
     Trajectory,
-    TurningCurrent,
     Water,
     Waves,
     make_trajectory,
@@ -33,8 +32,6 @@ TWO = ("A", "C")
 """Those that swim most of the days: a symmetric one and one that is not."""
 CURRENT = (0.05, -0.05, 0.0)
 """7 cm/s across the path [m/s]."""
-MEASURED_SOFT = FinModelSpec("soft", (("d", 0.1), ("e", 0.15), ("phi_e", 0.5), ("x0", 1.0)))
-"""Saturates within reach, and is uneven and askew, as fins of silicone are when measured."""
 
 
 @dataclass(frozen=True)
@@ -51,9 +48,9 @@ class HardDay:
     """Of `finlab.sim.SHIPPED`."""
     duration_s: float | None = None
     """How long it takes [s]; None for the trajectory's own time."""
-    fins: Literal["own", "soft", "mixed"] = "own"
-    """Whose laws all methods are given: the layout's, `MEASURED_SOFT`, or those of split `fins-mixed`, which
-    are others for each seed."""
+    mixed_fins: bool = False
+    """Whether all methods are given fins of split `fins-mixed`, others for each seed, in place of the
+    layout's."""
     truth: Mapping[str, Any] = field(default_factory=dict)
     """What the body really is: options of `finlab.sim.perturbed`."""
     water: Water = Still()
@@ -85,12 +82,10 @@ class HardDay:
     def robot(self, layout: str, seed: int) -> Layout:
         """The robot that methods believe in; the seed draws mixed fins."""
         robot = load_layout(layout)
-        if self.fins == "own":
+        if not self.mixed_fins:
             return robot
-        models = [MEASURED_SOFT] * robot.n_fins
-        if self.fins == "mixed":
-            cases = make_split("fins-mixed", robot.n_fins, 1, seed)
-            models = list(islice((fin.model for case in cases for fin in case.layout.fins), robot.n_fins))
+        cases = make_split("fins-mixed", robot.n_fins, 1, seed)
+        models = islice((fin.model for case in cases for fin in case.layout.fins), robot.n_fins)
         fins = tuple(replace(fin, model=own) for fin, own in zip(robot.fins, models, strict=True))
         return replace(robot, fins=fins)
 
@@ -166,7 +161,7 @@ HARD_DAYS = (
     HardDay(
         "current-turns",
         "A current of 7 cm/s that turns by a right angle within 5 s.",
-        water=TurningCurrent(CURRENT),
+        water=Changing(SteadyCurrent(CURRENT), SteadyCurrent((0.05, 0.05, 0.0)), 45.0, 5.0),
     ),
     HardDay("buoyant", "The robot is 1 % too buoyant.", truth={"buoyancy": 1.01}),
     HardDay("heavy", "The robot is 1 % too heavy for its buoyancy.", truth={"buoyancy": 0.99}),
@@ -186,9 +181,8 @@ HARD_DAYS = (
         "fins-mixed",
         "Each fin of A follows a law of its own, which all methods but `paper` know.",
         ("A",),
-        fins="mixed",
+        mixed_fins=True,
     ),
-    HardDay("fins-soft", "A has soft fins; all methods but `paper` know their law.", ("A",), fins="soft"),
     HardDay("weak", "One fin gives 70 % of its thrust; no method is given that.", ("A",), weak=0.7),
     HardDay("lost-one", "One fin is lost half-way, announced.", ("A",), lost=1),
     HardDay(

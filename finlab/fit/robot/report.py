@@ -1,7 +1,5 @@
 """What a fit to swims is worth, in sentences and as a table."""
 
-import numpy as np
-
 from finlab.fit.robot.robot_fit import UNTOLD, RobotFit
 from finlab.physics.table_file import DOUBT
 
@@ -56,14 +54,3 @@ def table(fit: RobotFit) -> str:
             f"+- {trial.error:.2f}, {verdict}"
         )
     return "\n".join(lines)
-
-
-def strengths(fit: RobotFit) -> dict[str, tuple[float, float]]:
-    """Strength of each fin over what the layout said, and its standard error, by name."""
-    found, error = fit.part("strength"), fit.part_error("strength")
-    assert found is not None and error is not None
-    share = np.exp(found)
-    return {
-        name: (float(value), float(value * own))
-        for name, value, own in zip(fit.model.layout.names, share, error, strict=True)
-    }

@@ -9,7 +9,7 @@ import pytest
 from finlab import load_allocator
 from finlab.cli import main
 from finlab.fit.robot.fitted_layout import write_robot
-from finlab.fit.robot.report import strengths, summary, table
+from finlab.fit.robot.report import summary, table
 from finlab.fit.robot.robot_fit import RobotFit, fit_robot
 from finlab.fit.robot.swim import Swim, only_new, replay
 from finlab.fit.robot.swim_file import read_swim
@@ -21,6 +21,14 @@ from tests.fit.robot.swims import swim, write_csv
 CENTER = np.array([0.015, -0.01, 0.005])
 STRENGTH = {"front_right": 0.8, "front_left": 1.15, "back_left": 1.0}
 TURNED = {"front_right": 0.08, "front_left": -0.05, "back_left": 0.0}
+
+
+def strengths(fit: RobotFit) -> dict[str, tuple[float, float]]:
+    """Strength of each fin over what the layout said, and its standard error."""
+    found, error = fit.part("strength"), fit.part_error("strength")
+    assert found is not None and error is not None
+    pairs = zip(np.exp(found).tolist(), (np.exp(found) * error).tolist(), strict=True)
+    return dict(zip(fit.model.layout.names, pairs, strict=True))
 
 
 @pytest.fixture(scope="module")
