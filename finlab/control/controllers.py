@@ -1,4 +1,4 @@
-"""The paper's two controllers, of waypoints and of speed, and odometry."""
+"""The paper's controller of waypoints, and odometry."""
 
 import math
 from typing import NamedTuple
@@ -6,42 +6,11 @@ from typing import NamedTuple
 import numpy as np
 
 from finlab.arrays import Array
-from finlab.control.filters import LowPass, Pid
-from finlab.control.gains import VelocityGains, WaypointGains
+from finlab.control.filters import LowPass
+from finlab.control.gains import WaypointGains
 from finlab.control.measurement import NO_WRENCH, Measurement, Setpoint
 from finlab.layout.angles import wrapped
 from finlab.vehicle.attitude import in_world
-
-
-class VelocityController:
-    """Surge PID on the filtered DVL speed, depth PID on pressure, damping of the yaw rate, saturation."""
-
-    name = "velocity"
-    axes: tuple[str, ...] = ("Fx", "Fz", "Tz")
-    free: tuple[str, ...] = ()
-    needs_given = False
-    lead_s = 0.0
-
-    def __init__(self, gains: VelocityGains | None = None) -> None:
-        """Takes gains; those for U-CAT by default."""
-        self.gains = VelocityGains() if gains is None else gains
-        self.period_s = self.gains.period_s
-        self.reset()
-
-    def reset(self) -> None:
-        """Forget filters and integrals."""
-        g = self.gains
-        self._speed = LowPass(g.velocity_filter_s, g.period_s)
-        self._surge = Pid(g.surge, g.max_surge, g.period_s)
-        self._depth = Pid(g.depth, g.max_heave, g.period_s)
-
-    def wrench(self, measurement: Measurement, setpoint: Setpoint, given: Array = NO_WRENCH) -> Array:
-        """Returns the wrench (6,) towards the speed and depth asked for [N, N m]."""
-        g = self.gains
-        surge = self._surge.step(setpoint.surge - self._speed.step(float(measurement.velocity[0])))
-        heave = self._depth.step(float(setpoint.position[2]) + measurement.depth)
-        yaw = min(max(-g.yaw_damping * float(measurement.rates[2]), -g.max_yaw), g.max_yaw)
-        return np.array([surge, 0.0, heave, 0.0, 0.0, yaw])
 
 
 class WaypointController:

@@ -1,8 +1,6 @@
-"""Filters in discrete time: low-pass and PID."""
+"""A low-pass filter in discrete time."""
 
 import math
-
-from finlab.control.gains import PidGains
 
 
 class LowPass:
@@ -19,31 +17,3 @@ class LowPass:
         """Takes a sample and returns the filtered value."""
         self.value = sample if self.value is None else self.value + self.share * (sample - self.value)
         return self.value
-
-
-class Pid:
-    """u = kp e + ki integral(e) + kd de/dt, limited to +-limit, anti-windup by conditional integration.
-
-    The rate is that of the error after a first-order filter: never steeper than noise over its time constant.
-    """
-
-    def __init__(self, gains: PidGains, limit: float, period_s: float) -> None:
-        """Takes gains, the largest output [N] and the time between calls [s]."""
-        self.gains = gains
-        self.limit = limit
-        self.period_s = period_s
-        self.integral = 0.0
-        """Integral part of the output [N]."""
-        self._smooth = LowPass(gains.rate_filter_s, period_s)
-
-    def step(self, error: float) -> float:
-        """Returns the output for an error."""
-        before = self._smooth.value
-        after = self._smooth.step(error)
-        rate = 0.0 if before is None else (after - before) / self.period_s
-        direct = self.gains.kp * error + self.gains.kd * rate
-        integral = self.integral + self.gains.ki * error * self.period_s
-        output = direct + integral
-        if abs(output) <= self.limit or output * error <= 0.0:
-            self.integral = integral  # within the limit, or on the way back to it
-        return min(max(direct + self.integral, -self.limit), self.limit)

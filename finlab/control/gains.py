@@ -1,4 +1,4 @@
-"""Gains of the waypoint and of the velocity controller, for U-CAT's hull (layouts A to D, ucat)."""
+"""Gains of the waypoint controller, for U-CAT's hull (layouts A to D, ucat)."""
 
 from dataclasses import dataclass
 
@@ -48,44 +48,3 @@ PAPER_WAYPOINT_GAINS = WaypointGains(
 )
 """The paper's law: proportional terms alone. The paper prints no gains; these have a longer lead and a softer
 heading, since only the water damps the heading."""
-
-
-@dataclass(frozen=True)
-class PidGains:
-    """Gains of one PID loop, per unit of its error."""
-
-    kp: float
-    """Per unit of error."""
-    ki: float
-    """Per unit of error and second."""
-    kd: float
-    """Per unit of error per second."""
-    rate_filter_s: float
-    """Time constant of the filter of the error's rate [s]."""
-
-
-@dataclass(frozen=True)
-class VelocityGains:
-    """Gains of the velocity and depth controller.
-
-    Surge: mass with added mass 59 kg, drag near 35 N s/m: kp 60 closes the speed loop at 1.6 rad/s, ki takes
-    the drag over within a few seconds. Depth: as heave of the waypoint controller, with a slow integral
-    against trim errors. No run was used to tune them.
-    """
-
-    period_s: float = 0.1
-    """Time between calls [s]."""
-    velocity_filter_s: float = 0.3
-    """Time constant of the filter of the DVL's surge speed [s]."""
-    surge: PidGains = PidGains(kp=60.0, ki=25.0, kd=0.0, rate_filter_s=0.3)
-    """Fx from the error of speed [N per m/s]."""
-    depth: PidGains = PidGains(kp=42.0, ki=3.0, kd=80.0, rate_filter_s=0.3)
-    """Upward force from the error of depth [N per m]."""
-    yaw_damping: float = 3.0
-    """Tz against the yaw rate [N m s/rad]."""
-    max_surge: float = 12.0
-    """Largest Fx [N]."""
-    max_heave: float = 8.0
-    """Largest Fz [N]."""
-    max_yaw: float = 1.5
-    """Largest Tz [N m]."""

@@ -42,7 +42,7 @@ class Setpoint(NamedTuple):
     """What the robot should do now; a controller takes what it needs."""
 
     position: Array
-    """Waypoint (3,) in the world [m]; x and y may be NaN where only depth counts."""
+    """Waypoint (3,) in the world [m]."""
     surge: float
     """Speed along x [m/s]."""
     velocity: Array = np.zeros(3)

@@ -116,9 +116,7 @@ class TrackingController:
 
     def _velocity(self, now: Estimate, setpoint: Setpoint) -> Array:
         """Velocity over ground (3,) to go with [m/s]."""
-        missing = setpoint.position - now.position
-        missing[np.isnan(missing)] = 0.0  # where only the depth counts
-        wanted: Array = setpoint.velocity + self.gains.path * missing
+        wanted: Array = setpoint.velocity + self.gains.path * (setpoint.position - now.position)
         speed = math.sqrt(wanted @ wanted)
         return wanted * min(1.0, self.gains.max_speed / max(speed, 1e-9))
 

@@ -17,10 +17,9 @@ from finlab.sim.sensors import NO_NOISE as NO_NOISE
 from finlab.sim.sensors import NOISE_ALONE as NOISE_ALONE
 from finlab.sim.sensors import SensorSettings as SensorSettings
 from finlab.sim.task import SHIPPED as SHIPPED
-from finlab.sim.task import Cruise as Cruise
-from finlab.sim.task import Task as Task
 from finlab.sim.task import Trajectory as Trajectory
 from finlab.sim.task import make_trajectory as make_trajectory
+from finlab.sim.task import straight as straight
 from finlab.sim.water import Changing as Changing
 from finlab.sim.water import Flow as Flow
 from finlab.sim.water import SteadyCurrent as SteadyCurrent

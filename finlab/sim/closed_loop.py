@@ -18,7 +18,6 @@ from finlab.control import (
     Measurement,
     Setpoint,
     TrackingController,
-    VelocityController,
     Verdict,
 )
 from finlab.control.measurement import NO_WRENCH
@@ -32,7 +31,7 @@ from finlab.sim.log import RunLog, Tick, log_of_ticks
 from finlab.sim.perturbed import checked_truth
 from finlab.sim.plants import make_plant
 from finlab.sim.sensors import Sensors, SensorSettings
-from finlab.sim.task import Cruise, Task
+from finlab.sim.task import Trajectory
 from finlab.sim.water import Still, Water
 from finlab.vehicle.attitude import quaternion_of_yaw
 from finlab.vehicle.body import complete_body
@@ -59,7 +58,7 @@ class ClosedLoop:
         self,
         layout: Layout,
         allocator: Allocator,
-        task: Task,
+        task: Trajectory,
         controller: Controller | None = None,
         *,
         plant: str = "mean",
@@ -78,9 +77,8 @@ class ClosedLoop:
         Args:
             layout: the robot; what its body does not say is U-CAT's.
             allocator: any method.
-            task: a `Trajectory` or a `Cruise`.
-            controller: by default the tracking controller of the layout for trajectories, the velocity
-                controller for cruises.
+            task: the path, such as `make_trajectory` gives.
+            controller: by default the tracking controller of the layout.
             plant: what the fins really do; see `PLANTS`.
             policy: what the allocator does with a wrench that is out of reach; by default its own
                 `policy_under_way`.
@@ -104,9 +102,7 @@ class ClosedLoop:
         self.layout = layout
         self.allocator = allocator
         self.task = task
-        if controller is None:
-            controller = VelocityController() if isinstance(task, Cruise) else TrackingController(layout)
-        self.controller = controller
+        self.controller = controller = TrackingController(layout) if controller is None else controller
         self._foresighted = controller if isinstance(controller, Foresighted) else None
         self.plant = plant
         self.policy = as_policy(allocator.policy_under_way if policy is None else policy)

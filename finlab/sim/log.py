@@ -36,7 +36,7 @@ class Tick(NamedTuple):
     """What the sensors said last (12,): position [m], roll, pitch, yaw [rad], velocity [m/s] and angular
     rates [rad/s] in the body frame."""
     reference: AnyArray
-    """Where the robot should be at `time` (3,) [m]; NaN where the task does not say."""
+    """Where the robot should be at `time` (3,) [m]."""
     reference_surge: float
     """How fast it should be along x [m/s]."""
     asked: AnyArray
@@ -110,7 +110,7 @@ class RunLog:
     controller: str
     """Name of the controller."""
     task: str
-    """Name of the trajectory or cruise."""
+    """Name of the trajectory."""
     plant: str
     """How the fins' forces were simulated."""
     water: str

@@ -1,11 +1,9 @@
-"""What a robot is to do: follow a path over time, shipped or from a file, keep a place, or cruise."""
+"""What a robot is to do: follow a path over time, shipped or from a file, or keep a place."""
 
 import math
 import os
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 
@@ -13,33 +11,6 @@ from finlab.arrays import Array
 from finlab.control import Setpoint
 from finlab.errors import DataError
 from finlab.files.csv_table import read_table
-
-
-@dataclass(frozen=True)
-class Cruise:
-    """Keep a speed and a depth, from rest."""
-
-    speed: float
-    """Surge speed [m/s]."""
-    depth: float = 1.0
-    """Below the world's origin [m]."""
-    duration_s: float = 30.0
-    """How long [s]."""
-
-    @property
-    def name(self) -> str:
-        """Speed in words."""
-        return f"cruise at {self.speed:g} m/s"
-
-    def setpoint(self, time: float) -> Setpoint:
-        """The same at all times."""
-        velocity = np.array([self.speed, 0.0, 0.0])
-        return Setpoint(np.array([np.nan, np.nan, -self.depth]), self.speed, velocity)
-
-    def start(self) -> tuple[Array, float]:
-        """At depth, heading along x."""
-        return np.array([0.0, 0.0, -self.depth]), 0.0
-
 
 RAMP_S = 6.0
 """Time in which a shipped trajectory picks up its speed from rest [s]."""
@@ -58,7 +29,7 @@ COLUMNS = ("t", "x", "y", "z")
 
 
 class Trajectory:
-    """Positions at times, with straight lines between them, for the waypoint controller."""
+    """Positions at times, with straight lines between them."""
 
     def __init__(self, name: str, time: Array, position: Array) -> None:
         """Takes a name, rising times (N,) [s] from 0 and positions (N, 3) in the world [m].
@@ -125,28 +96,6 @@ class Trajectory:
         return self.samples[0].copy(), math.atan2(dy, dx)
 
 
-class Task(Protocol):
-    """What a `ClosedLoop` can be given."""
-
-    @property
-    def name(self) -> str:
-        """What it is called in logs."""
-        ...
-
-    @property
-    def duration_s(self) -> float:
-        """How long it takes [s]."""
-        ...
-
-    def setpoint(self, time: float) -> Setpoint:
-        """What to do at `time` [s]; after the end as at the end."""
-        ...
-
-    def start(self) -> tuple[Array, float]:
-        """Position (3,) [m] and heading [rad] to begin with."""
-        ...
-
-
 def _eased(duration_s: float) -> tuple[Array, Array]:
     """Times, and the share of the path done by then: from rest to a steady speed within `RAMP_S`."""
     time = np.arange(0.0, duration_s + STEP_S / 2, STEP_S)
@@ -195,6 +144,14 @@ def dive(duration_s: float = 60.0) -> Trajectory:
     time, share = _eased(duration_s)
     depth = 1.0 + 0.5 * (1.0 - np.cos(2 * math.pi * share))
     return Trajectory("dive", time, np.stack([6.0 * share, np.zeros_like(share), -depth], axis=-1))
+
+
+def straight(speed: float, duration_s: float) -> Trajectory:
+    """Straight ahead at 1 m depth, from rest to a speed [m/s]."""
+    time, share = _eased(duration_s)
+    far = speed * (duration_s - 0.5 * RAMP_S)
+    path = np.stack([far * share, np.zeros_like(share), np.full_like(share, -1.0)], axis=-1)
+    return Trajectory(f"straight at {speed:g} m/s", time, path)
 
 
 def station(duration_s: float = 60.0, depth_m: float = 1.0, name: str = "station") -> Trajectory:

@@ -9,12 +9,9 @@ from finlab.control import (
     PAPER_WAYPOINT_GAINS,
     Measurement,
     Setpoint,
-    VelocityController,
     WaypointController,
 )
 from finlab.control.controllers import Odometry
-from finlab.control.filters import Pid
-from finlab.control.gains import PidGains
 from finlab.layout.angles import wrapped
 
 STILL = Measurement(0.0, np.array([0.0, 0.0, -1.0]), 0.0, np.zeros(3), 1.0, np.zeros(3), 0.0, 0.0)
@@ -66,30 +63,11 @@ def test_odometry_follows_steady_motion_without_lag_and_averages_noise() -> None
     assert pose.climb == pytest.approx(0.01, abs=1e-6)
 
 
-def test_pid_reaches_its_limit_without_winding_up() -> None:
-    pid = Pid(PidGains(kp=1.0, ki=1.0, kd=0.0, rate_filter_s=0.0), limit=2.0, period_s=0.1)
-    assert [pid.step(10.0) for _ in range(100)][-1] == 2.0
-    assert pid.integral <= 2.0
-    assert pid.step(-0.5) < 1.6, "it leaves the limit at once"
-
-
-@pytest.mark.parametrize("kind", [VelocityController, WaypointController])
-def test_a_reset_controller_remembers_nothing(kind: type[VelocityController | WaypointController]) -> None:
+def test_a_reset_controller_remembers_nothing() -> None:
     moving = STILL._replace(velocity=np.array([0.05, 0.0, 0.02]), depth=0.9, rates=np.array([0.0, 0.0, 0.3]))
     setpoint = Setpoint(np.array([1.0, 0.5, -1.0]), 0.15)
-    controller = kind()
+    controller = WaypointController()
     first = controller.wrench(STILL, setpoint)
     assert not np.array_equal(controller.wrench(moving, setpoint), first)
     controller.reset()
     np.testing.assert_array_equal(controller.wrench(STILL, setpoint), first)
-
-
-def test_velocity_controller_pushes_dives_and_damps() -> None:
-    moving = STILL._replace(velocity=np.array([0.05, 0.0, 0.0]), depth=0.9, rates=np.array([0.0, 0.0, 0.3]))
-    controller = VelocityController()
-    wrench = controller.wrench(moving, Setpoint(np.array([np.nan, np.nan, -1.0]), 0.15))
-    assert wrench[0] > 0.0 and wrench[2] < 0.0 and wrench[5] < 0.0
-    assert (wrench[[1, 3, 4]] == 0.0).all()
-    for _ in range(1000):
-        wrench = controller.wrench(moving, Setpoint(np.array([np.nan, np.nan, -9.0]), 2.0))
-    assert wrench[0] == controller.gains.max_surge and wrench[2] == -controller.gains.max_heave

@@ -15,12 +15,12 @@ from finlab.layout import Layout
 from finlab.sim import (
     NO_NOISE,
     ClosedLoop,
-    Cruise,
     FinFault,
     RunLog,
     Tick,
     load_log,
     make_trajectory,
+    straight,
 )
 from finlab.sim.log import log_of_ticks
 from finlab.vehicle.body import ucat_body
@@ -48,8 +48,8 @@ def test_same_seed_same_swim(layout_a: Layout, analytic: Allocator) -> None:
     assert (first != other).any()
 
 
-def test_cruise_holds_speed_and_depth(layout_a: Layout, analytic: Allocator) -> None:
-    log = swum(ClosedLoop(layout_a, analytic, Cruise(0.15), sensors=NO_NOISE), 20.0)
+def test_a_straight_path_holds_speed_and_depth(layout_a: Layout, analytic: Allocator) -> None:
+    log = swum(ClosedLoop(layout_a, analytic, straight(0.15, 30.0), sensors=NO_NOISE), 20.0)
     late = log.time > 15.0
     assert np.abs(log.motion[late, 0] - 0.15).max() < 0.01
     assert np.abs(log.position[late, 2] + 1.0).max() < 0.02

@@ -11,11 +11,11 @@ import numpy as np
 
 from finlab.allocation.allocator import Allocator
 from finlab.arrays import Array
-from finlab.control import PATH_CONTROLLERS, VelocityController
+from finlab.control import PATH_CONTROLLERS
 from finlab.errors import DataError
 from finlab.evaluation.report.document import Column, Row
 from finlab.layout import Layout
-from finlab.sim import ClosedLoop, Cruise, RunLog, Task
+from finlab.sim import ClosedLoop, RunLog, Trajectory
 
 RTE_DELTA_S = 5.0
 """Time between the two ends of a piece of path that the relative error compares [s]."""
@@ -81,7 +81,7 @@ def over_seeds(rows: Sequence[Row]) -> Row:
 def swim(
     layout: Layout,
     method: Allocator,
-    task: Task,
+    path: Trajectory,
     seed: int,
     plant: str,
     controller: str = "waypoint",
@@ -92,14 +92,14 @@ def swim(
     Args:
         layout: the robot.
         method: who allocates.
-        task: a trajectory, or a cruise.
+        path: what is followed.
         seed: of the sensors' noise.
         plant: how fin forces are simulated.
-        controller: of trajectories, one of `finlab.control.PATH_CONTROLLERS`; cruises have one of their own.
+        controller: one of `finlab.control.PATH_CONTROLLERS`.
         faults: fins, each with the time [s] at which it is lost.
     """
-    pilot = VelocityController() if isinstance(task, Cruise) else PATH_CONTROLLERS[controller](layout)
-    return ClosedLoop(layout, method, task, pilot, failures=faults, plant=plant, seed=seed).run()
+    pilot = PATH_CONTROLLERS[controller](layout)
+    return ClosedLoop(layout, method, path, pilot, failures=faults, plant=plant, seed=seed).run()
 
 
 def check_names(option: str, names: Sequence[str], known: Collection[str]) -> None:

@@ -13,7 +13,7 @@ from finlab.evaluation.paper_figures import paper_figures
 from finlab.evaluation.progress import progress
 from finlab.evaluation.report.document import Column, Row
 from finlab.layout import load_layout
-from finlab.sim import Cruise, RunLog
+from finlab.sim import RunLog, straight
 
 SPEEDS = (0.10, 0.15, 0.20)
 """The paper's speeds [m/s]."""
@@ -46,7 +46,7 @@ def run(
     robot, allocators = load_layout(layout), load_method_specs(methods, checkpoint)
     done: dict[tuple[float | None, str], list[Row]] = {}
     for speed, (name, method), k in progress(list(product(SPEEDS, allocators.items(), range(runs))), "swim"):
-        row = _row(swim(robot, method, Cruise(speed, duration_s=duration), seed + k, plant))
+        row = _row(swim(robot, method, straight(speed, duration), seed + k, plant, "tracking"))
         done.setdefault((speed, name), []).append(row)
         done.setdefault((None, name), []).append(row)
     order = sorted(done, key=lambda key: key[0] is None)

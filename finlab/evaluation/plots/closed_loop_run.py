@@ -67,11 +67,8 @@ def draw_errors(log: RunLog) -> Picture:
     error = log.position - log.reference
     with picture(2, 1, height=4.4, sharex=True) as drawn:
         top, bottom = drawn.axes
-        if np.isfinite(error).all():
-            top.plot(log.time, np.linalg.norm(error, axis=1), color=BLACK, label="distance")
-            top.plot(log.time, np.linalg.norm(error[:, :2], axis=1), color=BLUE, lw=1.2, label="horizontal")
-        else:
-            top.plot(log.time, log.motion[:, 0] - log.reference_surge, color=BLUE, label="surge speed [m/s]")
+        top.plot(log.time, np.linalg.norm(error, axis=1), color=BLACK, label="distance")
+        top.plot(log.time, np.linalg.norm(error[:, :2], axis=1), color=BLUE, lw=1.2, label="horizontal")
         top.plot(log.time, error[:, 2], color=ORANGE, lw=1.2, label="depth, up positive")
         top.set(ylabel="error [m]", title="Error")
         angles = np.degrees(euler(log.quaternion))
