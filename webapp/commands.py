@@ -67,7 +67,6 @@ def commands(page: Page) -> list[Command]:
         Command("Design", "Pin this layout to compare with", session.pin),
         Command("Design", "Start over", session.start_over),
         Command("Wrench", "Fail or repair the selected fin", fail_selected, "X"),
-        Command("Wrench", "Drag the wrench in 3D, or stop it", partial(session.toggle, "grips"), "G"),
         *(Command("Wrench", f"Ask for: {name}", partial(session.set_preset, name)) for name in PRESETS),
         *(
             Command("Wrench", f"Ask for {word} alone", partial(session.set_only_axis, axis))

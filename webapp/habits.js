@@ -1,10 +1,10 @@
 // What the page of viser does otherwise: with Ctrl the camera stays where it is, keys have their usual second names,
-// buttons have hints, the drawer is dragged taller, and the first card comes and goes.
+// buttons have hints, and the first card comes and goes.
 (() => {
   if (window.finlabFrame) return;
   const page = document.documentElement;
   const MOVES = /^(Key[WASDQE]|Arrow)/;
-  const TALL = 'finlab-drawer', MET = 'finlab-met';
+  const MET = 'finlab-met';
   const typing = (target) => target.closest?.('input, textarea, [contenteditable=true]');
 
   function kept(name) { try { return localStorage.getItem(name); } catch { return null; } }
@@ -14,7 +14,6 @@
     met() { page.classList.remove('fl-first'); keep(MET, '1'); },
   };
   if (!kept(MET)) page.classList.add('fl-first');
-  if (/^\d+px$/.test(kept(TALL) ?? '')) page.style.setProperty('--fl-drawer', kept(TALL));
 
   window.addEventListener('keydown', (event) => {
     const held = event.ctrlKey || event.metaKey;
@@ -46,18 +45,4 @@
     button.title = [isCut && label.textContent, window.finlabHints?.get(button.id)].filter(Boolean).join('\n');
   });
 
-  window.addEventListener('pointerdown', (event) => {
-    const handle = event.target.closest?.('.fl-handle');
-    if (!handle) return;
-    event.preventDefault();
-    const drawer = handle.parentElement.closest('.mantine-Paper-root');
-    const from = drawer.getBoundingClientRect().height + event.clientY;
-    const move = (to) => page.style.setProperty('--fl-drawer', `${Math.round(from - to.clientY)}px`);
-    const end = () => {
-      window.removeEventListener('pointermove', move);
-      keep(TALL, `${Math.round(drawer.getBoundingClientRect().height)}px`);
-    };
-    window.addEventListener('pointermove', move);
-    window.addEventListener('pointerup', end, { once: true });
-  }, { capture: true });
 })();

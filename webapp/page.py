@@ -236,7 +236,7 @@ class Page(ABC):
                 self._take_in()
                 # Before the panels: it settles the scale in the legend.
                 self.scenery.robot.editing = self.session.task == "Design"
-                self.scenery.refresh(self.answering, self.comparison, self.improver, self.analyst.findings)
+                self.scenery.refresh(self.answering, self.improver, self.analyst.findings)
             except Exception as error:
                 self.scenery.hide()
                 self.fault(error)

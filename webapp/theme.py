@@ -80,8 +80,6 @@ class Look:
     """Shafts and struts."""
     line: Rgb
     """Thin lines: the graph, dimension lines, stalks."""
-    overlay: Rgb
-    """Forces of a second method, beside those of the robot."""
 
 
 LIGHT = Look(
@@ -93,7 +91,6 @@ LIGHT = Look(
     glass=(44, 62, 78),
     metal=(98, 108, 118),
     line=(84, 104, 118),
-    overlay=(40, 44, 52),
 )
 DARK = Look(
     water_top=(24, 42, 54),
@@ -104,7 +101,6 @@ DARK = Look(
     glass=(58, 80, 100),
     metal=(120, 130, 140),
     line=(150, 170, 184),
-    overlay=(222, 228, 234),
 )
 
 

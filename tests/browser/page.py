@@ -80,7 +80,6 @@ class Page:
             self.session.desk = Desk()
             self.session.draft, self.session.swim = SearchRequest(), SwimSettings()
             self.session.compare_with(None)
-            self.session.set_overlay(None)
             self.view.improver.forget()
             self.view.sweep.stop()
             self.view.scenery.end_swim()

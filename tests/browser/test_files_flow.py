@@ -36,11 +36,11 @@ def drop(page: Any, place: str, files: dict[str, bytes]) -> None:
     """Drag files over an element of the page, see what the page says to that, and let them go there."""
     coded = [[name, base64.b64encode(content).decode()] for name, content in files.items()]
     carried = page.page.evaluate_handle(CARRIED, coded)
-    target, card = page.page.locator(place).first, page.page.locator(".fl-drop")
+    target, said = page.page.locator(place).first, page.page.locator("html.fl-dropping")
     target.dispatch_event("dragover", {"dataTransfer": carried})
-    card.wait_for()
+    said.wait_for()
     target.dispatch_event("drop", {"dataTransfer": carried})
-    card.wait_for(state="hidden")
+    said.wait_for(state="detached")
 
 
 def test_what_is_dropped_is_opened(page: Any, tmp_path: Path) -> None:

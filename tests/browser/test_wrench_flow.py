@@ -2,8 +2,6 @@
 
 from typing import Any
 
-import pytest
-
 from webapp.session.state import COMPARED
 
 
@@ -89,39 +87,3 @@ def test_methods_side_by_side(page: Any) -> None:
     page.until(lambda: page.session.drawer == "Comparison" and page.view.comparison.state is not None)
     page.until(lambda: not page.view.comparison.running)
     page.until(lambda: page.page.locator("table.methods tr").count() == 1 + len(COMPARED))
-    row = page.page.locator("table.methods tr.pick", has_text="analytic")
-    row.click()
-    page.until(lambda: page.session.overlay == "analytic")
-    page.visible("/robot/overlay")
-    page.until(lambda: "analytic" in page.text("table.methods tr.chosen"))
-    row.press("Enter")
-    page.until(lambda: page.session.overlay is None)
-
-
-def test_the_wrench_is_dragged_in_the_view(page: Any) -> None:
-    page.key("g")
-    page.until(lambda: page.session.display.grips)
-    page.visible("/robot/grip/force")
-    page.look_from_above()
-    before = page.session.state.target
-    page.drag(page.pixel("/robot/grip/force", (0.112, 0, 0)), page.pixel("/robot/grip/force", (0.192, 0, 0)))
-    page.until(lambda: page.session.state.target[0] > before[0] + 0.2)
-    page.until(lambda: page.view.scenery.robot.grips.dragged is None and not page.view.busy)
-    assert page.session.state.target[1:] == pytest.approx(before[1:], abs=0.02)
-    assert page.session.history.undo_name == "Drag the force"
-    page.tab("Design")  # one set of handles at a time
-    page.key("n")
-    fin = page.view.scenery.robot._fins[0]
-    page.until(lambda: page.session.selected is not None and not any(fin._move.active_axes))
-    page.key("g")
-    page.until(lambda: all(fin._move.active_axes))
-
-
-def test_a_sweep_plays_and_stops(page: Any) -> None:
-    page.tab("Sweep")
-    page.press("Play the sweep")
-    page.until(lambda: page.view.sweep.running and page.session.state.target[0] > -4.0)
-    page.until(lambda: page.page.locator(".uplot:visible").count() > 0)
-    page.press("Stop the sweep")
-    page.until(lambda: not page.view.sweep.running)
-    page.until(lambda: page.session.state.target[0] == 1.2 and page.row("Fx [N]").last.input_value() == "1.2")

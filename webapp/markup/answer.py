@@ -135,25 +135,12 @@ def _cells(command: Array, limits: NDArray[np.bool_], force: float, full: float,
     bar = f"width:{100 * share:.0f}%;background:{css(fin_color(index))}"
     meter = html("<span class='meter'><i style='{}'></i></span>", bar)
     return html(
-        "<td class='{}'>{:.1f}</td><td class='{}'>{:.2f}</td><td>{} {}</td><td>{:.2f}</td><td>{}</td>",
+        "<td class='{}'>{:.1f}</td><td class='{}'>{:.2f}</td><td>{}</td><td>{:.2f}</td><td>{}</td>",
         "full" if limits[0] else "",
         math.degrees(amplitude),
         "full" if limits[1] else "",
         frequency,
-        _dial(direction),
         degrees,
         force,
         meter,
-    )
-
-
-def _dial(direction: float) -> str:
-    """A small circle with a hand; right is the fin's horizontal thrust axis, up is up."""
-    x, y = 7 + 5.5 * math.cos(direction), 7 - 5.5 * math.sin(direction)
-    return html(
-        "<svg width='14' height='14' style='vertical-align:-3px'><circle cx='7' cy='7' "
-        "r='6' fill='none' stroke='currentColor' stroke-opacity='.35'/><line x1='7' y1='7' "
-        "x2='{:.1f}' y2='{:.1f}' stroke='currentColor' stroke-width='1.6'/></svg>",
-        x,
-        y,
     )

@@ -1,7 +1,5 @@
 """The table of compared methods."""
 
-import math
-
 from markupsafe import Markup
 
 from finlab.allocation.allocation import Allocation
@@ -9,19 +7,13 @@ from finlab.allocation.judging import REACHED
 from webapp.markup.html import html
 from webapp.markup.verdict import verdict_of
 from webapp.markup.words import error_digits, listed, objective_of, three_digits, unlearned_sentence
-from webapp.presses import press
 from webapp.session.state import COMPARED
 from webapp.tasks.comparison import Comparison
 from webapp.theme import NEARLY, css
 
-ERRORS = (1e-12, 10.0)
-"""Errors [σ] at both ends of their bars."""
-TIMES = (0.01, 1000.0)
-"""Times [ms] at both ends of their bars."""
 
-
-def comparison_table(comparison: Comparison, shown: str | None, stale: bool) -> str:
-    """Error, power, effort and time of each method; the one whose arrows are shown is marked."""
+def comparison_table(comparison: Comparison, stale: bool) -> str:
+    """Error, power, effort and time of each method."""
     if comparison.state is None:
         return Markup(
             "<div class='fl dim'>Several methods on the same wrench: error, power, effort, time side by side."
@@ -38,29 +30,14 @@ def comparison_table(comparison: Comparison, shown: str | None, stale: bool) -> 
             cells = html("<td colspan='4' class='words missing'>{}</td>", words)
         elif isinstance(answer, Allocation):
             color = css(verdict_of(answer, in_reach).color)
-            cells = html(
-                "<td>{}{}</td><td>{}</td><td>{}</td><td>{}{}</td>",
-                error_digits(answer.err_norm),
-                _bar(answer.err_norm, ERRORS, color),
-                three_digits(answer.power),
-                three_digits(answer.energy),
-                three_digits(answer.solve_ms),
-                _bar(answer.solve_ms, TIMES, "currentColor"),
-            )
+            figures = (answer.power, answer.energy, answer.solve_ms)
+            error = html("<td style='color:{}'>{}</td>", color, error_digits(answer.err_norm))
+            cells = error + Markup().join(html("<td>{}</td>", three_digits(value)) for value in figures)
         else:
             cells = html("<td colspan='4' class='words dim'>{}</td>", "…" if answer is None else answer)
         if isinstance(answer, Allocation) and objective_of(answer) != comparison.state.objective:
             others.append(method)
-        kind = "chosen" if method == shown else ""
-        rows.append(
-            html(
-                "<tr class='{} pick' {} tabindex='0'><td>{}</td>{}</tr>",
-                kind,
-                press("overlay", method),
-                method,
-                cells,
-            )
-        )
+        rows.append(html("<tr><td>{}</td>{}</tr>", method, cells))
     header = Markup(
         "<tr><th>method</th><th>error [σ]</th><th>power [W]</th><th>effort</th><th>time [ms]</th></tr>"
     )
@@ -70,8 +47,7 @@ def comparison_table(comparison: Comparison, shown: str | None, stale: bool) -> 
     said = html(
         "<div class='said'><span class='given'>Green</span>: exact, up to {} σ. <span "
         "style='color:{}'>Ochre</span>: approximate, another method is exact. <span "
-        "class='missing'>Orange</span>: out of reach of all. Bars are logarithmic. {}. "
-        "Press a method to lay its forces over those of the robot; again, and they go.</div>",
+        "class='missing'>Orange</span>: out of reach of all. {}.</div>",
         REACHED,
         css(NEARLY),
         kept,
@@ -81,12 +57,3 @@ def comparison_table(comparison: Comparison, shown: str | None, stale: bool) -> 
     )
     body = Markup().join(rows)
     return html("<div class='fl'><table class='methods'>{}{}</table>{}{}</div>", header, body, said, note)
-
-
-def _bar(value: float, ends: tuple[float, float], color: str) -> str:
-    """A thin bar under a number, as long as its logarithm between two ends."""
-    low, high = (math.log10(end) for end in ends)
-    share = (math.log10(max(value, ends[0])) - low) / (high - low)
-    return html(
-        "<span class='log'><i style='width:{:.0f}%;background:{}'></i></span>", 100 * min(share, 1.0), color
-    )

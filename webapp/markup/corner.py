@@ -16,7 +16,7 @@ from webapp.session.state import AXIS_UNITS, State
 from webapp.tasks.analyst import Findings
 from webapp.tasks.moment import ERROR
 from webapp.tasks.swimming import Swimming
-from webapp.theme import ASKED, DEAD, DELIVERED, HALF_TURN, WATER, css, look
+from webapp.theme import ASKED, DEAD, DELIVERED, HALF_TURN, WATER, css
 
 LONG = 24
 """Characters of a verdict above which it takes a line of its own in a small view."""
@@ -24,14 +24,14 @@ ARROWS = (("asked", 0.65), ("delivered", 1.0), ("missing", 1.0))
 """Words and opacities of the three arrows."""
 
 
-def legend(newtons: float, torque: float, cut: bool, also: tuple[str, ...]) -> str:
+def legend(newtons: float, torque: float, cut: bool, also: str) -> str:
     """Arrows, scales, and rows of more.
 
     Args:
         newtons: force [N] that an arrow of 0.1 m stands for.
         torque: torque [N m] that half a turn of a ring stands for.
         cut: whether a ring would have to be longer than a turn.
-        also: rows as `overlay_row` and the others here make them; empty ones are left out.
+        also: rows as `set_rows` makes them.
     """
     # By name, so that the dark theme can lighten them.
     rows = [_key(_arrow(f"var(--fl-{word})", alpha), word) for word, alpha in ARROWS]
@@ -50,13 +50,6 @@ def legend(newtons: float, torque: float, cut: bool, also: tuple[str, ...]) -> s
 def _length(newtons: float) -> str:
     """What the length of an arrow says; where there is little room, without the word in it."""
     return html("<i>arrow </i>0.1 m = {:g} N", newtons)
-
-
-def overlay_row(other: Allocation | None, dark: bool) -> str:
-    """Whose forces lie over those of the robot."""
-    if other is None:
-        return ""
-    return _key(_arrow(css(look(dark).overlay), 1.0), f"fins, {other.method}")
 
 
 def set_rows(findings: Findings | None) -> str:

@@ -1,5 +1,4 @@
-"""What lies over the page for a while: the card of the first visit, and what is said while files are dragged
-over it."""
+"""The card of the first visit."""
 
 from markupsafe import Markup
 
@@ -33,18 +32,4 @@ def welcome() -> str:
         "onclick='finlabFrame.met()'>Close</button></div></section>",
         tries,
         press("tour", ""),
-    )
-
-
-def drop_card() -> str:
-    """What can be dropped; `dropping.js` shows it while files are over the page."""
-    kinds = (
-        ("A design", "YAML, JSON or ZIP; its tables and its mesh at once with it", "opens it"),
-        ("Measurements", "CSV", "are fitted to the fin that is selected, or on whose row they are dropped"),
-        ("A hull", "STL, OBJ, GLB or PLY", "becomes this robot's"),
-        ("A path", "CSV with t, x, y, z", "is swum"),
-    )
-    rows = Markup().join(html("<li><b>{}</b> {}<span>{}</span></li>", a, c, b) for a, b, c in kinds)
-    return html(
-        "<div class='fl fl-drop' aria-hidden='true'><div><h2>Drop to open</h2><ul>{}</ul></div></div>", rows
     )

@@ -8,13 +8,13 @@ from markupsafe import Markup
 from finlab.fit.fin_fit import BAND, FinFit
 from finlab.fit.thrust_curves import ThrustCurve
 from webapp.markup.html import html
-from webapp.markup.mode_plot import BOTTOM, RIGHT, TOP, WIDTH, axes, cost_axis
+from webapp.markup.plot import Plot, positive
 from webapp.markup.words import three_digits
 from webapp.tasks.fitting import Fitted
 from webapp.theme import BLUE, GREEN, ORANGE, css
 
-LEFT, HEIGHT = 44, 214
-"""Left margin and height of the plot [px]."""
+HEIGHT = 214
+"""Height of the plot [px]."""
 COLORS = (ORANGE, GREEN, BLUE)
 """Of the curves, from the lowest frequency to the highest."""
 MOST_NAMED = 8
@@ -94,40 +94,17 @@ def _advice(found: Fitted) -> str:
 
 def thrust_plot(curves: tuple[ThrustCurve, ...]) -> str:
     """Thrust over amplitude at a few frequencies: samples, the fit, and its 95 % band."""
-    top = max(float(max(curve.thrust.max(), curve.samples[:, 1].max(initial=0.0))) for curve in curves)
-    bottom = min(0.0, *(float(curve.samples[:, 1].min(initial=0.0)) for curve in curves))
-    reach = float(curves[0].amplitude[-1])
-    across = cost_axis("half amplitude [rad]", np.array([0.0, reach]))._replace(low=0.0, high=1.02 * reach)
-    up = cost_axis("thrust [N]", np.array([bottom, top]))._replace(low=bottom)
-
-    def x(value: float) -> float:
-        return LEFT + across.share(value) * (WIDTH - LEFT - RIGHT)
-
-    def y(value: float) -> float:
-        return HEIGHT - BOTTOM - up.share(value) * (HEIGHT - BOTTOM - TOP)
-
-    def path(values: np.ndarray, amplitudes: np.ndarray) -> str:
-        return " ".join(f"{x(a):.1f},{y(v):.1f}" for a, v in zip(amplitudes, values, strict=True))
-
-    parts = [axes(across, up, LEFT, HEIGHT, upright=False)]
-    for curve, color in zip(curves, COLORS, strict=False):
-        dots = Markup().join(
-            html("<circle cx='{:.1f}' cy='{:.1f}' r='1.7'/>", x(a), y(v)) for a, v in curve.samples
-        )
-        parts.append(html("<g fill='{}'>{}</g>", css(color, 0.5), dots))
+    values = np.concatenate([np.append(curve.thrust, curve.samples[:, 1]) for curve in curves])
+    across = positive("half amplitude [rad]", curves[0].amplitude[-1:])
+    plot = Plot(across, positive("thrust [N]", values), HEIGHT)
+    dots, lines = [], []
     for k, (curve, color) in enumerate(zip(curves, COLORS, strict=False)):
+        places = (plot.place(*sample) for sample in curve.samples)
+        circles = (html("<circle cx='{:.1f}' cy='{:.1f}' r='1.7'/>", *place) for place in places)
+        dots.append(html("<g fill='{}'>{}</g>", css(color, 0.5), circles))
         band, a = BAND * curve.deviation, curve.amplitude
-        outline = f"{path(curve.thrust + band, a)} {path((curve.thrust - band)[::-1], a[::-1])}"
-        parts.append(html("<polygon points='{}' fill='{}'/>", outline, css(color, 0.22)))
-        parts.append(
-            html(
-                "<polyline points='{}' fill='none' stroke='{}' stroke-width='2'/>",
-                path(curve.thrust, a),
-                css(color),
-            )
-        )
-        place = LEFT + 116 * k
-        parts.append(html("<rect x='{}' y='7' width='14' height='5' rx='2' fill='{}'/>", place, css(color)))
-        low, high = curve.band
-        parts.append(html("<text x='{}' y='14'>{:.1f} to {:.1f} Hz</text>", place + 19, low, high))
-    return html("<svg class='plot' viewBox='0 0 {} {}'>{}</svg>", WIDTH, HEIGHT, parts)
+        outline = np.append(a, a[::-1]), np.append(curve.thrust + band, (curve.thrust - band)[::-1])
+        lines.append(html("<polygon points='{}' fill='{}'/>", plot.points(*outline), css(color, 0.22)))
+        lines.append(plot.curve(a, curve.thrust, color))
+        lines.append(plot.key(116 * k, color, f"{curve.band[0]:.1f} to {curve.band[1]:.1f} Hz"))
+    return plot.drawn([*dots, *lines])

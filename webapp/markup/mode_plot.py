@@ -1,7 +1,6 @@
 """The modes of an answer as numbered dots that can be picked: what is kept least against what else counts."""
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from markupsafe import Markup
@@ -9,19 +8,14 @@ from markupsafe import Markup
 from finlab.allocation.allocation import Allocation
 from finlab.arrays import Array
 from webapp.markup.html import html
+from webapp.markup.plot import EXACT, RIGHT, TOP, WIDTH, Plot, Point, cost_axis, error_axis
 from webapp.markup.words import objective_of
 from webapp.presses import press
 from webapp.tasks.mode_names import Modes
 from webapp.theme import DEAD, Rgb, css, mode_color
 
-WIDTH = 388
-"""Width of the plot [px]."""
-LEFT, RIGHT, TOP, BOTTOM = 54, 8, 24, 34
-"""Margins of the plot [px]."""
-MOST_TICKS = 6
-"""Steps between ticks at most."""
-EXACT = 1e-6
-"""Error [σ] below which all answers are drawn as equally exact."""
+LEFT = 54
+"""Where the axis that goes up stands [px]."""
 FAR = 2.0
 """Samples that cost more than so many times the dearest mode are counted, not drawn: modes keep apart."""
 LEGEND = (("refined", 5.0, 6), ("on the robot", 0.0, 72), ("sampled", 2.6, 176))
@@ -32,49 +26,6 @@ LABEL = (13.0, 12.0)
 """Width and height of the number of a mode [px]."""
 FAR_PX = 14.0
 """Distance of a number from its dot above which a line joins them [px]."""
-Point = tuple[float, float]
-"""Across and down [px]."""
-
-
-class Axis(NamedTuple):
-    """One axis of the plot."""
-
-    word: str
-    """What it measures."""
-    low: float
-    """Its value at the lower end."""
-    high: float
-    """At the upper end."""
-    ticks: tuple[tuple[float, str], ...]
-    """Values with a line, and their labels."""
-
-    def share(self, value: float) -> float:
-        """How far along it a value lies, 0 to 1."""
-        return (value - self.low) / (self.high - self.low)
-
-
-def cost_axis(word: str, values: Array) -> Axis:
-    """An axis that shows all of some values, with round ticks."""
-    low, high = float(values.min()), float(values.max())
-    margin = max(0.08 * (high - low), 0.02 * high, 1e-6)
-    low, high = low - margin, high + margin
-    decade = 10.0 ** math.floor(math.log10((high - low) / MOST_TICKS))
-    step = next(s * decade for s in (1.0, 2.0, 5.0, 10.0) if (high - low) / (s * decade) <= MOST_TICKS)
-    places = range(math.ceil(low / step), math.floor(high / step) + 1)
-    return Axis(word, low, high, tuple((k * step, f"{k * step:.3g}") for k in places))
-
-
-def error_axis(logs: Array) -> Axis:
-    """The same for logarithms of errors, in powers of ten."""
-    low = math.floor(logs.min())
-    high = max(math.ceil(logs.max()), low + 1)
-    ticks = []
-    for power in range(low, high + 1, max(1, round((high - low) / 5))):
-        below = "≤" if 10.0**power <= EXACT else ""
-        raised = str(power).replace("-", "−")
-        ticks.append((float(power), html("{}10<tspan dy='-4' font-size='8'>{}</tspan>", below, raised)))
-    margin = 0.06 * (high - low)
-    return Axis("error [σ]", low - margin, high + margin, tuple(ticks))
 
 
 def mode_plot(answer: Allocation, modes: Modes, shown: int, height: int) -> str:
@@ -105,44 +56,30 @@ def mode_plot(answer: Allocation, modes: Modes, shown: int, height: int) -> str:
     across = cost_axis(words[order[0]], points[:, 0])
     up = cost_axis(words[order[1]], points[:, 1]) if samples is None else error_axis(points[:, 1])
 
-    def place(point: Array) -> Point:
-        x = LEFT + across.share(float(point[0])) * (WIDTH - LEFT - RIGHT)
-        return x, height - BOTTOM - up.share(float(point[1])) * (height - BOTTOM - TOP)
-
-    parts = [_legend(samples is not None), axes(across, up, LEFT, height)]
+    plot = Plot(across, up, height, LEFT)
+    parts = [_legend(samples is not None)]
     if samples is not None:
-        dots = [place(point) if close else None for point, close in zip(raw, near, strict=True)]
+        dots = [plot.place(*point) if close else None for point, close in zip(raw, near, strict=True)]
         parts.append(_sample_dots(dots, modes))
-    parts += _mode_dots([place(point) for point in refined], height - BOTTOM, shown)
-    return html("<div class='fl'><svg class='plot' viewBox='0 0 {} {}'>{}</svg></div>", WIDTH, height, parts)
+    parts += _mode_dots([plot.place(*point) for point in refined], plot.floor, shown)
+    return html("<div class='fl'>{}</div>", plot.drawn(parts, upright=True))
 
 
 def _mode_dots(places: list[Point], floor: float, shown: int) -> list[str]:
     """A dot where each mode lies, with its number beside it; the best one on top."""
+    # What is between a dot and its number can be clicked, too.
+    dot = (
+        "<g class='pick' {}><path {} stroke='transparent' stroke-width='12'/>{}"
+        "<circle cx='{:.1f}' cy='{:.1f}' r='{}' class='mode' fill='{}'/>"
+        "<text x='{:.1f}' y='{:.1f}' class='digit' text-anchor='middle'>{}</text></g>"
+    )
     parts = []
     labels = _labels(places, floor)
     for k, ((x, y), (u, v)) in reversed(list(enumerate(zip(places, labels, strict=True)))):
-        color = css(mode_color(k))
+        color, pressed = css(mode_color(k)), press("mode", str(k))
         way = html("d='M{:.1f} {:.1f}L{:.1f} {:.1f}'", x, y, u, v)
         line = html("<path {} stroke='{}'/>", way, color) if math.dist((x, y), (u, v)) > FAR_PX else ""
-        parts.append(
-            # What is between a dot and its number can be clicked, too.
-            html(
-                "<g class='pick' {}><path {} stroke='transparent' stroke-width='12'/>{}<circle "
-                "cx='{:.1f}' cy='{:.1f}' r='{}' class='mode' fill='{}'/><text x='{:.1f}' y='{:.1f}' "
-                "class='digit' text-anchor='middle'>{}</text></g>",
-                press("mode", str(k)),
-                way,
-                line,
-                x,
-                y,
-                DOT,
-                color,
-                u,
-                v + 3.8,
-                k + 1,
-            )
-        )
+        parts.append(html(dot, pressed, way, line, x, y, DOT, color, u, v + 3.8, k + 1))
         if k == shown:
             parts.append(_ring(x, y, DOT + 3.0))
     return parts
@@ -206,27 +143,4 @@ def _legend(sampled: bool) -> str:
         dot = html("<circle cx='{}' cy='10' r='{}' fill='currentColor' opacity='.55'/>", LEFT + place, radius)
         parts.append(dot if radius else _ring(LEFT + place, 10, 5.5))
         parts.append(html("<text x='{}' y='14'>{}</text>", LEFT + place + 9, word))
-    return Markup().join(parts)
-
-
-def axes(across: Axis, up: Axis, left: float, height: float, *, upright: bool = True) -> str:
-    """The grid of a plot `height` [px] high with labels, those of the axis that goes up within `left` [px];
-    upright lines or none."""
-    floor, parts = height - BOTTOM, []
-    for value, label in up.ticks:
-        at = floor - up.share(value) * (floor - TOP)
-        parts.append(html("<path d='M{} {:.1f}H{}' class='grid'/>", left, at, WIDTH - RIGHT))
-        parts.append(html("<text x='{}' y='{:.1f}' text-anchor='end'>{}</text>", left - 5, at + 4, label))
-    for value, label in across.ticks:
-        at = left + across.share(value) * (WIDTH - left - RIGHT)
-        if upright:
-            parts.append(html("<path d='M{:.1f} {}V{}' class='grid'/>", at, TOP, floor))
-        parts.append(html("<text x='{:.1f}' y='{}' text-anchor='middle'>{}</text>", at, floor + 14, label))
-    turned = f"translate(10 {(TOP + floor) / 2}) rotate(-90)"
-    parts.append(
-        html(
-            "<text x='{}' y='{}' text-anchor='middle'>{}</text>", (left + WIDTH) / 2, height - 5, across.word
-        )
-    )
-    parts.append(html("<text transform='{}' text-anchor='middle'>{}</text>", turned, up.word))
     return Markup().join(parts)

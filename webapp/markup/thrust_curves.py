@@ -10,11 +10,11 @@ from finlab.layout import Fin
 from finlab.layout.fin import FinModelSpec, Limits
 from finlab.physics import make_law
 from webapp.markup.html import html
-from webapp.markup.mode_plot import BOTTOM, RIGHT, TOP, WIDTH, axes, cost_axis
-from webapp.theme import BLUE, GREEN, ORANGE, css
+from webapp.markup.plot import Plot, cost_axis, positive
+from webapp.theme import BLUE, GREEN, ORANGE
 
-LEFT, HEIGHT = 44, 150
-"""Left margin and height of the plot [px]."""
+HEIGHT = 150
+"""Height of the plot [px]."""
 SHARES, COLORS = (1.0, 2 / 3, 1 / 3), (ORANGE, GREEN, BLUE)
 """Of the largest amplitude, and the colours of their curves."""
 POINTS = 41
@@ -27,28 +27,14 @@ def thrust_curves(fin: Fin) -> str:
         amplitude, frequency, thrust = thrust_within(fin.model, fin.limits)
     except DataError:
         return ""
-    least, most = frequency[0], frequency[-1]
-    high = most + 0.02 * (most - least) + 1e-9
-    across = cost_axis("frequency [Hz]", frequency)._replace(low=least, high=high)
-    up = cost_axis("thrust [N]", np.array([0.0, max(1e-6, thrust.max())]))._replace(low=0.0)
-    across = across._replace(ticks=tuple(tick for tick in across.ticks if tick[0] >= least))
-
-    def x(value: float) -> float:
-        return LEFT + across.share(value) * (WIDTH - LEFT - RIGHT)
-
-    def y(value: float) -> float:
-        return HEIGHT - BOTTOM - up.share(value) * (HEIGHT - BOTTOM - TOP)
-
-    parts = [axes(across, up, LEFT, HEIGHT, upright=False)]
+    across = cost_axis("frequency [Hz]", frequency)
+    least = float(frequency[0])
+    across = across._replace(low=least, ticks=tuple(tick for tick in across.ticks if tick[0] >= least))
+    plot = Plot(across, positive("thrust [N]", np.array([1e-6, thrust.max()])), HEIGHT)
+    parts = []
     for k, (size, curve, color) in enumerate(zip(amplitude, thrust, COLORS, strict=True)):
-        way = " ".join(f"{x(f):.1f},{y(t):.1f}" for f, t in zip(frequency, curve, strict=True))
-        parts.append(
-            html("<polyline points='{}' fill='none' stroke='{}' stroke-width='2'/>", way, css(color))
-        )
-        place = LEFT + 104 * k
-        parts.append(html("<rect x='{}' y='7' width='14' height='5' rx='2' fill='{}'/>", place, css(color)))
-        parts.append(html("<text x='{}' y='14'>A {:.2f} rad</text>", place + 19, size))
-    return html("<div class='fl'><svg class='plot' viewBox='0 0 {} {}'>{}</svg></div>", WIDTH, HEIGHT, parts)
+        parts += [plot.curve(frequency, curve, color), plot.key(104 * k, color, f"A {size:.2f} rad")]
+    return html("<div class='fl'>{}</div>", plot.drawn(parts))
 
 
 @lru_cache(maxsize=64)

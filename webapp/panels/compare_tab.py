@@ -1,4 +1,4 @@
-"""Several methods on the same wrench, with the forces of one of them over those of the robot."""
+"""Several methods on the same wrench."""
 
 import viser
 
@@ -6,11 +6,10 @@ from webapp.handles import add_html, put
 from webapp.markup.comparison import comparison_table
 from webapp.markup.picking import marker
 from webapp.page import Page
-from webapp.session.state import COMPARED
 
 
 class ComparePanel:
-    """A button and a table, whose rows say whose arrows are shown."""
+    """A button and a table."""
 
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         self._page = page
@@ -21,15 +20,10 @@ class ComparePanel:
             icon=viser.Icon.SCALE,
             hint="For the present wrench and failures.",
         )
-        page.presses.on("overlay", lambda method, _held: self._choose(method))
         self._table = gui.add_html("")
-
-    def _choose(self, method: str) -> None:
-        session = self._page.session
-        session.set_overlay(method if method in COMPARED and method != session.overlay else None)
 
     def refresh(self) -> None:
         session, comparison = self._page.session, self._page.comparison
         stale = comparison.state is not None and comparison.state != session.state
         put(self._run, disabled=comparison.running)
-        put(self._table, content=comparison_table(comparison, session.overlay, stale))
+        put(self._table, content=comparison_table(comparison, stale))

@@ -142,7 +142,7 @@ class Frame:
         assert self._strip is not None
         put(
             self._strip,
-            content=_strip(session.task, session.desk.opened[session.task], session.desk.folded, plots),
+            content=_strip(session.task, session.desk.opened[session.task], session.desk.folded),
         )
 
     def _listen(self) -> None:
@@ -192,8 +192,8 @@ def _style(sections: list[Section], session: Session, plots: bool) -> str:
     return html("<style>:root {{ {} }} {} {} {}</style>", variables, COMPACT, height, hidden)
 
 
-def _strip(task: str, opened: str, folded: bool, plots: bool) -> str:
-    """The upper edge of the drawer: its handle, unless it is low, its tabs, and the button that folds it."""
+def _strip(task: str, opened: str, folded: bool) -> str:
+    """The upper edge of the drawer: its tabs, and the button that folds it."""
     tabs = Markup().join(
         html(
             "<button aria-pressed='{}' {}>{}</button>",
@@ -211,6 +211,4 @@ def _strip(task: str, opened: str, folded: bool, plots: bool) -> str:
         press("fold", ""),
         "▴" if folded else "▾",
     )
-    tall = plots and not folded
-    handle = Markup("<div class='fl-handle' title='drag to make the drawer taller'></div>") if tall else ""
-    return html("{}<nav class='fl-strip' aria-label='Drawer'>{}{}</nav>", handle, tabs, fold)
+    return html("<nav class='fl-strip' aria-label='Drawer'>{}{}</nav>", tabs, fold)

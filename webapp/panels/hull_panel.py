@@ -1,4 +1,4 @@
-"""The hull: a shape with a size, or a mesh file that is looked at, turned, scaled and simplified."""
+"""The hull: a shape with a size, or a mesh file that is looked at, turned and scaled."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -18,11 +18,9 @@ from webapp.scene.meshes.hull import hull_of
 from webapp.scene.meshes.mesh import Mesh
 from webapp.scene.meshes.mesh_file import (
     LARGEST,
-    LEAST_FACES,
     MAX_BYTES,
     MAX_FACES,
     SMALLEST,
-    simplified,
     turned,
 )
 from webapp.scene.meshes.mesh_hull import UNITS, MeshHull
@@ -79,10 +77,6 @@ class HullPanel:
             self._scale,
             lambda: 2.0 * hull_of(page.session.state.layout).half[0],
         )
-        hint = "At most so many; fewer make the page quicker."
-        self._faces = page.bind_number(
-            gui.add_number("Triangles", 1.0, step=1000, hint=hint), self._simplify, self._count, digits=0
-        )
 
     def _import(self, name: str, content: bytes) -> None:
         read = partial(stored_hull, name, content, self._page.session.mesh_unit)
@@ -118,10 +112,6 @@ class HullPanel:
         body = self._page.session.state.layout.body
         return None if body is None else body.hull
 
-    def _count(self) -> float:
-        drawn = hull_of(self._page.session.state.layout)
-        return float(drawn.report.triangles) if isinstance(drawn, MeshHull) else 0.0
-
     def _reshape(self, name: str, change: Callable[[Mesh], Mesh]) -> None:
         hull = self._hull
         if hull is None:
@@ -145,10 +135,6 @@ class HullPanel:
         share = number(length, "length of the hull [m]", SMALLEST, LARGEST) / now
         self._reshape("Scale the hull", lambda mesh: mesh._replace(vertices=mesh.vertices * share))
 
-    def _simplify(self, faces: float) -> None:
-        most = round(number(faces, "triangles of the hull", LEAST_FACES, MAX_FACES))
-        self._reshape("Simplify the hull", lambda mesh: simplified(mesh, most))
-
     @property
     def _shape(self) -> str | None:
         """The hull's parametric shape; None where it comes from a file."""
@@ -167,7 +153,7 @@ class HullPanel:
     def refresh(self) -> None:
         is_mesh = self._shape is None
         put(self._size, disabled=is_mesh)
-        for widget in (self._turns, self._length, self._faces):
+        for widget in (self._turns, self._length):
             put(widget, visible=is_mesh)
         drawn = hull_of(self._page.session.state.layout)
         text = _report(drawn) if isinstance(drawn, MeshHull) else ""

@@ -82,8 +82,6 @@ class ScenarioPanel(SwimPanel):
             ):
                 first = getattr(page.session.swim, key)
                 self._bind(key, gui.add_number(label, first, step=step, hint=hint), digits=3)
-            follow = gui.add_checkbox("Follow", False, hint="The camera goes along with the first robot.")
-            page.on_change(follow, page.scenery.swim.look)
             page.opening.add(".csv", self._open_path, knows=is_path)
             page.add_upload(
                 "Open a path (CSV)",

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from finlab.arrays import Array
 from finlab.layout import Fin
 from webapp.handles import put
-from webapp.scene.gizmos import add_gizmo
 from webapp.scene.meshes import fin as fin_mesh
 from webapp.scene.meshes.hull import AnyHull
 from webapp.scene.meshes.mesh import NOTHING, Mesh, force_arrow, tube
@@ -91,6 +90,20 @@ def quaternion(angle: float, axis: int) -> Array:
     turn = np.zeros(4)
     turn[0], turn[1 + axis] = math.cos(angle / 2), math.sin(angle / 2)
     return turn
+
+
+def add_gizmo(
+    scene: viser.SceneApi, name: str, size: float, on_drag: Callable[[str], None], **options: Any
+) -> viser.TransformControlsHandle:
+    """A gizmo that shows through everything, idle at first; `on_drag` gets `start`, `update` and `end`."""
+    gizmo = scene.add_transform_controls(name, size, depth_test=False, active_axes=(False,) * 3, **options)
+
+    @gizmo.on_update
+    async def _dragged(event: Any) -> None:
+        if event.client is not None:
+            on_drag(event.phase)
+
+    return gizmo
 
 
 class FinNode:

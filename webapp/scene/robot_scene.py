@@ -11,10 +11,9 @@ from finlab.layout import Fin, Layout
 from webapp.handles import put
 from webapp.markup.words import damage_words, missing_part
 from webapp.scene.fin_node import FinNode, Flapping
-from webapp.scene.gizmos import Grips
 from webapp.scene.meshes.hull import hull_of
 from webapp.scene.meshes.mesh import LONGEST_TURN
-from webapp.scene.overlays import Ghost, Overlay, moved_fins
+from webapp.scene.overlays import Ghost, moved_fins
 from webapp.scene.stage import Stage, aim_camera
 from webapp.scene.wrench_nodes import LENGTH, AttainableNodes, WrenchNodes, fitting_newtons, fitting_torque
 from webapp.session.state import State, chosen
@@ -44,10 +43,7 @@ class RobotScene:
         self._ghost = Ghost(scene, "/robot/ghost")
         self._proposed = Ghost(scene, "/robot/proposed", DELIVERED, None)
         self._landing = Ghost(scene, "/robot/landing", ASKED, 0.45)
-        self._overlay = Overlay(scene)
         self._attainable = AttainableNodes(scene)
-        self.grips = Grips(scene, session, self._do)
-        """Handles of the asked wrench."""
         self._fins: list[FinNode] = []
         self.dragged: int | None = None
         """Place of the fin in the user's hand."""
@@ -94,7 +90,6 @@ class RobotScene:
     def refresh(
         self,
         allocation: Allocation | None,
-        other: Allocation | None = None,
         findings: Findings | None = None,
         offered: Layout | None = None,
     ) -> None:
@@ -102,7 +97,6 @@ class RobotScene:
 
         Args:
             allocation: the answer.
-            other: another method's answer, whose forces are shown beside it.
             findings: what the layout can attain, where that is to be shown.
             offered: a better layout, whose fins are shown beside the present ones.
         """
@@ -116,14 +110,13 @@ class RobotScene:
             self._fins.append(FinNode(self._client.scene, len(self._fins), self._clicked, self._drag))
         for node in self._fins[state.layout.n_fins :]:
             node.hide()
-        if self.grips.dragged is None:  # a scale that changes would pull the handle out of the hand
-            self.newtons = display.newtons or fitting_newtons(_largest(state, allocation), self.newtons)
+        self.newtons = fitting_newtons(_largest(state, allocation), self.newtons)
         scale = LENGTH / self.newtons
         fits = allocation is not None and allocation.layout.names == state.layout.names
         for i, fin in enumerate(state.layout.fins):
             selected = fin.name == self._session.selected
             label = _label(state, i, fin.name in self._session.selection) if display.labels else None
-            gizmos = selected and self.editing and not display.grips
+            gizmos = selected and self.editing
             self._fins[i].place(fin, hull, gizmos, label, i == self.dragged)
             if fin.name in state.failed or allocation is None:
                 self._fins[i].command(None, np.zeros(3), 0.0, False)
@@ -138,19 +131,16 @@ class RobotScene:
         left = self._session.saved if display.ghost and offered is None else None
         self._ghost.show(moved_fins(left, state.layout))
         self._landing.show(self._landings())
-        self._overlay.refresh(other, scale, display.dark)
         target = np.array(state.target)
         self._attainable.refresh(findings if display.drawn != "none" else None, target)
         given = None if allocation is None else allocation.wrench
         missing = np.zeros(6) if allocation is None else missing_part(allocation)
         top = hull.center[2] + hull.half[2]
-        if self.grips.dragged is None:
-            torques = [target[3:], missing[3:], *([] if given is None else [given[3:]])]
-            most = float(max(np.linalg.norm(torque) for torque in torques))
-            self.torque = fitting_torque(most, self.torque)
-            self.cut = HALF_TURN * most / self.torque > LONGEST_TURN
+        torques = [target[3:], missing[3:], *([] if given is None else [given[3:]])]
+        most = float(max(np.linalg.norm(torque) for torque in torques))
+        self.torque = fitting_torque(most, self.torque)
+        self.cut = HALF_TURN * most / self.torque > LONGEST_TURN
         self._wrench.refresh(target, given, missing, top, scale, HALF_TURN / self.torque)
-        self.grips.refresh(display.grips, target, self._wrench.hub(top), scale)
 
     def _landings(self) -> tuple[Fin, ...]:
         """Where the fin in the user's hand would come to stand: its gizmo must not be moved meanwhile."""

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from finlab.allocation.allocation import Allocation
-from webapp.markup.corner import legend, overlay_row, set_rows
+from webapp.markup.corner import legend, set_rows
 from webapp.scene.robot_scene import RobotScene
 from webapp.scene.swim_scene import SwimScene
 from webapp.session.lessons import Lesson
@@ -11,7 +10,6 @@ from webapp.session.swim_plan import SwimSettings
 from webapp.session.tour import STEPS
 from webapp.tasks.analyst import Findings
 from webapp.tasks.answering import Answering
-from webapp.tasks.comparison import Comparison
 from webapp.tasks.context import Context
 from webapp.tasks.improving import Improver
 from webapp.tasks.swimming import Swimming
@@ -37,25 +35,19 @@ class Scenery:
         self.legend = ""
         """What is drawn of the robot that is designed, as markup."""
 
-    def refresh(
-        self, answering: Answering, comparison: Comparison, improver: Improver, findings: Findings | None
-    ) -> None:
+    def refresh(self, answering: Answering, improver: Improver, findings: Findings | None) -> None:
         """Show what has been found for the session's state."""
         self._follow_guide()
         self._apply_theme()
         found = improver.findings
         offered = found.layout if found is not None and found.improved else None
-        other, display = self._overlaid(comparison), self._session.display
-        self.robot.refresh(answering.shown, other, findings, offered)
+        display = self._session.display
+        self.robot.refresh(answering.shown, findings, offered)
         self.robot.flap()
         self.swims = bool(self._swimming.swimmers)
         self.robot.show(not self.swims)
-        self.legend = legend(
-            self.robot.newtons,
-            self.robot.torque,
-            self.robot.cut,
-            (overlay_row(other, display.dark), set_rows(findings if display.drawn != "none" else None)),
-        )
+        drawn = set_rows(findings if display.drawn != "none" else None)
+        self.legend = legend(self.robot.newtons, self.robot.torque, self.robot.cut, drawn)
         self.refresh_swim()
 
     def hide(self) -> None:
@@ -104,9 +96,3 @@ class Scenery:
             self._client.gui.configure_theme(
                 dark_mode=self._dark, show_logo=False, show_share_button=False, brand_color=BRAND
             )
-
-    def _overlaid(self, comparison: Comparison) -> Allocation | None:
-        """The compared answer whose forces are shown, unless the question has changed since."""
-        answer = comparison.answers.get(self._session.overlay or "")
-        fits = comparison.state == self._session.state
-        return answer if fits and isinstance(answer, Allocation) else None

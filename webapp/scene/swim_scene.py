@@ -46,7 +46,6 @@ class SwimScene:
         self._floor = add_floor(scene, "/swim/floor", 14.0, 0.25, 1.0, visible=False, **fade)
         self._robots: dict[int, SwimRobot] = {}
         self._shown: tuple[Swimmer, ...] = ()
-        self._followed: np.ndarray | None = None
 
     def refresh(self, dark: bool) -> None:
         """Show the moment that is looked at."""
@@ -85,7 +84,7 @@ class SwimScene:
         path = self._shown[0].path
         self._goal.show(goal, path)
         put(self._floor, position=np.array([0.0, 0.0, path[:, 2].min() - DEPTH_BELOW]))
-        self.look(follow=False)
+        self._look()
 
     def _robot(self, k: int, layout: Layout, moment: Moment) -> SwimRobot:
         """A robot at its start; it is made when it is first needed."""
@@ -100,23 +99,13 @@ class SwimScene:
         place = np.array([path[:, 0].min() - BEYOND_M, path[:, 1].max() + BEYOND_M, path[:, 2].mean()])
         self._water.show(force_arrow, np.round(FLOW_S * flow, 2), place, 0.03)
 
-    def look(self, follow: bool) -> None:
-        """Let the camera go along with the first robot, or stand where the whole path can be seen."""
-        self._followed = None
-        if not self._shown:
-            return
-        if follow:
-            self._followed = self._robots[0].place
-            self._look_at(self._followed, 1.1)
-        else:
-            path = self._shown[0].path
-            low, high = path.min(axis=0), path.max(axis=0)
-            distance = max(0.75 * float(np.linalg.norm((high - low)[:2])), 1.2)
-            # The lower part of the view is behind the plots, so the path belongs into the upper one.
-            self._look_at((low + high) / 2 + distance * np.array([-0.1, -0.22, 0.0]), distance)
-
-    def _look_at(self, middle: np.ndarray, distance: float) -> None:
-        """Move the camera to where it sees a point (3,) from a distance [m]."""
+    def _look(self) -> None:
+        """Let the camera stand where the whole path can be seen."""
+        path = self._shown[0].path
+        low, high = path.min(axis=0), path.max(axis=0)
+        distance = max(0.75 * float(np.linalg.norm((high - low)[:2])), 1.2)
+        # The lower part of the view is behind the plots, so the path belongs into the upper one.
+        middle = (low + high) / 2 + distance * np.array([-0.1, -0.22, 0.0])
         place = middle + distance * np.array([-0.35, -0.75, 0.75])
         aim_camera(self._client, place, middle - np.array([0.0, 0.0, 0.1]))
 
@@ -128,9 +117,3 @@ class SwimScene:
         rate = swimming.pace.rate or swimming.pace.speed
         for robot in self._robots.values():
             robot.animate(elapsed * rate)
-        if self._followed is not None:
-            step = self._robots[0].place - self._followed
-            if np.linalg.norm(step) > 0.004:
-                self._followed = self._followed + step
-                # What the camera looks at moves with it, so the user may still turn the view.
-                self._client.camera.position = self._client.camera.position + step

@@ -20,10 +20,11 @@ from webapp.scene.meshes.mesh import (
     tube,
 )
 from webapp.scene.shape import Shape
-from webapp.session.display import NEWTONS
 from webapp.tasks.analyst import Findings
 from webapp.theme import ASKED, DEAD, DELIVERED, HALF_TURN, LIGHT, MISSING
 
+NEWTONS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
+"""Forces [N] that an arrow of 0.1 m may stand for."""
 LENGTH = 0.1
 """Length that the legend speaks of [m]."""
 LONGEST, SHORTEST = 0.42, 0.14

@@ -130,8 +130,6 @@ class Core:
         """What 1 means in the next mesh file of a hull: key of `UNITS`."""
         self.mode = 0
         """Which of the answer's modes is shown; 0 is the best one."""
-        self.overlay: str | None = None
-        """Method whose forces are shown beside those on the robot."""
         self.revision = 0
         """Grows with every change of the state; an answer carries the revision it was made for."""
 

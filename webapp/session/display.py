@@ -11,8 +11,6 @@ POSITION_STEPS = {"off": 0.0, "5 mm": 0.005, "1 cm": 0.01, "5 cm": 0.05}
 """Grids [m] that a fin's position can snap to."""
 ANGLE_STEPS = {"off": 0.0, "5°": 5.0, "15°": 15.0, "45°": 45.0}
 """Grids [deg] that a mounting angle can snap to."""
-NEWTONS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
-"""Forces [N] that an arrow of 0.1 m may stand for."""
 DRAWN: dict[str, Kind | None] = {"none": None, "forces": "force", "torques": "torque"}
 """What set can be drawn, by the word on its button."""
 
@@ -33,8 +31,6 @@ class Display:
     """Cast shadows; slow without a graphics card."""
     dark: bool = False
     """Dark theme."""
-    newtons: float = 0.0
-    """Force that an arrow of 0.1 m stands for [N]; 0 lets the app choose."""
     position_snap: str = "off"
     """Key of `POSITION_STEPS`."""
     angle_snap: str = "off"
@@ -43,8 +39,6 @@ class Display:
     """Show where moved fins stood when the layout was opened or saved."""
     proposed: bool = True
     """Show where a search for a better layout puts the fins."""
-    grips: bool = False
-    """Show handles on the arrows of the asked wrench."""
     drawn: str = "none"
     """Key of `DRAWN`: the attainable set that is shown."""
     alone: bool = True
@@ -64,8 +58,6 @@ class Display:
         choices: dict[str, Any] = {"position_snap": POSITION_STEPS, "angle_snap": ANGLE_STEPS, "drawn": DRAWN}
         if key in choices:
             chosen(value, key, choices[key])
-        if key == "newtons" and value not in (0.0, *NEWTONS):
-            raise FinlabError(f"arrow scale: expected one of {NEWTONS} N per 0.1 m, got {value!r:.40}")
         if key == "speed":
             value = number(value, "speed of the animation", 0.02, 1.0)
         if isinstance(now, bool) and not isinstance(value, bool):

@@ -41,7 +41,7 @@ class Desk:
 
 
 class Looking(Core):
-    """Tasks, modes, samples, overlays, switches, and the layout to compare with."""
+    """Tasks, modes, samples, switches, and the layout to compare with."""
 
     desk = Desk()
     """Which task is open, and what lies in the drawers."""
@@ -74,10 +74,6 @@ class Looking(Core):
     def show_mode(self, index: int) -> None:
         """Show one of the answer's modes on the robot."""
         self.mode = max(0, int(index))
-
-    def set_overlay(self, method: str | None) -> None:
-        """Show the forces of a compared method, or of none."""
-        self.overlay = method
 
     def set_display(self, key: str, value: Any) -> None:
         """One field of `Display`."""

@@ -1,6 +1,5 @@
 """Intents about the question: what wrench is asked for, of which fins, answered how."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -20,16 +19,6 @@ class Questions(Core):
     def set_target(self, axis: int, value: Any) -> None:
         """One component of the target wrench [N or N m]."""
         self._commit(f"Set {AXES[axis]}", self.state.with_target(axis, value), f"target{axis}")
-
-    def drag_target(self, first: int, vector: Sequence[float], over: bool) -> None:
-        """Force (`first` 0) or torque (3) of the target in the user's hand; one step of undo for the drag."""
-        state = self.state
-        for axis, value in enumerate(vector, start=first):  # as finely as a hand can mean them
-            state = state.with_target(axis, round(float(value), 2 if axis < 3 else 3))
-        word = "force" if first == 0 else "torque"
-        self._commit(f"Drag the {word}", state, f"drag {word}", timed=False)
-        if over:
-            self.history.end_merge()
 
     def sweep_target(self, axis: int, value: float) -> None:
         """One component of the target [N or N m] on its way through a range; one step of undo in all."""

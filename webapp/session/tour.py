@@ -131,4 +131,4 @@ class Guiding(Returning):
         self._commit(f"Tour: {step.title}", step.state(self.state))
         self.stop, self.mode, self.selected = stop, step.mode, None
         self.show_drawer(step.drawer)
-        self.display = replace(self.display, drawn="none", grips=False)
+        self.display = replace(self.display, drawn="none")

@@ -16,8 +16,6 @@ MAX_BYTES = 20_000_000
 """Largest mesh file that is read."""
 MAX_FACES = 60_000
 """Most triangles of a hull; more would make the page slow and show nothing new, so they are simplified."""
-LEAST_FACES = 50
-"""Least number of triangles that a hull may be simplified to."""
 SMALLEST, LARGEST = 0.02, 10.0
 """Lengths [m] that a hull may have; anything else is a mistaken unit."""
 OPEN = 0.02

@@ -1,0 +1,128 @@
+"""Plots as SVG: axes with round ticks, curves, and what their colours mean."""
+
+import math
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import numpy as np
+
+from finlab.arrays import Array
+from webapp.markup.html import html
+from webapp.theme import Rgb, css
+
+WIDTH = 388
+"""Width of a plot [px]."""
+RIGHT, TOP, BOTTOM = 8, 24, 34
+"""Margins of a plot [px]."""
+MOST_TICKS = 6
+"""Steps between ticks at most."""
+EXACT = 1e-6
+"""Error [σ] below which all answers are drawn as equally exact."""
+Point = tuple[float, float]
+"""Across and down [px]."""
+
+
+class Axis(NamedTuple):
+    """One axis of a plot."""
+
+    word: str
+    """What it measures."""
+    low: float
+    """Its value at the lower end."""
+    high: float
+    """At the upper end."""
+    ticks: tuple[tuple[float, str], ...]
+    """Values with a line, and their labels."""
+
+    def share(self, value: float) -> float:
+        """How far along it a value lies, 0 to 1."""
+        return (value - self.low) / (self.high - self.low)
+
+
+def cost_axis(word: str, values: Array) -> Axis:
+    """An axis that shows all of some values, with round ticks."""
+    low, high = float(values.min()), float(values.max())
+    margin = max(0.08 * (high - low), 0.02 * high, 1e-6)
+    low, high = low - margin, high + margin
+    decade = 10.0 ** math.floor(math.log10((high - low) / MOST_TICKS))
+    step = next(s * decade for s in (1.0, 2.0, 5.0, 10.0) if (high - low) / (s * decade) <= MOST_TICKS)
+    places = range(math.ceil(low / step), math.floor(high / step) + 1)
+    return Axis(word, low, high, tuple((k * step, f"{k * step:.3g}") for k in places))
+
+
+def error_axis(logs: Array) -> Axis:
+    """The same for logarithms of errors, in powers of ten."""
+    low = math.floor(logs.min())
+    high = max(math.ceil(logs.max()), low + 1)
+    ticks = []
+    for power in range(low, high + 1, max(1, round((high - low) / 5))):
+        below = "≤" if 10.0**power <= EXACT else ""
+        raised = str(power).replace("-", "−")
+        ticks.append((float(power), html("{}10<tspan dy='-4' font-size='8'>{}</tspan>", below, raised)))
+    margin = 0.06 * (high - low)
+    return Axis("error [σ]", low - margin, high + margin, tuple(ticks))
+
+
+class Plot(NamedTuple):
+    """A plot between two axes."""
+
+    across: Axis
+    up: Axis
+    height: int
+    """[px]."""
+    left: int = 44
+    """Where the axis that goes up stands [px]."""
+
+    @property
+    def floor(self) -> float:
+        """Where the axis across stands [px]."""
+        return self.height - BOTTOM
+
+    def place(self, x: float, y: float) -> Point:
+        """Where a pair of values stands."""
+        right = self.left + self.across.share(x) * (WIDTH - self.left - RIGHT)
+        return right, self.floor - self.up.share(y) * (self.floor - TOP)
+
+    def points(self, x: Array, y: Array) -> str:
+        """Some places, as lines take them."""
+        places = (self.place(float(a), float(b)) for a, b in zip(x, y, strict=True))
+        return " ".join(f"{right:.1f},{down:.1f}" for right, down in places)
+
+    def curve(self, x: Array, y: Array, color: Rgb) -> str:
+        """A line through some places."""
+        line = "<polyline points='{}' fill='none' stroke='{}' stroke-width='2'/>"
+        return html(line, self.points(x, y), css(color))
+
+    def key(self, right: int, color: Rgb, words: str) -> str:
+        """What a colour means, above the plot, so far [px] from the axis that goes up."""
+        sign = "<rect x='{}' y='7' width='14' height='5' rx='2' fill='{}'/><text x='{}' y='14'>{}</text>"
+        return html(sign, self.left + right, css(color), self.left + right + 19, words)
+
+    def grid(self, upright: bool) -> str:
+        """Lines and labels; upright lines or none."""
+        parts, floor, left = [], self.floor, self.left
+        for value, label in self.up.ticks:
+            at = self.place(0.0, value)[1]
+            parts.append(html("<path d='M{} {:.1f}H{}' class='grid'/>", left, at, WIDTH - RIGHT))
+            parts.append(html("<text x='{}' y='{:.1f}' text-anchor='end'>{}</text>", left - 5, at + 4, label))
+        middle = "<text x='{:.1f}' y='{}' text-anchor='middle'>{}</text>"
+        for value, label in self.across.ticks:
+            at = self.place(value, 0.0)[0]
+            if upright:
+                parts.append(html("<path d='M{:.1f} {}V{}' class='grid'/>", at, TOP, floor))
+            parts.append(html(middle, at, floor + 14, label))
+        parts.append(html(middle, (left + WIDTH) / 2, self.height - 5, self.across.word))
+        turned = f"translate(10 {(TOP + floor) / 2}) rotate(-90)"
+        parts.append(html("<text transform='{}' text-anchor='middle'>{}</text>", turned, self.up.word))
+        return html("{}", parts)
+
+    def drawn(self, parts: Iterable[str], upright: bool = False) -> str:
+        """The whole plot, `parts` over its grid."""
+        whole = "<svg class='plot' viewBox='0 0 {} {}'>{}{}</svg>"
+        return html(whole, WIDTH, self.height, self.grid(upright), parts)
+
+
+def positive(word: str, values: Array) -> Axis:
+    """An axis from 0, or the least of some values, that shows all of them."""
+    least = min(0.0, float(values.min()))
+    return cost_axis(word, np.append(values, least))._replace(low=least)
