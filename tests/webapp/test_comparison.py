@@ -33,13 +33,13 @@ UCAT = load_layout(shipped_layouts()["ucat"])
 def test_all_methods_answer_one_after_the_other() -> None:
     worker, done = Worker(), threading.Event()
     comparison = Comparison(page_of(worker, changed=lambda: comparison.running or done.set()))
-    assert "side by side" in comparison_table(comparison, None, False)
+    assert "side by side" in comparison_table(comparison, False)
     comparison.start(State(UCAT, target=PRESETS["Turn"]))
     assert done.wait(60)
     worker.stop()
     assert tuple(comparison.answers) == COMPARED
     assert all(isinstance(answer, Allocation) for answer in comparison.answers.values())
-    table = comparison_table(comparison, "qp", True)
+    table = comparison_table(comparison, True)
     assert table.count("<tr") == 1 + len(COMPARED) and table.count("chosen") == 1 and "compare again" in table
 
 
@@ -61,7 +61,7 @@ def test_the_table_tells_what_is_kept_least() -> None:
     answers = {method: load_stand_in(method).allocate(UCAT, PRESETS["Turn"]) for method in ("mdn", "qp")}
     answers["search"] = load_allocator().allocate(UCAT, PRESETS["Turn"])
     comparison: Any = SimpleNamespace(state=State(UCAT), answers=answers)
-    table = comparison_table(comparison, None, False)
+    table = comparison_table(comparison, False)
     assert three_digits(answers["search"].power) in table and three_digits(answers["qp"].energy) in table
     assert "Kept least: power; mdn keeps effort least" in table, "this stand-in cannot be asked"
 

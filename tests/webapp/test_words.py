@@ -98,7 +98,7 @@ def test_fins_that_were_not_learned_are_told_in_words_of_their_own() -> None:
         shown = corner(State(strange), "", answer, False, None)
         assert css(UNLEARNED) in shown and css(DELIVERED) not in shown and "reach" not in shown
         comparison: Any = SimpleNamespace(state=State(strange), answers={"mdn": answer})
-        assert "Not learned: fin 3" in comparison_table(comparison, None, False)
+        assert "Not learned: fin 3" in comparison_table(comparison, False)
     without = allocator.allocate(strange, PRESETS["Turn"], failed=[other.name])
     assert verdict_of(without, True) is Verdict.EXACT
 
