@@ -88,10 +88,8 @@ class Page(ABC):
         self.comparison = Comparison(context)
         self.swimming = Swimming(context, self._swam)
         self.swim_files = SwimFiles(context, self.swimming, self._swam)
-        """What can be downloaded of that."""
         self.sweep = Sweep(context)
         self.exports = Exports(context)
-        """Files to download."""
         self.scenery = Scenery(context, self.swimming)
         self.bound: list[Callable[[], None]] = []
         """Each writes what the session holds into a widget; the panel that is being built takes them."""

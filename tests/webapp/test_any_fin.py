@@ -18,7 +18,7 @@ from finlab.files.plain_values import yaml_text
 from finlab.layout import FinModelSpec, Layout, layout_to_dict, load_layout
 from finlab.physics import make_law, plant_of
 from finlab.physics.table_file import write_table
-from webapp.markup.snippets import command_line, export_line
+from webapp.markup.snippets import command_line
 from webapp.markup.verdict import verdict_sentence
 from webapp.session import Session, files
 from webapp.session.session_files import restore, to_dict
@@ -96,7 +96,6 @@ def test_a_table_fin_goes_through_the_whole_app(
         files.read_layout("tabled.graph.json", graph)
     assert len(make_bundle(tabled, allocator).zip_bytes()) > len(graph), "the table travels along"
     assert command_line(session.state).startswith("finlab allocate tabled.yaml --wrench")
-    assert export_line(session.state) == "finlab export tabled.yaml -o tabled --zip"
 
 
 def test_a_table_that_did_not_come_along_is_told_when_the_layout_is_opened(tabled: Layout) -> None:

@@ -43,23 +43,21 @@ def wrench_bars(asked: ArrayLike, given: ArrayLike | None, sentence: str) -> str
         scale = scales[k // 3]
         rows.append(html("<span>{} <span class='dim'>{}</span></span>", AXIS_WORDS[k], AXES[k]))
         rows.append(_track(asked[k] / scale, None if given is None else given[k] / scale))
-        rows.append(html("<span class='right asked'>{}</span>", _value(asked[k], k)))
-        rows.append(
-            html("<span class='right given'>{}</span>", "–" if given is None else _value(given[k], k))
-        )
         rest = None if given is None else _value(asked[k] - given[k], k)
         kind = "missing" if rest is not None and float(rest.replace("−", "-")) else "dim"
-        rows.append(html("<span class='right {}'>{}</span>", kind, "–" if rest is None else rest))
+        delivered = "–" if given is None else _value(given[k], k)
+        cells = (("asked", _value(asked[k], k)), ("given", delivered), (kind, rest or "–"))
+        rows += [html("<span class='right {}'>{}</span>", *cell) for cell in cells]
     return html("<div class='fl'><div class='bars'>{}</div><div class='said'>{}</div></div>", rows, sentence)
 
 
 def _header(scales: list[float]) -> str:
     scale = f"±{scales[0]:g} N, ±{scales[1]:g} N m"
-    return html(
-        "<span class='dim scale'>{}</span><b class='right asked'>asked</b><b class='right "
-        "given'>delivered</b><b class='right missing'>missing</b>",
-        scale,
+    words = "".join(
+        f"<b class='right {kind}'>{word}</b>"
+        for kind, word in (("asked", "asked"), ("given", "delivered"), ("missing", "missing"))
     )
+    return html("<span class='dim scale'>{}</span>{}", scale, Markup(words))
 
 
 def _value(value: float, axis: int) -> str:
@@ -82,14 +80,8 @@ def _track(asked: float, given: float | None) -> str:
 
 def _bar(start: float, end: float, top: int, height: int, color: str) -> str:
     low, high = sorted((float(np.clip(start, -1, 1)), float(np.clip(end, -1, 1))))
-    return html(
-        "<i style='left:{:.2f}%;width:{:.2f}%;top:{}px;height:{}px;background:{}'></i>",
-        50 + 50 * low,
-        50 * (high - low),
-        top,
-        height,
-        color,
-    )
+    place = f"left:{50 + 50 * low:.2f}%;width:{50 * (high - low):.2f}%;top:{top}px;height:{height}px"
+    return html("<i style='{};background:{}'></i>", place, color)
 
 
 def swatch(index: int, failed: bool = False) -> str:
@@ -134,13 +126,7 @@ def _cells(command: Array, limits: NDArray[np.bool_], force: float, full: float,
     share = min(force / max(full, 1e-9), 1.0)
     bar = f"width:{100 * share:.0f}%;background:{css(fin_color(index))}"
     meter = html("<span class='meter'><i style='{}'></i></span>", bar)
-    return html(
-        "<td class='{}'>{:.1f}</td><td class='{}'>{:.2f}</td><td>{}</td><td>{:.2f}</td><td>{}</td>",
-        "full" if limits[0] else "",
-        math.degrees(amplitude),
-        "full" if limits[1] else "",
-        frequency,
-        degrees,
-        force,
-        meter,
-    )
+    at_limit = ["full" if one else "" for one in limits]
+    bounded = "<td class='{}'>{:.1f}</td><td class='{}'>{:.2f}</td>"
+    first = html(bounded, at_limit[0], math.degrees(amplitude), at_limit[1], frequency)
+    return html("{}<td>{}</td><td>{:.2f}</td><td>{}</td>", first, degrees, force, meter)

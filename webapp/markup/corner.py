@@ -35,16 +35,9 @@ def legend(newtons: float, torque: float, cut: bool, also: str) -> str:
     """
     # By name, so that the dark theme can lighten them.
     rows = [_key(_arrow(f"var(--fl-{word})", alpha), word) for word, alpha in ARROWS]
-    ring = html(
-        "<i>ring </i>{:.0f}° = {:g} N m{}", math.degrees(HALF_TURN), torque, ", cut off" if cut else ""
-    )
-    return html(
-        "<div class='fl-legend'>{}{}</div><div class='dim scales'><span>{}</span><span>{}</span></div>",
-        rows,
-        also,
-        _length(newtons),
-        ring,
-    )
+    ring = f"{math.degrees(HALF_TURN):.0f}° = {torque:g} N m{', cut off' if cut else ''}"
+    scales = "<div class='dim scales'><span>{}</span><span><i>ring </i>{}</span></div>"
+    return html("<div class='fl-legend'>{}{}</div>{}", rows, also, html(scales, _length(newtons), ring))
 
 
 def _length(newtons: float) -> str:
@@ -75,19 +68,13 @@ def _key(sign: str, words: str) -> str:
 
 
 def _patch(color: str) -> str:
-    return html(
-        "<svg width='44' height='12'><rect x='8' width='28' height='12' rx='3' fill='{}'/></svg>", color
-    )
+    box = "<svg width='44' height='12'><rect x='8' width='28' height='12' rx='3' fill='{}'/></svg>"
+    return html(box, color)
 
 
 def _arrow(color: str, opacity: float) -> str:
-    return html(
-        "<svg width='44' height='10' opacity='{}'><rect x='0' y='3' width='33' height='4' "
-        "fill='{}'/><path d='M32 0 L44 5 L32 10 Z' fill='{}'/></svg>",
-        opacity,
-        color,
-        color,
-    )
+    way = "<svg width='44' height='10' opacity='{}' fill='{}'><path d='M0 3H32V0L44 5L32 10V7H0Z'/></svg>"
+    return html(way, opacity, color)
 
 
 def corner(
@@ -137,12 +124,12 @@ def _figures(allocation: Allocation, least: bool, in_reach: bool) -> list[str]:
         costs.append(html("<span><span class='dim'>{}</span> {}</span>", kept, cost))
     method, ms = allocation.method, allocation.solve_ms
     time = f"{ms:.2g}" if ms < 10.0 else f"{ms:.0f}"  # no measurement repeats to a third digit
+    error = "<span class='dim'>error</span> <b class='err'>{}</b> σ"
     return [
         html(
-            "<span title='missing, by the fins’ own laws: {}'><span class='dim'>error</span> <b "
-            "class='err'>{}</b> σ</span>",
+            "<span title='missing, by the fins’ own laws: {}'>{}</span>",
             rest,
-            error_digits(allocation.err_norm),
+            html(error, error_digits(allocation.err_norm)),
         ),
         *costs,
         html("<span class='aside'><span class='dim'>{}</span> {} ms</span>", method, time),
@@ -153,22 +140,12 @@ def _figures(allocation: Allocation, least: bool, in_reach: bool) -> list[str]:
 def swim_corner(swimming: Swimming, newtons: float) -> str:
     """The same while robots swim."""
     first, shown = swimming.swimmers[0], swimming.seen[0]
-    trails = Markup().join(
-        _key(
-            html(
-                "<svg width='44' height='10'><path d='M0 5H44' stroke='{}' stroke-width='3.5'/></svg>",
-                css(color),
-            ),
-            word,
-        )
-        for word, color in (
-            ("the path", ASKED),
-            *((f"{name}, {robot.about}", color) for robot, _, color, name in robots(swimming)),
-        )
-    )
+    line = "<svg width='44' height='10'><path d='M0 5H44' stroke='{}' stroke-width='3.5'/></svg>"
+    named = [(f"{name}, {robot.about}", color) for robot, _, color, name in robots(swimming)]
+    trails = [_key(html(line, css(color)), word) for word, color in (("the path", ASKED), *named)]
     speed = 100.0 * float(np.linalg.norm(shown.flow))
     if speed >= 0.05:
-        trails += _key(_arrow(css(WATER), 0.9), f"water, {speed:.1f} cm/s")
+        trails.append(_key(_arrow(css(WATER), 0.9), f"water, {speed:.1f} cm/s"))
     alive = len(first.fins) - len(shown.lost)
     off = f"{100 * float(shown.record[-1, ERROR]):.1f}" if len(shown.record) else "–"
     power = "–" if shown.figures is None else f"{shown.figures.now_w:.1f}"
@@ -184,9 +161,6 @@ def swim_corner(swimming: Swimming, newtons: float) -> str:
 
 
 def _cards(legend: str, status: list[str]) -> str:
-    return html(
-        "<div class='fl-corner'><div class='fl fl-card fl-legend-card'>{}</div><div "
-        "class='fl fl-card fl-status'>{}</div></div>",
-        legend,
-        status,
-    )
+    card = "<div class='fl fl-card {}'>{}</div>"
+    both = html(card, "fl-legend-card", legend), html(card, "fl-status", status)
+    return html("<div class='fl-corner'>{}{}</div>", *both)

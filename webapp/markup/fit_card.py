@@ -7,7 +7,7 @@ from markupsafe import Markup
 
 from finlab.fit.fin_fit import BAND, FinFit
 from finlab.fit.thrust_curves import ThrustCurve
-from webapp.markup.html import html
+from webapp.markup.html import html, row
 from webapp.markup.plot import Plot, positive
 from webapp.markup.words import three_digits
 from webapp.tasks.fitting import Fitted
@@ -57,9 +57,7 @@ def _figures(fit: FinFit) -> str:
         ("unseen samples within the 95 % band", f"{100.0 * fit.coverage():.0f} %"),
         (f"largest force of {len(fit.measurements)} samples", f"{three_digits(fit.largest)} N"),
     )
-    return html(
-        "<table>{}</table>", Markup().join((html("<tr><td>{}</td><td>{}</td></tr>", a, b) for a, b in rows))
-    )
+    return html("<table>{}</table>", (row(*figure) for figure in rows))
 
 
 def _left_out(fit: FinFit) -> str:
@@ -73,17 +71,12 @@ def _left_out(fit: FinFit) -> str:
 def _advice(found: Fitted) -> str:
     assert found.fit is not None and found.advice is not None
     force = np.linalg.norm(found.fit.predict(found.advice)[0], axis=-1)
-    rows = Markup().join(
-        html(
-            "<tr><td>{}</td><td>{:.2f}</td><td>{:.2f}</td><td>{:.0f}</td><td>{}</td></tr>",
-            k,
-            a,
-            f,
-            math.degrees(phi),
-            three_digits(float(size)),
-        ).replace("-", "−")
+    rows = [
+        row(
+            k, f"{a:.2f}", f"{f:.2f}", f"{math.degrees(phi):.0f}".replace("-", "−"), three_digits(float(size))
+        )
         for k, ((a, f, phi), size) in enumerate(zip(found.advice, force, strict=True), start=1)
-    )
+    ]
     head = Markup(
         "<tr><th></th><th>A [rad]</th><th>f [Hz]</th><th>direction [°]</th><th>expected [N]</th></tr>"
     )

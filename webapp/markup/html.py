@@ -13,3 +13,8 @@ def html(template: str, *values: object) -> str:
 
 def _one(value: object) -> object:
     return Markup().join(value) if isinstance(value, Iterable) and not isinstance(value, str) else value
+
+
+def row(*cells: object) -> str:
+    """A row of a table."""
+    return html("<tr>{}</tr>", (html("<td>{}</td>", cell) for cell in cells))

@@ -10,7 +10,7 @@ from finlab.analysis import AXES, Authority, ScoreCard
 from finlab.analysis.score_card import QuickCheck
 from finlab.layout import Layout
 from webapp.markup.answer import swatch
-from webapp.markup.html import html
+from webapp.markup.html import html, row
 from webapp.markup.words import listed, three_digits
 from webapp.scene.meshes.fin import SPAN
 from webapp.scene.meshes.hull import hull_of
@@ -33,7 +33,6 @@ def score_table(layout: Layout, card: ScoreCard, before: ScoreCard | None, name:
         before: what the layout beside it can do, None where it is the same.
         name: what that one is called.
     """
-    name = name
     parts = [_summary(card, before, name), _axes(card, before, name), _losses(layout, card)]
     parts += [html("<div class='said dim'>{}</div>", note) for note in card.notes]
     return html("<div class='fl score'>{}</div>", parts)
@@ -57,13 +56,9 @@ def rank_sentence(a: Authority | QuickCheck) -> str:
 def _summary(card: ScoreCard, before: ScoreCard | None, name: str) -> str:
     head = ""
     if before is not None:
-        ranks = html("<td>{} of 6</td><td>{} of 6</td><td></td>", before.authority.rank, card.authority.rank)
-        head = html(
-            "<tr><th></th><th>{}</th><th>now</th><th></th></tr><tr><td>axes independent</td>{}</tr>",
-            name,
-            ranks,
-        )
-    rows = Markup().join(
+        ranks = row("axes independent", *(f"{one.authority.rank} of 6" for one in (before, card)), "")
+        head = html("<tr><th></th><th>{}</th><th>now</th><th></th></tr>{}", name, ranks)
+    rows = (
         _alone(words, of(card)) if before is None else _beside(words, of(card), of(before))
         for words, of in FIGURES.items()
     )
@@ -71,7 +66,7 @@ def _summary(card: ScoreCard, before: ScoreCard | None, name: str) -> str:
 
 
 def _alone(words: str, now: float | None) -> str:
-    return "" if now is None else html("<tr><td>{}</td><td>{}</td></tr>", words, three_digits(now))
+    return "" if now is None else row(words, three_digits(now))
 
 
 def _beside(words: str, now: float | None, old: float | None) -> str:
@@ -84,43 +79,30 @@ def _beside(words: str, now: float | None, old: float | None) -> str:
         same = abs(change) < 1e-3 * max(abs(now), abs(old), 1e-9)
         kind = "" if same else "given" if change > 0 else "missing"
         sign = "=" if same else "▲" if change > 0 else "▼"
-    cells = Markup().join(
-        html("<td>{}</td>", "–" if value is None else three_digits(value)) for value in (old, now)
-    )
-    return html("<tr><td>{}</td>{}<td class='{}'>{}</td></tr>", words, cells, kind, sign)
+    figures = ("–" if value is None else three_digits(value) for value in (old, now))
+    return row(words, *figures, html("<span class='{}'>{}</span>", kind, sign))
 
 
 def _axes(card: ScoreCard, before: ScoreCard | None, name: str) -> str:
+    known = [one.authority for one in (before, card) if one is not None]
     rows = []
     for k, word in enumerate(AXES):
-        now = card.authority
-        largest = _both(now.largest[k], now.most_negative[k])
-        old = ""
-        if before is not None:
-            a = before.authority
-            old = html("<td>{}</td>", _both(a.largest[k], a.most_negative[k]))
-        shares = [loss.share_left[k] for loss in card.losses]
-        left = [share for share in shares if share is not None]
-        least = f"{100 * min(left):.0f} %" if left else "–"
+        left = [loss.share_left[k] for loss in card.losses]
+        least = min((share for share in left if share is not None), default=None)
         power = card.unit_power[k]
         rows.append(
-            html(
-                "<tr><td>{} <span class='dim'>{}</span></td>{}<td>{}</td><td>{}</td><td>{}</td></tr>",
-                word,
-                AXIS_UNITS[k],
-                old,
-                largest,
-                least,
+            row(
+                html("{} <span class='dim'>{}</span>", word, AXIS_UNITS[k]),
+                *(_both(one.largest[k], one.most_negative[k]) for one in known),
+                "–" if least is None else f"{100 * least:.0f} %",
                 "–" if power is None else three_digits(power),
             )
         )
-    old = html("<th>{}</th>", name) if before is not None else ""
-    column = "" if before is None else "now"
+    columns = ("",) if before is None else (name, "now")
     head = html(
-        "<tr><th>largest on its own</th>{}<th>{}</th><th title='after the worst loss of a "
-        "fin'>one lost</th><th title='least power for 1 N, or 0.1 N m'>power [W]</th></tr>",
-        old,
-        column,
+        "<tr><th>largest on its own</th>{}<th title='after the worst loss of a fin'>one lost</th>"
+        "<th title='least power for 1 N, or 0.1 N m'>power [W]</th></tr>",
+        (html("<th>{}</th>", word) for word in columns),
     )
     return html("<table>{}{}</table>", head, rows)
 
@@ -139,12 +121,9 @@ def _losses(layout: Layout, card: ScoreCard) -> str:
     rows = []
     for loss in card.losses:
         cost = html("<span class='missing'>loses {}</span>", listed(loss.lost)) if loss.lost else ""
-        name = html("{}{}", swatch(layout.index(loss.fin)), loss.fin)
-        weakest = html("<td>{} N</td>", three_digits(loss.weakest))
-        rows.append(html("<tr><td>without {}</td>{}<td class='words'>{}</td></tr>", name, weakest, cost))
-    return html(
-        "<table><tr><th>one fin lost</th><th>weakest</th><th></th></tr>{}</table>", Markup().join(rows)
-    )
+        name = html("without {}{}", swatch(layout.index(loss.fin)), loss.fin)
+        rows.append(row(name, f"{three_digits(loss.weakest)} N", html("<div class='words'>{}</div>", cost)))
+    return html("<table><tr><th>one fin lost</th><th>weakest</th><th></th></tr>{}</table>", rows)
 
 
 def check_card(quick: QuickCheck, several: bool, warnings: tuple[str, ...]) -> str:

@@ -3,7 +3,6 @@
 import math
 import shlex
 
-from finlab.allocation.bundle_settings import METHODS_ON_BOARD
 from webapp.session.files import file_stem, shipped_name
 from webapp.session.state import State, knows_objective
 
@@ -21,13 +20,6 @@ def command_line(state: State) -> str:
     if state.policy != "closest":
         words += ["--policy", state.policy]
     return shlex.join(words)
-
-
-def export_line(state: State) -> str:
-    """What makes the bundle for this robot."""
-    words = ["finlab", "export", _layout_name(state), "-o", file_stem(state.layout.name), "--zip"]
-    words += _method(state) if state.method in METHODS_ON_BOARD else []
-    return shlex.join([*words, *_failures(state)])
 
 
 def python_lines(state: State) -> str:

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 from markupsafe import Markup
 
-from webapp.markup.html import html
+from webapp.markup.html import html, row
 from webapp.markup.words import fins_words, three_digits, unlearned_sentence
 from webapp.session.swim_plan import SwimSettings
 from webapp.tasks.moment import Figures, Moment
@@ -72,9 +72,9 @@ def swim_card(swimming: Swimming, settings: SwimSettings) -> str:
     rows, packs = [], []
     for robot, moment, color, name in robots(swimming):
         dot = html("<span class='swatch' style='background:{};min-width:10px'>&nbsp;</span>", css(color))
-        title = html("<td title='{}'>{}{}</td>", robot.about, dot, name)
-        rows.append(html("<tr>{}{}</tr>", title, _cells(_errors(moment.figures))))
-        packs.append(html("<tr>{}{}</tr>", title, _cells(_pack(moment.figures, settings))))
+        title = html("<span title='{}'>{}{}</span>", robot.about, dot, name)
+        rows.append(row(title, *_errors(moment.figures)))
+        packs.append(row(title, *_pack(moment.figures, settings)))
     header = Markup(
         "<tr><th>method</th>"
         "<th title='root mean square distance from where it should be'>off the path</th>"
@@ -120,10 +120,6 @@ def _pack(figures: Figures | None, settings: SwimSettings) -> tuple[str, ...]:
     far = 3.6 * figures.speed_m_s * hours
     range_km = f"{three_digits(far)} km" if figures.speed_m_s >= SLOWEST else "–"
     return f"{figures.energy_wh * 1000:.1f} mWh", f"{three_digits(hours)} h", range_km
-
-
-def _cells(texts: tuple[str, ...]) -> str:
-    return Markup().join(html("<td>{}</td>", text) for text in texts)
 
 
 def _warnings(swimming: Swimming, shown: Moment) -> str:

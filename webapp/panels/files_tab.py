@@ -1,23 +1,13 @@
 """Export: what the robot needs, what is seen and found, and the question as a command to copy."""
 
 import viser
-from markupsafe import Markup
 
 from webapp.handles import add_html, put
 from webapp.markup.html import html
 from webapp.markup.picking import marker
-from webapp.markup.snippets import command_line, export_line, python_lines
+from webapp.markup.snippets import command_line, python_lines
 from webapp.page import Page
 from webapp.session import files
-
-PURPOSES = {
-    "Bundle": Markup("for the robot, with all that it needs: <code>finlab-runtime check FILE</code>"),
-    "Graph file": "for the robot, too, which compiles the fins as it starts, and for all verbs of finlab",
-    "Candidates": "all answers to this question, for a spreadsheet",
-    "Picture": "what is seen now, for a paper",
-    "3D view": "moves by itself in any browser, without a server",
-}
-"""What each file is for."""
 
 
 class FilesTab:
@@ -35,9 +25,11 @@ class FilesTab:
             "Picture (PNG)": page.exports.picture,
             "3D view (HTML)": lambda: page.exports.html(page.shown),
         }
-        page.add_buttons("Single files", parts, hint="The layout graph alone, and what is seen.")
-        lines = (html("<div class='said'><b>{}</b> {}</div>", name, text) for name, text in PURPOSES.items())
-        add_html(gui, html("<div class='fl dim'>{}</div>", lines))
+        page.add_buttons(
+            "Single files",
+            parts,
+            hint="The layout graph; all answers; what is seen, still or to be turned.",
+        )
         self._command = gui.add_html("")
 
     def _send_candidates(self) -> None:
@@ -49,7 +41,6 @@ class FilesTab:
         texts = {
             "The same question on the command line": command_line(state),
             "The same in Python": python_lines(state),
-            "The bundle for the robot": export_line(state),
         }
         put(self._command, content=html("<div class='fl'>{}</div>", map(_copied, texts, texts.values())))
 

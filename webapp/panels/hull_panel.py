@@ -1,4 +1,4 @@
-"""The hull: a shape with a size, or a mesh file that is looked at, turned and scaled."""
+"""The hull: a shape with a size, or a mesh file that is looked at, turned."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -17,16 +17,14 @@ from webapp.page import Page
 from webapp.scene.meshes.hull import hull_of
 from webapp.scene.meshes.mesh import Mesh
 from webapp.scene.meshes.mesh_file import (
-    LARGEST,
     MAX_BYTES,
     MAX_FACES,
-    SMALLEST,
     turned,
 )
 from webapp.scene.meshes.mesh_hull import UNITS, MeshHull
 from webapp.session.files import reshaped_hull, stored_hull
 from webapp.session.layout_edits import center_of_gravity, with_hull
-from webapp.session.state import chosen, number
+from webapp.session.state import chosen
 
 MESH = "mesh file"
 """Entry of the list of shapes while the hull comes from a file."""
@@ -72,11 +70,6 @@ class HullPanel:
         turns = {axis: partial(self._turn, axis) for axis in TURNS}
         hint = "A quarter turn about the body's axis, by the right-hand rule."
         self._turns = page.add_buttons("Turn by 90°", turns, hint=hint)
-        self._length = page.bind_number(
-            gui.add_number("Length [m]", 1.0, step=0.01, hint="Along x; width and height follow."),
-            self._scale,
-            lambda: 2.0 * hull_of(page.session.state.layout).half[0],
-        )
 
     def _import(self, name: str, content: bytes) -> None:
         read = partial(stored_hull, name, content, self._page.session.mesh_unit)
@@ -130,11 +123,6 @@ class HullPanel:
         rotation = Rotation.from_euler(axis, 90.0, degrees=True).as_matrix()
         self._reshape(f"Turn the hull about {axis}", lambda mesh: turned(mesh, rotation))
 
-    def _scale(self, length: float) -> None:
-        now = 2.0 * hull_of(self._page.session.state.layout).half[0]
-        share = number(length, "length of the hull [m]", SMALLEST, LARGEST) / now
-        self._reshape("Scale the hull", lambda mesh: mesh._replace(vertices=mesh.vertices * share))
-
     @property
     def _shape(self) -> str | None:
         """The hull's parametric shape; None where it comes from a file."""
@@ -153,8 +141,7 @@ class HullPanel:
     def refresh(self) -> None:
         is_mesh = self._shape is None
         put(self._size, disabled=is_mesh)
-        for widget in (self._turns, self._length):
-            put(widget, visible=is_mesh)
+        put(self._turns, visible=is_mesh)
         drawn = hull_of(self._page.session.state.layout)
         text = _report(drawn) if isinstance(drawn, MeshHull) else ""
         put(self._report, content=text, visible=bool(text))

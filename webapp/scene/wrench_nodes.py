@@ -13,7 +13,6 @@ from webapp.scene.meshes.mesh import (
     LONGEST_TURN,
     NOTHING,
     RING_RADIUS,
-    SMALLEST_TURN,
     Mesh,
     force_arrow,
     torque_ring,
@@ -36,9 +35,6 @@ SHORTEST_TURN = math.radians(60.0)
 """The longest ring is no shorter than this [rad], unless nothing is asked to speak of."""
 HEIGHT = 0.16
 """How far above the hull the arrows begin [m]; inside it they could not be seen."""
-NUMBER_AT = (0.0, -1.3 * RING_RADIUS, 0.0)
-"""Where the number of the torque ends, from the hub [m]: at the left, as one sees it first; there the view
-is free."""
 LARGEST = 0.42
 """How far the drawn set may reach from the centre of gravity [m]."""
 
@@ -73,14 +69,6 @@ class WrenchNodes:
 
         self._asked = node("asked_force", ASKED, 0.4), node("asked_torque", ASKED, 0.4)
         self._given = node("delivered_force", DELIVERED, None), node("delivered_torque", DELIVERED, None)
-        self._number = scene.add_label(
-            "/robot/wrench/torque",
-            "",
-            position=NUMBER_AT,
-            anchor="center-right",
-            font_screen_scale=0.8,
-            visible=False,
-        )
         self._missing = node("missing_force", MISSING, None), node("missing_torque", MISSING, None)
 
     @staticmethod
@@ -108,15 +96,8 @@ class WrenchNodes:
         given = np.zeros(6) if wrench is None else wrench
         self._given[0].show(force_arrow, given[:3] * scale, zero, 0.0065)
         self._given[1].show(torque_ring, given[3:] * turn, zero, 0.005)
-        self._tell(target[3:], turn)
         self._missing[0].show(force_arrow, missing[:3] * scale, given[:3] * scale, 0.006)
         self._missing[1].show(torque_ring, missing[3:] * turn, zero, 0.005, 1.35 * RING_RADIUS)
-
-    def _tell(self, torque: Array, turn: float) -> None:
-        """The torque's size as a number beside its ring."""
-        size = float(np.linalg.norm(torque))
-        drawn = size * turn >= SMALLEST_TURN
-        put(self._number, visible=drawn, text=f"{size:.3g} N m" if drawn else "")
 
 
 class AttainableNodes:
