@@ -62,24 +62,17 @@ HALF_TURN = math.pi
 
 @dataclass(frozen=True)
 class Look:
-    """What differs between the light and the dark theme."""
+    """What differs between the light and the dark theme: the water at the top and bottom of the view, fine
+    and strong lines of the floor, the hull, the window that marks the bow, shafts and struts, thin lines."""
 
     water_top: Rgb
-    """Colour of the water at the top of the view."""
     water_bottom: Rgb
-    """Colour of the water at the bottom of the view."""
     grid: Rgb
-    """Fine lines of the floor."""
     grid_section: Rgb
-    """Strong lines of the floor."""
     hull: Rgb
-    """The hull."""
     glass: Rgb
-    """The window that marks the bow."""
     metal: Rgb
-    """Shafts and struts."""
     line: Rgb
-    """Thin lines: the graph, dimension lines, stalks."""
 
 
 LIGHT = Look(

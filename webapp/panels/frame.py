@@ -37,24 +37,13 @@ _VARIABLES = (
 )
 
 
-def _sheet(name: str) -> Markup:
-    return Markup(files("webapp.markup").joinpath(name).read_text("utf-8"))
-
-
-NARROW = _sheet("narrow.css")
-_MEDIA = html("@media (max-width: 1099px) {{ {} }}", NARROW)
+SHEETS = ("style.css", "frame.css", "narrow.css", "compact.css")
 STYLE = html(
-    "<style>{}{}{}{}</style>",
+    "<style>{}{}</style>",
     _VARIABLES,
-    _sheet("style.css"),
-    _sheet("frame.css"),
-    _MEDIA,
+    (Markup(files("webapp.markup").joinpath(name).read_text("utf-8")) for name in SHEETS),
 )
 """A style element, to be put into the page once."""
-_SMALL = ("(max-width: 1340px)", "(max-height: 780px)")
-_SMALL_VIEW = ", ".join(f"(min-width: 720px) and {side}" for side in _SMALL)
-COMPACT = html("@media {} {{ :root {{ {} }} }}", _SMALL_VIEW, _sheet("compact.css"))
-"""Rules of a page with a small view."""
 LOW = ":root { --tall: calc(var(--z) * 92px); }"
 """Height of a drawer in which nothing but a sentence stands."""
 TALL = ":root { --fl-usual: 344px; }"
@@ -189,7 +178,7 @@ def _style(sections: list[Section], session: Session, plots: bool) -> str:
     variables = Markup().join(f"--has-{name}: {int(there)};" for name, there in counts.items())
     height = LOW if not plots else TALL if task == SIMULATE else ""
     hidden = Markup(f"{', '.join(gone)} {{ display: none !important; }}")
-    return html("<style>:root {{ {} }} {} {} {}</style>", variables, COMPACT, height, hidden)
+    return html("<style>:root {{ {} }} {} {}</style>", variables, height, hidden)
 
 
 def _strip(task: str, opened: str, folded: bool) -> str:

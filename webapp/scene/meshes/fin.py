@@ -4,10 +4,10 @@ A fin that points aft pushes forward, so the blade lies opposite to its thrust.
 """
 
 import numpy as np
-from numpy.typing import NDArray
+from trimesh.convex import convex_hull
 
 from finlab.arrays import Array
-from webapp.scene.meshes.mesh import Mesh, joined, triangles, tube
+from webapp.scene.meshes.mesh import Mesh, joined, revolved, triangles, tube
 
 CHORD = 0.18
 """Length of the blade from the shaft to its trailing edge [m]."""
@@ -18,36 +18,14 @@ ROOT = 0.012
 
 
 def blade() -> Mesh:
-    """The blade: thick and narrow at the shaft, thin and wide at the trailing edge, a little cambered."""
-    rows, columns = 22, 15
-    along = np.linspace(0.0, 1.0, rows)
-    across = np.linspace(-1.0, 1.0, columns)
-    # Rounded corners at both ends come from shrinking the first and last rows' width.
-    width = (0.62 + 0.38 * along**1.3) * np.clip(1 - np.clip((along - 0.86) / 0.14, 0, 1) ** 2.6 * 0.55, 0, 1)
-    width *= np.clip(0.72 + along / 0.12 * 0.28, None, 1.0)
-    middle = ROOT + SPAN / 2
-    x = middle + 0.5 * SPAN * width[:, None] * across[None]
-    # The trailing edge is a shallow fork, as of a fish's tail.
-    y = -CHORD * along[:, None] * (1 - 0.07 * along[:, None] ** 4 * (1 - across[None] ** 2)) + 0.012
-    rim = np.sqrt(np.clip(1 - across**2, 0, 1))[None]
-    thickness = (0.0075 * (1 - along) ** 0.8 + 0.0012)[:, None] * (0.15 + 0.85 * rim)
-    thickness[[0, -1]] *= 0.3
-    camber = 0.006 * (1 - across[None] ** 2) * np.sin(np.pi * along)[:, None]
-    top = np.stack([x, y, camber + thickness], axis=-1).reshape(-1, 3)
-    bottom = np.stack([x, y, camber - thickness], axis=-1).reshape(-1, 3)
-    return Mesh(np.concatenate([top, bottom]), _shell_faces(rows, columns))
-
-
-def _shell_faces(rows: int, columns: int) -> NDArray[np.int32]:
-    """Upper side, lower side, and the strip around the edge."""
-    place = np.arange(rows * columns).reshape(rows, columns)
-    a, b, c, d = place[:-1, :-1], place[:-1, 1:], place[1:, :-1], place[1:, 1:]
-    low = place.size  # from a point of the upper side to the one below it
-    sides = triangles(a, c, b, b, c, d, a + low, b + low, c + low, b + low, d + low, c + low)
-    edge = np.concatenate([place[0], place[1:, -1], place[-1, -2::-1], place[-2:0:-1, 0]])
-    following = np.roll(edge, -1)
-    strip = triangles(edge, following, edge + low, following, following + low, edge + low)
-    return np.concatenate([sides, strip])
+    """The blade: thick and narrow at the shaft, thin and wide at the trailing edge."""
+    along = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, 30))
+    ends = np.sqrt(np.clip(1.0 - np.abs(2.0 * along - 1.0) ** 10, 0.0, 1.0))  # round
+    width = 0.5 * SPAN * (0.66 + 0.36 * along**1.3) * ends
+    body = revolved(along, width, (0.0075 * (1 - along) ** 0.8 + 0.0012) * ends, sides=32)
+    back, side, up = body.vertices.T
+    whole = convex_hull(np.stack([ROOT + SPAN / 2 + side, 0.012 - CHORD * back, up], axis=-1))
+    return Mesh(np.asarray(whole.vertices), np.asarray(whole.faces, dtype=np.int32))
 
 
 def shaft() -> Mesh:
