@@ -2,8 +2,7 @@
 
 Nothing is unpacked, no link is followed, nothing is read beyond its largest size, and no content is believed
 before its checksum fits. What the files mean is known to the rooms that read them: layout graph and force
-tables to `finlab.layout` and `finlab.physics`, compiled fins to `finlab.forces`, weights to
-`finlab.networks`, settings to `finlab.allocation`.
+tables to `finlab.layout` and `finlab.physics`, weights to `finlab.networks`, settings to `finlab.allocation`.
 """
 
 import hashlib
@@ -18,11 +17,9 @@ from finlab.files.archive import member_names, unpacked
 from finlab.files.guarded import is_regular, read_file
 from finlab.files.plain_values import parse_json
 
-VERSION = 3
+VERSION = 4
 """Version of the bundle; a reader knows exactly one."""
 GRAPH, ABOUT = "layout.graph.json", "bundle.json"
-COMPILED = "compiled_fins.safetensors"
-"""What each fin can do, ready for the search."""
 TABLES = "tables/"
 """Folder of the fins' force tables, each named by the SHA-256 of its content."""
 CHECKPOINT = "checkpoint/"
@@ -31,7 +28,6 @@ README, CHECKSUMS = "README.md", "SHA256SUMS"
 LARGEST = {
     GRAPH: 1_000_000,
     ABOUT: 100_000,
-    COMPILED: 5_000_000,
     f"{CHECKPOINT}config.json": 1_000_000,
     f"{CHECKPOINT}model.safetensors": 50_000_000,
     README: 100_000,
@@ -44,7 +40,7 @@ LARGEST_BUNDLE = 100_000_000
 """Largest size of all files together [bytes]."""
 MOST_FILES = len(LARGEST) + 16
 """Most files; a robot has up to 16 fins, each with a table at most."""
-REQUIRED = (GRAPH, ABOUT, COMPILED, CHECKSUMS)
+REQUIRED = (GRAPH, ABOUT, CHECKSUMS)
 
 Files = Mapping[str, bytes]
 """Contents by name."""

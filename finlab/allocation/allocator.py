@@ -119,8 +119,8 @@ class Allocator(Method):
         found = self.alternatives(result)
         if found is None:
             return ()
-        force = force_sizes(result.layout, found.command)
-        return find_modes(found, force, result.layout.lower, result.layout.upper, result.previous)
+        layout = result.layout
+        return find_modes(found, force_sizes(layout, found.command), layout.lower, layout.upper)
 
     def alternatives(self, result: Allocation) -> Candidates | None:
         """Many refined answers to the question of a result, its own first, by a wide search.

@@ -14,14 +14,12 @@ from finlab.allocation.bundle_settings import METHODS_ON_BOARD, read_about
 from finlab.bundle_files import (
     ABOUT,
     CHECKPOINT,
-    COMPILED,
     Files,
     checkpoint_part,
     is_bundle,
     read_bundle_files,
 )
 from finlab.errors import AllocationError, DataError
-from finlab.forces.compiled_fins import CompiledFins, parse_compiled
 from finlab.networks.checkpoint import (
     parse_checkpoint,
     read_checkpoint,
@@ -132,9 +130,8 @@ def allocator_from_bundle(
     `load_allocator`."""
     about = read_about(files, source)
     method, options = method or about.method, about.settings_for(method or about.method) | options
-    compiled = parse_compiled(files[COMPILED], f"{source}/{COMPILED}")
     if method not in LEARNED:
-        return _made(method, about.normalization, options, compiled)
+        return _made(method, about.normalization, options)
     if method not in METHODS_ON_BOARD:
         raise DataError(
             f"{source}: method {method!r} does not run from a bundle; name its checkpoint in place of that"
@@ -148,19 +145,13 @@ def allocator_from_bundle(
     weights = parse_checkpoint(part, f"{source}/{CHECKPOINT.rstrip('/')}", about.checkpoint)
     if not all(np.array_equal(a, b) for a, b in zip(weights.normalization, about.normalization, strict=True)):
         raise DataError(f"{source}: {ABOUT} and the networks differ in normalization; export it again")
-    return _made(method, weights, options, compiled)
+    return _made(method, weights, options)
 
 
-def _made(
-    method: str,
-    model: TrainedWeights | Normalization,
-    options: Mapping[str, Any],
-    compiled: CompiledFins | None = None,
-) -> Allocator:
+def _made(method: str, model: TrainedWeights | Normalization, options: Mapping[str, Any]) -> Allocator:
     kind: Any = method_class(method)
     kind.check_options(options)
-    known = {"compiled": compiled} if compiled and method in METHODS_ON_BOARD else {}
-    allocator: Allocator = kind(model, **options, **known)
+    allocator: Allocator = kind(model, **options)
     return allocator
 
 

@@ -53,15 +53,8 @@ class Mode(PlainData):
     """Mean mechanical power [W]."""
     saturation: float
     """Largest share of any fin's range of amplitude or frequency that is used; 1 is a limit."""
-    distance: float | None
-    """To the previous command, if one was given: root mean square over the fins of the change, amplitude and
-    frequency over their ranges, turns over half a circle."""
-    turn: float | None
-    """Largest turn from the previous command [rad]."""
     signature: ModeSignature
     """What distinguishes it from other ways."""
-    members: tuple[int, ...]
-    """Places of the alternatives that do the same, best first."""
     sources: tuple[str, ...]
     """Where these come from, in words, each once."""
 
@@ -71,9 +64,7 @@ class Mode(PlainData):
         return self.signature.resting
 
 
-def find_modes(
-    candidates: Candidates, force: Array, lower: Array, upper: Array, previous: Array | None = None
-) -> tuple[Mode, ...]:
+def find_modes(candidates: Candidates, force: Array, lower: Array, upper: Array) -> tuple[Mode, ...]:
     """The modes among candidates, in their order.
 
     Args:
@@ -81,14 +72,12 @@ def find_modes(
         force: size of each fin's force (K, n) [N] by its own law, as `force_sizes` tells.
         lower: lower limits (n, 3).
         upper: upper limits (n, 3).
-        previous: command (n, 3) of the previous tick.
     """
     modes = []
     signatures = [mode_signature(*each) for each in zip(candidates.command, force, strict=True)]
     for members in cluster(signatures):
         first = members[0]
         command = candidates.command[first]
-        distance, turn = (None, None) if previous is None else _change(command, previous, lower, upper)
         span = np.maximum(upper - lower, 1e-9)
         used = ((command - lower) / span)[:, :2]
         modes.append(
@@ -99,10 +88,7 @@ def find_modes(
                 energy=float(candidates.energy[first]),
                 power=float(candidates.power[first]),
                 saturation=float(np.clip(np.nanmax(used), 0.0, 1.0)),
-                distance=distance,
-                turn=turn,
                 signature=signatures[first],
-                members=tuple(members),
                 sources=tuple(dict.fromkeys(candidates.source[k] for k in members)),
             )
         )
@@ -149,14 +135,3 @@ def signature_difference(a: ModeSignature, b: ModeSignature) -> Array:
 def same_signature(a: ModeSignature, b: ModeSignature) -> bool:
     """Whether two commands with these signatures are one mode."""
     return a.resting == b.resting and bool((np.abs(signature_difference(a, b)) < 1.0).all())
-
-
-def _change(command: Array, previous: Array, lower: Array, upper: Array) -> tuple[float | None, float | None]:
-    """Distance and largest turn between two commands, over the fins that both know; None where none is."""
-    known = np.isfinite(command).all(1) & np.isfinite(previous).all(1)
-    if not known.any():
-        return None, None
-    change = (command - previous)[known] / np.maximum(upper - lower, 1e-9)[known]
-    turn = np.abs(wrapped((command - previous)[known, 2]))
-    change[:, 2] = turn / np.pi
-    return float(np.sqrt((change**2).sum(1).mean())), float(turn.max())

@@ -20,7 +20,6 @@ from finlab.bundle_files import (
     ABOUT,
     CHECKPOINT,
     CHECKSUMS,
-    COMPILED,
     GRAPH,
     LARGEST_BUNDLE,
     LARGEST_TABLE,
@@ -34,7 +33,6 @@ from finlab.deploy.graph import LayoutGraph, build_graph
 from finlab.deploy.graph_file import graph_bytes, write_graph
 from finlab.distribution import NAME
 from finlab.errors import AllocationError, DataError
-from finlab.forces.compiled_fins import compiled_bytes, compiled_fins
 from finlab.layout import FinModelSpec, Layout
 from finlab.networks.checkpoint import checkpoint_files
 from finlab.physics.table_file import table_bytes
@@ -110,7 +108,6 @@ def make_bundle(layout: Layout, allocator: Allocator, failed: tuple[str, ...] = 
     files = {
         GRAPH: graph_bytes(replace(graph, layout=inside)),
         ABOUT: about_bundle(allocator, finlab.__version__),
-        COMPILED: compiled_bytes(compiled_fins(layout, allocator.objective)),
         **tables,
         **{CHECKPOINT + name: content for name, content in checkpoint.items()},
         README: readme_text(graph).encode(),

@@ -19,7 +19,6 @@ from finlab.bundle_files import ABOUT, GRAPH, Files, check_bundle_files, is_bund
 from finlab.deploy.graph import LayoutGraph
 from finlab.deploy.graph_file import parse_graph, read_graph
 from finlab.errors import AllocationError, DataError
-from finlab.forces.compiled_fins import compiled_fins
 from finlab.layout import Layout
 from finlab.layout.load import bundle_graph_text
 
@@ -31,7 +30,7 @@ class Robot:
     graph: LayoutGraph
     """The robot, failed fins included, and self-tests."""
     allocator: SearchAllocator
-    """Made of the bundle's compiled fins, settings and, where there are any, networks."""
+    """Made of the bundle's settings and, where there are any, networks."""
 
     @property
     def layout(self) -> Layout:
@@ -84,24 +83,26 @@ class Robot:
 
 
 def load_robot(path: str | os.PathLike[str]) -> Robot:
-    """The robot in a bundle, a folder or a zip archive; or in a layout graph file, whose fins are compiled
-    here and answer with the usual settings.
+    """The robot in a bundle, a folder or a zip archive; or in a layout graph file, which answers with the
+    usual settings.
 
     Raises:
         FinlabError: it is neither, was changed, or cannot be run.
     """
     if is_bundle(path) or not str(path).endswith((".json", ".yaml", ".yml")):
-        return parse_robot(read_bundle_files(path), str(path))
-    if not str(path).endswith(".json"):
+        robot = parse_robot(read_bundle_files(path), str(path))
+    elif not str(path).endswith(".json"):
         raise DataError(f"{path}: is a layout file; run what `finlab export {path} -o DIR` makes of it")
-    return _graph_robot(read_graph(path), str(path))
+    else:
+        robot = _graph_robot(read_graph(path), str(path))
+    robot.allocator.pipeline.prepare(robot.graph.healthy)  # fins are compiled now, not at the first answer
+    return robot
 
 
 def _graph_robot(graph: LayoutGraph, source: str) -> Robot:
     allocator: Allocator | None = None
     if graph.method == SearchAllocator.name:
-        compiled = compiled_fins(graph.layout, SearchAllocator(graph.normalization).objective)
-        allocator = SearchAllocator(graph.normalization, compiled=compiled)
+        allocator = SearchAllocator(graph.normalization)
     elif graph.method in METHODS_ON_BOARD and graph.checkpoint in shipped_checkpoints():
         allocator = load_allocator(graph.method, checkpoint=graph.checkpoint)
     if not isinstance(allocator, SearchAllocator) or _sha256(allocator) != graph.checkpoint_sha256:

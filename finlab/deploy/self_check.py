@@ -1,8 +1,7 @@
 """`finlab-runtime check`: does this computer answer as the desk did, and truly?
 
-To be run on the robot before first use. Are the fins' laws and tables the same here, are the compiled fins
-what compiling gives here, do the fins' own models confirm this computer's answers, and are these as good as
-the stored ones.
+To be run on the robot before first use. Are the fins' laws and tables the same here, do the fins' own models
+confirm this computer's answers, and are these as good as the stored ones.
 """
 
 from collections.abc import Iterable
@@ -14,11 +13,8 @@ from finlab.allocation.judging import REACHED
 from finlab.deploy.graph import SELF_TEST_TOLERANCE
 from finlab.deploy.robot import Robot
 from finlab.errors import DataError
-from finlab.forces.compiled_fins import compiled_fins, difference
 from finlab.physics import plant_of
 
-COMPILED_TOLERANCE = 1e-3
-"""Largest difference of a compiled fin, as a share; another processor may round to a neighbour on a grid."""
 ERROR_TOLERANCE = 1e-4
 """Normalized error by which an answer may be worse than the stored one."""
 COST_TOLERANCE = 0.01
@@ -66,21 +62,10 @@ def self_check(robot: Robot) -> list[Finding]:
         dearer.append(float(prices[0] / max(prices[1], 1e-9)) - 1.0)
     return [
         Finding("wrench of the stored commands (err_norm)", worst(differs), SELF_TEST_TOLERANCE),
-        Finding("compiled fins, beside compiling here (share)", compiled_off(robot), COMPILED_TOLERANCE),
         Finding("own answers, judged by the fins' own models (err_norm)", worst(errors), REACHED),
         Finding("own answers, more error than stored (err_norm)", worst(worse), ERROR_TOLERANCE),
         Finding("own answers, more cost than stored (share)", worst(dearer), COST_TOLERANCE),
     ]
-
-
-def compiled_off(robot: Robot) -> float:
-    """The largest difference between a bundle's compiled fins and what compiling gives here; infinite where
-    one is missing. 0 for a layout graph file with networks, whose fins are compiled here alone."""
-    if not robot.allocator.compiled:
-        return 0.0
-    here = compiled_fins(robot.layout, robot.allocator.objective)
-    known = robot.allocator.compiled
-    return worst(difference(known[key], fin) if key in known else np.inf for key, fin in here.items())
 
 
 def worst(values: Iterable[float]) -> float:

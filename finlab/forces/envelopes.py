@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.arrays import Array
-from finlab.forces.compiled_fins import CompiledFins, content_key
 from finlab.forces.fin_envelope import LEAN, LEVELS, SHAFT, FinEnvelope, fin_envelope
 from finlab.layout import Layout
 from finlab.layout.angles import TURN
@@ -253,16 +252,13 @@ def largest_forces(layout: Layout) -> Array:
     return layout_envelopes(layout, Objective()).maximum
 
 
-def layout_envelopes(layout: Layout, objective: Objective, compiled: CompiledFins | None = None) -> Envelopes:
-    """Returns the compiled fins of a layout, by their own laws; those that are `compiled` already are taken.
+def layout_envelopes(layout: Layout, objective: Objective) -> Envelopes:
+    """Returns the compiled fins of a layout, by their own laws.
 
     Raises:
         DataError: a fin's force table cannot be read.
     """
-    known = compiled or {}
-    asked = [(fin.model, fin.limits, objective) for fin in layout.fins]
-    found = [known.get(content_key(*fin)) if known else None for fin in asked]
-    return _stacked(tuple(own or fin_envelope(*fin) for own, fin in zip(found, asked, strict=True)))
+    return _stacked(tuple(fin_envelope(fin.model, fin.limits, objective) for fin in layout.fins))
 
 
 @lru_cache(maxsize=256)

@@ -8,14 +8,11 @@ import pytest
 
 import finlab
 from finlab.allocation import Allocator
-from finlab.allocation.search.search_allocator import SearchAllocator
 from finlab.assets import shipped_layouts
 from finlab.deploy.bundle import Bundle, make_bundle
 from finlab.deploy.robot import Robot, load_robot, parse_robot
-from finlab.deploy.self_check import Finding, self_check
-from finlab.errors import DataError, FinlabError
-from finlab.forces.compiled_fins import compiled_fins
-from finlab.forces.fin_envelope import FinEnvelope
+from finlab.deploy.self_check import self_check
+from finlab.errors import FinlabError
 from finlab.layout import FinModelSpec, Layout
 from finlab.physics import plant_of
 from tests.exhaustive import sampled
@@ -85,82 +82,3 @@ def test_every_shipped_layout_answers_as_the_library_to_the_last_bit(
     batch, many = robot.allocator.allocate_batch(robot.layout, targets), desk.allocate_batch(layout, targets)
     np.testing.assert_array_equal(batch.command, many.command)
     assert (many.err_norm[:-1] < 1e-4).all()
-
-
-def test_what_was_compiled_at_the_desk_is_not_compiled_again(
-    measured: Layout, measured_bundle: Bundle, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    measured_bundle.write(tmp_path)
-    truth = finlab.load_allocator().allocate(measured, [1, 0, 0.5, 0, 0, 0.1]).command
-
-    def never(*_: object) -> FinEnvelope:
-        raise AssertionError("compiled")
-
-    monkeypatch.setattr("finlab.forces.envelopes.fin_envelope", never)
-    robot = load_robot(tmp_path)
-    np.testing.assert_array_equal(robot.allocate([1, 0, 0.5, 0, 0, 0.1]).command, truth)
-    assert robot.allocate([1, 0, 0.5, 0, 0, 0.1], failed=["front_left"]).err_norm < 1e-4
-    # Other settings go on with them; another objective is another compilation.
-    robot.allocator.with_settings(n_refined=2).allocate(robot.layout, [1, 0, 0.5, 0, 0, 0.1])
-    with pytest.raises(AssertionError, match="compiled"):
-        robot.allocator.with_settings(objective="effort").allocate(robot.layout, [1, 0, 0.5, 0, 0, 0.1])
-
-
-def test_compiled_fins_serve_their_own_allocator_alone(robot: Robot) -> None:
-    """What a bundle says of a fin is no word about that fin elsewhere."""
-    weak = {
-        key: replace(fin, largest=fin.largest * 0.5, smallest=fin.smallest * 0.5)
-        for key, fin in robot.allocator.compiled.items()
-    }
-    layout = robot.layout
-    liar = SearchAllocator(robot.graph.normalization, compiled=weak)
-    hard = 0.9 * plant_of(layout).wrench(np.where([True, True, False], layout.upper, 0.0))
-    honest = finlab.load_allocator().allocate(layout, hard)
-    assert honest.err_norm < 1e-4
-    assert not np.array_equal(liar.allocate(layout, hard).command, honest.command)
-    assert finlab.load_allocator().allocate(layout, hard) == honest
-    assert set(weak) == set(compiled_fins(layout, robot.allocator.objective))
-
-
-def test_self_check_notices_fins_that_were_compiled_wrongly(robot: Robot) -> None:
-    for change in (
-        lambda fin: {"largest": fin.largest * 1.01},
-        lambda fin: {"middle": fin.middle + 0.01},
-        lambda fin: {"table": fin.table * 1.01},
-    ):
-        wrong = {key: replace(fin, **change(fin)) for key, fin in robot.allocator.compiled.items()}
-        other = Robot(robot.graph, SearchAllocator(robot.graph.normalization, compiled=wrong))
-        findings = {finding.question: finding for finding in self_check(other)}
-        finding = findings["compiled fins, beside compiling here (share)"]
-        assert not finding.good and finding.value == pytest.approx(0.01, rel=1e-6, abs=0.009)
-
-
-def finding(robot: Robot, question: str) -> Finding:
-    return next(found for found in self_check(robot) if found.question.startswith(question))
-
-
-def test_each_question_sees_its_own_damage(robot: Robot) -> None:
-    """Every finding of a healthy robot is good; a changed number shows up as large as it is."""
-    assert all(found.good for found in self_check(robot))
-    first, *others = robot.graph.self_test
-    error, std = robot.graph.normalization.error, robot.graph.normalization.std
-
-    def stored(question: str, **changes: object) -> Finding:
-        cases = (replace(first, **changes), *others)  # type: ignore[arg-type]
-        return finding(Robot(replace(robot.graph, self_test=cases), robot.allocator), question)
-
-    delivered = np.array(first.delivered_wrench)
-    found = stored("wrench of the stored commands", delivered_wrench=tuple(delivered + 0.5 * std))
-    assert not found.good
-    assert found.value == pytest.approx(float(error(delivered + 0.5 * std, delivered)), abs=1e-6)
-    assert not stored("own answers, judged", wrench=tuple(1e3 * delivered)).good
-    far = (90.0, *first.wrench[1:])
-    assert not stored("own answers, more error", wrench=far, delivered_wrench=far).good
-    idle = tuple(None if row is None else (0.5 * row[0], *row[1:]) for row in first.command)
-    found = stored("own answers, more cost", command=idle)
-    assert not found.good and found.value > 1.0, "half the strokes take less than half the power"
-
-
-def test_without_self_tests_there_is_nothing_to_check(robot: Robot) -> None:
-    with pytest.raises(DataError, match="^the bundle has no self-tests; export it again$"):
-        self_check(Robot(replace(robot.graph, self_test=()), robot.allocator))

@@ -39,7 +39,6 @@ from finlab.allocation.search.refined_candidates import (
 from finlab.allocation.search.settings import SearchSettings
 from finlab.arrays import Array
 from finlab.forces import force_space
-from finlab.forces.compiled_fins import CompiledFins
 from finlab.layout import Layout
 from finlab.physics.fin_model import file_stamps
 
@@ -89,11 +88,11 @@ SEARCH = SearchNumbers()
 class Pipeline:
     """Answers targets on layouts without failures; every array is numpy's."""
 
-    def __init__(self, std: Array, settings: SearchSettings, compiled: CompiledFins | None = None) -> None:
-        """Make it for wrenches normalized by `std` (6,), with fins that are `compiled` already."""
+    def __init__(self, std: Array, settings: SearchSettings) -> None:
+        """Make it for wrenches normalized by `std` (6,)."""
         self.std, self.settings = std, settings
         self.objective = objective = settings.aim
-        self._prepared = lru_cache(maxsize=128)(lambda layout, _: prepare(layout, std, objective, compiled))
+        self._prepared = lru_cache(maxsize=128)(lambda layout, _: prepare(layout, std, objective))
 
     def prepare(self, layout: Layout) -> Prepared:
         """The layout, kept from the last time; force tables whose files have changed are read again."""

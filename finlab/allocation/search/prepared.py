@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from finlab.allocation.search.levenberg_marquardt import CommandProblem
 from finlab.arrays import Array
-from finlab.forces.compiled_fins import CompiledFins
 from finlab.forces.convex_parts import arcs_to_search
 from finlab.forces.envelopes import layout_envelopes
 from finlab.forces.force_space import PlanarProblem, planar_problem
@@ -66,16 +65,14 @@ class Prepared(NamedTuple):
     beside the error's yardstick."""
 
 
-def prepare(
-    layout: Layout, std: Array, objective: Objective, compiled: CompiledFins | None = None
-) -> Prepared:
-    """Prepare a layout whose fins are all healthy; `std` (6,) normalizes wrenches, `compiled` saves time.
+def prepare(layout: Layout, std: Array, objective: Objective) -> Prepared:
+    """Prepare a layout whose fins are all healthy; `std` (6,) normalizes wrenches.
 
     Raises:
         DataError: a fin's force table cannot be read.
     """
     plant = plant_of(layout)
-    fins = layout_envelopes(layout, objective, compiled)
+    fins = layout_envelopes(layout, objective)
     planar = planar_problem(layout, fins, std, objective)
     seeds = fins.maximum[None]
     if not objective.convex:

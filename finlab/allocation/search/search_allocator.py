@@ -26,7 +26,6 @@ from finlab.allocation.search.settings import SearchSettings
 from finlab.allocation.solution import Candidates, Solution
 from finlab.arrays import Array
 from finlab.errors import AllocationError
-from finlab.forces.compiled_fins import CompiledFins
 from finlab.forces.cost_bound import cost_bound
 from finlab.forces.fin_sets import planar_sets
 from finlab.forces.force_space import PlanarProblem, descend
@@ -61,14 +60,11 @@ class SearchAllocator(Allocator):
     settings_class = SearchSettings
     settings: SearchSettings
 
-    def __init__(
-        self, normalization: Normalization, *, compiled: CompiledFins | None = None, **settings: Any
-    ) -> None:
+    def __init__(self, normalization: Normalization, **settings: Any) -> None:
         """Make it.
 
         Args:
             normalization: the yardstick of the error; nothing else is taken from a checkpoint.
-            compiled: fins that need not be compiled here, such as those in a bundle.
             settings: fields of the method's settings.
 
         Raises:
@@ -76,9 +72,7 @@ class SearchAllocator(Allocator):
         """
         self.normalization = normalization
         self.settings = self.settings_class(**settings)
-        self.compiled = compiled or {}
-        """Compiled fins that came with the allocator."""
-        self.pipeline = Pipeline(normalization.std, self.settings, self.compiled)
+        self.pipeline = Pipeline(normalization.std, self.settings)
         # All products here are too small to be shared among threads; chunks of targets are not.
         self._one_thread = single_threaded_products()
 
@@ -93,7 +87,7 @@ class SearchAllocator(Allocator):
         if other.settings.aim == self.objective:  # all that is known of layouts depends on nothing else
             other.pipeline = self.pipeline.with_settings(other.settings)
         else:
-            other.pipeline = Pipeline(self.normalization.std, other.settings, self.compiled)
+            other.pipeline = Pipeline(self.normalization.std, other.settings)
         return other
 
     def _solve(

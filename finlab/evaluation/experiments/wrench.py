@@ -14,7 +14,7 @@ from finlab.evaluation.plots.style import Picture
 from finlab.evaluation.report.document import Column, Row
 from finlab.evaluation.scoring import Columns, run_method
 from finlab.evaluation.splits import SPLITS, Case, make_split
-from finlab.evaluation.statistics.bootstrap import mean_interval, quantile_interval, share_interval
+from finlab.evaluation.statistics.bootstrap import mean_interval, share_interval
 from finlab.physics.objective import Name as Objective
 
 SUCCESS_LEVELS = (0.01, 0.5)
@@ -89,7 +89,6 @@ def figures(found: Columns) -> Row:
     }
     intervals = {
         "err_norm_mean": mean_interval(error, group),
-        "err_norm_p95": quantile_interval(error, 0.95, group),
         "power_mean": mean_interval(found["power"], group),
         "success_0.01": share_interval(error <= 0.01, group),
     }

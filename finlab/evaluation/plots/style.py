@@ -40,8 +40,6 @@ FONT = 9.5
 """Points."""
 DPI = 110
 """Of a PNG."""
-COLOURS_IN_PNG = 96
-"""Of its palette; enough for smooth edges of ten colours."""
 
 
 @contextmanager
@@ -91,18 +89,14 @@ class Picture:
         self.figure, self.axes = figure, axes
 
     def save(self, path: Path) -> Path:
-        """Write a PNG with a palette, a third of the size of one with full colours.
+        """Write a PNG.
 
         Raises:
             DataError: the file cannot be written.
         """
-        from PIL import Image  # comes with matplotlib
-
-        canvas, found = io.BytesIO(), io.BytesIO()
+        canvas = io.BytesIO()
         self.figure.savefig(canvas, format="png", dpi=DPI)
-        image = Image.open(canvas).convert("RGB").quantize(COLOURS_IN_PNG, Image.Quantize.MAXCOVERAGE)
-        image.save(found, format="PNG", optimize=True)
-        write_whole(path, found.getvalue(), DataError)
+        write_whole(path, canvas.getvalue(), DataError)
         return path
 
     def svg(self, name: str) -> str:

@@ -21,8 +21,6 @@ TAIL = 0.002787
 """Share of a normal variable below -SPREAD: the percentiles of the interval."""
 REPLICATES = 2000
 """Times that layouts are drawn again."""
-BINS = 1000
-"""Ranks into which values are sorted for quantiles."""
 
 
 class Interval(NamedTuple):
@@ -58,21 +56,6 @@ def share_interval(holds: NDArray[np.bool_], group: NDArray[np.int64]) -> Interv
     half = SPREAD / (1 + SPREAD**2 / n) * np.sqrt(share * (1 - share) / n + SPREAD**2 / (4 * n**2))
     low, high = min(drawn.low, centre - half), max(drawn.high, centre + half)
     return Interval(max(0.0, float(low)), min(1.0, float(high)))
-
-
-def quantile_interval(values: Array, quantile: float, group: NDArray[np.int64]) -> Interval:
-    """Of a quantile of values (N,), to the resolution of `BINS` ranks."""
-    member, n_groups = _members(group)
-    order = np.argsort(values)
-    rank = np.empty(len(values), np.int64)
-    rank[order] = np.arange(len(values)) * BINS // len(values)
-    table = np.zeros((n_groups, BINS))
-    np.add.at(table, (member, rank), 1.0)
-    cumulative = np.cumsum(_counts(n_groups) @ table, axis=1)
-    at = (cumulative < quantile * cumulative[:, -1:]).sum(axis=1).clip(max=BINS - 1)
-    # The smallest value of each rank, so that a rank without one takes the next.
-    edges = values[order][np.minimum(-(-np.arange(BINS) * len(values) // BINS), len(values) - 1)]
-    return _ends(edges[at])
 
 
 def spread_interval(mean: float, std: float, runs: int) -> Interval:

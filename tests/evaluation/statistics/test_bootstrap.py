@@ -6,7 +6,6 @@ import pytest
 from finlab.evaluation.statistics.bootstrap import (
     SPREAD,
     mean_interval,
-    quantile_interval,
     ratio_interval,
     share_interval,
 )
@@ -27,7 +26,7 @@ def test_the_width_is_that_of_the_groups() -> None:
     assert high - low == pytest.approx(2 * SPREAD / np.sqrt(GROUPS), rel=0.15)
 
 
-@pytest.mark.parametrize("kind", ["mean", "median", "p90", "share", "ratio"])
+@pytest.mark.parametrize("kind", ["mean", "share", "ratio"])
 def test_reruns_land_inside(kind: str) -> None:
     def look(seed: int) -> tuple[float, object]:
         values, group = _draw(seed)
@@ -35,15 +34,12 @@ def test_reruns_land_inside(kind: str) -> None:
             return values.mean(), mean_interval(values, group)
         if kind == "share":
             return (values < 5.5).mean(), share_interval(values < 5.5, group)
-        if kind == "ratio":
-            below = values + np.random.default_rng(seed + 999).normal(size=GROUPS).repeat(EACH)
-            return values.sum() / below.sum(), ratio_interval(values, below, group)
-        q = 0.5 if kind == "median" else 0.9
-        return np.quantile(values, q), quantile_interval(values, q, group)
+        below = values + np.random.default_rng(seed + 999).normal(size=GROUPS).repeat(EACH)
+        return values.sum() / below.sum(), ratio_interval(values, below, group)
 
     seen = [look(seed) for seed in range(24)]
     inside = [low <= value <= high for value, _ in seen for _, (low, high) in seen]
-    assert np.mean(inside) > (0.8 if kind == "p90" else 0.88)  # tails of few layouts are narrow
+    assert np.mean(inside) > 0.88
 
 
 def test_no_failure_is_no_proof() -> None:
@@ -60,4 +56,3 @@ def test_one_layout_is_drawn_by_its_targets() -> None:
 def test_same_seed_same_interval() -> None:
     values, group = _draw(1)
     assert mean_interval(values, group) == mean_interval(values, group)
-    assert quantile_interval(values, 0.95, group) == quantile_interval(values, 0.95, group)
