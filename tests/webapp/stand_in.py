@@ -32,7 +32,7 @@ class StandInSettings(Settings):
 
 
 class StandIn(Allocator):
-    """Two starts of `sqp` as candidates, noise around them as samples."""
+    """Answers of `sqp` for power and for effort as candidates, noise around them as samples."""
 
     name = "mdn"
 
@@ -42,7 +42,8 @@ class StandIn(Allocator):
     def __init__(self, normalization: Normalization = NORMALIZATION, **settings: Any) -> None:
         """Settings as method `mdn` has them; the temperature widens the samples."""
         self.normalization, self.settings = normalization, StandInSettings(**settings)
-        self._inner = Sqp(NORMALIZATION, n_starts=2)
+        self._inner = Sqp(NORMALIZATION, n_starts=1)
+        self._other = Sqp(NORMALIZATION, n_starts=1, objective="effort")
 
     def _made_with(self, options: dict[str, Any]) -> Self:
         return type(self)(self.normalization, **options)
@@ -50,7 +51,8 @@ class StandIn(Allocator):
     def _solve(self, layout: Layout, targets: Array, *, seed: int, previous: Array | None) -> Solution:
         if len(targets) > 1:  # a policy asks for many at once, and for commands alone
             return self._inner._solve(layout, targets, seed=seed, previous=None)
-        starts = [self._inner._solve(layout, targets, seed=seed + k, previous=None) for k in range(N_REFINED)]
+        methods = (self._inner, self._other)
+        starts = [methods[k % 2]._solve(layout, targets, seed=seed, previous=None) for k in range(N_REFINED)]
         refined = np.concatenate([start.command for start in starts])
         rng = np.random.default_rng(seed)
         chosen = rng.integers(0, N_REFINED, self.settings.n_candidates)
