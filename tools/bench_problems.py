@@ -4,9 +4,12 @@
 Needs CasADi (extra `ipopt`) for the best costs that are known; running the benchmark does not.
 """
 
+import io
+import json
+import os
 import sys
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
@@ -14,10 +17,10 @@ import numpy as np
 from finlab.allocation.search.search_allocator import SearchAllocator
 from finlab.arrays import AnyArray, Array
 from finlab.assets import PAPER_LAYOUTS
-from finlab.bench.problems import KINDS, Problems, Robot, Sequences, Targets, save_problems
+from finlab.bench.problems import FORMAT, KINDS, VERSION, Problems, Robot, Sequences, Targets
+from finlab.errors import DataError
 from finlab.evaluation.cheapest_commands import CheapestCommands, has_formulas
 from finlab.evaluation.progress import progress
-from finlab.evaluation.smooth_paths import smooth_path
 from finlab.evaluation.splits import make_split, own_sigma
 from finlab.forces.envelopes import largest_forces
 from finlab.forces.fin_sets import FinSets, planar_sets
@@ -27,6 +30,7 @@ from finlab.layout.file import layout_to_dict
 from finlab.networks.normalization import Normalization
 from finlab.physics import plant_of, read_table
 from finlab.physics.objective import Name, Objective
+from finlab.whole_file import write_whole
 
 SEED = 8821
 """Of the shipped file; no development run, test or report uses it."""
@@ -51,6 +55,16 @@ TICKS = 60
 """Wrenches of a path, ten in a second."""
 NOISE = 0.02
 """Standard deviation of the noise on each fin's force along a path, as a share of the fin's largest force."""
+RATE = 10.0
+"""Wrenches per second [Hz]."""
+PERIODS = (10.0, 40.0)
+"""Shortest and longest period of a path's sines [s]."""
+N_SINES = 3
+"""Sines in each axis."""
+LOAD = 0.5
+"""Largest share of a fin's thrust that an even spread of the path over the fins asks for."""
+SMOOTH_DOMAIN = 0x57EAD
+"""Leads the seed of every smooth path."""
 DOMAIN, SIGMA_DOMAIN = 0xBE9D, 0xBE9E
 """Lead the seeds of every draw, and of sigma."""
 
@@ -83,12 +97,34 @@ def targets(layout: Layout, sets: FinSets, sigma: Array, seed: tuple[int, ...]) 
 
 def path(layout: Layout, sigma: Array, seed: int, noisy: bool) -> Array:
     """A path (T, 6) [N, N m] that the robot can follow; with noise, the same one with noise on its forces."""
-    smooth = smooth_path(layout, sigma, seed, TICKS)
+    smooth = smooth_path(layout, sigma, seed)
     if not noisy:
         return single(smooth)
     size = NOISE * np.repeat(largest_forces(layout), 2)
     draws = np.random.default_rng((DOMAIN, 1, seed)).standard_normal((TICKS, len(size)))
     return single(smooth + (draws * size) @ layout_effectiveness(layout).T)
+
+
+def smooth_path(layout: Layout, sigma: Array, seed: int) -> Array:
+    """A path of wrenches (T, 6) [N, N m] that the layout can follow.
+
+    Args:
+        layout: the robot.
+        sigma: per-axis standard deviation (6,), which sets how the axes compare.
+        seed: same seed, same sines.
+    """
+    rng = np.random.default_rng((SMOOTH_DOMAIN, seed))
+    time = np.arange(TICKS)[:, None] / RATE
+    path = np.zeros((TICKS, 6))
+    for _ in range(N_SINES):
+        frequency = rng.uniform(1.0 / PERIODS[1], 1.0 / PERIODS[0], 6)
+        phase, size = rng.uniform(0.0, 2.0 * np.pi, 6), rng.uniform(0.3, 1.0, 6)
+        path += size * np.sin(2.0 * np.pi * frequency * time + phase)
+    effectiveness = layout_effectiveness(layout)
+    # The least planar forces (T, 2n) whose wrench comes closest to sigma times the path.
+    spread = path @ np.linalg.pinv(effectiveness / sigma[:, None], rcond=1e-6).T
+    share = np.linalg.norm(spread.reshape(TICKS, -1, 2), axis=-1) / largest_forces(layout)
+    return np.asarray(spread @ effectiveness.T * (LOAD / share.max()))
 
 
 def single(values: Array) -> Array:
@@ -170,6 +206,19 @@ def _columns(kind: Any, rows: list[tuple[Any, ...]]) -> Any:
     columns = list(zip(*rows, strict=True)) or [()] * len(kind._fields)
     types = {"robot": np.int64, "kind": np.int64, "noisy": bool, "wrench": np.float32}
     return kind(*(np.array(c, types.get(n, np.float64)) for n, c in zip(kind._fields, columns, strict=True)))
+
+
+def save_problems(problems: Problems, path: str | os.PathLike[str]) -> None:
+    """Write the file whole."""
+    robots = [asdict(robot) | {"sigma": list(robot.sigma)} for robot in problems.robots]
+    index: dict[str, Any] = {"format": FORMAT, "version": VERSION, "kinds": list(KINDS), "robots": robots}
+    text = json.dumps(index | problems.about, separators=(",", ":")).encode()
+    arrays: dict[str, AnyArray] = {"index": np.frombuffer(text, np.uint8), **problems.forces}
+    arrays |= {f"target_{name}": values for name, values in problems.targets._asdict().items()}
+    arrays |= {f"sequence_{name}": values for name, values in problems.sequences._asdict().items()}
+    buffer = io.BytesIO()
+    np.savez_compressed(buffer, allow_pickle=False, **arrays)
+    write_whole(path, buffer.getvalue(), DataError)
 
 
 if __name__ == "__main__":

@@ -7,12 +7,12 @@ from functools import lru_cache
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from finlab.allocation.judging import REACHED
 from finlab.allocation.policy import Policy, largest_share
 from finlab.allocation.settings import Settings
-from finlab.allocation.solution import Insight, Solution
+from finlab.allocation.solution import Solution
 from finlab.arrays import Array
 from finlab.errors import AllocationError
 from finlab.layout import FinModelSpec, Layout
@@ -102,13 +102,6 @@ class Method(ABC):
                 f"policy: method {self.name!r} minimizes the plain error and knows neither axis weights nor "
                 "priorities; use method 'search', or policy 'closest' or 'direction'"
             )
-
-    def insight(self, layout: Layout, wrench: ArrayLike) -> Insight | None:
-        """What the networks make of a target (6,) [N, N m] for a layout whose fins all work.
-
-        None for methods without networks, or whose networks see one fin at a time.
-        """
-        return None
 
     def bound(self, result: Any) -> float:
         """A lower bound on what any answer to the question of a result costs.

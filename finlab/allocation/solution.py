@@ -68,16 +68,3 @@ class Solution(NamedTuple):
     """Gives the raw candidates before refinement, for a single target."""
     alternatives: Callable[[], Candidates] | None = None
     """Gives many refined answers to a single target, the chosen one first, by a wider search."""
-
-
-class Insight(NamedTuple):
-    """One target on a layout of n fins that all work; the mixture has M components."""
-
-    weight: Array
-    """Weights of the components (M,)."""
-    mean: Array
-    """Their means (n, M, 2): horizontal and vertical force of each fin over the largest that it can give."""
-    std: Array
-    """Their standard deviations (n, M), of the square roots of these shares, the same in all directions."""
-    attention: Array
-    """How much each fin (rows) looks at each (columns), (n, n); rows sum to 1, itself included."""

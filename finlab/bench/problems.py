@@ -5,11 +5,9 @@ read without finlab; `problems.schema.json` describes the index.
 """
 
 import hashlib
-import io
-import json
 import os
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -25,7 +23,6 @@ from finlab.files.guarded import read_file
 from finlab.layout import Layout
 from finlab.layout.file import parse_layout
 from finlab.physics import TableLaw, write_table
-from finlab.whole_file import write_whole
 
 FORMAT, VERSION = "finlab-bench-problems", 2
 FILE = Path(__file__).with_name("problems.npz")
@@ -139,19 +136,6 @@ class Problems:
         targets = Targets._make(each[np.isin(self.targets.robot, robots)] for each in self.targets)
         paths = Sequences._make(each[np.isin(self.sequences.robot, robots)] for each in self.sequences)
         return replace(self, targets=targets, sequences=paths)
-
-
-def save_problems(problems: Problems, path: str | os.PathLike[str]) -> None:
-    """Write the file whole."""
-    robots = [asdict(robot) | {"sigma": list(robot.sigma)} for robot in problems.robots]
-    index: dict[str, Any] = {"format": FORMAT, "version": VERSION, "kinds": list(KINDS), "robots": robots}
-    text = json.dumps(index | problems.about, separators=(",", ":")).encode()
-    arrays: dict[str, AnyArray] = {"index": np.frombuffer(text, np.uint8), **problems.forces}
-    arrays |= {f"target_{name}": values for name, values in problems.targets._asdict().items()}
-    arrays |= {f"sequence_{name}": values for name, values in problems.sequences._asdict().items()}
-    buffer = io.BytesIO()
-    np.savez_compressed(buffer, allow_pickle=False, **arrays)
-    write_whole(path, buffer.getvalue(), DataError)
 
 
 def open_problems(path: str | os.PathLike[str] = FILE) -> Problems:

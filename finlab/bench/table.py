@@ -2,8 +2,6 @@
 
 from collections.abc import Sequence
 
-from finlab.bench.problems import open_problems
-from finlab.bench.results import stored
 from finlab.evaluation.report.document import Column, Row, Table
 from finlab.evaluation.report.text import to_text
 
@@ -46,14 +44,6 @@ def text(found: Row, beside: Row | None) -> str:
     return to_text(*blocks)
 
 
-def markdown(found: Row) -> str:
-    """The table of results; `python -m finlab.bench.table > finlab/bench/results.md` makes the stored one."""
-    whole = table(found["methods"])
-    lines = [[whole.cell(row, column) for column in COLUMNS] for row in whole.rows]
-    head = [[column.heading for column in COLUMNS], ["---"] * len(COLUMNS)]
-    return "\n".join(f"| {' | '.join(line)} |" for line in head + lines)
-
-
 def table(rows: Sequence[Row]) -> Table:
     """Name and summary of each method."""
     return Table(COLUMNS, [{"method": row["method"], **row["summary"]} for row in rows])
@@ -63,7 +53,3 @@ def _example(row: Row, kind: str) -> str:
     """What was seen of a kind of failure."""
     seen = [words.partition(": ")[2] for words in row["examples"] if words.startswith(f"{kind}: ")]
     return f": {seen[0]}" if seen else ""
-
-
-if __name__ == "__main__":
-    print(markdown(stored(open_problems(), quick=False) or {"methods": []}))

@@ -52,8 +52,7 @@ def verb_of(experiment: Experiment) -> Callable[..., None]:
     def verb(**given: Any) -> None:
         json, picture = given.pop("json"), given.pop("picture", None)
         check_json_file(json)
-        if picture is not None and not picture.absolute().parent.is_dir():
-            raise DataError(f"picture: expected a file in an existing folder, got {picture}")
+        check_json_file(picture, "picture")
         begin(experiment.name)
         chosen = {name: _parsed(name, options[name], value) for name, value in given.items()}
         found = experiment.stream(**chosen)

@@ -26,10 +26,10 @@ def with_json_file(argv: Sequence[str]) -> list[str]:
     return whole
 
 
-def check_json_file(path: Path | None) -> None:
+def check_json_file(path: Path | None, option: str = "json") -> None:
     """Refuse a file that cannot be written before the work, not after it."""
     if path is not None and (path.is_dir() or not path.absolute().parent.is_dir()):
-        raise DataError(f"json: expected a file in an existing folder, got {path}")
+        raise DataError(f"{option}: expected a file in an existing folder, got {path}")
 
 
 def put_json(value: Any, path: Path | None, table: str | None = None) -> None:

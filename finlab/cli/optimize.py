@@ -53,12 +53,18 @@ def optimize(
 
     from finlab.analysis import Progress, optimize_layout
     from finlab.analysis.goals import MISSION
-    from finlab.cli.inputs import open_robot
+    from finlab.cli.inputs import check_positive, open_robot
+    from finlab.errors import FinlabError
     from finlab.layout import save_layout
 
     check_json_file(json)
+    check_json_file(output, "output")
+    check_positive(rounds=rounds)
     robot = open_robot(layout).layout
-    _check(output, reach, turn, rounds)
+    if not (0.0 <= reach < math.inf and 0.0 <= turn <= 180.0):
+        raise FinlabError(
+            f"expected --reach from 0 m and --turn from 0 to 180 degrees, got {reach:g}, {turn:g}"
+        )
     space = {name: _bounds(robot, name, bounds, reach, math.radians(turn)) for name in fins}
     bar = tqdm(total=rounds, desc=goal, unit="round", disable=None, leave=False, file=sys.stderr)
 
@@ -99,33 +105,19 @@ def improvement_record(found: Improvement) -> dict[str, object]:
 
 
 def improvement_text(found: Improvement, output: Path) -> str:
-    """Where the fins went, both cards side by side, and where the layout was written."""
-    from finlab.cli.score_card import comparison_text
+    """Where the fins went, the card after it, and where the layout was written."""
+    from finlab.cli.score_card import score_card_text
 
     lines = [f"{found.goal}: {found.value_before:.4g} -> {found.value_after:.4g}", ""]
     for name in found.moved:
         fin = found.layout.fins[found.layout.index(name)]
         place = "  ".join(f"{value:6.3f}" for value in fin.position)
         lines.append(f"{name:<16}  {place} m  {math.degrees(fin.mounting_angle):7.1f} deg")
-    lines += ["", comparison_text(found.card_before, found.card_after), ""]
+    lines += ["", score_card_text(found.card_after), ""]
     lines.append(
         f"{output}: written." if found.improved else f"{output}: written unchanged, nothing better was found."
     )
     return "\n".join(lines)
-
-
-def _check(output: Path, reach: float, turn: float, rounds: int) -> None:
-    """Refuse before the search what would fail after it."""
-    from finlab.errors import FinlabError
-
-    if output.is_dir() or not output.absolute().parent.is_dir():
-        raise FinlabError(f"{output}: expected a file to write in a folder that exists")
-    if not (math.isfinite(reach) and reach >= 0.0):
-        raise FinlabError(f"--reach: expected metres, 0 or more, got {reach:g}")
-    if not (0.0 <= turn <= 180.0):
-        raise FinlabError(f"--turn: expected degrees from 0 to 180, got {turn:g}")
-    if rounds < 1:
-        raise FinlabError(f"--rounds: expected 1 or more, got {rounds}")
 
 
 def _bounds(layout: Layout, name: str, box: Box | None, reach: float, turn: float) -> Bounds:

@@ -1,4 +1,4 @@
-"""The score card of a layout as text, and two of them side by side."""
+"""The score card of a layout as text."""
 
 from __future__ import annotations
 
@@ -20,26 +20,6 @@ def score_card_text(card: ScoreCard) -> str:
         lines += table(("without", "rank", "weakest [N]", *_axes(), "lost"), rows)
     lines += ["", f"Largest wrenches are exact to {max(card.authority.gap, 1e-6):.0e} N.", *card.notes]
     return "\n".join(lines)
-
-
-def comparison_text(before: ScoreCard, after: ScoreCard) -> str:
-    """What has become of the numbers: before and after."""
-    old, new = before.authority, after.authority
-    rows = [
-        ("rank", f"{old.rank}", f"{new.rank}"),
-        ("weakest direction [N]", f"{old.weakest:.2f}", f"{new.weakest:.2f}"),
-        ("isotropy", f"{old.isotropy:.3f}", f"{new.isotropy:.3f}"),
-        ("condition", _condition(old.condition), _condition(new.condition)),
-    ]
-    for axis, a, b, unit in zip(_axes(), _least(old), _least(new), _UNITS, strict=True):
-        rows.append((f"largest {axis} [{unit}]", f"{a:.3f}", f"{b:.3f}"))
-    for k, (axis, size, unit) in enumerate(zip(_axes(), before.unit_wrench, _UNITS, strict=True)):
-        energies = _number(before.unit_power[k]), _number(after.unit_power[k])
-        rows.append((f"power for {axis} {size:g} {unit}", *energies))
-    if before.worst_loss and after.worst_loss:
-        a, b = before.worst_loss.weakest, after.worst_loss.weakest
-        rows.append(("weakest after worst loss [N]", f"{a:.2f}", f"{b:.2f}"))
-    return "\n".join(table(("", "before", "after"), rows))
 
 
 def _span_lines(card: ScoreCard) -> list[str]:
@@ -101,11 +81,6 @@ def _axes() -> tuple[str, ...]:
     from finlab.analysis import AXES
 
     return AXES
-
-
-def _least(held: Authority) -> tuple[float, ...]:
-    """The smaller of both signs of the largest wrenches (6,)."""
-    return tuple(min(pair) for pair in zip(held.largest, held.most_negative, strict=True))
 
 
 def _condition(value: float | None) -> str:

@@ -4,8 +4,11 @@ All go on from the last saved state when they are called again with the same arg
 of the method of that name; `surrogate` and `allocator` are the paper's.
 """
 
+from __future__ import annotations
+
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from tyro.conf import arg
 from tyro.extras import SubcommandApp
@@ -13,7 +16,6 @@ from tyro.extras import SubcommandApp
 from finlab.cli.inputs import check_positive
 
 if TYPE_CHECKING:
-    from finlab.layout import FinModelSpec
     from finlab.networks.trained import TrainedWeights
 
 verbs = SubcommandApp()
@@ -46,10 +48,9 @@ def mdn(
     """
     from finlab.mdn.training.train import train_mdn
 
-    check_positive(minutes=minutes, steps=steps, stop_after=stop_after)
+    check_positive(minutes=minutes)
     seconds = None if minutes is None else 60.0 * minutes
-    checkpoint = train_mdn(preset, output, seed=seed, stop_after=stop_after, steps=steps, seconds=seconds)
-    _report(output, checkpoint)
+    _train(train_mdn, preset, output, {"steps": steps, "stop_after": stop_after}, seed=seed, seconds=seconds)
 
 
 @verbs.command
@@ -71,14 +72,13 @@ def surrogate(
         stop_after: stop after so many steps; call again to go on.
         fin_model: what to learn: drag, lighthill, or a table of measured forces.
     """
+    from finlab.layout import FinModelSpec
     from finlab.paper.training.surrogate import train_surrogate
 
-    check_positive(steps=steps, stop_after=stop_after)
-    spec = _fin_model(fin_model)
-    checkpoint = train_surrogate(
-        preset, output, seed=seed, steps=steps, stop_after=stop_after, fin_model=spec
-    )
-    _report(output, checkpoint)
+    table = (("path", str(Path(fin_model).resolve())),)
+    spec = FinModelSpec("table", table) if fin_model.lower().endswith(".csv") else FinModelSpec(fin_model)
+    counts = {"steps": steps, "stop_after": stop_after}
+    _train(train_surrogate, preset, output, counts, seed=seed, fin_model=spec)
 
 
 @verbs.command
@@ -89,8 +89,6 @@ def allocator(
     start: Annotated[Path | None, arg(metavar="NAME|FOLDER")] = None,
     seed: Annotated[int, arg(metavar="N")] = 0,
     steps: _Count = None,
-    batch_size: _Count = None,
-    learning_rate: Annotated[float | None, arg(metavar="X")] = None,
     layouts: _Count = None,
     commands: _Count = None,
     stop_after: _Count = None,
@@ -104,44 +102,26 @@ def allocator(
         start: checkpoint whose network the training begins with, instead of random weights.
         seed: seed of the data and of the first weights.
         steps: optimizer steps instead of the recipe's.
-        batch_size: samples per step instead of the recipe's.
-        learning_rate: peak learning rate instead of the recipe's.
         layouts: random layouts of the data set instead of the recipe's.
         commands: random commands on each of them instead of the recipe's.
         stop_after: stop after so many steps; call again to go on.
     """
     from finlab.paper.training.network import train_allocator
 
-    check_positive(
-        steps=steps, batch_size=batch_size, layouts=layouts, commands=commands, stop_after=stop_after
-    )
-    checkpoint = train_allocator(
-        preset,
-        output,
-        surrogate=surrogate,
-        start=start,
-        seed=seed,
-        steps=steps,
-        batch_size=batch_size,
-        learning_rate=learning_rate,
-        layouts=layouts,
-        commands=commands,
-        stop_after=stop_after,
-    )
-    _report(output, checkpoint)
+    counts = {"steps": steps, "layouts": layouts, "commands": commands, "stop_after": stop_after}
+    _train(train_allocator, preset, output, counts, surrogate=surrogate, start=start, seed=seed)
 
 
-def _fin_model(name: str) -> "FinModelSpec":
-    """A fin model by its name, or a table by its file."""
-    from finlab.layout import FinModelSpec
-
-    if name.lower().endswith(".csv"):
-        return FinModelSpec("table", (("path", str(Path(name).resolve())),))
-    return FinModelSpec(name)
-
-
-def _report(output: Path, checkpoint: "TrainedWeights") -> None:
-    """Say where the result lies and what was measured."""
+def _train(
+    train: Callable[..., TrainedWeights],
+    preset: str,
+    output: Path,
+    counts: dict[str, int | None],
+    **options: Any,
+) -> None:
+    """Train, and say where the result lies and what was measured."""
+    check_positive(**counts)
+    checkpoint = train(preset, output, **counts, **options)
     print(f"{output}: checkpoint {checkpoint.name}, preset {checkpoint.preset}, sha256 {checkpoint.sha256}")
     for group, values in checkpoint.metrics.items():
         for name, value in values.items():

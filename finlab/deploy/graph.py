@@ -7,6 +7,7 @@ import numpy as np
 from finlab.allocation import Allocator
 from finlab.arrays import Array
 from finlab.layout import Layout
+from finlab.layout.graph_form import Case
 from finlab.networks.normalization import Normalization
 from finlab.physics import plant_of
 
@@ -15,20 +16,6 @@ N_SELF_TEST = 4
 SELF_TEST_TOLERANCE = 1e-6
 """Allowed normalized error between the wrench of a self-test's command and what another machine computes for
 it; both are written with nine digits."""
-
-Row = tuple[float, ...]
-
-
-@dataclass(frozen=True)
-class SelfTest:
-    """One target with the answer that the allocator gave on the machine that wrote the file."""
-
-    wrench: Row
-    """Target (6,) [N, N m]."""
-    command: tuple[Row | None, ...]
-    """Command of each fin: amplitude [rad], frequency [Hz], zero direction [rad]; None for a failed fin."""
-    delivered_wrench: Row
-    """Wrench (6,) that the command gives by the fins' own models [N, N m]."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +34,7 @@ class LayoutGraph:
     """SHA-256 of its weights, hexadecimal."""
     method: str
     """Method that answered the self-tests."""
-    self_test: tuple[SelfTest, ...]
+    self_test: tuple[Case, ...]
     """Targets with their answers."""
 
     @property
@@ -83,7 +70,7 @@ def build_graph(layout: Layout, allocator: Allocator, failed: tuple[str, ...] = 
             None if name in failed else tuple(row)
             for name, row in zip(layout.names, answer.tolist(), strict=True)
         )
-        cases.append(SelfTest(tuple(target.tolist()), rows, tuple(delivered.tolist())))
+        cases.append(Case(tuple(target.tolist()), rows, tuple(delivered.tolist())))
     weights = allocator.weights
     return LayoutGraph(
         layout=layout,

@@ -7,14 +7,13 @@ Reading checks every value, and refusals name the key.
 
 import json
 import os
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from msgspec import to_builtins
 
-from finlab.deploy.graph import SELF_TEST_TOLERANCE, LayoutGraph, SelfTest
+from finlab.deploy.graph import SELF_TEST_TOLERANCE, LayoutGraph
 from finlab.errors import LayoutError
 from finlab.layout import layout_to_dict
 from finlab.layout.file import FRAME, under
@@ -105,7 +104,7 @@ def _document_of(graph: LayoutGraph) -> dict[str, Any]:
         "self_test": {
             "method": graph.method,
             "tolerance_err_norm": SELF_TEST_TOLERANCE,
-            "cases": [asdict(case) for case in graph.self_test],
+            "cases": [to_builtins(case) for case in graph.self_test],
         },
     }
 
@@ -125,7 +124,7 @@ def _graph(document: GraphDocument) -> LayoutGraph:
         checkpoint=data.checkpoint.name,
         checkpoint_sha256=data.checkpoint.sha256,
         method=data.self_test.method,
-        self_test=tuple(SelfTest(c.wrench, tuple(c.command), c.delivered_wrench) for c in cases),
+        self_test=tuple(cases),
     )
     if [(edge.source, edge.target) for edge in data.graph.edges] != list(graph.edges):
         raise LayoutError("expected every pair of healthy fins, and each with itself", "graph.edges")

@@ -8,7 +8,7 @@ that every method accounts for it and limits hold as always.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Literal, NamedTuple
@@ -21,15 +21,6 @@ from finlab.layout.layout import Layout
 
 Kind = Literal["lost", "weak", "torn", "stuck", "running", "whole"]
 """What may be true of a fin."""
-MEANING: dict[Kind, str] = {
-    "lost": "gives no force at all",
-    "weak": "reaches a share of its largest amplitude and frequency",
-    "torn": "gives a share of its law's thrust at every command",
-    "stuck": "beats, but no longer turns",
-    "running": "keeps its last command whatever is asked",
-    "whole": "works as it should",
-}
-"""The kinds in words."""
 Command = tuple[float, float, float]
 
 
@@ -112,17 +103,6 @@ class Health:
             stuck={name: math.radians(angle) for name, (angle,) in _named("stuck", stuck, 1).items()},
             running={name: (a, f, math.radians(angle)) for name, (a, f, angle) in kept},
         )
-
-    def of_fin(self, name: str) -> dict[Kind, float | Command]:
-        """What is known of one fin: a share for `weak` and `torn`, an angle [rad] for `stuck`, a command for
-        `running`; nothing for a whole one."""
-        known: dict[Kind, Iterable[tuple[str, float | Command]]] = {
-            "weak": self.weak,
-            "torn": self.thrust,
-            "stuck": self.stuck,
-            "running": self.running,
-        }
-        return {kind: value for kind, pairs in known.items() for fin, value in pairs if fin == name}
 
     def applied_to(self, layout: Layout) -> Layout:
         """The layout with the limits that are left.

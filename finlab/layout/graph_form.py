@@ -83,7 +83,7 @@ class Case(Struct, forbid_unknown_fields=True):
     """A target [N, N m], a command per fin [rad, Hz, rad] (null for a failed one), and its wrench."""
 
     wrench: Wrench
-    command: list[tuple[float, float, float] | None]
+    command: tuple[tuple[float, float, float] | None, ...]
     delivered_wrench: Wrench
 
 

@@ -10,20 +10,19 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from finlab.allocation.judging import costs
 from finlab.allocation.search.pipeline import Pipeline
 from finlab.allocation.search.prepared import Prepared
 from finlab.allocation.search.search_allocator import Beginning, SearchAllocator
 from finlab.allocation.search.settings import MdnSettings
-from finlab.allocation.solution import Candidates, Insight
+from finlab.allocation.solution import Candidates
 from finlab.arrays import Array
 from finlab.forces.force_space import polar, realize
 from finlab.layout import Layout
 from finlab.mdn.features import RobotView, Seen, robot_view, see
 from finlab.mdn.network import ForceMixture, ForceNetworkConfig
-from finlab.mdn.proposal import Proposal, propose, shares
+from finlab.mdn.proposal import Proposal, propose
 from finlab.networks.layers import single_precision
 from finlab.networks.trained import TrainedWeights
 
@@ -72,17 +71,6 @@ class MdnAllocator(SearchAllocator):
             names,
             lambda: _samples(prepared, proposal.force[0], targets / self.normalization.std, names),
         )
-
-    def insight(self, layout: Layout, wrench: ArrayLike) -> Insight:
-        """What the network makes of a target (6,) [N, N m] for a layout whose fins all work."""
-        view = self._view(self.pipeline, layout)
-        seen = see(view, np.asarray(wrench, dtype=float)[None] / self.normalization.std)
-        weight, root, std = self.mixture(seen).complex_parts()
-        mean = shares(root[0]) * seen.frame[0]
-        parts = np.stack([mean.real, mean.imag], axis=-1).swapaxes(0, 1)
-        attention = self.config.attention(self._network, seen.nodes, seen.pairs)[0]
-        arrays = (weight[0], parts, std[0].T, attention)
-        return Insight(*(np.asarray(values, dtype=float) for values in arrays))
 
 
 def _view(pipeline: Pipeline, layout: Layout) -> RobotView:

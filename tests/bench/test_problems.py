@@ -8,12 +8,12 @@ import jsonschema
 import numpy as np
 import pytest
 
-from finlab.bench import problems as module
-from finlab.bench.problems import FILE, KINDS, Problems, open_problems, save_problems
+from finlab.bench.problems import FILE, KINDS, Problems, open_problems
 from finlab.errors import DataError
 from finlab.physics import plant_of
 from tests.ipopt_reach import IpoptReach
-from tools.bench_problems import SEED, make_problems
+from tools import bench_problems as module
+from tools.bench_problems import SEED, make_problems, save_problems
 
 BEYOND = KINDS.index("beyond-1.2")
 

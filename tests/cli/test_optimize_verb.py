@@ -44,9 +44,9 @@ def test_optimize_as_json_within_a_box(tmp_path: Path, capsys: pytest.CaptureFix
     [
         (["--fins", "nobody"], "has no fin 'nobody'"),
         (["--fins", "front_right", "--goal", "beauty"], "goal: expected one of"),
-        (["--fins", "front_right", "--reach", "-1"], "--reach: expected metres"),
-        (["--fins", "front_right", "--turn", "200"], "--turn: expected degrees"),
-        (["--fins", "front_right", "--rounds", "0"], "--rounds: expected 1 or more"),
+        (["--fins", "front_right", "--reach", "-1"], "expected --reach from 0 m"),
+        (["--fins", "front_right", "--turn", "200"], "--turn from 0 to 180 degrees"),
+        (["--fins", "front_right", "--rounds", "0"], "rounds: expected a number of at least 1"),
         (["--fins", "front_right", "--bounds", "1", "0", "0", "0", "0", "0"], "bounds of x"),
     ],
 )
@@ -61,7 +61,7 @@ def test_wrong_questions(
 
 def test_a_folder_that_is_not_there(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["layout", "optimize", "A", "--fins", "front_right", "-o", "no/where.yaml"]) == 2
-    assert "a folder that exists" in capsys.readouterr().err
+    assert "output: expected a file in an existing folder" in capsys.readouterr().err
 
 
 def test_show_prints_the_score_card(capsys: pytest.CaptureFixture[str]) -> None:

@@ -57,8 +57,8 @@ def test_trains_the_network_over_forces_and_allocates_with_it(
         (["mdn", "--minutes", "0"], "minutes: expected a number of at least 1, got 0"),
         (["surrogate", "--steps", "0"], "steps: expected a number of at least 1, got 0"),
         (
-            ["allocator", "--surrogate", "nowhere/", "--batch-size", "-4"],
-            "batch-size: expected a number of at least 1",
+            ["allocator", "--surrogate", "nowhere/", "--layouts", "-4"],
+            "layouts: expected a number of at least 1",
         ),
         (["allocator", "--surrogate", "nowhere/"], "'nowhere' is not among the shipped ones"),
     ],

@@ -18,10 +18,11 @@ import finlab
 from finlab.allocation import Allocator
 from finlab.assets import shipped_layouts
 from finlab.cli import main
-from finlab.deploy.graph import N_SELF_TEST, LayoutGraph, SelfTest, build_graph
+from finlab.deploy.graph import N_SELF_TEST, LayoutGraph, build_graph
 from finlab.deploy.graph_file import graph_bytes, parse_graph, read_graph, write_graph
 from finlab.errors import FinlabError, LayoutError
 from finlab.layout import Fin, Layout, load_layout, save_layout
+from finlab.layout.graph_form import Case
 from finlab.layout.load import GraphText, checksum_of
 from finlab.networks.checkpoint import read_checkpoint
 from finlab.networks.normalization import Normalization
@@ -36,7 +37,7 @@ def make_graph(layout: Layout, failed: tuple[str, ...] = ()) -> LayoutGraph:
     def rows(*values: float) -> tuple[tuple[float, ...] | None, ...]:
         return tuple(None if name in failed else values for name in layout.names)
 
-    case = SelfTest((1.0, 0.0, 0.5, 0.0, 0.0, 0.1), rows(0.3, 1.0, -0.5), (0.9,) * 6)
+    case = Case((1.0, 0.0, 0.5, 0.0, 0.0, 0.1), rows(0.3, 1.0, -0.5), (0.9,) * 6)
     normalization = Normalization(np.zeros(6), np.array([1.0, 1.0, 1.0, 0.2, 0.2, 0.3]))
     checkpoint = ("default", "0" * 64) if failed else (None, None)
     return LayoutGraph(

@@ -69,10 +69,15 @@ def test_a_batch_costs_what_single_calls_do(settled: MdnAllocator, layout_a: Lay
     np.testing.assert_allclose(together.energy, alone, rtol=0.01)
 
 
+def weights(method: MdnAllocator, layout: Layout) -> np.ndarray:
+    """Of the mixture's components, for `TARGET`."""
+    seen = see(method._view(method.pipeline, layout), np.array([TARGET]) / method.normalization.std)
+    return method.mixture(seen).complex_parts()[0][0]
+
+
 def test_candidates_keep_the_name_of_their_component(settled: MdnAllocator, layout_a: Layout) -> None:
-    answer, insight = settled.allocate(layout_a, TARGET), settled.insight(layout_a, TARGET)
-    count = settled.settings.n_candidates
-    expected = [f"component {k + 1}" for k in np.argsort(-insight.weight)[:count]]
+    answer, count = settled.allocate(layout_a, TARGET), settled.settings.n_candidates
+    expected = [f"component {k + 1}" for k in np.argsort(-weights(settled, layout_a))[:count]]
     assert answer.samples is not None and answer.candidates is not None
     assert list(answer.samples.source) == expected
     assert set(answer.candidates.source) <= set(expected)
@@ -99,21 +104,6 @@ def test_from_tick_to_tick_candidates_keep_it_too(shipped: MdnAllocator) -> None
     assert away is not None and "the way it moves now" in away.source
 
 
-def test_insight_is_what_proposals_are_drawn_from(shipped: MdnAllocator, layout_a: Layout) -> None:
-    insight = shipped.insight(layout_a, TARGET)
-    m, n = len(insight.weight), layout_a.n_fins
-    assert insight.mean.shape == (n, m, 2) and insight.std.shape == (n, m)
-    assert insight.attention.shape == (n, n)
-    assert insight.weight.sum() == pytest.approx(1.0, abs=1e-5)
-    assert insight.attention.sum(1) == pytest.approx(np.ones(n), abs=1e-5)
-    view = shipped._view(shipped.pipeline, layout_a)
-    seen = see(view, np.array([TARGET]) / shipped.normalization.std)
-    proposal = propose(shipped.mixture(seen), view, seen, m, 1.0, 0)
-    largest = shipped.pipeline.prepare(layout_a).planar.fins.maximum
-    for force, component in zip(proposal.force[0], proposal.component[0], strict=True):
-        np.testing.assert_allclose(force.T / largest[:, None], insight.mean[:, component], atol=1e-6)
-
-
 def test_more_candidates_than_components_are_drawn_by_a_seed(shipped: MdnAllocator, layout_a: Layout) -> None:
     many = shipped.with_settings(n_candidates=40)
     first, again, other = (many.allocate(layout_a, TARGET, seed=seed).samples for seed in (0, 0, 1))
@@ -126,15 +116,15 @@ def test_more_candidates_than_components_are_drawn_by_a_seed(shipped: MdnAllocat
 
 def test_components_are_drawn_as_often_as_they_weigh(shipped: MdnAllocator, layout_a: Layout) -> None:
     """Behind the means, 8,000 draws; and their spread is the component's own, by the temperature."""
-    insight = shipped.insight(layout_a, TARGET)
-    view, m = shipped._view(shipped.pipeline, layout_a), len(insight.weight)
+    weight, view = weights(shipped, layout_a), shipped._view(shipped.pipeline, layout_a)
+    m = len(weight)
     seen = see(view, np.array([TARGET]) / shipped.normalization.std)
     proposal = propose(shipped.mixture(seen), view, seen, m + 8000, 1.0, 3)
     drawn = proposal.component[0, m:]
     share = np.bincount(drawn, minlength=m) / len(drawn)
-    np.testing.assert_allclose(share, insight.weight / insight.weight.sum(), atol=0.02)
+    np.testing.assert_allclose(share, weight / weight.sum(), atol=0.02)
     assert sorted(proposal.component[0, :m]) == list(range(m))
-    assert (np.diff(insight.weight[proposal.component[0, :m]]) <= 0.0).all()
+    assert (np.diff(weight[proposal.component[0, :m]]) <= 0.0).all()
 
 
 def test_it_goes_on_from_the_previous_command(shipped: MdnAllocator, layout_a: Layout) -> None:

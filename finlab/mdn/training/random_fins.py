@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from finlab.forces.fin_envelope import FinEnvelope, compile_fin
-from finlab.layout import Limits
+from finlab.layout import FinModelSpec, Limits
 from finlab.layout.random import random_layout
-from finlab.layout.random_fins import Numbers, log_uniform, random_fin_model, uniform
+from finlab.layout.random_fins import Numbers, log_uniform, random_fin_model
 from finlab.physics.blade import Blade
 from finlab.physics.fin_law import FinLaw
 from finlab.physics.fin_model import make_law
@@ -28,21 +28,17 @@ SHARES = {"drag": 0.3, "lighthill": 0.2, "soft": 0.38, "table": 0.12}
 """How often each family is drawn."""
 
 
-def _half_the_time(rng: np.random.Generator, low: float, high: float) -> float:
-    return float(rng.uniform(low, high) * (rng.random() < 0.5))
-
-
 NUMBERS: dict[str, Numbers] = {
-    "drag": {"area": (log_uniform, (0.003, 0.06)), "lever": (log_uniform, (0.04, 0.2))},
-    "lighthill": {"length": (log_uniform, (0.08, 0.4)), "width": (log_uniform, (0.04, 0.2))},
+    "drag": {"area": (0.003, 0.06), "lever": (0.04, 0.2)},
+    "lighthill": {"length": (0.08, 0.4), "width": (0.04, 0.2)},
     "soft": {
-        "e": (_half_the_time, (0.0, 0.3)),
-        "k": (log_uniform, (0.5, 12.0)),
-        "p": (uniform, (0.7, 2.5)),
-        "x0": (uniform, (0.4, 2.0)),
-        "q": (uniform, (2.0, 8.0)),
-        "phi_e": (uniform, (-math.pi, math.pi)),
-        "d": (uniform, (-0.3, 0.3)),
+        "e": (0.0, 0.3),
+        "k": (0.5, 12.0),
+        "p": (0.7, 2.5),
+        "x0": (0.4, 2.0),
+        "q": (2.0, 8.0),
+        "phi_e": (-math.pi, math.pi),
+        "d": (-0.3, 0.3),
     },
 }
 """Families with a formula: wider than any fin that is evaluated."""
@@ -76,8 +72,13 @@ def varied_limits(rng: np.random.Generator) -> Limits:
 
 
 def random_law(rng: np.random.Generator, family: str) -> FinLaw:
-    """Draw a law of one of the families in `SHARES`."""
-    return _table(rng) if family == "table" else make_law(random_fin_model(rng, family, NUMBERS))
+    """Draw a law of one of the families in `SHARES`; half of the soft fins push alike in all directions."""
+    if family == "table":
+        return _table(rng)
+    model = random_fin_model(rng, family, NUMBERS)
+    if family == "soft" and rng.random() < 0.5:
+        model = FinModelSpec("soft", tuple({**dict(model.parameters), "e": 0.0}.items()))
+    return make_law(model)
 
 
 def _table(rng: np.random.Generator) -> FinLaw:
