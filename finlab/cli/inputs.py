@@ -29,15 +29,9 @@ def open_robot(text: str) -> Robot:
     Raises:
         LayoutError: neither a readable file nor a shipped layout.
     """
-    from finlab.layout.load import holds_graph, layout_path, load_layout
+    from finlab.layout.load import layout_and_failed
 
-    path = layout_path(text)
-    if not holds_graph(path):
-        return Robot(load_layout(path))
-    from finlab.deploy.graph_file import read_graph
-
-    graph = read_graph(path)
-    return Robot(graph.layout, graph.failed)
+    return Robot(*layout_and_failed(text))
 
 
 def check_positive(**counts: int | None) -> None:

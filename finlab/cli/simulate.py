@@ -76,8 +76,9 @@ def simulate(
     if output is not None:
         check_new_folder(output)
     with tqdm(desc="swim", unit="s", disable=None, leave=False, file=sys.stderr) as bar:
-        from finlab.sim import FinFault
+        from finlab.sim import NO_NOISE, ClosedLoop, FinFault, make_trajectory
 
+        sensors = None if noise else NO_NOISE
         robot, water = open_robot(layout), _water(current, waves, seed)
         faults = [*(FinFault(name, 0.0) for name in robot.failed), *map(FinFault.parse, fail)]
         if excite:
@@ -85,11 +86,13 @@ def simulate(
                 raise FinlabError(
                     "--excite: a robot is learned with the fins that it has; leave --fail and --monitor out"
                 )
-            loop = _excitation(robot.layout.without(robot.failed), duration, plant, noise, water, seed)
+            from finlab.sim.excite import LONGEST_S, excitation
+
+            whole, seconds = robot.layout.without(robot.failed), LONGEST_S if duration is None else duration
+            loop = excitation(whole, seconds, plant=plant, sensors=sensors, water=water, seed=seed)
         else:
             from finlab.control import FaultMonitor
             from finlab.evaluation.method_specs import load_method_spec
-            from finlab.sim import NO_NOISE, ClosedLoop, make_trajectory
 
             pilot = _controller(robot.layout, controller)
             loop = ClosedLoop(
@@ -98,7 +101,7 @@ def simulate(
                 make_trajectory(trajectory, duration),
                 pilot,
                 plant=plant,
-                sensors=None if noise else NO_NOISE,
+                sensors=sensors,
                 water=water,
                 failures=faults,
                 announced=announced,
@@ -119,18 +122,6 @@ def simulate(
     told = excitation_summary(loop.log) if excite else summary(loop.log)
     changes = [f"{time:.1f} s: the monitor takes {what}" for time, what in found[1:]]
     print("\n".join([told, *changes, *written]))
-
-
-def _excitation(
-    layout: Layout, duration: float | None, plant: str, noise: bool, water: Water, seed: int
-) -> ClosedLoop:
-    """The swim from which a robot is learned."""
-    from finlab.sim import NO_NOISE
-    from finlab.sim.excite import LONGEST_S, excitation
-
-    seconds = LONGEST_S if duration is None else duration
-    sensors = None if noise else NO_NOISE
-    return excitation(layout, seconds, plant=plant, sensors=sensors, water=water, seed=seed)
 
 
 def _controller(layout: Layout, name: str) -> Controller:

@@ -4,25 +4,11 @@ import numpy as np
 
 from finlab.errors import DataError
 from finlab.evaluation.splits import Case, own_sigma
-from finlab.layout import Layout, load_layout
-from finlab.layout.load import holds_graph, layout_path, parse_graph_document, read_graph_text
+from finlab.layout import Layout
 from finlab.physics import plant_of
 
 DOMAIN = 0x0711
 """Leads the seed of the draws."""
-
-
-def layout_and_failed(name: str) -> tuple[Layout, tuple[str, ...]]:
-    """The layout in a file or of a shipped name, and the fins that a graph file marks as failed.
-
-    Raises:
-        LayoutError: neither a readable file nor a shipped layout.
-    """
-    path = layout_path(name)
-    if not holds_graph(path):
-        return load_layout(name), ()
-    found = parse_graph_document(read_graph_text(path))
-    return found.layout, found.failed
 
 
 def own_case(layout: Layout, failed: tuple[str, ...], n_targets: int, seed: int) -> Case:

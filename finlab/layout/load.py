@@ -62,13 +62,19 @@ def load_layout(layout: str | os.PathLike[str]) -> Layout:
         LayoutError: the file cannot be read or is not a valid layout; the message names file and key.
         DataError: the bundle cannot be read, or was changed.
     """
+    return layout_and_failed(layout)[0]
+
+
+def layout_and_failed(layout: str | os.PathLike[str]) -> tuple[Layout, tuple[str, ...]]:
+    """A layout as `load_layout` opens it, and the fins that a graph file marks as failed."""
     file = layout_path(layout)
     source = str(layout)
-    if holds_graph(file):
-        return parse_graph_document(read_graph_text(file)).layout
+    if is_bundle(file) or file.name.endswith(SUFFIX):
+        document = parse_graph_document(read_graph_text(file))
+        return document.layout, document.failed
     content = read_text(file, MAX_BYTES, A_LAYOUT, LayoutError)
     parse = parse_json if file.suffix.lower() == ".json" else parse_yaml
-    return parse_layout(parse(content, source, LayoutError), source=source, folder=file.resolve().parent)
+    return parse_layout(parse(content, source, LayoutError), source, file.resolve().parent), ()
 
 
 def layout_path(layout: str | os.PathLike[str]) -> Path:
@@ -93,11 +99,6 @@ def layout_path(layout: str | os.PathLike[str]) -> Path:
         f"layout {layout!r} is neither a file nor a shipped layout; "
         f"shipped are {', '.join(shipped) or 'none'}"
     )
-
-
-def holds_graph(path: Path) -> bool:
-    """Whether a path looks like a layout graph file, or a bundle with one."""
-    return is_bundle(path) or path.name.endswith(SUFFIX)
 
 
 def read_graph_text(path: Path) -> GraphText:

@@ -7,7 +7,7 @@ import numpy as np
 from finlab.errors import DataError
 from finlab.evaluation.experiment import Experiment
 from finlab.evaluation.method_specs import installed_methods, is_slow, load_method_specs
-from finlab.evaluation.own_layout import layout_and_failed, own_case
+from finlab.evaluation.own_layout import own_case
 from finlab.evaluation.paper_figures import paper_wrench_rows
 from finlab.evaluation.plots.dots import draw_dots
 from finlab.evaluation.plots.style import Picture
@@ -15,6 +15,7 @@ from finlab.evaluation.report.document import Column, Row
 from finlab.evaluation.scoring import Columns, run_method
 from finlab.evaluation.splits import SPLITS, Case, make_split
 from finlab.evaluation.statistics.bootstrap import mean_interval, share_interval
+from finlab.layout.load import layout_and_failed
 from finlab.physics.objective import Name as Objective
 
 SUCCESS_LEVELS = (0.01, 0.5)

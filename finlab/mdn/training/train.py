@@ -154,12 +154,13 @@ def losses(net: Callable[..., ForceMixture], batch: Batch, temper: float, spread
 def _wait(folder: Path, count: int, writer: BaseProcess) -> None:
     """Wait for so many files of answers; a bar shows how many there are."""
     with tqdm(total=count, desc="first answers", unit="file", disable=not sys.stderr.isatty()) as bar:
-        while bar.n < count:
-            bar.update(min(count, len(_written(folder))) - bar.n)
+        # A bar that is off, where nobody looks, counts nothing itself.
+        while (there := min(count, len(_written(folder)))) < count:
+            bar.n = there
+            bar.refresh()
             if writer.exitcode:
                 raise DataError(f"{folder}: the process that writes answers has ended; see its message above")
             time.sleep(0.2)
-            bar.refresh()
 
 
 def _written(folder: Path) -> list[Path]:
