@@ -66,25 +66,12 @@ def check(arguments: argparse.Namespace) -> int:
 
 def allocate(arguments: argparse.Namespace) -> int:
     """Print the commands for one target."""
-    from finlab.deploy.record import allocation_record, command_rows
+    from finlab.deploy.record import allocation_record
 
     answer = _robot(arguments).allocate(
         arguments.wrench, failed=arguments.failed, policy=arguments.policy, seed=arguments.seed
     )
-    if arguments.json:
-        print(json.dumps(allocation_record(answer), allow_nan=False))
-        return 0
-    width = max(map(len, ("fin", *answer.fins)))
-    print(f"{'fin':<{width}}  A [rad]  f [Hz]  zero direction [rad]")
-    for name, row in zip(answer.fins, command_rows(answer.command), strict=True):
-        values_text = "failed" if row is None else f"{row[0]:7.3f}  {row[1]:6.3f}  {row[2]:20.3f}"
-        print(f"{name:<{width}}  {values_text}")
-    print(
-        f"err_norm {answer.err_norm:.2e}   power {answer.power:.3f} W   energy {answer.energy:.3f}   "
-        f"{answer.solve_ms:.1f} ms"
-    )
-    for note in answer.notes:
-        print(note)
+    print(json.dumps(allocation_record(answer), allow_nan=False) if arguments.json else answer)
     return 0
 
 

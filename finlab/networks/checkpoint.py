@@ -52,9 +52,7 @@ def parse_checkpoint(files: Mapping[str, bytes], source: str, name: str) -> Trai
     from safetensors import SafetensorError
     from safetensors.numpy import load
 
-    config = _config(files, source)
-    if WEIGHTS_FILE not in files:
-        raise _missing(source, WEIGHTS_FILE)
+    config = _config(files, source, (CONFIG_FILE, WEIGHTS_FILE))
     sha256 = hashlib.sha256(files[WEIGHTS_FILE]).hexdigest()
     if sha256 != config.get("sha256"):
         raise CheckpointError(
@@ -71,9 +69,9 @@ def parse_checkpoint(files: Mapping[str, bytes], source: str, name: str) -> Trai
         return TrainedWeights(
             name=name,
             normalization=Normalization.parse(config["normalization"]),
-            network_sizes=_sizes(config["network"]),
+            network_sizes=config["network"] and dict(config["network"]),
             network=_part("network", tensors),
-            surrogate_sizes=_sizes(config["surrogate"]),
+            surrogate_sizes=config["surrogate"] and dict(config["surrogate"]),
             surrogate=_part("surrogate", tensors),
             fin_model=dict(config["fin_model"]),
             preset=str(config["preset"]),
@@ -110,14 +108,9 @@ def checkpoint_files(weights: TrainedWeights) -> dict[str, bytes]:
     return {CONFIG_FILE: (json.dumps(config, indent=2) + "\n").encode(), WEIGHTS_FILE: content}
 
 
-def _sizes(values: Any) -> dict[str, Any] | None:
-    """The sizes of a network from a file; what they must be is known to the method that uses it."""
-    return None if values is None else {str(key): value for key, value in dict(values).items()}
-
-
 def read_normalization(folder: Path) -> Normalization:
     """Only the wrench statistics of a checkpoint, for methods that need no network."""
-    config = _config(_files(folder, (CONFIG_FILE,)), str(folder))
+    config = _config(_files(folder, (CONFIG_FILE,)), str(folder), (CONFIG_FILE,))
     try:
         return Normalization.parse(config.get("normalization"))
     except ValueError as error:
@@ -144,10 +137,11 @@ def _files(folder: Path, names: tuple[str, ...] = tuple(LARGEST)) -> dict[str, b
     return {n: read_file(folder / n, LARGEST[n], "a checkpoint's file", CheckpointError) for n in there}
 
 
-def _config(files: Mapping[str, bytes], source: str) -> dict[str, Any]:
+def _config(files: Mapping[str, bytes], source: str, needed: tuple[str, ...]) -> dict[str, Any]:
     place = f"{source}/{CONFIG_FILE}"
-    if CONFIG_FILE not in files:
-        raise _missing(source, CONFIG_FILE)
+    if missing := [name for name in needed if name not in files]:
+        both = f"a checkpoint folder holds {CONFIG_FILE} and {WEIGHTS_FILE}"
+        raise CheckpointError(f"{source}/{missing[0]}: no such file; {both}")
     text = decoded(files[CONFIG_FILE], place, "JSON", CheckpointError)
     config = parse_json(text, place, CheckpointError)
     if not isinstance(config, dict) or config.get("format") != FORMAT:
@@ -163,9 +157,3 @@ def _config(files: Mapping[str, bytes], source: str) -> dict[str, Any]:
 def _part(prefix: str, tensors: State) -> dict[str, Any]:
     """The arrays of one network, by their names inside it."""
     return {k.removeprefix(prefix + "."): v for k, v in tensors.items() if k.startswith(prefix + ".")}
-
-
-def _missing(source: str, name: str) -> CheckpointError:
-    return CheckpointError(
-        f"{source}/{name}: no such file; a checkpoint folder holds {CONFIG_FILE} and {WEIGHTS_FILE}"
-    )

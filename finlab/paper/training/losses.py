@@ -12,7 +12,7 @@ from finlab.training.saving import Tensors
 
 
 class Surrogate(NamedTuple):
-    """A trained surrogate, which guides and stays as it is."""
+    """The surrogate with some weights, on the robots of a batch."""
 
     config: SurrogateConfig
     """Its sizes."""

@@ -11,8 +11,9 @@ from finlab.layout import FinModelSpec
 from finlab.networks.normalization import Normalization
 from finlab.networks.trained import TrainedWeights
 from finlab.paper.surrogate import SurrogateConfig
+from finlab.paper.training.losses import Surrogate
 from finlab.paper.training.recipes import RECIPES, SampledTraining
-from finlab.paper.training.sampling import Batch, RecordedSamples, fresh_batch
+from finlab.paper.training.sampling import RecordedSamples, fresh_batch
 from finlab.physics import FinLaw, make_law
 from finlab.training.device import training_device
 from finlab.training.first_weights import first_weights
@@ -94,7 +95,7 @@ def surrogate_metrics(
     batch = fresh_batch(model, 50_000, TRAIN_SEED + 7_000 + seed)
     std = torch.tensor(measure_normalization(model, seed).std)
     with torch.inference_mode():
-        error = ((_wrench(config, weights, batch) - batch.wrench) / std).norm(dim=-1)
+        error = ((Surrogate(config, weights).wrench(batch.command, batch) - batch.wrench) / std).norm(dim=-1)
     return {"wrench_error_norm": float(error.mean())}
 
 
@@ -112,11 +113,7 @@ def _wrench_terms(
 
     def terms(w: Tensors, step: int) -> dict[str, Tensor]:
         batch = samples.batch(step)
-        return {"loss": ((_wrench(config, w, batch) - batch.wrench) / std).square().sum(-1).mean()}
+        wrench = Surrogate(config, w).wrench(batch.command, batch)
+        return {"loss": ((wrench - batch.wrench) / std).square().sum(-1).mean()}
 
     return terms
-
-
-def _wrench(config: SurrogateConfig, w: Tensors, b: Batch) -> Tensor:
-    wrench: Tensor = config.wrench(w, b.command, b.position, b.mounting_angle, b.lower, b.upper, b.mask)
-    return wrench
