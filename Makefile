@@ -20,7 +20,7 @@ help:
 	@echo "make check        ruff, ruff format and mypy"
 	@echo "make schemas      write the JSON Schemas of layout and graph files"
 	@echo "make figures      the tables of figures in docs/*.md, or of one page: make figures PAGE=evaluation"
-	@echo "make format       let ruff mend what it can"
+	@echo "make format       let ruff correct what it can"
 	@echo "make checkpoint   train what is shipped, PRESET=default or PRESET=paper (hours)"
 	@echo "make wheel-check  build the wheel, install it in an empty environment of each Python here and try it"
 
