@@ -9,20 +9,8 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.errors import DataError
-from finlab.evaluation.hard_geometry import (
-    BIG,
-    TINY,
-    DrawLayout,
-    clustered,
-    coincident,
-    collinear,
-    parallel,
-    perturbed,
-    scaled,
-    stacked,
-)
 from finlab.evaluation.noisy_tables import noisy_table
-from finlab.layout import Layout, random_layout
+from finlab.layout import FinModelSpec, Layout, random_layout
 from finlab.layout.angles import wrapped
 from finlab.layout.random import TRAINING_BOX
 from finlab.layout.random_fins import random_fin_model
@@ -38,6 +26,8 @@ NEAR_ANGLE = math.radians(2.0)
 """Nearly parallel shafts of split `near-singular` differ by at most this; opposite counts as parallel."""
 NEAR_POSITION = 0.005
 """Nearly coincident fins of split `near-singular` lie within this of each other along each axis [m]."""
+BIG, TINY = 10.0, 1.0 / 6.0
+"""Length of splits `big` and `tiny` over that of the training layouts: fins out to 3 m and to 5 cm."""
 DOMAIN = 0x7E57
 """Leads the seed of every test case; training seeds begin otherwise."""
 OWN_SIGMA = ("fins", "fins-mixed", "tables", "big", "tiny")
@@ -91,9 +81,9 @@ def make_split(name: str, n_layouts: int, n_targets: int, seed: int) -> list[Cas
 
 
 def _make_case(split: str, n_targets: int, seed: int, k: int) -> Case:
-    entropy = (DOMAIN, list(SPLITS).index(split), seed, k)
+    entropy = (DOMAIN, SPLITS[split][0], seed, k)
     layout_seed, target_seed, sigma_seed = np.random.SeedSequence(entropy).spawn(3)
-    layout, failed = SPLITS[split](np.random.default_rng(layout_seed), f"{split}-{seed}-{k}")
+    layout, failed = SPLITS[split][1](np.random.default_rng(layout_seed), f"{split}-{seed}-{k}")
     plant = Plant(layout.without(failed))
     targets = plant.wrench(plant.sample(np.random.default_rng(target_seed), (n_targets,)))
     own = own_sigma(plant, np.random.default_rng(sigma_seed)) if split in OWN_SIGMA else None
@@ -113,12 +103,24 @@ Draw = Callable[[np.random.Generator, str], tuple[Layout, tuple[str, ...]]]
 
 def _whole(**options: Any) -> Draw:
     """Layouts of which no fin has failed; options of `random_layout`."""
-    return _healthy(lambda rng, name: random_layout(rng, name, **options))
+    return lambda rng, name: (random_layout(rng, name, **options), ())
 
 
-def _healthy(draw: DrawLayout) -> Draw:
-    """The same for layouts drawn in another way."""
-    return lambda rng, name: (draw(rng, name), ())
+def _scaled(size: float) -> Draw:
+    """Layouts as in training, times a size: places and blades; a bigger blade's tip moves no faster."""
+
+    def draw(rng: np.random.Generator, name: str) -> tuple[Layout, tuple[str, ...]]:
+        layout, blade = random_layout(rng, name), FinModelSpec().values()
+        bigger = ("area", float(blade["area"]) * size**2), ("lever", float(blade["lever"]) * size)
+        fins = []
+        for fin in layout.fins:
+            x, y, z = (size * np.array(fin.position)).tolist()
+            low, high = fin.limits.frequency
+            slower = replace(fin.limits, frequency=(low / max(size, 1.0), high / max(size, 1.0)))
+            fins.append(replace(fin, position=(x, y, z), model=FinModelSpec("drag", bigger), limits=slower))
+        return replace(layout, fins=tuple(fins)), ()
+
+    return draw
 
 
 def _failure(rng: np.random.Generator, name: str) -> tuple[Layout, tuple[str, ...]]:
@@ -166,26 +168,19 @@ def _tables(rng: np.random.Generator, name: str) -> tuple[Layout, tuple[str, ...
     return replace(layout, fins=tuple(noisy_table(own, fin, f"{name}-{fin.name}") for fin, own in noise)), ()
 
 
-SPLITS: dict[str, Draw] = {
-    "id": _whole(),
-    "ood": _whole(box=OOD_BOX, outside=TRAINING_BOX),
-    "ood-fins": _whole(n_fins=OOD_FINS),
-    "limits": _whole(limits="varied"),
-    "failure": _failure,
-    "near-singular": _near_singular,
-    "fins": _fins,
-    "fins-mixed": _fins_mixed,
-    "tables": _tables,
-    "many-fins": _whole(n_fins=MANY_FINS),
-    "perturbed": _healthy(perturbed),
-    "parallel": _healthy(parallel),
-    "collinear": _healthy(collinear),
-    "clustered": _healthy(clustered),
-    "coincident": _healthy(coincident),
-    "stacked": _healthy(stacked),
-    "big": _healthy(scaled(BIG)),
-    "tiny": _healthy(scaled(TINY)),
+SPLITS: dict[str, tuple[int, Draw]] = {
+    "id": (0, _whole()),
+    "ood": (1, _whole(box=OOD_BOX, outside=TRAINING_BOX)),
+    "ood-fins": (2, _whole(n_fins=OOD_FINS)),
+    "limits": (3, _whole(limits="varied")),
+    "failure": (4, _failure),
+    "near-singular": (5, _near_singular),
+    "fins": (6, _fins),
+    "fins-mixed": (7, _fins_mixed),
+    "tables": (8, _tables),
+    "many-fins": (9, _whole(n_fins=MANY_FINS)),
+    "big": (16, _scaled(BIG)),
+    "tiny": (17, _scaled(TINY)),
 }
-"""Name -> how a layout and its failed fins are drawn. The order is part of the seed: append only."""
-GEOMETRIES = ("perturbed", "parallel", "collinear", "clustered")
-"""Splits of which nothing but the places and shafts of the fins is out of the ordinary."""
+"""Name -> a number that is part of the seed and of no other split, and how a layout and its failed fins are
+drawn."""

@@ -52,7 +52,7 @@ def run(
         layout: a layout file, graph file or shipped name in place of a split: one case, of that many targets,
             with errors over the robot's own wrenches.
         split: names, or all: id, ood, ood-fins, limits, failure, near-singular, fins, fins-mixed, tables,
-            many-fins, perturbed, parallel, collinear, clustered, coincident, stacked, big, tiny.
+            many-fins, big, tiny.
         methods: names; by default search and paper, on LAYOUT all that are installed. An objective may
             follow, as in search-effort, and a number of starts ipopt, as in ipopt-32.
         layouts: of each split.

@@ -1,5 +1,6 @@
 """The search on fins that nobody has seen: exact, and as cheap as brute force finds, whatever they are."""
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,9 +10,8 @@ from numpy.typing import NDArray
 
 from finlab.allocation import load_allocator
 from finlab.assets import shipped_layouts
-from finlab.evaluation.hard_geometry import coincident
 from finlab.evaluation.splits import make_split
-from finlab.layout import Fin, FinModelSpec, Layout, load_layout
+from finlab.layout import Fin, FinModelSpec, Layout, load_layout, random_layout
 from finlab.physics import Plant
 from finlab.physics.objective import Name, Objective
 from tests.allocation.search.reference import least_cost
@@ -119,6 +119,15 @@ def test_pure_axes_of_symmetric_robots(name: str) -> None:
         answer = method.allocate(layout, target)
         bound = method.bound(answer)
         assert answer.err_norm < 1e-5 and bound <= answer.power < 1.02 * bound
+
+
+def coincident(rng: np.random.Generator, name: str) -> Layout:
+    """Two of three to six fins share their place, with shafts along or against each other."""
+    layout = random_layout(rng, name, n_fins=(3, 6))
+    first, second, *others = layout.fins
+    turned = first.mounting_angle + (math.pi if rng.random() < 0.5 else 0.0)
+    twin = replace(second, position=first.position, mounting_angle=math.remainder(turned, 2.0 * math.pi))
+    return replace(layout, fins=(first, twin, *others))
 
 
 @pytest.mark.parametrize("objective", OBJECTIVES)
