@@ -54,7 +54,7 @@ class MeanForce:
         return result
 
 
-class RippleForce:
+class RippleForce(MeanForce):
     """The mean force in two pulses per cycle, and a ripple of mean zero on top.
 
     The ripple is what a rigid plate of `Blade` feels normal to itself: the momentum of the water that it
@@ -67,13 +67,12 @@ class RippleForce:
     blade = Blade()
 
     def __init__(self, layout: Layout) -> None:
-        self._mean = MeanForce(layout)
-        self.columns = self._mean.columns
+        super().__init__(layout)
         self._momentum = np.zeros((layout.n_fins, 2))
 
     def step(self, motion: FinMotion, dt: float, water: Array = STILL) -> Array:
         length = self.blade.length
-        force = self._mean.step(motion, dt) * (1.0 - np.cos(2 * motion.phase))[:, None]
+        force = super().step(motion, dt) * (1.0 - np.cos(2 * motion.phase))[:, None]
         angle, speed = motion.angle + math.pi, motion.speed
         normal = np.stack([-np.sin(angle), np.cos(angle)], axis=-1)
         momentum = 0.5 * self.blade.virtual_mass * length**2 * speed[:, None] * normal

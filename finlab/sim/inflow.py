@@ -20,18 +20,15 @@ MOST = 0.4
 """Largest share that is lost, at a speed far beyond that of the tip."""
 
 
-class InflowForce:
-    """The fins of one layout; its `step` is that of `FinForce`."""
-
-    step_s = 0.02
+class InflowForce(MeanForce):
+    """The fins of one layout."""
 
     def __init__(self, layout: Layout) -> None:
-        self._mean = MeanForce(layout)
-        self.columns = self._mean.columns
+        super().__init__(layout)
         self._length = plant_of(layout).blade.length
 
     def step(self, motion: FinMotion, dt: float, water: Array = STILL) -> Array:
-        force = self._mean.step(motion, dt, water)
+        force = super().step(motion, dt, water)
         # What a newton does to the robot is what the robot's motion does to the fin's foot.
         foot = self.columns @ water
         speed = (foot * force).sum(axis=-1) / np.maximum(np.linalg.norm(force, axis=-1), 1e-9)

@@ -8,11 +8,9 @@ import math
 
 import numpy as np
 
-from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.layout.arrays import force_columns
-from finlab.sim.fin_force import STILL, MeanForce
-from finlab.vehicle.fin_motion import FinMotion
+from finlab.sim.fin_force import MeanForce
 
 CENTER = (-0.016, 0.012, 0.0)
 """The true centre of gravity as the layout's frame sees it [m]: 2 cm off."""
@@ -20,15 +18,10 @@ ASKEW = math.radians(5.0)
 """How far fins are turned about the vertical [rad], one this way and the next that way."""
 
 
-class OffsetForce:
-    """The fins of one layout; its `step` is that of `FinForce`."""
-
-    step_s = 0.02
+class OffsetForce(MeanForce):
+    """The fins of one layout."""
 
     def __init__(self, layout: Layout) -> None:
-        self._mean = MeanForce(layout)
+        super().__init__(layout)
         turned = np.where(np.arange(layout.n_fins) % 2 == 0, ASKEW, -ASKEW)
         self.columns = force_columns(layout.position - np.array(CENTER), layout.mounting_angle + turned)
-
-    def step(self, motion: FinMotion, dt: float, water: Array = STILL) -> Array:
-        return self._mean.step(motion, dt, water)

@@ -24,14 +24,11 @@ HALF_THRUST = 0.3
 """Thrust [N] of the front fin at which the loss is half as large as behind a very strong one."""
 
 
-class WakeForce:
-    """The fins of one layout; its `step` is that of `FinForce`."""
-
-    step_s = 0.02
+class WakeForce(MeanForce):
+    """The fins of one layout."""
 
     def __init__(self, layout: Layout) -> None:
-        self._mean = MeanForce(layout)
-        self.columns = self._mean.columns
+        super().__init__(layout)
         self._angle = layout.mounting_angle
         way = layout.position[None] - layout.position[:, None]
         distance = np.linalg.norm(way, axis=-1)
@@ -39,7 +36,7 @@ class WakeForce:
         self._near = np.exp(-((distance / REACH) ** 2)) * (distance > 1e-9)
 
     def step(self, motion: FinMotion, dt: float, water: Array = STILL) -> Array:
-        force = self._mean.step(motion, dt, water)
+        force = super().step(motion, dt, water)
         return force * (1.0 - self.loss(force))[:, None]
 
     def loss(self, force: Array) -> Array:

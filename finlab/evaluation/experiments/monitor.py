@@ -1,15 +1,13 @@
 """How soon and how surely a `FaultMonitor` finds a loss that is not announced, and what that costs."""
 
 import math
-import time
 from collections.abc import Iterable, Sequence
 from typing import Literal, NamedTuple
 
 import numpy as np
 
 from finlab.allocation.allocator import Allocator
-from finlab.arrays import Array
-from finlab.control import PATH_CONTROLLERS, FaultMonitor, Measurement, Verdict
+from finlab.control import PATH_CONTROLLERS, FaultMonitor
 from finlab.evaluation.experiment import Experiment
 from finlab.evaluation.experiments.closed_loop import absolute_error
 from finlab.evaluation.method_specs import load_method_spec
@@ -29,7 +27,7 @@ PUSHES_N = 0.2
 """A fin that is commanded to push less than this on average until it should be found nearly rests [N]."""
 GOALS = (
     "Aimed at: 95 % found within 3 s, 99 % of them the right fin, at most one false alarm an hour, an error "
-    "of at most 1.1 times that of the announced loss, 0.1 ms per tick."
+    "of at most 1.1 times that of the announced loss."
 )
 
 
@@ -45,21 +43,6 @@ class Loss(NamedTuple):
     whole_s: float  # time during which all fins are whole
     ate: float  # absolute trajectory error
     ate_announced: float  # that of the same swim with the loss announced; NaN where nothing is lost
-    tick_ms: float  # processor's time of the monitor per tick [ms]
-
-
-class TimedMonitor(FaultMonitor):
-    """A monitor that counts the processor's time that its steps take."""
-
-    spent_s = 0.0
-    """So far [s]."""
-
-    def step(self, measurement: Measurement, command: Array | None) -> Verdict:
-        """As `FaultMonitor.step`."""
-        start = time.process_time()
-        verdict = super().step(measurement, command)
-        self.spent_s += time.process_time() - start
-        return verdict
 
 
 def run(
@@ -135,11 +118,11 @@ def swim_loss(
     if fin is not None:
         log = loop(None).run()
         announced_ate = absolute_error(log.position, log.reference)
-    monitor = TimedMonitor(layout)
+    monitor = FaultMonitor(layout)
     return _loss(loop(monitor), monitor, fin, math.inf if fin is None else at, announced_ate)
 
 
-def _loss(swim: ClosedLoop, monitor: TimedMonitor, fin: str | None, at: float, announced_ate: float) -> Loss:
+def _loss(swim: ClosedLoop, monitor: FaultMonitor, fin: str | None, at: float, announced_ate: float) -> Loss:
     """Swims to the end and counts."""
     called: set[str] = set()
     found, right, false_alarms = math.inf, False, 0
@@ -168,7 +151,6 @@ def _loss(swim: ClosedLoop, monitor: TimedMonitor, fin: str | None, at: float, a
         whole_s=min(at, swim.time),
         ate=absolute_error(log.position, log.reference),
         ate_announced=announced_ate,
-        tick_ms=1e3 * monitor.spent_s / log.n_ticks,
     )
 
 
@@ -201,7 +183,6 @@ def _figures(losses: Sequence[Loss]) -> Row:
         "false_per_hour": alarms / hours,
         "ate": float(np.mean([loss.ate for loss in lost])),
         "ate_ratio": sum(loss.ate for loss in lost) / sum(loss.ate_announced for loss in lost),
-        "tick_ms": float(np.mean([loss.tick_ms for loss in losses])),
     }
 
 
@@ -224,12 +205,11 @@ experiment = Experiment(
         Column("false_alarms", "false alarms", "count"),
         Column("ate", "ATE", "metres", unit="m"),
         Column("ate_ratio", "over announced", "ratio"),
-        Column("tick_ms", "per tick", "three", unit="ms"),
     ),
     run=run,
     note=f"A random moment, a steady current of up to {CURRENT_M_S:g} m/s, noisy sensors. Pushing fins are "
     f"commanded to give at least {PUSHES_N:g} N in the {FOUND_WITHIN_S:g} s after their loss; the others "
-    f"nearly rest. Per tick: processor's time of the monitor. {GOALS}",
+    f"nearly rest. {GOALS}",
     quick={"layouts": ("A",), "seeds": 1},
     full={"layouts": ("A", "C"), "seeds": 1},
 )

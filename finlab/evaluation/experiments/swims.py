@@ -6,10 +6,8 @@ from itertools import product
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finlab.allocation.allocator import Allocator
-from finlab.arrays import Array
 from finlab.control.completion import LEVER_M
 from finlab.evaluation.experiment import Experiment
 from finlab.evaluation.experiments.closed_loop import ABOUT_ERRORS, LOST_M, check_names, follow_row
@@ -34,12 +32,9 @@ OURS = ("search", "mdn")
 """Beginnings of our methods' names; all others are baselines."""
 COMPARED = {"ate": "error", "driving_w": "power"}
 """What methods are compared by with the best baseline, in words."""
-FIGURES = (
-    *("ate", "rte", "depth_rmse", "driving_w", "peak_w", "out_of_reach", "rests_per_min", "cpu_s_per_min"),
-    *("turn", "frequency_step", "amplitude_step"),
-)
+FIGURES = (*("ate", "rte", "depth_rmse", "driving_w", "peak_w", "out_of_reach", "cpu_s_per_min", "turn"),)
 """All figures of a swim."""
-LARGEST = ("turn", "frequency_step", "amplitude_step", "peak_w")
+LARGEST = ("turn", "peak_w")
 """Those of which a row has the largest of its swims, not the mean."""
 
 Swims = Mapping[tuple[str, tuple[str, ...], int], Row]
@@ -97,24 +92,15 @@ def swim_figures(log: RunLog, cpu_s: float) -> Row:
     """
     minutes = log.n_ticks * float(log.time[1] - log.time[0]) / 60.0
     gap = np.linalg.norm((log.asked - log.allocated) / [1, 1, 1, LEVER_M, LEVER_M, LEVER_M], axis=1)
-    step = command_change(log.command)
+    turn = command_change(log.command)[..., 2]
     works = log.command[..., 0] > 0.0  # not so for lost fins, which are NaN
-    known = np.isfinite(log.command[..., 0])
-    both, kept = works[1:] & works[:-1], known[1:] & known[:-1]
     return {
         **follow_row(log),
         "peak_w": float(log.driving_power.sum(axis=1).max()),
-        "turn": _largest(step[..., 2], both),
-        "frequency_step": _largest(step[..., 1], both),
-        "amplitude_step": _largest(step[..., 0], kept),
-        "rests_per_min": float(((works[1:] != works[:-1]) & kept).sum() / minutes),
+        "turn": float(turn[works[1:] & works[:-1]].max(initial=0.0)),
         "out_of_reach": float((gap > GAP_N).mean()),
         "cpu_s_per_min": cpu_s / minutes,
     }
-
-
-def _largest(values: Array, where: NDArray[np.bool_]) -> float:
-    return float(values[where].max(initial=0.0))
 
 
 def day_rows(day: HardDay, done: Mapping[str, Swims]) -> list[Row]:

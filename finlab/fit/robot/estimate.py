@@ -56,7 +56,7 @@ class Windows(NamedTuple):
 
 @dataclass(frozen=True)
 class Fitted:
-    """Unknowns that were found."""
+    """Unknowns, and the problem near them, the windows' beginnings eliminated."""
 
     unknowns: Unknowns
     """What they are."""
@@ -64,14 +64,33 @@ class Fitted:
     """(size,), in scales."""
     start: Array
     """States in which the windows begin (12, W)."""
+    cost: Array
+    """Half the sum of squares (1,)."""
+    gradient: Array
+    """Its slopes by the unknowns (size,), downwards."""
     information: Array
-    """Second derivatives of half the cost by the unknowns (size, size), with what was believed before."""
+    """Its second derivatives (size, size), with what was believed before."""
+    own_information: Array
+    """What each window brings to them (W, size, size)."""
     scores: Array
-    """Slopes of half the cost of each window (W, size)."""
+    """And to the slopes (W, size)."""
     residual: Array
     """Measured less simulated, in deviations (L, 12, W); NaN where nothing was measured."""
     state: Array
     """Simulated states (L, 12, W)."""
+    inner: Array
+    """Inverse second derivatives by the beginnings (W, 12, 12)."""
+    mixed: Array
+    """By beginnings and unknowns (W, 12, size)."""
+    pull: Array
+    """Slopes by the beginnings (W, 12), downwards."""
+
+    def step(self, damping: float) -> tuple[Array, Array]:
+        """Changes of the unknowns (size,) and of the beginnings (12, W)."""
+        damped = self.information + damping * np.diag(np.diag(self.information))
+        change = np.asarray(np.linalg.solve(damped, self.gradient), np.float64)
+        pull = self.pull - self.mixed @ change
+        return change, (self.inner @ pull[..., None])[..., 0].T * START_DEVIATION[:, None]
 
 
 def cut(n_steps: list[int], measured: Array, smooth: Array) -> Windows:
@@ -113,13 +132,12 @@ def fit_windows(
     begin = windows.start if start is None else start
     steps = iter(range(MOST_STEPS))
 
-    def moved(at: _Linear, damping: Array, last: bool) -> _Linear:
+    def moved(at: Fitted, damping: Array, last: bool) -> Fitted:
         tell(next(steps))
         change, shift = at.step(float(damping[0]))
         return problem.after(at, at.vector + change, at.start + shift)
 
-    at = levenberg_marquardt(problem.at(vector, begin), moved, MOST_STEPS, DAMPING, SETTLED)
-    return Fitted(unknowns, at.vector, at.start, at.information, at.scores, at.residual, at.state)
+    return levenberg_marquardt(problem.at(vector, begin), moved, MOST_STEPS, DAMPING, SETTLED)
 
 
 def unseen_gains(
@@ -163,42 +181,6 @@ def unseen_gains(
 
 
 @dataclass(frozen=True)
-class _Linear:
-    """The problem near some unknowns, the windows' beginnings eliminated."""
-
-    cost: Array
-    """(1,)."""
-    vector: Array
-    start: Array
-    gradient: Array
-    information: Array
-    own_information: Array
-    """What each window brings to it (W, size, size)."""
-    scores: Array
-    """And to the gradient (W, size)."""
-    residual: Array
-    state: Array
-    inner: Array
-    """Inverse second derivatives by the beginnings (W, 12, 12)."""
-    mixed: Array
-    """(W, 12, size)."""
-    pull: Array
-    """(W, 12)."""
-
-    def step(self, damping: float) -> tuple[Array, Array]:
-        """Changes of the unknowns (size,) and of the beginnings (12, W)."""
-        damped = self.information + damping * np.diag(np.diag(self.information))
-        change = np.asarray(np.linalg.solve(damped, self.gradient), np.float64)
-        return change, self.step_of_starts(change)
-
-    def step_of_starts(self, change: Array) -> Array:
-        """Changes of the beginnings (12, W) that go with those of the unknowns (size,)."""
-        pull = self.pull - self.mixed @ change
-        result: Array = (self.inner @ pull[..., None])[..., 0].T * START_DEVIATION[:, None]
-        return result
-
-
-@dataclass(frozen=True)
 class _Problem:
     """What is looked for, and what it is held against."""
 
@@ -207,13 +189,13 @@ class _Problem:
     windows: Windows
     deviation: Array
 
-    def after(self, at: _Linear, vector: Array, start: Array) -> _Linear:
+    def after(self, at: Fitted, vector: Array, start: Array) -> Fitted:
         """The problem at other unknowns (size,) and beginnings (12, W); where those cost more, none of it but
         that is worked out."""
         cost = self.cost(vector, start)
         return self.at(vector, start) if cost < at.cost[0] else replace(at, cost=np.array([np.inf]))
 
-    def at(self, vector: Array, start: Array) -> _Linear:
+    def at(self, vector: Array, start: Array) -> Fitted:
         """The problem at unknowns (size,) and beginnings (12, W), derivatives by differences."""
         n, windows, unknowns = self.unknowns.size, self.windows, self.unknowns
         vectors = np.concatenate([vector[None], vector + DIFFERENCE * np.eye(n)])
@@ -243,7 +225,8 @@ class _Problem:
         whole = own - mixed.swapaxes(1, 2) @ inner @ mixed
         scores = np.einsum("wkm,wm->wk", by[:, :n], r) - np.einsum("wkn,wkl,wl->wn", mixed, inner, pull)
         believed = unknowns.believed
-        return _Linear(
+        return Fitted(
+            unknowns=unknowns,
             cost=np.array([self._half(left, vector, start)]),
             vector=vector,
             start=start,
