@@ -48,7 +48,7 @@ class FinMotion(FinLag):
 
     @property
     def amplitude(self) -> Array:
-        """Half amplitude [rad]; a view, and so are the next three."""
+        """Half amplitude [rad]; a view, and so are the next two."""
         amplitude: Array = self._value[0]
         return amplitude
 
@@ -57,12 +57,6 @@ class FinMotion(FinLag):
         """[Hz]."""
         frequency: Array = self._value[1]
         return frequency
-
-    @property
-    def amplitude_rate(self) -> Array:
-        """[rad/s]."""
-        rate: Array = self._rate[0]
-        return rate
 
     @property
     def direction_rate(self) -> Array:
@@ -84,12 +78,7 @@ class FinMotion(FinLag):
     @property
     def speed(self) -> Array:
         """The fins' angular speeds [rad/s]."""
-        swing = TURN * self.frequency
-        return (
-            self.direction_rate
-            + self.amplitude_rate * np.sin(self.phase)
-            + self.amplitude * swing * np.cos(self.phase)
-        )
+        return self.speed_and_acceleration()[0]
 
     def speed_and_acceleration(self) -> tuple[Array, Array]:
         """The fins' angular speeds [rad/s] and accelerations [rad/s^2], those of servos that change their aim

@@ -14,7 +14,6 @@ from finlab.evaluation.method_specs import load_method_spec
 from finlab.evaluation.progress import progress
 from finlab.evaluation.report.document import Column, Row
 from finlab.layout import Layout, load_layout
-from finlab.physics import plant_of
 from finlab.sim import ClosedLoop, FinFault, SteadyCurrent, Trajectory, make_trajectory
 
 FOUND_WITHIN_S = 3.0
@@ -23,8 +22,6 @@ QUIET_S = 10.0
 """Neither in the first nor in the last seconds of a swim is a fin lost [s]."""
 CURRENT_M_S = 0.05
 """Fastest current, whatever its heading [m/s]."""
-PUSHES_N = 0.2
-"""A fin that is commanded to push less than this on average until it should be found nearly rests [N]."""
 GOALS = (
     "Aimed at: 95 % found within 3 s, 99 % of them the right fin, at most one false alarm an hour, an error "
     "of at most 1.1 times that of the announced loss."
@@ -38,7 +35,6 @@ class Loss(NamedTuple):
     fin: str | None  # the fin that is lost, if one is
     found_s: float  # from the loss until a fin is called lost; infinite where none is
     right: bool  # whether it is the one
-    pushes: bool  # whether the fin is commanded to push when it is lost
     false_alarms: int  # how often a whole fin is called lost
     whole_s: float  # time during which all fins are whole
     ate: float  # absolute trajectory error
@@ -136,17 +132,11 @@ def _loss(swim: ClosedLoop, monitor: FaultMonitor, fin: str | None, at: float, a
             false_alarms += 1
         called = now
     log = swim.log
-    pushes = False
-    if fin is not None:
-        soon = (log.time >= at) & (log.time < at + FOUND_WITHIN_S) & np.isfinite(log.command[:, 0, 0])
-        force = plant_of(swim.layout).forces(log.command[soon])[:, swim.layout.index(fin)]
-        pushes = bool(np.linalg.norm(force, axis=-1).mean() >= PUSHES_N) if soon.any() else True
     return Loss(
         swim.layout.name,
         fin,
         found,
         right,
-        pushes,
         false_alarms,
         whole_s=min(at, swim.time),
         ate=absolute_error(log.position, log.reference),
@@ -168,14 +158,11 @@ def monitoring_rows(losses: Sequence[Loss]) -> list[Row]:
 def _figures(losses: Sequence[Loss]) -> Row:
     lost = [loss for loss in losses if loss.fin is not None]
     found = [loss for loss in lost if math.isfinite(loss.found_s)]
-    pushing = [loss for loss in lost if loss.pushes]
     hours = sum(loss.whole_s for loss in losses) / 3600.0
     alarms = sum(loss.false_alarms for loss in losses)
     return {
         "losses": len(lost),
         "found": _share(loss.found_s <= FOUND_WITHIN_S for loss in lost),
-        "pushing": len(pushing),
-        "found_pushing": _share(loss.found_s <= FOUND_WITHIN_S for loss in pushing),
         "right": _share(loss.right for loss in found),
         "found_s": float(np.median([loss.found_s for loss in found])) if found else None,
         "hours": hours,
@@ -198,7 +185,6 @@ experiment = Experiment(
         Column("layout", "layout"),
         Column("losses", "losses", "count"),
         Column("found", f"found within {FOUND_WITHIN_S:g} s", "share"),
-        Column("found_pushing", "of pushing fins", "share"),
         Column("right", "right fin", "share"),
         Column("found_s", "found after", "three", unit="s"),
         Column("hours", "whole", "three", unit="h"),
@@ -207,9 +193,7 @@ experiment = Experiment(
         Column("ate_ratio", "over announced", "ratio"),
     ),
     run=run,
-    note=f"A random moment, a steady current of up to {CURRENT_M_S:g} m/s, noisy sensors. Pushing fins are "
-    f"commanded to give at least {PUSHES_N:g} N in the {FOUND_WITHIN_S:g} s after their loss; the others "
-    f"nearly rest. {GOALS}",
+    note=f"A random moment, a steady current of up to {CURRENT_M_S:g} m/s, noisy sensors. {GOALS}",
     quick={"layouts": ("A",), "seeds": 1},
     full={"layouts": ("A", "C"), "seeds": 1},
 )

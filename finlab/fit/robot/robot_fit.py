@@ -163,7 +163,7 @@ def _fit(layout: Layout, swims: Sequence[Swim], tried: Sequence[str], stages: St
     fitted = fit_windows(model, fitted.unknowns, windows, deviation, fitted.vector, fitted.start, stages.step)
     if not np.isfinite(fitted.vector).all():
         raise DataError(f"{swims[0].name}: the fit goes astray; is the layout that of the robot that swam?")
-    return RobotFit(model, fitted, deviation, _explained(fitted, windows), trials, _notes(swims, windows))
+    return RobotFit(model, fitted, deviation, _explained(fitted, windows), trials, _notes(windows))
 
 
 def _with_what_helps(
@@ -245,12 +245,7 @@ def _explained(fitted: Fitted, windows: Windows) -> float:
     return float(np.mean(shares)) if shares else 0.0
 
 
-def _notes(swims: Sequence[Swim], windows: Windows) -> tuple[str, ...]:
+def _notes(windows: Windows) -> tuple[str, ...]:
     """What to know of the data."""
-    notes = []
-    if any(swim.replayed for swim in swims):
-        notes.append("what the fins did was worked out from their commands, with nominal servos")
     silent = [name for k, name in enumerate(CHANNELS) if not np.isfinite(windows.measured[:, k]).any()]
-    if silent:
-        notes.append(f"nothing was measured of {', '.join(silent)}")
-    return tuple(notes)
+    return (f"nothing was measured of {', '.join(silent)}",) if silent else ()

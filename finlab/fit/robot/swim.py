@@ -6,7 +6,6 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.layout import Layout
-from finlab.layout.angles import TURN
 from finlab.vehicle.fin_motion import FinMotion
 from finlab.vehicle.many_bodies import body_rates, body_velocity
 
@@ -35,8 +34,6 @@ class Swim:
     there is nothing new."""
     command: Array
     """What was commanded of the fins for each step (N, n, 3), NaN for a fin that was lost."""
-    replayed: bool = False
-    """Whether what the fins did was worked out from their commands, with nominal servos."""
 
     def __len__(self) -> int:
         return len(self.motion)
@@ -45,35 +42,14 @@ class Swim:
 def replay(layout: Layout, command: Array) -> Array:
     """What fins with nominal servos do (N, SUBSTEPS, n, 3) under commands (N, n, 3), one per step, NaN for a
     lost fin."""
-    return _nominal(layout, command)[0]
-
-
-def between(layout: Layout, ends: Array, command: Array) -> Array:
-    """What fins did (N, SUBSTEPS, n, 3) by what they did at the end of each step (N, n, 3): what nominal
-    servos do under the commands (N, n, 3), and in a straight line what those differ by at both ends."""
-    nominal, nominal_ends = _nominal(layout, command)
-    off = ends - nominal_ends
-    off[..., 2] = np.mod(off[..., 2] + np.pi, TURN) - np.pi
-    before = np.concatenate([np.zeros_like(off[:1]), off[:-1]])
-    share = (np.arange(SUBSTEPS) + 0.5)[:, None, None] / SUBSTEPS
-    motion: Array = nominal + before[:, None] + share * (off - before)[:, None]
-    lost = np.asarray(~np.isfinite(command[..., 0]))
-    motion[..., :2] = np.where(lost[:, None, :, None], 0.0, motion[..., :2])
-    return motion
-
-
-def _nominal(layout: Layout, command: Array) -> tuple[Array, Array]:
-    """What nominal servos do in the middle of substeps (N, SUBSTEPS, n, 3) and at the ends of steps."""
     fins = FinMotion(layout)
     motion = np.empty((len(command), SUBSTEPS, *command.shape[1:]))
-    ends = np.empty_like(command)
     for k, row in enumerate(command):
         for s in range(SUBSTEPS):
             fins.step(row, STEP_S / SUBSTEPS / 2)
             motion[k, s] = fins.command
             fins.step(row, STEP_S / SUBSTEPS / 2)
-        ends[k] = fins.command
-    return motion, ends
+    return motion
 
 
 def only_new(measured: Array) -> Array:

@@ -20,7 +20,7 @@ from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.files.archive import check_shapes, json_of, read_arrays
 from finlab.files.csv_table import read_table
-from finlab.fit.robot.swim import ANGLES, CHANNELS, STEP_S, Swim, between, only_new, replay
+from finlab.fit.robot.swim import ANGLES, CHANNELS, STEP_S, Swim, only_new, replay
 from finlab.layout import Layout
 from finlab.layout.fin import MAX_AMPLITUDE, MAX_FREQUENCY
 
@@ -49,7 +49,7 @@ def read_swim(path: str | os.PathLike[str], layout: Layout) -> Swim:
 
 def _log(path: Path, layout: Layout) -> Swim:
     """A log of `finlab simulate`."""
-    names = ("time", "measured", "command", "fin_motion")
+    names = ("time", "measured", "command")
     arrays = read_arrays(path, ("meta", *names), MAX_BYTES, "a swim log written by finlab simulate")
     meta = json_of(arrays["meta"], f"{path}: meta")
     said = meta.get("fins") if isinstance(meta, dict) else None
@@ -60,18 +60,17 @@ def _log(path: Path, layout: Layout) -> Swim:
             f"{', '.join(layout.names)}"
         )
     n = arrays["time"].size
-    commands = (n, len(fins), 3)
-    shapes = {"time": (n,), "measured": (n, 12), "command": commands, "fin_motion": commands}
-    check_shapes(arrays, shapes, str(path))
-    time, measured, command, motion = (np.asarray(arrays[name], np.float64) for name in names)
-    if not (np.isfinite(motion).all() and np.isfinite(time).all()):
-        raise DataError(f"{path}: expected finite numbers in time and fin_motion")
+    check_shapes(arrays, {"time": (n,), "measured": (n, 12), "command": (n, len(fins), 3)}, str(path))
+    time, measured, command = (np.asarray(arrays[name], np.float64) for name in names)
+    if not np.isfinite(time).all():
+        raise DataError(f"{path}: expected finite numbers in time")
     order = [fins.index(name) for name in layout.names]
     if len(time) > 1 and not np.allclose(np.diff(time), STEP_S):
         raise DataError(f"{path}: expected a row every {STEP_S:g} s, as finlab simulate writes them")
     _check_duration(len(time) * STEP_S, path)
-    command, motion = command[:, order], motion[:, order]
-    return Swim(path.name, between(layout, motion, command), only_new(measured), command)
+    command = command[:, order]
+    _check_commands(command, np.arange(1, n + 1), layout, path)
+    return Swim(path.name, replay(layout, command), only_new(measured), command)
 
 
 def _check_duration(seconds: float, path: Path) -> None:
@@ -101,7 +100,7 @@ def _csv(path: Path, layout: Layout) -> Swim:
     grid = np.arange(time[0], time[-1], STEP_S)
     held = np.searchsorted(time, grid + 1e-6, side="right") - 1
     command, measured = command[held], _on_grid(time, only_new(measured), grid)
-    return Swim(path.name, replay(layout, command), measured, command, True)
+    return Swim(path.name, replay(layout, command), measured, command)
 
 
 class _Column(NamedTuple):

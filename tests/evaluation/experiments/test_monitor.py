@@ -10,21 +10,20 @@ from finlab.evaluation.experiments.monitor import Loss, monitoring_rows, swim_lo
 from finlab.layout import Layout
 from finlab.sim import Trajectory
 
-QUICK = Loss("A", "bow", 1.0, True, True, 0, 900.0, 0.06, 0.05)
+QUICK = Loss("A", "bow", 1.0, True, 0, 900.0, 0.06, 0.05)
 
 
 def test_shares_hours_and_ratios() -> None:
     losses = [
         QUICK,
         QUICK._replace(found_s=2.0, right=False),
-        QUICK._replace(found_s=4.0, pushes=False),
-        QUICK._replace(found_s=math.inf, right=False, pushes=False),
+        QUICK._replace(found_s=4.0),
+        QUICK._replace(found_s=math.inf, right=False),
         QUICK._replace(fin=None, false_alarms=2, found_s=math.inf, right=False, ate=9.0),
     ]
     one, every = monitoring_rows(losses)
     assert (one["layout"], every["layout"]) == ("A", "all")
     assert every["losses"] == 4 and every["found"] == 0.5
-    assert every["pushing"] == 2 and every["found_pushing"] == 1.0
     assert every["right"] == pytest.approx(2 / 3) and every["found_s"] == 2.0
     assert every["hours"] == pytest.approx(1.25) and every["false_per_hour"] == pytest.approx(1.6)
     assert every["ate_ratio"] == pytest.approx(1.2)

@@ -1,17 +1,15 @@
 """CSV files of swims: what is read, and one sentence for whatever is wrong with them."""
 
 import csv
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from finlab.errors import DataError
-from finlab.fit.robot.swim import between, smoothed
+from finlab.fit.robot.swim import smoothed
 from finlab.fit.robot.swim_file import read_swim
-from finlab.layout import Layout, Servo, load_layout
-from finlab.vehicle.fin_motion import FinMotion
+from finlab.layout import Layout, load_layout
 from tests.fit.robot.swims import write_csv
 
 STEPS = 400
@@ -162,20 +160,3 @@ def test_logs_of_another_robot_are_refused(pair: Layout, tmp_path: Path) -> None
     with pytest.raises(DataError, match="is of a robot with the fins"):
         read_swim(tmp_path / "log.npz", load_layout("A"))
     assert len(read_swim(tmp_path / "log.npz", pair)) == 300
-
-
-@pytest.mark.parametrize(("servo", "error"), [(Servo(), 1e-9), (Servo(5.0, 5.0, 2.5), 0.03)])
-def test_what_fins_did_within_a_step_follows_from_its_ends(servo: Servo, error: float) -> None:
-    """Nominal servos exactly, slower ones nearly; a straight line between the ends misses by 0.06 Hz."""
-    layout, rng = load_layout("pair"), np.random.default_rng(2)
-    slow = replace(layout, fins=tuple(replace(fin, servo=servo) for fin in layout.fins))
-    span = (layout.upper - layout.lower) * (1.0, 1.0, 0.2)
-    command = np.repeat(layout.lower * (1.0, 1.0, 0.2) + span * rng.random((15, 2, 3)), 3, axis=0)
-    fins, did, ends = FinMotion(slow), np.empty((45, 2, 2, 3)), np.empty((45, 2, 3))
-    for k, row in enumerate(command):
-        for quarter in range(4):
-            fins.step(row, 0.025)
-            if quarter in (0, 2):
-                did[k, quarter // 2] = fins.command
-        ends[k] = fins.command
-    assert np.abs(between(layout, ends, command) - did).max() < error
