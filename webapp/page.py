@@ -34,7 +34,6 @@ from webapp.tasks.opening import Opening
 from webapp.tasks.reading import Reading
 from webapp.tasks.solver import Solver
 from webapp.tasks.sweeping import Sweep
-from webapp.tasks.swim_files import SwimFiles
 from webapp.tasks.swimming import Swimming
 from webapp.theme import VERMILLION
 from webapp.uploads import Uploads
@@ -87,7 +86,6 @@ class Page(ABC):
         self.fitting = Fitting(context)
         self.comparison = Comparison(context)
         self.swimming = Swimming(context, self._swam)
-        self.swim_files = SwimFiles(context, self.swimming, self._swam)
         self.sweep = Sweep(context)
         self.exports = Exports(context)
         self.scenery = Scenery(context, self.swimming)

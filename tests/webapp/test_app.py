@@ -132,11 +132,8 @@ def test_names_are_escaped(server: viser.ViserServer, view: View) -> None:
     on_loop(server, lambda: view.do(lambda: view.session.toggle_failure(evil)))
 
 
-def test_html_export_is_one_file(server: viser.ViserServer, view: View) -> None:
+def test_graph_and_bundle_are_sent(server: viser.ViserServer, view: View) -> None:
     until(lambda: not view.busy)
-    on_loop(server, lambda: view.do(lambda: view.exports.html(view.shown)))
-    until(lambda: "ucat.html" in view.client.files)
-    assert b"__VISER_EMBED_DATA__" in view.client.files["ucat.html"]
     on_loop(server, lambda: view.do(view.exports.graph))
     until(lambda: "ucat.graph.json" in view.client.files)
     on_loop(server, lambda: view.do(view.exports.bundle))

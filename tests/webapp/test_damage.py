@@ -3,7 +3,6 @@
 import json
 import math
 
-import numpy as np
 import pytest
 
 from finlab.assets import shipped_layouts
@@ -15,7 +14,7 @@ from webapp.markup.answer import fin_table
 from webapp.markup.snippets import command_line, python_lines
 from webapp.markup.words import damage_words
 from webapp.session import Session
-from webapp.session.search_request import ALL, SearchRequest, parsed_mission
+from webapp.session.search_request import SearchRequest
 from webapp.session.session_files import restore, to_dict
 from webapp.session.swim_plan import ALONE, OWN, SwimSettings
 from webapp.session.targets import axis_reach, full_thrust
@@ -85,30 +84,26 @@ def test_the_page_may_send_anything(session: Session) -> None:
     draft = session.draft
     for change in (
         lambda: draft.with_goal("<b>"),
-        lambda: draft.with_way(ALL, (math.nan, 0.0, 0.0, 0.0)),
-        lambda: draft.with_way(ALL, (0.0, 0.0, 0.0, 900.0)),
-        lambda: parsed_mission(draft.with_mission("1 2 3").mission),
+        lambda: draft.with_way((math.nan, 0.0, 0.0, 0.0)),
+        lambda: draft.with_way((0.0, 0.0, 0.0, 900.0)),
     ):
         with pytest.raises(FinlabError):
             change()
     assert session.state == before and session.draft == SearchRequest() and session.swim == SwimSettings()
-    assert len(draft.with_mission("1" * 10**6).mission) == 10_000
 
 
 def test_damage_draft_and_swim_outlive_the_server(session: Session) -> None:
     session.weaken("front_left", 0.5)
     session.jam("back_left", -2.0)
     way = (0.01, 0.02, 0.03, 40.0)
-    draft = session.draft.with_goal("power for a mission").with_held_toggled("back_right").with_way(ALL, way)
-    session.set_draft(draft.with_way("front_left", way).with_mission("1 0 0 0 0 0"))
+    draft = session.draft.with_goal("power for a mission").with_held_toggled("back_right")
+    session.set_draft(draft.with_way(way))
     for key, value in (("path", list(SHIPPED)[-1]), ("rival", "qp"), ("speed", 2.5)):
         session.set_swim(key, value)
     again = Session(UCAT)
     restore(again, json.loads(json.dumps(to_dict(session))))
     assert again.state == session.state and again.draft == session.draft and again.swim == session.swim
     assert set(again.draft.bounds(UCAT)) == set(UCAT.names) - {"back_right"}
-    assert again.draft.ways == ((ALL, way), ("front_left", way))
-    assert np.array(parsed_mission(again.draft.mission)).shape == (1, 6)
     session.set_swim("path", OWN)
     restore(again, json.loads(json.dumps(to_dict(session))))
     assert again.swim.path in SHIPPED, "the file of the path is not there any more"

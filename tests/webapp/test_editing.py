@@ -217,24 +217,6 @@ def test_new_fins_and_copies_stand_apart(session: Session) -> None:
         session.add_fin()
 
 
-def test_only_what_was_moved_snaps(session: Session) -> None:
-    session.set_display("position_snap", "5 cm")
-    session.set_display("angle_snap", "45°")
-    x, y, z = session.state.layout.fins[0].position
-    angle = session.state.layout.fins[0].mounting_angle
-    move_fin(session, "front_right", (0.262, y, z))
-    assert session.state.layout.fins[0].position == (0.25, y, z)
-    for k in range(4):
-        session.drag_fin("front_right", (0.25, y, 0.01 * k), angle)
-    session.end_drag("front_right", (0.25, y, 0.04), angle)
-    fin = session.state.layout.fins[0]
-    assert fin.position == (0.25, y, 0.05) and fin.mounting_angle == angle
-    session.drag_fin("front_right", fin.position, angle + 0.1)
-    session.end_drag("front_right", fin.position, angle + 0.4)
-    turned_fin = session.state.layout.fins[0]
-    assert turned_fin.position == fin.position and turned_fin.mounting_angle == pytest.approx(-math.pi / 4)
-
-
 def test_a_hull_that_nobody_described_stays_while_fins_move() -> None:
     session = Session(load_layout(shipped_layouts()["A"]))
     assert session.state.layout.body is None or session.state.layout.body.hull is None

@@ -16,16 +16,15 @@ from webapp.session import Session
 from webapp.tasks.exports import Exports
 from webapp.tasks.fitting import Fitting
 from webapp.tasks.improving import Improver
-from webapp.tasks.swim_files import SwimFiles
 from webapp.tasks.swimming import Swimming
 from webapp.view import View
 
 __all__ = ["app", "server", "view"]
 
 WORDS = "out of order"
-ACTING = (Session, Exports, Fitting, Improver, Swimming, SwimFiles)
+ACTING = (Session, Exports, Fitting, Improver, Swimming)
 """Whose methods the handlers of the widgets call."""
-ASKED = ("twin", "ask", "tick", "resume")
+ASKED = ("ask", "tick", "resume")
 """Methods that are called to write the page, not by its widgets."""
 
 

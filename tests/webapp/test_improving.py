@@ -18,7 +18,7 @@ from tests.webapp.loops import page_of, running
 from webapp.markup.score_card import warnings
 from webapp.session import Session
 from webapp.session.room import Room
-from webapp.session.search_request import ALL, SearchRequest, parsed_mission
+from webapp.session.search_request import SearchRequest
 from webapp.tasks.analyst import Findings, Question, find
 from webapp.tasks.background import Newest, Worker
 from webapp.tasks.improving import Improver
@@ -62,21 +62,15 @@ def test_bad_searches_are_refused() -> None:
         replace(request, held=NO_YAW.names).bounds(NO_YAW)
     for way in ((float("nan"), 0.05, 0.05, 90.0), (0.05, 0.05, 0.05, 720.0)):
         with pytest.raises(FinlabError):
-            request.with_way(ALL, way)
-    with pytest.raises(FinlabError, match="line 2"):
-        parsed_mission("1 0 0 0 0 0\n1 2 three 4 5 6")
-    with pytest.raises(FinlabError, match="line 1"):
-        parsed_mission("1 0 0 0 0 nan")
+            request.with_way(way)
 
 
-def test_each_fin_has_its_bounds_and_the_mission_is_the_users() -> None:
+def test_fins_move_within_bounds_for_the_power_of_a_mission() -> None:
     worker = Worker()
     improver = Improver(page_of(worker))
-    text = "0.5, 0 0 0 0 0.1\n\n0 0 1 0 0 0"
-    assert parsed_mission(text) == ((0.5, 0.0, 0.0, 0.0, 0.0, 0.1), (0.0, 0.0, 1.0, 0.0, 0.0, 0.0))
     first, second = NO_YAW.names[:2]
-    request = replace(SearchRequest("power for a mission", mission=text), held=NO_YAW.names[2:])
-    request = request.with_way(ALL, (0.01, 0.01, 0.0, 0.0)).with_way(second, (0.04, 0.0, 0.0, 20.0))
+    request = replace(SearchRequest("power for a mission"), held=NO_YAW.names[2:])
+    request = request.with_way((0.04, 0.01, 0.0, 0.0))
     bounds = request.bounds(NO_YAW)
     x = NO_YAW.fins[1].position[0]
     assert bounds[second].x == pytest.approx((x - 0.04, x + 0.04))
@@ -124,7 +118,7 @@ def test_what_is_proposed_can_be_built() -> None:
     assert room.broken(stuck.position[None], stuck.mounting_angle[None])[0] > 0.0
     worker = Worker()
     improver = Improver(page_of(worker))
-    request = SearchRequest().with_way(ALL, (0.15, 0.05, 0.05, 60.0))
+    request = SearchRequest().with_way((0.15, 0.05, 0.05, 60.0))
     improver.start(stuck, request)
     until(lambda: improver.findings is not None)
     found = improver.findings

@@ -64,7 +64,7 @@ def test_bad_settings_change_nothing(session: Session) -> None:
     ):
         with pytest.raises(FinlabError):
             session.set_setting(key, value)
-    for key, value in (("position_snap", "1 km"), ("speed", math.nan)):
+    for key, value in (("drawn", "1 km"), ("speed", math.nan)):
         with pytest.raises(FinlabError):
             session.set_display(key, value)
     with pytest.raises(FinlabError, match="no fin"):
@@ -86,17 +86,6 @@ def test_last_fin_can_neither_fail_nor_go(session: Session) -> None:
     session.select(session.state.layout.names[0])
     with pytest.raises(FinlabError, match="only fin"):
         session.delete_fin()
-
-
-def test_snapping_happens_when_a_drag_ends(session: Session) -> None:
-    name = session.state.layout.names[0]
-    session.set_display("position_snap", "5 cm")
-    session.set_display("angle_snap", "45°")
-    session.drag_fin(name, (0.213, -0.15, 0.0), 0.7)
-    assert session.state.layout.fins[0].position[0] == 0.213
-    session.end_drag(name, (0.213, -0.15, 0.0), 0.7)
-    assert session.state.layout.fins[0].position == pytest.approx((0.2, -0.15, 0.0))
-    assert session.state.layout.fins[0].mounting_angle == pytest.approx(math.pi / 4)
 
 
 def test_mirror_duplicate_add_and_selection(session: Session) -> None:

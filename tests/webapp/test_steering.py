@@ -114,12 +114,3 @@ def test_a_sweep_goes_to_and_fro(session: Session, monkeypatch: pytest.MonkeyPat
     assert sweep.running and seen[-3:] == pytest.approx([-0.1, 0.0, 0.1], abs=1e-12), (
         "what came between is no change"
     )
-
-
-def test_landing_tells_where_a_held_fin_would_go(session: Session) -> None:
-    name = session.state.layout.names[0]
-    assert session.landing(name, (0.3, -0.2, 0.0), 0.1) is None
-    session.set_display("angle_snap", "45°")
-    landing = session.landing(name, (0.3, -0.2, 0.0), 0.1)
-    session.end_drag(name, (0.3, -0.2, 0.0), 0.1)
-    assert landing == session.state.layout.fins[0], "the ghost tells the truth"

@@ -4,7 +4,6 @@ import io
 import zipfile
 from collections.abc import Iterator
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -19,8 +18,8 @@ from webapp.markup.swim_card import swim_card
 from webapp.panels.line_plot import with_cursor
 from webapp.session.swim_plan import Plan, SwimSettings
 from webapp.tasks.background import Worker
+from webapp.tasks.exports import Exports
 from webapp.tasks.moment import POWER, TIME, Figures
-from webapp.tasks.swim_files import SwimFiles
 from webapp.tasks.swimming import Swimming
 
 UCAT = load_layout("ucat")
@@ -34,7 +33,7 @@ class Shelf:
         client = SimpleNamespace(send_file_download=lambda name, data, **_: self.sent.update({name: data}))
         context = page_of(self.worker, client=client, notify=lambda _, text: self.notes.append(text))
         self.swimming = Swimming(context, lambda: None)
-        self.files = SwimFiles(context, self.swimming, lambda: None)
+        self.files = Exports(context)
 
     def swim(self, seconds: float, *methods: str) -> None:
         plan = Plan(UCAT, (), make_trajectory("circle"), methods)
@@ -126,49 +125,22 @@ def test_the_cursor_of_a_plot_stands_upright() -> None:
 
 def test_the_log_is_sent_as_a_table(shelf: Shelf) -> None:
     with pytest.raises(FinlabError, match="nothing has been swum"):
-        shelf.files.table()
+        shelf.files.swim(shelf.swimming.records())
     shelf.swim(2.0, "analytic")
-    shelf.files.table()
+    shelf.files.swim(shelf.swimming.records())
     until(lambda: bool(shelf.sent))
     ((name, content),) = shelf.sent.items()
-    assert name == "ucat_analytic_nominal_tracking.csv" and shelf.files.making == ""
+    assert name == "ucat_analytic_nominal_tracking.csv"
     header, *rows = content.decode().splitlines()
     assert header.startswith("t [s],x [m],") and len(rows) == 20
 
 
 def test_several_robots_are_sent_as_an_archive(shelf: Shelf) -> None:
     shelf.swim(1.0, "analytic", "qp")
-    shelf.files.table()
+    shelf.files.swim(shelf.swimming.records())
     until(lambda: bool(shelf.sent))
     names = zipfile.ZipFile(io.BytesIO(shelf.sent["ucat_analytic_nominal_tracking_csv.zip"])).namelist()
     assert names == ["ucat_analytic_nominal_tracking.csv", "ucat_qp_nominal_tracking.csv"]
-
-
-def test_pictures_are_made_beside_the_page(shelf: Shelf) -> None:
-    pytest.importorskip("matplotlib")
-    shelf.swim(0.2, "analytic")
-    with pytest.raises(FinlabError, match="too little"):
-        shelf.files.pictures()
-    shelf.swim(2.0, "analytic")
-    shelf.files.pictures()
-    assert shelf.files.making.endswith("_plots.zip")
-    with pytest.raises(FinlabError, match="is being made; wait for it"):
-        shelf.files.table()
-    until(lambda: not shelf.files.making)
-    archive = zipfile.ZipFile(io.BytesIO(shelf.sent["ucat_analytic_nominal_tracking_plots.zip"]))
-    pictures = {name.rpartition("/")[2] for name in archive.namelist()}
-    assert pictures == {"path.png", "errors.png", "commands.png", "wrench.png"}
-
-
-def test_what_fails_is_told(shelf: Shelf, monkeypatch: pytest.MonkeyPatch) -> None:
-    def broken(*_: Any, **__: Any) -> bytes:
-        raise FinlabError("the ink has dried")
-
-    monkeypatch.setattr("webapp.tasks.swim_files.save_pictures", broken)
-    shelf.swim(1.0, "analytic")
-    shelf.files.pictures()
-    until(lambda: bool(shelf.notes))
-    assert shelf.notes == ["the ink has dried"] and shelf.files.making == "" and not shelf.sent
 
 
 def test_power_is_a_column_of_the_record(shelf: Shelf) -> None:

@@ -12,7 +12,7 @@ from finlab.allocation import load_allocator
 from finlab.analysis import score_card
 from finlab.analysis.score_card import quick_check
 from finlab.assets import shipped_layouts
-from finlab.errors import FinlabError, LayoutError
+from finlab.errors import LayoutError
 from finlab.layout import FinModelSpec, load_layout
 from finlab.vehicle.body import GRAVITY
 from tests.webapp.stand_in import StandIn
@@ -156,17 +156,6 @@ def test_layout_files_go_out_and_come_back() -> None:
 def test_bad_uploads_are_refused_by_name(name: str, content: bytes, said: str) -> None:
     with pytest.raises(LayoutError, match=said):
         files.read_layout(name, content)
-
-
-def test_candidates_as_csv() -> None:
-    answer = StandIn().allocate(load_layout(shipped_layouts()["ucat"]), PRESETS["Turn"])
-    lines = files.candidates_csv(answer).decode().splitlines()
-    assert answer.candidates is not None
-    assert len(lines) == 1 + len(answer.candidates.energy)
-    assert lines[0].startswith("err_norm,missing_Fx_n,missing_Fy_n,missing_Fz_n,missing_Tx_nm,")
-    assert "missing_Tz_nm,power_w,energy,source,front_right.amplitude_rad" in lines[0]
-    with pytest.raises(FinlabError, match="no candidates"):
-        files.candidates_csv(None)
 
 
 def test_fins_in_the_way_are_told() -> None:

@@ -7,7 +7,6 @@ from webapp.markup.html import html
 from webapp.markup.picking import marker
 from webapp.markup.snippets import command_line, python_lines
 from webapp.page import Page
-from webapp.session import files
 
 
 class FilesTab:
@@ -21,20 +20,14 @@ class FilesTab:
         page.add_button("Export the bundle (ZIP)", page.exports.bundle, icon=icon, hint=about)
         parts = {
             "Graph file": page.exports.graph,
-            "Candidates (CSV)": self._send_candidates,
             "Picture (PNG)": page.exports.picture,
-            "3D view (HTML)": lambda: page.exports.html(page.shown),
         }
         page.add_buttons(
             "Single files",
             parts,
-            hint="The layout graph; all answers; what is seen, still or to be turned.",
+            hint="The layout graph, and what is seen.",
         )
         self._command = gui.add_html("")
-
-    def _send_candidates(self) -> None:
-        page = self._page
-        page.exports.download("candidates.csv", files.candidates_csv(page.answering.best))
 
     def refresh(self) -> None:
         state = self._page.session.state

@@ -16,7 +16,6 @@ from webapp.markup.html import html
 from webapp.markup.words import listed
 from webapp.page import Page
 from webapp.panels.fin_model import FinModelPanel
-from webapp.session import ANGLE_STEPS, POSITION_STEPS
 from webapp.session.state import number
 
 DRIVE = {
@@ -56,10 +55,6 @@ class FinInspector:
                     lambda: math.degrees(self._fin.mounting_angle),
                     digits=2,
                 )
-                snap_m = gui.add_dropdown("Snap place", tuple(POSITION_STEPS), hint="Grid for positions.")
-                snap_deg = gui.add_dropdown("Snap turn", tuple(ANGLE_STEPS), hint="Grid for the shaft.")
-                page.bind_display(snap_m, "position_snap")
-                page.bind_display(snap_deg, "angle_snap")
             with gui.add_folder("Limits"):
                 self._add_limits(gui)
             self._model = FinModelPanel(gui, page)

@@ -17,8 +17,7 @@ from webapp.page import Page
 from webapp.panels.damage import FinButtons
 from webapp.session.display import DRAWN
 from webapp.session.files import shipped
-from webapp.session.looking import PINNED
-from webapp.session.search_request import ALL, GOAL_WORDS, WAY, SearchRequest
+from webapp.session.search_request import GOAL_WORDS, WAY, SearchRequest
 
 SAVED = "saved state"
 """Entry of the list of layouts for the one that was opened or saved last."""
@@ -37,8 +36,6 @@ class ReachPanel:
             "Beside", (SAVED, *shipped()), hint="The layout that stands next to this one on the card."
         )
         page.on_change(self._beside, self._compare)
-        pins = {"Pin this layout": page.session.pin}
-        page.add_buttons("Put aside", pins, hint="As it is now, to compare others with.")
         self._card = gui.add_html("")
         self._changes = Changes()
 
@@ -47,8 +44,7 @@ class ReachPanel:
 
     def refresh(self) -> None:
         session = self._page.session
-        names = (SAVED, *((PINNED,) if session.pinned is not None else ()), *shipped())
-        put(self._beside, options=names, value=session.beside or SAVED)
+        put(self._beside, value=session.beside or SAVED)
         analyst, display = self._page.analyst, self._page.session.display
         put(self._alone, visible=display.drawn != "none")
         if self._changes(analyst.findings, analyst.busy, analyst.error, session.beside):
@@ -85,8 +81,6 @@ class ImprovePanel:
             "fl-movers",
             partial(self._draft, SearchRequest.with_held_toggled),
         )
-        self._whose = gui.add_dropdown("Bounds of", (ALL,), hint="All fins, or one fin with its own bounds.")
-        page.on_change(self._whose, lambda _: None)
         page.bind_number(
             gui.add_vector3("Reach ± [m]", WAY[:3], step=0.01, hint="Along x, y and z."),
             lambda reach: self._bound((*reach, self._way[3])),
@@ -110,14 +104,6 @@ class ImprovePanel:
             partial(self._draft, SearchRequest.with_symmetry),
             lambda: page.session.draft.symmetric,
         )
-        lines = "Wrenches, one line each: Fx Fy Fz Tx Ty Tz [N, N m]. Empty: the common ones."
-        self._mission = page.bind(
-            gui.add_text("Mission", "", multiline=True, hint=lines, visible=False),
-            partial(self._draft, SearchRequest.with_mission),
-            lambda: page.session.draft.mission,
-        )
-        takes = {"Add the present wrench": self._add_wrench}
-        self._take = page.add_buttons(" ", takes, hint="To the mission.", visible=False)
         stops = "Takes up to a minute; it can be stopped any time."
         offered = "What was found so far is offered."
         self._start = page.add_button("Search", self._search, icon=viser.Icon.SPARKLES, hint=stops)
@@ -134,21 +120,14 @@ class ImprovePanel:
 
     @property
     def _way(self) -> tuple[float, ...]:
-        """How far the fin may go that the widgets are about, or all fins."""
-        return self._page.session.draft.way(self._whose.value)
+        return self._page.session.draft.way
 
     def _bound(self, way: tuple[float, ...]) -> None:
-        whose = self._whose.value if self._whose.value in self._page.session.state.layout.names else ALL
-        self._draft(SearchRequest.with_way, whose, way)
+        self._draft(SearchRequest.with_way, way)
 
     def _draft(self, change: Callable[..., SearchRequest], *values: Any) -> None:
         session = self._page.session
         session.set_draft(change(session.draft, *values))
-
-    def _add_wrench(self) -> None:
-        session = self._page.session
-        line = " ".join(f"{value:g}" for value in session.state.target)
-        self._draft(SearchRequest.with_mission, f"{session.draft.mission.rstrip()}\n{line}".lstrip())
 
     def _search(self) -> None:
         session = self._page.session
@@ -187,10 +166,6 @@ class ImprovePanel:
         """Write which fins may move, and how far."""
         names, draft = self._page.session.state.layout.names, self._page.session.draft
         self._fins.refresh(names, held=draft.held)
-        put(self._whose, options=(ALL, *names))
-        mission = draft.goal == "power for a mission"
-        put(self._mission, visible=mission)
-        put(self._take, visible=mission)
 
 
 def _before_and_after(found: Improvement) -> str:

@@ -175,14 +175,11 @@ class SwimCardPanel:
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         self._page = page
         self._card = gui.add_html("")
-        files = {"Table (CSV)": page.swim_files.table, "Plots (PNG)": page.swim_files.pictures}
-        page.add_buttons("Save", files, hint="The log with units, and pictures; made on the server.")
-        self._making = gui.add_html("")
+        table = {"Table (CSV)": lambda: page.exports.swim(page.swimming.records())}
+        page.add_buttons("Save", table, hint="The log with units.")
 
     def refresh(self) -> None:
         state = self._page.session.state
         trim = trim_sentence(state.layout, axis_reach(state.able, state.failed))
         warning = "" if trim is None else html("<div class='fl missing'>{}</div>", trim)
         put(self._card, content=swim_card(self._page.swimming, self._page.session.swim) + warning)
-        making = self._page.swim_files.making
-        put(self._making, content=html("<div class='fl dim'>making {} …</div>", making) if making else "")

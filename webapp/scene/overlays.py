@@ -12,7 +12,7 @@ from webapp.theme import DEAD, Rgb
 
 
 class Ghost:
-    """Blades of some fins: pale where they stood or one would land, full where a search puts them."""
+    """Blades of some fins: pale where they stood, full where a search puts them."""
 
     def __init__(
         self, scene: viser.SceneApi, name: str, color: Rgb = DEAD, opacity: float | None = 0.3

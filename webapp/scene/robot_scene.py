@@ -7,7 +7,7 @@ import numpy as np
 
 from finlab.allocation.allocation import Allocation
 from finlab.arrays import Array
-from finlab.layout import Fin, Layout
+from finlab.layout import Layout
 from webapp.handles import put
 from webapp.markup.words import damage_words, missing_part
 from webapp.scene.fin_node import FinNode, Flapping
@@ -19,7 +19,7 @@ from webapp.scene.wrench_nodes import LENGTH, AttainableNodes, WrenchNodes, fitt
 from webapp.session.state import State, chosen
 from webapp.tasks.analyst import Findings
 from webapp.tasks.context import Context
-from webapp.theme import ASKED, DELIVERED, HALF_TURN
+from webapp.theme import DELIVERED, HALF_TURN
 from webapp.viser_internals import run_script
 
 CAMERAS = {
@@ -42,7 +42,6 @@ class RobotScene:
         self._wrench = WrenchNodes(scene)
         self._ghost = Ghost(scene, "/robot/ghost")
         self._proposed = Ghost(scene, "/robot/proposed", DELIVERED, None)
-        self._landing = Ghost(scene, "/robot/landing", ASKED, 0.45)
         self._attainable = AttainableNodes(scene)
         self._fins: list[FinNode] = []
         self.dragged: int | None = None
@@ -130,7 +129,6 @@ class RobotScene:
         self._proposed.show(moved_fins(offered if display.proposed else None, state.layout))
         left = self._session.saved if display.ghost and offered is None else None
         self._ghost.show(moved_fins(left, state.layout))
-        self._landing.show(self._landings())
         target = np.array(state.target)
         self._attainable.refresh(findings if display.drawn != "none" else None, target)
         given = None if allocation is None else allocation.wrench
@@ -142,14 +140,6 @@ class RobotScene:
         self.cut = HALF_TURN * most / self.torque > LONGEST_TURN
         self._wrench.refresh(target, given, missing, top, scale, HALF_TURN / self.torque)
 
-    def _landings(self) -> tuple[Fin, ...]:
-        """Where the fin in the user's hand would come to stand: its gizmo must not be moved meanwhile."""
-        names = self._session.state.layout.names
-        if self.dragged is None or self.dragged >= len(names):
-            return ()
-        landing = self._session.landing(names[self.dragged], *self._fins[self.dragged].pose())
-        return () if landing is None else (landing,)
-
     def flap(self) -> None:
         """Let the page move the fins (`frames.js`): commands of all, and how fast."""
         display = self._session.display
@@ -158,13 +148,6 @@ class RobotScene:
         if told != self._flaps:
             self._flaps = told
             run_script(self._client.gui, f"finlabFrames.flap({told});")
-
-    def animate(self, elapsed: float) -> None:
-        """Let the fins flap for some time [s] of the clock on the wall, in a recording."""
-        display = self._session.display
-        angles = self._flapping.angles(elapsed * display.speed, display.frozen)
-        for node, angle in zip(self._fins, angles, strict=False):  # a fin may be newer than the answer
-            node.shapes.pose(angle)
 
     def _clicked(self, index: int, also: bool) -> None:
         select = self._session.select_also if also else self._session.select

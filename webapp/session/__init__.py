@@ -4,7 +4,7 @@ Every method is an intent of the user. It either changes the session as a whole,
 with a sentence for the user and changes nothing. One file per kind of intent.
 """
 
-from webapp.session.display import ANGLE_STEPS, POSITION_STEPS, Display
+from webapp.session.display import Display
 from webapp.session.inspecting import Inspecting
 from webapp.session.lessons import Learning
 from webapp.session.questions import Questions
@@ -13,11 +13,5 @@ from webapp.session.questions import Questions
 class Session(Questions, Inspecting, Learning):
     """What one browser has made so far."""
 
-    def twin(self) -> "Session":
-        """A session with the same state and look, for work that must not see later changes."""
-        other = Session(self.state.layout, self.display)
-        other.resume(self.state)
-        return other
 
-
-__all__ = ["ANGLE_STEPS", "POSITION_STEPS", "Display", "Session"]
+__all__ = ["Display", "Session"]

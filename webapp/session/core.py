@@ -118,10 +118,8 @@ class Core:
         self._names = layout.names
         self.saved = layout
         """The layout as it was opened or saved last."""
-        self.pinned: Layout | None = None
-        """A layout that was put aside to compare others with."""
         self.beside: str | None = None
-        """With what the score card compares: a shipped layout's name, `PINNED`, or None for the saved one."""
+        """With what the score card compares: a shipped layout's name, or None for the saved one."""
         self.draft = SearchRequest()
         """What a search for a better layout is to do."""
         self.swim = SwimSettings()

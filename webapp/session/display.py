@@ -7,10 +7,6 @@ from finlab.errors import FinlabError
 from finlab.forces.attainable import Kind
 from webapp.session.state import chosen, number
 
-POSITION_STEPS = {"off": 0.0, "5 mm": 0.005, "1 cm": 0.01, "5 cm": 0.05}
-"""Grids [m] that a fin's position can snap to."""
-ANGLE_STEPS = {"off": 0.0, "5°": 5.0, "15°": 15.0, "45°": 45.0}
-"""Grids [deg] that a mounting angle can snap to."""
 DRAWN: dict[str, Kind | None] = {"none": None, "forces": "force", "torques": "torque"}
 """What set can be drawn, by the word on its button."""
 
@@ -31,10 +27,6 @@ class Display:
     """Cast shadows; slow without a graphics card."""
     dark: bool = False
     """Dark theme."""
-    position_snap: str = "off"
-    """Key of `POSITION_STEPS`."""
-    angle_snap: str = "off"
-    """Key of `ANGLE_STEPS`."""
     ghost: bool = True
     """Show where moved fins stood when the layout was opened or saved."""
     proposed: bool = True
@@ -55,9 +47,8 @@ class Display:
         now = getattr(self, key, None)
         if now is None:
             raise FinlabError(f"there is no switch {key!r:.40}")
-        choices: dict[str, Any] = {"position_snap": POSITION_STEPS, "angle_snap": ANGLE_STEPS, "drawn": DRAWN}
-        if key in choices:
-            chosen(value, key, choices[key])
+        if key == "drawn":
+            chosen(value, key, DRAWN)
         if key == "speed":
             value = number(value, "speed of the animation", 0.02, 1.0)
         if isinstance(now, bool) and not isinstance(value, bool):

@@ -1,15 +1,13 @@
 """Intents about the layout: place, turn, copy and remove fins, shape the hull."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import replace
 
 from finlab.errors import FinlabError
-from finlab.layout import Fin, FinModelSpec, Layout
+from finlab.layout import FinModelSpec, Layout
 from finlab.layout.body import Hull
 from webapp.session import layout_edits
 from webapp.session.core import Core
-from webapp.session.display import ANGLE_STEPS, POSITION_STEPS
 from webapp.session.links import followed, partner, unlinked
 
 Vector = tuple[float, float, float]
@@ -38,47 +36,19 @@ class Editing(Core):
         self.saved = layout
 
     def drag_fin(self, name: str, position: Vector, angle: float) -> None:
-        """A fin on its way in the user's hand: not snapped yet, and one step of undo for the whole drag."""
-        self._drag(name, self._placed(name, position, angle, 0.0, 0.0))
+        """A fin on its way in the user's hand: one step of undo for the whole drag."""
+        layout = layout_edits.moved(self.state.layout, name, position)
+        self._drag(name, layout_edits.turned(layout, name, angle))
 
     def end_drag(self, name: str, position: Vector, angle: float) -> None:
-        """A drag is over: snap, and let the next change be a step of its own."""
-        self._drag(name, self._placed(name, position, angle, self._step_m, self._step_rad))
+        """A drag is over: the next change is a step of its own."""
+        self.drag_fin(name, position, angle)
         self.history.end_merge()
-
-    def landing(self, name: str, position: Vector, angle: float) -> Fin | None:
-        """Where a fin would come to stand if it were let go now; None if that is where it is held."""
-        if self._step_m == 0.0 and self._step_rad == 0.0:
-            return None
-        layout = self._placed(name, position, angle, self._step_m, self._step_rad)
-        return layout.fins[layout.index(name)]
-
-    def _placed(self, name: str, position: Vector, angle: float, step_m: float, step_rad: float) -> Layout:
-        """The layout with a fin let go at a place, snapped to steps."""
-        before = self._untouched(name)
-        layout = layout_edits.moved(self.state.layout, name, position, step_m, before)
-        return layout_edits.turned(layout, name, angle, step_rad, before)
-
-    def _untouched(self, name: str) -> Fin | None:
-        """The fin before it was taken into the hand; None where it is not."""
-        history = self.history
-        if history.merge_key != f"drag {name}" or not history.past:
-            return None
-        layout = history.past[-1][1].layout
-        return layout.fins[layout.index(name)]
 
     def _drag(self, name: str, layout: Layout) -> None:
         whole = layout_edits.keeping_hull(self.state.layout, followed(layout, self.state.links, name))
         state = self.state.with_layout(whole)
         self._commit(f"Move {name}", state, f"drag {name}", timed=False)
-
-    @property
-    def _step_m(self) -> float:
-        return POSITION_STEPS[self.display.position_snap]
-
-    @property
-    def _step_rad(self) -> float:
-        return math.radians(ANGLE_STEPS[self.display.angle_snap])
 
     def add_fin(self) -> None:
         """One more fin; it is selected."""

@@ -1,7 +1,5 @@
 """Layouts, hulls, paths and bundles as files that a browser sends and takes; the layouts that are shipped."""
 
-import csv
-import io
 import os
 import re
 import tempfile
@@ -10,8 +8,6 @@ from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
-from finlab.allocation.allocation import Allocation
-from finlab.allocation.policy import AXES
 from finlab.assets import shipped_layouts
 from finlab.deploy.bundle import with_tables_inside
 from finlab.errors import DataError, FinlabError, LayoutError
@@ -106,31 +102,6 @@ def layout_file(layout: Layout) -> tuple[str, bytes]:
     inside, hull = with_hull_inside(inside)
     text, parts = yaml_text(layout_to_dict(inside)).encode(), {**tables, **hull}
     return (f"{stem}.zip", archive_of(f"{stem}.yaml", text, parts)) if parts else (f"{stem}.yaml", text)
-
-
-def candidates_csv(allocation: Allocation | None) -> bytes:
-    """The refined candidates of an answer, one line each, SI units and radians.
-
-    The error is that of the fins' own laws, as everywhere: one figure, and what is missing along each axis.
-    """
-    if allocation is None or allocation.candidates is None:
-        raise FinlabError("there are no candidates to save; choose the method search, mdn or paper")
-    candidates = allocation.candidates
-    text = io.StringIO()
-    writer = csv.writer(text)
-    columns = [
-        f"{name}.{quantity}"
-        for name in allocation.layout.names
-        for quantity in ("amplitude_rad", "frequency_hz", "zero_direction_rad")
-    ]
-    missing = [f"missing_{axis}_{'n' if axis.startswith('F') else 'nm'}" for axis in AXES]
-    writer.writerow(["err_norm", *missing, "power_w", "energy", "source", *columns])
-    for k, command in enumerate(candidates.command):
-        values = [f"{v:.6g}" for v in command.ravel()]
-        rest = allocation.target - candidates.wrench[k]
-        told = (candidates.err_norm[k], *rest, candidates.power[k], candidates.energy[k])
-        writer.writerow([*(f"{value:.6g}" for value in told), candidates.source[k], *values])
-    return text.getvalue().encode()
 
 
 def cache_folder() -> Path:

@@ -30,7 +30,7 @@ class Inspecting(Editing):
         def placed(layout: Layout, name: str) -> Layout:
             own = layout.fins[layout.index(name)].position
             x, y, z = (new if c else old for new, old, c in zip(position, own, changed, strict=True))
-            return layout_edits.moved(layout, name, (x, y, z), self._step_m)
+            return layout_edits.moved(layout, name, (x, y, z))
 
         self._for_each("Move", names, placed, f"move {names}")
 
@@ -39,7 +39,7 @@ class Inspecting(Editing):
         names = self._selected_names()
 
         def turned(layout: Layout, name: str) -> Layout:
-            return layout_edits.turned(layout, name, angle, self._step_rad)
+            return layout_edits.turned(layout, name, angle)
 
         self._for_each("Turn", names, turned, f"turn {names}")
 

@@ -31,33 +31,21 @@ STAND_OFF = 0.02
 Vector = tuple[float, float, float]
 
 
-def snapped(value: float, step: float) -> float:
-    """The nearest multiple of `step`; a step of zero leaves the value alone."""
-    return round(value / step) * step if step > 0 else value
-
-
-def moved(
-    layout: Layout, name: str, position: Vector, step: float = 0.0, before: Fin | None = None
-) -> Layout:
-    """A fin at another place [m], snapped to multiples of `step` [m] along the axes along which it moved.
-
-    `before` is the fin before it was touched, by default as it is now.
-    """
-    start = (before or layout.fins[layout.index(name)]).position
-    checked = []
-    for value, now, axis in zip(position, start, "xyz", strict=True):
-        place = number(value, f"{axis} of {name} [m]", -MAX_COORDINATE, MAX_COORDINATE)
-        checked.append(snapped(place, step) if abs(place - now) > UNTOUCHED else now)
+def moved(layout: Layout, name: str, position: Vector) -> Layout:
+    """A fin at another place [m]."""
+    checked = [
+        number(value, f"{axis} of {name} [m]", -MAX_COORDINATE, MAX_COORDINATE)
+        for value, axis in zip(position, "xyz", strict=True)
+    ]
     return layout.replace_fin(name, position=tuple(checked))
 
 
-def turned(layout: Layout, name: str, angle: float, step: float = 0.0, before: Fin | None = None) -> Layout:
-    """A fin with another mounting angle [rad], snapped to multiples of `step` [rad] if it was turned."""
-    now = (before or layout.fins[layout.index(name)]).mounting_angle
+def turned(layout: Layout, name: str, angle: float) -> Layout:
+    """A fin with another mounting angle [rad]."""
     checked = number(angle, f"mounting angle of {name} [rad]", -100.0, 100.0)
-    if abs(math.remainder(checked - now, math.tau)) <= UNTOUCHED:
-        return layout.replace_fin(name, mounting_angle=now)
-    return layout.replace_fin(name, mounting_angle=float(wrapped(snapped(checked, step))))
+    now = layout.fins[layout.index(name)].mounting_angle
+    same = abs(math.remainder(checked - now, math.tau)) <= UNTOUCHED
+    return layout.replace_fin(name, mounting_angle=now if same else float(wrapped(checked)))
 
 
 def keeping_hull(before: Layout, after: Layout) -> Layout:

@@ -3,7 +3,6 @@
 from dataclasses import dataclass, replace
 from typing import Any
 
-from finlab.errors import FinlabError
 from finlab.layout import Layout
 from webapp.session.core import Core
 from webapp.session.files import shipped
@@ -19,8 +18,6 @@ DRAWERS: dict[str, tuple[str, ...]] = {
     "Export": (),
 }
 """What lies in the drawer of each task."""
-PINNED = "pinned"
-"""Name of the layout that was put aside, among those to compare with."""
 
 
 @dataclass(frozen=True)
@@ -91,25 +88,17 @@ class Looking(Core):
         """What the next search for a better layout is to do."""
         self.draft = draft
 
-    def pin(self) -> None:
-        """Put the layout aside as it is now, and compare with it."""
-        self.pinned, self.beside = self.state.layout, PINNED
-
     def compare_with(self, name: str | None) -> None:
-        """Compare with a shipped layout, the pinned one, or (None) with the saved one.
+        """Compare with a shipped layout, or (None) with the saved one.
 
         Raises:
-            FinlabError: nothing is pinned, or there is no such layout.
+            FinlabError: there is no such layout.
         """
-        if name == PINNED and self.pinned is None:
-            raise FinlabError("nothing is pinned yet; Pin puts the layout aside as it is now")
-        if name is not None and name != PINNED and name not in shipped():
-            raise FinlabError(f"there is no shipped layout {name!r:.40}")
+        if name is not None:
+            chosen(name, "layout", shipped())
         self.beside = name
 
     @property
     def reference(self) -> Layout:
         """The layout that the score card compares with."""
-        if self.beside is None:
-            return self.saved
-        return (self.pinned or self.saved) if self.beside == PINNED else shipped()[self.beside]
+        return self.saved if self.beside is None else shipped()[self.beside]

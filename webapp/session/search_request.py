@@ -1,4 +1,4 @@
-"""What a search for a better layout may do: which fins move, how far each, and for which wrenches."""
+"""What a search for a better layout may do: which fins move, and how far."""
 
 import math
 from collections.abc import Mapping
@@ -9,7 +9,7 @@ from finlab.analysis import Bounds
 from finlab.analysis.moves import is_mirrored
 from finlab.errors import FinlabError
 from finlab.layout import Layout
-from webapp.session.state import MAX_TARGET, chosen, number
+from webapp.session.state import chosen, number
 
 GOAL_WORDS = {
     "weakest direction": "weakest_direction",
@@ -17,18 +17,10 @@ GOAL_WORDS = {
     "worst single failure": "worst_single_failure",
 }
 """What may be improved, in words, and the name that the search knows."""
-MAX_MISSION = 40
-"""Most wrenches of a mission; each costs time in every round of the search."""
 WAY = (0.05, 0.05, 0.05, 180.0)
 """How far a fin may go along x, y and z [m] and turn either way [deg] unless it is said otherwise."""
 
-MAX_TEXT = 10_000
-"""Longest text of a mission that is taken."""
-ALL = "all"
-"""Stands for all fins that have no bounds of their own."""
-
 Way = tuple[float, float, float, float]
-Wrench = tuple[float, float, float, float, float, float]
 
 
 @dataclass(frozen=True)
@@ -39,10 +31,8 @@ class SearchRequest:
     """Key of `GOAL_WORDS`."""
     held: tuple[str, ...] = ()
     """Fins that may not move."""
-    ways: tuple[tuple[str, Way], ...] = ()
-    """How far fins may go along x, y, z [m] and turn [deg], by name or `ALL`."""
-    mission: str = ""
-    """The mission as text, see `parsed_mission`."""
+    way: Way = WAY
+    """How far fins may go along x, y, z [m] and turn [deg]."""
     apart_m: float = 0.02
     """Least distance between what two fins sweep [m]."""
     symmetric: bool = True
@@ -61,8 +51,8 @@ class SearchRequest:
         held = tuple(other for other in self.held if other != name)
         return replace(self, held=held if name in self.held else (*held, name))
 
-    def with_way(self, name: str, way: tuple[Any, ...]) -> "SearchRequest":
-        """Other bounds of a fin, or of `ALL`.
+    def with_way(self, way: tuple[Any, ...]) -> "SearchRequest":
+        """Other bounds of all fins.
 
         Raises:
             FinlabError: they are too far, or no numbers.
@@ -70,9 +60,7 @@ class SearchRequest:
         x, y, z = (
             number(v, f"reach along {axis} [m]", 0.0, 0.5) for v, axis in zip(way, "xyz", strict=False)
         )
-        checked = x, y, z, number(way[3], "turn of the shaft [°]", 0.0, 180.0)
-        others = tuple(pair for pair in self.ways if pair[0] != name)
-        return replace(self, ways=(*others, (name, checked)))
+        return replace(self, way=(x, y, z, number(way[3], "turn of the shaft [°]", 0.0, 180.0)))
 
     def with_apart(self, apart: Any) -> "SearchRequest":
         """Another least distance between what fins sweep [m].
@@ -86,15 +74,6 @@ class SearchRequest:
         """Symmetric, or not."""
         return replace(self, symmetric=bool(symmetric))
 
-    def with_mission(self, text: Any) -> "SearchRequest":
-        """Another mission; it is read when the search begins, so that half a line may be typed."""
-        return replace(self, mission=str(text)[:MAX_TEXT])
-
-    def way(self, name: str) -> Way:
-        """How far a fin may go."""
-        ways = dict(self.ways)
-        return ways.get(name, ways.get(ALL, WAY))
-
     def bounds(self, layout: Layout) -> dict[str, Bounds]:
         """Where each fin that may move may go from where it is.
 
@@ -104,7 +83,7 @@ class SearchRequest:
         bounds = {}
         for fin in layout.fins:
             if fin.name not in self.held:
-                *reach, turn = self.way(fin.name)
+                *reach, turn = self.way
                 around = Bounds.around(fin, reach, math.radians(turn))
                 if self.symmetric and is_mirrored(fin, fin):
                     y, angle = fin.position[1], fin.mounting_angle
@@ -121,36 +100,8 @@ def restored_request(values: Mapping[str, Any]) -> SearchRequest:
     Raises:
         FinlabError: a value is not allowed. So may KeyError, TypeError and ValueError tell.
     """
-    request = SearchRequest().with_goal(values["goal"]).with_mission(values["mission"])
+    request = SearchRequest().with_goal(values["goal"]).with_way(tuple(values["way"]))
     request = request.with_apart(values["apart_m"]).with_symmetry(values["symmetric"])
     for name in values["held"]:
         request = request.with_held_toggled(str(name))
-    for name, way in values["ways"]:
-        request = request.with_way(str(name), tuple(way))
     return request
-
-
-def parsed_mission(text: str) -> tuple[Wrench, ...]:
-    """The wrenches in a text, one line each: six numbers, commas or blanks between them.
-
-    Raises:
-        FinlabError: a line is something else; the message names it.
-    """
-    wrenches: list[Wrench] = []
-    for place, line in enumerate(text[:MAX_TEXT].splitlines(), start=1):
-        words = line.replace(",", " ").split()
-        if not words:
-            continue
-        try:
-            values = [float(word) for word in words]
-        except ValueError:
-            values = []
-        if len(values) != 6 or not all(abs(value) <= MAX_TARGET for value in values):
-            raise FinlabError(
-                f"mission, line {place}: expected six numbers Fx Fy Fz Tx Ty Tz [N, N m], got {line!r:.60}"
-            )
-        fx, fy, fz, tx, ty, tz = values
-        wrenches.append((fx, fy, fz, tx, ty, tz))
-    if len(wrenches) > MAX_MISSION:
-        raise FinlabError(f"mission: expected at most {MAX_MISSION} wrenches, got {len(wrenches)}")
-    return tuple(wrenches)

@@ -22,8 +22,6 @@ MAX_FILES = 64
 """Sessions that are kept; the oldest go first."""
 MAX_BYTES = 3_000_000
 """Largest session file that is read."""
-MAX_STEPS = 100
-"""Steps of undo, and of redo, that are kept."""
 KEPT = ("failed", "weak", "stuck", "target", "links")
 """Fields of a state that are written as they are."""
 _KEY = re.compile(r"[A-Za-z0-9_-]{8,64}")
@@ -75,9 +73,8 @@ class SessionFiles:
 
 def frozen(session: Session) -> Session:
     """A session as it is now, to be written while it goes on."""
-    kept, history = copy.copy(session), copy.copy(session.history)
-    history.past, history.future = history.past[-MAX_STEPS:], history.future[-MAX_STEPS:]
-    kept.history = history
+    kept, kept_history = copy.copy(session), copy.copy(session.history)
+    kept.history = kept_history
     return kept
 
 
@@ -95,14 +92,10 @@ def to_dict(session: Session) -> dict[str, Any]:
             "settings": {key: getattr(state, key) for key in SETTINGS},
         }
 
-    history = session.history
     values = {
         "version": VERSION,
         "state": plain(session.state),
-        "past": [[name, plain(state)] for name, state in history.past[-MAX_STEPS:]],
-        "future": [[name, plain(state)] for name, state in history.future[-MAX_STEPS:]],
         "saved": place(session.saved),
-        "pinned": None if session.pinned is None else place(session.pinned),
         "beside": session.beside,
         "display": asdict(session.display),
         "draft": asdict(session.draft),
@@ -122,13 +115,8 @@ def restore(session: Session, values: dict[str, Any]) -> None:
         raise FinlabError(f"kept session: expected version {VERSION}, got {values['version']!r:.20}")
     layouts = [parse_layout(layout, source="kept session") for layout in values["layouts"]]
 
-    def steps(key: str) -> list[tuple[str, State]]:
-        return [(str(name)[:200], _state(state, layouts)) for name, state in values[key][-MAX_STEPS:]]
-
     session.resume(_state(values["state"], layouts))
-    session.history.past, session.history.future = steps("past"), steps("future")
-    session.saved, pinned = layouts[values["saved"]], values["pinned"]
-    session.pinned = None if pinned is None else layouts[pinned]
+    session.saved = layouts[values["saved"]]
     for key, value in values["display"].items():
         session.set_display(key, value)
     for key, value in values["swim"].items():

@@ -106,5 +106,5 @@ class SessionStore:
 
 def _mark(session: Session) -> object:
     """Differs whenever there is something new to keep."""
-    looks = session.display, session.saved, session.pinned, session.beside
+    looks = session.display, session.saved, session.beside
     return session.revision, *looks, session.draft, session.swim

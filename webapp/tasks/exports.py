@@ -1,54 +1,27 @@
 """Files that take time to make, and go to the browser when they are ready."""
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
-from types import SimpleNamespace
 from typing import Any
 
 import imageio.v3 as iio
 
-from finlab.allocation.allocation import Allocation
 from finlab.allocation.allocator import Allocator
 from finlab.deploy.bundle import make_bundle, with_tables_inside
 from finlab.deploy.graph import build_graph
 from finlab.deploy.graph_file import graph_bytes
 from finlab.errors import FinlabError
 from finlab.layout import Layout
-from webapp.scene.robot_scene import RobotScene
+from finlab.sim.log_csv import csv_of
 from webapp.session.companions import archive_of, has_tables
 from webapp.session.files import file_stem
 from webapp.tasks.context import Context
-from webapp.viser_internals import start_server, stop_server
-
-SECONDS = 4.0
-"""Length of the recording on the clock on the wall; it plays again and again."""
-FRAMES_PER_SECOND = 20
+from webapp.tasks.recorded import Recorded
 
 PICTURE_SIZE = (1080, 1620)
 """Height and width of an exported picture [px]."""
-
-
-def recorded_html(context: Context, allocation: Allocation) -> bytes:
-    """The robot of a page's session as it flaps with an answer.
-
-    Takes a second and must not run on the event loop: viser records shared scenes only, so the robot is
-    built once more on a server of its own.
-    """
-    server = start_server()
-    try:
-        server.scene.world_axes.visible = False
-        studio: Any = SimpleNamespace(scene=server.scene, camera=server.initial_camera, atomic=server.atomic)
-        robot = RobotScene(replace(context, client=studio, do=lambda _: None))
-        robot.refresh(allocation)
-        recording = server.get_scene_serializer()
-        for _ in range(int(SECONDS * FRAMES_PER_SECOND)):
-            robot.animate(1 / FRAMES_PER_SECOND)
-            recording.insert_sleep(1 / FRAMES_PER_SECOND)
-        return recording.as_html(dark_mode=context.session.display.dark).encode()
-    finally:
-        stop_server(server)
 
 
 class Exports:
@@ -83,18 +56,23 @@ class Exports:
     def _send_made(self, suffix: str, make: Callable[[Layout, Allocator, tuple[str, ...]], bytes]) -> None:
         """Send what is made of the robot and its allocator, as that is shipped but for the objective."""
         state, loaded = self._session.state, self._context.solver.loaded
-        self._send(suffix, lambda: make(state.layout, loaded(state.method, state.objective), state.failed))
+        name = f"{file_stem(state.layout.name)}{suffix}"
+        self._send(name, lambda: make(state.layout, loaded(state.method, state.objective), state.failed))
 
-    def html(self, shown: Allocation | None) -> None:
-        """Send a standalone page of the 3D view with an answer.
+    def swim(self, records: Sequence[Recorded]) -> None:
+        """Send the logs of robots that swim as CSV; an archive of them where there are several."""
+        names = [file_stem(f"{r.layout.name}_{r.method}_{r.about}") for r in records]
+        if len(records) == 1:
+            self._send(f"{names[0]}.csv", lambda: csv_of(records[0].log).encode())
+            return
 
-        Raises:
-            FinlabError: there is no answer yet.
-        """
-        if shown is None:
-            raise FinlabError("there is no answer yet; wait for one")
-        frozen = replace(self._context, session=self._session.twin())
-        self._send(".html", lambda: recorded_html(frozen, shown))
+        def archive() -> bytes:
+            (first, content), *others = (
+                (f"{name}.csv", csv_of(r.log).encode()) for name, r in zip(names, records, strict=True)
+            )
+            return archive_of(first, content, dict(others))
+
+        self._send(f"{names[0]}_csv.zip", archive)
 
     def picture(self) -> None:
         """Send a picture of the 3D view; the page has to make it, so not on the event loop."""
@@ -104,9 +82,8 @@ class Exports:
         name = f"{file_stem(self._session.state.layout.name)}.png"
         threading.Thread(target=self._take_picture, args=(name,), daemon=True).start()
 
-    def _send(self, suffix: str, make: Callable[[], bytes]) -> None:
-        """Have the worker make a file, and send it; of each kind only the newest that is asked for."""
-        name = f"{file_stem(self._session.state.layout.name)}{suffix}"
+    def _send(self, name: str, make: Callable[[], bytes]) -> None:
+        """Have the worker make a file, and send it; of each name only the newest that is asked for."""
         loop, notify = self._context.loop, self._context.notify
         self._context.workers.answers.submit(
             (id(self), name),

@@ -2,16 +2,15 @@
 
 import math
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import partial
 
 from finlab.analysis import Bounds, Improvement, Progress, optimize_layout
-from finlab.analysis.goals import MISSION
 from finlab.errors import FinlabError
 from finlab.layout import Layout
 from webapp.session.room import Room
-from webapp.session.search_request import GOAL_WORDS, SearchRequest, parsed_mission
+from webapp.session.search_request import GOAL_WORDS, SearchRequest
 from webapp.tasks.background import Newest
 from webapp.tasks.context import Context
 
@@ -29,8 +28,6 @@ class Search:
     """What to raise, as `optimize_layout` calls it."""
     bounds: Mapping[str, Bounds]
     """Where each fin that may move may go."""
-    mission: Sequence[Sequence[float]]
-    """Wrenches (N, 6) of the mission [N, N m]."""
     room: Room
     """Where fins may stand."""
     symmetric: bool
@@ -52,13 +49,12 @@ class Improver(Newest[Search, Improvement]):
         """Search from a layout.
 
         Raises:
-            FinlabError: a search is running, no fin may move, or the mission makes no sense.
+            FinlabError: a search is running, or no fin may move.
         """
         if self.busy:
             raise FinlabError("a search is running already; cancel it first")
-        mission = parsed_mission(request.mission) or MISSION
         room, goal = Room(layout, request.apart_m), GOAL_WORDS[request.goal]
-        search = Search(layout, goal, request.bounds(layout), mission, room, request.symmetric)
+        search = Search(layout, goal, request.bounds(layout), room, request.symmetric)
         self.forget()
         self.ask(search)
 
@@ -81,7 +77,6 @@ class Improver(Newest[Search, Improvement]):
             search.bounds,
             search.goal,
             None if search.symmetric else (),
-            mission=search.mission,
             rule=search.room.broken,
             grid=GRID,
             progress=lambda progress: self._loop.post(partial(self._note, search, progress)),

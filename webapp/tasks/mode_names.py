@@ -8,13 +8,11 @@ from numpy.typing import NDArray
 
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.modes import (
-    SAME_DIRECTION,
     Mode,
     ModeSignature,
     find_modes,
     force_sizes,
     same_signature,
-    signature_difference,
 )
 from finlab.allocation.solution import Candidates
 from webapp.markup.words import fins_words
@@ -87,44 +85,13 @@ def led_to(samples: Candidates, modes: tuple[NamedMode, ...]) -> NDArray[np.intp
 
 
 def _names(signatures: list[ModeSignature]) -> list[str]:
-    """Who rests; where that is not enough, the largest differences from the first mode with the same name."""
-    names: list[str] = []
-    firsts: dict[str, ModeSignature] = {}
-    for signature in signatures:
-        base = _resting_words(signature)
-        name = base
-        if base in firsts:
-            told = _difference_words(firsts[base], signature)
-            # One difference is enough to tell two modes apart; a third one may need more, or a number.
-            tries = [", ".join([base, *told[:n]]) for n in range(1, len(told) + 1)]
-            tries += [f"{tries[-1] if tries else base} ({k})" for k in range(2, len(signatures) + 2)]
-            name = next(text for text in tries if text not in names)
-        else:
-            firsts[base] = signature
-        names.append(name)
-    return names
+    """Who rests; modes of the same name are numbered."""
+    told = [_resting_words(signature) for signature in signatures]
+    places = [told[:k].count(name) + 1 for k, name in enumerate(told)]
+    return [f"{name} ({place})" if place > 1 else name for name, place in zip(told, places, strict=True)]
 
 
 def _resting_words(signature: ModeSignature) -> str:
     if not signature.resting:
         return "all fins push"
     return f"{fins_words(signature.resting)} {'rest' if len(signature.resting) > 1 else 'rests'}"
-
-
-def _difference_words(first: ModeSignature, signature: ModeSignature) -> list[str]:
-    """What differs, the largest difference first."""
-    told = signature_difference(first, signature)
-    words = []
-    for flat in np.argsort(-np.abs(told), axis=None):
-        kind, fin = divmod(int(flat), told.shape[1])
-        value = float(told[kind, fin])
-        if abs(value) < 1.0:
-            break
-        if kind == 0:
-            degrees = round(np.degrees(value * SAME_DIRECTION))
-            words.append(f"fin {fin + 1} {'reversed' if abs(degrees) > 135 else f'turned {degrees:+d}°'}")
-        elif kind == 1:
-            words.append(f"fin {fin + 1} pushes {'harder' if value > 0 else 'less'}")
-        else:
-            words.append(f"fin {fin + 1} {'wider and slower' if value > 0 else 'narrower and quicker'}")
-    return [word.replace("-", "−") for word in words]
