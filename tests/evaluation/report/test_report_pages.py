@@ -10,7 +10,7 @@ from finlab.evaluation.report.pages import to_html, to_markdown
 from finlab.evaluation.report.text import to_text
 
 COLUMNS = (Column("name", "method"), Column("value", "error <", "error", "ends"))
-ROWS = [
+ROWS: list[dict[str, Any]] = [
     {"name": "`ours`", "value": 0.00029, "ends": [0.0002, 0.0004], "_kind": "ours"},
     {"name": "theirs"},
 ]
