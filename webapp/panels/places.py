@@ -1,30 +1,29 @@
 """Which panel stands where: the one table of the frame. A panel is a class that takes `gui` and `page`."""
 
 from collections.abc import Callable
+from functools import partial
 from typing import NamedTuple
 
 import viser
 
 from webapp.page import Page, Panel
 from webapp.panels.body_inspector import BodyInspector
-from webapp.panels.camera_bar import CameraBar
-from webapp.panels.check_panel import CheckPanel
+from webapp.panels.cards import Card, answer, camera, check, guide, robot_name, tasks
 from webapp.panels.compare_tab import ComparePanel
 from webapp.panels.damage import DamagePanel
 from webapp.panels.design_panel import DesignPanel
 from webapp.panels.files_tab import FilesTab
 from webapp.panels.fin_inspector import FinInspector
 from webapp.panels.fin_list import FinList
-from webapp.panels.guide import GuidePanel
 from webapp.panels.hull_panel import HullPanel
 from webapp.panels.limits_tab import ImprovePanel, ReachPanel
 from webapp.panels.modes_tab import CandidatesPanel
 from webapp.panels.sweep import SweepPanel
 from webapp.panels.swim_tab import RunPanel, ScenarioPanel, SwimCardPanel
 from webapp.panels.timeline import Timeline
-from webapp.panels.top_bar import AnsweringBar, FileBar, HistoryBar, RobotBar, TaskBar
+from webapp.panels.top_bar import AnsweringBar, FileBar, HistoryBar
 from webapp.panels.view_tab import ViewPanel
-from webapp.panels.wrench_tab import AnswerPanel, FinsPanel, TargetPanel
+from webapp.panels.wrench_tab import FinsPanel, TargetPanel
 from webapp.session.looking import TASKS
 
 TOP, LEFT, RIGHT, DRAWER, VIEW = REGIONS = ("top", "left", "right", "drawer", "view")
@@ -53,24 +52,24 @@ class Place(NamedTuple):
 
 
 PLACES = (
-    Place(TOP, TASKS, "Robot", RobotBar),
+    Place(TOP, TASKS, "Robot", partial(Card, robot_name)),
     Place(TOP, TASKS, "File", FileBar),
     Place(TOP, TASKS, "History", HistoryBar),
-    Place(TOP, TASKS, "Tasks", TaskBar),
+    Place(TOP, TASKS, "Tasks", partial(Card, tasks)),
     Place(TOP, TASKS, "Answers", AnsweringBar),
-    Place(LEFT, TASKS, "Guide", GuidePanel, about="guide"),
+    Place(LEFT, TASKS, "Guide", partial(Card, guide), about="guide"),
     Place(LEFT, (DESIGN,), "Fins", FinList),
     Place(LEFT, (DESIGN,), "Designs", DesignPanel),
     Place(RIGHT, (DESIGN,), "Fin", FinInspector, about="fins"),
     Place(RIGHT, (DESIGN,), "Body", BodyInspector, about="robot"),
     Place(RIGHT, (DESIGN,), "Hull", HullPanel, folded=True, about="robot"),
-    Place(RIGHT, (DESIGN,), "Check", CheckPanel),
+    Place(RIGHT, (DESIGN,), "Check", partial(Card, check)),
     Place(DRAWER, (DESIGN,), "Reach", ReachPanel),
     Place(DRAWER, (DESIGN,), "Improve", ImprovePanel),
     Place(LEFT, (ALLOCATE,), "Fins", FinsPanel),
     Place(LEFT, (ALLOCATE,), "Damage a fin", DamagePanel, folded=True),
     Place(RIGHT, (ALLOCATE,), "Wrench", TargetPanel),
-    Place(RIGHT, (ALLOCATE,), "Asked and delivered", AnswerPanel),
+    Place(RIGHT, (ALLOCATE,), "Asked and delivered", partial(Card, answer)),
     Place(DRAWER, (ALLOCATE,), "Candidates", CandidatesPanel),
     Place(DRAWER, (ALLOCATE,), "Comparison", ComparePanel),
     Place(DRAWER, (ALLOCATE,), "Sweep", SweepPanel),
@@ -79,7 +78,7 @@ PLACES = (
     Place(RIGHT, (SIMULATE,), "Figures", SwimCardPanel, swims=True),
     Place(DRAWER, (SIMULATE,), "Swim over time", Timeline, swims=True),
     Place(RIGHT, (EXPORT,), "Files", FilesTab),
-    Place(VIEW, TASKS, "Camera", CameraBar),
+    Place(VIEW, TASKS, "Camera", partial(Card, camera)),
     Place(VIEW, TASKS, "Display", ViewPanel, folded=True),
 )
 """All panels, in the order in which they stand in their regions."""

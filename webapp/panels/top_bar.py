@@ -1,9 +1,8 @@
-"""The bar above all: whose design it is, its file, what can be undone, the tasks, who answers, and help."""
+"""The bar above all: the design's file, what can be undone, who answers, and help."""
 
 from functools import partial
 
 import viser
-from markupsafe import Markup
 
 from finlab.allocation.methods import METHODS
 from webapp.handles import add_html, put
@@ -13,7 +12,6 @@ from webapp.page import Page
 from webapp.presses import press
 from webapp.session.design_links import MAX_LINK
 from webapp.session.lessons import LESSONS
-from webapp.session.looking import TASKS
 from webapp.session.state import OBJECTIVES
 from webapp.session.tour import STEPS
 from webapp.tasks.opening import KINDS
@@ -25,23 +23,6 @@ PALETTE = (
     "{ key: 'k', code: 'KeyK', ctrlKey: true, bubbles: true }))"
 )
 """A line of script that opens the list of commands, as Ctrl+K does."""
-
-
-class RobotBar:
-    """The robot's name."""
-
-    def __init__(self, gui: viser.GuiApi, page: Page) -> None:
-        self._page, self._name = page, gui.add_html("")
-
-    def refresh(self) -> None:
-        session = self._page.session
-        layout = session.state.layout
-        changed = "" if layout == session.saved else Markup("<span class='dim'>edited</span>")
-        name = layout.name
-        put(
-            self._name,
-            content=html("<div class='fl-robot' title='{}'><h1>{}</h1>{}</div>", name, name, changed),
-        )
 
 
 class FileBar:
@@ -80,21 +61,6 @@ class HistoryBar:
             (self._redo, "Redo", history.redo_name),
         ):
             put(button, label=f"{word}: {name}" if name else word)
-
-
-class TaskBar:
-    """What is being done: one of four tasks."""
-
-    def __init__(self, gui: viser.GuiApi, page: Page) -> None:
-        self._page, self._tasks = page, gui.add_html("")
-
-    def refresh(self) -> None:
-        here = self._page.session.task
-        buttons = Markup().join(
-            html("<button {}{}>{}</button>", "aria-current=page " * (task == here), press("task", task), task)
-            for task in TASKS
-        )
-        put(self._tasks, content=html("<nav class='fl-tasks' aria-label='Tasks'>{}</nav>", buttons))
 
 
 class AnsweringBar:

@@ -7,10 +7,9 @@ import viser
 
 from finlab.allocation.policy import AXES, KINDS
 from webapp.handles import Changes, add_html, put
-from webapp.markup.answer import fin_table, wrench_bars
+from webapp.markup.answer import fin_table
 from webapp.markup.html import html
 from webapp.markup.picking import marker
-from webapp.markup.verdict import answer_sentence
 from webapp.markup.words import three_digits
 from webapp.page import Page
 from webapp.panels.damage import FinButtons
@@ -42,20 +41,6 @@ class FinsPanel:
         fitting = answer if answer is not None and answer.layout.names == state.layout.names else None
         table = fin_table(state, fitting, full_thrust(state.able), self._page.session.selected)
         put(self._table, content=table)
-
-
-class AnswerPanel:
-    """What is asked, what the fins give, and what is left undone."""
-
-    def __init__(self, gui: viser.GuiApi, page: Page) -> None:
-        self._page, self._bars = page, gui.add_html("")
-
-    def refresh(self) -> None:
-        """Write the answer; one to an earlier question stands beside what was asked then."""
-        answer, state, busy = self._page.shown, self._page.session.state, self._page.busy
-        asked = answer.target if answer is not None and busy else state.target
-        given = None if answer is None else answer.wrench
-        put(self._bars, content=wrench_bars(asked, given, answer_sentence(state, answer, busy)))
 
 
 class TargetPanel:

@@ -98,31 +98,18 @@ def _loaded(name: str, content: bytes) -> trimesh.Trimesh:
 
 def _mended(mesh: trimesh.Trimesh) -> tuple[str, ...]:
     """Close small holes, drop what has no area, turn triangles outwards: in place, and in words."""
-    told = []
     mesh.merge_vertices(merge_tex=True, merge_norm=True)
-    flat = int((~mesh.nondegenerate_faces()).sum())
-    if flat:
-        mesh.update_faces(mesh.nondegenerate_faces())
-        told.append(f"{_triangles(flat)} without an area left out")
-    twice = len(mesh.faces) - int(mesh.unique_faces().sum())
-    if twice:
-        mesh.update_faces(mesh.unique_faces())
-        told.append(f"{_triangles(twice)} that stood there twice left out")
     before = len(mesh.faces)
+    mesh.update_faces(mesh.nondegenerate_faces() & mesh.unique_faces())
+    kept = len(mesh.faces)
     if not mesh.is_watertight:
         trimesh.repair.fill_holes(mesh)
-        if len(mesh.faces) > before:
-            told.append(f"holes closed with {_triangles(len(mesh.faces) - before)}")
-    normals = np.array(mesh.face_normals)
+    filled, normals = len(mesh.faces) - kept, np.array(mesh.face_normals)
     trimesh.repair.fix_normals(mesh)
     turned = int((np.einsum("ij,ij->i", normals, mesh.face_normals) < 0.0).sum()) if len(normals) else 0
-    if turned:
-        told.append(f"{_triangles(turned)} turned outwards")
-    return tuple(told)
-
-
-def _triangles(count: int) -> str:
-    return f"{count} triangle{'s' * (count != 1)}"
+    counts = {"without an area or twice there left out": before - kept, "added to close holes": filled}
+    counts["turned outwards"] = turned
+    return tuple(f"{n} triangle{'s' * (n != 1)} {what}" for what, n in counts.items() if n)
 
 
 def simplified(mesh: Mesh, faces: int) -> Mesh:
