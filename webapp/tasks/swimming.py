@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from finlab.allocation.allocator import Allocator
 from finlab.errors import FinlabError
+from finlab.layout.damage import Kind
 from finlab.sim import Trajectory, Water
 from webapp.session.state import State
 from webapp.session.swim_plan import Plan
@@ -128,7 +129,7 @@ class Swimming:
         broken = name in lost
         if not broken and len(lost) + 1 >= len(self.swimmers[0].fins):
             raise FinlabError(f"{name} is the last fin that works; mend another one first")
-        kind = "whole" if broken else "lost"
+        kind: Kind = "whole" if broken else "lost"
         self._act(lambda swimmer: swimmer.swim.fail(name, kind, announced=announced))
 
     def meet(self, water: Water, buoyancy: float) -> None:
