@@ -53,8 +53,8 @@ class BodyInspector:
         self._page, session = page, page.session
         self._head = gui.add_html("")
         page.bind(gui.add_text("Name", ""), session.rename_robot, lambda: session.state.layout.name)
-        about = gui.add_text("About", "", multiline=True)
-        page.bind(about, session.describe_robot, lambda: session.state.layout.description)
+        text = gui.add_text("About", "", multiline=True)
+        page.bind(text, session.describe_robot, lambda: session.state.layout.description)
         acts = {"Estimate": session.estimate, "Forget": session.forget_dynamics}
         page.add_buttons("From the hull", acts, hint=FORMULAS)
         page.bind_number(
