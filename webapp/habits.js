@@ -25,11 +25,30 @@
     }
   }, { capture: true });
 
-  // What is typed counts when it is whole: with Enter, or when the box is left. Viser would send every key.
+  // What is typed counts when it is whole: with Enter, or when the box is left. Viser would send every key, and write
+  // over half a text; so from the first key until then the box's own `value`, by which the framework writes, does nothing.
   const BOXES = '.mantine-NumberInput-input, .mantine-TextInput-input, .mantine-Textarea-input';
-  window.addEventListener('input', (event) => {
-    if (event.target.matches?.(BOXES) && event.target.closest('.mantine-Flex-root')) event.stopImmediatePropagation();
-  }, { capture: true });
+  const held = new Map();
+  const listen = (kind, hear) => window.addEventListener(kind, (event) => hear(event, event.target), { capture: true });
+
+  function finish(box) {
+    if (!held.has(box)) return;
+    Object.defineProperty(box, 'value', held.get(box));
+    held.delete(box);
+    box.dispatchEvent(Object.assign(new Event('input', { bubbles: true }), { finlab: true }));
+  }
+  listen('input', (event, box) => {
+    if (event.finlab || !box.matches?.(BOXES) || !box.closest('.mantine-Flex-root')) return;
+    event.stopImmediatePropagation();
+    const plain = Object.getOwnPropertyDescriptor(Object.getPrototypeOf(box), 'value');
+    if (held.has(box)) return;
+    held.set(box, Object.getOwnPropertyDescriptor(box, 'value') ?? { configurable: true, ...plain });
+    Object.defineProperty(box, 'value', { configurable: true, get: () => plain.get.call(box), set: () => {} });
+  });
+  listen('keydown', (event, box) => {
+    if (event.key === 'Enter' && box instanceof HTMLInputElement) finish(box);
+  });
+  listen('focusout', (_event, box) => finish(box));
 
   // Commands listen on the root of the document, the camera on the document, which comes after.
   page.addEventListener('keydown', (event) => {

@@ -10,7 +10,6 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-import numpy as np
 import pytest
 
 from finlab import load_allocator
@@ -131,23 +130,6 @@ def test_a_finished_table_is_recognized(tmp_path: Path, worker: Worker) -> None:
     assert opened.session.state.layout.fins[1].model == opened.session.state.layout.fins[2].model
     words = model_card(opened.session.state.layout.fins[1])
     assert "<b>table</b>, fitted to 69 samples" in words and "all round" in words
-
-
-def test_a_noisy_full_grid_can_be_fitted_all_the_same(tmp_path: Path, worker: Worker) -> None:
-    opened = Opened(worker)
-    axes = np.meshgrid([0.1, 0.3, 0.6], [0.4, 1.0, 2.0], np.arange(-3.0, 3.0, 1.2), indexing="ij")
-    command = np.stack(axes, axis=-1).reshape(-1, 3)
-    content = write(tmp_path / "grid.csv", columns_of(command, measured(LAW, command))).read_bytes()
-    opened.fitting.start("back_left", "grid.csv", content)
-    until(lambda: "table" in opened.models)
-    taken = opened.session.state
-    opened.fitting.fit_table()
-    until(lambda: opened.session.state != taken)
-    assert opened.fitting.findings is not None and opened.fitting.findings.fit is not None
-    with pytest.raises(FinlabError, match="no full grid was taken"):
-        opened.fitting.fit_table()
-    opened.session.undo()
-    assert opened.session.state == taken
 
 
 @pytest.mark.parametrize(

@@ -25,9 +25,7 @@ def fit_card(found: Fitted) -> str:
     """What came of a file that was dropped on a fin."""
     name, fin = found.upload.name, found.upload.fin
     if found.fit is None:
-        said = html(
-            "<b>{} is a finished force table.</b> It is on {} as it stands. Fit it if it is noisy.", name, fin
-        )
+        said = html("<b>{} is a finished force table.</b> It is on {} as it stands.", name, fin)
         return html("<div class='fl said'>{}</div>", said)
     fit = found.fit
     if fit.doubts:

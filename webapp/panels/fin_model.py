@@ -56,7 +56,6 @@ class FinModelPanel:
             results = {
                 "On all like it": page.fitting.put_on_all,
                 "Table (CSV)": self._send_table,
-                "Fit it": page.fitting.fit_table,
                 "Close": page.fitting.forget,
             }
             self._results = page.add_buttons(

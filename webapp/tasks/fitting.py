@@ -11,7 +11,7 @@ from finlab.arrays import Array
 from finlab.distribution import install
 from finlab.errors import DataError, FinlabError
 from finlab.layout import FinModelSpec, Layout
-from finlab.physics.table_file import read_table, table_bytes
+from finlab.physics.table_file import read_table
 from webapp.session.companions import stored_table
 from webapp.session.files import table_folder
 from webapp.tasks.background import Newest
@@ -39,8 +39,6 @@ class Upload:
     """The file's name."""
     content: bytes
     """The file."""
-    is_noisy: bool = False
-    """Whether a full grid, too, is to be fitted instead of being taken as it stands."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,19 +84,6 @@ class Fitting(Newest[Upload, Fitted]):
         self.progress = "reading the file"
         self.ask(Upload(fin, model, short, content))
 
-    def fit_table(self) -> None:
-        """Fit the full grid that was taken as it stands: a rig may have stepped through one.
-
-        Raises:
-            FinlabError: none was taken.
-        """
-        found = self.findings
-        if found is None or found.fit is not None:
-            raise FinlabError("no full grid was taken as it stands; upload one first")
-        content = table_bytes(str(found.model.values()["path"]))
-        self.forget()
-        self.ask(Upload(found.upload.fin, found.model, found.upload.name, content, is_noisy=True))
-
     def forget(self) -> None:
         """Cancel what is under way, and put away what came of the last file; the fin keeps its model."""
         super().forget()
@@ -139,7 +124,7 @@ class Fitting(Newest[Upload, Fitted]):
             path = Path(folder) / upload.name
             path.write_bytes(upload.content)
             try:
-                if not upload.is_noisy and _is_table(path):
+                if _is_table(path):
                     return Fitted(done, stored_table(upload.content, table_folder()))
                 return self._fit_measurements(path, upload, done)
             except FinlabError as error:
