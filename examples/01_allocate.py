@@ -17,7 +17,7 @@ def main() -> None:
     for name, (amplitude, frequency, direction) in zip(result.fins, result.command, strict=True):
         print(f"{name:<12}  {amplitude:7.3f}  {frequency:6.3f}  {np.degrees(direction):20.1f}")
     print("delivered [N, N m]:", np.round(result.wrench, 3) + 0.0)
-    print(f"normalized error {result.err_norm:.1e}, energy {result.energy:.2f}")
+    print(f"normalized error {result.err_norm:.1e}, effort {result.effort:.2f}")
 
 
 if __name__ == "__main__":

@@ -17,7 +17,7 @@ import numpy as np
 from finlab.allocation.search.search_allocator import SearchAllocator
 from finlab.arrays import AnyArray, Array
 from finlab.assets import PAPER_LAYOUTS
-from finlab.bench.problems import FORMAT, KINDS, VERSION, Problems, Robot, Sequences, Targets
+from finlab.bench.problems import FORMAT, KINDS, VERSION, BenchRobot, Problems, Sequences, Targets
 from finlab.errors import DataError
 from finlab.evaluation.cheapest_commands import CheapestCommands, has_formulas
 from finlab.evaluation.progress import progress
@@ -156,7 +156,7 @@ class BestKnown:
 def make_problems(seed: int = SEED, per_split: int = PER_SPLIT, costs: bool = True) -> Problems:
     """All problems of a seed; without costs in seconds."""
     forces: dict[str, AnyArray] = {}
-    bots: list[Robot] = []
+    bots: list[BenchRobot] = []
     walked: dict[str, int] = {}
     for name, drawn in robots(seed, per_split):
         walked.setdefault(drawn.name, len(bots))
@@ -183,7 +183,7 @@ def make_problems(seed: int = SEED, per_split: int = PER_SPLIT, costs: bool = Tr
     return replace(problems, about={"seed": seed, "starts": STARTS}, **whole)
 
 
-def _robot(name: str, layout: Layout, forces: dict[str, AnyArray], seed: int, index: int) -> Robot:
+def _robot(name: str, layout: Layout, forces: dict[str, AnyArray], seed: int, index: int) -> BenchRobot:
     """A robot as the file describes it; its force tables join `forces`."""
     description, tables = layout_to_dict(layout), {}
     for fin in description["fins"]:
@@ -195,7 +195,7 @@ def _robot(name: str, layout: Layout, forces: dict[str, AnyArray], seed: int, in
             forces[key] = grid.values[..., :3].astype(np.float16)
             tables[file] = {name: axis.tolist() for name, axis in axes} | {"force": key}
             fin["model"] = {"type": "table", "path": file}
-    robot = Robot(name, description, (1.0,) * 6, tables)
+    robot = BenchRobot(name, description, (1.0,) * 6, tables)
     alone = Problems({}, (robot,), _columns(Targets, []), _columns(Sequences, []), forces)
     rng = np.random.default_rng((SIGMA_DOMAIN, seed, index))
     return replace(robot, sigma=tuple(own_sigma(plant_of(alone.layout(0)), rng).tolist()))

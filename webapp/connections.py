@@ -16,7 +16,7 @@ from websockets.exceptions import SecurityError
 from websockets.frames import Opcode
 from websockets.http11 import Response
 
-from webapp.guard import SECURE, Verdict
+from webapp.guard import SECURE, Admission
 
 STAGES = 3
 """How far a connection has come that is no page yet: it is open, it has asked, it has sent a message."""
@@ -124,7 +124,7 @@ class Connection(ServerConnection):
         super().send_data()
 
 
-def refusal(verdict: Verdict) -> Response:
+def refusal(verdict: Admission) -> Response:
     """An answer in plain words."""
     body = verdict.text.encode()
     headers = Headers({**SECURE, **verdict.headers, "Content-Type": "text/plain; charset=utf-8"})
@@ -132,11 +132,11 @@ def refusal(verdict: Verdict) -> Response:
     return Response(verdict.status.value, verdict.status.phrase, headers, body)
 
 
-def _reason(error: BaseException) -> Verdict:
+def _reason(error: BaseException) -> Admission:
     """What to say of a request that could not be read."""
     if isinstance(error, SecurityError):
-        return Verdict(HTTPStatus.REQUEST_HEADER_FIELDS_TOO_LARGE, "The request is too long.\n")
+        return Admission(HTTPStatus.REQUEST_HEADER_FIELDS_TOO_LARGE, "The request is too long.\n")
     if any(word in str(error) for word in ("HTTP method", "request body", "transfer codings", "int()")):
         text = "This server answers GET requests without a body.\n"
-        return Verdict(HTTPStatus.METHOD_NOT_ALLOWED, text, {"Allow": "GET"})
-    return Verdict(HTTPStatus.BAD_REQUEST, "This is no request of HTTP/1.1.\n")
+        return Admission(HTTPStatus.METHOD_NOT_ALLOWED, text, {"Allow": "GET"})
+    return Admission(HTTPStatus.BAD_REQUEST, "This is no request of HTTP/1.1.\n")

@@ -44,7 +44,7 @@ def is_loopback(host: str) -> bool:
 
 
 @dataclass(frozen=True)
-class Verdict:
+class Admission:
     """What to answer a request that is not let through, or that brings the token along."""
 
     status: HTTPStatus
@@ -69,7 +69,7 @@ class Guard:
         """A guard for an address, with a fresh token where others could connect."""
         return Guard(host, None if is_loopback(host) else secrets.token_urlsafe(18))
 
-    def check(self, path: str, headers: dict[str, str]) -> Verdict | None:
+    def check(self, path: str, headers: dict[str, str]) -> Admission | None:
         """Look at a request; None lets it through.
 
         Args:
@@ -82,34 +82,35 @@ class Guard:
         given = parse_qs(path.partition("?")[2]).get("token", [""])[0]
         if self._is_token(given):
             cookie = f"{COOKIE}={self.token}; Path=/; HttpOnly; SameSite=Strict"
-            return Verdict(HTTPStatus.SEE_OTHER, "", {"Location": "/", "Set-Cookie": cookie})
+            return Admission(HTTPStatus.SEE_OTHER, "", {"Location": "/", "Set-Cookie": cookie})
         if self._is_token(_cookie(headers.get("cookie", ""))):
             return None
-        return Verdict(HTTPStatus.UNAUTHORIZED, "Open the address with the token that finlab app printed.\n")
+        sentence = "Open the address with the token that finlab app printed.\n"
+        return Admission(HTTPStatus.UNAUTHORIZED, sentence)
 
-    def _malformed(self, path: str, headers: dict[str, str]) -> Verdict | None:
+    def _malformed(self, path: str, headers: dict[str, str]) -> Admission | None:
         """Why a request makes no sense."""
         place, _, query = path.partition("?")
         if len(place) > LONGEST_PATH or len(query) > LONGEST_QUERY:
-            return Verdict(HTTPStatus.REQUEST_URI_TOO_LONG, "The address is too long.\n")
+            return Admission(HTTPStatus.REQUEST_URI_TOO_LONG, "The address is too long.\n")
         if not _TARGET.fullmatch(path):
-            return Verdict(HTTPStatus.BAD_REQUEST, "The address is malformed.\n")
+            return Admission(HTTPStatus.BAD_REQUEST, "The address is malformed.\n")
         if not _HOST_ALONE.fullmatch(headers.get("host", "").lower()):
-            return Verdict(HTTPStatus.BAD_REQUEST, "The header Host is missing or malformed.\n")
+            return Admission(HTTPStatus.BAD_REQUEST, "The header Host is missing or malformed.\n")
         origin = headers.get("origin", "null").lower()
         if origin != "null" and not _ORIGIN.fullmatch(origin):
-            return Verdict(HTTPStatus.BAD_REQUEST, "The header Origin is malformed.\n")
+            return Admission(HTTPStatus.BAD_REQUEST, "The header Origin is malformed.\n")
         return None
 
-    def _foreign(self, headers: dict[str, str]) -> Verdict | None:
+    def _foreign(self, headers: dict[str, str]) -> Admission | None:
         """Why a request may not come from where it comes from; its headers are well formed."""
         host = headers["host"].lower()
         match, origin = _HOST_ALONE.fullmatch(host), headers.get("origin")
         if is_loopback(self.host) and not (match and is_loopback(match["name"])):
             # Another site's name that was made to point at this machine.
-            return Verdict(HTTPStatus.FORBIDDEN, "This server answers to localhost only.\n")
+            return Admission(HTTPStatus.FORBIDDEN, "This server answers to localhost only.\n")
         if origin is not None and origin.lower().partition("://")[2] != host:
-            return Verdict(HTTPStatus.FORBIDDEN, "Pages of other sites may not use this server.\n")
+            return Admission(HTTPStatus.FORBIDDEN, "Pages of other sites may not use this server.\n")
         return None
 
     def _is_token(self, text: str) -> bool:

@@ -20,7 +20,7 @@ from viser._assignable_props_api import AssignablePropsBase
 from websockets.http11 import Request, Response
 
 from webapp.connections import MAX_MESSAGE, REQUEST_S, Connection, Connections, quiet, refusal
-from webapp.guard import SECURE, Guard, Verdict
+from webapp.guard import SECURE, Admission, Guard
 
 _STARTING = threading.Lock()
 LOCAL = Guard("127.0.0.1")
@@ -52,7 +52,7 @@ def _guarded(guard: Guard) -> Iterator[None]:
                 answer: Response | None = process_request(connection, request)
                 if answer is None or answer.status_code == HTTPStatus.OK:
                     return answer
-            return refusal(Verdict(HTTPStatus.NOT_FOUND, "There is no such page.\n"))
+            return refusal(Admission(HTTPStatus.NOT_FOUND, "There is no such page.\n"))
 
         def secured(connection: Any, request: Request, response: Response) -> None:
             for name, value in SECURE.items():

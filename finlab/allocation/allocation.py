@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.judging import REACHED, Judge, judge
+from finlab.allocation.evaluate import REACHED, Judge, evaluate
 from finlab.allocation.policy import CLOSEST, Policy, describe_binding
 from finlab.allocation.solution import Candidates, PlainData
 from finlab.allocation.tables import allocation_html, allocation_text
@@ -35,7 +35,7 @@ class Answer(PlainData):
     """Delivered wrench (6,) or (N, 6) as the judge finds it [N, N m]."""
     sigma: Array
     """Per-axis standard deviation (6,) of the error measure."""
-    judged_by: Judge
+    evaluated_by: Judge
     """Who computed `fin_forces` and `wrench`: the plant, that is the fins' own laws and tables."""
     method: str
     """Name of the method that answered."""
@@ -69,7 +69,7 @@ class BatchAllocation(Answer):
 
     err_norm: Array
     """Sizes (N,) of what is missing from the targets, each axis over its `sigma`."""
-    energy: Array
+    effort: Array
     """Effort `J_en` (N,) of the commands, the paper's energy proxy."""
     power: Array
     """Mean mechanical power (N,) [W] of the commands, by the fins' own models."""
@@ -89,7 +89,7 @@ class BatchAllocation(Answer):
         return (
             f"BatchAllocation({len(self)} targets, layout={self.layout.name!r:.60}, fins={len(self.fins)}, "
             f"method={self.method!r}, delivered={int(self.reachable.sum())}, "
-            f"largest err_norm={worst} by the {self.judged_by})"
+            f"largest err_norm={worst} by the {self.evaluated_by})"
         )
 
 
@@ -102,7 +102,7 @@ class Allocation(Answer):
 
     err_norm: float
     """Size of what is missing from the target, each axis over its `sigma`."""
-    energy: float
+    effort: float
     """Effort `J_en` of the command, the paper's energy proxy."""
     power: float
     """Mean mechanical power [W] of the command, by the fins' own models."""
@@ -143,16 +143,16 @@ class Allocation(Answer):
 
     def with_command(self, command: Array) -> "Allocation":
         """The same question with another command (n, 3) in place of the answer, judged by the plant."""
-        verdict = judge(self.layout, command[None], self.target[None], self.sigma)
+        verdict = evaluate(self.layout, command[None], self.target[None], self.sigma)
         return replace(
             self,
             command=command,
             fin_forces=verdict.fin_forces[0],
             wrench=verdict.wrench[0],
             err_norm=float(verdict.err_norm[0]),
-            energy=float(verdict.energy[0]),
+            effort=float(verdict.effort[0]),
             power=float(verdict.power[0]),
-            judged_by="plant",
+            evaluated_by="plant",
             wrench_surrogate=None,
         )
 
@@ -160,8 +160,8 @@ class Allocation(Answer):
         failed = f", failed={', '.join(self.failed)!r:.60}" if self.failed else ""
         return (
             f"Allocation(layout={self.layout.name!r:.60}, fins={len(self.fins)}{failed}, "
-            f"method={self.method!r}, err_norm={self.err_norm:.2e} by the {self.judged_by}, "
-            f"power={self.power:.3g} W, energy={self.energy:.3f}, reachable={self.reachable}, "
+            f"method={self.method!r}, err_norm={self.err_norm:.2e} by the {self.evaluated_by}, "
+            f"power={self.power:.3g} W, effort={self.effort:.3f}, reachable={self.reachable}, "
             f"solve_ms={self.solve_ms:.1f})"
         )
 

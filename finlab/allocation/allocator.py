@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from finlab.allocation.allocation import Allocation, BatchAllocation
-from finlab.allocation.judging import judge
-from finlab.allocation.method import Method
+from finlab.allocation.evaluate import evaluate
+from finlab.allocation.method import AllocationMethod
 from finlab.allocation.modes import Mode, find_modes, force_sizes
 from finlab.allocation.notes import fin_notes
 from finlab.allocation.policy import CLOSEST, Policy, as_policy
@@ -29,7 +29,7 @@ SAME_COMMAND = 1e-6
 """Two commands [rad, Hz, rad] that differ by less are one answer, given on two machines."""
 
 
-class Allocator(Method):
+class Allocator(AllocationMethod):
     """Turns a target wrench into one command per fin.
 
     Failed fins are removed before a method solves and put back (as NaN) after, so no method can use one.
@@ -82,7 +82,7 @@ class Allocator(Method):
         solution = self._solve_by(policy, fins.healthy, target[None], seed=seed, previous=before)
         solve_ms = (time.perf_counter() - start) * 1e3
         command = fins.among_all(solution.command)
-        verdict = judge(fins.layout, command, target[None], self.normalization.std)
+        verdict = evaluate(fins.layout, command, target[None], self.normalization.std)
         return Allocation(
             layout=fins.layout,
             failed=fins.failed,
@@ -91,10 +91,10 @@ class Allocator(Method):
             fin_forces=verdict.fin_forces[0],
             wrench=verdict.wrench[0],
             err_norm=float(verdict.err_norm[0]),
-            energy=float(verdict.energy[0]),
+            effort=float(verdict.effort[0]),
             power=float(verdict.power[0]),
             sigma=self.normalization.std,
-            judged_by=verdict.judged_by,
+            evaluated_by=verdict.evaluated_by,
             method=self.name,
             solve_ms=solve_ms,
             checkpoint=self.checkpoint,
@@ -174,7 +174,7 @@ class Allocator(Method):
         solution = self._solve_many(policy, fins.healthy, targets, seed=seed)
         elapsed_ms = (time.perf_counter() - start) * 1e3
         command = fins.among_all(solution.command)
-        verdict = judge(fins.layout, command, targets, self.normalization.std)
+        verdict = evaluate(fins.layout, command, targets, self.normalization.std)
         return BatchAllocation(
             layout=fins.layout,
             failed=fins.failed,
@@ -183,10 +183,10 @@ class Allocator(Method):
             fin_forces=verdict.fin_forces,
             wrench=verdict.wrench,
             err_norm=verdict.err_norm,
-            energy=verdict.energy,
+            effort=verdict.effort,
             power=verdict.power,
             sigma=self.normalization.std,
-            judged_by=verdict.judged_by,
+            evaluated_by=verdict.evaluated_by,
             method=self.name,
             solve_ms=np.full(len(targets), elapsed_ms / max(len(targets), 1)),
             checkpoint=self.checkpoint,

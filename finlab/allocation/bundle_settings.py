@@ -11,7 +11,7 @@ from finlab.errors import AllocationError, DataError
 from finlab.files.guarded import decoded
 from finlab.files.plain_values import parse_json
 from finlab.networks.normalization import Normalization
-from finlab.physics.energy import EnergyWeights
+from finlab.physics.effort import EffortWeights
 
 if TYPE_CHECKING:
     from finlab.allocation.search.search_allocator import SearchAllocator
@@ -88,10 +88,10 @@ def read_about(files: Files, source: str) -> About:
 def _settings(kind: type[SearchSettings], values: dict[str, Any]) -> dict[str, Any]:
     """Settings by name from what a file holds; an `AllocationError` or a `TypeError` where that is wrong."""
     plain = {key: value for key, value in values.items() if key not in GONE}
-    weights = plain.pop("energy_weights", {})
+    weights = plain.pop("effort_weights", {})
     if not isinstance(weights, dict):
-        raise TypeError(f"energy_weights: expected keys and values, got {weights!r:.40}")
+        raise TypeError(f"effort_weights: expected keys and values, got {weights!r:.40}")
     known = kind.__dataclass_fields__
     if unknown := [key for key in plain if key not in known]:
         raise TypeError(f"expected {', '.join(known)}, got {unknown[0]!r:.40}")
-    return vars(kind(**plain, energy_weights=EnergyWeights(**weights)))
+    return vars(kind(**plain, effort_weights=EffortWeights(**weights)))

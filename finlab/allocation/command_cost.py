@@ -31,9 +31,9 @@ class CommandCost:
         """Returns costs (B,) of commands (B, n, 3)."""
         return self.weight * self._told(command)
 
-    def slopes(self, command: Array) -> Array:
+    def gradient(self, command: Array) -> Array:
         """Returns their derivatives (B, n, 3) by the commands."""
-        return self.weight * self._told.slopes(command)
+        return self.weight * self._told.gradient(command)
 
 
 def command_cost(plant: Plant, objective: Objective, sigma: Array, weight: float) -> CommandCost:
@@ -49,7 +49,8 @@ def command_cost(plant: Plant, objective: Objective, sigma: Array, weight: float
         weight: of one unit of effort, or of one usual load.
     """
     loads = _full_loads(plant)
-    largest = np.linalg.norm((plant.force(loads)[..., None, :] @ (plant.columns / sigma))[..., 0, :], axis=-1)
+    wrench = (plant.force(loads)[..., None, :] @ (plant.effectiveness / sigma))[..., 0, :]
+    largest = np.linalg.norm(wrench, axis=-1)
     weight *= min(1.0, float((largest.max(axis=0) ** 2).sum()))
     meter = objective.meter(plant)
     if not isinstance(meter, PowerMeter):

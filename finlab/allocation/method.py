@@ -9,7 +9,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.judging import REACHED
+from finlab.allocation.evaluate import REACHED
 from finlab.allocation.policy import Policy, largest_share
 from finlab.allocation.settings import Settings
 from finlab.allocation.solution import Solution
@@ -21,7 +21,7 @@ from finlab.networks.trained import TrainedWeights
 from finlab.physics import plant_of
 
 
-class Method(ABC):
+class AllocationMethod(ABC):
     """What turns target wrenches into commands, for layouts whose fins are all healthy.
 
     A method implements `_solve`; `Allocator` asks the questions.

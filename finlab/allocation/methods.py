@@ -46,7 +46,7 @@ METHODS: dict[str, tuple[str, str]] = {
     "ipopt": ("finlab.allocation.baselines.ipopt", "Ipopt"),
 }
 """Name -> module and class; modules are loaded only when their method is asked for. The one list of methods:
-tests hold `Method` and the command line's words against it."""
+tests hold `MethodName` and the command line's words against it."""
 
 GONE = {
     "learned": "is now called 'search'",
@@ -58,7 +58,7 @@ LEARNED = ("mdn", "paper")
 """Methods that need a trained network; the others take only the normalization from a checkpoint."""
 
 
-Method = Literal["search", "mdn", "paper", "qp", "sqp", "analytic", "ipopt"]
+MethodName = Literal["search", "mdn", "paper", "qp", "sqp", "analytic", "ipopt"]
 """The names again, for type checkers and editors."""
 
 
@@ -91,7 +91,7 @@ def load_allocator(
     **options: Any,
 ) -> Allocator: ...
 def load_allocator(
-    method: Method | str | os.PathLike[str] = "search",
+    method: MethodName | str | os.PathLike[str] = "search",
     *,
     checkpoint: str | os.PathLike[str] | None = None,
     **options: Any,

@@ -47,7 +47,7 @@ class Mode(PlainData):
     """Wrench (6,) that the method's own model expects [N, N m]."""
     err_norm: float
     """Normalized error of that wrench."""
-    energy: float
+    effort: float
     """Effort `J_en`, the paper's energy proxy."""
     power: float
     """Mean mechanical power [W]."""
@@ -85,7 +85,7 @@ def find_modes(candidates: Candidates, force: Array, lower: Array, upper: Array)
                 command=command,
                 wrench=candidates.wrench[first],
                 err_norm=float(candidates.err_norm[first]),
-                energy=float(candidates.energy[first]),
+                effort=float(candidates.effort[first]),
                 power=float(candidates.power[first]),
                 saturation=float(np.clip(np.nanmax(used), 0.0, 1.0)),
                 signature=signatures[first],

@@ -8,7 +8,7 @@ from numbers import Integral, Real
 from typing import Any, NamedTuple, TypedDict
 
 from finlab.errors import AllocationError
-from finlab.physics.energy import DEFAULT_WEIGHTS, EnergyWeights
+from finlab.physics.effort import DEFAULT_WEIGHTS, EffortWeights
 from finlab.physics.objective import Name, Objective
 
 LARGEST_WEIGHT = 100.0
@@ -74,7 +74,7 @@ def _checked(setting: "Field[Any]", value: Any) -> Any:
         expected = None if value in choices else f"one of {', '.join(choices)}"
     elif limits is not None:
         return _within(setting, limits, value)
-    elif isinstance(setting.default, EnergyWeights):
+    elif isinstance(setting.default, EffortWeights):
         return _weights(name, value)
     elif not isinstance(value, bool):
         expected = "true or false"
@@ -94,9 +94,9 @@ def _within(setting: "Field[Any]", limits: Range, value: Any) -> float | None:
     raise AllocationError(f"{setting.name}: expected {limits}, got {value!r:.60} ({limits.meaning})")
 
 
-def _weights(name: str, value: Any) -> EnergyWeights:
-    if not isinstance(value, EnergyWeights):
-        raise AllocationError(f"{name}: expected EnergyWeights, got {value!r:.60}")
+def _weights(name: str, value: Any) -> EffortWeights:
+    if not isinstance(value, EffortWeights):
+        raise AllocationError(f"{name}: expected EffortWeights, got {value!r:.60}")
     for key, weight in vars(value).items():
         plain = isinstance(weight, int | float) and not isinstance(weight, bool)
         if not (plain and 0.0 <= weight <= LARGEST_WEIGHT):
@@ -111,7 +111,7 @@ class AimSettings(Settings):
     """What is kept least, for methods that can choose."""
 
     objective: Name = choice("power", ("power", "effort"), "kept least: watts, or the paper's effort")
-    energy_weights: EnergyWeights = DEFAULT_WEIGHTS
+    effort_weights: EffortWeights = DEFAULT_WEIGHTS
     """Weights of the effort."""
     copper_loss: float = number(
         0.0, 0.0, 1e6, "heat in a motor's windings that counts beside the mechanical power", "W/(N m)^2"
@@ -120,12 +120,12 @@ class AimSettings(Settings):
     @property
     def aim(self) -> Objective:
         """The three as one."""
-        return Objective(self.objective, self.energy_weights, self.copper_loss)
+        return Objective(self.objective, self.effort_weights, self.copper_loss)
 
 
 class AimOptions(TypedDict, total=False):
     """`AimSettings` for editors and type checkers."""
 
     objective: Name
-    energy_weights: EnergyWeights
+    effort_weights: EffortWeights
     copper_loss: float

@@ -44,7 +44,7 @@ class Candidates(PlainData):
     """Wrench (K, 6) that the method's own model expects [N, N m]."""
     err_norm: Array
     """Normalized error (K,) of that wrench."""
-    energy: Array
+    effort: Array
     """Effort `J_en` (K,), the paper's energy proxy."""
     power: Array
     """Mean mechanical power (K,) [W]."""

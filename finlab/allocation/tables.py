@@ -41,7 +41,7 @@ def summary(result: Allocation) -> str:
     """The figures of an answer in one line."""
     source = f", checkpoint {result.checkpoint}" if result.checkpoint else ""
     return (
-        f"err_norm {result.err_norm:.2e}   power {result.power:.3f} W   effort {result.energy:.3f}   "
+        f"err_norm {result.err_norm:.2e}   power {result.power:.3f} W   effort {result.effort:.3f}   "
         f"{result.solve_ms:.1f} ms   method {result.method}{source}"
     )
 

@@ -12,7 +12,7 @@ from finlab.arrays import Array
 from finlab.errors import LayoutError
 from finlab.forces.fin_sets import SCALE, FinSets, fin_sets
 from finlab.layout import Fin, Layout
-from finlab.layout.arrays import force_columns
+from finlab.layout.arrays import force_effectiveness
 
 MIRROR_TOLERANCE = 1e-3
 """How far [m, rad] two fins may be from each other's mirror image and still count as a pair."""
@@ -149,8 +149,8 @@ class Moves:
 
     def sets(self, vectors: Array) -> FinSets:
         """Returns what the fins can push once moved by vectors (P, D)."""
-        columns = force_columns(*self.geometry(vectors))[..., 1:, :] / SCALE
-        return self._sets.tile(len(vectors))._replace(columns=np.ascontiguousarray(columns))
+        effectiveness = force_effectiveness(*self.geometry(vectors))[..., 1:, :] / SCALE
+        return self._sets.tile(len(vectors))._replace(effectiveness=np.ascontiguousarray(effectiveness))
 
     def moved(self, vector: Array) -> Layout:
         """Returns the layout with its fins moved by a vector (D,)."""

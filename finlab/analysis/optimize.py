@@ -147,9 +147,9 @@ def _search(
 
     def cost(vectors: Array) -> Array:
         nonlocal best
-        columns = vectors.reshape(len(moves.start), -1).T
-        value = measure(moves.sets(columns))
-        position, angle = moves.geometry(columns)
+        effectiveness = vectors.reshape(len(moves.start), -1).T
+        value = measure(moves.sets(effectiveness))
+        position, angle = moves.geometry(effectiveness)
         close = np.maximum(needed - _gaps(position), 0.0).sum(-1) + rule(position, angle)
         fine = value[close <= 0.0]
         best = max(best, float(fine.max())) if len(fine) else best

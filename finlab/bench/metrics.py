@@ -17,7 +17,7 @@ from finlab.bench.protocol import FAILURES
 from finlab.bench.runner import Answer, Answers
 from finlab.layout.angles import command_change
 from finlab.physics import plant_of
-from finlab.physics.energy import command_energy
+from finlab.physics.effort import command_effort
 
 Row = dict[str, Any]
 SOLVED = 0.01
@@ -51,7 +51,7 @@ def score(answers: list[Answer], problems: Problems, robot: int, wrench: Array, 
     return Scores(
         np.maximum(error - best_error, 0.0) / np.linalg.norm(wrench / sigma, axis=-1),
         np.where(failed, np.nan, plant.power(command).sum(-1)),
-        np.where(failed, np.nan, command_energy(command, plant.upper)),
+        np.where(failed, np.nan, command_effort(command, plant.upper)),
     )
 
 

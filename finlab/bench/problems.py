@@ -67,7 +67,7 @@ class Sequences(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Robot:
+class BenchRobot:
     """One robot of the benchmark, as the index describes it."""
 
     set: str
@@ -86,7 +86,7 @@ class Problems:
 
     about: dict[str, Any]
     """Where the problems come from: seed, command, starts of the solver."""
-    robots: tuple[Robot, ...]
+    robots: tuple[BenchRobot, ...]
     """The robots, set by set."""
     targets: Targets
     """Single wrenches."""
@@ -150,7 +150,7 @@ def open_problems(path: str | os.PathLike[str] = FILE) -> Problems:
         got = " ".join(f"{value!r:.60}" for value in about)
         raise DataError(f"{path}: expected {FORMAT} of version {VERSION}, got {got}")
     try:
-        robots = tuple(Robot(**{**robot, "sigma": tuple(robot["sigma"])}) for robot in index["robots"])
+        robots = tuple(BenchRobot(**{**robot, "sigma": tuple(robot["sigma"])}) for robot in index["robots"])
         targets = Targets(*(arrays[f"target_{name}"] for name in Targets._fields))
         paths = Sequences(*(arrays[f"sequence_{name}"] for name in Sequences._fields))
         files = [name for robot in robots for name in robot.tables]

@@ -38,7 +38,7 @@ class Answer(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Method:
+class BenchMethod:
     """A method under test."""
 
     name: str
@@ -69,7 +69,7 @@ class Answers:
 
 
 def run_method(
-    method: Method,
+    method: BenchMethod,
     problems: Problems,
     limit_s: float = LIMIT_S,
     done: Callable[[], object] = lambda: None,
@@ -109,7 +109,7 @@ def run_method(
 class Asker:
     """One method's process and the robot that it is asked about."""
 
-    def __init__(self, method: Method, limit_s: float) -> None:
+    def __init__(self, method: BenchMethod, limit_s: float) -> None:
         self.method, self.limit_s = method, limit_s
         self.child = Child(method.command)
         self.number, self.lost = 0, 0

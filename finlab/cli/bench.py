@@ -13,7 +13,7 @@ from finlab.cli.json_file import JsonFile, check_json_file, put_json
 from finlab.errors import DataError
 
 if TYPE_CHECKING:
-    from finlab.bench.runner import Method
+    from finlab.bench.runner import BenchMethod
 
 
 def bench(
@@ -76,19 +76,19 @@ def bench(
         raise
 
 
-def _tested(methods: tuple[str, ...], commands: tuple[str, ...], cpu: bool) -> list[Method]:
+def _tested(methods: tuple[str, ...], commands: tuple[str, ...], cpu: bool) -> list[BenchMethod]:
     """The methods that were named, each of another name."""
-    from finlab.bench.runner import Method
+    from finlab.bench.runner import BenchMethod
     from finlab.evaluation.method_specs import load_method_specs
 
     if own := [name for name in methods if ":" not in name]:
         load_method_specs(",".join(own))  # a wrong name costs no time
-    tested = [Method.of(name, cpu) for name in methods or (() if commands else ("search",))]
+    tested = [BenchMethod.of(name, cpu) for name in methods or (() if commands else ("search",))]
     for text in commands:
         words = shlex.split(text)
         if not words:
             raise DataError("command: expected a program and its arguments, got nothing")
-        tested.append(Method(" ".join(Path(word).name for word in words), tuple(words)))
+        tested.append(BenchMethod(" ".join(Path(word).name for word in words), tuple(words)))
     names = [method.name for method in tested]
     if len(set(names)) < len(names):
         raise DataError(f"methods: expected different names, got {', '.join(names)}")

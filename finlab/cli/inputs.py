@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from finlab.layout import Layout
 
 
-class Robot(NamedTuple):
+class OpenedRobot(NamedTuple):
     """A layout, and the fins of it that do not work."""
 
     layout: Layout
@@ -23,7 +23,7 @@ class Robot(NamedTuple):
         return tuple(dict.fromkeys([*self.failed, *names]))
 
 
-def open_robot(text: str) -> Robot:
+def open_robot(text: str) -> OpenedRobot:
     """The layout (and failed fins) in a file, or the shipped layout of that name.
 
     Raises:
@@ -31,7 +31,7 @@ def open_robot(text: str) -> Robot:
     """
     from finlab.layout.load import layout_and_failed
 
-    return Robot(*layout_and_failed(text))
+    return OpenedRobot(*layout_and_failed(text))
 
 
 def check_positive(**counts: int | None) -> None:

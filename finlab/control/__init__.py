@@ -5,8 +5,8 @@ Any object with the shape of `Controller` plugs into `finlab.sim.ClosedLoop`.
 
 from finlab.control.completion import Completion as Completion
 from finlab.control.controllers import WaypointController as WaypointController
+from finlab.control.fault_monitor import Diagnosis as Diagnosis
 from finlab.control.fault_monitor import FaultMonitor as FaultMonitor
-from finlab.control.fault_monitor import Verdict as Verdict
 from finlab.control.gains import PAPER_WAYPOINT_GAINS as PAPER_WAYPOINT_GAINS
 from finlab.control.gains import WaypointGains as WaypointGains
 from finlab.control.measurement import Controller as Controller

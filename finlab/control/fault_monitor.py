@@ -25,7 +25,7 @@ COARSE = 0.05
 """The allocator is given strengths in steps of this size, so that its problem is the same for many ticks."""
 
 
-class Verdict(NamedTuple):
+class Diagnosis(NamedTuple):
     """What a monitor believes of n fins."""
 
     damage: Damage
@@ -87,7 +87,7 @@ class FaultMonitor:
         marked = self._lost | self._torn | ~np.isnan(self._held)
         return tuple(self.layout.names[k] for k in np.flatnonzero(marked))
 
-    def step(self, measurement: Measurement, command: Array | None) -> Verdict:
+    def step(self, measurement: Measurement, command: Array | None) -> Diagnosis:
         """Takes what has been measured and says what is believed.
 
         Args:
@@ -108,7 +108,7 @@ class FaultMonitor:
         self._judge(other)
         return self.verdict()
 
-    def tell(self, name: str, strength: float = 1.0, stuck: float = math.nan) -> Verdict:
+    def tell(self, name: str, strength: float = 1.0, stuck: float = math.nan) -> Diagnosis:
         """The state of a fin is known: its strength, and where it is stuck [rad] if it is.
 
         A fin that is said to be lost is left alone until another state is said: no probe moves it.
@@ -132,7 +132,7 @@ class FaultMonitor:
         lost, direction = self._lost & ~self._told, self._model.fins.direction
         return self._probe.added(command, lost, direction)
 
-    def verdict(self) -> Verdict:
+    def verdict(self) -> Diagnosis:
         """What is believed now."""
         beliefs = self._beliefs
         strength, by_kind = beliefs.strength.copy(), beliefs.probability
@@ -148,7 +148,7 @@ class FaultMonitor:
             probability = np.where(broken, 1.0 - whole, probability)
             failed = tuple(names[k] for k in np.flatnonzero(self._lost))
             health = self._health(strength, stuck & ~self._lost)
-        return Verdict(Damage(failed, health), probability, strength, beliefs.strength_std)
+        return Diagnosis(Damage(failed, health), probability, strength, beliefs.strength_std)
 
     def _health(self, strength: Array, stuck: Array) -> Health | None:
         """What an allocator should know of fins that still push; a table's thrust cannot be scaled."""

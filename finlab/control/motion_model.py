@@ -138,7 +138,7 @@ class MotionModel:
         force = self._plant.force(both)
         force *= does[:, :1] * does[:, 1:2] > 0.0  # one that does not beat gives nothing, whatever its law
         self._thrust = force[0]
-        now = np.matmul(force[:, :, None, :], self._plant.columns)[:, :, 0]
+        now = np.matmul(force[:, :, None, :], self._plant.effectiveness)[:, :, 0]
         mean, self._force = 0.5 * (self._force + now), now
         return mean[0], mean[1] - mean[0]
 
@@ -147,6 +147,7 @@ class MotionModel:
         if not self._any_unsure:
             return None
         most = 2.0 * np.linalg.norm(self._thrust[self.unsure], axis=-1)
-        gained = (most[:, None, None] * self._plant.columns[self.unsure, 1:] * self._gain).reshape(-1, 6)
+        effectiveness = self._plant.effectiveness[self.unsure, 1:]
+        gained = (most[:, None, None] * effectiveness * self._gain).reshape(-1, 6)
         noise: Array = gained.T @ gained
         return noise

@@ -21,7 +21,7 @@ from finlab.layout.angles import wrapped
 from finlab.physics import plant_of
 from finlab.vehicle.attitude import in_world, quaternion_of
 from finlab.vehicle.body import complete_body
-from finlab.vehicle.fossen import damping_rates, damping_slopes
+from finlab.vehicle.fossen import damping_jacobian, damping_rates
 from finlab.vehicle.vehicle import Vehicle
 
 AXES = [0, 1, 2, 5]
@@ -145,8 +145,8 @@ class MotionObserver:
         flow = state[MOTION].copy()
         flow[:2] -= cosine * c + sine * d, cosine * d - sine * c
         surge, sway, heave, yaw = flow.tolist()
-        slopes = damping_slopes(self._dynamics, (surge, sway, heave, 0.0, 0.0, yaw))
-        kept = np.exp(-dt * np.array([slopes[k] for k in AXES]))
+        jacobian = damping_jacobian(self._dynamics, (surge, sway, heave, 0.0, 0.0, yaw))
+        kept = np.exp(-dt * np.array([jacobian[k] for k in AXES]))
         transition[range(4), range(4)] = kept
         carried = 1.0 - kept[:2]
         transition[0, CURRENT] = carried[0] * cosine, carried[0] * sine
@@ -174,10 +174,10 @@ class MotionObserver:
         u, v, w, r, by_surge, by_heave, by_yaw, c, d = self._state.tolist()
         attitude = quaternion_of(roll, pitch, yaw)
         self._vehicle.current = (c, d, 0.0)
-        slopes = self._vehicle.derivative(
+        jacobian = self._vehicle.derivative(
             [0.0, 0.0, 0.0, *attitude, u, v, w, *m.rates[:2].tolist(), r], (0.0,) * 6
         )
-        drift = np.array([slopes[7] + by_surge, slopes[8], slopes[9] + by_heave, slopes[12] + by_yaw])
+        drift = np.array([jacobian[7] + by_surge, jacobian[8], jacobian[9] + by_heave, jacobian[12] + by_yaw])
         velocity, current = self._state[:3].copy(), self._state[CURRENT].copy()
         world = in_world(velocity, roll, pitch, yaw)
         return Estimate(position, roll, pitch, yaw, velocity, r, world, current, drift)
@@ -185,7 +185,7 @@ class MotionObserver:
 
 def strongest_wrench(layout: Layout) -> Array:
     """Sizes (6,) [N, N m] of what all fins give along each axis if every one does its best for it."""
-    columns = plant_of(layout).columns[:, 1:]
+    effectiveness = plant_of(layout).effectiveness[:, 1:]
     # Not that of the largest command: a soft fin may push more with a smaller one.
-    reach: Array = (largest_forces(layout)[:, None] * np.linalg.norm(columns, axis=1)).sum(axis=0)
+    reach: Array = (largest_forces(layout)[:, None] * np.linalg.norm(effectiveness, axis=1)).sum(axis=0)
     return reach

@@ -15,7 +15,7 @@ from finlab.command_end import FAILED, exit_code
 from finlab.errors import FinlabError
 
 if TYPE_CHECKING:
-    from finlab.deploy.robot import Robot
+    from finlab.deploy.robot import DeployedRobot
 
 POLICIES = ("closest", "direction", "priority")
 
@@ -38,7 +38,7 @@ def _run(argv: Sequence[str] | None) -> int:
     return code
 
 
-def _robot(arguments: argparse.Namespace) -> "Robot":
+def _robot(arguments: argparse.Namespace) -> "DeployedRobot":
     from finlab.deploy.robot import load_robot
 
     return load_robot(arguments.bundle)

@@ -18,7 +18,7 @@ def allocation_record(result: Allocation) -> dict[str, object]:
         "wrench_plant": result.wrench.tolist(),
         "unallocated": result.unallocated.tolist(),
         "err_norm": result.err_norm,
-        "energy": result.energy,
+        "effort": result.effort,
         "power": result.power,
         "sigma": result.sigma.tolist(),
         "solve_ms": result.solve_ms,
@@ -27,7 +27,7 @@ def allocation_record(result: Allocation) -> dict[str, object]:
         "reachable": result.reachable,
         "scale": result.scale,
         "binding": list(result.binding),
-        "judged_by": result.judged_by,
+        "evaluated_by": result.evaluated_by,
         "unknown_fins": list(result.unknown_fins),
         "notes": list(result.notes),
     }

@@ -24,7 +24,7 @@ from finlab.layout.load import bundle_graph_text
 
 
 @dataclass(frozen=True)
-class Robot:
+class DeployedRobot:
     """What `finlab-runtime` works with."""
 
     graph: LayoutGraph
@@ -82,7 +82,7 @@ class Robot:
         return command
 
 
-def load_robot(path: str | os.PathLike[str]) -> Robot:
+def load_robot(path: str | os.PathLike[str]) -> DeployedRobot:
     """The robot in a bundle, a folder or a zip archive; or in a layout graph file, which answers with the
     usual settings.
 
@@ -99,7 +99,7 @@ def load_robot(path: str | os.PathLike[str]) -> Robot:
     return robot
 
 
-def _graph_robot(graph: LayoutGraph, source: str) -> Robot:
+def _graph_robot(graph: LayoutGraph, source: str) -> DeployedRobot:
     allocator: Allocator | None = None
     if graph.method == SearchAllocator.name:
         allocator = SearchAllocator(graph.normalization)
@@ -110,14 +110,14 @@ def _graph_robot(graph: LayoutGraph, source: str) -> Robot:
             f"{source}: was made for method {graph.method!r}, whose networks are not here; run the bundle "
             "that `finlab export LAYOUT -o DIR` makes, which brings them"
         )
-    return Robot(graph, allocator)
+    return DeployedRobot(graph, allocator)
 
 
 def _sha256(allocator: SearchAllocator) -> str | None:
     return None if allocator.weights is None else allocator.weights.sha256
 
 
-def parse_robot(files: Files, source: str = "bundle") -> Robot:
+def parse_robot(files: Files, source: str = "bundle") -> DeployedRobot:
     """The robot in the contents of a bundle's files; see `load_robot`.
 
     Force tables are read from the folder or archive `source` once they are needed.
@@ -130,4 +130,4 @@ def parse_robot(files: Files, source: str = "bundle") -> Robot:
         raise DataError(f"{source}: {GRAPH} and the weights are of different checkpoints; export again")
     if not all(map(np.array_equal, allocator.normalization, graph.normalization)):
         raise DataError(f"{source}: {GRAPH} and {ABOUT} differ in normalization; export again")
-    return Robot(graph, allocator)
+    return DeployedRobot(graph, allocator)

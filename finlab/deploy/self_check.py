@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from finlab.allocation.judging import REACHED
+from finlab.allocation.evaluate import REACHED
 from finlab.deploy.graph import SELF_TEST_TOLERANCE
-from finlab.deploy.robot import Robot
+from finlab.deploy.robot import DeployedRobot
 from finlab.errors import DataError
 from finlab.physics import plant_of
 
@@ -37,7 +37,7 @@ class Finding(NamedTuple):
         return self.value <= self.limit
 
 
-def self_check(robot: Robot) -> list[Finding]:
+def self_check(robot: DeployedRobot) -> list[Finding]:
     """Ask everything.
 
     Raises:

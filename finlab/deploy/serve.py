@@ -31,7 +31,7 @@ from finlab.allocation.allocation import Allocation
 from finlab.arrays import Array
 from finlab.deploy.record import command_rows
 from finlab.deploy.request import parse_request
-from finlab.deploy.robot import Robot
+from finlab.deploy.robot import DeployedRobot
 from finlab.deploy.transport import Transport, Unsent
 from finlab.errors import FinlabError
 
@@ -52,7 +52,7 @@ class Timing:
 class Server:
     """Answers requests until they end."""
 
-    def __init__(self, robot: Robot, timing: Timing) -> None:
+    def __init__(self, robot: DeployedRobot, timing: Timing) -> None:
         self._robot, self._timing = robot, timing
         self._worker = ThreadPoolExecutor(1)
         self._sent: Array | None = None  # the last commands, None while the fins rest
@@ -109,7 +109,7 @@ class Server:
             "wrench": answer.wrench.tolist(),
             "unallocated": answer.unallocated.tolist(),
             "err_norm": answer.err_norm,
-            "energy": answer.energy,
+            "effort": answer.effort,
             "power": answer.power,
             "solve_ms": answer.solve_ms,
         }

@@ -9,7 +9,7 @@ from finlab.arrays import AnyArray, Array
 from finlab.evaluation.progress import progress
 from finlab.evaluation.splits import Case
 from finlab.physics import plant_of
-from finlab.physics.energy import command_energy
+from finlab.physics.effort import command_effort
 
 Columns = dict[str, AnyArray]
 """Arrays of N entries by name."""
@@ -61,7 +61,7 @@ def score(
         "layout": np.full(len(targets), number, np.int64),
         "err_norm": np.linalg.norm(missing / (sigma if case.sigma is None else case.sigma), axis=-1),
         "err_phys": np.linalg.norm(missing, axis=-1),
-        "effort": command_energy(command, plant.upper),
+        "effort": command_effort(command, plant.upper),
         "power": np.nansum(plant.power(command), axis=-1),
         "solve_ms": np.asarray(solve_ms, np.float64),
     }

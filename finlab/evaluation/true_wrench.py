@@ -18,7 +18,7 @@ def true_wrench(plant: str, layout: Layout, command: Array, velocity: Array) -> 
     found = []
     for one, water in zip(command, velocity, strict=True):
         force = make_plant(plant, layout)
-        found.append(np.einsum("nk,nkw->w", _mean_force(force, layout, one, water), force.columns))
+        found.append(np.einsum("nk,nkw->w", _mean_force(force, layout, one, water), force.effectiveness))
     return np.array(found)
 
 

@@ -58,13 +58,13 @@ def summary(fit: FinFit) -> tuple[str, ...]:
     doubts = fit.doubts
     head = (f"{DOUBT}: {'; '.join(doubts)}",) if doubts else ()
     amplitude, frequency = fit.measurements.reach
-    lean = float(np.degrees(fit.lean))
+    deflection = float(np.degrees(fit.deflection))
     return (
         *head,
         f"fitted to {len(fit.measurements)} samples, amplitudes up to {amplitude:.3g} rad, frequencies up to "
         f"{frequency:.3g} Hz, forces up to {fit.largest:.3g} N",
         f"cross-validated error {fit.error():.1%} of the largest force, noise of a sample {fit.noise():.1%}; "
         f"{fit.coverage():.0%} of the samples lie in the 95 % band of the fit to the others",
-        f"thrust leans {lean:+.1f} deg off the zero direction",
+        f"thrust leans {deflection:+.1f} deg off the zero direction",
         *fit.notes,
     )

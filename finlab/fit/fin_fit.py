@@ -42,7 +42,7 @@ class FinFit:
     """Force along the thrust's mean direction, across it, and along the shaft, over `largest`."""
     power: Component | None
     """Root of the power over its largest, where it was measured: power grows faster than force does."""
-    lean: float
+    deflection: float
     """Angle from the zero direction to the thrust's mean direction [rad]."""
     largest: float
     """Largest force that was measured, outliers apart [N]."""
@@ -54,7 +54,7 @@ class FinFit:
     def predict(self, command: Array) -> tuple[Array, Array]:
         """Returns forces [N] in the fin frame and their standard deviations (..., 3) at commands (..., 3)."""
         thrust, unsure = self.thrust(command)
-        angle = command[..., 2] + self.lean
+        angle = command[..., 2] + self.deflection
         cos, sin = np.cos(angle), np.sin(angle)
         along, across, sideways = np.moveaxis(thrust, -1, 0)
         by_along, by_across, by_sideways = np.moveaxis(unsure, -1, 0)
@@ -189,7 +189,7 @@ def fit_fin(measurements: Measurements, seed: int = 0, progress: Progress = say_
 def _fitted(
     measurements: Measurements, outliers: tuple[str, ...], notes: tuple[str, ...], tell: Callable[[str], None]
 ) -> FinFit:
-    turned, lean = measurements.thrust()
+    turned, deflection = measurements.thrust()
     largest = float(np.linalg.norm(measurements.force, axis=-1).max())
     inputs = measurements.scaled(measurements.command)
     variance: list[Array | None] = [None, None, None]
@@ -209,5 +209,5 @@ def _fitted(
         largest_power = float(measurements.power.max())
         power = Component(inputs, np.sqrt(np.maximum(measurements.power, 0.0) / largest_power))
     return FinFit(
-        measurements, outliers, (along, across, sideways), power, lean, largest, largest_power, notes
+        measurements, outliers, (along, across, sideways), power, deflection, largest, largest_power, notes
     )

@@ -67,9 +67,9 @@ class Measurements:
         the angle [rad] from the zero direction to that direction."""
         force, phi = self.force, self.command[:, 2]
         planar = (force[:, 1] + 1j * force[:, 2]) * np.exp(-1j * phi)
-        lean = float(np.angle(planar.sum()))
-        planar *= np.exp(-1j * lean)
-        return np.stack([planar.real, planar.imag, force[:, 0]], axis=-1), lean
+        deflection = float(np.angle(planar.sum()))
+        planar *= np.exp(-1j * deflection)
+        return np.stack([planar.real, planar.imag, force[:, 0]], axis=-1), deflection
 
     def without(self, places: NDArray[np.bool_]) -> "Measurements":
         """The samples but those (n,) that are marked."""

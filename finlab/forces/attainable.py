@@ -19,7 +19,7 @@ FLAT = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
-class Hull:
+class Polytope:
     """A convex hull of dimension 0 to 3, and the planes that bound it."""
 
     vertices: Array
@@ -36,7 +36,7 @@ class Hull:
     """How far out (N,) those planes are."""
 
 
-def hull_of(points: Array) -> Hull:
+def hull_of(points: Array) -> Polytope:
     """Returns the convex hull of points (P, 3), at least one."""
     center = points.mean(axis=0)
     _, extent, axes = np.linalg.svd(points - center, full_matrices=True)
@@ -60,7 +60,7 @@ def hull_of(points: Array) -> Hull:
         corners, normals, offsets = np.array([0]), np.zeros((0, 3)), np.zeros(0)
     sides = np.concatenate([flat, -flat])
     vertices = points[corners]
-    return Hull(
+    return Polytope(
         vertices,
         np.zeros((0, 3), dtype=np.intp),
         np.arange(len(corners)) if dimension else np.zeros(0, dtype=np.intp),
@@ -70,7 +70,7 @@ def hull_of(points: Array) -> Hull:
     )
 
 
-def _body(points: Array) -> Hull:
+def _body(points: Array) -> Polytope:
     hull = ConvexHull(points)
     corners = hull.vertices
     place = np.zeros(len(points), dtype=np.intp)
@@ -80,7 +80,7 @@ def _body(points: Array) -> Hull:
     backward = (np.cross(b - a, c - a) * normals).sum(-1) < 0.0
     faces = np.where(backward[:, None], faces[:, ::-1], faces)
     planes = np.unique(np.round(hull.equations, 9), axis=0)
-    return Hull(
+    return Polytope(
         points[corners], place[faces], np.zeros(0, dtype=np.intp), 3, planes[:, :3].copy(), -planes[:, 3]
     )
 
@@ -98,7 +98,7 @@ TOLERANCE = 0.01
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class AttainableSet(Hull):
+class AttainableSet(Polytope):
     """A convex polytope of attainable forces or torques, body frame [N] or [N m]. Every vertex is attained,
     by the fins or, where `hull` says so, by the convex hulls of what they can push."""
 

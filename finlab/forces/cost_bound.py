@@ -39,7 +39,7 @@ class CostDual:
     def __call__(self, multiplier: Array) -> tuple[float, Array]:
         """Returns the bound, and its derivative (6,) by the multipliers."""
         problem, fin = self._problem, np.arange(len(self._size))
-        pull = (problem.columns @ multiplier).reshape(2, -1).T
+        pull = (problem.effectiveness @ multiplier).reshape(2, -1).T
         direction = self._direction
         if self._uniform:
             ahead = np.arctan2(pull[:, 1], pull[:, 0]) - problem.fins.middle
@@ -69,15 +69,15 @@ class CostDual:
         size, shaft = self._size[fin, k, level], self._shaft[fin, k, level]
         angle = direction[fin, k]
         force = np.concatenate([size * np.cos(angle), size * np.sin(angle)])
-        slope = self._target - force @ problem.columns - shaft @ problem.along_shaft
+        slope = self._target - force @ problem.effectiveness - shaft @ problem.along_shaft
         return float(multiplier @ self._target + best.sum()), slope
 
 
 def _dip(before: Array, at: Array, after: Array, place: Array) -> Array:
     """How far (n,) the parabola through three entries dips below the middle one, where that is the least."""
-    bend = before - 2.0 * at + after
+    hessian = before - 2.0 * at + after
     dip: Array = np.divide(
-        (after - before) ** 2, 8.0 * bend, out=np.zeros_like(at), where=(bend > 0.0) & (place == 1)
+        (after - before) ** 2, 8.0 * hessian, out=np.zeros_like(at), where=(hessian > 0.0) & (place == 1)
     )
     return dip
 
@@ -116,10 +116,10 @@ def _ascent(dual: CostDual, multiplier: Array) -> float:
     return value
 
 
-def _updated(inverse: Array, change: Array, bend: Array) -> Array:
+def _updated(inverse: Array, change: Array, hessian: Array) -> Array:
     """The inverse curvature (6, 6) after a step that changed the multipliers and the slopes so."""
-    scale = float(change @ bend)
+    scale = float(change @ hessian)
     if not scale > 1e-14:
         return inverse
-    shear = np.eye(6) - np.outer(change, bend) / scale
+    shear = np.eye(6) - np.outer(change, hessian) / scale
     return np.asarray(shear @ inverse @ shear.T + np.outer(change, change) / scale)

@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.arrays import Array
-from finlab.forces.fin_envelope import LEAN, LEVELS, SHAFT, FinEnvelope, fin_envelope
+from finlab.forces.fin_envelope import DEFLECTION, LEVELS, SHAFT, FinEnvelope, fin_envelope
 from finlab.layout import Layout
 from finlab.layout.angles import TURN
 from finlab.physics.objective import Objective
 
 LEAST = 1e-12
 """What sizes are kept above before something is divided by them."""
-RIM = 48
+BOUNDARY = 48
 """Sides of the polygon around what an uneven fin can push: at most a fifth of a percent too wide."""
 PLACES = 2.0 / np.pi * (LEVELS - 1) * (1.0 - 1e-12)
 """From the angle of a force in the table to its place among the levels, of which none is past the last."""
@@ -25,7 +25,7 @@ LONGEST_TURN = 0.3
 """Largest turn [rad] from a direction to that of the nearest force on the rim."""
 
 
-class Rim(NamedTuple):
+class Boundary(NamedTuple):
     """What R rows of n fins can do in given directions; (n,) where all fins are the same all round."""
 
     largest: Array
@@ -34,7 +34,7 @@ class Rim(NamedTuple):
     """Force at rest (R, n) [N]."""
     span: Array
     """What lies between the two (R, n) [N], above zero."""
-    bend: Array | float
+    hessian: Array | float
     """Derivative of the largest force by the direction (R, n) [N/rad]."""
     first: NDArray[np.intp]
     """Row of the table (R, n) with which the direction just before this one begins."""
@@ -53,7 +53,7 @@ class Projected(NamedTuple):
     """Size of the force (R, n) [N]."""
     wanted: Array
     """The size (R, n) [N] that is given in that direction where limits of size do not hold."""
-    rim: Rim
+    boundary: Boundary
     """In these directions."""
     stopped: NDArray[np.bool_] | None
     """Where a stop keeps the fin from pointing along the given force (R, n); None where no fin has stops."""
@@ -116,14 +116,14 @@ class Envelopes:
         return bool(np.abs(self.table[:, SHAFT]).max() > 1e-9 * self.maximum.max())
 
     @cached_property
-    def rim_shares(self) -> Array | None:
-        """How far the convex hulls of what the fins can push reach along `RIM` evenly spaced directions
+    def boundary_shares(self) -> Array | None:
+        """How far the convex hulls of what the fins can push reach along `BOUNDARY` evenly spaced directions
         (n, RIM), as shares of their largest forces; None where all fins are the same all round."""
         count = self.largest.shape[1]
         if count == 1:
             return None
         along = self.domain[0][:, None] + self.domain[1][:, None] * np.linspace(-1.0, 1.0, count)
-        sides = 2.0 * np.pi / RIM * np.arange(RIM)
+        sides = 2.0 * np.pi / BOUNDARY * np.arange(BOUNDARY)
         reach = (self.largest[..., None] * np.cos(along[..., None] - sides)).max(axis=1)
         return np.asarray(np.maximum(reach, 0.0) / self.maximum[:, None])
 
@@ -133,11 +133,11 @@ class Envelopes:
         return np.stack([self.table, np.diff(self.table, axis=0, append=self.table[-1:])], axis=1)
 
     @cached_property
-    def _all_round(self) -> Rim:
+    def _all_round(self) -> Boundary:
         """The rim of fins that are the same all round."""
         largest, smallest = self.largest[:, 0], self.smallest[:, 0]
         first = np.arange(len(largest)) * LEVELS
-        return Rim(largest, smallest, largest - smallest + LEAST, 0.0, first, None)
+        return Boundary(largest, smallest, largest - smallest + LEAST, 0.0, first, None)
 
     @cached_property
     def _grid(self) -> tuple[Array, Array, Array, NDArray[np.intp], Array, Array]:
@@ -158,13 +158,13 @@ class Envelopes:
         """The same fins, had they no smallest force."""
         return replace(self, smallest=np.zeros_like(self.smallest))
 
-    def lean(self, zero_direction: Array) -> Array:
+    def deflection(self, zero_direction: Array) -> Array:
         """By how much (n,) [rad] strong forces lean off zero directions (n,) [rad]."""
-        rim = self.rim(zero_direction[None])
-        lean: Array = self.lookup(rim, self.maximum[None])[0, :, LEAN]
-        return lean
+        boundary = self.boundary(zero_direction[None])
+        deflection: Array = self.lookup(boundary, self.maximum[None])[0, :, DEFLECTION]
+        return deflection
 
-    def rim(self, direction: Array) -> Rim:
+    def boundary(self, direction: Array) -> Boundary:
         """What the fins can do in directions (R, n) [rad]."""
         count = self.largest.shape[1]
         if count == 1:
@@ -180,12 +180,12 @@ class Envelopes:
         rest, rest_after = smallest.take(row), smallest.take(row + 1)
         rise = high - low
         most, least = low + part * rise, rest + part * (rest_after - rest)
-        return Rim(most, least, most - least + LEAST, rise / gap, row * LEVELS, part)
+        return Boundary(most, least, most - least + LEAST, rise / gap, row * LEVELS, part)
 
-    def lookup(self, rim: Rim, size: Array) -> Array:
+    def lookup(self, boundary: Boundary, size: Array) -> Array:
         """Rows (R, n, 8) of the tables for forces of sizes (R, n) [N] in the directions of a rim."""
-        place = size - rim.smallest
-        place /= rim.span
+        place = size - boundary.smallest
+        place /= boundary.span
         np.minimum(np.maximum(place, 0.0, out=place), 1.0, out=place)
         np.sqrt(np.sqrt(place, out=place), out=place)
         np.arcsin(place, out=place)
@@ -193,10 +193,10 @@ class Envelopes:
         level = place.astype(np.intp)
         place -= level
         part = place[..., None]
-        level += rim.first
+        level += boundary.first
         found = self._between(level, part)
-        if rim.part is not None:
-            found += (self._between(level + LEVELS, part) - found) * rim.part[..., None]
+        if boundary.part is not None:
+            found += (self._between(level + LEVELS, part) - found) * boundary.part[..., None]
         return found
 
     def _between(self, row: NDArray[np.intp], part: Array) -> Array:
@@ -209,9 +209,9 @@ class Envelopes:
         """What the fins can do near forces (R, 2, n) of sizes (R, n) [N], none of them zero."""
         unit = force / size[:, None]
         if self.turns_fully and self.largest.shape[1] == 1:
-            rim = self.rim(size)
-            held = np.minimum(np.maximum(size, rim.smallest), rim.largest)
-            return Projected(unit, size, held, size, rim, None)
+            boundary = self.boundary(size)
+            held = np.minimum(np.maximum(size, boundary.smallest), boundary.largest)
+            return Projected(unit, size, held, size, boundary, None)
         direction = np.arctan2(force[:, 1], force[:, 0])
         wanted, stopped = size, None
         if not self.turns_fully:
@@ -221,19 +221,20 @@ class Envelopes:
             stopped = excess > 0.0
             wanted = np.where(excess < 0.5 * np.pi, size * np.cos(excess), 0.0)
             direction = self.middle + held
-        asked, rim = wanted, self.rim(direction)
-        over = wanted > rim.largest
-        if rim.part is not None and over.any():
+        asked, boundary = wanted, self.boundary(direction)
+        over = wanted > boundary.largest
+        if boundary.part is not None and over.any():
             # The nearest force on the rim lies where the rim is farther out.
             over = over if stopped is None else over & ~stopped
-            turn = (wanted - rim.largest) * rim.bend / (rim.largest * wanted + rim.bend**2 + LEAST)
+            curved = boundary.largest * wanted + boundary.hessian**2 + LEAST
+            turn = (wanted - boundary.largest) * boundary.hessian / curved
             turn = np.where(over, np.clip(turn, -LONGEST_TURN, LONGEST_TURN), 0.0)
             direction = self._stopped(direction + turn)
-            rim = self.rim(direction)
-            wanted = np.where(over, rim.largest, wanted)
+            boundary = self.boundary(direction)
+            wanted = np.where(over, boundary.largest, wanted)
         unit = np.stack([np.cos(direction), np.sin(direction)], axis=1)
-        size = np.minimum(np.maximum(wanted, rim.smallest), rim.largest)
-        return Projected(unit, direction, size, asked, rim, stopped)
+        size = np.minimum(np.maximum(wanted, boundary.smallest), boundary.largest)
+        return Projected(unit, direction, size, asked, boundary, stopped)
 
     def _stopped(self, direction: Array) -> Array:
         """Directions (R, n) [rad] brought within the arcs."""

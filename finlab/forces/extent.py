@@ -30,7 +30,7 @@ def singular_values(sets: FinSets) -> tuple[Array, Array]:
 
     Each column of the matrix is what one fin does at its largest thrust along one axis of its plane.
     """
-    matrix = np.swapaxes(sets.full_columns(), -1, -2)
+    matrix = np.swapaxes(sets.full_effectiveness(), -1, -2)
     directions, values, _ = np.linalg.svd(matrix, full_matrices=True)
     return np.pad(values, ((0, 0), (0, 6 - values.shape[-1]))), directions
 

@@ -50,7 +50,7 @@ NARROWEST = 1e-6
 POLISHES = 3
 """Newton steps by the law itself."""
 
-AMPLITUDE, FREQUENCY, LEAN, COST, MOBILITY, STIFFNESS, DRIFT, SHAFT = range(8)
+AMPLITUDE, FREQUENCY, DEFLECTION, COST, MOBILITY, STIFFNESS, DRIFT, SHAFT = range(8)
 """Columns of a table: amplitude [rad], frequency [Hz], force direction minus zero direction [rad], cost,
 logarithm of the mobility T / (dc/dT), elasticity of dc/dT, dc/dtheta over dc/dT [N], force along the
 shaft [N]."""
@@ -155,28 +155,28 @@ def _force_grid(law: FinLaw, lower: Array, upper: Array) -> _Grid:
     turns = np.array([ahead]) if law.uniform else _axis(lower[2], upper[2], TURNS)
     force = law.force(np.stack(np.meshgrid(amplitude, frequency, turns, indexing="ij"), axis=-1))
     size = np.hypot(force[..., 1], force[..., 2])
-    lean = wrapped(np.arctan2(force[..., 2], force[..., 1]) - turns)
+    deflection = wrapped(np.arctan2(force[..., 2], force[..., 1]) - turns)
     if len(turns) == 1:
-        strongest = float(lean.flat[size.argmax()])
+        strongest = float(deflection.flat[size.argmax()])
         half = np.pi if full else 0.5 * float(upper[2] - lower[2])
         middle = 0.5 * float(lower[2] + upper[2]) + strongest
         turn = np.broadcast_to(turns, size.shape)
         return _Grid(amplitude, frequency, turns + strongest, size, turn, middle, half, True)
     # A force that is next to nothing leans as the strongest one does.
     a, f = np.unravel_index(size.max(axis=2).argmax(), size.shape[:2])
-    lean = np.where(size > WEAK * size.max(), lean, lean[a, f])
+    deflection = np.where(size > WEAK * size.max(), deflection, deflection[a, f])
     if full:
         middle, half = 0.5 * float(lower[2] + upper[2]), np.pi
     else:
         # The outermost directions of all forces that are worth anything.
         worth = size > 0.02 * size.max(axis=(0, 1))
-        first = float(np.where(worth[..., 0], turns[0] + lean[..., 0], np.inf).min())
-        last = float(np.where(worth[..., -1], turns[-1] + lean[..., -1], -np.inf).max())
+        first = float(np.where(worth[..., 0], turns[0] + deflection[..., 0], np.inf).min())
+        last = float(np.where(worth[..., -1], turns[-1] + deflection[..., -1], -np.inf).max())
         middle, half = 0.5 * (first + last), float(np.clip(0.5 * (last - first), 0.0, np.pi))
     direction = np.linspace(middle - half, middle + half, DIRECTIONS)
     turn = np.broadcast_to(direction, (*size.shape[:2], DIRECTIONS))
     for _ in range(8):  # the lean changes slowly from one zero direction to the next
-        turn = direction - _along_turns(lean, turns, turn, full)
+        turn = direction - _along_turns(deflection, turns, turn, full)
     size = _along_turns(size, turns, turn, full)
     if not full:
         size = np.where((turn >= lower[2] - 1e-3) & (turn <= upper[2] + 1e-3), size, 0.0)
@@ -285,12 +285,12 @@ def _polished(law: FinLaw, command: Array, grid: _Grid, wanted: Array, lower: Ar
     error = np.full(wanted.shape, np.inf)
     trial = best
     for _ in range(POLISHES + 1):
-        force, slopes = law.force_and_slopes(trial)
+        force, jacobian = law.force_and_jacobian(trial)
         missing = goal - force[..., 1:]
         off = np.hypot(missing[..., 0], missing[..., 1])
         better = off < error
         best, error = np.where(better[..., None], trial, best), np.where(better, off, error)
-        jacobian = slopes[..., free, 1:]
+        jacobian = jacobian[..., free, 1:]
         if grid.uniform:
             jacobian = jacobian * np.array([[1.0], [0.0]])
         gram = jacobian @ jacobian.swapaxes(-1, -2)
@@ -325,7 +325,7 @@ def _table(law: FinLaw, cost: Array, command: Array, grid: _Grid, wanted: Array,
     # The cost at a given size, not at a given level, by the direction.
     by_direction = _around(cost, grid) - marginal * _around(wanted, grid)
     mobility = np.maximum(wanted, 1e-5 * wanted[:, -1:] + 1e-300) / marginal
-    columns = (
+    effectiveness = (
         command[..., 0],
         command[..., 1],
         wrapped(grid.direction[:, None] - command[..., 2]),
@@ -335,7 +335,7 @@ def _table(law: FinLaw, cost: Array, command: Array, grid: _Grid, wanted: Array,
         by_direction / marginal,
         law.force(command)[..., 0],
     )
-    return np.stack(columns, axis=-1)
+    return np.stack(effectiveness, axis=-1)
 
 
 def _smooth(cost: Array, wanted: Array, grid: _Grid) -> tuple[Array, Array]:
@@ -362,10 +362,10 @@ def _around(values: Array, grid: _Grid) -> Array:
     if len(grid.direction) == 1 or grid.half < NARROWEST:
         return np.zeros_like(values)
     if grid.half < np.pi:
-        slopes: Array = np.gradient(values, grid.direction, axis=0)
-        return slopes
+        jacobian: Array = np.gradient(values, grid.direction, axis=0)
+        return jacobian
     turn = values[:-1]
-    slopes = (np.roll(turn, -1, axis=0) - np.roll(turn, 1, axis=0)) / (
+    jacobian = (np.roll(turn, -1, axis=0) - np.roll(turn, 1, axis=0)) / (
         2.0 * (grid.direction[1] - grid.direction[0])
     )
-    return np.concatenate([slopes, slopes[:1]])
+    return np.concatenate([jacobian, jacobian[:1]])

@@ -23,7 +23,7 @@ from finlab.forces.envelopes import Envelopes, layout_envelopes
 from finlab.forces.force_space import PlanarProblem
 from finlab.layout import Layout
 from finlab.layout.angles import wrapped
-from finlab.layout.arrays import force_columns
+from finlab.layout.arrays import force_effectiveness
 from finlab.physics.objective import Objective
 
 LEVER = 0.2
@@ -39,7 +39,7 @@ MAX_CUT = 3
 class FinSets(NamedTuple):
     """R robots of n fins each, in m coordinates of a wrench. A fin with radius 0 is not there."""
 
-    columns: Array
+    effectiveness: Array
     """Scaled wrench per newton (R, n, 2, m) of each fin's horizontal and vertical force."""
     radius: Array
     """Largest thrust (R, n) [N]."""
@@ -47,14 +47,14 @@ class FinSets(NamedTuple):
     """Middle of the arc of zero directions (R, n) [rad]."""
     half: Array
     """Half of the arc (R, n) [rad]; pi for a full circle."""
-    rim: Array | None = None
+    boundary: Array | None = None
     """How far the sets reach along M evenly spaced directions (R, n, M), the first at zero, as shares of the
     radius; None where every fin is the same all round."""
 
     def take(self, rows: NDArray[np.bool_] | NDArray[np.intp]) -> FinSets:
         """Returns some of the robots, in the order asked for, repeated where asked for twice."""
         known = FinSets(*(field[rows] for field in self[:4]))
-        return known if self.rim is None else known._replace(rim=self.rim[rows])
+        return known if self.boundary is None else known._replace(boundary=self.boundary[rows])
 
     def repeat(self, times: int) -> FinSets:
         """Returns each robot several times, side by side."""
@@ -68,12 +68,12 @@ class FinSets(NamedTuple):
         """Returns what each fin feels (R, n, 2) of the direction `normal` (R, m): the columns' dot
         products."""
         rows, n = self.radius.shape
-        return (self.columns.reshape(rows, 2 * n, -1) @ normal[..., None]).reshape(rows, n, 2)
+        return (self.effectiveness.reshape(rows, 2 * n, -1) @ normal[..., None]).reshape(rows, n, 2)
 
     def wrench(self, force: Array) -> Array:
         """Returns the scaled wrenches (R, m) of planar forces (R, n, 2) [N]."""
         rows, n = self.radius.shape
-        return (force.reshape(rows, 1, 2 * n) @ self.columns.reshape(rows, 2 * n, -1))[:, 0]
+        return (force.reshape(rows, 1, 2 * n) @ self.effectiveness.reshape(rows, 2 * n, -1))[:, 0]
 
     def farthest(self, normal: Array) -> tuple[Array, Array]:
         """Returns how far the sets reach along `normal` (R, m), and the planar forces (R, n, 2) that do it.
@@ -89,18 +89,18 @@ class FinSets(NamedTuple):
         thrust = np.where(share > 1e-12, self.radius, 0.0)
         direction = self.middle + held
         reach = thrust * share
-        if self.rim is not None:
-            support, inside = _along_rim(self.rim, self.middle + angle, direction)
+        if self.boundary is not None:
+            support, inside = _along_boundary(self.boundary, self.middle + angle, direction)
             reach, thrust = np.minimum(reach, self.radius * support), thrust * inside
         force = thrust[..., None] * np.stack([np.cos(direction), np.sin(direction)], axis=-1)
         return (reach * size).sum(-1), force
 
-    def full_columns(self) -> Array:
+    def full_effectiveness(self) -> Array:
         """Returns the scaled wrenches (R, 2n, m) of each fin's largest thrust along both axes of its plane.
 
         A fin whose stops coincide has but one, and zeros for the other.
         """
-        full = self.columns * self.radius[..., None, None]
+        full = self.effectiveness * self.radius[..., None, None]
         fixed = self.half == 0.0
         if fixed.any():
             only = np.stack([np.cos(self.middle), np.sin(self.middle)], axis=-1)
@@ -117,8 +117,8 @@ def fin_sets(layout: Layout, failed: Collection[str] = ()) -> FinSets:
         LayoutError: there is no fin of a name in `failed`.
     """
     lost = layout.indices(tuple(failed))
-    columns = force_columns(layout.position, layout.mounting_angle)[:, 1:] / SCALE
-    sets = _one_robot(columns, layout_envelopes(layout, Objective()))
+    effectiveness = force_effectiveness(layout.position, layout.mounting_angle)[:, 1:] / SCALE
+    sets = _one_robot(effectiveness, layout_envelopes(layout, Objective()))
     radius = sets.radius.copy()
     radius[:, list(lost)] = 0.0
     return sets._replace(radius=radius)
@@ -126,35 +126,35 @@ def fin_sets(layout: Layout, failed: Collection[str] = ()) -> FinSets:
 
 def planar_sets(problem: PlanarProblem) -> FinSets:
     """Returns what the compiled fins of a problem can push, in its normalized wrenches."""
-    return _one_robot(np.stack(np.split(problem.columns, 2), axis=1), problem.fins)
+    return _one_robot(np.stack(np.split(problem.effectiveness, 2), axis=1), problem.fins)
 
 
-def _one_robot(columns: Array, fins: Envelopes) -> FinSets:
+def _one_robot(effectiveness: Array, fins: Envelopes) -> FinSets:
     """Compiled fins with wrenches per newton (n, 2, m) as one robot of a batch."""
-    rim = fins.rim_shares
+    boundary = fins.boundary_shares
     return FinSets(
-        np.ascontiguousarray(columns)[None],
+        np.ascontiguousarray(effectiveness)[None],
         fins.maximum[None],
         fins.middle[None],
         fins.half[None],
-        None if rim is None else rim[None],
+        None if boundary is None else boundary[None],
     )
 
 
-def _along_rim(rim: Array, pull: Array, direction: Array) -> tuple[Array, Array]:
+def _along_boundary(boundary: Array, pull: Array, direction: Array) -> tuple[Array, Array]:
     """How far (R, n) sets with rims (R, n, M) reach along the directions `pull` (R, n) [rad], and how far out
     along `direction` (R, n) they end, both as shares of the radius."""
-    count = rim.shape[-1]
+    count = boundary.shape[-1]
     gap = 2.0 * np.pi / count
     place = np.mod(pull, 2.0 * np.pi) / gap
     before = np.minimum(place.astype(np.intp), count - 1)
-    here = np.take_along_axis(rim, before[..., None], axis=-1)[..., 0]
-    after = np.take_along_axis(rim, (before[..., None] + 1) % count, axis=-1)[..., 0]
+    here = np.take_along_axis(boundary, before[..., None], axis=-1)[..., 0]
+    after = np.take_along_axis(boundary, (before[..., None] + 1) % count, axis=-1)[..., 0]
     # The corner between two sides of the polygon.
     part = (place - before) * gap
     support = (here * np.sin(gap - part) + after * np.sin(part)) / np.sin(gap)
-    lean = np.cos(direction[..., None] - np.arange(count) * gap)
-    ends = np.where(lean > 0.1, rim / np.where(lean > 0.1, lean, 1.0), np.inf)
+    deflection = np.cos(direction[..., None] - np.arange(count) * gap)
+    ends = np.where(deflection > 0.1, boundary / np.where(deflection > 0.1, deflection, 1.0), np.inf)
     return support, np.minimum(ends.min(-1), 1.0)
 
 

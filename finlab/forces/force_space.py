@@ -25,11 +25,20 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.forces.envelopes import LEAST, Envelopes, Projected
-from finlab.forces.fin_envelope import AMPLITUDE, COST, DRIFT, FREQUENCY, LEAN, MOBILITY, SHAFT, STIFFNESS
+from finlab.forces.fin_envelope import (
+    AMPLITUDE,
+    COST,
+    DEFLECTION,
+    DRIFT,
+    FREQUENCY,
+    MOBILITY,
+    SHAFT,
+    STIFFNESS,
+)
 from finlab.forces.small_systems import solve
 from finlab.layout import Layout
 from finlab.layout.angles import TURN, wrapped
-from finlab.layout.arrays import force_columns
+from finlab.layout.arrays import force_effectiveness
 from finlab.physics.objective import Objective
 
 RIDGE = 1e-9
@@ -50,7 +59,7 @@ in its fifth digit: of a cost that grows faster than force, and of one that grow
 class PlanarProblem(NamedTuple):
     """One layout as the planar search sees it."""
 
-    columns: Array
+    effectiveness: Array
     """Normalized wrench per newton (2n, 6): all horizontal forces, then all vertical ones."""
     along_shaft: Array
     """Normalized wrench per newton (n, 6) of forces along the shafts."""
@@ -88,7 +97,7 @@ class Planar(NamedTuple):
     def command(self) -> Array:
         """The commands (R, n, 3) that give the forces at the least cost."""
         return np.stack(
-            [self.row[..., AMPLITUDE], self.row[..., FREQUENCY], self.direction - self.row[..., LEAN]],
+            [self.row[..., AMPLITUDE], self.row[..., FREQUENCY], self.direction - self.row[..., DEFLECTION]],
             axis=-1,
         )
 
@@ -102,12 +111,12 @@ def planar_problem(layout: Layout, fins: Envelopes, scale: Array, objective: Obj
         scale: what a wrench is divided by (6,).
         objective: what is kept least.
     """
-    columns = force_columns(layout.position, layout.mounting_angle) / scale
+    effectiveness = force_effectiveness(layout.position, layout.mounting_angle) / scale
     direction_cost = objective.direction_cost(layout.upper)
-    planar, products = flat_columns(columns[:, 1:])
+    planar, products = flat_effectiveness(effectiveness[:, 1:])
     return PlanarProblem(
-        columns=planar,
-        along_shaft=np.ascontiguousarray(columns[:, 0]),
+        effectiveness=planar,
+        along_shaft=np.ascontiguousarray(effectiveness[:, 0]),
         products=products,
         fins=fins,
         direction_cost=direction_cost,
@@ -117,9 +126,9 @@ def planar_problem(layout: Layout, fins: Envelopes, scale: Array, objective: Obj
     )
 
 
-def flat_columns(columns: Array) -> tuple[Array, Array]:
-    """`columns` and `products` of a problem from normalized columns (n, 2, 6)."""
-    x, y = columns[:, 0], columns[:, 1]
+def flat_effectiveness(effectiveness: Array) -> tuple[Array, Array]:
+    """`effectiveness` and `products` of a problem from normalized columns (n, 2, 6)."""
+    x, y = effectiveness[:, 0], effectiveness[:, 1]
     outer = [np.einsum("ni,nj->nij", a, b) for a, b in ((x, x), (x, y), (y, x), (y, y))]
     products = np.concatenate([outer[0], outer[1] + outer[2], outer[3]])
     # The ridge of a sum is the sum of the ridges.
@@ -191,19 +200,19 @@ def descend(
                 size = _size(force)
         before = force
         found = fins.project(force, size)
-        over = found.wanted > found.rim.largest
+        over = found.wanted > found.boundary.largest
         if cut is not None or over.any():
-            share = found.rim.largest / np.maximum(found.wanted, LEAST)
+            share = found.boundary.largest / np.maximum(found.wanted, LEAST)
             cut = np.minimum(share if cut is None else cut * share, 1.0 if works is None else works)
         response = _quadratic(problem, found, cut)
     else:
         multiplier = _multiplier(problem, target, response)
         force, size = _answer(problem, response, multiplier)
     found = fins.project(force, size)
-    rests = not problem.turning_is_free and (found.size <= found.rim.smallest).any()
+    rests = not problem.turning_is_free and (found.size <= found.boundary.smallest).any()
     if rests or found.stopped is not None or cut is not None:
         found, multiplier = _mended(problem, target, response, found, multiplier)
-    row = fins.lookup(found.rim, found.size)
+    row = fins.lookup(found.boundary, found.size)
     shaft = row[..., SHAFT] if fins.pushes_sideways else None
     residual = target - _wrench(problem, found.unit * found.size[:, None], shaft)
     return Planar(found.size, _direction(found), row, residual, multiplier)
@@ -240,7 +249,7 @@ def polar(problem: PlanarProblem, force: Array) -> Planar:
     """Planar forces (R, n, 2) [N] as sizes and directions within the arcs, the rest unknown."""
     turned = force.swapaxes(1, 2)
     found = problem.fins.project(turned, _size(turned))
-    row = problem.fins.lookup(found.rim, found.size)
+    row = problem.fins.lookup(found.boundary, found.size)
     unknown = np.full((len(force), 6), np.nan)
     return Planar(found.size, _direction(found), row, unknown, unknown)
 
@@ -259,7 +268,7 @@ def realize(problem: PlanarProblem, planar: Planar, rests: float | None = None) 
     least = fins.minimum * (1.0 + REST)
     idle = planar.size <= least + (rests or 0.0) * fins.maximum
     if rests:
-        rest = fins.lookup(fins.rim(planar.direction), np.where(idle, 0.0, planar.size))
+        rest = fins.lookup(fins.boundary(planar.direction), np.where(idle, 0.0, planar.size))
         planar = planar._replace(row=np.where(idle[..., None], rest, planar.row))
     command, cost = planar.command, planar.row[..., COST].sum(-1)
     direction = command[..., 2]
@@ -273,18 +282,18 @@ def realize(problem: PlanarProblem, planar: Planar, rests: float | None = None) 
 
 def _direction(found: Projected) -> Array:
     """Directions (R, n) [rad], also where angles have not been asked for yet."""
-    if found.stopped is None and found.rim.part is None:
+    if found.stopped is None and found.boundary.part is None:
         return np.asarray(np.arctan2(found.unit[:, 1], found.unit[:, 0]))
     return found.direction
 
 
 def _quadratic(problem: PlanarProblem, found: Projected, cut: Array | None) -> _Response:
     """The response of the quadratics that stand for the costs near the present forces, all of it `cut`."""
-    row = problem.fins.lookup(found.rim, found.size)
+    row = problem.fins.lookup(found.boundary, found.size)
     across = np.exp(row[..., MOBILITY])
     softness = 1.0 / row[..., STIFFNESS]
     kept = found.size * (1.0 - softness)
-    drift = None if found.rim.part is None else row[..., DRIFT]
+    drift = None if found.boundary.part is None else row[..., DRIFT]
     if cut is not None:
         across *= cut
         kept *= cut
@@ -293,7 +302,7 @@ def _quadratic(problem: PlanarProblem, found: Projected, cut: Array | None) -> _
     x, y = found.unit[:, 0], found.unit[:, 1]
     shift = found.unit * kept[:, None]
     if not problem.turning_is_free:
-        turn = _direction(found) - row[..., LEAN]
+        turn = _direction(found) - row[..., DEFLECTION]
         turn -= TURN * np.rint(turn / TURN)
         size = np.maximum(found.size, LEAST)
         pull = 2.0 * problem.direction_cost * across / size
@@ -331,7 +340,7 @@ def _held(problem: PlanarProblem, found: Projected, response: _Response, multipl
     its largest or smallest force it only turns, at a stop it only pushes harder, at both it is stuck."""
     _, size = _answer(problem, response, multiplier)
     turns = found.size / size
-    follows = (found.size < found.rim.largest) & (found.size > found.rim.smallest)
+    follows = (found.size < found.boundary.largest) & (found.size > found.boundary.smallest)
     if found.stopped is not None:
         turns = np.where(found.stopped, 0.0, turns)
     along, across = response.along * follows, response.across * turns
@@ -341,7 +350,7 @@ def _held(problem: PlanarProblem, found: Projected, response: _Response, multipl
 def _answer(problem: PlanarProblem, response: _Response, multiplier: Array) -> tuple[Array, Array]:
     """Forces (R, 2, n) that answer multipliers (R, 6), whatever the limits, and their sizes (R, n)."""
     rows, _, n = response.shift.shape
-    pull = (multiplier @ problem.columns.T).reshape(rows, 2, n)
+    pull = (multiplier @ problem.effectiveness.T).reshape(rows, 2, n)
     force = response.free_mobility[:, :2] * pull[:, :1]
     force += response.free_mobility[:, 1:] * pull[:, 1:]
     force += response.free_shift
@@ -358,7 +367,7 @@ def _size(force: Array) -> Array:
 
 def _wrench(problem: PlanarProblem, force: Array, shaft: Array | None) -> Array:
     """Normalized wrenches (R, 6) of planar forces (R, 2, n) and of those along the shafts (R, n)."""
-    wrench: Array = force.reshape(len(force), -1) @ problem.columns
+    wrench: Array = force.reshape(len(force), -1) @ problem.effectiveness
     return wrench if shaft is None else wrench + shaft @ problem.along_shaft
 
 

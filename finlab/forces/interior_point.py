@@ -64,7 +64,7 @@ class _State(NamedTuple):
     """(R, m)."""
     c: Array
     """(R, m)."""
-    bend: Array
+    hessian: Array
     """b (R, n) times the squared largest thrust."""
     point: Array
     """(R, 2, n)."""
@@ -82,7 +82,7 @@ def minimize(
     sets: FinSets,
     wanted: Array,
     c: Array,
-    bend: Array | float = 0.0,
+    hessian: Array | float = 0.0,
     gap: float = GAP,
 ) -> Optimum:
     """Solves R problems.
@@ -95,7 +95,7 @@ def minimize(
         bend: cost b (R, n) of a fin's squared force [1/N^2].
         gap: when to stop, see `GAP`.
     """
-    state = _outset(sets, wanted, c, bend)
+    state = _outset(sets, wanted, c, hessian)
     busy, least = np.arange(len(wanted)), np.full(len(wanted), np.inf)
     point, multiplier = state.point.copy(), state.multiplier.copy()
     for _ in range(ITERATIONS):
@@ -115,11 +115,11 @@ def minimize(
     return Optimum(force * sets.radius[..., None], multiplier * _unit(sets)[:, None])
 
 
-def _outset(sets: FinSets, wanted: Array, c: Array, bend: Array | float) -> _State:
+def _outset(sets: FinSets, wanted: Array, c: Array, hessian: Array | float) -> _State:
     rows, n = sets.radius.shape
-    m = sets.columns.shape[-1]
+    m = sets.effectiveness.shape[-1]
     unit = _unit(sets)
-    full = _ahead(sets, sets.columns * (sets.radius / unit[:, None])[..., None, None])
+    full = _ahead(sets, sets.effectiveness * (sets.radius / unit[:, None])[..., None, None])
     sides, beyond = _sides(sets)
     limits = 1 + sides.shape[1]
     wanted, c = wanted / unit[:, None], np.broadcast_to(np.asarray(c, np.float64), (rows, m))
@@ -130,7 +130,7 @@ def _outset(sets: FinSets, wanted: Array, c: Array, bend: Array | float) -> _Sta
         beyond,
         wanted,
         c,
-        np.broadcast_to(bend * (sets.radius / unit[:, None]) ** 2, (rows, n)),
+        np.broadcast_to(hessian * (sets.radius / unit[:, None]) ** 2, (rows, n)),
         np.zeros((rows, 2, n)),
         np.zeros((rows, m)),
         np.full((rows, limits, n), SLACK),
@@ -141,7 +141,7 @@ def _outset(sets: FinSets, wanted: Array, c: Array, bend: Array | float) -> _Sta
 
 def _unit(sets: FinSets) -> Array:
     """Wrench (R,) of each robot's strongest fin, by which all are divided."""
-    size: Array = (np.sqrt((sets.columns**2).sum((-1, -2))) * sets.radius).max(-1)
+    size: Array = (np.sqrt((sets.effectiveness**2).sum((-1, -2))) * sets.radius).max(-1)
     return np.where(size > 0.0, size, 1.0)
 
 
@@ -161,14 +161,14 @@ def _sides(sets: FinSets) -> tuple[Array, Array]:
     between its stops. An uneven fin has those of the polygon around it. Where no fin has any, K is 0.
     """
     normals, beyond = _stops(sets)
-    if sets.rim is None:
+    if sets.boundary is None:
         return normals, beyond
-    rows, n, count = sets.rim.shape
+    rows, n, count = sets.boundary.shape
     angle = 2.0 * np.pi / count * np.arange(count)
     around = np.broadcast_to(
         np.stack([np.cos(angle), np.sin(angle)], axis=1)[:, :, None], (rows, count, 2, n)
     )
-    out = np.concatenate([beyond, np.maximum(sets.rim.swapaxes(1, 2), THINNEST)], axis=1)
+    out = np.concatenate([beyond, np.maximum(sets.boundary.swapaxes(1, 2), THINNEST)], axis=1)
     return np.concatenate([normals, around], axis=1), out
 
 
@@ -190,13 +190,13 @@ def _stops(sets: FinSets) -> tuple[Array, Array]:
 
 def _step(state: _State, tolerance: float) -> tuple[NDArray[np.bool_], Array, _State]:
     """Which rows are done, how far off each is (R,), and all others one Newton step on."""
-    full, sides, beyond, wanted, c, bend, point, multiplier, slack, weight, length = state
+    full, sides, beyond, wanted, c, hessian, point, multiplier, slack, weight, length = state
     rows, _, n = point.shape
     missing = wanted - _wrench(full, point)
     disc = 0.5 * ((point * point).sum(1, keepdims=True) - 1.0)
     flat = (sides * point[:, None]).sum(2) - beyond
     astray = np.concatenate([disc, flat], axis=1) + slack
-    size = 1.0 + np.sqrt((missing * missing / c).sum(-1) + (bend * (2.0 * disc[:, 0] + 1.0)).sum(-1))
+    size = 1.0 + np.sqrt((missing * missing / c).sum(-1) + (hessian * (2.0 * disc[:, 0] + 1.0)).sum(-1))
     gap = (weight * slack).mean((1, 2))
     unmet = np.abs(missing - c * multiplier).max(-1) + np.abs(astray).max((1, 2))
     gap, unmet = gap / size, unmet / size
@@ -207,9 +207,9 @@ def _step(state: _State, tolerance: float) -> tuple[NDArray[np.bool_], Array, _S
     slope = np.concatenate([point[:, None], sides], axis=1)  # of the limits (R, 1 + K, 2, n)
     ratio = weight / slack
     aim = (np.where(length > LONG, *CENTRING) * gap * size)[:, None, None] / slack + ratio * astray
-    xx, xy, yy = _softness(slope, ratio, weight[:, 0] + bend + STIFF)
+    xx, xy, yy = _softness(slope, ratio, weight[:, 0] + hessian + STIFF)
     pull = (full @ multiplier[..., None]).reshape(point.shape) - (aim[:, :, None] * slope).sum(1)
-    pull -= bend[:, None] * point
+    pull -= hessian[:, None] * point
     blocks = full.reshape(rows, 2, n, -1)
     x, y = blocks[:, 0], blocks[:, 1]
     spread = np.concatenate(

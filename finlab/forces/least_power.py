@@ -13,7 +13,7 @@ from finlab.arrays import Array
 from finlab.forces.envelopes import layout_envelopes
 from finlab.forces.fin_envelope import COST
 from finlab.forces.fin_sets import SCALE, FinSets
-from finlab.forces.force_space import PlanarProblem, descend, flat_columns, planar_problem
+from finlab.forces.force_space import PlanarProblem, descend, flat_effectiveness, planar_problem
 from finlab.layout import Layout
 from finlab.physics.objective import Objective
 
@@ -44,9 +44,9 @@ def power_problem(layout: Layout) -> PlanarProblem:
 
 def variant(problem: PlanarProblem, sets: FinSets, row: int) -> PlanarProblem:
     """Returns the same fins placed, and stopped, as those of one robot among `sets`."""
-    columns, products = flat_columns(sets.columns[row])
+    effectiveness, products = flat_effectiveness(sets.effectiveness[row])
     fins = problem.fins.within(sets.middle[row], sets.half[row])
-    return problem._replace(columns=columns, products=products, fins=fins)
+    return problem._replace(effectiveness=effectiveness, products=products, fins=fins)
 
 
 def cheapest(problem: PlanarProblem, target: Array) -> Array:
@@ -56,6 +56,6 @@ def cheapest(problem: PlanarProblem, target: Array) -> Array:
         return np.empty(0)
     maximum = problem.fins.maximum
     found = descend(problem, target, np.broadcast_to(maximum, (len(target), len(maximum))), STEPS)
-    strongest = (np.tile(maximum, 2)[:, None] * problem.columns).max()
+    strongest = (np.tile(maximum, 2)[:, None] * problem.effectiveness).max()
     missed = np.abs(found.residual).max(-1) > OFF * strongest
     return np.where(missed, np.nan, found.row[..., COST].sum(-1))

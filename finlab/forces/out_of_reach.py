@@ -41,7 +41,7 @@ class Nearest(NamedTuple):
     """What each axis would gain (R, 6): the dual's unknowns."""
 
 
-def nearest(sets: FinSets, target: Array, c: Array | None = None, bend: float = 0.0) -> Nearest:
+def nearest(sets: FinSets, target: Array, c: Array | None = None, hessian: float = 0.0) -> Nearest:
     """Forces whose wrench is nearest to each target.
 
     Args:
@@ -55,8 +55,8 @@ def nearest(sets: FinSets, target: Array, c: Array | None = None, bend: float = 
     scale = np.ones(6) if c is None else np.asarray(c, np.float64)
     counts = np.isfinite(scale)
     robots = sets.tile(len(target))
-    seen = robots._replace(columns=robots.columns[..., counts])
-    found = _best_part(seen, target[:, counts], scale[counts], bend)
+    seen = robots._replace(effectiveness=robots.effectiveness[..., counts])
+    found = _best_part(seen, target[:, counts], scale[counts], hessian)
     multiplier = np.zeros(target.shape)
     multiplier[:, counts] = found.multiplier
     return Nearest(found.force, robots.wrench(found.force), multiplier)
@@ -86,7 +86,7 @@ def nearest_in_turn(sets: FinSets, target: Array, groups: list[NDArray[np.bool_]
         if np.linalg.norm((goal - wrench)[group]) > MISSED:
             # All who could lessen what is missing give their all: only one force of theirs does so.
             pull = np.linalg.norm(sets.pull(found.multiplier)[0], axis=-1)
-            felt = np.linalg.norm(found.multiplier) * np.sqrt((sets.columns[0] ** 2).sum((1, 2)))
+            felt = np.linalg.norm(found.multiplier) * np.sqrt((sets.effectiveness[0] ** 2).sum((1, 2)))
             settled |= pull > UNFELT * felt
         goal, c = np.where(group, wrench, goal), np.where(group, HELD, c)
     return Nearest(force, sets.wrench(force), found.multiplier)
@@ -97,13 +97,13 @@ def nearest_along(sets: FinSets, target: Array) -> Nearest:
     n = sets.radius.shape[1]
     nothing = Nearest(np.zeros((1, n, 2)), np.zeros((1, 6)), np.zeros((1, 6)))
     size = float(np.linalg.norm(target))
-    flat = sets.columns.reshape(-1, 6)
+    flat = sets.effectiveness.reshape(-1, 6)
     beside = target - flat.T @ np.linalg.lstsq(flat.T, target, rcond=1e-9)[0]
     if size < 1e-12 or np.linalg.norm(beside) > SPOILED * size:
         return nothing  # fins of another direction can give nothing of it alone
     unit = (target / size)[None]
     frame = np.concatenate([unit[:, :, None], orthogonal_complement(unit)], axis=-1)
-    seen = sets._replace(columns=sets.columns @ frame[:, None])
+    seen = sets._replace(effectiveness=sets.effectiveness @ frame[:, None])
     found = _best_part(seen, np.array([[size, *(0.0,) * 5]]), np.array([1.0, *(HELD,) * 5]))
     wrench = sets.wrench(found.force)
     if wrench[0] @ target <= 0.0:  # none of it at all; what is left is rounding
@@ -111,10 +111,10 @@ def nearest_along(sets: FinSets, target: Array) -> Nearest:
     return Nearest(found.force, wrench, found.multiplier @ frame[0].T)
 
 
-def _best_part(sets: FinSets, target: Array, c: Array, bend: float = 0.0) -> Optimum:
+def _best_part(sets: FinSets, target: Array, c: Array, hessian: float = 0.0) -> Optimum:
     """Optima of R robots with the same arcs, each in the best of its convex parts."""
-    strongest = (np.sqrt((sets.columns**2).sum((-1, -2))) * sets.radius).max(-1)
-    bent = bend * (strongest[:, None] / np.maximum(sets.radius, TINY)) ** 2
+    strongest = (np.sqrt((sets.effectiveness**2).sum((-1, -2))) * sets.radius).max(-1)
+    bent = hessian * (strongest[:, None] / np.maximum(sets.radius, TINY)) ** 2
     hulls = None
     if len(wide_fins(sets)) > MAX_CUT:  # of all beyond the first few, the halves that suit the hull are tried
         hulls = minimize(sets, target, c, bent).force
@@ -128,7 +128,7 @@ def _best_part(sets: FinSets, target: Array, c: Array, bend: float = 0.0) -> Opt
     return Optimum(found.force[best], found.multiplier[best])
 
 
-def wrench_of(columns: Array, force: Array) -> Array:
+def wrench_of(effectiveness: Array, force: Array) -> Array:
     """Normalized wrench (R, 6) of planar forces (R, n, 2); columns (2n, 6) as in a `PlanarProblem`."""
-    wrench: Array = force.swapaxes(1, 2).reshape(len(force), -1) @ columns
+    wrench: Array = force.swapaxes(1, 2).reshape(len(force), -1) @ effectiveness
     return wrench

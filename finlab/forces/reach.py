@@ -55,10 +55,10 @@ def largest(
     """
     rows, _, k = basis.shape
     frame = np.concatenate([origin[:, :, None], basis], axis=-1)
-    seen = sets._replace(columns=sets.columns @ frame[:, None])
+    seen = sets._replace(effectiveness=sets.effectiveness @ frame[:, None])
     wanted = np.empty((rows, 1 + k))
     wanted[:, 1:] = held
-    full = np.sqrt((seen.full_columns() ** 2).sum(-1))
+    full = np.sqrt((seen.full_effectiveness() ** 2).sum(-1))
     wanted[:, 0] = np.maximum(BEYOND * full.sum(-1), 1e-9)
     found = minimize(seen, wanted, np.array([1.0, *(HELD,) * k]), gap=tolerance)
     lead = found.multiplier[:, :1]
@@ -84,7 +84,7 @@ def max_wrench_along(sets: FinSets, direction: Array, tolerance: float = FINE) -
     # Where fins do not act along a direction at all, no force proves that, but a plane through the origin.
     unsure = np.flatnonzero(found.gap > 1e-6 * (1.0 + found.size))
     if len(unsure):
-        matrix = sets.take(unsure).full_columns()
+        matrix = sets.take(unsure).full_effectiveness()
         _, values, axes = np.linalg.svd(matrix, full_matrices=True)
         values = np.pad(values, ((0, 0), (0, 6 - values.shape[-1])))
         free = values <= SPAN_TOLERANCE * values[:, :1]

@@ -53,7 +53,7 @@ def stack_layouts(layouts: Sequence[Layout]) -> LayoutArrays:
     return arrays
 
 
-def force_columns(position: Any, mounting_angle: Any) -> Any:
+def force_effectiveness(position: Any, mounting_angle: Any) -> Any:
     """Returns what one newton along each fin's three axes does to the robot.
 
     Args:
@@ -79,5 +79,5 @@ def layout_effectiveness(layout: Layout) -> Array:
     Returns:
         (6, 2 n): wrench [Fx, Fy, Fz, Tx, Ty, Tz] of 1 N along e_h and along e_z, fins side by side.
     """
-    columns: Array = force_columns(layout.position, layout.mounting_angle)[:, 1:]
-    return columns.reshape(-1, 6).T
+    effectiveness: Array = force_effectiveness(layout.position, layout.mounting_angle)[:, 1:]
+    return effectiveness.reshape(-1, 6).T

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from finlab.allocation.judging import costs
+from finlab.allocation.evaluate import costs
 from finlab.allocation.search.pipeline import Pipeline
 from finlab.allocation.search.prepared import Prepared
 from finlab.allocation.search.search_allocator import Beginning, SearchAllocator

@@ -83,15 +83,16 @@ def robot_view(problem: PlanarProblem, effort: bool) -> RobotView:
     full = fins.half >= np.pi
     evenly = np.linspace(-1.0, 1.0, AROUND + 1)[:-1, None]  # around a circle, no direction counts twice
     direction = fins.middle + fins.half * np.where(full, evenly, np.linspace(-1.0, 1.0, AROUND)[:, None])
-    rim, unit = fins.rim(direction), np.exp(1j * direction)
-    largest, smallest = (np.broadcast_to(values, unit.shape) for values in (rim.largest, rim.smallest))
-    top = fins.lookup(rim, largest)[..., COST]
+    boundary, unit = fins.boundary(direction), np.exp(1j * direction)
+    ends = boundary.largest, boundary.smallest
+    largest, smallest = (np.broadcast_to(values, unit.shape) for values in ends)
+    top = fins.lookup(boundary, largest)[..., COST]
     mean_top = np.maximum(top.mean(0), 1e-12)
-    shares = [fins.lookup(rim, share * largest)[..., COST].mean(0) / mean_top for share in SHARES]
+    shares = [fins.lookup(boundary, share * largest)[..., COST].mean(0) / mean_top for share in SHARES]
     reach = largest / fins.maximum
-    idle = problem.idle_direction + fins.lean(problem.idle_direction)
+    idle = problem.idle_direction + fins.deflection(problem.idle_direction)
     counted = np.arange(n)
-    columns = [
+    effectiveness = [
         np.log(mean_top / mean_top.mean()),
         *shares,
         reach.mean(0),
@@ -107,7 +108,7 @@ def robot_view(problem: PlanarProblem, effort: bool) -> RobotView:
         2.0 * np.mod(0.25 + counted * GOLDEN**2, 1.0) - 1.0,
         np.full(n, n / 12.0),
     ]
-    scaled = problem.columns * np.tile(fins.maximum, 2)[:, None]
+    scaled = problem.effectiveness * np.tile(fins.maximum, 2)[:, None]
     gram = scaled.T @ scaled
     gram += (RIDGE * np.trace(gram) + 1e-300) * np.eye(6)
     solver = np.linalg.solve(gram, scaled.T)
@@ -116,7 +117,7 @@ def robot_view(problem: PlanarProblem, effort: bool) -> RobotView:
     a = 0.5 * ((xx + zz) + 1j * (zx - xz))
     b = 0.5 * ((xx - zz) + 1j * (zx + xz))
     return RobotView(
-        np.stack(columns, axis=-1), np.stack([a, b]), solver[:, :n] + 1j * solver[:, n:], fins.maximum
+        np.stack(effectiveness, axis=-1), np.stack([a, b]), solver[:, :n] + 1j * solver[:, n:], fins.maximum
     )
 
 

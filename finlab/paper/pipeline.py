@@ -6,7 +6,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 
 from finlab.allocation.allocator import Allocator
-from finlab.allocation.judging import costs
+from finlab.allocation.evaluate import costs
 from finlab.allocation.search.levenberg_marquardt import CommandProblem, refine
 from finlab.allocation.solution import Candidates, Solution
 from finlab.arrays import AnyArray
@@ -20,7 +20,7 @@ from finlab.paper.features import raw_features
 from finlab.paper.network import Mixture, NetworkConfig
 from finlab.paper.settings import STEPS, PaperSettings
 from finlab.paper.surrogate import LayoutSurrogate, SurrogateConfig, blocks_of
-from finlab.physics.energy import EnergyMeter
+from finlab.physics.effort import EffortMeter
 
 CHUNK = 250
 """Targets that are solved together; keeps memory flat for any number of targets."""
@@ -45,7 +45,7 @@ class _Robot(NamedTuple):
     """Lower and upper limits (n, 3), in single precision as all else here."""
     features: AnyArray
     """The network's node features (1, n, 10)."""
-    energy: EnergyMeter
+    effort: EffortMeter
     """J_en."""
 
 
@@ -121,10 +121,10 @@ class PaperAllocator(Allocator):
         surrogate, std = LayoutSurrogate(layout, self.weights), self.normalization.std
         lower, upper = layout.lower, layout.upper
         turns_fully = np.asarray(is_full_turn(upper[:, 2] - lower[:, 2]))
-        problem = CommandProblem(surrogate, surrogate.columns / std, lower, upper, turns_fully)
+        problem = CommandProblem(surrogate, surrogate.effectiveness / std, lower, upper, turns_fully)
         place = layout.position[None], layout.mounting_angle[None], lower[None], upper[None]
         limits = lower.astype(np.float32), upper.astype(np.float32)
-        return _Robot(layout, surrogate, problem, limits, raw_features(*place), EnergyMeter(upper))
+        return _Robot(layout, surrogate, problem, limits, raw_features(*place), EffortMeter(upper))
 
     def _predict(self, robot: _Robot, centred: AnyArray) -> Mixture:
         """The network's mixture for normalized, centred targets (N, 6)."""
@@ -149,8 +149,8 @@ class PaperAllocator(Allocator):
         rows, k, n, _ = command.shape
         flat = command.reshape(-1, n, 3)
         error = robot.problem.wrench(flat).reshape(rows, k, 6) - wanted[:, None]
-        energy = robot.energy(flat).reshape(rows, k)
-        return np.asarray(np.einsum("rki,rki->rk", error, error) + self.settings.gamma * energy)
+        effort = robot.effort(flat).reshape(rows, k)
+        return np.asarray(np.einsum("rki,rki->rk", error, error) + self.settings.gamma * effort)
 
     def _refine(self, robot: _Robot, command: AnyArray, wanted: AnyArray) -> AnyArray:
         """Refined commands (N, K, n, 3), inside the limits."""
@@ -176,12 +176,12 @@ class PaperAllocator(Allocator):
         keep_mean, keep_square = ADAM_DECAY
         best, least = x.copy(), np.full(len(x), np.inf, np.float32)
         for step in range(steps + 1):
-            score, slopes = self._score_and_slopes(robot, to_command(x, lower, upper), target)
+            score, jacobian = self._score_and_gradient(robot, to_command(x, lower, upper), target)
             better = score < least
             best[better], least[better] = x[better], score[better]
             if step == steps:
                 break
-            gradient = half * slopes
+            gradient = half * jacobian
             mean += (1.0 - keep_mean) * (gradient - mean)
             square += (1.0 - keep_square) * (gradient * gradient - square)
             rate = ADAM_RATE * (1.0 - 0.95 * step / steps) / (1.0 - keep_mean ** (step + 1))
@@ -193,18 +193,18 @@ class PaperAllocator(Allocator):
             np.clip(x, -1.0, 1.0, out=x)
         return np.asarray(to_command(best, lower, upper))
 
-    def _score_and_slopes(
+    def _score_and_gradient(
         self, robot: _Robot, command: AnyArray, target: AnyArray
     ) -> tuple[AnyArray, AnyArray]:
         """J (R,) of commands (R, n, 3), and its derivatives (R, n, 3) by them."""
         rows = len(command)
-        columns = robot.problem.columns_float32
+        effectiveness = robot.problem.effectiveness_float32
         force, pull = robot.surrogate.force_and_pullback(command)
-        error = force.reshape(rows, -1) @ columns - target
+        error = force.reshape(rows, -1) @ effectiveness - target
         gamma = np.float32(self.settings.gamma)
-        energy, by_energy = robot.energy.with_slopes(command)
-        score = np.einsum("ri,ri->r", error, error) + gamma * energy
-        return score, pull(2.0 * error @ columns.T) + gamma * by_energy
+        effort, by_effort = robot.effort.with_gradient(command)
+        score = np.einsum("ri,ri->r", error, error) + gamma * effort
+        return score, pull(2.0 * error @ effectiveness.T) + gamma * by_effort
 
     def _candidates(self, robot: _Robot, command: AnyArray, target: AnyArray, source: str) -> Candidates:
         """Candidates (K, n, 3) of a single target (6,), in their order."""

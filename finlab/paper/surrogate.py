@@ -15,7 +15,7 @@ import numpy as np
 from finlab.arrays import AnyArray, Values, library_of
 from finlab.errors import CheckpointError
 from finlab.layout import Layout
-from finlab.layout.arrays import force_columns
+from finlab.layout.arrays import force_effectiveness
 from finlab.networks import layers
 from finlab.networks.layers import Weights
 from finlab.networks.normalization import to_normalized
@@ -91,7 +91,7 @@ class SurrogateConfig:
         if mask is not None:
             force = force * mask[..., None]
         # The perceptron answers in the body frame, that of a fin whose shaft points forward.
-        wrench = wrench_of_forces(force, force_columns(position, 0.0 * mounting_angle))
+        wrench = wrench_of_forces(force, force_effectiveness(position, 0.0 * mounting_angle))
         here = xp.ones_like(x[..., 0]) if mask is None else mask * xp.ones_like(x[..., 0])
         scale, bias = correction(w, x, here)
         return wrench * (1.0 + scale) + bias
@@ -103,7 +103,7 @@ def of_fins(w: Weights, features: Values) -> Values:
 
 
 def perceptron(
-    config: SurrogateConfig, w: Weights, fins: Values, x: Values, slopes: list[Values] | None = None
+    config: SurrogateConfig, w: Weights, fins: Values, x: Values, jacobian: list[Values] | None = None
 ) -> Values:
     """Forces (..., 3) [N] in the body frame of commands x (..., 3) in normalized coordinates.
 
@@ -118,8 +118,8 @@ def perceptron(
     for name in config.layers()[1:]:
         gate = layers.sigmoid(z)
         silu = z * gate
-        if slopes is not None:
-            slopes.append(gate + silu * (1.0 - gate))
+        if jacobian is not None:
+            jacobian.append(gate + silu * (1.0 - gate))
         z = layers.linear(w, name, silu)
     return z * FORCE_UNIT
 
@@ -149,15 +149,15 @@ class LayoutSurrogate:
         self._half = np.maximum(0.5 * (self._upper - self._lower), np.float32(1e-9))
         scale, self.bias = correction(self._w, features, np.ones(len(features), np.float32))
         """Wrench (6,) [N, N m] of fins that give no force."""
-        columns = force_columns(layout.position, np.zeros_like(layout.mounting_angle))
-        self.columns: AnyArray = columns * (1.0 + scale)
+        effectiveness = force_effectiveness(layout.position, np.zeros_like(layout.mounting_angle))
+        self.effectiveness: AnyArray = effectiveness * (1.0 + scale)
         """Wrench per newton (n, 3, 6) of each fin's force along the three axes of the body."""
 
     def force(self, command: AnyArray) -> AnyArray:
         """Forces (R, n, 3) [N] of commands (R, n, 3)."""
         return np.concatenate([self._forward(command[rows]) for rows in blocks_of(len(command))])
 
-    def force_and_slopes(self, command: AnyArray) -> tuple[AnyArray, AnyArray]:
+    def force_and_jacobian(self, command: AnyArray) -> tuple[AnyArray, AnyArray]:
         """Forces (R, n, 3) and, for each of the three commands in turn, their derivatives (R, n, 3, 3)."""
         force, pull = self.force_and_pullback(command)
         axes = (np.broadcast_to(axis, force.shape) for axis in np.eye(3, dtype=np.float32))
@@ -166,12 +166,12 @@ class LayoutSurrogate:
     def force_and_pullback(self, command: AnyArray) -> tuple[AnyArray, Callable[[AnyArray], AnyArray]]:
         """Forces (R, n, 3) [N], and what turns derivatives of a number by them into those by the commands,
         (R, n, 3) each."""
-        slopes: list[AnyArray] = []
-        force = self._forward(command, slopes)
+        jacobian: list[AnyArray] = []
+        force = self._forward(command, jacobian)
 
         def pull(by_force: AnyArray) -> AnyArray:
             by_layer = FORCE_UNIT * by_force.reshape(-1, 3)
-            for name, slope in zip(reversed(self.config.layers()[1:]), reversed(slopes), strict=True):
+            for name, slope in zip(reversed(self.config.layers()[1:]), reversed(jacobian), strict=True):
                 by_layer = by_layer @ self._w[f"{name}.weight"]
                 by_layer *= slope.reshape(by_layer.shape)
             by_command = by_layer @ self._w["net.0.weight"][:, RAW_SIZE:]
@@ -182,13 +182,13 @@ class LayoutSurrogate:
     def wrench(self, command: AnyArray) -> AnyArray:
         """Wrenches (..., 6) [N, N m] of commands (..., n, 3)."""
         force = self.force(command.reshape(-1, *command.shape[-2:]))
-        wrench = force.reshape(len(force), -1) @ self.columns.reshape(-1, 6) + self.bias
+        wrench = force.reshape(len(force), -1) @ self.effectiveness.reshape(-1, 6) + self.bias
         return np.asarray(wrench.reshape(*command.shape[:-2], 6))
 
-    def _forward(self, command: AnyArray, slopes: list[AnyArray] | None = None) -> AnyArray:
+    def _forward(self, command: AnyArray, jacobian: list[AnyArray] | None = None) -> AnyArray:
         # Rounded first: where a range has no width, any remainder would be blown up.
         x = to_normalized(command.astype(np.float32), self._lower, self._upper)
-        return np.asarray(perceptron(self.config, self._w, self._fins, x, slopes))
+        return np.asarray(perceptron(self.config, self._w, self._fins, x, jacobian))
 
 
 def blocks_of(rows: int) -> list[slice]:

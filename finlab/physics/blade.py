@@ -79,7 +79,7 @@ class Blade:
         beat = amplitude * frequency
         return EIGHT_PI2 * frequency * beat * beat * (drag * amplitude + inertia)
 
-    def power_slopes(self, amplitude: Values, frequency: Values) -> tuple[Values, Values]:
+    def power_gradient(self, amplitude: Values, frequency: Values) -> tuple[Values, Values]:
         """Returns the power's derivatives by amplitude [W/rad] and frequency [W/Hz]."""
         drag, inertia = self._shares(amplitude)
         scale = EIGHT_PI2 * frequency * frequency * amplitude
@@ -95,11 +95,11 @@ class Blade:
         scale, inertia, drag = self._heat(amplitude, frequency, copper_loss)
         return power + scale * amplitude**2 * frequency * (inertia + drag)
 
-    def driving_slopes(
+    def driving_jacobian(
         self, amplitude: Values, frequency: Values, copper_loss: float
     ) -> tuple[Values, Values]:
         """Returns the derivatives of `driving_power` by amplitude and frequency."""
-        by_amplitude, by_frequency = self.power_slopes(amplitude, frequency)
+        by_amplitude, by_frequency = self.power_gradient(amplitude, frequency)
         if not copper_loss:
             return by_amplitude, by_frequency
         scale, inertia, drag = self._heat(amplitude, frequency, copper_loss)

@@ -14,21 +14,21 @@ class CoupledPlant(Plant):
     def __init__(self, layout: Layout) -> None:
         super().__init__(layout)
         assert layout.interaction is not None
-        self.coupling = Coupling(layout, layout.interaction, self.columns, self.blade.length)
+        self.coupling = Coupling(layout, layout.interaction, self.effectiveness, self.blade.length)
 
     def force(self, command: Array) -> Array:
         """See `Plant`."""
         alone = super().force(command)
         return alone * self.coupling.kept(alone, command)[..., None]
 
-    def force_and_slopes(self, command: Array) -> tuple[Array, Array]:
+    def force_and_jacobian(self, command: Array) -> tuple[Array, Array]:
         """See `Plant`; the derivatives of each fin's force by its own command, the other fins unchanged."""
-        alone, slopes = super().force_and_slopes(command)
-        kept, by_command = self.coupling.kept_and_slopes(alone, slopes, command)
+        alone, jacobian = super().force_and_jacobian(command)
+        kept, by_command = self.coupling.kept_and_jacobian(alone, jacobian, command)
         n = np.arange(self.n_fins)
         own = np.moveaxis(by_command[..., n, :, n], 0, -2)
-        slopes = slopes * kept[..., None, None] + own[..., None] * alone[..., None, :]
-        return alone * kept[..., None], slopes
+        jacobian = jacobian * kept[..., None, None] + own[..., None] * alone[..., None, :]
+        return alone * kept[..., None], jacobian
 
     @property
     def parts(self) -> tuple["WrenchParts", Array]:
@@ -38,19 +38,19 @@ class CoupledPlant(Plant):
 
     def linearize(self, command: Array) -> tuple[Array, Array]:
         """See `Plant`."""
-        shares, slopes = self.shares_and_slopes(command)
-        jacobian = slopes.reshape(*command.shape[:-2], 3 * self.n_fins, 6)
+        shares, jacobian = self.shares_and_jacobian(command)
+        jacobian = jacobian.reshape(*command.shape[:-2], 3 * self.n_fins, 6)
         return shares.sum(axis=-2), jacobian.swapaxes(-1, -2)
 
-    def shares_and_slopes(self, command: Array) -> tuple[Array, Array]:
+    def shares_and_jacobian(self, command: Array) -> tuple[Array, Array]:
         """Each fin's part of the wrench (..., n, 6), and the derivatives of the whole wrench by each command
         of each fin (..., n, 3, 6)."""
-        alone, own = super().force_and_slopes(command)
-        kept, by_command = self.coupling.kept_and_slopes(alone, own, command)
-        by_alone = np.einsum("...na,nab->...nb", alone, self.columns)
-        slopes = (own @ self.columns) * kept[..., None, None]
-        slopes += by_command @ by_alone[..., None, :, :]
-        return by_alone * kept[..., None], slopes
+        alone, own = super().force_and_jacobian(command)
+        kept, by_command = self.coupling.kept_and_jacobian(alone, own, command)
+        by_alone = np.einsum("...na,nab->...nb", alone, self.effectiveness)
+        jacobian = (own @ self.effectiveness) * kept[..., None, None]
+        jacobian += by_command @ by_alone[..., None, :, :]
+        return by_alone * kept[..., None], jacobian
 
 
 class WrenchParts:
@@ -61,9 +61,9 @@ class WrenchParts:
 
     def force(self, command: Array) -> Array:
         """Each fin's part of the wrench (..., n, 6) of commands (..., n, 3)."""
-        parts: Array = np.einsum("...na,nab->...nb", self._plant.force(command), self._plant.columns)
+        parts: Array = np.einsum("...na,nab->...nb", self._plant.force(command), self._plant.effectiveness)
         return parts
 
-    def force_and_slopes(self, command: Array) -> tuple[Array, Array]:
-        """See `CoupledPlant.shares_and_slopes`."""
-        return self._plant.shares_and_slopes(command)
+    def force_and_jacobian(self, command: Array) -> tuple[Array, Array]:
+        """See `CoupledPlant.shares_and_jacobian`."""
+        return self._plant.shares_and_jacobian(command)

@@ -23,7 +23,7 @@ LEAST = 1e-9
 class Coupling:
     """The interaction of one robot's n fins."""
 
-    def __init__(self, layout: Layout, interaction: Interaction, columns: Array, length: Array) -> None:
+    def __init__(self, layout: Layout, interaction: Interaction, effectiveness: Array, length: Array) -> None:
         """Takes the columns (n, 3, 6) of the plant and the fins' lengths (n,) [m]."""
         self.half_thrust = interaction.half_thrust_n
         self.kappa = interaction.narrowness * WIDE_AND_NARROW
@@ -34,9 +34,9 @@ class Coupling:
         for jet in interaction.jets:
             self.share[place[jet.source], place[jet.target]] = jet.share
         velocity = np.array(interaction.velocity)
-        self.way = jet_ways(layout.position, columns)
+        self.way = jet_ways(layout.position, effectiveness)
         self.length = length
-        self.foot = foot_velocity(layout.position, columns, velocity)
+        self.foot = foot_velocity(layout.position, effectiveness, velocity)
 
     def kept(self, force: Array, command: Array) -> Array:
         """Share (..., n) that fins keep of the forces (..., n, 3) that each gives by itself, in its frame."""
@@ -47,7 +47,7 @@ class Coupling:
         result: Array = 1.0 - lost
         return result
 
-    def kept_and_slopes(self, force: Array, slopes: Array, command: Array) -> tuple[Array, Array]:
+    def kept_and_jacobian(self, force: Array, jacobian: Array, command: Array) -> tuple[Array, Array]:
         """`kept`, and its derivatives (..., n, 3, n) by the commands of fin j, of what fin i keeps.
 
         Args:
@@ -67,17 +67,17 @@ class Coupling:
         over = 1.0 / (thrust + self.half_thrust)
         along = (self.half_thrust * over * over)[..., None, None] * unit[..., None, :]
         by_force = (steep * over[..., None])[..., None] * across + wide[..., None] * along
-        by_command = -np.einsum("...jka,...jia->...jki", slopes, by_force)
+        by_command = -np.einsum("...jka,...jia->...jki", jacobian, by_force)
         kept = 1.0 - lost
         if self.foot.any() and self.inflow.any():
-            taken, own = self._inflow_and_slopes(unit, thrust, slopes, command)
+            taken, own = self._inflow_and_jacobian(unit, thrust, jacobian, command)
             kept = kept - taken
             n = np.arange(force.shape[-2])
             by_command[..., n, :, n] -= np.moveaxis(own, -2, 0)
         return kept, by_command
 
-    def _inflow_and_slopes(
-        self, unit: Array, thrust: Array, slopes: Array, command: Array
+    def _inflow_and_jacobian(
+        self, unit: Array, thrust: Array, jacobian: Array, command: Array
     ) -> tuple[Array, Array]:
         """What speed takes (..., n), and its derivatives (..., n, 3) by each fin's own command."""
         speed = np.einsum("na,...na->...n", self.foot, unit)
@@ -88,20 +88,20 @@ class Coupling:
         p, q = self.inflow
         outer = (p + 2.0 * q * t) * (1.0 - t * t)
         turn = (self.foot - speed[..., None] * unit) / np.maximum(thrust, LEAST)[..., None]
-        by = np.einsum("...nka,...na->...nk", slopes, turn) / pace[..., None]
+        by = np.einsum("...nka,...na->...nk", jacobian, turn) / pace[..., None]
         fall = -speed * tip / pace**3 * beat
         by[..., 0] += fall * command[..., 1]
         by[..., 1] += fall * command[..., 0]
         return p * t + q * t * t, outer[..., None] * by
 
 
-def jet_ways(position: Array, columns: Array) -> Array:
+def jet_ways(position: Array, effectiveness: Array) -> Array:
     """Unit vectors (n, n, 3) from fin j (first) to fin i (second), in the frame of fin j; zero where two fins
     share a place."""
     way = position[None] - position[:, None]
     distance = np.linalg.norm(way, axis=-1, keepdims=True)
     unit = np.where(distance > LEAST, way / np.maximum(distance, LEAST), 0.0)
-    result: Array = np.einsum("jib,jab->jia", unit, columns[..., :3])
+    result: Array = np.einsum("jib,jab->jia", unit, effectiveness[..., :3])
     return result
 
 
@@ -115,11 +115,11 @@ def jet_terms(force: Array, way: Array, half_thrust: float, kappa: Array) -> Arr
     return result
 
 
-def foot_velocity(position: Array, columns: Array, velocity: Array) -> Array:
+def foot_velocity(position: Array, effectiveness: Array, velocity: Array) -> Array:
     """Velocity (..., n, 3) of each fin's place through the water, in its own frame [m/s], of a robot that
     moves with (..., 6)."""
     moved = velocity[..., None, :3] + np.cross(velocity[..., None, 3:], position)
-    result: Array = np.einsum("...nb,nab->...na", moved, columns[..., :3])
+    result: Array = np.einsum("...nb,nab->...na", moved, effectiveness[..., :3])
     return result
 
 

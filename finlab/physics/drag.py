@@ -25,7 +25,7 @@ class Drag(PlanarLaw):
         """See `PlanarLaw`; the zero direction does not matter."""
         return self.coefficient * (frequency * library_of(amplitude).sin(amplitude)) ** 2
 
-    def thrust_slopes(
+    def thrust_gradient(
         self, amplitude: Array, frequency: Array, zero_direction: Array
     ) -> tuple[Array, Array, Array | float]:
         """See `PlanarLaw`."""

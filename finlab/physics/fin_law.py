@@ -28,7 +28,7 @@ class FinLaw(ABC):
         single or double precision as the commands are."""
 
     @abstractmethod
-    def force_and_slopes(self, command: Array) -> tuple[Array, Array]:
+    def force_and_jacobian(self, command: Array) -> tuple[Array, Array]:
         """Returns the force and its derivative by each command in turn (..., n, 3 commands, 3 axes)."""
 
     def power(self, command: Values, copper_loss: float = 0.0) -> Values:
@@ -36,12 +36,12 @@ class FinLaw(ABC):
         [W/(N m)^2] times the mean squared torque on the shaft."""
         return self.blade.driving_power(command[..., 0], command[..., 1], copper_loss)
 
-    def power_slopes(self, command: Array, copper_loss: float = 0.0) -> Array:
+    def power_gradient(self, command: Array, copper_loss: float = 0.0) -> Array:
         """Returns the power's derivatives (..., n, 3) by each command."""
-        slopes = np.zeros(command.shape)
-        by = self.blade.driving_slopes(command[..., 0], command[..., 1], copper_loss)
-        slopes[..., 0], slopes[..., 1] = by
-        return slopes
+        jacobian = np.zeros(command.shape)
+        by = self.blade.driving_jacobian(command[..., 0], command[..., 1], copper_loss)
+        jacobian[..., 0], jacobian[..., 1] = by
+        return jacobian
 
 
 class PlanarLaw(FinLaw):
@@ -56,7 +56,7 @@ class PlanarLaw(FinLaw):
         """Returns the size [N] of the force at half amplitude [rad], frequency [Hz], zero direction [rad]."""
 
     @abstractmethod
-    def thrust_slopes(
+    def thrust_gradient(
         self, amplitude: Array, frequency: Array, zero_direction: Array
     ) -> tuple[Array, Array, Array | float]:
         """Returns the thrust's derivatives by amplitude, frequency and zero direction."""
@@ -77,17 +77,17 @@ class PlanarLaw(FinLaw):
         planar = [xp.zeros_like(thrust), thrust * xp.cos(direction), thrust * xp.sin(direction)]
         return xp.stack(planar, axis=-1)
 
-    def force_and_slopes(self, command: Array) -> tuple[Array, Array]:
+    def force_and_jacobian(self, command: Array) -> tuple[Array, Array]:
         """See `FinLaw`."""
         parts = command[..., 0], command[..., 1], command[..., 2]
         direction = parts[2] + self.offset
         cos, sin = np.cos(direction), np.sin(direction)
         thrust = self.thrust(*parts)
         force = np.zeros((*thrust.shape, 3))
-        slopes = np.zeros((*thrust.shape, 3, 3))
+        jacobian = np.zeros((*thrust.shape, 3, 3))
         force[..., 1], force[..., 2] = thrust * cos, thrust * sin
-        for k, slope in enumerate(self.thrust_slopes(*parts)):
-            slopes[..., k, 1], slopes[..., k, 2] = slope * cos, slope * sin
-        slopes[..., 2, 1] -= force[..., 2]
-        slopes[..., 2, 2] += force[..., 1]
-        return force, slopes
+        for k, slope in enumerate(self.thrust_gradient(*parts)):
+            jacobian[..., k, 1], jacobian[..., k, 2] = slope * cos, slope * sin
+        jacobian[..., 2, 1] -= force[..., 2]
+        jacobian[..., 2, 2] += force[..., 1]
+        return force, jacobian

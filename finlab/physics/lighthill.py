@@ -47,7 +47,7 @@ class Lighthill(PlanarLaw):
         """See `PlanarLaw`; the zero direction does not matter."""
         return self.coefficient * frequency**2 * amplitude * bessel_j1(amplitude)
 
-    def thrust_slopes(
+    def thrust_gradient(
         self, amplitude: Array, frequency: Array, zero_direction: Array
     ) -> tuple[Array, Array, Array | float]:
         """See `PlanarLaw`."""

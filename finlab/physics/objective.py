@@ -11,7 +11,7 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.errors import AllocationError
-from finlab.physics.energy import DEFAULT_WEIGHTS, EnergyMeter, EnergyWeights, energy_of_shares, energy_scale
+from finlab.physics.effort import DEFAULT_WEIGHTS, EffortMeter, EffortWeights, effort_of_shares, effort_scale
 from finlab.physics.fin_law import FinLaw
 from finlab.physics.plant import Plant
 
@@ -29,7 +29,7 @@ class Objective:
 
     name: Name = "power"
     """`power`: mean mechanical watts by each fin's own model. `effort`: the paper's energy proxy `J_en`."""
-    weights: EnergyWeights = DEFAULT_WEIGHTS
+    weights: EffortWeights = DEFAULT_WEIGHTS
     """Weights of `J_en`."""
     copper_loss: float = 0.0
     """Heat in a motor's windings [W/(N m)^2] that counts beside the mechanical power."""
@@ -37,8 +37,8 @@ class Objective:
     def __post_init__(self) -> None:
         if self.name not in get_args(Name):
             raise AllocationError(f"objective: expected 'power' or 'effort', got {self.name!r}")
-        if not isinstance(self.weights, EnergyWeights):
-            raise TypeError(f"energy_weights: expected EnergyWeights, got {self.weights!r}")
+        if not isinstance(self.weights, EffortWeights):
+            raise TypeError(f"effort_weights: expected EffortWeights, got {self.weights!r}")
         if not 0.0 <= self.copper_loss < np.inf:
             raise AllocationError(
                 f"copper_loss: expected watts per (N m)^2, from 0, got {self.copper_loss!r}"
@@ -60,11 +60,11 @@ class Objective:
         """Returns the cost of commands (..., 3) of one fin with upper limits (3,), its direction left out."""
         if self.name == "power":
             return lambda command: np.asarray(law.power(command, self.copper_loss))
-        scale = energy_scale(upper)
+        scale = effort_scale(upper)
 
         def effort(command: Array) -> Array:
             share = command / scale
-            return np.asarray(energy_of_shares(share[..., 0], share[..., 1], 0.0, self.weights))
+            return np.asarray(effort_of_shares(share[..., 0], share[..., 1], 0.0, self.weights))
 
         return effort
 
@@ -72,13 +72,13 @@ class Objective:
         """Returns the cost (n,) per squared zero direction [1/rad^2] of fins with upper limits (n, 3)."""
         if self.name == "power":
             return np.zeros(len(upper))
-        return np.asarray(self.weights.zero_direction / energy_scale(upper)[:, 2] ** 2)
+        return np.asarray(self.weights.zero_direction / effort_scale(upper)[:, 2] ** 2)
 
     def meter(self, plant: Plant) -> "CostMeter":
         """Returns the meter of the cost of a robot's commands."""
         if self.name == "power":
             return PowerMeter(plant, self.copper_loss)
-        return EnergyMeter(plant.upper, self.weights)
+        return EffortMeter(plant.upper, self.weights)
 
 
 class PowerMeter:
@@ -97,10 +97,10 @@ class PowerMeter:
         total: Array = self.fins(command).sum(-1)
         return total
 
-    def slopes(self, command: Array) -> Array:
+    def gradient(self, command: Array) -> Array:
         """Derivatives (R, n, 3) of the power by commands (R, n, 3)."""
-        return self._plant.power_slopes(command, self._copper_loss)
+        return self._plant.power_gradient(command, self._copper_loss)
 
 
-CostMeter = PowerMeter | EnergyMeter
+CostMeter = PowerMeter | EffortMeter
 """Commands (R, n, 3) of one robot to costs (R,), and their slopes."""

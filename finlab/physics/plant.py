@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from finlab.arrays import Array
 from finlab.errors import CommandError
 from finlab.layout.angles import TURN, is_full_turn
-from finlab.layout.arrays import force_columns
+from finlab.layout.arrays import force_effectiveness
 from finlab.layout.layout import Layout
 from finlab.physics.blade import Blade
 from finlab.physics.fin_model import make_law, stack_laws
@@ -35,7 +35,7 @@ class Plant:
         """Ranges of the limits (n, 3)."""
         self.full_turn: NDArray[np.bool_] = is_full_turn(self.width[:, 2])
         """Fins (n,) whose zero direction may turn freely; theirs wraps instead of ending at a limit."""
-        self.columns: Array = force_columns(layout.position, layout.mounting_angle)
+        self.effectiveness: Array = force_effectiveness(layout.position, layout.mounting_angle)
         """Wrench (n, 3, 6) of 1 N along each fin's shaft, horizontal axis and z."""
         self._laws = stack_laws([fin.model for fin in layout.fins])
 
@@ -51,7 +51,7 @@ class Plant:
         Raises:
             CommandError: the shape does not fit the layout, or a value is infinite or partly NaN.
         """
-        wrench: Array = wrench_of_forces(self.forces(command), self.columns)
+        wrench: Array = wrench_of_forces(self.forces(command), self.effectiveness)
         return wrench
 
     def forces(self, command: ArrayLike) -> Array:
@@ -72,14 +72,15 @@ class Plant:
             force[..., places, :] = law.force(command[..., places, :])
         return force
 
-    def force_and_slopes(self, command: Array) -> tuple[Array, Array]:
+    def force_and_jacobian(self, command: Array) -> tuple[Array, Array]:
         """Returns `force` and its derivatives (..., n, 3 commands, 3 axes)."""
         if len(self._laws) == 1:
-            return self._laws[0][1].force_and_slopes(command)
-        force, slopes = np.empty(command.shape), np.empty((*command.shape, 3))
+            return self._laws[0][1].force_and_jacobian(command)
+        force, jacobian = np.empty(command.shape), np.empty((*command.shape, 3))
         for places, law in self._laws:
-            force[..., places, :], slopes[..., places, :, :] = law.force_and_slopes(command[..., places, :])
-        return force, slopes
+            answer = law.force_and_jacobian(command[..., places, :])
+            force[..., places, :], jacobian[..., places, :, :] = answer
+        return force, jacobian
 
     def fin_forces(self, command: ArrayLike) -> Array:
         """Returns each fin's mean force (..., n, 3) [N] in the body frame; see `wrench`."""
@@ -89,16 +90,16 @@ class Plant:
     def linearize(self, command: Array) -> tuple[Array, Array]:
         """Returns wrenches (..., 6) of commands (..., n, 3) without failed fins, and their derivatives
         (..., 6, 3 n), fin by fin."""
-        force, slopes = self.force_and_slopes(command)
-        jacobian = (slopes @ self.columns).reshape(*command.shape[:-2], 3 * self.n_fins, 6)
-        wrench: Array = wrench_of_forces(force, self.columns)
+        force, jacobian = self.force_and_jacobian(command)
+        jacobian = (jacobian @ self.effectiveness).reshape(*command.shape[:-2], 3 * self.n_fins, 6)
+        wrench: Array = wrench_of_forces(force, self.effectiveness)
         return wrench, jacobian.swapaxes(-1, -2)
 
     @property
     def parts(self) -> tuple[Any, Array]:
-        """What gives each fin's part of the wrench, by `force` and `force_and_slopes` in axes of its own, and
+        """What gives each fin's part of the wrench, by `force` and `force_and_jacobian` in its own axes, and
         the wrench (n, axes, 6) per unit of each; here the fins' forces."""
-        return self, self.columns
+        return self, self.effectiveness
 
     def power(self, command: Array, copper_loss: float = 0.0) -> Array:
         """Returns each fin's mean power (..., n) [W] of commands (..., n, 3), NaN for a failed fin's; with a
@@ -110,12 +111,12 @@ class Plant:
             power[..., places] = law.power(command[..., places, :], copper_loss)
         return power
 
-    def power_slopes(self, command: Array, copper_loss: float = 0.0) -> Array:
+    def power_gradient(self, command: Array, copper_loss: float = 0.0) -> Array:
         """Returns the power's derivatives (..., n, 3) by each command."""
-        slopes = np.empty(command.shape)
+        jacobian = np.empty(command.shape)
         for places, law in self._laws:
-            slopes[..., places, :] = law.power_slopes(command[..., places, :], copper_loss)
-        return slopes
+            jacobian[..., places, :] = law.power_gradient(command[..., places, :], copper_loss)
+        return jacobian
 
     @cached_property
     def blade(self) -> Blade:

@@ -24,7 +24,7 @@ class Soft(PlanarLaw):
         uneven = 1.0 + self._e * cos(zero_direction - self._phi_e)
         return self._k * x**self._p / (1.0 + (x / self._x0) ** self._q) * uneven
 
-    def thrust_slopes(
+    def thrust_gradient(
         self, amplitude: Array, frequency: Array, zero_direction: Array
     ) -> tuple[Array, Array, Array | float]:
         """See `PlanarLaw`."""

@@ -33,10 +33,10 @@ class GridLaw(FinLaw):
             return xp.from_numpy(np.ascontiguousarray(values)).to(command)
         return self._grids(command, 1)[..., 0, 0, 0, :3].astype(command.dtype, copy=False)
 
-    def force_and_slopes(self, command: Array) -> tuple[Array, Array]:
+    def force_and_jacobian(self, command: Array) -> tuple[Array, Array]:
         """See `FinLaw`; exact derivatives of the interpolation."""
         found = self._grids(command, 2)[..., :3]
-        return found[..., 0, 0, 0, :], _slopes(found)
+        return found[..., 0, 0, 0, :], _jacobian(found)
 
     def power(self, command: Values, copper_loss: float = 0.0) -> Values:
         """See `FinLaw`. Measured power stands as it is, whatever the loss."""
@@ -45,12 +45,12 @@ class GridLaw(FinLaw):
         # A polynomial through points near zero may dip below.
         return np.maximum(self._grids(command, 1)[..., 0, 0, 0, 3], 0.0)
 
-    def power_slopes(self, command: Array, copper_loss: float = 0.0) -> Array:
+    def power_gradient(self, command: Array, copper_loss: float = 0.0) -> Array:
         """See `FinLaw`."""
         if not self.has_power:
-            return super().power_slopes(command, copper_loss)
+            return super().power_gradient(command, copper_loss)
         found = self._grids(command, 2)[..., 3:]
-        return _slopes(found)[..., 0] * (found[..., 0, 0, 0, :] > 0.0)
+        return _jacobian(found)[..., 0] * (found[..., 0, 0, 0, :] > 0.0)
 
 
 class TableLaw(GridLaw):
@@ -72,7 +72,7 @@ class TableLaw(GridLaw):
         """First and last amplitude [rad], frequency [Hz] and zero direction [rad] of the grid."""
 
 
-def _slopes(found: Array) -> Array:
+def _jacobian(found: Array) -> Array:
     """First derivatives (..., 3 commands, c) of values and mixed derivatives (..., 2, 2, 2, c)."""
     by = found[..., 1, 0, 0, :], found[..., 0, 1, 0, :], found[..., 0, 0, 1, :]
     return np.stack(by, axis=-2)

@@ -5,7 +5,7 @@ gravity. Wrench order [Fx, Fy, Fz, Tx, Ty, Tz] in N and N m.
 """
 
 from finlab.arrays import Values, library_of
-from finlab.layout.arrays import force_columns
+from finlab.layout.arrays import force_effectiveness
 from finlab.physics.fin_law import FinLaw
 
 
@@ -25,15 +25,16 @@ def body_force(fin_force: Values, mounting_angle: Values) -> Values:
     return xp.stack([shaft * cos - horizontal * sin, shaft * sin + horizontal * cos, vertical], axis=-1)
 
 
-def wrench_of_forces(fin_force: Values, columns: Values) -> Values:
+def wrench_of_forces(fin_force: Values, effectiveness: Values) -> Values:
     """Sums forces (..., n, 3) [N] in fin frames to wrenches (..., 6) [N, N m].
 
     Args:
-        fin_force: broadcast with the columns.
-        columns: wrench per newton of each fin (..., n, 3, 6), from `finlab.layout.arrays.force_columns`.
+        fin_force: broadcast with the effectiveness.
+        effectiveness: wrench per newton of each fin (..., n, 3, 6), from `force_effectiveness` of
+            `finlab.layout.arrays`.
     """
     n = fin_force.shape[-2]
-    flat = columns.reshape(*columns.shape[:-3], 3 * n, 6)
+    flat = effectiveness.reshape(*effectiveness.shape[:-3], 3 * n, 6)
     if flat.ndim == 2:
         return fin_force.reshape(*fin_force.shape[:-2], 3 * n) @ flat
     row = fin_force.reshape(*fin_force.shape[:-2], 1, 3 * n)
@@ -58,4 +59,4 @@ def assemble_wrench(
     keep = mask[..., None]
     force = law.force(xp.where(keep, command, xp.zeros_like(command)))
     force = xp.where(keep, force, xp.zeros_like(force))
-    return wrench_of_forces(force, force_columns(position, mounting_angle))
+    return wrench_of_forces(force, force_effectiveness(position, mounting_angle))

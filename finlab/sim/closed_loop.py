@@ -13,12 +13,12 @@ from finlab.arrays import Array
 from finlab.control import (
     Completion,
     Controller,
+    Diagnosis,
     FaultMonitor,
     Foresighted,
     Measurement,
     Setpoint,
     TrackingController,
-    Verdict,
 )
 from finlab.control.measurement import NO_WRENCH
 from finlab.layout import Layout
@@ -124,7 +124,7 @@ class ClosedLoop:
         """What is true: the fins that are not whole now, by name."""
         self._told: dict[str, FinFault] = {}
         self._held = np.full(layout.n_fins, np.nan)
-        self.verdict: Verdict | None = None
+        self.verdict: Diagnosis | None = None
         """What the monitor believed at the last step; None without one."""
         self._completion: dict[tuple[str, ...], Completion] = {}
         self._ticks: list[Tick] = []
@@ -283,7 +283,7 @@ class ClosedLoop:
         self._lag.step(self._command, self.period_s)
         motion = self._lag.command
         force = self._plant.force(motion) * (motion[:, :1] * motion[:, 1:2] > 0.0)
-        before, self._gave = self._gave, force.ravel() @ self._plant.columns.reshape(-1, 6)
+        before, self._gave = self._gave, force.ravel() @ self._plant.effectiveness.reshape(-1, 6)
         return 0.5 * (before + self._gave)
 
     def _complete(self) -> Completion:
@@ -334,7 +334,7 @@ class ClosedLoop:
                 force = force * share
             if some_hang:
                 force[hangs] = self._hanging.force(self.fins.direction, water)[hangs]
-            wrenches = np.einsum("nk,nkw->nw", force, self._fin_force.columns)
+            wrenches = np.einsum("nk,nkw->nw", force, self._fin_force.effectiveness)
             wrench = wrenches.sum(axis=0)
             self.state = self.vehicle.step(self.state, wrench.tolist(), dt)
             if k + 1 < n_steps:  # the sample at the end belongs to the next period

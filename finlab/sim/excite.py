@@ -69,7 +69,7 @@ class ExcitingController:
         plant = plant_of(layout)
         largest = np.linalg.norm(plant.forces(plant.upper), axis=-1)
         # Each axis as far as all fins could push it, were they all aimed at it.
-        reach = np.linalg.norm(plant.columns[:, 1:], axis=1)
+        reach = np.linalg.norm(plant.effectiveness[:, 1:], axis=1)
         self._size = np.array(SHARE) * (reach * largest[:, None]).sum(axis=0)
         rng = np.random.default_rng(seed)
         self._phase = rng.uniform(0.0, 2 * math.pi, (6, len(PERIODS_S[0])))

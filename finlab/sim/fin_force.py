@@ -1,7 +1,7 @@
 """Forces of moving fins on the hull: the cycle mean, resolved within the cycle, or of fins with soft tips.
 
 A fin force model keeps the momentum that it needs from step to step; `step` gives each fin's planar force,
-and `columns` say what it does to the robot. `plants.py` names them all.
+and `effectiveness` say what it does to the robot. `plants.py` names them all.
 """
 
 import math
@@ -13,7 +13,7 @@ import numpy as np
 from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.layout.angles import wrapped
-from finlab.layout.arrays import force_columns
+from finlab.layout.arrays import force_effectiveness
 from finlab.physics import plant_of
 from finlab.physics.blade import Blade
 from finlab.vehicle.fin_motion import FinMotion
@@ -27,7 +27,7 @@ class FinForce(Protocol):
 
     step_s: float
     """Longest step that resolves the force [s]."""
-    columns: Array
+    effectiveness: Array
     """Wrench (n, 3, 6) of 1 N along each fin's shaft, e_h and e_z, about the true centre of gravity."""
 
     def step(self, motion: FinMotion, dt: float, water: Array = STILL) -> Array:
@@ -43,7 +43,7 @@ class MeanForce:
 
     def __init__(self, layout: Layout) -> None:
         self._plant = plant_of(layout)
-        self.columns = self._plant.columns
+        self.effectiveness = self._plant.effectiveness
 
     def step(self, motion: FinMotion, dt: float, water: Array = STILL) -> Array:
         command = motion.mean_command
@@ -108,7 +108,7 @@ class FlexibleForce:
 
     def __init__(self, layout: Layout, fin: SoftFin | None = None) -> None:
         self.fin = SoftFin() if fin is None else fin
-        self.columns = force_columns(layout.position, layout.mounting_angle)
+        self.effectiveness = force_effectiveness(layout.position, layout.mounting_angle)
         n = layout.n_fins
         self._tip_angle: Array | None = None
         self._tip_speed = np.zeros(n)
@@ -143,14 +143,14 @@ class FlexibleForce:
         fin, blade = self.fin, self.fin.blade
         a, b = fin.root, blade.length - fin.root
         mass, drag = blade.virtual_mass, blade.drag_per_length
-        bend = self._tip_angle - angle
-        cosine, sine = np.cos(bend), np.sin(bend)
+        hessian = self._tip_angle - angle
+        cosine, sine = np.cos(hessian), np.sin(hessian)
         across = a * speed * cosine
         strips = across[:, None] + self._arm * self._tip_speed[:, None]
         strip_drag = drag * strips * np.abs(strips) * self._weight
         moved = a * (acceleration * cosine - speed * sine * (2 * self._tip_speed - speed))
         torque = (
-            -fin.stiffness * bend
+            -fin.stiffness * hessian
             - fin.damping * (self._tip_speed - speed)
             - 0.5 * mass * b**2 * moved
             - strip_drag @ self._arm

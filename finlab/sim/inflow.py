@@ -30,7 +30,7 @@ class InflowForce(MeanForce):
     def step(self, motion: FinMotion, dt: float, water: Array = STILL) -> Array:
         force = super().step(motion, dt, water)
         # What a newton does to the robot is what the robot's motion does to the fin's foot.
-        foot = self.columns @ water
+        foot = self.effectiveness @ water
         speed = (foot * force).sum(axis=-1) / np.maximum(np.linalg.norm(force, axis=-1), 1e-9)
         tip = 2 * math.pi * motion.frequency * motion.amplitude * self._length
         result: Array = force * (1.0 - MOST * np.tanh(speed / np.maximum(tip, 1e-3)))[:, None]

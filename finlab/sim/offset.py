@@ -9,7 +9,7 @@ import math
 import numpy as np
 
 from finlab.layout import Layout
-from finlab.layout.arrays import force_columns
+from finlab.layout.arrays import force_effectiveness
 from finlab.sim.fin_force import MeanForce
 
 CENTER = (-0.016, 0.012, 0.0)
@@ -24,4 +24,6 @@ class OffsetForce(MeanForce):
     def __init__(self, layout: Layout) -> None:
         super().__init__(layout)
         turned = np.where(np.arange(layout.n_fins) % 2 == 0, ASKEW, -ASKEW)
-        self.columns = force_columns(layout.position - np.array(CENTER), layout.mounting_angle + turned)
+        self.effectiveness = force_effectiveness(
+            layout.position - np.array(CENTER), layout.mounting_angle + turned
+        )

@@ -92,7 +92,7 @@ def jacobian(body: Dynamics[Any, Any], flow: Any) -> list[list[Any]]:
     mx, my, mz, ix, iy, iz = body.inertia
     munk_x, munk_y, munk_z = (my - mz) / ix, (mz - mx) / iy, (mx - my) / iz
     gyro_x, gyro_y, gyro_z = (iy - iz) / ix, (iz - ix) / iy, (ix - iy) / iz
-    dx, dy, dz, dp, dq, dr = (-slope for slope in damping_slopes(body, flow))
+    dx, dy, dz, dp, dq, dr = (-slope for slope in damping_jacobian(body, flow))
     return [
         [dx, my * r / mx, -mz * q / mx, 0.0 * u, -mz * w / mx, my * v / mx],
         [-mx * r / my, dy, mz * p / my, mz * w / my, 0.0 * u, -mx * u / my],
@@ -109,7 +109,7 @@ def damping_rates(body: Dynamics[Any, Any], flow: Any) -> list[Any]:
     return [(linear + quadratic * abs(speed)) / m for linear, quadratic, speed, m in terms]
 
 
-def damping_slopes(body: Dynamics[Any, Any], flow: Any) -> list[Any]:
+def damping_jacobian(body: Dynamics[Any, Any], flow: Any) -> list[Any]:
     """Returns the derivatives (6) of those decelerations, each by its own speed [1/s]: minus the diagonal of
     the Jacobian."""
     terms = zip(body.linear, body.quadratic, flow, body.inertia, strict=True)

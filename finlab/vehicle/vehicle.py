@@ -17,7 +17,7 @@ from finlab.errors import LayoutError
 from finlab.layout import Body
 from finlab.vehicle.attitude import rotation_of_quaternion, to_body, to_world
 from finlab.vehicle.body import GRAVITY, dynamics_of
-from finlab.vehicle.fossen import accelerations, damping_slopes
+from finlab.vehicle.fossen import accelerations, damping_jacobian
 
 STATE_SIZE = 13
 LONGEST, MOST_STEPS = 1.5, 500
@@ -46,7 +46,7 @@ class Vehicle:
         """Weight and buoyant force [N]."""
         uneven = max(self.inertia[:3]) - min(self.inertia[:3])
         self._munk = math.sqrt(uneven / min(self.inertia[3:]))
-        self._rate_at_rest = max(damping_slopes(dynamics, (0.0,) * 6))
+        self._rate_at_rest = max(damping_jacobian(dynamics, (0.0,) * 6))
         quadratic = max(b / m for b, m in zip(dynamics.quadratic, self.inertia, strict=True))
         self._rate_by_speed = 2.0 * quadratic + self._munk + 1.0
 
@@ -65,7 +65,7 @@ class Vehicle:
             return 1  # as nearly always: known from a bound, which takes less time
         u, v, w, p, q, r = map(abs, motion)
         speeds = (u + stream, v + stream, w + stream, p, q, r)
-        damping: float = max(damping_slopes(self.dynamics, speeds))
+        damping: float = max(damping_jacobian(self.dynamics, speeds))
         often = damping + self._munk * max(speeds[:3]) + max(speeds[3:])
         most = MOST_STEPS * LONGEST / dt
         if not often <= most:  # nor where it is no number any more

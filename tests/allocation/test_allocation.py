@@ -63,8 +63,8 @@ def test_every_field_counts_but_the_time(search: Allocator) -> None:
         {"previous": result.command},
         {"failed": ("front_left",)},
         {"notes": ("beware",)},
-        {"judged_by": "surrogate"},
-        {"candidates": replace(result.candidates, energy=result.candidates.energy + 1.0)},
+        {"evaluated_by": "surrogate"},
+        {"candidates": replace(result.candidates, effort=result.candidates.effort + 1.0)},
         {"candidates": None},
         {"samples": result.candidates},
         {"seed": 1},
@@ -95,7 +95,7 @@ def test_all_figures_are_those_of_the_plant(method: str) -> None:
         np.testing.assert_allclose(result.wrench, plant.wrench(result.command), atol=1e-12)
         np.testing.assert_allclose(result.fin_forces, plant.fin_forces(result.command), atol=1e-12)
         assert result.err_norm == pytest.approx(np.linalg.norm(result.unallocated / result.sigma), abs=1e-12)
-        assert result.judged_by == "plant" and isinstance(result.err_norm, float)
+        assert result.evaluated_by == "plant" and isinstance(result.err_norm, float)
         assert all(not np.any(result.fin_forces[i]) for i in layout.indices(failed))
 
 
@@ -178,7 +178,7 @@ def test_another_command_is_judged_anew(search: Allocator) -> None:
     least = np.where(np.isnan(result.command), np.nan, layout.lower)
     other = result.with_command(least)
     np.testing.assert_allclose(other.wrench, Plant(layout).wrench(least), atol=1e-12)
-    assert not other.reachable and other.err_norm > 0.1 > result.err_norm and other.energy < result.energy
+    assert not other.reachable and other.err_norm > 0.1 > result.err_norm and other.effort < result.effort
     assert other.wrench_surrogate is None and other.target is result.target
 
 

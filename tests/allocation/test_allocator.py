@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from finlab.allocation import METHODS, Allocation, Allocator, Candidates, Solution, allocator, load_allocator
-from finlab.allocation.methods import Method
+from finlab.allocation.methods import MethodName
 from finlab.cli.allocate import allocate
 from finlab.errors import AllocationError, CommandError, LayoutError
 from finlab.layout import Fin, Layout
@@ -164,11 +164,11 @@ def test_energy_counts_the_working_fins(method: Drawn) -> None:
     whole = 0.0
     for amplitude, frequency, direction in result.command[[0, 2]] / [0.6, 2.1, math.pi]:
         whole += amplitude**2 + frequency**2 + 0.1 * direction**2 + amplitude * frequency
-    assert result.energy == pytest.approx(whole)
+    assert result.effort == pytest.approx(whole)
     working = result.command[[0, 2]]
     assert result.power == pytest.approx(Blade().power(working[:, 0], working[:, 1]).sum())
     batch = method.allocate_batch(ROBOT, [SURGE], failed=["left"])
-    np.testing.assert_allclose([batch.power[0], batch.energy[0]], [result.power, result.energy])
+    np.testing.assert_allclose([batch.power[0], batch.effort[0]], [result.power, result.effort])
 
 
 def test_a_method_without_candidates_says_so(method: Drawn) -> None:
@@ -195,7 +195,7 @@ def test_the_command_line_names_every_method() -> None:
 
 
 def test_the_method_comes_first_and_the_checkpoint_by_keyword() -> None:
-    assert get_args(Method) == tuple(METHODS)
+    assert get_args(MethodName) == tuple(METHODS)
     for name in ("analytic", "qp"):
         assert load_allocator(name).name == name
     with pytest.raises(TypeError):

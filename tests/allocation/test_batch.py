@@ -69,7 +69,7 @@ def test_batches_are_plain_data_judged_by_the_plant(method: str) -> None:
     np.testing.assert_allclose(batch.wrench, Plant(layout).wrench(batch.command), atol=1e-12)
     np.testing.assert_allclose(batch.fin_forces, Plant(layout).fin_forces(batch.command), atol=1e-12)
     np.testing.assert_allclose(batch.err_norm, np.linalg.norm((targets - batch.wrench) / batch.sigma, axis=1))
-    assert batch.judged_by == "plant" and len(batch) == 4 and batch.energy.shape == (4,)
+    assert batch.evaluated_by == "plant" and len(batch) == 4 and batch.effort.shape == (4,)
     assert (batch.wrench_surrogate is not None) == (method == "paper")
     np.testing.assert_allclose(batch.power, np.nansum(Plant(layout).power(batch.command), axis=-1))
     for twin in (pickle.loads(pickle.dumps(batch)), copy.copy(batch), copy.deepcopy(batch)):
@@ -83,7 +83,7 @@ def test_empty_batches_have_the_shapes_of_full_ones(method: str) -> None:
     layout = load_layout("A")
     batch = quick_allocator(method).allocate_batch(layout, np.empty((0, 6)), policy="direction")
     assert batch.command.shape == batch.fin_forces.shape == (0, 4, 3) and batch.wrench.shape == (0, 6)
-    assert batch.err_norm.shape == batch.energy.shape == batch.solve_ms.shape == batch.reachable.shape == (0,)
+    assert batch.err_norm.shape == batch.effort.shape == batch.solve_ms.shape == batch.reachable.shape == (0,)
 
 
 @pytest.mark.parametrize("method", METHODS)

@@ -9,13 +9,13 @@ from finlab.allocation.command_cost import CommandCost, command_cost
 from finlab.arrays import Array
 from finlab.layout import FinModelSpec, Layout, random_layout
 from finlab.physics import Plant, plant_of
-from finlab.physics.energy import EnergyWeights, command_energy
+from finlab.physics.effort import EffortWeights, command_effort
 from finlab.physics.objective import Objective
 
 SIGMA = np.array([1.4, 1.4, 2.0, 0.35, 0.3, 0.4])
 AIMS = [
-    Objective("effort", EnergyWeights(1.0, 2.0, 0.4, 0.7)),
-    Objective("effort", EnergyWeights(1.0, 2.0, 0.4, 0.7, 3.0)),
+    Objective("effort", EffortWeights(1.0, 2.0, 0.4, 0.7)),
+    Objective("effort", EffortWeights(1.0, 2.0, 0.4, 0.7, 3.0)),
     Objective("power"),
     Objective("power", copper_loss=0.3),
 ]
@@ -35,19 +35,19 @@ def mixed() -> Plant:
 @pytest.mark.parametrize("aim", AIMS)
 def test_slopes_agree_with_differences(mixed: Plant, aim: Objective) -> None:
     cost, at = command_cost(mixed, aim, SIGMA, 0.7), mixed.sample(np.random.default_rng(0), (5,))
-    slopes = cost.slopes(at)
+    gradient = cost.gradient(at)
     for i, k in np.ndindex(3, 3):
         offset = np.zeros((3, 3))
         offset[i, k] = 1e-6
         rise = (cost(at + offset) - cost(at - offset)) / 2e-6
-        np.testing.assert_allclose(slopes[:, i, k], rise, rtol=1e-6, atol=1e-8)
+        np.testing.assert_allclose(gradient[:, i, k], rise, rtol=1e-6, atol=1e-8)
 
 
 def test_effort_counts_as_it_is() -> None:
     plant = robot(*[FinModelSpec("drag")] * 3)
     at = plant.sample(np.random.default_rng(0), (4,))
     cost = command_cost(plant, Objective("effort"), SIGMA, 1e-4)
-    np.testing.assert_allclose(cost(at), 1e-4 * command_energy(at, plant.upper))
+    np.testing.assert_allclose(cost(at), 1e-4 * command_effort(at, plant.upper))
 
 
 @pytest.mark.parametrize("copper_loss", [0.0, 0.3])
@@ -72,9 +72,9 @@ def test_for_a_robot_that_is_weak_beside_the_yardstick_cost_counts_less() -> Non
 
 def differences(cost: CommandCost, at: Array) -> Array:
     """Derivatives (B, n, 3) of what commands (B, n, 3) cost, by central differences."""
-    slopes = np.empty(at.shape)
+    gradient = np.empty(at.shape)
     for i, k in np.ndindex(at.shape[1:]):
         offset = np.zeros(at.shape[1:])
         offset[i, k] = 1e-6
-        slopes[:, i, k] = (cost(at + offset) - cost(at - offset)) / 2e-6
-    return slopes
+        gradient[:, i, k] = (cost(at + offset) - cost(at - offset)) / 2e-6
+    return gradient

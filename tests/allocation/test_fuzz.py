@@ -108,7 +108,7 @@ def ask(seed: int) -> None:
     missing = np.linalg.norm((wrench - result.target) / result.sigma)
     assert result.err_norm == pytest.approx(missing, rel=1e-6, abs=1e-9)
     assert (
-        np.isfinite([result.err_norm, result.power, result.energy]).all()
+        np.isfinite([result.err_norm, result.power, result.effort]).all()
         and np.isfinite(batch.err_norm).all()
     )
 

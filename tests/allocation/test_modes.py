@@ -61,7 +61,7 @@ def test_the_same_fins_at_rest_are_the_same_mode_whatever_they_do_there() -> Non
     told = candidates([PUSH, REST], [PUSH, (0.05, 0.1, 2.0)], [REST, PUSH])
     modes = find_modes(told, drag(told.command), LOWER, UPPER)
     assert [mode.resting for mode in modes] == [(1,), (0,)]
-    assert modes[1].energy == 3.0 and modes[1].power == 9.0 and modes[0].saturation < 1.0
+    assert modes[1].effort == 3.0 and modes[1].power == 9.0 and modes[0].saturation < 1.0
 
 
 def test_angles_are_compared_the_shorter_way_round() -> None:
@@ -78,7 +78,7 @@ def test_modes_of_an_answer_deliver_the_wrench_in_different_ways(search: SearchA
     modes = search.explore(result)
     assert len(modes) >= 2
     np.testing.assert_array_equal(modes[0].command, result.command)
-    assert modes[0].energy == pytest.approx(result.energy) and modes[0].power == pytest.approx(result.power)
+    assert modes[0].effort == pytest.approx(result.effort) and modes[0].power == pytest.approx(result.power)
     wrench = Plant(layout).wrench(np.array([mode.command for mode in modes]))
     assert search.normalization.error(wrench, target).max() < 1e-3
     ways = [mode.signature for mode in modes]

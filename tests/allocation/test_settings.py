@@ -13,7 +13,7 @@ from finlab.errors import AllocationError
 from finlab.layout import load_layout
 from finlab.paper.pipeline import PaperSettings
 from finlab.paper.settings import PaperOptions
-from finlab.physics.energy import EnergyWeights
+from finlab.physics.effort import EffortWeights
 
 SURGE = [1.0, 0.0, 0.5, 0.0, 0.0, 0.1]
 OTHER: dict[str, dict[str, Any]] = {
@@ -57,9 +57,9 @@ def test_networks_and_layouts_are_shared() -> None:
     layout, allocator = load_layout("A"), load_allocator()
     fewer = allocator.with_settings(n_refined=1)
     assert fewer.pipeline.prepare(layout) is allocator.pipeline.prepare(layout)
-    weights = EnergyWeights(1.0, 0.5, 0.0, 0.0, 0.25)
-    other = allocator.with_settings(objective="effort", energy_weights=weights)
-    expected = load_allocator(objective="effort", energy_weights=weights).allocate(layout, SURGE)
+    weights = EffortWeights(1.0, 0.5, 0.0, 0.0, 0.25)
+    other = allocator.with_settings(objective="effort", effort_weights=weights)
+    expected = load_allocator(objective="effort", effort_weights=weights).allocate(layout, SURGE)
     assert other.allocate(layout, SURGE) == expected
     assert not np.array_equal(
         expected.command, allocator.with_settings(objective="effort").allocate(layout, SURGE).command
@@ -84,8 +84,8 @@ def test_unknown_settings_are_refused(method: str) -> None:
         ("search", {"objective": "speed"}, "objective: expected one of power, effort, got 'speed'"),
         ("mdn", {"copper_loss": float("nan")}, "copper_loss: expected a number .* W/.N m.\\^2, got nan"),
         ("mdn", {"copper_loss": 10**400}, "copper_loss: expected a number .*, got 1000"),
-        ("mdn", {"energy_weights": 3}, "energy_weights: expected EnergyWeights, got 3"),
-        ("mdn", {"energy_weights": EnergyWeights(-1.0)}, "energy_weights: amplitude must be .*, got -1.0"),
+        ("mdn", {"effort_weights": 3}, "effort_weights: expected EffortWeights, got 3"),
+        ("mdn", {"effort_weights": EffortWeights(-1.0)}, "effort_weights: amplitude must be .*, got -1.0"),
         ("paper", {"refinement": "magic"}, "refinement: expected one of none, adam, lev"),
         ("sqp", {"time_limit_s": 0.0}, "time_limit_s: expected a number above 0 up to 3600 s, got 0.0"),
         ("sqp", {"n_starts": 0}, "n_starts: expected a whole number from 1"),

@@ -9,7 +9,7 @@ import pytest
 import finlab
 from finlab.bench.metrics import figures
 from finlab.bench.problems import Problems
-from finlab.bench.runner import Answers, Method, run_method
+from finlab.bench.runner import Answers, BenchMethod, run_method
 from finlab.errors import AllocationError
 from finlab.physics import plant_of
 
@@ -17,7 +17,7 @@ METHODS = Path(__file__).with_name("methods.py")
 
 
 def run(name: str, problems: Problems, limit_s: float = 5.0) -> Answers:
-    return run_method(Method.of(f"{METHODS}:{name}"), problems, limit_s)
+    return run_method(BenchMethod.of(f"{METHODS}:{name}"), problems, limit_s)
 
 
 @pytest.mark.parametrize(
@@ -46,7 +46,7 @@ def test_late_answers_are_failures(few: Problems) -> None:
 
 def test_the_processors_time_leaves_waiting_out(few: Problems, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("finlab.bench.runner.PATIENCE", 1000.0)  # other work may hold a call up for long
-    method = Method.of(f"{METHODS}:is_slow", cpu=True)
+    method = BenchMethod.of(f"{METHODS}:is_slow", cpu=True)
     found = figures(few, run_method(method, few, 0.05))
     assert found["summary"]["failed"] == 0.0 and found["summary"]["p50_ms"] < 20.0
 
@@ -75,7 +75,7 @@ def test_previous_command_comes_back_and_angles_go_round(few: Problems) -> None:
 
 
 def test_search_is_judged_by_the_plant(few: Problems) -> None:
-    answers = run_method(Method.of("search"), few, 5.0)
+    answers = run_method(BenchMethod.of("search"), few, 5.0)
     plant, allocator = plant_of(few.layout(0)), finlab.load_allocator()
     for answer, wrench, kind in zip(answers.targets, few.targets.wrench, few.targets.kind, strict=True):
         assert answer.command is not None
@@ -99,7 +99,7 @@ def test_search_is_judged_by_the_plant(few: Problems) -> None:
 )
 def test_a_method_that_cannot_be_loaded_is_an_error(name: str, words: str, few: Problems) -> None:
     with pytest.raises(AllocationError, match="(?s)" + words.replace("(", r"\(")):
-        run_method(Method.of(name), few)
+        run_method(BenchMethod.of(name), few)
 
 
 @pytest.mark.parametrize(
@@ -113,5 +113,5 @@ def test_a_method_that_cannot_be_loaded_is_an_error(name: str, words: str, few: 
     ],
 )
 def test_programs_that_speak_nonsense(program: str, kind: str, few: Problems) -> None:
-    found = figures(few, run_method(Method("it", (sys.executable, "-c", program)), few, 5.0))
+    found = figures(few, run_method(BenchMethod("it", (sys.executable, "-c", program)), few, 5.0))
     assert found["summary"]["failed"] == 1.0 and kind in found["failures"]

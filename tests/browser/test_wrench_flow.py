@@ -74,7 +74,7 @@ def test_candidates_of_search_and_network(page: Any) -> None:
     page.until(lambda: "from component" in page.text("table.modes"))
     page.type("Candidates K", "24")
     page.until(lambda: session.state.n_candidates == 24 and not page.view.busy)
-    assert len(answering.best.samples.energy) == 24
+    assert len(answering.best.samples.effort) == 24
     page.until(lambda: page.page.locator("svg.plot:visible .samples circle").count() > 4)
     assert page.problems == []
 

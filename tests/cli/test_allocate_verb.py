@@ -26,7 +26,7 @@ KEYS = [
     "wrench_plant",
     "unallocated",
     "err_norm",
-    "energy",
+    "effort",
     "power",
     "sigma",
     "solve_ms",
@@ -35,7 +35,7 @@ KEYS = [
     "reachable",
     "scale",
     "binding",
-    "judged_by",
+    "evaluated_by",
     "unknown_fins",
     "notes",
 ]
@@ -103,7 +103,7 @@ def test_the_objective_decides_what_is_kept_least(allocate: Callable[..., tuple[
         for option in ((), ("--objective", "power"), ("--objective", "effort"))
     )
     assert usual["command"] == power["command"]
-    assert power["power"] < 0.95 * effort["power"] and effort["energy"] < 0.95 * power["energy"]
+    assert power["power"] < 0.95 * effort["power"] and effort["effort"] < 0.95 * power["effort"]
     assert max(power["err_norm"], effort["err_norm"]) < 1e-4
 
 

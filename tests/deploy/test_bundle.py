@@ -27,7 +27,7 @@ from finlab.deploy.robot import load_robot, parse_robot
 from finlab.errors import AllocationError, DataError, FinlabError
 from finlab.layout import Layout
 from finlab.layout.load import checksum_of
-from finlab.physics.energy import EnergyWeights
+from finlab.physics.effort import EffortWeights
 
 WEIGHTS = "checkpoint/model.safetensors"
 WRENCH = [1, 0, 0.5, 0, 0, 0.1]
@@ -107,9 +107,9 @@ def test_the_command_line_takes_a_bundle_with_its_lost_fins(
 
 
 def test_settings_travel_and_can_be_changed(tmp_path: Path) -> None:
-    weights = EnergyWeights(1.0, 0.5, 0.0, 0.0, 0.25)
+    weights = EffortWeights(1.0, 0.5, 0.0, 0.0, 0.25)
     desk = finlab.load_allocator(
-        n_refined=2, search_steps=9, objective="effort", energy_weights=weights, copper_loss=0.5
+        n_refined=2, search_steps=9, objective="effort", effort_weights=weights, copper_loss=0.5
     )
     make_bundle(finlab.load_layout("octo"), desk).write(tmp_path)
     assert finlab.load_allocator(tmp_path).options == desk.options

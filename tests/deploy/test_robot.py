@@ -10,7 +10,7 @@ import finlab
 from finlab.allocation import Allocator
 from finlab.assets import shipped_layouts
 from finlab.deploy.bundle import Bundle, make_bundle
-from finlab.deploy.robot import Robot, load_robot, parse_robot
+from finlab.deploy.robot import DeployedRobot, load_robot, parse_robot
 from finlab.deploy.self_check import self_check
 from finlab.errors import FinlabError
 from finlab.layout import FinModelSpec, Layout
@@ -22,22 +22,22 @@ WRENCH = ["--wrench", "1", "0", "0.5", "0", "0", "0.1"]
 
 
 @pytest.fixture(scope="module")
-def robot(bundle: Bundle) -> Robot:
+def robot(bundle: Bundle) -> DeployedRobot:
     return parse_robot(bundle.files)
 
 
-def with_model(robot: Robot, model: FinModelSpec) -> Robot:
+def with_model(robot: DeployedRobot, model: FinModelSpec) -> DeployedRobot:
     """The same robot, had all its fins another model than the one that it was exported for."""
     fins = tuple(replace(fin, model=model) for fin in robot.layout.fins)
-    return Robot(replace(robot.graph, layout=replace(robot.layout, fins=fins)), robot.allocator)
+    return DeployedRobot(replace(robot.graph, layout=replace(robot.layout, fins=fins)), robot.allocator)
 
 
-def bad(robot: Robot) -> list[str]:
+def bad(robot: DeployedRobot) -> list[str]:
     """What its self-check complains about."""
     return [finding.question for finding in self_check(robot) if not finding.good]
 
 
-def test_answer_says_what_is_missing(robot: Robot) -> None:
+def test_answer_says_what_is_missing(robot: DeployedRobot) -> None:
     answer = robot.allocate([1, 0, 0.5, 0, 0, 0.1], failed=["front_right"])
     assert answer.fins == finlab.load_layout("A").names
     assert np.isnan(answer.command[0]).all() and not np.isnan(answer.command[1:]).any()
@@ -75,9 +75,9 @@ def test_every_shipped_layout_answers_as_the_library_to_the_last_bit(
     for target in targets:
         truth = desk.allocate(layout, target, previous=previous)
         answer = robot.allocate(target, previous=previous)
-        for field in ("command", "wrench", "fin_forces", "err_norm", "energy", "power"):
+        for field in ("command", "wrench", "fin_forces", "err_norm", "effort", "power"):
             np.testing.assert_array_equal(getattr(answer, field), getattr(truth, field), field)
-        assert answer.judged_by == "plant" and answer.notes == truth.notes
+        assert answer.evaluated_by == "plant" and answer.notes == truth.notes
         previous = truth.command
     batch, many = robot.allocator.allocate_batch(robot.layout, targets), desk.allocate_batch(layout, targets)
     np.testing.assert_array_equal(batch.command, many.command)

@@ -18,7 +18,7 @@ from finlab.allocation import Allocation
 from finlab.deploy import serve as serve_module
 from finlab.deploy.bundle import Bundle
 from finlab.deploy.request import MAX_LINE
-from finlab.deploy.robot import Robot, parse_robot
+from finlab.deploy.robot import DeployedRobot, parse_robot
 from finlab.deploy.serve import RECENT_S, Server, Timing
 from finlab.deploy.stopping import SIGNALS, StopSignals
 from finlab.deploy.transport import LoopbackUdp, StandardStreams, Unsent
@@ -29,7 +29,7 @@ LINE = json.dumps(GOOD).encode() + b"\n"
 
 
 @pytest.fixture(scope="module")
-def robot(bundle: Bundle) -> Robot:
+def robot(bundle: Bundle) -> DeployedRobot:
     return parse_robot(bundle.files)
 
 
@@ -64,13 +64,13 @@ class Script:
         self.sent.append(json.loads(line, parse_constant=pytest.fail))
 
 
-def served(robot: Robot, *requests: Any, timing: Timing | None = None) -> list[dict[str, Any]]:
+def served(robot: DeployedRobot, *requests: Any, timing: Timing | None = None) -> list[dict[str, Any]]:
     script = Script(*requests)
     Server(robot, timing or Timing()).run(script)
     return script.sent
 
 
-def test_answers_like_the_library(robot: Robot) -> None:
+def test_answers_like_the_library(robot: DeployedRobot) -> None:
     first, end = served(robot, {**GOOD, "id": 7, "failed": ["back_left"]})
     truth = robot.allocate(GOOD["wrench"], failed=["back_left"])
     assert (first["id"], first["status"]) == (7, "ok") and first["fins"] == list(truth.fins)
@@ -83,7 +83,7 @@ def test_answers_like_the_library(robot: Robot) -> None:
 
 
 @pytest.mark.parametrize("id_", [None, 0, -1.5, "a", "\ud800", [1, "x"], {"of": [None, True]}, 10**300])
-def test_an_id_of_any_kind_comes_back(id_: Any, robot: Robot) -> None:
+def test_an_id_of_any_kind_comes_back(id_: Any, robot: DeployedRobot) -> None:
     assert served(robot, {**GOOD, "id": id_})[0]["id"] == id_
 
 
@@ -110,7 +110,9 @@ def test_an_id_of_any_kind_comes_back(id_: Any, robot: Robot) -> None:
         ({"wrench": [10**400, 0, 0, 0, 0, 0]}, "10+ is too large"),
     ],
 )
-def test_bad_requests_get_one_sentence_and_no_commands(request_: Any, message: str, robot: Robot) -> None:
+def test_bad_requests_get_one_sentence_and_no_commands(
+    request_: Any, message: str, robot: DeployedRobot
+) -> None:
     reply = served(robot, request_)[0]
     assert reply["status"] == "error" and "command" not in reply
     with pytest.raises(FinlabError, match=message):
@@ -118,7 +120,7 @@ def test_bad_requests_get_one_sentence_and_no_commands(request_: Any, message: s
 
 
 def test_only_good_targets_and_rest_wind_up_the_watchdog(
-    robot: Robot, monkeypatch: pytest.MonkeyPatch
+    robot: DeployedRobot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     script = Script(GOOD, b"nonsense", b"nonsense", GOOD, *[b"nonsense"] * 4, None)
     monkeypatch.setattr("finlab.deploy.serve.time.monotonic", lambda: script.now)
@@ -132,17 +134,17 @@ def test_only_good_targets_and_rest_wind_up_the_watchdog(
     assert script.waits == [None] * 3
 
 
-def test_the_fins_rest_before_an_error_that_nobody_foresaw_is_told(robot: Robot) -> None:
+def test_the_fins_rest_before_an_error_that_nobody_foresaw_is_told(robot: DeployedRobot) -> None:
     script = Script(GOOD, ZeroDivisionError("a fault of ours"))
     with pytest.raises(ZeroDivisionError, match="a fault of ours"):
         Server(robot, Timing()).run(script)
     assert [reply["status"] for reply in script.sent] == ["ok", "neutral"]
 
 
-class Slow(Robot):
+class Slow(DeployedRobot):
     """A robot whose computer is busy."""
 
-    def __init__(self, robot: Robot, delay: float) -> None:
+    def __init__(self, robot: DeployedRobot, delay: float) -> None:
         super().__init__(robot.graph, robot.allocator)
         vars(self)["delay"] = delay
 
@@ -151,7 +153,7 @@ class Slow(Robot):
         return super().allocate(*args, **options)
 
 
-def test_deadline_repeats_what_was_sent_last(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_deadline_repeats_what_was_sent_last(robot: DeployedRobot, monkeypatch: pytest.MonkeyPatch) -> None:
     slow = Slow(robot, 0.0)
     server = Server(slow, Timing(deadline=20.0))
     sent = server.answer(LINE)["command"]
@@ -168,7 +170,9 @@ def test_deadline_repeats_what_was_sent_last(robot: Robot, monkeypatch: pytest.M
     np.testing.assert_array_equal(np.array(first["command"]), robot.neutral())
 
 
-def test_commands_change_no_faster_than_servos_do(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_commands_change_no_faster_than_servos_do(
+    robot: DeployedRobot, monkeypatch: pytest.MonkeyPatch
+) -> None:
     now = [100.0]
     monkeypatch.setattr(serve_module.time, "monotonic", lambda: now[0])
     server = Server(robot, Timing())
@@ -181,7 +185,9 @@ def test_commands_change_no_faster_than_servos_do(robot: Robot, monkeypatch: pyt
     assert server.answer(forwards)["err_norm"] < 1e-5, "commands of long ago bind no more"
 
 
-def test_an_answer_that_is_no_number_is_an_error(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_answer_that_is_no_number_is_an_error(
+    robot: DeployedRobot, monkeypatch: pytest.MonkeyPatch
+) -> None:
     healthy = type(robot.allocator)._solve
 
     def broken(self: Any, *arguments: Any, **options: Any) -> Any:

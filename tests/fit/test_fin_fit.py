@@ -56,7 +56,7 @@ def test_power_and_lean(fit: FinFit) -> None:
     power = fit.predict_power(TEST)
     assert power is not None
     assert np.abs(power - LAW.power(TEST)).max() < 0.05 * LAW.power(TEST).max()
-    assert fit.lean == pytest.approx(0.12, abs=0.03)
+    assert fit.deflection == pytest.approx(0.12, abs=0.03)
     assert fit.predict(np.array([[0.0, 1.0, 0.3], [0.4, 0.0, 1.0]]))[0] == pytest.approx(0.0), "at rest"
 
 

@@ -67,7 +67,7 @@ def largest_by_polygons(sets: FinSets, direction: Array, corners: int, outer: bo
             row[2 * i : 2 * i + 2] = np.cos(angle), np.sin(angle)
             rows.append(row)
             limits.append(limit)
-    wrench = np.hstack([sets.columns[0].reshape(2 * n, 6).T, -direction[:, None]])
+    wrench = np.hstack([sets.effectiveness[0].reshape(2 * n, 6).T, -direction[:, None]])
     cost = np.zeros(2 * n + 1)
     cost[-1] = -1.0
     found = linprog(cost, np.array(rows), limits, wrench, np.zeros(6), bounds=(None, None))

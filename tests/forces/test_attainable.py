@@ -49,7 +49,7 @@ def test_no_sampled_wrench_lies_outside(shipped: Layouts, name: str, kind: str) 
     # Fins may depart from their convex sets: they cannot rest, and tables are uneven.
     fins = layout_envelopes(layout, Objective())
     off = fins.minimum + fins.maximum - fins.largest.min(axis=1)
-    error = (np.linalg.norm(fin_sets(layout).columns[0], axis=1) * off[:, None]).sum(axis=0) * SCALE
+    error = (np.linalg.norm(fin_sets(layout).effectiveness[0], axis=1) * off[:, None]).sum(axis=0) * SCALE
     assert body.dimension == 3
     assert not body.hull
     assert body.gap <= 0.011 * np.linalg.norm(body.vertices, axis=-1).max()
@@ -64,13 +64,13 @@ def test_sets_with_all_else_zero_hold_what_was_found_otherwise(shipped: Layouts,
     layout = shipped("mixed")
     sets = fin_sets(layout)
     own, other = OWN[kind], OWN["torque" if kind == "force" else "force"]
-    columns = sets.columns[0].reshape(-1, 6)
-    _, _, directions = np.linalg.svd(columns[:, other].T)
+    effectiveness = sets.effectiveness[0].reshape(-1, 6)
+    _, _, directions = np.linalg.svd(effectiveness[:, other].T)
     kept = directions[3:]
     drawn = np.random.default_rng(0).standard_normal((20_000, len(kept))) @ kept
     thrust = np.linalg.norm(drawn.reshape(-1, layout.n_fins, 2), axis=-1)
     drawn /= (thrust / sets.radius[0]).max(axis=-1)[:, None]
-    points = (drawn @ columns)[:, own] * SCALE[own]
+    points = (drawn @ effectiveness)[:, own] * SCALE[own]
     body = attainable_set(layout, kind)
     assert outside(body, points) <= body.gap + 1e-6
     # The draws reach most of the way in every direction.

@@ -20,7 +20,7 @@ def ranges_by_polygons(layout: Layout, wrench: list[float], failed: tuple[str, .
     n = sets.radius.shape[1]
     turn = sets.middle[0, :, None] + sets.half[0, :, None] * np.linspace(-1, 1, CORNERS)
     force = sets.radius[0, :, None, None] * np.stack([np.cos(turn), np.sin(turn)], axis=-1)
-    corners = np.einsum("npc,nck->npk", force, sets.columns[0]).reshape(-1, 6)
+    corners = np.einsum("npc,nck->npk", force, sets.effectiveness[0]).reshape(-1, 6)
     share = np.kron(np.eye(n), np.ones(CORNERS))
     found = np.full((6, 2), np.nan)
     for k in range(6):

@@ -43,13 +43,14 @@ def test_each_fin_pushes_as_far_as_the_pull_on_it_pays() -> None:
         command = plant.sample(np.random.default_rng(7), (20,))
         command[10:, :, :2] = plant.upper[:, :2]  # fins at full load, most of which the search turns
         planar, fins = solved(problem, plant.wrench(command) / SIGMA), problem.fins
-        pull = (planar.multiplier @ problem.columns.T).reshape(20, 2, -1)
+        pull = (planar.multiplier @ problem.effectiveness.T).reshape(20, 2, -1)
         along = pull[:, 0] * np.cos(planar.direction) + pull[:, 1] * np.sin(planar.direction)
         across = pull[:, 1] * np.cos(planar.direction) - pull[:, 0] * np.sin(planar.direction)
         scale = np.abs(along).max(1, keepdims=True)
         excess = (along - planar.size / np.exp(planar.row[..., MOBILITY])) / scale
-        rim, offset = fins.rim(planar.direction), wrapped(planar.direction - fins.middle)
-        most, least = planar.size >= rim.largest * (1.0 - 1e-9), planar.size <= rim.smallest * (1.0 + 1e-9)
+        boundary, offset = fins.boundary(planar.direction), wrapped(planar.direction - fins.middle)
+        most = planar.size >= boundary.largest * (1.0 - 1e-9)
+        least = planar.size <= boundary.smallest * (1.0 + 1e-9)
         stopped = (fins.half < np.pi) & (np.abs(offset) > fins.half - 1e-9)
         exact = np.linalg.norm(planar.residual, axis=1) < 1e-6
         plain = (exact & ~(most | least | stopped).any(1))[:, None] & np.ones_like(most)
@@ -70,8 +71,8 @@ def test_multipliers_are_what_each_axis_of_the_target_costs() -> None:
         layout = robot(seed)
         problem, target = problem_of(layout), 0.6 * reachable(layout, 6, seed)
         planar = solved(problem, target)
-        rim = problem.fins.rim(planar.direction)
-        inside = ((planar.size < 0.999 * rim.largest) & (planar.size > 1.5 * rim.smallest)).all(1)
+        boundary = problem.fins.boundary(planar.direction)
+        inside = ((planar.size < 0.999 * boundary.largest) & (planar.size > 1.5 * boundary.smallest)).all(1)
         fine = inside & (np.linalg.norm(planar.residual, axis=1) < 1e-7)
         for axis in range(6):
             step = 5e-2 * np.eye(6)[axis]

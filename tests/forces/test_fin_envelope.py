@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from finlab.forces.fin_envelope import (
     AMPLITUDE,
     COST,
+    DEFLECTION,
     FREQUENCY,
-    LEAN,
     LEVELS,
     SHAFT,
     FinEnvelope,
@@ -64,7 +64,7 @@ def sizes(envelope: FinEnvelope) -> Array:
 def commands(envelope: FinEnvelope) -> Array:
     """The command of each entry (K, LEVELS, 3)."""
     table = envelope.table
-    turn = directions(envelope)[:, None] - table[..., LEAN]
+    turn = directions(envelope)[:, None] - table[..., DEFLECTION]
     return np.stack([table[..., AMPLITUDE], table[..., FREQUENCY], turn], axis=-1)
 
 
@@ -106,7 +106,7 @@ def test_no_cheaper_command_gives_the_same_force(name: str, objective: Name) -> 
     cost, promised = Objective(objective).fin_cost(law, np.array(limits.upper)), sizes(envelope)
     gaps: list[float] = []
     for k in range(0, len(envelope.largest), 12):
-        turn = float(directions(envelope)[k] - envelope.table[k, LEVELS // 2, LEAN])
+        turn = float(directions(envelope)[k] - envelope.table[k, LEVELS // 2, DEFLECTION])
         size, command = brute(law, limits, turn)
         for level in range(4, LEVELS - 2, 6):
             passed = (size[:, :-1] - promised[k, level]) * (size[:, 1:] - promised[k, level]) <= 0.0
@@ -124,9 +124,9 @@ def test_no_cheaper_command_gives_the_same_force(name: str, objective: Name) -> 
 def test_the_ends_are_those_of_brute_force(name: str) -> None:
     law, limits, envelope = compiled(name, Objective())
     for k in range(0, len(envelope.largest), 12):
-        size, _ = brute(law, limits, float(directions(envelope)[k] - envelope.table[k, -1, LEAN]))
+        size, _ = brute(law, limits, float(directions(envelope)[k] - envelope.table[k, -1, DEFLECTION]))
         assert envelope.largest[k] == pytest.approx(size.max(), rel=2e-3, abs=1e-9)
-        at_rest = np.array([*limits.lower[:2], directions(envelope)[k] - envelope.table[k, 0, LEAN]])
+        at_rest = np.array([*limits.lower[:2], directions(envelope)[k] - envelope.table[k, 0, DEFLECTION]])
         least = float(np.linalg.norm(law.force(at_rest)))
         assert envelope.smallest[k] == pytest.approx(least, rel=2e-3, abs=1e-5 * envelope.largest[k])
 

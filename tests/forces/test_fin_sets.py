@@ -13,10 +13,10 @@ HALVES = [0.0, 0.4, np.pi / 2, 1.9, 2.9, np.pi]
 def fins(half: float, rows: int = 200) -> FinSets:
     """Robots of one fin that pushes along x and y alone."""
     rng = np.random.default_rng(0)
-    columns = np.zeros((rows, 1, 2, 6))
-    columns[:, 0, 0, 0] = columns[:, 0, 1, 1] = 1.0
+    effectiveness = np.zeros((rows, 1, 2, 6))
+    effectiveness[:, 0, 0, 0] = effectiveness[:, 0, 1, 1] = 1.0
     middle = rng.uniform(-np.pi, np.pi, (rows, 1))
-    return FinSets(columns, np.full((rows, 1), 3.0), middle, np.full((rows, 1), half))
+    return FinSets(effectiveness, np.full((rows, 1), 3.0), middle, np.full((rows, 1), half))
 
 
 def pulls(rows: int = 200) -> Array:
@@ -26,8 +26,8 @@ def pulls(rows: int = 200) -> Array:
 def sector(sets: FinSets, row: int) -> Array:
     """Points (S, 2) all over one fin's sector, its rim and its tip included."""
     angle = sets.middle[row, 0] + np.linspace(-1.0, 1.0, 721) * sets.half[row, 0]
-    rim = sets.radius[row, 0] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-    return np.concatenate([rim * share for share in np.linspace(0.0, 1.0, 60)])
+    boundary = sets.radius[row, 0] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    return np.concatenate([boundary * share for share in np.linspace(0.0, 1.0, 60)])
 
 
 @pytest.mark.parametrize("half", HALVES)
@@ -51,21 +51,21 @@ def test_an_uneven_fin_reaches_as_far_as_the_polygon_around_it(count: int) -> No
     ahead = np.hypot(
         long[:, None] * np.cos(side - tilt[:, None]), short[:, None] * np.sin(side - tilt[:, None])
     )
-    rim = ahead + 0.15 * np.cos(side - 1.0)
-    uneven = sets._replace(rim=rim[:, None])
+    boundary = ahead + 0.15 * np.cos(side - 1.0)
+    uneven = sets._replace(boundary=boundary[:, None])
     reach, force = uneven.farthest(np.pad(pull[:, 0], ((0, 0), (0, 4))))
     corners = np.linalg.solve(
         np.stack([normals, np.roll(normals, -1, axis=0)], axis=1)[None],
-        3.0 * np.stack([rim, np.roll(rim, -1, axis=1)], axis=2)[..., None],
+        3.0 * np.stack([boundary, np.roll(boundary, -1, axis=1)], axis=2)[..., None],
     )[..., 0]
     np.testing.assert_allclose(reach, np.einsum("rkc,rc->rk", corners, pull[:, 0]).max(1), rtol=1e-9)
-    outward = (force[:, 0] @ normals.T) / (3.0 * rim)
+    outward = (force[:, 0] @ normals.T) / (3.0 * boundary)
     np.testing.assert_allclose(outward.max(1), 1.0, rtol=1e-9)
     np.testing.assert_allclose(
         np.arctan2(force[:, 0, 1], force[:, 0, 0]), np.arctan2(pull[:, 0, 1], pull[:, 0, 0]), atol=1e-9
     )
     # A polygon farther out than the disc leaves the disc.
-    plain = sets._replace(rim=np.full((200, 1, count), 1.5))
+    plain = sets._replace(boundary=np.full((200, 1, count), 1.5))
     for found, known in zip(
         plain.farthest(np.pad(pull[:, 0], ((0, 0), (0, 4)))),
         sets.farthest(np.pad(pull[:, 0], ((0, 0), (0, 4)))),
@@ -76,9 +76,9 @@ def test_an_uneven_fin_reaches_as_far_as_the_polygon_around_it(count: int) -> No
 
 def five_fins(half: float) -> FinSets:
     """Two robots of five fins with the same arcs."""
-    columns = np.random.default_rng(2).standard_normal((2, 5, 2, 6))
+    effectiveness = np.random.default_rng(2).standard_normal((2, 5, 2, 6))
     middle = np.tile(np.linspace(-2.0, 2.0, 5), (2, 1))
-    return FinSets(columns, np.ones((2, 5)), middle, np.full((2, 5), half))
+    return FinSets(effectiveness, np.ones((2, 5)), middle, np.full((2, 5), half))
 
 
 @pytest.mark.parametrize(("half", "parts"), [(np.pi / 2, 1), (np.pi, 1), (2.0, 2**MAX_CUT)])
@@ -104,7 +104,7 @@ def test_forces_choose_the_halves_of_fins_beyond_the_first_few() -> None:
 
 def test_a_fin_whose_stops_coincide_has_one_column() -> None:
     sets = five_fins(0.0)
-    full = sets.full_columns().reshape(2, 5, 2, 6)
+    full = sets.full_effectiveness().reshape(2, 5, 2, 6)
     unit = np.stack([np.cos(sets.middle), np.sin(sets.middle)], axis=-1)
-    assert full[:, :, 0] == pytest.approx((unit[..., None] * sets.columns).sum(2))
+    assert full[:, :, 0] == pytest.approx((unit[..., None] * sets.effectiveness).sum(2))
     assert (full[:, :, 1] == 0.0).all()

@@ -56,8 +56,9 @@ def test_forces_keep_the_limits_wherever_the_target_lies(limits: str, scale: flo
         problem = problem_of(layout, Objective(objective))
         target = scale * reachable(layout)
         planar = descend(problem, target, full(problem, len(target)), 6)
-        rim = problem.fins.rim(planar.direction)
-        assert (planar.size >= rim.smallest - 1e-12).all() and (planar.size <= rim.largest + 1e-12).all()
+        boundary = problem.fins.boundary(planar.direction)
+        assert (planar.size >= boundary.smallest - 1e-12).all()
+        assert (planar.size <= boundary.largest + 1e-12).all()
         command, cost = realize(problem, planar)
         assert np.isfinite(command).all() and np.isfinite(cost).all()
         turned = np.remainder(planar.direction - problem.fins.middle + np.pi, 2 * np.pi) - np.pi
@@ -72,8 +73,8 @@ def test_is_cheaper_than_the_pseudo_inverse() -> None:
         for aim, most in ((Objective("power"), 1.004), (Objective("effort"), 1.02)):
             problem = problem_of(layout, aim)
             target = 0.5 * reachable(layout)
-            columns = np.stack(np.split(problem.columns, 2), axis=1).reshape(-1, 6)
-            force = (target @ np.linalg.pinv(columns)).reshape(len(target), -1, 2)
+            effectiveness = np.stack(np.split(problem.effectiveness, 2), axis=1).reshape(-1, 6)
+            force = (target @ np.linalg.pinv(effectiveness)).reshape(len(target), -1, 2)
             size = np.linalg.norm(force, axis=-1)
             planar = descend(problem, target, size, 30)
             inside = ((size >= problem.fins.minimum) & (size <= problem.fins.maximum)).all(1)

@@ -14,18 +14,18 @@ Array = NDArray[np.float64]
 X, Y, Z = (np.arange(6) == k for k in range(3))
 
 
-def planar(columns: Array, radius: Array) -> FinSets:
+def planar(effectiveness: Array, radius: Array) -> FinSets:
     """One robot of free fins."""
     n = len(radius)
-    return FinSets(columns[None], radius[None], np.zeros((1, n)), np.full((1, n), np.pi))
+    return FinSets(effectiveness[None], radius[None], np.zeros((1, n)), np.full((1, n), np.pi))
 
 
 def axes_of(*pairs: tuple[int, int]) -> Array:
     """Columns (n, 2, 6) of fins that push along two axes each."""
-    columns = np.zeros((len(pairs), 2, 6))
+    effectiveness = np.zeros((len(pairs), 2, 6))
     for i, pair in enumerate(pairs):
-        columns[i, 0, pair[0]] = columns[i, 1, pair[1]] = 1.0
-    return columns
+        effectiveness[i, 0, pair[0]] = effectiveness[i, 1, pair[1]] = 1.0
+    return effectiveness
 
 
 def test_who_gives_all_for_the_first_group_gives_nothing_to_the_next() -> None:

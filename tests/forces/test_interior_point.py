@@ -15,9 +15,9 @@ Array = NDArray[np.float64]
 
 def robots(half: float, rows: int = 40, n: int = 5, scale: float = 1.0) -> FinSets:
     rng = np.random.default_rng(5)
-    columns = scale * rng.standard_normal((rows, n, 2, 6))
+    effectiveness = scale * rng.standard_normal((rows, n, 2, 6))
     middle = rng.uniform(-np.pi, np.pi, (rows, n))
-    return FinSets(columns, rng.uniform(0.5, 3.0, (rows, n)), middle, np.full((rows, n), half))
+    return FinSets(effectiveness, rng.uniform(0.5, 3.0, (rows, n)), middle, np.full((rows, n), half))
 
 
 @pytest.mark.parametrize(
@@ -30,10 +30,10 @@ def test_no_force_within_the_sets_gains_more(half: float, scale: float, far: flo
     rng = np.random.default_rng(6)
     size = far * scale * 10.0
     wanted = rng.standard_normal((40, 6)) * size
-    c, bend = rng.uniform(0.1, 10.0, (40, 6)), rng.uniform(0.0, 0.3, (40, 5)) * scale**2
-    force, multiplier = minimize(sets, wanted, c, bend)
+    c, hessian = rng.uniform(0.1, 10.0, (40, 6)), rng.uniform(0.0, 0.3, (40, 5)) * scale**2
+    force, multiplier = minimize(sets, wanted, c, hessian)
     assert multiplier == pytest.approx((wanted - sets.wrench(force)) / c, abs=1e-5 * (scale + size))
-    gain = sets.pull(multiplier) - bend[..., None] * force
+    gain = sets.pull(multiplier) - hessian[..., None] * force
     alone = FinSets(
         np.tile(np.eye(2), (40, 5, 1, 1)).reshape(200, 1, 2, 2),
         *(f.reshape(200, 1) for f in (sets.radius, sets.middle, sets.half)),
@@ -62,8 +62,8 @@ def test_robots_without_anything_to_push_with() -> None:
     wanted = np.random.default_rng(7).standard_normal((40, 6))
     for dead in (
         sets._replace(radius=np.zeros((40, 5))),
-        sets._replace(columns=np.zeros((40, 5, 2, 6))),
-        sets._replace(columns=np.repeat(sets.columns[:, :1], 5, axis=1)),
+        sets._replace(effectiveness=np.zeros((40, 5, 2, 6))),
+        sets._replace(effectiveness=np.repeat(sets.effectiveness[:, :1], 5, axis=1)),
         sets._replace(half=np.zeros((40, 5)), middle=np.zeros((40, 5))),
     ):
         for c in (np.ones(6), np.array([1.0, *(1e-9,) * 5])):
@@ -78,18 +78,18 @@ def test_uneven_fins_within_their_polygons_against_scipy(far: float) -> None:
     rng, count, n = np.random.default_rng(5), 12, 3
     side = 2.0 * np.pi * np.arange(count) / count
     normals = np.stack([np.cos(side), np.sin(side)])
-    rim = 0.75 + 0.2 * np.cos(side - rng.uniform(0.0, 6.0, (6, n, 1)))
-    columns = rng.standard_normal((6, n, 2, 6))
+    boundary = 0.75 + 0.2 * np.cos(side - rng.uniform(0.0, 6.0, (6, n, 1)))
+    effectiveness = rng.standard_normal((6, n, 2, 6))
     radius = rng.uniform(0.5, 2.0, (6, n))
-    sets = FinSets(columns, radius, np.zeros((6, n)), np.full((6, n), np.pi), rim)
-    wanted, bend = far * rng.standard_normal((6, 6)), 0.1
-    found = minimize(sets, wanted, np.ones(6), np.full((6, n), bend))
+    sets = FinSets(effectiveness, radius, np.zeros((6, n)), np.full((6, n), np.pi), boundary)
+    wanted, hessian = far * rng.standard_normal((6, 6)), 0.1
+    found = minimize(sets, wanted, np.ones(6), np.full((6, n), hessian))
     for row in range(6):
-        most = (rim[row] * radius[row, :, None]).ravel()
+        most = (boundary[row] * radius[row, :, None]).ravel()
 
         def value(flat: Array, row: int = row) -> float:
-            missed = wanted[row] - flat @ columns[row].reshape(2 * n, 6)
-            return float(0.5 * missed @ missed + 0.5 * bend * flat @ flat)
+            missed = wanted[row] - flat @ effectiveness[row].reshape(2 * n, 6)
+            return float(0.5 * missed @ missed + 0.5 * hessian * flat @ flat)
 
         def room(flat: Array, row: int = row, most: Array = most) -> Array:
             force = flat.reshape(n, 2)

@@ -28,7 +28,7 @@ def drawn(seed: int, limits: str) -> tuple[PlanarProblem, np.ndarray]:
 
 def paired(planar: PlanarProblem) -> np.ndarray:
     """Normalized wrench per newton (n, 2, 6) of each fin's horizontal and vertical force."""
-    return np.stack(np.split(planar.columns, 2), axis=1)
+    return np.stack(np.split(planar.effectiveness, 2), axis=1)
 
 
 def farthest(planar: PlanarProblem, pull: np.ndarray) -> float:
@@ -103,11 +103,11 @@ def test_the_direction_is_kept_and_no_more_can_be_had(limits: str) -> None:
 def test_a_general_solver_finds_nothing_nearer() -> None:
     planar = problem_of(load_layout(shipped_layouts()["penta"]))
     target = 4.0 * np.array([6.0, -4.0, 5.0, 1.0, 2.0, -3.0])
-    columns, top = paired(planar).reshape(-1, 6), planar.fins.maximum
+    effectiveness, top = paired(planar).reshape(-1, 6), planar.fins.maximum
     found = minimize(
-        lambda y: 0.5 * ((y @ columns - target) ** 2).sum(),
-        np.zeros(len(columns)),
-        jac=lambda y: columns @ (y @ columns - target),
+        lambda y: 0.5 * ((y @ effectiveness - target) ** 2).sum(),
+        np.zeros(len(effectiveness)),
+        jac=lambda y: effectiveness @ (y @ effectiveness - target),
         constraints={"type": "ineq", "fun": lambda y: top**2 - (y.reshape(-1, 2) ** 2).sum(1)},
         method="SLSQP",
         options={"maxiter": 300, "ftol": 1e-12},
@@ -120,7 +120,7 @@ def test_a_general_solver_finds_nothing_nearer() -> None:
 def test_along_a_direction_that_the_fins_do_not_have_nothing_is_given(seed: int) -> None:
     """Two fins push along four of six axes; next to nothing beside them is let pass."""
     sets = planar_sets(problem_of(random_layout(np.random.default_rng(seed), n_fins=2)))
-    flat = sets.columns.reshape(4, 6)
+    flat = sets.effectiveness.reshape(4, 6)
     along = flat.T @ np.array([0.4, 0.1, -0.2, 0.3])
     size = float(np.linalg.norm(along))
     beside = np.linalg.svd(flat)[2][-1]

@@ -16,7 +16,7 @@ from finlab.layout import (
     random_layouts,
     stack_layouts,
 )
-from finlab.layout.arrays import force_columns
+from finlab.layout.arrays import force_effectiveness
 from finlab.layout.random import TRAINING_BOX
 
 THREE = Layout(
@@ -70,7 +70,7 @@ def test_stacking_pads_with_nothing():
 def test_force_columns_are_force_and_moment_of_a_newton():
     rng = np.random.default_rng(0)
     position, angle = rng.normal(size=(7, 3, 3)), rng.uniform(-4, 4, (7, 3))
-    columns = force_columns(position, angle)
+    columns = force_effectiveness(position, angle)
     assert columns.shape == (7, 3, 3, 6)
     for b in range(7):
         for i in range(3):

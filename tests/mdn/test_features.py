@@ -39,7 +39,7 @@ def test_forces_that_give_the_wrench_are_those_that_give_the_least_shares(layout
     view, rng = robot_view(problem, True), np.random.default_rng(0)
     share = rng.normal(size=(4, layout.n_fins)) + 1j * rng.normal(size=(4, layout.n_fins))
     force = share * view.largest
-    target = np.concatenate([force.real, force.imag], axis=1) @ problem.columns
+    target = np.concatenate([force.real, force.imag], axis=1) @ problem.effectiveness
     for row in range(4):
         # P x = p for every x that gives the target, and P is a projection up to its regularization.
         np.testing.assert_allclose(acted(view, share[row]), target[row] @ view.solver, atol=1e-3)
@@ -119,7 +119,7 @@ def test_documented_features_of_a_hand_made_fin() -> None:
     layout = random_layout(np.random.default_rng(1), n_fins=1)
     problem = problem_of(layout)
     top = problem.fins.maximum[0]
-    target = 0.25 * top * problem.columns[1]  # a quarter of its force, straight up
+    target = 0.25 * top * problem.effectiveness[1]  # a quarter of its force, straight up
     found = see(robot_view(problem, True), target[None])
     node = found.nodes[0, 0]
     assert node.shape == (NODE_SIZE,) and found.frame[0, 0] == pytest.approx(1j, abs=1e-4)

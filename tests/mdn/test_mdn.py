@@ -16,7 +16,7 @@ from finlab.mdn.features import see
 from finlab.mdn.proposal import propose, shares
 from finlab.networks.checkpoint import read_checkpoint
 from finlab.physics import Plant
-from finlab.physics.energy import command_energy
+from finlab.physics.effort import command_effort
 
 TARGET = [0.5, -0.3, 1.0, 0.05, -0.02, 0.1]
 
@@ -65,8 +65,8 @@ def test_a_batch_costs_what_single_calls_do(settled: MdnAllocator, layout_a: Lay
     targets = reachable(layout_a, 6)
     together = settled.allocate_batch(layout_a, targets)
     np.testing.assert_allclose(Plant(layout_a).wrench(together.command), targets, atol=1e-4)
-    alone = [settled.allocate(layout_a, target).energy for target in targets]
-    np.testing.assert_allclose(together.energy, alone, rtol=0.01)
+    alone = [settled.allocate(layout_a, target).effort for target in targets]
+    np.testing.assert_allclose(together.effort, alone, rtol=0.01)
 
 
 def weights(method: MdnAllocator, layout: Layout) -> np.ndarray:
@@ -141,7 +141,7 @@ def test_objectives_do_not_share_what_is_seen(shipped: MdnAllocator) -> None:
     target = [2.0, 0.0, 1.0, 0.0, 0.0, 0.1]
     effort = shipped.allocate(layout, target)
     power = shipped.with_settings(objective="power").allocate(layout, target)
-    assert power.power < effort.power and effort.energy < power.energy
+    assert power.power < effort.power and effort.effort < power.effort
 
 
 def test_shares_are_squares_of_roots_and_at_most_one() -> None:
@@ -179,7 +179,7 @@ def test_samples_tell_what_the_plant_says_of_them(
     np.testing.assert_allclose(told.wrench, plant.wrench(told.command), atol=1e-9)
     error = np.linalg.norm((told.wrench - TARGET) / method.normalization.std, axis=-1)
     np.testing.assert_allclose(told.err_norm, error, rtol=1e-9)
-    np.testing.assert_allclose(told.energy, command_energy(told.command, plant.upper), rtol=1e-9)
+    np.testing.assert_allclose(told.effort, command_effort(told.command, plant.upper), rtol=1e-9)
     np.testing.assert_allclose(told.power, plant.power(told.command).sum(-1), rtol=1e-9)
 
 

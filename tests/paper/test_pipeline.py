@@ -20,7 +20,7 @@ from finlab.paper.pipeline import ADAM_RATE, CHUNK, PaperAllocator
 from finlab.paper.surrogate import SurrogateConfig
 from finlab.paper.training.surrogate import first_surrogate
 from finlab.physics import Plant
-from finlab.physics.energy import command_energy
+from finlab.physics.effort import command_effort
 from finlab.training.first_weights import first_weights
 from finlab.training.saving import arrays_of, tensors_of
 
@@ -123,7 +123,7 @@ def test_candidates_come_best_first(checkpoint: TrainedWeights, robot: Layout) -
     assert result.candidates.source == ("refined",) * 3 and result.samples.source == ("sample",) * 20
     for offered in (result.candidates, result.samples):
         j_norm = method.normalization.error(offered.wrench, np.array(TARGET)) ** 2
-        assert (np.diff(j_norm + 0.01 * offered.energy) >= -1e-5).all()
+        assert (np.diff(j_norm + 0.01 * offered.effort) >= -1e-5).all()
         error = method.normalization.error(offered.wrench, np.array(TARGET))
         np.testing.assert_allclose(offered.err_norm, error, atol=1e-3)
 
@@ -188,8 +188,8 @@ def test_adam_goes_where_torch_goes(checkpoint: TrainedWeights, robot: Layout) -
         command = to_command(x, lower, upper)
         error = (asked(checkpoint, command, robot) - wanted) / std
         a, f, d = (command / upper.abs()).unbind(-1)
-        energy = (a * a + f * f + 0.1 * d * d + a * f).sum(-1)
-        score = error.square().sum(-1) + 0.05 * energy
+        effort = (a * a + f * f + 0.1 * d * d + a * f).sum(-1)
+        score = error.square().sum(-1) + 0.05 * effort
         better = score < least
         best[better], least[better] = x.detach()[better], score.detach()[better]
         optimizer.zero_grad()
@@ -267,7 +267,7 @@ def test_each_ranking_takes_what_it_ranks_first(checkpoint: TrainedWeights) -> N
             best = int(np.argmax(mixture.log_prob(x).sum(-1)))
         else:
             error = (robot.surrogate.wrench(sampled) - target) / std
-            best = int(np.argmin((error**2).sum(1) + 0.2 * command_energy(sampled, layout.upper)))
+            best = int(np.argmin((error**2).sum(1) + 0.2 * command_effort(sampled, layout.upper)))
         chosen[ranking] = best
         answer = paper.allocate(layout, target[0], seed=3)
         np.testing.assert_allclose(answer.command, sampled[best], atol=1e-6)

@@ -52,14 +52,14 @@ def test_the_plate_of_the_robot() -> None:
 @pytest.mark.parametrize("blade", BLADES)
 def test_slopes_are_differences(blade: Blade, loss: float) -> None:
     a, f = (np.array(values) for values in zip(*BEATS, strict=True))
-    by_a, by_f = blade.driving_slopes(a, f, loss)
+    by_a, by_f = blade.driving_jacobian(a, f, loss)
     h = 1e-6
     ahead, behind = (blade.driving_power(a * (1.0 + s * h), f, loss) for s in (1, -1))
     np.testing.assert_allclose(by_a, (ahead - behind) / (2.0 * h * a), rtol=2e-8)
     ahead, behind = (blade.driving_power(a, f * (1.0 + s * h), loss) for s in (1, -1))
     np.testing.assert_allclose(by_f, (ahead - behind) / (2.0 * h * f), rtol=2e-8)
     if not loss:
-        np.testing.assert_array_equal(blade.power_slopes(a, f), blade.driving_slopes(a, f, 0.0))
+        np.testing.assert_array_equal(blade.power_gradient(a, f), blade.driving_jacobian(a, f, 0.0))
 
 
 @pytest.mark.parametrize(
@@ -78,7 +78,7 @@ def test_each_law_knows_its_plate(spec: FinModelSpec, blade: Blade, loss: float)
     command = np.random.default_rng(0).uniform([0.05, 0.1, -3.0], [0.6, 2.1, 3.0], (20, 3))
     expected = blade.driving_power(command[:, 0], command[:, 1], loss)
     np.testing.assert_allclose(law.power(command, loss), expected, rtol=1e-12)
-    slopes = law.power_slopes(command, loss)
-    np.testing.assert_array_equal(slopes[:, 2], 0.0)
-    by = blade.driving_slopes(command[:, 0], command[:, 1], loss)
-    np.testing.assert_allclose(slopes[:, :2].T, by, rtol=1e-12)
+    jacobian = law.power_gradient(command, loss)
+    np.testing.assert_array_equal(jacobian[:, 2], 0.0)
+    by = blade.driving_jacobian(command[:, 0], command[:, 1], loss)
+    np.testing.assert_allclose(jacobian[:, :2].T, by, rtol=1e-12)

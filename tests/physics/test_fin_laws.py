@@ -77,14 +77,14 @@ def test_force_points_where_the_law_says_and_never_along_the_shaft(law):
 @every_law
 def test_slopes_are_those_of_the_tensors_own_differentiation(law):
     u = torch.from_numpy(commands(50)).requires_grad_()
-    force, slopes = law.force_and_slopes(u.detach().numpy())
+    force, jacobian = law.force_and_jacobian(u.detach().numpy())
     np.testing.assert_array_equal(force, law.force(u.detach().numpy()))
     tensor = law.force(u)
     np.testing.assert_allclose(force, tensor.detach().numpy(), rtol=1e-13, atol=1e-14)
     for axis in (1, 2):
         (by_command,) = torch.autograd.grad(tensor[:, axis].sum(), u, retain_graph=True)
-        np.testing.assert_allclose(slopes[..., axis], by_command.numpy(), rtol=1e-10, atol=1e-12)
-    assert not slopes[..., 0].any()
+        np.testing.assert_allclose(jacobian[..., axis], by_command.numpy(), rtol=1e-10, atol=1e-12)
+    assert not jacobian[..., 0].any()
 
 
 @every_law
@@ -98,8 +98,8 @@ def test_symbols_give_the_same_thrust(law):
 @every_law
 def test_a_fin_that_does_not_beat_gives_nothing_and_its_slopes_are_finite(law):
     for still in ([0.0, 1.0, 0.3], [0.4, 0.0, 0.3], [0.0, 0.0, 0.3]):
-        force, slopes = law.force_and_slopes(np.array(still))
-        assert not force.any() and np.isfinite(slopes).all()
+        force, jacobian = law.force_and_jacobian(np.array(still))
+        assert not force.any() and np.isfinite(jacobian).all()
 
 
 @pytest.mark.parametrize("name", PLANAR_LAWS)

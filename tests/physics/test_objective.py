@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 
 from finlab.physics import Plant
-from finlab.physics.energy import DEFAULT_WEIGHTS, EnergyWeights, command_energy
+from finlab.physics.effort import DEFAULT_WEIGHTS, EffortWeights, command_effort
 from finlab.physics.objective import Objective
 from tests.random_fins import KINDS, random_robot
 
-INERTIAL = EnergyWeights(0.0, 0.0, 0.0, 0.0, 1.0)
+INERTIAL = EffortWeights(0.0, 0.0, 0.0, 0.0, 1.0)
 
 OBJECTIVES = [
     Objective(),
     Objective("power", copper_loss=1.5),
     Objective("effort"),
-    Objective("effort", EnergyWeights(2.0, 0.5, 0.3, 0.7, 1.1)),
+    Objective("effort", EffortWeights(2.0, 0.5, 0.3, 0.7, 1.1)),
     Objective("effort", INERTIAL),
 ]
 
@@ -26,14 +26,14 @@ def test_a_meters_slopes_are_differences(objective: Objective, tmp_path: Path) -
     plant = Plant(random_robot(np.random.default_rng(3), KINDS, tmp_path, n_fins=6))
     meter = objective.meter(plant)
     command = plant.sample(np.random.default_rng(0), (7,))
-    slopes = meter.slopes(command)
-    assert slopes.shape == command.shape and meter(command).shape == (7,)
+    gradient = meter.gradient(command)
+    assert gradient.shape == command.shape and meter(command).shape == (7,)
     for i in range(6):
         for axis in range(3):
             step = np.zeros((6, 3))
             step[i, axis] = 1e-6
             difference = (meter(command + step) - meter(command - step)) / 2e-6
-            np.testing.assert_allclose(slopes[:, i, axis], difference, rtol=1e-5, atol=1e-6)
+            np.testing.assert_allclose(gradient[:, i, axis], difference, rtol=1e-5, atol=1e-6)
 
 
 def test_what_each_objective_counts() -> None:
@@ -41,7 +41,7 @@ def test_what_each_objective_counts() -> None:
     plant = Plant(layout)
     command = plant.sample(np.random.default_rng(0), (4,))
     np.testing.assert_allclose(Objective().meter(plant)(command), plant.power(command).sum(-1))
-    effort = command_energy(command, layout.upper, DEFAULT_WEIGHTS)
+    effort = command_effort(command, layout.upper, DEFAULT_WEIGHTS)
     np.testing.assert_allclose(Objective("effort").meter(plant)(command), effort)
     assert Objective().convex and not Objective("effort").convex
     np.testing.assert_array_equal(Objective().direction_cost(layout.upper), np.zeros(3))

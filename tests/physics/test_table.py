@@ -38,24 +38,24 @@ def test_the_grid_points_come_back_exactly_and_the_rest_closely(table):
 
 def test_slopes_agree_with_differences_and_with_the_original(table):
     u = commands(200)
-    force, slopes = table.force_and_slopes(u)
+    force, jacobian = table.force_and_jacobian(u)
     np.testing.assert_allclose(force, table.force(u), rtol=1e-13, atol=1e-13)
     for k in range(3):
         offset = np.zeros(3)
         offset[k] = 1e-6
         difference = (table.force(u + offset) - table.force(u - offset)) / 2e-6
-        np.testing.assert_allclose(slopes[:, k], difference, rtol=1e-5, atol=1e-6)
-    original = DRAG.force_and_slopes(u)[1]
-    assert np.abs(slopes - original).max() < 0.15 * np.abs(original).max()
+        np.testing.assert_allclose(jacobian[:, k], difference, rtol=1e-5, atol=1e-6)
+    original = DRAG.force_and_jacobian(u)[1]
+    assert np.abs(jacobian - original).max() < 0.15 * np.abs(original).max()
 
 
 def test_force_and_slope_are_continuous_across_cells_and_around_the_circle(table):
     for axis, knot in [(0, AMPLITUDE[4]), (1, FREQUENCY[4]), (2, CIRCLE[4]), (2, math.pi)]:
         u = np.array([[0.31, 1.37, 0.4]] * 2)
         u[:, axis] = knot - 1e-7, knot + 1e-7
-        force, slopes = table.force_and_slopes(u)
+        force, jacobian = table.force_and_jacobian(u)
         np.testing.assert_allclose(force[0], force[1], rtol=0, atol=1e-5)
-        np.testing.assert_allclose(slopes[0], slopes[1], rtol=0, atol=1e-4)
+        np.testing.assert_allclose(jacobian[0], jacobian[1], rtol=0, atol=1e-4)
 
 
 def test_full_circle_is_periodic_with_or_without_its_end_point(table, tmp_path):
@@ -199,10 +199,10 @@ def test_power_never_falls_below_zero_between_points_near_zero(tmp_path):
     (tmp_path / "t.csv").write_text("\n".join([HEADER + ",P", *rows]))
     law, at = read_table(tmp_path / "t.csv"), np.zeros((401, 3))
     at[:, 0], at[:, 1] = 0.15, np.linspace(0.0, 4.0, 401)
-    found, slopes = law.power(at), law.power_slopes(at)
+    found, jacobian = law.power(at), law.power_gradient(at)
     assert found.min() == 0.0 and found.max() > 1.0
     dips = (at[:, 1] > 1.0) & (at[:, 1] < 2.0)
-    assert not found[dips].any() and not slopes[dips].any() and slopes[:, 1].max() > 0.5
+    assert not found[dips].any() and not jacobian[dips].any() and jacobian[:, 1].max() > 0.5
 
 
 @pytest.mark.parametrize(("share", "good"), [(0.04, True), (0.07, False)])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from finlab.layout import Fin, Layout
-from finlab.layout.arrays import force_columns
+from finlab.layout.arrays import force_effectiveness
 from finlab.sim.hanging_fin import DRAG_COEFFICIENT, HangingFins
 
 AHEAD = np.array([0.2, 0.0, 0.0, 0.0, 0.0, 0.0])
@@ -18,7 +18,7 @@ FULL = 0.5 * 1000.0 * DRAG_COEFFICIENT * 0.1 * 0.2
 
 def wrench(layout: Layout, direction: float, water: np.ndarray) -> np.ndarray:
     force = HangingFins(layout).force(np.full(layout.n_fins, direction), water)
-    columns = force_columns(layout.position, layout.mounting_angle)
+    columns = force_effectiveness(layout.position, layout.mounting_angle)
     return np.einsum("nk,nkw->w", force, columns)
 
 

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from finlab.layout import Body, Layout
 from finlab.vehicle.body import complete_body, dynamics_of
-from finlab.vehicle.fossen import accelerations, damping_rates, damping_slopes, jacobian
+from finlab.vehicle.fossen import accelerations, damping_jacobian, damping_rates, jacobian
 from finlab.vehicle.vehicle import Vehicle
 
 SIGNS = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])
@@ -124,7 +124,7 @@ def test_the_jacobian_is_that_of_the_accelerations(layout_a: Layout) -> None:
         ahead, behind = (np.array(accelerations(body, flow + s * step, up, up, wrench)) for s in (1, -1))
         np.testing.assert_allclose(found[:, k], (ahead - behind) / (2 * h), atol=1e-6)
     np.testing.assert_allclose(jacobian(body, flow[:, 3].tolist()), found[:, :, 3], atol=1e-12)
-    np.testing.assert_allclose(damping_slopes(body, flow), -found.diagonal().T, atol=1e-12)
+    np.testing.assert_allclose(damping_jacobian(body, flow), -found.diagonal().T, atol=1e-12)
     still = np.zeros((6, 20))
     still[2] = flow[2]
     slowed = -np.array(accelerations(body, still, 0.0 * up, 0.0 * up, np.zeros(6)))[2]

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.baselines.sqp import Sqp
-from finlab.allocation.judging import costs
+from finlab.allocation.evaluate import costs
 from finlab.allocation.methods import METHODS
 from finlab.allocation.settings import Settings, number
 from finlab.allocation.solution import Candidates, Solution

@@ -62,7 +62,7 @@ def test_the_table_tells_what_is_kept_least() -> None:
     answers["search"] = load_allocator().allocate(UCAT, PRESETS["Turn"])
     comparison: Any = SimpleNamespace(state=State(UCAT), answers=answers)
     table = comparison_table(comparison, False)
-    assert three_digits(answers["search"].power) in table and three_digits(answers["qp"].energy) in table
+    assert three_digits(answers["search"].power) in table and three_digits(answers["qp"].effort) in table
     assert "Kept least: power; mdn keeps effort least" in table, "this stand-in cannot be asked"
 
 
@@ -101,7 +101,7 @@ def test_what_a_page_tries_out_stays_with_its_own_answers() -> None:
 def test_every_answer_keeps_least_what_is_asked() -> None:
     solver, state = Solver(), State(UCAT, target=PRESETS["Turn"])
     power, effort = (solver.solve(replace(state, objective=name)) for name in OBJECTIVES)
-    assert power.power < effort.power and power.energy > effort.energy
+    assert power.power < effort.power and power.effort > effort.effort
     assert [answer.settings["objective"] for answer in (power, effort)] == ["power", "effort"]
     assert "least power" in corner(state, "", power, False, None)
     assert "least effort" in corner(state, "", effort, False, None)

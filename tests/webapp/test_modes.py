@@ -93,7 +93,7 @@ def test_real_candidates_are_drawn_and_listed() -> None:
     assert answer.candidates is not None and answer.samples is not None
     listed = listed_modes(found, answer.samples)
     led = listed.of_samples
-    assert led is not None and len(led) == len(answer.samples.energy)
+    assert led is not None and len(led) == len(answer.samples.effort)
     for source, place in zip(answer.samples.source, led.tolist(), strict=True):
         led_here = [k for k, (mode, _) in enumerate(modes) if source in mode.sources]
         assert place == (led_here[0] if led_here else -1), "the mode that its component led to"
@@ -101,7 +101,7 @@ def test_real_candidates_are_drawn_and_listed() -> None:
     assert set(led_to(strange, modes)) == {-1}, "of no component"
     plot = mode_plot(answer, listed, 0, 200)
     assert plot.count("data-press='mode'") == len(modes)
-    assert plot.count("r='3'") == len(answer.samples.energy)
+    assert plot.count("r='3'") == len(answer.samples.effort)
     table = mode_table(listed, False, 0)
     assert table.count("data-press=") == len(modes) and "0.0000" not in table and "more are" not in table
     assert "2 more are" in mode_table(replace(listed, count=listed.count + 2), False, 0)

@@ -7,7 +7,7 @@ import trimesh
 from finlab.assets import shipped_layouts
 from finlab.layout import load_layout
 from webapp.scene.meshes import fin
-from webapp.scene.meshes.hull import Hull, hull_of
+from webapp.scene.meshes.hull import HullShape, hull_of
 from webapp.scene.meshes.mesh import NOTHING, Mesh, force_arrow, torque_ring
 from webapp.scene.meshes.mesh_hull import Triangles
 
@@ -42,7 +42,7 @@ def test_blade_trails_behind_its_thrust() -> None:
 
 @pytest.mark.parametrize("shape", ["box", "ellipsoid", "torpedo", "ucat"])
 def test_hulls(shape: str) -> None:
-    hull = Hull(shape, (0.3, 0.12, 0.1), (0.02, 0.0, 0.01))
+    hull = HullShape(shape, (0.3, 0.12, 0.1), (0.02, 0.0, 0.01))
     mesh = hull.mesh()
     assert solid(mesh).volume > 0
     assert mesh.vertices.max(axis=0) == pytest.approx([0.32, 0.12, 0.11], abs=0.01)

@@ -3,7 +3,7 @@
 from markupsafe import Markup
 
 from finlab.allocation.allocation import Allocation
-from finlab.allocation.judging import REACHED
+from finlab.allocation.evaluate import REACHED
 from webapp.markup.html import html
 from webapp.markup.verdict import verdict_of
 from webapp.markup.words import error_digits, listed, objective_of, three_digits, unlearned_sentence
@@ -30,7 +30,7 @@ def comparison_table(comparison: Comparison, stale: bool) -> str:
             cells = html("<td colspan='4' class='words missing'>{}</td>", words)
         elif isinstance(answer, Allocation):
             color = css(verdict_of(answer, in_reach).color)
-            figures = (answer.power, answer.energy, answer.solve_ms)
+            figures = (answer.power, answer.effort, answer.solve_ms)
             error = html("<td style='color:{}'>{}</td>", color, error_digits(answer.err_norm))
             cells = error + Markup().join(html("<td>{}</td>", three_digits(value)) for value in figures)
         else:

@@ -118,7 +118,7 @@ def _figures(allocation: Allocation, least: bool, in_reach: bool) -> list[str]:
         for axis, value, unit in zip(AXES, allocation.unallocated, AXIS_UNITS, strict=True)
     ).replace("-", "−")
     costs = []
-    for word, value, unit in (("power", allocation.power, " W"), ("effort", allocation.energy, "")):
+    for word, value, unit in (("power", allocation.power, " W"), ("effort", allocation.effort, "")):
         kept = f"least {word}" if word == objective_of(allocation) and least else word
         cost = html("<b class='{}'>{}</b>{}", word, three_digits(value), unit)
         costs.append(html("<span><span class='dim'>{}</span> {}</span>", kept, cost))

@@ -43,12 +43,12 @@ def mode_plot(answer: Allocation, modes: Modes, shown: int, height: int) -> str:
         return ""
     samples = answer.samples
     words, order = ("power [W]", "effort"), (0, 1) if objective_of(answer) == "power" else (1, 0)
-    costs = np.array([(mode.power, mode.energy) for mode, _ in modes.shown])[:, order]
+    costs = np.array([(mode.power, mode.effort) for mode, _ in modes.shown])[:, order]
     refined = raw = costs
     if samples is not None:
         error = np.array([mode.err_norm for mode, _ in modes.shown])
         refined = np.stack([costs[:, 0], _logarithm(error)], axis=1)
-        raw = np.stack([(samples.power, samples.energy)[order[0]], _logarithm(samples.err_norm)], axis=1)
+        raw = np.stack([(samples.power, samples.effort)[order[0]], _logarithm(samples.err_norm)], axis=1)
     near = raw[:, 0] <= FAR * costs[:, 0].max()
     points = np.concatenate([refined, raw[near]])
     if not np.isfinite(points).all():

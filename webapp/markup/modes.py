@@ -34,7 +34,7 @@ def mode_table(modes: Modes, searching: bool, shown: int) -> str:
                 origin,
                 error_digits(mode.err_norm),
                 three_digits(mode.power),
-                three_digits(mode.energy),
+                three_digits(mode.effort),
                 100 * mode.saturation,
             )
         )

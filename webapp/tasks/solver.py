@@ -9,7 +9,7 @@ import numpy as np
 
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.allocator import Allocator
-from finlab.allocation.judging import judge
+from finlab.allocation.evaluate import evaluate
 from finlab.allocation.methods import load_allocator
 from finlab.allocation.modes import Mode
 from finlab.allocation.solution import Candidates
@@ -118,7 +118,7 @@ def judged(answer: Allocation) -> Allocation:
 
 
 def _judged(answer: Allocation, found: Candidates) -> Candidates:
-    verdict = judge(answer.layout, found.command, np.tile(answer.target, (len(found), 1)), answer.sigma)
+    verdict = evaluate(answer.layout, found.command, np.tile(answer.target, (len(found), 1)), answer.sigma)
     return replace(found, wrench=verdict.wrench, err_norm=verdict.err_norm)
 
 
@@ -127,7 +127,7 @@ def judged_modes(answer: Allocation, modes: tuple[Mode, ...]) -> tuple[Mode, ...
     if answer.wrench_surrogate is None or not modes:
         return modes
     command = np.stack([mode.command for mode in modes])
-    verdict = judge(answer.layout, command, np.tile(answer.target, (len(modes), 1)), answer.sigma)
+    verdict = evaluate(answer.layout, command, np.tile(answer.target, (len(modes), 1)), answer.sigma)
     return tuple(
         replace(mode, wrench=wrench, err_norm=float(error))
         for mode, wrench, error in zip(modes, verdict.wrench, verdict.err_norm, strict=True)

@@ -7,7 +7,7 @@ import numpy as np
 from finlab.allocation.command_cost import CommandCost
 from finlab.arrays import Array
 from finlab.physics import PlanarLaw, Plant, make_law
-from finlab.physics.energy import energy_of_shares, energy_scale
+from finlab.physics.effort import effort_of_shares, effort_scale
 from finlab.physics.objective import Objective
 
 DIFFERENCE = 1e-4
@@ -23,19 +23,19 @@ def plant_formulas(casadi: Any, plant: Plant, objective: Objective) -> tuple[Any
         objective: what commands cost.
     """
     command, wrench, cost = casadi.SX.sym("command", 3 * plant.n_fins), casadi.SX.zeros(6), 0
-    scale = energy_scale(plant.upper)
+    scale = effort_scale(plant.upper)
     for i, fin in enumerate(plant.layout.fins):
         law = make_law(fin.model)
         assert isinstance(law, PlanarLaw)
         amplitude, frequency, direction = (command[3 * i + k] for k in range(3))
         thrust, points = law.thrust(amplitude, frequency, direction), direction + law.offset
-        wrench += thrust * casadi.cos(points) * casadi.DM(plant.columns[i, 1])
-        wrench += thrust * casadi.sin(points) * casadi.DM(plant.columns[i, 2])
+        wrench += thrust * casadi.cos(points) * casadi.DM(plant.effectiveness[i, 1])
+        wrench += thrust * casadi.sin(points) * casadi.DM(plant.effectiveness[i, 2])
         if objective.name == "power":
             cost += law.blade.driving_power(amplitude, frequency, objective.copper_loss)
         else:
             shares = amplitude / scale[i, 0], frequency / scale[i, 1], direction / scale[i, 2]
-            cost += energy_of_shares(*shares, objective.weights)
+            cost += effort_of_shares(*shares, objective.weights)
     return command, wrench, cost
 
 
@@ -60,9 +60,9 @@ def plant_in_casadi(casadi: Any, plant: Plant, cost: CommandCost, sigma: Array) 
         at = command.reshape(shape)
         return np.concatenate([plant.wrench(at)[0], cost(at)])
 
-    def slopes(command: Array, *_: Array) -> Array:
+    def gradient(command: Array, *_: Array) -> Array:
         at = command.reshape(shape)
-        return np.concatenate([plant.linearize(at)[1][0], cost.slopes(at).reshape(1, -1)])
+        return np.concatenate([plant.linearize(at)[1][0], cost.gradient(at).reshape(1, -1)])
 
     def curvature(command: Array, target: Array, factor: Array, *_: Array) -> Array:
         at = command.reshape(shape)
@@ -71,16 +71,17 @@ def plant_in_casadi(casadi: Any, plant: Plant, cost: CommandCost, sigma: Array) 
         half = slope.T @ slope
         before, after = np.maximum(at - shift, plant.lower), np.minimum(at + shift, plant.upper)
         around = np.concatenate([before, after])
-        pull = plant.columns @ ((wrench[0] - target) / sigma**2)
-        by = np.einsum("rnka,na->rnk", plant.force_and_slopes(around)[1], pull) + 0.5 * cost.slopes(around)
-        bend = (by[3:] - by[:3]) / np.maximum((after - before).sum(-1, keepdims=True), 1e-300)
+        pull = plant.effectiveness @ ((wrench[0] - target) / sigma**2)
+        by = np.einsum("rnka,na->rnk", plant.force_and_jacobian(around)[1], pull)
+        by = by + 0.5 * cost.gradient(around)
+        hessian = (by[3:] - by[:3]) / np.maximum((after - before).sum(-1, keepdims=True), 1e-300)
         first = 3 * np.arange(plant.n_fins)
         for i, j in np.ndindex(3, 3):
-            half[first + i, first + j] += 0.5 * (bend[i, :, j] + bend[j, :, i])
+            half[first + i, first + j] += 0.5 * (hessian[i, :, j] + hessian[j, :, i])
         return np.asarray(2.0 * factor * half)
 
     dense, upper = casadi.Sparsity.dense, casadi.Sparsity.upper(size)
-    jacobian = _function(casadi, "slopes", slopes, [dense(size), dense(7)], dense(7, size))
+    jacobian = _function(casadi, "slopes", gradient, [dense(size), dense(7)], dense(7, size))
     called = _function(casadi, "answer", answer, [dense(size)], dense(7), jacobian)
     given = [dense(size), dense(6), dense(1), dense(0)]
     return called, _function(casadi, "curvature", curvature, given, upper)

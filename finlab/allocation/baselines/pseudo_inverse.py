@@ -61,25 +61,25 @@ class PseudoInverse:
         best, error = command, np.full(command.shape[:-1], np.inf)
         for step in range(STEPS + 1):
             last = step == STEPS
-            force, slopes = (plant.force(command), None) if last else plant.force_and_slopes(command)
+            force, jacobian = (plant.force(command), None) if last else plant.force_and_jacobian(command)
             missing = wanted - force[..., 1:]
             off: Array = np.hypot(missing[..., 0], missing[..., 1])
             better = off < error
             best, error = np.where(better[..., None], command, best), np.minimum(off, error)
-            if slopes is None:
+            if jacobian is None:
                 break
             frequency = command[..., 1]
             stuck = (frequency <= plant.lower[:, 1]) | (frequency >= plant.upper[:, 1])
             range_ = plant.width * np.stack([stuck, ~stuck, np.ones_like(stuck)], axis=-1)
             command = plant.feasible(
-                command + range_ * _least_change(slopes[..., 1:] * range_[..., None], missing)
+                command + range_ * _least_change(jacobian[..., 1:] * range_[..., None], missing)
             )
         return best
 
 
-def _least_change(slopes: Array, missing: Array) -> Array:
+def _least_change(jacobian: Array, missing: Array) -> Array:
     """The least change (..., 3) of commands that makes up for forces (..., 2), by slopes (..., 3, 2)."""
-    x, y = slopes[..., 0], slopes[..., 1]
+    x, y = jacobian[..., 0], jacobian[..., 1]
     xx, xy, yy = (x * x).sum(-1), (x * y).sum(-1), (y * y).sum(-1)
     ridge = RIDGE * (xx + yy) + 1e-30
     xx, yy = xx + ridge, yy + ridge

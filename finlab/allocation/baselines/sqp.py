@@ -104,24 +104,24 @@ def cheapest_program(plant: Plant, meter: CostMeter, sigma: Array, steps: int, s
     def cost(x: Array) -> float:
         return float(meter(command_at(x)[None])[0]) / usual
 
-    def cost_slopes(x: Array) -> Array:
-        return np.asarray((meter.slopes(command_at(x)[None])[0] * width).ravel()[free]) / usual
+    def cost_gradient(x: Array) -> Array:
+        return np.asarray((meter.gradient(command_at(x)[None])[0] * width).ravel()[free]) / usual
 
     def solve(target: Array, start: Array) -> Array:
         def missing(x: Array) -> Array:
             return np.asarray(axes @ (plant.wrench(command_at(x)) / sigma - target))
 
-        def slopes(x: Array) -> Array:
+        def gradient(x: Array) -> Array:
             _, jacobian = plant.linearize(command_at(x))
             return np.asarray(axes @ (jacobian / sigma[:, None] * width.ravel())[:, free])
 
         if not free.any():
             return start
         first = ((start - plant.lower) / np.where(width > 0.0, width, 1.0)).ravel()[free]
-        exactly: Any = {"type": "eq", "fun": missing, "jac": slopes}
+        exactly: Any = {"type": "eq", "fun": missing, "jac": gradient}
         how: dict[str, Any] = {"method": "SLSQP", "options": {"maxiter": steps, "ftol": settled}}
         limits = [(0.0, 1.0)] * len(first)
-        end = minimize(cost, first, jac=cost_slopes, bounds=limits, constraints=exactly, **how).x
+        end = minimize(cost, first, jac=cost_gradient, bounds=limits, constraints=exactly, **how).x
         return command_at(np.clip(end, 0.0, 1.0)) if np.isfinite(end).all() else start
 
     return solve

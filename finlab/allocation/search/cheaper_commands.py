@@ -128,11 +128,11 @@ def _model(problem: CommandProblem, cost: CostMeter, target: Array, command: Arr
     for k in range(3):
         points[k + 1, ..., k] += (apart * problem.width)[..., k]
     points = points.reshape(4 * rows, n, 3)
-    force, slopes = problem.fin.force_and_slopes(points)
-    jacobian = (slopes @ problem.columns * problem.width[..., None]).reshape(4, rows, n, 3, 6)
-    slope = (cost.slopes(points) * problem.width).reshape(4, rows, n, 3)
-    columns = problem.columns.reshape(-1, 6)
-    wrench = force[:rows].reshape(rows, len(columns)) @ columns
+    force, gradient = problem.fin.force_and_jacobian(points)
+    jacobian = (gradient @ problem.effectiveness * problem.width[..., None]).reshape(4, rows, n, 3, 6)
+    slope = (cost.gradient(points) * problem.width).reshape(4, rows, n, 3)
+    effectiveness = problem.effectiveness.reshape(-1, 6)
+    wrench = force[:rows].reshape(rows, len(effectiveness)) @ effectiveness
     apart = np.moveaxis(apart, -1, 0)[..., None]
     by_force = np.moveaxis((jacobian[1:] - jacobian[0]) / apart[..., None], 0, 2)
     by_cost = np.moveaxis((slope[1:] - slope[0]) / apart, 0, 2)

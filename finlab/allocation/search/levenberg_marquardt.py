@@ -23,7 +23,7 @@ RIDGE = (1e-9, 1e-14)
 strong fins on long levers are singular to rounding."""
 
 
-class Limits(NamedTuple):
+class CommandLimits(NamedTuple):
     """The limits of n fins in one floating-point type."""
 
     lower: AnyArray
@@ -43,7 +43,7 @@ class FinForces(Protocol):
         """Forces (..., n, 3) [N] of commands (..., n, 3)."""
         ...
 
-    def force_and_slopes(self, command: AnyArray) -> tuple[AnyArray, AnyArray]:
+    def force_and_jacobian(self, command: AnyArray) -> tuple[AnyArray, AnyArray]:
         """Forces and, for each of the three commands in turn, their derivative by it (..., n, 3, 3)."""
         ...
 
@@ -54,7 +54,7 @@ class CommandProblem:
 
     fin: FinForces
     """What commands give: the fins' own laws, or a surrogate."""
-    columns: AnyArray
+    effectiveness: AnyArray
     """Normalized wrench (n, 3, 6) per newton of each fin's force along the axes in which `fin` gives it; six
     axes in place of three where each fin's command changes what the others give."""
     lower: AnyArray
@@ -67,8 +67,8 @@ class CommandProblem:
     @classmethod
     def of(cls, plant: Plant, sigma: Array) -> Self:
         """A robot as its fins' own laws say, wrenches normalized by `sigma` (6,)."""
-        parts, columns = plant.parts
-        return cls(parts, columns / sigma, plant.lower, plant.upper, plant.full_turn)
+        parts, effectiveness = plant.parts
+        return cls(parts, effectiveness / sigma, plant.lower, plant.upper, plant.full_turn)
 
     @cached_property
     def width(self) -> AnyArray:
@@ -83,12 +83,12 @@ class CommandProblem:
         return low, high
 
     @cached_property
-    def _limits(self) -> dict[str, Limits]:
+    def _limits(self) -> dict[str, CommandLimits]:
         """The limits by the name of a type: double precision, and single precision."""
         middle = 0.5 * (self.lower[:, 2] + self.upper[:, 2])
         kinds: tuple[Any, ...] = (np.float64, np.float32)
         return {
-            kind.__name__: Limits(
+            kind.__name__: CommandLimits(
                 self.lower.astype(kind),
                 self.upper.astype(kind),
                 middle.astype(kind) - kind(np.pi),
@@ -98,14 +98,14 @@ class CommandProblem:
         }
 
     @cached_property
-    def columns_float32(self) -> AnyArray:
+    def effectiveness_float32(self) -> AnyArray:
         """The columns (3n, 6) in single precision."""
-        return self.columns.reshape(-1, 6).astype(np.float32)
+        return self.effectiveness.reshape(-1, 6).astype(np.float32)
 
     def wrench(self, command: AnyArray) -> AnyArray:
         """Normalized wrenches (R, 6) of commands (R, n, 3)."""
-        columns = self.columns.reshape(-1, 6)
-        return self.fin.force(command).reshape(len(command), len(columns)) @ columns
+        effectiveness = self.effectiveness.reshape(-1, 6)
+        return self.fin.force(command).reshape(len(command), len(effectiveness)) @ effectiveness
 
     def feasible(self, command: AnyArray) -> AnyArray:
         """Commands (..., n, 3) inside the limits, zero directions wrapped first; the type is kept."""
@@ -152,15 +152,15 @@ def refine(
 
     def moved(at: _Evaluated, damping: AnyArray, last: bool) -> _Evaluated:
         # (R, n, 3 commands, 6): change of the normalized wrench per unit of each limit range.
-        jacobian = np.matmul(at.slopes, problem.columns)
+        jacobian = np.matmul(at.jacobian, problem.effectiveness)
         jacobian *= problem.width[..., None]
         there = _step(problem, at, jacobian, damping)
         there *= problem.width
         there += at.command
-        return _evaluated(problem, target, problem.make_feasible(there), at.slopes if last else None)
+        return _evaluated(problem, target, problem.make_feasible(there), at.jacobian if last else None)
 
     # Where nothing better is found this is the answer: it must not lie outside by a turn or a rounding error.
-    start = _evaluated(problem, target, problem.feasible(command), None if steps else _NO_SLOPES)
+    start = _evaluated(problem, target, problem.feasible(command), None if steps else _NO_GRADIENT)
     best = levenberg_marquardt(start, moved, steps, Damping(damping))
     return Refined(best.command, best.wrench, np.sqrt(best.cost))
 
@@ -176,26 +176,26 @@ class _Evaluated(NamedTuple):
     """Target minus wrench (R, 6)."""
     cost: AnyArray
     """Its squared size (R,)."""
-    slopes: AnyArray
+    jacobian: AnyArray
     """Derivatives of each fin's force by each of its commands (R, n, 3 commands, 3)."""
 
 
-_NO_SLOPES = np.empty((1, 1, 1, 1))
+_NO_GRADIENT = np.empty((1, 1, 1, 1))
 
 
 def _evaluated(
-    problem: CommandProblem, target: AnyArray, command: AnyArray, slopes: AnyArray | None
+    problem: CommandProblem, target: AnyArray, command: AnyArray, jacobian: AnyArray | None
 ) -> _Evaluated:
     """Errors of commands; slopes that are given are not computed again."""
     rows, n, _ = command.shape
-    if slopes is None:
-        force, slopes = problem.fin.force_and_slopes(command)
+    if jacobian is None:
+        force, jacobian = problem.fin.force_and_jacobian(command)
     else:
         force = problem.fin.force(command)
-    columns = problem.columns.reshape(-1, 6)
-    wrench = force.reshape(rows, len(columns)).dot(columns)
+    effectiveness = problem.effectiveness.reshape(-1, 6)
+    wrench = force.reshape(rows, len(effectiveness)).dot(effectiveness)
     residual = target - wrench
-    return _Evaluated(command, wrench, residual, np.einsum("ri,ri->r", residual, residual), slopes)
+    return _Evaluated(command, wrench, residual, np.einsum("ri,ri->r", residual, residual), jacobian)
 
 
 def _step(problem: CommandProblem, at: _Evaluated, jacobian: AnyArray, damping: AnyArray) -> AnyArray:

@@ -183,7 +183,7 @@ class Pipeline:
             if is_within_rates(prepared, previous, free.command[0, 0], period):
                 return free
             near = within_rates(prepared, previous, period)
-            return self._descend(near, target, start, keep_mode=True)
+            return self._descend(near, target, start, warm_start=True)
         free = self._descend(prepared, target, start)
         if is_within_rates(prepared, previous, free.command[0, 0], period):
             # The first seed is how the robot moves now, which was not tried.
@@ -191,7 +191,7 @@ class Pipeline:
         near = within_rates(prepared, previous, period, free.command[0, 0, :, 2])
         kept = force if start.seeds.ndim == 4 else np.hypot(force[:, :, 0], force[:, :, 1])
         start = start._replace(seeds=np.concatenate([kept, start.seeds], axis=1))
-        found = self._descend(near, target, start, keep_mode=True)
+        found = self._descend(near, target, start, warm_start=True)
         if free.cost[0, 0] < (1.0 - SEARCH.worth_leaving) * found.cost[0, 0]:
             towards, fresh = near.commands.feasible(free.command[:, :1]), np.full((1, 1), -1)
             other = refine_candidates(near, target, towards, fresh, SEARCH.leaving_lm_steps)
@@ -200,23 +200,23 @@ class Pipeline:
         return found
 
     def _descend(
-        self, prepared: Prepared, target: Array, start: _Start, keep_mode: bool = False
+        self, prepared: Prepared, target: Array, start: _Start, warm_start: bool = False
     ) -> RefinedCandidates:
         """Search from seeds, refine, and go on where that did not reach the target."""
         # Fins that rest have hardly any slope: two steps where there are such.
         steps = self.settings.refine_steps + (not self.objective.convex)
-        steps += prepared.arcs is not None or keep_mode  # fins at stops take more steps
+        steps += prepared.arcs is not None or warm_start  # fins at stops take more steps
         command, origin, expected = self._search(
-            prepared, target, start.seeds, keep_mode, near_best=start.near_best
+            prepared, target, start.seeds, warm_start, near_best=start.near_best
         )
         searched = command[:, 0]
         exact = exact_error(prepared)
         if prepared.unsettled:
             command = _cheaper(prepared, target, command)
-        candidates = refine_candidates(prepared, target, command, origin, steps, keep_mode)
+        candidates = refine_candidates(prepared, target, command, origin, steps, warm_start)
         candidates = RefinedCandidates._make(values[:, : self.settings.n_refined] for values in candidates)
         missed = candidates.error[:, 0] > exact
-        if missed.any() and keep_mode:
+        if missed.any() and warm_start:
             improve(prepared, target, candidates, missed, None, SEARCH.tick_lm_steps)
         elif missed.any():
             refine_missed(prepared, target, candidates, missed, start.fallback)
@@ -234,7 +234,7 @@ class Pipeline:
         prepared: Prepared,
         target: Array,
         seeds: Array,
-        keep_mode: bool,
+        warm_start: bool,
         *,
         near_best: bool = False,
         keep: int | None = None,
@@ -244,7 +244,7 @@ class Pipeline:
         """Cheapest commands (N, P, n, 3) reached from seeds, whose seeds they are (N, P), and what the first
         should cost (N,).
 
-        With `keep_mode`, the first seed is how the robot moves now; what it leads to stays first.
+        With `warm_start`, the first seed is how the robot moves now; what it leads to stays first.
         """
         (rows, n_seeds), n, problem = seeds.shape[:2], seeds.shape[-1], prepared.planar
         if prepared.arcs is not None:
@@ -274,7 +274,7 @@ class Pipeline:
             ends = ends.beside(self._ends(prepared, prepared.planar, planar, rows))
             origin = np.concatenate([origin, np.full(len(near) // rows, -1)])
         score = ends.score
-        if keep_mode:
+        if warm_start:
             score = score.copy()  # it may be the cost itself
             score[:, 0] = -1.0
         # With fins at rest, what refinement corrects changes the order of the costs: twice as many are tried.

@@ -80,7 +80,7 @@ def prepare(layout: Layout, std: Array, objective: Objective) -> Prepared:
         seeds = np.concatenate([rests, uneven_seeds(fins.maximum)])
     tables = any(fin.model.type == "table" for fin in layout.fins)
     unsettled = tables if objective.convex else layout.n_fins >= SEEDS.many
-    strongest = np.tile(fins.maximum, 2)[:, None] * planar.columns
+    strongest = np.tile(fins.maximum, 2)[:, None] * planar.effectiveness
     return Prepared(
         plant,
         planar,

@@ -49,7 +49,7 @@ def within_rates(prepared: Prepared, previous: Array, period_s: float, aim: Arra
         ahead = np.clip(ahead, lower[:, 2], upper[:, 2])
     middle, half = 0.5 * (lower[:, 2] + upper[:, 2]), 0.5 * (upper[:, 2] - lower[:, 2])
     planar = prepared.planar._replace(
-        fins=fins.within(middle + fins.lean(middle), np.where(full_turn, np.pi, half)),
+        fins=fins.within(middle + fins.deflection(middle), np.where(full_turn, np.pi, half)),
         idle_direction=ahead,
     )
     commands = replace(problem, lower=lower, upper=upper, full_turn=full_turn)

@@ -62,11 +62,11 @@ def refine_candidates(
     command: Array,
     origin: NDArray[np.intp],
     steps: int,
-    keep_mode: bool = False,
+    warm_start: bool = False,
 ) -> RefinedCandidates:
     """Refined commands (N, P, n, 3), best first: the cheapest exact one, or the most exact one.
 
-    With `keep_mode`, the first command is how the robot moves now; another must save the share
+    With `warm_start`, the first command is how the robot moves now; another must save the share
     `switch_gain` of its cost to take its place.
     """
     rows, p, n, _ = command.shape
@@ -77,7 +77,7 @@ def refine_candidates(
         command, wrench, error = (values[:, None] for values in refined)
         return RefinedCandidates(command, wrench, error, cost[:, None], origin)
     score = cost.reshape(rows, p)
-    if keep_mode:
+    if warm_start:
         score = score.copy()
         score[:, 0] *= 1.0 - RANKING.switch_gain
     error = refined.error.reshape(rows, p)
@@ -160,7 +160,7 @@ FallbackForces = Callable[[PlanarProblem, Array], Array | None]
 
 def nearest_forces(problem: PlanarProblem, target: Array) -> Array:
     """The forces (R, n, 2) whose wrench is nearest, small ones where many are."""
-    return nearest(planar_sets(problem), target, bend=SPARING).force
+    return nearest(planar_sets(problem), target, hessian=SPARING).force
 
 
 def refine_missed(
@@ -191,7 +191,7 @@ def refine_missed(
     if force is None:
         return
     needed = np.zeros(len(target))
-    left = target[missed] - wrench_of(prepared.planar.columns, force)
+    left = target[missed] - wrench_of(prepared.planar.effectiveness, force)
     needed[missed] = np.linalg.norm(left, axis=-1)
     start, _ = realize(prepared.planar, polar(prepared.planar, force))
     improve(prepared, target, candidates, missed, start[:, None], settings.nearest_lm_steps)

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.allocator import Allocator
+from finlab.allocation.evaluate import effort_of, power_of
 from finlab.allocation.in_time import in_time
-from finlab.allocation.judging import effort_of, power_of
 from finlab.allocation.policy import Policy
 from finlab.allocation.question import usable_fins
 from finlab.allocation.search.pipeline import SEARCH, Pipeline

@@ -58,7 +58,7 @@ def run(
             for target in case.targets:
                 samples = method.allocate(case.healthy, target, seed=seed).samples
                 assert samples is not None
-                best.append((samples.err_norm**2 + method.settings.gamma * samples.energy).min())
+                best.append((samples.err_norm**2 + method.settings.gamma * samples.effort).min())
                 spread.append(diversity(samples.command, case.healthy))
                 group.append(k)
         rows.append(

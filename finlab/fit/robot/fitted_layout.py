@@ -11,7 +11,7 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.errors import DataError
-from finlab.fit.robot.model import leaned, shape_factor
+from finlab.fit.robot.model import deflected, shape_factor
 from finlab.fit.robot.report import summary
 from finlab.fit.robot.robot_fit import RobotFit
 from finlab.layout import Body, Fin, FinModelSpec, Interaction, Jet, Layout, save_layout
@@ -25,7 +25,7 @@ GRID = (17, 17, 16)
 """Amplitudes, frequencies and zero directions of a fin that becomes a table."""
 STRENGTH = {"drag": "drag_coefficient", "soft": "k"}
 """Parameter of a fin's model that its thrust is proportional to."""
-LEANS = (3.0, 0.03)
+DEFLECTIONS = (3.0, 0.03)
 """Standard errors, and angle [rad], from which a fin's lean counts; an IMU that is mounted askew looks like a
 smaller one."""
 LEAST_SHARE = 0.005
@@ -94,19 +94,19 @@ def _model(fit: RobotFit, i: int) -> tuple[FinModelSpec, str | None]:
     strength = float(np.exp(_found(fit, "strength")[i]))
     error = fit.part_error("lean")
     assert error is not None
-    lean = float(_found(fit, "lean")[i])
-    lean = lean if abs(lean) > max(LEANS[0] * error[i], LEANS[1]) else 0.0
+    deflection = float(_found(fit, "lean")[i])
+    deflection = deflection if abs(deflection) > max(DEFLECTIONS[0] * error[i], DEFLECTIONS[1]) else 0.0
     values = spec.values()
-    if fit.part("shape") is None and spec.type in STRENGTH and (not lean or spec.type == "soft"):
+    if fit.part("shape") is None and spec.type in STRENGTH and (not deflection or spec.type == "soft"):
         key = STRENGTH[spec.type]
         changed = {**dict(spec.parameters), key: float(values[key]) * strength}
-        if lean:
-            changed["d"] = float(values["d"]) + lean
+        if deflection:
+            changed["d"] = float(values["d"]) + deflection
         return FinModelSpec(spec.type, tuple(changed.items())), None
-    return spec, _table(fit, i, strength, lean)
+    return spec, _table(fit, i, strength, deflection)
 
 
-def _table(fit: RobotFit, i: int, strength: float, lean: float) -> str:
+def _table(fit: RobotFit, i: int, strength: float, deflection: float) -> str:
     """The i-th fin's law as a table, from rest to its limits."""
     fin = fit.model.layout.fins[i]
     law = make_law(fin.model)
@@ -118,7 +118,7 @@ def _table(fit: RobotFit, i: int, strength: float, lean: float) -> str:
     shape = fit.part("shape")
     if shape is not None:
         force = force * shape_factor(fit.model.shape_terms(command), shape)[:, None]
-    force = leaned(force[:, None], np.array([lean]))[:, 0]
+    force = deflected(force[:, None], np.array([deflection]))[:, 0]
     power = np.asarray(law.power(command))
     text = io.StringIO()
     text.write(f"# fin {fin.name}, fitted to a swim of the whole robot\n")

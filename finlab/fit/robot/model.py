@@ -9,7 +9,7 @@ from finlab.fit.robot.swim import STEP_S, Swim
 from finlab.fit.robot.swing import swing_forces
 from finlab.fit.robot.unknowns import SENSORS, Unknowns, blocks_of
 from finlab.layout import Layout
-from finlab.layout.arrays import force_columns
+from finlab.layout.arrays import force_effectiveness
 from finlab.physics import plant_of
 from finlab.physics.coupling import WIDE_AND_NARROW, foot_velocity, inflow_terms, jet_terms, jet_ways
 from finlab.vehicle.body import complete_body, dynamics_of
@@ -68,13 +68,13 @@ class RobotModel:
 
     def wrench(self, unknowns: Unknowns, vector: Array) -> Array:
         """Mean wrench (M, 6) of each step for one vector (size,) of unknowns."""
-        layout, force = self.layout, leaned(self.alone, unknowns.of("lean", vector))
+        layout, force = self.layout, deflected(self.alone, unknowns.of("lean", vector))
         share = np.exp(unknowns.of("strength", vector)) * np.ones(force.shape[:-1])
         shape = unknowns.part("shape", vector)
         if shape is not None:
             share *= shape_factor(self._shapes, shape)
         position = layout.position - unknowns.of("center", vector)
-        columns = force_columns(position, layout.mounting_angle + unknowns.of("mounting", vector))
+        columns = force_effectiveness(position, layout.mounting_angle + unknowns.of("mounting", vector))
         force = force * share[..., None]
         jets, inflow = unknowns.part("jets", vector), unknowns.part("inflow", vector)
         kept = np.ones(share.shape)
@@ -123,9 +123,9 @@ class RobotModel:
         return said
 
 
-def leaned(force: Array, lean: Array) -> Array:
+def deflected(force: Array, deflection: Array) -> Array:
     """Forces (..., n, 3) in fin frames, turned about the shafts by (n,) [rad]."""
-    cos, sin = np.cos(lean), np.sin(lean)
+    cos, sin = np.cos(deflection), np.sin(deflection)
     y, z = force[..., 1], force[..., 2]
     return np.stack([force[..., 0], cos * y - sin * z, sin * y + cos * z], axis=-1)
 

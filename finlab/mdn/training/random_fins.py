@@ -95,8 +95,8 @@ def _table(rng: np.random.Generator) -> FinLaw:
     for order in (1, 2):
         size *= 1.0 + rng.uniform(0.0, 0.25) * np.cos(order * d - rng.uniform(-math.pi, math.pi))
     size *= log_uniform(rng, 0.3, 10.0) * (1.0 + 0.03 * rng.standard_normal(size.shape))
-    lean = rng.uniform(-0.3, 0.3) + rng.uniform(0.0, 0.2) * np.sin(d - rng.uniform(-math.pi, math.pi))
-    columns = [np.zeros_like(size), size * np.cos(d + lean), size * np.sin(d + lean)]
+    deflection = rng.uniform(-0.3, 0.3) + rng.uniform(0.0, 0.2) * np.sin(d - rng.uniform(-math.pi, math.pi))
+    columns = [np.zeros_like(size), size * np.cos(d + deflection), size * np.sin(d + deflection)]
     if rng.random() < 0.5:
         blade = Blade()
         power = blade.power(a, f) * (0.2 + beat ** rng.uniform(0.0, 1.0))

@@ -10,7 +10,7 @@ from finlab.forces.envelopes import Envelopes
 from finlab.forces.force_space import PlanarProblem, planar_problem
 from finlab.layout import Fin, Layout, Limits
 from finlab.layout.angles import wrapped
-from finlab.layout.arrays import force_columns
+from finlab.layout.arrays import force_effectiveness
 from finlab.layout.random import TRAINING_BOX
 from finlab.mdn.training.random_fins import RandomFin, random_fin, varied_limits
 from finlab.physics.objective import Name, Objective
@@ -114,22 +114,23 @@ def random_targets(rng: np.random.Generator, robot: RandomRobot, count: int) -> 
     third = count // 4
     lower, upper = robot.layout.lower, robot.layout.upper
     command = lower + rng.random((count - 2 * third, n, 3)) * (upper - lower)
-    columns = force_columns(robot.layout.position, robot.layout.mounting_angle)
+    effectiveness = force_effectiveness(robot.layout.position, robot.layout.mounting_angle)
     force = np.stack([fin.law.force(command[:, i]) for i, fin in enumerate(robot.fins)], axis=1)
-    by_command = np.einsum("kna,naw->kw", force, columns) / robot.scale
+    by_command = np.einsum("kna,naw->kw", force, effectiveness) / robot.scale
     fins = problem.fins
     direction = fins.middle + rng.uniform(-1.0, 1.0, (third, n)) * fins.half
     share = rng.random((third, n)) ** 2 * (rng.random((third, n)) < rng.uniform(0.3, 1.0, (third, 1)))
-    rim = fins.rim(direction)
-    size = rim.smallest + share * (rim.largest - rim.smallest)
-    by_force = np.concatenate([size * np.cos(direction), size * np.sin(direction)], axis=1) @ problem.columns
+    boundary = fins.boundary(direction)
+    size = boundary.smallest + share * (boundary.largest - boundary.smallest)
+    force = np.concatenate([size * np.cos(direction), size * np.sin(direction)], axis=1)
+    by_force = force @ problem.effectiveness
     return np.concatenate([by_command, by_force, _axes(rng, robot, third)])
 
 
 def _axes(rng: np.random.Generator, robot: RandomRobot, count: int) -> Array:
     """One to three axes together, as far as the fins go without leaving what each can give."""
     problem = robot.problem
-    full = problem.columns * np.tile(problem.fins.maximum, 2)[:, None]
+    full = problem.effectiveness * np.tile(problem.fins.maximum, 2)[:, None]
     signs = rng.choice([-1.0, 1.0], (count, 6)) * rng.uniform(0.2, 1.0, (count, 6))
     axes = rng.random((count, 6)).argsort(axis=1) < rng.integers(1, 4, (count, 1))
     gram = full.T @ full

@@ -58,7 +58,7 @@ def _told(robot: RandomRobot, target: Array, found: Planar, count: int) -> tuple
     """Forces (N, S, n), complex, and costs (N, S), infinite where the target is missed."""
     _, cost = realize(robot.problem, found)
     missed = np.linalg.norm(found.residual, axis=1)
-    strength = np.linalg.norm(np.tile(robot.problem.fins.maximum, 2)[:, None] * robot.problem.columns)
+    strength = np.linalg.norm(np.tile(robot.problem.fins.maximum, 2)[:, None] * robot.problem.effectiveness)
     allowed = EXACT * np.minimum(np.linalg.norm(target, axis=1) + 1e-2 * strength, strength)
     cost = np.where(missed <= np.repeat(allowed, count), cost, np.inf)
     force = found.size * np.exp(1j * found.direction)

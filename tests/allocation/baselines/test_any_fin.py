@@ -31,37 +31,37 @@ Change = Callable[[np.ndarray, np.ndarray], np.ndarray]
 """Commands (rows, 3) and columns (rows, 4) of a table to other columns."""
 
 
-def noise(command: np.ndarray, columns: np.ndarray) -> np.ndarray:
+def noise(command: np.ndarray, effectiveness: np.ndarray) -> np.ndarray:
     """3 % on force and power, the same at both ends of the circle."""
     rng = np.random.default_rng(0)
     factor = 1.0 + 0.03 * rng.normal(size=(len(AMPLITUDE), len(FREQUENCY), len(CIRCLE), 4))
     factor[:, :, -1] = factor[:, :, 0]
-    return columns * factor.reshape(-1, 4)
+    return effectiveness * factor.reshape(-1, 4)
 
 
-def beyond_a_peak(command: np.ndarray, columns: np.ndarray) -> np.ndarray:
+def beyond_a_peak(command: np.ndarray, effectiveness: np.ndarray) -> np.ndarray:
     """Thrust that falls again from half the frequency on, while power grows."""
-    columns[:, :3] *= (np.exp(-((command[:, 1] / 1.3) ** 4)) + 0.1)[:, None]
-    return columns
+    effectiveness[:, :3] *= (np.exp(-((command[:, 1] / 1.3) ** 4)) + 0.1)[:, None]
+    return effectiveness
 
 
-def dead_zone(command: np.ndarray, columns: np.ndarray) -> np.ndarray:
+def dead_zone(command: np.ndarray, effectiveness: np.ndarray) -> np.ndarray:
     """No thrust at all for slow or small beats."""
-    columns[command[:, 0] * command[:, 1] < 0.2, :3] = 0.0
-    return columns
+    effectiveness[command[:, 0] * command[:, 1] < 0.2, :3] = 0.0
+    return effectiveness
 
 
-def along_the_shaft(command: np.ndarray, columns: np.ndarray) -> np.ndarray:
+def along_the_shaft(command: np.ndarray, effectiveness: np.ndarray) -> np.ndarray:
     """A twentieth of the thrust acts along the shaft."""
-    columns[:, 0] = 0.05 * np.hypot(columns[:, 1], columns[:, 2])
-    return columns
+    effectiveness[:, 0] = 0.05 * np.hypot(effectiveness[:, 1], effectiveness[:, 2])
+    return effectiveness
 
 
-def never_at_rest(command: np.ndarray, columns: np.ndarray) -> np.ndarray:
+def never_at_rest(command: np.ndarray, effectiveness: np.ndarray) -> np.ndarray:
     """A fifth of a newton along the zero direction even without a beat."""
-    columns[:, 1] += 0.2 * np.cos(command[:, 2])
-    columns[:, 2] += 0.2 * np.sin(command[:, 2])
-    return columns
+    effectiveness[:, 1] += 0.2 * np.cos(command[:, 2])
+    effectiveness[:, 2] += 0.2 * np.sin(command[:, 2])
+    return effectiveness
 
 
 TABLES: dict[str, tuple[FinModelSpec, tuple[Change, ...], bool]] = {
@@ -99,10 +99,10 @@ def model(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], list[FinM
 def write(path: Path, spec: FinModelSpec, changes: tuple[Change, ...], with_power: bool) -> None:
     law = make_law(spec)
     command = np.stack(np.meshgrid(AMPLITUDE, FREQUENCY, CIRCLE, indexing="ij"), axis=-1).reshape(-1, 3)
-    columns = np.column_stack([law.force(command), law.power(command)])
+    effectiveness = np.column_stack([law.force(command), law.power(command)])
     for change in changes:
-        columns = change(command, columns)
-    rows = np.hstack([command, columns[:, : 4 if with_power else 3]])
+        effectiveness = change(command, effectiveness)
+    rows = np.hstack([command, effectiveness[:, : 4 if with_power else 3]])
     with open(path, "w", newline="") as file:
         writer = csv.writer(file)
         writer.writerow(["A", "f", "phi", "Fx", "Fy", "Fz", *(["P"] if with_power else [])])
@@ -136,7 +136,7 @@ def test_every_method_on_every_fin(
     for asked in (target, 100.0 * target):
         answer = allocator.allocate(layout, asked)
         assert (answer.command >= plant.lower).all() and (answer.command <= plant.upper).all()
-        assert np.isfinite([answer.err_norm, answer.power, answer.energy]).all()
+        assert np.isfinite([answer.err_norm, answer.power, answer.effort]).all()
         if asked is target and method in EXACT:
             assert answer.err_norm < 6e-3
         if (
@@ -163,7 +163,7 @@ def test_each_objective_is_kept_lower_by_its_own_setting(
         make(method, objective).allocate_batch(layout, targets) for objective in ("power", "effort")
     )
     assert sparing.power.mean() <= 1.001 * easy.power.mean()
-    assert easy.energy.mean() <= 1.001 * sparing.energy.mean()
+    assert easy.effort.mean() <= 1.001 * sparing.effort.mean()
 
 
 @pytest.mark.parametrize(
@@ -192,12 +192,12 @@ def test_ipopt_minimizes_what_the_plant_says(
     asked = cs.Function("asked", [formulas.command, formulas.target], [total, gradient])
     hessian = solver.get_function("nlp_hess_l")
     for command in at:
-        value, slopes = asked(command.ravel(), target)
+        value, jacobian = asked(command.ravel(), target)
         wrench, jacobian = plant.linearize(command)
         residual = (wrench - target) / sigma
         assert float(value) == pytest.approx(float(residual @ residual + cost(command[None])[0]), rel=1e-9)
-        by = 2.0 * (residual / sigma) @ jacobian + cost.slopes(command[None])[0].ravel()
-        np.testing.assert_allclose(np.array(slopes).ravel(), by, rtol=1e-6, atol=1e-8)
+        by = 2.0 * (residual / sigma) @ jacobian + cost.jacobian(command[None])[0].ravel()
+        np.testing.assert_allclose(np.array(jacobian).ravel(), by, rtol=1e-6, atol=1e-8)
         second = np.array(hessian(command.ravel(), target, 1.0, []))
         second = second + np.triu(second, 1).T
         for k, offset in enumerate(1e-5 * np.eye(3 * plant.n_fins)):
@@ -212,9 +212,9 @@ def test_what_is_no_objective_is_refused(method: str) -> None:
         load_allocator(method, objective="thrift")
     with pytest.raises(AllocationError, match="copper_loss: expected a number from 0"):
         load_allocator(method, copper_loss=-1.0)
-    with pytest.raises(AllocationError, match="expected EnergyWeights"):
-        load_allocator(method, energy_weights=(1.0, 2.0))
-    with pytest.raises(AllocationError, match="knows the options .*objective, energy_weights, copper_loss"):
+    with pytest.raises(AllocationError, match="expected EffortWeights"):
+        load_allocator(method, effort_weights=(1.0, 2.0))
+    with pytest.raises(AllocationError, match="knows the options .*objective, effort_weights, copper_loss"):
         load_allocator(method, price=1.0)
 
 

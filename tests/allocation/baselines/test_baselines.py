@@ -158,6 +158,6 @@ def test_sqp_needs_hardly_more_than_the_search(objective: Name) -> None:
     )
     least = load_allocator(objective=objective).allocate_batch(layout, targets)
     answer = make("sqp", objective=objective).allocate_batch(layout, targets)
-    cost, best = (getattr(found, "power" if objective == "power" else "energy") for found in (answer, least))
+    cost, best = (getattr(found, "power" if objective == "power" else "effort") for found in (answer, least))
     exact = (answer.err_norm < 1e-3) & (least.err_norm < 1e-3)
     assert exact.sum() >= 15 and cost[exact].sum() < 1.06 * best[exact].sum()

@@ -9,7 +9,7 @@ from finlab.allocation.baselines.plant_in_casadi import plant_formulas, plant_in
 from finlab.allocation.command_cost import CommandCost, command_cost
 from finlab.layout import Fin, FinModelSpec, Layout, Limits, load_layout
 from finlab.physics import Plant
-from finlab.physics.energy import EnergyWeights
+from finlab.physics.effort import EffortWeights
 from finlab.physics.objective import Objective
 
 casadi = pytest.importorskip("casadi", reason="method ipopt is an optional extra")
@@ -22,7 +22,7 @@ SIGMA = np.array([1.4, 1.2, 2.0, 0.35, 0.3, 0.4])
     [
         Objective("power", copper_loss=0.3),
         Objective("effort"),
-        Objective("effort", EnergyWeights(1.0, 0.7, 0.3, 0.4, 0.6)),
+        Objective("effort", EffortWeights(1.0, 0.7, 0.3, 0.4, 0.6)),
     ],
 )
 def test_formulas_are_the_plant(objective: Objective) -> None:

@@ -48,7 +48,7 @@ def least_cost(
         starts = np.concatenate([(also - low)[None] / width, starts])
     bounds = [(None, None) if axis == 2 and full[i] else (0.0, 1.0) for i in range(n) for axis in range(3)]
     # Equations beyond the rank of what the fins can do only confuse the solver.
-    axes = np.linalg.svd(plant.columns[:, 1:].reshape(2 * n, 6) / sigma, full_matrices=False)
+    axes = np.linalg.svd(plant.effectiveness[:, 1:].reshape(2 * n, 6) / sigma, full_matrices=False)
     rank = int((axes[1] > 1e-9 * axes[1][0]).sum())
     seen = axes[2][:rank] if not plant.force(plant.sample(rng, (3,)))[..., 0].any() else np.eye(6)
     scale = max(float(meter(plant.upper[None])[0]), 1e-9)
@@ -57,7 +57,7 @@ def least_cost(
         found = minimize(
             lambda s: float(meter(command(s)[None])[0]) / scale,
             start.ravel(),
-            jac=lambda s: (meter.slopes(command(s)[None])[0] * width).ravel() / scale,
+            jac=lambda s: (meter.jacobian(command(s)[None])[0] * width).ravel() / scale,
             bounds=bounds,
             constraints={"type": "eq", "fun": lambda s: seen @ missing(s), "jac": lambda s: seen @ bent(s)},
             method="SLSQP",

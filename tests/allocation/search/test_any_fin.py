@@ -38,7 +38,7 @@ def with_arcs(name: str, arcs: dict[int, tuple[float, float]]) -> Layout:
 
 
 def cost_of(objective: Name, answer: object) -> float:
-    return float(getattr(answer, {"power": "power", "effort": "energy"}[objective]))
+    return float(getattr(answer, {"power": "power", "effort": "effort"}[objective]))
 
 
 @pytest.mark.parametrize(
@@ -109,7 +109,7 @@ def test_dear_directions_are_left_by_weak_forces(arcs: tuple[tuple[float, float]
         for target, command in zip(targets, batch.command, strict=True)
     ]
     assert batch.err_norm.max() < 1e-5
-    assert batch.energy.sum() < 1.01 * sum(least) and (batch.energy < 1.05 * np.array(least)).all()
+    assert batch.effort.sum() < 1.01 * sum(least) and (batch.effort < 1.05 * np.array(least)).all()
 
 
 @pytest.mark.parametrize("name", ["A", "B", "penta", "hexa", "octo"])
@@ -158,7 +158,7 @@ def test_fins_at_rest_point_where_that_costs_least(case: int, target: int) -> No
     assert rests.any() and np.abs(answer.command[rests, 2]).max() < 0.03
     goal = Objective("effort")
     least = least_cost(robot, answer.target, answer.sigma, goal, n_starts=8, also=answer.command)
-    assert answer.err_norm < 1e-5 and answer.energy < 1.005 * least
+    assert answer.err_norm < 1e-5 and answer.effort < 1.005 * least
 
 
 def test_what_was_reached_late_is_as_cheap() -> None:
@@ -188,7 +188,7 @@ def test_batches_are_single_answers() -> None:
         method = load_allocator(objective=objective)  # type: ignore[arg-type]
         batch = method.allocate_batch(layout, targets)
         singles = [method.allocate(layout, target) for target in targets]
-        cost = batch.power if objective == "power" else batch.energy
+        cost = batch.power if objective == "power" else batch.effort
         assert batch.err_norm.max() < 1e-5
         for row, single in enumerate(singles):
             assert cost[row] == pytest.approx(cost_of(objective, single), rel=2e-3)  # type: ignore[arg-type]

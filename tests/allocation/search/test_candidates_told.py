@@ -8,7 +8,7 @@ import pytest
 from finlab.allocation import load_allocator
 from finlab.layout import load_layout
 from finlab.physics import Plant
-from finlab.physics.energy import command_energy
+from finlab.physics.effort import command_effort
 
 TARGET = np.array([1.0, 0.5, 2.0, 0.0, 0.1, 0.1])
 OBJECTIVES: list[dict[str, Any]] = [
@@ -25,5 +25,5 @@ def test_candidates_tell_what_the_plant_says_of_them(options: dict[str, Any]) ->
     np.testing.assert_allclose(told.wrench, plant.wrench(told.command), atol=1e-9)
     error = np.linalg.norm((told.wrench - TARGET) / method.normalization.std, axis=-1)
     np.testing.assert_allclose(told.err_norm, error, atol=1e-9)
-    np.testing.assert_allclose(told.energy, command_energy(told.command, plant.upper), rtol=1e-9)
+    np.testing.assert_allclose(told.effort, command_effort(told.command, plant.upper), rtol=1e-9)
     np.testing.assert_allclose(told.power, plant.power(told.command).sum(-1), rtol=1e-9)

@@ -31,7 +31,7 @@ def question(layout: Layout, objective: Name) -> tuple[CommandProblem, CostMeter
     """The robot, its cost, normalized targets (12, 6) and exact but needlessly dear answers (12, n, 3)."""
     plant, rng = plant_of(layout), np.random.default_rng(3)
     sigma = plant.wrench(plant.sample(rng, (500,))).std(axis=0)
-    problem = CommandProblem(plant, plant.columns / sigma, plant.lower, plant.upper, plant.full_turn)
+    problem = CommandProblem(plant, plant.effectiveness / sigma, plant.lower, plant.upper, plant.full_turn)
     command = plant.sample(rng, (12,))
     return problem, Objective(objective).meter(plant), problem.wrench(command), command
 
@@ -60,9 +60,9 @@ def test_where_it_ends_is_a_minimum(tmp_path: Path, monkeypatch: pytest.MonkeyPa
         command = cheaper_commands(problem, cost, target, command, EXACT)
     left = []
     for row in command:
-        _, slopes = problem.fin.force_and_slopes(row[None])
-        jacobian = (slopes[0] @ problem.columns * problem.width[..., None]).reshape(-1, 6)
-        slope = (cost.slopes(row[None])[0] * problem.width).ravel()
+        _, jacobian = problem.fin.force_and_jacobian(row[None])
+        jacobian = (jacobian[0] @ problem.effectiveness * problem.width[..., None]).reshape(-1, 6)
+        slope = (cost.jacobian(row[None])[0] * problem.width).ravel()
         inside = ((row > problem.lower + 1e-6) & (row < problem.upper - 1e-6)).ravel()
         multiplier = np.linalg.lstsq(jacobian[inside], slope[inside], rcond=1e-9)[0]
         left.append(np.linalg.norm(slope[inside] - jacobian[inside] @ multiplier) / np.linalg.norm(slope))

@@ -53,7 +53,7 @@ def reachable(layout: Layout, rng: np.random.Generator) -> np.ndarray:
 
 
 def same_energy(one: Allocation, other: Allocation, share: float) -> bool:
-    return abs(one.energy - other.energy) <= share * one.energy
+    return abs(one.effort - other.effort) <= share * one.effort
 
 
 def wrapped(angle: float) -> float:
@@ -142,7 +142,7 @@ def test_failed_is_removed(search: SearchAllocator, seed: int, limits: str, lost
     np.testing.assert_array_equal(failed.command[alive], removed.command)
     assert np.isnan(failed.command[layout.index(name)]).all()
     np.testing.assert_allclose(failed.wrench, removed.wrench, atol=1e-12)
-    assert failed.energy == pytest.approx(removed.energy)
+    assert failed.effort == pytest.approx(removed.effort)
 
 
 @few(10)

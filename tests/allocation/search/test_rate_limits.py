@@ -51,7 +51,7 @@ def drive(method: SearchAllocator, layout: Layout, path: np.ndarray, *, bound: b
         results.append(result)
     return Drive(
         np.array([result.command for result in results]),
-        np.array([result.power if method.objective.name == "power" else result.energy for result in results]),
+        np.array([result.power if method.objective.name == "power" else result.effort for result in results]),
         np.array([result.err_norm for result in results]),
     )
 
@@ -175,7 +175,7 @@ def test_a_previous_command_that_is_the_answer_stays(
         np.testing.assert_allclose(result.fin_forces, plant.fin_forces(before), atol=step)
         again = method.allocate(penta, smooth_path(0)[tick], previous=result.command)
         np.testing.assert_allclose(again.fin_forces, result.fin_forces, atol=1e-3)
-        cost = result.power if method.objective.name == "power" else result.energy
+        cost = result.power if method.objective.name == "power" else result.effort
         assert cost < 1.005 * free.cost[tick]
 
 

@@ -15,10 +15,10 @@ from finlab.allocation.search.search_allocator import CHUNK, SearchAllocator
 from finlab.assets import shipped_layouts
 from finlab.layout import Fin, FinModelSpec, Layout, Limits, load_layout, random_layout
 from finlab.physics import Plant, make_law, write_table
-from finlab.physics.energy import EnergyWeights
+from finlab.physics.effort import EffortWeights
 from finlab.physics.objective import Name
 
-INERTIAL = EnergyWeights(0.0, 0.0, 0.0, 0.0, 1.0)
+INERTIAL = EffortWeights(0.0, 0.0, 0.0, 0.0, 1.0)
 
 GOOD = 1e-5
 """Normalized error below which an answer counts as exact, as in the search itself."""
@@ -152,7 +152,7 @@ def test_candidates_are_offered_best_first(objective: Name) -> None:
     assert len(candidates.command) == (4 if objective == "effort" else 1)
     np.testing.assert_array_equal(candidates.command[0], result.command)
     exact = candidates.err_norm < GOOD
-    cost = getattr(candidates, {"power": "power", "effort": "energy"}[objective])
+    cost = getattr(candidates, {"power": "power", "effort": "effort"}[objective])
     assert exact[0] and (np.diff(cost[exact]) >= 0).all()
     assert (np.sort(exact)[::-1] == exact).all()  # the exact ones come first
     for command, wrench, error in zip(
@@ -178,8 +178,8 @@ def test_candidates_are_offered_best_first(objective: Name) -> None:
         {"copper_loss": 0.5},
         {"objective": "effort", "subsets": False},
         {"objective": "effort", "n_refined": 1},
-        {"objective": "effort", "energy_weights": EnergyWeights(2.0, 1.0, 0.0, 0.5)},
-        {"objective": "effort", "energy_weights": INERTIAL},
+        {"objective": "effort", "effort_weights": EffortWeights(2.0, 1.0, 0.0, 0.5)},
+        {"objective": "effort", "effort_weights": INERTIAL},
     ],
 )
 def test_every_option_still_answers_exactly(options: dict[str, Any]) -> None:

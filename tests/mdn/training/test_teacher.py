@@ -31,7 +31,7 @@ def test_ways_deliver_the_target_at_the_cost_that_is_told(
     assert known[:, 0].mean() > 0.8
     for row, k in np.argwhere(known):
         force = ways.force[row, k]
-        wrench = np.concatenate([force.real, force.imag]) @ robot.problem.columns
+        wrench = np.concatenate([force.real, force.imag]) @ robot.problem.effectiveness
         assert np.linalg.norm(wrench - target[row]) < 0.05
         planar = polar(robot.problem, np.stack([force.real, force.imag], axis=-1)[None])
         _, cost = realize(robot.problem, planar)

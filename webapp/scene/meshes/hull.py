@@ -18,7 +18,7 @@ STATIONS: Array = np.sin(np.linspace(-np.pi / 2, np.pi / 2, 41))
 
 
 @dataclass(frozen=True)
-class Hull:
+class HullShape:
     """A drawable hull. It can tell inside from outside, so that fins can be tied to its surface."""
 
     shape: str
@@ -76,11 +76,11 @@ class Hull:
 
 
 @lru_cache(maxsize=8)
-def _triangles(hull: Hull) -> Triangles:
+def _triangles(hull: HullShape) -> Triangles:
     return Triangles(hull.mesh())
 
 
-AnyHull = Hull | MeshHull
+AnyHull = HullShape | MeshHull
 
 
 def hull_of(layout: Layout) -> AnyHull:
@@ -93,10 +93,10 @@ def hull_of(layout: Layout) -> AnyHull:
     elif described is not None and described.shape is not None and described.size_m is not None:
         length, width, height = described.size_m
         x, y, z = described.center_m
-        return Hull(described.shape, (length / 2, width / 2, height / 2), (x, y, z))
+        return HullShape(described.shape, (length / 2, width / 2, height / 2), (x, y, z))
     reach = np.abs([fin.position for fin in layout.fins]).max(axis=0)
     half = np.maximum(reach * [1.06, 0.86, 0.86], [0.16, 0.09, 0.08])
     slender = half[0] > 2.4 * max(half[1], half[2])
     round_plan = half[1] > 0.8 * half[0]
     shape = "torpedo" if slender else "ellipsoid" if round_plan else "ucat"
-    return Hull(shape, (float(half[0]), float(half[1]), float(half[2])))
+    return HullShape(shape, (float(half[0]), float(half[1]), float(half[2])))

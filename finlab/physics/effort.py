@@ -9,7 +9,7 @@ from finlab.arrays import AnyArray, Array, Values
 
 
 @dataclass(frozen=True)
-class EnergyWeights:
+class EffortWeights:
     """Weights of the terms of `J_en` (paper, inference section)."""
 
     amplitude: float = 1.0
@@ -25,11 +25,11 @@ class EnergyWeights:
     that the paper measures, I alpha omega, is proportional."""
 
 
-DEFAULT_WEIGHTS = EnergyWeights()
+DEFAULT_WEIGHTS = EffortWeights()
 """The contract's `J_en`."""
 
 
-def energy_scale(upper: Values) -> Values:
+def effort_scale(upper: Values) -> Values:
     """What each command is divided by: its own fin's upper limit.
 
     A fin whose upper limit is zero or negative (an arc of zero directions below zero, say) would
@@ -41,75 +41,75 @@ def energy_scale(upper: Values) -> Values:
     return abs(upper).clip(1e-3)
 
 
-def energy_of_shares(
-    amplitude: Values, frequency: Values, zero_direction: Values, weights: EnergyWeights = DEFAULT_WEIGHTS
+def effort_of_shares(
+    amplitude: Values, frequency: Values, zero_direction: Values, weights: EffortWeights = DEFAULT_WEIGHTS
 ) -> Values:
     """One fin's summand of `J_en`, from commands over their scale: arrays, tensors or symbols."""
     a, f, d, w = amplitude, frequency, zero_direction, weights
-    energy = w.amplitude * a * a + w.frequency * f * f + w.zero_direction * d * d + w.product * a * f
-    return energy + w.inertial * (a * f) ** 2 * f if w.inertial else energy
+    effort = w.amplitude * a * a + w.frequency * f * f + w.zero_direction * d * d + w.product * a * f
+    return effort + w.inertial * (a * f) ** 2 * f if w.inertial else effort
 
 
-def fin_energy(command: Values, upper: Values, weights: EnergyWeights = DEFAULT_WEIGHTS) -> Values:
+def fin_effort(command: Values, upper: Values, weights: EffortWeights = DEFAULT_WEIGHTS) -> Values:
     """Energy (...,) of each fin: commands (..., 3) and upper limits (..., 3), arrays or tensors."""
-    scaled = command / energy_scale(upper)
-    return energy_of_shares(scaled[..., 0], scaled[..., 1], scaled[..., 2], weights)
+    scaled = command / effort_scale(upper)
+    return effort_of_shares(scaled[..., 0], scaled[..., 1], scaled[..., 2], weights)
 
 
-def command_energy(
-    command: NDArray[np.floating], upper: NDArray[np.floating], weights: EnergyWeights = DEFAULT_WEIGHTS
+def command_effort(
+    command: NDArray[np.floating], upper: NDArray[np.floating], weights: EffortWeights = DEFAULT_WEIGHTS
 ) -> AnyArray:
     """`J_en` of whole robots: commands (..., n, 3) to energies (...,). Failed fins (NaN) count nothing."""
-    energy = fin_energy(command, upper, weights)
-    return np.asarray(np.where(np.isnan(energy), 0.0, energy).sum(-1))
+    effort = fin_effort(command, upper, weights)
+    return np.asarray(np.where(np.isnan(effort), 0.0, effort).sum(-1))
 
 
-class EnergyMeter:
+class EffortMeter:
     """The energy proxy of one robot whose fins are all healthy, ready for many commands."""
 
-    def __init__(self, upper: Array, weights: EnergyWeights = DEFAULT_WEIGHTS) -> None:
+    def __init__(self, upper: Array, weights: EffortWeights = DEFAULT_WEIGHTS) -> None:
         """Make it for upper limits (n, 3)."""
-        self.upper, self.weights, self._scale = upper, weights, energy_scale(upper)
+        self.upper, self.weights, self._scale = upper, weights, effort_scale(upper)
         squares = np.array([weights.amplitude, weights.frequency, weights.zero_direction])
         self._twice = 2.0 * squares / self._scale**2
         self._product = weights.product / (self._scale[:, 0] * self._scale[:, 1])
 
     def __call__(self, command: NDArray[np.floating]) -> AnyArray:
         """Energies (R,) of commands (R, n, 3)."""
-        return self._energy(command, self._quadratic_slopes(command))
+        return self._effort(command, self._quadratic_jacobian(command))
 
-    def slopes(self, command: NDArray[np.floating]) -> AnyArray:
+    def gradient(self, command: NDArray[np.floating]) -> AnyArray:
         """Derivatives (R, n, 3) of the energies by commands (R, n, 3)."""
-        return self._slopes(command, self._quadratic_slopes(command))
+        return self._gradient(command, self._quadratic_jacobian(command))
 
-    def with_slopes(self, command: NDArray[np.floating]) -> tuple[AnyArray, AnyArray]:
+    def with_gradient(self, command: NDArray[np.floating]) -> tuple[AnyArray, AnyArray]:
         """Both, for little more than the price of one."""
-        quadratic = self._quadratic_slopes(command)
-        return self._energy(command, quadratic), self._slopes(command, quadratic)
+        quadratic = self._quadratic_jacobian(command)
+        return self._effort(command, quadratic), self._gradient(command, quadratic)
 
-    def _energy(self, command: NDArray[np.floating], quadratic: AnyArray) -> AnyArray:
+    def _effort(self, command: NDArray[np.floating], quadratic: AnyArray) -> AnyArray:
         # Of a quadratic form, half the slopes times the commands.
-        energy: AnyArray = np.einsum("rni,rni->r", quadratic, command)
-        energy *= 0.5
+        effort: AnyArray = np.einsum("rni,rni->r", quadratic, command)
+        effort *= 0.5
         if self.weights.inertial:
             a, f = self._beat(command)
-            energy += self.weights.inertial * ((a * f) ** 2 * f).sum(-1)
-        return energy
+            effort += self.weights.inertial * ((a * f) ** 2 * f).sum(-1)
+        return effort
 
-    def _slopes(self, command: NDArray[np.floating], slopes: AnyArray) -> AnyArray:
+    def _gradient(self, command: NDArray[np.floating], gradient: AnyArray) -> AnyArray:
         """All slopes, in place of the quadratic ones."""
         if self.weights.inertial:
             a, f = self._beat(command)
-            slopes[..., 0] += self.weights.inertial * 2.0 * a * f**3 / self._scale[:, 0]
-            slopes[..., 1] += self.weights.inertial * 3.0 * (a * f) ** 2 / self._scale[:, 1]
-        return slopes
+            gradient[..., 0] += self.weights.inertial * 2.0 * a * f**3 / self._scale[:, 0]
+            gradient[..., 1] += self.weights.inertial * 3.0 * (a * f) ** 2 / self._scale[:, 1]
+        return gradient
 
-    def _quadratic_slopes(self, command: NDArray[np.floating]) -> AnyArray:
+    def _quadratic_jacobian(self, command: NDArray[np.floating]) -> AnyArray:
         """Derivatives (R, n, 3) of all but the inertial part."""
-        slopes: AnyArray = command * self._twice
-        slopes[..., 0] += self._product * command[..., 1]
-        slopes[..., 1] += self._product * command[..., 0]
-        return slopes
+        gradient: AnyArray = command * self._twice
+        gradient[..., 0] += self._product * command[..., 1]
+        gradient[..., 1] += self._product * command[..., 0]
+        return gradient
 
     def _beat(self, command: NDArray[np.floating]) -> tuple[AnyArray, AnyArray]:
         """Normalized amplitudes and frequencies (R, n)."""

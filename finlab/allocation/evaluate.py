@@ -7,7 +7,7 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.layout import Layout
-from finlab.physics.energy import EnergyMeter
+from finlab.physics.effort import EffortMeter
 from finlab.physics.known_plants import plant_of
 from finlab.physics.wrench import wrench_of_forces
 
@@ -19,7 +19,7 @@ Judge = Literal["plant"]
 """Who says what commands give: the fins' own laws and tables."""
 
 
-class Verdict(NamedTuple):
+class Evaluation(NamedTuple):
     """What N commands give."""
 
     fin_forces: Array
@@ -28,15 +28,15 @@ class Verdict(NamedTuple):
     """(N, 6) [N, N m]."""
     err_norm: Array
     """(N,)."""
-    energy: Array
+    effort: Array
     """Effort `J_en` (N,)."""
     power: Array
     """Mean mechanical power (N,) [W]."""
-    judged_by: Judge = "plant"
+    evaluated_by: Judge = "plant"
     """Whose forces these are."""
 
 
-def judge(layout: Layout, command: Array, target: Array, sigma: Array) -> Verdict:
+def evaluate(layout: Layout, command: Array, target: Array, sigma: Array) -> Evaluation:
     """Judge commands (N, n, 3), NaN for failed fins, by the fins' own models.
 
     Args:
@@ -49,19 +49,19 @@ def judge(layout: Layout, command: Array, target: Array, sigma: Array) -> Verdic
         DataError: a fin's force table cannot be read.
     """
     plant = plant_of(layout)
-    force, columns = plant.forces(command), plant.columns
+    force, effectiveness = plant.forces(command), plant.effectiveness
     # The first half of a column is its fin's axis in the body frame.
-    fin_forces = np.matmul(force[..., None, :], columns[..., :3])[..., 0, :]
-    wrench = wrench_of_forces(force, columns)
+    fin_forces = np.matmul(force[..., None, :], effectiveness[..., :3])[..., 0, :]
+    wrench = wrench_of_forces(force, effectiveness)
     missing = (target - wrench) / sigma
     err_norm = np.sqrt(np.einsum("ri,ri->r", missing, missing))
     if len(command) == 0:
-        return Verdict(fin_forces, wrench, err_norm, np.empty(0), np.empty(0))
+        return Evaluation(fin_forces, wrench, err_norm, np.empty(0), np.empty(0))
     power = plant.power(command)
     failed = np.isnan(power)
     if failed.any():  # a failed fin costs nothing
         command, power = np.where(failed[..., None], 0.0, command), np.where(failed, 0.0, power)
-    return Verdict(fin_forces, wrench, err_norm, effort_of(layout, command), power.sum(-1))
+    return Evaluation(fin_forces, wrench, err_norm, effort_of(layout, command), power.sum(-1))
 
 
 def costs(layout: Layout, command: Array) -> tuple[Array, Array]:
@@ -81,5 +81,5 @@ def power_of(layout: Layout, command: Array) -> Array:
 
 
 @lru_cache(maxsize=256)
-def _meter(layout: Layout) -> EnergyMeter:
-    return EnergyMeter(layout.upper)
+def _meter(layout: Layout) -> EffortMeter:
+    return EffortMeter(layout.upper)
