@@ -152,6 +152,9 @@ def test_only_what_changes_is_drawn(page: Any) -> None:
     def drawn() -> int:
         return int(page.page.evaluate("window.finlabFrames.count"))
 
+    view = page.view
+    page.until(lambda: not (view.busy or view.analyst.busy or view.ranging.busy))  # all has come
+    page.catch_up()
     page.rest(600)
     before = drawn()
     page.rest(2500)
