@@ -31,8 +31,16 @@
     const found = pressed(event.target);
     if (found) hear(event, found.dataset);
   }, { capture: true });
-  listen('click', (event, { press, key }) =>
-    tell(press, key, event.shiftKey ? 'shift' : event.ctrlKey || event.metaKey ? 'ctrl' : ''));
+  const press = (event, { press, key }) =>
+    tell(press, key, event.shiftKey ? 'shift' : event.ctrlKey || event.metaKey ? 'ctrl' : '');
+  // A word that is rendered again while the button is down is another element, and the browser makes no click of it.
+  let down = null;
+  window.addEventListener('mousedown', (event) => { down = { ...pressed(event.target)?.dataset }; }, { capture: true });
+  listen('mouseup', (event, word) => {
+    if (event.button === 0 && down?.press === word.press && down.key === word.key) press(event, word);
+    down = null;
+  });
+  listen('click', (event, word) => { if (event.detail === 0) press(event, word); }); // by a key, or by a script
   listen('mousedown', (event) => { if (event.shiftKey) event.preventDefault(); }); // else text is marked
   listen('keydown', (event, { press, key }) => {
     if (event.key === 'Enter' && event.target.matches('[data-press][tabindex]')) tell(press, key, '');

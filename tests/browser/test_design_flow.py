@@ -108,6 +108,11 @@ def test_the_list_selects(page: Any) -> None:
     page.until(lambda: session.selected == "back_left")
     page.page.locator(".fin-list tr[data-fin=front_left] .swatch").click(modifiers=["Control"])
     page.until(lambda: session.selection == ("front_left", "back_left"))
+    page.page.locator(".fin-list tr[data-fin=front_right] .name").hover()
+    page.page.mouse.down()
+    page.page.evaluate("document.querySelectorAll('.fin-list').forEach(list => list.outerHTML += '')")
+    page.page.mouse.up()  # on a list that was rendered again meanwhile
+    page.until(lambda: session.selected == "front_right")
 
 
 def test_limits_and_model_count_for_all_selected_fins(page: Any) -> None:
