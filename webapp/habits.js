@@ -26,29 +26,45 @@
   }, { capture: true });
 
   // What is typed counts when it is whole: with Enter, or when the box is left. Viser would send every key, and write
-  // over half a text; so from the first key until then the box's own `value`, by which the framework writes, does nothing.
+  // over half a text; so until then what the framework writes is only remembered. The text then comes as if it were put
+  // over all that stood there: Mantine tells from the selection before what has changed.
   const BOXES = '.mantine-NumberInput-input, .mantine-TextInput-input, .mantine-Textarea-input';
-  const held = new Map();
-  const listen = (kind, hear) => window.addEventListener(kind, (event) => hear(event, event.target), { capture: true });
+  let box = null, before = '', own = null;
+  const plain = () => Object.getOwnPropertyDescriptor(Object.getPrototypeOf(box), 'value');
 
-  function finish(box) {
-    if (!held.has(box)) return;
-    Object.defineProperty(box, 'value', held.get(box));
-    held.delete(box);
-    box.dispatchEvent(Object.assign(new Event('input', { bubbles: true }), { finlab: true }));
+  function begin(target) {
+    [box, before, own] = [target, target.value, Object.getOwnPropertyDescriptor(target, 'value')];
+    const { get } = plain();
+    Object.defineProperty(box, 'value', { configurable: true, get, set: (text) => { before = text; } });
   }
-  listen('input', (event, box) => {
-    if (event.finlab || !box.matches?.(BOXES) || !box.closest('.mantine-Flex-root')) return;
-    event.stopImmediatePropagation();
-    const plain = Object.getOwnPropertyDescriptor(Object.getPrototypeOf(box), 'value');
-    if (held.has(box)) return;
-    held.set(box, Object.getOwnPropertyDescriptor(box, 'value') ?? { configurable: true, ...plain });
-    Object.defineProperty(box, 'value', { configurable: true, get: () => plain.get.call(box), set: () => {} });
+  function end(text) {
+    const ended = box, { set } = plain();
+    box = null;
+    delete ended.value;
+    if (own) Object.defineProperty(ended, 'value', own);
+    ended.value = before;
+    if (text === before || (!text.trim() && ended.matches('.mantine-NumberInput-input'))) return;
+    ended.select();
+    ended.dispatchEvent(new KeyboardEvent('keydown', { key: 'Unidentified', bubbles: true }));
+    set.call(ended, text);
+    ended.dispatchEvent(new InputEvent('input', { bubbles: true }));
+  }
+  const commit = () => end(box.value);
+
+  const listen = (kind, hear) => window.addEventListener(kind, hear, { capture: true });
+  listen('beforeinput', ({ target }) => {
+    if (target === box || !target.matches?.(BOXES) || !target.closest('.mantine-Flex-root')) return;
+    if (box) commit();
+    begin(target);
   });
-  listen('keydown', (event, box) => {
-    if (event.key === 'Enter' && box instanceof HTMLInputElement) finish(box);
+  listen('input', (event) => { if (event.isTrusted && event.target === box) event.stopImmediatePropagation(); });
+  listen('focusout', ({ target }) => { if (target === box) commit(); });
+  listen('mousedown', ({ target }) => { if (box && target !== box) commit(); });
+  listen('keydown', ({ key, target, isTrusted }) => {
+    if (target !== box || !isTrusted) return;
+    if (key === 'Escape') end(before);
+    else if (box.tagName === 'INPUT' && ['Enter', 'ArrowUp', 'ArrowDown'].includes(key)) commit();
   });
-  listen('focusout', (_event, box) => finish(box));
 
   // Commands listen on the root of the document, the camera on the document, which comes after.
   page.addEventListener('keydown', (event) => {

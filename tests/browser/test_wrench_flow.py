@@ -1,4 +1,4 @@
-"""Ask for a wrench, fail and damage fins, choose among answers and methods: numbers and arrows follow."""
+"""Ask for a wrench, by typing and otherwise, fail and damage fins, choose among answers and methods: numbers and arrows follow."""
 
 from typing import Any
 
@@ -87,3 +87,24 @@ def test_methods_side_by_side(page: Any) -> None:
     page.until(lambda: page.session.drawer == "Comparison" and page.view.comparison.state is not None)
     page.until(lambda: not page.view.comparison.running)
     page.until(lambda: page.page.locator("table.methods tr").count() == 1 + len(COMPARED))
+
+
+def test_a_number_counts_when_it_is_typed_whole(page: Any) -> None:
+    session, keys, box = page.session, page.page.keyboard, page.row("Fx [N]").last
+
+    def asked(text: str, end: str, value: float) -> None:
+        box.click()
+        keys.press("Control+a")
+        keys.type(text, delay=20)
+        keys.press(end)
+        page.until(lambda: session.state.target[0] == value and not page.view.busy)
+        page.until(lambda: box.input_value() == f"{value:g}", told=lambda: box.input_value())
+
+    for text, end, value in (("2.347", "Enter", 2.347), ("-0.5", "Tab", -0.5), ("12.25", "Enter", 12.25)):
+        asked(text, end, value)
+        assert session.history.undo_name == "Set Fx"
+    page.press("Undo")
+    page.until(lambda: session.state.target[0] == -0.5)  # one step for each number, not for each key
+    asked("77", "Escape", -0.5)
+    asked("", "Enter", -0.5)
+    asked("3", "ArrowUp", 3.01)
