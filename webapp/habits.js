@@ -58,6 +58,7 @@
     begin(target);
   });
   listen('input', (event) => { if (event.isTrusted && event.target === box) event.stopImmediatePropagation(); });
+  listen('change', (event) => { if (event.isTrusted && event.target === box) { event.stopImmediatePropagation(); commit(); } });
   listen('focusout', ({ target }) => { if (target === box) commit(); });
   listen('mousedown', ({ target }) => { if (box && target !== box) commit(); });
   listen('keydown', ({ key, target, isTrusted }) => {
