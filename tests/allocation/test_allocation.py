@@ -163,7 +163,7 @@ def test_an_allocator_explores_any_copy_of_its_answer(search: Allocator) -> None
             layout, wrench, failed=["back_left"], policy=policy, seed=3, previous=before
         )
         modes = allocator.explore(result)
-        assert len(modes) > 0 and all(mode.distance is not None for mode in modes)
+        assert len(modes) > 0
         np.testing.assert_allclose(modes[0].command, result.command, atol=1e-12)
         signatures = [mode.signature for mode in modes]
         assert not any(same_signature(a, b) for i, a in enumerate(signatures) for b in signatures[:i])

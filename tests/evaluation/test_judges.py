@@ -22,7 +22,7 @@ def test_qp_answers_meet_their_kkt_conditions(split: str) -> None:
         command = method._commands(plant, case.targets, seed=0)
         step = ((command - linear.reference) / plant.width).reshape(len(command), -1)[:, linear.free]
         wanted = (case.targets - linear.wrench) / NORMALIZATION.std
-        gradient = (step @ linear.matrix.T - wanted) @ linear.matrix + method.regularization * step
+        gradient = (step @ linear.matrix.T - wanted) @ linear.matrix + method.settings.regularization * step
         # A step along the negative gradient, brought back into the box, must not move.
         residual = np.abs(step - np.clip(step - gradient, -0.5, 0.5)).max()
         assert residual < 1e-8 * np.abs(wanted @ linear.matrix).max()

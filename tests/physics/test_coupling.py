@@ -58,7 +58,7 @@ def test_derivatives_agree_with_differences(coupled: Layout) -> None:
     command = plant.sample(np.random.default_rng(1), (20,))
     wrench, jacobian = plant.linearize(command)
     np.testing.assert_allclose(wrench, plant.wrench(command), atol=1e-12)
-    force, jacobian = plant.force_and_jacobian(command)
+    force, own_jacobian = plant.force_and_jacobian(command)
     np.testing.assert_allclose(force, plant.force(command), atol=1e-12)
     step = 1e-6
     for i in range(4):
@@ -69,7 +69,7 @@ def test_derivatives_agree_with_differences(coupled: Layout) -> None:
             by = (plant.wrench(up) - plant.wrench(down)) / (2 * step)
             np.testing.assert_allclose(jacobian[:, :, 3 * i + k], by, atol=2e-6)
             own = (plant.force(up) - plant.force(down))[:, i] / (2 * step)
-            np.testing.assert_allclose(jacobian[:, i, k], own, atol=2e-6)
+            np.testing.assert_allclose(own_jacobian[:, i, k], own, atol=2e-6)
 
 
 def test_answers_are_exact_by_the_coupled_plant(coupled: Layout) -> None:

@@ -70,7 +70,7 @@ def test_garbage_from_the_page_changes_nothing_but_raises_no_fault(
                 heard += 1
     assert heard > 500
     kept = json.dumps(to_dict(view.session), allow_nan=False)
-    assert "alert" not in kept and "xxx" not in kept.replace(view.session.draft.mission, "")
+    assert "alert" not in kept and "xxx" not in kept
     states = [state for _, state in view.session.history.past]
     assert any(set(before.names) <= set(state.layout.names) for state in states), "buttons may well add fins"
     assert "Traceback" not in capsys.readouterr().err

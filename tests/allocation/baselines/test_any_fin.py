@@ -192,12 +192,12 @@ def test_ipopt_minimizes_what_the_plant_says(
     asked = cs.Function("asked", [formulas.command, formulas.target], [total, gradient])
     hessian = solver.get_function("nlp_hess_l")
     for command in at:
-        value, jacobian = asked(command.ravel(), target)
+        value, slope = asked(command.ravel(), target)
         wrench, jacobian = plant.linearize(command)
         residual = (wrench - target) / sigma
         assert float(value) == pytest.approx(float(residual @ residual + cost(command[None])[0]), rel=1e-9)
-        by = 2.0 * (residual / sigma) @ jacobian + cost.jacobian(command[None])[0].ravel()
-        np.testing.assert_allclose(np.array(jacobian).ravel(), by, rtol=1e-6, atol=1e-8)
+        by = 2.0 * (residual / sigma) @ jacobian + cost.gradient(command[None])[0].ravel()
+        np.testing.assert_allclose(np.array(slope).ravel(), by, rtol=1e-6, atol=1e-8)
         second = np.array(hessian(command.ravel(), target, 1.0, []))
         second = second + np.triu(second, 1).T
         for k, offset in enumerate(1e-5 * np.eye(3 * plant.n_fins)):

@@ -57,7 +57,7 @@ def least_cost(
         found = minimize(
             lambda s: float(meter(command(s)[None])[0]) / scale,
             start.ravel(),
-            jac=lambda s: (meter.jacobian(command(s)[None])[0] * width).ravel() / scale,
+            jac=lambda s: (meter.gradient(command(s)[None])[0] * width).ravel() / scale,
             bounds=bounds,
             constraints={"type": "eq", "fun": lambda s: seen @ missing(s), "jac": lambda s: seen @ bent(s)},
             method="SLSQP",

@@ -62,7 +62,7 @@ def test_where_it_ends_is_a_minimum(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     for row in command:
         _, jacobian = problem.fin.force_and_jacobian(row[None])
         jacobian = (jacobian[0] @ problem.effectiveness * problem.width[..., None]).reshape(-1, 6)
-        slope = (cost.jacobian(row[None])[0] * problem.width).ravel()
+        slope = (cost.gradient(row[None])[0] * problem.width).ravel()
         inside = ((row > problem.lower + 1e-6) & (row < problem.upper - 1e-6)).ravel()
         multiplier = np.linalg.lstsq(jacobian[inside], slope[inside], rcond=1e-9)[0]
         left.append(np.linalg.norm(slope[inside] - jacobian[inside] @ multiplier) / np.linalg.norm(slope))

@@ -41,7 +41,7 @@ def test_soft_fins_are_averaged_over_whole_beats(robot: Layout) -> None:
     wrench = true_wrench("flexible", robot, command, np.zeros((1, 6)))[0]
     # Whatever swings within the beat is gone: what is left points along the zero directions.
     along = np.stack([np.zeros(4), np.cos(command[0, :, 2]), np.sin(command[0, :, 2])], axis=-1)
-    units = np.einsum("nk,nkw->nw", along, force.columns)
+    units = np.einsum("nk,nkw->nw", along, force.effectiveness)
     thrust, left, *_ = np.linalg.lstsq(units.T, wrench, rcond=None)
     assert (thrust > 0.0).all() and np.linalg.norm(units.T @ thrust - wrench) < 0.1
 

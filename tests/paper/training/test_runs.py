@@ -175,6 +175,7 @@ def test_refuses_a_missing_surrogate(tmp_path: Path) -> None:
         train_allocator("smoke", tmp_path / "run", surrogate=tmp_path / "nowhere")
 
 
+@pytest.mark.exhaustive
 def test_the_paper_s_recipe_runs(fewer_samples: None, tmp_path: Path) -> None:
     surrogate = train_surrogate("paper", tmp_path / "surrogate", steps=2)
     assert surrogate.metrics["surrogate"].keys() == {"wrench_error_norm"}
