@@ -1,6 +1,7 @@
 """`finlab train mdn|surrogate|allocator`: a few steps, then an allocation with the result."""
 
 import json
+import resource
 import subprocess
 import sys
 from pathlib import Path
@@ -77,3 +78,19 @@ def test_says_what_to_install_where_torch_is_missing(verb: str, tmp_path: Path) 
     done = subprocess.run(command, capture_output=True, text=True, timeout=60)
     assert done.returncode == 2 and done.stdout == ""
     assert done.stderr == "finlab: error: torch is not installed; run: pip install 'finlab-marine[train]'\n"
+
+
+@pytest.mark.parametrize("verb", ["surrogate", "mdn"])
+def test_a_full_disk_is_one_sentence_with_the_path(verb: str, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    command = [sys.executable, "-m", "finlab", "train", verb, "-o", str(out), *SMOKE]
+    done = subprocess.run(
+        command,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (2000, 2000)),
+    )
+    assert done.returncode == 2 and "Traceback" not in done.stderr
+    assert f"{out}/" in done.stderr and "cannot be written: File too large" in done.stderr
+    assert not list(out.rglob("*.part"))
