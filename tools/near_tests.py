@@ -3,8 +3,8 @@
 
 The change is what differs from the branch `main` (from the last commit while on it) and what git does not
 track yet, or the paths that are given. Near are the tests in the folder that mirrors a changed module's
-package, and each test file elsewhere that imports a changed module by its full name, where few do. Browser
-and packaging tests are left to `make test`, unless they were changed themselves.
+package, and each test file elsewhere that imports a changed module by its full name, where few do. Slow files
+and folders are left to `make test`, unless they were changed themselves.
 """
 
 import ast
@@ -14,7 +14,15 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-SLOW = ("tests/browser", "tests/packaging")
+SLOW = (
+    "tests/browser",
+    "tests/packaging",
+    "tests/webapp/test_faults_in_handlers.py",
+    "tests/webapp/test_hostile.py",
+    "tests/webapp/test_swimming.py",
+    "tests/webapp/test_visitors.py",
+)
+"""What takes most of a minute by itself."""
 FEW = 12
 """Of a module that more test files import, only the tests of its own package are near."""
 
@@ -29,7 +37,9 @@ def main(argv: list[str]) -> int:
         return 0
     print("near what was changed:", *tests)
     threads = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
-    command = [sys.executable, "-m", "pytest", "-q", "-n", "2", "--dist", "worksteal", *argv[split + 1 :]]
+    skipped = [f"--ignore={path}" for path in SLOW if not any(name.startswith(path) for name in changed)]
+    command = [sys.executable, "-m", "pytest", "-q", "-n", "2", "--dist", "worksteal", *skipped]
+    command += argv[split + 1 :]
     return subprocess.run([*command, *tests], cwd=ROOT, env=os.environ | threads).returncode
 
 
