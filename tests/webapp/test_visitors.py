@@ -120,21 +120,8 @@ async def _silent_socket(port: int) -> None:
 async def _silent_answer(port: int) -> None:
     """A page that tells where it looks, and never what it has kept."""
     async with visitor(port) as page:
-        await page.send("ViewerCameraMessage", **{k: v for k, v in CAMERA.items()})
+        await page.look()
         await asyncio.sleep(60)
-
-
-CAMERA: dict[str, Any] = {
-    "wxyz": (1.0, 0.0, 0.0, 0.0),
-    "position": (1.0, 1.0, 1.0),
-    "fov": 1.0,
-    "near": 0.01,
-    "far": 1000.0,
-    "image_height": 600,
-    "image_width": 800,
-    "look_at": (0.0, 0.0, 0.0),
-    "up_direction": (0.0, 0.0, 1.0),
-}
 
 
 @pytest.mark.parametrize("silent", [_silent_request, _silent_socket, _silent_answer])

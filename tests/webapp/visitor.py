@@ -10,8 +10,7 @@ import viser
 import zstandard
 from websockets.asyncio.client import ClientConnection, connect
 
-CAMERA = {
-    "type": "ViewerCameraMessage",
+CAMERA: dict[str, Any] = {
     "wxyz": (1.0, 0.0, 0.0, 0.0),
     "position": (1.0, 1.0, 1.0),
     "fov": 1.0,
@@ -46,9 +45,13 @@ class Visitor:
             for message in msgspec.msgpack.decode(text)["messages"]:
                 yield message
 
+    async def look(self) -> None:
+        """Say where the camera is, which is a page's first message."""
+        await self.send("ViewerCameraMessage", **CAMERA)
+
     async def enter(self, keys: str | None = None) -> None:
         """Answer until the server has opened a page."""
-        await self.send(CAMERA["type"], **{k: v for k, v in CAMERA.items() if k != "type"})
+        await self.look()
         async for message in self.heard():
             if message["type"] == "LocalStorageGetItemRequestMessage":
                 answer = {"value": keys, "error": None, "request_uuid": message["request_uuid"]}
