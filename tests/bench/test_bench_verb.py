@@ -1,11 +1,7 @@
 """`finlab bench` through `main`: table, results, progress, and one sentence for what is wrong."""
 
 import json
-import os
-import pty
-import subprocess
 import sys
-import termios
 from pathlib import Path
 
 import pytest
@@ -14,6 +10,7 @@ from finlab.bench.problems import Problems
 from finlab.bench.results import stored
 from finlab.bench.table import text
 from finlab.cli import main
+from tests.terminal import first_shown
 
 METHODS = Path(__file__).with_name("methods.py")
 ROOT = Path(__file__).resolve().parents[2]
@@ -47,20 +44,8 @@ def test_a_full_disk_does_not_cost_the_table(capsys: pytest.CaptureFixture[str])
 
 
 def test_progress_is_shown_at_once() -> None:
-    leader, follower = pty.openpty()
-    termios.tcsetwinsize(follower, (24, 80))
-    program = [sys.executable, "-m", "finlab", "bench", "analytic", "--quick", "--sets", "paper"]
-    process = subprocess.Popen(program, cwd=ROOT, stderr=follower, stdout=subprocess.DEVNULL)
-    os.close(follower)
-    try:
-        shown = os.read(leader, 1000).decode()
-        user, system = Path(f"/proc/{process.pid}/stat").read_text().rpartition(")")[2].split()[11:13]
-    finally:
-        process.kill()
-        process.wait()
-        os.close(leader)
+    shown, spent = first_shown("bench", "analytic", "--quick", "--sets", "paper")
     assert "bench" in shown
-    spent = (int(user) + int(system)) / os.sysconf("SC_CLK_TCK")
     assert spent < 1.5, "the processor's time until a bar is there [s]"
 
 

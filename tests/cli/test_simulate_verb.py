@@ -1,18 +1,17 @@
 """`finlab simulate` through `main`: log, pictures, sentences; folders that are whole or untouched."""
 
 import os
-import pty
 import resource
 import signal
 import subprocess
 import sys
-import termios
 from pathlib import Path
 
 import pytest
 
 from finlab.cli import main
 from finlab.sim import load_log
+from tests.terminal import first_shown
 
 FILES = {"log.npz", "log.csv", "path.png", "errors.png", "commands.png", "wrench.png"}
 
@@ -71,20 +70,8 @@ def test_a_full_disk_is_a_sentence_and_leaves_nothing(limit: int, line: list[str
 
 
 def test_progress_is_shown_at_once(line: list[str]) -> None:
-    leader, follower = pty.openpty()
-    termios.tcsetwinsize(follower, (24, 80))
-    program = [sys.executable, "-m", "finlab", *line]
-    process = subprocess.Popen(program, stderr=follower, stdout=subprocess.DEVNULL)
-    os.close(follower)
-    try:
-        shown = os.read(leader, 1000).decode()
-        user, system = Path(f"/proc/{process.pid}/stat").read_text().rpartition(")")[2].split()[11:13]
-    finally:
-        process.kill()
-        process.wait()
-        os.close(leader)
+    shown, spent = first_shown(*line)
     assert "swim" in shown
-    spent = (int(user) + int(system)) / os.sysconf("SC_CLK_TCK")
     assert spent < 1.5, "the processor's time until a bar is there [s]"
 
 

@@ -1,0 +1,28 @@
+"""The command on a terminal, for tests of what a person sees first."""
+
+import os
+import pty
+import subprocess
+import sys
+import termios
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+def first_shown(*words: str) -> tuple[str, float]:
+    """What `finlab WORDS` shows first on a terminal, and the processor's time until then [s]; it is ended
+    there."""
+    leader, follower = pty.openpty()
+    termios.tcsetwinsize(follower, (24, 80))
+    program = [sys.executable, "-m", "finlab", *words]
+    process = subprocess.Popen(program, cwd=ROOT, stderr=follower, stdout=subprocess.DEVNULL)
+    os.close(follower)
+    try:
+        shown = os.read(leader, 1000).decode()
+        user, system = Path(f"/proc/{process.pid}/stat").read_text().rpartition(")")[2].split()[11:13]
+    finally:
+        process.kill()
+        process.wait()
+        os.close(leader)
+    return shown, (int(user) + int(system)) / os.sysconf("SC_CLK_TCK")
