@@ -17,6 +17,7 @@ LEVELS = (
     ("files", "assets", "command_end", "least_squares", "whole_file"),
     ("bundle_files",),
     ("layout",),
+    ("actuators",),
     ("physics", "exchange"),
     ("vehicle",),
     ("networks",),

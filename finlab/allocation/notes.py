@@ -4,10 +4,10 @@ from functools import lru_cache
 
 import numpy as np
 
+from finlab.actuators.fin.models import file_stamps
+from finlab.actuators.fin.table_file import DOUBT
 from finlab.layout import FinModelSpec, Layout, Limits
 from finlab.physics import FinLaw, TableLaw, make_law
-from finlab.physics.fin_model import file_stamps
-from finlab.physics.table_file import DOUBT
 
 RESTLESS = 0.05
 """Share of its largest force below which a fin counts as able to rest."""

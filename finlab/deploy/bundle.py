@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import finlab
+from finlab.actuators.fin.table_file import table_bytes
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.bundle_settings import METHODS_ON_BOARD, about_bundle
 from finlab.allocation.search.search_allocator import SearchAllocator
@@ -35,7 +36,6 @@ from finlab.distribution import NAME
 from finlab.errors import AllocationError, DataError
 from finlab.layout import FinModelSpec, Layout
 from finlab.networks.checkpoint import checkpoint_files
-from finlab.physics.table_file import table_bytes
 from finlab.whole_file import write_whole
 
 

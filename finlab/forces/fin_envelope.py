@@ -14,12 +14,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from finlab.actuators.fin.models import file_stamp, make_law
+from finlab.actuators.law import FinLaw
 from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.layout import FinModelSpec, Limits
 from finlab.layout.angles import is_full_turn, wrapped
-from finlab.physics.fin_law import FinLaw
-from finlab.physics.fin_model import file_stamp, make_law
 from finlab.physics.objective import Objective
 
 LEVELS = 49

@@ -2,9 +2,9 @@
 
 from functools import lru_cache
 
+from finlab.actuators.fin.models import file_stamps
 from finlab.layout import Layout
 from finlab.physics.coupled_plant import CoupledPlant
-from finlab.physics.fin_model import file_stamps
 from finlab.physics.plant import Plant
 
 

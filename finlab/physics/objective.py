@@ -9,10 +9,10 @@ from typing import Literal, get_args
 
 import numpy as np
 
+from finlab.actuators.law import FinLaw
 from finlab.arrays import Array
 from finlab.errors import AllocationError
 from finlab.physics.effort import DEFAULT_WEIGHTS, EffortMeter, EffortWeights, effort_of_shares, effort_scale
-from finlab.physics.fin_law import FinLaw
 from finlab.physics.plant import Plant
 
 Name = Literal["power", "effort"]

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from finlab.actuators.fin.blade import Blade
+from finlab.actuators.fin.models import make_law, stack_laws
 from finlab.arrays import Array
 from finlab.errors import CommandError
 from finlab.layout.angles import TURN, is_full_turn
 from finlab.layout.arrays import force_effectiveness
 from finlab.layout.layout import Layout
-from finlab.physics.blade import Blade
-from finlab.physics.fin_model import make_law, stack_laws
 from finlab.physics.wrench import body_force, wrench_of_forces
 
 

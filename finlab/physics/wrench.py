@@ -4,9 +4,9 @@ Frames: fin frame x' = shaft, y' = e_h, z' = e_z (see `finlab.layout.fin`); body
 gravity. Wrench order [Fx, Fy, Fz, Tx, Ty, Tz] in N and N m.
 """
 
+from finlab.actuators.law import FinLaw
 from finlab.arrays import Values, library_of
 from finlab.layout.arrays import force_effectiveness
-from finlab.physics.fin_law import FinLaw
 
 
 def body_force(fin_force: Values, mounting_angle: Values) -> Values:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from finlab.actuators.fin.blade import COPPER_LOSS
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.policy import Policy, as_policy
 from finlab.arrays import Array
@@ -24,7 +25,6 @@ from finlab.control.measurement import NO_WRENCH
 from finlab.layout import Layout
 from finlab.layout.damage import Damage, Kind
 from finlab.physics import plant_of
-from finlab.physics.blade import COPPER_LOSS
 from finlab.sim.fin_fault import FinFault, damage_of
 from finlab.sim.hanging_fin import HangingFins
 from finlab.sim.log import RunLog, Tick, log_of_ticks

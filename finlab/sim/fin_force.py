@@ -10,12 +10,12 @@ from typing import Protocol
 
 import numpy as np
 
+from finlab.actuators.fin.blade import Blade
 from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.layout.angles import wrapped
 from finlab.layout.arrays import force_effectiveness
 from finlab.physics import plant_of
-from finlab.physics.blade import Blade
 from finlab.vehicle.fin_motion import FinMotion
 
 STILL = np.zeros(6)

@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from finlab.actuators.fin.blade import COPPER_LOSS, Blade
 from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.layout.angles import TURN
-from finlab.physics.blade import COPPER_LOSS, Blade
 from finlab.vehicle.fin_lag import FinLag
 
 CREEP = 0.1

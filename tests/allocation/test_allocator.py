@@ -8,13 +8,13 @@ from typing import get_args
 import numpy as np
 import pytest
 
+from finlab.actuators.fin.blade import Blade
 from finlab.allocation import METHODS, Allocation, Allocator, Candidates, Solution, allocator, load_allocator
 from finlab.allocation.methods import MethodName
 from finlab.cli.allocate import allocate
 from finlab.errors import AllocationError, CommandError, LayoutError
 from finlab.layout import Fin, Layout
 from finlab.networks.normalization import Normalization
-from finlab.physics.blade import Blade
 
 SIGMA = np.array([1.0, 2.0, 1.0, 0.5, 0.5, 0.5])
 ROBOT = Layout(

@@ -8,11 +8,11 @@ from typing import Any
 import trimesh
 
 import finlab
+from finlab.actuators.fin.table_file import write_table
 from finlab.cli import main
 from finlab.files.plain_values import yaml_text
 from finlab.layout import FinModelSpec, layout_to_dict, load_layout
 from finlab.physics import make_law
-from finlab.physics.table_file import write_table
 
 CARRIED = """files => {
   const carried = new DataTransfer();

@@ -19,6 +19,7 @@ import pytest
 import trimesh
 
 import finlab
+from finlab.actuators.fin.table_file import read_table
 from finlab.bundle_files import CHECKSUMS, GRAPH, checksums
 from finlab.deploy.bundle import make_bundle
 from finlab.deploy.graph import build_graph
@@ -32,7 +33,6 @@ from finlab.layout import FinModelSpec, load_layout, save_layout
 from finlab.layout.load import checksum_of
 from finlab.networks.checkpoint import read_checkpoint
 from finlab.physics import make_law, write_table
-from finlab.physics.table_file import read_table
 from finlab.sim import load_log
 from finlab.sim.log import Tick, log_of_ticks
 from finlab.sim.task import make_trajectory

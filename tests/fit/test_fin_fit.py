@@ -9,6 +9,7 @@ import pytest
 from threadpoolctl import threadpool_info
 
 from finlab import load_allocator, load_layout
+from finlab.actuators.fin.table_file import DOUBT, read_table
 from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.fit.advice import APART, next_measurements
@@ -17,7 +18,6 @@ from finlab.fit.fin_fit import FinFit, fit_fin
 from finlab.layout import Fin, FinModelSpec, Layout
 from finlab.layout.angles import wrapped
 from finlab.physics import TableLaw
-from finlab.physics.table_file import DOUBT, read_table
 from tests.fit.cell import commands, measured, samples, soft
 
 LAW = soft(k=4.0, p=1.4, x0=0.9, q=4.0, e=0.15, phi_e=1.0, d=0.12)

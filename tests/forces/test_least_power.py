@@ -6,12 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from finlab.actuators.fin.blade import Blade
 from finlab.allocation.search.search_allocator import SearchAllocator
 from finlab.forces.fin_sets import FinSets, fin_sets
 from finlab.forces.least_power import cheapest, least_power, power_problem, variant
 from finlab.layout import FinModelSpec, Layout
 from finlab.networks.normalization import Normalization
-from finlab.physics.blade import Blade
 
 Layouts = Callable[[str], Layout]
 WRENCHES = np.concatenate([np.diag([1, 1, 1, 0.1, 0.1, 0.1]), [[1.2, 0, 0.5, 0, 0, 0.15]]])

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from finlab.actuators.fin.blade import OWN_INERTIA, Blade
 from finlab.layout import FinModelSpec
 from finlab.physics import make_law
-from finlab.physics.blade import OWN_INERTIA, Blade
 
 BLADES = [
     Blade(),

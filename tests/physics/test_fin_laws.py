@@ -8,11 +8,11 @@ import pytest
 import torch
 from scipy.special import j0, j1
 
+from finlab.actuators.fin.lighthill import bessel_j0, bessel_j1
+from finlab.actuators.fin.models import PLANAR_LAWS
 from finlab.layout import FinModelSpec
 from finlab.layout.fin import FIN_MODELS
 from finlab.physics import make_law
-from finlab.physics.fin_model import PLANAR_LAWS
-from finlab.physics.lighthill import bessel_j0, bessel_j1
 
 SPECS = [
     FinModelSpec("drag"),

@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
+from finlab.actuators.fin.blade import Blade
 from finlab.assets import shipped_layouts
 from finlab.layout import Layout, load_layout
 from finlab.physics import Plant
-from finlab.physics.blade import Blade
 from finlab.sim.fin_force import FinForce, FlexibleForce, MeanForce, RippleForce, SoftFin
 from finlab.vehicle.fin_motion import FinMotion
 

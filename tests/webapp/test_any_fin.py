@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from finlab.actuators.fin.table_file import write_table
 from finlab.assets import shipped_checkpoints, shipped_layouts
 from finlab.deploy.bundle import make_bundle
 from finlab.deploy.graph import build_graph
@@ -16,7 +17,6 @@ from finlab.errors import LayoutError
 from finlab.files.plain_values import yaml_text
 from finlab.layout import FinModelSpec, Layout, layout_to_dict, load_layout
 from finlab.physics import make_law, plant_of
-from finlab.physics.table_file import write_table
 from webapp.markup.snippets import command_line
 from webapp.markup.verdict import verdict_sentence
 from webapp.session import Session, files

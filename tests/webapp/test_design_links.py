@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 import trimesh
 
+from finlab.actuators.fin.table_file import write_table
 from finlab.assets import shipped_layouts
 from finlab.errors import FinlabError
 from finlab.files.plain_values import yaml_text
 from finlab.layout import FinModelSpec, layout_to_dict, load_layout
 from finlab.layout.load import MAX_BYTES
 from finlab.physics import make_law
-from finlab.physics.table_file import write_table
 from tests.webapp.loops import ReadAtOnce
 from webapp.session import Session
 from webapp.session.companions import stored_table

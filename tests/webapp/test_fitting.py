@@ -13,10 +13,10 @@ from typing import Any
 import pytest
 
 from finlab import load_allocator
+from finlab.actuators.fin.table_file import DOUBT, table_bytes
 from finlab.errors import DataError, FinlabError, LayoutError
 from finlab.fit import outliers
 from finlab.layout import Layout, load_layout
-from finlab.physics.table_file import DOUBT, table_bytes
 from tests.fit.cell import columns_of, commands, measured, soft, write
 from tests.webapp.loops import page_of
 from webapp.markup.fin_model import model_card
@@ -243,9 +243,9 @@ def test_doubts_come_first(tmp_path: Path, worker: Worker) -> None:
 
 def robot(tmp_path: Path, cache: Path) -> Layout:
     """U-CAT with one measured fin."""
+    from finlab.actuators.fin.table_file import write_table
     from finlab.layout import FinModelSpec
     from finlab.physics import make_law
-    from finlab.physics.table_file import write_table
 
     grid = [[0.05, 0.3, 0.6], [0.1, 1.0, 2.1], [-3.0, -1.5, 0.0, 1.5]]
     write_table(tmp_path / "mine.csv", make_law(FinModelSpec("soft")), *grid)  # type: ignore[arg-type]

@@ -8,12 +8,12 @@ from typing import Any
 
 import pytest
 
+from finlab.actuators.fin.table_file import write_table
 from finlab.bundle_files import LARGEST_BUNDLE
 from finlab.errors import FinlabError
 from finlab.files.plain_values import yaml_text
 from finlab.layout import FinModelSpec, layout_to_dict, load_layout
 from finlab.physics import make_law
-from finlab.physics.table_file import write_table
 from webapp.session.files import is_path, read_together
 from webapp.tasks.opening import Opening
 

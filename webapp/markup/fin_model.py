@@ -2,11 +2,11 @@
 
 import math
 
+from finlab.actuators.fin.table import TableLaw
+from finlab.actuators.fin.table_file import DOUBT
 from finlab.errors import DataError
 from finlab.layout.fin import Fin, FinModelSpec
 from finlab.physics import make_law
-from finlab.physics.table import TableLaw
-from finlab.physics.table_file import DOUBT
 from webapp.markup.html import html
 
 BEYOND = 0.01

@@ -99,7 +99,7 @@ class FinModelPanel:
         return found
 
     def _send_table(self) -> None:
-        from finlab.physics.table_file import table_bytes
+        from finlab.actuators.fin.table_file import table_bytes
 
         found = self._found()
         path = str(found.model.values()["path"])

@@ -7,11 +7,11 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from finlab.actuators.fin.table_file import read_table
 from finlab.arrays import Array
 from finlab.distribution import install
 from finlab.errors import DataError, FinlabError
 from finlab.layout import FinModelSpec, Layout
-from finlab.physics.table_file import read_table
 from webapp.session.companions import stored_table
 from webapp.session.files import table_folder
 from webapp.tasks.background import Newest

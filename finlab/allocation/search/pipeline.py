@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from finlab.actuators.fin.models import file_stamps
 from finlab.allocation.search.cheaper_commands import cheaper_commands
 from finlab.allocation.search.prepared import (
     SEEDS,
@@ -40,7 +41,6 @@ from finlab.allocation.search.settings import SearchSettings
 from finlab.arrays import Array
 from finlab.forces import force_space
 from finlab.layout import Layout
-from finlab.physics.fin_model import file_stamps
 
 
 @dataclass(frozen=True)

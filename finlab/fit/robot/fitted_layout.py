@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from finlab.actuators.fin.table_file import COLUMNS, POWER_COLUMN
 from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.fit.robot.model import deflected, shape_factor
@@ -18,7 +19,6 @@ from finlab.layout import Body, Fin, FinModelSpec, Interaction, Jet, Layout, sav
 from finlab.layout.interaction import MAX_SHARE
 from finlab.layout.layout import MAX_DESCRIPTION_LENGTH
 from finlab.physics import make_law
-from finlab.physics.table_file import COLUMNS, POWER_COLUMN
 from finlab.whole_file import write_whole
 
 GRID = (17, 17, 16)

@@ -1,7 +1,7 @@
 """Forces of fins that swing within the beat and while they turn: no thrust, but they shake the robot.
 
 They follow from where each fin is within its beat, which is known where all began to flap with the log and
-servos are nominal. As those of a rigid plate (`finlab.physics.blade`) they are
+servos are nominal. As those of a rigid plate (`finlab.actuators.fin.blade`) they are
 
 - of the water that it carries: minus the change of m L^2 / 2 theta' along the plate's normal;
 - of its drag, rho Cd W L^3 / 6 theta' |theta'| against the normal;

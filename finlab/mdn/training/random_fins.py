@@ -8,15 +8,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from finlab.actuators.fin.blade import Blade
+from finlab.actuators.fin.models import make_law
+from finlab.actuators.fin.table import TableLaw
+from finlab.actuators.law import FinLaw
 from finlab.forces.fin_envelope import FinEnvelope, compile_fin
 from finlab.layout import FinModelSpec, Limits
 from finlab.layout.random import random_layout
 from finlab.layout.random_fins import Numbers, log_uniform, random_fin_model
-from finlab.physics.blade import Blade
-from finlab.physics.fin_law import FinLaw
-from finlab.physics.fin_model import make_law
 from finlab.physics.objective import Objective
-from finlab.physics.table import TableLaw
 
 WEAKEST = 1e-2
 """Largest force [N] of the weakest fin worth learning from."""

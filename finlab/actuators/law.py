@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from finlab.actuators.fin.blade import Blade
 from finlab.arrays import Array, Values, library_of
-from finlab.physics.blade import Blade
 
 
 class FinLaw(ABC):

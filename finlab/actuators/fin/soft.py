@@ -4,8 +4,8 @@ from typing import Any
 
 import numpy as np
 
+from finlab.actuators.law import PlanarLaw
 from finlab.arrays import Array, Values, library_of
-from finlab.physics.fin_law import PlanarLaw
 
 
 class Soft(PlanarLaw):

@@ -8,15 +8,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from finlab.actuators.fin.drag import Drag
+from finlab.actuators.fin.lighthill import Lighthill
+from finlab.actuators.fin.soft import Soft
+from finlab.actuators.fin.table import GridLaw, TableLaw
+from finlab.actuators.fin.table_file import read_table
+from finlab.actuators.law import FinLaw, PlanarLaw
 from finlab.bundle_files import archive_around
 from finlab.layout.fin import FinModelSpec
 from finlab.layout.layout import Layout
-from finlab.physics.drag import Drag
-from finlab.physics.fin_law import FinLaw, PlanarLaw
-from finlab.physics.lighthill import Lighthill
-from finlab.physics.soft import Soft
-from finlab.physics.table import GridLaw, TableLaw
-from finlab.physics.table_file import read_table
 
 PLANAR_LAWS: dict[str, type[PlanarLaw]] = {"drag": Drag, "lighthill": Lighthill, "soft": Soft}
 """Fin model -> law with a formula; its parameters may be arrays, one number for each of n fins."""

@@ -3,9 +3,9 @@
 import math
 from typing import Any
 
+from finlab.actuators.fin.blade import Blade
+from finlab.actuators.law import PlanarLaw
 from finlab.arrays import Array, Values
-from finlab.physics.blade import Blade
-from finlab.physics.fin_law import PlanarLaw
 
 # J_n(x) = (x/2)^n sum_k (-1)^k (x/2)^(2k) / (k! (k+n)!). An amplitude is at most pi/2, where the terms fall
 # below 1e-17 after k = 11; a few more keep float64 exact to |x| = 4.

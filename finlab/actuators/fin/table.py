@@ -6,9 +6,9 @@ the circle the table is periodic. Amplitudes and frequencies beyond the table co
 
 import numpy as np
 
+from finlab.actuators.fin.hermite_grid import Grid, HermiteGrids
+from finlab.actuators.law import FinLaw
 from finlab.arrays import Array, Values, library_of
-from finlab.physics.fin_law import FinLaw
-from finlab.physics.hermite_grid import Grid, HermiteGrids
 
 
 class GridLaw(FinLaw):

@@ -16,6 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from finlab.actuators.fin.table import TableLaw
+from finlab.actuators.law import FinLaw
 from finlab.arrays import Array
 from finlab.bundle_files import TABLES, archive_around, read_bundle_files
 from finlab.errors import DataError
@@ -23,8 +25,6 @@ from finlab.files.csv_table import CsvTable
 from finlab.files.guarded import read_file
 from finlab.layout.angles import FILE_TURN_TOLERANCE, TURN
 from finlab.layout.fin import MAX_AMPLITUDE, MAX_FREQUENCY
-from finlab.physics.fin_law import FinLaw
-from finlab.physics.table import TableLaw
 
 COLUMNS = ("A", "f", "phi", "Fx", "Fy", "Fz")
 """Columns of a force table, by name; their order in the file is free."""

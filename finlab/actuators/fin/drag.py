@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
+from finlab.actuators.fin.blade import Blade
+from finlab.actuators.law import PlanarLaw
 from finlab.arrays import Array, Values, library_of
-from finlab.physics.blade import Blade
-from finlab.physics.fin_law import PlanarLaw
 
 
 class Drag(PlanarLaw):
