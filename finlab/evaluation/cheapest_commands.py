@@ -15,7 +15,7 @@ import numpy as np
 from finlab.allocation.baselines.ipopt import SOLVER_OPTIONS, import_casadi
 from finlab.allocation.baselines.plant_in_casadi import plant_formulas
 from finlab.allocation.baselines.sqp import Solve, cheapest_program, pushed_axes
-from finlab.allocation.search.levenberg_marquardt import CommandProblem, refine
+from finlab.allocation.levenberg_marquardt import CommandProblem, refine
 from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.physics import PlanarLaw, Plant, make_law, plant_of

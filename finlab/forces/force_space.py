@@ -35,11 +35,11 @@ from finlab.forces.fin_envelope import (
     SHAFT,
     STIFFNESS,
 )
-from finlab.forces.small_systems import solve
 from finlab.layout import Layout
 from finlab.layout.angles import TURN, wrapped
 from finlab.layout.arrays import force_effectiveness
 from finlab.physics.objective import Objective
+from finlab.small_systems import solve
 
 RIDGE = 1e-9
 """Relative regularization of the 6 x 6 systems."""

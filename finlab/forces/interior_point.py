@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from finlab.arrays import Array
 from finlab.forces.fin_sets import FinSets
-from finlab.forces.small_systems import solve
+from finlab.small_systems import solve
 
 ITERATIONS = 40
 """Most Newton steps; usually about 10 are taken."""

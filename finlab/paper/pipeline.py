@@ -7,7 +7,7 @@ import numpy as np
 
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.evaluate import costs
-from finlab.allocation.search.levenberg_marquardt import CommandProblem, refine
+from finlab.allocation.levenberg_marquardt import CommandProblem, refine
 from finlab.allocation.solution import Candidates, Solution
 from finlab.arrays import AnyArray
 from finlab.layout import FinModelSpec, Layout

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from finlab.allocation.search.levenberg_marquardt import CommandProblem, refine
+from finlab.allocation.levenberg_marquardt import CommandProblem, refine
 from finlab.errors import DataError
 from finlab.evaluation.splits import NEAR_ANGLE, NEAR_POSITION, SPLITS, Case, make_split
 from finlab.layout import Limits

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from finlab.allocation.baselines.model_based import CACHE_SIZE, ModelBased, TimeLimit, TimeLimitedSettings
-from finlab.allocation.search.levenberg_marquardt import CommandProblem, refine
+from finlab.allocation.levenberg_marquardt import CommandProblem, refine
 from finlab.allocation.settings import number
 from finlab.arrays import Array
 from finlab.layout import layout_effectiveness

@@ -16,10 +16,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from finlab.allocation.search.levenberg_marquardt import CommandProblem, refine
+from finlab.allocation.levenberg_marquardt import CommandProblem, refine
 from finlab.arrays import AnyArray, Array
-from finlab.forces.small_systems import Held, solve, step_within
 from finlab.physics.objective import CostMeter
+from finlab.small_systems import Held, solve, step_within
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.search.levenberg_marquardt import CommandProblem
+from finlab.allocation.levenberg_marquardt import CommandProblem
 from finlab.arrays import Array
 from finlab.forces.convex_parts import arcs_to_search
 from finlab.forces.envelopes import layout_envelopes

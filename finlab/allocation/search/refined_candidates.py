@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.search.levenberg_marquardt import refine
+from finlab.allocation.levenberg_marquardt import refine
 from finlab.allocation.search.prepared import Prepared
 from finlab.arrays import Array
 from finlab.forces.fin_sets import planar_sets

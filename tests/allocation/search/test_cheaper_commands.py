@@ -8,8 +8,8 @@ import pytest
 
 import finlab.allocation.search.cheaper_commands
 from finlab.allocation import load_allocator
+from finlab.allocation.levenberg_marquardt import CommandProblem, refine
 from finlab.allocation.search.cheaper_commands import DESCENT, cheaper_commands
-from finlab.allocation.search.levenberg_marquardt import CommandProblem, refine
 from finlab.arrays import Array
 from finlab.evaluation.splits import make_split
 from finlab.layout import Layout

@@ -6,7 +6,7 @@ import warnings
 import numpy as np
 import pytest
 
-from finlab.allocation.search.levenberg_marquardt import CommandProblem, refine
+from finlab.allocation.levenberg_marquardt import CommandProblem, refine
 from finlab.allocation.search.search_allocator import SearchAllocator
 from finlab.layout import Fin, FinModelSpec, Layout, Limits, random_layout
 

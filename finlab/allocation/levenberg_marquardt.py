@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.arrays import AnyArray, Array
-from finlab.forces.small_systems import solve, step_within
 from finlab.least_squares import Damping, levenberg_marquardt
 from finlab.physics.plant import Plant
+from finlab.small_systems import solve, step_within
 
 AT_LIMIT = 1e-9
 """How near [rad, Hz, rad] to a limit a command counts as being at it."""
