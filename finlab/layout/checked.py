@@ -28,6 +28,8 @@ class Checked:
 
     KEYS: ClassVar[Mapping[str, str]] = {}
     """Fields -> their keys in a file, where the two differ."""
+    type: ClassVar[str] = ""
+    """What a file calls it under the key `type`, where it may hold one of several."""
 
     def __post_init__(self) -> None:
         shape = _plain_fields(cast(Hashable, type(self)))
@@ -72,15 +74,27 @@ def form(cls: type, keys: Mapping[str, str] | None = None, /, **kinds: Any) -> A
         keys: fields -> keys in the file; `cls.KEYS` when None.
         kinds: types of fields that are different in the file, and of those that are there alone; None for
             a field that no file has.
+
+    A class with a `type` has that as the key `type` of its part, which tells it from others.
     """
-    hints = {**get_type_hints(cls, include_extras=True), **kinds}
+    own = get_type_hints(cls, include_extras=True)
+    hints = {**{field.name: own[field.name] for field in fields(cls)}, **kinds}
     optional = [field.name for field in fields(cls) if field.default is not MISSING]
-    told = [(name, kind) for name, kind in hints.items() if kind is not None and name != "KEYS"]
+    told = [(name, kind) for name, kind in hints.items() if kind is not None]
     parts = [(name, kind | None, None) if name in optional else (name, kind) for name, kind in told]
     parts.sort(key=len)
     rename = cls.KEYS if keys is None and issubclass(cls, Checked) else dict(keys or {})
     about = {"__doc__": (cls.__doc__ or "").split("\n")[0].replace(" Checked on construction.", "")}
-    return msgspec.defstruct(cls.__name__, parts, rename=rename, forbid_unknown_fields=True, namespace=about)
+    tag = cls.type if issubclass(cls, Checked) and cls.type else None
+    return msgspec.defstruct(
+        cls.__name__,
+        parts,
+        rename=rename,
+        forbid_unknown_fields=True,
+        namespace=about,
+        tag=tag,
+        tag_field="type" if tag else None,
+    )
 
 
 def given(part: Any) -> dict[str, Any]:

@@ -1,0 +1,119 @@
+"""Thrusters, azimuths and rudders as parts of a file: forms that are read, and plain values that are written.
+
+What holds degrees in a file is kept in radians; a table of thrust in a CSV file becomes rows.
+"""
+
+import math
+import os
+from dataclasses import MISSING, fields
+from pathlib import Path
+from typing import Annotated, Any
+
+from msgspec import Meta, Struct
+
+from finlab.errors import LayoutError
+from finlab.layout.azimuth import Azimuth, Tilt
+from finlab.layout.checked import form, given
+from finlab.layout.rudder import Rudder
+from finlab.layout.thrust_model import MAX_ROWS, PowerLaw, PowerTable, Row, ThrustModel
+from finlab.layout.thruster import Thruster
+
+OTHERS: tuple[type[Thruster | Azimuth | Rudder], ...] = (Thruster, Azimuth, Tilt, Rudder)
+"""The types of actuator that are no fins."""
+
+
+class TableForm(Struct, tag="table", tag_field="type", forbid_unknown_fields=True):
+    """Force and power over the thruster's own command: rows, or the CSV file that has them."""
+
+    rows: Annotated[list[Row], Meta(min_length=3, max_length=MAX_ROWS)] | None = None
+    path: Annotated[str, Meta(min_length=1, max_length=4096, description="a CSV file of thrust")] | None = (
+        None
+    )
+    unit: Annotated[str, Meta(max_length=20)] | None = None
+
+
+THRUST_MODEL: Any = form(PowerLaw) | TableForm
+
+
+def _form_of(cls: Any) -> Any:
+    """The form of a type of actuator."""
+    degrees = getattr(cls, "DEGREES", {})
+    kinds = {name: kind for name, (_, kind) in degrees.items()}
+    if cls is not Rudder:
+        kinds["model"] = THRUST_MODEL
+    return form(cls, _keys(cls), **kinds)
+
+
+def _keys(cls: Any) -> dict[str, str]:
+    """Fields -> their keys in a file, where the two differ."""
+    return {**cls.KEYS, **{name: key for name, (key, _) in getattr(cls, "DEGREES", {}).items()}}
+
+
+FORMS: dict[str, Any] = {cls.type: _form_of(cls) for cls in OTHERS}
+"""Type of actuator -> the part of a file that describes one."""
+
+
+def actuator_of(part: Any, folder: Path | None = None) -> Thruster | Azimuth | Rudder:
+    """Returns the actuator in a part of a file, an instance of one of `FORMS`; relative paths start at a
+    folder, the working directory when None.
+
+    Raises:
+        LayoutError: something does not fit; the message names the key.
+    """
+    cls: Any = next(cls for cls in OTHERS if type(part) is FORMS[cls.type])
+    told = given(part)
+    for name in getattr(cls, "DEGREES", {}):
+        if name in told:
+            value = told[name]
+            told[name] = math.radians(value) if isinstance(value, float) else tuple(map(math.radians, value))
+    if "model" in told:
+        try:
+            told["model"] = _model_of(told["model"], folder)
+        except LayoutError as error:
+            raise error.under("model") from None
+    actuator: Thruster | Azimuth | Rudder = cls(**told)
+    return actuator
+
+
+def _model_of(part: Any, folder: Path | None) -> ThrustModel:
+    if not isinstance(part, TableForm):
+        return PowerLaw(**given(part))
+    if (part.rows is None) == (part.path is None):
+        raise LayoutError("give either rows, or the path of a CSV file, not both or neither", "rows")
+    if part.path is not None:
+        return PowerTable.read(os.path.normpath((folder or Path.cwd()) / part.path), part.unit or "")
+    return PowerTable(tuple(part.rows or ()), part.unit or "")
+
+
+def actuator_to_dict(actuator: Thruster | Azimuth | Rudder) -> dict[str, Any]:
+    """Returns the plain values of an actuator in a file; `actuator_of` gives the same one back."""
+    degrees, keys = getattr(actuator, "DEGREES", {}), _keys(type(actuator))
+    data: dict[str, Any] = {"name": actuator.name, "type": actuator.type}
+    for field in fields(actuator):
+        value = getattr(actuator, field.name)
+        if field.name in data or (field.default is not MISSING and value == field.default):
+            continue
+        if field.name in degrees:
+            value = _rounded(value)
+        data[keys.get(field.name, field.name)] = value
+        if field.name == "model":
+            data["model"] = _model_to_dict(value)
+        elif isinstance(value, tuple):
+            data[keys.get(field.name, field.name)] = list(value)
+    return data
+
+
+def _rounded(value: Any) -> Any:
+    """Degrees of radians [rad], one or a tuple, without the error of rounding that conversion leaves."""
+    return tuple(map(_rounded, value)) if isinstance(value, tuple) else round(math.degrees(value), 12)
+
+
+def _model_to_dict(model: ThrustModel) -> dict[str, Any]:
+    told = {
+        field.name: getattr(model, field.name)
+        for field in fields(model)
+        if getattr(model, field.name) != field.default
+    }
+    if isinstance(model, PowerTable):
+        told["rows"] = [list(row) for row in model.rows]
+    return {"type": model.type, **told}

@@ -1,0 +1,108 @@
+"""A thruster whose axis turns in a plane: a full turn (azimuth) or an arc (tilt)."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar
+
+from msgspec import Meta
+
+from finlab.errors import LayoutError
+from finlab.layout.angles import FILE_TURN_TOLERANCE, TURN, is_full_turn
+from finlab.layout.axes import Direction3, Vector, axes_across, cross
+from finlab.layout.checked import Checked, Name
+from finlab.layout.thrust_model import KEYS, MAX_FORCE, ThrustModel, check_force
+from finlab.layout.thruster import ForceRate, Metres, Place, Seconds, Threshold
+
+Angle = Annotated[float, Meta(ge=-TURN - 1e-9, le=TURN + 1e-9)]
+TurnRate = Annotated[float, Meta(ge=1e-3, le=1000.0)]
+AngleDegrees = Annotated[float, Meta(ge=-360.0, le=360.0)]
+TurnRateDegrees = Annotated[float, Meta(ge=0.06, le=57000.0)]
+Push = Annotated[float, Meta(ge=0.0, le=MAX_FORCE)]
+
+
+@dataclass(frozen=True)
+class Azimuth(Checked):
+    """A thruster that turns and pushes one way; its command is angle and force. Checked on construction."""
+
+    KEYS: ClassVar[Mapping[str, str]] = KEYS
+    DEGREES: ClassVar[Mapping[str, tuple[str, Any]]] = {
+        "arc": ("arc_deg", tuple[AngleDegrees, AngleDegrees]),
+        "turn_rate": ("turn_rate_deg_s", TurnRateDegrees),
+    }
+    """Fields in radians -> their keys and types in a file, in degrees."""
+    type: ClassVar[str] = "azimuth"
+
+    name: Name
+    """Unique within its layout."""
+    position: Place
+    """Where the force acts, body frame [m]."""
+    turn_axis: Direction3
+    """Unit vector about which the thruster turns, body frame."""
+    zero: Direction3
+    """Unit vector across it: direction of the force at angle 0; it turns towards turn_axis x zero."""
+    force: tuple[Push, Push]
+    """Least and most force [N]; above 0 for one that cannot stop."""
+    model: ThrustModel
+    """What power it takes."""
+    arc: tuple[Angle, Angle] = (-math.pi, math.pi)
+    """Least and greatest angle [rad]; a full turn means any angle."""
+    dead_band: Threshold = 0.0
+    """Forces smaller than this, other than 0, cannot be held [N]."""
+    torque_per_newton: Metres = 0.0
+    """Reaction torque about the direction of the force, per force, signed [m]."""
+    turn_rate: TurnRate | None = None
+    """How fast it turns at most [rad/s]; None where nothing limits it."""
+    time_constant: Seconds = 0.1
+    """Time in which the force comes to 63 % of a new one [s]."""
+    rate: ForceRate | None = None
+    """How fast the commanded force changes at most [N/s]; None where nothing limits it."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        turn_axis, zero = axes_across(("turn_axis", self.turn_axis), ("zero", self.zero))
+        object.__setattr__(self, "turn_axis", turn_axis)
+        object.__setattr__(self, "zero", zero)
+        if not self.force[0] < self.force[1]:
+            raise LayoutError(
+                f"expected a least below the most force, got {self.force[0]:g} and {self.force[1]:g}",
+                "force_n",
+            )
+        if self.dead_band > self.force[1]:
+            raise LayoutError(
+                f"leaves no force, got {self.dead_band:g} beside {self.force[1]:g} N", "dead_band_n"
+            )
+        width = self.arc[1] - self.arc[0]
+        if not 0.0 <= width <= TURN + FILE_TURN_TOLERANCE:
+            low, high = map(math.degrees, self.arc)
+            raise LayoutError(f"must rise, by at most one turn, got {low:g} and {high:g}", "arc_deg")
+        check_force(self.model, self.force)
+
+    @property
+    def lower(self) -> tuple[float, float, float]:
+        """Least command: (angle [rad], force [N], 0)."""
+        return self.arc[0], self.force[0], 0.0
+
+    @property
+    def upper(self) -> tuple[float, float, float]:
+        """Greatest command: (angle [rad], force [N], 0)."""
+        return self.arc[1], self.force[1], 0.0
+
+    @property
+    def frame(self) -> tuple[Vector, Vector, Vector]:
+        """Own axes in the body frame: turn_axis, zero, turn_axis x zero."""
+        return self.turn_axis, self.zero, cross(self.turn_axis, self.zero)
+
+
+@dataclass(frozen=True)
+class Tilt(Azimuth):
+    """An azimuth thruster that turns within an arc. Checked on construction."""
+
+    type: ClassVar[str] = "tilt"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if is_full_turn(self.arc[1] - self.arc[0]):
+            raise LayoutError(
+                "required key is missing: the arc of a tilt is less than a full turn", "arc_deg"
+            )

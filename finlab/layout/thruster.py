@@ -1,0 +1,87 @@
+"""A thruster whose axis is fixed in the robot."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, ClassVar
+
+from msgspec import Meta
+
+from finlab.errors import LayoutError
+from finlab.layout.axes import Direction3, Vector, cross, unit_vector
+from finlab.layout.checked import Checked, Name
+from finlab.layout.thrust_model import KEYS, MAX_FORCE, Newtons, ThrustModel, check_force
+
+Metres = Annotated[float, Meta(ge=-100.0, le=100.0)]
+"""A coordinate of a place on a robot, or an arm of torque [m]."""
+Place = tuple[Metres, Metres, Metres]
+Seconds = Annotated[float, Meta(ge=0.0, le=1000.0)]
+ForceRate = Annotated[float, Meta(ge=1e-6, le=1e9)]
+Threshold = Annotated[float, Meta(ge=0.0, le=MAX_FORCE)]
+
+
+@dataclass(frozen=True)
+class Thruster(Checked):
+    """A thruster with a fixed axis; its command is the force. Checked on construction."""
+
+    KEYS: ClassVar[Mapping[str, str]] = KEYS
+    type: ClassVar[str] = "thruster"
+
+    name: Name
+    """Unique within its layout."""
+    position: Place
+    """Where the force acts, body frame [m]."""
+    axis: Direction3
+    """Unit vector, body frame: direction of the force on the robot for a positive force."""
+    force: tuple[Newtons, Newtons]
+    """Least and most force [N]; one of them is 0 where the thruster pushes one way only."""
+    model: ThrustModel
+    """What power it takes."""
+    dead_band: Threshold = 0.0
+    """Forces smaller than this, other than 0, cannot be held [N]."""
+    torque_per_newton: Metres = 0.0
+    """Reaction torque about the axis per force, signed [m]."""
+    time_constant: Seconds = 0.1
+    """Time in which the force comes to 63 % of a new one [s]."""
+    rate: ForceRate | None = None
+    """How fast the commanded force changes at most [N/s]; None where nothing limits it."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "axis", unit_vector("axis", self.axis))
+        least, most = self.force
+        if not least <= 0.0 <= most or least == most:
+            raise LayoutError(
+                f"must include 0, and more than that, got {least:g} and {most:g}",
+                "force_n",
+            )
+        if self.dead_band > max(-least, most):
+            raise LayoutError(
+                f"leaves no force, got {self.dead_band:g} beside {least:g} .. {most:g} N", "dead_band_n"
+            )
+        check_force(self.model, self.force)
+
+    @property
+    def lower(self) -> tuple[float, float, float]:
+        """Least command: (force [N], 0, 0)."""
+        return self.force[0], 0.0, 0.0
+
+    @property
+    def upper(self) -> tuple[float, float, float]:
+        """Greatest command: (force [N], 0, 0)."""
+        return self.force[1], 0.0, 0.0
+
+    @property
+    def frame(self) -> tuple[Vector, Vector, Vector]:
+        """Own axes in the body frame: the axis, and two across it."""
+        least = min(range(3), key=lambda i: abs(self.axis[i]))
+        beside = unit_vector("axis", _scaled(cross(self.axis, _AXES[least])))
+        return self.axis, beside, cross(self.axis, beside)
+
+
+_AXES: tuple[Vector, Vector, Vector] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+
+def _scaled(vector: Vector) -> Vector:
+    """A vector of any length with length 1."""
+    length = sum(value * value for value in vector) ** 0.5
+    return vector[0] / length, vector[1] / length, vector[2] / length
