@@ -45,6 +45,8 @@ class Answer(PlainData):
     """What was to be done if a target was out of reach."""
     seed: int = 0
     """Seed that makes the answer repeatable."""
+    flow: Array | None = None
+    """Velocity (6,) of the body relative to the water [m/s, rad/s], body frame; None at rest."""
     wrench_surrogate: Array | None = None
     """Wrench (6,) or (N, 6) that the method itself expected, if it used a learned model."""
     unknown_fins: tuple[str, ...] = ()
@@ -143,7 +145,7 @@ class Allocation(Answer):
 
     def with_command(self, command: Array) -> "Allocation":
         """The same question with another command (n, 3) in place of the answer, judged by the plant."""
-        verdict = evaluate(self.layout, command[None], self.target[None], self.sigma)
+        verdict = evaluate(self.layout, command[None], self.target[None], self.sigma, self.flow)
         return replace(
             self,
             command=command,

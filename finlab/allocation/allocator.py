@@ -15,12 +15,14 @@ from finlab.allocation.notes import fin_notes
 from finlab.allocation.policy import CLOSEST, Policy, as_policy
 from finlab.allocation.question import (
     Fins,
+    check_flow,
     check_layout_and_seed,
     check_previous,
     check_wrenches,
     usable_fins,
 )
 from finlab.allocation.solution import Candidates
+from finlab.arrays import Array
 from finlab.errors import AllocationError
 from finlab.layout import FinModelSpec, Layout
 from finlab.layout.damage import Health
@@ -45,6 +47,7 @@ class Allocator(AllocationMethod):
         reference: ArrayLike | None = None,
         policy: Policy | str = CLOSEST,
         health: Health | None = None,
+        flow: ArrayLike | None = None,
         seed: int = 0,
     ) -> Allocation:
         """Commands for one target.
@@ -61,11 +64,12 @@ class Allocator(AllocationMethod):
             policy: what to do when the wrench is out of reach; see `Policy`.
             health: fins that are weak, stuck at an angle or running on; the result's layout has the limits
                 that are left.
+            flow: velocity (6,) of the body relative to the water [m/s, rad/s], body frame; None at rest.
             seed: the same target, layout and seed give the same answer.
 
         Raises:
-            CommandError: the wrench is not six finite numbers, or `previous` or `reference` has another
-                shape.
+            CommandError: the wrench or the flow is not six finite numbers, or `previous` or `reference` has
+                another shape.
             AllocationError: the method does not know the policy.
             LayoutError: an unknown fin, or none left.
             DataError: a fin's force table cannot be read.
@@ -74,15 +78,17 @@ class Allocator(AllocationMethod):
         check_layout_and_seed(layout, seed)
         self._check_policy(policy)
         fins = usable_fins(layout, failed, health)
+        water = check_flow(flow)
         before = None if previous is None else check_previous(previous, layout)[fins.alive]
         start = time.perf_counter()
         if reference is not None:
             expected = check_wrenches(reference, single=False, name="reference")
             target = self._in_time(fins.healthy, target, expected)
-        solution = self._solve_by(policy, fins.healthy, target[None], seed=seed, previous=before)
+        method = self.at(water)
+        solution = method._solve_by(policy, fins.healthy, target[None], seed=seed, previous=before)
         solve_ms = (time.perf_counter() - start) * 1e3
         command = fins.among_all(solution.command)
-        verdict = evaluate(fins.layout, command, target[None], self.normalization.std)
+        verdict = evaluate(fins.layout, command, target[None], self.normalization.std, water)
         return Allocation(
             layout=fins.layout,
             failed=fins.failed,
@@ -101,10 +107,11 @@ class Allocator(AllocationMethod):
             settings=self.options,
             policy=policy,
             seed=seed,
+            flow=water,
             previous=None if before is None else fins.among_all(before),
             wrench_surrogate=None if solution.wrench_surrogate is None else solution.wrench_surrogate[0],
             unknown_fins=self.unknown_fins(fins.healthy),
-            notes=self._notes(fins.healthy),
+            notes=self._notes(fins.healthy, water),
             candidates=_made(solution.candidates, fins),
             samples=_made(solution.samples, fins),
         )
@@ -120,7 +127,7 @@ class Allocator(AllocationMethod):
         if found is None:
             return ()
         layout = result.layout
-        return find_modes(found, force_sizes(layout, found.command), layout.lower, layout.upper)
+        return find_modes(found, force_sizes(layout, found.command, result.flow), layout.lower, layout.upper)
 
     def alternatives(self, result: Allocation) -> Candidates | None:
         """Many refined answers to the question of a result, its own first, by a wide search.
@@ -132,7 +139,7 @@ class Allocator(AllocationMethod):
         """
         fins = usable_fins(result.layout, result.failed)
         previous = None if result.previous is None else result.previous[fins.alive]
-        solution = self._solve_by(
+        solution = self.at(result.flow)._solve_by(
             result.policy, fins.healthy, result.target[None], seed=result.seed, previous=previous
         )
         again = fins.among_all(solution.command[0])
@@ -143,9 +150,9 @@ class Allocator(AllocationMethod):
             )
         return _made(solution.alternatives or solution.candidates, fins)
 
-    def _notes(self, layout: Layout) -> tuple[str, ...]:
+    def _notes(self, layout: Layout, flow: Array | None) -> tuple[str, ...]:
         """Sentences that the user should read before trusting an answer for this layout."""
-        unknown, notes = self.unknown_fins(layout), fin_notes(layout)
+        unknown, notes = self.unknown_fins(layout), fin_notes(layout, flow)
         if not unknown or self.fin_model is None:
             return notes
         return (
@@ -163,18 +170,19 @@ class Allocator(AllocationMethod):
         failed: Sequence[str] = (),
         policy: Policy | str = CLOSEST,
         health: Health | None = None,
+        flow: ArrayLike | None = None,
         seed: int = 0,
     ) -> BatchAllocation:
         """Commands for many targets (N, 6) on one layout; arguments and errors as in `allocate`."""
         targets, policy = check_wrenches(wrenches, single=False), as_policy(policy)
         check_layout_and_seed(layout, seed)
         self._check_policy(policy)
-        fins = usable_fins(layout, failed, health)
+        fins, water = usable_fins(layout, failed, health), check_flow(flow)
         start = time.perf_counter()
-        solution = self._solve_many(policy, fins.healthy, targets, seed=seed)
+        solution = self.at(water)._solve_many(policy, fins.healthy, targets, seed=seed)
         elapsed_ms = (time.perf_counter() - start) * 1e3
         command = fins.among_all(solution.command)
-        verdict = evaluate(fins.layout, command, targets, self.normalization.std)
+        verdict = evaluate(fins.layout, command, targets, self.normalization.std, water)
         return BatchAllocation(
             layout=fins.layout,
             failed=fins.failed,
@@ -192,9 +200,10 @@ class Allocator(AllocationMethod):
             checkpoint=self.checkpoint,
             policy=policy,
             seed=seed,
+            flow=water,
             wrench_surrogate=solution.wrench_surrogate,
             unknown_fins=self.unknown_fins(fins.healthy),
-            notes=self._notes(fins.healthy),
+            notes=self._notes(fins.healthy, water),
         )
 
 

@@ -36,7 +36,9 @@ class Evaluation(NamedTuple):
     """Whose forces these are."""
 
 
-def evaluate(layout: Layout, command: Array, target: Array, sigma: Array) -> Evaluation:
+def evaluate(
+    layout: Layout, command: Array, target: Array, sigma: Array, flow: Array | None = None
+) -> Evaluation:
     """Judge commands (N, n, 3), NaN for failed fins, by the fins' own models.
 
     Args:
@@ -44,12 +46,13 @@ def evaluate(layout: Layout, command: Array, target: Array, sigma: Array) -> Eva
         command: what its fins do.
         target: desired wrenches (N, 6).
         sigma: per-axis standard deviation (6,) of the error measure.
+        flow: velocity (6,) or (N, 6) relative to the water [m/s, rad/s], body frame; None at rest.
 
     Raises:
         DataError: a fin's force table cannot be read.
     """
     plant = plant_of(layout)
-    force, effectiveness = plant.forces(command), plant.effectiveness
+    force, effectiveness = plant.forces(command, flow=flow), plant.effectiveness
     # The first half of a column is its fin's axis in the body frame.
     fin_forces = np.matmul(force[..., None, :], effectiveness[..., :3])[..., 0, :]
     wrench = wrench_of_forces(force, effectiveness)

@@ -2,6 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
+from copy import copy
 from dataclasses import fields
 from functools import lru_cache
 from typing import Any, Self
@@ -41,8 +42,19 @@ class AllocationMethod(ABC):
     """What can be set."""
     settings: Settings = Settings()
     """Present settings."""
+    flow: Array | None = None
+    """Velocity (6,) of the body relative to the water at which it answers [m/s, rad/s], body frame; None at
+    rest."""
     fin_model: FinModelSpec | None = None
     """Fin model that the networks have learned; None for methods that ask every fin's own model."""
+
+    def at(self, flow: Array | None) -> Self:
+        """The same method for a robot that moves through the water; what it has prepared is shared."""
+        if flow is None:
+            return self
+        other = copy(self)
+        other.flow = flow
+        return other
 
     def unknown_fins(self, layout: Layout) -> tuple[str, ...]:
         """Names of the fins whose model the networks have not learned; answers for them are wrong."""
@@ -137,7 +149,7 @@ class AllocationMethod(ABC):
         """Which of the targets (N, 6) are met, by the method's own model, or the plant where it has none."""
         wrench = solution.wrench_surrogate
         if wrench is None:
-            wrench = plant_of(layout).wrench(solution.command)
+            wrench = plant_of(layout).wrench(solution.command, flow=self.flow)
         return self.normalization.error(wrench, targets) <= REACHED
 
     def _solve_many(self, policy: Policy, layout: Layout, targets: Array, *, seed: int) -> Solution:

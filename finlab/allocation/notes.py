@@ -6,8 +6,9 @@ import numpy as np
 
 from finlab.actuators.fin.models import file_stamps
 from finlab.actuators.fin.table_file import DOUBT
+from finlab.arrays import Array
 from finlab.layout import FinModelSpec, Layout, Limits
-from finlab.physics import FinLaw, TableLaw, make_law
+from finlab.physics import FinLaw, TableLaw, make_law, plant_of
 
 RESTLESS = 0.05
 """Share of its largest force below which a fin counts as able to rest."""
@@ -17,13 +18,21 @@ BEYOND = 1e-6
 """By how much [rad, Hz] limits may exceed a table unnoticed."""
 
 
-def fin_notes(layout: Layout) -> tuple[str, ...]:
+def fin_notes(layout: Layout, flow: Array | None = None) -> tuple[str, ...]:
     """Returns a sentence for each fin that cannot rest, and for each that may leave its table; before them,
-    why the layout itself is not to be trusted, where its description begins so.
+    why the layout itself is not to be trusted, where its description begins so; and one where a flow (6,) is
+    given that no actuator feels.
 
     Neither is an error: a servo may be stuck, or a fin may have been damaged so that it runs on.
     """
-    return _made(layout, file_stamps(layout))
+    notes = _made(layout, file_stamps(layout))
+    if flow is None or plant_of(layout).feels_flow:
+        return notes
+    return (
+        *notes,
+        f"the flow is without effect: layout {layout.name} does not say what speed through the water takes "
+        "from its fins (interaction.inflow), and it has no rudder",
+    )
 
 
 @lru_cache(maxsize=256)

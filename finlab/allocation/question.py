@@ -15,6 +15,9 @@ from finlab.layout.damage import Health
 MAX_WRENCH = 1e6
 """Largest magnitude of a target component [N, N m]; beyond it something is wrong upstream."""
 
+MAX_FLOW = 100.0
+"""Largest magnitude of a component of the flow [m/s, rad/s]."""
+
 
 class Fins(NamedTuple):
     """Which fins there are, and which of them an allocator may use."""
@@ -79,6 +82,25 @@ def check_wrenches(wrench: ArrayLike, *, single: bool, name: str = "wrench") -> 
         value = array[bad][0]
         raise CommandError(f"{name}: {axis} must be finite and at most {MAX_WRENCH:g} in size, got {value}")
     return array
+
+
+def check_flow(flow: ArrayLike | None) -> Array | None:
+    """The velocity (6,) of the body relative to the water as finite float64; None at rest, or a
+    `CommandError` that says what is wrong."""
+    if flow is None:
+        return None
+    expected = "expected six numbers [VX, VY, VZ, WX, WY, WZ] in m/s and rad/s, body relative to the water"
+    try:
+        array = np.array(flow, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise CommandError(f"flow: {expected}, got {flow!r:.100}") from error
+    if array.shape != (6,):
+        raise CommandError(f"flow: {expected}, got an array of shape {array.shape}")
+    if not (np.abs(array) <= MAX_FLOW).all():
+        raise CommandError(
+            f"flow: each component must be finite and at most {MAX_FLOW:g} in size, got {flow!r:.100}"
+        )
+    return array if array.any() else None
 
 
 def check_layout_and_seed(layout: object, seed: object) -> None:

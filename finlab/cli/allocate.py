@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from finlab.layout import Layout
 
 Wrench = tuple[float, float, float, float, float, float]
+Flow = Wrench
 
 
 def allocate(
@@ -29,6 +30,7 @@ def allocate(
     health: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME=SHARE")] = (),
     stuck: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME=DEG")] = (),
     running: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME=A,F,DEG")] = (),
+    flow: Annotated[Flow | None, arg(metavar="VX VY VZ WX WY WZ")] = None,
     bound: bool = False,
     seed: Annotated[int, arg(metavar="N")] = 0,
     json: JsonFile = None,
@@ -48,6 +50,7 @@ def allocate(
         health: a weak fin: share that is left of its largest amplitude and frequency, such as bow=0.5.
         stuck: a fin that no longer turns: the zero direction at which it stays [deg].
         running: a fin that no longer listens: the command that it keeps [rad, Hz, deg].
+        flow: velocity of the robot relative to the water, body frame [m/s, rad/s]; it is at rest by default.
         bound: tell as well the power [W] that no answer can undercut.
         seed: same target, layout and seed, same answer.
         json: file for one JSON object; it is printed in place of the table where no file is named.
@@ -64,7 +67,9 @@ def allocate(
     answer = policy_from(policy, axis_weights, priority)
     damage = Health.parse(health, stuck, running)
     lost = robot.with_failed(failed)
-    result = allocator.allocate(robot.layout, wrench, failed=lost, policy=answer, health=damage, seed=seed)
+    result = allocator.allocate(
+        robot.layout, wrench, failed=lost, policy=answer, health=damage, flow=flow, seed=seed
+    )
     lost_axes = axes_lost(robot.layout, result.layout, lost) if lost or damage is not None else None
     least = allocator.bound(result) if bound else None
     record, lines = allocation_record(result), [str(result)]

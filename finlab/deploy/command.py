@@ -69,7 +69,11 @@ def allocate(arguments: argparse.Namespace) -> int:
     from finlab.deploy.record import allocation_record
 
     answer = _robot(arguments).allocate(
-        arguments.wrench, failed=arguments.failed, policy=arguments.policy, seed=arguments.seed
+        arguments.wrench,
+        failed=arguments.failed,
+        policy=arguments.policy,
+        flow=arguments.flow,
+        seed=arguments.seed,
     )
     print(json.dumps(allocation_record(answer), allow_nan=False) if arguments.json else answer)
     return 0
@@ -154,6 +158,9 @@ def _parser() -> argparse.ArgumentParser:
     one.add_argument("--wrench", nargs=6, type=float, required=True, metavar=names, help="[N, N m]")
     one.add_argument("--failed", action="append", default=[], metavar="NAME", help="fin that is lost")
     one.add_argument("--policy", choices=POLICIES, default="closest", help="what to do out of reach")
+    speeds = ("VX", "VY", "VZ", "WX", "WY", "WZ")
+    through = "velocity relative to the water [m/s, rad/s]"
+    one.add_argument("--flow", nargs=6, type=float, metavar=speeds, help=through)
     one.add_argument("--seed", type=int, default=0, help="seed of the candidates")
     one.add_argument("--json", action="store_true", help="print one JSON object")
     loop = verb(

@@ -11,7 +11,7 @@ MAX_LINE = 65_536
 """Longest request that is read [bytes]."""
 MAX_ID = 1_000
 """Longest `id`, as JSON [characters]."""
-KEYS = ("wrench", "id", "failed", "policy", "reference")
+KEYS = ("wrench", "id", "failed", "policy", "reference", "flow")
 """What a request may hold."""
 
 

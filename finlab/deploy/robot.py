@@ -49,6 +49,7 @@ class DeployedRobot:
         previous: ArrayLike | None = None,
         reference: ArrayLike | None = None,
         policy: Policy | str = CLOSEST,
+        flow: ArrayLike | None = None,
         seed: int = 0,
     ) -> Allocation:
         """Commands for one target; arguments and errors as in `finlab.Allocator.allocate`.
@@ -64,6 +65,7 @@ class DeployedRobot:
             previous=previous,
             reference=reference,
             policy=policy,
+            flow=flow,
             seed=seed,
         )
         works = [name not in lost for name in self.layout.names]

@@ -1,7 +1,8 @@
 """`finlab-runtime serve`: targets in, commands out, as lines of JSON; safe when no targets come any more.
 
-A request is `{"wrench": [Fx, Fy, Fz, Tx, Ty, Tz]}`, with `id`, `failed`, `policy` and `reference`, the
-wrenches that are expected at the next ticks of 0.1 s, if wanted. Each answer says in `status` what it is:
+A request is `{"wrench": [Fx, Fy, Fz, Tx, Ty, Tz]}`, with `id`, `failed`, `policy`, `reference`, the
+wrenches that are expected at the next ticks of 0.1 s, and `flow`, the velocity of the body relative to the
+water [m/s, rad/s], if wanted. Each answer says in `status` what it is:
 
 =========  ============================================================================================
 status     meaning
@@ -128,6 +129,7 @@ class Server:
                 previous=previous,
                 reference=request.get("reference"),
                 policy=request.get("policy", "closest"),
+                flow=request.get("flow"),
             )
 
         if self._timing.deadline is None:

@@ -43,7 +43,7 @@ FRAME = to_builtins(Frame())
 
 LIMITS, SERVO = form(Limits), form(Servo)
 BODY = form(Body, hull=form(Hull))
-INTERACTION = form(Interaction, jets=list[form(Jet)], velocity=None)  # type: ignore[misc]
+INTERACTION = form(Interaction, jets=list[form(Jet)])  # type: ignore[misc]
 FIN = form(
     Fin,
     {"position": "position_m", "mounting_angle": "mounting_angle_deg"},
@@ -152,7 +152,6 @@ def layout_to_dict(layout: Layout) -> dict[str, Any]:
         data["body"] = _plain(asdict(layout.body))
     if layout.interaction is not None:
         data["interaction"] = _plain(asdict(layout.interaction))
-        del data["interaction"]["velocity"]
     return data
 
 

@@ -22,7 +22,6 @@ MAX_SHARE = 2.0
 Share = Annotated[float, Meta(ge=-MAX_SHARE, le=MAX_SHARE)]
 """A coefficient of a share of thrust."""
 Two = Meta(min_length=2, max_length=2)
-Six = Meta(min_length=6, max_length=6)
 
 
 @dataclass(frozen=True)
@@ -55,8 +54,6 @@ class Interaction(Checked):
     as much."""
     inflow: Annotated[tuple[Share, ...], Two] = (0.0, 0.0)
     """Coefficients p and q of what speed through the water takes."""
-    velocity: Annotated[tuple[Annotated[float, Meta(ge=-100.0, le=100.0)], ...], Six] = (0.0,) * 6
-    """The robot's velocity relative to the water [m/s, rad/s], body frame; of now, and in no file."""
 
     def __post_init__(self) -> None:
         super().__post_init__()

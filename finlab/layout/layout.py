@@ -149,23 +149,6 @@ class Layout(Checked):
         left = self.interaction and self.interaction.among([fin.name for fin in fins])
         return replace(self, fins=fins, interaction=left)
 
-    def moving(self, velocity: ArrayLike) -> "Layout":
-        """Returns the layout as it is at a velocity relative to the water (6,) [m/s, rad/s], body frame.
-
-        The velocity is rounded to 0.01, so that what is prepared for a layout serves again.
-
-        Raises:
-            LayoutError: the velocity is not six finite numbers, or the layout does not say what speed takes
-                from its fins (`has_inflow`), so that it would be without effect.
-        """
-        if self.interaction is None or not self.has_inflow:
-            raise LayoutError(
-                f"layout {self.name} does not say what speed takes from its fins, so a velocity is without "
-                "effect; give interaction.inflow, as `finlab fit robot` finds it, or leave the velocity out"
-            )
-        rounded = tuple(np.round(np.asarray(velocity, np.float64), 2).tolist())
-        return replace(self, interaction=replace(self.interaction, velocity=rounded))
-
     def replace_fin(self, name: str, /, **changes: Any) -> "Layout":
         """Returns the layout with some fields of one fin changed, such as `position=(0.1, 0, 0)`."""
         i = self.index(name)

@@ -15,16 +15,19 @@ class CoupledPlant(Plant):
         super().__init__(layout)
         assert layout.interaction is not None
         self.coupling = Coupling(layout, layout.interaction, self.effectiveness, self.blade.length)
+        self.feels_flow |= layout.has_inflow
 
-    def force(self, command: Array) -> Array:
+    def force(self, command: Array, *, flow: Array | None = None) -> Array:
         """See `Plant`."""
-        alone = super().force(command)
-        return alone * self.coupling.kept(alone, command)[..., None]
+        inflow = self.inflow(flow)
+        alone = self._force(command, inflow)
+        return alone * self.coupling.kept(alone, command, inflow)[..., None]
 
-    def force_and_jacobian(self, command: Array) -> tuple[Array, Array]:
+    def force_and_jacobian(self, command: Array, *, flow: Array | None = None) -> tuple[Array, Array]:
         """See `Plant`; the derivatives of each fin's force by its own command, the other fins unchanged."""
-        alone, jacobian = super().force_and_jacobian(command)
-        kept, by_command = self.coupling.kept_and_jacobian(alone, jacobian, command)
+        inflow = self.inflow(flow)
+        alone, jacobian = self._force_and_jacobian(command, inflow)
+        kept, by_command = self.coupling.kept_and_jacobian(alone, jacobian, command, inflow)
         n = np.arange(self.n_fins)
         own = np.moveaxis(by_command[..., n, :, n], 0, -2)
         jacobian = jacobian * kept[..., None, None] + own[..., None] * alone[..., None, :]
@@ -36,20 +39,21 @@ class CoupledPlant(Plant):
         the others, too."""
         return WrenchParts(self), np.broadcast_to(np.eye(6), (self.n_fins, 6, 6))
 
-    def linearize(self, command: Array) -> tuple[Array, Array]:
+    def linearize(self, command: Array, *, flow: Array | None = None) -> tuple[Array, Array]:
         """See `Plant`."""
-        shares, jacobian = self.shares_and_jacobian(command)
-        jacobian = jacobian.reshape(*command.shape[:-2], 3 * self.n_fins, 6)
+        shares, jacobian = self.shares_and_jacobian(command, flow=flow)
+        jacobian = jacobian.reshape(*shares.shape[:-2], 3 * self.n_fins, 6)
         return shares.sum(axis=-2), jacobian.swapaxes(-1, -2)
 
-    def shares_and_jacobian(self, command: Array) -> tuple[Array, Array]:
+    def shares_and_jacobian(self, command: Array, *, flow: Array | None = None) -> tuple[Array, Array]:
         """Each fin's part of the wrench (..., n, 6), and the derivatives of the whole wrench by each command
         of each fin (..., n, 3, 6)."""
-        alone, own = super().force_and_jacobian(command)
-        kept, by_command = self.coupling.kept_and_jacobian(alone, own, command)
+        inflow = self.inflow(flow)
+        alone, own = self._force_and_jacobian(command, inflow)
+        kept, by_command = self.coupling.kept_and_jacobian(alone, own, command, inflow)
         by_alone = np.einsum("...na,nab->...nb", alone, self.effectiveness)
         jacobian = (own @ self.effectiveness) * kept[..., None, None]
-        jacobian += by_command @ by_alone[..., None, :, :]
+        jacobian = jacobian + by_command @ by_alone[..., None, :, :]
         return by_alone * kept[..., None], jacobian
 
 

@@ -27,33 +27,36 @@ class Coupling:
         """Takes the columns (n, 3, 6) of the plant and the fins' lengths (n,) [m]."""
         self.half_thrust = interaction.half_thrust_n
         self.kappa = interaction.narrowness * WIDE_AND_NARROW
-        self.inflow = np.array(interaction.inflow)
+        self.taken = np.array(interaction.inflow)
+        """Coefficients p and q of what speed takes."""
         place = {name: i for i, name in enumerate(layout.names)}
         self.share = np.zeros((layout.n_fins, layout.n_fins, 2))
         """What the jet of fin j (first) takes from fin i (second)."""
         for jet in interaction.jets:
             self.share[place[jet.source], place[jet.target]] = jet.share
-        velocity = np.array(interaction.velocity)
         self.way = jet_ways(layout.position, effectiveness)
         self.length = length
-        self.foot = foot_velocity(layout.position, effectiveness, velocity)
 
-    def kept(self, force: Array, command: Array) -> Array:
-        """Share (..., n) that fins keep of the forces (..., n, 3) that each gives by itself, in its frame."""
+    def kept(self, force: Array, command: Array, inflow: Array | None = None) -> Array:
+        """Share (..., n) that fins keep of the forces (..., n, 3) that each gives by itself, in its frame,
+        where their places move with `inflow` (..., n, 3) [m/s]."""
         met = jet_terms(force, self.way, self.half_thrust, self.kappa)
         lost = np.einsum("...jik,jik->...i", met, self.share)
-        if self.foot.any() and self.inflow.any():
-            lost = lost + inflow_terms(force, command, self.foot, self.length) @ self.inflow
+        if inflow is not None:
+            lost = lost + inflow_terms(force, command, inflow, self.length) @ self.taken
         result: Array = 1.0 - lost
         return result
 
-    def kept_and_jacobian(self, force: Array, jacobian: Array, command: Array) -> tuple[Array, Array]:
+    def kept_and_jacobian(
+        self, force: Array, jacobian: Array, command: Array, inflow: Array | None = None
+    ) -> tuple[Array, Array]:
         """`kept`, and its derivatives (..., n, 3, n) by the commands of fin j, of what fin i keeps.
 
         Args:
             force: (..., n, 3) by the fins alone.
-            slopes: their derivatives (..., n, 3 commands, 3 axes).
+            jacobian: their derivatives (..., n, 3 commands, 3 axes).
             command: (..., n, 3).
+            inflow: velocities (..., n, 3) of their places [m/s], own frames; None at rest.
         """
         thrust = np.sqrt((force * force).sum(-1))
         unit = force / np.maximum(thrust, LEAST)[..., None]
@@ -69,25 +72,26 @@ class Coupling:
         by_force = (steep * over[..., None])[..., None] * across + wide[..., None] * along
         by_command = -np.einsum("...jka,...jia->...jki", jacobian, by_force)
         kept = 1.0 - lost
-        if self.foot.any() and self.inflow.any():
-            taken, own = self._inflow_and_jacobian(unit, thrust, jacobian, command)
+        if inflow is not None:
+            taken, own = self._inflow_and_jacobian(unit, thrust, jacobian, command, inflow)
             kept = kept - taken
             n = np.arange(force.shape[-2])
+            by_command = np.broadcast_to(by_command, (*kept.shape, 3, len(n))).copy()
             by_command[..., n, :, n] -= np.moveaxis(own, -2, 0)
         return kept, by_command
 
     def _inflow_and_jacobian(
-        self, unit: Array, thrust: Array, jacobian: Array, command: Array
+        self, unit: Array, thrust: Array, jacobian: Array, command: Array, inflow: Array
     ) -> tuple[Array, Array]:
         """What speed takes (..., n), and its derivatives (..., n, 3) by each fin's own command."""
-        speed = np.einsum("na,...na->...n", self.foot, unit)
+        speed = np.einsum("...na,...na->...n", inflow, unit)
         beat = 2.0 * math.pi * self.length
         tip = beat * command[..., 0] * command[..., 1]
         pace = np.sqrt(tip * tip + SLOW**2)
         t = np.tanh(speed / pace)
-        p, q = self.inflow
+        p, q = self.taken
         outer = (p + 2.0 * q * t) * (1.0 - t * t)
-        turn = (self.foot - speed[..., None] * unit) / np.maximum(thrust, LEAST)[..., None]
+        turn = (inflow - speed[..., None] * unit) / np.maximum(thrust, LEAST)[..., None]
         by = np.einsum("...nka,...na->...nk", jacobian, turn) / pace[..., None]
         fall = -speed * tip / pace**3 * beat
         by[..., 0] += fall * command[..., 1]
@@ -115,18 +119,10 @@ def jet_terms(force: Array, way: Array, half_thrust: float, kappa: Array) -> Arr
     return result
 
 
-def foot_velocity(position: Array, effectiveness: Array, velocity: Array) -> Array:
-    """Velocity (..., n, 3) of each fin's place through the water, in its own frame [m/s], of a robot that
-    moves with (..., 6)."""
-    moved = velocity[..., None, :3] + np.cross(velocity[..., None, 3:], position)
-    result: Array = np.einsum("...nb,nab->...na", moved, effectiveness[..., :3])
-    return result
-
-
-def inflow_terms(force: Array, command: Array, foot: Array, length: Array) -> Array:
-    """tanh J and its square (..., n, 2), for forces (..., n, 3), commands (..., n, 3) and `foot_velocity`."""
+def inflow_terms(force: Array, command: Array, inflow: Array, length: Array) -> Array:
+    """tanh J and its square (..., n, 2), for forces, commands and `inflow_of` (..., n, 3)."""
     thrust = np.sqrt((force * force).sum(-1))
-    speed = (foot * force).sum(-1) / np.maximum(thrust, LEAST)
+    speed = (inflow * force).sum(-1) / np.maximum(thrust, LEAST)
     tip = 2.0 * math.pi * length * command[..., 0] * command[..., 1]
     t = np.tanh(speed / np.sqrt(tip * tip + SLOW**2))
     return np.stack([t, t * t], axis=-1)

@@ -1,22 +1,26 @@
 """The plant: what a robot's fins really do, in numpy and float64.
 
-It judges every allocation method, and the model-based methods optimize over it.
+It judges every allocation method, and the model-based methods optimize over it. `flow` (..., 6) is the
+velocity of the body relative to the water [m/s, rad/s], body frame; None is a robot at rest.
 """
 
+from copy import copy
 from dataclasses import astuple
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from finlab.actuators.fin.blade import Blade
 from finlab.actuators.fin.models import make_law, stack_laws
+from finlab.actuators.law import FinLaw
 from finlab.arrays import Array
 from finlab.errors import CommandError
 from finlab.layout.angles import TURN, is_full_turn
 from finlab.layout.arrays import force_effectiveness
 from finlab.layout.layout import Layout
+from finlab.physics.inflow import inflow_of
 from finlab.physics.wrench import body_force, wrench_of_forces
 
 
@@ -38,12 +42,34 @@ class Plant:
         self.effectiveness: Array = force_effectiveness(layout.position, layout.mounting_angle)
         """Wrench (n, 3, 6) of 1 N along each fin's shaft, horizontal axis and z."""
         self._laws = stack_laws([fin.model for fin in layout.fins])
+        self.feels_flow = any(law.feels_flow for _, law in self._laws)
+        """Whether forces depend on the flow."""
+        self.flow: Array | None = None
+        """The flow (..., 6) where a call names none."""
 
-    def wrench(self, command: ArrayLike) -> Array:
+    def at(self, flow: ArrayLike | None) -> Self:
+        """Returns the plant for those who ask it many times at one flow (..., 6); itself where the flow is
+        without effect."""
+        if flow is None or not self.feels_flow:
+            return self
+        other = copy(self)
+        other.flow = np.asarray(flow, np.float64)
+        return other
+
+    def inflow(self, flow: Array | None) -> Array | None:
+        """Returns the velocity (..., n, 3) of each fin's place through the water in its own frame [m/s]; None
+        at rest, or where no force depends on it."""
+        flow = self.flow if flow is None else flow
+        if flow is None or not self.feels_flow:
+            return None
+        return inflow_of(np.asarray(flow, np.float64), self.layout.position, self.effectiveness[..., :3])
+
+    def wrench(self, command: ArrayLike, *, flow: Array | None = None) -> Array:
         """Returns the wrench that a command causes.
 
         Args:
             command: (..., n, 3) [rad, Hz, rad]; a row of NaN is a failed fin and gives no force.
+            flow: (..., 6), or None at rest.
 
         Returns:
             (..., 6) [N, N m], body frame.
@@ -51,47 +77,56 @@ class Plant:
         Raises:
             CommandError: the shape does not fit the layout, or a value is infinite or partly NaN.
         """
-        wrench: Array = wrench_of_forces(self.forces(command), self.effectiveness)
+        wrench: Array = wrench_of_forces(self.forces(command, flow=flow), self.effectiveness)
         return wrench
 
-    def forces(self, command: ArrayLike) -> Array:
+    def forces(self, command: ArrayLike, *, flow: Array | None = None) -> Array:
         """Returns each fin's mean force (..., n, 3) [N] in its own frame (shaft, e_h, e_z); see `wrench`."""
         values, failed = self._checked(command)
-        force = self.force(values)
+        force = self.force(values, flow=flow)
         if failed is not None:
-            force[failed] = 0.0
+            force[np.broadcast_to(failed, force.shape[:-1])] = 0.0
         return force
 
-    def force(self, command: Array) -> Array:
+    def force(self, command: Array, *, flow: Array | None = None) -> Array:
         """Returns forces (..., n, 3) [N] in fin frames of commands (..., n, 3) known to be finite."""
-        if len(self._laws) == 1:
+        return self._force(command, self.inflow(flow))
+
+    def force_and_jacobian(self, command: Array, *, flow: Array | None = None) -> tuple[Array, Array]:
+        """Returns `force` and its derivatives (..., n, 3 commands, 3 axes)."""
+        return self._force_and_jacobian(command, self.inflow(flow))
+
+    def _force(self, command: Array, inflow: Array | None) -> Array:
+        """`force` of each fin by itself, at velocities (..., n, 3) of their places, see `inflow`."""
+        if len(self._laws) == 1 and inflow is None:
             alone: Array = self._laws[0][1].force(command)
             return alone
-        force = np.empty_like(command)
+        force = np.empty(_broadcast(command, inflow))
         for places, law in self._laws:
-            force[..., places, :] = law.force(command[..., places, :])
+            force[..., places, :] = law.force(command[..., places, :], *_met(law, inflow, places))
         return force
 
-    def force_and_jacobian(self, command: Array) -> tuple[Array, Array]:
-        """Returns `force` and its derivatives (..., n, 3 commands, 3 axes)."""
-        if len(self._laws) == 1:
+    def _force_and_jacobian(self, command: Array, inflow: Array | None) -> tuple[Array, Array]:
+        """`_force` and its derivatives (..., n, 3 commands, 3 axes)."""
+        if len(self._laws) == 1 and inflow is None:
             return self._laws[0][1].force_and_jacobian(command)
-        force, jacobian = np.empty(command.shape), np.empty((*command.shape, 3))
+        shape = _broadcast(command, inflow)
+        force, jacobian = np.empty(shape), np.empty((*shape, 3))
         for places, law in self._laws:
-            answer = law.force_and_jacobian(command[..., places, :])
+            answer = law.force_and_jacobian(command[..., places, :], *_met(law, inflow, places))
             force[..., places, :], jacobian[..., places, :, :] = answer
         return force, jacobian
 
-    def fin_forces(self, command: ArrayLike) -> Array:
+    def fin_forces(self, command: ArrayLike, *, flow: Array | None = None) -> Array:
         """Returns each fin's mean force (..., n, 3) [N] in the body frame; see `wrench`."""
-        force: Array = body_force(self.forces(command), self.layout.mounting_angle)
+        force: Array = body_force(self.forces(command, flow=flow), self.layout.mounting_angle)
         return force
 
-    def linearize(self, command: Array) -> tuple[Array, Array]:
+    def linearize(self, command: Array, *, flow: Array | None = None) -> tuple[Array, Array]:
         """Returns wrenches (..., 6) of commands (..., n, 3) without failed fins, and their derivatives
         (..., 6, 3 n), fin by fin."""
-        force, jacobian = self.force_and_jacobian(command)
-        jacobian = (jacobian @ self.effectiveness).reshape(*command.shape[:-2], 3 * self.n_fins, 6)
+        force, jacobian = self.force_and_jacobian(command, flow=flow)
+        jacobian = (jacobian @ self.effectiveness).reshape(*force.shape[:-2], 3 * self.n_fins, 6)
         wrench: Array = wrench_of_forces(force, self.effectiveness)
         return wrench, jacobian.swapaxes(-1, -2)
 
@@ -164,3 +199,13 @@ class Plant:
                 "a failed fin has NaN in all three entries, any other has none"
             )
         return values, failed
+
+
+def _broadcast(command: Array, inflow: Array | None) -> tuple[int, ...]:
+    """Shape (..., n, 3) of forces."""
+    return command.shape if inflow is None else np.broadcast_shapes(command.shape, inflow.shape)
+
+
+def _met(law: FinLaw, inflow: Array | None, places: Any) -> tuple[Array, ...]:
+    """What a law is told beside the commands: the velocities of its actuators' places, where they count."""
+    return () if inflow is None or not law.feels_flow else (inflow[..., places, :],)

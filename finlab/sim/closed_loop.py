@@ -116,6 +116,7 @@ class ClosedLoop:
         self._fin_force = make_plant(plant, truth)
         self._hanging = HangingFins(truth)
         self._plant = plant_of(layout)
+        self._flow: Array | None = None
         self._blade, self._copper_loss = plant_of(truth).blade, copper_loss
         self._sensors = Sensors(SensorSettings() if sensors is None else sensors, np.random.default_rng(seed))
         self._pending = sorted(events, key=lambda event: event.time_s)
@@ -234,17 +235,17 @@ class ClosedLoop:
         now = self._sensors.measure(time, self.state)
         if self.monitor is not None:
             self.verdict = self.monitor.step(now, self._command)
+        if self._plant.feels_flow:  # what the sensors know of it: the water itself is taken to rest
+            self._flow = np.concatenate([now.velocity, now.rates])
         setpoint, lead = self.task.setpoint(time), self.controller.lead_s
         whole = self._complete()
         followed = self.task.setpoint(time + lead) if lead else setpoint
         asked = whole(self.controller.wrench(now, followed, self._given()))
-        layout = self.layout
-        if layout.has_inflow:
-            layout = layout.moving((*now.velocity, *now.rates))
         answer = self.allocator.allocate(
-            layout,
+            self.layout,
             asked,
             **self.damage._asdict(),
+            flow=self._flow,
             previous=self._answered,
             reference=self._reference(time, whole),
             policy=self.policy,
@@ -282,7 +283,7 @@ class ClosedLoop:
             return NO_WRENCH
         self._lag.step(self._command, self.period_s)
         motion = self._lag.command
-        force = self._plant.force(motion) * (motion[:, :1] * motion[:, 1:2] > 0.0)
+        force = self._plant.force(motion, flow=self._flow) * (motion[:, :1] * motion[:, 1:2] > 0.0)
         before, self._gave = self._gave, force.ravel() @ self._plant.effectiveness.reshape(-1, 6)
         return 0.5 * (before + self._gave)
 
@@ -353,7 +354,7 @@ class ClosedLoop:
             reference=setpoint.position,
             reference_surge=setpoint.surge,
             asked=asked,
-            allocated=self._plant.wrench(np.where(commanded, command, 0.0)),
+            allocated=self._plant.wrench(np.where(commanded, command, 0.0), flow=self._flow),
             delivered=mean.sum(axis=0),
             command=command,
             fin_motion=self.fins.command,

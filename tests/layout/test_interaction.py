@@ -20,11 +20,10 @@ def coupled() -> Layout:
 
 
 @pytest.mark.parametrize("suffix", ["yaml", "json"])
-def test_files_keep_all_but_the_velocity(coupled: Layout, tmp_path: Path, suffix: str) -> None:
+def test_files_keep_it(coupled: Layout, tmp_path: Path, suffix: str) -> None:
     path = tmp_path / f"robot.{suffix}"
-    save_layout(coupled.moving((0.1, 0, 0, 0, 0, 0)), path)
+    save_layout(coupled, path)
     assert load_layout(path) == coupled
-    assert "velocity" not in path.read_text()
 
 
 def test_it_fits_the_schema(coupled: Layout) -> None:
@@ -51,14 +50,6 @@ def test_layouts_with_and_without_it_are_two(coupled: Layout) -> None:
     plain = replace(coupled, interaction=None)
     assert plain != coupled and hash(plain) != hash(coupled)
     assert coupled.has_inflow and not plain.has_inflow
-    with pytest.raises(LayoutError, match="does not say what speed takes from its fins"):
-        plain.moving((1, 0, 0, 0, 0, 0))
-
-
-def test_velocities_are_rounded_so_that_what_is_prepared_serves_again(coupled: Layout) -> None:
-    assert coupled.moving((0.101, 0, 0, 0, 0, 0.2)) == coupled.moving((0.099, 0, 0, 0, 0, 0.2))
-    with pytest.raises(LayoutError, match="velocity"):
-        coupled.moving((0.1, 0, 0))
 
 
 def test_a_fin_may_be_renamed_and_lost(coupled: Layout) -> None:

@@ -68,7 +68,7 @@ class ModelBased(Allocator):
         """
 
     def _solve(self, layout: Layout, targets: Array, *, seed: int, previous: Array | None) -> Solution:
-        plant = plant_of(layout)
+        plant = plant_of(layout).at(self.flow)
         command = self._commands(plant, targets, seed)
         return Solution(plant.feasible(command))
 

@@ -64,6 +64,13 @@ class Prepared(NamedTuple):
     """What thresholds on the normalized error are multiplied by: less than one for a robot that is weak
     beside the error's yardstick."""
 
+    def at(self, flow: Array | None, std: Array) -> "Prepared":
+        """The same layout at a flow (6,); `std` (6,) normalizes wrenches."""
+        plant = self.plant.at(flow)
+        if plant is self.plant:
+            return self
+        return self._replace(plant=plant, commands=CommandProblem.of(plant, std))
+
 
 def prepare(layout: Layout, std: Array, objective: Objective) -> Prepared:
     """Prepare a layout whose fins are all healthy; `std` (6,) normalizes wrenches.

@@ -99,7 +99,7 @@ class SearchAllocator(Allocator):
         previous: Array | None,
         fallback: FallbackForces = nearest_forces,
     ) -> Solution:
-        prepared = self.pipeline.prepare(layout)
+        prepared = self.pipeline.prepare(layout).at(self.flow, self.normalization.std)
         if len(targets) == 1:
             with self._one_thread():
                 beginning = self._beginning(prepared, targets, seed)

@@ -81,7 +81,7 @@ def _errors(drawn: Layout, robot: Layout, allocator: Allocator, plant: str, targ
     velocity = rng.uniform(-FASTEST, FASTEST, (targets, 6))
     command = np.array(
         [
-            allocator.allocate(robot.moving(water) if robot.has_inflow else robot, target, seed=seed).command
+            allocator.allocate(robot, target, flow=water, seed=seed).command
             for target, water in zip(wanted, velocity, strict=True)
         ]
     )

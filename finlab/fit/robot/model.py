@@ -11,7 +11,8 @@ from finlab.fit.robot.unknowns import SENSORS, Unknowns, blocks_of
 from finlab.layout import Layout
 from finlab.layout.arrays import force_effectiveness
 from finlab.physics import plant_of
-from finlab.physics.coupling import WIDE_AND_NARROW, foot_velocity, inflow_terms, jet_terms, jet_ways
+from finlab.physics.coupling import WIDE_AND_NARROW, inflow_terms, jet_terms, jet_ways
+from finlab.physics.inflow import inflow_of
 from finlab.vehicle.body import complete_body, dynamics_of
 from finlab.vehicle.fossen import Dynamics
 from finlab.vehicle.many_bodies import Bodies
@@ -83,7 +84,7 @@ class RobotModel:
             met = jet_terms(force, jet_ways(position, columns), half_thrust, narrowness * WIDE_AND_NARROW)
             kept -= np.einsum("msjik,jik->msi", met, jet_shares(jets, layout.n_fins))
         if inflow is not None:
-            foot = foot_velocity(position, columns, self.velocity)[:, None]
+            foot = inflow_of(self.velocity, position, columns[..., :3])[:, None]
             kept -= inflow_terms(force, self.motion, foot, self.length) @ inflow
         mean = (force * kept[..., None]).mean(axis=1)
         beat = unknowns.part("beat", vector)

@@ -35,8 +35,7 @@ def swim(truth: Layout, seconds: float, seed: int, noise: float = 1.0) -> tuple[
         for _ in range(5):
             fins.step(command, STEP_S / 5)
             moving = fins.command
-            now = truth.moving(vehicle.velocity_in_water(state)) if truth.has_inflow else truth
-            wrench = plant_of(now).wrench(plant.feasible(moving))
+            wrench = plant.wrench(plant.feasible(moving), flow=vehicle.velocity_in_water(state))
             state = vehicle.step(state, wrench.tolist(), STEP_S / 5)
     return commands, measured + noise * NOISE * rng.standard_normal(measured.shape)
 
