@@ -16,7 +16,7 @@ def main() -> None:
     layout = Layout(
         name="tripod",
         description="One fin at the stern, two at the sides.",
-        fins=(
+        actuators=(
             Fin("stern", (-0.25, 0.0, 0.0), math.pi, strong),
             Fin("port", (0.1, 0.2, 0.0), math.radians(90)),
             Fin("starboard", (0.1, -0.2, 0.0), math.radians(-90)),

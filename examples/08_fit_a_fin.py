@@ -23,7 +23,7 @@ def main() -> None:
         write_fin(fit, path)
         model = FinModelSpec("table", (("path", str(path)),))
         layout = finlab.load_layout("A")
-        layout = replace(layout, fins=tuple(replace(fin, model=model) for fin in layout.fins))
+        layout = replace(layout, actuators=tuple(replace(fin, model=model) for fin in layout.fins))
         result = finlab.load_allocator().allocate(layout, [1, 0, 0.5, 0, 0, 0.1])
         print(result)
 

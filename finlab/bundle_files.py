@@ -38,8 +38,8 @@ LARGEST_TABLE = 20_000_000
 """Largest size of a force table in a bundle [bytes]."""
 LARGEST_BUNDLE = 100_000_000
 """Largest size of all files together [bytes]."""
-MOST_FILES = len(LARGEST) + 16
-"""Most files; a robot has up to 16 fins, each with a table at most."""
+MOST_FILES = len(LARGEST) + 64
+"""Most files; a robot has up to 64 actuators, each with a table at most."""
 REQUIRED = (GRAPH, ABOUT, CHECKSUMS)
 
 Files = Mapping[str, bytes]

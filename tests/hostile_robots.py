@@ -8,7 +8,6 @@ import numpy as np
 from finlab.arrays import Array
 from finlab.layout import Fin, FinModelSpec, Layout, Limits
 from finlab.layout.fin import FIN_MODELS, LEAST, LEAST_WIDTH, MAX_AMPLITUDE, MAX_FREQUENCY, MAX_POSITION
-from finlab.layout.layout import MAX_FINS
 from finlab.physics import Plant
 
 DOMAIN = 0xF022
@@ -41,7 +40,7 @@ def hostile_robot(number: int, seed: int, table: str | None = None) -> Layout:
         table: path of a table of forces; without one no fin follows a table.
     """
     rng = np.random.default_rng([DOMAIN, seed, number])
-    n = int(rng.choice([1, 2, 3, 4, 5, 6, 8, 12, MAX_FINS]))
+    n = int(rng.choice([1, 2, 3, 4, 5, 6, 8, 12, 16]))
     position, angle = _places(rng, str(rng.choice(GEOMETRIES)), n)
     ranges = rng.choice(RANGES, size=int(rng.integers(1, 4)))
     arcs = rng.choice(ARCS, size=int(rng.integers(1, 4)))

@@ -85,4 +85,4 @@ def random_robot(
             law = make_law(model)
             model = write_fin_table(path, law, fin.limits, rng=rng, noise=0.03, sideways=0.1, power=True)
         fins.append(replace(fin, model=model))
-    return replace(layout, fins=tuple(fins))
+    return replace(layout, actuators=tuple(fins))

@@ -43,7 +43,7 @@ class Bounds:
         is."""
         by = np.broadcast_to(np.asarray(reach, dtype=np.float64), 3)
         x, y, z = ((p - float(r), p + float(r)) for p, r in zip(fin.position, by, strict=True))
-        return Bounds(x, y, z, (fin.mounting_angle - turn, fin.mounting_angle + turn))
+        return Bounds(x, y, z, (fin.shaft_azimuth - turn, fin.shaft_azimuth + turn))
 
     @property
     def pairs(self) -> Array:
@@ -68,7 +68,7 @@ def is_mirrored(fin: Fin, other: Fin) -> bool:
     """Says whether two fins are each other's mirror image."""
     x, y, z = fin.position
     apart = np.abs(np.subtract(other.position, (x, -y, z))).max()
-    turned = abs(math.remainder(fin.mounting_angle + other.mounting_angle, math.tau))
+    turned = abs(math.remainder(fin.shaft_azimuth + other.shaft_azimuth, math.tau))
     return bool(max(apart, turned) <= MIRROR_TOLERANCE)
 
 
@@ -115,7 +115,7 @@ class Moves:
         """Where all fins are now (n, 3) [m]."""
         self._angle = layout.mounting_angle
         box = np.concatenate([bounds[name].pairs for name in leaders])  # (4 leaders, 2)
-        held = np.concatenate([[*layout.fins[i].position, layout.fins[i].mounting_angle] for i in self._lead])
+        held = np.concatenate([[*layout.fins[i].position, layout.fins[i].shaft_azimuth] for i in self._lead])
         self._whole = np.clip(held, box[:, 0], box[:, 1])
         self._free = box[:, 1] - box[:, 0] > 0.0
         if not self._free.any():
@@ -159,7 +159,7 @@ class Moves:
         for i in self.layout.indices(self.names):
             x, y, z = (round(float(value), 12) for value in position[0, i])
             turned = math.remainder(float(angle[0, i]), math.tau)
-            result = result.replace_fin(self.layout.names[i], position=(x, y, z), mounting_angle=turned)
+            result = result.replace_actuator(self.layout.names[i], position=(x, y, z), mounting_angle=turned)
         return result
 
 

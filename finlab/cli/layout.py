@@ -79,7 +79,7 @@ def layout_text(layout: Layout) -> str:
         directions = "any" if high - low >= 360.0 - 1e-6 else f"{low:.0f}..{high:.0f}"
         position = (f"{value:6.3f}" for value in fin.position)
         largest = (f"{fin.limits.amplitude[1]:.3f}", f"{fin.limits.frequency[1]:.3f}")
-        angle = f"{math.degrees(fin.mounting_angle):.1f}"
+        angle = f"{math.degrees(fin.shaft_azimuth):.1f}"
         rows.append((fin.name, *position, angle, *largest, directions, fin.model.type))
     title = f"{layout.name}: {layout.description}" if layout.description else layout.name
     return "\n".join([title, "", *table((*head, "model"), rows)])

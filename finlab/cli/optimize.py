@@ -112,7 +112,7 @@ def improvement_text(found: Improvement, output: Path) -> str:
     for name in found.moved:
         fin = found.layout.fins[found.layout.index(name)]
         place = "  ".join(f"{value:6.3f}" for value in fin.position)
-        lines.append(f"{name:<16}  {place} m  {math.degrees(fin.mounting_angle):7.1f} deg")
+        lines.append(f"{name:<16}  {place} m  {math.degrees(fin.shaft_azimuth):7.1f} deg")
     lines += ["", score_card_text(found.card_after), ""]
     lines.append(
         f"{output}: written." if found.improved else f"{output}: written unchanged, nothing better was found."
@@ -126,5 +126,5 @@ def _bounds(layout: Layout, name: str, box: Box | None, reach: float, turn: floa
     fin = layout.fins[layout.index(name)]
     if box is None:
         return Bounds.around(fin, reach, turn)
-    angle = (fin.mounting_angle - turn, fin.mounting_angle + turn)
+    angle = (fin.shaft_azimuth - turn, fin.shaft_azimuth + turn)
     return Bounds((box[0], box[1]), (box[2], box[3]), (box[4], box[5]), angle)

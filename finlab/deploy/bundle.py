@@ -151,7 +151,7 @@ def with_tables_inside(layout: Layout) -> tuple[Layout, dict[str, bytes]]:
             tables[table_name(content)] = content
             fin = replace(fin, model=FinModelSpec("table", (("path", table_name(content)),)))
         fins.append(fin)
-    return replace(layout, fins=tuple(fins)), tables
+    return replace(layout, actuators=tuple(fins)), tables
 
 
 def readme_text(graph: LayoutGraph) -> str:
@@ -165,7 +165,7 @@ def readme_text(graph: LayoutGraph) -> str:
         works = "no" if fin.name in graph.failed else "yes"
         name = fin.name.replace("|", "\\|")
         rows.append(
-            f"| {name} | {x:g}, {y:g}, {z:g} | {fin.mounting_angle:.4f} | {' | '.join(ranges)} | {works} |"
+            f"| {name} | {x:g}, {y:g}, {z:g} | {fin.shaft_azimuth:.4f} | {' | '.join(ranges)} | {works} |"
         )
     template = Path(__file__).with_name("bundle_readme.md").read_text("utf-8")
     return template.format(

@@ -75,7 +75,7 @@ def _document_of(graph: LayoutGraph) -> dict[str, Any]:
         node = {
             "id": entry["name"],
             "position_m": entry["position_m"],
-            "mounting_angle_rad": fin.mounting_angle,
+            "mounting_angle_rad": fin.shaft_azimuth,
             "limits": entry["limits"],
             "model": entry["model"],
             "healthy": fin.name not in graph.failed,

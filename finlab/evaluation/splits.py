@@ -118,7 +118,7 @@ def _scaled(size: float) -> Draw:
             low, high = fin.limits.frequency
             slower = replace(fin.limits, frequency=(low / max(size, 1.0), high / max(size, 1.0)))
             fins.append(replace(fin, position=(x, y, z), model=FinModelSpec("drag", bigger), limits=slower))
-        return replace(layout, fins=tuple(fins)), ()
+        return replace(layout, actuators=tuple(fins)), ()
 
     return draw
 
@@ -139,33 +139,37 @@ def _near_singular(rng: np.random.Generator, name: str) -> tuple[Layout, tuple[s
         turns = rng.uniform(-NEAR_ANGLE, NEAR_ANGLE, len(others)) / 2
         turns += math.pi * rng.integers(0, 2, len(others))
         fins = [
-            replace(fin, mounting_angle=float(wrapped(first.mounting_angle + turn)))
+            replace(fin, mounting_angle=float(wrapped(first.shaft_azimuth + turn)))
             for fin, turn in zip(others, turns, strict=True)
         ]
     else:
         x, y, z = (np.array(first.position) + rng.uniform(-NEAR_POSITION, NEAR_POSITION, 3)).tolist()
-        turned = float(wrapped(first.mounting_angle + rng.uniform(-NEAR_ANGLE, NEAR_ANGLE)))
+        turned = float(wrapped(first.shaft_azimuth + rng.uniform(-NEAR_ANGLE, NEAR_ANGLE)))
         fins = [replace(others[0], position=(x, y, z), mounting_angle=turned), *others[1:]]
-    return replace(layout, fins=(first, *fins)), ()
+    return replace(layout, actuators=(first, *fins)), ()
 
 
 def _fins(rng: np.random.Generator, name: str) -> tuple[Layout, tuple[str, ...]]:
     """All fins of one random model."""
     layout, model = random_layout(rng, name), random_fin_model(rng)
-    return replace(layout, fins=tuple(replace(fin, model=model) for fin in layout.fins)), ()
+    return replace(layout, actuators=tuple(replace(fin, model=model) for fin in layout.fins)), ()
 
 
 def _fins_mixed(rng: np.random.Generator, name: str) -> tuple[Layout, tuple[str, ...]]:
     """Each fin of a random model of its own."""
     layout = random_layout(rng, name)
-    return replace(layout, fins=tuple(replace(fin, model=random_fin_model(rng)) for fin in layout.fins)), ()
+    return replace(
+        layout, actuators=tuple(replace(fin, model=random_fin_model(rng)) for fin in layout.fins)
+    ), ()
 
 
 def _tables(rng: np.random.Generator, name: str) -> tuple[Layout, tuple[str, ...]]:
     """The same, each fin known by a noisy table."""
     layout, _ = _fins_mixed(rng, name)
     noise = zip(layout.fins, rng.spawn(layout.n_fins), strict=True)
-    return replace(layout, fins=tuple(noisy_table(own, fin, f"{name}-{fin.name}") for fin, own in noise)), ()
+    return replace(
+        layout, actuators=tuple(noisy_table(own, fin, f"{name}-{fin.name}") for fin, own in noise)
+    ), ()
 
 
 SPLITS: dict[str, tuple[int, Draw]] = {

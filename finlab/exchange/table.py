@@ -8,7 +8,7 @@ from pathlib import Path
 
 from finlab.errors import LayoutError
 from finlab.files.guarded import read_text
-from finlab.layout import MAX_FINS, Fin, Layout, Limits
+from finlab.layout import MAX_ACTUATORS, Fin, Layout, Limits
 from finlab.layout.file import under
 from finlab.layout.load import MAX_BYTES
 from finlab.whole_file import write_whole
@@ -48,8 +48,8 @@ def read_csv(path: str | os.PathLike[str]) -> Layout:
                 raise LayoutError("a column is given twice")
             fins = []
             for i, row in enumerate(rows, start=1):
-                if i > MAX_FINS:
-                    raise LayoutError(f"expected 1 to {MAX_FINS} fins, got more")
+                if i > MAX_ACTUATORS:
+                    raise LayoutError(f"expected 1 to {MAX_ACTUATORS} fins, got more")
                 with under(f"row {i}"):
                     fins.append(_fin(row, i))
             return Layout(Path(path).stem, tuple(fins), f"From {Path(path).name}.")
@@ -68,7 +68,7 @@ def write_csv(layout: Layout, path: str | os.PathLike[str]) -> None:
     writer.writerow(COLUMNS)
     for fin in layout.fins:
         limits = [value for name in LIMITS for value in getattr(fin.limits, name)]
-        writer.writerow([fin.name, *fin.position, math.degrees(fin.mounting_angle), *limits])
+        writer.writerow([fin.name, *fin.position, math.degrees(fin.shaft_azimuth), *limits])
     write_whole(path, text.getvalue())
 
 

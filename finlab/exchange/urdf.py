@@ -209,7 +209,7 @@ def urdf_text(layout: Layout) -> str:
         joint = SubElement(robot, "joint", name=f"{fin.name}_joint", type="continuous")
         SubElement(joint, "parent", link=ROOT)
         SubElement(joint, "child", link=fin.name)
-        SubElement(joint, "origin", xyz=_text(fin.position), rpy=_text((0.0, 0.0, fin.mounting_angle)))
+        SubElement(joint, "origin", xyz=_text(fin.position), rpy=_text((0.0, 0.0, fin.shaft_azimuth)))
         SubElement(joint, "axis", xyz="1 0 0")
     ElementTree.indent(robot)
     return '<?xml version="1.0"?>\n' + ElementTree.tostring(robot, encoding="unicode") + "\n"

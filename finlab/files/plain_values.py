@@ -12,7 +12,7 @@ from typing import Any
 from finlab.errors import DataError, FinlabError
 
 MAX_EVENTS = 30_000
-"""Most YAML events (keys, values, brackets); a layout of 16 fins has under a thousand."""
+"""Most YAML events (keys, values, brackets); a layout of 64 fins has about four thousand."""
 MAX_DEPTH = 20
 """Deepest nesting of YAML; a layout needs five levels."""
 MAX_DIGITS = 100

@@ -23,7 +23,7 @@ from finlab.forces.envelopes import Envelopes, layout_envelopes
 from finlab.forces.force_space import PlanarProblem
 from finlab.layout import Layout
 from finlab.layout.angles import wrapped
-from finlab.layout.arrays import force_effectiveness
+from finlab.layout.arrays import own_effectiveness
 from finlab.physics.objective import Objective
 
 LEVER = 0.2
@@ -117,7 +117,7 @@ def fin_sets(layout: Layout, failed: Collection[str] = ()) -> FinSets:
         LayoutError: there is no fin of a name in `failed`.
     """
     lost = layout.indices(tuple(failed))
-    effectiveness = force_effectiveness(layout.position, layout.mounting_angle)[:, 1:] / SCALE
+    effectiveness = own_effectiveness(layout)[:, 1:] / SCALE
     sets = _one_robot(effectiveness, layout_envelopes(layout, Objective()))
     radius = sets.radius.copy()
     radius[:, list(lost)] = 0.0

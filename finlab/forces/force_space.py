@@ -37,7 +37,7 @@ from finlab.forces.fin_envelope import (
 )
 from finlab.layout import Layout
 from finlab.layout.angles import TURN, wrapped
-from finlab.layout.arrays import force_effectiveness
+from finlab.layout.arrays import own_effectiveness
 from finlab.physics.objective import Objective
 from finlab.small_systems import solve
 
@@ -111,7 +111,7 @@ def planar_problem(layout: Layout, fins: Envelopes, scale: Array, objective: Obj
         scale: what a wrench is divided by (6,).
         objective: what is kept least.
     """
-    effectiveness = force_effectiveness(layout.position, layout.mounting_angle) / scale
+    effectiveness = own_effectiveness(layout) / scale
     direction_cost = objective.direction_cost(layout.upper)
     planar, products = flat_effectiveness(effectiveness[:, 1:])
     return PlanarProblem(

@@ -1,7 +1,9 @@
 """What a robot is: fins, limits and body, as frozen values, files and padded arrays. numpy and msgspec."""
 
+from finlab.layout.actuator import Actuator as Actuator
 from finlab.layout.arrays import LayoutArrays as LayoutArrays
 from finlab.layout.arrays import layout_effectiveness as layout_effectiveness
+from finlab.layout.arrays import own_effectiveness as own_effectiveness
 from finlab.layout.arrays import stack_layouts as stack_layouts
 from finlab.layout.body import Body as Body
 from finlab.layout.body import Hull as Hull
@@ -15,7 +17,7 @@ from finlab.layout.fin import FinModelSpec as FinModelSpec
 from finlab.layout.fin import Limits as Limits
 from finlab.layout.interaction import Interaction as Interaction
 from finlab.layout.interaction import Jet as Jet
-from finlab.layout.layout import MAX_FINS as MAX_FINS
+from finlab.layout.layout import MAX_ACTUATORS as MAX_ACTUATORS
 from finlab.layout.layout import Layout as Layout
 from finlab.layout.load import load_layout as load_layout
 from finlab.layout.random import layout_from_arrays as layout_from_arrays

@@ -73,11 +73,25 @@ def force_effectiveness(position: Any, mounting_angle: Any) -> Any:
     return xp.stack([xp.stack(axis, axis=-1) for axis in (shaft, horizontal, vertical)], axis=-2)
 
 
+def own_effectiveness(layout: Layout) -> Array:
+    """What one newton along each actuator's own three axes does to the robot.
+
+    Returns:
+        (n, 3, 6): wrench [Fx, Fy, Fz, Tx, Ty, Tz] about the origin of 1 N along each row of `layout.frames`.
+    """
+    torque = np.cross(layout.position[:, None], layout.frames)
+    return np.concatenate([layout.frames, torque], axis=-1)
+
+
 def layout_effectiveness(layout: Layout) -> Array:
     """What one newton along each fin's two thrust axes does to the robot.
 
     Returns:
-        (6, 2 n): wrench [Fx, Fy, Fz, Tx, Ty, Tz] of 1 N along e_h and along e_z, fins side by side.
+        (6, 2 n): wrench [Fx, Fy, Fz, Tx, Ty, Tz] of 1 N along zero and along shaft x zero, which are e_h and
+        e_z of a horizontal shaft, fins side by side.
+
+    Raises:
+        LayoutError: an actuator is no fin.
     """
-    effectiveness: Array = force_effectiveness(layout.position, layout.mounting_angle)[:, 1:]
-    return effectiveness.reshape(-1, 6).T
+    layout.only_fins("what asks for two thrust axes of each actuator")
+    return own_effectiveness(layout)[:, 1:].reshape(-1, 6).T

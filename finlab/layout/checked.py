@@ -4,7 +4,7 @@ One declaration serves three: construction in code is checked by it, files are r
 JSON Schemas are made of it.
 """
 
-from collections.abc import Hashable, Mapping
+from collections.abc import Collection, Hashable, Mapping
 from dataclasses import MISSING, fields
 from functools import cache
 from typing import Annotated, Any, ClassVar, cast, get_args, get_type_hints
@@ -66,34 +66,49 @@ def _holds_checked(kind: Any) -> bool:
     return any(map(_holds_checked, parts)) if parts else isinstance(kind, type) and issubclass(kind, Checked)
 
 
-def form(cls: type, keys: Mapping[str, str] | None = None, /, **kinds: Any) -> Any:
+def form(
+    cls: type,
+    keys: Mapping[str, str] | None = None,
+    /,
+    called: str = "",
+    required: Collection[str] = (),
+    tag: tuple[str, str | int] | tuple[()] | None = None,
+    **kinds: Any,
+) -> Any:
     """Returns the `msgspec.Struct` of the part of a file that a dataclass stands for.
 
     Args:
         cls: the dataclass; what has a default there may be left out of the file, or be null.
         keys: fields -> keys in the file; `cls.KEYS` when None.
+        called: what the part is called in a schema; the dataclass's name when empty.
+        required: fields that the file must have although they have a default.
+        tag: a key and its value, by which the part is known among others in the same place; the key `type`
+            where the class has a `type` when None.
         kinds: types of fields that are different in the file, and of those that are there alone; None for
             a field that no file has.
-
-    A class with a `type` has that as the key `type` of its part, which tells it from others.
     """
-    own = get_type_hints(cls, include_extras=True)
-    hints = {**{field.name: own[field.name] for field in fields(cls)}, **kinds}
-    optional = [field.name for field in fields(cls) if field.default is not MISSING]
+    own = {field.name for field in fields(cls)}
+    told_of = get_type_hints(cls, include_extras=True).items()
+    hints = {**{name: kind for name, kind in told_of if name in own}, **kinds}
+    optional = [
+        field.name for field in fields(cls) if field.default is not MISSING and field.name not in required
+    ]
     told = [(name, kind) for name, kind in hints.items() if kind is not None]
     parts = [(name, kind | None, None) if name in optional else (name, kind) for name, kind in told]
     parts.sort(key=len)
     rename = cls.KEYS if keys is None and issubclass(cls, Checked) else dict(keys or {})
     about = {"__doc__": (cls.__doc__ or "").split("\n")[0].replace(" Checked on construction.", "")}
-    tag = cls.type if issubclass(cls, Checked) and cls.type else None
+    if tag is None and issubclass(cls, Checked) and cls.type:
+        tag = ("type", cls.type)
+    key, value = tag or (None, None)
     return msgspec.defstruct(
-        cls.__name__,
+        called or cls.__name__,
         parts,
         rename=rename,
         forbid_unknown_fields=True,
         namespace=about,
-        tag=tag,
-        tag_field="type" if tag else None,
+        tag_field=key,
+        tag=value,
     )
 
 

@@ -120,7 +120,7 @@ def _applied(health: Health, layout: Layout) -> Layout:
     layout.indices((*weak, *stuck, *running, *thrust))
     return replace(
         layout,
-        fins=tuple(
+        actuators=tuple(
             _damaged(
                 fin if fin.name not in thrust else replace(fin, model=fin.model.scaled(thrust[fin.name])),
                 weak.get(fin.name),

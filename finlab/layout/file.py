@@ -1,4 +1,7 @@
-"""Layout files, version 1: YAML for people, JSON accepted. Shaft angles in degrees, the rest SI and radians.
+"""Layout files: YAML for people, JSON accepted. Mounting angles in degrees, the rest SI and radians.
+
+Version 2 holds actuators of any type under `actuators`; version 1 holds fins with horizontal shafts under
+`fins`, and robots of such fins are written as version 1.
 
 Every error names the file and the key, such as
 `layouts/x.yaml: fins[2].limits.amplitude_rad: minimum 0.6 is above maximum 0.05; swap them`.
@@ -8,7 +11,7 @@ Every error names the file and the key, such as
 import json
 import math
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
@@ -19,16 +22,18 @@ from msgspec import Meta, Struct, to_builtins
 from finlab.errors import LayoutError
 from finlab.files.plain_values import yaml_text
 from finlab.files.schema import checked, shown
+from finlab.layout.actuator import Actuator
 from finlab.layout.body import Body, Hull
 from finlab.layout.checked import form, given
 from finlab.layout.fin import Fin, FinModelSpec, Limits, Model
 from finlab.layout.interaction import Interaction, Jet
-from finlab.layout.layout import MAX_FINS, Layout
+from finlab.layout.layout import MAX_ACTUATORS, Layout
 from finlab.layout.servo import Servo
 from finlab.whole_file import write_whole
 
 FORMAT = "finlab-layout"
-VERSION = 1
+VERSIONS = {1: "fins", 2: "actuators"}
+"""Versions of layout files that are read, and the key of the actuators in each."""
 
 
 class Frame(Struct, forbid_unknown_fields=True):
@@ -44,24 +49,49 @@ FRAME = to_builtins(Frame())
 LIMITS, SERVO = form(Limits), form(Servo)
 BODY = form(Body, hull=form(Hull))
 INTERACTION = form(Interaction, jets=list[form(Jet)])  # type: ignore[misc]
+POSITION, ANGLE = {"position": "position_m"}, {"mounting_angle": "mounting_angle_deg"}
+_OF_A_FIN: dict[str, Any] = {
+    "mounting_angle": Annotated[float, Meta(ge=-360.0, le=360.0)],
+    "limits": LIMITS,
+    "model": Model,
+    "servo": SERVO,
+}
 FIN = form(
     Fin,
-    {"position": "position_m", "mounting_angle": "mounting_angle_deg"},
-    mounting_angle=Annotated[float, Meta(ge=-360.0, le=360.0)],
-    limits=LIMITS,
-    model=Model,
-    servo=SERVO,
+    POSITION | ANGLE,
+    called="HorizontalFin",
+    tag=(),
+    required=["mounting_angle"],
+    shaft=None,
+    zero=None,
+    **_OF_A_FIN,
+)
+ACTUATOR: Any = form(Fin, POSITION | ANGLE, **_OF_A_FIN)
+_OF_A_LAYOUT: dict[str, Any] = {
+    "format": Literal["finlab-layout"],
+    "body": BODY,
+    "interaction": INTERACTION,
+    "frame": Frame | None,
+}
+_COUNT = Meta(min_length=1, max_length=MAX_ACTUATORS)
+LAYOUT_OF_FINS = form(
+    Layout,
+    {},
+    called="LayoutOfFins",
+    tag=("version", 1),
+    actuators=None,
+    fins=Annotated[list[FIN], _COUNT],  # type: ignore[valid-type]
+    **_OF_A_LAYOUT,
 )
 LAYOUT = form(
     Layout,
-    format=Literal["finlab-layout"],
-    version=Literal[1],
-    fins=Annotated[list[FIN], Meta(min_length=1, max_length=MAX_FINS)],  # type: ignore[valid-type]
-    body=BODY,
-    interaction=INTERACTION,
-    frame=Frame | None,
+    {},
+    tag=("version", 2),
+    actuators=Annotated[list[ACTUATOR], _COUNT],
+    **_OF_A_LAYOUT,
 )
-"""A layout file."""
+ANY_LAYOUT: Any = LAYOUT_OF_FINS | LAYOUT
+"""A layout file: version 1, which holds horizontal fins, or version 2."""
 
 
 def parse_layout(data: Any, source: str = "layout", folder: Path | None = None) -> Layout:
@@ -76,18 +106,27 @@ def parse_layout(data: Any, source: str = "layout", folder: Path | None = None) 
         LayoutError: something is missing, unknown or out of range.
     """
     with under(source=source):
-        check_version(data, FORMAT, VERSION)
-        file = checked(data, LAYOUT)
-        fins = []
-        for i, fin in enumerate(file.fins):
-            with under(f"fins[{i}]"):
-                fins.append(fin_of(fin, math.radians(fin.mounting_angle), folder))
-        return layout_of(file, fins, folder)
+        check_version(data, FORMAT, *VERSIONS)
+        file = checked(data, ANY_LAYOUT)
+        key = VERSIONS[data["version"]]
+        parts = []
+        for i, part in enumerate(getattr(file, key)):
+            with under(f"{key}[{i}]"):
+                parts.append(actuator_of(part, folder))
+        try:
+            return layout_of(file, parts, folder)
+        except LayoutError as error:
+            raise LayoutError(error.problem, error.key.replace("actuators[", f"{key}[")) from None
 
 
-def fin_of(part: Any, mounting_angle: float, folder: Path | None) -> Fin:
+def actuator_of(part: Any, folder: Path | None) -> Actuator:
+    """Returns the actuator in a part of a layout file; relative paths start at a folder."""
+    angle = part.mounting_angle
+    return fin_of(part, None if angle is None else math.radians(angle), folder)
+
+
+def fin_of(part: Any, mounting_angle: float | None, folder: Path | None) -> Fin:
     """Returns the fin in a part of a layout or graph file; relative paths start at a folder."""
-    name = part.name
     with under("limits"):
         limits = Limits(**given(part.limits)) if part.limits else Limits()
     model = given(part.model) if part.model else {}
@@ -95,11 +134,13 @@ def fin_of(part: Any, mounting_angle: float, folder: Path | None) -> Fin:
         model["path"] = _absolute(model["path"], folder)
     kind = type(part.model).__struct_config__.tag if part.model else "drag"
     servo = Servo(**given(part.servo)) if part.servo else Servo()
-    return Fin(name, part.position, mounting_angle, limits, FinModelSpec(kind, tuple(model.items())), servo)
+    spec = FinModelSpec(kind, tuple(model.items()))
+    shaft, zero = getattr(part, "shaft", None), getattr(part, "zero", None)
+    return Fin(part.name, part.position, mounting_angle, limits, spec, servo, shaft, zero)
 
 
-def layout_of(part: Any, fins: list[Fin], folder: Path | None) -> Layout:
-    """Returns the layout of fins, with all that a file says beside them."""
+def layout_of(part: Any, actuators: Sequence[Actuator], folder: Path | None) -> Layout:
+    """Returns the layout of actuators, with all that a file says beside them."""
     body = interaction = None
     if part.body:
         told = given(part.body)
@@ -118,7 +159,7 @@ def layout_of(part: Any, fins: list[Fin], folder: Path | None) -> Layout:
                 jets.append(Jet(**given(jet)))
         with under("interaction"):
             interaction = Interaction(**{**told, "jets": tuple(jets)})
-    return Layout(part.name, tuple(fins), part.description or "", body, interaction)
+    return Layout(part.name, tuple(actuators), part.description or "", body, interaction)
 
 
 @contextmanager
@@ -130,24 +171,30 @@ def under(key: str = "", source: str = "") -> Iterator[None]:
         raise error.under(key, source) from None
 
 
-def check_version(data: Any, form: str, version: int) -> None:
+def check_version(data: Any, form: str, *versions: int) -> None:
     """Refuses files of another format or version, in which unknown keys are not the news."""
     if not isinstance(data, Mapping):
         raise LayoutError(f"expected keys and values, got {shown(data)}")
     if data.get("format", form) != form:
         raise LayoutError(f"expected {form}, got {shown(data['format'])}", "format")
-    found = data.get("version", version)
-    if type(found) is not int or found != version:
-        raise LayoutError(f"this finlab reads version {version}, got {shown(found)}", "version")
+    found = data.get("version", versions[0])
+    if type(found) is not int or found not in versions:
+        known = " and ".join(map(str, versions))
+        raise LayoutError(f"this finlab reads version {known}, got {shown(found)}", "version")
 
 
 def layout_to_dict(layout: Layout) -> dict[str, Any]:
     """Returns the layout as the plain values of a layout file; `parse_layout` gives the same layout back."""
-    data: dict[str, Any] = {"format": FORMAT, "version": VERSION, "name": layout.name}
+    horizontal = all(isinstance(part, Fin) and part.mounting_angle is not None for part in layout.actuators)
+    version = 1 if horizontal else 2
+    data: dict[str, Any] = {"format": FORMAT, "version": version, "name": layout.name}
     if layout.description:
         data["description"] = layout.description
     data["frame"] = dict(FRAME)
-    data["fins"] = [_fin_to_dict(fin) for fin in layout.fins]
+    if horizontal:
+        data["fins"] = [_fin_to_dict(fin) for fin in layout.fins]
+    else:
+        data["actuators"] = [_actuator_to_dict(part) for part in layout.actuators]
     if layout.body is not None:
         data["body"] = _plain(asdict(layout.body))
     if layout.interaction is not None:
@@ -170,12 +217,21 @@ def _absolute(path: str, folder: Path | None) -> str:
     return os.path.normpath((folder or Path.cwd()) / path)
 
 
+def _actuator_to_dict(part: Actuator) -> dict[str, Any]:
+    data = _fin_to_dict(part)
+    return {"name": data.pop("name"), "type": part.type, **data}
+
+
 def _fin_to_dict(fin: Fin) -> dict[str, Any]:
+    # Degrees from radians carry a rounding error of 1e-14; twelve digits give back what people wrote.
+    if fin.mounting_angle is not None:
+        direction: dict[str, Any] = {"mounting_angle_deg": round(math.degrees(fin.mounting_angle), 12)}
+    else:
+        direction = {"shaft": list(fin.shaft or ()), "zero": list(fin.zero or ())}
     data = {
         "name": fin.name,
         "position_m": list(fin.position),
-        # Degrees from radians carry a rounding error of 1e-14; twelve digits give back what people wrote.
-        "mounting_angle_deg": round(math.degrees(fin.mounting_angle), 12),
+        **direction,
         "limits": {key: list(getattr(fin.limits, name)) for name, key in Limits.KEYS.items()},
         "model": {"type": fin.model.type, **dict(fin.model.parameters)},
     }

@@ -10,6 +10,7 @@ from msgspec import Meta, Struct, defstruct
 from finlab.errors import LayoutError
 from finlab.files.schema import checked
 from finlab.layout.angles import FULL_TURN_TOLERANCE, TURN
+from finlab.layout.axes import Direction3, Vector, axes_across, cross
 from finlab.layout.checked import Checked, Name, given
 from finlab.layout.servo import Servo
 
@@ -139,6 +140,8 @@ LEAST = {"amplitude": 1e-4, "frequency": 1e-3}
 """Least amplitude [rad] and frequency [Hz] that is not 0."""
 LEAST_WIDTH = 1e-6
 """Least width of a range [rad, Hz] that is not 0."""
+SAME_AXIS = 1e-9
+"""By how much two unit vectors that are the same may differ, from rounding."""
 
 
 @dataclass(frozen=True)
@@ -191,19 +194,76 @@ class Limits(Checked):
 
 @dataclass(frozen=True)
 class Fin(Checked):
-    """One fin on the hull. Checked on construction."""
+    """One fin on the hull, its shaft horizontal or in any direction. Checked on construction."""
 
     KEYS: ClassVar[Mapping[str, str]] = {"position": "position_m"}
+    type: ClassVar[str] = "fin"
 
     name: Name
     """Unique within its layout; `--failed NAME` and the app refer to it."""
     position: tuple[Coordinate, Coordinate, Coordinate]
     """Where the fin's force acts, body frame (x forward, y left, z up from the centre of gravity) [m]."""
-    mounting_angle: MountingAngle
-    """Azimuth of the shaft in the body xy plane, from +x, counter-clockwise [rad]."""
+    mounting_angle: MountingAngle | None = None
+    """Azimuth of a horizontal shaft in the body xy plane, from +x, counter-clockwise [rad]; None where
+    `shaft` and `zero` are given."""
     limits: Limits = Limits()
     """What the fin may be commanded."""
     model: FinModelSpec = FinModelSpec()
     """Which law gives its force."""
     servo: Servo = Servo()
     """How fast it comes to what is commanded."""
+    shaft: Direction3 | None = None
+    """Unit vector out of the hull along the shaft, body frame; None where `mounting_angle` is given."""
+    zero: Direction3 | None = None
+    """Unit vector across the shaft: the thrust's direction at zero direction 0; from there it turns towards
+    shaft x zero. None where
+    `mounting_angle` is given; zero is e_z x shaft then."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.shaft is None and self.zero is None:
+            if self.mounting_angle is None:
+                raise LayoutError("required key is missing; give it, or shaft and zero", "mounting_angle_deg")
+            return
+        if self.mounting_angle is not None:
+            raise LayoutError("give either mounting_angle_deg, or shaft and zero, not both", "shaft")
+        shaft, zero = axes_across(("shaft", self.shaft), ("zero", self.zero))
+        object.__setattr__(self, "shaft", shaft)
+        object.__setattr__(self, "zero", zero)
+        if math.dist(zero, (-shaft[1], shaft[0], 0.0)) < SAME_AXIS:
+            # The shaft is horizontal, and zero where a mounting angle has it: one fin has one description.
+            object.__setattr__(self, "mounting_angle", math.atan2(shaft[1], shaft[0]))
+            object.__setattr__(self, "shaft", None)
+            object.__setattr__(self, "zero", None)
+
+    @property
+    def lower(self) -> tuple[float, float, float]:
+        """Least (amplitude [rad], frequency [Hz], zero direction [rad])."""
+        return self.limits.lower
+
+    @property
+    def upper(self) -> tuple[float, float, float]:
+        """Greatest (amplitude [rad], frequency [Hz], zero direction [rad])."""
+        return self.limits.upper
+
+    @property
+    def frame(self) -> tuple[Vector, Vector, Vector]:
+        """The fin's own axes in the body frame: shaft, zero, shaft x zero."""
+        if self.shaft is None or self.zero is None:
+            c, s = math.cos(self.shaft_azimuth), math.sin(self.shaft_azimuth)
+            return (c, s, 0.0), (-s, c, 0.0), (0.0, 0.0, 1.0)
+        return self.shaft, self.zero, cross(self.shaft, self.zero)
+
+    @property
+    def shaft_azimuth(self) -> float:
+        """The mounting angle [rad], for what works with horizontal shafts only.
+
+        Raises:
+            LayoutError: the shaft is not horizontal, or thrust at zero direction 0 is not.
+        """
+        if self.mounting_angle is None:
+            raise LayoutError(
+                f"fin {self.name!r} has a shaft of its own direction, and what was asked works for fins with "
+                "mounting_angle_deg only; use `finlab allocate` with method dual, which takes any shaft"
+            )
+        return self.mounting_angle

@@ -7,7 +7,7 @@ from msgspec import Meta, Struct, defstruct
 from finlab.layout.checked import Name
 from finlab.layout.file import BODY, INTERACTION, LIMITS, SERVO, Frame
 from finlab.layout.fin import Coordinate, Model, MountingAngle
-from finlab.layout.layout import MAX_DESCRIPTION_LENGTH, MAX_FINS
+from finlab.layout.layout import MAX_ACTUATORS, MAX_DESCRIPTION_LENGTH
 
 Wrench = tuple[float, float, float, float, float, float]
 Deviation = Annotated[float, Meta(ge=0.0, le=1e9)]
@@ -57,7 +57,7 @@ class NodeLink(Struct, forbid_unknown_fields=True):
     directed: bool
     multigraph: bool
     graph: dict[str, str]
-    nodes: Annotated[list[NODE], Meta(min_length=1, max_length=MAX_FINS)]
+    nodes: Annotated[list[NODE], Meta(min_length=1, max_length=MAX_ACTUATORS)]
     edges: list[Edge]
 
     def __post_init__(self) -> None:

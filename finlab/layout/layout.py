@@ -1,7 +1,7 @@
-"""A layout: the fins of one robot, in order, and optionally its body."""
+"""A layout: the actuators of one robot, in order, and optionally its body."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Annotated, Any
 
@@ -11,25 +11,26 @@ from numpy.typing import ArrayLike
 
 from finlab.arrays import Array
 from finlab.errors import LayoutError
+from finlab.layout.actuator import Actuator
 from finlab.layout.body import Body
 from finlab.layout.checked import Checked, Name
 from finlab.layout.fin import Fin
 from finlab.layout.interaction import Interaction
 
-MAX_FINS = 16
-"""Most fins a layout may have."""
+MAX_ACTUATORS = 64
+"""Most actuators a layout may have."""
 MAX_DESCRIPTION_LENGTH = 4000
 """Most characters of a description."""
 
 
 @dataclass(frozen=True)
 class Layout(Checked):
-    """The fins of one robot. Immutable and comparable; every change returns a new layout."""
+    """The actuators of one robot. Immutable and comparable; every change returns a new layout."""
 
     name: Name
     """What the layout is called."""
-    fins: tuple[Fin, ...]
-    """The fins, 1 to 16, with unique names. Commands and arrays follow this order."""
+    actuators: tuple[Actuator, ...]
+    """The actuators, 1 to 64, with unique names. Commands and arrays follow this order."""
     description: Annotated[str, Meta(max_length=MAX_DESCRIPTION_LENGTH)] = ""
     """What there is to know about it, for people."""
     body: Body | None = None
@@ -39,52 +40,90 @@ class Layout(Checked):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        object.__setattr__(self, "fins", tuple(self.fins))
-        if not 1 <= len(self.fins) <= MAX_FINS:
-            raise LayoutError(f"expected 1 to {MAX_FINS} fins, got {len(self.fins)}", "fins")
+        object.__setattr__(self, "actuators", tuple(self.actuators))
+        if not 1 <= self.n <= MAX_ACTUATORS:
+            raise LayoutError(f"expected 1 to {MAX_ACTUATORS} actuators, got {self.n}", "actuators")
         first_use: dict[str, int] = {}
-        for i, fin in enumerate(self.fins):
-            if fin.name in first_use:
+        for i, name in enumerate(self.names):
+            if name in first_use:
                 raise LayoutError(
-                    f"{fin.name!r} is already the name of fins[{first_use[fin.name]}]", f"fins[{i}].name"
+                    f"{name!r} is already the name of actuator {first_use[name] + 1}", f"actuators[{i}].name"
                 )
-            first_use[fin.name] = i
+            first_use[name] = i
+        fins = {fin.name for fin in self.fins}
         for i, jet in enumerate(self.interaction.jets if self.interaction else ()):
             for key, name in (("source", jet.source), ("target", jet.target)):
-                if name not in first_use:
+                if name not in fins:
                     raise LayoutError(f"there is no fin {name!r}", f"interaction.jets[{i}].{key}")
 
     @cached_property
     def _hash(self) -> int:
-        return hash((self.name, self.fins, self.description, self.body, self.interaction))
+        return hash((self.name, self.actuators, self.description, self.body, self.interaction))
 
     def __hash__(self) -> int:
-        # Kept: every call of an allocator looks its layout up, and hashing all fins takes longer than that.
+        # Kept: every call of an allocator looks its layout up, and hashing all parts takes longer.
         return self._hash
 
     def __getstate__(self) -> dict[str, Any]:
         # Hashes of text differ between processes, and arrays are quickly made again.
-        return {key: self.__dict__[key] for key in ("name", "fins", "description", "body", "interaction")}
+        return {field.name: self.__dict__[field.name] for field in fields(self)}
+
+    @cached_property
+    def fins(self) -> tuple[Fin, ...]:
+        """The actuators that are fins, in order; of a robot of fins all of them."""
+        return tuple(part for part in self.actuators if isinstance(part, Fin))
+
+    @property
+    def is_of_fins(self) -> bool:
+        """Whether all actuators are fins."""
+        return self.n_fins == self.n
+
+    def only_fins(self, what: str) -> None:
+        """Refuses a robot that is not of fins alone, for what is made for fins.
+
+        Raises:
+            LayoutError: the sentence names `what` and the first actuator that is no fin.
+        """
+        for part in self.actuators:
+            if not isinstance(part, Fin):
+                raise LayoutError(
+                    f"{what} works for robots of fins only, and {part.name!r} of layout {self.name} is of "
+                    f"type {part.type}; leave it out, or use `finlab allocate`, which takes any actuator"
+                )
 
     @cached_property
     def position(self) -> Array:
-        """Where each fin's force acts (n, 3), body frame [m]; read-only."""
-        return _read_only([fin.position for fin in self.fins])
+        """Where each actuator's force acts (n, 3), body frame [m]; read-only."""
+        return _read_only([part.position for part in self.actuators])
+
+    @cached_property
+    def frames(self) -> Array:
+        """Own axes of each actuator (n, 3, 3), rows in the body frame; read-only.
+
+        Fin: shaft, zero, shaft x zero; see the other types for theirs.
+        """
+        return _read_only([part.frame for part in self.actuators])
 
     @cached_property
     def mounting_angle(self) -> Array:
-        """Azimuth of each shaft (n,) [rad]; read-only."""
-        return _read_only([fin.mounting_angle for fin in self.fins])
+        """Azimuth of each fin's shaft (n,) [rad]; read-only.
+
+        Raises:
+            LayoutError: an actuator is no fin, or its shaft is not horizontal.
+        """
+        self.only_fins("what asks for mounting angles")
+        return _read_only([fin.shaft_azimuth for fin in self.fins])
 
     @cached_property
     def lower(self) -> Array:
-        """Least amplitude [rad], frequency [Hz] and zero direction [rad] of each fin (n, 3); read-only."""
-        return _read_only([fin.limits.lower for fin in self.fins])
+        """Least command of each actuator (n, 3), of a fin amplitude [rad], frequency [Hz] and zero direction
+        [rad]; read-only."""
+        return _read_only([part.lower for part in self.actuators])
 
     @cached_property
     def upper(self) -> Array:
-        """Greatest amplitude [rad], frequency [Hz] and zero direction [rad] of each fin (n, 3); read-only."""
-        return _read_only([fin.limits.upper for fin in self.fins])
+        """Greatest command of each actuator (n, 3), as `lower`; read-only."""
+        return _read_only([part.upper for part in self.actuators])
 
     @cached_property
     def servo_poles(self) -> Array:
@@ -111,8 +150,13 @@ class Layout(Checked):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the fins, in order."""
-        return tuple(fin.name for fin in self.fins)
+        """Names of the actuators, in order."""
+        return tuple(part.name for part in self.actuators)
+
+    @property
+    def n(self) -> int:
+        """How many actuators there are."""
+        return len(self.actuators)
 
     @property
     def n_fins(self) -> int:
@@ -120,43 +164,47 @@ class Layout(Checked):
         return len(self.fins)
 
     def index(self, name: str) -> int:
-        """Returns the place of the fin called `name`.
+        """Returns the place of the actuator called `name`.
 
         Raises:
-            LayoutError: there is no such fin; the message lists those there are.
+            LayoutError: there is none; the message lists those there are.
         """
         if name not in self.names:
-            raise LayoutError(f"layout {self.name} has no fin {name!r:.60}, it has {', '.join(self.names)}")
+            what = "fin" if self.is_of_fins else "actuator"
+            raise LayoutError(
+                f"layout {self.name} has no {what} {name!r:.60}, it has {', '.join(self.names)}"
+            )
         return self.names.index(name)
 
     def indices(self, names: Sequence[str]) -> tuple[int, ...]:
-        """Returns the places of several fins, in the order asked for; one unknown name is an error."""
+        """Returns the places of several actuators, in the order asked for; one unknown name is an error."""
         return tuple(self.index(name) for name in names)
 
     def without(self, names: Iterable[str]) -> "Layout":
-        """Returns the layout that is left when the fins called `names` are lost.
+        """Returns the layout that is left when the actuators called `names` are lost.
 
         Raises:
-            LayoutError: a name is unknown, or no fin is left.
+            LayoutError: a name is unknown, or none is left.
         """
         names = [names] if isinstance(names, str) else list(names)
         lost = set(self.indices(names))
-        if len(lost) == self.n_fins:
+        if len(lost) == self.n:
+            what = "fin" if self.is_of_fins else "actuator"
             raise LayoutError(
-                f"layout {self.name} has no fin left once {', '.join(names)} are lost; keep one"
+                f"layout {self.name} has no {what} left once {', '.join(names)} are lost; keep one"
             )
-        fins = tuple(fin for i, fin in enumerate(self.fins) if i not in lost)
-        left = self.interaction and self.interaction.among([fin.name for fin in fins])
-        return replace(self, fins=fins, interaction=left)
+        left = tuple(part for i, part in enumerate(self.actuators) if i not in lost)
+        jets = self.interaction and self.interaction.among([part.name for part in left])
+        return replace(self, actuators=left, interaction=jets)
 
-    def replace_fin(self, name: str, /, **changes: Any) -> "Layout":
-        """Returns the layout with some fields of one fin changed, such as `position=(0.1, 0, 0)`."""
+    def replace_actuator(self, name: str, /, **changes: Any) -> "Layout":
+        """Returns the layout with some fields of one actuator changed, such as `position=(0.1, 0, 0)`."""
         i = self.index(name)
-        fins = list(self.fins)
-        fins[i] = replace(fins[i], **changes)
-        if fins[i].name != name and self.interaction is not None:
-            return replace(self, fins=tuple(fins), interaction=self.interaction.renamed(name, fins[i].name))
-        return replace(self, fins=tuple(fins))
+        changed = replace(self.actuators[i], **changes)
+        parts = (*self.actuators[:i], changed, *self.actuators[i + 1 :])
+        if changed.name != name and self.interaction is not None:
+            return replace(self, actuators=parts, interaction=self.interaction.renamed(name, changed.name))
+        return replace(self, actuators=parts)
 
 
 def _read_only(values: ArrayLike) -> Array:

@@ -95,7 +95,7 @@ def layout_from_arrays(arrays: LayoutArrays, row: int = 0, name: str = "random")
         pairs = [tuple(p) for p in np.stack([arrays.lower[row, i], arrays.upper[row, i]], axis=1).tolist()]
         angle = float(arrays.mounting_angle[row, i])
         fins.append(Fin(f"fin_{len(fins) + 1}", (x, y, z), angle, Limits(*pairs)))
-    return Layout(name=name, fins=tuple(fins))
+    return Layout(name=name, actuators=tuple(fins))
 
 
 def _any_outside(arrays: LayoutArrays, box: tuple[float, float, float]) -> np.ndarray:

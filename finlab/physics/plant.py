@@ -18,7 +18,7 @@ from finlab.actuators.law import FinLaw
 from finlab.arrays import Array
 from finlab.errors import CommandError
 from finlab.layout.angles import TURN, is_full_turn
-from finlab.layout.arrays import force_effectiveness
+from finlab.layout.arrays import own_effectiveness
 from finlab.layout.layout import Layout
 from finlab.physics.inflow import inflow_of
 from finlab.physics.wrench import body_force, wrench_of_forces
@@ -39,8 +39,8 @@ class Plant:
         """Ranges of the limits (n, 3)."""
         self.full_turn: NDArray[np.bool_] = is_full_turn(self.width[:, 2])
         """Fins (n,) whose zero direction may turn freely; theirs wraps instead of ending at a limit."""
-        self.effectiveness: Array = force_effectiveness(layout.position, layout.mounting_angle)
-        """Wrench (n, 3, 6) of 1 N along each fin's shaft, horizontal axis and z."""
+        self.effectiveness: Array = own_effectiveness(layout)
+        """Wrench (n, 3, 6) of 1 N along each fin's shaft, zero and shaft x zero."""
         self._laws = stack_laws([fin.model for fin in layout.fins])
         self.feels_flow = any(law.feels_flow for _, law in self._laws)
         """Whether forces depend on the flow."""
@@ -81,7 +81,7 @@ class Plant:
         return wrench
 
     def forces(self, command: ArrayLike, *, flow: Array | None = None) -> Array:
-        """Returns each fin's mean force (..., n, 3) [N] in its own frame (shaft, e_h, e_z); see `wrench`."""
+        """Returns each fin's mean force (..., n, 3) [N] in its own frame (`layout.frames`); see `wrench`."""
         values, failed = self._checked(command)
         force = self.force(values, flow=flow)
         if failed is not None:
@@ -119,7 +119,7 @@ class Plant:
 
     def fin_forces(self, command: ArrayLike, *, flow: Array | None = None) -> Array:
         """Returns each fin's mean force (..., n, 3) [N] in the body frame; see `wrench`."""
-        force: Array = body_force(self.forces(command, flow=flow), self.layout.mounting_angle)
+        force: Array = body_force(self.forces(command, flow=flow), self.layout.frames)
         return force
 
     def linearize(self, command: Array, *, flow: Array | None = None) -> tuple[Array, Array]:

@@ -9,20 +9,17 @@ from finlab.arrays import Values, library_of
 from finlab.layout.arrays import force_effectiveness
 
 
-def body_force(fin_force: Values, mounting_angle: Values) -> Values:
-    """Turns forces from the fin frame to the body frame.
+def body_force(own_force: Values, frames: Values) -> Values:
+    """Turns forces from the actuators' own frames to the body frame.
 
     Args:
-        fin_force: (..., 3) along (x', y', z') [N].
-        mounting_angle: (...) [rad].
+        own_force: (..., 3) along own axes [N].
+        frames: (..., 3, 3), own axes in the rows, such as `layout.frames`.
 
     Returns:
         (..., 3) along body (x, y, z) [N].
     """
-    xp = library_of(fin_force)
-    cos, sin = xp.cos(mounting_angle), xp.sin(mounting_angle)
-    shaft, horizontal, vertical = fin_force[..., 0], fin_force[..., 1], fin_force[..., 2]
-    return xp.stack([shaft * cos - horizontal * sin, shaft * sin + horizontal * cos, vertical], axis=-1)
+    return (own_force[..., None, :] @ frames)[..., 0, :]
 
 
 def wrench_of_forces(fin_force: Values, effectiveness: Values) -> Values:

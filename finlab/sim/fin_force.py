@@ -14,7 +14,7 @@ from finlab.actuators.fin.blade import Blade
 from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.layout.angles import wrapped
-from finlab.layout.arrays import force_effectiveness
+from finlab.layout.arrays import own_effectiveness
 from finlab.physics import plant_of
 from finlab.vehicle.fin_motion import FinMotion
 
@@ -108,7 +108,7 @@ class FlexibleForce:
 
     def __init__(self, layout: Layout, fin: SoftFin | None = None) -> None:
         self.fin = SoftFin() if fin is None else fin
-        self.effectiveness = force_effectiveness(layout.position, layout.mounting_angle)
+        self.effectiveness = own_effectiveness(layout)
         n = layout.n_fins
         self._tip_angle: Array | None = None
         self._tip_speed = np.zeros(n)

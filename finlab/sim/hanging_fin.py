@@ -9,7 +9,7 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.layout import Layout
-from finlab.layout.arrays import force_effectiveness
+from finlab.layout.arrays import own_effectiveness
 from finlab.physics import plant_of
 
 DRAG_COEFFICIENT = 1.2
@@ -25,7 +25,7 @@ class HangingFins:
         blade = plant_of(layout).blade
         self._resistance = 0.5 * blade.density * DRAG_COEFFICIENT * blade.width * blade.length
         # What a newton does to the robot is what the robot's motion does to the fin's foot.
-        self._foot = force_effectiveness(layout.position, layout.mounting_angle)[:, 1:]
+        self._foot = own_effectiveness(layout)[:, 1:]
 
     def force(self, direction: Array, water: Array) -> Array:
         """Force (n, 3) [N] of each fin in its own frame (shaft, e_h, e_z), as if all hung still.

@@ -74,7 +74,7 @@ def perturbed(
         if (share := shares.get(fin.name, 1.0)) != 1.0:
             moved = replace(moved, model=fin.model.scaled(checked(share, Factor, key=fin.name)))
         fins.append(moved)
-    return replace(layout, fins=tuple(fins), body=changed)
+    return replace(layout, actuators=tuple(fins), body=changed)
 
 
 def checked_truth(layout: Layout, truth: Layout) -> Layout:

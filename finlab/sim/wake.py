@@ -29,7 +29,7 @@ class WakeForce(MeanForce):
 
     def __init__(self, layout: Layout) -> None:
         super().__init__(layout)
-        self._angle = layout.mounting_angle
+        self._frames = layout.frames
         way = layout.position[None] - layout.position[:, None]
         distance = np.linalg.norm(way, axis=-1)
         self._way = way / np.maximum(distance, 1e-9)[..., None]
@@ -42,7 +42,7 @@ class WakeForce(MeanForce):
     def loss(self, force: Array) -> Array:
         """Share (n,) that each fin loses where alone they would give forces (n, 3) in their frames [N]."""
         thrust = np.linalg.norm(force, axis=-1)
-        jet = -body_force(force, self._angle) / np.maximum(thrust, 1e-9)[:, None]
+        jet = -body_force(force, self._frames) / np.maximum(thrust, 1e-9)[:, None]
         angle = np.arccos(np.clip(np.einsum("ik,ijk->ij", jet, self._way), -1.0, 1.0))
         strength = thrust / (thrust + HALF_THRUST)
         met = np.exp(-((angle / SPREAD) ** 2)) * self._near * strength[:, None]

@@ -139,7 +139,7 @@ class Cells(HTMLParser):
 
 def test_notebooks_show_the_table_of_the_command_line(search: Allocator) -> None:
     layout = load_layout("A")
-    layout = replace(layout, fins=(replace(layout.fins[0], name="<b>bow</b> & co"), *layout.fins[1:]))
+    layout = replace(layout, actuators=(replace(layout.fins[0], name="<b>bow</b> & co"), *layout.fins[1:]))
     for wrench in (SURGE, FAR):
         result = search.allocate(layout, wrench, failed=["front_left"])
         page = Cells()
@@ -184,7 +184,9 @@ def test_another_command_is_judged_anew(search: Allocator) -> None:
 
 def test_a_method_that_does_not_know_the_fins_blames_no_limit() -> None:
     layout = load_layout("A")
-    strange = replace(layout, fins=tuple(replace(f, model=FinModelSpec("lighthill")) for f in layout.fins))
+    strange = replace(
+        layout, actuators=tuple(replace(f, model=FinModelSpec("lighthill")) for f in layout.fins)
+    )
     result = quick_allocator("paper").allocate(strange, SURGE)
     assert not result.reachable and result.binding == () and result.unknown_fins == layout.names
     assert "not reached" not in str(result) and "the method does not know these fins: front_right" in str(
@@ -208,7 +210,7 @@ def test_random_robots_too(k: int, search: Allocator) -> None:
 def test_without_its_force_table_no_method_answers(method: str, tmp_path: Path) -> None:
     allocator, layout = quick_allocator(method), load_layout("A")
     table = FinModelSpec("table", (("path", str(tmp_path / "gone.csv")),))
-    tables = replace(layout, fins=tuple(replace(fin, model=table) for fin in layout.fins))
+    tables = replace(layout, actuators=tuple(replace(fin, model=table) for fin in layout.fins))
     for answer in (allocator.allocate, lambda *asked, **how: allocator.allocate_batch(*asked, **how)):
         with pytest.raises(DataError, match=r"gone\.csv: no such file, expected a CSV table"):
             answer(tables, SURGE if answer == allocator.allocate else [SURGE], failed=["front_left"])

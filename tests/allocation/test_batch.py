@@ -89,7 +89,7 @@ def test_empty_batches_have_the_shapes_of_full_ones(method: str) -> None:
 @pytest.mark.parametrize("method", METHODS)
 def test_batches_carry_the_note_about_unknown_fins(method: str) -> None:
     layout = load_layout("A")
-    strange = layout.replace_fin("back_left", model=FinModelSpec("lighthill"))
+    strange = layout.replace_actuator("back_left", model=FinModelSpec("lighthill"))
     batch = quick_allocator(method).allocate_batch(strange, wrenches(2))
     assert batch.unknown_fins == (("back_left",) if method == "paper" else ())
     assert len(batch.notes) == len(batch.unknown_fins) and all("back_left" in note for note in batch.notes)

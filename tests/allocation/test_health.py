@@ -39,7 +39,7 @@ def test_a_torn_fin_gives_its_share_at_every_command(
     search: SearchAllocator, penta: Layout, kind: str
 ) -> None:
     fins = tuple(replace(fin, model=FinModelSpec(kind)) for fin in penta.fins)
-    layout, bow = replace(penta, fins=fins), penta.index("bow")
+    layout, bow = replace(penta, actuators=fins), penta.index("bow")
     result = search.allocate(layout, TARGET, health=Health.of(thrust={"bow": 0.4}))
     assert result.err_norm < 1e-5
     told, law = result.fin_forces, Plant(layout).fin_forces(result.command)
@@ -133,7 +133,7 @@ def test_a_stuck_fin_is_held_at_the_turn_within_its_limits(
     penta: Layout, arc: tuple[float, float], angle: float, held: float
 ) -> None:
     limits = Limits((0.1, 0.5), (0.2, 2.0), arc)
-    layout = Health.of(stuck={"bow": angle}).applied_to(penta.replace_fin("bow", limits=limits))
+    layout = Health.of(stuck={"bow": angle}).applied_to(penta.replace_actuator("bow", limits=limits))
     left = layout.fins[layout.index("bow")].limits
     assert left.zero_direction == pytest.approx((held, held))
     assert (left.amplitude, left.frequency) == ((0.1, 0.5), (0.2, 2.0))
@@ -146,7 +146,7 @@ def test_what_is_left_of_a_weak_fins_limits(
     penta: Layout, share: float, amplitude: tuple[float, float], frequency: tuple[float, float]
 ) -> None:
     """The upper limits shrink; a lower one only where it would lie above."""
-    whole = penta.replace_fin("bow", limits=Limits((0.1, 0.5), (1.0, 2.0), (0.0, 1.0)))
+    whole = penta.replace_actuator("bow", limits=Limits((0.1, 0.5), (1.0, 2.0), (0.0, 1.0)))
     layout = Health.of(weak={"bow": share}).applied_to(whole)
     left = layout.fins[layout.index("bow")].limits
     assert left.amplitude == pytest.approx(amplitude) and left.frequency == pytest.approx(frequency)

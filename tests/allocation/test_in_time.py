@@ -20,7 +20,7 @@ RISING = np.outer(np.arange(1.0, 41.0), [1.0, 0.0, 0.5, 0.0, 0.0, 0.1])
 def with_pole(pole: float) -> Layout:
     robot = load_layout("A")
     slow = replace(robot.fins[0], servo=Servo(direction_pole=pole))
-    return replace(robot, fins=(slow, *robot.fins[1:]))
+    return replace(robot, actuators=(slow, *robot.fins[1:]))
 
 
 @pytest.mark.parametrize("pole", [1.0, 2.0, 3.5])

@@ -18,7 +18,9 @@ pytestmark = pytest.mark.skipif(
 
 def with_models(**models: FinModelSpec) -> Layout:
     layout = load_layout("A")
-    return replace(layout, fins=tuple(replace(f, model=models.get(f.name, f.model)) for f in layout.fins))
+    return replace(
+        layout, actuators=tuple(replace(f, model=models.get(f.name, f.model)) for f in layout.fins)
+    )
 
 
 @pytest.mark.parametrize("method", METHODS)

@@ -32,7 +32,9 @@ def first_wrench(robot: Layout, setpoint: Setpoint, yaw: float = 0.0) -> np.ndar
 
 
 def test_all_gains_follow_from_the_slowest_fin(robot: Layout) -> None:
-    slow = replace(robot, fins=(replace(robot.fins[0], servo=Servo(direction_pole=1.75)), *robot.fins[1:]))
+    slow = replace(
+        robot, actuators=(replace(robot.fins[0], servo=Servo(direction_pole=1.75)), *robot.fins[1:])
+    )
     fast, halved = gains_for(robot), gains_for(slow)
     for name in ("velocity", "heading", "path"):
         assert getattr(halved, name) == pytest.approx(0.5 * getattr(fast, name))

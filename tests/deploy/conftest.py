@@ -41,7 +41,7 @@ def measured(force_table: Path) -> Layout:
     layout = finlab.load_layout("mixed")
     table = FinModelSpec("table", (("path", str(force_table)),))
     fins = (*layout.fins[:2], replace(layout.fins[2], model=table), layout.fins[3])
-    return replace(layout, name="measured", fins=fins)
+    return replace(layout, name="measured", actuators=fins)
 
 
 @pytest.fixture(scope="session")

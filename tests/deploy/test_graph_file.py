@@ -110,7 +110,7 @@ def test_white_space_and_order_of_keys_do_not_matter() -> None:
         (lambda d: d.update(format="finlab-layout"), "format: expected finlab-graph, got 'finlab-layout'"),
         (lambda d: d.update(surprise=1), "surprise: unknown key"),
         (lambda d: d.pop("normalization"), "normalization: required key is missing"),
-        (lambda d: d["graph"].update(nodes=[]), "expected a list of 1 to 16 values, got 0"),
+        (lambda d: d["graph"].update(nodes=[]), "expected a list of 1 to 64 values, got 0"),
         (lambda d: d["graph"]["nodes"][1].pop("limits"), r"graph.nodes\[1\].limits: required key is missing"),
         (lambda d: d["graph"]["nodes"][1].update(healthy=1), r"nodes\[1\].healthy: expected true or false"),
         (lambda d: d["graph"]["edges"].pop(), "graph.edges: expected every pair of healthy fins"),

@@ -29,7 +29,7 @@ def robot(bundle: Bundle) -> DeployedRobot:
 def with_model(robot: DeployedRobot, model: FinModelSpec) -> DeployedRobot:
     """The same robot, had all its fins another model than the one that it was exported for."""
     fins = tuple(replace(fin, model=model) for fin in robot.layout.fins)
-    return DeployedRobot(replace(robot.graph, layout=replace(robot.layout, fins=fins)), robot.allocator)
+    return DeployedRobot(replace(robot.graph, layout=replace(robot.layout, actuators=fins)), robot.allocator)
 
 
 def bad(robot: DeployedRobot) -> list[str]:

@@ -44,8 +44,8 @@ def test_shipped_layouts_survive_the_way_there_and_back(name: str, tmp_path: Pat
         ("x_m,y_m,z_m\n0,zero,0\n", "row 1.y_m: expected a number, got 'zero'"),
         ("x_m,y_m,z_m\n0,0,0,0\n", "row 1: has more values than the header"),
         ("x_m,y_m,z_m\n0,0,nan\n", "row 1.position_m.2.: must lie within"),
-        ("x_m,y_m,z_m\n", "expected 1 to 16 fins, got 0"),
-        ("x_m,y_m,z_m\n" + "0,0,0\n" * 17, "expected 1 to 16 fins, got more"),
+        ("x_m,y_m,z_m\n", "expected 1 to 64 actuators, got 0"),
+        ("x_m,y_m,z_m\n" + "0,0,0\n" * 65, "expected 1 to 64 fins, got more"),
     ],
 )
 def test_refusals_name_row_and_column(text: str, message: str, tmp_path: Path) -> None:

@@ -167,7 +167,7 @@ def kinds(tmp_path_factory: pytest.TempPathFactory, untrained_mdn: Path) -> list
     grid = np.linspace(0.05, 0.6, 4), np.linspace(0.1, 2.1, 4), np.linspace(-np.pi, np.pi, 7)
     write_table(place / "fin.csv", make_law(FinModelSpec("soft")), *grid)
     table = FinModelSpec("table", (("path", str(place / "fin.csv")),))
-    layout = load_layout("A").replace_fin("front_right", model=table)
+    layout = load_layout("A").replace_actuator("front_right", model=table)
     save_layout(layout, place / "a.json")
     write_csv(layout, place / "a.csv")
     write_urdf(layout, place / "a.urdf")

@@ -24,7 +24,7 @@ def uneven(n: int, seed: int) -> Layout:
         x, y, z = rng.uniform(-1.0, 1.0, 3) * [0.3, 0.3, 0.1]
         limits = Limits(zero_direction=(-1.2, 1.2)) if i == 0 else Limits()
         fins.append(Fin(f"fin_{i}", (x, y, z), rng.uniform(-3.0, 3.0), limits, model))
-    return Layout(name="uneven", fins=tuple(fins))
+    return Layout(name="uneven", actuators=tuple(fins))
 
 
 def problem_of(layout: Layout, name: Name) -> PlanarProblem:

@@ -82,5 +82,5 @@ def test_a_variant_is_the_robot_itself_placed_anew(shipped: Layouts) -> None:
 def test_larger_blades_of_the_same_thrust_take_more_power(shipped: Layouts) -> None:
     layout = shipped("A")
     long = FinModelSpec("drag", (("area", 0.02 / 1.44), ("lever", 0.12)))
-    other = replace(layout, fins=tuple(replace(fin, model=long) for fin in layout.fins))
+    other = replace(layout, actuators=tuple(replace(fin, model=long) for fin in layout.fins))
     assert (least_power(other, WRENCHES) > 1.02 * least_power(layout, WRENCHES)).all()

@@ -49,12 +49,12 @@ def edited(*path, value):
 
 
 BAD = [
-    ("fins", edited("fins", value=[]), "expected a list of 1 to 16 values, got 0"),
+    ("fins", edited("fins", value=[]), "expected a list of 1 to 64 values, got 0"),
     ("fins", edited("fins", value="left"), "expected a list, got 'left'"),
     ("fins", edited("fins", value=...), "required key is missing"),
-    ("version", edited("version", value=99), "this finlab reads version 1, got 99"),
-    ("version", edited("version", value="1"), "this finlab reads version 1"),
-    ("version", edited("version", value=True), "this finlab reads version 1"),
+    ("version", edited("version", value=99), "this finlab reads version 1 and 2, got 99"),
+    ("version", edited("version", value="1"), "this finlab reads version 1 and 2"),
+    ("version", edited("version", value=True), "this finlab reads version 1 and 2"),
     ("format", edited("format", value="urdf"), "expected finlab-layout, got 'urdf'"),
     ("name", edited("name", value=...), "required key is missing"),
     ("name", edited("name", value=7), "expected text, got 7"),
@@ -65,7 +65,7 @@ BAD = [
     ("frame.convention", edited("frame", "convention", value="NED"), "expected FLU, got 'NED'"),
     ("frame.up", edited("frame", "up", value="z"), "unknown key"),
     ("fins[1]", edited("fins", 1, value=3), "expected keys and values"),
-    ("fins[1].name", edited("fins", 1, "name", value="left"), "already the name of fins[0]"),
+    ("fins[1].name", edited("fins", 1, "name", value="left"), "already the name of actuator 1"),
     ("fins[1].name", edited("fins", 1, "name", value="x" * 65), "1 to 64 characters, got 65"),
     ("fins[1].nmae", edited("fins", 1, "nmae", value="x"), "unknown key"),
     ("fins[1].position_m", edited("fins", 1, "position_m", value=[0.1, 0.2]), "a list of 3 values, got 2"),
@@ -190,7 +190,7 @@ HOSTILE = {
     "wide": ("[" + "1," * 400_000 + "1]", "too many to be read"),
     "many": (
         yaml.safe_dump(edited("fins", value=[{"name": f"f{i}"} for i in range(5000)])),
-        "1 to 16 values, got 5000",
+        "1 to 64 values, got 5000",
     ),
     "twice": ("name: a\nversion: 1\nname: b\n", "line 3: key 'name' is given twice"),
     "list_key": ("? [1, 2]\n: 3\n", "a key must be plain text"),

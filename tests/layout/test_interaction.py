@@ -53,7 +53,7 @@ def test_layouts_with_and_without_it_are_two(coupled: Layout) -> None:
 
 
 def test_a_fin_may_be_renamed_and_lost(coupled: Layout) -> None:
-    renamed = coupled.replace_fin("front_right", name="bow")
+    renamed = coupled.replace_actuator("front_right", name="bow")
     assert renamed.interaction is not None and renamed.interaction.jets[0].source == "bow"
     left = coupled.without(["back_right"])
     assert left.interaction is not None and [jet.source for jet in left.interaction.jets] == ["back_left"]

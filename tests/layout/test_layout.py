@@ -43,12 +43,12 @@ def test_without_leaves_the_rest_in_order_and_never_nothing():
 
 
 def test_layouts_are_values():
-    moved = THREE.replace_fin("b", position=(0.3, 0.0, 0.0))
+    moved = THREE.replace_actuator("b", position=(0.3, 0.0, 0.0))
     assert moved.fins[1].position == (0.3, 0.0, 0.0)
     assert THREE.fins[1].position == (0.1, 0.2, -0.1)
     assert hash(THREE) == hash(Layout("three", THREE.fins))
     with pytest.raises(LayoutError, match="already the name"):
-        THREE.replace_fin("b", name="a")
+        THREE.replace_actuator("b", name="a")
 
 
 def test_numpy_numbers_become_plain_ones():

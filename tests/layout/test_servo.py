@@ -16,7 +16,7 @@ SLOW = Servo(amplitude_pole=3.0, speed_limit=6.0)
 
 @pytest.fixture(scope="module")
 def slow() -> Layout:
-    return load_layout("A").replace_fin("back_left", servo=SLOW)
+    return load_layout("A").replace_actuator("back_left", servo=SLOW)
 
 
 def test_arrays_follow_the_order_of_commands(slow: Layout) -> None:

@@ -25,7 +25,7 @@ def layout(request: pytest.FixtureRequest) -> Layout:
     """Fins with limits of their own, one of which pushes unevenly and leans."""
     layout = random_layout(np.random.default_rng(request.param), n_fins=request.param, limits="varied")
     uneven = FinModelSpec("soft", (("d", 0.2), ("e", 0.25), ("phi_e", 1.0)))
-    return layout.replace_fin("fin_1", model=uneven)
+    return layout.replace_actuator("fin_1", model=uneven)
 
 
 def acted(view: RobotView, share: np.ndarray) -> np.ndarray:
@@ -100,7 +100,7 @@ def test_turning_the_robot_changes_nothing(layout: Layout) -> None:
     )
     turned = np.concatenate([rotation @ target[:3], rotation @ target[3:]])
     even = np.array([1.0, 1.0, 1.0, 0.2, 0.2, 0.2])  # a yardstick that turns along
-    before, after = seen(layout, target, even), seen(replace(layout, fins=fins), turned, even)
+    before, after = seen(layout, target, even), seen(replace(layout, actuators=fins), turned, even)
     for a, b in zip(before, after, strict=True):
         np.testing.assert_allclose(a, b, atol=2e-3)
 
@@ -110,7 +110,7 @@ def test_a_robot_with_fins_of_another_size_is_seen_as_the_same() -> None:
     layout = random_layout(np.random.default_rng(3), n_fins=5)
     larger = layout
     for name in layout.names:
-        larger = larger.replace_fin(name, model=FinModelSpec("drag", (("area", 0.06),)))
+        larger = larger.replace_actuator(name, model=FinModelSpec("drag", (("area", 0.06),)))
     for a, b in zip(seen(layout, target), seen(larger, 3.0 * target), strict=True):
         np.testing.assert_allclose(a, b, atol=1e-5)
 

@@ -54,7 +54,7 @@ def test_answers_are_exact_even_where_nothing_was_learned(
     n: int, objective: str, untrained: MdnAllocator
 ) -> None:
     layout = random_layout(np.random.default_rng(n), n_fins=n, limits="varied")
-    layout = layout.replace_fin("fin_1", model=FinModelSpec("soft", (("e", 0.2), ("d", 0.1))))
+    layout = layout.replace_actuator("fin_1", model=FinModelSpec("soft", (("e", 0.2), ("d", 0.1))))
     targets = reachable(layout, 20)
     answer = untrained.with_settings(objective=objective).allocate_batch(layout, targets)
     error = untrained.normalization.error(Plant(layout).wrench(answer.command), targets)

@@ -57,7 +57,7 @@ def robot() -> Layout:
     layout = load_layout(shipped_layouts()["A"])
     first, second = layout.names[:2]
     arc, stiff = Limits(zero_direction=(0.3, 1.7)), Limits((0.3, 0.3), (1.1, 1.1), (0.7, 0.7))
-    return layout.replace_fin(first, limits=arc).replace_fin(second, limits=stiff)
+    return layout.replace_actuator(first, limits=arc).replace_actuator(second, limits=stiff)
 
 
 def keeps_limits(layout: Layout, command: np.ndarray) -> bool:

@@ -17,7 +17,9 @@ def robot() -> Layout:
     """A robot with a fin confined to an arc and one that cannot move at all."""
     layout = random_layout(np.random.default_rng(1), n_fins=4)
     arc, stiff = Limits(zero_direction=(0.3, 1.7)), Limits((0.3, 0.3), (1.1, 1.1), (0.7, 0.7))
-    return layout.replace_fin(layout.names[0], limits=arc).replace_fin(layout.names[1], limits=stiff)
+    return layout.replace_actuator(layout.names[0], limits=arc).replace_actuator(
+        layout.names[1], limits=stiff
+    )
 
 
 def untrained(*hidden: int) -> TrainedWeights:

@@ -29,10 +29,17 @@ def robots():
     return command, unit[..., 3:6] - 0.5, (2 * unit[..., 6] - 1) * math.pi
 
 
+def frames(angle):
+    """Axes of fins with horizontal shafts, (..., 3, 3)."""
+    sin, cos, zero, one = torch.sin(angle), torch.cos(angle), torch.zeros_like(angle), torch.ones_like(angle)
+    rows = [(cos, sin, zero), (-sin, cos, zero), (zero, zero, one)]
+    return torch.stack([torch.stack(row, -1) for row in rows], -2)
+
+
 def test_fin_axes_in_the_body_frame():
     angle = torch.tensor([0.0, math.pi / 2, -2.0], dtype=F64)
     for i, axis in enumerate([(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)]):
-        got = body_force(torch.tensor([axis] * 3, dtype=F64), angle)
+        got = body_force(torch.tensor([axis] * 3, dtype=F64), frames(angle))
         sin, cos = torch.sin(angle), torch.cos(angle)
         zero, one = torch.zeros_like(sin), torch.ones_like(sin)
         expected = [(cos, sin, zero), (-sin, cos, zero), (zero, zero, one)][i]
@@ -73,6 +80,6 @@ def test_arrays_and_tensors_give_the_same_wrench(robots):
     arrays = assemble_wrench(DRAG, command, position, angle, np.ones(angle.shape, dtype=bool))
     np.testing.assert_allclose(arrays, tensors, rtol=1e-13, atol=1e-14)
     # By hand: forces in the body frame, and their moments.
-    force = body_force(DRAG.force(command), angle)
+    force = body_force(DRAG.force(command), frames(torch.from_numpy(angle)).numpy())
     np.testing.assert_allclose(arrays[:, :3], force.sum(1), atol=1e-14)
     np.testing.assert_allclose(arrays[:, 3:], np.cross(position, force).sum(1), atol=1e-14)

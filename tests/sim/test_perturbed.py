@@ -48,7 +48,7 @@ def test_what_makes_no_sense_is_refused(layout_a: Layout, analytic: Allocator) -
     with pytest.raises(LayoutError, match="no fin 'tail'"):
         perturbed(layout_a, thrust={"tail": 0.5})
     measured = replace(layout_a.fins[0], model=FinModelSpec("table", (("path", "x.csv"),)))
-    table = replace(layout_a, fins=(measured, *layout_a.fins[1:]))
+    table = replace(layout_a, actuators=(measured, *layout_a.fins[1:]))
     with pytest.raises(LayoutError, match="table cannot be scaled"):
         perturbed(table, thrust={"front_right": 0.5})
     with pytest.raises(LayoutError, match="truth: expected the fins of A"):

@@ -10,7 +10,7 @@ from finlab.vehicle.fin_motion import FinMotion
 def test_it_follows_as_the_simulated_servo_does(layout_a: Layout) -> None:
     rng = np.random.default_rng(5)
     slow = Servo(amplitude_pole=3.0, frequency_pole=2.0, direction_pole=1.5)
-    layout = layout_a.replace_fin("back_left", servo=slow)
+    layout = layout_a.replace_actuator("back_left", servo=slow)
     lag, motion = FinLag(layout), FinMotion(layout)
     low, high = layout.lower, layout.upper
     for _ in range(40):

@@ -22,7 +22,7 @@ def pair() -> Layout:
 
 def driven(layout: Layout, servo: Servo) -> Layout:
     """The layout with the same servo at all fins."""
-    return replace(layout, fins=tuple(replace(fin, servo=servo) for fin in layout.fins))
+    return replace(layout, actuators=tuple(replace(fin, servo=servo) for fin in layout.fins))
 
 
 def flapping(layout: Layout, amplitude: float, frequency: float, direction: float) -> FinMotion:
@@ -35,7 +35,7 @@ def flapping(layout: Layout, amplitude: float, frequency: float, direction: floa
 def test_the_filters_are_critically_damped_and_exact(pair: Layout) -> None:
     """Against the differential equation x'' = k (k/4 (x* - x) - x') by SciPy."""
     slow = Servo(amplitude_pole=3.0, frequency_pole=5.0, direction_pole=2.0)
-    layout = pair.replace_fin(pair.names[1], servo=slow)
+    layout = pair.replace_actuator(pair.names[1], servo=slow)
     motion, command = FinMotion(layout), np.array([[0.3, 1.0, 1.2], [0.5, 0.7, -0.4]])
     for _ in range(37):
         motion.step(command, DT)

@@ -47,7 +47,7 @@ def tabled(tmp_path: Path) -> Layout:
     write_table(tmp_path / "fin.csv", law, *grid)
     spec = FinModelSpec("table", (("path", str(tmp_path / "fin.csv")),))
     ucat = load_layout("ucat")
-    return replace(ucat, name="tabled", fins=tuple(replace(fin, model=spec) for fin in ucat.fins))
+    return replace(ucat, name="tabled", actuators=tuple(replace(fin, model=spec) for fin in ucat.fins))
 
 
 @pytest.mark.parametrize("name", shipped_layouts())

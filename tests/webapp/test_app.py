@@ -118,7 +118,7 @@ def test_nodes_and_widgets_do_not_grow(server: viser.ViserServer, view: View) ->
 
 def test_names_are_escaped(server: viser.ViserServer, view: View) -> None:
     evil = "<img src=x onerror=alert(1)>"
-    layout = view.session.state.layout.replace_fin("front_left", name=evil)
+    layout = view.session.state.layout.replace_actuator("front_left", name=evil)
     on_loop(server, lambda: view.do(lambda: view.session.open_layout(layout)))
     until(lambda: not view.busy)
 

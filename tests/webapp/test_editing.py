@@ -12,7 +12,7 @@ from finlab.assets import shipped_layouts
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
 from finlab.layout.body import Hull
-from finlab.layout.layout import MAX_FINS
+from finlab.layout.layout import MAX_ACTUATORS
 from tests.webapp.hands import move_fin, turn_fin
 from webapp.markup.score_card import warnings
 from webapp.scene.meshes.hull import hull_of
@@ -66,8 +66,8 @@ def test_ring_around_the_vertical_axis(session: Session) -> None:
     turned = new[0].mounting_angle - first.mounting_angle
     assert math.cos(turned) == pytest.approx(0.0, abs=1e-9)
     session.ring_of_fins(8)
-    with pytest.raises(FinlabError, match="at most 16"):
-        session.ring_of_fins(8)
+    with pytest.raises(FinlabError, match="at most 64"):
+        session.ring_of_fins(64)
     assert session.state.layout.n_fins == 12
 
 
@@ -211,9 +211,9 @@ def test_new_fins_and_copies_stand_apart(session: Session) -> None:
         session.duplicate_fin()
     heights = [fin.position[2] for fin in session.state.layout.fins if fin.name.startswith("front_left")]
     assert heights == pytest.approx([0.0, 0.05, 0.1, 0.15])
-    while session.state.layout.n_fins < MAX_FINS:
+    while session.state.layout.n_fins < MAX_ACTUATORS:
         session.add_fin()
-    with pytest.raises(FinlabError, match=f"at most {MAX_FINS}"):
+    with pytest.raises(FinlabError, match=f"at most {MAX_ACTUATORS}"):
         session.add_fin()
 
 

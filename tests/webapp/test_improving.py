@@ -91,7 +91,7 @@ def test_analyst_answers_only_the_question_that_stays() -> None:
     async def run() -> Newest[Question, Findings]:
         analyst: Newest[Question, Findings] = Newest(running(), worker, find, asked.set, 0.1)
         for k in range(20):
-            moved = layout.replace_fin(layout.names[0], position=(0.01 * k, 0.2, 0.0))
+            moved = layout.replace_actuator(layout.names[0], position=(0.01 * k, 0.2, 0.0))
             analyst.ask(Question(moved, (), layout, "none", True))
             await asyncio.sleep(0.01)
         while analyst.busy:
@@ -108,11 +108,11 @@ def test_analyst_answers_only_the_question_that_stays() -> None:
 def test_what_is_proposed_can_be_built() -> None:
     """Outside of the hull, apart, symmetric, in whole millimetres and degrees; with figures that stay."""
     ucat = load_layout(shipped_layouts()["ucat"])
-    inside = replace(ucat, fins=(*ucat.fins, Fin("tail", (-0.25753, 0.0, 0.0), math.pi)))
+    inside = replace(ucat, actuators=(*ucat.fins, Fin("tail", (-0.25753, 0.0, 0.0), math.pi)))
     assert (
         any("tail beats inside" in text for text in warnings(inside)) is False
     )  # it points out of the stern
-    stuck = inside.replace_fin("tail", position=(-0.15, 0.0, 0.0))
+    stuck = inside.replace_actuator("tail", position=(-0.15, 0.0, 0.0))
     assert any("tail beats inside" in text for text in warnings(stuck))
     room = Room(stuck, 0.02)
     assert room.broken(stuck.position[None], stuck.mounting_angle[None])[0] > 0.0

@@ -52,7 +52,7 @@ def test_no_page_shows_markup_of_ours_as_text(server: viser.ViserServer, view: V
 
 
 def test_no_page_takes_names_for_markup(server: viser.ViserServer, view: View) -> None:
-    layout = view.session.state.layout.replace_fin("front_left", name=EVIL[:40])
+    layout = view.session.state.layout.replace_actuator("front_left", name=EVIL[:40])
     evil = replace(layout, name=EVIL[:40], description=EVIL)
     for task in DRAWERS:
         on_loop(server, lambda: view.do(lambda: view.session.open_layout(evil)))

@@ -115,7 +115,7 @@ def test_fins_break_and_are_mended_while_it_swims(swimming: Swimming) -> None:
 
 
 def test_a_robot_that_no_fins_can_steer_is_told_with_all_its_fins(swimming: Swimming) -> None:
-    aligned = replace(UCAT, fins=tuple(replace(fin, mounting_angle=0.0) for fin in UCAT.fins))
+    aligned = replace(UCAT, actuators=tuple(replace(fin, mounting_angle=0.0) for fin in UCAT.fins))
     swimming.start(Plan(aligned, (), path=SHORT, methods=("analytic",)))
     until(lambda: bool(swimming.swimmers))
     assert swimming.swimmers[0].shown.failed == ()

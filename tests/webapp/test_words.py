@@ -91,7 +91,7 @@ def test_fins_that_were_not_learned_are_told_in_words_of_their_own() -> None:
     layout, allocator = load_layout("ucat"), StandIn()
     allocator.fin_model = layout.fins[0].model
     other = replace(layout.fins[2], model=FinModelSpec("lighthill"))
-    strange = replace(layout, fins=(*layout.fins[:2], other, layout.fins[3]))
+    strange = replace(layout, actuators=(*layout.fins[:2], other, layout.fins[3]))
     for wrench in (PRESETS["Turn"], [0, 0, 60, 0, 0, 0]):  # even where the numbers happen to fit
         answer = allocator.allocate(strange, wrench)
         assert verdict_sentence(answer, True) == "Not learned: fin 3. Choose another method"
@@ -161,9 +161,9 @@ def test_bad_uploads_are_refused_by_name(name: str, content: bytes, said: str) -
 def test_fins_in_the_way_are_told() -> None:
     layout = load_layout(shipped_layouts()["ucat"])
     assert warnings(layout) == ()
-    crowded = layout.replace_fin("front_left", position=layout.fins[0].position)
+    crowded = layout.replace_actuator("front_left", position=layout.fins[0].position)
     assert "may touch" in warnings(crowded)[0]
-    inside = layout.replace_fin("front_left", position=(0.0, 0.0, 0.0))
+    inside = layout.replace_actuator("front_left", position=(0.0, 0.0, 0.0))
     assert any("inside the hull" in text for text in warnings(inside))
 
 

@@ -48,7 +48,7 @@ def fin_list(state: State, selection: tuple[str, ...]) -> str:
 
 def _row(state: State, index: int, chosen: bool) -> str:
     fin = state.layout.fins[index]
-    places = (*(f"{value:.3f}" for value in fin.position), f"{math.degrees(fin.mounting_angle):.0f}")
+    places = (*(f"{value:.3f}" for value in fin.position), f"{math.degrees(fin.shaft_azimuth):.0f}")
     twin = partner(state.links, fin.name)
     return html(
         "<tr class='{}' data-fin='{}' {}><td>{}<span class='name' title='{}'>{}</span>{}</td>{}</tr>",

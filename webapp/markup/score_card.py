@@ -153,7 +153,7 @@ def warnings(layout: Layout) -> tuple[str, ...]:
         if gap < SPAN:
             sentences.append(f"{a.name} and {b.name} are {100 * gap:.0f} cm apart and may touch.")
     for fin in layout.fins:
-        shaft = np.array([np.cos(fin.mounting_angle), np.sin(fin.mounting_angle), 0.0])
+        shaft = np.array([np.cos(fin.shaft_azimuth), np.sin(fin.shaft_azimuth), 0.0])
         if hull.contains(np.array(fin.position) + 0.05 * shaft):
             sentences.append(f"{fin.name} beats inside the hull.")
     return tuple(sentences)

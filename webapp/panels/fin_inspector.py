@@ -52,7 +52,7 @@ class FinInspector:
                 page.bind_number(
                     gui.add_slider("Shaft [°]", -180.0, 180.0, 1.0, 0.0, hint=about),
                     self._turn,
-                    lambda: math.degrees(self._fin.mounting_angle),
+                    lambda: math.degrees(self._fin.shaft_azimuth),
                     digits=2,
                 )
             with gui.add_folder("Limits"):
@@ -147,7 +147,7 @@ class FinInspector:
 def differences(fins: list[Fin]) -> str:
     """What of some fins is not the same, in words; nothing is said of their places."""
     parts: dict[str, set[object]] = {
-        "shaft": {round(fin.mounting_angle, 6) for fin in fins},
+        "shaft": {round(fin.shaft_azimuth, 6) for fin in fins},
         "limits": {fin.limits for fin in fins},
         "model": {fin.model for fin in fins},
         "drive": {fin.servo for fin in fins},

@@ -6,7 +6,7 @@ from functools import partial
 import viser
 
 from finlab.errors import FinlabError
-from finlab.layout.layout import MAX_FINS
+from finlab.layout.layout import MAX_ACTUATORS
 from webapp.handles import add_html, hold_kind, put
 from webapp.markup.fin_list import fin_list
 from webapp.markup.picking import marker
@@ -27,7 +27,9 @@ class FinList:
         page.presses.on("fin", self._select)
         page.presses.on("robot", lambda _key, _held: session.select(None))
         add_html(gui, marker("fl-primary"))
-        page.add_button("Add a fin", session.add_fin, icon=viser.Icon.PLUS, hint=f"Up to {MAX_FINS} fins.")
+        page.add_button(
+            "Add a fin", session.add_fin, icon=viser.Icon.PLUS, hint=f"Up to {MAX_ACTUATORS} fins."
+        )
         edits: dict[str, Callable[[], object]] = {
             "Mirror": session.mirror_fin,
             "Unlink": session.unlink_fin,

@@ -7,13 +7,13 @@ import viser
 from viser import uplot
 
 from finlab.arrays import Array
-from finlab.layout.layout import MAX_FINS
+from finlab.layout.layout import MAX_ACTUATORS
 from webapp.handles import put
 from webapp.session.targets import nice_limit
 from webapp.theme import css, fin_color
 
 FONT = "13px sans-serif"
-FIN_LINES = tuple(css(fin_color(i)) for i in range(MAX_FINS))
+FIN_LINES = tuple(css(fin_color(i)) for i in range(MAX_ACTUATORS))
 """Colours of lines that belong to a fin each."""
 ROOM = 1.14
 """Room above the last tick, so that its number is not cut off."""

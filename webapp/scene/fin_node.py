@@ -178,9 +178,9 @@ class FinNode:
         put(self._turn, active_axes=(selected, selected, False))
         if not owned_by_user:
             put(self._move, position=np.array(fin.position))
-            put(self._turn, wxyz=quaternion(fin.mounting_angle, 2))
+            put(self._turn, wxyz=quaternion(fin.shaft_azimuth, 2))
         put(self._label, visible=label is not None, text=label or "", position=np.array([0.0, 0.0, 0.04]))
-        shaft = np.array([math.cos(fin.mounting_angle), math.sin(fin.mounting_angle), 0.0])
+        shaft = np.array([math.cos(fin.shaft_azimuth), math.sin(fin.shaft_azimuth), 0.0])
         servo = np.array(fin.position) - 0.03 * shaft
         self._strut.show(_strut, servo, hull)
         put(self._strut.node, visible=True)

@@ -122,7 +122,7 @@ class RobotScene:
             elif fits and np.isfinite(allocation.command[i, 0]):
                 force = allocation.fin_forces[i]
                 # The force belongs to the answer's own mounting angle, which a drag may have left behind.
-                angle = allocation.layout.fins[i].mounting_angle
+                angle = allocation.layout.fins[i].shaft_azimuth
                 self._fins[i].command(allocation.command[i], force * scale, angle, display.fans)
         if fits and allocation is not None:
             self._flapping.take(allocation.command)

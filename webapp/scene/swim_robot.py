@@ -60,10 +60,10 @@ class SwimRobot:
             self._frames.append(self._scene.add_frame(name, show_axes=False))
             self._fins.append(FinShapes(self._scene, name, index, self._opacity))
         for frame, fin in zip(self._frames, layout.fins, strict=False):
-            put(frame, position=np.array(fin.position), visible=True, wxyz=quaternion(fin.mounting_angle, 2))
+            put(frame, position=np.array(fin.position), visible=True, wxyz=quaternion(fin.shaft_azimuth, 2))
         for spare in self._frames[layout.n_fins :]:
             put(spare, visible=False)
-        self._angles = [fin.mounting_angle for fin in layout.fins]
+        self._angles = [fin.shaft_azimuth for fin in layout.fins]
         self._flapping = Flapping()
         self._names = layout.names
         self._flap(moment)

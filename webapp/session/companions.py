@@ -141,7 +141,7 @@ def adopted(layout: Layout, parts: Mapping[str, bytes], folder: Path, source: st
         else:
             missing.append(Path(mesh).name[-60:])
             body = replace(body, hull=None)
-    return Opened(replace(layout, fins=tuple(fins), body=body), tuple(missing))
+    return Opened(replace(layout, actuators=tuple(fins), body=body), tuple(missing))
 
 
 def stored_mesh(name: str, content: bytes, scale: float, folder: Path) -> str:

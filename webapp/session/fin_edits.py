@@ -38,7 +38,7 @@ def with_fin(layout: Layout, name: str, fin: Fin) -> Layout:
     """The layout with another fin in the place of one of the same name."""
     fins = list(layout.fins)
     fins[layout.index(name)] = fin
-    return replace(layout, fins=tuple(fins))
+    return replace(layout, actuators=tuple(fins))
 
 
 def limited(fin: Fin, quantity: str, ends: Sequence[Any]) -> Fin:

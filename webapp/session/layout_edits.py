@@ -10,7 +10,7 @@ from finlab.errors import FinlabError
 from finlab.layout import Body, Fin, FinModelSpec, Layout
 from finlab.layout.angles import wrapped
 from finlab.layout.body import HULL_SHAPES, Hull
-from finlab.layout.layout import MAX_FINS
+from finlab.layout.layout import MAX_ACTUATORS
 from webapp.scene.meshes.hull import hull_of
 from webapp.session.links import existing_image, image
 from webapp.session.state import chosen, number
@@ -37,15 +37,15 @@ def moved(layout: Layout, name: str, position: Vector) -> Layout:
         number(value, f"{axis} of {name} [m]", -MAX_COORDINATE, MAX_COORDINATE)
         for value, axis in zip(position, "xyz", strict=True)
     ]
-    return layout.replace_fin(name, position=tuple(checked))
+    return layout.replace_actuator(name, position=tuple(checked))
 
 
 def turned(layout: Layout, name: str, angle: float) -> Layout:
     """A fin with another mounting angle [rad]."""
     checked = number(angle, f"mounting angle of {name} [rad]", -100.0, 100.0)
-    now = layout.fins[layout.index(name)].mounting_angle
+    now = layout.fins[layout.index(name)].shaft_azimuth
     same = abs(math.remainder(checked - now, math.tau)) <= UNTOUCHED
-    return layout.replace_fin(name, mounting_angle=now if same else float(wrapped(checked)))
+    return layout.replace_actuator(name, mounting_angle=now if same else float(wrapped(checked)))
 
 
 def keeping_hull(before: Layout, after: Layout) -> Layout:
@@ -90,12 +90,12 @@ def ring(layout: Layout, name: str, count: int, axis: str = "z") -> Layout:
     x, y, z = fin.position
     if math.hypot(x, y) < 1e-3:
         raise FinlabError(f"{name} stands on the axis {axis}, so its copies would all be in one place")
-    whole = round(number(count, "fins around the axis", 2, MAX_FINS))
+    whole = round(number(count, "fins around the axis", 2, MAX_ACTUATORS))
     for k in range(1, whole):
         turn = 2 * math.pi * k / whole
         c, s = math.cos(turn), math.sin(turn)
         place = round(c * x - s * y, 9), round(s * x + c * y, 9), z
-        azimuth = float(wrapped(fin.mounting_angle + turn))
+        azimuth = float(wrapped(fin.shaft_azimuth + turn))
         layout, _ = _added(layout, replace(fin, position=place, mounting_angle=azimuth), name)
     return layout
 
@@ -108,16 +108,16 @@ def stuck(layout: Layout, name: str) -> Layout:
     """
     fin = layout.fins[layout.index(name)]
     point, normal = hull_of(layout).nearest(np.array(fin.position))
-    azimuth = fin.mounting_angle if np.hypot(*normal[:2]) < 0.2 else math.atan2(normal[1], normal[0])
+    azimuth = fin.shaft_azimuth if np.hypot(*normal[:2]) < 0.2 else math.atan2(normal[1], normal[0])
     x, y, z = (round(float(v), 4) for v in point + STAND_OFF * normal)
-    return layout.replace_fin(name, position=(x, y, z), mounting_angle=float(wrapped(azimuth)))
+    return layout.replace_actuator(name, position=(x, y, z), mounting_angle=float(wrapped(azimuth)))
 
 
 def duplicated(layout: Layout, name: str) -> tuple[Layout, str]:
     """The layout with a copy of a fin above it, 5 cm or the first place that is free, and the copy's name."""
     fin = layout.fins[layout.index(name)]
     x, y, z = fin.position
-    places = ((x, y, round(z + STEP_UP * k, 9)) for k in range(1, MAX_FINS + 1))
+    places = ((x, y, round(z + STEP_UP * k, 9)) for k in range(1, MAX_ACTUATORS + 1))
     return _added(
         layout, replace(fin, position=next(p for p in places if _is_free(layout, p, STEP_UP))), name
     )
@@ -164,10 +164,10 @@ def deleted(layout: Layout, names: Sequence[str]) -> Layout:
 
 
 def _added(layout: Layout, fin: Fin, wanted: str) -> tuple[Layout, str]:
-    if layout.n_fins >= MAX_FINS:
-        raise FinlabError(f"the layout has {layout.n_fins} fins already; expected at most {MAX_FINS}")
+    if layout.n_fins >= MAX_ACTUATORS:
+        raise FinlabError(f"the layout has {layout.n_fins} fins already; expected at most {MAX_ACTUATORS}")
     name = _free_name(layout, wanted)
-    return replace(layout, fins=(*layout.fins, replace(fin, name=name))), name
+    return replace(layout, actuators=(*layout.fins, replace(fin, name=name))), name
 
 
 def _free_name(layout: Layout, wanted: str) -> str:
@@ -191,7 +191,7 @@ def _mirror_name(name: str) -> str:
 def with_model(layout: Layout, names: Sequence[str], model: FinModelSpec) -> Layout:
     """The layout with another model on some fins."""
     for name in names:
-        layout = layout.replace_fin(name, model=model)
+        layout = layout.replace_actuator(name, model=model)
     return layout
 
 
@@ -237,4 +237,4 @@ def balanced(layout: Layout, center: Vector) -> Layout:
     buoyancy = body.center_of_buoyancy_m
     body = replace(body, hull=hull, center_of_buoyancy_m=None if buoyancy is None else moved(buoyancy))
     fins = tuple(replace(fin, position=moved(fin.position)) for fin in layout.fins)
-    return replace(layout, fins=fins, body=body)
+    return replace(layout, actuators=fins, body=body)

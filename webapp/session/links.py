@@ -19,7 +19,7 @@ def image(fin: Fin) -> Fin:
     y and the shaft's azimuth change sign.
     """
     x, y, z = fin.position
-    return replace(fin, position=(x, -y, z), mounting_angle=float(wrapped(-fin.mounting_angle)))
+    return replace(fin, position=(x, -y, z), mounting_angle=float(wrapped(-fin.shaft_azimuth)))
 
 
 def partner(links: Links, name: str) -> str | None:
@@ -51,14 +51,14 @@ def followed(layout: Layout, links: Links, name: str) -> Layout:
     if twin is None or twin not in layout.names:
         return layout
     wanted = image(layout.fins[layout.index(name)])
-    return layout.replace_fin(twin, position=wanted.position, mounting_angle=wanted.mounting_angle)
+    return layout.replace_actuator(twin, position=wanted.position, mounting_angle=wanted.shaft_azimuth)
 
 
 def existing_image(layout: Layout, name: str) -> str | None:
     """The fin that already stands where the mirror image of `name` would."""
     wanted = image(layout.fins[layout.index(name)])
     for fin in layout.fins:
-        turn = abs(float(wrapped(fin.mounting_angle - wanted.mounting_angle)))
+        turn = abs(float(wrapped(fin.shaft_azimuth - wanted.shaft_azimuth)))
         if fin.name != name and math.dist(fin.position, wanted.position) < CLOSE_M and turn < CLOSE_RAD:
             return fin.name
     return None

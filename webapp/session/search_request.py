@@ -86,7 +86,7 @@ class SearchRequest:
                 *reach, turn = self.way
                 around = Bounds.around(fin, reach, math.radians(turn))
                 if self.symmetric and is_mirrored(fin, fin):
-                    y, angle = fin.position[1], fin.mounting_angle
+                    y, angle = fin.position[1], fin.shaft_azimuth
                     around = replace(around, y=(y, y), mounting_angle=(angle, angle))
                 bounds[fin.name] = around
         if not bounds:

@@ -148,7 +148,7 @@ class State:
 
         return replace(
             self,
-            layout=self.layout.replace_fin(name, name=wanted),
+            layout=self.layout.replace_actuator(name, name=wanted),
             failed=tuple(new(old) for old in self.failed),
             weak=tuple((new(old), share) for old, share in self.weak),
             stuck=tuple((new(old), angle) for old, angle in self.stuck),

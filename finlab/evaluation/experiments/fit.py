@@ -91,7 +91,7 @@ def _fitted(allocator: Allocator, case: Case, samples: int, noise: float, rng: n
     with tempfile.TemporaryDirectory() as folder:
         write_fin(fit, Path(folder) / "fin.csv")
         model = FinModelSpec("table", (("path", str(Path(folder) / "fin.csv")),))
-        robot = replace(case.layout, fins=tuple(replace(fin, model=model) for fin in case.layout.fins))
+        robot = replace(case.layout, actuators=tuple(replace(fin, model=model) for fin in case.layout.fins))
         answer = allocator.allocate_batch(robot, case.targets)
     missed = Plant(case.layout).wrench(answer.command) - case.targets
     assert case.sigma is not None, "robots of split fins have a sigma of their own"

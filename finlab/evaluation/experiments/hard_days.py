@@ -87,7 +87,7 @@ class HardDay:
         cases = make_split("fins-mixed", robot.n_fins, 1, seed)
         models = islice((fin.model for case in cases for fin in case.layout.fins), robot.n_fins)
         fins = tuple(replace(fin, model=own) for fin, own in zip(robot.fins, models, strict=True))
-        return replace(robot, fins=fins)
+        return replace(robot, actuators=fins)
 
     def obstacle(self, case: "Case") -> str | None:
         """Why a swim would be hopeless; None where it is not."""

@@ -134,7 +134,7 @@ def _robot_of_new_fins(rng: np.random.Generator, kind: str, name: str) -> Layout
         if kind == "table":
             fin = noisy_table(rng, fin, f"first-answer-{name}-{i}")
         fins.append(replace(old, model=fin.model))
-    return replace(layout, fins=tuple(fins))
+    return replace(layout, actuators=tuple(fins))
 
 
 def _printed(rows: Sequence[Row]) -> list[Row]:

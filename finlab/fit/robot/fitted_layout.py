@@ -48,7 +48,7 @@ def fitted_layout(fit: RobotFit, path: str | os.PathLike[str]) -> tuple[Layout, 
             name = str(place.resolve().with_name(f"{place.stem}-fin{i + 1}.csv"))
             tables[name], model = table, FinModelSpec("table", (("path", name),))
         x, y, z = (float(value) for value in np.array(fin.position) - center)
-        angle = float(np.mod(fin.mounting_angle + mounting[i] + np.pi, 2 * np.pi) - np.pi)
+        angle = float(np.mod(fin.shaft_azimuth + mounting[i] + np.pi, 2 * np.pi) - np.pi)
         fins.append(replace(fin, position=(x, y, z), mounting_angle=angle, model=model))
     notes = "\n".join(summary(fit))
     text = f"{notes}\n{layout.description}".strip()[:MAX_DESCRIPTION_LENGTH]
@@ -80,7 +80,7 @@ def _named(layout: Layout, names: dict[str, str]) -> Layout:
             return fin
         return replace(fin, model=FinModelSpec("table", (("path", names[path]),)))
 
-    return replace(layout, fins=tuple(renamed(fin) for fin in layout.fins))
+    return replace(layout, actuators=tuple(renamed(fin) for fin in layout.fins))
 
 
 def _found(fit: RobotFit, name: str) -> Array:

@@ -57,7 +57,7 @@ def test_it_agrees_with_ipopt_in_commands_and_with_the_search(name: str) -> None
 def test_it_agrees_with_the_search_on_any_fin_and_arc(model: FinModelSpec, arc: tuple[float, float]) -> None:
     drawn = random_layout(np.random.default_rng(5), n_fins=5)
     fins = [replace(fin, model=model, limits=Limits(zero_direction=arc)) for fin in drawn.fins]
-    layout = replace(drawn, fins=(*fins[:2], replace(fins[2], limits=Limits()), *fins[3:]))
+    layout = replace(drawn, actuators=(*fins[:2], replace(fins[2], limits=Limits()), *fins[3:]))
     targets = targets_of(layout)
     least, missed, _ = timed(load_allocator(), layout, targets)
     power, error, _ = timed(load_allocator("ipopt", space="forces"), layout, targets)

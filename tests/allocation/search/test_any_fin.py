@@ -34,7 +34,7 @@ def with_arcs(name: str, arcs: dict[int, tuple[float, float]]) -> Layout:
     layout = load_layout(shipped_layouts()[name])
     held = {i: replace(layout.fins[i].limits, zero_direction=arc) for i, arc in arcs.items()}
     fins = (replace(fin, limits=held.get(i, fin.limits)) for i, fin in enumerate(layout.fins))
-    return replace(layout, fins=tuple(fins))
+    return replace(layout, actuators=tuple(fins))
 
 
 def cost_of(objective: Name, answer: object) -> float:
@@ -127,7 +127,7 @@ def coincident(rng: np.random.Generator, name: str) -> Layout:
     first, second, *others = layout.fins
     turned = first.mounting_angle + (math.pi if rng.random() < 0.5 else 0.0)
     twin = replace(second, position=first.position, mounting_angle=math.remainder(turned, 2.0 * math.pi))
-    return replace(layout, fins=(first, twin, *others))
+    return replace(layout, actuators=(first, twin, *others))
 
 
 @pytest.mark.parametrize("objective", OBJECTIVES)
@@ -174,7 +174,7 @@ def test_what_was_reached_late_is_as_cheap() -> None:
 def test_tiny_fins_are_as_exact_beside_their_own_strength(area: float) -> None:
     layout = load_layout(shipped_layouts()["A"])
     model = FinModelSpec("drag", (("area", area),))
-    tiny = replace(layout, fins=tuple(replace(fin, model=model) for fin in layout.fins))
+    tiny = replace(layout, actuators=tuple(replace(fin, model=model) for fin in layout.fins))
     method = load_allocator()
     for target in reachable(tiny, 6):
         answer = method.allocate(tiny, target)

@@ -82,7 +82,7 @@ def test_limits_hold_out_of_reach(search: SearchAllocator, seed: int, limits: st
 def test_the_order_of_the_fins_does_not_matter(search: SearchAllocator, seed: int) -> None:
     layout, target = drawn(seed)
     order = np.random.default_rng(seed).permutation(layout.n_fins)
-    shuffled = replace(layout, fins=tuple(layout.fins[i] for i in order))
+    shuffled = replace(layout, actuators=tuple(layout.fins[i] for i in order))
     one, other = search.allocate(layout, target), search.allocate(shuffled, target)
     assert one.err_norm < GOOD and other.err_norm < GOOD
     assert search.normalization.error(one.wrench, other.wrench) < GOOD
@@ -105,7 +105,7 @@ def test_a_turned_robot_gets_the_turned_answer(
         )
         for fin in layout.fins
     ]
-    turned = replace(layout, fins=tuple(fins))
+    turned = replace(layout, actuators=tuple(fins))
     one = search.allocate(layout, target)
     other = search.allocate(turned, np.concatenate([rotation @ target[:3], rotation @ target[3:]]))
     assert one.err_norm < GOOD and other.err_norm < GOOD
@@ -126,7 +126,7 @@ def test_a_mirrored_robot_gets_the_mirrored_answer(search: SearchAllocator, seed
         for fin in layout.fins
     ]
     one = search.allocate(layout, target)
-    other = search.allocate(replace(layout, fins=tuple(fins)), MIRROR * target)
+    other = search.allocate(replace(layout, actuators=tuple(fins)), MIRROR * target)
     assert one.err_norm < GOOD and other.err_norm < GOOD
     assert same_energy(one, other, 0.02)
 
@@ -170,7 +170,10 @@ def test_a_small_change_of_the_layout_changes_the_answer_little(search: SearchAl
         )
         for fin in layout.fins
     ]
-    one, other = search.allocate(layout, target), search.allocate(replace(layout, fins=tuple(fins)), target)
+    one, other = (
+        search.allocate(layout, target),
+        search.allocate(replace(layout, actuators=tuple(fins)), target),
+    )
     # A robot of few fins may have been moved away from the target.
     moved = search.normalization.error(Plant(other.layout).wrench(one.command), target)
     assert other.err_norm <= max(GOOD, moved) and same_energy(one, other, 0.01)

@@ -105,7 +105,7 @@ def test_many_fins_for_effort_track_at_about_the_same_cost(name: str) -> None:
 
 def test_rates_are_those_of_each_fin(search: SearchAllocator, penta: Layout) -> None:
     first = replace(penta.fins[0], servo=replace(penta.fins[0].servo, frequency_rate=0.5, direction_rate=1.0))
-    other = replace(penta, fins=(first, *penta.fins[1:]))
+    other = replace(penta, actuators=(first, *penta.fins[1:]))
     ride = drive(search, other, smooth_path(1)[:60], bound=True)
     assert (ride.change[:, 0] <= np.array([0.1, 0.05, 0.1]) + 1e-9).all()
     assert (ride.change[:, 1:, 2] > 0.1).any()

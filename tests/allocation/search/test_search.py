@@ -194,7 +194,7 @@ def test_a_force_table_that_was_measured_again_is_read_again(search: SearchAlloc
     grid = np.linspace(0.0, 0.6, 9), np.linspace(0.0, 2.1, 10), np.linspace(-np.pi, np.pi, 13)
     table = FinModelSpec("table", (("path", str(tmp_path / "fin.csv")),))
     layout = load_layout("A")
-    layout = replace(layout, fins=tuple(replace(fin, model=table) for fin in layout.fins))
+    layout = replace(layout, actuators=tuple(replace(fin, model=table) for fin in layout.fins))
     for hour, area in enumerate((0.02, 0.03)):
         write_table(tmp_path / "fin.csv", make_law(FinModelSpec("drag", (("area", area),))), *grid)
         os.utime(tmp_path / "fin.csv", (3600 * hour, 3600 * hour))

@@ -44,7 +44,7 @@ def truth(drawn: Layout) -> Layout:
         angle = fin.mounting_angle + TURNED[fin.name]
         return replace(fin, position=(x, y, z), mounting_angle=angle, model=model)
 
-    return replace(drawn, fins=tuple(changed(fin) for fin in drawn.fins))
+    return replace(drawn, actuators=tuple(changed(fin) for fin in drawn.fins))
 
 
 @pytest.fixture(scope="module")
@@ -107,7 +107,7 @@ def test_late_sensors_are_found_out(drawn: Layout, truth: Layout) -> None:
 
 
 def test_a_fin_that_never_works_is_said_to_be_unknown(drawn: Layout) -> None:
-    lost = replace(drawn, fins=tuple(fin for i, fin in enumerate(drawn.fins) if i != 1))
+    lost = replace(drawn, actuators=tuple(fin for i, fin in enumerate(drawn.fins) if i != 1))
     command, measured = swim(lost, 60.0, seed=2)
     motion = replay(lost, command)
     whole = np.zeros((*motion.shape[:2], 3, 3))

@@ -111,7 +111,7 @@ def test_constant_columns_are_refused(rows: Rows, pair: Layout, tmp_path: Path, 
 def test_missing_columns_are_named(
     rows: Rows, pair: Layout, tmp_path: Path, missing: tuple[str, ...], why: str
 ) -> None:
-    layout = pair.replace_fin(pair.names[0], name="bow")
+    layout = pair.replace_actuator(pair.names[0], name="bow")
     rows[0] = [name.replace(f"{pair.names[0]}.", "bow.") for name in rows[0]]
     keep = [k for k, name in enumerate(rows[0]) if name not in missing]
     with pytest.raises(DataError, match=why):

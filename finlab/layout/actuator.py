@@ -1,0 +1,7 @@
+"""What a layout may hold: every type of actuator, as one type."""
+
+from finlab.layout.fin import Fin
+
+Actuator = Fin
+"""An actuator of a robot: `name`, `type`, `position` [m], `frame` (3 x 3, rows in the body frame), and
+`lower` and `upper`, the limits of its command (3,)."""
