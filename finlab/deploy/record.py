@@ -14,6 +14,7 @@ def allocation_record(result: Allocation) -> dict[str, object]:
         "failed": list(result.failed),
         "command": command_rows(result.command),
         "target": result.target.tolist(),
+        "flow": None if result.flow is None else result.flow.tolist(),
         "wrench_surrogate": None if surrogate is None else surrogate.tolist(),
         "wrench_plant": result.wrench.tolist(),
         "unallocated": result.unallocated.tolist(),

@@ -22,6 +22,7 @@ KEYS = [
     "failed",
     "command",
     "target",
+    "flow",
     "wrench_surrogate",
     "wrench_plant",
     "unallocated",
@@ -105,6 +106,20 @@ def test_the_objective_decides_what_is_kept_least(allocate: Callable[..., tuple[
     assert usual["command"] == power["command"]
     assert power["power"] < 0.95 * effort["power"] and effort["effort"] < 0.95 * power["effort"]
     assert max(power["err_norm"], effort["err_norm"]) < 1e-4
+
+
+def test_at_a_flow_the_plant_at_that_flow_judges(
+    allocate: Callable[..., tuple[int, str, str]], tmp_path: Path
+) -> None:
+    robot = replace(load_layout("A"), interaction=Interaction(inflow=(0.3, 0.2)))
+    save_layout(robot, tmp_path / "robot.yaml")
+    flow = [0.3, 0.0, -0.1, 0.0, 0.0, 0.2]
+    result = answer(
+        allocate(str(tmp_path / "robot.yaml"), *WRENCH, "--flow", *map(str, flow), "--json")
+    )
+    assert result["flow"] == flow and result["err_norm"] < 1e-3 and not result["notes"]
+    wrench = plant_of(robot).wrench(result["command"], flow=np.array(flow))
+    assert result["wrench_plant"] == pytest.approx(wrench.tolist())
 
 
 def test_table_for_people(allocate: Callable[..., tuple[int, str, str]]) -> None:

@@ -101,6 +101,7 @@ def test_an_id_of_any_kind_comes_back(id_: Any, robot: DeployedRobot) -> None:
         ({**GOOD, "failed": ["nobody"]}, "no fin 'nobody'"),
         ({**GOOD, "policy": "hope"}, "policy: expected one of"),
         ({**GOOD, "policy": 3}, "policy: expected a name"),
+        ({**GOOD, "flow": [1, 0, 0]}, "flow: expected six numbers"),
         ({**GOOD, "reference": [1, 0, 0, 0, 0, 0]}, r"reference: expected an array of shape \(N, 6\)"),
         ({**GOOD, "id": "x" * 1000}, "id: longer than 1000 characters"),
         ({**GOOD, "id": float("nan")}, "NaN is no number in JSON"),
