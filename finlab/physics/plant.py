@@ -62,7 +62,7 @@ class Plant:
         flow = self.flow if flow is None else flow
         if flow is None or not self.feels_flow:
             return None
-        return inflow_of(np.asarray(flow, np.float64), self.layout.position, self.effectiveness[..., :3])
+        return inflow_of(np.asarray(flow, np.float64), self.layout.position, self.layout.frames)
 
     def wrench(self, command: ArrayLike, *, flow: Array | None = None) -> Array:
         """Returns the wrench that a command causes.
