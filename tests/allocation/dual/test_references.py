@@ -1,0 +1,80 @@
+"""The judges of least watts agree with each other and with published figures of a BlueROV2 Heavy."""
+
+import numpy as np
+import pytest
+from scipy.optimize import lsq_linear
+
+from tests.least_power import conic_optimum, farthest, least_known, least_miss, lower_bound
+from tests.mixed_robots import KINDS, bluerov2_heavy, random_robot, within
+from tests.own_plant import OwnPlant
+
+HEAVY = OwnPlant(bluerov2_heavy())
+
+
+@pytest.mark.parametrize(
+    ("wrench", "forces"),
+    [
+        ((20, 0, 0, 0, 0, 0), (-7.0711, -7.0711, 7.0711, 7.0711, 0.4661, 0.4661, -0.4661, -0.4661)),
+        ((0, 20, 0, 0, 0, 0), (-7.2202, 7.2202, -6.9219, 6.9219, -0.2558, 0.2558, -0.2558, 0.2558)),
+        ((0, 0, 20, 0, 0, 0), (0, 0, 0, 0, -5, -5, -5, -5)),
+        ((0, 0, 0, 2, 0, 0), (0, 0, 0, 0, 2.3256, -2.3256, 2.3256, -2.3256)),
+        ((0, 0, 0, 0, 2, 0), (0, 0, 0, 0, 4.2373, 4.2373, -4.2373, -4.2373)),
+        ((0, 0, 0, 0, 0, 2), (-2.9836, 2.9836, 2.9836, -2.9836, 0, 0, 0, 0)),
+        ((30, 15, -20, 0, 1, 3), (-20.4971, -0.7161, 9.8905, 11.3227, 7.6259, 8.0097, 1.9903, 2.3741)),
+    ],
+)
+def test_the_pseudo_inverse_of_a_heavy(wrench: tuple[float, ...], forces: tuple[float, ...]) -> None:
+    np.testing.assert_allclose(np.linalg.pinv(HEAVY.effectiveness) @ wrench, forces, atol=6e-5)
+    assert np.linalg.cond(HEAVY.effectiveness) == pytest.approx(8.48, abs=5e-3)
+
+
+@pytest.mark.parametrize(
+    ("axis", "most", "least"),
+    [
+        (0, 129.2, 129.2),
+        (1, 126.5, 126.5),
+        (2, 159.6, 205.8),
+        (3, 34.3, 34.3),
+        (4, 18.8, 18.8),
+        (5, 30.6, 30.6),
+    ],
+)
+def test_the_reach_of_a_heavy(axis: int, most: float, least: float) -> None:
+    for sign, expected in ((1.0, most), (-1.0, least)):
+        assert farthest(HEAVY, sign * np.eye(6)[axis]) == pytest.approx(expected, abs=0.051)
+
+
+def test_three_ways_to_the_least_watts_of_a_heavy() -> None:
+    for seed in range(3):
+        wrench = within(HEAVY, np.random.default_rng(seed))
+        watts, forces = conic_optimum(HEAVY, wrench)
+        np.testing.assert_allclose(HEAVY.effectiveness @ forces, wrench, atol=1e-6)
+        assert lower_bound(HEAVY, wrench) == pytest.approx(watts, rel=1e-6)
+        assert least_known(HEAVY, wrench, 2) == pytest.approx(watts, rel=1e-6)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_bound_and_best_known_meet(kind: str) -> None:
+    """Where the bound by prices equals what is found, both are the optimum; wide arcs and holes included."""
+    plant, rng = OwnPlant(random_robot(kind, 0, 1)), np.random.default_rng(0)
+    wrench = within(plant, rng)
+    best = least_known(plant, wrench, 1)
+    assert best is not None
+    assert lower_bound(plant, wrench) == pytest.approx(best, rel=2e-5)
+    assert farthest(plant, wrench) >= 0.9999
+
+
+def test_beyond_the_farthest_the_bound_says_so() -> None:
+    wrench = within(HEAVY, np.random.default_rng(3))
+    assert np.isfinite(lower_bound(HEAVY, 0.999 * farthest(HEAVY, wrench) * wrench))
+    assert lower_bound(HEAVY, 1.01 * farthest(HEAVY, wrench) * wrench) == np.inf
+
+
+def test_least_miss_of_a_heavy() -> None:
+    """Against least squares with bounds."""
+    wrench = 2.0 * farthest(HEAVY, np.ones(6)) * np.ones(6)
+    low, high = np.array([each.limits for each in HEAVY.actuators])[:, :, 0].T
+    ends = lsq_linear(
+        HEAVY.effectiveness / HEAVY.scales[:, None], wrench / HEAVY.scales, (low, high), tol=1e-14
+    )
+    assert least_miss(HEAVY, wrench) == pytest.approx(np.sqrt(2.0 * ends.cost), rel=1e-5)

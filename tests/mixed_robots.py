@@ -1,0 +1,233 @@
+"""Seeded random robots of all kinds of actuator as layout files, and wrenches within reach and beyond."""
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from finlab.arrays import Array
+from finlab.layout import Layout
+from finlab.layout.file import parse_layout
+from tests.least_power import farthest
+from tests.own_plant import OwnPlant, edge_forces
+
+DOMAIN = 0x3A11
+"""Leads the seed of every robot."""
+KINDS = (
+    "thrusters",
+    "azimuths",
+    "fins",
+    "fins any shaft",
+    "fins uneven",
+    "wide arcs",
+    "holes",
+    "mixed",
+    "all",
+)
+"""Kinds of robot; in `holes` fins cannot rest, their least force is up to 5 % of the largest."""
+CONVEX = ("thrusters", "azimuths", "fins", "fins any shaft", "fins uneven", "mixed")
+"""Kinds of robot whose sets of forces are convex, but for the rest of a fin."""
+T200 = {"type": "power_law", "forward": 0.997, "reverse": 1.449, "exponent": 1.5}
+"""A T200 thruster at 16 V: watts over N^1.5."""
+T200_FORCE = [-39.91, 51.44]
+"""Its least and largest force [N]."""
+
+
+def load(layout: Mapping[str, Any]) -> Layout:
+    """A layout file's mapping as the library reads it."""
+    return parse_layout(layout)
+
+
+def random_robot(kind: str, number: int, seed: int) -> dict[str, Any]:
+    """Robot `number` of a seed, of one of `KINDS`, as the mapping of a layout file."""
+    rng = np.random.default_rng([DOMAIN, KINDS.index(kind), seed, number])
+    while True:
+        makers = _makers(kind, rng)
+        scale = 10.0 ** rng.uniform(-0.5, 0.5)
+        actuators = [make(rng, f"a{i + 1}", scale) for i, make in enumerate(makers)]
+        layout = {
+            "format": "finlab-layout",
+            "version": 2,
+            "name": kind.replace(" ", "_"),
+            "actuators": actuators,
+        }
+        if kind not in ("thrusters", "azimuths") or len(makers) < 6 or _condition(layout) < 100.0:
+            return layout
+
+
+def within(plant: OwnPlant, rng: np.random.Generator, low: float = 0.2, high: float = 1.0) -> Array:
+    """A wrench (6,) within reach: that of a random command whose sizes are up to 0.2 to 1 of their range."""
+    wrench: Array = plant.wrench(plant.draw(rng, float(rng.uniform(low, high))))
+    return wrench
+
+
+def beyond(plant: OwnPlant, rng: np.random.Generator, times: float) -> Array:
+    """A wrench (6,) so many times as far as what is pushed at most along its direction."""
+    wrench = plant.wrench(plant.draw(rng))
+    return times * farthest(plant, wrench) * wrench
+
+
+def bluerov2_heavy() -> dict[str, Any]:
+    """BlueROV2 Heavy: positions about its centre of gravity, T200 at 16 V, directions of ArduSub."""
+    s = math.sqrt(0.5)
+    places = [(0.14, -0.092), (0.14, 0.092), (-0.15, -0.092), (-0.15, 0.092)]
+    axes = [(-s, -s), (-s, s), (s, -s), (s, s)]
+    rows = [((x, y, -0.011), (*axis, 0.0)) for (x, y), axis in zip(places, axes, strict=True)]
+    rows += [((x, y, 0.053), (0.0, 0.0, -1.0)) for x in (0.118, -0.118) for y in (-0.215, 0.215)]
+    thrusters = [
+        {"name": f"t{i}", "type": "thruster", "position_m": list(position), "axis": list(axis)}
+        | {"force_n": T200_FORCE, "model": T200}
+        for i, (position, axis) in enumerate(rows, 1)
+    ]
+    return layout_of("heavy", thrusters)
+
+
+def layout_of(name: str, actuators: list[dict[str, Any]]) -> dict[str, Any]:
+    """The mapping of a layout file."""
+    return {"format": "finlab-layout", "version": 2, "name": name, "actuators": actuators}
+
+
+def _condition(layout: Mapping[str, Any]) -> float:
+    plant = OwnPlant(layout)
+    return float(np.linalg.cond(plant.effectiveness / plant.scales[:, None]))
+
+
+Maker = Callable[[np.random.Generator, str, float], dict[str, Any]]
+
+
+def _makers(kind: str, rng: np.random.Generator) -> list[Maker]:
+    """What a robot of a kind is made of."""
+    if kind == "thrusters":
+        return [_thruster] * int(rng.integers(4, 11))
+    if kind == "azimuths":
+        return [_azimuth] * int(rng.integers(3, 7))
+    if kind == "wide arcs":
+        wide = int(rng.integers(1, 3))
+        return [_wide_fin] * wide + [_azimuth] * int(rng.integers(0, 2)) + [_fin] * int(rng.integers(2, 5))
+    fins = {"fins any shaft": _shaft_fin, "fins uneven": _uneven_fin, "holes": _restless_fin}
+    if kind in ("fins", *fins):
+        return [fins.get(kind, _fin)] * int(rng.integers(3, 9))
+    few: list[Maker] = [_fin, _shaft_fin, _thruster, _azimuth]
+    if kind == "all":
+        few += [_uneven_fin, _wide_fin, _restless_fin]
+    chosen = [few[k] for k in rng.integers(len(few), size=int(rng.integers(4, 10)))]
+    return chosen[:1] + [_thruster, _azimuth] + chosen[1:]
+
+
+def _position(rng: np.random.Generator) -> list[float]:
+    place: list[float] = (rng.uniform(-1.0, 1.0, 3) * [0.3, 0.3, 0.15]).tolist()
+    return place
+
+
+def _unit(rng: np.random.Generator) -> Array:
+    drawn = rng.normal(size=3)
+    return np.asarray(drawn / np.linalg.norm(drawn))
+
+
+def _plane(rng: np.random.Generator) -> tuple[list[float], list[float]]:
+    """A shaft and a zero direction across it."""
+    shaft = _unit(rng)
+    zero = np.cross(shaft, _unit(rng))
+    return shaft.tolist(), (zero / np.linalg.norm(zero)).tolist()
+
+
+def _law(rng: np.random.Generator) -> dict[str, Any]:
+    exponent = float(rng.choice([1.5, rng.uniform(1.2, 2.5)]))
+    forward = float(10.0 ** rng.uniform(-0.5, 0.5)) * 20.0 ** (1.5 - exponent)
+    return {"type": "power_law", "forward": forward, "reverse": forward * float(rng.uniform(0.8, 3.0))} | {
+        "exponent": exponent
+    }
+
+
+def _thruster(rng: np.random.Generator, name: str, scale: float) -> dict[str, Any]:
+    high = float(scale * rng.uniform(4.0, 30.0))
+    low = -high * float(rng.choice([0.0, 1.0, rng.uniform(0.2, 1.2)], p=[0.1, 0.1, 0.8]))
+    spec: dict[str, Any] = {"name": name, "type": "thruster", "position_m": _position(rng)}
+    spec |= {"axis": _unit(rng).tolist(), "force_n": [low, high], "model": _law(rng)}
+    if rng.random() < 0.5:
+        spec["torque_per_newton_m"] = float(rng.uniform(-0.03, 0.03))
+    return spec
+
+
+def with_dead_bands(layout: Mapping[str, Any], rng: np.random.Generator) -> dict[str, Any]:
+    """A layout whose thrusters give no force below 0.1 to 1 N."""
+    banded = [
+        each | {"dead_band_n": float(rng.uniform(0.1, 1.0))} if each["type"] == "thruster" else each
+        for each in layout["actuators"]
+    ]
+    return {**layout, "actuators": banded}
+
+
+def _azimuth(rng: np.random.Generator, name: str, scale: float) -> dict[str, Any]:
+    axis, zero = _plane(rng)
+    spec: dict[str, Any] = {"name": name, "type": "azimuth", "position_m": _position(rng), "turn_axis": axis}
+    spec |= {"zero": zero, "force_n": [0.0, float(scale * rng.uniform(4.0, 30.0))], "model": _law(rng)}
+    if rng.random() < 0.5:
+        spec["arc_deg"] = _arc(rng, 20.0, 170.0)
+    return spec
+
+
+def _arc(rng: np.random.Generator, least: float, most: float) -> list[float]:
+    width = float(rng.uniform(least, most))
+    start = float(rng.uniform(-180.0, 180.0 - width))
+    return [start, start + width]
+
+
+def _fin_model(rng: np.random.Generator, uneven: float = 0.0) -> dict[str, Any]:
+    kind = ("drag", "lighthill", "soft")[rng.integers(3)] if not uneven else "soft"
+
+    def log(low: float, high: float) -> float:
+        return float(math.exp(rng.uniform(math.log(low), math.log(high))))
+
+    if kind == "drag":
+        return {"type": kind, "area": log(0.005, 0.04), "lever": log(0.05, 0.15)}
+    if kind == "lighthill":
+        return {"type": kind, "length": log(0.1, 0.3), "width": log(0.05, 0.15)}
+    lean = float(rng.uniform(-0.15, 0.15))
+    shape = {"k": log(1.0, 8.0), "p": float(rng.uniform(1.0, 2.0)), "x0": float(rng.uniform(0.6, 1.5))}
+    shape |= {"q": float(rng.uniform(3.0, 6.0)), "d": lean}
+    return {"type": kind, **shape, "e": uneven, "phi_e": float(rng.uniform(-math.pi, math.pi))}
+
+
+def _fin(rng: np.random.Generator, name: str, scale: float) -> dict[str, Any]:
+    return _any_fin(rng, name, _fin_model(rng), _arc(rng, 30.0, 170.0) if rng.random() < 0.4 else None)
+
+
+def _shaft_fin(rng: np.random.Generator, name: str, scale: float) -> dict[str, Any]:
+    spec = _fin(rng, name, scale)
+    del spec["mounting_angle_deg"]
+    spec["shaft"], spec["zero"] = _plane(rng)
+    return spec
+
+
+def _uneven_fin(rng: np.random.Generator, name: str, scale: float) -> dict[str, Any]:
+    return _any_fin(rng, name, _fin_model(rng, float(rng.uniform(0.02, 0.2))), None)
+
+
+def _wide_fin(rng: np.random.Generator, name: str, scale: float) -> dict[str, Any]:
+    return _any_fin(rng, name, _fin_model(rng), _arc(rng, 190.0, 340.0))
+
+
+def _restless_fin(rng: np.random.Generator, name: str, scale: float) -> dict[str, Any]:
+    """A fin whose least force is up to 5 % of its largest: it beats no slower than some frequency."""
+    spec = _fin(rng, name, scale)
+    share, limits = float(rng.uniform(0.005, 0.05)), spec["limits"]
+    limits["amplitude_rad"][0] = 0.3
+    for frequency in np.linspace(0.1, 1.5, 141):
+        limits["frequency_hz"][0] = float(frequency)
+        size = np.linalg.norm(edge_forces(OwnPlant({"actuators": [spec]}).actuators[0], 3), axis=1)
+        if size.min() >= share * size.max():
+            break
+    limits["frequency_hz"][0] = max(float(frequency) - 0.01, 0.1)
+    return spec
+
+
+def _any_fin(
+    rng: np.random.Generator, name: str, model: dict[str, Any], arc: list[float] | None
+) -> dict[str, Any]:
+    directions = [-math.pi, math.pi] if arc is None else np.radians(arc).tolist()
+    limits = {"amplitude_rad": [0.05, float(rng.uniform(0.4, 0.8))], "zero_direction_rad": directions}
+    limits["frequency_hz"] = [0.1, float(rng.uniform(1.0, 3.0))]
+    spec: dict[str, Any] = {"name": name, "type": "fin", "position_m": _position(rng), "model": model}
+    return spec | {"mounting_angle_deg": float(rng.uniform(-180.0, 180.0)), "limits": limits}

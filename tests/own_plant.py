@@ -1,0 +1,277 @@
+"""A plant of all kinds of actuator, written apart from the library: it judges what the library answers.
+
+It reads a layout file's mapping as a stranger would and follows the formulas in the documentation. Commands
+are arrays (n, 3): fin (half amplitude [rad], frequency [Hz], zero direction [rad]), thruster (force [N],
+0, 0), azimuth (angle [rad], force [N], 0), rudder (deflection [rad], 0, 0).
+"""
+
+import math
+from collections.abc import Mapping
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.special import j1
+
+from finlab.arrays import Array
+
+DENSITY = 1000.0
+FIN_DEFAULTS: Mapping[str, Mapping[str, float]] = {
+    "drag": {"drag_coefficient": 0.15, "area": 0.02, "lever": 0.1},
+    "lighthill": {"length": 0.2, "width": 0.1},
+    "soft": {"k": 3.6, "p": 1.0, "x0": 1.3, "q": 5.0, "e": 0.0, "phi_e": 0.0, "d": 0.0},
+}
+
+
+class OwnActuator:
+    """One actuator of a layout file: its set of forces, its watts, and its effectiveness.
+
+    A force is a size along a direction of the actuator's own plane (angle [rad]); a thruster or a rudder has
+    the two angles 0 and pi.
+    """
+
+    def __init__(self, spec: Mapping[str, Any]) -> None:
+        self.spec, self.name = spec, str(spec["name"])
+        self.kind = "azimuth" if spec["type"] == "tilt" else str(spec["type"])
+        self.model = dict(spec.get("model", {"type": "drag"}))
+        self.position = np.array(spec["position_m"], np.float64)
+        self.first, self.second = self._plane()
+        wrench = np.stack([self._column(self.first), self._column(self.second)], axis=-1)
+        self.effectiveness = wrench if self.kind in ("fin", "azimuth") else wrench[:, :1]
+        """Wrench (6, 1 or 2) of 1 N along the own directions."""
+
+    def _plane(self) -> tuple[Array, Array]:
+        spec = self.spec
+        if self.kind == "thruster":
+            return np.array(spec["axis"], np.float64), np.zeros(3)
+        if "mounting_angle_deg" in spec:
+            angle = math.radians(spec["mounting_angle_deg"])
+            return np.array([-math.sin(angle), math.cos(angle), 0.0]), np.array([0.0, 0.0, 1.0])
+        about = np.array(spec["turn_axis" if self.kind == "azimuth" else "shaft"], np.float64)
+        zero = np.array(spec["zero"], np.float64)
+        across = np.cross(about, zero)
+        return (across, np.zeros(3)) if self.kind == "rudder" else (zero, across)
+
+    def _column(self, direction: Array) -> Array:
+        reaction = float(self.spec.get("torque_per_newton_m", 0.0))
+        return np.concatenate([direction, np.cross(self.position, direction) + reaction * direction])
+
+    @property
+    def limits(self) -> tuple[Array, Array]:
+        """Least and largest command (3,)."""
+        spec = self.spec
+        if self.kind == "fin":
+            keys = ("amplitude_rad", "frequency_hz", "zero_direction_rad")
+            ends = [
+                spec.get("limits", {}).get(key, default) for key, default in zip(keys, NOMINAL, strict=True)
+            ]
+        elif self.kind == "azimuth":
+            ends = [np.radians(spec.get("arc_deg", [-180.0, 180.0])), spec["force_n"], (0.0, 0.0)]
+        elif self.kind == "thruster":
+            ends = [spec["force_n"], (0.0, 0.0), (0.0, 0.0)]
+        else:
+            most = math.radians(spec["deflection_deg"])
+            ends = [(-most, most), (0.0, 0.0), (0.0, 0.0)]
+        low, high = np.array(ends, np.float64).T
+        return low, high
+
+    @property
+    def turns_fully(self) -> bool:
+        """Whether the direction goes round the whole circle."""
+        low, high = self.limits
+        turn = {"fin": 2, "azimuth": 0}.get(self.kind)
+        return turn is not None and bool(high[turn] - low[turn] >= 2.0 * math.pi - 1e-6)
+
+    @property
+    def dead_band(self) -> float:
+        """Force [N] below which a thruster gives none."""
+        return float(self.spec.get("dead_band_n", 0.0))
+
+    # ---- fins -----------------------------------------------------------------------------------------
+    def _of(self, key: str) -> float:
+        return float(self.model.get(key, FIN_DEFAULTS[self.model["type"]][key]))
+
+    def thrust(self, amplitude: ArrayLike, frequency: ArrayLike) -> Array:
+        """Thrust [N] of a fin, its unevenness left out."""
+        a, f = np.asarray(amplitude, np.float64), np.asarray(frequency, np.float64)
+        if self.model["type"] == "drag":
+            scale = 2.0 * DENSITY * self._of("drag_coefficient") * self._of("area") * self._of("lever") ** 2
+            return scale * (2.0 * math.pi * f) ** 2 * (1.0 - np.cos(2.0 * a))
+        if self.model["type"] == "lighthill":
+            mass = math.pi / 4.0 * DENSITY * self._of("width") ** 2
+            return 0.5 * mass * (self._of("length") * 2.0 * math.pi * f) ** 2 * a * j1(a)
+        x = a * f
+        return np.asarray(self._of("k") * x ** self._of("p") / (1.0 + (x / self._of("x0")) ** self._of("q")))
+
+    def unevenness(self, direction: ArrayLike) -> Array:
+        """By what the thrust of a fin is larger at a zero direction [rad]."""
+        phi = np.asarray(direction, np.float64)
+        if self.kind != "fin" or self.model["type"] != "soft":
+            return np.ones(phi.shape)
+        return 1.0 + self._of("e") * np.cos(phi - self._of("phi_e"))
+
+    @property
+    def lean(self) -> float:
+        """Angle [rad] from a fin's zero direction to its thrust."""
+        return self._of("d") if self.kind == "fin" and self.model["type"] == "soft" else 0.0
+
+    def beating(self, amplitude: ArrayLike, frequency: ArrayLike) -> Array:
+        """Mean watts of a plate that beats about one edge; what braking gives back is lost."""
+        a, f = np.asarray(amplitude, np.float64), np.asarray(frequency, np.float64)
+        length, width = 0.2, 0.1
+        if self.model["type"] == "drag":
+            length = 2.0 * self._of("lever")
+            width = self._of("area") / length
+        elif self.model["type"] == "lighthill":
+            length, width = self._of("length"), self._of("width")
+        own = 0.0097 * (length / 0.2) ** 3 * (width / 0.1)
+        inertia = own + math.pi / 4.0 * DENSITY * width**2 * length**3 / 3.0
+        drag = DENSITY * 2.0 * width * length**4 / 8.0
+        # Half a beat does work from one end up to where the drag no longer outweighs the inertia: sin = end.
+        ratio = drag * a / inertia
+        end = np.where(ratio > 0.0, 2.0 * ratio / (1.0 + np.sqrt(1.0 + 4.0 * ratio**2)), 0.0)
+        half = 0.5 * inertia * (1.0 - end**2) + drag * a * (end - end**3 / 3.0 + 2.0 / 3.0)
+        return np.asarray(2.0 * f * (2.0 * math.pi * f * a) ** 2 * half)
+
+    # ---- any kind -------------------------------------------------------------------------------------
+    def propeller_watts(self, force: ArrayLike) -> Array:
+        """Watts of a propeller for a force [N]."""
+        size = np.asarray(force, np.float64)
+        scale = np.where(size > 0.0, self.model["forward"], self.model.get("reverse", self.model["forward"]))
+        return np.asarray(scale * np.abs(size) ** self.model.get("exponent", 1.5))
+
+    def own_force(self, command: Array) -> Array:
+        """Force (..., 2) [N] in the own plane of commands (..., 3)."""
+        if self.kind == "thruster":
+            force = np.where(np.abs(command[..., 0]) < self.dead_band, 0.0, command[..., 0])
+            return np.stack([force, np.zeros_like(force)], axis=-1)
+        if self.kind == "azimuth":
+            size, angle = command[..., 1], command[..., 0]
+        else:
+            size = self.thrust(command[..., 0], command[..., 1]) * self.unevenness(command[..., 2])
+            angle = command[..., 2] + self.lean
+        return np.stack([size * np.cos(angle), size * np.sin(angle)], axis=-1)
+
+    def force(self, command: Array) -> Array:
+        """Force (..., 3) [N] in the body frame."""
+        own = self.own_force(command)
+        return own[..., :1] * self.first + own[..., 1:] * self.second
+
+    def watts(self, command: Array) -> Array:
+        """Watts (...,) of commands (..., 3)."""
+        if self.kind == "fin":
+            return self.beating(command[..., 0], command[..., 1])
+        return self.propeller_watts(
+            self.own_force(command)[..., 0] if self.kind == "thruster" else command[..., 1]
+        )
+
+    def excess(self, command: Array) -> float:
+        """By how much a command (3,) is outside the limits; a full circle has none."""
+        low, high = self.limits
+        over = np.maximum(np.maximum(low - command, command - high), 0.0)
+        if self.turns_fully:
+            over[2 if self.kind == "fin" else 0] = 0.0
+        return float(over.max())
+
+    def draw(self, rng: np.random.Generator, share: float = 1.0, count: int = 1) -> Array:
+        """Commands (count, 3), uniform in the limits, the size of the force up to a share of its range."""
+        low, high = self.limits
+        top = high.copy()
+        if self.kind == "fin":
+            top[:2] = low[:2] + share * (high - low)[:2]
+        elif self.kind == "azimuth":
+            top[1] = low[1] + share * (high - low)[1]
+        elif low[0] < 0.0 < high[0]:
+            low, top = share * low, share * high
+        else:
+            top[0] = low[0] + share * (high - low)[0]
+        return low + rng.random((count, 3)) * (top - low)
+
+
+NOMINAL = ((0.05, 0.6), (0.1, 2.1), (-math.pi, math.pi))
+
+
+class OwnPlant:
+    """All actuators of a layout file."""
+
+    def __init__(self, layout: Mapping[str, Any]) -> None:
+        self.layout = layout
+        self.actuators = tuple(OwnActuator(spec) for spec in layout["actuators"])
+
+    @cached_property
+    def effectiveness(self) -> Array:
+        """Wrench (6, m) of 1 N along each own direction, actuator after actuator."""
+        return np.concatenate([each.effectiveness for each in self.actuators], axis=1)
+
+    def wrench(self, commands: Array) -> Array:
+        """Wrench (..., 6) of commands (..., n, 3); NaN rows give nothing."""
+        total = np.zeros((*commands.shape[:-2], 6))
+        for i, each in enumerate(self.actuators):
+            given = np.where(np.isfinite(commands[..., i, :]), commands[..., i, :], 0.0)
+            own = each.own_force(given)[..., : each.effectiveness.shape[1]]
+            alive = np.isfinite(commands[..., i, :1])
+            total += np.where(alive, own @ each.effectiveness.T, 0.0)
+        return total
+
+    def power(self, commands: Array) -> float:
+        """Watts of commands (n, 3); NaN rows take none."""
+        pairs = zip(self.actuators, commands, strict=True)
+        return float(sum(each.watts(row) for each, row in pairs if np.isfinite(row).all()))
+
+    def excess(self, commands: Array) -> float:
+        """By how much commands (n, 3) break a limit at most."""
+        pairs = zip(self.actuators, commands, strict=True)
+        return max((each.excess(row) for each, row in pairs if np.isfinite(row).all()), default=0.0)
+
+    def draw(self, rng: np.random.Generator, share: float = 1.0) -> Array:
+        """Commands (n, 3) within limits."""
+        return np.stack([each.draw(rng, share)[0] for each in self.actuators])
+
+    @cached_property
+    def scales(self) -> Array:
+        """Two scales of the robot, one for forces [N] and one for torques [N m], as six numbers: roots of the
+        sums of squares of what each actuator alone can push and turn at most."""
+        forces, torques = [], []
+        for each in self.actuators:
+            edge = edge_forces(each, 181)
+            wrench = edge @ each.effectiveness.T
+            forces.append(np.linalg.norm(wrench[:, :3], axis=1).max())
+            torques.append(np.linalg.norm(wrench[:, 3:], axis=1).max())
+        return np.repeat([np.linalg.norm(forces), max(np.linalg.norm(torques), 1e-12)], 3)
+
+    def commands_of(self, result: Any) -> Array:
+        """Commands (n, 3) of a result of the library."""
+        rows = []
+        for each in self.actuators:
+            given, row = result.commands.get(each.name), np.full(3, np.nan)
+            if given is not None:
+                values = [getattr(given, key) for key in COMMAND_KEYS[each.kind]]
+                row = np.zeros(3)
+                row[: len(values)] = values
+            rows.append(row)
+        return np.array(rows, np.float64)
+
+
+COMMAND_KEYS = {
+    "fin": ("amplitude", "frequency", "zero_direction"),
+    "thruster": ("force",),
+    "azimuth": ("angle", "force"),
+    "rudder": ("deflection",),
+}
+
+
+def edge_forces(actuator: OwnActuator, count: int) -> Array:
+    """The outermost forces (K, 1 or 2) [N] in the own plane of an actuator: the corners of its hull."""
+    low, high = actuator.limits
+    if actuator.kind == "thruster":
+        return np.array([[low[0]], [high[0]], [min(max(0.0, low[0]), high[0])]])
+    if actuator.kind == "azimuth":
+        angle = np.linspace(low[0], high[0], count)
+        ring = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+        return np.concatenate([low[1] * ring, high[1] * ring])
+    size = actuator.thrust(*np.meshgrid(*(np.linspace(low[k], high[k], 400) for k in (0, 1))))
+    phi = np.linspace(low[2], high[2], count)
+    ring = np.stack([np.cos(phi + actuator.lean), np.sin(phi + actuator.lean)], axis=-1)
+    ring *= actuator.unevenness(phi)[:, None]
+    return np.concatenate([size.min() * ring, size.max() * ring])
