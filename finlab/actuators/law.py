@@ -20,8 +20,8 @@ class FinLaw(ABC):
     uniform: bool = True
     """Whether the size of the force is the same whatever the zero direction."""
     feels_flow: bool = False
-    """Whether the force depends on the water that meets the actuator. `force` and `force_and_jacobian` then
-    take the velocity (..., n, 3) [m/s] of its place through the water, in its own frame, as `inflow`."""
+    """Whether force and power depend on the water that meets the actuator. The four methods below then take
+    the velocity (..., n, 3) [m/s] of its place through the water, in its own frame, as last argument."""
     blade: Blade = Blade()
     """The plate whose beating takes power, where nothing better is known."""
 

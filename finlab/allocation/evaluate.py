@@ -60,7 +60,7 @@ def evaluate(
     err_norm = np.sqrt(np.einsum("ri,ri->r", missing, missing))
     if len(command) == 0:
         return Evaluation(fin_forces, wrench, err_norm, np.empty(0), np.empty(0))
-    power = plant.power(command)
+    power = plant.power(command, flow=flow)
     failed = np.isnan(power)
     if failed.any():  # a failed fin costs nothing
         command, power = np.where(failed[..., None], 0.0, command), np.where(failed, 0.0, power)

@@ -136,21 +136,25 @@ class Plant:
         the wrench (n, axes, 6) per unit of each; here the fins' forces."""
         return self, self.effectiveness
 
-    def power(self, command: Array, copper_loss: float = 0.0) -> Array:
+    def power(self, command: Array, copper_loss: float = 0.0, *, flow: Array | None = None) -> Array:
         """Returns each fin's mean power (..., n) [W] of commands (..., n, 3), NaN for a failed fin's; with a
         motor's loss [W/(N m)^2], see `FinLaw.power`."""
-        if len(self._laws) == 1:
+        inflow = self.inflow(flow)
+        if len(self._laws) == 1 and inflow is None:
             return np.asarray(self._laws[0][1].power(command, copper_loss))
-        power = np.empty(command.shape[:-1])
+        power = np.empty(_broadcast(command, inflow)[:-1])
         for places, law in self._laws:
-            power[..., places] = law.power(command[..., places, :], copper_loss)
+            beside = _met(law, inflow, places)
+            power[..., places] = law.power(command[..., places, :], copper_loss, *beside)
         return power
 
-    def power_gradient(self, command: Array, copper_loss: float = 0.0) -> Array:
+    def power_gradient(self, command: Array, copper_loss: float = 0.0, *, flow: Array | None = None) -> Array:
         """Returns the power's derivatives (..., n, 3) by each command."""
-        jacobian = np.empty(command.shape)
+        inflow = self.inflow(flow)
+        jacobian = np.empty(_broadcast(command, inflow))
         for places, law in self._laws:
-            jacobian[..., places, :] = law.power_gradient(command[..., places, :], copper_loss)
+            beside = _met(law, inflow, places)
+            jacobian[..., places, :] = law.power_gradient(command[..., places, :], copper_loss, *beside)
         return jacobian
 
     @cached_property
