@@ -15,7 +15,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Union
 
 from msgspec import Meta, Struct, to_builtins
 
@@ -23,6 +23,9 @@ from finlab.errors import LayoutError
 from finlab.files.plain_values import yaml_text
 from finlab.files.schema import checked, shown
 from finlab.layout.actuator import Actuator
+from finlab.layout.actuator_form import FORMS
+from finlab.layout.actuator_form import actuator_of as other_actuator_of
+from finlab.layout.actuator_form import actuator_to_dict as other_actuator_to_dict
 from finlab.layout.body import Body, Hull
 from finlab.layout.checked import form, given
 from finlab.layout.fin import Fin, FinModelSpec, Limits, Model
@@ -66,7 +69,7 @@ FIN = form(
     zero=None,
     **_OF_A_FIN,
 )
-ACTUATOR: Any = form(Fin, POSITION | ANGLE, **_OF_A_FIN)
+ACTUATOR: Any = Union[form(Fin, POSITION | ANGLE, **_OF_A_FIN), *FORMS.values()]  # noqa: UP007
 _OF_A_LAYOUT: dict[str, Any] = {
     "format": Literal["finlab-layout"],
     "body": BODY,
@@ -121,6 +124,8 @@ def parse_layout(data: Any, source: str = "layout", folder: Path | None = None) 
 
 def actuator_of(part: Any, folder: Path | None) -> Actuator:
     """Returns the actuator in a part of a layout file; relative paths start at a folder."""
+    if type(part) in FORMS.values():
+        return other_actuator_of(part, folder)
     angle = part.mounting_angle
     return fin_of(part, None if angle is None else math.radians(angle), folder)
 
@@ -218,6 +223,8 @@ def _absolute(path: str, folder: Path | None) -> str:
 
 
 def _actuator_to_dict(part: Actuator) -> dict[str, Any]:
+    if not isinstance(part, Fin):
+        return other_actuator_to_dict(part)
     data = _fin_to_dict(part)
     return {"name": data.pop("name"), "type": part.type, **data}
 
