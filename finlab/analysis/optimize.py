@@ -102,6 +102,7 @@ def optimize_layout(
     Raises:
         LayoutError: something about the fins, bounds, pairs, goal or mission does not fit; it says what.
     """
+    layout.only_fins("improving a layout", horizontal=True)
     bounds = bounds or {}
     known = {name: bounds.get(name) or Bounds.around(layout.fins[layout.index(name)]) for name in fins}
     pairs = mirror_pairs(layout) if mirror is None else mirror

@@ -64,6 +64,7 @@ def score_card(layout: Layout, failed: Collection[str] = ()) -> ScoreCard:
     Raises:
         LayoutError: there is no fin of a name in `failed`.
     """
+    layout.only_fins("a score card")
     held = authority(layout, failed)
     power = least_power(layout, np.diag(UNIT), failed=failed)
     return ScoreCard(

@@ -94,7 +94,7 @@ def robot(
             raise DataError(
                 f"{output}: a layout is a YAML or JSON file, expected a name that ends in .yaml or .json"
             )
-        believed = open_robot(layout).layout
+        believed = open_robot(layout, fins_for="fit robot").layout
         tell("reading", 0.0)
         swims = [read_swim(log, believed) for log in logs]
         fit = fit_robot(believed, swims, RESIDUAL if residual else (), tell)

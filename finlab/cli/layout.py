@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -12,10 +11,11 @@ from tyro.conf import Positional, UseAppendAction, arg
 from tyro.extras import SubcommandApp
 
 from finlab.cli.json_file import JsonFile, check_json_file, put_json
+from finlab.cli.layout_table import counted, layout_text
 from finlab.cli.optimize import optimize
 
 if TYPE_CHECKING:
-    from finlab.layout import Layout
+    pass
 
 verbs = SubcommandApp()
 verbs.command(optimize)
@@ -41,7 +41,7 @@ def check(layouts: Annotated[Positional[tuple[str, ...]], arg(metavar="LAYOUT...
             print(f"finlab: error: {error}", file=sys.stderr)
             n_bad += 1
         else:
-            print(f"{text}: ok, layout {layout.name} with {layout.n_fins} fins")
+            print(f"{text}: ok, layout {layout.name} with {counted(layout)}")
     return 2 if n_bad else 0
 
 
@@ -51,38 +51,28 @@ def show(
     failed: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME")] = (),
     json: JsonFile = None,
 ) -> None:
-    """Print the fins of a layout and its score card: what it can do, what that costs, what it can lose.
+    """Print the actuators of a layout and, of fins, the score card: what it can do, what it can lose.
 
     Args:
         layout: layout file, layout graph file, or the name of a shipped layout.
-        failed: name of a fin that does not work.
+        failed: name of an actuator that does not work.
         json: file for one JSON object; it is printed in place of the tables where no file is named.
     """
     from finlab.analysis import score_card
     from finlab.cli.inputs import open_robot
     from finlab.cli.score_card import score_card_text
+    from finlab.layout import layout_to_dict
 
     check_json_file(json)
     robot = open_robot(layout)
-    card = score_card(robot.layout, robot.with_failed(failed))
-    put_json(card.to_dict(), json, f"{layout_text(robot.layout)}\n\n{score_card_text(card)}")
-
-
-def layout_text(layout: Layout) -> str:
-    """A layout in words and a table: what it is, and its fins."""
-    from finlab.cli.score_card import table
-
-    head = ("fin", "x [m]", "y [m]", "z [m]", "angle [deg]", "A max [rad]", "f max [Hz]", "directions [deg]")
-    rows = []
-    for fin in layout.fins:
-        low, high = (math.degrees(angle) for angle in fin.limits.zero_direction)
-        directions = "any" if high - low >= 360.0 - 1e-6 else f"{low:.0f}..{high:.0f}"
-        position = (f"{value:6.3f}" for value in fin.position)
-        largest = (f"{fin.limits.amplitude[1]:.3f}", f"{fin.limits.frequency[1]:.3f}")
-        angle = f"{math.degrees(fin.shaft_azimuth):.1f}"
-        rows.append((fin.name, *position, angle, *largest, directions, fin.model.type))
-    title = f"{layout.name}: {layout.description}" if layout.description else layout.name
-    return "\n".join([title, "", *table((*head, "model"), rows)])
+    text, lost = layout_text(robot.layout), robot.with_failed(failed)
+    if robot.layout.is_of_fins:
+        card = score_card(robot.layout, lost)
+        put_json(card.to_dict(), json, f"{text}\n\n{score_card_text(card)}")
+        return
+    robot.layout.indices(lost)
+    values = {**layout_to_dict(robot.layout), "failed": lost}
+    put_json(values, json, f"{text}\n\nA score card is made of robots of fins only.")
 
 
 @verbs.command(name="import")
@@ -136,6 +126,6 @@ def export_layout(
     writers = {".urdf": write_urdf, ".csv": write_csv}
     if output.suffix.lower() not in writers:
         raise CommandError(f"{output}: expected a file that ends in .urdf or .csv")
-    robot = open_robot(layout)
+    robot = open_robot(layout, fins_for="layout export")
     writers[output.suffix.lower()](robot.layout, output)
     print(f"{output}: {robot.layout.n_fins} fins")

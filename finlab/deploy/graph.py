@@ -56,9 +56,10 @@ def build_graph(layout: Layout, allocator: Allocator, failed: tuple[str, ...] = 
     else depend on the layout and the allocator alone.
 
     Raises:
-        LayoutError: an unknown failed fin, or none left.
+        LayoutError: an unknown failed fin, none left, or an actuator that is no fin.
         DataError: a fin's force table cannot be read.
     """
+    layout.only_fins("export", horizontal=True)
     healthy = layout.without(failed) if failed else layout
     plant = plant_of(healthy)
     cases = []

@@ -69,6 +69,7 @@ def parse_graph(found: GraphText) -> LayoutGraph:
 
 def _document_of(graph: LayoutGraph) -> dict[str, Any]:
     """Everything but the checksum, which comes third once it is known."""
+    graph.layout.only_fins("a graph file", horizontal=True)
     layout = layout_to_dict(graph.layout)
     nodes = []
     for fin, entry in zip(graph.layout.fins, layout["fins"], strict=True):

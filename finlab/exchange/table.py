@@ -63,6 +63,7 @@ def write_csv(layout: Layout, path: str | os.PathLike[str]) -> None:
     Raises:
         LayoutError: the file cannot be written.
     """
+    layout.only_fins("a CSV file of fins", horizontal=True)
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(COLUMNS)

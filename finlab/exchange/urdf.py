@@ -190,6 +190,7 @@ def write_urdf(layout: Layout, path: str | os.PathLike[str]) -> None:
 
 def urdf_text(layout: Layout) -> str:
     """The contents of the URDF file."""
+    layout.only_fins("a URDF file", horizontal=True)
     robot = Element("robot", name=layout.name)
     base = SubElement(robot, "link", name=ROOT)
     body = layout.body

@@ -116,6 +116,7 @@ def fin_sets(layout: Layout, failed: Collection[str] = ()) -> FinSets:
     Raises:
         LayoutError: there is no fin of a name in `failed`.
     """
+    layout.only_fins("what computes reach")
     lost = layout.indices(tuple(failed))
     effectiveness = own_effectiveness(layout)[:, 1:] / SCALE
     sets = _one_robot(effectiveness, layout_envelopes(layout, Objective()))

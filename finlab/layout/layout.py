@@ -78,17 +78,26 @@ class Layout(Checked):
         """Whether all actuators are fins."""
         return self.n_fins == self.n
 
-    def only_fins(self, what: str) -> None:
+    def only_fins(self, what: str, horizontal: bool = False) -> None:
         """Refuses a robot that is not of fins alone, for what is made for fins.
 
+        Args:
+            what: what was asked for, as the sentence begins.
+            horizontal: whether the fins' shafts have to be horizontal, too, with a mounting angle.
+
         Raises:
-            LayoutError: the sentence names `what` and the first actuator that is no fin.
+            LayoutError: the sentence names `what` and the first actuator that it does not take.
         """
         for part in self.actuators:
             if not isinstance(part, Fin):
                 raise LayoutError(
                     f"{what} works for robots of fins only, and {part.name!r} of layout {self.name} is of "
                     f"type {part.type}; leave it out, or use `finlab allocate`, which takes any actuator"
+                )
+            if horizontal and part.mounting_angle is None:
+                raise LayoutError(
+                    f"{what} works for fins with a mounting angle only, and {part.name!r} of layout "
+                    f"{self.name} has a shaft of its own direction; use `finlab allocate`, which takes any"
                 )
 
     @cached_property
@@ -111,7 +120,7 @@ class Layout(Checked):
         Raises:
             LayoutError: an actuator is no fin, or its shaft is not horizontal.
         """
-        self.only_fins("what asks for mounting angles")
+        self.only_fins("what asks for mounting angles", horizontal=True)
         return _read_only([fin.shaft_azimuth for fin in self.fins])
 
     @cached_property

@@ -98,6 +98,7 @@ class ClosedLoop:
                 other fins.
         """
         events = [FinFault(*failure).checked() for failure in failures]
+        layout.only_fins("a simulation")
         layout.indices([event.fin for event in events])
         self.layout = layout
         self.allocator = allocator

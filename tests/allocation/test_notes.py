@@ -8,10 +8,10 @@ import pytest
 
 from finlab.allocation import load_allocator
 from finlab.allocation.notes import fin_notes
-from finlab.assets import shipped_layouts
 from finlab.errors import DataError
 from finlab.layout import Fin, FinModelSpec, Layout, Limits, load_layout
 from finlab.physics import make_law, write_table
+from tests.fin_robots import FIN_ROBOTS
 
 DRAG = make_law(FinModelSpec("drag"))
 CIRCLE = np.linspace(-np.pi, np.pi, 25)
@@ -22,7 +22,7 @@ def robot(limits: Limits, path: Path | None = None) -> Layout:
     return Layout("two", (Fin("a", (0.2, 0.1, 0.0), 0.7, limits, model), Fin("b", (-0.2, 0.1, 0.0), 2.0)))
 
 
-@pytest.mark.parametrize("name", sorted(shipped_layouts()))
+@pytest.mark.parametrize("name", sorted(FIN_ROBOTS))
 def test_the_shipped_robots_need_no_note(name: str) -> None:
     assert fin_notes(load_layout(name)) == ()
 

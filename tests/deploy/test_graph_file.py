@@ -27,6 +27,7 @@ from finlab.layout.load import GraphText, checksum_of
 from finlab.networks.checkpoint import read_checkpoint
 from finlab.networks.normalization import Normalization
 from tests.exhaustive import sampled
+from tests.fin_robots import FIN_ROBOTS
 
 SCHEMA = json.loads((Path(__file__).parents[2] / "finlab/deploy/graph.schema.json").read_text())
 
@@ -61,7 +62,7 @@ def edited(change: Callable[[dict[str, Any]], None], fix_checksum: bool = True) 
     return json.dumps(document)
 
 
-@pytest.mark.parametrize("name", sampled(sorted(shipped_layouts()), every=5))
+@pytest.mark.parametrize("name", sampled(sorted(FIN_ROBOTS), every=5))
 def test_shipped_layouts_come_back_as_they_were(name: str, tmp_path: Path) -> None:
     layout = load_layout(shipped_layouts()[name])
     graph = make_graph(layout, failed=layout.names[:1])

@@ -8,7 +8,6 @@ import pytest
 
 import finlab
 from finlab.allocation import Allocator
-from finlab.assets import shipped_layouts
 from finlab.deploy.bundle import Bundle, make_bundle
 from finlab.deploy.robot import DeployedRobot, load_robot, parse_robot
 from finlab.deploy.self_check import self_check
@@ -16,6 +15,7 @@ from finlab.errors import FinlabError
 from finlab.layout import FinModelSpec, Layout
 from finlab.physics import plant_of
 from tests.exhaustive import sampled
+from tests.fin_robots import FIN_ROBOTS
 
 HEAVY = ("torch", "scipy", "viser", "matplotlib", "yaml", "tyro", "tqdm", "threadpoolctl")
 WRENCH = ["--wrench", "1", "0", "0.5", "0", "0", "0.1"]
@@ -59,7 +59,7 @@ def test_failed_fins_of_the_bundle_stay_failed(shipped_allocator: Allocator) -> 
 
 
 @pytest.mark.parametrize("objective", ["power", "effort"])
-@pytest.mark.parametrize("name", sampled(["measured", *sorted(shipped_layouts())], every=4))
+@pytest.mark.parametrize("name", sampled(["measured", *sorted(FIN_ROBOTS)], every=4))
 def test_every_shipped_layout_answers_as_the_library_to_the_last_bit(
     name: str, objective: str, measured: Layout, tmp_path: Path
 ) -> None:

@@ -10,6 +10,7 @@ from finlab.assets import shipped_layouts
 from finlab.cli import main
 from finlab.errors import LayoutError
 from finlab.exchange import read_csv, write_csv
+from tests.fin_robots import FIN_ROBOTS
 
 
 def read(text: str, tmp_path: Path) -> finlab.Layout:
@@ -25,7 +26,7 @@ def test_positions_are_enough(tmp_path: Path) -> None:
     assert layout.fins[1].limits.amplitude == (0.05, 0.6)
 
 
-@pytest.mark.parametrize("name", sorted(shipped_layouts()))
+@pytest.mark.parametrize("name", sorted(FIN_ROBOTS))
 def test_shipped_layouts_survive_the_way_there_and_back(name: str, tmp_path: Path) -> None:
     layout = finlab.load_layout(shipped_layouts()[name])
     write_csv(layout, tmp_path / "x.csv")

@@ -11,6 +11,7 @@ from finlab.assets import shipped_layouts
 from finlab.cli import main
 from finlab.errors import LayoutError
 from finlab.exchange import read_urdf, write_urdf
+from tests.fin_robots import FIN_ROBOTS
 
 TURTLE = Path(__file__).parent / "turtle.urdf"
 FINS = ("front_right_fin", "front_left_fin", "tail_fin")
@@ -38,7 +39,7 @@ def test_origin_moves_to_the_centre_of_gravity() -> None:
     np.testing.assert_allclose(gravity.body.inertia_kgm2, [0.1, 0.2, 0.3])
 
 
-@pytest.mark.parametrize("name", sorted(shipped_layouts()))
+@pytest.mark.parametrize("name", sorted(FIN_ROBOTS))
 def test_shipped_layouts_survive_the_way_there_and_back(name: str, tmp_path: Path) -> None:
     layout = finlab.load_layout(shipped_layouts()[name])
     write_urdf(layout, tmp_path / "robot.urdf")

@@ -6,18 +6,24 @@ import numpy as np
 import pytest
 
 from finlab.assets import shipped_layouts
-from finlab.layout import layout_effectiveness, layout_to_dict, load_layout, parse_layout, save_layout
+from finlab.layout import layout_to_dict, load_layout, own_effectiveness, parse_layout, save_layout
 
 SHIPPED = shipped_layouts()
 AXES = ["Fx", "Fy", "Fz", "Tx", "Ty", "Tz"]
 
 
+def columns(layout):
+    """Wrenches (6, k) of 1 N along all directions in which the actuators push; those here have no azimuths."""
+    own = zip(layout.actuators, own_effectiveness(layout), strict=True)
+    return np.concatenate([axes[1:] if part.type == "fin" else axes[:1] for part, axes in own]).T
+
+
 def rank(layout):
-    return int(np.linalg.matrix_rank(layout_effectiveness(layout), tol=1e-6))
+    return int(np.linalg.matrix_rank(columns(layout), tol=1e-6))
 
 
 def missing_axes(layout):
-    rows = layout_effectiveness(layout)
+    rows = columns(layout)
     return [axis for axis, row in zip(AXES, rows, strict=True) if np.abs(row).max() < 1e-9]
 
 
@@ -54,6 +60,8 @@ def test_there_is_something_to_teach():
         ("restricted", 6, []),
         ("no_yaw", 5, ["Tz"]),
         ("ucat", 6, []),
+        ("turtle_hybrid", 6, []),
+        ("bluerov2_heavy", 6, []),
     ],
 )
 def test_rank_and_missing_axes(name, expected, missing):
@@ -81,6 +89,19 @@ def test_ucat_is_layout_a_with_a_body():
     assert all(
         len(getattr(ucat.body, key)) == 6 for key in ("added_mass", "linear_damping", "quadratic_damping")
     )
+
+
+def test_turtle_hybrid_is_ucat_with_two_thrusters():
+    hybrid, ucat = load_layout("turtle_hybrid"), load_layout("ucat")
+    assert (hybrid.fins, hybrid.body) == (ucat.fins, ucat.body)
+    assert [part.type for part in hybrid.actuators[4:]] == ["thruster", "thruster"]
+
+
+def test_bluerov2_heavy_has_the_geometry_of_its_source():
+    # Thrusts of least square, worked out from the source's table by hand.
+    share = np.linalg.pinv(columns(load_layout("bluerov2_heavy"))) @ [30.0, 15.0, -20.0, 0.0, 1.0, 3.0]
+    expected = [-20.4971, -0.7161, 9.8905, 11.3227, 7.6259, 8.0097, 1.9903, 2.3741]
+    np.testing.assert_allclose(share, expected, atol=1e-4)
 
 
 def test_restricted_zero_directions_confine_the_force_as_described():

@@ -10,6 +10,7 @@ from finlab.assets import shipped_layouts
 from finlab.errors import CommandError
 from finlab.layout import Fin, FinModelSpec, Layout, load_layout
 from finlab.physics import Plant, make_law, write_table
+from tests.fin_robots import FIN_ROBOTS
 
 
 def wrench_by_hand(layout, command):
@@ -35,7 +36,7 @@ def random_commands(layout, n, seed=0):
     return np.random.default_rng(seed).uniform(lower, upper, (n, *lower.shape))
 
 
-@pytest.mark.parametrize("name", shipped_layouts())
+@pytest.mark.parametrize("name", FIN_ROBOTS)
 def test_the_plant_is_the_contract(name):
     layout = load_layout(shipped_layouts()[name])
     commands = random_commands(layout, 20)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from finlab.actuators.fin.table_file import write_table
-from finlab.assets import shipped_checkpoints, shipped_layouts
+from finlab.assets import shipped_checkpoints
 from finlab.deploy.bundle import make_bundle
 from finlab.deploy.graph import build_graph
 from finlab.deploy.graph_file import graph_bytes
@@ -17,6 +17,7 @@ from finlab.errors import LayoutError
 from finlab.files.plain_values import yaml_text
 from finlab.layout import FinModelSpec, Layout, layout_to_dict, load_layout
 from finlab.physics import make_law, plant_of
+from tests.fin_robots import FIN_ROBOTS
 from webapp.markup.snippets import command_line
 from webapp.markup.verdict import verdict_sentence
 from webapp.session import Session, files
@@ -50,7 +51,7 @@ def tabled(tmp_path: Path) -> Layout:
     return replace(ucat, name="tabled", actuators=tuple(replace(fin, model=spec) for fin in ucat.fins))
 
 
-@pytest.mark.parametrize("name", shipped_layouts())
+@pytest.mark.parametrize("name", FIN_ROBOTS)
 def test_every_shipped_layout_is_answered_exactly(name: str) -> None:
     layout = load_layout(name)
     for objective in OBJECTIVES:

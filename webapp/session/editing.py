@@ -17,7 +17,12 @@ class Editing(Core):
     """Changes of the layout."""
 
     def open_layout(self, layout: Layout, step: str = "") -> None:
-        """Another layout; the target stays, damage and links are forgotten. `step` is what undo calls it."""
+        """Another layout; the target stays, damage and links are forgotten. `step` is what undo calls it.
+
+        Raises:
+            LayoutError: an actuator is no fin, or a fin's shaft is not horizontal.
+        """
+        layout.only_fins("the app", horizontal=True)
         whole = replace(self.state, layout=layout, failed=(), weak=(), stuck=(), links=())
         self._commit(step or f"Open {layout.name}", whole)
         self.saved = layout

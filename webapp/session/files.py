@@ -39,8 +39,9 @@ MAX_PATH_BYTES = 2_000_000
 
 @cache
 def shipped() -> dict[str, Layout]:
-    """Shipped layouts by the name that the command line knows them by."""
-    return {name: load_layout(path) for name, path in shipped_layouts().items()}
+    """Shipped layouts of fins by the name that the command line knows them by."""
+    layouts = {name: load_layout(path) for name, path in shipped_layouts().items()}
+    return {name: layout for name, layout in layouts.items() if layout.is_of_fins}
 
 
 def shipped_name(layout: Layout) -> str | None:

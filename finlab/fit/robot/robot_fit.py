@@ -129,6 +129,7 @@ def fit_robot(
     Raises:
         DataError: there is no swim, or the fit goes astray.
     """
+    layout.only_fins("fitting a robot", horizontal=True)
     if not swims:
         raise DataError("expected at least one swim, got none")
     if layout.interaction is not None:

@@ -17,6 +17,7 @@ from finlab.layout import Fin, FinModelSpec, Layout, Limits, load_layout, random
 from finlab.physics import Plant, make_law, write_table
 from finlab.physics.effort import EffortWeights
 from finlab.physics.objective import Name
+from tests.fin_robots import FIN_ROBOTS
 
 INERTIAL = EffortWeights(0.0, 0.0, 0.0, 0.0, 1.0)
 
@@ -50,7 +51,7 @@ def errors(method: Allocator, layout: Layout, targets: np.ndarray) -> np.ndarray
     return method.normalization.error(Plant(layout).wrench(command), targets)
 
 
-@pytest.mark.parametrize("name", list(shipped_layouts()))
+@pytest.mark.parametrize("name", list(FIN_ROBOTS))
 def test_exact_on_shipped_layouts(name: str, search: SearchAllocator) -> None:
     layout = load_layout(shipped_layouts()[name])
     assert errors(search, layout, reachable(layout, 25)).max() < GOOD
