@@ -13,7 +13,7 @@ AXES = ["Fx", "Fy", "Fz", "Tx", "Ty", "Tz"]
 
 
 def columns(layout):
-    """Wrenches (6, k) of 1 N along all directions in which the actuators push; those here have no azimuths."""
+    """Wrenches (6, k) of 1 N along all directions in which the actuators push, without azimuths."""
     own = zip(layout.actuators, own_effectiveness(layout), strict=True)
     return np.concatenate([axes[1:] if part.type == "fin" else axes[:1] for part, axes in own]).T
 
