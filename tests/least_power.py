@@ -36,6 +36,11 @@ class OwnSet:
         if actuator.kind == "thruster":
             self.rays = [self._ray(actuator, sign, low[0], high[0]) for sign in (1.0, -1.0)]
             return
+        if actuator.kind == "rudder":
+            self.angles = np.linspace(low[0], high[0], 4001)
+            self.curve, self.taken = actuator.foil(self.angles)
+            self.rays = [_Ray(np.array([0.0, 1.0]), np.full(2, self.taken.max()))]
+            return
         if actuator.kind == "fin":
             sizes, costs = fin_costs(actuator)
         else:
@@ -60,7 +65,7 @@ class OwnSet:
     @property
     def wide(self) -> bool:
         """Whether its arc is no convex set."""
-        return self.actuator.kind != "thruster" and not self.full and self.half > 0.5 * math.pi + 1e-9
+        return self.actuator.kind in ("fin", "azimuth") and not self.full and self.half > 0.5 * math.pi + 1e-9
 
     def answer(self, price: Array) -> tuple[Array, float]:
         """The force (1 or 2,) [N] that earns most at a price (1 or 2,) [W/N], and what it earns [W]."""
@@ -71,6 +76,9 @@ class OwnSet:
             return (
                 (np.array([ahead[0]]), ahead[1]) if ahead[1] >= back[1] else (np.array([-back[0]]), back[1])
             )
+        if self.actuator.kind == "rudder":
+            best = int((self.curve @ price - self.taken).argmax())
+            return self.curve[best], float(self.curve[best] @ price - self.taken[best])
         size, towards = float(np.hypot(*price)), math.atan2(price[1], price[0])
         lean = self.actuator.lean
         phi = self._direction(towards - lean)
@@ -194,6 +202,10 @@ def _polar(sets: tuple[OwnSet, ...], forces: list[Array]) -> Array:
     """Forces as sizes and zero directions, those of a thruster as they are."""
     parts = []
     for each, force in zip(sets, forces, strict=True):
+        if each.actuator.kind == "rudder":
+            place = np.square(each.curve - force).sum(axis=1).argmin()
+            parts.append(each.angles[place : place + 1])
+            continue
         if len(force) == 1:
             parts.append(force)
             continue
@@ -254,7 +266,9 @@ def least_known(plant: OwnPlant, wrench: Array, starts: int = 8, seed: int = 0) 
         out = []
         for each, a, b in zip(sets, parts[:-1], parts[1:], strict=True):
             part = x[a:b]
-            if len(part) == 1:
+            if each.actuator.kind == "rudder":
+                out.append(each.actuator.foil(part)[0][0])
+            elif len(part) == 1:
                 out.append(part)
             else:
                 size = part[0] * each.actuator.unevenness(part[1])
@@ -266,13 +280,12 @@ def least_known(plant: OwnPlant, wrench: Array, starts: int = 8, seed: int = 0) 
         return (plant.effectiveness @ np.concatenate(forces(x)) - wrench) / scale
 
     def watts(x: Array) -> float:
-        pairs = zip(sets, splines, parts[:-1], strict=True)
-        return float(
-            sum(
-                each.actuator.propeller_watts(x[a]) if each.actuator.kind == "thruster" else spline(x[a])
-                for each, spline, a in pairs
-            )
-        )
+        total = 0.0
+        for each, spline, a in zip(sets, splines, parts[:-1], strict=True):
+            one_number = each.actuator.kind in ("thruster", "rudder")
+            command = np.array([x[a], 0.0, 0.0])
+            total += float(each.actuator.watts(command) if one_number else spline(x[a]))
+        return total
 
     pulled = [_polar(sets, _dual(plant, halves, wrench)[1]) for halves in _halves(plant, 2)]
     best, unit = None, max(sum(float(each.rays[0].costs.max()) for each in sets), 1e-9)
@@ -297,7 +310,7 @@ def _ends(sets: tuple[OwnSet, ...]) -> tuple[list[Array], list[Array]]:
     """Least and largest size and direction by actuator; thrusters have a force alone."""
     low, high = [], []
     for each in sets:
-        if each.actuator.kind == "thruster":
+        if each.actuator.kind in ("thruster", "rudder"):
             ends = each.actuator.limits
             low.append(ends[0][:1])
             high.append(ends[1][:1])

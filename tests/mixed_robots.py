@@ -22,6 +22,7 @@ KINDS = (
     "fins uneven",
     "wide arcs",
     "holes",
+    "rudders",
     "mixed",
     "all",
 )
@@ -54,6 +55,20 @@ def random_robot(kind: str, number: int, seed: int) -> dict[str, Any]:
         }
         if kind not in ("thrusters", "azimuths") or len(makers) < 6 or _condition(layout) < 100.0:
             return layout
+
+
+def random_flow(kind: str, number: int, seed: int) -> Array | None:
+    """Velocity (6,) through the water [m/s, rad/s] for a robot with rudders; None for others."""
+    if kind != "rudders":
+        return None
+    rng = np.random.default_rng([DOMAIN, KINDS.index(kind), seed, number, 1])
+    along: Array = rng.uniform(0.3, 2.0) * np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    return along + 0.03 * rng.normal(size=6)
+
+
+def random_plant(kind: str, number: int, seed: int) -> OwnPlant:
+    """The own plant of `random_robot` in its `random_flow`."""
+    return OwnPlant(random_robot(kind, number, seed), random_flow(kind, number, seed))
 
 
 def within(plant: OwnPlant, rng: np.random.Generator, low: float = 0.2, high: float = 1.0) -> Array:
@@ -102,6 +117,8 @@ def _makers(kind: str, rng: np.random.Generator) -> list[Maker]:
         return [_thruster] * int(rng.integers(4, 11))
     if kind == "azimuths":
         return [_azimuth] * int(rng.integers(3, 7))
+    if kind == "rudders":
+        return [_rudder] * int(rng.integers(2, 5)) + [_thruster] * int(rng.integers(4, 8))
     if kind == "wide arcs":
         wide = int(rng.integers(1, 3))
         return [_wide_fin] * wide + [_azimuth] * int(rng.integers(0, 2)) + [_fin] * int(rng.integers(2, 5))
@@ -166,6 +183,15 @@ def _azimuth(rng: np.random.Generator, name: str, scale: float) -> dict[str, Any
     if rng.random() < 0.5:
         spec["arc_deg"] = _arc(rng, 20.0, 170.0)
     return spec
+
+
+def _rudder(rng: np.random.Generator, name: str, scale: float) -> dict[str, Any]:
+    around, zero = rng.uniform(-math.pi, math.pi), [1.0, 0.0, 0.0]
+    shaft = [0.0, math.cos(around), math.sin(around)]
+    most = float(rng.uniform(10.0, 20.0))
+    spec: dict[str, Any] = {"name": name, "type": "rudder", "position_m": _position(rng), "shaft": shaft}
+    spec |= {"zero": zero, "area_m2": float(0.005 * scale * rng.uniform(0.5, 2.0))}
+    return spec | {"aspect_ratio": float(rng.uniform(1.0, 4.0)), "deflection_deg": [-most, most]}
 
 
 def _arc(rng: np.random.Generator, least: float, most: float) -> list[float]:

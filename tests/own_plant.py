@@ -31,14 +31,15 @@ class OwnActuator:
     the two angles 0 and pi.
     """
 
-    def __init__(self, spec: Mapping[str, Any]) -> None:
+    def __init__(self, spec: Mapping[str, Any], flow: ArrayLike | None = None) -> None:
         self.spec, self.name = spec, str(spec["name"])
+        self.flow = np.zeros(6) if flow is None else np.asarray(flow, np.float64)
         self.kind = "azimuth" if spec["type"] == "tilt" else str(spec["type"])
         self.model = dict(spec.get("model", {"type": "drag"}))
         self.position = np.array(spec["position_m"], np.float64)
         self.first, self.second = self._plane()
         wrench = np.stack([self._column(self.first), self._column(self.second)], axis=-1)
-        self.effectiveness = wrench if self.kind in ("fin", "azimuth") else wrench[:, :1]
+        self.effectiveness = wrench[:, :1] if self.kind == "thruster" else wrench
         """Wrench (6, 1 or 2) of 1 N along the own directions."""
 
     def _plane(self) -> tuple[Array, Array]:
@@ -51,7 +52,7 @@ class OwnActuator:
         about = np.array(spec["turn_axis" if self.kind == "azimuth" else "shaft"], np.float64)
         zero = np.array(spec["zero"], np.float64)
         across = np.cross(about, zero)
-        return (across, np.zeros(3)) if self.kind == "rudder" else (zero, across)
+        return zero, across
 
     def _column(self, direction: Array) -> Array:
         reaction = float(self.spec.get("torque_per_newton_m", 0.0))
@@ -71,8 +72,7 @@ class OwnActuator:
         elif self.kind == "thruster":
             ends = [spec["force_n"], (0.0, 0.0), (0.0, 0.0)]
         else:
-            most = math.radians(spec["deflection_deg"])
-            ends = [(-most, most), (0.0, 0.0), (0.0, 0.0)]
+            ends = [np.radians(spec["deflection_deg"]), (0.0, 0.0), (0.0, 0.0)]
         low, high = np.array(ends, np.float64).T
         return low, high
 
@@ -134,6 +134,36 @@ class OwnActuator:
         half = 0.5 * inertia * (1.0 - end**2) + drag * a * (end - end**3 / 3.0 + 2.0 / 3.0)
         return np.asarray(2.0 * f * (2.0 * math.pi * f * a) ** 2 * half)
 
+    # ---- rudders --------------------------------------------------------------------------------------
+    def foil(self, deflection: Array) -> tuple[Array, Array]:
+        """Force (..., 2) [N] in the own plane and watts (...,) of deflections [rad] in the flow."""
+        spec = self.spec
+        through = self.flow[:3] + np.cross(self.flow[3:], self.position)
+        ahead, aside = float(through @ self.first), float(through @ self.second)
+        speed = math.hypot(ahead, aside)
+        if speed == 0.0:
+            return np.zeros((*deflection.shape, 2)), np.zeros(deflection.shape)
+        course = np.array([ahead, aside]) / speed
+        ratio = spec["aspect_ratio"]
+        slope = 1.8 * math.pi * ratio / (math.sqrt(ratio**2 + 4.0) + 1.8)
+        stall = math.radians(spec.get("stall_deg", math.degrees(0.47)))
+        angle = deflection - math.atan2(aside, ahead)
+        angle = np.arctan(np.tan(angle))  # astern is as good as ahead
+        ends = (
+            np.exp(np.clip(-50.0 * (angle - stall), -600, 600)),
+            np.exp(np.clip(50.0 * (angle + stall), -600, 600)),
+        )
+        parted = (1.0 + ends[0] + ends[1]) / ((1.0 + ends[0]) * (1.0 + ends[1]))
+        lift = (1.0 - parted) * slope * angle + parted * 2.0 * np.sign(angle) * np.sin(angle) ** 2 * np.cos(
+            angle
+        )
+        drag = spec.get("drag_coefficient", 0.0065) + parted * 2.0 * np.sin(angle) ** 2
+        drag = drag + (1.0 - parted) * (slope * angle) ** 2 / (0.9 * math.pi * ratio)
+        pressure = 0.5 * spec.get("density_kg_m3", DENSITY) * speed**2 * spec["area_m2"]
+        across = np.array([-course[1], course[0]])
+        force = pressure * (lift[..., None] * across - drag[..., None] * course)
+        return force, pressure * drag * speed
+
     # ---- any kind -------------------------------------------------------------------------------------
     def propeller_watts(self, force: ArrayLike) -> Array:
         """Watts of a propeller for a force [N]."""
@@ -146,6 +176,8 @@ class OwnActuator:
         if self.kind == "thruster":
             force = np.where(np.abs(command[..., 0]) < self.dead_band, 0.0, command[..., 0])
             return np.stack([force, np.zeros_like(force)], axis=-1)
+        if self.kind == "rudder":
+            return self.foil(command[..., 0])[0]
         if self.kind == "azimuth":
             size, angle = command[..., 1], command[..., 0]
         else:
@@ -162,9 +194,10 @@ class OwnActuator:
         """Watts (...,) of commands (..., 3)."""
         if self.kind == "fin":
             return self.beating(command[..., 0], command[..., 1])
-        return self.propeller_watts(
-            self.own_force(command)[..., 0] if self.kind == "thruster" else command[..., 1]
-        )
+        if self.kind == "rudder":
+            return self.foil(command[..., 0])[1]
+        thruster = self.kind == "thruster"
+        return self.propeller_watts(self.own_force(command)[..., 0] if thruster else command[..., 1])
 
     def excess(self, command: Array) -> float:
         """By how much a command (3,) is outside the limits; a full circle has none."""
@@ -193,11 +226,11 @@ NOMINAL = ((0.05, 0.6), (0.1, 2.1), (-math.pi, math.pi))
 
 
 class OwnPlant:
-    """All actuators of a layout file."""
+    """All actuators of a layout file, in a flow: the velocity (6,) through the water, none by default."""
 
-    def __init__(self, layout: Mapping[str, Any]) -> None:
-        self.layout = layout
-        self.actuators = tuple(OwnActuator(spec) for spec in layout["actuators"])
+    def __init__(self, layout: Mapping[str, Any], flow: ArrayLike | None = None) -> None:
+        self.layout, self.flow = layout, flow
+        self.actuators = tuple(OwnActuator(spec, flow) for spec in layout["actuators"])
 
     @cached_property
     def effectiveness(self) -> Array:
@@ -266,6 +299,8 @@ def edge_forces(actuator: OwnActuator, count: int) -> Array:
     low, high = actuator.limits
     if actuator.kind == "thruster":
         return np.array([[low[0]], [high[0]], [min(max(0.0, low[0]), high[0])]])
+    if actuator.kind == "rudder":
+        return actuator.foil(np.linspace(low[0], high[0], count))[0]
     if actuator.kind == "azimuth":
         angle = np.linspace(low[0], high[0], count)
         ring = np.stack([np.cos(angle), np.sin(angle)], axis=-1)

@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import lsq_linear
 
 from tests.least_power import conic_optimum, farthest, least_known, least_miss, lower_bound
-from tests.mixed_robots import KINDS, bluerov2_heavy, random_robot, within
+from tests.mixed_robots import KINDS, bluerov2_heavy, random_plant, within
 from tests.own_plant import OwnPlant
 
 HEAVY = OwnPlant(bluerov2_heavy())
@@ -56,7 +56,7 @@ def test_three_ways_to_the_least_watts_of_a_heavy() -> None:
 @pytest.mark.parametrize("kind", KINDS)
 def test_bound_and_best_known_meet(kind: str) -> None:
     """Where the bound by prices equals what is found, both are the optimum; wide arcs and holes included."""
-    plant, rng = OwnPlant(random_robot(kind, 0, 1)), np.random.default_rng(0)
+    plant, rng = random_plant(kind, 0, 1), np.random.default_rng(0)
     wrench = within(plant, rng)
     best = least_known(plant, wrench, 1)
     assert best is not None
