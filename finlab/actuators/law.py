@@ -1,8 +1,9 @@
-"""What a fin's law is: command to cycle-mean force in the fin's own frame, and to power, with derivatives.
+"""What an actuator's law is: command to force in its own frame, and to power, with derivatives.
 
-Fin frame: x' = shaft, y' = e_h, z' = e_z (see `finlab.layout.fin`). A law's parameters are numbers, or arrays
-(n,) where it speaks for n fins at once. Each law is written once, for numpy's arrays, torch's tensors (which
-training differentiates by itself) and CasADi's symbols; its derivatives in closed form stand beside it.
+Own frames are those of `finlab.layout`, of a fin: shaft, zero, shaft x zero. A law's parameters are numbers,
+or arrays (n,) where it speaks for n actuators at once. Laws of fins are written once, for numpy's arrays,
+torch's tensors (which training differentiates by itself) and CasADi's symbols; derivatives in closed form
+stand beside them. The other laws work with numpy's arrays.
 """
 
 from abc import ABC, abstractmethod
@@ -14,33 +15,50 @@ from finlab.actuators.fin.blade import Blade
 from finlab.arrays import Array, Values, library_of
 
 
-class FinLaw(ABC):
-    """Command to force and power of one fin, or of n fins that share a model."""
+class ActuatorLaw(ABC):
+    """Command to force and power of one actuator, or of n actuators that share a law.
+
+    `inflow` is the velocity (..., n, 3) [m/s] of their places through the water, in their own frames; None at
+    rest. Laws that do not feel the flow pass over it.
+    """
+
+    feels_flow: bool = False
+    """Whether force and power depend on the water that meets the actuator."""
+
+    @abstractmethod
+    def force(self, command: Values, inflow: Array | None = None) -> Values:
+        """Returns the force (..., n, 3) [N], of fins the mean over a beat, in own frames, of commands
+        (..., n, 3), in single or double precision as the commands are."""
+
+    @abstractmethod
+    def force_and_jacobian(self, command: Array, inflow: Array | None = None) -> tuple[Array, Array]:
+        """Returns the force and its derivative by each command in turn (..., n, 3 commands, 3 axes)."""
+
+    @abstractmethod
+    def power(self, command: Values, copper_loss: float = 0.0, inflow: Array | None = None) -> Values:
+        """Returns the power (..., n) [W] of commands (..., n, 3); of fins, whose laws tell mechanical power,
+        with `copper_loss` [W/(N m)^2] times the mean squared torque on the shaft."""
+
+    @abstractmethod
+    def power_gradient(self, command: Array, copper_loss: float = 0.0, inflow: Array | None = None) -> Array:
+        """Returns the power's derivatives (..., n, 3) by each command."""
+
+
+class FinLaw(ActuatorLaw):
+    """The law of one flapping fin, or of n fins that share a model. Commands are half amplitude [rad],
+    frequency [Hz] and zero direction [rad]."""
 
     uniform: bool = True
     """Whether the size of the force is the same whatever the zero direction."""
-    feels_flow: bool = False
-    """Whether force and power depend on the water that meets the actuator. The four methods below then take
-    the velocity (..., n, 3) [m/s] of its place through the water, in its own frame, as last argument."""
     blade: Blade = Blade()
     """The plate whose beating takes power, where nothing better is known."""
 
-    @abstractmethod
-    def force(self, command: Values) -> Values:
-        """Returns the mean force (..., n, 3) [N] in the fin frame of commands (..., n, 3) [rad, Hz, rad], in
-        single or double precision as the commands are."""
-
-    @abstractmethod
-    def force_and_jacobian(self, command: Array) -> tuple[Array, Array]:
-        """Returns the force and its derivative by each command in turn (..., n, 3 commands, 3 axes)."""
-
-    def power(self, command: Values, copper_loss: float = 0.0) -> Values:
-        """Returns the mean power (..., n) [W] of commands (..., n, 3): mechanical, and `copper_loss`
-        [W/(N m)^2] times the mean squared torque on the shaft."""
+    def power(self, command: Values, copper_loss: float = 0.0, inflow: Array | None = None) -> Values:
+        """See `ActuatorLaw`."""
         return self.blade.driving_power(command[..., 0], command[..., 1], copper_loss)
 
-    def power_gradient(self, command: Array, copper_loss: float = 0.0) -> Array:
-        """Returns the power's derivatives (..., n, 3) by each command."""
+    def power_gradient(self, command: Array, copper_loss: float = 0.0, inflow: Array | None = None) -> Array:
+        """See `ActuatorLaw`."""
         jacobian = np.zeros(command.shape)
         by = self.blade.driving_jacobian(command[..., 0], command[..., 1], copper_loss)
         jacobian[..., 0], jacobian[..., 1] = by
@@ -64,8 +82,8 @@ class PlanarLaw(FinLaw):
     ) -> tuple[Array, Array, Array | float]:
         """Returns the thrust's derivatives by amplitude, frequency and zero direction."""
 
-    def force(self, command: Values) -> Values:
-        """See `FinLaw`."""
+    def force(self, command: Values, inflow: Array | None = None) -> Values:
+        """See `ActuatorLaw`."""
         xp = library_of(command)
         amplitude, frequency, zero_direction = command[..., 0], command[..., 1], command[..., 2]
         thrust = self.thrust(amplitude, frequency, zero_direction)
@@ -80,8 +98,8 @@ class PlanarLaw(FinLaw):
         planar = [xp.zeros_like(thrust), thrust * xp.cos(direction), thrust * xp.sin(direction)]
         return xp.stack(planar, axis=-1)
 
-    def force_and_jacobian(self, command: Array) -> tuple[Array, Array]:
-        """See `FinLaw`."""
+    def force_and_jacobian(self, command: Array, inflow: Array | None = None) -> tuple[Array, Array]:
+        """See `ActuatorLaw`."""
         parts = command[..., 0], command[..., 1], command[..., 2]
         direction = parts[2] + self.offset
         cos, sin = np.cos(direction), np.sin(direction)

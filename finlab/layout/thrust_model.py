@@ -147,7 +147,7 @@ def lower_hull(x: Array, y: Array) -> tuple[Array, Array]:
     for i in range(len(x)):
         while len(kept) > 1:
             a, b = kept[-2:]
-            if (y[b] - y[a]) * (x[i] - x[a]) < (y[i] - y[a]) * (x[b] - x[a]):
+            if (y[b] - y[a]) * (x[i] - x[a]) <= (y[i] - y[a]) * (x[b] - x[a]):
                 break
             kept.pop()
         kept.append(i)

@@ -25,7 +25,7 @@ class GridLaw(FinLaw):
         """Whether it is known what power the fins take."""
         return self._grids.columns > 3
 
-    def force(self, command: Values) -> Values:
+    def force(self, command: Values, inflow: Array | None = None) -> Values:
         """See `FinLaw`. Tensors are answered, too, but nothing is differentiated through the table."""
         xp = library_of(command)
         if xp is not np:
@@ -33,19 +33,19 @@ class GridLaw(FinLaw):
             return xp.from_numpy(np.ascontiguousarray(values)).to(command)
         return self._grids(command, 1)[..., 0, 0, 0, :3].astype(command.dtype, copy=False)
 
-    def force_and_jacobian(self, command: Array) -> tuple[Array, Array]:
+    def force_and_jacobian(self, command: Array, inflow: Array | None = None) -> tuple[Array, Array]:
         """See `FinLaw`; exact derivatives of the interpolation."""
         found = self._grids(command, 2)[..., :3]
         return found[..., 0, 0, 0, :], _jacobian(found)
 
-    def power(self, command: Values, copper_loss: float = 0.0) -> Values:
+    def power(self, command: Values, copper_loss: float = 0.0, inflow: Array | None = None) -> Values:
         """See `FinLaw`. Measured power stands as it is, whatever the loss."""
         if not self.has_power:
             return super().power(command, copper_loss)
         # A polynomial through points near zero may dip below.
         return np.maximum(self._grids(command, 1)[..., 0, 0, 0, 3], 0.0)
 
-    def power_gradient(self, command: Array, copper_loss: float = 0.0) -> Array:
+    def power_gradient(self, command: Array, copper_loss: float = 0.0, inflow: Array | None = None) -> Array:
         """See `FinLaw`."""
         if not self.has_power:
             return super().power_gradient(command, copper_loss)

@@ -1,0 +1,125 @@
+"""The law of rudders: lift and drag of a foil in the water that flows past it, with stall.
+
+Command: (deflection [rad], 0, 0). Own frame: shaft, zero (the chord at deflection 0, pointing forward), and
+shaft x zero. U is the speed of the foil's place through the water across the shaft, and the angle a goes from
+the direction of travel to the chord. Lift is 1/2 rho U^2 S CL(a) across the travel, drag 1/2 rho U^2 S CD(a)
+against it. Below stall CL = slope a and CD = CD0 + k CL^2. Beyond it they are those of a flat plate, CL =
+2 |sin a| sin a cos a and CD = CD0 + 2 sin^2 a, with a logistic blend between (Beard and McLain, 2012, section
+4.2). A foil that goes astern is taken to be as good as ahead. At rest there is no force.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from finlab.actuators.law import ActuatorLaw
+from finlab.arrays import Array, Values
+from finlab.layout.rudder import Rudder
+
+SHARPNESS = 50.0
+"""How fast the flow separates around the angle of stall [1/rad]."""
+
+
+class Coefficients(NamedTuple):
+    """Lift and drag coefficients, and their derivatives by the angle [1/rad]."""
+
+    lift: Array
+    drag: Array
+    lift_slope: Array
+    drag_slope: Array
+
+
+class Met(NamedTuple):
+    """The water that meets foils (..., n)."""
+
+    speed: Array
+    """Speed across the shaft [m/s]."""
+    pressure: Array
+    """Dynamic pressure times area [N]."""
+    course: Array
+    """Direction of travel from zero towards shaft x zero [rad]."""
+
+
+class RudderLaw(ActuatorLaw):
+    """n rudders."""
+
+    feels_flow = True
+
+    def __init__(self, rudders: Sequence[Rudder]) -> None:
+        """Takes n rudders."""
+        self.slope = np.array([rudder.slope for rudder in rudders])
+        self.drag = np.array([rudder.drag for rudder in rudders])
+        self.induced = np.array([rudder.induced for rudder in rudders])
+        self.stall = np.array([rudder.stall for rudder in rudders])
+        self.half_density_area = np.array([0.5 * rudder.density * rudder.area for rudder in rudders])
+
+    def met(self, inflow: Array) -> Met:
+        """Returns the water that meets the foils, of velocities (..., n, 3) [m/s] in own frames."""
+        square = inflow[..., 1] ** 2 + inflow[..., 2] ** 2
+        course = np.arctan2(inflow[..., 2], inflow[..., 1])
+        return Met(np.sqrt(square), self.half_density_area * square, course)
+
+    def coefficients(self, angle: Array) -> Coefficients:
+        """Returns lift and drag of angles (..., n) [rad] from the direction of travel to the chord."""
+        a = np.mod(angle + 0.5 * np.pi, np.pi) - 0.5 * np.pi
+        up = 0.5 * (1.0 + np.tanh(0.5 * SHARPNESS * (a - self.stall)))
+        down = 0.5 * (1.0 - np.tanh(0.5 * SHARPNESS * (a + self.stall)))
+        parted = up + down - up * down
+        by_parted = SHARPNESS * (1.0 - up) * (1.0 - down) * (up - down)
+        sin, cos = np.sin(a), np.cos(a)
+        lift, plate = self.slope * a, 2.0 * np.abs(sin) * sin * cos
+        drag, behind = self.induced * lift * lift, 2.0 * sin * sin
+        plate_slope = 4.0 * np.abs(sin) * cos * cos - 2.0 * np.abs(sin) * sin * sin
+        return Coefficients(
+            lift + parted * (plate - lift),
+            self.drag + drag + parted * (behind - drag),
+            self.slope + parted * (plate_slope - self.slope) + by_parted * (plate - lift),
+            2.0 * self.induced * self.slope * lift * (1.0 - parted)
+            + parted * 4.0 * sin * cos
+            + by_parted * (behind - drag),
+        )
+
+    def force(self, command: Values, inflow: Array | None = None) -> Values:
+        """See `ActuatorLaw`."""
+        if inflow is None:
+            return np.zeros_like(command)
+        met = self.met(inflow)
+        found = self.coefficients(command[..., 0] - met.course)
+        return _along(met, found.lift, found.drag)
+
+    def force_and_jacobian(self, command: Array, inflow: Array | None = None) -> tuple[Array, Array]:
+        """See `ActuatorLaw`."""
+        if inflow is None:
+            return np.zeros(command.shape), np.zeros((*command.shape, 3))
+        met = self.met(inflow)
+        found = self.coefficients(command[..., 0] - met.course)
+        force = _along(met, found.lift, found.drag)
+        jacobian = np.zeros((*force.shape, 3))
+        jacobian[..., 0, :] = _along(met, found.lift_slope, found.drag_slope)
+        return force, jacobian
+
+    def power(self, command: Values, copper_loss: float = 0.0, inflow: Array | None = None) -> Values:
+        """See `ActuatorLaw`: what the drag takes, drag times speed."""
+        if inflow is None:
+            return np.zeros(command.shape[:-1])
+        met = self.met(inflow)
+        return met.pressure * met.speed * self.coefficients(command[..., 0] - met.course).drag
+
+    def power_gradient(self, command: Array, copper_loss: float = 0.0, inflow: Array | None = None) -> Array:
+        """See `ActuatorLaw`."""
+        gradient = np.zeros(command.shape)
+        if inflow is not None:
+            met = self.met(inflow)
+            slope = met.pressure * met.speed * self.coefficients(command[..., 0] - met.course).drag_slope
+            gradient = np.zeros((*slope.shape, 3))
+            gradient[..., 0] = slope
+        return gradient
+
+
+def _along(met: Met, lift: Array, drag: Array) -> Array:
+    """Forces (..., n, 3) [N] in own frames of coefficients (..., n)."""
+    cos, sin = np.cos(met.course), np.sin(met.course)
+    along = met.pressure * -drag
+    across = met.pressure * lift
+    return np.stack([np.zeros_like(along), along * cos - across * sin, along * sin + across * cos], axis=-1)

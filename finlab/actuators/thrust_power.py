@@ -1,0 +1,158 @@
+"""Power of a propeller over its force: a power law, or a convex curve through a table of measurements."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from functools import lru_cache
+
+import numpy as np
+
+from finlab.arrays import AnyArray, Array
+from finlab.layout.thrust_model import PowerLaw, PowerTable, ThrustModel, lower_hull, side_points
+
+STEEP = 1e-9
+"""Share of the largest marginal cost by which the marginal cost of a curve rises at least from its one end to
+the other, so that each price has one answer."""
+
+
+class ThrustPower(ABC):
+    """Watts over newtons, convex, of n propellers (..., n)."""
+
+    @abstractmethod
+    def watts(self, force: AnyArray) -> AnyArray:
+        """Returns the power [W] of forces [N], negative ones in reverse."""
+
+    @abstractmethod
+    def marginal(self, force: AnyArray) -> AnyArray:
+        """Returns its derivative [W/N] by the force."""
+
+
+class ByPower(ThrustPower):
+    """Watts that grow with a power of the force; parameters are numbers or arrays (n,)."""
+
+    def __init__(self, models: Sequence[PowerLaw]) -> None:
+        """Takes n models."""
+        self.forward = np.array([model.forward for model in models])
+        self.reverse = np.array(
+            [model.forward if model.reverse is None else model.reverse for model in models]
+        )
+        self.exponent = np.array([model.exponent for model in models])
+
+    def watts(self, force: AnyArray) -> AnyArray:
+        """See `ThrustPower`."""
+        power: AnyArray = np.where(force < 0.0, self.reverse, self.forward) * np.abs(force) ** self.exponent
+        return power
+
+    def marginal(self, force: AnyArray) -> AnyArray:
+        """See `ThrustPower`."""
+        factor = np.where(force < 0.0, -self.reverse, self.forward) * self.exponent
+        slope: AnyArray = factor * np.abs(force) ** (self.exponent - 1.0)
+        return slope
+
+
+class Curve:
+    """Watts over the size of the force of one side: convex, quadratic between knots, with a marginal cost
+    that rises from 0 at rest without a jump."""
+
+    def __init__(self, size: Array, watts: Array) -> None:
+        """Takes points of a convex curve, sizes [N] from 0 on, and meets each of them.
+
+        The knots between are those of Schumaker (1983): quadratic splines that keep the shape.
+        """
+        step = np.diff(size)
+        chord = np.diff(watts) / step
+        slope = np.zeros_like(size)
+        slope[1:-1] = (chord[:-1] * step[1:] + chord[1:] * step[:-1]) / (step[1:] + step[:-1])
+        slope[-1] = max(1.5 * chord[-1] - 0.5 * slope[-2], chord[-1])
+        below, above = chord - slope[:-1], slope[1:] - chord
+        total = np.maximum(below + above, 1e-300)
+        share = np.clip(np.where(above < below, above, total - below) / total, 1e-6, 1.0 - 1e-6)
+        between = 2.0 * chord - slope[:-1] * share - slope[1:] * (1.0 - share)
+        gaps = np.arange(1, len(size))
+        self.size = np.insert(size, gaps, size[:-1] + share * step)
+        """Sizes of the force [N] at the knots."""
+        marginal = np.maximum.accumulate(np.maximum(np.insert(slope, gaps, between), 0.0))
+        self.marginal = marginal + STEEP * slope[-1] * self.size / size[-1]
+        """Marginal cost [W/N] there."""
+        gain = 0.5 * (self.marginal[1:] + self.marginal[:-1]) * np.diff(self.size)
+        self.watts = watts[0] + np.insert(np.cumsum(gain), 0, 0.0)
+        """Power [W] there."""
+
+    def at(self, size: AnyArray) -> tuple[Array, Array]:
+        """Returns the power [W] and the marginal cost [W/N] of sizes [N]; beyond the last knot the curve goes
+        on with its last slope."""
+        i = np.clip(np.searchsorted(self.size, size, "right") - 1, 0, len(self.size) - 2)
+        step = size - self.size[i]
+        bend = (self.marginal[i + 1] - self.marginal[i]) / (self.size[i + 1] - self.size[i])
+        return self.watts[i] + step * (self.marginal[i] + 0.5 * bend * step), self.marginal[i] + bend * step
+
+    def answer(self, price: Array) -> Array:
+        """Returns the sizes [N] that are worth most at prices [W/N] from 0 on."""
+        return np.interp(price, self.marginal, self.size)
+
+
+class Sides:
+    """Both sides of one table."""
+
+    def __init__(self, model: PowerTable) -> None:
+        """Makes the curves of the sides that the table has."""
+        _, force, power = model.columns
+        rest = float(power.min())
+        curves = []
+        for sign in (1, -1):
+            size, watts = side_points(force, power, sign)
+            watts = np.minimum.accumulate(watts[::-1])[::-1]
+            watts[0] = rest
+            curves.append(Curve(*lower_hull(size, watts)) if len(size) > 1 else None)
+        self.rest = rest
+        """Power at rest [W]."""
+        self.forward, self.reverse = curves
+        """Curves of positive and of negative forces; None for a side that there is not."""
+
+    def at(self, force: AnyArray) -> tuple[Array, Array]:
+        """Returns power [W] and marginal cost [W/N] of forces [N]."""
+        watts, marginal = np.full(np.shape(force), self.rest), np.zeros(np.shape(force))
+        for curve, sign in ((self.forward, 1.0), (self.reverse, -1.0)):
+            if curve is not None:
+                on = force * sign > 0.0
+                watts[on], slope = curve.at(sign * force[on])
+                marginal[on] = sign * slope
+        return watts, marginal
+
+
+@lru_cache(maxsize=256)
+def sides_of(model: PowerTable) -> Sides:
+    """Returns the curves of a table, made once."""
+    return Sides(model)
+
+
+class ByTable(ThrustPower):
+    """Watts by tables, one for each of n propellers."""
+
+    def __init__(self, models: Sequence[PowerTable]) -> None:
+        """Takes n tables; those that are the same are evaluated together."""
+        self._groups = [
+            (np.array([i for i, own in enumerate(models) if own == model]), sides_of(model))
+            for model in dict.fromkeys(models)
+        ]
+
+    def watts(self, force: AnyArray) -> AnyArray:
+        """See `ThrustPower`."""
+        return self._both(force, 0)
+
+    def marginal(self, force: AnyArray) -> AnyArray:
+        """See `ThrustPower`."""
+        return self._both(force, 1)
+
+    def _both(self, force: AnyArray, which: int) -> AnyArray:
+        result: AnyArray = np.empty(np.shape(force))
+        for places, sides in self._groups:
+            result[..., places] = sides.at(force[..., places])[which]
+        return result
+
+
+def power_of(models: Sequence[ThrustModel]) -> ThrustPower:
+    """Returns the power of n propellers whose models are of one kind."""
+    laws = [model for model in models if isinstance(model, PowerLaw)]
+    tables = [model for model in models if isinstance(model, PowerTable)]
+    assert not (laws and tables), "one kind of model at a time"
+    return ByPower(laws) if laws else ByTable(tables)
