@@ -7,9 +7,10 @@ points along cos(a) zero + sin(a) (turn_axis x zero).
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finlab.actuators.law import ActuatorLaw
-from finlab.actuators.thrust_power import power_of
+from finlab.actuators.thrust_power import by_model, power_of
 from finlab.arrays import Array, Values
 from finlab.layout.azimuth import Azimuth
 
@@ -45,3 +46,8 @@ class AzimuthLaw(ActuatorLaw):
         gradient = np.zeros(command.shape)
         gradient[..., 1] = self.power_curve.marginal(command[..., 1])
         return gradient
+
+
+def azimuth_laws(azimuths: Sequence[Azimuth]) -> list[tuple[NDArray[np.intp], ActuatorLaw]]:
+    """Returns the laws of n turning thrusters, each with the places of its own."""
+    return [*by_model(azimuths, AzimuthLaw)]

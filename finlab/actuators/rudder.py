@@ -83,7 +83,7 @@ class RudderLaw(ActuatorLaw):
     def force(self, command: Values, inflow: Array | None = None) -> Values:
         """See `ActuatorLaw`."""
         if inflow is None:
-            return np.zeros_like(command)
+            return 0.0 * command
         met = self.met(inflow)
         found = self.coefficients(command[..., 0] - met.course)
         return _along(met, found.lift, found.drag)
@@ -102,7 +102,7 @@ class RudderLaw(ActuatorLaw):
     def power(self, command: Values, copper_loss: float = 0.0, inflow: Array | None = None) -> Values:
         """See `ActuatorLaw`: what the drag takes, drag times speed."""
         if inflow is None:
-            return np.zeros(command.shape[:-1])
+            return 0.0 * command[..., 0]
         met = self.met(inflow)
         return met.pressure * met.speed * self.coefficients(command[..., 0] - met.course).drag
 

@@ -1,14 +1,17 @@
 """Power of a propeller over its force: a power law, or a convex curve through a table of measurements."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import lru_cache
+from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finlab.arrays import AnyArray, Array
 from finlab.layout.thrust_model import PowerLaw, PowerTable, ThrustModel, lower_hull, side_points
 
+Law = TypeVar("Law")
 STEEP = 1e-9
 """Share of the largest marginal cost by which the marginal cost of a curve rises at least from its one end to
 the other, so that each price has one answer."""
@@ -110,7 +113,8 @@ class Sides:
 
     def at(self, force: AnyArray) -> tuple[Array, Array]:
         """Returns power [W] and marginal cost [W/N] of forces [N]."""
-        watts, marginal = np.full(np.shape(force), self.rest), np.zeros(np.shape(force))
+        marginal = 0.0 * force  # NaN of a failed one stays
+        watts = self.rest + marginal
         for curve, sign in ((self.forward, 1.0), (self.reverse, -1.0)):
             if curve is not None:
                 on = force * sign > 0.0
@@ -156,3 +160,15 @@ def power_of(models: Sequence[ThrustModel]) -> ThrustPower:
     tables = [model for model in models if isinstance(model, PowerTable)]
     assert not (laws and tables), "one kind of model at a time"
     return ByPower(laws) if laws else ByTable(tables)
+
+
+def by_model(
+    propellers: Sequence[Any], law: Callable[[Sequence[Any]], Law]
+) -> list[tuple[NDArray[np.intp], Law]]:
+    """Returns the laws of n propellers, one for each kind of model, with the places of its propellers."""
+    kinds = [type(propeller.model) for propeller in propellers]
+    found = []
+    for kind in dict.fromkeys(kinds):
+        places = np.array([i for i, own in enumerate(kinds) if own is kind])
+        found.append((places, law([propellers[i] for i in places])))
+    return found

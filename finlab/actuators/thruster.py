@@ -7,9 +7,10 @@ reaction torque of the propeller is part of the effectiveness.
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finlab.actuators.law import ActuatorLaw
-from finlab.actuators.thrust_power import power_of
+from finlab.actuators.thrust_power import by_model, power_of
 from finlab.arrays import Array, Values
 from finlab.layout.thruster import Thruster
 
@@ -42,3 +43,8 @@ class ThrusterLaw(ActuatorLaw):
         gradient = np.zeros(command.shape)
         gradient[..., 0] = self.power_curve.marginal(command[..., 0])
         return gradient
+
+
+def thruster_laws(thrusters: Sequence[Thruster]) -> list[tuple[NDArray[np.intp], ActuatorLaw]]:
+    """Returns the laws of n thrusters, each with the places of its own."""
+    return [*by_model(thrusters, ThrusterLaw)]

@@ -77,9 +77,11 @@ def own_effectiveness(layout: Layout) -> Array:
     """What one newton along each actuator's own three axes does to the robot.
 
     Returns:
-        (n, 3, 6): wrench [Fx, Fy, Fz, Tx, Ty, Tz] about the origin of 1 N along each row of `layout.frames`.
+        (n, 3, 6): wrench [Fx, Fy, Fz, Tx, Ty, Tz] about the origin of 1 N along each row of `layout.frames`,
+        with the reaction torque of propellers about the direction of their force.
     """
-    torque = np.cross(layout.position[:, None], layout.frames)
+    reaction = np.array([getattr(part, "torque_per_newton", 0.0) for part in layout.actuators])
+    torque = np.cross(layout.position[:, None], layout.frames) + reaction[:, None, None] * layout.frames
     return np.concatenate([layout.frames, torque], axis=-1)
 
 

@@ -1,4 +1,4 @@
-"""The plant: what a robot's fins really do, in numpy and float64.
+"""The plant: what a robot's actuators really do, in numpy and float64.
 
 It judges every allocation method, and the model-based methods optimize over it. `flow` (..., 6) is the
 velocity of the body relative to the water [m/s, rad/s], body frame; None is a robot at rest.
@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from finlab.actuators.fin.blade import Blade
-from finlab.actuators.fin.models import make_law, stack_laws
-from finlab.actuators.law import FinLaw
+from finlab.actuators.fin.models import make_law
+from finlab.actuators.law import ActuatorLaw
+from finlab.actuators.registry import free_angles, laws_of
 from finlab.arrays import Array
 from finlab.errors import CommandError
 from finlab.layout.angles import TURN, is_full_turn
@@ -25,23 +26,25 @@ from finlab.physics.wrench import body_force, wrench_of_forces
 
 
 class Plant:
-    """The fins of one layout, each with its own law: commands to wrenches and their derivatives."""
+    """The actuators of one layout, each with its own law: commands to wrenches and their derivatives."""
 
     def __init__(self, layout: Layout) -> None:
-        """Prepares the laws of the layout's fins; `plant_of` keeps plants that were made.
+        """Prepares the laws of the layout's actuators; `plant_of` keeps plants that were made.
 
         Raises:
             DataError: a fin's force table cannot be read.
         """
-        self.layout, self.n_fins = layout, layout.n_fins
+        self.layout, self.n, self.n_fins = layout, layout.n, layout.n_fins
         self.lower, self.upper = layout.lower, layout.upper
         self.width = self.upper - self.lower
         """Ranges of the limits (n, 3)."""
-        self.full_turn: NDArray[np.bool_] = is_full_turn(self.width[:, 2])
-        """Fins (n,) whose zero direction may turn freely; theirs wraps instead of ending at a limit."""
+        self.turns: NDArray[np.bool_] = free_angles(layout) & is_full_turn(self.width)
+        """Commands (n, 3) that may turn freely: they wrap instead of ending at a limit."""
+        self.full_turn = self.turns[:, 2]
+        """Fins (n,) whose zero direction does."""
         self.effectiveness: Array = own_effectiveness(layout)
-        """Wrench (n, 3, 6) of 1 N along each fin's shaft, zero and shaft x zero."""
-        self._laws = stack_laws([fin.model for fin in layout.fins])
+        """Wrench (n, 3, 6) of 1 N along the own axes of each actuator."""
+        self._laws = laws_of(layout)
         self.feels_flow = any(law.feels_flow for _, law in self._laws)
         """Whether forces depend on the flow."""
         self.flow: Array | None = None
@@ -57,8 +60,8 @@ class Plant:
         return other
 
     def inflow(self, flow: Array | None) -> Array | None:
-        """Returns the velocity (..., n, 3) of each fin's place through the water in its own frame [m/s]; None
-        at rest, or where no force depends on it."""
+        """Returns the velocity (..., n, 3) of each actuator's place through the water in its own frame
+        [m/s]; None at rest, or where no force depends on it."""
         flow = self.flow if flow is None else flow
         if flow is None or not self.feels_flow:
             return None
@@ -68,7 +71,7 @@ class Plant:
         """Returns the wrench that a command causes.
 
         Args:
-            command: (..., n, 3) [rad, Hz, rad]; a row of NaN is a failed fin and gives no force.
+            command: (..., n, 3), of fins [rad, Hz, rad]; a row of NaN is a failed one and gives no force.
             flow: (..., 6), or None at rest.
 
         Returns:
@@ -81,7 +84,7 @@ class Plant:
         return wrench
 
     def forces(self, command: ArrayLike, *, flow: Array | None = None) -> Array:
-        """Returns each fin's mean force (..., n, 3) [N] in its own frame (`layout.frames`); see `wrench`."""
+        """Returns each actuator's force (..., n, 3) [N] in its own frame (`layout.frames`); see `wrench`."""
         values, failed = self._checked(command)
         force = self.force(values, flow=flow)
         if failed is not None:
@@ -89,7 +92,7 @@ class Plant:
         return force
 
     def force(self, command: Array, *, flow: Array | None = None) -> Array:
-        """Returns forces (..., n, 3) [N] in fin frames of commands (..., n, 3) known to be finite."""
+        """Returns forces (..., n, 3) [N] in own frames of commands (..., n, 3) known to be finite."""
         return self._force(command, self.inflow(flow))
 
     def force_and_jacobian(self, command: Array, *, flow: Array | None = None) -> tuple[Array, Array]:
@@ -97,7 +100,7 @@ class Plant:
         return self._force_and_jacobian(command, self.inflow(flow))
 
     def _force(self, command: Array, inflow: Array | None) -> Array:
-        """`force` of each fin by itself, at velocities (..., n, 3) of their places, see `inflow`."""
+        """`force` of each actuator by itself, at velocities (..., n, 3) of their places, see `inflow`."""
         if len(self._laws) == 1 and inflow is None:
             alone: Array = self._laws[0][1].force(command)
             return alone
@@ -118,34 +121,33 @@ class Plant:
         return force, jacobian
 
     def fin_forces(self, command: ArrayLike, *, flow: Array | None = None) -> Array:
-        """Returns each fin's mean force (..., n, 3) [N] in the body frame; see `wrench`."""
+        """Returns each actuator's force (..., n, 3) [N] in the body frame; see `wrench`."""
         force: Array = body_force(self.forces(command, flow=flow), self.layout.frames)
         return force
 
     def linearize(self, command: Array, *, flow: Array | None = None) -> tuple[Array, Array]:
-        """Returns wrenches (..., 6) of commands (..., n, 3) without failed fins, and their derivatives
-        (..., 6, 3 n), fin by fin."""
+        """Returns wrenches (..., 6) of commands (..., n, 3) without failed ones, and their derivatives
+        (..., 6, 3 n), one actuator after the other."""
         force, jacobian = self.force_and_jacobian(command, flow=flow)
-        jacobian = (jacobian @ self.effectiveness).reshape(*force.shape[:-2], 3 * self.n_fins, 6)
+        jacobian = (jacobian @ self.effectiveness).reshape(*force.shape[:-2], 3 * self.n, 6)
         wrench: Array = wrench_of_forces(force, self.effectiveness)
         return wrench, jacobian.swapaxes(-1, -2)
 
     @property
     def parts(self) -> tuple[Any, Array]:
-        """What gives each fin's part of the wrench, by `force` and `force_and_jacobian` in its own axes, and
-        the wrench (n, axes, 6) per unit of each; here the fins' forces."""
+        """What gives each actuator's part of the wrench, by `force` and `force_and_jacobian` in its own axes,
+        and the wrench (n, axes, 6) per unit of each; here the forces."""
         return self, self.effectiveness
 
     def power(self, command: Array, copper_loss: float = 0.0, *, flow: Array | None = None) -> Array:
-        """Returns each fin's mean power (..., n) [W] of commands (..., n, 3), NaN for a failed fin's; with a
-        motor's loss [W/(N m)^2], see `FinLaw.power`."""
+        """Returns each actuator's power (..., n) [W] of commands (..., n, 3), NaN for a failed one's; of fins
+        with a motor's loss [W/(N m)^2], see `ActuatorLaw.power`."""
         inflow = self.inflow(flow)
         if len(self._laws) == 1 and inflow is None:
             return np.asarray(self._laws[0][1].power(command, copper_loss))
         power = np.empty(_broadcast(command, inflow)[:-1])
         for places, law in self._laws:
-            beside = _met(law, inflow, places)
-            power[..., places] = law.power(command[..., places, :], copper_loss, *beside)
+            power[..., places] = law.power(command[..., places, :], copper_loss, *_met(law, inflow, places))
         return power
 
     def power_gradient(self, command: Array, copper_loss: float = 0.0, *, flow: Array | None = None) -> Array:
@@ -153,13 +155,13 @@ class Plant:
         inflow = self.inflow(flow)
         jacobian = np.empty(_broadcast(command, inflow))
         for places, law in self._laws:
-            beside = _met(law, inflow, places)
-            jacobian[..., places, :] = law.power_gradient(command[..., places, :], copper_loss, *beside)
+            met = _met(law, inflow, places)
+            jacobian[..., places, :] = law.power_gradient(command[..., places, :], copper_loss, *met)
         return jacobian
 
     @cached_property
     def blade(self) -> Blade:
-        """The plates whose beating takes power, side by side (n,)."""
+        """The plates whose beating takes power, side by side, one for each fin."""
         fins = [astuple(make_law(fin.model).blade) for fin in self.layout.fins]
         return Blade(*map(np.array, zip(*fins, strict=True)))
 
@@ -171,27 +173,25 @@ class Plant:
 
     def feasible(self, command: Array) -> Array:
         """Returns commands (..., n, 3) brought within the limits exactly: full turns wrap, all else clips."""
-        result = np.array(command, np.float64)
-        direction = result[..., 2]
-        wrapped = self.lower[:, 2] + np.mod(direction - self.lower[:, 2], TURN)
-        result[..., 2] = np.where(self.full_turn, wrapped, direction)
-        return np.clip(result, self.lower, self.upper)
+        values = np.asarray(command, np.float64)
+        wrapped = self.lower + np.mod(values - self.lower, TURN)
+        return np.clip(np.where(self.turns, wrapped, values), self.lower, self.upper)
 
     def sample(self, rng: np.random.Generator, size: tuple[int, ...]) -> Array:
         """Returns uniform commands (*size, n, 3) within the limits."""
-        return np.asarray(self.lower + rng.uniform(size=(*size, self.n_fins, 3)) * self.width)
+        return np.asarray(self.lower + rng.uniform(size=(*size, self.n, 3)) * self.width)
 
     def _checked(self, command: ArrayLike) -> tuple[Array, NDArray[np.bool_] | None]:
-        """Finite float64 commands (..., n, 3), and which fins have failed (..., n), None where none has."""
+        """Finite float64 commands (..., n, 3), and which have failed (..., n), None where none has."""
         try:
             values = np.asarray(command, dtype=np.float64)
         except (TypeError, ValueError):
             raise CommandError(
-                "expected commands as numbers [rad, Hz, rad] per fin, got something else"
+                "expected commands as three numbers per actuator, of a fin [rad, Hz, rad], got something else"
             ) from None
-        if values.ndim < 2 or values.shape[-2:] != (self.n_fins, 3):
+        if values.ndim < 2 or values.shape[-2:] != (self.n, 3):
             raise CommandError(
-                f"expected commands (..., {self.n_fins}, 3) for layout {self.layout.name}, got {values.shape}"
+                f"expected commands (..., {self.n}, 3) for layout {self.layout.name}, got {values.shape}"
             )
         if np.isfinite(values).all():
             return values, None
@@ -200,7 +200,7 @@ class Plant:
         if not np.isfinite(values).all():
             raise CommandError(
                 f"the command for layout {self.layout.name} holds NaN or infinite values; "
-                "a failed fin has NaN in all three entries, any other has none"
+                "a failed actuator has NaN in all three entries, any other has none"
             )
         return values, failed
 
@@ -210,6 +210,6 @@ def _broadcast(command: Array, inflow: Array | None) -> tuple[int, ...]:
     return command.shape if inflow is None else np.broadcast_shapes(command.shape, inflow.shape)
 
 
-def _met(law: FinLaw, inflow: Array | None, places: Any) -> tuple[Array, ...]:
+def _met(law: ActuatorLaw, inflow: Array | None, places: Any) -> tuple[Array, ...]:
     """What a law is told beside the commands: the velocities of its actuators' places, where they count."""
     return () if inflow is None or not law.feels_flow else (inflow[..., places, :],)
