@@ -154,6 +154,12 @@ class ByTable(ThrustPower):
         return result
 
 
+def held(force: AnyArray, dead_band: Array) -> AnyArray:
+    """Returns the forces (..., n) [N] that come of commanded ones: none within the dead bands (n,) [N]."""
+    result: AnyArray = np.where(np.abs(force) < dead_band * (1.0 - 1e-9), 0.0, force)
+    return result
+
+
 def power_of(models: Sequence[ThrustModel]) -> ThrustPower:
     """Returns the power of n propellers whose models are of one kind."""
     laws = [model for model in models if isinstance(model, PowerLaw)]

@@ -1,4 +1,4 @@
-"""The law of thrusters with a fixed axis: the force is the command.
+"""The law of thrusters with a fixed axis: the force is the command, but none within the dead band.
 
 Command: (force [N], 0, 0). Own frame: axis, and two directions across it, along which nothing acts. The
 reaction torque of the propeller is part of the effectiveness.
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.actuators.law import ActuatorLaw
-from finlab.actuators.thrust_power import by_model, power_of
+from finlab.actuators.thrust_power import by_model, held, power_of
 from finlab.arrays import Array, Values
 from finlab.layout.thruster import Thruster
 
@@ -21,27 +21,29 @@ class ThrusterLaw(ActuatorLaw):
     def __init__(self, thrusters: Sequence[Thruster]) -> None:
         """Takes n thrusters."""
         self.power_curve = power_of([thruster.model for thruster in thrusters])
+        self.dead_band = np.array([thruster.dead_band for thruster in thrusters])
 
     def force(self, command: Values, inflow: Array | None = None) -> Values:
         """See `ActuatorLaw`."""
         force = np.zeros_like(command)
-        force[..., 0] = command[..., 0]
+        force[..., 0] = held(command[..., 0], self.dead_band)
         return force
 
     def force_and_jacobian(self, command: Array, inflow: Array | None = None) -> tuple[Array, Array]:
         """See `ActuatorLaw`."""
         jacobian = np.zeros((*command.shape, 3))
-        jacobian[..., 0, 0] = 1.0
-        return self.force(command), jacobian
+        force = self.force(command)
+        jacobian[..., 0, 0] = force[..., 0] == command[..., 0]
+        return force, jacobian
 
     def power(self, command: Values, copper_loss: float = 0.0, inflow: Array | None = None) -> Values:
         """See `ActuatorLaw`. The models tell electrical power, in which the motor's loss is included."""
-        return self.power_curve.watts(command[..., 0])
+        return self.power_curve.watts(held(command[..., 0], self.dead_band))
 
     def power_gradient(self, command: Array, copper_loss: float = 0.0, inflow: Array | None = None) -> Array:
         """See `ActuatorLaw`."""
         gradient = np.zeros(command.shape)
-        gradient[..., 0] = self.power_curve.marginal(command[..., 0])
+        gradient[..., 0] = self.power_curve.marginal(held(command[..., 0], self.dead_band))
         return gradient
 
 

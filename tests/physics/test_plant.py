@@ -107,7 +107,7 @@ def test_derivatives_agree_with_differences(name, of_four_kinds):
     [
         (np.zeros((3, 3)), r"expected commands \(..., 4, 3\) for layout A, got \(3, 3\)"),
         (np.zeros(12), "expected commands"),
-        ([[1, 2, 3], [4]], "expected commands as numbers"),
+        ([[1, 2, 3], [4]], "expected commands as three numbers"),
         (np.full((4, 3), np.inf), "NaN or infinite"),
         ([[0.1, np.nan, 0.0]] * 4, "a failed actuator has NaN in all three"),
     ],
