@@ -72,6 +72,7 @@ def form(
     /,
     called: str = "",
     required: Collection[str] = (),
+    optional: Collection[str] = (),
     tag: tuple[str, str | int] | tuple[()] | None = None,
     **kinds: Any,
 ) -> Any:
@@ -82,6 +83,7 @@ def form(
         keys: fields -> keys in the file; `cls.KEYS` when None.
         called: what the part is called in a schema; the dataclass's name when empty.
         required: fields that the file must have although they have a default.
+        optional: those of `kinds` that the file may leave out, beside the fields that have a default.
         tag: a key and its value, by which the part is known among others in the same place; the key `type`
             where the class has a `type` when None.
         kinds: types of fields that are different in the file, and of those that are there alone; None for
@@ -90,11 +92,10 @@ def form(
     own = {field.name for field in fields(cls)}
     told_of = get_type_hints(cls, include_extras=True).items()
     hints = {**{name: kind for name, kind in told_of if name in own}, **kinds}
-    optional = [
-        field.name for field in fields(cls) if field.default is not MISSING and field.name not in required
-    ]
+    usual = {field.name for field in fields(cls) if field.default is not MISSING}
+    free = (usual - set(required)) | set(optional)
     told = [(name, kind) for name, kind in hints.items() if kind is not None]
-    parts = [(name, kind | None, None) if name in optional else (name, kind) for name, kind in told]
+    parts = [(name, kind | None, None) if name in free else (name, kind) for name, kind in told]
     parts.sort(key=len)
     rename = cls.KEYS if keys is None and issubclass(cls, Checked) else dict(keys or {})
     about = {"__doc__": (cls.__doc__ or "").split("\n")[0].replace(" Checked on construction.", "")}

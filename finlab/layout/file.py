@@ -74,7 +74,8 @@ _OF_A_LAYOUT: dict[str, Any] = {
     "format": Literal["finlab-layout"],
     "body": BODY,
     "interaction": INTERACTION,
-    "frame": Frame | None,
+    "frame": Frame,
+    "optional": ["frame"],
 }
 _COUNT = Meta(min_length=1, max_length=MAX_ACTUATORS)
 LAYOUT_OF_FINS = form(

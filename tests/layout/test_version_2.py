@@ -1,0 +1,225 @@
+"""Layout files of version 2: actuators of any type, fins with shafts in any direction."""
+
+import copy
+import json
+import math
+from dataclasses import replace
+
+import jsonschema
+import numpy as np
+import pytest
+import yaml
+
+from finlab.errors import LayoutError
+from finlab.layout import Fin, Layout, Thruster, layout_to_dict, load_layout, own_effectiveness, parse_layout
+from finlab.layout.layout import MAX_ACTUATORS
+from finlab.layout.thrust_model import PowerLaw
+from finlab.physics.plant import Plant
+from tools.schemas import PACKAGE
+
+LAW = {"type": "power_law", "forward": 0.997, "reverse": 1.449, "exponent": 1.5}
+THRUSTER = {
+    "type": "thruster",
+    "position_m": [0, 0.2, 0],
+    "axis": [0, 0, 1],
+    "force_n": [-39.91, 51.44],
+    "model": LAW,
+}
+PUSH = {"force_n": [0, 30], "model": {"type": "power_law", "forward": 1.0}}
+GOOD = {
+    "format": "finlab-layout",
+    "version": 2,
+    "name": "all types",
+    "actuators": [
+        {"name": "side", "type": "fin", "position_m": [0.2, -0.1, 0], "mounting_angle_deg": -60.0},
+        {"name": "tail", "type": "fin", "position_m": [-0.4, 0, 0], "shaft": [0, 0, 1], "zero": [1, 0, 0]},
+        {"name": "lift", **THRUSTER},
+        {
+            "name": "pod",
+            "type": "azimuth",
+            "position_m": [-0.3, 0, -0.1],
+            "turn_axis": [0, 0, 1],
+            "zero": [1, 0, 0],
+            **PUSH,
+        },
+        {
+            "name": "nose",
+            "type": "tilt",
+            "position_m": [0.3, 0, 0],
+            "turn_axis": [0, 1, 0],
+            "zero": [0, 0, 1],
+            "arc_deg": [-30, 30],
+            **PUSH,
+        },
+        {
+            "name": "rudder",
+            "type": "rudder",
+            "position_m": [-0.6, 0, 0],
+            "shaft": [0, 0, 1],
+            "zero": [1, 0, 0],
+            "area_m2": 0.01,
+            "aspect_ratio": 2.2,
+            "deflection_deg": [-25, 25],
+        },
+    ],
+}
+
+
+def plain_yaml(data):
+    """YAML without anchors."""
+    return yaml.safe_dump(json.loads(json.dumps(data)))
+
+
+def edited(i, **changes):
+    """A copy of GOOD with some keys of one actuator changed, or removed if the value is `...`."""
+    data = copy.deepcopy(GOOD)
+    part = data["actuators"][i]
+    part.update(changes)
+    for key in [key for key, value in changes.items() if value is ...]:
+        del part[key]
+    return data
+
+
+def test_all_types_are_read_and_written(tmp_path):
+    path = tmp_path / "robot.yaml"
+    path.write_text(plain_yaml(GOOD))
+    layout = load_layout(path)
+    assert [part.type for part in layout.actuators] == ["fin", "fin", "thruster", "azimuth", "tilt", "rudder"]
+    assert (layout.n, layout.n_fins, layout.is_of_fins) == (6, 2, False)
+    assert layout.names == ("side", "tail", "lift", "pod", "nose", "rudder")
+    assert layout.lower.shape == layout.upper.shape == layout.position.shape == (6, 3)
+    assert layout.upper[2].tolist() == [51.44, 0.0, 0.0]
+    assert layout.upper[4].tolist() == [math.radians(30), 30.0, 0.0]
+    written = layout_to_dict(layout)
+    assert written["version"] == 2 and parse_layout(json.loads(json.dumps(written))) == layout
+    jsonschema.validate(GOOD, json.loads((PACKAGE / "layout/layout.schema.json").read_text()))
+    np.testing.assert_allclose(layout.frames @ layout.frames.swapaxes(1, 2), [np.eye(3)] * 6, atol=1e-15)
+    assert np.linalg.det(layout.frames) == pytest.approx(1.0)
+    assert layout.without(["side", "lift"]).names == ("tail", "pod", "nose", "rudder")
+    assert layout.replace_actuator("lift", force=(0.0, 9.0)).upper[2, 0] == 9.0
+
+
+def test_robots_of_horizontal_fins_are_written_as_version_1():
+    layout = parse_layout({**GOOD, "actuators": GOOD["actuators"][:1]})
+    written = layout_to_dict(layout)
+    assert written["version"] == 1 and [fin["name"] for fin in written["fins"]] == ["side"]
+    assert parse_layout(written) == layout
+
+
+def test_a_horizontal_shaft_has_one_description():
+    c, s = math.cos(0.7), math.sin(0.7)
+    by_axes = Fin("a", (0.1, 0.2, 0.0), shaft=(c, s, 0.0), zero=(-s, c, 0.0))
+    by_angle = Fin("a", (0.1, 0.2, 0.0), 0.7)
+    assert by_axes == replace(by_angle, mounting_angle=by_axes.mounting_angle)
+    assert by_axes.mounting_angle == pytest.approx(0.7, abs=1e-15)
+    # The other side forward at zero direction 0: no mounting angle says this.
+    assert Fin("a", (0.1, 0.2, 0.0), shaft=(c, s, 0.0), zero=(s, -c, 0.0)).mounting_angle is None
+
+
+def test_rounded_axes_become_exact():
+    fin = Fin("a", (0.0, 0.0, 0.0), shaft=(0.577, 0.577, 0.577), zero=(0.707, -0.707, 0.0))
+    np.testing.assert_allclose(np.array(fin.frame) @ np.transpose(fin.frame), np.eye(3), atol=1e-15)
+    np.testing.assert_allclose(fin.frame[0], [3**-0.5] * 3, atol=1e-15)
+
+
+def test_a_mounting_angle_is_a_frame():
+    angle = 0.7
+    by_angle = Fin("a", (0.1, 0.2, 0.3), angle).frame
+    c, s = math.cos(angle), math.sin(angle)
+    np.testing.assert_allclose(by_angle, [(c, s, 0), (-s, c, 0), (0, 0, 1)])
+
+
+def test_fins_with_any_shaft_push_as_a_formula_of_its_own_says():
+    rng = np.random.default_rng(4)
+    n = 5
+    shaft = rng.normal(size=(n, 3))
+    shaft /= np.linalg.norm(shaft, axis=1, keepdims=True)
+    zero = np.cross(shaft, rng.normal(size=(n, 3)))
+    zero /= np.linalg.norm(zero, axis=1, keepdims=True)
+    place = rng.uniform(-0.3, 0.3, (n, 3))
+    fins = [Fin(f"f{i}", tuple(place[i]), shaft=tuple(shaft[i]), zero=tuple(zero[i])) for i in range(n)]
+    layout = Layout("any", tuple(fins))
+    command = rng.uniform(layout.lower, layout.upper, (7, n, 3))
+    a, f, phi = np.moveaxis(command, -1, 0)[..., None]
+    thrust = 2 * 1000 * 0.15 * 0.02 * 0.1**2 * (2 * np.pi * f) ** 2 * (1 - np.cos(2 * a))
+    force = thrust * (np.cos(phi) * zero + np.sin(phi) * np.cross(shaft, zero))
+    wrench = np.concatenate([force.sum(1), np.cross(place, force).sum(1)], axis=-1)
+    np.testing.assert_allclose(Plant(layout).wrench(command), wrench, atol=1e-12)
+    np.testing.assert_allclose(Plant(layout).fin_forces(command), force, atol=1e-12)
+
+
+def test_the_effectiveness_is_force_and_lever():
+    layout = parse_layout(GOOD)
+    columns = own_effectiveness(layout)
+    np.testing.assert_allclose(columns[2, 0], [0, 0, 1, 0.2, 0, 0], atol=1e-15)
+    np.testing.assert_allclose(columns[1, 1], [1, 0, 0, 0, 0, 0], atol=1e-15)
+    np.testing.assert_allclose(columns[1, 2], [0, 1, 0, 0, 0, -0.4], atol=1e-15)
+
+
+BAD = [
+    ("actuators[2].name", edited(2, name="tail"), "'tail' is already the name of actuator 2"),
+    ("actuators", {**GOOD, "actuators": []}, "a list of 1 to 64 values, got 0"),
+    (
+        "actuators",
+        {**GOOD, "actuators": [{**THRUSTER, "name": f"t{i}"} for i in range(65)]},
+        "values, got 65",
+    ),
+    ("fins", {**GOOD, "fins": []}, "unknown key"),
+    ("actuators", {**GOOD, "version": 1}, "unknown key"),
+    ("version", {**GOOD, "version": 3}, "reads version 1 and 2, got 3"),
+    ("version", {key: value for key, value in GOOD.items() if key != "version"}, "required key is missing"),
+    ("actuators[0].type", edited(0, type="paddle"), "expected one of fin, thruster, azimuth, tilt, rudder"),
+    ("actuators[0].type", edited(0, type=...), "required key is missing"),
+    ("actuators[0].mounting_angle_deg", edited(0, mounting_angle_deg=...), "or shaft and zero"),
+    ("actuators[0].shaft", edited(0, shaft=[1, 0, 0], zero=[0, 1, 0]), "not both"),
+    ("actuators[0].axis", edited(0, axis=[1, 0, 0]), "unknown key"),
+    ("actuators[1].zero", edited(1, zero=...), "required key is missing"),
+    ("actuators[1].shaft", edited(1, shaft=...), "required key is missing"),
+    ("actuators[1].shaft", edited(1, shaft=[0, 0, 0.9]), "a unit vector, got one of length 0.9"),
+    ("actuators[1].shaft", edited(1, shaft=[0, 0, 0]), "a unit vector, got one of length 0"),
+    ("actuators[1].shaft[2]", edited(1, shaft=[0, 0, math.nan]), ""),
+    ("actuators[1].zero", edited(1, zero=[0.6, 0, 0.8]), "must stand across shaft, got 36.87 degrees"),
+    ("actuators[1].zero", edited(1, zero=[1, 0]), "a list of 3 values, got 2"),
+    ("actuators[2].axis", edited(2, axis=[0, 1, 1]), "a unit vector, got one of length 1.41421"),
+    ("actuators[2].axis", edited(2, axis=...), "required key is missing"),
+    ("actuators[2].force_n", edited(2, force_n=[3, 2]), ""),
+    (
+        "actuators[2].model.exponent",
+        edited(2, model={**LAW, "exponent": 1.0}),
+        "must lie within",
+    ),
+    ("actuators[3].turn_axis", edited(3, turn_axis=[0, 0, 2]), ""),
+    ("actuators[5].deflection_deg", edited(5, deflection_deg=[25, -25]), "25 and -25"),
+]
+
+
+@pytest.mark.parametrize(("key", "data", "why"), BAD, ids=[f"{key}-{i}" for i, (key, *_) in enumerate(BAD)])
+def test_a_bad_value_is_refused_with_file_key_and_reason(key, data, why, tmp_path):
+    path = tmp_path / "bad.yaml"
+    path.write_text(plain_yaml(data))
+    with pytest.raises(LayoutError) as caught:
+        load_layout(path)
+    assert str(caught.value).startswith(f"{path}: {key}"), caught.value
+    assert why in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_as_many_actuators_as_are_allowed():
+    model = PowerLaw(1.0)
+    parts = [Thruster(f"t{i}", (0, 0, 0), (0, 0, 1), (-9, 9), model) for i in range(MAX_ACTUATORS)]
+    layout = Layout("many", tuple(parts))
+    assert parse_layout(layout_to_dict(layout)) == layout
+    with pytest.raises(LayoutError, match="expected 1 to 64 actuators, got 65"):
+        Layout("more", (*parts, replace(parts[0], name="one more")))
+
+
+def test_what_works_for_fins_only_says_so():
+    layout = parse_layout(GOOD)
+    with pytest.raises(LayoutError, match="simulate works for .* 'lift' of .* is of type thruster"):
+        layout.only_fins("simulate")
+    tail = layout.without(["side", "lift", "pod", "nose", "rudder"])
+    tail.only_fins("simulate")
+    with pytest.raises(LayoutError, match="the app works for .* 'tail' .* has a shaft of its own direction"):
+        tail.only_fins("the app", horizontal=True)
+    with pytest.raises(LayoutError, match="'tail'"):
+        _ = tail.mounting_angle
