@@ -1,0 +1,281 @@
+"""The answer of a fin to a price: for each price the command that is worth most, by the fin's own law.
+
+The fin's amplitude and frequency maximize `v T(A, f) - P(A, f)` within its limits. That is found on a grid of
+commands and made exact by finer and finer grids around the best place: it needs no derivatives and holds for
+any law, convex or not. A fin whose force differs from one direction to the next has a gauge: the share of the
+force that the same cost gives in each direction.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from finlab.actuators.fin.models import make_law
+from finlab.actuators.law import FinLaw
+from finlab.actuators.response import Group, Plane, RadialTable, price_grid
+from finlab.arrays import Array
+from finlab.errors import DataError
+from finlab.layout import Fin
+from finlab.layout.angles import TURN, is_full_turn, wrapped
+
+GRID = 33, 49
+"""Amplitudes and frequencies of the first grid."""
+STEPS = 12
+"""Steps of Newton's method from the best place of the grid."""
+PEAK = 5e-4
+"""Share of the largest force that is given up where the price of the last newton has no end."""
+SIZES = 512
+"""Sizes of force for which the command is kept."""
+TURNS = 256
+"""Directions in which an uneven fin is asked for its force."""
+
+
+class FinTable(NamedTuple):
+    """How a fin answers a price, and by which commands."""
+
+    table: RadialTable
+    """Force over price in its strongest direction."""
+    middle: float
+    """Middle of the arc of force directions [rad]."""
+    half: float
+    """Half of it [rad]; pi for a full circle."""
+    gauge: Array | None
+    """Share (TURNS,) of the table's force in each direction, from 0 on; None where it is the same all
+    round."""
+    beat: Array
+    """Amplitude [rad] and frequency [Hz] (SIZES + 1, 2) that give the force `largest (j / SIZES)^2`."""
+    deflection: Array
+    """Direction of the force minus zero direction (TURNS,) [rad] around the circle of force directions; one
+    value (1,) where it is the same all round."""
+
+
+class FinGroup(Group):
+    """The fins of a robot."""
+
+    def __init__(self, fins: Sequence[Fin], effectiveness: Array, copper_loss: float = 0.0) -> None:
+        """Compile fins; those of one model and limits are compiled once.
+
+        Args:
+            fins: the fins.
+            effectiveness: wrench (m, 3, 6) per newton along each own axis: shaft, zero, across.
+            copper_loss: heat of a motor that counts as power [W/(N m)^2].
+
+        Raises:
+            DataError: a fin's force table cannot be read, or gives no thrust within the limits.
+        """
+        kept: dict[tuple[object, object], FinTable] = {}
+        for fin in fins:
+            if (fin.model, fin.limits) not in kept:
+                kept[fin.model, fin.limits] = fin_table(fin, copper_loss)
+        tables = [kept[fin.model, fin.limits] for fin in fins]
+        self._laws = [make_law(fin.model) for fin in fins]
+        self.responses = [
+            Plane(matrix[1:], each.table, each.middle, each.half, each.gauge)
+            for each, matrix in zip(tables, effectiveness, strict=True)
+        ]
+        self._largest = np.array([each.table.largest for each in tables])
+        self._beat = np.array([each.beat for each in tables])
+        self._deflection = np.array([np.broadcast_to(each.deflection, TURNS) for each in tables])
+        self._gauge = np.array([np.ones(TURNS) if each.gauge is None else each.gauge for each in tables])
+        self._even = all(each.gauge is None for each in tables)
+
+    def commands(self, force: Array) -> Array:
+        """See `Group`."""
+        x, y = force[..., 0], force[..., 1]
+        angle, size = np.arctan2(y, x), np.hypot(x, y)
+        row = np.arange(len(self._largest))
+        if self._even:
+            deflection = self._deflection[:, 0]
+        else:
+            place = (angle / TURN) % 1.0 * TURNS
+            cell = place.astype(np.intp) % TURNS
+            part, after = place - np.floor(place), (cell + 1) % TURNS
+            deflection = self._deflection[row, cell] * (1.0 - part) + self._deflection[row, after] * part
+            size = size / (self._gauge[row, cell] * (1.0 - part) + self._gauge[row, after] * part)
+        place = np.sqrt(np.minimum(size / self._largest, 1.0)) * SIZES
+        cell = np.minimum(place.astype(np.intp), SIZES - 1)
+        part = (place - cell)[..., None]
+        command = np.empty((*size.shape, 3))
+        command[..., :2] = self._beat[row, cell] * (1.0 - part) + self._beat[row, cell + 1] * part
+        command[..., 2] = wrapped(angle - deflection)
+        return command
+
+    def reach(self, lower: Array, upper: Array) -> Array:
+        """See `Group`: sizes are those of a few commands between the limits, at the middle of the arc."""
+        share = np.stack(np.meshgrid(*[np.linspace(0.0, 1.0, 5)] * 2, indexing="ij"), axis=-1).reshape(-1, 2)
+        found = np.empty((len(self._laws), 4))
+        for i, law in enumerate(self._laws):
+            command = np.empty((len(share), 3))
+            command[:, :2] = lower[i, :2] + share * (upper[i, :2] - lower[i, :2])
+            command[:, 2] = 0.5 * (lower[i, 2] + upper[i, 2])
+            force = law.force(command)[:, 1:]
+            size = np.hypot(force[:, 0], force[:, 1])
+            lean = wrapped(np.arctan2(force[size.argmax(), 1], force[size.argmax(), 0]) - command[0, 2])
+            found[i] = size.min(), size.max(), command[0, 2] + lean, 0.5 * (upper[i, 2] - lower[i, 2])
+        return found
+
+
+def fin_table(fin: Fin, copper_loss: float = 0.0) -> FinTable:
+    """Compile one fin; arguments and errors as for `FinGroup`."""
+    law = make_law(fin.model)
+    box = _Box(law, np.array(fin.limits.lower), np.array(fin.limits.upper), copper_loss)
+    strongest = box.largest()
+    if strongest <= 0.0:
+        raise DataError(
+            f"{fin.name}: gives no thrust within its limits, amplitudes {fin.limits.amplitude[0]:.4g} to "
+            f"{fin.limits.amplitude[1]:.4g} rad and frequencies {fin.limits.frequency[0]:.4g} to "
+            f"{fin.limits.frequency[1]:.4g} Hz; widen the limits or leave the fin out"
+        )
+    top = box.top_price(strongest)
+    command = box.best(price_grid(top))
+    force = np.maximum.accumulate(box.force(command))
+    table = RadialTable.of_forces(top, force, float(box.power(command[:1])[0]))
+    size = force[-1] * np.linspace(0.0, 1.0, SIZES + 1) ** 2
+    beat = np.stack([np.interp(size, force, command[:, k]) for k in range(2)], axis=-1)
+    middle, half, gauge, deflection = _directions(law, box)
+    return FinTable(table, middle, half, gauge, beat, deflection)
+
+
+class _Box:
+    """One fin's law within the limits of amplitude and frequency, in its strongest direction."""
+
+    def __init__(self, law: FinLaw, lower: Array, upper: Array, copper_loss: float) -> None:
+        self.law, self.lower, self.upper, self.copper_loss = law, lower, upper, copper_loss
+        self.turn = float(np.clip(0.0, lower[2], upper[2]))
+        if not law.uniform:
+            turns = np.linspace(lower[2], upper[2], TURNS)
+            grid = np.broadcast_to(np.append(upper[:2], 0.0), (TURNS, 3)).copy()
+            grid[:, 2] = turns
+            size = np.linalg.norm(law.force(grid)[:, 1:], axis=-1)
+            self.turn = float(turns[size.argmax()])
+
+    def command(self, beat: Array) -> Array:
+        """Commands (..., 3) of amplitude and frequency (..., 2)."""
+        return np.concatenate([beat, np.full((*beat.shape[:-1], 1), self.turn)], axis=-1)
+
+    def force(self, command: Array) -> Array:
+        """Sizes (...) [N] of the force in the fin's plane."""
+        size: Array = np.linalg.norm(self.law.force(command)[..., 1:], axis=-1)
+        return size
+
+    def power(self, command: Array) -> Array:
+        """Powers (...) [W]."""
+        return np.asarray(self.law.power(command, self.copper_loss))
+
+    def largest(self) -> float:
+        """The largest force [N] within the limits."""
+        return float(self.force(self.best(np.array([1e12])))[0])
+
+    def grid(self, shape: tuple[int, int] = GRID) -> Array:
+        """Commands (G, 3) on a grid of amplitudes and frequencies."""
+        axes = [np.linspace(a, b, n) for a, b, n in zip(self.lower, self.upper, shape, strict=False)]
+        beat = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
+        return self.command(beat)
+
+    def best(self, price: Array) -> Array:
+        """Commands (K, 3) that are worth most at prices (K,) [W/N]: from the best place of a grid by Newton's
+        method within the limits."""
+        grid = self.grid()
+        worth = price[:, None] * self.force(grid) - self.power(grid)
+        beat = grid[worth.argmax(axis=1), :2]
+        low, high = self.lower[:2], self.upper[:2]
+        span = high - low
+        longest = 2.0 * span / (np.array(GRID) - 1.0)
+        value, row = worth.max(axis=1), np.arange(len(price))
+        for _ in range(STEPS):
+            slope, curve = self._worth_derivatives(price, beat, 1e-6 * span + 1e-15)
+            step = np.clip(_uphill_steps(beat, slope, curve), -longest, longest)
+            trial = np.clip(np.concatenate([step, 0.2 * step]) + beat, low, high)
+            command = self.command(trial)
+            found = price * self.force(command) - self.power(command)
+            best = found.argmax(axis=0)
+            better = found[best, row] > value
+            beat = np.where(better[:, None], trial[best, row], beat)
+            value = np.where(better, found[best, row], value)
+        return self.command(beat)
+
+    def _worth_derivatives(self, price: Array, beat: Array, probe: Array) -> tuple[Array, Array]:
+        """Gradient (K, 2) and Hessian (K, 2, 2) of what commands are worth, by amplitude and frequency."""
+        at = np.where(beat + probe > self.upper[:2], beat - probe, beat)
+        slopes = [self._slope(price, at + shift) for shift in (0.0 * probe, probe * [1, 0], probe * [0, 1])]
+        with np.errstate(invalid="ignore", divide="ignore"):
+            curve = np.stack([slopes[1] - slopes[0], slopes[2] - slopes[0]], axis=-1) / probe
+        return self._slope(price, beat), 0.5 * (curve + curve.swapaxes(-1, -2))
+
+    def _slope(self, price: Array, beat: Array) -> Array:
+        command = self.command(beat)
+        force, jacobian = self.law.force_and_jacobian(command)
+        size = np.maximum(np.linalg.norm(force[:, 1:], axis=-1), 1e-300)
+        along = np.einsum("kci,ki->kc", jacobian[:, :2, 1:], force[:, 1:]) / size[:, None]
+        return np.asarray(price[:, None] * along - self.law.power_gradient(command, self.copper_loss)[:, :2])
+
+    def top_price(self, strongest: float) -> float:
+        """The price [W/N] at which the fin gives its largest force, or nearly so where that has no end."""
+        corner = self.command(self.upper[None, :2])
+        if float(self.force(corner)[0]) >= strongest * (1.0 - 1e-12):
+            zero = np.zeros(1)
+            marginal_force = self._slope(zero + 1.0, self.upper[None, :2]) - self._slope(
+                zero, self.upper[None, :2]
+            )
+            moves = self.upper[:2] > self.lower[:2]
+            if (marginal_force[0][moves] > 1e-3 * strongest).all():
+                price = -self._slope(zero, self.upper[None, :2])[0][moves] / marginal_force[0][moves]
+                return float(price.max()) if len(price) else 1e-9
+        low, high = 1e-9, 1e9
+        for _ in range(5):
+            prices = np.geomspace(low, high, 33)
+            enough = self.force(self.best(prices)) >= (1.0 - PEAK) * strongest
+            first = int(enough.argmax()) if enough.any() else len(prices) - 1
+            low, high = float(prices[max(first - 1, 0)]), float(prices[first])
+        return high
+
+
+def _uphill_steps(beat: Array, slope: Array, curve: Array) -> Array:
+    """Steps (4, K, 2) uphill from amplitudes and frequencies (K, 2): Newton's, and those of its
+    one-dimensional form along the amplitude, the frequency, and both with a constant product."""
+    a, b, c = curve[:, 0, 0], curve[:, 0, 1], curve[:, 1, 1]
+    det = a * c - b * b
+    ways = [np.broadcast_to(way, beat.shape) for way in ([1.0, 0.0], [0.0, 1.0])] + [beat * [1.0, -1.0]]
+    steps = []
+    with np.errstate(all="ignore"):
+        newton = np.stack([b * slope[:, 1] - c * slope[:, 0], b * slope[:, 0] - a * slope[:, 1]], axis=-1)
+        steps.append(np.where(((a < 0.0) & (det > 0.0))[:, None], newton / det[:, None], 0.0))
+        for way in ways:
+            up = np.einsum("ki,ki->k", way, slope)
+            bend = np.einsum("ki,kij,kj->k", way, curve, way)
+            steps.append(way * (up / np.where(bend < 0.0, -bend, np.abs(up) + 1e-300))[:, None])
+    return np.nan_to_num(np.stack(steps), posinf=0.0, neginf=0.0)
+
+
+def _directions(law: FinLaw, box: _Box) -> tuple[float, float, Array | None, Array]:
+    """Middle and half of the arc of force directions [rad], gauge (TURNS,) or None, and deflection."""
+    lower, upper = box.lower, box.upper
+    full = bool(is_full_turn(upper[2] - lower[2]))
+    middle, half = 0.5 * float(lower[2] + upper[2]), np.pi if full else 0.5 * float(upper[2] - lower[2])
+    if law.uniform:
+        force = law.force(np.append(upper[:2], box.turn))
+        lean = float(wrapped(np.arctan2(force[2], force[1]) - box.turn))
+        return middle + lean, half, None, np.array([lean])
+    turns = np.linspace(lower[2], upper[2], TURNS + 1)
+    grid = box.grid((9, 13))
+    reference = float(box.force(grid).max())
+    commands = np.broadcast_to(grid, (len(turns), *grid.shape)).copy()
+    commands[..., 2] = turns[:, None]
+    force = law.force(commands.reshape(-1, 3)).reshape(*commands.shape)
+    size = np.linalg.norm(force[..., 1:], axis=-1)
+    best = size.argmax(axis=1)
+    row = np.arange(len(turns))
+    size, across = size[row, best], force[row, best]
+    direction = turns + wrapped(np.arctan2(across[:, 2], across[:, 1]) - turns)
+    lean = np.unwrap(direction - turns)
+    if not full:
+        middle, half = 0.5 * float(direction[0] + direction[-1]), 0.5 * float(direction[-1] - direction[0])
+    angle = np.linspace(0.0, TURN, TURNS, endpoint=False)
+    place = (angle - direction[0]) % TURN
+    if not full:  # beyond its arc a fin is taken to be as at the nearer end
+        width = 2.0 * half
+        place = np.where(place > 0.5 * (width + TURN), 0.0, np.minimum(place, width))
+    along = direction - direction[0]
+    gauge = np.interp(place, along, size) / reference
+    return middle, half, gauge, np.interp(place, along, lean)

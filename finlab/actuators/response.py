@@ -1,0 +1,182 @@
+"""The answer of one actuator to a price: the force that is worth its watts, as a table over the price.
+
+An actuator that is paid `v` [W/N] for its force along a direction gives the force `T(v)` that
+maximizes `v T - c(T)`, with `c` its power. `T` rises with the price; its integral is the conjugate `c*`. Both
+are kept as piecewise polynomials on prices that are dense near zero, so that `T = dc*/dv` to rounding
+whatever the law is, and powers `T ~ v^2` (cost `~ T^1.5`) are exact. A cost that is not convex is replaced by
+its convex hull, at which `T` has a steep place.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from finlab.arrays import Array
+
+CELLS = 512
+"""Intervals of price of a table; their ends are `top (j / CELLS)^2`."""
+
+
+def price_grid(top: float, points: int = CELLS + 1) -> Array:
+    """Prices (points,) [W/N] from 0 to `top`, the ends of a table's intervals."""
+    grid: Array = top * np.linspace(0.0, 1.0, points) ** 2
+    return grid
+
+
+@dataclass(frozen=True, eq=False)
+class RadialTable:
+    """Force over price in one direction, cubic in each interval."""
+
+    top: float
+    """Price [W/N] from which on the force is the largest one."""
+    force: Array
+    """Force (CELLS + 1,) [N] at the ends of the intervals, rising."""
+    slope: Array
+    """Its derivative (CELLS + 1,) [N^2/W] there."""
+    rest: float
+    """Power [W] at the least force."""
+
+    @classmethod
+    def of_forces(cls, top: float, force: Array, rest: float, slope: Array | None = None) -> "RadialTable":
+        """A table from forces (CELLS + 1,) at `price_grid(top)`; slopes that are not given are those of a
+        monotone cubic (Fritsch and Carlson, 1980)."""
+        force = np.maximum.accumulate(np.asarray(force, np.float64))
+        slope = monotone_slopes(price_grid(top), force) if slope is None else slope
+        return cls(float(top), force, np.asarray(slope, np.float64), float(rest))
+
+    @classmethod
+    def of_price(cls, top: float, answer: Callable[[Array], Array], rest: float = 0.0) -> "RadialTable":
+        """A table of a function that gives forces for prices."""
+        return cls.of_forces(top, answer(price_grid(top)), rest)
+
+    @classmethod
+    def of_costs(cls, force: Array, cost: Array) -> "RadialTable":
+        """A table from points of force (K,) [N], rising, and power (K,) [W]: that of their convex hull, with
+        a quadratic cost between its points."""
+        keep = _lower_hull(force, cost)
+        force, cost = force[keep], cost[keep]
+        if len(force) == 1:
+            return cls.of_forces(1e-9, np.full(CELLS + 1, force[0]), float(cost[0]))
+        chord = np.diff(cost) / np.diff(force)
+        marginal = np.concatenate(
+            [
+                [max(1.5 * chord[0] - 0.5 * chord[min(1, len(chord) - 1)], 0.0)],
+                0.5 * (chord[1:] + chord[:-1]),
+                [chord[-1]],
+            ]
+        )
+        if len(chord) > 1:
+            marginal[-1] = max(1.5 * chord[-1] - 0.5 * chord[-2], chord[-1])
+        marginal = np.maximum.accumulate(marginal) + 1e-12 * chord[-1] * np.arange(len(marginal))
+        grid = price_grid(float(marginal[-1]))
+        return cls.of_forces(float(marginal[-1]), np.interp(grid, marginal, force), float(cost[0]))
+
+    @property
+    def largest(self) -> float:
+        """The largest force [N]."""
+        return float(self.force[-1])
+
+    def scaled(self, share: float, cost: float = 1.0) -> "RadialTable":
+        """The table with `share` times the force, and `cost` times the power, at each command."""
+        per = share / cost
+        return replace(
+            self,
+            top=self.top / per,
+            force=self.force * share,
+            slope=self.slope * share * per,
+            rest=self.rest * cost,
+        )
+
+    def polynomials(self) -> Array:
+        """Coefficients (CELLS, 5): of the force in `t` from 0 to 1 along each interval, rising powers, and
+        the conjugate at its beginning [W]."""
+        width = np.diff(price_grid(self.top))
+        first, last = self.force[:-1], self.force[1:]
+        m0, m1 = self.slope[:-1] * width, self.slope[1:] * width
+        rise = last - first
+        part = np.stack([first, m0, 3.0 * rise - 2.0 * m0 - m1, m0 + m1 - 2.0 * rise], axis=1)
+        gain = width * (part @ (1.0 / np.arange(1.0, 5.0)))
+        start = np.concatenate([[0.0], np.cumsum(gain)[:-1]]) - self.rest
+        return np.concatenate([part, start[:, None]], axis=1)
+
+
+def monotone_slopes(x: Array, y: Array) -> Array:
+    """Slopes (K,) of a rising cubic spline through points (K,), third order where the data allow."""
+    width, chord = np.diff(x), np.diff(y) / np.diff(x)
+    slope = np.empty_like(y)
+    slope[1:-1] = (width[1:] * chord[:-1] + width[:-1] * chord[1:]) / (width[1:] + width[:-1])
+    slope[0] = chord[0] + (chord[0] - chord[1]) * width[0] / (width[0] + width[1])
+    slope[-1] = chord[-1] + (chord[-1] - chord[-2]) * width[-1] / (width[-1] + width[-2])
+    most = 3.0 * np.minimum(np.append(chord, chord[-1]), np.insert(chord, 0, chord[0]))
+    return np.clip(slope, 0.0, most)
+
+
+def _lower_hull(x: Array, y: Array) -> Array:
+    """Places of the points of the lower convex hull, from left to right."""
+    kept: list[int] = []
+    for i in range(len(x)):
+        while len(kept) > 1 and (
+            (y[kept[-1]] - y[kept[-2]]) * (x[i] - x[kept[-2]])
+            >= (y[i] - y[kept[-2]]) * (x[kept[-1]] - x[kept[-2]])
+        ):
+            kept.pop()
+        kept.append(i)
+    return np.array(kept)
+
+
+@dataclass(frozen=True, eq=False)
+class Line:
+    """What an actuator with one direction offers: a force between two limits, of either sign."""
+
+    effectiveness: Array
+    """Wrench (6,) per newton [-, m], body frame."""
+    forward: RadialTable
+    """Answer to a positive price."""
+    reverse: RadialTable | None = None
+    """Answer to a negative price, as sizes; None where the force has one sign."""
+    band: float = 0.0
+    """Forces smaller than this one, other than 0, cannot be held [N]."""
+    low: float = -np.inf
+    """Least force [N], where that is more than the tables give."""
+    high: float = np.inf
+    """Largest force [N], where that is less than the tables give."""
+
+
+@dataclass(frozen=True, eq=False)
+class Plane:
+    """What an actuator with two directions offers: forces within an arc, up to a largest size."""
+
+    effectiveness: Array
+    """Wrench (2, 6) per newton along its two directions [-, m], body frame."""
+    table: RadialTable
+    """Answer to a price along the force; its first force is the least one."""
+    middle: float = 0.0
+    """Middle of the arc of force directions, from the first direction towards the second [rad]."""
+    half: float = np.pi
+    """Half of that arc [rad]; pi for a full circle."""
+    gauge: Array | None = None
+    """Share (G,) of the table's force that the same cost gives in each of G directions around the circle,
+    from angle 0 on; None for a fin that is alike all round."""
+
+
+Response = Line | Plane
+"""What one actuator offers."""
+
+
+class Group(ABC):
+    """The m actuators of one type in a robot: what they offer for prices, and which commands give a force."""
+
+    responses: list[Response]
+    """What each offers, by the effectiveness of its own directions."""
+
+    @abstractmethod
+    def commands(self, force: Array) -> Array:
+        """Commands (N, m, 3), padded as in a layout's limits, that give forces (N, m, 2) [N] along the own
+        directions (a line's second entry is 0) at least power, as near as the table is."""
+
+    @abstractmethod
+    def reach(self, lower: Array, upper: Array) -> Array:
+        """What commands between `lower` and `upper` (m, 3) can give: least and largest force [N] (of planes
+        the sizes), middle and half of the arc [rad] (0 and pi for lines), as rows (m, 4)."""

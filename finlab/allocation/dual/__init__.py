@@ -1,0 +1,1 @@
+"""Least-power allocation by one dual: every actuator answers a price."""

@@ -1,0 +1,273 @@
+"""The answers of all actuators of one robot to prices, for many targets at once.
+
+Targets come last in all arrays: prices (k, N) [W/N] of the actuators' own directions, in the order lines,
+first directions of planes, second directions of planes. Each answer is the gradient of a conjugate: a line's
+`T(|s|) sign(s)`, a plane's `T(v) g` with `v = s . g` and `g` the direction of the force, its size the gauge.
+"""
+
+from dataclasses import dataclass, fields
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.actuators.response import CELLS, Line, Plane
+from finlab.allocation.dual.gauges import Gauges
+from finlab.arrays import Array
+
+SMOOTHING = 1e-5
+"""Price, as a share of the largest, over which an answer changes from one side of a gap to the other: the
+dual of a set that is not convex has corners there."""
+TINY = 1e-9
+"""The same share where there is no gap: it keeps the direction of a force of no price defined."""
+
+
+class Answer(NamedTuple):
+    """What a robot's actuators answer to N prices."""
+
+    force: Array
+    """Forces (k, N) [N]."""
+    derivative: Array
+    """Derivatives by the prices (l + 3 p, N) [N^2/W]: of lines, then of planes first-first, first-second and
+    second-second."""
+    conjugate: Array
+    """Sum of the conjugates (N,) [W]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sets:
+    """What the n actuators may give: (n, 1) for all targets alike, or (n, N). Lines first."""
+
+    low: Array
+    """Least force, of planes least size [N]."""
+    high: Array
+    """Largest force or size [N]."""
+    low_cost: Array
+    """Power at the least force [W]."""
+    high_cost: Array
+    """Power at the largest force [W]."""
+    middle: Array
+    """Middles of the arcs of the p planes (p, 1) or (p, N) [rad]."""
+    half: Array
+    """Halves of these arcs [rad]; pi for full circles."""
+
+    def take(self, columns: NDArray[np.intp]) -> "Sets":
+        """The same for some of the targets."""
+        values = (getattr(self, field.name) for field in fields(self))
+        return Sets(*(a if a.shape[-1] == 1 else a[:, columns] for a in values))
+
+
+class Answers:
+    """A robot's actuators, ready to answer."""
+
+    def __init__(self, lines: list[Line], planes: list[Plane]) -> None:
+        """Makes the tables of the actuators, lines before planes."""
+        self.lines, self.planes = len(lines), len(planes)
+        sides = [(line.forward, line.reverse or line.forward) for line in lines]
+        sides += [(plane.table, plane.table) for plane in planes]
+        tables = [table for both in sides for table in both]
+        self._coefficients = np.array([table.polynomials() for table in tables]).reshape(-1, 5).T.copy()
+        self._top = np.array([table.top for table in tables])
+        self.tops = self._top.reshape(-1, 2).max(axis=1)
+        self._ends = np.array([table.force for table in tables])
+        self._row = 2 * np.arange(len(sides))[:, None]
+        self.gauges = Gauges([plane.gauge for plane in planes])
+        self._tiny = TINY * self._top[2 * self.lines :: 2, None]
+
+    def radial(self, price: Array, row: NDArray[np.intp]) -> tuple[Array, Array, Array]:
+        """Force [N], its derivative and conjugate [W] (m, N) at prices (m, N) in rows (m, 1) or (m, N) of the
+        tables, two for each actuator."""
+        top = self._top[row]
+        share = np.clip(price / top, 0.0, 1.0)
+        cell = np.minimum((np.sqrt(share) * CELLS).astype(np.intp), CELLS - 1)
+        a0, a1, a2, a3, start = self._coefficients[:, row * CELLS + cell]
+        odd = 2 * cell + 1
+        t = (share * CELLS**2 - cell * cell) / odd
+        width = odd * (top / CELLS**2)
+        force = a0 + t * (a1 + t * (a2 + t * a3))
+        slope = (a1 + t * (2.0 * a2 + 3.0 * t * a3)) / width
+        conjugate = start + width * t * (a0 + t * (a1 / 2.0 + t * (a2 / 3.0 + t * (a3 / 4.0))))
+        return force, slope, conjugate
+
+    def cost(self, force: Array) -> Array:
+        """Power (n, N) [W] of forces (n, N) within the tables; of planes of their sizes."""
+        row = self._row + ((np.arange(len(force)) < self.lines)[:, None] & (force < 0.0))
+        size, low, high = np.abs(force), np.zeros(force.shape), self._top[row] + np.zeros(force.shape)
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            enough = self.radial(middle, row)[0] >= size
+            low, high = np.where(enough, low, middle), np.where(enough, middle, high)
+        return high * size - self.radial(high, row)[2]
+
+    def forked(self, sets: Sets) -> NDArray[np.intp]:
+        """Places of the planes whose set has a gap: wide arcs, and arcs of forces that cannot rest."""
+        arc = sets.half < np.pi
+        wide = arc & ((sets.half > 0.5 * np.pi) | ((sets.low[self.lines :] > 0.0) & (sets.half > 0.0)))
+        return np.flatnonzero(wide.any(axis=1))
+
+    def __call__(self, price: Array, sets: Sets) -> Answer:
+        """Answers to prices (k, N)."""
+        lines, planes = self.lines, self.planes
+        sign = np.where(price[:lines] < 0.0, -1.0, 1.0)
+        if not planes:
+            force, slope, conjugate = self._limited(price, sign, self._row, sets)
+            return Answer(force, slope, conjugate.sum(axis=0))
+        first, second = price[lines : lines + planes], price[lines + planes :]
+        fan = self._fan(first, second, sets)
+        value = np.concatenate([price[:lines], first * fan.first + second * fan.second])
+        sign = np.concatenate([sign, np.ones_like(first)])
+        size, slope, conjugate = self._limited(value, sign, self._row, sets)
+        planar = _Planar.of(fan, size[lines:], slope[lines:], conjugate[lines:])
+        total = conjugate.sum(axis=0)
+        if fan.beyond is not None and len(forked := self.forked(sets)):
+            total += self._fork(forked, planar, fan, first, second, sets)
+        return Answer(
+            np.concatenate([size[:lines], planar.first, planar.second]),
+            np.concatenate([slope[:lines], planar.xx, planar.xy, planar.yy]),
+            total,
+        )
+
+    def _limited(
+        self, price: Array, sign: Array, row: NDArray[np.intp], sets: Sets, of: Any = slice(None)
+    ) -> tuple[Array, Array, Array]:
+        """Forces, derivatives and conjugates (m, N) for prices (m, N) within the limits of some actuators."""
+        force, slope, conjugate = self.radial(np.maximum(price * sign, 0.0), row + (sign < 0.0))
+        force = force * sign
+        low, high = sets.low[of], sets.high[of]
+        below, above = force <= low, force >= high
+        conjugate = np.where(below, price * low - sets.low_cost[of], conjugate)
+        conjugate = np.where(above & ~below, price * high - sets.high_cost[of], conjugate)
+        return np.minimum(np.maximum(force, low), high), np.where(below | above, 0.0, slope), conjugate
+
+    def _fan(self, first: Array, second: Array, sets: Sets) -> "_Fan":
+        """Directions in which planes answer prices (p, N)."""
+        gap = self._gap(sets)
+        size = np.sqrt(first * first + second * second + gap * gap)
+        x, y = first / size, second / size
+        tangent = 1.0 / size
+        fan_x, fan_y = x, y
+        if self.gauges:
+            fan_x, fan_y, tangent = self._uneven(x, y, tangent)
+        xx, xy, yy = tangent * (1.0 - x * x), -tangent * x * y, tangent * (1.0 - y * y)
+        if (sets.half >= np.pi).all():
+            return _Fan(fan_x, fan_y, xx, xy, yy, None, None)
+        cos, sin = np.cos(sets.middle), np.sin(sets.middle)
+        ahead, aside = fan_x * cos + fan_y * sin, fan_y * cos - fan_x * sin
+        beyond = np.abs(aside) * np.cos(sets.half) > ahead * np.sin(sets.half)
+        beyond &= sets.half < np.pi
+        # The nearer end by the price itself: by the force, both are alike where the arc has no width.
+        nearer = np.where(second * cos - first * sin < 0.0, -1.0, 1.0)
+        angle = sets.middle + nearer * sets.half
+        end_x, end_y = self._end(angle)
+        keep = np.where(beyond, 0.0, 1.0)
+        return _Fan(
+            np.where(beyond, end_x, fan_x),
+            np.where(beyond, end_y, fan_y),
+            xx * keep,
+            xy * keep,
+            yy * keep,
+            beyond,
+            sets.middle - nearer * sets.half,
+        )
+
+    def _gap(self, sets: Sets) -> Array:
+        """Prices (p, 1) or (p, N) below which a plane's direction is undecided."""
+        rests = sets.low[self.lines :] <= 0.0
+        return np.where(rests, self._tiny, self._tiny * (SMOOTHING / TINY))
+
+    def _uneven(self, x: Array, y: Array, tangent: Array) -> tuple[Array, Array, Array]:
+        """Directions of the force with the gauges' sizes, and the weights of their change, for directions of
+        the price."""
+        places = self.gauges.places
+        value, slope, bend = self.gauges.support(np.arctan2(y[places], x[places]))
+        fan_x, fan_y, tangent = x.copy(), y.copy(), tangent.copy()
+        fan_x[places], fan_y[places] = (
+            value * x[places] - slope * y[places],
+            value * y[places] + slope * x[places],
+        )
+        tangent[places] *= np.maximum(value + bend, 0.0)
+        return fan_x, fan_y, tangent
+
+    def _end(self, angle: Array) -> tuple[Array, Array]:
+        """The directions (p, N) of forces at angles (p, N), with the gauges' sizes."""
+        x, y = np.cos(angle), np.sin(angle)
+        if self.gauges:
+            places = self.gauges.places
+            rho = self.gauges.along(angle[places])
+            x[places] *= rho
+            y[places] *= rho
+        return x, y
+
+    def _fork(
+        self,
+        places: NDArray[np.intp],
+        planar: "_Planar",
+        fan: "_Fan",
+        first: Array,
+        second: Array,
+        sets: Sets,
+    ) -> Array:
+        """Blend the answers of planes beyond their arcs with those of the other ends; the change (N,) of the
+        sum of conjugates."""
+        x, y = (values[places] for values in self._end(fan.other + np.zeros_like(first)))
+        price = first[places] * x + second[places] * y
+        row = self.lines + places
+        size, slope, conjugate = self._limited(price, np.ones_like(price), self._row[row], sets, row)
+        other = _Planar(size * x, size * y, slope * x * x, slope * x * y, slope * y * y, conjugate)
+        width = SMOOTHING * self._top[2 * row, None] * sets.high[row]
+        ahead = planar.conjugate[places] - conjugate
+        root = np.sqrt(ahead * ahead + width * width)
+        share = np.where(fan.beyond[places], 0.5 * (1.0 + ahead / root), 1.0)
+        turn = np.where(fan.beyond[places], 0.5 * width * width / root**3, 0.0)
+        dx, dy = planar.first[places] - other.first, planar.second[places] - other.second
+        for name, extra in (
+            ("first", 0.0),
+            ("second", 0.0),
+            ("xx", dx * dx),
+            ("xy", dx * dy),
+            ("yy", dy * dy),
+        ):
+            own, others = getattr(planar, name), getattr(other, name)
+            own[places] = share * own[places] + (1.0 - share) * others + turn * extra
+        gain: Array = np.where(fan.beyond[places], 0.5 * (root - ahead), 0.0).sum(axis=0)
+        return gain
+
+
+class _Fan(NamedTuple):
+    """Directions of the forces of planes, with their gauges (p, N), and what changes them."""
+
+    first: Array
+    second: Array
+    xx: Array
+    """First-first part of the change of direction with the price, over the force [N/W]."""
+    xy: Array
+    yy: Array
+    beyond: NDArray[np.bool_] | None
+    """Which are at an end of their arc; None where all arcs are full circles."""
+    other: Array | None
+    """The angle of the other end [rad]."""
+
+
+class _Planar(NamedTuple):
+    """Answers of planes (p, N)."""
+
+    first: Array
+    second: Array
+    xx: Array
+    xy: Array
+    yy: Array
+    conjugate: Array
+
+    @classmethod
+    def of(cls, fan: _Fan, size: Array, slope: Array, conjugate: Array) -> "_Planar":
+        """The answers along a fan of directions, of sizes, their derivatives and conjugates (p, N)."""
+        x, y = fan.first, fan.second
+        steep_x = slope * x
+        return cls(
+            size * x,
+            size * y,
+            steep_x * x + size * fan.xx,
+            steep_x * y + size * fan.xy,
+            slope * y * y + size * fan.yy,
+            conjugate,
+        )

@@ -1,0 +1,203 @@
+"""Targets out of reach: the nearest wrench, the same direction, or groups of axes in order, by the same dual.
+
+`closest` allows a miss `m = E l` with `E` the inverse of `rho` times the squared weights: exact as `rho`
+grows. `direction` pays a reward for the share `t` of the target that is given. `priority` asks for the axes
+of one group after the other, the groups before it met exactly. At the wrench that is got, one more solution
+finds the least watts.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from finlab.allocation.dual.answers import Sets
+from finlab.allocation.dual.newton import Prices, Terms, solve
+from finlab.allocation.dual.robot import DualRobot
+from finlab.allocation.policy import Policy
+from finlab.arrays import Array
+
+STIFFNESS = (10.0, 1e3, 1e5, 1e7)
+"""Costs of a miss, one after the other, as multiples of the robot's largest power per actuator."""
+REWARD = 10.0
+"""Reward for a share of a target, as a multiple of the same."""
+RIM = 1e-6
+"""Share of a wrench on the boundary of the reach that is given up where rounding puts it beyond."""
+UNWEIGHTED = 1e-4
+"""Weight of an axis whose miss does not count."""
+MISSED = 1e-7
+"""Share of a group's target from which it counts as missed."""
+DRIVEN = 1e-6
+"""Share of the largest price from which an actuator counts as driven to its limit."""
+FAR = 1e9
+"""Price, as a multiple of the largest, at which every actuator is at its limit."""
+
+
+class Nearest(NamedTuple):
+    """What is given in place of a target out of reach."""
+
+    force: Array
+    """Forces (k,) [N] of the robot's directions."""
+    bound: float
+    """Least power [W] of the wrench that they give, by the dual."""
+
+
+def nearest(robot: DualRobot, sets: Sets, wrench: Array, policy: Policy, yardstick: Array) -> Nearest:
+    """Forces for one wrench (6,) [N, N m] that no forces within the sets give.
+
+    Args:
+        robot: the robot.
+        sets: what its actuators may give, for one target.
+        wrench: the target.
+        policy: what counts.
+        yardstick: scales (6,) of the missing wrench [N, N m].
+    """
+    weight = robot.scale / yardstick
+    if policy.kind == "direction":
+        force = direction(robot, sets, wrench / robot.scale)
+    elif policy.kind == "priority":
+        force = priority(robot, sets, wrench / robot.scale, policy.groups, weight)
+    else:
+        weight = weight * np.maximum(np.array(policy.axis_weights) / max(policy.axis_weights), UNWEIGHTED)
+        force = closest(robot, sets, wrench / robot.scale, weight)
+    return _cheapest(robot, sets, force)
+
+
+def _cheapest(robot: DualRobot, sets: Sets, force: Array) -> Nearest:
+    """The least power for the wrench that some forces (k,) give."""
+    target = (robot.matrix.T @ force)[:, None]
+    for share in (1.0, 1.0 - RIM):
+        found = solve(robot, share * target, sets)
+        if found.solved[0]:
+            return Nearest(found.force[:, 0], float(found.value[0]))
+    return Nearest(force, float(found.value[0]))
+
+
+def closest(robot: DualRobot, sets: Sets, wrench: Array, weight: Array) -> Array:
+    """Forces (k,) [N] whose scaled wrench comes nearest to a scaled one (6,), each axis by its weight
+    (6,)."""
+    metric = robot.basis.T * weight**2
+    inner = metric @ robot.basis
+    target = np.linalg.solve(inner, metric @ wrench)[:, None]
+    return _nearer(robot, sets, target, np.linalg.inv(inner)).force[:, 0]
+
+
+def _nearer(robot: DualRobot, sets: Sets, target: Array, compliance: Array) -> Prices:
+    """Prices for a target (r, 1) that may be missed, the more it costs the less: a miss is `compliance` (r,
+    r) times the prices over the stiffness."""
+    unit = _unit(sets)
+    prices, last = None, STIFFNESS[0]
+    for stiffness in STIFFNESS:
+        if prices is not None:
+            prices = prices + (stiffness / last - 1.0) * _unanswered(robot, prices, sets)
+        found = solve(robot, target, sets, prices, Terms(penalty=compliance / (stiffness * unit)))
+        prices, last = found.prices, stiffness
+    return found
+
+
+def _unit(sets: Sets) -> float:
+    """The largest power per actuator [W]."""
+    return float(sets.high_cost.sum(axis=0)[0]) / len(sets.high) + 1e-12
+
+
+def _unanswered(robot: DualRobot, prices: Array, sets: Sets) -> Array:
+    """The part (r, 1) of prices to which no actuator answers: they are at their limits along it."""
+    answer = robot.answers(robot.matrix @ prices, sets)
+    hessian = (robot.outer @ answer.derivative).reshape(robot.shape)
+    values, vectors = np.linalg.eigh(hessian)
+    still = vectors[:, values <= 1e-9 * max(values[-1], robot.least_trace)]
+    part: Array = still @ (still.T @ prices)
+    return part
+
+
+def direction(robot: DualRobot, sets: Sets, wrench: Array) -> Array:
+    """Forces (k,) [N] that give the largest share of a scaled wrench (6,)."""
+    target = (robot.basis.T @ wrench)[:, None]
+    if np.linalg.norm(robot.basis @ target[:, 0] - wrench) > 1e-9 * np.linalg.norm(wrench):
+        return solve(robot, 0.0 * target, sets).force[:, 0]
+    target = target / max(float(np.linalg.norm(target)) / 4.0, 1.0)  # farther than any robot reaches
+    unit = _unit(sets)
+    found, reward = solve(robot, target, sets, None, Terms(reward=REWARD * unit)), REWARD
+    for _ in range(4):
+        share = _share(robot, found, target)
+        if share >= (1.0 - 1e-6) * _most_share(robot, sets, found.prices, target):
+            break
+        reward *= 10.0
+        prices = found.prices + 9.0 * _unanswered(robot, found.prices, sets)
+        found = solve(robot, target, sets, prices, Terms(reward=reward * unit))
+    return found.force[:, 0]
+
+
+def _share(robot: DualRobot, found: Prices, target: Array) -> float:
+    given = robot.matrix.T @ found.force[:, 0]
+    return float(given @ target[:, 0] / (target[:, 0] @ target[:, 0]))
+
+
+def _most_share(robot: DualRobot, sets: Sets, prices: Array, target: Array) -> float:
+    """No share of a target (r, 1) larger than this one is within reach: the plane that touches the reach
+    where prices are very high."""
+    worth = float(prices[:, 0] @ target[:, 0])
+    if worth <= 0.0:
+        return np.inf
+    far = robot.answers(robot.matrix @ (prices * FAR / max(float(np.abs(prices).max()), 1e-300)), sets)
+    return float(prices[:, 0] @ (robot.matrix.T @ far.force[:, 0])) / worth
+
+
+def priority(robot: DualRobot, sets: Sets, wrench: Array, groups: list[Array], weight: Array) -> Array:
+    """Forces (k,) [N] that serve groups of axes (masks (6,)) of a scaled wrench (6,), each as far as those
+    before it allow.
+
+    A group that is missed lies on a face of the reach: the actuators that its normal drives stay at their
+    limits, and what is left of the group's axes is held.
+    """
+    held, aim = np.zeros((6, 0)), np.array(wrench)
+    for group in groups:
+        basis = np.concatenate([held, np.eye(6)[:, group]], axis=1)
+        part = robot.within(basis)
+        compliance = np.zeros(basis.shape[1])
+        compliance[held.shape[1] :] = 1.0 / weight[group] ** 2
+        found = _nearer(part, sets, (basis.T @ aim)[:, None], np.diag(compliance))
+        force = found.force[:, 0]
+        got = (robot.effectiveness.T @ force) / robot.scale
+        missed = np.linalg.norm(basis.T @ (got - aim))
+        held = basis
+        if missed > MISSED * np.linalg.norm(basis.T @ aim):
+            normal = _unanswered(part, found.prices, sets)[:, 0]
+            sets = frozen(
+                robot, sets, force, np.abs(part.matrix @ normal) > DRIVEN * np.abs(part.matrix @ normal).max()
+            )
+            held = _beside(basis, normal)
+        aim = np.where(_spanned(held), got, aim)
+    return force
+
+
+def _beside(basis: Array, normal: Array) -> Array:
+    """The part (6, q - 1) of a basis (6, q) at right angles to one of its directions (q,)."""
+    size = float(np.linalg.norm(normal))
+    if size == 0.0:
+        return basis
+    _, _, right = np.linalg.svd((normal / size)[None], full_matrices=True)
+    return basis @ right[1:].T
+
+
+def _spanned(basis: Array) -> Array:
+    """Which axes (6,) a basis (6, q) touches."""
+    touched: Array = (np.abs(basis) > 1e-12).any(axis=1)
+    return touched
+
+
+def frozen(robot: DualRobot, sets: Sets, force: Array, directions: Array) -> Sets:
+    """The sets in which the actuators of some directions (k,) keep their forces (k,)."""
+    lines, planes = robot.answers.lines, robot.answers.planes
+    x, y = force[lines : lines + planes], force[lines + planes :]
+    size = np.concatenate([force[:lines], np.hypot(x, y)])[:, None]
+    planar = directions[lines : lines + planes] | directions[lines + planes :]
+    fixed = np.concatenate([directions[:lines], planar])[:, None]
+    cost = robot.answers.cost(size)
+    return Sets(
+        np.where(fixed, size, sets.low),
+        np.where(fixed, size, sets.high),
+        np.where(fixed, cost, sets.low_cost),
+        np.where(fixed, cost, sets.high_cost),
+        np.where(planar[:, None], np.arctan2(y, x)[:, None], sets.middle),
+        np.where(planar[:, None], 0.0, sets.half),
+    )

@@ -1,0 +1,152 @@
+"""A robot as the dual sees it: scaled effectiveness in the range that its actuators span, and their sets."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from finlab.actuators.response import Line, Plane, Response
+from finlab.allocation.dual.answers import Answers, Sets
+from finlab.arrays import Array
+
+RANK = 1e-9
+"""Share of the largest singular value of the scaled effectiveness below which a direction counts as out of
+reach of all actuators."""
+
+
+@dataclass(frozen=True, eq=False)
+class DualRobot:
+    """One robot, prepared."""
+
+    order: Array
+    """Places (n,) of the actuators in the layout, lines first."""
+    answers: Answers
+    """Their answers to prices."""
+    sets: Sets
+    """What each may give."""
+    effectiveness: Array
+    """Wrench (k, 6) per newton along each direction, lines, first directions, second directions."""
+    scale: Array
+    """Size (6,) of what the robot can push along each axis [N, N m]; 1 where it cannot."""
+    basis: Array
+    """Directions (6, r) of scaled wrenches that the actuators span, orthonormal."""
+    matrix: Array
+    """Effectiveness (k, r) in that basis."""
+
+    @cached_property
+    def outer(self) -> Array:
+        """Products (r r, l + 3 p) that make the Hessian of derivatives of the answers."""
+        lines, planes = self.answers.lines, self.answers.planes
+        line, first, second = np.split(self.matrix, [lines, lines + planes])
+        mixed = _products(first, second)
+        parts = [
+            _products(line, line),
+            _products(first, first),
+            mixed + mixed.swapaxes(1, 2),
+            _products(second, second),
+        ]
+        return np.concatenate(parts).reshape(lines + 3 * planes, -1).T.copy()
+
+    @cached_property
+    def most(self) -> Array:
+        """Largest force or size (n, 1) [N] of each actuator."""
+        found: Array = np.maximum(np.abs(self.sets.low), self.sets.high)[:, :1] + 1e-12
+        return found
+
+    @cached_property
+    def gain(self) -> Array:
+        """Force over price (k, 1) [N^2/W] of each direction at its limit."""
+        each = self.most / self.answers.tops[:, None]
+        return np.concatenate([each, each[self.answers.lines :]])
+
+    @cached_property
+    def squares(self) -> Array:
+        """Products (r r, k) that make the Hessian of weights of the directions."""
+        return np.einsum("ki,kj->ijk", self.matrix, self.matrix).reshape(-1, len(self.matrix))
+
+    @cached_property
+    def first_force(self) -> Array:
+        """Forces (k, r) of a scaled wrench at least quadratic cost."""
+        hessian = (self.matrix.T * self.gain[:, 0]) @ self.matrix
+        found: Array = (self.matrix * self.gain) @ np.linalg.pinv(hessian, hermitian=True)
+        return found
+
+    @cached_property
+    def trace(self) -> Array:
+        """Row (l + 3 p,) that makes the trace of the Hessian."""
+        return self.outer.reshape(*self.shape, -1).trace()
+
+    @cached_property
+    def least_trace(self) -> float:
+        """Least trace that a ridge is a share of: that of the quadratic costs, times 1e-6."""
+        return 1e-6 * float((self.squares @ self.gain).reshape(self.shape).trace())
+
+    @cached_property
+    def unit(self) -> Array:
+        """The unit matrix (r, r)."""
+        return np.eye(self.matrix.shape[1])
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns of the Hessian."""
+        return self.matrix.shape[1], self.matrix.shape[1]
+
+    def within(self, basis: Array) -> "DualRobot":
+        """The same robot with only some directions (6, q) of the scaled wrench asked for."""
+        return replace(self, basis=basis, matrix=(self.effectiveness / self.scale) @ basis)
+
+    def target(self, wrench: Array) -> Array:
+        """Wrenches (N, 6) in the basis (r, N)."""
+        found: Array = self.basis.T @ (wrench / self.scale).T
+        return found
+
+    def wrench(self, force: Array) -> Array:
+        """Wrenches (N, 6) [N, N m] of forces (k, N)."""
+        found: Array = force.T @ self.effectiveness
+        return found
+
+
+def _products(a: Array, b: Array) -> Array:
+    """Outer products (m, r, r) of rows (m, r)."""
+    return np.asarray(a[:, :, None] * b[:, None, :])
+
+
+def dual_robot(responses: list[Response]) -> DualRobot:
+    """Prepare a robot of the responses of its actuators."""
+    line_places = [i for i, each in enumerate(responses) if isinstance(each, Line)]
+    plane_places = [i for i, each in enumerate(responses) if isinstance(each, Plane)]
+    lines = [each for each in responses if isinstance(each, Line)]
+    planes = [each for each in responses if isinstance(each, Plane)]
+    answers = Answers(lines, planes)
+    low = [max(line.low, -line.reverse.largest if line.reverse else line.forward.force[0]) for line in lines]
+    high = [min(line.high, line.forward.largest) for line in lines]
+    low += [plane.table.force[0] for plane in planes]
+    high += [plane.table.largest for plane in planes]
+    low_, high_ = np.array(low)[:, None], np.array(high)[:, None]
+    sets = Sets(
+        low_,
+        high_,
+        answers.cost(low_),
+        answers.cost(high_),
+        np.array([plane.middle for plane in planes]).reshape(-1, 1),
+        np.array([plane.half for plane in planes]).reshape(-1, 1),
+    )
+    rows = [line.effectiveness for line in lines]
+    rows += [plane.effectiveness[0] for plane in planes] + [plane.effectiveness[1] for plane in planes]
+    effectiveness = np.array(rows)
+    most = np.abs(
+        np.concatenate([np.maximum(-low_, high_)[: len(lines)], high_[len(lines) :], high_[len(lines) :]])
+    )
+    size = np.sqrt(((effectiveness * most) ** 2).sum(axis=0))
+    scale = np.where(size > RANK * max(size.max(), 1e-300), size, 1.0)
+    left, values, _ = np.linalg.svd((effectiveness * most / scale).T, full_matrices=False)
+    basis = left[:, values > RANK * max(values[0], 1e-300)]
+    return DualRobot(
+        np.array(line_places + plane_places),
+        answers,
+        sets,
+        effectiveness,
+        scale,
+        basis,
+        (effectiveness / scale) @ basis,
+    )
