@@ -17,6 +17,11 @@ from scipy.special import j1
 from finlab.arrays import Array
 
 DENSITY = 1000.0
+LIMITS = ("amplitude_rad", "frequency_hz", "zero_direction_rad")
+NOMINAL = ((0.05, 0.6), (0.1, 2.1), (-math.pi, math.pi))
+"""Limits of a fin, where a file gives none."""
+SERVO = {"amplitude_rate_rad_s": 1.0, "frequency_rate_hz_s": 3.0, "direction_rate_rad_s": 5.0}
+"""How fast a fin's command changes at most, where a file says nothing."""
 FIN_DEFAULTS: Mapping[str, Mapping[str, float]] = {
     "drag": {"drag_coefficient": 0.15, "area": 0.02, "lever": 0.1},
     "lighthill": {"length": 0.2, "width": 0.1},
@@ -207,6 +212,24 @@ class OwnActuator:
             over[2 if self.kind == "fin" else 0] = 0.0
         return float(over.max())
 
+    @property
+    def rates(self) -> Array:
+        """How fast a command (3,) changes at most [per second]."""
+        spec = self.spec
+        if self.kind == "fin":
+            return np.array([spec.get("servo", {}).get(key, value) for key, value in SERVO.items()])
+        force, turn = spec.get("rate_n_s", np.inf), math.radians(spec.get("turn_rate_deg_s", np.inf))
+        if self.kind == "rudder":
+            return np.array([math.radians(spec.get("rate_deg_s", np.inf)), np.inf, np.inf])
+        return np.array([turn, force, np.inf] if self.kind == "azimuth" else [force, np.inf, np.inf])
+
+    def rate_excess(self, previous: Array, command: Array, period_s: float) -> float:
+        """By what share of its largest step a command (3,) goes beyond what may follow a previous one."""
+        change, turn = command - previous, {"fin": 2, "azimuth": 0}.get(self.kind)
+        if turn is not None and self.turns_fully:
+            change[turn] = (change[turn] + math.pi) % (2.0 * math.pi) - math.pi
+        return float((np.abs(change) / (self.rates * period_s)).max() - 1.0)
+
     def draw(self, rng: np.random.Generator, share: float = 1.0, count: int = 1) -> Array:
         """Commands (count, 3), uniform in the limits, the size of the force up to a share of its range."""
         low, high = self.limits
@@ -220,9 +243,6 @@ class OwnActuator:
         else:
             top[0] = low[0] + share * (high - low)[0]
         return low + rng.random((count, 3)) * (top - low)
-
-
-NOMINAL = ((0.05, 0.6), (0.1, 2.1), (-math.pi, math.pi))
 
 
 class OwnPlant:
@@ -256,6 +276,11 @@ class OwnPlant:
         """By how much commands (n, 3) break a limit at most."""
         pairs = zip(self.actuators, commands, strict=True)
         return max((each.excess(row) for each, row in pairs if np.isfinite(row).all()), default=0.0)
+
+    def rate_excess(self, previous: Array, commands: Array, period_s: float) -> float:
+        """By what share of its largest step a command goes beyond what may follow a previous one, at most."""
+        rows = zip(self.actuators, previous, commands, strict=True)
+        return max(each.rate_excess(before, now, period_s) for each, before, now in rows)
 
     def draw(self, rng: np.random.Generator, share: float = 1.0) -> Array:
         """Commands (n, 3) within limits."""
