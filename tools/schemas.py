@@ -16,7 +16,7 @@ def schemas() -> dict[Path, str]:
     """Returns the text of each schema by its file."""
     kinds = {
         "layout/layout.schema.json": ("finlab-layout-2", ANY_LAYOUT),
-        "deploy/graph.schema.json": ("finlab-graph-2", Graph),
+        "deploy/graph.schema.json": ("finlab-graph-3", Graph),
     }
     texts = {}
     for name, (title, kind) in kinds.items():

@@ -1,4 +1,4 @@
-"""Layout graph files (`*.graph.json`, version 2): written once at the desk, read on a robot. numpy only.
+"""Layout graph files (`*.graph.json`, version 3): written once at the desk, read on a robot. numpy only.
 
 The file is one JSON object; `graph.schema.json` beside this module describes it, and its part `graph` is what
 `networkx.node_link_graph` reads. A SHA-256 over all the rest tells an edited or damaged file from a good one.
@@ -17,7 +17,7 @@ from finlab.deploy.graph import SELF_TEST_TOLERANCE, LayoutGraph
 from finlab.errors import LayoutError
 from finlab.layout import layout_to_dict
 from finlab.layout.file import FRAME, under
-from finlab.layout.graph_form import Units
+from finlab.layout.graph_form import Units, node_to_dict
 from finlab.layout.load import (
     GRAPH_FORMAT,
     GRAPH_VERSION,
@@ -71,19 +71,7 @@ def _document_of(graph: LayoutGraph) -> dict[str, Any]:
     """Everything but the checksum, which comes third once it is known."""
     graph.layout.only_fins("a graph file", horizontal=True)
     layout = layout_to_dict(graph.layout)
-    nodes = []
-    for fin, entry in zip(graph.layout.fins, layout["fins"], strict=True):
-        node = {
-            "id": entry["name"],
-            "position_m": entry["position_m"],
-            "mounting_angle_rad": fin.shaft_azimuth,
-            "limits": entry["limits"],
-            "model": entry["model"],
-            "healthy": fin.name not in graph.failed,
-        }
-        if "servo" in entry:
-            node["servo"] = entry["servo"]
-        nodes.append(node)
+    nodes = [node_to_dict(part, part.name not in graph.failed) for part in graph.layout.actuators]
     return {
         "format": GRAPH_FORMAT,
         "version": GRAPH_VERSION,
@@ -115,8 +103,8 @@ def _graph(document: GraphDocument) -> LayoutGraph:
     data, layout = document.values, document.layout
     cases = data.self_test.cases
     for i, case in enumerate(cases):
-        if len(case.command) != layout.n_fins:
-            problem = f"expected a list of {layout.n_fins} rows, one for each fin, got {len(case.command)}"
+        if len(case.command) != layout.n:
+            problem = f"expected a list of {layout.n} rows, one for each actuator, got {len(case.command)}"
             raise LayoutError(problem, f"self_test.cases[{i}].command")
     graph = LayoutGraph(
         layout=layout,
@@ -128,5 +116,5 @@ def _graph(document: GraphDocument) -> LayoutGraph:
         self_test=tuple(cases),
     )
     if [(edge.source, edge.target) for edge in data.graph.edges] != list(graph.edges):
-        raise LayoutError("expected every pair of healthy fins, and each with itself", "graph.edges")
+        raise LayoutError("expected every pair of healthy actuators, and each with itself", "graph.edges")
     return graph

@@ -35,35 +35,40 @@ class TableForm(Struct, tag="table", tag_field="type", forbid_unknown_fields=Tru
 THRUST_MODEL: Any = form(PowerLaw) | TableForm
 
 
-def _form_of(cls: Any) -> Any:
-    """The form of a type of actuator."""
-    degrees = getattr(cls, "DEGREES", {})
-    kinds = {name: kind for name, (_, kind) in degrees.items()}
+def form_of(cls: Any, radians: bool = False, **others: Any) -> Any:
+    """Returns the form of a type of actuator, in degrees or in radians, with other parts beside its own."""
+    kinds: dict[str, Any] = {}
+    if not radians:
+        kinds = {name: kind for name, (_, kind) in getattr(cls, "DEGREES", {}).items()}
     if cls is not Rudder:
         kinds["model"] = THRUST_MODEL
-    return form(cls, _keys(cls), **kinds)
+    return form(cls, _keys(cls, radians), **kinds, **others)
 
 
-def _keys(cls: Any) -> dict[str, str]:
+def _keys(cls: Any, radians: bool) -> dict[str, str]:
     """Fields -> their keys in a file, where the two differ."""
-    return {**cls.KEYS, **{name: key for name, (key, _) in getattr(cls, "DEGREES", {}).items()}}
+    angles = {name: key for name, (key, _) in getattr(cls, "DEGREES", {}).items()}
+    if radians:
+        angles = {name: key.replace("_deg", "_rad") for name, key in angles.items()}
+    return {**cls.KEYS, **angles}
 
 
-FORMS: dict[str, Any] = {cls.type: _form_of(cls) for cls in OTHERS}
-"""Type of actuator -> the part of a file that describes one."""
+FORMS: dict[str, Any] = {cls.type: form_of(cls) for cls in OTHERS}
+"""Type of actuator -> the part of a layout file that describes one."""
 
 
-def actuator_of(part: Any, folder: Path | None = None) -> Thruster | Azimuth | Rudder:
-    """Returns the actuator in a part of a file, an instance of one of `FORMS`; relative paths start at a
-    folder, the working directory when None.
+def actuator_of(part: Any, folder: Path | None = None, radians: bool = False) -> Thruster | Azimuth | Rudder:
+    """Returns the actuator in a part of a file, an instance of what `form_of` makes; relative paths start at
+    a folder, the working directory when None.
 
     Raises:
         LayoutError: something does not fit; the message names the key.
     """
-    cls: Any = next(cls for cls in OTHERS if type(part) is FORMS[cls.type])
-    told = given(part)
+    cls: Any = next(cls for cls in OTHERS if cls.type == type(part).__struct_config__.tag)
+    own = {field.name for field in fields(cls)}
+    told = {name: value for name, value in given(part).items() if name in own}
     for name in getattr(cls, "DEGREES", {}):
-        if name in told:
+        if name in told and not radians:
             value = told[name]
             told[name] = math.radians(value) if isinstance(value, float) else tuple(map(math.radians, value))
     if "model" in told:
@@ -85,9 +90,10 @@ def _model_of(part: Any, folder: Path | None) -> ThrustModel:
     return PowerTable(tuple(part.rows or ()), part.unit or "")
 
 
-def actuator_to_dict(actuator: Thruster | Azimuth | Rudder) -> dict[str, Any]:
+def actuator_to_dict(actuator: Thruster | Azimuth | Rudder, radians: bool = False) -> dict[str, Any]:
     """Returns the plain values of an actuator in a file; `actuator_of` gives the same one back."""
-    degrees, keys = getattr(actuator, "DEGREES", {}), _keys(type(actuator))
+    degrees = {} if radians else getattr(actuator, "DEGREES", {})
+    keys = _keys(type(actuator), radians)
     data: dict[str, Any] = {"name": actuator.name, "type": actuator.type}
     for field in fields(actuator):
         value = getattr(actuator, field.name)

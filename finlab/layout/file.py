@@ -198,7 +198,7 @@ def layout_to_dict(layout: Layout) -> dict[str, Any]:
         data["description"] = layout.description
     data["frame"] = dict(FRAME)
     if horizontal:
-        data["fins"] = [_fin_to_dict(fin) for fin in layout.fins]
+        data["fins"] = [fin_to_dict(fin) for fin in layout.fins]
     else:
         data["actuators"] = [_actuator_to_dict(part) for part in layout.actuators]
     if layout.body is not None:
@@ -226,11 +226,12 @@ def _absolute(path: str, folder: Path | None) -> str:
 def _actuator_to_dict(part: Actuator) -> dict[str, Any]:
     if not isinstance(part, Fin):
         return other_actuator_to_dict(part)
-    data = _fin_to_dict(part)
+    data = fin_to_dict(part)
     return {"name": data.pop("name"), "type": part.type, **data}
 
 
-def _fin_to_dict(fin: Fin) -> dict[str, Any]:
+def fin_to_dict(fin: Fin) -> dict[str, Any]:
+    """Returns the plain values of a fin in a file, without its type."""
     # Degrees from radians carry a rounding error of 1e-14; twelve digits give back what people wrote.
     if fin.mounting_angle is not None:
         direction: dict[str, Any] = {"mounting_angle_deg": round(math.degrees(fin.mounting_angle), 12)}

@@ -1,12 +1,15 @@
-"""The parts of a layout graph file, version 2, as types, of which `graph.schema.json` is made."""
+"""The parts of a layout graph file, version 3, as types, of which `graph.schema.json` is made."""
 
-from typing import Annotated, Any, Literal
+from pathlib import Path
+from typing import Annotated, Any, Literal, Union
 
-from msgspec import Meta, Struct, defstruct
+from msgspec import Meta, Struct
 
-from finlab.layout.checked import Name
-from finlab.layout.file import BODY, INTERACTION, LIMITS, SERVO, Frame
-from finlab.layout.fin import Coordinate, Model, MountingAngle
+from finlab.layout.actuator import Actuator
+from finlab.layout.actuator_form import OTHERS, actuator_of, actuator_to_dict, form_of
+from finlab.layout.checked import Name, form
+from finlab.layout.file import BODY, INTERACTION, LIMITS, SERVO, Frame, fin_of, fin_to_dict
+from finlab.layout.fin import Fin, Model
 from finlab.layout.layout import MAX_ACTUATORS, MAX_DESCRIPTION_LENGTH
 
 Wrench = tuple[float, float, float, float, float, float]
@@ -24,25 +27,39 @@ class Units(Struct, forbid_unknown_fields=True):
     torque: Literal["N m"] = "N m"
 
 
-NODE: Any = defstruct(
-    "Node",
-    [
-        ("name", Name),
-        ("position", tuple[Coordinate, Coordinate, Coordinate]),
-        ("mounting_angle", MountingAngle),
-        ("limits", LIMITS),
-        ("model", Model),
-        ("healthy", bool),
-        ("servo", SERVO | None, None),
-    ],
-    rename={"name": "id", "position": "position_m", "mounting_angle": "mounting_angle_rad"},
-    forbid_unknown_fields=True,
-    namespace={"__doc__": "A fin: a node of the graph."},
+FIN = form(
+    Fin,
+    {"name": "id", "position": "position_m", "mounting_angle": "mounting_angle_rad"},
+    called="FinNode",
+    limits=LIMITS,
+    model=Model,
+    servo=SERVO,
+    healthy=bool,
 )
+NODE: Any = Union[FIN, *(form_of(kind, True, healthy=bool) for kind in OTHERS)]  # noqa: UP007
+"""An actuator, a node of the graph: what a layout file says of it, in radians, and whether it works."""
+
+
+def actuator_of_node(node: Any, folder: Path | None) -> Actuator:
+    """Returns the actuator in a node; relative paths start at a folder."""
+    if isinstance(node, FIN):
+        return fin_of(node, node.mounting_angle, folder)
+    return actuator_of(node, folder, radians=True)
+
+
+def node_to_dict(actuator: Actuator, healthy: bool) -> dict[str, Any]:
+    """Returns the plain values of a node; `actuator_of_node` gives the same actuator back."""
+    if isinstance(actuator, Fin):
+        told = fin_to_dict(actuator)
+        if told.pop("mounting_angle_deg", None) is not None:
+            told["mounting_angle_rad"] = actuator.mounting_angle
+    else:
+        told = actuator_to_dict(actuator, radians=True)
+    return {"id": told.pop("name"), "type": actuator.type, **told, "healthy": healthy}
 
 
 class Edge(Struct, forbid_unknown_fields=True):
-    """A pair of fins that work, or one such fin twice."""
+    """A pair of actuators that work, or one such actuator twice."""
 
     source: Name
     target: Name
@@ -51,7 +68,7 @@ class Edge(Struct, forbid_unknown_fields=True):
 class NodeLink(Struct, forbid_unknown_fields=True):
     """Node-link form; `networkx.node_link_graph` reads it.
 
-    Edges are all pairs of healthy fins, and each with itself.
+    Edges are all pairs of healthy actuators, and each with itself.
     """
 
     directed: bool
@@ -80,7 +97,7 @@ class Checkpoint(Struct, forbid_unknown_fields=True):
 
 
 class Case(Struct, forbid_unknown_fields=True):
-    """A target [N, N m], a command per fin [rad, Hz, rad] (null for a failed one), and its wrench."""
+    """A target [N, N m], a command per actuator in SI and radians (null for a failed one), and its wrench."""
 
     wrench: Wrench
     command: tuple[tuple[float, float, float] | None, ...]
@@ -105,13 +122,13 @@ class About(Struct, forbid_unknown_fields=True):
 
 
 class Graph(Struct, forbid_unknown_fields=True):
-    """A robot's fins, which pairs of them work together, and what is needed to check an answer. SI, radians.
+    """A robot's actuators, which pairs of them work together, and what is needed to check an answer.
 
     `checksum` is the SHA-256 of all else, as JSON with sorted keys, without white space, in UTF-8.
     """
 
     format: Literal["finlab-graph"]
-    version: Literal[2]
+    version: Literal[3]
     checksum: str
     frame: Frame
     units: Units

@@ -13,14 +13,15 @@ from finlab.errors import LayoutError
 from finlab.files.guarded import decoded, read_text
 from finlab.files.plain_values import parse_json, parse_yaml
 from finlab.files.schema import checked
-from finlab.layout.file import check_version, fin_of, layout_of, parse_layout, under
-from finlab.layout.graph_form import Graph
+from finlab.layout.file import check_version, layout_of, parse_layout, under
+from finlab.layout.fin import Fin
+from finlab.layout.graph_form import Graph, actuator_of_node
 from finlab.layout.layout import Layout
 
 SUFFIX = ".graph.json"
 """How the name of a graph file ends."""
 GRAPH_FORMAT = "finlab-graph"
-GRAPH_VERSION = 2
+GRAPH_VERSION = 3
 MAX_BYTES = 1_000_000
 """Largest layout file that is read [bytes]; a real one has a few thousand."""
 A_LAYOUT = "a layout file (.yaml or .json)"
@@ -47,7 +48,7 @@ class GraphDocument(NamedTuple):
     layout: Layout
     """The layout, failed fins included, the shafts' angles exactly as they were."""
     failed: tuple[str, ...]
-    """Names of the fins that do not work."""
+    """Names of the actuators that do not work."""
 
 
 def load_layout(layout: str | os.PathLike[str]) -> Layout:
@@ -133,15 +134,16 @@ def parse_graph_document(found: GraphText) -> GraphDocument:
         document = checked(data, Graph)
         if document.checksum != checksum_of(data):
             raise LayoutError("does not fit the contents; the file was changed, export it again", "checksum")
-        fins, nodes = [], document.graph.nodes
+        parts, nodes = [], document.graph.nodes
         for i, node in enumerate(nodes):
             with under(f"graph.nodes[{i}]"):
-                fins.append(fin_of(node, node.mounting_angle, found.folder))
-                path = fins[i].model.values().get("path")
+                part = actuator_of_node(node, found.folder)
+                parts.append(part)
+                path = part.model.values().get("path") if isinstance(part, Fin) else None
                 if found.tables is not None and path is not None and path not in found.tables:
                     problem = "names a force table that is not in the bundle; export it again"
                     raise LayoutError(problem, "model.path")
-        layout = layout_of(document.layout, fins, found.folder)
+        layout = layout_of(document.layout, parts, found.folder)
     return GraphDocument(document, layout, tuple(node.name for node in nodes if not node.healthy))
 
 

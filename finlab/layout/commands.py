@@ -1,0 +1,118 @@
+"""Commands of actuators as users see them: one small value per type; inside, a command is a row of three."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from finlab.arrays import Array
+from finlab.layout.azimuth import Azimuth
+from finlab.layout.fin import Fin
+from finlab.layout.rudder import Rudder
+from finlab.layout.thrust_model import PowerTable, ThrustModel
+from finlab.layout.thruster import Thruster
+
+AnyActuator = Fin | Thruster | Azimuth | Rudder
+
+
+@dataclass(frozen=True)
+class FinCommand:
+    """What a fin is told."""
+
+    KEYS: ClassVar[Mapping[str, str]] = {
+        "amplitude": "amplitude_rad",
+        "frequency": "frequency_hz",
+        "zero_direction": "zero_direction_rad",
+    }
+    amplitude: float
+    """Half amplitude [rad]."""
+    frequency: float
+    """[Hz]."""
+    zero_direction: float
+    """Direction about which it beats [rad]."""
+
+
+@dataclass(frozen=True)
+class ThrusterCommand:
+    """What a thruster with a fixed axis is told."""
+
+    KEYS: ClassVar[Mapping[str, str]] = {"force": "force_n", "input": "input"}
+    force: float
+    """Force along its axis [N], signed."""
+    input: float | None = None
+    """What its table says to send for it, in the table's unit; None for a power law."""
+
+
+@dataclass(frozen=True)
+class AzimuthCommand:
+    """What a thruster that turns is told."""
+
+    KEYS: ClassVar[Mapping[str, str]] = {"angle": "angle_rad", "force": "force_n", "input": "input"}
+    angle: float
+    """Angle of its force from `zero` towards turn_axis x zero [rad]."""
+    force: float
+    """[N]."""
+    input: float | None = None
+    """As for a `ThrusterCommand`."""
+
+
+@dataclass(frozen=True)
+class RudderCommand:
+    """What a rudder is told."""
+
+    KEYS: ClassVar[Mapping[str, str]] = {"deflection": "deflection_rad"}
+    deflection: float
+    """Angle of its chord from `zero` towards shaft x zero [rad]."""
+
+
+Command = FinCommand | ThrusterCommand | AzimuthCommand | RudderCommand
+
+
+def command_of(actuator: AnyActuator, row: Array) -> Command | None:
+    """Returns a row (3,) of a command as the actuator's own type; None for a failed one, whose row is NaN."""
+    first, second, third = row.tolist()
+    if np.isnan(first):
+        return None
+    if isinstance(actuator, Fin):
+        return FinCommand(first, second, third)
+    if isinstance(actuator, Thruster):
+        return ThrusterCommand(first, input_of(actuator.model, first))
+    if isinstance(actuator, Azimuth):
+        return AzimuthCommand(first, second, input_of(actuator.model, second))
+    return RudderCommand(first)
+
+
+def command_values(command: Command) -> dict[str, float]:
+    """Returns a command as the mapping in a JSON file; its keys carry the units."""
+    told = ((key, getattr(command, name)) for name, key in command.KEYS.items())
+    return {key: value for key, value in told if value is not None}
+
+
+def input_of(model: ThrustModel, force: float) -> float | None:
+    """Returns what a table says to send for a force [N], in the table's unit; None for a power law.
+
+    Where several inputs give no force, the middle of them stops the propeller.
+    """
+    if not isinstance(model, PowerTable):
+        return None
+    inputs, forces, _ = model.columns
+    first, last = np.searchsorted(forces, 0.0, "left"), np.searchsorted(forces, 0.0, "right")
+    if force == 0.0 and first < last:
+        return float(0.5 * (inputs[first] + inputs[last - 1]))
+    side = slice(max(last - 1, 0), None) if force > 0.0 else slice(0, first + 1)
+    return float(np.interp(force, forces[side], inputs[side]))
+
+
+def neutral_row(actuator: AnyActuator, now: Array | None = None) -> Array:
+    """Returns the command (3,) that pushes least: a fin's least amplitude and frequency about the zero
+    direction nearest to 0, no force of a thruster or the least that it can give, a rudder amidships.
+
+    Args:
+        actuator: whose.
+        now: its present command (3,); an azimuth keeps its angle.
+    """
+    row = np.clip(0.0, np.array(actuator.lower), np.array(actuator.upper))
+    if isinstance(actuator, Azimuth) and now is not None and np.isfinite(now[0]):
+        row[0] = now[0]
+    return row
