@@ -36,7 +36,8 @@ THRUST_MODEL: Any = form(PowerLaw) | TableForm
 
 
 def form_of(cls: Any, radians: bool = False, **others: Any) -> Any:
-    """Returns the form of a type of actuator, in degrees or in radians, with other parts beside its own."""
+    """Returns the form of a type of actuator, with other parts beside its own: in degrees as in a layout
+    file, or in radians as in a graph file, which calls the name `id`."""
     kinds: dict[str, Any] = {}
     if not radians:
         kinds = {name: kind for name, (_, kind) in getattr(cls, "DEGREES", {}).items()}
@@ -49,7 +50,7 @@ def _keys(cls: Any, radians: bool) -> dict[str, str]:
     """Fields -> their keys in a file, where the two differ."""
     angles = {name: key for name, (key, _) in getattr(cls, "DEGREES", {}).items()}
     if radians:
-        angles = {name: key.replace("_deg", "_rad") for name, key in angles.items()}
+        angles = {name: key.replace("_deg", "_rad") for name, key in angles.items()} | {"name": "id"}
     return {**cls.KEYS, **angles}
 
 
@@ -94,10 +95,10 @@ def actuator_to_dict(actuator: Thruster | Azimuth | Rudder, radians: bool = Fals
     """Returns the plain values of an actuator in a file; `actuator_of` gives the same one back."""
     degrees = {} if radians else getattr(actuator, "DEGREES", {})
     keys = _keys(type(actuator), radians)
-    data: dict[str, Any] = {"name": actuator.name, "type": actuator.type}
+    data: dict[str, Any] = {keys.get("name", "name"): actuator.name, "type": actuator.type}
     for field in fields(actuator):
         value = getattr(actuator, field.name)
-        if field.name in data or (field.default is not MISSING and value == field.default):
+        if field.name == "name" or (field.default is not MISSING and value == field.default):
             continue
         if field.name in degrees:
             value = _rounded(value)

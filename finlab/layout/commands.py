@@ -7,13 +7,11 @@ from typing import ClassVar
 import numpy as np
 
 from finlab.arrays import Array
+from finlab.layout.actuator import Actuator
 from finlab.layout.azimuth import Azimuth
 from finlab.layout.fin import Fin
-from finlab.layout.rudder import Rudder
 from finlab.layout.thrust_model import PowerTable, ThrustModel
 from finlab.layout.thruster import Thruster
-
-AnyActuator = Fin | Thruster | Azimuth | Rudder
 
 
 @dataclass(frozen=True)
@@ -69,7 +67,7 @@ class RudderCommand:
 Command = FinCommand | ThrusterCommand | AzimuthCommand | RudderCommand
 
 
-def command_of(actuator: AnyActuator, row: Array) -> Command | None:
+def command_of(actuator: Actuator, row: Array) -> Command | None:
     """Returns a row (3,) of a command as the actuator's own type; None for a failed one, whose row is NaN."""
     first, second, third = row.tolist()
     if np.isnan(first):
@@ -104,7 +102,7 @@ def input_of(model: ThrustModel, force: float) -> float | None:
     return float(np.interp(force, forces[side], inputs[side]))
 
 
-def neutral_row(actuator: AnyActuator, now: Array | None = None) -> Array:
+def neutral_row(actuator: Actuator, now: Array | None = None) -> Array:
     """Returns the command (3,) that pushes least: a fin's least amplitude and frequency about the zero
     direction nearest to 0, no force of a thruster or the least that it can give, a rudder amidships.
 
@@ -112,7 +110,7 @@ def neutral_row(actuator: AnyActuator, now: Array | None = None) -> Array:
         actuator: whose.
         now: its present command (3,); an azimuth keeps its angle.
     """
-    row = np.clip(0.0, np.array(actuator.lower), np.array(actuator.upper))
+    row: Array = np.clip(0.0, np.array(actuator.lower), np.array(actuator.upper))
     if isinstance(actuator, Azimuth) and now is not None and np.isfinite(now[0]):
         row[0] = now[0]
     return row

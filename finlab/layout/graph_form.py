@@ -31,6 +31,7 @@ FIN = form(
     Fin,
     {"name": "id", "position": "position_m", "mounting_angle": "mounting_angle_rad"},
     called="FinNode",
+    required=["limits", "model"],
     limits=LIMITS,
     model=Model,
     servo=SERVO,
@@ -49,12 +50,11 @@ def actuator_of_node(node: Any, folder: Path | None) -> Actuator:
 
 def node_to_dict(actuator: Actuator, healthy: bool) -> dict[str, Any]:
     """Returns the plain values of a node; `actuator_of_node` gives the same actuator back."""
-    if isinstance(actuator, Fin):
-        told = fin_to_dict(actuator)
-        if told.pop("mounting_angle_deg", None) is not None:
-            told["mounting_angle_rad"] = actuator.mounting_angle
-    else:
-        told = actuator_to_dict(actuator, radians=True)
+    if not isinstance(actuator, Fin):
+        return {**actuator_to_dict(actuator, radians=True), "healthy": healthy}
+    told = fin_to_dict(actuator)
+    if told.pop("mounting_angle_deg", None) is not None:
+        told["mounting_angle_rad"] = actuator.mounting_angle
     return {"id": told.pop("name"), "type": actuator.type, **told, "healthy": healthy}
 
 

@@ -22,12 +22,15 @@ from finlab.deploy.graph import N_SELF_TEST, LayoutGraph, build_graph
 from finlab.deploy.graph_file import graph_bytes, parse_graph, read_graph, write_graph
 from finlab.errors import FinlabError, LayoutError
 from finlab.layout import Fin, Layout, load_layout, save_layout
+from finlab.layout.azimuth import Azimuth, Tilt
 from finlab.layout.graph_form import Case
 from finlab.layout.load import GraphText, checksum_of
+from finlab.layout.rudder import Rudder
+from finlab.layout.thrust_model import PowerLaw, PowerTable
+from finlab.layout.thruster import Thruster
 from finlab.networks.checkpoint import read_checkpoint
 from finlab.networks.normalization import Normalization
 from tests.exhaustive import sampled
-from tests.fin_robots import FIN_ROBOTS
 
 SCHEMA = json.loads((Path(__file__).parents[2] / "finlab/deploy/graph.schema.json").read_text())
 
@@ -62,7 +65,7 @@ def edited(change: Callable[[dict[str, Any]], None], fix_checksum: bool = True) 
     return json.dumps(document)
 
 
-@pytest.mark.parametrize("name", sampled(sorted(FIN_ROBOTS), every=5))
+@pytest.mark.parametrize("name", sampled(sorted(shipped_layouts()), every=5))
 def test_shipped_layouts_come_back_as_they_were(name: str, tmp_path: Path) -> None:
     layout = load_layout(shipped_layouts()[name])
     graph = make_graph(layout, failed=layout.names[:1])
@@ -82,6 +85,22 @@ def test_any_fin_comes_back_or_is_refused(angle: float, x: float, name: str) -> 
     except FinlabError:
         return
     assert parse_graph(GraphText(graph_bytes(make_graph(layout)).decode())).layout == layout
+
+
+def test_every_type_of_actuator_comes_back() -> None:
+    ahead, up, law = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0), PowerLaw(2.0, 3.0)
+    table = PowerTable(((-1.0, -9.0, 4.0), (0.0, 0.0, 0.0), (1.0, 10.0, 5.0)), "us")
+    parts = (
+        Fin("any shaft", (0.1, 0.2, 0.3), shaft=up, zero=ahead),
+        Thruster("thruster", (0.0, 0.1, 0.0), (0.6, 0.8, 0.0), (-9.0, 10.0), table, 0.3, 0.01, rate=50.0),
+        Azimuth("azimuth", (0.0, 0.0, 0.2), up, ahead, (0.0, 20.0), law, turn_rate=1.0 / 3.0),
+        Tilt("tilt", (0.0, 0.0, 0.2), up, ahead, (0.0, 20.0), law, arc=(-math.pi / 7.0, 0.1)),
+        Rudder("rudder", (-1.0, 0.0, 0.0), up, ahead, 0.03, (-0.7, 0.7), 3.0, stall=1.0 / 3.0),
+    )
+    graph = make_graph(Layout("all", parts), failed=("tilt",))
+    jsonschema.validate(json.loads(graph_bytes(graph)), SCHEMA)
+    back = parse_graph(GraphText(graph_bytes(graph).decode()))
+    assert same(back, graph) and back.layout == graph.layout
 
 
 def test_networkx_reads_nodes_and_edges() -> None:
@@ -106,15 +125,15 @@ def test_white_space_and_order_of_keys_do_not_matter() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda d: d.update(version=1), "version: this finlab reads version 2, got 1"),
-        (lambda d: d.update(version=2.0), "version: this finlab reads version 2, got 2.0"),
+        (lambda d: d.update(version=1), "version: this finlab reads version 3, got 1"),
+        (lambda d: d.update(version=2.0), "version: this finlab reads version 3, got 2.0"),
         (lambda d: d.update(format="finlab-layout"), "format: expected finlab-graph, got 'finlab-layout'"),
         (lambda d: d.update(surprise=1), "surprise: unknown key"),
         (lambda d: d.pop("normalization"), "normalization: required key is missing"),
         (lambda d: d["graph"].update(nodes=[]), "expected a list of 1 to 64 values, got 0"),
         (lambda d: d["graph"]["nodes"][1].pop("limits"), r"graph.nodes\[1\].limits: required key is missing"),
         (lambda d: d["graph"]["nodes"][1].update(healthy=1), r"nodes\[1\].healthy: expected true or false"),
-        (lambda d: d["graph"]["edges"].pop(), "graph.edges: expected every pair of healthy fins"),
+        (lambda d: d["graph"]["edges"].pop(), "graph.edges: expected every pair of healthy actuators"),
         (lambda d: d["self_test"]["cases"][0]["command"].pop(), r"\[0\].command: expected a list of 4 rows"),
         (lambda d: d["frame"].update(convention="NED"), "frame.convention: expected FLU"),
     ],
