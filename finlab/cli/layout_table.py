@@ -10,6 +10,19 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from finlab.layout import Actuator, Fin, Layout
 
+PLACE = ("x [m]", "y [m]", "z [m]")
+COLUMNS = ("actuator", "type", *PLACE, "direction", "limits")
+FIN_COLUMNS = (
+    "fin",
+    *PLACE,
+    "angle [deg]",
+    "A max [rad]",
+    "f max [Hz]",
+    "directions [deg]",
+    "model",
+)
+"""Columns for fins with horizontal shafts."""
+
 
 def counted(layout: Layout) -> str:
     """How many actuators there are of each type, such as `4 fins and 2 thrusters`."""
@@ -23,11 +36,9 @@ def layout_text(layout: Layout) -> str:
 
     horizontal = layout.is_of_fins and all(fin.mounting_angle is not None for fin in layout.fins)
     if horizontal:
-        head = ("fin", "x [m]", "y [m]", "z [m]", "angle [deg]", "A max [rad]", "f max [Hz]")
-        lines = table((*head, "directions [deg]", "model"), [_fin_row(fin) for fin in layout.fins])
+        lines = table(FIN_COLUMNS, [_fin_row(fin) for fin in layout.fins])
     else:
-        head = ("actuator", "type", "x [m]", "y [m]", "z [m]")
-        lines = table((*head, "direction", "limits"), [_row(part) for part in layout.actuators])
+        lines = table(COLUMNS, [_row(part) for part in layout.actuators])
     title = f"{layout.name}: {layout.description}" if layout.description else layout.name
     return "\n".join([title, "", *lines])
 

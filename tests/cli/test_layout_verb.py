@@ -1,5 +1,6 @@
 """`finlab layout check|show`, through `main` in this process."""
 
+import json
 from pathlib import Path
 
 import pytest
@@ -50,3 +51,40 @@ def test_show_works_from_any_folder(
     monkeypatch.chdir(tmp_path)
     assert main(["layout", "show", "ucat"]) == 0
     assert capsys.readouterr().out.startswith("ucat: ")
+
+
+def test_check_and_show_take_any_actuator(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["layout", "check", "turtle_hybrid"]) == 0
+    assert capsys.readouterr().out == "turtle_hybrid: ok, layout turtle_hybrid with 4 fins and 2 thrusters\n"
+    assert main(["layout", "show", "turtle_hybrid"]) == 0
+    out = capsys.readouterr().out
+    assert "front_right       fin   0.258  -0.150   0.000   shaft at -60.0 deg  A 0.05..0.6 rad" in out
+    assert "axis (0, 0, 1)                           -39.91..51.44 N, power_law" in out
+    assert main(["layout", "show", "turtle_hybrid", "--failed", "lift_left", "--json"]) == 0
+    values = json.loads(capsys.readouterr().out)
+    assert (values["version"], values["failed"]) == (2, ["lift_left"])
+    assert main(["layout", "show", "turtle_hybrid", "--failed", "bow"]) == 2
+
+
+@pytest.mark.parametrize(
+    ("verb", "argv"),
+    [
+        ("simulate", ["simulate", "turtle_hybrid"]),
+        ("layout optimize", ["layout", "optimize", "turtle_hybrid", "--fins", "front_left", "-o", "x.yaml"]),
+        ("layout export", ["layout", "export", "turtle_hybrid", "-o", "x.urdf"]),
+        ("fit robot", ["fit", "robot", "turtle_hybrid", "swim.csv", "-o", "x.yaml"]),
+        ("the app", ["app", "--layout", "turtle_hybrid"]),
+    ],
+)
+def test_verbs_for_fins_only_name_the_actuator(
+    verb: str,
+    argv: list[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(argv) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"finlab: error: {verb} works for robots of fins only, and 'lift_left' of layout")
+    assert "is of type thruster" in line
