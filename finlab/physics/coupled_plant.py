@@ -24,30 +24,30 @@ class CoupledPlant(Plant):
         return alone * self.coupling.kept(alone, command, inflow)[..., None]
 
     def force_and_jacobian(self, command: Array, *, flow: Array | None = None) -> tuple[Array, Array]:
-        """See `Plant`; the derivatives of each fin's force by its own command, the other fins unchanged."""
+        """See `Plant`; the derivatives of each force by its own command, the others unchanged."""
         inflow = self.inflow(flow)
         alone, jacobian = self._force_and_jacobian(command, inflow)
         kept, by_command = self.coupling.kept_and_jacobian(alone, jacobian, command, inflow)
-        n = np.arange(self.n_fins)
+        n = np.arange(self.n)
         own = np.moveaxis(by_command[..., n, :, n], 0, -2)
         jacobian = jacobian * kept[..., None, None] + own[..., None] * alone[..., None, :]
         return alone * kept[..., None], jacobian
 
     @property
     def parts(self) -> tuple["WrenchParts", Array]:
-        """See `Plant`; each fin's part in all six axes of the wrench, since its command changes the parts of
-        the others, too."""
-        return WrenchParts(self), np.broadcast_to(np.eye(6), (self.n_fins, 6, 6))
+        """See `Plant`; each actuator's part in all six axes of the wrench, since its command changes the
+        parts of the others, too."""
+        return WrenchParts(self), np.broadcast_to(np.eye(6), (self.n, 6, 6))
 
     def linearize(self, command: Array, *, flow: Array | None = None) -> tuple[Array, Array]:
         """See `Plant`."""
         shares, jacobian = self.shares_and_jacobian(command, flow=flow)
-        jacobian = jacobian.reshape(*shares.shape[:-2], 3 * self.n_fins, 6)
+        jacobian = jacobian.reshape(*shares.shape[:-2], 3 * self.n, 6)
         return shares.sum(axis=-2), jacobian.swapaxes(-1, -2)
 
     def shares_and_jacobian(self, command: Array, *, flow: Array | None = None) -> tuple[Array, Array]:
-        """Each fin's part of the wrench (..., n, 6), and the derivatives of the whole wrench by each command
-        of each fin (..., n, 3, 6)."""
+        """Each actuator's part of the wrench (..., n, 6), and the derivatives of the whole wrench by each
+        command of each actuator (..., n, 3, 6)."""
         inflow = self.inflow(flow)
         alone, own = self._force_and_jacobian(command, inflow)
         kept, by_command = self.coupling.kept_and_jacobian(alone, own, command, inflow)
@@ -64,7 +64,7 @@ class WrenchParts:
         self._plant = plant
 
     def force(self, command: Array) -> Array:
-        """Each fin's part of the wrench (..., n, 6) of commands (..., n, 3)."""
+        """Each actuator's part of the wrench (..., n, 6) of commands (..., n, 3)."""
         parts: Array = np.einsum("...na,nab->...nb", self._plant.force(command), self._plant.effectiveness)
         return parts
 

@@ -9,6 +9,7 @@ import math
 import numpy as np
 
 from finlab.arrays import Array
+from finlab.layout.fin import Fin
 from finlab.layout.interaction import Interaction
 from finlab.layout.layout import Layout
 
@@ -21,21 +22,23 @@ LEAST = 1e-9
 
 
 class Coupling:
-    """The interaction of one robot's n fins."""
+    """The interaction of one robot's fins, among n actuators; the others keep their forces."""
 
     def __init__(self, layout: Layout, interaction: Interaction, effectiveness: Array, length: Array) -> None:
-        """Takes the columns (n, 3, 6) of the plant and the fins' lengths (n,) [m]."""
+        """Takes the columns (n, 3, 6) of the plant and the lengths [m] of the fins alone."""
         self.half_thrust = interaction.half_thrust_n
         self.kappa = interaction.narrowness * WIDE_AND_NARROW
         self.taken = np.array(interaction.inflow)
         """Coefficients p and q of what speed takes."""
         place = {name: i for i, name in enumerate(layout.names)}
-        self.share = np.zeros((layout.n_fins, layout.n_fins, 2))
+        self.share = np.zeros((layout.n, layout.n, 2))
         """What the jet of fin j (first) takes from fin i (second)."""
         for jet in interaction.jets:
             self.share[place[jet.source], place[jet.target]] = jet.share
         self.way = jet_ways(layout.position, effectiveness)
-        self.length = length
+        self.is_fin = np.array([isinstance(actuator, Fin) for actuator in layout.actuators])
+        self.length = np.ones(layout.n)
+        self.length[self.is_fin] = length
 
     def kept(self, force: Array, command: Array, inflow: Array | None = None) -> Array:
         """Share (..., n) that fins keep of the forces (..., n, 3) that each gives by itself, in its frame,
@@ -43,7 +46,7 @@ class Coupling:
         met = jet_terms(force, self.way, self.half_thrust, self.kappa)
         lost = np.einsum("...jik,jik->...i", met, self.share)
         if inflow is not None:
-            lost = lost + inflow_terms(force, command, inflow, self.length) @ self.taken
+            lost = lost + (inflow_terms(force, command, inflow, self.length) @ self.taken) * self.is_fin
         result: Array = 1.0 - lost
         return result
 
@@ -74,7 +77,7 @@ class Coupling:
         kept = 1.0 - lost
         if inflow is not None:
             taken, own = self._inflow_and_jacobian(unit, thrust, jacobian, command, inflow)
-            kept = kept - taken
+            kept, own = kept - taken * self.is_fin, own * self.is_fin[:, None]
             n = np.arange(force.shape[-2])
             by_command = np.broadcast_to(by_command, (*kept.shape, 3, len(n))).copy()
             by_command[..., n, :, n] -= np.moveaxis(own, -2, 0)
