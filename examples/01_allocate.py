@@ -10,8 +10,8 @@ import finlab
 
 def main() -> None:
     layout = finlab.load_layout("A")
-    allocator = finlab.load_allocator()
-    result = allocator.allocate(layout, [1, 0, 0.5, 0, 0, 0.1], seed=0)
+    allocator = finlab.Allocator(layout)
+    result = allocator.allocate([1, 0, 0.5, 0, 0, 0.1], seed=0)
 
     print("fin           A [rad]  f [Hz]  zero direction [deg]")
     for name, (amplitude, frequency, direction) in zip(result.fins, result.command, strict=True):

@@ -10,9 +10,9 @@ TARGET = [0.5, 0, 0.5, 0, 0, 0.05]
 
 def main() -> None:
     layout = finlab.load_layout("A")
-    allocator = finlab.load_allocator()
+    allocator = finlab.Allocator(layout)
     for failed in ([], ["front_right"], ["front_right", "back_left"]):
-        result = allocator.allocate(layout, TARGET, failed=failed, seed=0)
+        result = allocator.allocate(TARGET, failed=failed, seed=0)
         lost = ", ".join(failed) or "none"
         missing = ", ".join(f"{value:+.2f}" for value in result.unallocated)
         print(f"lost: {lost:<22}  err_norm {result.err_norm:8.4f}  missing [{missing}]")

@@ -19,9 +19,9 @@ def main() -> None:
     targets[:, 0] = 1.0
     targets[:, 5] = 0.2 * np.sin(phase)
 
-    allocator = finlab.load_allocator()
+    allocator = finlab.Allocator(layout)
     start = time.perf_counter()
-    result = allocator.allocate_batch(layout, targets)
+    result = allocator.allocate_batch(targets)
     seconds = time.perf_counter() - start
 
     print(

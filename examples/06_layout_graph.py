@@ -18,7 +18,7 @@ def main() -> None:
     layout = finlab.load_layout("A")
     with TemporaryDirectory() as folder:
         path = Path(folder) / "A.graph.json"
-        write_graph(build_graph(layout, finlab.load_allocator(), failed=("back_left",)), path)
+        write_graph(build_graph(finlab.Allocator(layout), failed=("back_left",)), path)
         document = json.loads(path.read_text())
         graph = read_graph(path)
     assert graph.layout == layout

@@ -17,13 +17,13 @@ class Bridge:
     """On a robot: node.create_subscription(WrenchStamped, "wrench", bridge.on_wrench, 1)."""
 
     def __init__(self, bundle: str, publish: Callable[[Message], None]) -> None:
-        self.robot, self.allocator = finlab.load_layout(bundle), finlab.load_allocator(bundle)
+        self.allocator = finlab.Allocator.from_bundle(bundle)
         self.publish = publish
 
     def on_wrench(self, message: Message) -> None:
         force, torque = message.wrench.force, message.wrench.torque
         wrench = [force.x, force.y, force.z, torque.x, torque.y, torque.z]
-        answer = self.allocator.allocate(self.robot, wrench)
+        answer = self.allocator.allocate(wrench)
         self.publish(Message(flippers=[m._asdict() for m in flippers(answer.fins, answer.command)]))
 
 
@@ -45,7 +45,7 @@ def main() -> None:
     layout = finlab.load_layout("ucat")
     with TemporaryDirectory() as folder:
         bundle = Path(folder) / "ucat"
-        make_bundle(layout, finlab.load_allocator()).write(bundle)
+        make_bundle(finlab.Allocator(layout)).write(bundle)
         bridge = Bridge(str(bundle), show)
         for wrench in (wrench_stamped(1.0, 0.5, 0.0), wrench_stamped(0.5, 0.0, 0.1), wrench_stamped(0, 0, 0)):
             bridge.on_wrench(wrench)

@@ -24,7 +24,7 @@ def main() -> None:
         model = FinModelSpec("table", (("path", str(path)),))
         layout = finlab.load_layout("A")
         layout = replace(layout, actuators=tuple(replace(fin, model=model) for fin in layout.fins))
-        result = finlab.load_allocator().allocate(layout, [1, 0, 0.5, 0, 0, 0.1])
+        result = finlab.Allocator(layout).allocate([1, 0, 0.5, 0, 0, 0.1])
         print(result)
 
 

@@ -26,7 +26,7 @@ def main() -> None:
         print("\n".join(summary(fit)))
         fitted = write_robot(fit, path)
     for robot in (drawn, fitted):
-        print(finlab.load_allocator().allocate(robot, TARGET))
+        print(finlab.Allocator(robot).allocate(TARGET))
 
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@ A layout says where the fins of a robot sit. A wrench says what the body should 
 both into one command per fin:
 
     layout = finlab.load_layout("A")
-    result = finlab.load_allocator().allocate(layout, [1, 0, 0.5, 0, 0, 0.1])
+    result = finlab.Allocator(layout).allocate([1, 0, 0.5, 0, 0, 0.1])
 
 Names are imported on first use, so that `import finlab` needs neither torch nor the time to load it.
 """
@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from finlab.allocation.allocation import Allocation as Allocation
     from finlab.allocation.allocator import Allocator as Allocator
-    from finlab.allocation.methods import load_allocator as load_allocator
     from finlab.allocation.policy import Policy as Policy
     from finlab.errors import FinlabError as FinlabError
     from finlab.layout.body import Body as Body
@@ -33,7 +32,6 @@ _HOME = {
     "Allocator": "finlab.allocation.allocator",
     "Health": "finlab.layout.damage",
     "Policy": "finlab.allocation.policy",
-    "load_allocator": "finlab.allocation.methods",
     "FinlabError": "finlab.errors",
     "load_layout": "finlab.layout.load",
     "save_layout": "finlab.layout.file",

@@ -14,7 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from finlab.allocation.search.search_allocator import SearchAllocator
+from finlab.allocation import Allocator, Policy
+from finlab.allocation.search.pipeline import Pipeline
+from finlab.allocation.search.settings import SearchSettings
 from finlab.arrays import AnyArray, Array
 from finlab.assets import PAPER_LAYOUTS
 from finlab.bench.problems import FORMAT, KINDS, VERSION, BenchRobot, Problems, Sequences, Targets
@@ -27,7 +29,6 @@ from finlab.forces.fin_sets import FinSets, planar_sets
 from finlab.forces.out_of_reach import nearest_along
 from finlab.layout import Layout, layout_effectiveness, load_layout
 from finlab.layout.file import layout_to_dict
-from finlab.networks.normalization import Normalization
 from finlab.physics import plant_of, read_table
 from finlab.physics.objective import Name, Objective
 from finlab.whole_file import write_whole
@@ -138,12 +139,14 @@ class BestKnown:
     def __init__(self, layout: Layout, sigma: Array, seed: int) -> None:
         """Prepare for a robot, with what errors are divided by (6,) and the seed of random starts."""
         self.layout, self.sigma, self.seed = layout, sigma, seed
-        self.method = SearchAllocator(Normalization(np.zeros(6), sigma))
-        self.sets = planar_sets(self.method.pipeline.prepare(layout).planar)
+        self.allocator = Allocator(layout)
+        self.policy = Policy(axis_weights=tuple((self.allocator.scale / sigma).tolist()))
+        self.sets = planar_sets(Pipeline(sigma, SearchSettings()).prepare(layout).planar)
 
     def least_errors(self, wrenches: Array) -> Array:
         """The least errors (N,) known for wrenches (N, 6)."""
-        return self.method.allocate_batch(self.layout, wrenches, seed=self.seed).err_norm
+        answers = self.allocator.allocate_batch(wrenches, policy=self.policy, seed=self.seed)
+        return np.asarray(np.linalg.norm(answers.unallocated / self.sigma, axis=-1))
 
     def least_cost(self, objective: Name, wrench: Array) -> float:
         """The least cost known of a wrench (6,) within reach; NaN where none is."""

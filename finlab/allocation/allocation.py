@@ -1,58 +1,80 @@
 """What every allocation method answers: commands, what they give, and what is left undone."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from functools import cached_property
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.evaluate import REACHED, Judge, evaluate
+from finlab.allocation.evaluate import REACHED, body_forces, judged_effort, judged_power
 from finlab.allocation.policy import CLOSEST, Policy, describe_binding
 from finlab.allocation.solution import Candidates, PlainData
 from finlab.allocation.tables import allocation_html, allocation_text
 from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.layout.arrays import layout_effectiveness
+from finlab.layout.damage import Health
+from finlab.physics.known_plants import plant_of
+from finlab.physics.plant import Plant
+
+CHUNK = 4096
+"""Answers that are judged together; keeps memory flat for any number of targets."""
+
+
+class Later(NamedTuple):
+    """What is told of an answer only when it is asked for."""
+
+    plant: Plant
+    """Who judges: the laws and tables of all actuators, failed ones included, at the flow of the question."""
+    notes: Callable[[], tuple[str, ...]]
+    """Gives the notes."""
+    candidates: Callable[[], Candidates | None] = lambda: None
+    """Gives the refined candidates."""
+    samples: Callable[[], Candidates | None] = lambda: None
+    """Gives the raw candidates."""
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Answer(PlainData):
-    """What answers to one target and to many share, as plain data; many have N rows of each array."""
+    """What answers to one target and to many share, as plain data; many have N rows of each array.
+
+    What is dear to tell is told when it is first asked for, and kept; copies have all of it.
+    """
+
+    TOLD: ClassVar[tuple[str, ...]] = ("forces", "wrench", "err_norm", "power", "effort", "notes")
+    """What is told when it is asked for."""
 
     layout: Layout
     """The whole layout, failed fins included, with the limits that damage has left."""
     failed: tuple[str, ...]
     """Names of the fins that were left out."""
+    health: Health | None = None
+    """What was known of fins that work in part."""
     target: Array
     """Desired wrench (6,) or (N, 6), [N, N m], body frame."""
     command: Array
     """Command (n, 3) or (N, n, 3) of every fin: amplitude [rad], frequency [Hz], zero direction [rad]; NaN if
     failed."""
-    fin_forces: Array
-    """Force (n, 3) or (N, n, 3) that the judge finds for each fin [N], body frame; zero if failed."""
-    wrench: Array
-    """Delivered wrench (6,) or (N, 6) as the judge finds it [N, N m]."""
-    sigma: Array
-    """Per-axis standard deviation (6,) of the error measure."""
-    evaluated_by: Judge
-    """Who computed `fin_forces` and `wrench`: the plant, that is the fins' own laws and tables."""
+    scale: Array
+    """Yardstick (6,) of the error [N, N m]; see `finlab.allocation.yardstick`."""
     method: str
     """Name of the method that answered."""
     checkpoint: str | None = None
     """Name of the checkpoint that was used, if any."""
     policy: Policy = CLOSEST
     """What was to be done if a target was out of reach."""
-    seed: int = 0
-    """Seed that makes the answer repeatable."""
     flow: Array | None = None
     """Velocity (6,) of the body relative to the water [m/s, rad/s], body frame; None at rest."""
-    wrench_surrogate: Array | None = None
-    """Wrench (6,) or (N, 6) that the method itself expected, if it used a learned model."""
+    seed: int = 0
+    """Seed that makes the answer repeatable."""
+    wrench_expected: Array | None = None
+    """Wrench (6,) or (N, 6) that the method itself expected, if it used a model of its own."""
     unknown_fins: tuple[str, ...] = ()
     """Names of fins whose model the method's networks have not learned; answers for them are wrong."""
-    notes: tuple[str, ...] = ()
-    """Sentences that the user should read, such as a fin model that the checkpoint never saw."""
+    later: Later | None = field(default=None, compare=False)
+    """Tells what is told later; None in copies, which have it all."""
 
     @property
     def fins(self) -> tuple[str, ...]:
@@ -64,23 +86,94 @@ class Answer(PlainData):
         """What the robot does not deliver: target minus delivered wrench (6,) or (N, 6)."""
         return self.target - self.wrench
 
+    @cached_property
+    def forces(self) -> Array:
+        """Force (n, 3) or (N, n, 3) of each fin [N], body frame, by its own law or table; zero if failed."""
+        return self._by_parts(lambda rows: body_forces(self._plant, rows))
+
+    @cached_property
+    def wrench(self) -> Array:
+        """Delivered wrench (6,) or (N, 6) [N, N m] by the fins' own laws and tables."""
+        return self._by_parts(self._plant.wrench)
+
+    @cached_property
+    def notes(self) -> tuple[str, ...]:
+        """Sentences that the user should read, such as a fin model that the checkpoint never saw."""
+        return self.later.notes() if self.later is not None else ()
+
+    @property
+    def expected_miss(self) -> Array:
+        """Standard deviation (6,) of the wrench [N, N m] by what is uncertain of the actuators; zeros where
+        nothing is known to be."""
+        return np.zeros(6)
+
+    @property
+    def expected_error(self) -> float:
+        """The same as a share of the yardstick, as `err_norm`."""
+        return float(np.linalg.norm(self.expected_miss / self.scale))
+
+    @property
+    def _plant(self) -> Plant:
+        return plant_of(self.layout).at(self.flow) if self.later is None else self.later.plant
+
+    def _by_parts(self, judge: Callable[[Array], Array]) -> Array:
+        """What is told of commands, a few at a time."""
+        if self.command.ndim == 2:
+            one: Array = judge(self.command[None])[0]
+            return one
+        if len(self.command) <= CHUNK:
+            return judge(self.command)
+        result: Array | None = None
+        for rows in chunks(len(self.command)):
+            part = judge(self.command[rows])
+            if result is None:
+                result = np.empty((len(self.command), *part.shape[1:]))
+            result[rows] = part
+        assert result is not None
+        return result
+
+    def _equal_names(self) -> list[str]:
+        return [*super()._equal_names(), *self.TOLD]
+
+    def __getstate__(self) -> dict[str, Any]:
+        for name in self.TOLD:
+            getattr(self, name)
+        return {**self.__dict__, "later": None}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class BatchAllocation(Answer):
     """Answers to N targets on one layout: plain data, as an `Allocation` is."""
 
-    err_norm: Array
-    """Sizes (N,) of what is missing from the targets, each axis over its `sigma`."""
-    effort: Array
-    """Effort `J_en` (N,) of the commands, the paper's energy proxy."""
-    power: Array
-    """Mean mechanical power (N,) [W] of the commands, by the fins' own models."""
+    bound: Array | None = None
+    """Power (N,) [W] that no answer can undercut; None for methods that prove none."""
     solve_ms: Array = field(compare=False)
-    """Time per target (N,) [ms]; the whole time divided by N where targets were solved together."""
+    """Time per target (N,) [ms]: the whole time divided by N."""
+
+    @cached_property
+    def err_norm(self) -> Array:
+        """Sizes (N,) of what is missing from the targets, each axis over its `scale`."""
+        error = np.empty(len(self))
+        for rows in chunks(len(self)):
+            error[rows] = np.linalg.norm((self.target[rows] - self.wrench[rows]) / self.scale, axis=-1)
+        return error
+
+    @cached_property
+    def power(self) -> Array:
+        """Mean mechanical power (N,) [W] of the commands, by the fins' own models."""
+        return self._by_parts(lambda rows: judged_power(self._plant, rows))
+
+    @cached_property
+    def effort(self) -> Array | None:
+        """Effort `J_en` (N,) of the commands, the paper's energy proxy."""
+        return self._by_parts(lambda rows: judged_effort(self.layout, rows))
 
     @property
     def reachable(self) -> NDArray[np.bool_]:
-        """Which targets are delivered (N,): an `err_norm` of at most 0.01."""
+        """Which targets are delivered (N,): an `err_norm` of at most 0.001."""
         return self.err_norm <= REACHED
 
     def __len__(self) -> int:
@@ -90,8 +183,7 @@ class BatchAllocation(Answer):
         worst = f"{self.err_norm.max():.2e}" if len(self) else "none"
         return (
             f"BatchAllocation({len(self)} targets, layout={self.layout.name!r:.60}, fins={len(self.fins)}, "
-            f"method={self.method!r}, delivered={int(self.reachable.sum())}, "
-            f"largest err_norm={worst} by the {self.evaluated_by})"
+            f"method={self.method!r}, delivered={int(self.reachable.sum())}, largest err_norm={worst})"
         )
 
 
@@ -102,34 +194,54 @@ class Allocation(Answer):
     `print(result)` shows it as a table.
     """
 
-    err_norm: float
-    """Size of what is missing from the target, each axis over its `sigma`."""
-    effort: float
-    """Effort `J_en` of the command, the paper's energy proxy."""
-    power: float
-    """Mean mechanical power [W] of the command, by the fins' own models."""
+    TOLD: ClassVar[tuple[str, ...]] = (*Answer.TOLD, "candidates", "samples")
+
+    bound: float | None = None
+    """Power [W] that no answer can undercut; None for methods that prove none."""
     solve_ms: float = field(compare=False)
     """Time spent solving [ms], judging not included."""
     settings: Mapping[str, Any] = field(default_factory=dict)
     """Settings of the method, by name."""
     previous: Array | None = None
     """Command (n, 3) of the previous tick, if it was given."""
-    candidates: Candidates | None = None
-    """Refined candidates, best first; None for methods that have a single answer."""
-    samples: Candidates | None = None
-    """Raw candidates before refinement, best first; None for methods that draw none."""
+
+    @cached_property
+    def err_norm(self) -> float:
+        """Size of what is missing from the target, each axis over its `scale`."""
+        missing = self.unallocated / self.scale
+        return float(np.sqrt(missing @ missing))
+
+    @cached_property
+    def power(self) -> float:
+        """Mean mechanical power [W] of the command, by the fins' own models."""
+        return float(judged_power(self._plant, self.command[None])[0])
+
+    @cached_property
+    def effort(self) -> float | None:
+        """Effort `J_en` of the command, the paper's energy proxy."""
+        return float(judged_effort(self.layout, self.command[None])[0])
+
+    @cached_property
+    def candidates(self) -> Candidates | None:
+        """Refined candidates, best first; None for methods that have a single answer."""
+        return self.later.candidates() if self.later is not None else None
+
+    @cached_property
+    def samples(self) -> Candidates | None:
+        """Raw candidates before refinement, best first; None for methods that draw none."""
+        return self.later.samples() if self.later is not None else None
 
     @property
     def reachable(self) -> bool:
-        """Whether the target is delivered: an `err_norm` of at most 0.01."""
+        """Whether the target is delivered: an `err_norm` of at most 0.001."""
         return self.err_norm <= REACHED
 
     @property
-    def scale(self) -> float:
+    def share(self) -> float:
         """Share of the target that is delivered in its own direction; 1 where nothing is asked."""
-        asked, given = self.target / self.sigma, self.wrench / self.sigma
+        asked, given = self.target / self.scale, self.wrench / self.scale
         size = float(asked @ asked)
-        return 1.0 if size < 1e-12 else float(asked @ given) / size
+        return 1.0 if size < 1e-14 else float(asked @ given) / size
 
     @property
     def binding(self) -> tuple[str, ...]:
@@ -139,31 +251,35 @@ class Allocation(Answer):
         """
         if self.reachable or self.unknown_fins:
             return ()
-        missing = self.unallocated / self.sigma**2
+        missing = self.unallocated / self.scale**2
         pull = (missing @ layout_effectiveness(self.layout)).reshape(-1, 2)
         return tuple(describe_binding(self.fins, self.command, self.layout.lower, self.layout.upper, pull))
 
-    def with_command(self, command: Array) -> "Allocation":
+    def with_command(self, command: Array) -> Self:
         """The same question with another command (n, 3) in place of the answer, judged by the plant."""
-        verdict = evaluate(self.layout, command[None], self.target[None], self.sigma, self.flow)
-        return replace(
-            self,
-            command=command,
-            fin_forces=verdict.fin_forces[0],
-            wrench=verdict.wrench[0],
-            err_norm=float(verdict.err_norm[0]),
-            effort=float(verdict.effort[0]),
-            power=float(verdict.power[0]),
-            evaluated_by="plant",
-            wrench_surrogate=None,
-        )
+        return replace(self._open(), command=command, wrench_expected=None)
+
+    def with_candidates(self, candidates: Candidates | None, samples: Candidates | None) -> Self:
+        """The same answer beside other candidates."""
+        whole = self._open()
+        assert whole.later is not None
+        told = whole.later._replace(candidates=lambda: candidates, samples=lambda: samples)
+        return replace(whole, later=told)
+
+    def _open(self) -> Self:
+        """The same answer, even a copy, that can tell again what is told later."""
+        if self.later is not None:
+            return self
+        told = Later(self._plant, lambda: self.notes, lambda: self.candidates, lambda: self.samples)
+        return replace(self, later=told)
 
     def __repr__(self) -> str:
         failed = f", failed={', '.join(self.failed)!r:.60}" if self.failed else ""
+        effort = "" if self.effort is None else f", effort={self.effort:.3f}"
         return (
             f"Allocation(layout={self.layout.name!r:.60}, fins={len(self.fins)}{failed}, "
-            f"method={self.method!r}, err_norm={self.err_norm:.2e} by the {self.evaluated_by}, "
-            f"power={self.power:.3g} W, effort={self.effort:.3f}, reachable={self.reachable}, "
+            f"method={self.method!r}, err_norm={self.err_norm:.2e}, "
+            f"power={self.power:.3g} W{effort}, reachable={self.reachable}, "
             f"solve_ms={self.solve_ms:.1f})"
         )
 
@@ -173,3 +289,8 @@ class Allocation(Answer):
     def _repr_html_(self) -> str:
         """The table of the command line, for notebooks."""
         return allocation_html(self)
+
+
+def chunks(n: int) -> Iterator[slice]:
+    """Slices of at most `CHUNK` of n rows."""
+    return (slice(start, start + CHUNK) for start in range(0, n, CHUNK))

@@ -1,45 +1,198 @@
-"""The one interface of every allocation method: check the problem, solve it, answer with an `Allocation`."""
+"""The one interface of every allocation method: made for a robot, it checks questions and answers them."""
 
+import os
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
+from itertools import islice
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from finlab.allocation.allocation import Allocation, BatchAllocation
-from finlab.allocation.evaluate import evaluate
-from finlab.allocation.method import AllocationMethod
+from finlab.allocation.allocation import CHUNK, Allocation, BatchAllocation, Later
+from finlab.allocation.method import Method
+from finlab.allocation.methods import (
+    Checkpoint,
+    MethodChoice,
+    bundled_method,
+    checked_settings,
+    choose_method,
+)
 from finlab.allocation.modes import Mode, find_modes, force_sizes
 from finlab.allocation.notes import fin_notes
 from finlab.allocation.policy import CLOSEST, Policy, as_policy
 from finlab.allocation.question import (
     Fins,
     check_flow,
-    check_layout_and_seed,
+    check_layout,
     check_previous,
+    check_seed,
     check_wrenches,
     usable_fins,
 )
-from finlab.allocation.solution import Candidates
+from finlab.allocation.settings import Settings
+from finlab.allocation.solution import Candidates, Solution
+from finlab.allocation.yardstick import yardstick
 from finlab.arrays import Array
+from finlab.bundle_files import read_bundle_files
 from finlab.errors import AllocationError
 from finlab.layout import FinModelSpec, Layout
 from finlab.layout.damage import Health
+from finlab.layout.load import load_layout
+from finlab.networks.trained import TrainedWeights
+from finlab.physics.known_plants import plant_of
+from finlab.physics.plant import Plant
 
 SAME_COMMAND = 1e-6
 """Two commands [rad, Hz, rad] that differ by less are one answer, given on two machines."""
+MOST_PREPARED = 32
+"""Damaged states of the robot that an allocator keeps prepared."""
 
 
-class Allocator(AllocationMethod):
-    """Turns a target wrench into one command per fin.
+class Ready(NamedTuple):
+    """A state of the robot that is ready for questions."""
 
-    Failed fins are removed before a method solves and put back (as NaN) after, so no method can use one.
+    fins: Fins
+    """Which fins may be used."""
+    method: Method
+    """Made for these."""
+    plant: Plant
+    """Of all fins; judges."""
+
+
+class Allocator:
+    """Turns a target wrench into one command per fin, for one robot.
+
+    All that a method needs of the robot is prepared when the allocator is made. A damaged robot is prepared
+    when it is first asked about; failed fins are removed before a method solves and put back (as NaN) after,
+    so no method can use one. Force tables are read once. An allocator can be copied and pickled.
     """
+
+    def __init__(
+        self,
+        layout: Layout,
+        method: str | type[Method] = "dual",
+        *,
+        checkpoint: Checkpoint = None,
+        **settings: Any,
+    ) -> None:
+        """Prepare a method for a robot.
+
+        Args:
+            layout: the robot.
+            method: one of `finlab.allocation.METHODS`, or a class of your own.
+            checkpoint: for methods with networks: a checkpoint folder, a bundle, the name of a shipped
+                checkpoint, or what `read_checkpoint` gives; by default the shipped one.
+            settings: of the method, by name.
+
+        Raises:
+            AllocationError: unknown method or setting, or a value out of its range.
+            CheckpointError: missing, corrupt or foreign checkpoint.
+            DataError: a fin's force table or a bundle cannot be read.
+        """
+        check_layout(layout)
+        if isinstance(method, str):
+            self._made(layout, choose_method(method, checkpoint, **settings))
+        elif isinstance(method, type) and issubclass(method, Method):
+            known = checkpoint if isinstance(checkpoint, TrainedWeights) else None
+            self._made(layout, MethodChoice(method, checked_settings(method, settings), known))
+        else:
+            raise AllocationError(f"method: expected the name of a method, got {method!r:.60}")
+
+    @classmethod
+    def from_bundle(
+        cls, path: str | os.PathLike[str], method: str | None = None, **settings: Any
+    ) -> "Allocator":
+        """The allocator of a bundle's robot, as `finlab export` wrote it.
+
+        Args:
+            path: of the bundle, a folder or a zip archive.
+            method: by default the bundle's own.
+            settings: those that are to differ from the bundle's.
+
+        Raises:
+            AllocationError: unknown method or setting.
+            DataError: the bundle cannot be read, or was changed.
+            LayoutError: its layout cannot be read.
+        """
+        choice = bundled_method(read_bundle_files(path), str(path), method, **settings)
+        return cls.of_choice(load_layout(path), choice)
+
+    @classmethod
+    def of_choice(cls, layout: Layout, choice: MethodChoice) -> "Allocator":
+        """The allocator of a robot by a method with its networks and settings."""
+        made = cls.__new__(cls)
+        made._made(layout, choice)
+        return made
+
+    def _made(self, layout: Layout, choice: MethodChoice) -> None:
+        self._layout, self._choice = layout, choice
+        self._scale = yardstick(layout)
+        self._whole = self._make((), None)
+        self._prepared: dict[object, Ready] = {}
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {"layout": self._layout, "choice": self._choice}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self._made(state["layout"], state["choice"])
+
+    def __deepcopy__(self, memo: object) -> Self:
+        return type(self).of_choice(self._layout, self._choice)  # type: ignore[return-value]
+
+    @property
+    def layout(self) -> Layout:
+        """The whole robot."""
+        return self._layout
+
+    @property
+    def method(self) -> str:
+        """Name of the method."""
+        return self._choice.kind.name
+
+    @property
+    def settings(self) -> Settings:
+        """Settings of the method."""
+        return self._choice.settings
+
+    @property
+    def scale(self) -> Array:
+        """Yardstick (6,) of the robot's errors [N, N m]; see `finlab.allocation.yardstick`."""
+        return self._scale
+
+    @property
+    def weights(self) -> TrainedWeights | None:
+        """Trained networks; None for methods without."""
+        return self._choice.weights
+
+    @property
+    def checkpoint(self) -> str | None:
+        """Name of the checkpoint that the networks come from; None for methods without."""
+        return None if self.weights is None else self.weights.name
+
+    @property
+    def policy_under_way(self) -> str:
+        """What a control loop asks for by default where a wrench is out of reach."""
+        return self._choice.kind.policy_under_way
+
+    @property
+    def unknown_fins(self) -> tuple[str, ...]:
+        """Names of the fins whose model the networks have not learned; answers for them are wrong."""
+        return self._whole.method.unknown_fins
+
+    def with_settings(self, **changes: Any) -> "Allocator":
+        """Another allocator for the same robot, method and networks, with some settings changed.
+
+        Raises:
+            AllocationError: the method knows no such setting, or cannot work with its value.
+        """
+        settings = checked_settings(self._choice.kind, {**vars(self.settings), **changes})
+        return self.of_choice(self._layout, replace(self._choice, settings=settings))
 
     def allocate(
         self,
-        layout: Layout,
         wrench: ArrayLike,
         *,
         failed: Sequence[str] = (),
@@ -53,7 +206,6 @@ class Allocator(AllocationMethod):
         """Commands for one target.
 
         Args:
-            layout: the robot.
             wrench: desired wrench (6,) [N, N m] in the body frame.
             failed: names of fins that do not work; they leave the graph.
             previous: command (n, 3) of the previous tick: fins then turn slowly, and the robot changes the
@@ -65,55 +217,51 @@ class Allocator(AllocationMethod):
             health: fins that are weak, stuck at an angle or running on; the result's layout has the limits
                 that are left.
             flow: velocity (6,) of the body relative to the water [m/s, rad/s], body frame; None at rest.
-            seed: the same target, layout and seed give the same answer.
+            seed: the same target and seed give the same answer.
 
         Raises:
-            CommandError: the wrench or the flow is not six finite numbers, or `previous` or `reference` has
+            CommandError: the wrench is not six finite numbers, or `previous`, `reference` or `flow` has
                 another shape.
             AllocationError: the method does not know the policy.
             LayoutError: an unknown fin, or none left.
             DataError: a fin's force table cannot be read.
         """
         target, policy = check_wrenches(wrench, single=True), as_policy(policy)
-        check_layout_and_seed(layout, seed)
-        self._check_policy(policy)
-        fins = usable_fins(layout, failed, health)
+        check_seed(seed)
         water = check_flow(flow)
-        before = None if previous is None else check_previous(previous, layout)[fins.alive]
+        ready = self._ready(failed, health)
+        fins, method = ready.fins, ready.method
+        method.check_policy(policy)
+        before = None if previous is None else check_previous(previous, fins.layout)[fins.alive]
         start = time.perf_counter()
         if reference is not None:
-            expected = check_wrenches(reference, single=False, name="reference")
-            target = self._in_time(fins.healthy, target, expected)
-        method = self.at(water)
-        solution = method._solve_by(policy, fins.healthy, target[None], seed=seed, previous=before)
+            target = method.in_time(target, check_wrenches(reference, single=False, name="reference"))
+        solution = method.solve(target[None], policy=policy, previous=before, flow=water, seed=seed)
         solve_ms = (time.perf_counter() - start) * 1e3
-        command = fins.among_all(solution.command)
-        verdict = evaluate(fins.layout, command, target[None], self.normalization.std, water)
         return Allocation(
             layout=fins.layout,
             failed=fins.failed,
+            health=health,
             target=target,
-            command=command[0].copy(),
-            fin_forces=verdict.fin_forces[0],
-            wrench=verdict.wrench[0],
-            err_norm=float(verdict.err_norm[0]),
-            effort=float(verdict.effort[0]),
-            power=float(verdict.power[0]),
-            sigma=self.normalization.std,
-            evaluated_by=verdict.evaluated_by,
-            method=self.name,
+            command=fins.among_all(solution.command)[0].copy(),
+            scale=self._scale,
+            method=self.method,
+            bound=None if solution.bound is None else float(solution.bound[0]),
             solve_ms=solve_ms,
             checkpoint=self.checkpoint,
-            settings=self.options,
+            settings=vars(self.settings).copy(),
             policy=policy,
-            seed=seed,
             flow=water,
+            seed=int(seed),
             previous=None if before is None else fins.among_all(before),
-            wrench_surrogate=None if solution.wrench_surrogate is None else solution.wrench_surrogate[0],
-            unknown_fins=self.unknown_fins(fins.healthy),
-            notes=self._notes(fins.healthy, water),
-            candidates=_made(solution.candidates, fins),
-            samples=_made(solution.samples, fins),
+            wrench_expected=None if solution.wrench is None else solution.wrench[0],
+            unknown_fins=method.unknown_fins,
+            later=Later(
+                ready.plant.at(water),
+                partial(self._notes, ready, water),
+                partial(_among_all, solution.candidates, fins),
+                partial(_among_all, solution.samples, fins),
+            ),
         )
 
     def explore(self, result: Allocation) -> tuple[Mode, ...]:
@@ -121,7 +269,8 @@ class Allocator(AllocationMethod):
         milliseconds. Methods that have a single answer know none.
 
         Raises:
-            AllocationError: the method, as it is set, gives another answer to that question.
+            AllocationError: the answer is of another robot, or the method, as it is set, gives another
+                answer to that question.
         """
         found = self.alternatives(result)
         if found is None:
@@ -135,36 +284,32 @@ class Allocator(AllocationMethod):
         None for methods that have a single answer.
 
         Raises:
-            AllocationError: the method gives another answer to that question.
+            AllocationError: as for `explore`.
         """
-        fins = usable_fins(result.layout, result.failed)
-        previous = None if result.previous is None else result.previous[fins.alive]
-        solution = self.at(result.flow)._solve_by(
-            result.policy, fins.healthy, result.target[None], seed=result.seed, previous=previous
-        )
-        again = fins.among_all(solution.command[0])
-        if not np.allclose(again, result.command, rtol=0.0, atol=SAME_COMMAND, equal_nan=True):
+        ready = self._ready(result.failed, result.health)
+        fins = ready.fins
+        if fins.layout != result.layout:
             raise AllocationError(
-                f"method {self.name!r} with checkpoint {self.checkpoint!r} gives another answer than this "
+                f"this answer is of layout {result.layout.name!r:.60}, and this allocator is for "
+                f"{self._layout.name!r:.60} as it was made; ask the allocator that answered"
+            )
+        previous = None if result.previous is None else result.previous[fins.alive]
+        found = ready.method.alternatives(
+            result.target, policy=result.policy, previous=previous, flow=result.flow, seed=result.seed
+        )
+        if found is None:
+            return None
+        told = _among_all(lambda: found, fins)
+        assert told is not None
+        if not np.allclose(told.command[0], result.command, rtol=0.0, atol=SAME_COMMAND, equal_nan=True):
+            raise AllocationError(
+                f"method {self.method!r} with checkpoint {self.checkpoint!r} gives another answer than this "
                 "one; ask the allocator that answered, with its settings"
             )
-        return _made(solution.alternatives or solution.candidates, fins)
-
-    def _notes(self, layout: Layout, flow: Array | None) -> tuple[str, ...]:
-        """Sentences that the user should read before trusting an answer for this layout."""
-        unknown, notes = self.unknown_fins(layout), fin_notes(layout, flow)
-        if not unknown or self.fin_model is None:
-            return notes
-        return (
-            f"the method does not know these fins: {', '.join(unknown)}; checkpoint {self.checkpoint!r} "
-            f"takes them for fins of model {_listed(self.fin_model)}: trust the plant's error or train a "
-            "surrogate for them",
-            *notes,
-        )
+        return told
 
     def allocate_batch(
         self,
-        layout: Layout,
         wrenches: ArrayLike,
         *,
         failed: Sequence[str] = (),
@@ -173,46 +318,114 @@ class Allocator(AllocationMethod):
         flow: ArrayLike | None = None,
         seed: int = 0,
     ) -> BatchAllocation:
-        """Commands for many targets (N, 6) on one layout; arguments and errors as in `allocate`."""
+        """Commands for many targets (N, 6); arguments and errors as in `allocate`.
+
+        Beside the targets it keeps the commands and bounds, 32 bytes or so for each number of a command; what
+        else there is to tell is computed when it is asked for.
+        """
         targets, policy = check_wrenches(wrenches, single=False), as_policy(policy)
-        check_layout_and_seed(layout, seed)
-        self._check_policy(policy)
-        fins, water = usable_fins(layout, failed, health), check_flow(flow)
+        check_seed(seed)
+        water = check_flow(flow)
+        ready = self._ready(failed, health)
+        fins, method = ready.fins, ready.method
+        method.check_policy(policy)
         start = time.perf_counter()
-        solution = self.at(water)._solve_many(policy, fins.healthy, targets, seed=seed)
+        parts = (
+            method.solve(targets[k : k + CHUNK], policy=policy, flow=water, seed=seed + k)
+            for k in range(0, len(targets), CHUNK)
+        )
+        solution = _joined(parts, len(targets), fins)
         elapsed_ms = (time.perf_counter() - start) * 1e3
-        command = fins.among_all(solution.command)
-        verdict = evaluate(fins.layout, command, targets, self.normalization.std, water)
         return BatchAllocation(
             layout=fins.layout,
             failed=fins.failed,
+            health=health,
             target=targets,
-            command=command,
-            fin_forces=verdict.fin_forces,
-            wrench=verdict.wrench,
-            err_norm=verdict.err_norm,
-            effort=verdict.effort,
-            power=verdict.power,
-            sigma=self.normalization.std,
-            evaluated_by=verdict.evaluated_by,
-            method=self.name,
-            solve_ms=np.full(len(targets), elapsed_ms / max(len(targets), 1)),
+            command=solution.command,
+            scale=self._scale,
+            method=self.method,
+            bound=solution.bound,
+            solve_ms=np.broadcast_to(elapsed_ms / max(len(targets), 1), len(targets)),
             checkpoint=self.checkpoint,
             policy=policy,
-            seed=seed,
             flow=water,
-            wrench_surrogate=solution.wrench_surrogate,
-            unknown_fins=self.unknown_fins(fins.healthy),
-            notes=self._notes(fins.healthy, water),
+            seed=int(seed),
+            wrench_expected=solution.wrench,
+            unknown_fins=method.unknown_fins,
+            later=Later(ready.plant.at(water), partial(self._notes, ready, water)),
         )
 
+    def allocate_stream(self, wrenches: Iterable[ArrayLike], **question: Any) -> Iterator[BatchAllocation]:
+        """Commands for any number of targets, a few thousand at a time.
 
-def _made(make: Callable[[], Candidates] | None, fins: Fins) -> Candidates | None:
+        Args:
+            wrenches: targets (6,), one after the other; an array (N, 6) or whatever gives them.
+            question: arguments of `allocate_batch`.
+
+        Raises:
+            FinlabError: as `allocate_batch`, at the targets that are wrong.
+        """
+        rest = iter(wrenches)
+        while some := list(islice(rest, CHUNK)):
+            yield self.allocate_batch(np.array(some), **question)
+
+    def _ready(self, failed: Sequence[str], health: Health | None) -> Ready:
+        """The robot in a state, prepared now or kept from an earlier question."""
+        if health is None and (failed == () or failed == []):
+            return self._whole
+        key = usable_fins(self._layout, failed).failed, health
+        found = self._prepared.pop(key, None) or self._make(failed, health)
+        self._prepared[key] = found  # the newest is last
+        while len(self._prepared) > MOST_PREPARED:
+            self._prepared.pop(next(iter(self._prepared)), None)
+        return found
+
+    def _make(self, failed: Sequence[str], health: Health | None) -> Ready:
+        fins, choice = usable_fins(self._layout, failed, health), self._choice
+        method = choice.kind(fins.healthy, choice.settings, self._scale, choice.weights)
+        return Ready(fins, method, plant_of(fins.layout))
+
+    def _notes(self, ready: Ready, flow: Array | None) -> tuple[str, ...]:
+        """Sentences that the user should read before trusting an answer."""
+        method, notes = ready.method, fin_notes(ready.fins.healthy, flow)
+        if not method.unknown_fins or method.fin_model is None:
+            return notes
+        return (
+            f"the method does not know these fins: {', '.join(method.unknown_fins)}; checkpoint "
+            f"{self.checkpoint!r} takes them for fins of model {_listed(method.fin_model)}: trust the "
+            "plant's error or train a surrogate for them",
+            *notes,
+        )
+
+    def __repr__(self) -> str:
+        return f"Allocator({self._layout.name!r:.60}, method={self.method!r})"
+
+
+def _among_all(make: Callable[[], Candidates] | None, fins: Fins) -> Candidates | None:
     """Candidates of the healthy fins, put among all."""
     if make is None:
         return None
     found = make()
     return found if len(fins.failed) == 0 else replace(found, command=fins.among_all(found.command))
+
+
+def _joined(parts: Iterable[Solution], n: int, fins: Fins) -> Solution:
+    """Solutions one after the other, the commands among those of all fins."""
+    command = np.full((n, len(fins.alive), 3), np.nan)
+    bound: Array | None = None
+    wrench: Array | None = None
+    start = 0
+    for part in parts:
+        rows = slice(start, start + len(part.command))
+        start = rows.stop
+        command[rows] = fins.among_all(part.command)
+        if part.bound is not None:
+            bound = np.full(n, np.nan) if bound is None else bound
+            bound[rows] = part.bound
+        if part.wrench is not None:
+            wrench = np.empty((n, 6)) if wrench is None else wrench
+            wrench[rows] = part.wrench
+    return Solution(command, bound, wrench)
 
 
 def _listed(model: FinModelSpec) -> str:

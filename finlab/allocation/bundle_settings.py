@@ -5,6 +5,8 @@ from collections.abc import Mapping
 from dataclasses import asdict, is_dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
+
 from finlab.allocation.search.settings import MdnSettings, SearchSettings
 from finlab.bundle_files import ABOUT, VERSION, Files
 from finlab.errors import AllocationError, DataError
@@ -14,10 +16,10 @@ from finlab.networks.normalization import Normalization
 from finlab.physics.effort import EffortWeights
 
 if TYPE_CHECKING:
-    from finlab.allocation.search.search_allocator import SearchAllocator
+    from finlab.allocation.allocator import Allocator
 
 FORMAT = "finlab-bundle"
-METHODS_ON_BOARD: Mapping[str, type[SearchSettings]] = {"search": SearchSettings, "mdn": MdnSettings}
+METHODS_ON_BOARD: Mapping[str, type[SearchSettings]] = {"dual": SearchSettings, "mdn": MdnSettings}
 """Methods that a bundle can answer with, and their settings."""
 GONE = ("energy_tradeoff",)
 """Settings that earlier bundles hold and that no method has any more."""
@@ -43,19 +45,26 @@ class About(NamedTuple):
         return {name: value for name, value in self.settings.items() if name in known}
 
 
-def about_bundle(allocator: "SearchAllocator", made_by: str) -> bytes:
+def about_bundle(allocator: "Allocator", made_by: str) -> bytes:
     """The contents of `bundle.json` for an allocator, made by a version of finlab."""
-    options = allocator.options.items()
+    options = vars(allocator.settings).items()
+    statistics = normalization_of(allocator)._asdict().items()
     document = {
         "format": FORMAT,
         "version": VERSION,
         "finlab": made_by,
-        "method": allocator.name,
+        "method": allocator.method,
         "checkpoint": allocator.checkpoint,
-        "normalization": {key: value.tolist() for key, value in allocator.normalization._asdict().items()},
+        "normalization": {key: value.tolist() for key, value in statistics},
         "settings": {key: asdict(value) if is_dataclass(value) else value for key, value in options},  # type: ignore[arg-type]
     }
     return (json.dumps(document, indent=1, allow_nan=False) + "\n").encode()
+
+
+def normalization_of(allocator: "Allocator") -> Normalization:
+    """What the networks of an allocator were trained with; the robot's yardstick for methods without."""
+    weights = allocator.weights
+    return Normalization(np.zeros(6), allocator.scale) if weights is None else weights.normalization
 
 
 def read_about(files: Files, source: str) -> About:

@@ -1,7 +1,6 @@
 """What commands really give: every method's answers are judged by the plant, in one place."""
 
 from functools import lru_cache
-from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -9,62 +8,30 @@ from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.physics.effort import EffortMeter
 from finlab.physics.known_plants import plant_of
-from finlab.physics.wrench import wrench_of_forces
+from finlab.physics.plant import Plant
 
-REACHED = 0.01
-"""Normalized error up to which a wrench counts as delivered."""
-
-
-Judge = Literal["plant"]
-"""Who says what commands give: the fins' own laws and tables."""
+REACHED = 1e-3
+"""Share of the yardstick up to which an error is none: the wrench counts as delivered."""
 
 
-class Evaluation(NamedTuple):
-    """What N commands give."""
-
-    fin_forces: Array
-    """Force of each fin (N, n, 3) [N], body frame; zero if failed."""
-    wrench: Array
-    """(N, 6) [N, N m]."""
-    err_norm: Array
-    """(N,)."""
-    effort: Array
-    """Effort `J_en` (N,)."""
-    power: Array
-    """Mean mechanical power (N,) [W]."""
-    evaluated_by: Judge = "plant"
-    """Whose forces these are."""
+def body_forces(plant: Plant, command: Array) -> Array:
+    """Force of each actuator (..., n, 3) [N], body frame, of commands (..., n, 3); zero if failed (NaN)."""
+    force = plant.forces(command)
+    # The first half of a column is its actuator's axis in the body frame.
+    forces: Array = np.matmul(force[..., None, :], plant.effectiveness[..., :3])[..., 0, :]
+    return forces
 
 
-def evaluate(
-    layout: Layout, command: Array, target: Array, sigma: Array, flow: Array | None = None
-) -> Evaluation:
-    """Judge commands (N, n, 3), NaN for failed fins, by the fins' own models.
+def judged_power(plant: Plant, command: Array) -> Array:
+    """Mean mechanical power (N,) [W] of commands (N, n, 3); what has failed (NaN) takes none."""
+    power: Array = np.nansum(plant.power(command), axis=-1)
+    return power
 
-    Args:
-        layout: the robot.
-        command: what its fins do.
-        target: desired wrenches (N, 6).
-        sigma: per-axis standard deviation (6,) of the error measure.
-        flow: velocity (6,) or (N, 6) relative to the water [m/s, rad/s], body frame; None at rest.
 
-    Raises:
-        DataError: a fin's force table cannot be read.
-    """
-    plant = plant_of(layout)
-    force, effectiveness = plant.forces(command, flow=flow), plant.effectiveness
-    # The first half of a column is its fin's axis in the body frame.
-    fin_forces = np.matmul(force[..., None, :], effectiveness[..., :3])[..., 0, :]
-    wrench = wrench_of_forces(force, effectiveness)
-    missing = (target - wrench) / sigma
-    err_norm = np.sqrt(np.einsum("ri,ri->r", missing, missing))
-    if len(command) == 0:
-        return Evaluation(fin_forces, wrench, err_norm, np.empty(0), np.empty(0))
-    power = plant.power(command, flow=flow)
-    failed = np.isnan(power)
-    if failed.any():  # a failed fin costs nothing
-        command, power = np.where(failed[..., None], 0.0, command), np.where(failed, 0.0, power)
-    return Evaluation(fin_forces, wrench, err_norm, effort_of(layout, command), power.sum(-1))
+def judged_effort(layout: Layout, command: Array) -> Array:
+    """Effort `J_en` (N,) of commands (N, n, 3), the paper's energy proxy, without what has failed (NaN)."""
+    failed = np.isnan(command).any(axis=-1, keepdims=True)
+    return effort_of(layout, np.where(failed, 0.0, command) if failed.any() else command)
 
 
 def costs(layout: Layout, command: Array) -> tuple[Array, Array]:

@@ -15,8 +15,11 @@ class PlainData:
     def __eq__(self, other: object) -> bool:
         if type(other) is not type(self):
             return NotImplemented
-        names = [field.name for field in fields(self) if field.compare]  # type: ignore[arg-type]
-        return all(equal(getattr(self, name), getattr(other, name)) for name in names)
+        return all(equal(getattr(self, name), getattr(other, name)) for name in self._equal_names())
+
+    def _equal_names(self) -> list[str]:
+        """What must be equal."""
+        return [field.name for field in fields(self) if field.compare]  # type: ignore[arg-type]
 
     __hash__ = None  # type: ignore[assignment]
 
@@ -54,17 +57,23 @@ class Candidates(PlainData):
     def __len__(self) -> int:
         return len(self.command)
 
+    def beside(self, others: "Candidates") -> "Candidates":
+        """These, then others."""
+        names = ("command", "wrench", "err_norm", "effort", "power")
+        both = {name: np.concatenate([getattr(self, name), getattr(others, name)]) for name in names}
+        return Candidates(**both, source=self.source + others.source)
+
 
 class Solution(NamedTuple):
-    """What a method's solver returns for N targets on the n healthy fins of one layout."""
+    """What a method answers to N targets with the n healthy fins of its layout."""
 
     command: Array
     """Chosen commands (N, n, 3)."""
-    wrench_surrogate: Array | None = None
-    """Wrench (N, 6) that the method itself believed, where it used a model of its own."""
+    bound: Array | None = None
+    """Power (N,) [W] that no answer can undercut; None for methods that prove none."""
+    wrench: Array | None = None
+    """Wrench (N, 6) that the method itself expects, where it has a model of its own."""
     candidates: Callable[[], Candidates] | None = None
     """Gives the refined candidates, for a single target."""
     samples: Callable[[], Candidates] | None = None
     """Gives the raw candidates before refinement, for a single target."""
-    alternatives: Callable[[], Candidates] | None = None
-    """Gives many refined answers to a single target, the chosen one first, by a wider search."""

@@ -20,7 +20,7 @@ WRENCH_COLUMNS = tuple(f"{axis} [{'N' if axis.startswith('F') else 'N m'}]" for 
 def fin_rows(result: Allocation) -> list[tuple[str, ...]]:
     """Name and cells of each fin; a failed one has no cells."""
     rows: list[tuple[str, ...]] = []
-    for name, command, force in zip(result.fins, result.command, result.fin_forces, strict=True):
+    for name, command, force in zip(result.fins, result.command, result.forces, strict=True):
         if name in result.failed:
             rows.append((name,))
             continue
@@ -40,8 +40,9 @@ def wrench_rows(result: Allocation) -> list[tuple[str, ...]]:
 def summary(result: Allocation) -> str:
     """The figures of an answer in one line."""
     source = f", checkpoint {result.checkpoint}" if result.checkpoint else ""
+    effort = "" if result.effort is None else f"effort {result.effort:.3f}   "
     return (
-        f"err_norm {result.err_norm:.2e}   power {result.power:.3f} W   effort {result.effort:.3f}   "
+        f"err_norm {result.err_norm:.2e}   power {result.power:.3f} W   {effort}"
         f"{result.solve_ms:.1f} ms   method {result.method}{source}"
     )
 
@@ -53,7 +54,7 @@ def remarks(result: Allocation) -> list[str]:
         # With fins that the method does not know, what is missing says nothing about the robot.
         return words
     limits = f"; {', '.join(result.binding)}" if result.binding else ""
-    return [f"not reached: {100 * result.scale:.0f} % of the wrench is delivered{limits}", *words]
+    return [f"not reached: {100 * result.share:.0f} % of the wrench is delivered{limits}", *words]
 
 
 def allocation_text(result: Allocation) -> str:

@@ -12,7 +12,6 @@ import runpy
 import sys
 import time
 from collections.abc import Callable
-from dataclasses import replace
 from functools import lru_cache
 from importlib import import_module
 from pathlib import Path
@@ -21,13 +20,13 @@ from typing import Any
 import numpy as np
 
 from finlab.allocation.allocator import Allocator
+from finlab.allocation.policy import CLOSEST, Policy
 from finlab.arrays import Array
 from finlab.bench.protocol import CPU, GREETING
 from finlab.errors import DataError, FinlabError
 from finlab.evaluation.method_specs import load_method_spec
 from finlab.layout import Layout
 from finlab.layout.file import parse_layout
-from finlab.networks.normalization import Normalization
 
 KNOWN = ("targets", "layout", "robot", "sigma", "previous")
 """Parameters that a function may have."""
@@ -62,26 +61,20 @@ def load_callable(name: str) -> Callable[..., Any]:
 
 
 def finlab_method(name: str) -> Callable[..., Array]:
-    """One of finlab's methods as a function, told what the benchmark divides errors by; `paper` keeps what
-    its network was trained with."""
-    base = load_method_spec(name)
-    made: dict[Layout, Allocator] = {}
+    """One of finlab's methods as a function, told what the benchmark divides errors by, where it
+    can weigh axes."""
+    method = load_method_spec(name)
+    made: dict[Layout, tuple[Allocator, Policy]] = {}
 
     def answer(layout: Layout, targets: Array, sigma: Array, previous: Array | None) -> Array:
         if layout not in made:
-            made[layout] = base if base.name == "paper" else _with_sigma(base, sigma)
-        return made[layout].allocate(layout, targets[0], previous=previous).command[None]
+            allocator = method.on(layout)
+            weighs = Policy(axis_weights=tuple((allocator.scale / sigma).tolist()))
+            made[layout] = allocator, weighs if method.choice.kind.every_policy else CLOSEST
+        allocator, policy = made[layout]
+        return allocator.allocate(targets[0], policy=policy, previous=previous).command[None]
 
     return answer
-
-
-def _with_sigma(method: Allocator, sigma: Array) -> Allocator:
-    """The same method with another scale of the error; what the network of `mdn` sees has none."""
-    make: Any = type(method)
-    own = Normalization(np.zeros(6), sigma)
-    known = own if method.weights is None else replace(method.weights, normalization=own)
-    made: Allocator = make(known, **method.options)
-    return made
 
 
 @lru_cache(2)

@@ -21,7 +21,7 @@ def allocate(
     layout: Annotated[Positional[str], arg(metavar="LAYOUT")],
     wrench: Annotated[Wrench, arg(metavar="FX FY FZ TX TY TZ")],
     failed: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME")] = (),
-    method: Annotated[str, arg(metavar="NAME")] = "search",
+    method: Annotated[str, arg(metavar="NAME")] = "dual",
     objective: Literal["power", "effort"] | None = None,
     checkpoint: Annotated[str | None, arg(metavar="NAME|FOLDER")] = None,
     policy: Annotated[str, arg(metavar="NAME")] = "closest",
@@ -41,7 +41,7 @@ def allocate(
         layout: layout file, layout graph file, or the name of a shipped layout.
         wrench: target in the body frame [N, N m].
         failed: name of a fin that does not work.
-        method: search, mdn, paper, qp, sqp, analytic or ipopt.
+        method: dual, mdn, paper, qp, sqp, analytic or ipopt.
         objective: what is kept least, power in watts (the default) or the paper's effort.
         checkpoint: trained checkpoint; the shipped one of the method by default.
         policy: for a wrench out of reach: closest, direction (same direction, scaled down) or priority.
@@ -55,31 +55,31 @@ def allocate(
         seed: same target, layout and seed, same answer.
         json: file for one JSON object; it is printed in place of the table where no file is named.
     """
-    from finlab.allocation import Health, load_allocator
+    from finlab.allocation import Allocator, Health
     from finlab.allocation.policy import policy_from
     from finlab.cli.inputs import open_robot
     from finlab.deploy.record import allocation_record
+    from finlab.errors import FinlabError
 
     check_json_file(json)
     robot = open_robot(layout)
     options: dict[str, Any] = {} if objective is None else {"objective": objective}
-    allocator = load_allocator(method, checkpoint=checkpoint, **options)
+    allocator = Allocator(robot.layout, method, checkpoint=checkpoint, **options)
     answer = policy_from(policy, axis_weights, priority)
     damage = Health.parse(health, stuck, running)
     lost = robot.with_failed(failed)
     result = allocator.allocate(
-        robot.layout, wrench, failed=lost, policy=answer, health=damage, flow=flow, seed=seed
+        wrench, failed=lost, policy=answer, health=damage, flow=flow, seed=seed
     )
     lost_axes = axes_lost(robot.layout, result.layout, lost) if lost or damage is not None else None
-    least = allocator.bound(result) if bound else None
     record, lines = allocation_record(result), [str(result)]
     if lost_axes is not None:
         record["axes"] = lost_axes
         lines.append(loss_text(lost_axes))
-    if least is not None:
-        record["bound"] = least
-        unit = "" if objective == "effort" else " W"
-        lines.append(f"no exact answer has less {objective or 'power'} than {least:.4g}{unit}")
+    if bound and result.bound is None:
+        raise FinlabError(f"bound: method {method!r} proves none; leave --bound out")
+    if bound:
+        lines.append(f"no exact answer takes less than {result.bound:.4g} W")
     put_json(record, json, "\n".join(lines))
 
 

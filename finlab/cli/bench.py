@@ -83,7 +83,7 @@ def _tested(methods: tuple[str, ...], commands: tuple[str, ...], cpu: bool) -> l
 
     if own := [name for name in methods if ":" not in name]:
         load_method_specs(",".join(own))  # a wrong name costs no time
-    tested = [BenchMethod.of(name, cpu) for name in methods or (() if commands else ("search",))]
+    tested = [BenchMethod.of(name, cpu) for name in methods or (() if commands else ("dual",))]
     for text in commands:
         words = shlex.split(text)
         if not words:

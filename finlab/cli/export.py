@@ -11,9 +11,9 @@ def export(
     output: Annotated[Path, arg(metavar="DIR|FILE.graph.json", aliases=["-o"])],
     zip: bool = False,
     failed: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME")] = (),
-    method: Literal["search", "mdn"] = "search",
+    method: Literal["dual", "mdn"] = "dual",
     objective: Literal["power", "effort"] = "power",
-    checkpoint: Annotated[str, arg(metavar="NAME|FOLDER")] = "default",
+    checkpoint: Annotated[str | None, arg(metavar="NAME|FOLDER")] = None,
 ) -> None:
     """Write the deployment bundle: layout graph, the fins' physics, settings, README and checksums.
 
@@ -24,7 +24,7 @@ def export(
         failed: name of a fin that does not work.
         method: who answers on the robot; the networks of mdn travel with it.
         objective: what the robot keeps least, power in watts or the paper's effort.
-        checkpoint: checkpoint with the yardstick of errors, and the networks of mdn.
+        checkpoint: of mdn, the shipped one by default.
     """
     from finlab.cli.inputs import open_robot
     from finlab.errors import FinlabError
@@ -37,20 +37,20 @@ def export(
         raise FinlabError(f"{output}: expected a file name that ends in {SUFFIX}, or a folder")
     robot = open_robot(layout)  # before a network is loaded
     failed = robot.with_failed(failed)
-    from finlab.allocation import load_allocator
+    from finlab.allocation import Allocator
 
-    allocator = load_allocator(method, checkpoint=checkpoint, objective=objective)
+    allocator = Allocator(robot.layout, method, checkpoint=checkpoint, objective=objective)
     if graph_alone:
         from finlab.deploy.bundle import write_graph_and_tables
         from finlab.deploy.graph import build_graph
 
-        graph = build_graph(robot.layout, allocator, failed)
+        graph = build_graph(allocator, failed)
         write_graph_and_tables(graph, output)
         print(f"{output}: {robot.layout.n_fins} fins, {len(graph.self_test)} self-tests, method {method}")
         return
     from finlab.deploy.bundle import make_bundle
 
-    bundle = make_bundle(robot.layout, allocator, failed)
+    bundle = make_bundle(allocator, failed)
     if zip:
         output = output if output.suffix == ".zip" else output.with_name(output.name + ".zip")
         bundle.write_zip(output)

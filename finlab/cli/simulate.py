@@ -28,7 +28,7 @@ def simulate(
     fail: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME@SECONDS[:KIND]")] = (),
     announced: bool = True,
     monitor: bool = False,
-    method: Annotated[str, arg(metavar="NAME")] = "search",
+    method: Annotated[str, arg(metavar="NAME")] = "dual",
     objective: Literal["power", "effort"] = "power",
     duration: Annotated[float | None, arg(metavar="SECONDS")] = None,
     plant: Annotated[str, arg(metavar="NAME")] = "mean",
@@ -54,7 +54,7 @@ def simulate(
             front_left@60:whole (it is repaired).
         announced: whether what happens to fins is announced to the allocator.
         monitor: let a FaultMonitor watch the robot and tell the allocator what it finds.
-        method: search, mdn, paper, qp, sqp, analytic, ipopt or on-board.
+        method: dual, mdn, paper, qp, sqp, analytic, ipopt or on-board.
         objective: what the method keeps least: power in watts, or effort, the paper's J_en.
         duration: time for a shipped trajectory.
         plant: what the fins really do: mean (the fin law), ripple (within the flapping cycle), flexible (fins
@@ -97,7 +97,7 @@ def simulate(
             pilot = _controller(robot.layout, controller)
             loop = ClosedLoop(
                 robot.layout,
-                load_method_spec(method, checkpoint, objective),
+                load_method_spec(method, checkpoint, objective).on(robot.layout),
                 make_trajectory(trajectory, duration),
                 pilot,
                 plant=plant,

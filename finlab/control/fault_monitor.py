@@ -44,7 +44,7 @@ class FaultMonitor:
         monitor = FaultMonitor(layout)
         while swimming:
             verdict = monitor.step(measurement, command)  # the command that was in force until now
-            answer = allocator.allocate(layout, wrench, **verdict.damage._asdict())
+            answer = allocator.allocate(wrench, **verdict.damage._asdict())
             command = monitor.probed(answer.command)
 
     A fin that rests cannot be distinguished from one that is lost: its probability stays where it was.

@@ -1,7 +1,7 @@
 """The bundle that a robot runs: layout graph, the fins' physics, settings, a README and checksums.
 
-`finlab.load_layout` and `finlab.load_allocator` read it, so the robot runs the library itself. The same
-layout and settings give the same bytes, as a folder and as a zip archive.
+`finlab.load_layout` and `finlab.Allocator.from_bundle` read it, so the robot runs the library itself. The
+same layout and settings give the same bytes, as a folder and as a zip archive.
 """
 
 import io
@@ -16,7 +16,6 @@ import finlab
 from finlab.actuators.fin.table_file import table_bytes
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.bundle_settings import METHODS_ON_BOARD, about_bundle
-from finlab.allocation.search.search_allocator import SearchAllocator
 from finlab.bundle_files import (
     ABOUT,
     CHECKPOINT,
@@ -85,12 +84,11 @@ class Bundle:
         return buffer.getvalue()
 
 
-def make_bundle(layout: Layout, allocator: Allocator, failed: tuple[str, ...] = ()) -> Bundle:
-    """Prepare a layout for a robot with the method and settings of an allocator.
+def make_bundle(allocator: Allocator, failed: tuple[str, ...] = ()) -> Bundle:
+    """Prepare what a robot runs: the robot, method and settings of an allocator.
 
     Args:
-        layout: the robot, failed fins included.
-        allocator: of method `search` or `mdn`.
+        allocator: of method `dual` or `mdn`.
         failed: names of fins that do not work.
 
     Raises:
@@ -98,11 +96,11 @@ def make_bundle(layout: Layout, allocator: Allocator, failed: tuple[str, ...] = 
         AllocationError: the method cannot run from a bundle.
         DataError: a force table cannot be read, or is too large to travel.
     """
-    if not isinstance(allocator, SearchAllocator):
+    if allocator.method not in METHODS_ON_BOARD:
         raise AllocationError(
-            f"method {allocator.name!r} cannot be exported; a bundle runs {' or '.join(METHODS_ON_BOARD)}"
+            f"method {allocator.method!r} cannot be exported; a bundle runs {' or '.join(METHODS_ON_BOARD)}"
         )
-    graph = build_graph(layout, allocator, failed)
+    layout, graph = allocator.layout, build_graph(allocator, failed)
     inside, tables = with_tables_inside(layout)
     checkpoint = {} if allocator.weights is None else checkpoint_files(allocator.weights)
     files = {

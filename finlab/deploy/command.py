@@ -51,7 +51,7 @@ def check(arguments: argparse.Namespace) -> int:
     robot = _robot(arguments)
     print(
         f"{arguments.bundle}: {robot.layout.name}, {robot.layout.n_fins} fins, "
-        f"method {robot.allocator.name}, ready in {time.perf_counter() - arguments.started:.2f} s"
+        f"method {robot.allocator.method}, ready in {time.perf_counter() - arguments.started:.2f} s"
     )
     findings = self_check(robot)
     for finding in findings:

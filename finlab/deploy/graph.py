@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from finlab.allocation import Allocator
+from finlab.allocation.bundle_settings import normalization_of
 from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.layout.graph_form import Case
@@ -49,8 +50,8 @@ class LayoutGraph:
         return self.layout.without(self.failed) if self.failed else self.layout
 
 
-def build_graph(layout: Layout, allocator: Allocator, failed: tuple[str, ...] = ()) -> LayoutGraph:
-    """Prepare a layout for deployment with an allocator.
+def build_graph(allocator: Allocator, failed: tuple[str, ...] = ()) -> LayoutGraph:
+    """Prepare the robot of an allocator for deployment.
 
     The self-test's targets are wrenches of random commands, so each can be reached; they and everything
     else depend on the layout and the allocator alone.
@@ -59,13 +60,14 @@ def build_graph(layout: Layout, allocator: Allocator, failed: tuple[str, ...] = 
         LayoutError: an unknown failed fin, none left, or an actuator that is no fin.
         DataError: a fin's force table cannot be read.
     """
+    layout = allocator.layout
     layout.only_fins("export", horizontal=True)
     healthy = layout.without(failed) if failed else layout
     plant = plant_of(healthy)
     cases = []
     for wrench in random_targets(healthy, N_SELF_TEST):
         target = _rounded(wrench)
-        answer = _rounded(allocator.allocate(layout, target, failed=failed).command)
+        answer = _rounded(allocator.allocate(target, failed=failed).command)
         delivered = _rounded(plant.wrench(answer[~np.isnan(answer).any(axis=1)]))
         rows = tuple(
             None if name in failed else tuple(row)
@@ -76,10 +78,10 @@ def build_graph(layout: Layout, allocator: Allocator, failed: tuple[str, ...] = 
     return LayoutGraph(
         layout=layout,
         failed=tuple(failed),
-        normalization=allocator.normalization,
+        normalization=normalization_of(allocator),
         checkpoint=None if weights is None else weights.name,
         checkpoint_sha256=None if weights is None else weights.sha256,
-        method=allocator.name,
+        method=allocator.method,
         self_test=tuple(cases),
     )
 

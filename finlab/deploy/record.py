@@ -8,27 +8,28 @@ from finlab.arrays import Array
 
 def allocation_record(result: Allocation) -> dict[str, object]:
     """The JSON object of an answer; its keys are a contract."""
-    surrogate = result.wrench_surrogate
+    expected = result.wrench_expected
     return {
         "fins": list(result.fins),
         "failed": list(result.failed),
         "command": command_rows(result.command),
         "target": result.target.tolist(),
         "flow": None if result.flow is None else result.flow.tolist(),
-        "wrench_surrogate": None if surrogate is None else surrogate.tolist(),
+        "wrench_expected": None if expected is None else expected.tolist(),
         "wrench_plant": result.wrench.tolist(),
         "unallocated": result.unallocated.tolist(),
         "err_norm": result.err_norm,
+        "expected_error": result.expected_error,
         "effort": result.effort,
         "power": result.power,
-        "sigma": result.sigma.tolist(),
+        "bound": result.bound,
+        "scale": result.scale.tolist(),
         "solve_ms": result.solve_ms,
         "method": result.method,
         "checkpoint": result.checkpoint,
         "reachable": result.reachable,
-        "scale": result.scale,
+        "share": result.share,
         "binding": list(result.binding),
-        "evaluated_by": result.evaluated_by,
         "unknown_fins": list(result.unknown_fins),
         "notes": list(result.notes),
     }

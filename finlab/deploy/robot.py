@@ -9,10 +9,10 @@ from numpy.typing import ArrayLike
 
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.allocator import Allocator
-from finlab.allocation.bundle_settings import METHODS_ON_BOARD
-from finlab.allocation.methods import allocator_from_bundle, load_allocator
+from finlab.allocation.bundle_settings import METHODS_ON_BOARD, read_about
+from finlab.allocation.methods import LEARNED, bundled_method
 from finlab.allocation.policy import CLOSEST, Policy
-from finlab.allocation.search.search_allocator import SearchAllocator
+from finlab.allocation.settings import AimSettings
 from finlab.arrays import Array
 from finlab.assets import shipped_checkpoints
 from finlab.bundle_files import ABOUT, GRAPH, Files, check_bundle_files, is_bundle, read_bundle_files
@@ -21,6 +21,7 @@ from finlab.deploy.graph_file import parse_graph, read_graph
 from finlab.errors import AllocationError, DataError
 from finlab.layout import Layout
 from finlab.layout.load import bundle_graph_text
+from finlab.physics.objective import Objective
 
 
 @dataclass(frozen=True)
@@ -29,13 +30,19 @@ class DeployedRobot:
 
     graph: LayoutGraph
     """The robot, failed fins included, and self-tests."""
-    allocator: SearchAllocator
+    allocator: Allocator
     """Made of the bundle's settings and, where there are any, networks."""
 
     @property
     def layout(self) -> Layout:
         """All fins."""
         return self.graph.layout
+
+    @property
+    def objective(self) -> Objective:
+        """What is kept least."""
+        settings = self.allocator.settings
+        return settings.aim if isinstance(settings, AimSettings) else Objective()
 
     def lost(self, failed: Sequence[str] = ()) -> tuple[str, ...]:
         """Fins that the bundle names as failed stay failed, whatever `failed` adds."""
@@ -59,7 +66,6 @@ class DeployedRobot:
         """
         lost = self.lost(failed)
         answer = self.allocator.allocate(
-            self.layout,
             wrench,
             failed=lost,
             previous=previous,
@@ -97,25 +103,24 @@ def load_robot(path: str | os.PathLike[str]) -> DeployedRobot:
         raise DataError(f"{path}: is a layout file; run what `finlab export {path} -o DIR` makes of it")
     else:
         robot = _graph_robot(read_graph(path), str(path))
-    robot.allocator.pipeline.prepare(robot.graph.healthy)  # fins are compiled now, not at the first answer
+    if robot.graph.failed:  # what is left is prepared now, not at the first answer
+        robot.allocator.allocate(np.zeros(6), failed=robot.graph.failed)
     return robot
 
 
 def _graph_robot(graph: LayoutGraph, source: str) -> DeployedRobot:
-    allocator: Allocator | None = None
-    if graph.method == SearchAllocator.name:
-        allocator = SearchAllocator(graph.normalization)
-    elif graph.method in METHODS_ON_BOARD and graph.checkpoint in shipped_checkpoints():
-        allocator = load_allocator(graph.method, checkpoint=graph.checkpoint)
-    if not isinstance(allocator, SearchAllocator) or _sha256(allocator) != graph.checkpoint_sha256:
-        raise DataError(
-            f"{source}: was made for method {graph.method!r}, whose networks are not here; run the bundle "
-            "that `finlab export LAYOUT -o DIR` makes, which brings them"
-        )
-    return DeployedRobot(graph, allocator)
+    learned = graph.method in LEARNED
+    if graph.method in METHODS_ON_BOARD and (not learned or graph.checkpoint in shipped_checkpoints()):
+        allocator = Allocator(graph.layout, graph.method, checkpoint=graph.checkpoint if learned else None)
+        if _sha256(allocator) == graph.checkpoint_sha256:
+            return DeployedRobot(graph, allocator)
+    raise DataError(
+        f"{source}: was made for method {graph.method!r}, whose networks are not here; run the bundle that "
+        "`finlab export LAYOUT -o DIR` makes, which brings them"
+    )
 
 
-def _sha256(allocator: SearchAllocator) -> str | None:
+def _sha256(allocator: Allocator) -> str | None:
     return None if allocator.weights is None else allocator.weights.sha256
 
 
@@ -126,10 +131,9 @@ def parse_robot(files: Files, source: str = "bundle") -> DeployedRobot:
     """
     check_bundle_files(files, source)
     graph = parse_graph(bundle_graph_text(files, source))
-    allocator = allocator_from_bundle(files, source)
-    assert isinstance(allocator, SearchAllocator)
+    allocator = Allocator.of_choice(graph.layout, bundled_method(files, source))
     if _sha256(allocator) != graph.checkpoint_sha256:
         raise DataError(f"{source}: {GRAPH} and the weights are of different checkpoints; export again")
-    if not all(map(np.array_equal, allocator.normalization, graph.normalization)):
+    if not all(map(np.array_equal, read_about(files, source).normalization, graph.normalization)):
         raise DataError(f"{source}: {GRAPH} and {ABOUT} differ in normalization; export again")
     return DeployedRobot(graph, allocator)

@@ -15,7 +15,7 @@ from finlab.deploy.robot import DeployedRobot
 from finlab.errors import DataError
 from finlab.physics import plant_of
 
-ERROR_TOLERANCE = 1e-4
+ERROR_TOLERANCE = 1e-5
 """Normalized error by which an answer may be worse than the stored one."""
 COST_TOLERANCE = 0.01
 """Largest share by which an answer may cost more than the stored one."""
@@ -47,17 +47,17 @@ def self_check(robot: DeployedRobot) -> list[Finding]:
     if not cases:
         raise DataError("the bundle has no self-tests; export it again")
     alive = [i for i, name in enumerate(layout.names) if name not in failed]
-    plant, normalization = plant_of(robot.graph.healthy), robot.graph.normalization
-    cost = robot.allocator.objective.meter(plant)
+    plant, scale = plant_of(robot.graph.healthy), robot.allocator.scale
+    cost = robot.objective.meter(plant)
 
     differs, errors, worse, dearer = [], [], [], []
     for case in cases:
         stored = np.array([case.command[i] for i in alive], dtype=np.float64)
         target, delivered = np.array(case.wrench), np.array(case.delivered_wrench)
-        answer = robot.allocator.allocate(layout, case.wrench, failed=failed)
-        differs.append(float(normalization.error(plant.wrench(stored), delivered)))
+        answer = robot.allocator.allocate(case.wrench, failed=failed)
+        differs.append(float(np.linalg.norm((plant.wrench(stored) - delivered) / scale)))
         errors.append(answer.err_norm)
-        worse.append(answer.err_norm - float(normalization.error(delivered, target)))
+        worse.append(answer.err_norm - float(np.linalg.norm((delivered - target) / scale)))
         prices = cost(np.stack([answer.command[alive], stored]))
         dearer.append(float(prices[0] / max(prices[1], 1e-9)) - 1.0)
     return [

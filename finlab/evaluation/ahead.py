@@ -6,7 +6,6 @@ It divides what there is to gain: what comes of knowing how late fins are, and w
 from finlab.allocation.baselines.analytic import Analytic
 from finlab.allocation.in_time import in_time
 from finlab.arrays import Array
-from finlab.layout import Layout
 
 TICK_S = 0.1
 """Time between the wrenches of a reference [s]."""
@@ -17,5 +16,6 @@ class AnalyticAhead(Analytic):
 
     name = "analytic-ahead"
 
-    def _in_time(self, layout: Layout, target: Array, reference: Array) -> Array:
-        return in_time(layout, target, reference, TICK_S)
+    def in_time(self, target: Array, reference: Array) -> Array:
+        """See `Method`."""
+        return in_time(self.layout, target, reference, TICK_S)

@@ -2,21 +2,23 @@
 
 import re
 from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.baselines.ipopt import IpoptSettings
-from finlab.allocation.methods import load_allocator
+from finlab.allocation.methods import LEARNED, MethodChoice, checked_settings, choose_method
 from finlab.errors import AllocationError
 from finlab.evaluation.ahead import AnalyticAhead
 from finlab.evaluation.on_board import OnBoard
+from finlab.layout import Layout
 from finlab.physics.objective import Name
 
 SLOW = ("ipopt",)
 """Methods that take a tenth of a second per target, each from several starts; they run on a subsample."""
-QUICK = ("search", "mdn", "paper", "qp", "sqp", "analytic")
+QUICK = ("dual", "mdn", "paper", "qp", "sqp", "analytic")
 """Methods that run on every target."""
 OWN = (OnBoard, AnalyticAhead)
 """Methods that are for comparison alone."""
@@ -37,14 +39,35 @@ def installed_methods() -> list[str]:
     return [name for name in (*QUICK, *SLOW) if name != "ipopt" or find_spec("casadi") is not None]
 
 
+@dataclass(frozen=True)
+class MethodSpec:
+    """A method with its settings and networks, for any robot."""
+
+    name: str
+    """As the user has written it."""
+    choice: MethodChoice
+    """What it is."""
+
+    def on(self, layout: Layout) -> Allocator:
+        """Its allocator for a robot."""
+        return Allocator.of_choice(layout, self.choice)
+
+    def with_settings(self, **changes: Any) -> "MethodSpec":
+        """The same method with those of some settings changed that it knows."""
+        kind = self.choice.kind
+        known = {name: value for name, value in changes.items() if name in kind.option_names()}
+        settings = checked_settings(kind, {**vars(self.choice.settings), **known})
+        return replace(self, choice=replace(self.choice, settings=settings))
+
+
 def load_method_specs(
     names: str | Iterable[str],
     checkpoint: str | Path | None = None,
     objective: Name | None = None,
     *,
     patient: bool = False,
-) -> dict[str, Allocator]:
-    """Allocators by name, in the order of the names.
+) -> dict[str, MethodSpec]:
+    """Methods by name, in the order of the names.
 
     Args:
         names: of methods, as in `load_method_spec`; as one text with commas between.
@@ -59,36 +82,31 @@ def load_method_specs(
     listed = names.split(",") if isinstance(names, str) else names
     each = dict.fromkeys(name.strip() for name in listed if name.strip())
     if not each:
-        raise AllocationError(f"methods: expected names with commas between (search,paper), got {names!r}")
+        raise AllocationError(f"methods: expected names with commas between (dual,paper), got {names!r}")
     found = {name: load_method_spec(name, checkpoint, objective) for name in each}
     if not patient:
         return found
-    return {
-        name: method.with_settings(time_limit_s=PATIENCE_S)
-        if "time_limit_s" in method.option_names()
-        else method
-        for name, method in found.items()
-    }
+    return {name: method.with_settings(time_limit_s=PATIENCE_S) for name, method in found.items()}
 
 
 def load_method_spec(
     name: str, checkpoint: str | Path | None = None, objective: Name | None = None
-) -> Allocator:
-    """The allocator of a specification, as `finlab.load_allocator` makes it.
+) -> MethodSpec:
+    """The method of a specification.
 
     Args:
-        name: a method; `ipopt-32`, say, for 32 starts; `search-effort`, say, for an objective of its own; or
+        name: a method; `ipopt-32`, say, for 32 starts; `sqp-effort`, say, for an objective of its own; or
             `on-board`, U-CAT's own method; or `analytic-ahead`, the pseudo-inverse with the lag of the fins.
-        checkpoint: as in `load_allocator`.
+        checkpoint: of learned methods, as for `finlab.Allocator`.
         objective: what the methods that can choose keep least; each one's default where None.
 
     Raises:
         AllocationError: unknown method, or starts or an objective for a method that has none.
     """
     if own := next((kind for kind in OWN if kind.name == name), None):
-        return own(load_allocator("analytic", checkpoint=checkpoint).normalization)
+        return MethodSpec(name, MethodChoice(own, own.settings_class()))
     if named := _WITH_OBJECTIVE.fullmatch(name):
-        return load_allocator(named[1], checkpoint=checkpoint, objective=named[2])
+        return MethodSpec(name, _choice(named[1], checkpoint, objective=named[2]))
     method, starts = method_and_starts(name)
     options: dict[str, Any] = {}
     if starts is not None:
@@ -100,9 +118,12 @@ def load_method_spec(
         usual = IpoptSettings()
         limit = usual.time_limit_s * max(1.0, starts / usual.n_starts)
         options = {"n_starts": starts, "time_limit_s": limit}
-    allocator = load_allocator(method, checkpoint=checkpoint, **options)
-    chooses = objective is not None and "objective" in allocator.option_names()
-    return allocator.with_settings(objective=objective) if chooses else allocator
+    spec = MethodSpec(name, _choice(method, checkpoint, **options))
+    return spec if objective is None else spec.with_settings(objective=objective)
+
+
+def _choice(method: str, checkpoint: str | Path | None, **options: Any) -> MethodChoice:
+    return choose_method(method, checkpoint if method in LEARNED else None, **options)
 
 
 def method_and_starts(name: str) -> tuple[str, int | None]:

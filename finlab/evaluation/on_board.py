@@ -11,7 +11,6 @@ import numpy as np
 from finlab.allocation.baselines.model_based import ModelBased
 from finlab.arrays import Array
 from finlab.layout import layout_effectiveness
-from finlab.physics import Plant
 
 FREQUENCY_HZ = 2.0
 """Of the wrench driver in U-CAT's simulator; the robot itself has modes of 1.1 and 2.1 Hz."""
@@ -26,7 +25,8 @@ class OnBoard(ModelBased):
 
     name = "on-board"
 
-    def _commands(self, plant: Plant, targets: Array, seed: int) -> Array:
+    def _commands(self, targets: Array, seed: int) -> Array:
+        plant = self.plant
         planar = layout_effectiveness(plant.layout)
         force = (targets @ np.linalg.pinv(planar, rcond=1e-6).T).reshape(len(targets), plant.n_fins, 2)
         frequency = np.clip(FREQUENCY_HZ, plant.lower[:, 1], plant.upper[:, 1])

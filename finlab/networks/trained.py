@@ -2,12 +2,14 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, ClassVar, Protocol, TypeVar
 
 import numpy as np
 
 from finlab.arrays import AnyArray
 from finlab.errors import CheckpointError
+from finlab.networks.layers import single_precision
 from finlab.networks.normalization import Normalization
 
 State = Mapping[str, AnyArray]
@@ -64,6 +66,11 @@ class TrainedWeights:
     """Measured figures, each with what scored it."""
     sha256: str = ""
     """SHA-256 of the file of the weights; empty for what was not read from a file."""
+
+    @cached_property
+    def single_precision(self) -> dict[str, Any]:
+        """The network in single precision, ready to be asked; every method that is made of it shares this."""
+        return single_precision(self.network)
 
     def network_of(self, kind: type[Kind]) -> Kind:
         """The sizes of the network; a `CheckpointError` where there is none, or one of another kind."""

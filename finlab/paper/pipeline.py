@@ -1,18 +1,18 @@
 """The paper's own pipeline: sample the mixture, rank by the surrogate, refine with Adam. numpy only."""
 
-from functools import lru_cache
-from typing import Any, NamedTuple, Self
+from typing import NamedTuple
 
 import numpy as np
 
-from finlab.allocation.allocator import Allocator
 from finlab.allocation.evaluate import costs
+from finlab.allocation.method import LeastErrorMethod
+from finlab.allocation.policy import Policy
 from finlab.allocation.levenberg_marquardt import CommandProblem, refine
+from finlab.allocation.settings import Settings
 from finlab.allocation.solution import Candidates, Solution
-from finlab.arrays import AnyArray
+from finlab.arrays import AnyArray, Array
 from finlab.layout import FinModelSpec, Layout
 from finlab.layout.angles import is_full_turn
-from finlab.networks.layers import single_precision
 from finlab.networks.normalization import clamp_to_limits, to_command, to_normalized
 from finlab.networks.threads import single_threaded_products
 from finlab.networks.trained import TrainedWeights
@@ -49,7 +49,7 @@ class _Robot(NamedTuple):
     """J_en."""
 
 
-class PaperAllocator(Allocator):
+class Paper(LeastErrorMethod):
     """Mixture density network, physics-guided ranking and gradient refinement, by the printed equations."""
 
     name = "paper"
@@ -57,34 +57,32 @@ class PaperAllocator(Allocator):
     settings: PaperSettings
     weights: TrainedWeights
 
-    def __init__(self, weights: TrainedWeights, **settings: Any) -> None:
-        """Make it from trained weights; settings are fields of `PaperSettings`.
-
-        Raises:
-            AllocationError: a setting is unknown or leaves nothing to answer with.
-            CheckpointError: the checkpoint's network is of another kind.
-        """
-        self.weights, self.config = weights, weights.network_of(NetworkConfig)
+    def __init__(self, layout: Layout, settings: Settings, scale: Array, weights: TrainedWeights) -> None:
+        super().__init__(layout, settings, scale, weights)
+        self.config = weights.network_of(NetworkConfig)
         SurrogateConfig.of(weights)
-        self.checkpoint, self.normalization = weights.name, weights.normalization
+        self.normalization = weights.normalization
         self.fin_model = FinModelSpec.from_values(weights.fin_model)
-        self.settings = PaperSettings(**settings)
-        self._network = single_precision(weights.network)
+        self._network = weights.single_precision
         self._one_thread = single_threaded_products()
-        self._prepared = lru_cache(maxsize=128)(self._prepare)
+        self._robot = self._prepare(layout)
 
-    def _made_with(self, options: dict[str, Any]) -> Self:
-        return type(self)(self.weights, **options)
-
-    def _solve(self, layout: Layout, targets: AnyArray, *, seed: int, previous: AnyArray | None) -> Solution:
-        robot = self._prepared(layout)
+    def _solve(self, targets: AnyArray, *, seed: int, previous: AnyArray | None) -> Solution:
+        robot = self._robot
         if len(targets) == 1:
             with self._one_thread():
                 return self._solve_chunk(robot, targets, seed)
         starts = range(0, len(targets), CHUNK)
         parts = [self._solve_chunk(robot, targets[k : k + CHUNK], seed + k) for k in starts]
-        wrench = [part.wrench_surrogate for part in parts if part.wrench_surrogate is not None]
-        return Solution(np.concatenate([part.command for part in parts]), np.concatenate(wrench))
+        wrench = [part.wrench for part in parts if part.wrench is not None]
+        return Solution(np.concatenate([part.command for part in parts]), wrench=np.concatenate(wrench))
+
+    def alternatives(
+        self, target: AnyArray, *, policy: Policy, previous: Array | None, flow: Array | None, seed: int
+    ) -> Candidates | None:
+        """See `Method`: the refined samples."""
+        solution = self.solve(target[None], policy=policy, previous=previous, flow=flow, seed=seed)
+        return None if solution.candidates is None else solution.candidates()
 
     def _solve_chunk(self, robot: _Robot, targets: AnyArray, seed: int) -> Solution:
         settings = self.settings
@@ -96,7 +94,7 @@ class PaperAllocator(Allocator):
             chosen = _take(chosen, np.argsort(self._score(robot, chosen, wanted), axis=1, kind="stable"))
         return Solution(
             _inside(robot, chosen[:, 0]),
-            robot.surrogate.wrench(chosen[:, 0]).astype(np.float64),
+            wrench=robot.surrogate.wrench(chosen[:, 0]).astype(np.float64),
             candidates=lambda: self._candidates(robot, chosen[0], targets[0], "refined"),
             samples=lambda: self._candidates(robot, sampled[0], targets[0], "sample"),
         )

@@ -1,6 +1,6 @@
 """Simulation of a robot that swims: body, fins, sensors, and the closed loop around an allocator.
 
-    loop = ClosedLoop(layout, finlab.load_allocator(), make_trajectory("circle"), failures=[("bow", 30.0)])
+    loop = ClosedLoop(layout, finlab.Allocator(layout), make_trajectory("circle"), failures=[("bow", 30.0)])
     log = loop.run()
 
 World: z up. Body: x forward, y left, z up. SI and radians.

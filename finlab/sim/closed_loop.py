@@ -22,6 +22,7 @@ from finlab.control import (
     TrackingController,
 )
 from finlab.control.measurement import NO_WRENCH
+from finlab.errors import FinlabError
 from finlab.layout import Layout
 from finlab.layout.damage import Damage, Kind
 from finlab.physics import plant_of
@@ -46,7 +47,7 @@ AHEAD = 10
 class ClosedLoop:
     """One robot under way. Make it, then call `step` until `done`, and `fail` and `mend` in between.
 
-        loop = ClosedLoop(layout, finlab.load_allocator(), make_trajectory("lissajous"))
+        loop = ClosedLoop(layout, finlab.Allocator(layout), make_trajectory("lissajous"))
         while not loop.done:
             tick = loop.step()
 
@@ -76,7 +77,7 @@ class ClosedLoop:
 
         Args:
             layout: the robot; what its body does not say is U-CAT's.
-            allocator: any method.
+            allocator: of the layout, by any method.
             task: the path, such as `make_trajectory` gives.
             controller: by default the tracking controller of the layout.
             plant: what the fins really do; see `PLANTS`.
@@ -94,9 +95,14 @@ class ClosedLoop:
             seed: of the sensors' noise and of the allocator.
 
         Raises:
-            FinlabError: an unknown fin, plant or kind of failure, a time that is none, or a truth that has
-                other fins.
+            FinlabError: an allocator of another robot, an unknown fin, plant or kind of failure, a time that
+                is none, or a truth that has other fins.
         """
+        if allocator.layout != layout:
+            raise FinlabError(
+                f"allocator: expected one for layout {layout.name!r:.60}, got one for "
+                f"{allocator.layout.name!r:.60} or another state of it; make it with Allocator(layout)"
+            )
         events = [FinFault(*failure).checked() for failure in failures]
         layout.only_fins("a simulation")
         layout.indices([event.fin for event in events])
@@ -164,7 +170,7 @@ class ClosedLoop:
             self._ticks,
             layout=self.layout.name,
             fins=self.layout.names,
-            method=self.allocator.name,
+            method=self.allocator.method,
             controller=self.controller.name,
             task=self.task.name,
             plant=self.plant,
@@ -243,7 +249,6 @@ class ClosedLoop:
         followed = self.task.setpoint(time + lead) if lead else setpoint
         asked = whole(self.controller.wrench(now, followed, self._given()))
         answer = self.allocator.allocate(
-            self.layout,
             asked,
             **self.damage._asdict(),
             flow=self._flow,

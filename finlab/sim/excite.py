@@ -7,10 +7,14 @@ fades until it is back.
 """
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
 from finlab.allocation.allocator import Allocator
+from finlab.allocation.method import Method
+from finlab.allocation.policy import Policy
+from finlab.allocation.settings import Settings, number
 from finlab.allocation.solution import Solution
 from finlab.arrays import Array
 from finlab.control import Measurement, Setpoint
@@ -18,7 +22,7 @@ from finlab.errors import DataError
 from finlab.layout import Layout
 from finlab.layout.angles import wrapped
 from finlab.layout.arrays import layout_effectiveness
-from finlab.networks.normalization import Normalization
+from finlab.networks.trained import TrainedWeights
 from finlab.physics import plant_of
 from finlab.sim.closed_loop import ClosedLoop
 from finlab.sim.sensors import SensorSettings
@@ -99,15 +103,27 @@ class ExcitingController:
         return np.asarray(self._size * np.sin(angle).mean(axis=1))
 
 
-class ExcitingAllocator(Allocator):
+@dataclass(frozen=True)
+class ExcitingSettings(Settings):
+    """Where its randomness comes from."""
+
+    seed: int = number(0, 0, 2**63, "of the forces and amplitudes that are drawn")
+
+
+class Exciting(Method):
     """Gives a wrench with forces that also push against each other, and with amplitudes drawn at random."""
 
     name = "excitation"
+    settings_class = ExcitingSettings
+    settings: ExcitingSettings
 
-    def __init__(self, layout: Layout, seed: int = 0) -> None:
-        self.normalization = Normalization(np.zeros(6), np.ones(6))
+    def __init__(
+        self, layout: Layout, settings: Settings, scale: Array, weights: TrainedWeights | None = None
+    ) -> None:
+        super().__init__(layout, settings, scale, weights)
+        seed = self.settings.seed
         self._rng = np.random.default_rng(seed)
-        self._plant = plant_of(layout)
+        self._plant = self.plant
         self._to_force = np.linalg.pinv(layout_effectiveness(layout), rcond=1e-6)
         _, values, right = np.linalg.svd(layout_effectiveness(layout))
         rank = int((values > 1e-6 * values[0]).sum())
@@ -124,12 +140,16 @@ class ExcitingAllocator(Allocator):
         )
         self._amplitude = upper[:, 0]
 
-    @classmethod
-    def option_names(cls) -> list[str]:
-        """Nothing can be set."""
-        return []
-
-    def _solve(self, layout: Layout, targets: Array, *, seed: int, previous: Array | None) -> Solution:
+    def solve(
+        self,
+        targets: Array,
+        *,
+        policy: Policy,
+        previous: Array | None = None,
+        flow: Array | None = None,
+        seed: int = 0,
+    ) -> Solution:
+        """See `Method`; each target is a tick of the controller."""
         return Solution(np.stack([self._command(target) for target in targets]))
 
     def _command(self, target: Array) -> Array:
@@ -188,7 +208,7 @@ def excitation(
         raise DataError(f"duration: expected {SHORTEST_S:g} to {LONGEST_S:g} s, got {duration_s:g}")
     return ClosedLoop(
         layout,
-        ExcitingAllocator(layout, seed),
+        Allocator(layout, Exciting, seed=seed),
         station(duration_s, DEPTH_M, "excitation"),
         ExcitingController(layout, seed),
         plant=plant,

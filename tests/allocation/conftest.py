@@ -7,8 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from finlab.allocation import load_allocator
-from finlab.allocation.search.search_allocator import SearchAllocator
+from tests.any_robot import AnyRobot
 
 
 @pytest.fixture
@@ -28,12 +27,12 @@ def force_table(tmp_path: Path) -> str:
 
 
 @pytest.fixture(scope="session")
-def search() -> SearchAllocator:
+def search() -> AnyRobot:
     """The product's default method."""
-    return load_allocator()
+    return AnyRobot()
 
 
 @pytest.fixture(scope="session")
-def effort() -> SearchAllocator:
+def effort() -> AnyRobot:
     """The same with the paper's effort kept least."""
-    return load_allocator(objective="effort")
+    return AnyRobot(objective="effort")

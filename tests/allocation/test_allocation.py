@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from finlab.allocation import METHODS, Allocation, Allocator, Health, load_allocator
+from finlab.allocation import METHODS, Allocation, Allocator, Health
 from finlab.allocation.modes import same_signature
 from finlab.allocation.solution import equal
 from finlab.assets import shipped_checkpoints
@@ -57,7 +57,7 @@ def test_every_field_counts_but_the_time(search: Allocator) -> None:
     for changed in (
         {"command": result.command + 1e-15},
         {"command": result.command[:3]},
-        {"wrench_surrogate": result.wrench},
+        {"wrench_expected": result.wrench},
         {"power": result.power + 1e-12},
         {"candidates": replace(result.candidates, power=result.candidates.power + 1e-12)},
         {"previous": result.command},
@@ -93,10 +93,10 @@ def test_all_figures_are_those_of_the_plant(method: str) -> None:
         result = quick_allocator(method).allocate(layout, wrench, failed=failed)
         plant = Plant(layout)
         np.testing.assert_allclose(result.wrench, plant.wrench(result.command), atol=1e-12)
-        np.testing.assert_allclose(result.fin_forces, plant.fin_forces(result.command), atol=1e-12)
+        np.testing.assert_allclose(result.forces, plant.forces(result.command), atol=1e-12)
         assert result.err_norm == pytest.approx(np.linalg.norm(result.unallocated / result.sigma), abs=1e-12)
         assert result.evaluated_by == "plant" and isinstance(result.err_norm, float)
-        assert all(not np.any(result.fin_forces[i]) for i in layout.indices(failed))
+        assert all(not np.any(result.forces[i]) for i in layout.indices(failed))
 
 
 def test_what_the_user_writes_into_an_answer_stays_there(search: Allocator) -> None:
@@ -179,7 +179,7 @@ def test_another_command_is_judged_anew(search: Allocator) -> None:
     other = result.with_command(least)
     np.testing.assert_allclose(other.wrench, Plant(layout).wrench(least), atol=1e-12)
     assert not other.reachable and other.err_norm > 0.1 > result.err_norm and other.effort < result.effort
-    assert other.wrench_surrogate is None and other.target is result.target
+    assert other.wrench_expected is None and other.target is result.target
 
 
 def test_a_method_that_does_not_know_the_fins_blames_no_limit() -> None:
@@ -192,8 +192,8 @@ def test_a_method_that_does_not_know_the_fins_blames_no_limit() -> None:
     assert "not reached" not in str(result) and "the method does not know these fins: front_right" in str(
         result
     )
-    for method in ("search", "sqp"):
-        known = load_allocator(method).allocate(strange, SURGE)
+    for method in ("dual", "sqp"):
+        known = Allocator(strange, method).allocate(SURGE)
         assert known.reachable and known.unknown_fins == ()
 
 

@@ -7,15 +7,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from finlab.allocation import Allocator, Health, Policy, load_allocator
+from finlab.allocation import Allocator, Health, Policy
 from finlab.errors import LayoutError
 from finlab.layout import Layout
 from finlab.physics import plant_of
+from tests.any_robot import AnyRobot
 from tests.exhaustive import sampled
 from tests.hostile_robots import hostile_robot
 
 N_CASES = 400
-METHODS = ("search", "search", "search-effort", "mdn", "analytic", "qp", "sqp", "paper")
+METHODS = ("dual", "dual", "search-effort", "mdn", "analytic", "qp", "sqp", "paper")
 
 
 @cache
@@ -26,7 +27,7 @@ def method(name: str) -> Allocator:
         options = {"n_candidates": 4, "n_steps": 2}
     if kind == "sqp":
         options |= {"n_starts": 1, "n_steps": 4}
-    return load_allocator(kind, **options)
+    return AnyRobot(kind, **options)
 
 
 def pick(rng: np.random.Generator, values: Any) -> Any:
@@ -72,7 +73,7 @@ def ask(seed: int) -> None:
     rng = np.random.default_rng([2026, seed])
     name = pick(rng, METHODS)
     robot, allocator, how = hostile_robot(seed, 2026), method(name), policy(rng)
-    if name not in ("search", "search-effort", "mdn") and not how.is_plain and how.kind != "direction":
+    if name not in ("dual", "search-effort", "mdn") and not how.is_plain and how.kind != "direction":
         how = Policy()
     plant, asked = plant_of(robot), question(rng, robot)
     reached = plant.wrench(plant.sample(rng, (1,)))[0]
@@ -87,8 +88,8 @@ def ask(seed: int) -> None:
         except LayoutError as error:  # what damage leaves of a fin may be below all bounds
             assert "must be at least" in str(error) and "health" in asked
             return
-        modes = allocator.explore(result) if name == "search" and seed % 5 == 0 else ()
-        if name == "search" and result.reachable:
+        modes = allocator.explore(result) if name == "dual" and seed % 5 == 0 else ()
+        if name == "dual" and result.reachable:
             assert 0.0 <= allocator.bound(result) <= result.power * (1 + 1e-6) + 1e-12
         batch = allocator.allocate_batch(
             robot, [target, 0.3 * target], policy=how, failed=asked.get("failed", ())
@@ -103,7 +104,7 @@ def ask(seed: int) -> None:
         assert ((found >= limited.lower) & (found <= limited.upper))[works].all()
     healthy = result.layout.without(result.failed) if result.failed else result.layout
     wrench = plant_of(healthy).wrench(result.command[works])
-    rounding = 1e-12 * 20.0 * np.abs(result.fin_forces).sum()
+    rounding = 1e-12 * 20.0 * np.abs(result.forces).sum()
     np.testing.assert_allclose(result.wrench, wrench, rtol=1e-9, atol=rounding)
     missing = np.linalg.norm((wrench - result.target) / result.sigma)
     assert result.err_norm == pytest.approx(missing, rel=1e-6, abs=1e-9)

@@ -6,14 +6,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from finlab.allocation import Health, load_allocator
-from finlab.allocation.search.search_allocator import SearchAllocator
+from finlab.allocation import Allocator, Health
 from finlab.assets import shipped_layouts
 from finlab.cli import main
 from finlab.errors import AllocationError, FinlabError, LayoutError
 from finlab.layout import Layout, Limits, load_layout
 from finlab.layout.fin import FinModelSpec
 from finlab.physics import Plant
+from tests.any_robot import AnyRobot
 
 TARGET = [1.0, 0.3, 1.0, 0.0, 0.05, 0.1]
 
@@ -23,7 +23,7 @@ def penta() -> Layout:
     return load_layout(shipped_layouts()["penta"])
 
 
-def test_a_weak_fin_keeps_to_what_is_left(search: SearchAllocator, penta: Layout) -> None:
+def test_a_weak_fin_keeps_to_what_is_left(search: AnyRobot, penta: Layout) -> None:
     health = Health.of(weak={"bow": 0.4})
     result = search.allocate(penta, TARGET, health=health)
     assert result.err_norm < 1e-5
@@ -31,18 +31,16 @@ def test_a_weak_fin_keeps_to_what_is_left(search: SearchAllocator, penta: Layout
     amplitude, frequency, _ = result.command[penta.index("bow")]
     assert amplitude <= 0.4 * whole.amplitude[1] and frequency <= 0.4 * whole.frequency[1]
     far = search.allocate(penta, [20.0, 0, 0, 0, 0, 0], health=health)
-    assert np.linalg.norm(far.fin_forces[penta.index("bow")]) < 0.05 * np.linalg.norm(far.fin_forces)
+    assert np.linalg.norm(far.forces[penta.index("bow")]) < 0.05 * np.linalg.norm(far.forces)
 
 
 @pytest.mark.parametrize("kind", ["drag", "lighthill", "soft"])
-def test_a_torn_fin_gives_its_share_at_every_command(
-    search: SearchAllocator, penta: Layout, kind: str
-) -> None:
+def test_a_torn_fin_gives_its_share_at_every_command(search: AnyRobot, penta: Layout, kind: str) -> None:
     fins = tuple(replace(fin, model=FinModelSpec(kind)) for fin in penta.fins)
     layout, bow = replace(penta, actuators=fins), penta.index("bow")
     result = search.allocate(layout, TARGET, health=Health.of(thrust={"bow": 0.4}))
     assert result.err_norm < 1e-5
-    told, law = result.fin_forces, Plant(layout).fin_forces(result.command)
+    told, law = result.forces, Plant(layout).forces(result.command)
     assert np.linalg.norm(law[bow]) > 0.01, "the fin is in use"
     np.testing.assert_allclose(told[bow], 0.4 * law[bow], rtol=1e-9)
     np.testing.assert_allclose(np.delete(told, bow, 0), np.delete(law, bow, 0), rtol=1e-9)
@@ -55,23 +53,23 @@ def test_the_thrust_of_a_table_cannot_be_scaled() -> None:
         Health.of(thrust={"bow": 1.5})
 
 
-def test_a_stuck_fin_points_where_it_stays(search: SearchAllocator, penta: Layout) -> None:
+def test_a_stuck_fin_points_where_it_stays(search: AnyRobot, penta: Layout) -> None:
     for angle in (0.7, -2.0, 0.7 + 2 * math.pi):
         result = search.allocate(penta, TARGET, health=Health.of(stuck={"bow": angle}))
         assert result.err_norm < 1e-5
         assert math.cos(result.command[penta.index("bow"), 2] - angle) == pytest.approx(1.0)
 
 
-@pytest.mark.parametrize("method", ["search", "sqp"])
+@pytest.mark.parametrize("method", ["dual", "sqp"])
 def test_the_force_of_a_running_fin_is_made_up_for(method: str, penta: Layout) -> None:
     kept = (0.4, 1.2, 1.0)
-    result = load_allocator(method).allocate(penta, TARGET, health=Health.of(running={"bow": kept}))
+    result = Allocator(penta, method).allocate(TARGET, health=Health.of(running={"bow": kept}))
     np.testing.assert_allclose(result.command[penta.index("bow")], kept)
-    assert result.err_norm < (1e-5 if method == "search" else 0.02)
+    assert result.err_norm < (1e-5 if method == "dual" else 0.02)
     np.testing.assert_allclose(result.wrench, Plant(penta).wrench(result.command), atol=1e-12)
 
 
-def test_damage_and_failures_go_together(search: SearchAllocator, penta: Layout) -> None:
+def test_damage_and_failures_go_together(search: AnyRobot, penta: Layout) -> None:
     name = penta.names[1]
     result = search.allocate(penta, TARGET, failed=[name], health=Health.of(stuck={"bow": 0.2}))
     assert np.isnan(result.command[1]).all() and result.command[penta.index("bow"), 2] == pytest.approx(0.2)
@@ -86,7 +84,7 @@ def test_whole_fins_are_left_alone(penta: Layout) -> None:
     assert same.count(False) == 1
 
 
-def test_nonsense_is_refused(search: SearchAllocator, penta: Layout) -> None:
+def test_nonsense_is_refused(search: AnyRobot, penta: Layout) -> None:
     for bad in (
         {"weak": {"bow": 0.0}},
         {"weak": {"bow": 1.5}},

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from finlab import load_allocator, load_layout
+from finlab import load_layout
+from finlab.allocation import Allocator
 from finlab.allocation.in_time import in_time
 from finlab.errors import CommandError
 from finlab.evaluation.method_specs import load_method_spec
@@ -42,14 +43,14 @@ def test_after_the_last_wrench_comes_the_last() -> None:
 
 def test_the_default_method_answers_it_and_others_answer_the_present() -> None:
     robot, now, later = load_layout("A"), np.array([1.0, 0, 0.5, 0, 0, 0]), [[3.0, 0, 0, 0, 0, 0]] * 9
-    for name, answered in (("search", later[0]), ("analytic-ahead", later[0]), ("analytic", now)):
+    for name, answered in (("dual", later[0]), ("analytic-ahead", later[0]), ("analytic", now)):
         result = load_method_spec(name).allocate(robot, now, reference=later)
         np.testing.assert_array_equal(result.target, answered)
         np.testing.assert_allclose(result.wrench, answered, atol=1e-3)
-    slower = load_allocator(period_s=0.4).allocate(robot, now, reference=[[2.0, 0, 0, 0, 0, 0], *later])
+    slower = Allocator(robot, period_s=0.4).allocate(now, reference=[[2.0, 0, 0, 0, 0, 0], *later])
     assert 2.0 < slower.target[0] < 3.0, "by then hardly two ticks have gone by"
 
 
 def test_what_cannot_be_expected_is_named() -> None:
     with pytest.raises(CommandError, match=r"^reference: expected an array of shape \(N, 6\)"):
-        load_allocator().allocate(load_layout("A"), np.zeros(6), reference=np.zeros(6))
+        Allocator(load_layout("A")).allocate(np.zeros(6), reference=np.zeros(6))

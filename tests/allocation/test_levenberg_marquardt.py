@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from finlab.allocation.levenberg_marquardt import CommandProblem, refine
-from finlab.allocation.search.search_allocator import SearchAllocator
 from finlab.layout import Fin, FinModelSpec, Layout, Limits, random_layout
+from tests.any_robot import AnyRobot
 
 
-def problem_of(search: SearchAllocator, layout: Layout) -> CommandProblem:
+def problem_of(search: AnyRobot, layout: Layout) -> CommandProblem:
     return search.pipeline.prepare(layout).commands
 
 
@@ -47,7 +47,7 @@ HOSTILE = {
 
 
 @pytest.mark.parametrize("limits", ["nominal", "varied"])
-def test_never_makes_it_worse_and_mostly_much_better(limits: str, search: SearchAllocator) -> None:
+def test_never_makes_it_worse_and_mostly_much_better(limits: str, search: AnyRobot) -> None:
     before, after = [], []
     for seed in range(5000, 5010):
         layout = random_layout(np.random.default_rng(seed), limits=limits)  # type: ignore[arg-type]
@@ -64,7 +64,7 @@ def test_never_makes_it_worse_and_mostly_much_better(limits: str, search: Search
     assert np.median(first) > 0.5 and (last < 0.05 * first).mean() > 0.7
 
 
-def test_finds_the_way_back_from_nearby(search: SearchAllocator) -> None:
+def test_finds_the_way_back_from_nearby(search: AnyRobot) -> None:
     problem = problem_of(search, random_layout(np.random.default_rng(5003), n_fins=5))
     middle = problem.lower + (0.3 + 0.4 * np.random.default_rng(0).uniform(size=(30, 5, 3))) * (
         problem.upper - problem.lower
@@ -84,7 +84,7 @@ STRONG = {
 
 @pytest.mark.parametrize(("model", "limits"), STRONG.values(), ids=list(STRONG))
 def test_strong_fins_on_long_levers_give_numbers(
-    model: FinModelSpec, limits: Limits, search: SearchAllocator
+    model: FinModelSpec, limits: Limits, search: AnyRobot
 ) -> None:
     """Their derivatives are large and of too low a rank: without a relative ridge a step is no number.
 
@@ -99,7 +99,7 @@ def test_strong_fins_on_long_levers_give_numbers(
     assert np.isfinite(refined.command).all() and np.isfinite(refined.error).all()
 
 
-def test_a_start_a_whole_turn_off_is_the_same_start(search: SearchAllocator) -> None:
+def test_a_start_a_whole_turn_off_is_the_same_start(search: AnyRobot) -> None:
     limits = Limits(zero_direction=(0.0, 2.0 * math.pi))
     problem = problem_of(search, Layout("one", (Fin("a", (0.0, 0.0, 0.0), 0.0, limits),)))
     start = np.array([[[0.4, 1.5, -1.0]]])
@@ -108,7 +108,7 @@ def test_a_start_a_whole_turn_off_is_the_same_start(search: SearchAllocator) -> 
     assert refined.error[0] < 1e-9
 
 
-def test_commands_without_room_stay_bit_for_bit(search: SearchAllocator) -> None:
+def test_commands_without_room_stay_bit_for_bit(search: AnyRobot) -> None:
     problem = problem_of(search, HOSTILE["no width"])
     refined = refine(problem, np.random.default_rng(0).normal(size=(10, 6)), draw(problem, 10, 1), 10)
     assert (refined.command[:, 0] == [0.3, 1.0, 0.5]).all()
@@ -116,7 +116,7 @@ def test_commands_without_room_stay_bit_for_bit(search: SearchAllocator) -> None
     assert np.ptp(refined.command[:, 1, 0]) > 0.01  # what has room moves
 
 
-def test_rows_do_not_see_each_other(search: SearchAllocator) -> None:
+def test_rows_do_not_see_each_other(search: AnyRobot) -> None:
     problem = problem_of(search, random_layout(np.random.default_rng(5004), n_fins=4))
     target, start = problem.wrench(draw(problem, 6, 1)), draw(problem, 6, 2)
     together = refine(problem, target, start, 8)
@@ -125,7 +125,7 @@ def test_rows_do_not_see_each_other(search: SearchAllocator) -> None:
         np.testing.assert_allclose(together.error[row], alone.error[0], rtol=1e-3, atol=1e-6)
 
 
-def test_a_direction_may_cross_the_seam(search: SearchAllocator) -> None:
+def test_a_direction_may_cross_the_seam(search: AnyRobot) -> None:
     # The answer lies just across +-pi from the start, and nearly a full turn away the other way round.
     problem = problem_of(search, Layout("one", (Fin("a", (0.0, 0.0, 0.0), 0.0),)))
     start = np.array([[[0.4, 1.5, math.pi - 0.1]]])

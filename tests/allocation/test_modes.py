@@ -5,7 +5,6 @@ import math
 import numpy as np
 import pytest
 
-from finlab.allocation import load_allocator
 from finlab.allocation.modes import (
     ModeSignature,
     cluster,
@@ -15,11 +14,11 @@ from finlab.allocation.modes import (
     same_signature,
     signature_difference,
 )
-from finlab.allocation.search.search_allocator import SearchAllocator
 from finlab.allocation.solution import Candidates
 from finlab.assets import shipped_layouts
 from finlab.layout import load_layout
 from finlab.physics import Plant
+from tests.any_robot import AnyRobot
 
 LOWER, UPPER = np.tile([0.05, 0.1, -math.pi], (2, 1)), np.tile([0.6, 2.1, math.pi], (2, 1))
 PUSH, REST = (0.4, 1.5, 0.0), (0.05, 0.1, 0.0)
@@ -51,7 +50,7 @@ def test_a_fin_rests_by_its_own_law() -> None:
     assert mode_signature(command, np.array([2.0, 0.0, 0.0])).resting == (1,)
     assert mode_signature(command, np.zeros(3)).resting == ()
     layout = load_layout("mixed")
-    allocator = load_allocator()
+    allocator = AnyRobot()
     for mode in allocator.explore(allocator.allocate(layout, [1.2, 0, 0, 0, 0, 0.25])):
         force = force_sizes(layout, mode.command)
         assert mode.resting == tuple(np.flatnonzero(force < 0.15 * force.max()))
@@ -70,7 +69,7 @@ def test_angles_are_compared_the_shorter_way_round() -> None:
     assert not same_signature(one, signature_of(np.array([PUSH, (0.4, 1.5, 0.6 - math.pi)])))
 
 
-def test_modes_of_an_answer_deliver_the_wrench_in_different_ways(search: SearchAllocator) -> None:
+def test_modes_of_an_answer_deliver_the_wrench_in_different_ways(search: AnyRobot) -> None:
     layout = load_layout(shipped_layouts()["penta"])
     target = np.array([1.0, 0.5, 2.0, 0.0, 0.1, 0.1])
     before = search.allocate(layout, 0.9 * target).command
@@ -89,7 +88,7 @@ def test_modes_of_an_answer_deliver_the_wrench_in_different_ways(search: SearchA
 
 def test_a_method_with_one_answer_tells_no_modes() -> None:
     layout = load_layout(shipped_layouts()["A"])
-    analytic = load_allocator("analytic")
+    analytic = AnyRobot("analytic")
     assert analytic.explore(analytic.allocate(layout, [1, 0, 0, 0, 0, 0])) == ()
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from finlab.allocation import load_allocator
+from finlab.allocation import Allocator
 from finlab.allocation.notes import fin_notes
 from finlab.errors import DataError
 from finlab.layout import Fin, FinModelSpec, Layout, Limits, load_layout
@@ -29,13 +29,13 @@ def test_the_shipped_robots_need_no_note(name: str) -> None:
 
 def test_a_fin_that_cannot_rest_is_named_with_its_forces() -> None:
     layout = robot(Limits((0.3, 0.6), (1.0, 2.0)))
-    (note,) = load_allocator("analytic").allocate(layout, [0.5, 0, 0, 0, 0, 0]).notes
+    (note,) = Allocator(layout, "analytic").allocate([0.5, 0, 0, 0, 0, 0]).notes
     least, most = (4.73741 * (f * np.sin(a)) ** 2 for a, f in ((0.3, 1.0), (0.6, 2.0)))
     assert note.startswith(
         f"fin a cannot rest: within its limits it always pushes with at least {least:.3g} N"
     )
     assert f"of at most {most:.3g} N" in note
-    assert load_allocator().allocate_batch(layout, np.zeros((2, 6))).notes == (note,)
+    assert Allocator(layout).allocate_batch(np.zeros((2, 6))).notes == (note,)
 
 
 def test_limits_beyond_a_table_are_told_until_the_table_is_wider(tmp_path: Path) -> None:
@@ -62,7 +62,7 @@ def test_a_table_without_thrust_within_the_limits_is_refused(tmp_path: Path) -> 
     with pytest.raises(
         DataError, match="gives no thrust within the fin's limits, amplitudes 0.05 to 0.2 rad"
     ):
-        load_allocator("analytic").allocate(layout, [0.5, 0, 0, 0, 0, 0])
+        Allocator(layout, "analytic").allocate([0.5, 0, 0, 0, 0, 0])
 
 
 def test_a_layout_whose_fit_is_doubtful_says_so_with_every_answer() -> None:

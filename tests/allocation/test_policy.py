@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from finlab.allocation import METHODS, Allocation, load_allocator
+from finlab.allocation import METHODS, Allocation, Allocator
 from finlab.allocation.policy import (
     AXES,
     CLOSEST,
@@ -14,12 +14,12 @@ from finlab.allocation.policy import (
     largest_share,
     policy_from,
 )
-from finlab.allocation.search.search_allocator import SearchAllocator
 from finlab.assets import shipped_layouts
 from finlab.errors import AllocationError, CommandError
 from finlab.layout import Layout, load_layout
 from finlab.layout.arrays import layout_effectiveness
 from finlab.physics import Plant
+from tests.any_robot import AnyRobot
 
 FAR = (30.0, 5.0, 20.0, 1.0, 1.0, 1.0)
 """A wrench that robots of up to six such fins do not deliver."""
@@ -60,7 +60,7 @@ def proven_error(layout: Layout, result: Allocation, target: np.ndarray) -> floa
     residual = (target - result.wrench) / result.sigma
     facing = residual / np.linalg.norm(residual)
     strongest = np.array([[fin.limits.amplitude[1], fin.limits.frequency[1], 0.0] for fin in layout.fins])
-    thrust = np.linalg.norm(Plant(layout).fin_forces(strongest), axis=1)
+    thrust = np.linalg.norm(Plant(layout).forces(strongest), axis=1)
     pulls = ((facing / result.sigma) @ layout_effectiveness(layout)).reshape(-1, 2)
     return float(facing @ (target / result.sigma) - thrust @ np.linalg.norm(pulls, axis=1))
 
@@ -75,7 +75,7 @@ def cosine(result: Allocation) -> float:
     ("name", "target"), [("A", FAR), ("pair", FAR), ("restricted", HEAVY), ("restricted", FAR)]
 )
 def test_closest_is_no_worse_than_least_squares_on_the_plant(
-    name: str, target: tuple[float, ...], search: SearchAllocator
+    name: str, target: tuple[float, ...], search: AnyRobot
 ) -> None:
     layout = shipped(name)
     result = search.allocate(layout, target)
@@ -85,7 +85,7 @@ def test_closest_is_no_worse_than_least_squares_on_the_plant(
 
 @pytest.mark.parametrize("name", ["A", "B", "penta", "pair", "hexa"])
 @pytest.mark.parametrize("target", [FAR, (0.0, 60.0, 0.0, 0.0, 0.0, -6.0)])
-def test_closest_is_proven_closest(name: str, target: tuple[float, ...], search: SearchAllocator) -> None:
+def test_closest_is_proven_closest(name: str, target: tuple[float, ...], search: AnyRobot) -> None:
     layout = shipped(name)
     result = search.allocate(layout, target)
     assert not result.reachable
@@ -93,7 +93,7 @@ def test_closest_is_proven_closest(name: str, target: tuple[float, ...], search:
 
 
 @pytest.mark.parametrize("axis", range(6))
-def test_weights_move_the_error_away_from_an_axis(axis: int, search: SearchAllocator) -> None:
+def test_weights_move_the_error_away_from_an_axis(axis: int, search: AnyRobot) -> None:
     layout = shipped("penta")
     plain = search.allocate(layout, FAR)
     weights = np.where(np.arange(6) == axis, 10.0, 1.0)
@@ -106,7 +106,7 @@ def test_weights_move_the_error_away_from_an_axis(axis: int, search: SearchAlloc
     assert plain.err_norm <= result.err_norm * (1.0 + 1e-6)
 
 
-def test_weights_are_answered_as_well_as_by_least_squares(search: SearchAllocator) -> None:
+def test_weights_are_answered_as_well_as_by_least_squares(search: AnyRobot) -> None:
     layout = shipped("restricted")
     weights = np.array([1.0, 1.0, 10.0, 1.0, 1.0, 1.0])
     result = search.allocate(layout, FAR, policy=Policy(axis_weights=tuple(weights)))
@@ -114,7 +114,7 @@ def test_weights_are_answered_as_well_as_by_least_squares(search: SearchAllocato
     assert error < 1.001 * least_error(layout, np.array(FAR), weights / result.sigma, 2)
 
 
-def test_equal_weights_change_nothing(search: SearchAllocator) -> None:
+def test_equal_weights_change_nothing(search: AnyRobot) -> None:
     layout = shipped("A")
     plain = search.allocate(layout, FAR)
     weighted = search.allocate(layout, FAR, policy=Policy(axis_weights=(3.0,) * 6))
@@ -123,7 +123,7 @@ def test_equal_weights_change_nothing(search: SearchAllocator) -> None:
 
 @pytest.mark.parametrize(("name", "target"), [("A", HEAVY), ("pair", SHALLOW), ("penta", FAR)])
 def test_direction_is_kept_at_the_largest_scale(
-    name: str, target: tuple[float, ...], search: SearchAllocator
+    name: str, target: tuple[float, ...], search: AnyRobot
 ) -> None:
     layout = shipped(name)
     result = search.allocate(layout, target, policy="direction")
@@ -138,7 +138,7 @@ def test_direction_is_kept_at_the_largest_scale(
         assert proven_error(layout, tried, beyond) > 0.0
 
 
-def test_direction_within_arcs(search: SearchAllocator) -> None:
+def test_direction_within_arcs(search: AnyRobot) -> None:
     layout = shipped("restricted")
     result = search.allocate(layout, FAR, policy="direction")
     assert cosine(result) > 1.0 - 1e-9
@@ -147,7 +147,7 @@ def test_direction_within_arcs(search: SearchAllocator) -> None:
 
 
 @pytest.mark.parametrize("policy", ["closest", "direction", "priority"])
-def test_what_is_reachable_is_delivered_whole_by_all(policy: str, search: SearchAllocator) -> None:
+def test_what_is_reachable_is_delivered_whole_by_all(policy: str, search: AnyRobot) -> None:
     layout, target = shipped("A"), [1.0, 0.5, 2.0, 0.0, 0.1, 0.1]
     result = search.allocate(layout, target, policy=policy)
     assert result.reachable
@@ -156,7 +156,7 @@ def test_what_is_reachable_is_delivered_whole_by_all(policy: str, search: Search
 
 
 @pytest.mark.parametrize("name", ["A", "penta", "restricted"])
-def test_priority_serves_the_first_group_whole(name: str, search: SearchAllocator) -> None:
+def test_priority_serves_the_first_group_whole(name: str, search: AnyRobot) -> None:
     layout = shipped(name)
     assert search.allocate(layout, [0.0, 0.0, SHALLOW[2], 0.0, 0.0, 0.0]).reachable
     plain = search.allocate(layout, SHALLOW)
@@ -165,7 +165,7 @@ def test_priority_serves_the_first_group_whole(name: str, search: SearchAllocato
     assert not result.reachable
 
 
-def test_priority_serves_groups_in_the_order_asked(search: SearchAllocator) -> None:
+def test_priority_serves_groups_in_the_order_asked(search: AnyRobot) -> None:
     layout = shipped("pair")
     heave = search.allocate(layout, FAR, policy=Policy("priority", order=(("Fz",), ("Fx",))))
     surge = search.allocate(layout, FAR, policy=Policy("priority", order=(("Fx",), ("Fz",))))
@@ -173,11 +173,11 @@ def test_priority_serves_groups_in_the_order_asked(search: SearchAllocator) -> N
     assert abs(surge.unallocated[0]) < abs(heave.unallocated[0])
 
 
-def test_scale_of_nothing_is_one(search: SearchAllocator) -> None:
+def test_scale_of_nothing_is_one(search: AnyRobot) -> None:
     assert search.allocate(shipped("A"), np.zeros(6)).scale == 1.0
 
 
-def test_binding_limits_are_named(search: SearchAllocator) -> None:
+def test_binding_limits_are_named(search: AnyRobot) -> None:
     strong = search.allocate(shipped("A"), (60.0, 0.0, 0.0, 0.0, 0.0, 0.0))
     assert set(strong.binding) == {f"{name} at full thrust" for name in strong.fins}
     stopped = search.allocate(shipped("restricted"), (-40.0, 0.0, 0.0, 0.0, 0.0, 0.0))
@@ -186,7 +186,7 @@ def test_binding_limits_are_named(search: SearchAllocator) -> None:
     assert "back_left cannot point where it is needed" in lame.binding
 
 
-def test_nothing_binds_where_the_target_is_delivered(search: SearchAllocator) -> None:
+def test_nothing_binds_where_the_target_is_delivered(search: AnyRobot) -> None:
     for failed in ([], ["back_left"]):
         assert search.allocate(shipped("A"), np.zeros(6), failed=failed).binding == ()
 
@@ -194,19 +194,19 @@ def test_nothing_binds_where_the_target_is_delivered(search: SearchAllocator) ->
 def test_methods_without_weights_say_so() -> None:
     layout = shipped("pair")
     for name in METHODS:
-        if name in ("search", "mdn", "paper") or name in PATIENT:
+        if name in ("dual", "mdn", "paper") or name in PATIENT:
             continue
-        method = load_allocator(name)
+        method = AnyRobot(name)
         for policy in (Policy("priority"), Policy(axis_weights=(2.0, 1.0, 1.0, 1.0, 1.0, 1.0))):
             with pytest.raises(AllocationError, match=f"method '{name}' minimizes the plain error") as caught:
                 method.allocate(layout, FAR, policy=policy)
-            assert "use method 'search'" in str(caught.value) and "\n" not in str(caught.value)
+            assert "use method 'dual'" in str(caught.value) and "\n" not in str(caught.value)
         assert np.isfinite(method.allocate(layout, FAR, policy=CLOSEST).command).all()
 
 
 def test_direction_is_known_to_every_method() -> None:
     layout = shipped("A")
-    result = load_allocator("analytic").allocate(layout, HEAVY, policy="direction")
+    result = Allocator(layout, "analytic").allocate(HEAVY, policy="direction")
     assert cosine(result) > 0.999 and 0.5 < result.scale < 0.8
 
 
@@ -228,7 +228,7 @@ def test_bad_policies_are_refused(options: dict[str, object], sentence: str) -> 
     assert str(caught.value).startswith(sentence) and "\n" not in str(caught.value)
 
 
-def test_a_name_that_is_no_policy_is_refused(search: SearchAllocator) -> None:
+def test_a_name_that_is_no_policy_is_refused(search: AnyRobot) -> None:
     with pytest.raises(CommandError, match="policy: expected one of"):
         search.allocate(shipped("A"), FAR, policy="nearest")
 

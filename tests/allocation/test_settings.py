@@ -6,7 +6,7 @@ from typing import Any, get_type_hints
 import numpy as np
 import pytest
 
-from finlab.allocation import METHODS, load_allocator
+from finlab.allocation import METHODS, Allocator
 from finlab.allocation.search.settings import MdnOptions, MdnSettings, SearchOptions, SearchSettings
 from finlab.assets import shipped_checkpoints, shipped_layouts
 from finlab.errors import AllocationError
@@ -14,10 +14,11 @@ from finlab.layout import load_layout
 from finlab.paper.pipeline import PaperSettings
 from finlab.paper.settings import PaperOptions
 from finlab.physics.effort import EffortWeights
+from tests.any_robot import AnyRobot
 
 SURGE = [1.0, 0.0, 0.5, 0.0, 0.0, 0.1]
 OTHER: dict[str, dict[str, Any]] = {
-    "search": {"objective": "effort", "n_refined": 2, "refine_steps": 3},
+    "dual": {"objective": "effort", "n_refined": 2, "refine_steps": 3},
     "mdn": {"objective": "effort", "n_refined": 2},
     "paper": {"n_candidates": 4, "n_steps": 3},
     "ipopt": {"n_starts": 1},
@@ -40,11 +41,11 @@ def test_every_method_is_here() -> None:
 @pytest.mark.parametrize("method", METHODS)
 def test_other_settings_answer_as_if_loaded_with_them(method: str) -> None:
     layout = load_layout(shipped_layouts()["A"])
-    allocator = load_allocator(method)
+    allocator = AnyRobot(method)
     before = allocator.allocate(layout, SURGE).command
     other = allocator.with_settings(**OTHER[method])
     command = other.allocate(layout, SURGE).command
-    loaded = load_allocator(method, **OTHER[method])
+    loaded = AnyRobot(method, **OTHER[method])
     assert type(other) is type(allocator) and other.options == loaded.options
     np.testing.assert_array_equal(command, loaded.allocate(layout, SURGE).command)
     assert method in SAME_ANSWER or not np.array_equal(command, before)
@@ -52,14 +53,14 @@ def test_other_settings_answer_as_if_loaded_with_them(method: str) -> None:
 
 
 def test_networks_and_layouts_are_shared() -> None:
-    network = load_allocator("mdn")
+    network = AnyRobot("mdn")
     assert vars(network.with_settings(n_refined=1))["weights"] is vars(network)["weights"]
-    layout, allocator = load_layout("A"), load_allocator()
+    layout, allocator = load_layout("A"), AnyRobot()
     fewer = allocator.with_settings(n_refined=1)
     assert fewer.pipeline.prepare(layout) is allocator.pipeline.prepare(layout)
     weights = EffortWeights(1.0, 0.5, 0.0, 0.0, 0.25)
     other = allocator.with_settings(objective="effort", effort_weights=weights)
-    expected = load_allocator(objective="effort", effort_weights=weights).allocate(layout, SURGE)
+    expected = Allocator(layout, objective="effort", effort_weights=weights).allocate(SURGE)
     assert other.allocate(layout, SURGE) == expected
     assert not np.array_equal(
         expected.command, allocator.with_settings(objective="effort").allocate(layout, SURGE).command
@@ -69,19 +70,19 @@ def test_networks_and_layouts_are_shared() -> None:
 @pytest.mark.parametrize("method", METHODS)
 def test_unknown_settings_are_refused(method: str) -> None:
     with pytest.raises(AllocationError, match="knows the options .*, got 'shoe_size'"):
-        load_allocator(method).with_settings(shoe_size=43)
+        AnyRobot(method).with_settings(shoe_size=43)
 
 
 @pytest.mark.parametrize(
     ("method", "wrong", "message"),
     [
-        ("search", {"n_refined": 0}, "n_refined: expected a whole number from 1 to 256, got 0"),
-        ("search", {"n_refined": "5"}, "n_refined: expected a whole number .*, got '5'"),
-        ("search", {"n_refined": True}, "n_refined: expected a whole number .*, got True"),
-        ("search", {"search_steps": 0}, "search_steps: expected a whole number from 1 to 100, got 0"),
-        ("search", {"period_s": 0.0}, "period_s: expected a number above 0 up to 1000 s, got 0.0"),
-        ("search", {"subsets": 1}, "subsets: expected true or false, got 1"),
-        ("search", {"objective": "speed"}, "objective: expected one of power, effort, got 'speed'"),
+        ("dual", {"n_refined": 0}, "n_refined: expected a whole number from 1 to 256, got 0"),
+        ("dual", {"n_refined": "5"}, "n_refined: expected a whole number .*, got '5'"),
+        ("dual", {"n_refined": True}, "n_refined: expected a whole number .*, got True"),
+        ("dual", {"search_steps": 0}, "search_steps: expected a whole number from 1 to 100, got 0"),
+        ("dual", {"period_s": 0.0}, "period_s: expected a number above 0 up to 1000 s, got 0.0"),
+        ("dual", {"subsets": 1}, "subsets: expected true or false, got 1"),
+        ("dual", {"objective": "speed"}, "objective: expected one of power, effort, got 'speed'"),
         ("mdn", {"copper_loss": float("nan")}, "copper_loss: expected a number .* W/.N m.\\^2, got nan"),
         ("mdn", {"copper_loss": 10**400}, "copper_loss: expected a number .*, got 1000"),
         ("mdn", {"effort_weights": 3}, "effort_weights: expected EffortWeights, got 3"),
@@ -95,9 +96,9 @@ def test_unknown_settings_are_refused(method: str) -> None:
 )
 def test_impossible_settings_are_refused(method: str, wrong: dict[str, Any], message: str) -> None:
     with pytest.raises(AllocationError, match=message):
-        load_allocator(method, **wrong)
+        AnyRobot(method, **wrong)
     with pytest.raises(AllocationError, match=message):
-        load_allocator(method).with_settings(**wrong)
+        AnyRobot(method).with_settings(**wrong)
 
 
 def test_editors_complete_the_settings_that_there_are() -> None:
@@ -108,4 +109,4 @@ def test_editors_complete_the_settings_that_there_are() -> None:
     ):
         kinds = get_type_hints(settings)
         assert get_type_hints(options) == {f.name: kinds[f.name] for f in fields(settings)}
-    assert list(get_type_hints(SearchOptions)) == load_allocator().option_names()
+    assert list(get_type_hints(SearchOptions)) == AnyRobot().option_names()

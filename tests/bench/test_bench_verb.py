@@ -56,7 +56,7 @@ def test_stored_results_belong_to_the_shipped_problems(shipped: Problems) -> Non
         asked = shipped.quick() if quick else shipped
         calls = len(asked.targets.robot) + asked.sequences.best_error.size
         assert {row["summary"]["calls"] for row in found["methods"]} == {calls}
-        search = next(row["summary"] for row in found["methods"] if row["method"] == "search")
+        search = next(row["summary"] for row in found["methods"] if row["method"] == "dual")
         assert search["failed"] == 0.0 and search["solved"] > 0.99
         assert "Stored, not of this run: " in text({"methods": found["methods"][:1]}, found)
         assert "Stored" not in text(found, found)

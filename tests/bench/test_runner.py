@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import finlab
 from finlab.bench.metrics import figures
 from finlab.bench.problems import Problems
 from finlab.bench.runner import Answers, BenchMethod, run_method
 from finlab.errors import AllocationError
 from finlab.physics import plant_of
+from tests.any_robot import AnyRobot
 
 METHODS = Path(__file__).with_name("methods.py")
 
@@ -75,8 +75,8 @@ def test_previous_command_comes_back_and_angles_go_round(few: Problems) -> None:
 
 
 def test_search_is_judged_by_the_plant(few: Problems) -> None:
-    answers = run_method(BenchMethod.of("search"), few, 5.0)
-    plant, allocator = plant_of(few.layout(0)), finlab.load_allocator()
+    answers = run_method(BenchMethod.of("dual"), few, 5.0)
+    plant, allocator = plant_of(few.layout(0)), AnyRobot()
     for answer, wrench, kind in zip(answers.targets, few.targets.wrench, few.targets.kind, strict=True):
         assert answer.command is not None
         if kind == 0:

@@ -26,8 +26,7 @@ KEYS = [
     "failed",
     "command",
     "target",
-    "flow",
-    "wrench_surrogate",
+    "wrench_expected",
     "wrench_plant",
     "unallocated",
     "err_norm",
@@ -78,7 +77,7 @@ def test_json_has_the_keys_of_the_contract(allocate: Callable[..., tuple[int, st
     assert result["failed"] == []
     assert [len(row) for row in result["command"]] == [3, 3, 3, 3]
     assert result["target"] == [1.0, 0.0, -0.5, 0.0, 0.0, 0.1]
-    assert result["method"] == "search" and result["checkpoint"] is None
+    assert result["method"] == "dual" and result["checkpoint"] is None
     gap = [t - w for t, w in zip(result["target"], result["wrench_plant"], strict=True)]
     assert result["unallocated"] == pytest.approx(gap)
     scaled = sum((g / s) ** 2 for g, s in zip(gap, result["sigma"], strict=True)) ** 0.5
@@ -99,7 +98,7 @@ def test_same_seed_same_answer(allocate: Callable[..., tuple[int, str, str]]) ->
 
 def test_methods_without_a_network(allocate: Callable[..., tuple[int, str, str]]) -> None:
     result = answer(allocate("A", *WRENCH, "--method", "analytic", "--json"))
-    assert result["method"] == "analytic" and result["wrench_surrogate"] is None
+    assert result["method"] == "analytic" and result["wrench_expected"] is None
 
 
 def test_the_objective_decides_what_is_kept_least(allocate: Callable[..., tuple[int, str, str]]) -> None:
@@ -183,8 +182,8 @@ def test_shipped_name_works_from_any_folder(
             "has no fin left",
         ),
         (["A", *WRENCH, "--method", "magic"], "method: expected one of search, mdn, paper"),
-        (["A", *WRENCH, "--method", "learned"], "method: 'learned' is now called 'search'"),
-        (["A", *WRENCH, "--method", "fast"], "method: 'fast' has gone; 'search' is exact on any fin"),
+        (["A", *WRENCH, "--method", "learned"], "method: 'learned' is now called 'dual'"),
+        (["A", *WRENCH, "--method", "fast"], "method: 'fast' has gone; 'dual' is exact on any fin"),
         (["A", *WRENCH, "--objective", "money"], "--objective"),
         (["A", *WRENCH, "--seed", "x"], "--seed"),
         (["missing.yaml", *WRENCH], "neither a file nor a shipped layout"),

@@ -24,7 +24,7 @@ def test_every_method_on_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[st
     assert [row["method"] for row in rows] == installed_methods()
     assert {row["split"] for row in rows} == {"layout pair"} and "layout pair" in capsys.readouterr().out
     by_name = {row["method"]: row for row in rows}
-    assert by_name["search"]["err_norm_max"] < 1e-4 and by_name["search"]["n"] == 4
+    assert by_name["dual"]["err_norm_max"] < 1e-4 and by_name["dual"]["n"] == 4
     assert by_name["ipopt"]["n"] == 1
 
 
@@ -34,13 +34,13 @@ def test_targets_are_seeded_and_within_reach() -> None:
     assert np.array_equal(case.targets, again.targets) and not np.array_equal(case.targets, other.targets)
     # Products of fewer rows may round otherwise.
     np.testing.assert_allclose(own_case(layout, (), 3, 3).targets, case.targets[:3], rtol=1e-12, atol=1e-14)
-    assert finlab.load_allocator().allocate_batch(layout, case.targets).reachable.all()
+    assert finlab.Allocator(layout).allocate_batch(case.targets).reachable.all()
 
 
 def test_failed_fins_of_a_graph_file_stay_out(tmp_path: Path) -> None:
     file, graph = tmp_path / "rows.json", tmp_path / "A.graph.json"
     assert main(["export", "A", "--failed", "front_left", "-o", str(graph)]) == 0
-    arguments = ["--targets", "3", "--methods", "search", "--json", str(file)]
+    arguments = ["--targets", "3", "--methods", "dual", "--json", str(file)]
     assert main(["eval", "wrench", str(graph), *arguments]) == 0
     row = json.loads(file.read_text())["rows"][0]
     assert row["success_0.01"] == 1.0

@@ -6,12 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from finlab.allocation import load_allocator
 from finlab.allocation.allocator import Allocator
 from finlab.control import FaultMonitor, Measurement, MonitorSettings, WaypointController
 from finlab.errors import LayoutError
 from finlab.layout import Layout
 from finlab.sim import NOISE_ALONE, ClosedLoop, FinFault, RunLog, SteadyCurrent, make_trajectory
+from tests.any_robot import AnyRobot
 
 CURRENT = (0.03, -0.02, 0.0)
 PRIOR = 0.01
@@ -69,7 +69,7 @@ def test_a_lost_fin_is_found_and_no_longer_used(layout_a: Layout, analytic: Allo
 @pytest.mark.parametrize("lost", [("front_right", "back_left"), ("front_left", "back_right")])
 def test_two_fins_lost_at_one_moment_are_found(layout_a: Layout, lost: tuple[str, str]) -> None:
     """Each alone explains as little of it as any other fin would."""
-    loop = swim(layout_a, load_allocator(), [FinFault(name, 12.0) for name in lost])
+    loop = swim(layout_a, AnyRobot(), [FinFault(name, 12.0) for name in lost])
     until(loop, 12.0)
     assert loop.damage.failed == ()
     until(loop, 16.0)

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from finlab import load_allocator, load_layout
+from finlab import load_layout
 from finlab.control import (
     Controller,
     Measurement,
@@ -19,6 +19,7 @@ from finlab.layout import Layout, Servo
 from finlab.sim import ClosedLoop, make_trajectory
 from finlab.sim.perturbed import perturbed
 from finlab.sim.water import SteadyCurrent, Water
+from tests.any_robot import AnyRobot
 
 
 @pytest.fixture(scope="module")
@@ -70,7 +71,7 @@ def error(
     path: str = "circle",
 ) -> float:
     """Root mean square distance from a path [m]."""
-    loop = ClosedLoop(robot, load_allocator(), make_trajectory(path), pilot, truth=truth, water=water)
+    loop = ClosedLoop(robot, AnyRobot(), make_trajectory(path), pilot, truth=truth, water=water)
     log = loop.run()
     return float(np.sqrt(((log.position - log.reference) ** 2).sum(1).mean()))
 

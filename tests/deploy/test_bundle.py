@@ -28,6 +28,7 @@ from finlab.errors import AllocationError, DataError, FinlabError
 from finlab.layout import Layout
 from finlab.layout.load import checksum_of
 from finlab.physics.effort import EffortWeights
+from tests.any_robot import AnyRobot
 
 WEIGHTS = "checkpoint/model.safetensors"
 WRENCH = [1, 0, 0.5, 0, 0, 0.1]
@@ -36,7 +37,7 @@ WRENCH = [1, 0, 0.5, 0, 0, 0.1]
 @pytest.fixture(scope="module")
 def with_networks(untrained_mdn: Path) -> Bundle:
     """Layout A for method `mdn`, with a small network that has learned nothing."""
-    return make_bundle(finlab.load_layout("A"), finlab.load_allocator("mdn", checkpoint=untrained_mdn))
+    return make_bundle(Allocator(finlab.load_layout("A"), "mdn", checkpoint=untrained_mdn))
 
 
 def resealed(files: dict[str, bytes]) -> dict[str, bytes]:
@@ -62,58 +63,56 @@ def test_the_library_reads_it(bundle: Bundle, shipped_allocator: Allocator, tmp_
     layout = finlab.load_layout("A")
     truth = shipped_allocator.allocate(layout, WRENCH)
     for allocator in (
-        finlab.load_allocator(tmp_path / "A"),
-        finlab.load_allocator(str(tmp_path / "A.zip")),
-        finlab.load_allocator("search", checkpoint=tmp_path / "A"),
+        AnyRobot(tmp_path / "A"),
+        AnyRobot(str(tmp_path / "A.zip")),
+        AnyRobot("dual", checkpoint=tmp_path / "A"),
     ):
         assert allocator.allocate(layout, WRENCH) == truth
-    sqp = finlab.load_allocator("sqp", checkpoint=tmp_path / "A.zip")
+    sqp = AnyRobot("sqp", checkpoint=tmp_path / "A.zip")
     np.testing.assert_array_equal(sqp.normalization.std, shipped_allocator.normalization.std)
     with pytest.raises(AllocationError, match="method: expected one of"):
-        finlab.load_allocator(tmp_path / "A", checkpoint="default")
+        AnyRobot(tmp_path / "A", checkpoint="default")
     with pytest.raises(AllocationError, match="method: expected one of .* got 'nowhere'"):
-        finlab.load_allocator("nowhere")
+        AnyRobot("nowhere")
     with pytest.raises(
         DataError, match="holds no networks, which method 'mdn' needs; export .* --method mdn`"
     ):
-        finlab.load_allocator("mdn", checkpoint=tmp_path / "A")
+        AnyRobot("mdn", checkpoint=tmp_path / "A")
     with pytest.raises(DataError, match="method 'paper' does not run from a bundle; name its checkpoint"):
-        finlab.load_allocator("paper", checkpoint=tmp_path / "A")
+        AnyRobot("paper", checkpoint=tmp_path / "A")
 
 
 def test_networks_travel_for_the_method_that_needs_them(
     with_networks: Bundle, untrained_mdn: Path, tmp_path: Path
 ) -> None:
     with_networks.write(tmp_path)
-    layout, desk = finlab.load_layout("A"), finlab.load_allocator("mdn", checkpoint=untrained_mdn)
+    layout, desk = finlab.load_layout("A"), AnyRobot("mdn", checkpoint=untrained_mdn)
     for name in ("config.json", "model.safetensors"):
         assert with_networks.files[f"checkpoint/{name}"] == (untrained_mdn / name).read_bytes()
-    for allocator in (finlab.load_allocator(tmp_path), finlab.load_allocator("mdn", checkpoint=tmp_path)):
+    for allocator in (AnyRobot(tmp_path), AnyRobot("mdn", checkpoint=tmp_path)):
         assert allocator.allocate(layout, WRENCH) == desk.allocate(layout, WRENCH)
-    plain = finlab.load_allocator("search", checkpoint=tmp_path)
-    assert plain.name == "search" and set(plain.options) < set(desk.options)
+    plain = AnyRobot("dual", checkpoint=tmp_path)
+    assert plain.name == "dual" and set(plain.options) < set(desk.options)
     assert load_robot(tmp_path).graph.checkpoint_sha256 == desk.weights.sha256  # type: ignore[union-attr]
 
 
 def test_the_command_line_takes_a_bundle_with_its_lost_fins(
     shipped_allocator: Allocator, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    make_bundle(finlab.load_layout("A"), shipped_allocator, ("back_left",)).write_zip(tmp_path / "A.zip")
+    make_bundle(shipped_allocator.on(finlab.load_layout("A")), ("back_left",)).write_zip(tmp_path / "A.zip")
     robot = str(tmp_path / "A.zip")
     line = ["allocate", robot, "--checkpoint", robot, "--wrench", "1", "0", "0.5", "0", "0", "0", "--json"]
     assert main(line) == 0
     values = json.loads(capsys.readouterr().out)
-    assert values["failed"] == ["back_left"] and values["method"] == "search"
+    assert values["failed"] == ["back_left"] and values["method"] == "dual"
 
 
 def test_settings_travel_and_can_be_changed(tmp_path: Path) -> None:
     weights = EffortWeights(1.0, 0.5, 0.0, 0.0, 0.25)
-    desk = finlab.load_allocator(
-        n_refined=2, search_steps=9, objective="effort", effort_weights=weights, copper_loss=0.5
-    )
-    make_bundle(finlab.load_layout("octo"), desk).write(tmp_path)
-    assert finlab.load_allocator(tmp_path).options == desk.options
-    assert finlab.load_allocator(tmp_path, n_refined=8).options == desk.options | {"n_refined": 8}
+    desk = AnyRobot(n_refined=2, search_steps=9, objective="effort", effort_weights=weights, copper_loss=0.5)
+    make_bundle(desk.on(finlab.load_layout("octo"))).write(tmp_path)
+    assert AnyRobot(tmp_path).options == desk.options
+    assert AnyRobot(tmp_path, n_refined=8).options == desk.options | {"n_refined": 8}
 
 
 @pytest.mark.parametrize(
@@ -190,11 +189,11 @@ def test_force_tables_travel_and_answer_from_folder_and_archive(
         layout = finlab.load_layout(place)
         path = Path(str(layout.fins[2].model.values()["path"]))
         assert path == place / table_name(content)
-        answer = finlab.load_allocator(place).allocate(layout, WRENCH, failed=["front_left"])
+        answer = finlab.Allocator(layout, place).allocate(WRENCH, failed=["front_left"])
         np.testing.assert_array_equal(answer.command, truth.command)
         np.testing.assert_array_equal(answer.wrench, truth.wrench)
         # And out of the bundle another one can be made.
-        again = make_bundle(layout, finlab.load_allocator(place))
+        again = make_bundle(Allocator(layout, place))
         assert again.zip_bytes() == measured_bundle.zip_bytes()
 
 
@@ -274,7 +273,7 @@ def test_a_folder_with_other_things_is_not_written_to(bundle: Bundle, tmp_path: 
 
 def test_methods_that_do_not_travel_are_refused() -> None:
     with pytest.raises(AllocationError, match="method 'sqp' cannot be exported"):
-        make_bundle(finlab.load_layout("A"), finlab.load_allocator("sqp"))
+        make_bundle(Allocator(finlab.load_layout("A"), "sqp"))
 
 
 def test_the_command_line_chooses_method_and_objective(
@@ -282,8 +281,8 @@ def test_the_command_line_chooses_method_and_objective(
 ) -> None:
     line = ["export", "mixed", "-o", str(tmp_path / "mixed"), "--objective", "effort"]
     assert main(line) == 0
-    robot = finlab.load_allocator(tmp_path / "mixed")
-    assert (robot.name, robot.options["objective"]) == ("search", "effort")
+    robot = AnyRobot(tmp_path / "mixed")
+    assert (robot.name, robot.options["objective"]) == ("dual", "effort")
     line = ["export", "A", "-o", str(tmp_path / "A"), "--method", "mdn", "--checkpoint"]
     assert main([*line, str(untrained_mdn)]) == 0
     assert read_bundle_files(tmp_path / "A") == dict(with_networks.files)

@@ -48,7 +48,7 @@ def test_nothing_heavy_is_loaded(folder: Path) -> None:
 
 def test_allocate_prints_a_table_or_one_object(folder: Path, capsys: Any) -> None:
     question = ["allocate", str(folder), *WRENCH, "--failed", "back_left"]
-    truth = finlab.load_allocator().allocate(finlab.load_layout("A"), TARGET, failed=["back_left"])
+    truth = finlab.Allocator(finlab.load_layout("A")).allocate(TARGET, failed=["back_left"])
     assert main([*question, "--json"]) == 0
     shown = json.loads(capsys.readouterr().out)
     lost = shown["fins"].index("back_left")
@@ -64,7 +64,7 @@ def test_allocate_prints_a_table_or_one_object(folder: Path, capsys: Any) -> Non
     assert any(line.startswith("err_norm ") for line in lines)
 
 
-@pytest.mark.parametrize("method", ["search", "mdn"])
+@pytest.mark.parametrize("method", ["dual", "mdn"])
 def test_a_layout_graph_file_runs(
     method: str, measured: Layout, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -76,7 +76,7 @@ def test_a_layout_graph_file_runs(
     assert "FAILED" not in capsys.readouterr().out
     assert main(["allocate", graph, *WRENCH, "--json"]) == 0
     shown = json.loads(capsys.readouterr().out)
-    truth = finlab.load_allocator(method).allocate(measured, TARGET)
+    truth = finlab.Allocator(measured, method).allocate(TARGET)
     np.testing.assert_allclose(shown["command"], truth.command, rtol=1e-9)
     if method == "mdn":
         document = json.loads(Path(graph).read_text())

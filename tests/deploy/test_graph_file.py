@@ -30,6 +30,7 @@ from finlab.layout.thrust_model import PowerLaw, PowerTable
 from finlab.layout.thruster import Thruster
 from finlab.networks.checkpoint import read_checkpoint
 from finlab.networks.normalization import Normalization
+from tests.any_robot import AnyRobot
 from tests.exhaustive import sampled
 
 SCHEMA = json.loads((Path(__file__).parents[2] / "finlab/deploy/graph.schema.json").read_text())
@@ -44,9 +45,7 @@ def make_graph(layout: Layout, failed: tuple[str, ...] = ()) -> LayoutGraph:
     case = Case((1.0, 0.0, 0.5, 0.0, 0.0, 0.1), rows(0.3, 1.0, -0.5), (0.9,) * 6)
     normalization = Normalization(np.zeros(6), np.array([1.0, 1.0, 1.0, 0.2, 0.2, 0.3]))
     checkpoint = ("default", "0" * 64) if failed else (None, None)
-    return LayoutGraph(
-        layout, failed, normalization, *checkpoint, "mdn" if failed else "search", (case, case)
-    )
+    return LayoutGraph(layout, failed, normalization, *checkpoint, "mdn" if failed else "dual", (case, case))
 
 
 def same(a: LayoutGraph, b: LayoutGraph) -> bool:
@@ -173,15 +172,15 @@ def test_stands_in_for_a_layout_file_everywhere(tmp_path: Path) -> None:
         load_layout(tmp_path / "x.graph.json")
 
 
-@pytest.fixture(scope="module", params=["search", "mdn"])
+@pytest.fixture(scope="module", params=["dual", "mdn"])
 def allocator(request: pytest.FixtureRequest, untrained_mdn: Path) -> Allocator:
-    return finlab.load_allocator(request.param, checkpoint=untrained_mdn)
+    return AnyRobot(request.param, checkpoint=untrained_mdn)
 
 
 @pytest.mark.parametrize("failed", [(), ("front_left",)], ids=["whole", "one lost"])
 def test_graph_of_an_allocator(failed: tuple[str, ...], allocator: Allocator, untrained_mdn: Path) -> None:
     layout = finlab.load_layout(shipped_layouts()["A"])
-    graph = build_graph(layout, allocator, failed)
+    graph = build_graph(allocator.on(layout), failed)
     jsonschema.validate(json.loads(graph_bytes(graph)), SCHEMA)
     assert graph.layout == layout and graph.failed == failed and graph.healthy.n_fins == 4 - len(failed)
     weights = read_checkpoint(untrained_mdn)
@@ -192,8 +191,8 @@ def test_graph_of_an_allocator(failed: tuple[str, ...], allocator: Allocator, un
 
 def test_same_input_same_bytes(allocator: Allocator, untrained_mdn: Path) -> None:
     layout = finlab.load_layout(shipped_layouts()["ucat"])
-    again = finlab.load_allocator(allocator.name, checkpoint=untrained_mdn)
-    assert graph_bytes(build_graph(layout, allocator)) == graph_bytes(build_graph(layout, again))
+    again = AnyRobot(allocator.name, checkpoint=untrained_mdn)
+    assert graph_bytes(build_graph(allocator.on(layout))) == graph_bytes(build_graph(again.on(layout)))
 
 
 def test_force_tables_are_found_beside_the_graph_file(
@@ -201,7 +200,7 @@ def test_force_tables_are_found_beside_the_graph_file(
 ) -> None:
     """A graph file alone names its tables by their places; one written relatively starts at the file."""
     path = tmp_path / "x.graph.json"
-    write_graph(build_graph(measured, allocator), path)
+    write_graph(build_graph(allocator.on(measured)), path)
     assert read_graph(path).layout == finlab.load_layout(path) == measured
     document = json.loads(path.read_text())
     document["graph"]["nodes"][2]["model"]["path"] = "tank/soft.csv"
@@ -222,7 +221,7 @@ def test_an_exported_graph_file_takes_its_tables_along(
     moved = finlab.load_layout(there / "x.graph.json")
     paths = [str(fin.model.values()["path"]) for fin in moved.fins if fin.model.type == "table"]
     assert paths and all(path.startswith(str(there / "tables")) for path in paths)
-    assert finlab.load_allocator().allocate(moved, [0.2, 0, 0.2, 0, 0, 0]).err_norm < 1e-6
+    assert finlab.Allocator(moved).allocate([0.2, 0, 0.2, 0, 0, 0]).err_norm < 1e-6
     capsys.readouterr()
     assert main(["export", str(there / "x.graph.json"), "-o", str(tmp_path / "no" / "x.graph.json")]) == 2
     assert "cannot be written: No such file or directory" in capsys.readouterr().err

@@ -14,6 +14,7 @@ from finlab.deploy.self_check import self_check
 from finlab.errors import FinlabError
 from finlab.layout import FinModelSpec, Layout
 from finlab.physics import plant_of
+from tests.any_robot import AnyRobot
 from tests.exhaustive import sampled
 from tests.fin_robots import FIN_ROBOTS
 
@@ -50,7 +51,7 @@ def test_answer_says_what_is_missing(robot: DeployedRobot) -> None:
 
 def test_failed_fins_of_the_bundle_stay_failed(shipped_allocator: Allocator) -> None:
     layout = finlab.load_layout("A")
-    robot = parse_robot(make_bundle(layout, shipped_allocator, ("back_left",)).files)
+    robot = parse_robot(make_bundle(shipped_allocator.on(layout), ("back_left",)).files)
     lost = layout.index("back_left")
     assert np.isnan(robot.allocate([0.5, 0, 0, 0, 0, 0]).command[lost]).all()
     assert np.isnan(robot.allocate([0.5, 0, 0, 0, 0, 0], failed=["front_left"]).command[lost]).all()
@@ -65,8 +66,8 @@ def test_every_shipped_layout_answers_as_the_library_to_the_last_bit(
 ) -> None:
     """By its own physics, tables included; single, batched and from tick to tick."""
     layout = measured if name == "measured" else finlab.load_layout(name)
-    desk = finlab.load_allocator(objective=objective)
-    make_bundle(layout, desk).write_zip(tmp_path / "x.zip")
+    desk = AnyRobot(objective=objective)
+    make_bundle(desk.on(layout)).write_zip(tmp_path / "x.zip")
     robot = load_robot(tmp_path / "x.zip")
     assert not bad(robot)
     targets = plant_of(layout).wrench(plant_of(layout).sample(np.random.default_rng(7), (6,)))
@@ -75,7 +76,7 @@ def test_every_shipped_layout_answers_as_the_library_to_the_last_bit(
     for target in targets:
         truth = desk.allocate(layout, target, previous=previous)
         answer = robot.allocate(target, previous=previous)
-        for field in ("command", "wrench", "fin_forces", "err_norm", "effort", "power"):
+        for field in ("command", "wrench", "forces", "err_norm", "effort", "power"):
             np.testing.assert_array_equal(getattr(answer, field), getattr(truth, field), field)
         assert answer.evaluated_by == "plant" and answer.notes == truth.notes
         previous = truth.command

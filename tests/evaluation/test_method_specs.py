@@ -6,7 +6,7 @@ from finlab.errors import AllocationError
 from finlab.evaluation.method_specs import is_slow, load_method_spec, load_method_specs
 
 
-@pytest.mark.parametrize("name", ["search", "analytic", "sqp"])
+@pytest.mark.parametrize("name", ["dual", "analytic", "sqp"])
 def test_the_objective_is_a_part_of_the_name_or_given_to_all(name: str) -> None:
     assert load_method_spec(name).options["objective"] == "power"
     assert load_method_spec(name, objective="effort").options["objective"] == "effort"
@@ -16,8 +16,8 @@ def test_the_objective_is_a_part_of_the_name_or_given_to_all(name: str) -> None:
 
 def test_methods_that_cannot_choose_are_left_as_they_are() -> None:
     methods = load_method_specs("paper, on-board,search", objective="effort")
-    assert list(methods) == ["paper", "on-board", "search"]
-    assert "objective" not in methods["paper"].options and methods["search"].options["objective"] == "effort"
+    assert list(methods) == ["paper", "on-board", "dual"]
+    assert "objective" not in methods["paper"].options and methods["dual"].options["objective"] == "effort"
 
 
 def test_methods_for_comparison_alone() -> None:
@@ -33,7 +33,7 @@ def test_starts() -> None:
 @pytest.mark.parametrize(
     ("names", "message"),
     [
-        ("learned", "method: 'learned' is now called 'search'"),
+        ("learned", "method: 'learned' is now called 'dual'"),
         ("search,fast", "method: 'fast' has gone"),
         ("search-32", "a number of starts, from 1, goes with ipopt only, got 'search-32'"),
         ("paper-effort", "knows the options .*, got 'objective'"),

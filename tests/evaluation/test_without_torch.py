@@ -45,5 +45,5 @@ def test_eval_wrench() -> None:
 def test_simulate(plant: str, tmp_path: Path) -> None:
     path = tmp_path / "line.csv"
     path.write_text("t,x,y,z\n0,0,0,-1\n3,0.3,0,-1\n")
-    shown = _run("simulate", "A", "--trajectory", str(path), "--method", "search", "--plant", plant)
+    shown = _run("simulate", "A", "--trajectory", str(path), "--method", "dual", "--plant", plant)
     assert "ATE" in shown and f"plant {plant}" in shown

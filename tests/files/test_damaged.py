@@ -18,8 +18,8 @@ import numpy as np
 import pytest
 import trimesh
 
-import finlab
 from finlab.actuators.fin.table_file import read_table
+from finlab.allocation import Allocator
 from finlab.bundle_files import CHECKSUMS, GRAPH, checksums
 from finlab.deploy.bundle import make_bundle
 from finlab.deploy.graph import build_graph
@@ -36,6 +36,7 @@ from finlab.physics import make_law, write_table
 from finlab.sim import load_log
 from finlab.sim.log import Tick, log_of_ticks
 from finlab.sim.task import make_trajectory
+from tests.any_robot import AnyRobot
 from tests.fit.cell import columns_of, commands, measured, soft, write
 from tests.fit.robot.swims import write_csv as write_swim
 from webapp.scene.meshes.mesh_hull import MeshHull
@@ -182,9 +183,9 @@ def kinds(tmp_path_factory: pytest.TempPathFactory, untrained_mdn: Path) -> list
     with (place / "path.csv").open("w", newline="") as file:
         rows = [[0.1 * k, 0.1 * k, np.sin(k), -1.0] for k in range(60)]
         csv.writer(file).writerows([["t", "x", "y", "z"], *rows])
-    bundle = make_bundle(layout, finlab.load_allocator("mdn", checkpoint=untrained_mdn))
-    allocator = finlab.load_allocator()
-    graph = graph_bytes(build_graph(PAIR, allocator))
+    bundle = make_bundle(Allocator(layout, "mdn", checkpoint=untrained_mdn))
+    allocator = AnyRobot()
+    graph = graph_bytes(build_graph(allocator.on(PAIR)))
     box = trimesh.creation.icosphere(subdivisions=2, radius=0.2)
     names = [path.relative_to(untrained_mdn).as_posix() for path in untrained_mdn.iterdir()]
     checkpoint = packed({name: (untrained_mdn / name).read_bytes() for name in names})

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_info
 
-from finlab import load_allocator, load_layout
+from finlab import load_layout
 from finlab.actuators.fin.table_file import DOUBT, read_table
+from finlab.allocation import Allocator
 from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.fit.advice import APART, next_measurements
@@ -88,7 +89,7 @@ def test_few_samples_are_doubted_first_of_all(tmp_path: Path) -> None:
     assert summary(few)[0].startswith(DOUBT)
     write_fin(few, tmp_path / "few.csv")
     assert (tmp_path / "few.csv").read_text().startswith(f"# {DOUBT}: ")
-    notes = load_allocator().allocate(robot_with(tmp_path / "few.csv"), [0.3, 0, 0, 0, 0, 0]).notes
+    notes = Allocator(robot_with(tmp_path / "few.csv")).allocate([0.3, 0, 0, 0, 0, 0]).notes
     assert any(f"is {DOUBT}" in note for note in notes)
 
 

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from finlab.allocation import load_allocator
 from finlab.errors import AllocationError
 from finlab.forces.cost_bound import CostDual
 from finlab.forces.envelopes import layout_envelopes
@@ -11,6 +10,7 @@ from finlab.forces.force_space import PlanarProblem, planar_problem
 from finlab.layout import Fin, FinModelSpec, Layout, Limits, load_layout
 from finlab.physics import plant_of
 from finlab.physics.objective import Name, Objective
+from tests.any_robot import AnyRobot
 
 SIGMA = np.array([1.0, 1.0, 1.0, 0.2, 0.2, 0.2])
 
@@ -50,7 +50,7 @@ def test_the_dual_is_below_every_command_of_the_same_wrench(layout: Layout) -> N
     "layout", [load_layout("A"), load_layout("mixed"), load_layout("octo"), uneven(5, 3)]
 )
 def test_the_search_is_within_a_percent_of_the_bound_of_power(layout: Layout) -> None:
-    allocator, plant = load_allocator(), plant_of(layout)
+    allocator, plant = AnyRobot(), plant_of(layout)
     for command in plant.sample(np.random.default_rng(2), (4,)):
         result = allocator.allocate(layout, plant.wrench(command))
         bound = allocator.bound(result)
@@ -58,7 +58,7 @@ def test_the_search_is_within_a_percent_of_the_bound_of_power(layout: Layout) ->
 
 
 def test_no_bound_without_an_answer_and_none_of_effort() -> None:
-    allocator, layout = load_allocator(), load_layout("A")
+    allocator, layout = AnyRobot(), load_layout("A")
     with pytest.raises(AllocationError, match="out of reach"):
         allocator.bound(allocator.allocate(layout, [90.0, 0.0, 0.0, 0.0, 0.0, 0.0]))
     effort = allocator.with_settings(objective="effort")

@@ -6,10 +6,11 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from finlab import load_allocator
+from finlab.allocation import Allocator
 from finlab.deploy.bundle import make_bundle
 from finlab.errors import LayoutError
 from finlab.layout import Interaction, Jet, Layout, layout_to_dict, load_layout, parse_layout, save_layout
+from tests.any_robot import AnyRobot
 
 
 @pytest.fixture(scope="module")
@@ -34,13 +35,13 @@ def test_it_fits_the_schema(coupled: Layout) -> None:
 
 
 def test_bundles_take_it_along(coupled: Layout, tmp_path: Path) -> None:
-    make_bundle(coupled, load_allocator()).write(tmp_path / "bundle")
+    make_bundle(Allocator(coupled)).write(tmp_path / "bundle")
     again = load_layout(tmp_path / "bundle")
     assert again.interaction == coupled.interaction
     target = [1.0, 0.0, 0.5, 0.0, 0.0, 0.1]
     here, there = (
         allocator.allocate(layout, target)
-        for allocator, layout in ((load_allocator(), coupled), (load_allocator(tmp_path / "bundle"), again))
+        for allocator, layout in ((AnyRobot(), coupled), (AnyRobot(tmp_path / "bundle"), again))
     )
     assert here.err_norm < 1e-4 and there.err_norm < 1e-4
     assert there.power == pytest.approx(here.power, rel=1e-6)

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from finlab import load_allocator
+from finlab.allocation import Allocator
 from finlab.deploy.bundle import make_bundle
 from finlab.errors import LayoutError
 from finlab.layout import Layout, Servo, layout_to_dict, load_layout, parse_layout, save_layout
@@ -41,7 +41,7 @@ def test_files_hold_what_is_not_usual(slow: Layout, tmp_path: Path, suffix: str)
 def test_bundles_and_graph_files_take_it_along(slow: Layout, tmp_path: Path) -> None:
     import jsonschema
 
-    make_bundle(slow, load_allocator()).write(tmp_path / "bundle")
+    make_bundle(Allocator(slow)).write(tmp_path / "bundle")
     assert load_layout(tmp_path / "bundle") == slow
     graph = json.loads((tmp_path / "bundle" / "layout.graph.json").read_text())
     schema = json.loads(Path("finlab/deploy/graph.schema.json").read_text())

@@ -7,28 +7,27 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from finlab.allocation import load_allocator
 from finlab.assets import checkpoint_path
 from finlab.errors import AllocationError, CheckpointError
 from finlab.layout import FinModelSpec, Layout, load_layout, random_layout
-from finlab.mdn.allocator import MdnAllocator
 from finlab.mdn.features import see
 from finlab.mdn.proposal import propose, shares
 from finlab.networks.checkpoint import read_checkpoint
 from finlab.physics import Plant
 from finlab.physics.effort import command_effort
+from tests.any_robot import AnyRobot
 
 TARGET = [0.5, -0.3, 1.0, 0.05, -0.02, 0.1]
 
 
 @pytest.fixture(scope="module")
-def untrained(untrained_mdn: Path) -> MdnAllocator:
-    return load_allocator("mdn", checkpoint=untrained_mdn)
+def untrained(untrained_mdn: Path) -> AnyRobot:
+    return AnyRobot("mdn", checkpoint=untrained_mdn)
 
 
 @pytest.fixture(scope="module")
-def shipped() -> MdnAllocator:
-    return load_allocator("mdn", objective="effort")
+def shipped() -> AnyRobot:
+    return AnyRobot("mdn", objective="effort")
 
 
 def same_forces(layout: Layout, one: np.ndarray, other: np.ndarray) -> None:
@@ -38,7 +37,7 @@ def same_forces(layout: Layout, one: np.ndarray, other: np.ndarray) -> None:
 
 
 @pytest.fixture(scope="module")
-def settled(shipped: MdnAllocator) -> MdnAllocator:
+def settled(shipped: AnyRobot) -> AnyRobot:
     """With so many steps that every search comes to its end, whatever goes on beside it."""
     return shipped.with_settings(search_steps=60)
 
@@ -51,7 +50,7 @@ def reachable(layout: Layout, count: int, seed: int = 0) -> np.ndarray:
 @pytest.mark.parametrize("objective", ["power", "effort"])
 @pytest.mark.parametrize("n", [2, 4, 8, 12])
 def test_answers_are_exact_even_where_nothing_was_learned(
-    n: int, objective: str, untrained: MdnAllocator
+    n: int, objective: str, untrained: AnyRobot
 ) -> None:
     layout = random_layout(np.random.default_rng(n), n_fins=n, limits="varied")
     layout = layout.replace_actuator("fin_1", model=FinModelSpec("soft", (("e", 0.2), ("d", 0.1))))
@@ -61,7 +60,7 @@ def test_answers_are_exact_even_where_nothing_was_learned(
     assert np.mean(error < 1e-4) >= 0.95 and error.max() < 0.05
 
 
-def test_a_batch_costs_what_single_calls_do(settled: MdnAllocator, layout_a: Layout) -> None:
+def test_a_batch_costs_what_single_calls_do(settled: AnyRobot, layout_a: Layout) -> None:
     targets = reachable(layout_a, 6)
     together = settled.allocate_batch(layout_a, targets)
     np.testing.assert_allclose(Plant(layout_a).wrench(together.command), targets, atol=1e-4)
@@ -69,13 +68,13 @@ def test_a_batch_costs_what_single_calls_do(settled: MdnAllocator, layout_a: Lay
     np.testing.assert_allclose(together.effort, alone, rtol=0.01)
 
 
-def weights(method: MdnAllocator, layout: Layout) -> np.ndarray:
+def weights(method: AnyRobot, layout: Layout) -> np.ndarray:
     """Of the mixture's components, for `TARGET`."""
     seen = see(method._view(method.pipeline, layout), np.array([TARGET]) / method.normalization.std)
     return method.mixture(seen).complex_parts()[0][0]
 
 
-def test_candidates_keep_the_name_of_their_component(settled: MdnAllocator, layout_a: Layout) -> None:
+def test_candidates_keep_the_name_of_their_component(settled: AnyRobot, layout_a: Layout) -> None:
     answer, count = settled.allocate(layout_a, TARGET), settled.settings.n_candidates
     expected = [f"component {k + 1}" for k in np.argsort(-weights(settled, layout_a))[:count]]
     assert answer.samples is not None and answer.candidates is not None
@@ -92,7 +91,7 @@ def test_candidates_keep_the_name_of_their_component(settled: MdnAllocator, layo
         same_forces(layout_a, command, alone.command[0, 0])
 
 
-def test_from_tick_to_tick_candidates_keep_it_too(shipped: MdnAllocator) -> None:
+def test_from_tick_to_tick_candidates_keep_it_too(shipped: AnyRobot) -> None:
     layout, all_kept = load_layout("octo"), shipped.with_settings(n_refined=100, subsets=False)
     alone = all_kept.allocate(layout, TARGET)
     again = all_kept.allocate(layout, TARGET, previous=alone.command)
@@ -104,7 +103,7 @@ def test_from_tick_to_tick_candidates_keep_it_too(shipped: MdnAllocator) -> None
     assert away is not None and "the way it moves now" in away.source
 
 
-def test_more_candidates_than_components_are_drawn_by_a_seed(shipped: MdnAllocator, layout_a: Layout) -> None:
+def test_more_candidates_than_components_are_drawn_by_a_seed(shipped: AnyRobot, layout_a: Layout) -> None:
     many = shipped.with_settings(n_candidates=40)
     first, again, other = (many.allocate(layout_a, TARGET, seed=seed).samples for seed in (0, 0, 1))
     assert first is not None and other is not None
@@ -114,7 +113,7 @@ def test_more_candidates_than_components_are_drawn_by_a_seed(shipped: MdnAllocat
     assert means is not None and len({command.tobytes() for command in means.command.round(9)}) <= 16
 
 
-def test_components_are_drawn_as_often_as_they_weigh(shipped: MdnAllocator, layout_a: Layout) -> None:
+def test_components_are_drawn_as_often_as_they_weigh(shipped: AnyRobot, layout_a: Layout) -> None:
     """Behind the means, 8,000 draws; and their spread is the component's own, by the temperature."""
     weight, view = weights(shipped, layout_a), shipped._view(shipped.pipeline, layout_a)
     m = len(weight)
@@ -127,7 +126,7 @@ def test_components_are_drawn_as_often_as_they_weigh(shipped: MdnAllocator, layo
     assert (np.diff(weight[proposal.component[0, :m]]) <= 0.0).all()
 
 
-def test_it_goes_on_from_the_previous_command(shipped: MdnAllocator, layout_a: Layout) -> None:
+def test_it_goes_on_from_the_previous_command(shipped: AnyRobot, layout_a: Layout) -> None:
     before = shipped.allocate(layout_a, TARGET)
     near = np.array(TARGET) + [0.02, 0.0, 0.01, 0.0, 0.0, 0.0]
     answer = shipped.allocate(layout_a, near, previous=before.command)
@@ -136,7 +135,7 @@ def test_it_goes_on_from_the_previous_command(shipped: MdnAllocator, layout_a: L
     np.testing.assert_allclose(answer.wrench, near, atol=1e-4)
 
 
-def test_objectives_do_not_share_what_is_seen(shipped: MdnAllocator) -> None:
+def test_objectives_do_not_share_what_is_seen(shipped: AnyRobot) -> None:
     layout = load_layout("octo")
     target = [2.0, 0.0, 1.0, 0.0, 0.0, 0.1]
     effort = shipped.allocate(layout, target)
@@ -151,18 +150,18 @@ def test_shares_are_squares_of_roots_and_at_most_one() -> None:
 
 def test_refuses_other_networks_and_settings() -> None:
     with pytest.raises(CheckpointError, match="fed 'raw', expected one that is fed 'forces'; .*train mdn`"):
-        MdnAllocator(read_checkpoint(checkpoint_path("paper")))
+        AnyRobot("mdn", read_checkpoint(checkpoint_path("paper"))).on(load_layout("A"))
     with pytest.raises(AllocationError, match="n_candidates: expected"):
-        load_allocator("mdn", n_candidates=0)
+        AnyRobot("mdn", n_candidates=0)
     with pytest.raises(AllocationError, match="temperature: expected"):
-        load_allocator("mdn", temperature=-1.0)
+        AnyRobot("mdn", temperature=-1.0)
 
 
 def test_it_needs_no_torch() -> None:
     code = (
         "import sys; sys.modules['torch'] = None\n"
         "import finlab\n"
-        "a = finlab.load_allocator('mdn').allocate(finlab.load_layout('A'), [1, 0, 0.5, 0, 0, 0.1])\n"
+        "a = finlab.Allocator(finlab.load_layout('A'), 'mdn').allocate([1, 0, 0.5, 0, 0, 0.1])\n"
         "assert a.err_norm < 1e-4"
     )
     subprocess.run([sys.executable, "-c", code], timeout=60, check=True)
@@ -170,7 +169,7 @@ def test_it_needs_no_torch() -> None:
 
 @pytest.mark.parametrize("objective", ["power", "effort"])
 def test_samples_tell_what_the_plant_says_of_them(
-    objective: str, shipped: MdnAllocator, layout_a: Layout
+    objective: str, shipped: AnyRobot, layout_a: Layout
 ) -> None:
     method, plant = shipped.with_settings(objective=objective), Plant(layout_a)
     told = method.allocate(layout_a, TARGET).samples
@@ -183,7 +182,7 @@ def test_samples_tell_what_the_plant_says_of_them(
     np.testing.assert_allclose(told.power, plant.power(told.command).sum(-1), rtol=1e-9)
 
 
-def test_samples_are_the_proposed_forces(shipped: MdnAllocator, layout_a: Layout) -> None:
+def test_samples_are_the_proposed_forces(shipped: AnyRobot, layout_a: Layout) -> None:
     """As near as the compiled fins come, where a fin can give what is proposed."""
     prepared, target = shipped.pipeline.prepare(layout_a), np.array([TARGET])
     told, proposal = shipped.allocate(layout_a, TARGET).samples, shipped.proposals(prepared, target, 0)

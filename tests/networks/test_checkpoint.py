@@ -16,7 +16,6 @@ import pytest
 import torch
 from safetensors.torch import load_file, save_file
 
-from finlab.allocation import load_allocator
 from finlab.assets import checkpoint_path, shipped_checkpoints
 from finlab.errors import CheckpointError
 from finlab.networks.checkpoint import (
@@ -26,6 +25,7 @@ from finlab.networks.checkpoint import (
     resolve_checkpoint,
 )
 from finlab.training.saving import save_checkpoint
+from tests.any_robot import AnyRobot
 
 
 def file_sha256(path: Path) -> str:
@@ -65,7 +65,7 @@ def refusal(folder: Path) -> str:
     """The sentence with which a folder is refused, at the latest by the method that would answer with it."""
     with pytest.raises(CheckpointError) as caught:
         read_checkpoint(folder)
-        load_allocator("paper", checkpoint=folder)
+        AnyRobot("paper", checkpoint=folder)
     message = str(caught.value)
     assert "\n" not in message and folder.name in message
     return message
@@ -229,7 +229,7 @@ def test_a_surrogate_alone_loads_but_cannot_allocate(folder: Path) -> None:
     save_checkpoint(folder, replace(read_checkpoint(folder), network_sizes=None, network={}))
     assert read_checkpoint(folder).network_sizes is None
     with pytest.raises(CheckpointError, match="holds no network, .* train it with `finlab train allocator`"):
-        load_allocator("paper", checkpoint=folder)
+        AnyRobot("paper", checkpoint=folder)
 
 
 def test_a_network_over_forces_comes_back_without_a_surrogate(untrained_mdn: Path, tmp_path: Path) -> None:
@@ -237,7 +237,7 @@ def test_a_network_over_forces_comes_back_without_a_surrogate(untrained_mdn: Pat
     assert first.surrogate_sizes is None and first.network_sizes is not None
     assert save_checkpoint(tmp_path / "again", first).sha256 == first.sha256
     with pytest.raises(CheckpointError, match="fed 'forces', expected one that is fed 'raw'"):
-        load_allocator("paper", checkpoint=untrained_mdn)
+        AnyRobot("paper", checkpoint=untrained_mdn)
 
 
 def test_a_checkpoint_of_an_earlier_finlab_is_refused(folder: Path) -> None:

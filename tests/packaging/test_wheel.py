@@ -154,7 +154,7 @@ def test_without_extras_every_method_but_ipopt_allocates(bare: Path, tmp_path: P
         "layout = finlab.load_layout('A')\n"
         "for name in METHODS:\n"
         "    if name != 'ipopt':\n"
-        "        result = finlab.load_allocator(name).allocate(layout, [1, 0, 0.5, 0, 0, 0.1])\n"
+        "        result = finlab.Allocator(layout, name).allocate([1, 0, 0.5, 0, 0, 0.1])\n"
         "        assert result.err_norm < {'paper': 0.1, 'qp': 1.0}.get(name, 0.01), name\n"
         "assert 'torch' not in sys.modules\n"
     )

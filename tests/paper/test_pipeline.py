@@ -106,7 +106,7 @@ def test_the_same_seed_gives_the_same_answer(
 def test_refinement_lowers_what_the_surrogate_sees(checkpoint: TrainedWeights, robot: Layout) -> None:
     def believed(**options: object) -> float:
         method = PaperAllocator(checkpoint, **options)  # type: ignore[arg-type]
-        wrench = method.allocate_batch(robot, targets).wrench_surrogate
+        wrench = method.allocate_batch(robot, targets).wrench_expected
         return float(method.normalization.error(wrench, targets).mean())
 
     targets = np.random.default_rng(1).normal(size=(10, 6)) * checkpoint.normalization.std
@@ -216,9 +216,9 @@ def test_levenberg_marquardt_reaches_what_the_surrogate_can_give(
     share = np.random.default_rng(3).random((8, robot.n_fins, 3))
     command = torch.tensor(robot.lower + share * (robot.upper - robot.lower), dtype=torch.float32)
     targets = asked(checkpoint, command, robot).numpy().astype(np.float64)
-    error = method.normalization.error(method.allocate_batch(robot, targets).wrench_surrogate, targets)
+    error = method.normalization.error(method.allocate_batch(robot, targets).wrench_expected, targets)
     raw = PaperAllocator(checkpoint, refinement="none").allocate_batch(robot, targets)
-    assert np.median(error) < 0.05 * np.median(method.normalization.error(raw.wrench_surrogate, targets))
+    assert np.median(error) < 0.05 * np.median(method.normalization.error(raw.wrench_expected, targets))
 
 
 def test_the_shipped_checkpoint_answers_without_torch() -> None:
@@ -226,7 +226,7 @@ def test_the_shipped_checkpoint_answers_without_torch() -> None:
         "import sys\n"
         "sys.modules['torch'] = None\n"
         "import finlab\n"
-        "allocator = finlab.load_allocator('paper')\n"
+        "allocator = AnyRobot('paper')\n"
         "print(allocator.allocate(finlab.load_layout('A'), [1, 0, 0.5, 0, 0, 0.1]).command.shape)"
     )
     done = subprocess.run(

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from finlab import load_allocator
-from finlab.errors import CommandError
+from finlab.allocation import Allocator
 from finlab.layout import Interaction, Jet, Layout, load_layout
 from finlab.physics import Plant, plant_of
 from finlab.physics.coupled_plant import CoupledPlant
+from tests.any_robot import AnyRobot
 
 FLOW = np.array([0.15, -0.05, 0.03, 0.1, -0.2, 0.3])
 
@@ -34,7 +34,7 @@ def test_one_jet_by_hand() -> None:
     alone, found = Plant(layout).forces(command), plant_of(one).forces(command)
     np.testing.assert_array_equal(found[:3], alone[:3])
     thrust = np.linalg.norm(alone[0])
-    jet = -Plant(layout).fin_forces(command)[0] / thrust
+    jet = -Plant(layout).forces(command)[0] / thrust
     way = layout.position[3] - layout.position[0]
     cosine = float(jet @ way / np.linalg.norm(way))
     lost = (0.2 * np.exp(2.0 * (cosine - 1.0)) + 0.1 * np.exp(8.0 * (cosine - 1.0))) * thrust / (thrust + 0.5)
@@ -46,7 +46,7 @@ def test_speed_by_hand() -> None:
     layout = load_layout("A")
     fast, flow = _with(layout, Interaction((), inflow=(0.3, 0.2))), np.array([0.2, 0, 0, 0, 0, 0])
     command = np.tile([0.5, 1.0, 0.0], (4, 1))
-    alone, found = Plant(layout).fin_forces(command), plant_of(fast).fin_forces(command, flow=flow)
+    alone, found = Plant(layout).forces(command), plant_of(fast).forces(command)
     along = alone / np.linalg.norm(alone, axis=1, keepdims=True)
     j = 0.2 * along[:, 0] / np.hypot(2 * np.pi * 0.5 * 0.2, 0.05)
     kept = 1.0 - 0.3 * np.tanh(j) - 0.2 * np.tanh(j) ** 2
@@ -74,21 +74,8 @@ def test_derivatives_agree_with_differences(coupled: Layout, flow: np.ndarray | 
             np.testing.assert_allclose(own_jacobian[:, i, k], own, atol=2e-6)
 
 
-def test_each_command_has_a_flow_of_its_own(coupled: Layout) -> None:
-    plant, rng = plant_of(coupled), np.random.default_rng(6)
-    command, flows = plant.sample(rng, (7,)), rng.normal(0.0, 0.2, (7, 6))
-    together = plant.wrench(command, flow=flows)
-    for k, flow in enumerate(flows):
-        np.testing.assert_allclose(plant.wrench(command[k], flow=flow), together[k], atol=1e-12)
-    np.testing.assert_allclose(plant.wrench(command[0], flow=flows)[0], together[0], atol=1e-12)
-    np.testing.assert_array_equal(plant.at(flows).wrench(command), together)
-    still = plant_of(_with(coupled, Interaction()))
-    assert still.at(flows) is still
-    np.testing.assert_array_equal(still.wrench(command, flow=flows), Plant(coupled).wrench(command))
-
-
-def test_answers_are_exact_by_the_coupled_plant_at_the_flow(coupled: Layout) -> None:
-    allocator, plant = load_allocator(), plant_of(coupled)
+def test_answers_are_exact_by_the_coupled_plant(coupled: Layout) -> None:
+    allocator = AnyRobot()
     rng = np.random.default_rng(2)
     targets = plant.wrench(Plant(coupled).sample(rng, (40,)), flow=FLOW) * 0.7
     batch = allocator.allocate_batch(coupled, targets, flow=FLOW)
@@ -121,7 +108,7 @@ def test_a_lost_fin_takes_nothing(coupled: Layout) -> None:
     assert left.interaction is not None
     assert not any(lost in (jet.source, jet.target) for jet in left.interaction.jets)
     assert len(left.interaction.jets) == 6
-    answer = load_allocator().allocate(coupled, [0.5, 0, 0.3, 0, 0, 0.05], failed=[lost])
+    answer = Allocator(coupled).allocate([0.5, 0, 0.3, 0, 0, 0.05], failed=[lost])
     assert answer.err_norm < 1e-3
     np.testing.assert_allclose(
         plant_of(left).wrench(np.delete(answer.command, 1, axis=0)), answer.wrench, atol=1e-9

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from finlab.allocation import load_allocator
 from finlab.allocation.allocator import Allocator
 from finlab.control import FaultMonitor, TrackingController
 from finlab.errors import DataError, FinlabError, LayoutError
@@ -24,6 +23,7 @@ from finlab.sim import (
 )
 from finlab.sim.log import log_of_ticks
 from finlab.vehicle.body import ucat_body
+from tests.any_robot import AnyRobot
 
 
 def swum(swim: ClosedLoop, seconds: float) -> RunLog:
@@ -123,7 +123,7 @@ def test_what_becomes_of_fins_without_a_word(layout_a: Layout, analytic: Allocat
     braked = (log.fin_force[:, lost] * foot).sum(axis=1)[after]
     assert braked.sum() < 0.0 and braked.max() < 1e-6, "a fin that hangs still drags"
     assert np.ptp(log.fin_motion[after, stuck, 2]) < 1e-9 and np.ptp(log.command[after, stuck, 2]) > 0.02
-    law = np.linalg.norm(swim._plant.fin_forces(log.fin_motion), axis=-1)
+    law = np.linalg.norm(swim._plant.forces(log.fin_motion), axis=-1)
     share = np.linalg.norm(log.fin_force, axis=-1)[:, weak] / law[:, weak]
     assert np.median(share[after & (log.time < 4.0)]) == pytest.approx(0.5, abs=0.06)
     assert np.median(share[log.time > 4.0]) == pytest.approx(1.0, abs=0.06)
@@ -169,7 +169,7 @@ def test_odd_bodies_keep_loop_and_monitor_finite(layout_a: Layout, body: dict[st
     layout = replace(layout_a, body=replace(ucat_body(), **{"buoyancy_n": None, **body}))
     monitor = FaultMonitor(layout)
     task = make_trajectory("lissajous")
-    loop = ClosedLoop(layout, load_allocator("analytic"), task, TrackingController(layout), monitor=monitor)
+    loop = ClosedLoop(layout, AnyRobot("analytic"), task, TrackingController(layout), monitor=monitor)
     for _ in range(60):
         tick = loop.step()
         assert np.isfinite([*tick.motion, *tick.asked, *tick.fault_probability, *tick.strength_std]).all()

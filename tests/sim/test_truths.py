@@ -5,7 +5,6 @@ import math
 import numpy as np
 import pytest
 
-from finlab import load_allocator
 from finlab.layout import Layout, load_layout
 from finlab.sim import ClosedLoop, make_trajectory
 from finlab.sim.fin_force import MeanForce
@@ -14,6 +13,7 @@ from finlab.sim.offset import OffsetForce
 from finlab.sim.wake import MOST, WakeForce
 from finlab.vehicle.attitude import euler
 from finlab.vehicle.fin_motion import FinMotion
+from tests.any_robot import AnyRobot
 
 
 @pytest.fixture(scope="module")
@@ -68,7 +68,7 @@ def test_a_robot_built_askew_feels_its_fins_elsewhere(robot: Layout) -> None:
 
 @pytest.mark.parametrize("name", ["wake", "inflow", "offset"])
 def test_robots_stay_afoot_on_every_truth(name: str, robot: Layout) -> None:
-    loop = ClosedLoop(robot, load_allocator(), make_trajectory("circle"), plant=name)
+    loop = ClosedLoop(robot, AnyRobot(), make_trajectory("circle"), plant=name)
     for _ in range(120):
         loop.step()
     assert np.abs(euler(loop.state[3:7])[:2]).max() < 0.3

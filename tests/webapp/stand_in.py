@@ -74,10 +74,10 @@ def _ranked(layout: Layout, command: Array, target: Array, component: NDArray[np
     return Candidates(command[order], wrench[order], error[order], effort[order], power[order], source)
 
 
-def load_stand_in(method: str = "search", *, checkpoint: Any = None) -> Allocator:
+def load_stand_in(method: str = "dual", *, checkpoint: Any = None) -> Allocator:
     """As `load_allocator`: `search` and `mdn` are the stand-in, `ipopt` fails, the rest is `sqp`."""
     if method == "ipopt":
         raise AllocationError("ipopt is out of order in this test")
     if method not in METHODS:
         raise AllocationError(f"method: expected one of {', '.join(METHODS)}, got {method!r}")
-    return StandIn() if method in ("search", "mdn") else Sqp(NORMALIZATION)
+    return StandIn() if method in ("dual", "mdn") else Sqp(NORMALIZATION)

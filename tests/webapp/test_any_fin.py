@@ -90,11 +90,11 @@ def test_a_table_fin_goes_through_the_whole_app(
     while session.history.redo_name is not None:
         session.redo()
     assert session.state == again.state
-    allocator = SOLVER.loaded("search", "power")
-    graph = graph_bytes(build_graph(tabled, allocator))
+    allocator = SOLVER.loaded("dual", "power")
+    graph = graph_bytes(build_graph(allocator.on(tabled)))
     with pytest.raises(LayoutError, match=r"fin\.csv', which did not come along"):
         files.read_layout("tabled.graph.json", graph)
-    assert len(make_bundle(tabled, allocator).zip_bytes()) > len(graph), "the table travels along"
+    assert len(make_bundle(allocator.on(tabled)).zip_bytes()) > len(graph), "the table travels along"
     assert command_line(session.state).startswith("finlab allocate tabled.yaml --wrench")
 
 
@@ -112,7 +112,7 @@ def test_one_error_everywhere() -> None:
     solver = Solver()
     reply = solver.reply(state)
     answer, plant = reply.answer, plant_of(layout)
-    assert answer.candidates is not None and answer.wrench_surrogate is not None
+    assert answer.candidates is not None and answer.wrench_expected is not None
     modes = [mode for mode, _ in (*reply.modes.shown, *solver.modes(reply).shown)]
     told = [
         (c, e)

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from finlab.allocation import Allocator
 from finlab.allocation.allocation import Allocation
-from finlab.allocation.methods import load_allocator
 from finlab.assets import shipped_checkpoints, shipped_layouts
 from finlab.layout import load_layout
 from tests.webapp.loops import page_of
@@ -44,7 +44,7 @@ def test_all_methods_answer_one_after_the_other() -> None:
 
 
 def test_a_method_that_fails_keeps_nobody_else_waiting() -> None:
-    def load(method: str = "search", checkpoint: object = None) -> object:
+    def load(method: str = "dual", checkpoint: object = None) -> object:
         return load_stand_in("ipopt" if method == "paper" else method)
 
     worker, done = Worker(), threading.Event()
@@ -59,10 +59,10 @@ def test_a_method_that_fails_keeps_nobody_else_waiting() -> None:
 
 def test_the_table_tells_what_is_kept_least() -> None:
     answers = {method: load_stand_in(method).allocate(UCAT, PRESETS["Turn"]) for method in ("mdn", "qp")}
-    answers["search"] = load_allocator().allocate(UCAT, PRESETS["Turn"])
+    answers["dual"] = Allocator(UCAT).allocate(PRESETS["Turn"])
     comparison: Any = SimpleNamespace(state=State(UCAT), answers=answers)
     table = comparison_table(comparison, False)
-    assert three_digits(answers["search"].power) in table and three_digits(answers["qp"].effort) in table
+    assert three_digits(answers["dual"].power) in table and three_digits(answers["qp"].effort) in table
     assert "Kept least: power; mdn keeps effort least" in table, "this stand-in cannot be asked"
 
 
@@ -78,7 +78,7 @@ def test_each_mode_of_mdn_tells_its_components_and_search_has_no_samples() -> No
     dear = replace(samples, power=np.full(len(samples), 1e4))
     far = mode_plot(replace(reply.answer, samples=dear), modes, 0, 200)
     assert "1e+04" not in far and "e+" not in far, "samples that are far too dear stand at the edge"
-    searched = solver.reply(replace(state, method="search"))
+    searched = solver.reply(replace(state, method="dual"))
     found = solver.modes(searched)
     assert searched.answer.samples is None and found.of_samples is None
     assert not any(s.startswith("component") for mode, _ in found.shown for s in mode.sources)
@@ -112,6 +112,6 @@ def test_every_answer_keeps_least_what_is_asked() -> None:
     assert plan.objective == "effort" and state.drawing == {} and not knows_objective("paper")
     assert "--objective effort" in command_line(replace(state, objective="effort"))
     assert "--objective" not in command_line(replace(state, method="paper", objective="effort"))
-    assert "load_allocator('mdn', objective='effort')" in python_lines(
+    assert "AnyRobot('mdn', objective='effort')" in python_lines(
         replace(state, method="mdn", objective="effort")
     )

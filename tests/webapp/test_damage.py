@@ -112,8 +112,8 @@ def test_damage_draft_and_swim_outlive_the_server(session: Session) -> None:
 def test_a_plan_is_made_of_the_settings(session: Session) -> None:
     settings = SwimSettings()
     assert settings.rival == ALONE and len(settings.plan(session.state, None).methods) == 1
-    assert settings.with_value("rival", "qp").plan(session.state, None).methods == ("search", "qp")
-    assert settings.with_value("rival", "search").plan(session.state, None).methods == ("search",)
+    assert settings.with_value("rival", "qp").plan(session.state, None).methods == ("dual", "qp")
+    assert settings.with_value("rival", "dual").plan(session.state, None).methods == ("dual",)
     with pytest.raises(FinlabError, match="own"):
         settings.with_value("path", OWN).plan(session.state, None)
     session.jam("front_left", 0.5)

@@ -12,8 +12,8 @@ from typing import Any
 
 import pytest
 
-from finlab import load_allocator
 from finlab.actuators.fin.table_file import DOUBT, table_bytes
+from finlab.allocation import Allocator
 from finlab.errors import DataError, FinlabError, LayoutError
 from finlab.fit import outliers
 from finlab.layout import Layout, load_layout
@@ -107,7 +107,7 @@ def test_a_noisy_file_becomes_the_fins_model_and_undo_takes_it_off(tmp_path: Pat
     card = fit_card(found)
     assert "May be trusted" in card and "1 sample contradicts the others: cell.csv line 7." in card
     assert card.count("<circle") >= 60 and "Measure next" in card and "of 69 samples" in card
-    answer = load_allocator().allocate(opened.session.state.layout, [0.5, 0, 0.2, 0, 0, 0.05])
+    answer = Allocator(opened.session.state.layout).allocate([0.5, 0, 0.2, 0, 0, 0.05])
     assert answer.err_norm < 1e-6
     fitting.put_on_all()
     assert opened.models == ["table"] * 4 and opened.session.history.undo_name == "Fit 3 fins"
@@ -263,7 +263,7 @@ def test_a_layout_carries_its_tables_elsewhere(tmp_path: Path, cache: Path) -> N
     for path in cache.glob("*.csv"):
         path.unlink()
     opened = load_layout(elsewhere / "my_robot.yaml")
-    answer = load_allocator().allocate(opened, [0.5, 0, 0.2, 0, 0, 0.05])
+    answer = Allocator(opened).allocate([0.5, 0, 0.2, 0, 0, 0.05])
     assert answer.err_norm < 1e-6
     (tmp_path / name).write_bytes(content)
     with pytest.raises(
@@ -303,7 +303,7 @@ def test_a_bundle_opens_in_the_app(tmp_path: Path, cache: Path) -> None:
     from finlab.deploy.bundle import make_bundle
 
     layout = robot(tmp_path, cache)
-    content = make_bundle(layout, load_allocator()).zip_bytes()
+    content = make_bundle(Allocator(layout)).zip_bytes()
     assert files.read_layout("robot.zip", content).layout.fins[2].model == layout.fins[2].model
     with pytest.raises(DataError, match=r"^robot\.zip: is damaged"):
         files.read_layout("robot.zip", content.replace(b"finlab-graph", b"finlab-gr@ph"))

@@ -124,7 +124,7 @@ def test_kept_files_are_checked(tmp_path: Path) -> None:
     assert files.read("a" * 16, found) and found.state == session.state
     path = tmp_path / f"{'a' * 16}.json"
     assert path.stat().st_mode & 0o077 == 0
-    for text in ("", "{", "[]", "{}", '{"layout": 1}', path.read_text().replace("search", "<script>")):
+    for text in ("", "{", "[]", "{}", '{"layout": 1}', path.read_text().replace("dual", "<script>")):
         path.write_text(text)
         assert not files.read("a" * 16, fresh())
     store = SessionStore(lambda: Session(load_layout(shipped_layouts()["A"])), files)

@@ -13,6 +13,7 @@ import pytest
 import viser
 
 from finlab.actuators.fin.table_file import write_table
+from finlab.allocation import Allocator
 from finlab.errors import DataError, FinlabError, LayoutError
 from finlab.files.plain_values import yaml_text
 from finlab.layout import FinModelSpec, layout_to_dict, load_layout
@@ -173,12 +174,11 @@ def test_what_comes_along_is_kept_and_goes_along(tmp_path: Path, table: bytes, c
 def test_a_bundle_names_only_what_is_in_it(tmp_path: Path, table: bytes) -> None:
     import json
 
-    from finlab import load_allocator
     from finlab.bundle_files import CHECKSUMS, GRAPH, checksums
     from finlab.deploy.bundle import make_bundle
     from finlab.layout.load import checksum_of
 
-    bundle = make_bundle(load_layout("ucat"), load_allocator()).zip_bytes()
+    bundle = make_bundle(Allocator(load_layout("ucat"))).zip_bytes()
     with zipfile.ZipFile(io.BytesIO(bundle)) as archive:
         parts = {name: archive.read(name) for name in archive.namelist()}
     for path in secrets_of(tmp_path, table)[:9]:

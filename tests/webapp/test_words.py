@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from finlab.allocation import load_allocator
+from finlab.allocation import Allocator
 from finlab.analysis import score_card
 from finlab.analysis.score_card import quick_check
 from finlab.assets import shipped_layouts
@@ -106,7 +106,7 @@ def test_fins_that_were_not_learned_are_told_in_words_of_their_own() -> None:
 def test_what_a_method_cannot_is_not_what_the_fins_cannot() -> None:
     """A method that shares out a linear model misses what the others give exactly."""
     layout = load_layout("mixed")
-    answer = load_allocator("qp").allocate(layout, PRESETS["Zero"])
+    answer = Allocator(layout, "qp").allocate(PRESETS["Zero"])
     assert not answer.reachable and is_within(layout, PRESETS["Zero"], ())
     state = State(layout, target=PRESETS["Zero"], method="qp")
     assert Solver().reply(state).in_reach

@@ -114,7 +114,7 @@ def fin_table(state: State, allocation: Allocation | None, full: Array, selected
         elif failed:
             cells = Markup("<td colspan='5'>failed</td>")
         else:
-            force = float(np.linalg.norm(allocation.fin_forces[i]))
+            force = float(np.linalg.norm(allocation.forces[i]))
             cells = _cells(allocation.command[i], limits[i], force, full[i], i)
         rows.append(html("<tr class='{}'><td>{}</td>{}</tr>", kind, first, cells))
     return html("<div class='fl'><table class='fins'>{}{}</table></div>", HEADER, rows)

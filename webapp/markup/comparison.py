@@ -39,13 +39,13 @@ def comparison_table(comparison: Comparison, stale: bool) -> str:
             others.append(method)
         rows.append(html("<tr><td>{}</td>{}</tr>", method, cells))
     header = Markup(
-        "<tr><th>method</th><th>error [σ]</th><th>power [W]</th><th>effort</th><th>time [ms]</th></tr>"
+        "<tr><th>method</th><th>error</th><th>power [W]</th><th>effort</th><th>time [ms]</th></tr>"
     )
     kept = f"Kept least: {comparison.state.objective}"
     if others:
         kept += f"; {listed(others)} keep{'s' * (len(others) == 1)} effort least whatever is asked"
     said = html(
-        "<div class='said'><span class='given'>Green</span>: exact, up to {} σ. <span "
+        "<div class='said'><span class='given'>Green</span>: exact, an error of at most {}. <span "
         "style='color:{}'>Ochre</span>: approximate, another method is exact. <span "
         "class='missing'>Orange</span>: out of reach of all. {}.</div>",
         REACHED,

@@ -124,7 +124,7 @@ def _figures(allocation: Allocation, least: bool, in_reach: bool) -> list[str]:
         costs.append(html("<span><span class='dim'>{}</span> {}</span>", kept, cost))
     method, ms = allocation.method, allocation.solve_ms
     time = f"{ms:.2g}" if ms < 10.0 else f"{ms:.0f}"  # no measurement repeats to a third digit
-    error = "<span class='dim'>error</span> <b class='err'>{}</b> σ"
+    error = "<span class='dim'>error</span> <b class='err'>{}</b>"
     return [
         html(
             "<span title='missing, by the fins’ own laws: {}'>{}</span>",

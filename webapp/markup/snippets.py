@@ -25,7 +25,7 @@ def command_line(state: State) -> str:
 def python_lines(state: State) -> str:
     """The same question in Python."""
     name = _layout_name(state)
-    chosen = [repr(state.method)] if state.method != "search" else []
+    chosen = [repr(state.method)] if state.method != "dual" else []
     chosen += [f"objective={state.objective!r}"] if _asks_objective(state) else []
     target = ", ".join(f"{value:g}" for value in state.target)
     options = [f"failed={list(state.failed)!r}"] if state.failed else []
@@ -43,9 +43,9 @@ def python_lines(state: State) -> str:
         "import finlab",
         "",
         f"layout = finlab.load_layout({name!r})",
-        f"allocator = finlab.load_allocator({', '.join(chosen)})",
+        f"allocator = finlab.Allocator({', '.join(['layout', *chosen])})",
         f"wrench = [{target}]",
-        f"result = allocator.allocate({', '.join(['layout', 'wrench', *options])})",
+        f"result = allocator.allocate({', '.join(['wrench', *options])})",
         "print(result.command, result.wrench)",
     ]
     return "\n".join(lines)
@@ -58,7 +58,7 @@ def _layout_name(state: State) -> str:
 
 def _method(state: State) -> list[str]:
     """The method and the objective, where they are not the usual ones."""
-    method = ["--method", state.method] if state.method != "search" else []
+    method = ["--method", state.method] if state.method != "dual" else []
     return [*method, "--objective", state.objective] if _asks_objective(state) else method
 
 

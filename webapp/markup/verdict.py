@@ -71,7 +71,7 @@ def verdict_sentence(allocation: Allocation, in_reach: bool) -> str:
         return unlearned_sentence(allocation.layout, allocation.unknown_fins)
     if verdict is Verdict.EXACT:
         return str(verdict.value)
-    axis = int(np.argmax(np.abs(allocation.unallocated / allocation.sigma)))
+    axis = int(np.argmax(np.abs(allocation.unallocated / allocation.scale)))
     target, given = allocation.target[axis], allocation.wrench[axis]
     kind = "force" if axis < 3 else "torque"
     share = 100.0 * given / target if abs(target) > 1e-3 else np.nan
@@ -90,7 +90,7 @@ def rest_sentence(allocation: Allocation) -> str:
     """One sentence on what is left undone, axis by axis; nothing is where the answer is exact."""
     if allocation.reachable:
         return "Nothing is left undone."
-    rest, size = allocation.unallocated, np.abs(allocation.unallocated / allocation.sigma)
+    rest, size = allocation.unallocated, np.abs(allocation.unallocated / allocation.scale)
     parts = [_amount(rest[k], k) for k in np.argsort(-size) if size[k] >= SPOKEN * size.max()]
     return f"{listed(parts)} {'is' if len(parts) == 1 else 'are'} left undone."
 
@@ -109,7 +109,7 @@ def answer_sentence(state: State, allocation: Allocation | None, busy: bool) -> 
             sentences.append(_warning("; ".join(allocation.notes) + "."))
         sentences.append(rest_sentence(allocation))
         if not allocation.reachable and not allocation.unknown_fins:
-            share = round(100 * allocation.scale)
+            share = round(100 * allocation.share)
             told = [f"{share} % of what is asked"] if 0 <= share < 100 else []
             told += [*allocation.binding, *allocation.notes]
             sentences.append("; ".join(told) + "." if told else "")

@@ -13,8 +13,8 @@ from finlab.vehicle.body import complete_body
 from finlab.vehicle.vehicle import Vehicle
 from webapp.session.state import AXIS_WORDS, State
 
-SMALL = 0.05
-"""Normalized error of an axis that is too small to speak of."""
+SMALL = 0.01
+"""Share of the robot's yardstick that is too small to speak of, on one axis."""
 ROUNDING = 1e-9
 """Normalized error below which the digits are those of the computer's rounding."""
 AT_LIMIT = 0.995
@@ -40,13 +40,13 @@ def small(value: float) -> str:
 
 
 def error_digits(value: float) -> str:
-    """An error [σ] as `small` has it; what lies below `ROUNDING` is rounding."""
+    """An error as `small` has it; what lies below `ROUNDING` is rounding."""
     return "≤ 1e−9" if value < ROUNDING else small(value)
 
 
-def three_digits(value: float) -> str:
+def three_digits(value: float | None) -> str:
     """Three significant digits: `2.32`, `0.0410`, `12.5`; small and large ones as `small` has them."""
-    if not math.isfinite(value):
+    if value is None or not math.isfinite(value):
         return "–"
     if value != 0 and not 1e-3 <= abs(value) < 1e4:
         return small(value)
@@ -72,7 +72,7 @@ def source_words(sources: Sequence[str]) -> str:
 def missing_part(allocation: Allocation) -> Array:
     """The unallocated wrench (6,) [N, N m] without what is too small to matter."""
     rest = allocation.unallocated
-    return np.where(np.abs(rest / allocation.sigma) > 2 * SMALL, rest, 0.0)
+    return np.where(np.abs(rest / allocation.scale) > SMALL, rest, 0.0)
 
 
 def unlearned_sentence(layout: Layout, fins: Sequence[str]) -> str:

@@ -14,7 +14,7 @@ from webapp.page import Page
 from webapp.session.state import knows_objective
 
 ORIGINS = {
-    "search": "The search knows each fin's own law and draws nothing. It begins with all fins at work and, "
+    "dual": "The search knows each fin's own law and draws nothing. It begins with all fins at work and, "
     "for other ways, with some of them at rest.",
     "mdn": "A network proposes ways to share the wrench, drawn from its mixture; the search, by the fins' "
     "own laws, takes each to its exact end. A mode names the components that led to it; all others are the "

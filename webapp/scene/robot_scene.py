@@ -120,7 +120,7 @@ class RobotScene:
             if fin.name in state.failed or allocation is None:
                 self._fins[i].command(None, np.zeros(3), 0.0, False)
             elif fits and np.isfinite(allocation.command[i, 0]):
-                force = allocation.fin_forces[i]
+                force = allocation.forces[i]
                 # The force belongs to the answer's own mounting angle, which a drag may have left behind.
                 angle = allocation.layout.fins[i].shaft_azimuth
                 self._fins[i].command(allocation.command[i], force * scale, angle, display.fans)
@@ -176,5 +176,5 @@ def _largest(state: State, allocation: Allocation | None) -> float:
     """Largest force that an arrow has to show [N]."""
     forces = [np.array(state.target[:3])]
     if allocation is not None:
-        forces += [allocation.wrench[:3], *allocation.fin_forces]
+        forces += [allocation.wrench[:3], *allocation.forces]
     return float(max(np.linalg.norm(force) for force in forces))

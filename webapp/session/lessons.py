@@ -14,7 +14,7 @@ from webapp.session.state import State
 from webapp.session.targets import PRESETS
 from webapp.session.tour import Guiding
 
-DELIVERED = 0.01
+DELIVERED = 1e-3
 """Normalized error up to which a wrench counts as delivered."""
 ALIGNED = 0.999
 """Cosine from which what is delivered points where it was asked."""
@@ -72,7 +72,7 @@ class Lesson:
 
 def _aligned(seen: Seen) -> bool:
     """Whether something is delivered, and in the direction that was asked for."""
-    given, asked = (wrench / seen.answer.sigma for wrench in (seen.answer.wrench, seen.answer.target))
+    given, asked = (wrench / seen.answer.scale for wrench in (seen.answer.wrench, seen.answer.target))
     size = float(np.linalg.norm(given) * np.linalg.norm(asked))
     return size > 0.0 and float(given @ asked) / size > ALIGNED
 

@@ -25,7 +25,7 @@ MAX_TARGET = 1000.0
 """Largest target component that the page may ask for [N, N m]."""
 STRENGTH_RANGE = (0.05, 1.0)
 """Shares that may be left of a weak fin's largest amplitude and frequency."""
-COMPARED = ("search", "mdn", "paper", "analytic", "qp", "sqp")
+COMPARED = ("dual", "mdn", "paper", "analytic", "qp", "sqp")
 """Methods that answer quickly enough to be compared while one waits."""
 OBJECTIVES: tuple[str, ...] = get_args(Objective)
 """What answers may keep least."""
@@ -59,7 +59,7 @@ class State:
     """T, how far the draws may stray from the mixture's means; None as above, and so is gamma."""
     gamma: float | None = None
     """Weight of the effort in the ranking."""
-    method: str = "search"
+    method: str = "dual"
     """Name of the allocation method."""
     objective: str = "power"
     """What answers keep least: one of `OBJECTIVES`."""

@@ -24,7 +24,7 @@ class Step:
     """Fins that have failed."""
     mode: int = 0
     """Which mode is shown."""
-    method: str = "search"
+    method: str = "dual"
     """Method that answers."""
     swims: bool = False
     """Whether the robot swims."""

@@ -13,7 +13,6 @@ from finlab.deploy.bundle import make_bundle, with_tables_inside
 from finlab.deploy.graph import build_graph
 from finlab.deploy.graph_file import graph_bytes
 from finlab.errors import FinlabError
-from finlab.layout import Layout
 from finlab.sim.log_csv import csv_of
 from webapp.session.companions import archive_of, has_tables
 from webapp.session.files import file_stem
@@ -53,11 +52,11 @@ class Exports:
         """
         self._send_made(".zip", lambda *robot: make_bundle(*robot).zip_bytes())
 
-    def _send_made(self, suffix: str, make: Callable[[Layout, Allocator, tuple[str, ...]], bytes]) -> None:
+    def _send_made(self, suffix: str, make: Callable[[Allocator, tuple[str, ...]], bytes]) -> None:
         """Send what is made of the robot and its allocator, as that is shipped but for the objective."""
-        state, loaded = self._session.state, self._context.solver.loaded
+        state, shipped = self._session.state, self._context.solver.shipped
         name = f"{file_stem(state.layout.name)}{suffix}"
-        self._send(name, lambda: make(state.layout, loaded(state.method, state.objective), state.failed))
+        self._send(name, lambda: make(shipped(state.layout, state.method, state.objective), state.failed))
 
     def swim(self, records: Sequence[Recorded]) -> None:
         """Send the logs of robots that swim as CSV; an archive of them where there are several."""

@@ -1,6 +1,6 @@
 """From a state to an answer with all that a page shows of it: picks the allocator and keeps it."""
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -9,16 +9,19 @@ import numpy as np
 
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.allocator import Allocator
-from finlab.allocation.evaluate import evaluate
-from finlab.allocation.methods import load_allocator
+from finlab.allocation.methods import MethodChoice, checked_settings, choose_method
 from finlab.allocation.modes import Mode
 from finlab.allocation.solution import Candidates
+from finlab.arrays import Array
 from finlab.forces.reach import axis_ranges
 from finlab.layout import Layout
+from finlab.physics import plant_of
 from webapp.session.state import State
 from webapp.tasks.mode_names import Modes, known_modes, listed_modes
 
-Load = Callable[..., Allocator]
+Load = Callable[..., MethodChoice]
+KEPT = 8
+"""Allocators that are kept."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,43 +41,61 @@ class Reply:
 class Solver:
     """Answers states. Used from one thread only, the worker's."""
 
-    def __init__(self, checkpoint: str | Path | None = None, load: Load = load_allocator) -> None:
+    def __init__(self, checkpoint: str | Path | None = None, load: Load = choose_method) -> None:
         """`checkpoint` is a name or folder, None for the shipped one; `load` is replaced in tests."""
         self._checkpoint = checkpoint
         self._load = load
-        self._allocators: dict[tuple[str, str], Allocator] = {}
+        self._choices: dict[tuple[str, str], MethodChoice] = {}
+        self._made: dict[tuple[Layout, str, str, str], Allocator] = {}
 
     @cached_property
     def aside(self) -> "Solver":
         """Another solver with the same checkpoint, for another thread."""
         return Solver(self._checkpoint, self._load)
 
-    def loaded(self, method: str, objective: str) -> Allocator:
-        """The allocator of a method as it is shipped, loaded once for each objective that it knows.
+    def shipped(self, layout: Layout, method: str, objective: str) -> Allocator:
+        """The allocator of a robot by a method as it is shipped, whose networks are loaded once.
 
         Raises:
-            FinlabError: it cannot be loaded.
+            FinlabError: it cannot be made.
         """
-        known = self._allocators
-        if (method, objective) not in known:
-            checkpoint = None if method == "paper" else self._checkpoint
-            allocator = self._load(method, checkpoint=checkpoint)
-            if "objective" in allocator.option_names():
-                allocator = allocator.with_settings(objective=objective)
-            known[method, objective] = allocator
-        return known[method, objective]
+        return self._on(layout, method, objective, {})
 
     def allocator(self, state: State) -> Allocator:
-        """The allocator for the state's method with the state's settings.
+        """The allocator for the state's robot and method with the state's settings.
 
         Raises:
-            FinlabError: it cannot be loaded.
+            FinlabError: it cannot be made.
         """
-        allocator = self.loaded(state.method, state.objective)
-        known = allocator.options
-        own = {key: v for key, v in state.drawing.items() if getattr(state, key) is not None and key in known}
-        changes = {key: value for key, value in own.items() if value != known[key]}
-        return allocator.with_settings(**changes) if changes else allocator
+        drawing = {key: v for key, v in state.drawing.items() if getattr(state, key) is not None}
+        return self._on(state.layout, state.method, state.objective, drawing)
+
+    def _on(self, layout: Layout, method: str, objective: str, drawing: Mapping[str, object]) -> Allocator:
+        """An allocator, one of the last few or made now."""
+        key = layout, method, objective, repr(sorted(drawing.items()))
+        found = self._made.pop(key, None)
+        if found is None:
+            choice = self._choice(method, objective)
+            known = choice.kind.option_names()
+            own = {name: value for name, value in drawing.items() if name in known}
+            settings = replace(choice.settings, **own)
+            found = Allocator.of_choice(layout, replace(choice, settings=settings))
+        self._made[key] = found  # the newest is last
+        while len(self._made) > KEPT:
+            self._made.pop(next(iter(self._made)))
+        return found
+
+    def _choice(self, method: str, objective: str) -> MethodChoice:
+        """A method with its networks, loaded once for each objective that it knows."""
+        known = self._choices
+        if (method, objective) not in known:
+            checkpoint = self._checkpoint if method == "mdn" else None
+            choice = self._load(method, checkpoint=checkpoint)
+            if "objective" in choice.kind.option_names():
+                settings = checked_settings(choice.kind, {"objective": objective})
+                choice = replace(choice, settings=settings)
+            known[method, objective] = choice
+        return known[method, objective]
 
     def reply(self, state: State) -> Reply:
         """The answer to a state with all that a page shows of it, computed to the end.
@@ -99,7 +120,7 @@ class Solver:
             FinlabError: the method cannot be loaded or cannot answer.
         """
         return self.allocator(state).allocate(
-            state.layout, state.target, failed=state.failed, policy=state.policy, health=state.health, seed=0
+            state.target, failed=state.failed, policy=state.policy, health=state.health, seed=0
         )
 
 
@@ -108,29 +129,34 @@ def judged(answer: Allocation) -> Allocation:
 
     A method with a learned model ranks them by what that believes.
     """
-    if answer.wrench_surrogate is None:
+    if answer.wrench_expected is None:
         return answer
     told = (
         None if found is None else _judged(answer, found) for found in (answer.candidates, answer.samples)
     )
-    candidates, samples = told
-    return replace(answer, candidates=candidates, samples=samples)
+    return answer.with_candidates(*told)
 
 
 def _judged(answer: Allocation, found: Candidates) -> Candidates:
-    verdict = evaluate(answer.layout, found.command, np.tile(answer.target, (len(found), 1)), answer.sigma)
-    return replace(found, wrench=verdict.wrench, err_norm=verdict.err_norm)
+    wrench, error = _verdict(answer, found.command)
+    return replace(found, wrench=wrench, err_norm=error)
+
+
+def _verdict(answer: Allocation, command: Array) -> tuple[Array, Array]:
+    """Wrenches (K, 6) of commands (K, n, 3) by the plant, and their errors (K,)."""
+    wrench = plant_of(answer.layout).wrench(command)
+    return wrench, np.linalg.norm((wrench - answer.target) / answer.scale, axis=-1)
 
 
 def judged_modes(answer: Allocation, modes: tuple[Mode, ...]) -> tuple[Mode, ...]:
     """The same for modes."""
-    if answer.wrench_surrogate is None or not modes:
+    if answer.wrench_expected is None or not modes:
         return modes
     command = np.stack([mode.command for mode in modes])
-    verdict = evaluate(answer.layout, command, np.tile(answer.target, (len(modes), 1)), answer.sigma)
+    wrenches, errors = _verdict(answer, command)
     return tuple(
         replace(mode, wrench=wrench, err_norm=float(error))
-        for mode, wrench, error in zip(modes, verdict.wrench, verdict.err_norm, strict=True)
+        for mode, wrench, error in zip(modes, wrenches, errors, strict=True)
     )
 
 

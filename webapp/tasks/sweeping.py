@@ -91,5 +91,5 @@ class Sweep:
             return
         at = int(np.argmin(np.abs(self.values - answer.target[self.axis])))
         if abs(self.values[at] - answer.target[self.axis]) < 1e-9:
-            self.force[:, at] = np.linalg.norm(answer.fin_forces, axis=1)
+            self.force[:, at] = np.linalg.norm(answer.forces, axis=1)
             self.error[at], self.power[at] = answer.err_norm, answer.power

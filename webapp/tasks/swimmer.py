@@ -27,7 +27,7 @@ class Swimmer:
         self.path: Array = np.array([swim.task.setpoint(float(t)).position for t in times])
         """The way to go (POINTS, 3) [m]."""
         self.duration_s = swim.task.duration_s
-        self.unknown_fins = swim.allocator.unknown_fins(swim.layout)
+        self.unknown_fins = swim.allocator.unknown_fins
         """Fins that its method has not learned."""
         self._water = swim.water
         self._rows: list[Array] = []

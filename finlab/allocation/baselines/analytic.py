@@ -1,12 +1,12 @@
 """Method `analytic`: force-space pseudo-inverse, each fin's force looked up in its own envelope."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 from finlab.allocation.baselines.model_based import ModelBased
 from finlab.allocation.baselines.pseudo_inverse import RCOND, PseudoInverse
 from finlab.allocation.settings import AimSettings, number
 from finlab.arrays import Array
-from finlab.physics import Plant
 
 
 @dataclass(frozen=True)
@@ -28,8 +28,9 @@ class Analytic(ModelBased):
     settings_class = AnalyticSettings
     settings: AnalyticSettings
 
-    def _invert(self, plant: Plant) -> PseudoInverse:
-        return PseudoInverse(plant, self.normalization.std, self.aim, self.settings.rcond)
+    @cached_property
+    def _inverse(self) -> PseudoInverse:
+        return PseudoInverse(self.plant, self.sigma, self.aim, self.settings.rcond)
 
-    def _commands(self, plant: Plant, targets: Array, seed: int) -> Array:
-        return self._inverse(plant).command(targets)
+    def _commands(self, targets: Array, seed: int) -> Array:
+        return self._inverse.command(targets)

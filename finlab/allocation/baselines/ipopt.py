@@ -8,20 +8,21 @@ table's exact Jacobian and a Hessian by differences of it.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from finlab.allocation.baselines.ipopt_forces import ForceProgram
-from finlab.allocation.baselines.model_based import CACHE_SIZE, ModelBased, TimeLimit, TimeLimitedSettings
+from finlab.allocation.baselines.model_based import ModelBased, TimeLimit, TimeLimitedSettings
 from finlab.allocation.baselines.plant_in_casadi import plant_formulas, plant_in_casadi
-from finlab.allocation.settings import choice, number
+from finlab.allocation.settings import Settings, choice, number
 from finlab.arrays import Array
 from finlab.distribution import install
 from finlab.errors import AllocationError
-from finlab.networks.normalization import Normalization
-from finlab.physics import PlanarLaw, Plant, make_law
+from finlab.layout import Layout
+from finlab.networks.trained import TrainedWeights
+from finlab.physics import PlanarLaw, make_law
 
 SOLVER_OPTIONS = {
     "ipopt.print_level": 0,
@@ -73,78 +74,80 @@ class Ipopt(ModelBased):
     settings_class = IpoptSettings
     settings: IpoptSettings
 
-    def __init__(self, normalization: Normalization, **settings: Any) -> None:
-        super().__init__(normalization, **settings)
+    def __init__(
+        self, layout: Layout, settings: Settings, scale: Array, weights: TrainedWeights | None = None
+    ) -> None:
+        super().__init__(layout, settings, scale, weights)
         if self.settings.space == "forces" and self.aim.name != "power":
             raise AllocationError(
                 f"method ipopt: space 'forces' keeps power least, got objective {self.aim.name!r}; "
                 "take space 'commands'"
             )
         self._casadi = import_casadi()
-        self._solver = lru_cache(CACHE_SIZE)(self._build)
-        self._force_program = lru_cache(CACHE_SIZE)(self._build_forces)
 
-    def _commands(self, plant: Plant, targets: Array, seed: int) -> Array:
+    def _commands(self, targets: Array, seed: int) -> Array:
         if self.settings.space == "forces":
-            return self._by_forces(plant, targets, seed)
-        random = plant.sample(np.random.default_rng(seed), (self.settings.n_starts,))
-        first = self._inverse(plant).command(targets)
-        result = np.empty((len(targets), plant.n_fins, 3))
+            return self._by_forces(targets, seed)
+        random = self.plant.sample(np.random.default_rng(seed), (self.settings.n_starts,))
+        first = self._inverse.command(targets)
+        result = np.empty((len(targets), self.plant.n_fins, 3))
         for i, target in enumerate(targets):
             limit = TimeLimit(self.settings.time_limit_s)
-            ends = [self._end(plant, target, first[i])]
-            ends += [self._end(plant, target, start) for start in random if not limit.over]
-            result[i] = ends[self._total(plant, np.array(ends), target).argmin()]
+            ends = [self._end(target, first[i])]
+            ends += [self._end(target, start) for start in random if not limit.over]
+            result[i] = ends[self._total(np.array(ends), target).argmin()]
         return result
 
-    def _by_forces(self, plant: Plant, targets: Array, seed: int) -> Array:
+    def _by_forces(self, targets: Array, seed: int) -> Array:
         """Commands (N, n, 3) for targets (N, 6), found in the space of forces."""
-        program, result = self._force_program(plant), []
+        program, result = self._force_program, []
         for target in targets:
             limit = TimeLimit(self.settings.time_limit_s)
             starts = program.starts(target, self.settings.n_starts, seed)
             ends = np.array(
                 [program.command(target, each) for k, each in enumerate(starts) if not (k and limit.over)]
             )
-            result.append(ends[self._total(plant, ends, target).argmin()])
-        return np.array(result).reshape(len(targets), plant.n_fins, 3)
+            result.append(ends[self._total(ends, target).argmin()])
+        return np.array(result).reshape(len(targets), self.plant.n_fins, 3)
 
-    def _build_forces(self, plant: Plant) -> ForceProgram:
-        inverse, std = self._inverse(plant), self.normalization.std
-        return ForceProgram(self._casadi, inverse, std, self._cost(plant).weight, self._options)
+    @cached_property
+    def _force_program(self) -> ForceProgram:
+        return ForceProgram(self._casadi, self._inverse, self.sigma, self._cost.weight, self._options)
 
     @property
     def _options(self) -> dict[str, Any]:
         return SOLVER_OPTIONS | {"ipopt.max_cpu_time": 0.5 * self.settings.time_limit_s}
 
-    def _end(self, plant: Plant, target: Array, start: Array) -> Array:
+    def _end(self, target: Array, start: Array) -> Array:
         """The command (n, 3) IPOPT ends at, or the start itself where it breaks down."""
+        plant = self.plant
         limits = {"lbx": plant.lower.ravel(), "ubx": plant.upper.ravel()}
-        answer = self._solver(plant)[0](x0=start.ravel(), p=target, **limits)
+        answer = self._solver[0](x0=start.ravel(), p=target, **limits)
         end = np.array(answer["x"], np.float64).reshape(-1, 3)
         return plant.feasible(end) if np.isfinite(end).all() else start
 
-    def _build(self, plant: Plant) -> tuple[Any, Formulas]:
-        """The solver of one layout, and the formulas, which must live as long; its variables are the commands
-        as they are, its parameter the target."""
-        formulas = self._formulas(plant)
+    @cached_property
+    def _solver(self) -> tuple[Any, Formulas]:
+        """The solver, and the formulas, which must live as long; its variables are the commands as they are,
+        its parameter the target."""
+        formulas = self._formulas()
         objective = self._casadi.sumsqr(formulas.residual) + formulas.cost
         program = {"x": formulas.command, "p": formulas.target, "f": objective}
         options = self._options | formulas.options
         return self._casadi.nlpsol("allocation", "ipopt", program, options), formulas
 
-    def _formulas(self, plant: Plant) -> Formulas:
-        """What a robot's commands give and cost."""
-        cs, sigma = self._casadi, self._casadi.DM(self.normalization.std)
+    def _formulas(self) -> Formulas:
+        """What the robot's commands give and cost."""
+        cs, plant, sigma = self._casadi, self.plant, self._casadi.DM(self.sigma)
         if not all(isinstance(make_law(fin.model), PlanarLaw) for fin in plant.layout.fins):
-            answer, hessian = plant_in_casadi(cs, plant, self._cost(plant), self.normalization.std)
+            answer, hessian = plant_in_casadi(cs, plant, self._cost, self.sigma)
             command, target = cs.MX.sym("command", 3 * plant.n_fins), cs.MX.sym("target", 6)
             given = answer(command)
             options = {"hess_lag": hessian}
             return Formulas(command, target, (given[:6] - target) / sigma, given[6], options, answer)
         command, wrench, cost = plant_formulas(cs, plant, self.aim)
         target = cs.SX.sym("target", 6)
-        weight = self._cost(plant).weight
+        weight = self._cost.weight
         return Formulas(command, target, (wrench - target) / sigma, weight * cost, {}, None)
 
 

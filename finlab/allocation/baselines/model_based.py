@@ -3,23 +3,22 @@
 import time
 from abc import abstractmethod
 from dataclasses import dataclass
-from functools import lru_cache
-from typing import Any
+from functools import cached_property
+from typing import ClassVar
 
-from finlab.allocation.allocator import Allocator
 from finlab.allocation.baselines.pseudo_inverse import PseudoInverse
-from finlab.allocation.command_cost import CommandCost, command_cost
-from finlab.allocation.settings import AimSettings, number
+from finlab.allocation.command_cost import command_cost
+from finlab.allocation.method import LeastErrorMethod
+from finlab.allocation.settings import AimSettings, Settings, number
 from finlab.allocation.solution import Solution
 from finlab.arrays import Array
 from finlab.layout import Layout
-from finlab.networks.normalization import Normalization
-from finlab.physics import Plant, plant_of
+from finlab.networks.trained import TrainedWeights
 
 ENERGY_TRADEOFF = 1e-4
 """Weight of the cost beside the squared normalized error where a method weighs both; see `command_cost`."""
-CACHE_SIZE = 64
-"""Layouts whose prepared quantities a method keeps; a control loop asks for the same one again and again."""
+USUAL_SHARE = 0.1
+"""What a robot is mostly asked for, as a share of its yardstick."""
 
 
 class TimeLimit:
@@ -38,53 +37,45 @@ class TimeLimit:
         return time.thread_time() > self._end
 
 
-class ModelBased(Allocator):
+class ModelBased(LeastErrorMethod):
     """A method that optimizes over the fins' own laws and tables, those that score every method."""
 
-    settings_class: type[AimSettings] = AimSettings
+    settings_class: ClassVar[type[Settings]] = AimSettings
+    settings: AimSettings
 
-    def __init__(self, normalization: Normalization, **settings: Any) -> None:
-        """Make it.
+    def __init__(
+        self, layout: Layout, settings: Settings, scale: Array, weights: TrainedWeights | None = None
+    ) -> None:
+        super().__init__(layout, settings, scale, weights)
+        self.aim = self.settings.aim
+        self.sigma = USUAL_SHARE * scale
+        """What wrenches (6,) are divided by: what a robot is mostly asked for."""
 
-        Args:
-            normalization: the yardstick of the error; nothing else is taken from a checkpoint.
-            settings: fields of the method's settings.
+    @cached_property
+    def _cost(self) -> CommandCost:
+        """What the robot's commands cost, weighed beside the squared error."""
+        return command_cost(self.plant, self.aim, self.sigma, ENERGY_TRADEOFF)
 
-        Raises:
-            AllocationError: a setting that the method cannot work with.
-        """
-        self.normalization = normalization
-        self.settings = chosen = self.settings_class(**settings)
-        self.aim = chosen.aim
-        self._cost = lru_cache(CACHE_SIZE)(self._weigh)
-        self._inverse = lru_cache(CACHE_SIZE)(self._invert)
+    @cached_property
+    def _inverse(self) -> PseudoInverse:
+        """What answers by the pseudo-inverse, and where others start."""
+        return PseudoInverse(self.plant, self.sigma, self.aim)
 
     @abstractmethod
-    def _commands(self, plant: Plant, targets: Array, seed: int) -> Array:
+    def _commands(self, targets: Array, seed: int) -> Array:
         """Commands (N, n, 3) for targets (N, 6).
 
         Random starts are drawn once and shared by all targets, so that a target gets the same answer alone
         and among others.
         """
 
-    def _solve(self, layout: Layout, targets: Array, *, seed: int, previous: Array | None) -> Solution:
-        plant = plant_of(layout).at(self.flow)
-        command = self._commands(plant, targets, seed)
-        return Solution(plant.feasible(command))
+    def _solve(self, targets: Array, *, seed: int, previous: Array | None) -> Solution:
+        return Solution(self.plant.feasible(self._commands(targets, seed)))
 
-    def _weigh(self, plant: Plant) -> CommandCost:
-        """What a robot's commands cost, weighed beside the squared normalized error."""
-        return command_cost(plant, self.aim, self.normalization.std, ENERGY_TRADEOFF)
-
-    def _invert(self, plant: Plant) -> PseudoInverse:
-        """What answers by the pseudo-inverse, and where others start."""
-        return PseudoInverse(plant, self.normalization.std, self.aim)
-
-    def _total(self, plant: Plant, command: Array, target: Array) -> Array:
-        """`J = err_norm^2 + cost` (B,) of commands (B, n, 3)."""
-        total: Array = self.normalization.error(plant.wrench(command), target) ** 2 + self._cost(plant)(
-            command
-        )
+    def _total(self, command: Array, target: Array) -> Array:
+        """`J = err_norm^2 + cost` (B,) of commands (B, n, 3), the error over `sigma`."""
+        missing = (self.plant.wrench(command) - target) / self.sigma
+        total: Array = (missing**2).sum(-1) + self._cost(command)
         return total
 
 

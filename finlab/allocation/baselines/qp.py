@@ -1,16 +1,14 @@
 """Method `qp`: one linear map per layout, one box-constrained least squares per target, as in the paper."""
 
 from dataclasses import dataclass
-from functools import lru_cache
-from typing import Any
+from functools import cached_property
 
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from finlab.allocation.baselines.model_based import CACHE_SIZE, ModelBased
+from finlab.allocation.baselines.model_based import ModelBased
 from finlab.allocation.settings import AimSettings, number
 from finlab.arrays import Array
-from finlab.networks.normalization import Normalization
 from finlab.physics import Plant
 
 DIFFERENCE_STEP = 1e-4
@@ -53,21 +51,18 @@ class Qp(ModelBased):
     settings_class = QpSettings
     settings: QpSettings
 
-    def __init__(self, normalization: Normalization, **settings: Any) -> None:
-        super().__init__(normalization, **settings)
-        self._map = lru_cache(CACHE_SIZE)(self._prepare)
+    @cached_property
+    def _map(self) -> LinearMap:
+        return LinearMap(self.plant, self.sigma)
 
-    def _commands(self, plant: Plant, targets: Array, seed: int) -> Array:
-        linear = self._map(plant)
+    def _commands(self, targets: Array, seed: int) -> Array:
+        linear, plant = self._map, self.plant
         n_free = int(linear.free.sum())
         step = np.zeros((len(targets), linear.free.size))
         if n_free:
             matrix = np.vstack([linear.matrix, np.sqrt(self.settings.regularization) * np.eye(n_free)])
             wanted = np.zeros((len(targets), 6 + n_free))
-            wanted[:, :6] = (targets - linear.wrench) / self.normalization.std
+            wanted[:, :6] = (targets - linear.wrench) / self.sigma
             for i, right in enumerate(wanted):
                 step[i, linear.free] = lsq_linear(matrix, right, (-0.5, 0.5), method="bvls").x
         return linear.reference + step.reshape(-1, plant.n_fins, 3) * plant.width
-
-    def _prepare(self, plant: Plant) -> LinearMap:
-        return LinearMap(plant, self.normalization.std)

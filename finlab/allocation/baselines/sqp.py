@@ -2,18 +2,17 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from scipy.optimize import minimize
 
-from finlab.allocation.baselines.model_based import CACHE_SIZE, ModelBased, TimeLimit, TimeLimitedSettings
+from finlab.allocation.baselines.model_based import ModelBased, TimeLimit, TimeLimitedSettings
 from finlab.allocation.levenberg_marquardt import CommandProblem, refine
 from finlab.allocation.settings import number
 from finlab.arrays import Array
 from finlab.layout import layout_effectiveness
-from finlab.networks.normalization import Normalization
 from finlab.physics import Plant
 from finlab.physics.objective import CostMeter
 
@@ -53,20 +52,17 @@ class Sqp(ModelBased):
     settings_class = SqpSettings
     settings: SqpSettings
 
-    def __init__(self, normalization: Normalization, **settings: Any) -> None:
-        super().__init__(normalization, **settings)
-        self._program = lru_cache(CACHE_SIZE)(self._build)
+    @cached_property
+    def _program(self) -> tuple[CommandProblem, CostMeter, Solve]:
+        meter = self.aim.meter(self.plant)
+        solve = cheapest_program(self.plant, meter, self.sigma, self.settings.n_steps, SETTLED)
+        return CommandProblem.of(self.plant, self.sigma), meter, solve
 
-    def _build(self, plant: Plant) -> tuple[CommandProblem, CostMeter, Solve]:
-        meter, sigma = self.aim.meter(plant), self.normalization.std
-        solve = cheapest_program(plant, meter, sigma, self.settings.n_steps, SETTLED)
-        return CommandProblem.of(plant, sigma), meter, solve
-
-    def _commands(self, plant: Plant, targets: Array, seed: int) -> Array:
-        problem, meter, solve = self._program(plant)
-        answer = self._inverse(plant).command(targets)
+    def _commands(self, targets: Array, seed: int) -> Array:
+        (problem, meter, solve), plant = self._program, self.plant
+        answer = self._inverse.command(targets)
         random = plant.sample(np.random.default_rng(seed), (self.settings.n_starts - 1,))
-        for i, target in enumerate(targets / self.normalization.std):
+        for i, target in enumerate(targets / self.sigma):
             limit = TimeLimit(self.settings.time_limit_s)
             starts = np.array([answer[i], (plant.lower + plant.upper) / 2, *random])
             near = refine(problem, target[None], starts, APPROACH)

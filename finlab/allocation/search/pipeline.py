@@ -135,8 +135,8 @@ class Pipeline:
         # Arcs that pass the seam are brought back inside the fin's own limits.
         return candidates._replace(command=prepared.commands.feasible(candidates.command))
 
-    def explore(self, prepared: Prepared, targets: Array, answer: RefinedCandidates) -> RefinedCandidates:
-        """Many refined answers to one target (1, 6): the answer itself, then all that many seeds lead to.
+    def explore(self, prepared: Prepared, targets: Array) -> RefinedCandidates:
+        """Many refined answers to one target (1, 6): all that many seeds lead to.
 
         Fins rest alone and in pairs, for good where the objective would have them all work.
         """
@@ -145,8 +145,7 @@ class Pipeline:
         command, origin, _ = self._search(
             prepared, target, seeds[None], False, keep=len(seeds), steps=SEARCH.wide_steps, works=works
         )
-        found = refine_candidates(prepared, target, command, origin, MISSED.first_lm_steps)
-        return found.with_first(answer)
+        return refine_candidates(prepared, target, command, origin, MISSED.first_lm_steps)
 
     def own_seeds(self, prepared: Prepared) -> Array:
         """Sizes of forces (S, n) [N] from which every search begins, unless others are given."""

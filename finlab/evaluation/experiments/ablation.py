@@ -6,13 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from finlab.allocation.methods import load_allocator
+from finlab.allocation.methods import choose_method
 from finlab.errors import DataError
 from finlab.evaluation.experiment import Experiment
+from finlab.evaluation.method_specs import MethodSpec
 from finlab.evaluation.paper_figures import paper_figures
 from finlab.evaluation.progress import progress
 from finlab.evaluation.report.document import Column, Row
-from finlab.evaluation.scoring import joined, score
+from finlab.evaluation.scoring import joined, paper_sigma, score
 from finlab.evaluation.splits import make_split
 from finlab.evaluation.statistics.bootstrap import mean_interval
 
@@ -60,17 +61,19 @@ def run(
     for variant in variants:
         for refinement in REFINEMENTS:
             options = {"n_candidates": candidates, "temperature": temperature, "refinement": refinement}
-            method = load_allocator("paper", checkpoint=checkpoint, **{**options, **VARIANTS[variant]})
+            method = MethodSpec(
+                "paper", choose_method("paper", checkpoint, **{**options, **VARIANTS[variant]})
+            )
             times = [
-                method.allocate(case.layout, case.targets[0], failed=case.failed, seed=seed).solve_ms
+                method.on(case.layout).allocate(case.targets[0], failed=case.failed, seed=seed).solve_ms
                 for case in islice(cycle(cases), TIMED_CALLS + 1)
             ]
-            parts, sigma = [], method.normalization.std
+            parts, sigma = [], paper_sigma()
             for k, case in enumerate(progress(cases, "layout", f"{variant}, {refinement}")):
-                answer = method.allocate_batch(case.layout, case.targets, failed=case.failed, seed=seed)
-                part = score(case, case.targets, answer.command, answer.solve_ms, sigma, number=k)
-                assert answer.wrench_surrogate is not None
-                missing = answer.wrench_surrogate - case.targets
+                answer = method.on(case.layout).allocate_batch(case.targets, failed=case.failed, seed=seed)
+                part = score(case, case.targets, answer.command, answer.solve_ms, number=k)
+                assert answer.wrench_expected is not None
+                missing = answer.wrench_expected - case.targets
                 parts.append(part | {"believed": np.linalg.norm(missing / sigma, axis=-1)})
             found = joined(parts)
             for scored_by, key in (("surrogate", "believed"), ("plant", "err_norm")):

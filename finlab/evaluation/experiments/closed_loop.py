@@ -9,10 +9,10 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
-from finlab.allocation.allocator import Allocator
 from finlab.arrays import Array
 from finlab.control import PATH_CONTROLLERS
 from finlab.errors import DataError
+from finlab.evaluation.method_specs import MethodSpec
 from finlab.evaluation.report.document import Column, Row
 from finlab.layout import Layout
 from finlab.sim import ClosedLoop, RunLog, Trajectory
@@ -80,7 +80,7 @@ def over_seeds(rows: Sequence[Row]) -> Row:
 
 def swim(
     layout: Layout,
-    method: Allocator,
+    method: MethodSpec,
     path: Trajectory,
     seed: int,
     plant: str,
@@ -99,7 +99,7 @@ def swim(
         faults: fins, each with the time [s] at which it is lost.
     """
     pilot = PATH_CONTROLLERS[controller](layout)
-    return ClosedLoop(layout, method, path, pilot, failures=faults, plant=plant, seed=seed).run()
+    return ClosedLoop(layout, method.on(layout), path, pilot, failures=faults, plant=plant, seed=seed).run()
 
 
 def check_names(option: str, names: Sequence[str], known: Collection[str]) -> None:

@@ -5,16 +5,16 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.allocator import Allocator
 from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.evaluation.cheapest_commands import CheapestCommands, has_formulas
 from finlab.evaluation.experiment import Experiment
-from finlab.evaluation.method_specs import load_method_specs
+from finlab.evaluation.method_specs import MethodSpec, load_method_specs
 from finlab.evaluation.plots.dots import draw_dots
 from finlab.evaluation.plots.style import Picture
 from finlab.evaluation.progress import progress
 from finlab.evaluation.report.document import Column, Row
+from finlab.evaluation.scoring import sigma_of
 from finlab.evaluation.splits import SPLITS, Case, make_split
 from finlab.evaluation.statistics.bootstrap import ratio_interval
 from finlab.evaluation.symmetric_cases import SETS, symmetric_cases
@@ -31,7 +31,7 @@ UNITS: dict[Name, str] = {"power": "W", "effort": "J_en"}
 
 def run(
     split: tuple[str, ...] = ("id",),
-    methods: tuple[str, ...] = ("search", "mdn"),
+    methods: tuple[str, ...] = ("dual", "mdn"),
     objectives: tuple[str, ...] = ("power", "effort"),
     layouts: int = 20,
     targets: int = 4,
@@ -75,17 +75,17 @@ def _rows(
     checkpoint: str | None,
     seed: int,
 ) -> list[Row]:
-    allocators = load_method_specs(methods, checkpoint, objective, patient=True)
+    specs = load_method_specs(methods, checkpoint, objective, patient=True)
     aim, best = Objective(objective), list[Array]()
-    found: dict[str, list[tuple[Array, Array]]] = {name: [] for name in allocators}
+    found: dict[str, list[tuple[Array, Array]]] = {name: [] for name in specs}
     for case in progress(cases, "layout", f"{split}, {objective}"):
-        sigma = next(iter(allocators.values())).normalization.std if case.sigma is None else case.sigma
+        sigma = sigma_of(case)
         reference = CheapestCommands(aim, sigma)
         n_starts = starts if has_formulas(case.healthy) else 2 * starts
         ends = (reference.ends(case.healthy, target, n_starts, seed)[1] for target in case.targets)
         best.append(np.array([cost[0] if len(cost) else np.nan for cost in ends]))
-        for name, allocator in allocators.items():
-            found[name].append(_answers(allocator, case, aim, sigma))
+        for name, method in specs.items():
+            found[name].append(_answers(method, case, aim, sigma))
     group = np.repeat(np.arange(len(cases)), [len(case.targets) for case in cases])
     rows: list[Row] = []
     for name, parts in found.items():
@@ -95,9 +95,9 @@ def _rows(
     return rows
 
 
-def _answers(allocator: Allocator, case: Case, aim: Objective, sigma: Array) -> tuple[Array, Array]:
+def _answers(method: MethodSpec, case: Case, aim: Objective, sigma: Array) -> tuple[Array, Array]:
     """Costs and normalized errors, each (N,)."""
-    answer = allocator.allocate_batch(case.layout, case.targets, failed=case.failed)
+    answer = method.on(case.layout).allocate_batch(case.targets, failed=case.failed)
     works = [name not in case.failed for name in case.layout.names]
     command, plant = answer.command[:, works], plant_of(case.healthy)
     error = np.linalg.norm((plant.wrench(command) - case.targets) / sigma, axis=-1)
@@ -151,14 +151,14 @@ experiment = Experiment(
     ),
     quick={
         "split": ("id", "axes"),
-        "methods": ("search", "mdn", "sqp"),
+        "methods": ("dual", "mdn", "sqp"),
         "layouts": 3,
         "targets": 1,
         "starts": 8,
     },
     full={
         "split": ("id", "ood-fins", "limits", "failure", "fins-mixed", "axes", "axes-mixed"),
-        "methods": ("search", "mdn", "sqp", "analytic"),
+        "methods": ("dual", "mdn", "sqp", "analytic"),
         "layouts": 12,
         "targets": 2,
         "starts": 16,

@@ -10,11 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
-from finlab.allocation.allocator import Allocator
 from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.evaluation.experiment import Experiment
-from finlab.evaluation.method_specs import load_method_spec
+from finlab.evaluation.method_specs import MethodSpec, load_method_spec
 from finlab.evaluation.progress import progress
 from finlab.evaluation.report.document import Column, Row
 from finlab.evaluation.splits import Case, make_split
@@ -35,7 +34,7 @@ def run(
     samples: int = 300,
     noise: float = 0.05,
     targets: int = 20,
-    method: str = "search",
+    method: str = "dual",
     seed: int = 0,
 ) -> list[Row]:
     """One row over all fins.
@@ -52,9 +51,9 @@ def run(
         raise DataError(f"samples: expected at least {MIN_SAMPLES}, got {samples}")
     if not 0.0 <= noise < 1.0:
         raise DataError(f"noise: expected a share from 0 to 1, got {noise:g}")
-    allocator = load_method_spec(method)
+    spec = load_method_spec(method)
     found = [
-        _fitted(allocator, case, samples, noise, np.random.default_rng([DOMAIN, seed, k]))
+        _fitted(spec, case, samples, noise, np.random.default_rng([DOMAIN, seed, k]))
         for k, case in enumerate(progress(list(make_split("fins", fins, targets, seed)), "fin"))
     ]
     each = {key: np.array([row[key] for row in found]) for key in found[0]}
@@ -73,7 +72,7 @@ def run(
     ]
 
 
-def _fitted(allocator: Allocator, case: Case, samples: int, noise: float, rng: np.random.Generator) -> Row:
+def _fitted(method: MethodSpec, case: Case, samples: int, noise: float, rng: np.random.Generator) -> Row:
     """Figures of one fin, fitted and tried."""
     fin = case.layout.fins[0]  # all fins of the robot are alike
     law, plant = make_law(fin.model), Plant(Layout("one", (fin,)))
@@ -92,7 +91,7 @@ def _fitted(allocator: Allocator, case: Case, samples: int, noise: float, rng: n
         write_fin(fit, Path(folder) / "fin.csv")
         model = FinModelSpec("table", (("path", str(Path(folder) / "fin.csv")),))
         robot = replace(case.layout, actuators=tuple(replace(fin, model=model) for fin in case.layout.fins))
-        answer = allocator.allocate_batch(robot, case.targets)
+        answer = method.on(robot).allocate_batch(case.targets)
     missed = Plant(case.layout).wrench(answer.command) - case.targets
     assert case.sigma is not None, "robots of split fins have a sigma of their own"
     return {

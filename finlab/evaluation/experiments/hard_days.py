@@ -9,9 +9,9 @@ from dataclasses import dataclass, field, replace
 from itertools import combinations, islice
 from typing import Any, NamedTuple
 
-from finlab.allocation.allocator import Allocator
 from finlab.assets import PAPER_LAYOUTS
 from finlab.control import PATH_CONTROLLERS, Completion, FaultMonitor, TrackingController
+from finlab.evaluation.method_specs import MethodSpec
 from finlab.evaluation.splits import make_split
 from finlab.layout import Layout, load_layout
 from finlab.sim import (
@@ -102,13 +102,13 @@ class HardDay:
         )
 
     def swim(
-        self, case: "Case", allocator: Allocator, seed: int, *, controller: str = "tracking"
+        self, case: "Case", method: MethodSpec, seed: int, *, controller: str = "tracking"
     ) -> ClosedLoop:
         """The swim, ready to start.
 
         Args:
             case: of `cases()`.
-            allocator: the method.
+            method: who allocates.
             seed: of noise, biases, waves and mixed fins.
             controller: one of `finlab.control.PATH_CONTROLLERS`.
         """
@@ -118,7 +118,7 @@ class HardDay:
         water = replace(self.water, seed=seed) if isinstance(self.water, Waves) else self.water
         return ClosedLoop(
             robot,
-            allocator,
+            method.on(robot),
             path,
             PATH_CONTROLLERS[controller](robot),
             plant=self.plant,

@@ -10,10 +10,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from finlab.allocation.allocator import Allocator
 from finlab.errors import DataError
 from finlab.evaluation.experiment import Experiment
-from finlab.evaluation.method_specs import load_method_spec, load_method_specs
+from finlab.evaluation.method_specs import MethodSpec, load_method_spec, load_method_specs
 from finlab.evaluation.noisy_tables import noisy_table
 from finlab.evaluation.paper_figures import paper_figures
 from finlab.evaluation.progress import progress
@@ -24,7 +23,7 @@ from finlab.layout.random_fins import FAMILIES, random_fin_model
 
 DOMAIN = 0xF1257
 """Leads the seed of every robot with new fins."""
-REFERENCE = "search"
+REFERENCE = "dual"
 """The method that the others are compared with, where it takes part."""
 LAYOUTS = 5
 """Layouts whose calls are timed."""
@@ -39,7 +38,7 @@ SMALL = np.array([0.02, 0.02, 0.02, 0.002, 0.002, 0.002])
 
 
 def run(
-    methods: tuple[str, ...] = ("search", "mdn", "paper", "analytic", "qp", "sqp"),
+    methods: tuple[str, ...] = ("dual", "mdn", "paper", "analytic", "qp", "sqp"),
     fins: int = 4,
     calls: int = 200,
     budget: float = 20.0,
@@ -47,7 +46,7 @@ def run(
     checkpoint: str | None = None,
     seed: int = 0,
 ) -> list[Row]:
-    """One row for each method, and one for the first answers of `search` on each kind of new fins.
+    """One row for each method, and one for the first answers of `dual` on each kind of new fins.
 
     Args:
         methods: names as in eval wrench; ipopt needs its extra.
@@ -62,16 +61,20 @@ def run(
         raise DataError(f"fins: expected 2 to 5, the fin counts of split id, got {fins}")
     cases = [case for case in make_split("id", 100, 50, seed) if case.layout.n_fins == fins][:LAYOUTS]
     rows: list[Row] = []
-    for name, allocator in progress(load_method_specs(methods, checkpoint).items(), "method"):
-        times = call_times(allocator, cases, calls, budget)
+    for name, method in progress(load_method_specs(methods, checkpoint).items(), "method"):
+        times = call_times(method, cases, calls, budget)
         rows.append(_row(name, "same fins as before", times))
     reference = next((row["p50_ms"] for row in rows if row["method"] == REFERENCE), None)
     for row in rows:
-        row["p50_over_search"] = None if reference is None else row["p50_ms"] / reference
-    search = load_method_spec(REFERENCE, checkpoint)
-    search.allocate(load_layout("A"), np.zeros(6))  # what a process does once is not the fins' doing
+        row["p50_over_dual"] = None if reference is None else row["p50_ms"] / reference
+    ours = load_method_spec(REFERENCE, checkpoint)
+    ours.on(load_layout("A")).allocate(np.zeros(6))  # what a process does once is not the fins' doing
     return rows + [
-        _row(REFERENCE, f"first answer, {NEW_FINS} new fins: {kind}", first_times(search, kind, robots, seed))
+        _row(
+            REFERENCE,
+            f"first answer, {NEW_FINS} new fins: {kind}",
+            first_times(ours, kind, robots, seed),
+        )
         for kind in progress(KINDS, "kind of fin")
     ]
 
@@ -88,11 +91,11 @@ def _row(method: str, what: str, times: Sequence[float]) -> Row:
     }
 
 
-def call_times(allocator: Allocator, cases: Sequence[Case], n_calls: int, budget_s: float) -> list[float]:
+def call_times(method: MethodSpec, cases: Sequence[Case], n_calls: int, budget_s: float) -> list[float]:
     """Wall time of each counted call [ms], of layouts visited one after the other.
 
     Args:
-        allocator: the method.
+        method: who answers.
         cases: layouts with targets.
         n_calls: at most so many.
         budget_s: no further call on a layout after its part of this time [s].
@@ -100,10 +103,10 @@ def call_times(allocator: Allocator, cases: Sequence[Case], n_calls: int, budget
     times: list[float] = []
     per_case = -(-n_calls // len(cases))
     for case in cases:
-        begin = time.perf_counter()
+        allocator, begin = method.on(case.layout), time.perf_counter()
         for k in range(WARM_UP + min(per_case, n_calls - len(times))):
             start = time.perf_counter()
-            allocator.allocate(case.layout, case.targets[k % len(case.targets)], failed=case.failed)
+            allocator.allocate(case.targets[k % len(case.targets)], failed=case.failed)
             end = time.perf_counter()
             if k >= WARM_UP:
                 times.append((end - start) * 1e3)
@@ -114,7 +117,7 @@ def call_times(allocator: Allocator, cases: Sequence[Case], n_calls: int, budget
     return times
 
 
-def first_times(allocator: Allocator, kind: str, robots: int, seed: int) -> list[float]:
+def first_times(method: MethodSpec, kind: str, robots: int, seed: int) -> list[float]:
     """The processor's time [ms] of the first call of robots with fins of a kind that were not seen before."""
     times = []
     for k in range(robots):
@@ -122,7 +125,7 @@ def first_times(allocator: Allocator, kind: str, robots: int, seed: int) -> list
         layout = _robot_of_new_fins(rng, kind, f"{seed}-{k}")
         target = SMALL * rng.standard_normal(6)
         start = time.process_time()
-        allocator.allocate(layout, target)
+        method.on(layout).allocate(target)
         times.append(1e3 * (time.process_time() - start))
     return times
 
@@ -153,7 +156,7 @@ experiment = Experiment(
         Column("calls", "calls", "count"),
         Column("p50_ms", "median", "three", unit="ms"),
         Column("p99_ms", "99th percentile", "three", unit="ms"),
-        Column("p50_over_search", "times that of search", "three"),
+        Column("p50_over_dual", "times that of dual", "three"),
     ),
     run=run,
     note=(

@@ -6,11 +6,10 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from finlab.allocation.allocator import Allocator
 from finlab.control import PATH_CONTROLLERS, FaultMonitor
 from finlab.evaluation.experiment import Experiment
 from finlab.evaluation.experiments.closed_loop import absolute_error
-from finlab.evaluation.method_specs import load_method_spec
+from finlab.evaluation.method_specs import MethodSpec, load_method_spec
 from finlab.evaluation.progress import progress
 from finlab.evaluation.report.document import Column, Row
 from finlab.layout import Layout, load_layout
@@ -44,7 +43,7 @@ class Loss(NamedTuple):
 def run(
     layouts: tuple[str, ...] = ("A", "B", "C", "D"),
     trajectory: str = "lissajous",
-    method: str = "search",
+    method: str = "dual",
     seeds: int = 4,
     whole: int = 0,
     plant: str = "mean",
@@ -67,7 +66,7 @@ def run(
         seed: the first seed of times, currents and noise.
     """
     robots, path = [load_layout(name) for name in layouts], make_trajectory(trajectory)
-    allocator = load_method_spec(method)
+    spec = load_method_spec(method)
     cases: list[tuple[int, Layout, str | None]] = [
         (each, robot, fin)
         for each in range(seed, seed + seeds + whole)
@@ -76,7 +75,7 @@ def run(
     ]
     losses = []
     for each, robot, fin in progress(cases, "swim"):
-        losses.append(swim_loss(robot, fin, path, allocator, each, plant, controller))
+        losses.append(swim_loss(robot, fin, path, spec, each, plant, controller))
     return monitoring_rows(losses)
 
 
@@ -84,7 +83,7 @@ def swim_loss(
     layout: Layout,
     fin: str | None,
     trajectory: Trajectory,
-    allocator: Allocator,
+    method: MethodSpec,
     seed: int,
     plant: str = "mean",
     controller: str = "tracking",
@@ -94,7 +93,7 @@ def swim_loss(
     at = float(rng.uniform(QUIET_S, trajectory.duration_s - QUIET_S))
     speed, heading = rng.uniform(0.0, CURRENT_M_S), rng.uniform(0.0, 2 * math.pi)
     current = SteadyCurrent((speed * math.cos(heading), speed * math.sin(heading), 0.0))
-    steer = PATH_CONTROLLERS[controller]
+    steer, allocator = PATH_CONTROLLERS[controller], method.on(layout)
 
     def loop(monitor: FaultMonitor | None) -> ClosedLoop:
         return ClosedLoop(

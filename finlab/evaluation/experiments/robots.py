@@ -12,13 +12,13 @@ from pathlib import Path
 
 import numpy as np
 
-from finlab.allocation.allocator import Allocator
 from finlab.arrays import Array
 from finlab.evaluation.experiment import Experiment
 from finlab.evaluation.experiments.closed_loop import check_names
-from finlab.evaluation.method_specs import load_method_spec
+from finlab.evaluation.method_specs import MethodSpec, load_method_spec
 from finlab.evaluation.progress import progress
 from finlab.evaluation.report.document import Column, Row
+from finlab.evaluation.scoring import paper_sigma
 from finlab.evaluation.true_wrench import true_wrench
 from finlab.fit.robot.fitted_layout import write_robot
 from finlab.fit.robot.robot_fit import RobotFit, fit_robot
@@ -38,7 +38,7 @@ def run(
     layout: str = "A",
     plants: tuple[str, ...] = ("offset", "wake", "inflow", "flexible"),
     targets: int = 100,
-    method: str = "search",
+    method: str = "dual",
     seed: int = 0,
 ) -> Iterator[Row]:
     """One row for each plant: the error of answers before and after the fit.
@@ -51,7 +51,7 @@ def run(
         seed: of all draws.
     """
     check_names("plants", plants, PLANTS)
-    drawn, allocator = load_layout(layout), load_method_spec(method)
+    drawn, spec = load_layout(layout), load_method_spec(method)
     for plant in progress(plants, "plant"):
         with tempfile.TemporaryDirectory() as folder:
             began = time.process_time()
@@ -60,7 +60,7 @@ def run(
             row: Row = {"plant": plant, "used": used, "fit_s": time.process_time() - began}
             row |= {"trusted": "no" if fit.doubts() else "yes", "targets": targets}
             for name, robot in (("drawn", drawn), ("fitted", fitted)):
-                error = _errors(drawn, robot, allocator, plant, targets, seed)
+                error = _errors(drawn, robot, spec, plant, targets, seed)
                 row |= {f"{name}_mean": float(error.mean()), f"{name}_median": float(np.median(error))}
             yield row | {"times_smaller": row["drawn_mean"] / row["fitted_mean"]}
 
@@ -74,19 +74,20 @@ def _fitted(layout: Layout, plant: str, folder: Path, seed: int) -> tuple[Layout
     return load_layout(path), fit
 
 
-def _errors(drawn: Layout, robot: Layout, allocator: Allocator, plant: str, targets: int, seed: int) -> Array:
+def _errors(drawn: Layout, robot: Layout, method: MethodSpec, plant: str, targets: int, seed: int) -> Array:
     """Normalized errors (targets,) of answers for a robot, by the true plant of the one that was drawn."""
+    allocator = method.on(robot)
     rng, own = np.random.default_rng((DOMAIN, seed)), plant_of(drawn)
     wanted = own.wrench(own.sample(rng, (targets,)))
     velocity = rng.uniform(-FASTEST, FASTEST, (targets, 6))
     command = np.array(
         [
-            allocator.allocate(robot, target, flow=water, seed=seed).command
+            allocator.allocate(target, flow=water, seed=seed).command
             for target, water in zip(wanted, velocity, strict=True)
         ]
     )
     missed = true_wrench(plant, drawn, command, velocity) - wanted
-    return np.asarray(np.linalg.norm(missed / allocator.normalization.std, axis=1))
+    return np.asarray(np.linalg.norm(missed / paper_sigma(), axis=1))
 
 
 experiment = Experiment(

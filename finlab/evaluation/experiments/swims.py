@@ -7,12 +7,11 @@ from typing import Literal
 
 import numpy as np
 
-from finlab.allocation.allocator import Allocator
 from finlab.control.completion import LEVER_M
 from finlab.evaluation.experiment import Experiment
 from finlab.evaluation.experiments.closed_loop import ABOUT_ERRORS, LOST_M, check_names, follow_row
 from finlab.evaluation.experiments.hard_days import HARD_DAYS, HardDay
-from finlab.evaluation.method_specs import load_method_specs
+from finlab.evaluation.method_specs import MethodSpec, load_method_specs
 from finlab.evaluation.progress import progress
 from finlab.evaluation.report.document import Column, Row
 from finlab.evaluation.statistics.bootstrap import Interval, spread_interval
@@ -28,7 +27,7 @@ REPORTED = (
 GAP_N = 0.1
 """A tick whose wrench misses what was asked by more than this, torques as forces at `LEVER_M`, counts as out
 of reach [N]."""
-OURS = ("search", "mdn")
+OURS = ("dual", "mdn")
 """Beginnings of our methods' names; all others are baselines."""
 COMPARED = {"ate": "error", "driving_w": "power"}
 """What methods are compared by with the best baseline, in words."""
@@ -43,7 +42,7 @@ Swims = Mapping[tuple[str, tuple[str, ...], int], Row]
 
 def run(
     scenarios: tuple[str, ...] = tuple(DAYS),
-    methods: tuple[str, ...] = ("search", "analytic", "on-board"),
+    methods: tuple[str, ...] = ("dual", "analytic", "on-board"),
     seeds: int = 5,
     controller: Literal["tracking", "waypoint"] = "tracking",
     checkpoint: str | None = None,
@@ -51,7 +50,7 @@ def run(
 ) -> Iterator[Row]:
     """One row for each day and method.
 
-    search, analytic and on-board take two minutes of the processor each per seed.
+    dual, analytic and on-board take two minutes of the processor each per seed.
 
     Args:
         scenarios: names of days.
@@ -63,14 +62,14 @@ def run(
         seed: the first seed of noise, biases, waves and mixed fins.
     """
     check_names("scenarios", scenarios, DAYS)
-    allocators = load_method_specs(methods, checkpoint)
+    specs = load_method_specs(methods, checkpoint)
     for name in scenarios:
-        done = swim_day(DAYS[name], allocators, range(seed, seed + seeds), controller)
+        done = swim_day(DAYS[name], specs, range(seed, seed + seeds), controller)
         yield from day_rows(DAYS[name], done)
 
 
 def swim_day(
-    day: HardDay, methods: Mapping[str, Allocator], seeds: Sequence[int], controller: str = "tracking"
+    day: HardDay, methods: Mapping[str, MethodSpec], seeds: Sequence[int], controller: str = "tracking"
 ) -> dict[str, Swims]:
     """Figures of each method's swims; hopeless cases are left out."""
     cases = [case for case in day.cases() if day.obstacle(case) is None]
@@ -179,7 +178,7 @@ experiment = Experiment(
     f"interval without 1. Lost: swims that were ever farther than {LOST_M:g} m away. Out of reach: ticks at "
     f"which commands miss more than {GAP_N:g} N of what is asked, torques at {LEVER_M:g} m. Processor's time "
     "with the simulation's. What the days are: `finlab/evaluation/experiments/hard_days.py`.",
-    quick={"scenarios": ("nominal", "current", "lost-one"), "methods": ("search", "analytic"), "seeds": 1},
-    full={"scenarios": REPORTED, "seeds": 2, "methods": ("search", "analytic")},
+    quick={"scenarios": ("nominal", "current", "lost-one"), "methods": ("dual", "analytic"), "seeds": 1},
+    full={"scenarios": REPORTED, "seeds": 2, "methods": ("dual", "analytic")},
     each="scenarios",
 )

@@ -1,10 +1,12 @@
 """The paper's figure A: what the temperature of the draw does to the candidates of its network."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from finlab.allocation.methods import load_allocator
+from finlab.allocation.allocator import Allocator
+from finlab.allocation.methods import choose_method
 from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.evaluation.experiment import Experiment
@@ -15,6 +17,7 @@ from finlab.evaluation.splits import make_split
 from finlab.evaluation.statistics.bootstrap import mean_interval
 from finlab.layout import Layout
 from finlab.layout.angles import is_full_turn
+from finlab.paper.settings import PaperSettings
 
 PAPER_TEMPERATURE = 0.02
 """The paper's choice."""
@@ -46,19 +49,15 @@ def run(
     cases = make_split(split, layouts, targets, seed)
     rows: list[Row] = []
     for temperature in temperatures:
-        method = load_allocator(
-            "paper",
-            checkpoint=checkpoint,
-            n_candidates=candidates,
-            temperature=temperature,
-            refinement="none",
-        )
+        settings = PaperSettings(n_candidates=candidates, temperature=temperature, refinement="none")
+        choice = replace(choose_method("paper", checkpoint), settings=settings)
         best, spread, group = [], [], []
         for k, case in enumerate(progress(cases, "layout", f"T = {temperature:g}")):
+            allocator = Allocator.of_choice(case.healthy, choice)
             for target in case.targets:
-                samples = method.allocate(case.healthy, target, seed=seed).samples
+                samples = allocator.allocate(target, seed=seed).samples
                 assert samples is not None
-                best.append((samples.err_norm**2 + method.settings.gamma * samples.effort).min())
+                best.append((samples.err_norm**2 + settings.gamma * samples.effort).min())
                 spread.append(diversity(samples.command, case.healthy))
                 group.append(k)
         rows.append(

@@ -26,7 +26,7 @@ Controller = Literal["waypoint", "tracking"]
 def run(
     layouts: tuple[str, ...] = ("A", "B", "C", "D"),
     trajectory: str = "lissajous",
-    methods: tuple[str, ...] = ("search", "paper"),
+    methods: tuple[str, ...] = ("dual", "paper"),
     runs: int = 3,
     plant: str = "mean",
     controller: Controller = "waypoint",
@@ -46,9 +46,9 @@ def run(
         seed: of the first run's noise.
     """
     robots, path = [load_layout(name) for name in layouts], make_trajectory(trajectory)
-    allocators = load_method_specs(methods, checkpoint)
+    specs = load_method_specs(methods, checkpoint)
     done: dict[tuple[str, str], list[Row]] = {}
-    for robot, (name, method), k in progress(list(product(robots, allocators.items(), range(runs))), "swim"):
+    for robot, (name, method), k in progress(list(product(robots, specs.items(), range(runs))), "swim"):
         row = follow_row(swim(robot, method, path, seed + k, plant, controller))
         done.setdefault((robot.name, name), []).append(row)
         done.setdefault(("all", name), []).append(row)
@@ -80,7 +80,7 @@ experiment = Experiment(
     ),
     run=run,
     note=f"{ABOUT_ERRORS} The paper's runs took place in another simulator, on paths that it does not print.",
-    quick={"layouts": ("A", "C"), "methods": ("search",), "runs": 1},
+    quick={"layouts": ("A", "C"), "methods": ("dual",), "runs": 1},
     full={"runs": 2},
     printed=_printed,
     less_is_better=("ate", "driving_w"),

@@ -23,7 +23,7 @@ SETTLED_S = 10.0
 
 def run(
     layout: str = "A",
-    methods: tuple[str, ...] = ("search", "search-effort", "analytic", "on-board"),
+    methods: tuple[str, ...] = ("dual", "mdn-effort", "analytic", "on-board"),
     runs: int = 5,
     duration: float = 30.0,
     plant: str = "mean",
@@ -43,9 +43,9 @@ def run(
     """
     if not SETTLED_S < duration <= 3600.0:
         raise DataError(f"duration: expected more than {SETTLED_S:g} s and at most 3600 s, got {duration:g}")
-    robot, allocators = load_layout(layout), load_method_specs(methods, checkpoint)
+    robot, specs = load_layout(layout), load_method_specs(methods, checkpoint)
     done: dict[tuple[float | None, str], list[Row]] = {}
-    for speed, (name, method), k in progress(list(product(SPEEDS, allocators.items(), range(runs))), "swim"):
+    for speed, (name, method), k in progress(list(product(SPEEDS, specs.items(), range(runs))), "swim"):
         row = _row(swim(robot, method, straight(speed, duration), seed + k, plant, "tracking"))
         done.setdefault((speed, name), []).append(row)
         done.setdefault((None, name), []).append(row)

@@ -53,8 +53,8 @@ def run(
             with errors over the robot's own wrenches.
         split: names, or all: id, ood, ood-fins, limits, failure, near-singular, fins, fins-mixed, tables,
             many-fins, big, tiny.
-        methods: names; by default search and paper, on LAYOUT all that are installed. An objective may
-            follow, as in search-effort, and a number of starts ipopt, as in ipopt-32.
+        methods: names; by default dual and paper, on LAYOUT all that are installed. An objective may
+            follow, as in sqp-effort, and a number of starts ipopt, as in ipopt-32.
         layouts: of each split.
         targets: on each layout.
         subsample: ipopt answers only the first so many of each layout; column n says how many.
@@ -63,13 +63,13 @@ def run(
         seed: of all draws.
     """
     sets = _cases(layout, split, layouts, targets, seed)
-    usual = ("search", "paper") if layout is None else installed_methods()
-    allocators = load_method_specs(methods or usual, checkpoint, objective, patient=True)
+    usual = ("dual", "paper") if layout is None else installed_methods()
+    specs = load_method_specs(methods or usual, checkpoint, objective, patient=True)
     return [
         {"split": name, "method": method, "n": len(found["layout"]), "scored_by": "plant", **figures(found)}
         for name, cases in sets.items()
-        for method, allocator in allocators.items()
-        for found in [run_method(allocator, cases, first=subsample if is_slow(method) else None)]
+        for method, spec in specs.items()
+        for found in [run_method(spec, cases, first=subsample if is_slow(method) else None)]
     ]
 
 
@@ -143,10 +143,10 @@ experiment = Experiment(
         "robot's wrenches. Intervals: where another seed lands, 95 times of 100. Time: that of all targets "
         "of a layout over their number. Printed: the paper's figures, on its own layouts and targets."
     ),
-    quick={"split": HARD[:4], "methods": ("search", "paper", "sqp"), "layouts": 10, "targets": 5},
+    quick={"split": HARD[:4], "methods": ("dual", "paper", "sqp"), "layouts": 10, "targets": 5},
     full={
         "split": HARD,
-        "methods": ("search", "mdn", "paper", "qp", "sqp", "analytic"),
+        "methods": ("dual", "mdn", "paper", "qp", "sqp", "analytic"),
         "layouts": 40,
         "targets": 8,
     },

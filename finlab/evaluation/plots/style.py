@@ -20,7 +20,7 @@ VERMILION, PURPLE, YELLOW, BLACK, GREY = "#D55E00", "#CC79A7", "#F0E442", "#0000
 INK, SOFT, LINE = "#1c2733", "#5c6b7a", "#e3e8ed"
 
 COLOURS = {
-    "search": BLUE,
+    "dual": BLUE,
     "mdn": "#004B78",
     "paper": ORANGE,
     "analytic": GREEN,
@@ -29,7 +29,7 @@ COLOURS = {
     "ipopt": BLACK,
     "ipopt-32": BLACK,
     "on-board": ORANGE,
-    "search-effort": VERMILION,
+    "mdn-effort": VERMILION,
 }
 """Method -> colour."""
 DASHES: dict[str, Any] = {"color": GREY, "linestyle": (0, (2, 2)), "linewidth": 1.2}

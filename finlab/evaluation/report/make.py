@@ -29,7 +29,7 @@ ABOUT = (
     f"controllers were developed on other seeds than {SEED}."
 )
 LEADS = (
-    "Method `search` against the others: a method leads where its interval and the other's lie apart by more "
+    "Method `dual` against the others: a method leads where its interval and the other's lie apart by more "
     f"than {LEVEL:g}, which is the solvers' rounding."
 )
 Size = Literal["quick", "full"]

@@ -9,13 +9,13 @@ from collections.abc import Sequence
 from finlab.evaluation.experiment import Experiment
 from finlab.evaluation.report.document import Column, Row
 
-OURS = "search"
+OURS = "dual"
 LEVEL = 1e-5
 """Differences up to this are the solvers' rounding: normalized errors, ratios of costs, metres or watts."""
 COLUMNS = (
     Column("experiment", "experiment", "code"),
     Column("measure", "less is better"),
-    Column("against", "`search` against", "code"),
+    Column("against", "`dual` against", "code"),
     Column("cases", "cases", "count"),
     Column("leads", "leads", "count"),
     Column("level", "intervals overlap", "count"),

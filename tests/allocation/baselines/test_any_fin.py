@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from finlab.allocation import Allocator, load_allocator
+from finlab.allocation import Allocator
 from finlab.allocation.baselines.ipopt import Ipopt
 from finlab.allocation.baselines.sqp import Sqp
 from finlab.allocation.command_cost import command_cost
@@ -17,6 +17,7 @@ from finlab.errors import AllocationError
 from finlab.layout import Fin, FinModelSpec, Layout, Limits
 from finlab.physics import make_law, plant_of
 from finlab.physics.objective import Name, Objective
+from tests.any_robot import AnyRobot
 from tests.exhaustive import crossed
 
 METHODS = ("analytic", "qp", "sqp", "ipopt")
@@ -120,7 +121,7 @@ def robot(models: list[FinModelSpec]) -> Layout:
 def make(method: str, objective: Name) -> Allocator:
     if method == "ipopt":
         pytest.importorskip("casadi", reason="method ipopt is an optional extra")
-    return load_allocator(method, objective=objective, **FEW_STARTS.get(method, {}))
+    return AnyRobot(method, objective=objective, **FEW_STARTS.get(method, {}))
 
 
 @pytest.mark.parametrize(
@@ -180,7 +181,7 @@ def test_ipopt_minimizes_what_the_plant_says(
 ) -> None:
     """Objective, gradient and Hessian of the program against the plant's, with and without formulas."""
     cs = pytest.importorskip("casadi", reason="method ipopt is an optional extra")
-    method = load_allocator("ipopt", objective=objective, copper_loss=copper_loss)
+    method = AnyRobot("ipopt", objective=objective, copper_loss=copper_loss)
     assert isinstance(method, Ipopt)
     plant = plant_of(robot(model(name)))
     target, at = 0.4 * plant.wrench(plant.upper), plant.sample(np.random.default_rng(4), (2,))
@@ -209,17 +210,17 @@ def test_ipopt_minimizes_what_the_plant_says(
 @pytest.mark.parametrize("method", METHODS)
 def test_what_is_no_objective_is_refused(method: str) -> None:
     with pytest.raises(AllocationError, match="objective: expected one of power, effort, got 'thrift'"):
-        load_allocator(method, objective="thrift")
+        AnyRobot(method, objective="thrift")
     with pytest.raises(AllocationError, match="copper_loss: expected a number from 0"):
-        load_allocator(method, copper_loss=-1.0)
+        AnyRobot(method, copper_loss=-1.0)
     with pytest.raises(AllocationError, match="expected EffortWeights"):
-        load_allocator(method, effort_weights=(1.0, 2.0))
+        AnyRobot(method, effort_weights=(1.0, 2.0))
     with pytest.raises(AllocationError, match="knows the options .*objective, effort_weights, copper_loss"):
-        load_allocator(method, price=1.0)
+        AnyRobot(method, price=1.0)
 
 
 def test_settings_are_told_and_changed_like_any_other() -> None:
-    method = load_allocator("sqp", objective="effort", n_steps=7)
+    method = AnyRobot("sqp", objective="effort", n_steps=7)
     assert method.options["objective"] == "effort" and method.options["n_steps"] == 7
     other = method.with_settings(copper_loss=0.3, objective="power")
     assert isinstance(other, Sqp) and other.settings.n_steps == 7

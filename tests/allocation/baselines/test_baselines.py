@@ -11,7 +11,6 @@ from finlab.allocation.baselines.analytic import Analytic
 from finlab.allocation.baselines.ipopt import Ipopt
 from finlab.allocation.baselines.qp import Qp
 from finlab.allocation.baselines.sqp import Sqp
-from finlab.allocation.methods import load_allocator
 from finlab.errors import LayoutError
 from finlab.layout import Fin, FinModelSpec, Layout, Limits, random_layout
 from finlab.networks.normalization import Normalization
@@ -69,7 +68,7 @@ def test_two_fins_turn_the_robot(method: str) -> None:
     result = make(method).allocate(layout, [0.0, 0.0, 0.0, 0.0, 0.0, 0.4])
     # Each gives 1 N: the left one backward, the right one forward. Shafts point outwards, so that a positive
     # zero direction 0 pushes the left fin backward and the right one forward.
-    np.testing.assert_allclose(Plant(layout).fin_forces(result.command), [[-1, 0, 0], [1, 0, 0]], atol=3e-3)
+    np.testing.assert_allclose(Plant(layout).forces(result.command), [[-1, 0, 0], [1, 0, 0]], atol=3e-3)
 
 
 @pytest.mark.parametrize("method", EXACT)
@@ -156,7 +155,7 @@ def test_sqp_needs_hardly_more_than_the_search(objective: Name) -> None:
     targets = Plant(layout).wrench(
         np.random.default_rng(22).uniform([0.05, 0.1, -3], [0.6, 2.1, 3], (20, 5, 3))
     )
-    least = load_allocator(objective=objective).allocate_batch(layout, targets)
+    least = Allocator(layout, objective=objective).allocate_batch(targets)
     answer = make("sqp", objective=objective).allocate_batch(layout, targets)
     cost, best = (getattr(found, "power" if objective == "power" else "effort") for found in (answer, least))
     exact = (answer.err_norm < 1e-3) & (least.err_norm < 1e-3)

@@ -6,10 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from finlab.allocation import Allocator, load_allocator
+from finlab.allocation import Allocator
 from finlab.errors import AllocationError
 from finlab.layout import FinModelSpec, Layout, Limits, load_layout, random_layout
 from finlab.physics import plant_of
+from tests.any_robot import AnyRobot
 from tests.exhaustive import crossed, sampled
 
 pytest.importorskip("casadi", reason="method ipopt is an optional extra")
@@ -34,9 +35,9 @@ def timed(allocator: Allocator, layout: Layout, targets: np.ndarray) -> tuple[np
 def test_it_agrees_with_ipopt_in_commands_and_with_the_search(name: str) -> None:
     layout = load_layout(name)
     targets = targets_of(layout)
-    least, _, _ = timed(load_allocator(), layout, targets)
-    by_commands, _, slow = timed(load_allocator("ipopt", n_starts=2, time_limit_s=3.0), layout, targets)
-    by_forces, error, quick = timed(load_allocator("ipopt", space="forces"), layout, targets)
+    least, _, _ = timed(AnyRobot(), layout, targets)
+    by_commands, _, slow = timed(AnyRobot("ipopt", n_starts=2, time_limit_s=3.0), layout, targets)
+    by_forces, error, quick = timed(AnyRobot("ipopt", space="forces"), layout, targets)
     print(
         f"{name}: {1e3 * quick:.1f} ms in forces, {1e3 * slow:.0f} ms in commands: {slow / quick:.0f} times"
     )
@@ -59,8 +60,8 @@ def test_it_agrees_with_the_search_on_any_fin_and_arc(model: FinModelSpec, arc: 
     fins = [replace(fin, model=model, limits=Limits(zero_direction=arc)) for fin in drawn.fins]
     layout = replace(drawn, actuators=(*fins[:2], replace(fins[2], limits=Limits()), *fins[3:]))
     targets = targets_of(layout)
-    least, missed, _ = timed(load_allocator(), layout, targets)
-    power, error, _ = timed(load_allocator("ipopt", space="forces"), layout, targets)
+    least, missed, _ = timed(AnyRobot(), layout, targets)
+    power, error, _ = timed(AnyRobot("ipopt", space="forces"), layout, targets)
     exact = missed < 1e-4
     assert exact.any() and error[exact].max() < 5e-3
     np.testing.assert_allclose(power[exact], least[exact], rtol=0.01)
@@ -68,12 +69,12 @@ def test_it_agrees_with_the_search_on_any_fin_and_arc(model: FinModelSpec, arc: 
 
 def test_it_keeps_watts_least_and_nothing_else() -> None:
     with pytest.raises(AllocationError, match="space 'forces' keeps power least, got objective 'effort'"):
-        load_allocator("ipopt", space="forces", objective="effort")
+        AnyRobot("ipopt", space="forces", objective="effort")
 
 
 def test_out_of_reach_it_comes_as_near_as_the_search() -> None:
     layout = load_layout("ucat")
     far = 20.0 * targets_of(layout)
-    _, nearest, _ = timed(load_allocator(), layout, far)
-    _, error, _ = timed(load_allocator("ipopt", space="forces"), layout, far)
+    _, nearest, _ = timed(AnyRobot(), layout, far)
+    _, error, _ = timed(AnyRobot("ipopt", space="forces"), layout, far)
     np.testing.assert_allclose(error, nearest, rtol=1e-3, atol=1e-3)

@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from finlab.allocation import load_allocator
+from finlab.allocation import Allocator
 from finlab.assets import shipped_layouts
 from finlab.evaluation.splits import make_split
 from finlab.layout import Fin, FinModelSpec, Layout, load_layout, random_layout
 from finlab.physics import Plant
 from finlab.physics.objective import Name, Objective
 from tests.allocation.search.reference import least_cost
+from tests.any_robot import AnyRobot
 from tests.exhaustive import crossed, sampled
 from tests.random_fins import KINDS, random_robot
 
@@ -51,7 +52,7 @@ def cost_of(objective: Name, answer: object) -> float:
     ),
 )
 def test_exact_on_any_fin(kinds: tuple[str, ...], limits: str, objective: Name, tmp_path: Path) -> None:
-    method = load_allocator(objective=objective)
+    method = AnyRobot(objective=objective)
     for seed in range(4):
         layout = random_robot(np.random.default_rng(seed), kinds, tmp_path, limits=limits, n_fins=(2, 7))
         batch = method.allocate_batch(layout, reachable(layout, 12, seed))
@@ -63,7 +64,7 @@ def test_exact_on_any_fin(kinds: tuple[str, ...], limits: str, objective: Name, 
 
 @pytest.mark.parametrize(("objective", "most", "mean"), [("power", 1.01, 1.001), ("effort", 1.05, 1.01)])
 def test_no_more_than_brute_force_finds(objective: Name, most: float, mean: float) -> None:
-    method, ratio = load_allocator(objective=objective), []
+    method, ratio = AnyRobot(objective=objective), []
     for seed in range(2):
         layout = random_robot(np.random.default_rng(seed), LAWS, n_fins=(2, 4))
         for target in reachable(layout, 2, seed) * [[1.0], [0.5]]:
@@ -80,7 +81,7 @@ def test_no_more_than_brute_force_finds(objective: Name, most: float, mean: floa
 def test_robots_with_stops_are_as_cheap(target: Array) -> None:
     """Fins that start outside their arcs must come back to where they are pulled."""
     layout = load_layout(shipped_layouts()["restricted"])
-    answer = load_allocator().allocate(layout, target)
+    answer = Allocator(layout).allocate(target)
     least = least_cost(layout, target, answer.sigma, Objective(), n_starts=6, also=answer.command)
     assert answer.err_norm < 1e-5 and answer.power < 1.01 * least
 
@@ -89,7 +90,7 @@ def test_robots_with_stops_are_as_cheap(target: Array) -> None:
 def test_arcs_wider_than_half_a_turn_are_as_cheap(axis: int) -> None:
     """Which side of the gap each fin takes is no convex question."""
     layout, target = with_arcs("A", dict.fromkeys(range(4), (-2.4, 2.4))), AXES[axis]
-    answer = load_allocator().allocate(layout, target)
+    answer = Allocator(layout).allocate(target)
     least = least_cost(layout, target, answer.sigma, Objective(), n_starts=6, also=answer.command)
     assert answer.err_norm < 1e-5 and answer.power < 1.01 * least
 
@@ -99,7 +100,7 @@ def test_dear_directions_are_left_by_weak_forces(arcs: tuple[tuple[float, float]
     """Where an arc ends near zero its other end costs several times what a fin at work does."""
     layout, method = (
         with_arcs("penta", dict(zip((1, 3), arcs, strict=True))),
-        load_allocator(objective="effort"),
+        AnyRobot(objective="effort"),
     )
     targets = reachable(layout, 8, 5)
     batch = method.allocate_batch(layout, targets)
@@ -114,7 +115,7 @@ def test_dear_directions_are_left_by_weak_forces(arcs: tuple[tuple[float, float]
 
 @pytest.mark.parametrize("name", ["A", "B", "penta", "hexa", "octo"])
 def test_pure_axes_of_symmetric_robots(name: str) -> None:
-    layout, method = load_layout(shipped_layouts()[name]), load_allocator()
+    layout, method = load_layout(shipped_layouts()[name]), AnyRobot()
     for target in AXES[[0, 2, 5, 6]]:
         answer = method.allocate(layout, target)
         bound = method.bound(answer)
@@ -134,7 +135,7 @@ def coincident(rng: np.random.Generator, name: str) -> Layout:
 def test_coincident_fins_share_or_rest(objective: Name) -> None:
     """Two at one place: for power each gives half, for effort both or one, whichever is cheaper."""
     pair = Layout("twins", tuple(Fin(name, (0.1, 0.05, 0.0), 0.3) for name in "ab"))
-    plant, method = Plant(pair), load_allocator(objective=objective)
+    plant, method = Plant(pair), AnyRobot(objective=objective)
     for force in (0.5, 2.0, 6.0, 12.0):
         command = np.array([[0.6, 2.1, 0.4]] * 2)
         target = plant.wrench(command) * force / 13.32
@@ -142,7 +143,7 @@ def test_coincident_fins_share_or_rest(objective: Name) -> None:
         least = least_cost(pair, target, answer.sigma, Objective(objective), n_starts=8, also=answer.command)
         assert answer.err_norm < 1e-5 and cost_of(objective, answer) < 1.01 * least
         if objective == "power":
-            size = np.linalg.norm(answer.fin_forces, axis=1)
+            size = np.linalg.norm(answer.forces, axis=1)
             assert size[0] == pytest.approx(size[1], rel=1e-3)
 
 
@@ -153,7 +154,7 @@ def test_fins_at_rest_point_where_that_costs_least(case: int, target: int) -> No
     robot = coincident(rng, "twins")
     plant = Plant(robot)
     targets = plant.wrench(plant.sample(rng, (4,)))
-    answer = load_allocator(objective="effort").allocate(robot, targets[target])
+    answer = Allocator(robot, objective="effort").allocate(targets[target])
     rests = (answer.command[:, :2] < plant.lower[:, :2] + 1e-3).all(axis=1)
     assert rests.any() and np.abs(answer.command[rests, 2]).max() < 0.03
     goal = Objective("effort")
@@ -164,7 +165,7 @@ def test_fins_at_rest_point_where_that_costs_least(case: int, target: int) -> No
 def test_what_was_reached_late_is_as_cheap() -> None:
     """Near the peak of soft fins, which the search in force space steps over."""
     case = make_split("fins", 10, 4, 77)[3]
-    answer = load_allocator().allocate(case.layout, case.targets[3])
+    answer = Allocator(case.layout).allocate(case.targets[3])
     goal = Objective("power")
     least = least_cost(case.layout, answer.target, answer.sigma, goal, n_starts=8, also=answer.command)
     assert answer.err_norm < 1e-5 and answer.power < 1.03 * least
@@ -174,8 +175,8 @@ def test_what_was_reached_late_is_as_cheap() -> None:
 def test_tiny_fins_are_as_exact_beside_their_own_strength(area: float) -> None:
     layout = load_layout(shipped_layouts()["A"])
     model = FinModelSpec("drag", (("area", area),))
-    tiny = replace(layout, actuators=tuple(replace(fin, model=model) for fin in layout.fins))
-    method = load_allocator()
+    tiny = replace(layout, fins=tuple(replace(fin, model=model) for fin in layout.fins))
+    method = AnyRobot()
     for target in reachable(tiny, 6):
         answer = method.allocate(tiny, target)
         assert answer.err_norm < 1e-4 * method.pipeline.prepare(tiny).exactness
@@ -185,7 +186,7 @@ def test_batches_are_single_answers() -> None:
     layout = random_robot(np.random.default_rng(5), LAWS, n_fins=5)
     targets = reachable(layout, 30)
     for objective in ("power", "effort"):
-        method = load_allocator(objective=objective)  # type: ignore[arg-type]
+        method = AnyRobot(objective=objective)  # type: ignore[arg-type]
         batch = method.allocate_batch(layout, targets)
         singles = [method.allocate(layout, target) for target in targets]
         cost = batch.power if objective == "power" else batch.effort

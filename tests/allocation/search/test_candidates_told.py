@@ -5,10 +5,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from finlab.allocation import load_allocator
 from finlab.layout import load_layout
 from finlab.physics import Plant
 from finlab.physics.effort import command_effort
+from tests.any_robot import AnyRobot
 
 TARGET = np.array([1.0, 0.5, 2.0, 0.0, 0.1, 0.1])
 OBJECTIVES: list[dict[str, Any]] = [
@@ -19,7 +19,7 @@ OBJECTIVES: list[dict[str, Any]] = [
 
 @pytest.mark.parametrize("options", OBJECTIVES)
 def test_candidates_tell_what_the_plant_says_of_them(options: dict[str, Any]) -> None:
-    method, layout = load_allocator(**options), load_layout("penta")
+    method, layout = AnyRobot(**options), load_layout("penta")
     told, plant = method.allocate(layout, TARGET).candidates, Plant(layout)
     assert told is not None
     np.testing.assert_allclose(told.wrench, plant.wrench(told.command), atol=1e-9)

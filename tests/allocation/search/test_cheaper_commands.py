@@ -7,8 +7,6 @@ import numpy as np
 import pytest
 
 import finlab.allocation.search.cheaper_commands
-from finlab.allocation import load_allocator
-from finlab.allocation.levenberg_marquardt import CommandProblem, refine
 from finlab.allocation.search.cheaper_commands import DESCENT, cheaper_commands
 from finlab.arrays import Array
 from finlab.evaluation.splits import make_split
@@ -16,6 +14,7 @@ from finlab.layout import Layout
 from finlab.physics import plant_of
 from finlab.physics.objective import CostMeter, Name, Objective
 from tests.allocation.search.reference import least_cost
+from tests.any_robot import AnyRobot
 from tests.exhaustive import crossed
 from tests.random_fins import random_robot
 
@@ -71,7 +70,7 @@ def test_where_it_ends_is_a_minimum(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 
 @pytest.mark.parametrize(("objective", "most", "mean"), [("power", 1.06, 1.01), ("effort", 1.05, 1.01)])
 def test_tables_cost_what_many_starts_find(objective: Name, most: float, mean: float) -> None:
-    method, aim, ratio = load_allocator(objective=objective), Objective(objective), []
+    method, aim, ratio = AnyRobot(objective=objective), Objective(objective), []
     for case in make_split("tables", 2, 1, 40):
         batch, sigma = method.allocate_batch(case.layout, case.targets), case.sigma
         assert sigma is not None

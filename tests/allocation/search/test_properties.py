@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from finlab.allocation import Allocation
 from finlab.allocation.modes import force_sizes, mode_signature, same_signature
-from finlab.allocation.search.search_allocator import SearchAllocator
 from finlab.layout import Layout, random_layout
 from finlab.physics import Plant
+from tests.any_robot import AnyRobot
 
 GOOD = 1e-5
 """Normalized error below which an answer counts as exact here."""
@@ -62,7 +62,7 @@ def wrapped(angle: float) -> float:
 
 @few(20)
 @given(seed=SEEDS, limits=LIMITS, size=st.sampled_from([0.0, 1e-6, 0.5, 1.0, 5.0, 1e5]))
-def test_limits_hold_to_the_last_bit(search: SearchAllocator, seed: int, limits: str, size: float) -> None:
+def test_limits_hold_to_the_last_bit(search: AnyRobot, seed: int, limits: str, size: float) -> None:
     layout, target = drawn(seed, limits)
     assert inside(layout, search.allocate_batch(layout, [size * target, -size * target]).command[0])
     first = search.allocate(layout, size * target)
@@ -72,14 +72,14 @@ def test_limits_hold_to_the_last_bit(search: SearchAllocator, seed: int, limits:
 
 @few(5)
 @given(seed=SEEDS, limits=LIMITS, policy=st.sampled_from(["direction", "priority"]))
-def test_limits_hold_out_of_reach(search: SearchAllocator, seed: int, limits: str, policy: str) -> None:
+def test_limits_hold_out_of_reach(search: AnyRobot, seed: int, limits: str, policy: str) -> None:
     layout, target = drawn(seed, limits)
     assert inside(layout, search.allocate(layout, 20.0 * target, policy=policy).command)
 
 
 @few(20)
 @given(seed=SEEDS)
-def test_the_order_of_the_fins_does_not_matter(search: SearchAllocator, seed: int) -> None:
+def test_the_order_of_the_fins_does_not_matter(search: AnyRobot, seed: int) -> None:
     layout, target = drawn(seed)
     order = np.random.default_rng(seed).permutation(layout.n_fins)
     shuffled = replace(layout, actuators=tuple(layout.fins[i] for i in order))
@@ -91,9 +91,7 @@ def test_the_order_of_the_fins_does_not_matter(search: SearchAllocator, seed: in
 
 @few(20)
 @given(seed=SEEDS, limits=LIMITS, yaw=st.floats(-math.pi, math.pi))
-def test_a_turned_robot_gets_the_turned_answer(
-    search: SearchAllocator, seed: int, limits: str, yaw: float
-) -> None:
+def test_a_turned_robot_gets_the_turned_answer(search: AnyRobot, seed: int, limits: str, yaw: float) -> None:
     layout, target = drawn(seed, limits)
     c, s = math.cos(yaw), math.sin(yaw)
     rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
@@ -114,7 +112,7 @@ def test_a_turned_robot_gets_the_turned_answer(
 
 @few(20)
 @given(seed=SEEDS, limits=LIMITS)
-def test_a_mirrored_robot_gets_the_mirrored_answer(search: SearchAllocator, seed: int, limits: str) -> None:
+def test_a_mirrored_robot_gets_the_mirrored_answer(search: AnyRobot, seed: int, limits: str) -> None:
     layout, target = drawn(seed, limits)
     # The thrust axis e_h is mirrored, so zero directions and with them the energy stay what they are.
     fins = [
@@ -133,7 +131,7 @@ def test_a_mirrored_robot_gets_the_mirrored_answer(search: SearchAllocator, seed
 
 @few(15)
 @given(seed=SEEDS, limits=LIMITS, lost=st.integers(0, 4), policy=st.sampled_from(["closest", "priority"]))
-def test_failed_is_removed(search: SearchAllocator, seed: int, limits: str, lost: int, policy: str) -> None:
+def test_failed_is_removed(search: AnyRobot, seed: int, limits: str, lost: int, policy: str) -> None:
     layout, target = drawn(seed, limits)
     name = layout.names[lost % layout.n_fins]
     failed = search.allocate(layout, target, failed=[name], policy=policy)
@@ -147,9 +145,7 @@ def test_failed_is_removed(search: SearchAllocator, seed: int, limits: str, lost
 
 @few(10)
 @given(seed=SEEDS, draw=st.integers(0, 1000), scale=st.sampled_from([1.0, 10.0]))
-def test_the_same_seed_gives_the_same_answer(
-    search: SearchAllocator, seed: int, draw: int, scale: float
-) -> None:
+def test_the_same_seed_gives_the_same_answer(search: AnyRobot, seed: int, draw: int, scale: float) -> None:
     layout, target = drawn(seed)
     first = search.allocate(layout, scale * target, seed=draw, previous=None)
     search.allocate(layout, -target, seed=draw + 1, previous=first.command)
@@ -159,7 +155,7 @@ def test_the_same_seed_gives_the_same_answer(
 
 @few(15)
 @given(seed=SEEDS)
-def test_a_small_change_of_the_layout_changes_the_answer_little(search: SearchAllocator, seed: int) -> None:
+def test_a_small_change_of_the_layout_changes_the_answer_little(search: AnyRobot, seed: int) -> None:
     layout, target = drawn(seed)
     rng = np.random.default_rng(seed + 1)
     fins = [
@@ -179,4 +175,4 @@ def test_a_small_change_of_the_layout_changes_the_answer_little(search: SearchAl
     assert other.err_norm <= max(GOOD, moved) and same_energy(one, other, 0.01)
     ways = [mode_signature(a.command, force_sizes(a.layout, a.command)) for a in (one, other)]
     if same_signature(*ways):
-        np.testing.assert_allclose(one.fin_forces, other.fin_forces, atol=0.05)
+        np.testing.assert_allclose(one.forces, other.forces, atol=0.05)

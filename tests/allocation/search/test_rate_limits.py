@@ -7,13 +7,12 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from finlab.allocation import load_allocator
 from finlab.allocation.search import search_allocator
-from finlab.allocation.search.search_allocator import SearchAllocator
 from finlab.forces.force_space import SETTLED
 from finlab.layout import Layout, load_layout
 from finlab.layout.angles import wrapped
 from finlab.physics import Plant
+from tests.any_robot import AnyRobot
 from tests.exhaustive import sampled
 
 TICKS = np.arange(150) * 0.1
@@ -43,7 +42,7 @@ class Drive(NamedTuple):
         return np.abs(change)
 
 
-def drive(method: SearchAllocator, layout: Layout, path: np.ndarray, *, bound: bool) -> Drive:
+def drive(method: AnyRobot, layout: Layout, path: np.ndarray, *, bound: bool) -> Drive:
     previous, results = None, []
     for wrench in path:
         result = method.allocate(layout, wrench, previous=previous)
@@ -68,17 +67,17 @@ def penta() -> Layout:
 
 
 @pytest.fixture(scope="module", params=["power", "effort"])
-def method(request: pytest.FixtureRequest) -> SearchAllocator:
-    return load_allocator(objective=request.param)
+def method(request: pytest.FixtureRequest) -> AnyRobot:
+    return AnyRobot(objective=request.param)
 
 
 @pytest.fixture(scope="module")
-def free(method: SearchAllocator, penta: Layout) -> Drive:
+def free(method: AnyRobot, penta: Layout) -> Drive:
     return drive(method, penta, smooth_path(0), bound=False)
 
 
 @pytest.fixture(scope="module")
-def steady(method: SearchAllocator, penta: Layout) -> Drive:
+def steady(method: AnyRobot, penta: Layout) -> Drive:
     return drive(method, penta, smooth_path(0), bound=True)
 
 
@@ -88,7 +87,7 @@ def test_no_command_changes_faster_than_its_servo(free: Drive, steady: Drive) ->
 
 
 def test_the_path_is_still_tracked_at_about_the_same_cost(
-    method: SearchAllocator, free: Drive, steady: Drive
+    method: AnyRobot, free: Drive, steady: Drive
 ) -> None:
     assert free.error.max() < 1e-5
     assert steady.error.max() < 0.02 and np.median(steady.error) < 1e-6
@@ -97,13 +96,13 @@ def test_the_path_is_still_tracked_at_about_the_same_cost(
 
 @pytest.mark.parametrize("name", sampled(["octo", "hexa"]))
 def test_many_fins_for_effort_track_at_about_the_same_cost(name: str) -> None:
-    search, layout, path = load_allocator(objective="effort"), load_layout(name), smooth_path(0)[:30]
+    search, layout, path = AnyRobot(objective="effort"), load_layout(name), smooth_path(0)[:30]
     free, steady = (drive(search, layout, path, bound=told) for told in (False, True))
     assert steady.error.max() < 0.02
     assert steady.cost.mean() < 1.06 * free.cost.mean()
 
 
-def test_rates_are_those_of_each_fin(search: SearchAllocator, penta: Layout) -> None:
+def test_rates_are_those_of_each_fin(search: AnyRobot, penta: Layout) -> None:
     first = replace(penta.fins[0], servo=replace(penta.fins[0].servo, frequency_rate=0.5, direction_rate=1.0))
     other = replace(penta, actuators=(first, *penta.fins[1:]))
     ride = drive(search, other, smooth_path(1)[:60], bound=True)
@@ -112,7 +111,7 @@ def test_rates_are_those_of_each_fin(search: SearchAllocator, penta: Layout) -> 
 
 
 def test_ticks_may_be_longer(penta: Layout) -> None:
-    slow = load_allocator(period_s=0.4)
+    slow = AnyRobot(period_s=0.4)
     before = slow.allocate(penta, TARGET).command
     after = slow.allocate(penta, -np.array(TARGET), previous=before).command
     change = np.abs(after - before)
@@ -132,7 +131,7 @@ def test_what_servos_alone_hold_back_is_not_asked_for_anew(
         return within_reach(*arguments)
 
     monkeypatch.setattr(search_allocator, "_within_reach", counted)
-    method = load_allocator()
+    method = AnyRobot()
     before = method.allocate(penta, TARGET).command
     turned = method.allocate(penta, -np.array(TARGET), previous=before, policy="direction")
     assert turned.err_norm > 0.01 and not projected
@@ -146,7 +145,7 @@ def test_commands_stay_inside_the_limits_across_the_seam(steady: Drive, penta: L
     assert jumps.any()  # fins do pass the seam
 
 
-def test_a_fin_follows_a_turning_force_over_the_seam(search: SearchAllocator) -> None:
+def test_a_fin_follows_a_turning_force_over_the_seam(search: AnyRobot) -> None:
     layout = load_layout("pair")
     previous = None
     for angle in np.linspace(0.0, 4.0 * math.pi, 80):
@@ -157,24 +156,22 @@ def test_a_fin_follows_a_turning_force_over_the_seam(search: SearchAllocator) ->
         previous = result.command
 
 
-def test_arcs_are_kept(search: SearchAllocator) -> None:
+def test_arcs_are_kept(search: AnyRobot) -> None:
     layout = load_layout("restricted")
     ride = drive(search, layout, smooth_path(1)[:60], bound=True)
     assert ((ride.command >= layout.lower) & (ride.command <= layout.upper)).all()
 
 
-def test_a_previous_command_that_is_the_answer_stays(
-    method: SearchAllocator, penta: Layout, free: Drive
-) -> None:
+def test_a_previous_command_that_is_the_answer_stays(method: AnyRobot, penta: Layout, free: Drive) -> None:
     plant = Plant(penta)
     for tick in (0, 50, 120):
         before = free.command[tick]
         result = method.allocate(penta, smooth_path(0)[tick], previous=before)
         # The search ends where forces settle; asked again, the answer is the same.
         step = 2.0 * SETTLED[0] * method.pipeline.prepare(penta).planar.fins.maximum.max()
-        np.testing.assert_allclose(result.fin_forces, plant.fin_forces(before), atol=step)
+        np.testing.assert_allclose(result.forces, plant.forces(before), atol=step)
         again = method.allocate(penta, smooth_path(0)[tick], previous=result.command)
-        np.testing.assert_allclose(again.fin_forces, result.fin_forces, atol=1e-3)
+        np.testing.assert_allclose(again.forces, result.forces, atol=1e-3)
         cost = result.power if method.objective.name == "power" else result.effort
         assert cost < 1.005 * free.cost[tick]
 
@@ -183,7 +180,7 @@ def test_the_first_tick_knows_no_past(free: Drive, steady: Drive) -> None:
     np.testing.assert_array_equal(steady.command[0], free.command[0])
 
 
-def test_a_failed_fin_comes_back(search: SearchAllocator, penta: Layout) -> None:
+def test_a_failed_fin_comes_back(search: AnyRobot, penta: Layout) -> None:
     lost = search.allocate(penta, TARGET, failed=["port_back"])
     still = search.allocate(penta, TARGET, failed=["port_back"], previous=lost.command)
     assert np.isnan(still.command[2]).all() and np.isfinite(still.command[[0, 1, 3, 4]]).all()
@@ -193,7 +190,7 @@ def test_a_failed_fin_comes_back(search: SearchAllocator, penta: Layout) -> None
     assert (np.abs(back.command - lost.command)[known] <= STEP + 1e-9).all()
 
 
-def test_a_target_that_needs_a_turn_is_reached_tick_by_tick(method: SearchAllocator, penta: Layout) -> None:
+def test_a_target_that_needs_a_turn_is_reached_tick_by_tick(method: AnyRobot, penta: Layout) -> None:
     """From rise to dive all fins turn by half a circle: seven ticks, in which less and less is missing."""
     target = np.array([0.0, 0.0, 12.0, 0.0, 0.0, 0.0])
     previous, missing = method.allocate(penta, target).command, []

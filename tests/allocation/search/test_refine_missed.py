@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 
-from finlab.allocation import load_allocator
-from finlab.allocation.search.search_allocator import SearchAllocator
 from finlab.layout import Fin, Layout, Limits
 from finlab.physics import Plant
 from finlab.physics.objective import Name
+from tests.any_robot import AnyRobot
 from tests.exhaustive import crossed
 
 
@@ -34,14 +33,14 @@ def with_arcs(seed: int) -> tuple[Layout, np.ndarray]:
     crossed(range(5060, 5100, 3), ["power", "effort"], every=9),
 )
 def test_what_is_within_reach_is_found(objective: Name, seed: int) -> None:
-    method = load_allocator(objective=objective)
+    method = AnyRobot(objective=objective)
     layout, targets = with_arcs(seed)
     assert method.allocate_batch(layout, targets[:12]).err_norm.max() < 1e-5
 
 
 @pytest.mark.parametrize(("seed", "target", "least"), [(5065, 14, 2.367)])
 def test_enough_fresh_starts_find_what_fins_with_arcs_can_do(
-    search: SearchAllocator, seed: int, target: int, least: float
+    search: AnyRobot, seed: int, target: int, least: float
 ) -> None:
     layout, targets = with_arcs(seed)
     assert search.allocate_batch(layout, targets).err_norm[target] < 1.001 * least

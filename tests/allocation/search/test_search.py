@@ -9,15 +9,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+from finlab.allocation.search.search_method import CHUNK
 
-from finlab.allocation import Allocator, load_allocator
-from finlab.allocation.search.search_allocator import CHUNK, SearchAllocator
+from finlab.allocation import Allocator
 from finlab.assets import shipped_layouts
 from finlab.layout import Fin, FinModelSpec, Layout, Limits, load_layout, random_layout
 from finlab.physics import Plant, make_law, write_table
 from finlab.physics.effort import EffortWeights
 from finlab.physics.objective import Name
-from tests.fin_robots import FIN_ROBOTS
+from tests.any_robot import AnyRobot
 
 INERTIAL = EffortWeights(0.0, 0.0, 0.0, 0.0, 1.0)
 
@@ -51,20 +51,20 @@ def errors(method: Allocator, layout: Layout, targets: np.ndarray) -> np.ndarray
     return method.normalization.error(Plant(layout).wrench(command), targets)
 
 
-@pytest.mark.parametrize("name", list(FIN_ROBOTS))
-def test_exact_on_shipped_layouts(name: str, search: SearchAllocator) -> None:
+@pytest.mark.parametrize("name", list(shipped_layouts()))
+def test_exact_on_shipped_layouts(name: str, search: AnyRobot) -> None:
     layout = load_layout(shipped_layouts()[name])
     assert errors(search, layout, reachable(layout, 25)).max() < GOOD
 
 
 @pytest.mark.parametrize("limits", ["nominal", "varied"])
-def test_exact_on_random_layouts(limits: str, search: SearchAllocator) -> None:
+def test_exact_on_random_layouts(limits: str, search: AnyRobot) -> None:
     for seed in range(5000, 5015):
         layout = random_layout(np.random.default_rng(seed), limits=limits)  # type: ignore[arg-type]
         assert errors(search, layout, reachable(layout, 20, seed)).max() < GOOD, seed
 
 
-def test_exact_outside_the_training_box_and_with_more_fins(search: SearchAllocator) -> None:
+def test_exact_outside_the_training_box_and_with_more_fins(search: AnyRobot) -> None:
     for seed in range(5000, 5005):
         rng = np.random.default_rng(seed)
         wide = random_layout(rng, box=(0.45, 0.45, 0.2), outside=(0.3, 0.3, 0.1))
@@ -74,7 +74,7 @@ def test_exact_outside_the_training_box_and_with_more_fins(search: SearchAllocat
 
 
 @pytest.mark.parametrize("name", ["A", "B", "C", "D"])
-def test_exact_after_the_loss_of_any_fin(name: str, search: SearchAllocator) -> None:
+def test_exact_after_the_loss_of_any_fin(name: str, search: AnyRobot) -> None:
     layout = load_layout(shipped_layouts()[name])
     for fin in layout.names:
         for target in reachable(layout.without([fin]), 2):
@@ -105,31 +105,31 @@ HOSTILE = {
 
 
 @pytest.mark.parametrize("name", ["one fin", "two at one place", "all parallel", "may rest", "sixteen"])
-def test_hostile_layouts_still_get_what_they_can_do(name: str, search: SearchAllocator) -> None:
+def test_hostile_layouts_still_get_what_they_can_do(name: str, search: AnyRobot) -> None:
     layout = HOSTILE[name]
     error = errors(search, layout, reachable(layout, 10))
     assert error.max() < GOOD
 
 
-def test_what_cannot_be_done_is_done_as_far_as_possible(search: SearchAllocator) -> None:
+def test_what_cannot_be_done_is_done_as_far_as_possible(search: AnyRobot) -> None:
     result = search.allocate(HOSTILE["one fin"], [0.0, 50.0, 0.0, 0.0, 0.0, 0.0])
     np.testing.assert_allclose(result.command[0], [0.6, 2.1, 0.0], atol=1e-2)
     assert result.unallocated[1] > 40.0
 
 
-def test_the_same_question_gets_the_same_answer(search: SearchAllocator) -> None:
+def test_the_same_question_gets_the_same_answer(search: AnyRobot) -> None:
     layout = load_layout(shipped_layouts()["A"])
     target = reachable(layout, 1)[0]
     first = search.allocate(layout, target, seed=3)
     search.allocate(layout, -target, seed=9)  # what was asked in between leaves no trace
-    for other in (search, SearchAllocator(search.normalization)):
+    for other in (search, AnyRobot()):
         again = other.allocate(layout, target, seed=3)
         np.testing.assert_array_equal(again.command, first.command)
         assert again.candidates is not None and first.candidates is not None
         np.testing.assert_array_equal(again.candidates.command, first.candidates.command)
 
 
-def test_many_targets_are_answered_as_well_as_one(search: SearchAllocator) -> None:
+def test_many_targets_are_answered_as_well_as_one(search: AnyRobot) -> None:
     layout = load_layout(shipped_layouts()["A"])
     targets = reachable(layout, CHUNK + 3)
     batch = search.allocate_batch(layout, targets)
@@ -137,16 +137,16 @@ def test_many_targets_are_answered_as_well_as_one(search: SearchAllocator) -> No
     assert error.max() < GOOD
     for row in (0, 1, CHUNK - 1, CHUNK, CHUNK + 2):  # around the seam of two chunks
         assert search.allocate(layout, targets[row]).err_norm < GOOD
-    assert batch.wrench_surrogate is None
+    assert batch.wrench_expected is None
 
 
-def test_no_targets_get_no_answers(search: SearchAllocator) -> None:
+def test_no_targets_get_no_answers(search: AnyRobot) -> None:
     assert search.allocate_batch(HOSTILE["one fin"], np.zeros((0, 6))).command.shape == (0, 1, 3)
 
 
 @pytest.mark.parametrize("objective", ["power", "effort"])
 def test_candidates_are_offered_best_first(objective: Name) -> None:
-    layout, method = load_layout(shipped_layouts()["B"]), load_allocator(objective=objective)
+    layout, method = load_layout(shipped_layouts()["B"]), AnyRobot(objective=objective)
     result = method.allocate(layout, reachable(layout, 1, seed=4)[0])
     candidates = result.candidates
     assert candidates is not None and result.samples is None
@@ -184,14 +184,14 @@ def test_candidates_are_offered_best_first(objective: Name) -> None:
     ],
 )
 def test_every_option_still_answers_exactly(options: dict[str, Any]) -> None:
-    method = load_allocator(**options)
+    method = AnyRobot(**options)
     layout = load_layout(shipped_layouts()["A"])
     result = method.allocate(layout, reachable(layout, 1)[0])
     assert result.err_norm < GOOD and keeps_limits(layout, result.command)
     assert result.candidates is not None and len(result.candidates.command) <= options.get("n_refined", 4)
 
 
-def test_a_force_table_that_was_measured_again_is_read_again(search: SearchAllocator, tmp_path: Path) -> None:
+def test_a_force_table_that_was_measured_again_is_read_again(search: AnyRobot, tmp_path: Path) -> None:
     grid = np.linspace(0.0, 0.6, 9), np.linspace(0.0, 2.1, 10), np.linspace(-np.pi, np.pi, 13)
     table = FinModelSpec("table", (("path", str(tmp_path / "fin.csv")),))
     layout = load_layout("A")
@@ -202,7 +202,7 @@ def test_a_force_table_that_was_measured_again_is_read_again(search: SearchAlloc
         assert search.allocate(layout, [1.0, 0.0, 0.5, 0.0, 0.0, 0.1]).err_norm < GOOD
 
 
-def test_turning_the_robot_does_not_make_it_worse(search: SearchAllocator) -> None:
+def test_turning_the_robot_does_not_make_it_worse(search: AnyRobot) -> None:
     layout = load_layout(shipped_layouts()["C"])
     yaw = 0.8
     c, s = math.cos(yaw), math.sin(yaw)

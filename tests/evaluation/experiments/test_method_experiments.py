@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from finlab.allocation import load_allocator
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.baselines.analytic import Analytic
 from finlab.allocation.solution import Solution
@@ -20,6 +19,7 @@ from finlab.evaluation.splits import make_split
 from finlab.layout import Fin, Layout, Limits
 from finlab.networks.normalization import Normalization
 from finlab.physics import Plant
+from tests.any_robot import AnyRobot
 
 SIGMA = np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.35])
 
@@ -64,7 +64,7 @@ def test_the_plant_scores(first: int | None) -> None:
 
 def test_the_search_costs_no_more_than_the_best_start() -> None:
     pytest.importorskip("casadi")
-    sizes = {"layouts": 3, "targets": 1, "seed": 6, "starts": 8, "methods": ("search",)}
+    sizes = {"layouts": 3, "targets": 1, "seed": 6, "starts": 8, "methods": ("dual",)}
     rows = load_experiment("cost").rows(split=("id", "failure", "axes"), objectives=("power",), **sizes)
     assert [row["split"] for row in rows] == ["id", "failure", "axes"]
     for row in rows:
@@ -91,18 +91,18 @@ def surge_robot(arc: tuple[float, float] = (-math.pi, math.pi)) -> tuple[Layout,
     fins = [Fin(name, (0.0, y, 0.0), -math.pi / 2, limits) for name, y in (("port", 0.2), ("star", -0.2))]
     layout = Layout("pair", tuple(fins))
     full = np.array([[*limits.upper[:2], 0.5 * sum(arc)]] * 2)
-    return layout, float(np.linalg.norm(Plant(layout).fin_forces(full)[0]))
+    return layout, float(np.linalg.norm(Plant(layout).forces(full)[0]))
 
 
 def test_latency_compares_with_search() -> None:
-    rows = load_experiment("latency").rows(methods=("search", "analytic"), calls=6, robots=1, seed=4711)
+    rows = load_experiment("latency").rows(methods=("dual", "analytic"), calls=6, robots=1, seed=4711)
     search, analytic, *first = rows
     assert (search["calls"], search["p50_over_search"]) == (6, 1.0)
     assert analytic["p50_over_search"] == pytest.approx(analytic["p50_ms"] / search["p50_ms"])
     assert all(0 < row["p50_ms"] <= row["p99_ms"] for row in rows)
     soft = next(row for row in first if row["call"].endswith("soft"))
     assert soft["p50_ms"] > 5.0 * search["p50_ms"]  # compiling takes many times the call itself
-    assert first_times(load_allocator(), "soft", 1, 4711)[0] < 0.5 * soft["p50_ms"]  # compiled once
+    assert first_times(AnyRobot(), "soft", 1, 4711)[0] < 0.5 * soft["p50_ms"]  # compiled once
     with pytest.raises(DataError, match="fins: expected 2 to 5"):
         load_experiment("latency").rows(fins=9)
 

@@ -129,7 +129,7 @@ def test_swims_of_the_same_noise_are_compared_with_each_other() -> None:
     low, high = paired_interval(ours, theirs, "ate") or (0.0, 0.0)
     assert -0.007 < low < -0.005 < high < -0.003
     assert paired_interval(dict([*ours.items()][:1]), theirs, "ate") is None
-    row = day_rows(DAYS["nominal"], {"search": ours, "analytic": theirs})[0]
+    row = day_rows(DAYS["nominal"], {"dual": ours, "analytic": theirs})[0]
     assert row["ate_ratio_interval"][0] < row["ate_ratio"] < row["ate_ratio_interval"][1] < 1.0
     assert row["verdict"] == "error better, power level"
 
@@ -137,7 +137,7 @@ def test_swims_of_the_same_noise_are_compared_with_each_other() -> None:
 def test_the_best_baseline_is_another_for_each_figure() -> None:
     errors = [0.001 * seed for seed in range(4)]
     done = {
-        "search": _swims([0.05 + e for e in errors], [2.0, 3.0, 4.0, 5.0]),
+        "dual": _swims([0.05 + e for e in errors], [2.0, 3.0, 4.0, 5.0]),
         "analytic": _swims([0.10 + e for e in errors], [4.0] * 4),
         "on-board": _swims([0.20] * 4, [3.0] * 4),
         "qp": _swims([0.01] * 4, [0.1] * 4, farthest=2.0),  # loses its path: is no baseline
@@ -151,9 +151,9 @@ def test_the_best_baseline_is_another_for_each_figure() -> None:
 
 def test_who_alone_keeps_the_path_and_who_loses_it() -> None:
     kept, lost = _swims([0.1, 0.1], [1.0, 1.0]), _swims([0.1, 0.1], [1.0, 1.0], farthest=3.0)
-    row = day_rows(DAYS["nominal"], {"search": kept, "analytic": lost})[0]
+    row = day_rows(DAYS["nominal"], {"dual": kept, "analytic": lost})[0]
     assert row["verdict"] == "alone keeps its path" and "ate_ratio" not in row
-    row = day_rows(DAYS["nominal"], {"search": lost, "analytic": kept})[0]
+    row = day_rows(DAYS["nominal"], {"dual": lost, "analytic": kept})[0]
     assert row["verdict"].startswith("loses its path")
 
 

@@ -16,11 +16,11 @@ def test_dots_stand_at_their_values_with_their_intervals() -> None:
         ends = None if value is None else [value - 0.1, value + 0.2]
         return {"method": method, "split": split, "cost": value, "cost_interval": ends}
 
-    rows = [row("search", "id", 1.5), row("search", "ood", 1.2), row("qp", "id", 2.0), row("qp", "ood", None)]
+    rows = [row("dual", "id", 1.5), row("dual", "ood", 1.2), row("qp", "id", 2.0), row("qp", "ood", None)]
     view = draw_dots(rows, "cost", "split", "cost [W]")
     (axis,) = view.axes
     search, qp = axis.containers
-    assert (search.get_label(), qp.get_label()) == ("search", "qp")
+    assert (search.get_label(), qp.get_label()) == ("dual", "qp")
     assert search[0].get_ydata() == pytest.approx([1.5, 1.2]) and qp[0].get_ydata() == pytest.approx([2.0])
     place = np.asarray(search[0].get_xdata(), float)
     assert np.round(place).tolist() == [0, 1] and place[0] < float(qp[0].get_xdata()[0])

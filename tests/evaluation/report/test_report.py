@@ -28,9 +28,9 @@ pytest.importorskip("matplotlib")
 pytest.importorskip("casadi")
 
 TINY: dict[str, dict[str, Any]] = {
-    "wrench": {"split": ("id", "tables"), "methods": ("search", "qp"), "layouts": 2, "targets": 2},
-    "cost": {"split": ("id",), "methods": ("search",), "layouts": 2, "targets": 1, "starts": 4},
-    "latency": {"methods": ("search", "qp"), "calls": 2, "robots": 1},
+    "wrench": {"split": ("id", "tables"), "methods": ("dual", "qp"), "layouts": 2, "targets": 2},
+    "cost": {"split": ("id",), "methods": ("dual",), "layouts": 2, "targets": 1, "starts": 4},
+    "latency": {"methods": ("dual", "qp"), "calls": 2, "robots": 1},
     "ablation": {"variants": ("ours",), "layouts": 2, "targets": 1, "candidates": 4},
     "temperature": {"temperatures": (0.01, 1.0), "layouts": 2, "targets": 1, "candidates": 4},
 }
@@ -167,8 +167,8 @@ def test_a_lead_needs_intervals_that_lie_apart() -> None:
     def row(split: str, method: str, low: float, high: float) -> Row:
         return {"split": split, "method": method, "err_norm_mean_interval": [low, high]}
 
-    rows = [row("id", "search", 1.0, 2.0), row("id", "qp", 3.0, 4.0), row("id", "paper", 1.5, 9.0)]
-    rows += [row("ood", "search", 5.0, 6.0), row("ood", "qp", 3.0, 4.0), row("limits", "qp", 0.0, 1.0)]
+    rows = [row("id", "dual", 1.0, 2.0), row("id", "qp", 3.0, 4.0), row("id", "paper", 1.5, 9.0)]
+    rows += [row("ood", "dual", 5.0, 6.0), row("ood", "qp", 3.0, 4.0), row("limits", "qp", 0.0, 1.0)]
     qp, paper = standings(load_experiment("wrench"), rows)
     assert (qp["against"], qp["cases"], qp["leads"], qp["level"], qp["trails"]) == ("qp", 2, 1, 0, 1)
     assert (paper["cases"], paper["leads"], paper["level"], paper["trails"]) == (1, 0, 1, 0)

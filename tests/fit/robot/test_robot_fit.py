@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from finlab import load_allocator
 from finlab.cli import main
 from finlab.fit.robot.fitted_layout import write_robot
 from finlab.fit.robot.report import summary, table
@@ -16,6 +15,7 @@ from finlab.fit.robot.swim_file import read_swim
 from finlab.layout import Fin, FinModelSpec, Layout, load_layout, save_layout
 from finlab.layout.angles import wrapped
 from finlab.physics import plant_of
+from tests.any_robot import AnyRobot
 from tests.fit.robot.swims import swim, write_csv
 
 CENTER = np.array([0.015, -0.01, 0.005])
@@ -83,7 +83,7 @@ def test_the_fitted_layout_allocates_for_the_true_robot(fit: RobotFit, truth: La
     assert fitted.description.startswith("fitted to 60 s of swimming")
     true = plant_of(truth)
     targets = 0.6 * true.wrench(true.sample(np.random.default_rng(3), (30,)))
-    allocator = load_allocator()
+    allocator = AnyRobot()
     missed = [
         np.linalg.norm(true.wrench(allocator.allocate_batch(robot, targets).command) - targets, axis=1).mean()
         for robot in (drawn, fitted)

@@ -6,35 +6,33 @@ The stages are in `pipeline`; here are the policies, the batches and what is off
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from copy import copy
 from functools import lru_cache
-from typing import Any, NamedTuple, Self
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.allocation import Allocation
-from finlab.allocation.allocator import Allocator
-from finlab.allocation.evaluate import effort_of, power_of
+from finlab.allocation.evaluate import REACHED, effort_of, power_of
 from finlab.allocation.in_time import in_time
+from finlab.allocation.method import Method
 from finlab.allocation.policy import Policy
-from finlab.allocation.question import usable_fins
 from finlab.allocation.search.pipeline import SEARCH, Pipeline
 from finlab.allocation.search.prepared import Prepared, resting_fins
 from finlab.allocation.search.refined_candidates import FallbackForces, RefinedCandidates, nearest_forces
 from finlab.allocation.search.settings import SearchSettings
+from finlab.allocation.settings import Settings
 from finlab.allocation.solution import Candidates, Solution
 from finlab.arrays import Array
-from finlab.errors import AllocationError
-from finlab.forces.cost_bound import cost_bound
 from finlab.forces.fin_sets import planar_sets
-from finlab.forces.force_space import PlanarProblem, descend
+from finlab.forces.force_space import PlanarProblem
 from finlab.forces.out_of_reach import Nearest, nearest, nearest_along, nearest_in_turn
 from finlab.layout import Layout
-from finlab.networks.normalization import Normalization
 from finlab.networks.threads import single_threaded_products
+from finlab.networks.trained import TrainedWeights
 from finlab.physics.objective import Objective
 
+USUAL_SHARE = 0.1
+"""What a robot is mostly asked for, as a share of its yardstick."""
 CHUNK = 512
 """Targets that are solved together; keeps memory flat for any number of targets."""
 
@@ -50,29 +48,23 @@ class Beginning(NamedTuple):
     """The seeds of a single target as candidates, where they were drawn."""
 
 
-class SearchAllocator(Allocator):
+class Search(Method):
     """Exact on any fin whose law or table is known, without a network."""
 
-    name = "search"
+    name = "dual"
     # A smaller wrench in the same direction still turns a robot to where it should go; the nearest one may
     # only push it on.
     policy_under_way = "direction"
     settings_class = SearchSettings
     settings: SearchSettings
 
-    def __init__(self, normalization: Normalization, **settings: Any) -> None:
-        """Make it.
-
-        Args:
-            normalization: the yardstick of the error; nothing else is taken from a checkpoint.
-            settings: fields of the method's settings.
-
-        Raises:
-            AllocationError: a setting that no search can work with.
-        """
-        self.normalization = normalization
-        self.settings = self.settings_class(**settings)
-        self.pipeline = Pipeline(normalization.std, self.settings)
+    def __init__(
+        self, layout: Layout, settings: Settings, scale: Array, weights: TrainedWeights | None = None
+    ) -> None:
+        super().__init__(layout, settings, scale, weights)
+        self.sigma = USUAL_SHARE * scale if weights is None else weights.normalization.std
+        self.pipeline = Pipeline(self.sigma, self.settings)
+        self.prepared = self.pipeline.prepare(layout)
         # All products here are too small to be shared among threads; chunks of targets are not.
         self._one_thread = single_threaded_products()
 
@@ -81,35 +73,22 @@ class SearchAllocator(Allocator):
         """What is kept least."""
         return self.pipeline.objective
 
-    def _made_with(self, options: dict[str, Any]) -> Self:
-        other = copy(self)
-        other.settings = self.settings_class(**options)
-        if other.settings.aim == self.objective:  # all that is known of layouts depends on nothing else
-            other.pipeline = self.pipeline.with_settings(other.settings)
-        else:
-            other.pipeline = Pipeline(self.normalization.std, other.settings)
-        return other
-
     def _solve(
         self,
-        layout: Layout,
         targets: Array,
         *,
         seed: int,
         previous: Array | None,
         fallback: FallbackForces = nearest_forces,
     ) -> Solution:
-        prepared = self.pipeline.prepare(layout).at(self.flow, self.normalization.std)
+        prepared = self.prepared
         if len(targets) == 1:
             with self._one_thread():
                 beginning = self._beginning(prepared, targets, seed)
                 refined = self.pipeline.solve(
                     prepared, targets, previous, seeds=beginning.seeds, fallback=fallback
                 )
-            names = beginning.names or _seed_names(layout)
-            if previous is not None:  # its own way is what the search begins with
-                names = ("the way it moves now", *names)
-            return self._single(prepared, targets, refined, names)._replace(samples=beginning.samples)
+            return self._single(refined, self._names(beginning, previous))._replace(samples=beginning.samples)
 
         def solve(start: int) -> RefinedCandidates:
             some = targets[start : start + CHUNK]
@@ -120,105 +99,123 @@ class SearchAllocator(Allocator):
             parts = list(executor.map(solve, range(0, len(targets), CHUNK)))
         return Solution(np.concatenate([part.command[:, 0] for part in parts]))
 
+    def _names(self, beginning: "Beginning", previous: Array | None) -> tuple[str, ...]:
+        """What the seeds of a single target are called."""
+        names = beginning.names or _seed_names(self.layout)
+        # The robot's own way is what the search begins with.
+        return names if previous is None else ("the way it moves now", *names)
+
     def _beginning(self, prepared: Prepared, targets: Array, seed: int) -> Beginning:
         """Where the search for targets (N, 6) begins."""
         return Beginning()
 
-    def _single(
-        self, prepared: Prepared, targets: Array, refined: RefinedCandidates, names: tuple[str, ...]
-    ) -> Solution:
+    def _single(self, refined: RefinedCandidates, names: tuple[str, ...]) -> Solution:
         """The answer to one target (1, 6), and what may be asked about it; `names` of the seeds."""
         own = _sources(refined.origin[0], names)
-
-        def explored() -> Candidates:
-            found = self.pipeline.explore(prepared, targets, refined)
-            # The answer's own candidates come first; the others are what the wider search has found.
-            wider = found.origin[0, refined.origin.shape[1] :]
-            source = own + _sources(wider, _seed_names(prepared.plant.layout))
-            exact = max(SEARCH.alternative_error * prepared.exactness, 1.01 * found.error[0, 0])
-            kept = np.flatnonzero(found.error[0] <= exact)
-            exact_ones = RefinedCandidates._make(values[:, kept] for values in found)
-            return self._candidates(prepared, exact_ones, tuple(source[k] for k in kept))
-
         return Solution(
-            refined.command[:, 0],
-            candidates=lambda: self._candidates(prepared, refined, own),
-            alternatives=explored,
+            refined.command[:, 0], candidates=lambda: self._candidates(self.prepared, refined, own)
         )
+
+    def alternatives(
+        self, target: Array, *, policy: Policy, previous: Array | None, flow: Array | None, seed: int
+    ) -> Candidates | None:
+        """See `Method`."""
+        prepared, targets = self.prepared, target[None]
+        if (moved := self.at(flow)) is not self:
+            return moved.alternatives(target, policy=policy, previous=previous, flow=None, seed=seed)
+        solution = self.solve(targets, policy=policy, previous=previous, seed=seed)
+        assert solution.candidates is not None
+        first = solution.candidates()
+        with self._one_thread():
+            found = self.pipeline.explore(prepared, targets)
+        exact = max(SEARCH.alternative_error * prepared.exactness, 1.01 * float(first.err_norm[0]))
+        kept = np.flatnonzero(found.error[0] <= exact)
+        others = RefinedCandidates._make(values[:, kept] for values in found)
+        source = _sources(others.origin[0], _seed_names(self.layout))
+        # The answer's own candidates come first; the others are what the wider search has found.
+        return first.beside(self._candidates(prepared, others, source))
 
     def _candidates(
         self, prepared: Prepared, refined: RefinedCandidates, source: tuple[str, ...]
     ) -> Candidates:
         """The refined answers to a single target, and where each comes from."""
         command, wrench, error, cost, _ = (values[0] for values in refined)
-        layout, std = prepared.plant.layout, self.normalization.std
+        layout, std = prepared.plant.layout, self.sigma
         # What was kept least is known already.
         power = cost if self.objective.is_power else power_of(layout, command)
         return Candidates(command, wrench * std, error, effort_of(layout, command), power, source)
 
-    def bound(self, result: Allocation) -> float:
-        """A lower bound on the power [W] of any answer to the question of a result, by the convex dual.
+    def at(self, flow: Array | None) -> Self:
+        """See `Method`."""
+        other = super().at(flow)
+        if other is not self:
+            other.prepared = self.prepared.at(flow, self.sigma)
+        return other
 
-        It holds as far as the compiled fins do: to about one part in a thousand, and in a hundred where weak
-        forces are asked of soft fins.
+    def in_time(self, target: Array, reference: Array) -> Array:
+        """See `Method`."""
+        return in_time(self.layout, target, reference, self.settings.period_s)
 
-        Raises:
-            AllocationError: effort is kept least, which has no such bound, or the wrench is out of reach, so
-                that there is no exact answer.
-        """
-        if not self.objective.convex:
-            raise AllocationError("bound: proven for power alone; take objective 'power'")
-        if not result.reachable:
-            raise AllocationError("bound: the wrench is out of reach, so no answer has a cost to bound")
-        fins = usable_fins(result.layout, result.failed)
-        prepared = self.pipeline.prepare(fins.healthy)
-        wanted, seed = result.target / self.normalization.std, prepared.seeds[:1]
-        planar = descend(prepared.planar, wanted[None], seed, SEARCH.bound_steps)
-        least = cost_bound(prepared.planar, wanted, planar.multiplier[0])
-        return min(least, float(prepared.cost(result.command[None, fins.alive])[0]))
-
-    def _in_time(self, layout: Layout, target: Array, reference: Array) -> Array:
-        return in_time(layout, target, reference, self.settings.period_s)
-
-    def _check_policy(self, policy: Policy) -> None:
-        """All policies are known."""
-
-    def _solve_by(
-        self, policy: Policy, layout: Layout, target: Array, *, seed: int, previous: Array | None
+    def solve(
+        self,
+        targets: Array,
+        *,
+        policy: Policy,
+        previous: Array | None = None,
+        flow: Array | None = None,
+        seed: int = 0,
     ) -> Solution:
+        """See `Method`."""
+        if len(targets) == 0:
+            return Solution(np.empty((0, self.layout.n_fins, 3)))
+        if (moved := self.at(flow)) is not self:
+            return moved.solve(targets, policy=policy, previous=previous, seed=seed)
+        if len(targets) == 1:
+            return self._solve_by(policy, targets, seed=seed, previous=previous)
+        solution = self._solve(targets, seed=seed, previous=None)
+        if not policy.is_plain:
+            command = solution.command
+            error = np.linalg.norm((self.plant.wrench(command) - targets) / self.scale, axis=-1)
+            for row in np.flatnonzero(error > REACHED):
+                one = self._solve_by(policy, targets[row : row + 1], seed=seed, previous=None)
+                command[row] = one.command[0]
+        return solution
+
+    def _solve_by(self, policy: Policy, target: Array, *, seed: int, previous: Array | None) -> Solution:
         if policy.is_plain:
-            return self._solve(layout, target, seed=seed, previous=previous)
+            return self._solve(target, seed=seed, previous=previous)
         missed = []
 
         def give_up(*_: object) -> None:
             missed.append(True)
 
-        plain = self._solve(layout, target, seed=seed, previous=previous, fallback=give_up)
+        plain = self._solve(target, seed=seed, previous=previous, fallback=give_up)
+        error = np.linalg.norm((self.plant.wrench(plain.command[0]) - target[0]) / self.scale)
         # What servos alone hold back is within reach, and comes at one of the next ticks.
-        if not missed or self._reaches(layout, plain, target)[0]:
+        if not missed or error <= REACHED:
             return plain
         # What the policy asks for within reach is one wrench; that one is then delivered as any other.
-        std = self.normalization.std
-        served = _within_reach(self.pipeline.prepare(layout).planar, policy, target[0] / std)
+        served = _within_reach(self.prepared.planar, policy, target[0] / self.sigma, self.scale / self.sigma)
         return self._solve(
-            layout, served.wrench * std, seed=seed, previous=previous, fallback=lambda *_: served.force
+            served.wrench * self.sigma, seed=seed, previous=previous, fallback=lambda *_: served.force
         )
 
 
-def _within_reach(problem: PlanarProblem, policy: Policy, target: Array) -> Nearest:
+def _within_reach(problem: PlanarProblem, policy: Policy, target: Array, scale: Array) -> Nearest:
     """The one wrench to deliver in place of one that is out of reach, normalized, and forces that do so.
 
     Args:
         problem: the layout.
         policy: what counts.
         target: the wrench (6,) that was asked for.
+        scale: what the axis weights of a policy are given for (6,), normalized.
     """
     sets = planar_sets(problem)
     if policy.kind == "direction":
         return nearest_along(sets, target)
     if policy.kind == "priority":
         return nearest_in_turn(sets, target, policy.groups)
-    weights = np.array(policy.axis_weights, np.float64)
+    weights = np.array(policy.axis_weights, np.float64) / scale
     with np.errstate(divide="ignore"):
         return nearest(sets, target[None], (weights.max() / weights) ** 2)
 

@@ -6,28 +6,24 @@ begins, with the fins' own laws, and so is each answer's name. What no component
 is what the method is compared for. The answers are exact because of the search, not because of the network.
 """
 
-from functools import lru_cache
-from typing import Any
-
 import numpy as np
 
 from finlab.allocation.evaluate import costs
-from finlab.allocation.search.pipeline import Pipeline
 from finlab.allocation.search.prepared import Prepared
-from finlab.allocation.search.search_allocator import Beginning, SearchAllocator
+from finlab.allocation.search.search_method import Beginning, Search
 from finlab.allocation.search.settings import MdnSettings
+from finlab.allocation.settings import Settings
 from finlab.allocation.solution import Candidates
 from finlab.arrays import Array
 from finlab.forces.force_space import polar, realize
 from finlab.layout import Layout
-from finlab.mdn.features import RobotView, Seen, robot_view, see
+from finlab.mdn.features import Seen, robot_view, see
 from finlab.mdn.network import ForceMixture, ForceNetworkConfig
 from finlab.mdn.proposal import Proposal, propose
-from finlab.networks.layers import single_precision
 from finlab.networks.trained import TrainedWeights
 
 
-class MdnAllocator(SearchAllocator):
+class Mdn(Search):
     """The search, started from what a network proposes and from nowhere else."""
 
     name = "mdn"
@@ -35,47 +31,30 @@ class MdnAllocator(SearchAllocator):
     settings: MdnSettings
     weights: TrainedWeights
 
-    def __init__(self, weights: TrainedWeights, **options: Any) -> None:
-        """Make it from the weights of a checkpoint.
-
-        Args:
-            weights: trained weights.
-            options: objective and its numbers as for `SearchAllocator`, and fields of `MdnSettings`.
-
-        Raises:
-            AllocationError: settings that leave nothing to answer with.
-            CheckpointError: the checkpoint's network is of another kind.
-        """
+    def __init__(self, layout: Layout, settings: Settings, scale: Array, weights: TrainedWeights) -> None:
         self.config = weights.network_of(ForceNetworkConfig)
-        super().__init__(weights.normalization, **options)
-        self.weights, self.checkpoint = weights, weights.name
-        self._network = single_precision(weights.network)
-        self._view = lru_cache(maxsize=128)(_view)
+        super().__init__(layout, settings, scale, weights)
+        self._network = weights.single_precision
+        self._view = robot_view(self.prepared.planar, not self.objective.convex)
 
-    def proposals(self, prepared: Prepared, targets: Array, seed: int) -> Proposal:
+    def proposals(self, targets: Array, seed: int) -> Proposal:
         """The network's proposals for targets (N, 6)."""
-        view = self._view(self.pipeline, prepared.plant.layout)
-        seen = see(view, targets / self.normalization.std)
+        seen = see(self._view, targets / self.sigma)
         drawn = self.settings.n_candidates, self.settings.temperature, seed
-        return propose(self.mixture(seen), view, seen, *drawn)
+        return propose(self.mixture(seen), self._view, seen, *drawn)
 
     def mixture(self, seen: Seen) -> ForceMixture:
         """What the network gives for what it sees of some targets."""
         return self.config(self._network, seen.nodes, seen.pairs)
 
     def _beginning(self, prepared: Prepared, targets: Array, seed: int) -> Beginning:
-        proposal = self.proposals(prepared, targets, seed)
+        proposal = self.proposals(targets, seed)
         names = tuple(f"component {k + 1}" for k in proposal.component[0].tolist())
         return Beginning(
             proposal.force,
             names,
-            lambda: _samples(prepared, proposal.force[0], targets / self.normalization.std, names),
+            lambda: _samples(prepared, proposal.force[0], targets / self.sigma, names),
         )
-
-
-def _view(pipeline: Pipeline, layout: Layout) -> RobotView:
-    """What the network sees of a layout under a pipeline's objective."""
-    return robot_view(pipeline.prepare(layout).planar, not pipeline.objective.convex)
 
 
 def _samples(prepared: Prepared, force: Array, target: Array, names: tuple[str, ...]) -> Candidates:

@@ -1,0 +1,35 @@
+"""The yardstick of a robot: what an error in its wrench is compared with, forces and torques each by one
+number."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from finlab.arrays import Array
+from finlab.layout import Layout
+from finlab.physics.plant import Plant
+
+STEPS = (9, 9, 17)
+"""Values of each of its three numbers that an actuator is tried with, evenly spread over its limits."""
+LEAST_LEVER = 1e-3
+"""Least ratio [m] of the scale of torques to that of forces, for robots whose actuators turn nothing."""
+
+
+def yardstick(layout: Layout) -> Array:
+    """The scales (6,) of a robot's wrench: three times F [N], three times T [N m].
+
+    F is the root of the sum of squares of the actuators' largest forces, T that of their largest torques
+    about the origin, each actuator alone. A robot that gives nothing has F = 1 N.
+
+    Raises:
+        DataError: a fin's force table cannot be read.
+    """
+    plant = Plant(replace(layout, interaction=None))
+    share = np.stack(np.meshgrid(*(np.linspace(0.0, 1.0, count) for count in STEPS), indexing="ij"), -1)
+    command = plant.lower + share.reshape(-1, 1, 3) * plant.width
+    wrench = np.einsum("kni,niw->knw", plant.force(command), plant.effectiveness)
+    force = float(np.sqrt((wrench[..., :3] ** 2).sum(-1).max(0).sum())) or 1.0
+    torque = float(np.sqrt((wrench[..., 3:] ** 2).sum(-1).max(0).sum()))
+    scale = np.repeat([force, max(torque, LEAST_LEVER * force)], 3)
+    scale.setflags(write=False)
+    return scale
