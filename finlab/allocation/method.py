@@ -104,7 +104,9 @@ class Method(ABC):
             return self
         other = copy(self)
         other.plant = plant
-        for name in [key for key in vars(self) if isinstance(getattr(type(self), key, None), cached_property)]:
+        for name in [
+            key for key in vars(self) if isinstance(getattr(type(self), key, None), cached_property)
+        ]:
             del other.__dict__[name]
         return other
 

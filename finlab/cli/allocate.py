@@ -68,9 +68,7 @@ def allocate(
     answer = policy_from(policy, axis_weights, priority)
     damage = Health.parse(health, stuck, running)
     lost = robot.with_failed(failed)
-    result = allocator.allocate(
-        wrench, failed=lost, policy=answer, health=damage, flow=flow, seed=seed
-    )
+    result = allocator.allocate(wrench, failed=lost, policy=answer, health=damage, flow=flow, seed=seed)
     lost_axes = axes_lost(robot.layout, result.layout, lost) if lost or damage is not None else None
     record, lines = allocation_record(result), [str(result)]
     if lost_axes is not None:

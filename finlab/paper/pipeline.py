@@ -5,9 +5,9 @@ from typing import NamedTuple
 import numpy as np
 
 from finlab.allocation.evaluate import costs
+from finlab.allocation.levenberg_marquardt import CommandProblem, refine
 from finlab.allocation.method import LeastErrorMethod
 from finlab.allocation.policy import Policy
-from finlab.allocation.levenberg_marquardt import CommandProblem, refine
 from finlab.allocation.settings import Settings
 from finlab.allocation.solution import Candidates, Solution
 from finlab.arrays import AnyArray, Array

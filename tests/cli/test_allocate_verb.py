@@ -26,6 +26,7 @@ KEYS = [
     "failed",
     "command",
     "target",
+    "flow",
     "wrench_expected",
     "wrench_plant",
     "unallocated",

@@ -10,7 +10,7 @@ from finlab.actuators.fin.blade import Blade
 from finlab.forces.fin_sets import FinSets, fin_sets
 from finlab.forces.least_power import cheapest, least_power, power_problem, variant
 from finlab.layout import FinModelSpec, Layout
-from finlab.networks.normalization import Normalization
+from tests.any_robot import AnyRobot
 
 Layouts = Callable[[str], Layout]
 WRENCHES = np.concatenate([np.diag([1, 1, 1, 0.1, 0.1, 0.1]), [[1.2, 0, 0.5, 0, 0, 0.15]]])

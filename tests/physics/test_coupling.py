@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from finlab.allocation import Allocator
+from finlab.errors import CommandError
 from finlab.layout import Interaction, Jet, Layout, load_layout
 from finlab.physics import Plant, plant_of
 from finlab.physics.coupled_plant import CoupledPlant
@@ -46,7 +47,7 @@ def test_speed_by_hand() -> None:
     layout = load_layout("A")
     fast, flow = _with(layout, Interaction((), inflow=(0.3, 0.2))), np.array([0.2, 0, 0, 0, 0, 0])
     command = np.tile([0.5, 1.0, 0.0], (4, 1))
-    alone, found = Plant(layout).forces(command), plant_of(fast).forces(command)
+    alone, found = Plant(layout).forces(command), plant_of(fast).forces(command, flow=flow)
     along = alone / np.linalg.norm(alone, axis=1, keepdims=True)
     j = 0.2 * along[:, 0] / np.hypot(2 * np.pi * 0.5 * 0.2, 0.05)
     kept = 1.0 - 0.3 * np.tanh(j) - 0.2 * np.tanh(j) ** 2
@@ -74,8 +75,21 @@ def test_derivatives_agree_with_differences(coupled: Layout, flow: np.ndarray | 
             np.testing.assert_allclose(own_jacobian[:, i, k], own, atol=2e-6)
 
 
-def test_answers_are_exact_by_the_coupled_plant(coupled: Layout) -> None:
-    allocator = AnyRobot()
+def test_each_command_has_a_flow_of_its_own(coupled: Layout) -> None:
+    plant, rng = plant_of(coupled), np.random.default_rng(6)
+    command, flows = plant.sample(rng, (7,)), rng.normal(0.0, 0.2, (7, 6))
+    together = plant.wrench(command, flow=flows)
+    for k, flow in enumerate(flows):
+        np.testing.assert_allclose(plant.wrench(command[k], flow=flow), together[k], atol=1e-12)
+    np.testing.assert_allclose(plant.wrench(command[0], flow=flows)[0], together[0], atol=1e-12)
+    np.testing.assert_array_equal(plant.at(flows).wrench(command), together)
+    still = plant_of(_with(coupled, Interaction()))
+    assert still.at(flows) is still
+    np.testing.assert_array_equal(still.wrench(command, flow=flows), Plant(coupled).wrench(command))
+
+
+def test_answers_are_exact_by_the_coupled_plant_at_the_flow(coupled: Layout) -> None:
+    allocator, plant = AnyRobot(), plant_of(coupled)
     rng = np.random.default_rng(2)
     targets = plant.wrench(Plant(coupled).sample(rng, (40,)), flow=FLOW) * 0.7
     batch = allocator.allocate_batch(coupled, targets, flow=FLOW)
@@ -90,7 +104,7 @@ def test_answers_are_exact_by_the_coupled_plant(coupled: Layout) -> None:
 
 
 def test_a_flow_that_no_fin_feels_is_said_and_changes_nothing() -> None:
-    layout, allocator, target = load_layout("A"), load_allocator(), [0.5, 0, 0.3, 0, 0, 0.05]
+    layout, allocator, target = load_layout("A"), AnyRobot(), [0.5, 0, 0.3, 0, 0, 0.05]
     still, moving = (allocator.allocate(layout, target, flow=flow) for flow in (np.zeros(6), FLOW))
     np.testing.assert_array_equal(still.command, moving.command)
     assert still.flow is None and "the flow is without effect" in moving.notes[-1]
@@ -99,7 +113,7 @@ def test_a_flow_that_no_fin_feels_is_said_and_changes_nothing() -> None:
 @pytest.mark.parametrize("flow", [[0.1] * 3, [np.nan] * 6, [1e3, 0, 0, 0, 0, 0], "fast"])
 def test_a_flow_that_is_none_is_refused(flow: object) -> None:
     with pytest.raises(CommandError, match="flow: "):
-        load_allocator().allocate(load_layout("A"), [1, 0, 0, 0, 0, 0], flow=flow)
+        Allocator(load_layout("A")).allocate([1, 0, 0, 0, 0, 0], flow=flow)
 
 
 def test_a_lost_fin_takes_nothing(coupled: Layout) -> None:

@@ -7,7 +7,7 @@ from functools import cached_property
 from typing import ClassVar
 
 from finlab.allocation.baselines.pseudo_inverse import PseudoInverse
-from finlab.allocation.command_cost import command_cost
+from finlab.allocation.command_cost import CommandCost, command_cost
 from finlab.allocation.method import LeastErrorMethod
 from finlab.allocation.settings import AimSettings, Settings, number
 from finlab.allocation.solution import Solution

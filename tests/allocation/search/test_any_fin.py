@@ -175,7 +175,7 @@ def test_what_was_reached_late_is_as_cheap() -> None:
 def test_tiny_fins_are_as_exact_beside_their_own_strength(area: float) -> None:
     layout = load_layout(shipped_layouts()["A"])
     model = FinModelSpec("drag", (("area", area),))
-    tiny = replace(layout, fins=tuple(replace(fin, model=model) for fin in layout.fins))
+    tiny = replace(layout, actuators=tuple(replace(fin, model=model) for fin in layout.fins))
     method = AnyRobot()
     for target in reachable(tiny, 6):
         answer = method.allocate(tiny, target)

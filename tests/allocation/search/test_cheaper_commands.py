@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import finlab.allocation.search.cheaper_commands
+from finlab.allocation.levenberg_marquardt import CommandProblem, refine
 from finlab.allocation.search.cheaper_commands import DESCENT, cheaper_commands
 from finlab.arrays import Array
 from finlab.evaluation.splits import make_split

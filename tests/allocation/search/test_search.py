@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from finlab.allocation.search.search_method import CHUNK
 
 from finlab.allocation import Allocator
+from finlab.allocation.search.search_method import CHUNK
 from finlab.assets import shipped_layouts
 from finlab.layout import Fin, FinModelSpec, Layout, Limits, load_layout, random_layout
 from finlab.physics import Plant, make_law, write_table
