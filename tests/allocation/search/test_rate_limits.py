@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from finlab.allocation.search import search_allocator
+from finlab.allocation.search import search_method
 from finlab.forces.force_space import SETTLED
 from finlab.layout import Layout, load_layout
 from finlab.layout.angles import wrapped
@@ -124,13 +124,13 @@ def test_what_servos_alone_hold_back_is_not_asked_for_anew(
 ) -> None:
     """The policies project targets that the fins cannot reach, not those that they reach some ticks later."""
     projected: list[object] = []
-    within_reach = search_allocator._within_reach
+    within_reach = search_method._within_reach
 
     def counted(*arguments: Any) -> Any:
         projected.append(arguments)
         return within_reach(*arguments)
 
-    monkeypatch.setattr(search_allocator, "_within_reach", counted)
+    monkeypatch.setattr(search_method, "_within_reach", counted)
     method = AnyRobot()
     before = method.allocate(penta, TARGET).command
     turned = method.allocate(penta, -np.array(TARGET), previous=before, policy="direction")
