@@ -9,8 +9,9 @@ import pytest
 from finlab.allocation import Health
 from finlab.allocation.question import (
     MAX_WRENCH,
-    check_seed,
+    check_layout,
     check_previous,
+    check_seed,
     check_wrenches,
     usable_fins,
 )
@@ -87,18 +88,18 @@ def test_complex_numbers_are_no_wrench() -> None:
 
 @pytest.mark.parametrize("seed", [0, 1, np.int64(3)])
 def test_seeds_are_whole_numbers_from_0(seed: object) -> None:
-    check_seed(ROBOT, seed)
+    check_seed(seed)
 
 
 @pytest.mark.parametrize("seed", [-1, True, 1.0, "1", None])
 def test_other_seeds_are_refused(seed: object) -> None:
     with pytest.raises(AllocationError, match=f"^seed: expected a whole number from 0, got {seed!r}$"):
-        check_seed(ROBOT, seed)
+        check_seed(seed)
 
 
 def test_no_layout_is_refused() -> None:
     with pytest.raises(AllocationError, match="layout: expected a Layout, got 'A'; read a file with"):
-        check_seed("A", 0)
+        check_layout("A")
 
 
 def test_previous_commands_may_hold_nan_but_nothing_infinite() -> None:
