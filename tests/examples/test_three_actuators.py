@@ -1,0 +1,34 @@
+"""The solver of three actuators in the examples against judges that share nothing with it."""
+
+import runpy
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.least_power import lower_bound
+from tests.mixed_robots import T200, T200_FORCE, layout_of
+from tests.own_plant import OwnPlant
+
+PATH = Path(__file__).resolve().parents[2] / "examples" / "13_three_actuators.py"
+ROBOT = layout_of(
+    "three",
+    [
+        {"name": "left", "type": "thruster", "position_m": [-0.8, 0.4, 0.0], "axis": [1.0, 0.0, 0.0]}
+        | {"force_n": T200_FORCE, "model": T200},
+        {"name": "right", "type": "thruster", "position_m": [-0.8, -0.4, 0.0], "axis": [1.0, 0.0, 0.0]}
+        | {"force_n": T200_FORCE, "model": T200},
+        {"name": "bow", "type": "azimuth", "position_m": [0.9, 0.0, 0.0], "turn_axis": [0.0, 0.0, 1.0]}
+        | {"zero": [1.0, 0.0, 0.0], "force_n": [0.0, T200_FORCE[1]], "model": T200},
+    ],
+)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_least_watts_of_three_actuators(seed: int) -> None:
+    plant, rng = OwnPlant(ROBOT), np.random.default_rng(seed)
+    wrench = plant.wrench(plant.draw(rng, float(rng.uniform(0.2, 1.0))))
+    force, watts, bound = runpy.run_path(str(PATH))["solve"](wrench[[0, 1, 5]])
+    np.testing.assert_allclose(plant.effectiveness @ force, wrench, atol=1e-8)
+    assert lower_bound(plant, wrench) == pytest.approx(watts, rel=1e-6)
+    assert bound == pytest.approx(watts, rel=1e-9)
