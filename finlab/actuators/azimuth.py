@@ -1,4 +1,4 @@
-"""The law of thrusters that turn: azimuths and tilts.
+"""Thrusters that turn: azimuths and tilts.
 
 Command: (angle [rad], force [N], 0). Own frame: turn_axis, zero, turn_axis x zero; at the angle a the force
 points along cos(a) zero + sin(a) (turn_axis x zero). There is none within the dead band.
@@ -10,8 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.actuators.law import ActuatorLaw
-from finlab.actuators.thrust_power import by_model, held, power_of
+from finlab.actuators.response import Group, Plane
+from finlab.actuators.thrust_power import by_model, held, power_of, radial_table
 from finlab.arrays import Array, Values
+from finlab.layout.angles import TURN, is_full_turn, wrapped
 from finlab.layout.azimuth import Azimuth
 
 
@@ -56,3 +58,44 @@ class AzimuthLaw(ActuatorLaw):
 def azimuth_laws(azimuths: Sequence[Azimuth]) -> list[tuple[NDArray[np.intp], ActuatorLaw]]:
     """Returns the laws of n turning thrusters, each with the places of its own."""
     return [*by_model(azimuths, AzimuthLaw)]
+
+
+class AzimuthGroup(Group):
+    """What the turning thrusters of a robot offer for prices."""
+
+    def __init__(self, azimuths: Sequence[Azimuth], effectiveness: Array) -> None:
+        """Takes turning thrusters and the wrench (m, 3, 6) per newton along each own axis."""
+        self._lower = np.array([azimuth.lower for azimuth in azimuths])
+        self._upper = np.array([azimuth.upper for azimuth in azimuths])
+        middle, half = _arcs(self._lower[:, 0], self._upper[:, 0])
+        self.responses = [
+            Plane(
+                matrix[1:],
+                radial_table(azimuth.model, 1, *azimuth.force),
+                float(middle[i]),
+                float(half[i]),
+                band=azimuth.dead_band,
+            )
+            for i, (azimuth, matrix) in enumerate(zip(azimuths, effectiveness, strict=True))
+        ]
+
+    def commands(self, force: Array, previous: Array | None = None) -> Array:
+        """See `Group`. Where no force is asked for, the angle stays that of the `previous` commands
+        (..., m, 3), or comes as near to 0 as the arc allows."""
+        size = np.hypot(force[..., 0], force[..., 1])
+        before = np.zeros_like(size) if previous is None else np.nan_to_num(previous[..., 0])
+        angle = np.where(size > 0.0, np.arctan2(force[..., 1], force[..., 0]), before)
+        middle, _ = _arcs(self._lower[:, 0], self._upper[:, 0])
+        command = np.zeros((*size.shape, 3))
+        command[..., 0] = middle + wrapped(angle - middle)
+        command[..., 1] = size
+        return np.clip(command, self._lower, self._upper)
+
+    def reach(self, lower: Array, upper: Array) -> Array:
+        """See `Group`."""
+        return np.stack([lower[:, 1], upper[:, 1], *_arcs(lower[:, 0], upper[:, 0])], axis=-1)
+
+
+def _arcs(low: Array, high: Array) -> tuple[Array, Array]:
+    """Middles and halves (m,) of arcs [rad]; pi is the half of a full turn."""
+    return 0.5 * (low + high), np.where(is_full_turn(high - low), 0.5 * TURN, 0.5 * (high - low))

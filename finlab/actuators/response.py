@@ -159,6 +159,8 @@ class Plane:
     gauge: Array | None = None
     """Share (G,) of the table's force that the same cost gives in each of G directions around the circle,
     from angle 0 on; None for a fin that is alike all round."""
+    band: float = 0.0
+    """Forces smaller than this one, other than 0, cannot be held [N]."""
 
 
 Response = Line | Plane

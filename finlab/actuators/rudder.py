@@ -1,4 +1,4 @@
-"""The law of rudders: lift and drag of a foil in the water that flows past it, with stall.
+"""Rudders: lift and drag of a foil in the water that flows past it, with stall.
 
 Command: (deflection [rad], 0, 0). Own frame: shaft, zero (the chord at deflection 0, pointing forward), and
 shaft x zero. U is the speed of the foil's place through the water across the shaft, and the angle a goes from
@@ -9,16 +9,26 @@ against it. Below stall CL = slope a and CD = CD0 + k CL^2. Beyond it they are t
 """
 
 from collections.abc import Sequence
+from copy import copy
 from typing import NamedTuple
 
 import numpy as np
 
 from finlab.actuators.law import ActuatorLaw
+from finlab.actuators.response import CELLS, Group, Line, RadialTable
 from finlab.arrays import Array, Values
 from finlab.layout.rudder import Rudder
 
 SHARPNESS = 50.0
 """How fast the flow separates around the angle of stall [1/rad]."""
+POINTS = 1001
+"""Angles between chord and flow for which lift and drag are kept."""
+PEAK = 0.995
+"""Share of the largest lift that is asked of a rudder: towards the peak a newton has no price."""
+NO_PRESSURE = 1e-9
+"""Dynamic pressure times area [N] below which a rudder counts as at rest."""
+LEAST_DRAG = 1e-3
+"""Drag coefficient per squared lift coefficient that counts at least, so that each price has one answer."""
 
 
 class Coefficients(NamedTuple):
@@ -123,3 +133,75 @@ def _along(met: Met, lift: Array, drag: Array) -> Array:
     along = met.pressure * -drag
     across = met.pressure * lift
     return np.stack([np.zeros_like(along), along * cos - across * sin, along * sin + across * cos], axis=-1)
+
+
+class RudderGroup(Group):
+    """What the rudders of a robot offer for prices in one flow: a lift, at the cost of its drag."""
+
+    def __init__(self, rudders: Sequence[Rudder], effectiveness: Array, inflow: Array | None = None) -> None:
+        """Takes rudders and the wrench (m, 3, 6) per newton along each own axis; see `at` for the flow."""
+        self._law, self._effectiveness = RudderLaw(rudders), effectiveness
+        self._limits = np.array([rudder.deflection for rudder in rudders])
+        angle = np.linspace(0.0, 0.3 * np.pi, POINTS)[:, None] + np.zeros(len(rudders))
+        found = self._law.coefficients(angle)
+        self._curves, self._tables = [], []
+        for lift, drag in zip(found.lift.T, found.drag.T, strict=True):
+            falls = np.append(np.diff(lift) <= 0.0, True)
+            last = int(np.argmax(lift >= PEAK * lift[np.argmax(falls)])) + 1
+            self._curves.append((lift[:last], angle[:last, 0]))
+            drag = drag[:last] + LEAST_DRAG * lift[:last] ** 2
+            self._tables.append(RadialTable.of_costs(lift[:last], drag))
+        self._meet(inflow)
+
+    def at(self, inflow: Array | None) -> "RudderGroup":
+        """Returns the group in another flow: velocities (m, 3) [m/s] in own frames, or None at rest."""
+        other = copy(self)
+        other._meet(inflow)
+        return other
+
+    def _meet(self, inflow: Array | None) -> None:
+        flow = np.zeros((len(self._limits), 3)) if inflow is None else inflow
+        self._met = self._law.met(flow)
+        course, pressure = self._met.course, self._met.pressure
+        # Lift and drag are the same ahead and astern.
+        self._turned = np.mod(course + 0.5 * np.pi, np.pi) - 0.5 * np.pi
+        self._range = self._lift(self._limits)
+        across = np.stack([-np.sin(course), np.cos(course)], axis=-1)
+        along = np.stack([np.cos(course), np.sin(course)], axis=-1)
+        wrench = np.einsum("mk,mkw->mw", across, self._effectiveness[:, 1:])
+        drag = -(pressure * self._law.drag)[:, None] * along
+        self.beside: Array = np.einsum("mk,mkw->mw", drag, self._effectiveness[:, 1:])
+        """Wrench (m, 6) [N, N m] of the drag without lift, which comes on top of the answers' forces."""
+        self.responses = []
+        for i, (low, high) in enumerate(self._range):
+            if pressure[i] < NO_PRESSURE:
+                table = RadialTable.of_forces(1.0, np.zeros(CELLS + 1), 0.0)
+            else:
+                table = self._tables[i].scaled(pressure[i], pressure[i] * self._met.speed[i])
+            self.responses.append(Line(wrench[i], table, table, low=float(low), high=float(high)))
+
+    def _lift(self, deflection: Array) -> Array:
+        """Least and largest lifts (m, 2) [N] between two deflections (m, 2) [rad], without those that another
+        deflection gives with less drag."""
+        angle = deflection - self._turned[:, None]
+        end = np.array([angles[-1] for _, angles in self._curves])
+        parted = np.clip(0.0, angle[:, 0], angle[:, 1])
+        usual = np.clip(angle, -end[:, None], end[:, None])
+        near = np.where((np.abs(parted) > end)[:, None], parted[:, None], usual)
+        most = np.array([lifts[-1] for lifts, _ in self._curves])[:, None]
+        lift = np.clip(self._law.coefficients(near.T).lift.T, -most, most)
+        found: Array = lift * self._met.pressure[:, None]
+        return found
+
+    def commands(self, force: Array) -> Array:
+        """See `Group`."""
+        command = np.zeros((*force.shape[:-1], 3))
+        for i, (lifts, angles) in enumerate(self._curves):
+            size = np.abs(force[..., i, 0]) / max(self._met.pressure[i], 1e-300)
+            angle = np.sign(force[..., i, 0]) * np.interp(size, lifts, angles)
+            command[..., i, 0] = np.clip(angle + self._turned[i], *self._limits[i])
+        return command
+
+    def reach(self, lower: Array, upper: Array) -> Array:
+        """See `Group`."""
+        return np.pad(self._lift(np.stack([lower[:, 0], upper[:, 0]], axis=-1)), ((0, 0), (0, 2)))

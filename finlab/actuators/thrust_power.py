@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from finlab.actuators.response import RadialTable
 from finlab.arrays import AnyArray, Array
 from finlab.layout.thrust_model import PowerLaw, PowerTable, ThrustModel, lower_hull, side_points
 
@@ -152,6 +153,38 @@ class ByTable(ThrustPower):
         for places, sides in self._groups:
             result[..., places] = sides.at(force[..., places])[which]
         return result
+
+
+def radial_table(model: ThrustModel, sign: int, least: float, most: float) -> RadialTable:
+    """Returns the answer of one side, forward (`sign` 1) or reverse (-1), to a price.
+
+    Args:
+        model: what power the forces take.
+        sign: the side.
+        least: least size of the force [N].
+        most: largest size [N].
+    """
+    own = power_of([model])
+    ends = np.array([[sign * least], [sign * most]])
+    rest = float(own.watts(ends)[0, 0])
+    top = abs(float(own.marginal(ends)[1, 0]))
+
+    def answer(price: Array) -> Array:
+        return np.clip(_sizes(model, sign, price), least, most)
+
+    return RadialTable.of_price(top, answer, rest)
+
+
+def _sizes(model: ThrustModel, sign: int, price: Array) -> Array:
+    """Sizes of the force [N] whose marginal cost is a price [W/N]."""
+    if isinstance(model, PowerLaw):
+        factor = model.forward if sign > 0 or model.reverse is None else model.reverse
+        found: Array = (price / (model.exponent * factor)) ** (1.0 / (model.exponent - 1.0))
+        return found
+    sides = sides_of(model)
+    curve = sides.forward if sign > 0 else sides.reverse
+    assert curve is not None, "the limits of the force are within the table"
+    return curve.answer(price)
 
 
 def held(force: AnyArray, dead_band: Array) -> AnyArray:

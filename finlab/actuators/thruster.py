@@ -1,4 +1,4 @@
-"""The law of thrusters with a fixed axis: the force is the command, but none within the dead band.
+"""Thrusters with a fixed axis: the force is the command, but none within the dead band.
 
 Command: (force [N], 0, 0). Own frame: axis, and two directions across it, along which nothing acts. The
 reaction torque of the propeller is part of the effectiveness.
@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.actuators.law import ActuatorLaw
-from finlab.actuators.thrust_power import by_model, held, power_of
+from finlab.actuators.response import Group, Line
+from finlab.actuators.thrust_power import by_model, held, power_of, radial_table
 from finlab.arrays import Array, Values
 from finlab.layout.thruster import Thruster
 
@@ -50,3 +51,36 @@ class ThrusterLaw(ActuatorLaw):
 def thruster_laws(thrusters: Sequence[Thruster]) -> list[tuple[NDArray[np.intp], ActuatorLaw]]:
     """Returns the laws of n thrusters, each with the places of its own."""
     return [*by_model(thrusters, ThrusterLaw)]
+
+
+class ThrusterGroup(Group):
+    """What the thrusters of a robot offer for prices."""
+
+    def __init__(self, thrusters: Sequence[Thruster], effectiveness: Array) -> None:
+        """Takes thrusters and the wrench (m, 3, 6) per newton along each own axis."""
+        self._sign = np.array([1.0 if thruster.force[1] > 0.0 else -1.0 for thruster in thrusters])
+        self.responses = [
+            _response(thruster, sign * matrix[0])
+            for thruster, sign, matrix in zip(thrusters, self._sign, effectiveness, strict=True)
+        ]
+        self._limits = np.array([thruster.force for thruster in thrusters])
+
+    def commands(self, force: Array) -> Array:
+        """See `Group`."""
+        command = np.zeros((*force.shape[:-1], 3))
+        command[..., 0] = np.clip(self._sign * force[..., 0], self._limits[:, 0], self._limits[:, 1])
+        return command
+
+    def reach(self, lower: Array, upper: Array) -> Array:
+        """See `Group`."""
+        ends = self._sign[:, None] * np.stack([lower[:, 0], upper[:, 0]], axis=-1)
+        return np.pad(np.sort(ends, axis=-1), ((0, 0), (0, 2)))
+
+
+def _response(thruster: Thruster, along: Array) -> Line:
+    """What one thruster offers; `along` (6,) is the wrench per newton, of one that only pulls in reverse."""
+    least, most = thruster.force
+    if most <= 0.0:
+        return Line(along, radial_table(thruster.model, -1, 0.0, -least), band=thruster.dead_band)
+    reverse = radial_table(thruster.model, -1, 0.0, -least) if least < 0.0 else None
+    return Line(along, radial_table(thruster.model, 1, 0.0, most), reverse, thruster.dead_band)

@@ -1,0 +1,164 @@
+"""Answers to prices: worth as much as any command within the limits, and decoded to the command that gives them."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pytest
+
+from finlab.actuators.azimuth import AzimuthGroup, AzimuthLaw
+from finlab.actuators.response import Group
+from finlab.actuators.rudder import RudderGroup, RudderLaw
+from finlab.actuators.thruster import ThrusterGroup, ThrusterLaw
+from finlab.allocation.dual.robot import dual_robot
+from finlab.arrays import Array
+from finlab.layout.arrays import own_effectiveness
+from finlab.layout.azimuth import Azimuth
+from finlab.layout.layout import Layout
+from finlab.layout.rudder import Rudder
+from finlab.layout.thrust_model import PowerLaw, PowerTable
+from finlab.layout.thruster import Thruster
+from tests.t200 import t200_rows
+
+TABLE = PowerTable(t200_rows(16), "us")
+UP, AHEAD = (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)
+
+
+def thruster(force: tuple[float, float], model: Any, **more: Any) -> Thruster:
+    return Thruster(
+        f"t{force}{model.type}{more}"[:60], (0.1, 0.2, 0.3), (0.0, 0.6, 0.8), force, model, **more
+    )
+
+
+THRUSTERS = [
+    thruster((-39.0, 51.0), PowerLaw(0.997, 1.449)),
+    thruster((0.0, 5.0), PowerLaw(2.0, exponent=2.0)),
+    thruster((-8.0, 0.0), PowerLaw(2.0, 3.0, 1.3)),
+    thruster((-39.0, 51.0), TABLE),
+    thruster((-2.0, 0.0), TABLE, torque_per_newton=0.02),
+]
+AZIMUTHS = [
+    Azimuth("full", (0, 0, 0), UP, AHEAD, (0.0, 40.0), PowerLaw(1.0)),
+    Azimuth("arc", (0, 0.2, 0), AHEAD, UP, (0.0, 20.0), TABLE, arc=(-0.2, 1.1)),
+    Azimuth("runs", (0.3, 0, 0), UP, AHEAD, (2.0, 20.0), PowerLaw(1.0), arc=(1.0, 1.5)),
+]
+RUDDERS = [
+    Rudder("wide", (-0.6, 0, 0), UP, AHEAD, 0.01, (-0.5, 0.5), aspect_ratio=2.21),
+    Rudder("one side", (-0.6, 0, 0), (0, 1, 0), AHEAD, 0.02, (0.0, 0.3), aspect_ratio=1.0, stall=0.6),
+]
+
+
+def columns(actuators: Sequence[Any]) -> Array:
+    return own_effectiveness(Layout("robot", tuple(actuators)))
+
+
+def prices_of(group: Group, top: float) -> Array:
+    return np.random.default_rng(0).normal(0.0, top, (6, 40))
+
+
+def check(
+    group: Group, law: Any, wrench: Array, low: Array, high: Array, inflow: Array | None = None
+) -> None:
+    """No command is worth more at random multipliers (6, N) than the answer, and its own command gives it."""
+    robot = dual_robot(group.responses)
+    multipliers = prices_of(group, 5.0)
+    answer = robot.answers(robot.effectiveness @ multipliers, robot.sets)
+    m = len(group.responses)
+    force = np.zeros((multipliers.shape[1], m, 2))
+    planes = len(robot.effectiveness) - m
+    force[..., 0] = answer.force[:m].T
+    if planes:
+        force[..., 1] = answer.force[m:].T
+    command = group.commands(force)
+    assert (command >= low).all() and (command <= high).all()
+    given = law.force(command, inflow)
+    worth = np.einsum("nma,maw,wn->nm", given, wrench, multipliers) - law.power(command, 0.0, inflow)
+    tried = low + np.random.default_rng(1).uniform(size=(400, m, 3)) * (high - low)
+    others = np.einsum("tma,maw,wn->tnm", law.force(tried, inflow), wrench, multipliers)
+    others -= law.power(tried, 0.0, inflow)[:, None]
+    scale = np.abs(worth).max(axis=0) + 1e-9
+    assert (worth >= others.max(axis=0) - 2e-3 * scale).all()
+    np.testing.assert_allclose(answer.conjugate, worth.sum(axis=1), atol=2e-3 * scale.sum())
+
+
+def test_thrusters_answer_with_what_is_worth_most() -> None:
+    for part in THRUSTERS:
+        wrench = columns([part])
+        group = ThrusterGroup([part], wrench)
+        check(group, ThrusterLaw([part]), wrench, np.array([part.lower]), np.array([part.upper]))
+
+
+def test_thrusters_of_one_model_answer_together() -> None:
+    parts = [THRUSTERS[i] for i in (0, 1, 2)]
+    wrench = columns(parts)
+    group = ThrusterGroup(parts, wrench)
+    low, high = (np.array([getattr(part, end) for part in parts]) for end in ("lower", "upper"))
+    check(group, ThrusterLaw(parts), wrench, low, high)
+    np.testing.assert_array_equal(group.reach(low, high)[:, :2], [[-39, 51], [0, 5], [0, 8]])
+
+
+def test_azimuths_answer_with_what_is_worth_most() -> None:
+    for part in AZIMUTHS:
+        wrench = columns([part])
+        group = AzimuthGroup([part], wrench)
+        check(group, AzimuthLaw([part]), wrench, np.array([part.lower]), np.array([part.upper]))
+
+
+@pytest.mark.parametrize("flow", [(1.5, 0.0, 0.0), (1.2, 0.2, -0.1), (-0.8, 0.1, 0.0), (1.0, 1.0, 0.3)])
+def test_rudders_answer_with_a_lift_that_their_deflections_give(flow: tuple[float, float, float]) -> None:
+    wrench = columns(RUDDERS)
+    frames = np.array([part.frame for part in RUDDERS])
+    inflow = frames @ np.array(flow)
+    group, law = RudderGroup(RUDDERS, wrench).at(inflow), RudderLaw(RUDDERS)
+    low, high = (np.array([getattr(part, end) for part in RUDDERS]) for end in ("lower", "upper"))
+    found = group.reach(low, high)
+    met = law.met(inflow)
+    across = np.stack([0.0 * met.course, -np.sin(met.course), np.cos(met.course)], axis=-1)
+    for share in (0.0, 0.3, 1.0):
+        force = np.zeros((1, 2, 2))
+        force[0, :, 0] = found[:, 0] + share * (found[:, 1] - found[:, 0])
+        command = group.commands(force)[0]
+        assert (command >= low).all() and (command <= high).all()
+        given = law.force(command, inflow)
+        most = met.pressure * 0.03
+        np.testing.assert_allclose((given * across).sum(-1), force[0, :, 0], atol=most.max() * 1e-2)
+    for response, matrix in zip(group.responses, wrench, strict=True):
+        assert np.isfinite(response.effectiveness).all() and matrix.shape == (3, 6)
+    still = law.force((met.course - np.pi * np.round(met.course / np.pi))[:, None] * [1.0, 0.0, 0.0], inflow)
+    np.testing.assert_allclose(group.beside, np.einsum("ma,maw->mw", still, wrench), atol=1e-9)
+
+
+def test_a_rudder_answers_a_price_with_the_lift_whose_drag_it_pays() -> None:
+    part = RUDDERS[0]
+    inflow = np.array([[0.0, 1.5, 0.1]])
+    wrench, law = columns([part]), RudderLaw([part])
+    robot = dual_robot(RudderGroup([part], wrench, inflow).responses)
+    price = np.linspace(-3.0, 3.0, 31)[None]
+    answer = robot.answers(price, robot.sets)
+    delta = np.linspace(-0.5, 0.5, 4001)[:, None, None] * [1.0, 0.0, 0.0]
+    course = law.met(inflow).course[0]
+    lift = law.force(delta, inflow)[:, 0] @ [0.0, -np.sin(course), np.cos(course)]
+    worth = price * lift[:, None] - law.power(delta, 0.0, inflow)
+    np.testing.assert_allclose(answer.conjugate, worth.max(axis=0), rtol=0.02, atol=0.02)
+
+
+def test_a_rudder_at_rest_offers_nothing() -> None:
+    group = RudderGroup(RUDDERS, columns(RUDDERS))
+    assert [(line.low, line.high) for line in group.responses] == [(0.0, 0.0)] * 2  # type: ignore[union-attr]
+    assert not group.commands(np.zeros((3, 2, 2)))[:, 0].any()
+
+
+def test_an_azimuth_keeps_its_angle_where_no_force_is_asked_for() -> None:
+    group = AzimuthGroup(AZIMUTHS, columns(AZIMUTHS))
+    before = np.array([[3.0, 5.0, 0.0], [0.9, 0.0, 0.0], [1.2, 2.0, 0.0]])
+    np.testing.assert_allclose(group.commands(np.zeros((3, 2)), before)[:, 0], [3.0, 0.9, 1.2])
+    np.testing.assert_allclose(group.commands(np.zeros((3, 2)))[:, 0], [0.0, 0.0, 1.0])
+    np.testing.assert_allclose(
+        group.commands(np.zeros((3, 2)), np.full((3, 3), np.nan))[:, 0], [0.0, 0.0, 1.0]
+    )
+
+
+def test_what_a_tick_can_do_of_an_azimuth_is_a_smaller_arc() -> None:
+    group = AzimuthGroup(AZIMUTHS[:1], columns(AZIMUTHS[:1]))
+    found = group.reach(np.array([[3.0, 1.0, 0.0]]), np.array([[3.4, 4.0, 0.0]]))
+    np.testing.assert_allclose(found, [[1.0, 4.0, 3.2, 0.2]])
