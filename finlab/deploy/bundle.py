@@ -12,6 +12,8 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 import finlab
 from finlab.actuators.fin.table_file import table_bytes
 from finlab.allocation.allocator import Allocator
@@ -33,7 +35,8 @@ from finlab.deploy.graph import LayoutGraph, build_graph
 from finlab.deploy.graph_file import graph_bytes, write_graph
 from finlab.distribution import NAME
 from finlab.errors import AllocationError, DataError
-from finlab.layout import FinModelSpec, Layout
+from finlab.layout import Fin, FinModelSpec, Layout
+from finlab.layout.commands import command_of, command_values
 from finlab.networks.checkpoint import checkpoint_files
 from finlab.whole_file import write_whole
 
@@ -139,32 +142,29 @@ def with_tables_inside(layout: Layout) -> tuple[Layout, dict[str, bytes]]:
         DataError: a table cannot be read, or is too large to travel.
     """
     tables: dict[str, bytes] = {}
-    fins = []
-    for fin in layout.fins:
-        if fin.model.type == "table":
-            path = str(fin.model.values()["path"])
+    parts = []
+    for part in layout.actuators:
+        if isinstance(part, Fin) and part.model.type == "table":
+            path = str(part.model.values()["path"])
             content = table_bytes(path)
             if len(content) > LARGEST_TABLE:
                 raise DataError(f"{path}: is larger than {LARGEST_TABLE:,} bytes, too large for a bundle")
             tables[table_name(content)] = content
-            fin = replace(fin, model=FinModelSpec("table", (("path", table_name(content)),)))
-        fins.append(fin)
-    return replace(layout, actuators=tuple(fins)), tables
+            part = replace(part, model=FinModelSpec("table", (("path", table_name(content)),)))
+        parts.append(part)
+    return replace(layout, actuators=tuple(parts)), tables
 
 
 def readme_text(graph: LayoutGraph) -> str:
     """The README of a bundle with this graph: `bundle_readme.md`, beside this module, filled in."""
     rows = []
-    for fin in graph.layout.fins:
-        x, y, z = fin.position
-        ranges = (
-            f"{low:.4g}..{high:.4g}" for low, high in zip(fin.limits.lower, fin.limits.upper, strict=True)
-        )
-        works = "no" if fin.name in graph.failed else "yes"
-        name = fin.name.replace("|", "\\|")
-        rows.append(
-            f"| {name} | {x:g}, {y:g}, {z:g} | {fin.shaft_azimuth:.4f} | {' | '.join(ranges)} | {works} |"
-        )
+    for part in graph.layout.actuators:
+        x, y, z = part.position
+        low, high = (command_values(command_of(part, np.array(end))) for end in (part.lower, part.upper))
+        ranges = "; ".join(f"{key} {low[key]:.4g}..{high[key]:.4g}" for key in low)
+        works = "no" if part.name in graph.failed else "yes"
+        name = part.name.replace("|", "\\|")
+        rows.append(f"| {name} | {part.type} | {x:g}, {y:g}, {z:g} | {ranges} | {works} |")
     template = Path(__file__).with_name("bundle_readme.md").read_text("utf-8")
     return template.format(
         name=graph.layout.name,
@@ -172,6 +172,6 @@ def readme_text(graph: LayoutGraph) -> str:
         wheel=NAME.replace("-", "_"),
         method=graph.method,
         networks="" if graph.checkpoint is None else f" with checkpoint `{graph.checkpoint}`",
-        fins="\n".join(rows),
+        actuators="\n".join(rows),
         failed=list(graph.failed),
     )

@@ -1,4 +1,4 @@
-"""The layout graph as a value: a robot's fins, ready for deployment, and proof of what should be answered."""
+"""The layout graph as a value: a robot ready for deployment, and proof of what should be answered."""
 
 from dataclasses import dataclass
 
@@ -26,7 +26,7 @@ class LayoutGraph:
     layout: Layout
     """The robot, failed fins included."""
     failed: tuple[str, ...]
-    """Fins that do not work; they have no edges."""
+    """Actuators that do not work; they have no edges."""
     normalization: Normalization
     """Mean and standard deviation of the wrench; the latter is the yardstick of errors."""
     checkpoint: str | None
@@ -40,13 +40,13 @@ class LayoutGraph:
 
     @property
     def edges(self) -> tuple[tuple[str, str], ...]:
-        """Pairs of fins that share the work: all healthy ones, each with itself as well."""
+        """Pairs of actuators that share the work: all healthy ones, each with itself as well."""
         alive = [name for name in self.layout.names if name not in self.failed]
         return tuple((a, b) for i, a in enumerate(alive) for b in alive[i:])
 
     @property
     def healthy(self) -> Layout:
-        """The fins that work."""
+        """The actuators that work."""
         return self.layout.without(self.failed) if self.failed else self.layout
 
 
@@ -57,11 +57,10 @@ def build_graph(allocator: Allocator, failed: tuple[str, ...] = ()) -> LayoutGra
     else depend on the layout and the allocator alone.
 
     Raises:
-        LayoutError: an unknown failed fin, none left, or an actuator that is no fin.
+        LayoutError: an unknown failed actuator, or none left.
         DataError: a fin's force table cannot be read.
     """
     layout = allocator.layout
-    layout.only_fins("export", horizontal=True)
     healthy = layout.without(failed) if failed else layout
     plant = plant_of(healthy)
     cases = []

@@ -4,15 +4,17 @@ import numpy as np
 
 from finlab.allocation.allocation import Allocation
 from finlab.arrays import Array
+from finlab.layout import Layout
+from finlab.layout.commands import command_of, command_values
+from finlab.layout.thruster import Thruster
 
 
 def allocation_record(result: Allocation) -> dict[str, object]:
     """The JSON object of an answer; its keys are a contract."""
     expected = result.wrench_expected
     return {
-        "fins": list(result.fins),
+        **command_record(result.layout, result.command, result.forces),
         "failed": list(result.failed),
-        "command": command_rows(result.command),
         "target": result.target.tolist(),
         "flow": None if result.flow is None else result.flow.tolist(),
         "wrench_expected": None if expected is None else expected.tolist(),
@@ -33,6 +35,31 @@ def allocation_record(result: Allocation) -> dict[str, object]:
         "unknown_fins": list(result.unknown_fins),
         "notes": list(result.notes),
     }
+
+
+def command_record(layout: Layout, command: Array, forces: Array) -> dict[str, object]:
+    """The part of an answer that tells the commands; arguments as of `actuator_values`."""
+    record: dict[str, object] = {"actuators": actuator_values(layout, command, forces)}
+    if layout.is_of_fins:
+        record |= {"fins": list(layout.names), "command": command_rows(command)}
+    return record
+
+
+def actuator_values(layout: Layout, command: Array, forces: Array) -> list[dict[str, object]]:
+    """What each actuator of a robot is told and gives, as plain values; a failed one is told nothing.
+
+    Args:
+        layout: the robot.
+        command: (n, 3).
+        forces: (n, 3) [N], body frame; of a thruster the signed force along its axis is told.
+    """
+    values: list[dict[str, object]] = []
+    for part, row, force in zip(layout.actuators, command, forces, strict=True):
+        told = command_of(part, row)
+        along = float(force @ np.array(part.axis)) if isinstance(part, Thruster) else force.tolist()
+        own = None if told is None else command_values(told)
+        values.append({"name": part.name, "type": part.type, "force_n": along, "command": own})
+    return values
 
 
 def command_rows(command: Array) -> list[list[float] | None]:

@@ -20,6 +20,7 @@ from finlab.deploy.graph import LayoutGraph
 from finlab.deploy.graph_file import parse_graph, read_graph
 from finlab.errors import AllocationError, DataError
 from finlab.layout import Layout
+from finlab.layout.commands import neutral_row
 from finlab.layout.load import bundle_graph_text
 from finlab.physics.objective import Objective
 
@@ -81,10 +82,13 @@ class DeployedRobot:
             )
         return answer
 
-    def neutral(self, failed: Sequence[str] = ()) -> Array:
-        """Commands (n, 3) that push least: least amplitude and frequency, zero direction nearest to 0."""
-        command = self.layout.lower.copy()
-        command[:, 2] = np.clip(0.0, command[:, 2], self.layout.upper[:, 2])
+    def neutral(self, failed: Sequence[str] = (), now: Array | None = None) -> Array:
+        """Commands (n, 3) that push least, see `neutral_row`; azimuths keep the angles of the present ones
+        (n, 3), where there are any."""
+        rows = [None] * self.layout.n if now is None else now
+        command = np.array(
+            [neutral_row(part, row) for part, row in zip(self.layout.actuators, rows, strict=True)]
+        )
         lost = self.lost(failed)
         command[[name in lost for name in self.layout.names]] = np.nan
         return command

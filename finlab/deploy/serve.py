@@ -30,11 +30,12 @@ import numpy as np
 
 from finlab.allocation.allocation import Allocation
 from finlab.arrays import Array
-from finlab.deploy.record import command_rows
+from finlab.deploy.record import command_record
 from finlab.deploy.request import parse_request
 from finlab.deploy.robot import DeployedRobot
 from finlab.deploy.transport import Transport, Unsent
 from finlab.errors import FinlabError
+from finlab.physics import plant_of
 
 RECENT_S = 0.5
 """Age [s] up to which the last commands bind the next ones by the servos' rates."""
@@ -101,12 +102,12 @@ class Server:
             self._failed = tuple(request.get("failed", ()))
             answer = self._solve(request, start)
         except TooLate:
-            held = self._neutral() if self._sent is None else self._sent.copy()
-            held[np.isnan(self._neutral())] = np.nan
-            return _reply(name, "late", self._robot.layout.names, held)
+            neutral = self._neutral()
+            held = neutral if self._sent is None else np.where(np.isnan(neutral), np.nan, self._sent)
+            return self._reply(name, "late", held)
         except FinlabError as error:
             return {"id": name, "status": "error", "error": str(error)}
-        reply = _reply(name, "ok", answer.fins, answer.command) | {
+        reply = self._reply(name, "ok", answer.command, answer.forces) | {
             "wrench": answer.wrench.tolist(),
             "unallocated": answer.unallocated.tolist(),
             "err_norm": answer.err_norm,
@@ -143,16 +144,18 @@ class Server:
         return self._busy.result(max(self._timing.deadline - (time.perf_counter() - start), 0.0))
 
     def _rest(self) -> dict[str, Any]:
-        self._sent = None
-        return _reply(None, "neutral", self._robot.layout.names, self._neutral())
+        command, self._sent = self._neutral(), None
+        return self._reply(None, "neutral", command)
 
     def _neutral(self) -> Array:
         known = [name for name in self._failed if name in self._robot.layout.names]
-        return self._robot.neutral(known)
+        return self._robot.neutral(known, self._sent)
 
-
-def _reply(name: Any, status: str, fins: tuple[str, ...], command: Array) -> dict[str, Any]:
-    return {"id": name, "status": status, "fins": list(fins), "command": command_rows(command)}
+    def _reply(self, name: Any, status: str, command: Array, forces: Array | None = None) -> dict[str, Any]:
+        """Commands (n, 3), and the forces (n, 3) [N], body frame, that they give; at rest where not told."""
+        layout = self._robot.layout
+        forces = plant_of(layout).fin_forces(command) if forces is None else forces
+        return {"id": name, "status": status, **command_record(layout, command, forces)}
 
 
 def _line(reply: Mapping[str, Any]) -> bytes:

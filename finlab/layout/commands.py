@@ -81,8 +81,10 @@ def command_of(actuator: Actuator, row: Array) -> Command | None:
     return RudderCommand(first)
 
 
-def command_values(command: Command) -> dict[str, float]:
-    """Returns a command as the mapping in a JSON file; its keys carry the units."""
+def command_values(command: Command | None) -> dict[str, float]:
+    """Returns a command as the mapping in a JSON file; its keys carry the units. Empty for a failed one."""
+    if command is None:
+        return {}
     told = ((key, getattr(command, name)) for name, key in command.KEYS.items())
     return {key: value for key, value in told if value is not None}
 

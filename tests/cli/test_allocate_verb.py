@@ -22,9 +22,10 @@ from finlab.physics import plant_of
 
 WRENCH = ["--wrench", "1", "0", "-0.5", "0", "0", "1e-1"]
 KEYS = [
+    "actuators",
     "fins",
-    "failed",
     "command",
+    "failed",
     "target",
     "flow",
     "wrench_expected",
