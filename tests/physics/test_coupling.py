@@ -35,7 +35,7 @@ def test_one_jet_by_hand() -> None:
     alone, found = Plant(layout).forces(command), plant_of(one).forces(command)
     np.testing.assert_array_equal(found[:3], alone[:3])
     thrust = np.linalg.norm(alone[0])
-    jet = -Plant(layout).forces(command)[0] / thrust
+    jet = -Plant(layout).fin_forces(command)[0] / thrust
     way = layout.position[3] - layout.position[0]
     cosine = float(jet @ way / np.linalg.norm(way))
     lost = (0.2 * np.exp(2.0 * (cosine - 1.0)) + 0.1 * np.exp(8.0 * (cosine - 1.0))) * thrust / (thrust + 0.5)
@@ -47,7 +47,7 @@ def test_speed_by_hand() -> None:
     layout = load_layout("A")
     fast, flow = _with(layout, Interaction((), inflow=(0.3, 0.2))), np.array([0.2, 0, 0, 0, 0, 0])
     command = np.tile([0.5, 1.0, 0.0], (4, 1))
-    alone, found = Plant(layout).forces(command), plant_of(fast).forces(command, flow=flow)
+    alone, found = Plant(layout).fin_forces(command), plant_of(fast).fin_forces(command, flow=flow)
     along = alone / np.linalg.norm(alone, axis=1, keepdims=True)
     j = 0.2 * along[:, 0] / np.hypot(2 * np.pi * 0.5 * 0.2, 0.05)
     kept = 1.0 - 0.3 * np.tanh(j) - 0.2 * np.tanh(j) ** 2
