@@ -115,7 +115,7 @@ def solve(
         ridge = np.where(saturated, SATURATED_RIDGE, RIDGE)
     else:
         ridge = np.full(count, RIDGE)
-    most = sets.high_cost.sum(axis=0) * (1.0 + 1e-9) + 1e-9 + np.zeros(count)
+    most = np.maximum(sets.low_cost, sets.high_cost).sum(axis=0) * (1.0 + 1e-9) + 1e-9 + np.zeros(count)
     proves = terms.penalty is None and terms.reward is None
     state = _state(robot, target, prices, sets, terms)
     if count == 1:
