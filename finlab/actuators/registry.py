@@ -7,51 +7,82 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.actuators.azimuth import azimuth_laws
+from finlab.actuators.azimuth import AzimuthGroup, azimuth_laws
 from finlab.actuators.fin.models import stack_laws
+from finlab.actuators.fin.response import FinGroup
 from finlab.actuators.law import ActuatorLaw
-from finlab.actuators.rudder import RudderLaw
-from finlab.actuators.thruster import thruster_laws
+from finlab.actuators.response import Group
+from finlab.actuators.rudder import RudderGroup, RudderLaw
+from finlab.actuators.thruster import ThrusterGroup, thruster_laws
+from finlab.arrays import Array
 from finlab.layout.layout import Layout
 
-Groups = list[tuple[NDArray[np.intp], ActuatorLaw]]
-"""Laws, each with the places of its actuators."""
+Places = NDArray[np.intp]
+"""Places of actuators among others."""
 
 
 @dataclass(frozen=True)
 class Kind:
     """What is known of one kind of actuator."""
 
-    laws: Callable[[Sequence[Any]], Groups]
-    """Its laws for n actuators of the kind, few laws for many of them; places count among these n."""
+    laws: Callable[[Sequence[Any]], Sequence[tuple[Places, ActuatorLaw]]]
+    """Laws of m actuators of the kind, few for many of them, each with its places among these m."""
+    group: Callable[[Sequence[Any], Array, float], Group]
+    """Answers to prices of m actuators with an effectiveness (m, 3, 6), and `copper_loss` [W/(N m)^2]."""
     angle: int | None = None
     """Which of its commands is an angle that may turn freely."""
 
 
-_AZIMUTH = Kind(azimuth_laws, angle=0)
+_AZIMUTH = Kind(azimuth_laws, lambda parts, wrench, _: AzimuthGroup(parts, wrench), angle=0)
 KINDS: dict[str, Kind] = {
-    "fin": Kind(lambda fins: [*stack_laws([fin.model for fin in fins])], angle=2),
-    "thruster": Kind(thruster_laws),
+    "fin": Kind(lambda fins: stack_laws([fin.model for fin in fins]), FinGroup, angle=2),
+    "thruster": Kind(thruster_laws, lambda parts, wrench, _: ThrusterGroup(parts, wrench)),
     "azimuth": _AZIMUTH,
     "tilt": _AZIMUTH,
-    "rudder": Kind(lambda rudders: [(np.arange(len(rudders)), RudderLaw(rudders))]),
+    "rudder": Kind(
+        lambda rudders: [(np.arange(len(rudders)), RudderLaw(rudders))],
+        lambda parts, wrench, _: RudderGroup(parts, wrench),
+    ),
 }
 """Type of an actuator in a layout -> what is known of it."""
 
 
-def laws_of(layout: Layout) -> Groups:
-    """Returns the laws of a robot's actuators, those of one kind together.
+def laws_of(layout: Layout) -> list[tuple[Places, ActuatorLaw]]:
+    """Returns the laws of a robot's actuators with their places; those of one kind together.
 
     Raises:
         DataError: the force table of a fin cannot be read.
     """
-    kinds = [KINDS[actuator.type] for actuator in layout.actuators]
-    groups: Groups = []
-    for kind in dict.fromkeys(kinds):
-        places = np.array([i for i, own in enumerate(kinds) if own is kind])
+    groups: list[tuple[Places, ActuatorLaw]] = []
+    for places, kind in _kinds(layout):
         found = kind.laws([layout.actuators[i] for i in places])
         groups += [(places[among], law) for among, law in found]
     return groups
+
+
+def groups_of(layout: Layout, effectiveness: Array, copper_loss: float = 0.0) -> list[tuple[Places, Group]]:
+    """Returns the answers to prices of a robot's actuators, by kind, with their places.
+
+    Args:
+        layout: the robot.
+        effectiveness: wrench (n, 3, 6) of 1 N along the own axes of each actuator.
+        copper_loss: heat of a fin's motor that counts as power [W/(N m)^2].
+
+    Raises:
+        DataError: a fin's force table cannot be read, or gives no thrust within the limits.
+    """
+    return [
+        (places, kind.group([layout.actuators[i] for i in places], effectiveness[places], copper_loss))
+        for places, kind in _kinds(layout)
+    ]
+
+
+def _kinds(layout: Layout) -> list[tuple[Places, Kind]]:
+    """The kinds of a robot's actuators, in the order in which they come, with their places."""
+    kinds = [KINDS[actuator.type] for actuator in layout.actuators]
+    return [
+        (np.array([i for i, own in enumerate(kinds) if own is kind]), kind) for kind in dict.fromkeys(kinds)
+    ]
 
 
 def free_angles(layout: Layout) -> NDArray[np.bool_]:

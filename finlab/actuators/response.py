@@ -172,11 +172,21 @@ class Group(ABC):
 
     responses: list[Response]
     """What each offers, by the effectiveness of its own directions."""
+    feels_flow: bool = False
+    """Whether that depends on the water that meets them."""
+    beside: Array | None = None
+    """Wrench (m, 6) [N, N m] that comes on top of the answers' forces; None where there is none."""
+
+    def at(self, inflow: Array | None) -> "Group":
+        """Returns the group where its places move through the water with velocities (m, 3) [m/s], in own
+        frames; None at rest."""
+        return self
 
     @abstractmethod
-    def commands(self, force: Array) -> Array:
+    def commands(self, force: Array, previous: Array | None = None) -> Array:
         """Commands (N, m, 3), padded as in a layout's limits, that give forces (N, m, 2) [N] along the own
-        directions (a line's second entry is 0) at least power, as near as the table is."""
+        directions (a line's second entry is 0) at least power, as near as the table is. Where no force is
+        asked for, azimuths keep the angles of the `previous` commands (..., m, 3)."""
 
     @abstractmethod
     def reach(self, lower: Array, upper: Array) -> Array:

@@ -136,7 +136,13 @@ def _along(met: Met, lift: Array, drag: Array) -> Array:
 
 
 class RudderGroup(Group):
-    """What the rudders of a robot offer for prices in one flow: a lift, at the cost of its drag."""
+    """What the rudders of a robot offer for prices in one flow: a lift, at the cost of its drag.
+
+    `beside` is the drag without lift.
+    """
+
+    feels_flow = True
+    beside: Array
 
     def __init__(self, rudders: Sequence[Rudder], effectiveness: Array, inflow: Array | None = None) -> None:
         """Takes rudders and the wrench (m, 3, 6) per newton along each own axis; see `at` for the flow."""
@@ -154,7 +160,7 @@ class RudderGroup(Group):
         self._meet(inflow)
 
     def at(self, inflow: Array | None) -> "RudderGroup":
-        """Returns the group in another flow: velocities (m, 3) [m/s] in own frames, or None at rest."""
+        """See `Group`."""
         other = copy(self)
         other._meet(inflow)
         return other
@@ -170,8 +176,7 @@ class RudderGroup(Group):
         along = np.stack([np.cos(course), np.sin(course)], axis=-1)
         wrench = np.einsum("mk,mkw->mw", across, self._effectiveness[:, 1:])
         drag = -(pressure * self._law.drag)[:, None] * along
-        self.beside: Array = np.einsum("mk,mkw->mw", drag, self._effectiveness[:, 1:])
-        """Wrench (m, 6) [N, N m] of the drag without lift, which comes on top of the answers' forces."""
+        self.beside = np.einsum("mk,mkw->mw", drag, self._effectiveness[:, 1:])
         self.responses = []
         for i, (low, high) in enumerate(self._range):
             if pressure[i] < NO_PRESSURE:
@@ -193,7 +198,7 @@ class RudderGroup(Group):
         found: Array = lift * self._met.pressure[:, None]
         return found
 
-    def commands(self, force: Array) -> Array:
+    def commands(self, force: Array, previous: Array | None = None) -> Array:
         """See `Group`."""
         command = np.zeros((*force.shape[:-1], 3))
         for i, (lifts, angles) in enumerate(self._curves):

@@ -65,7 +65,7 @@ class ThrusterGroup(Group):
         ]
         self._limits = np.array([thruster.force for thruster in thrusters])
 
-    def commands(self, force: Array) -> Array:
+    def commands(self, force: Array, previous: Array | None = None) -> Array:
         """See `Group`."""
         command = np.zeros((*force.shape[:-1], 3))
         command[..., 0] = np.clip(self._sign * force[..., 0], self._limits[:, 0], self._limits[:, 1])

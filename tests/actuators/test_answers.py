@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from finlab.actuators.azimuth import AzimuthGroup, AzimuthLaw
+from finlab.actuators.registry import groups_of
 from finlab.actuators.response import Group, Line
 from finlab.actuators.rudder import RudderGroup, RudderLaw
 from finlab.actuators.thruster import ThrusterGroup, ThrusterLaw
@@ -14,10 +15,12 @@ from finlab.allocation.dual.robot import dual_robot
 from finlab.arrays import Array
 from finlab.layout.arrays import own_effectiveness
 from finlab.layout.azimuth import Azimuth
+from finlab.layout.fin import Fin
 from finlab.layout.layout import Layout
 from finlab.layout.rudder import Rudder
 from finlab.layout.thrust_model import PowerLaw, PowerTable
 from finlab.layout.thruster import Thruster
+from finlab.physics.plant import Plant
 from tests.t200 import t200_rows
 
 TABLE = PowerTable(t200_rows(16), "us")
@@ -160,3 +163,16 @@ def test_what_a_tick_can_do_of_an_azimuth_is_a_smaller_arc() -> None:
     group = AzimuthGroup(AZIMUTHS[:1], columns(AZIMUTHS[:1]))
     found = group.reach(np.array([[3.0, 1.0, 0.0]]), np.array([[3.4, 4.0, 0.0]]))
     np.testing.assert_allclose(found, [[1.0, 4.0, 3.2, 0.2]])
+
+
+def test_every_actuator_of_a_mixed_robot_is_in_one_group() -> None:
+    robot = Layout("robot", (RUDDERS[0], *THRUSTERS[:2], *AZIMUTHS, Fin("fin", (0.1, 0, 0), 0.3), RUDDERS[1]))
+    found = groups_of(robot, own_effectiveness(robot))
+    assert sorted(np.concatenate([places for places, _ in found])) == list(range(robot.n))
+    force = np.zeros((2, robot.n, 2))
+    command = np.empty((2, robot.n, 3))
+    for places, group in found:
+        assert len(group.responses) == len(places)
+        command[:, places] = group.at(None).commands(force[:, places])
+    plant = Plant(robot)
+    np.testing.assert_array_equal(plant.feasible(command), command)

@@ -80,7 +80,7 @@ class FinGroup(Group):
         self._gauge = np.array([np.ones(TURNS) if each.gauge is None else each.gauge for each in tables])
         self._even = all(each.gauge is None for each in tables)
 
-    def commands(self, force: Array) -> Array:
+    def commands(self, force: Array, previous: Array | None = None) -> Array:
         """See `Group`."""
         x, y = force[..., 0], force[..., 1]
         angle, size = np.arctan2(y, x), np.hypot(x, y)
