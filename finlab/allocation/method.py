@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 from copy import copy
 from dataclasses import fields
 from functools import cached_property
-from typing import ClassVar, Self
+from typing import ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,9 @@ from finlab.layout import FinModelSpec, Layout
 from finlab.networks.trained import TrainedWeights
 from finlab.physics import plant_of
 
+Takes = Literal["any actuator", "fins", "horizontal fins"]
+"""What a method's robot may have."""
+
 
 class Method(ABC):
     """Turns target wrenches into commands. `finlab.Allocator` asks, and makes results of answers."""
@@ -31,6 +34,8 @@ class Method(ABC):
     """What a control loop asks for by default where a wrench is out of reach."""
     every_policy: ClassVar[bool] = True
     """Whether axis weights and priorities are known."""
+    takes: ClassVar[Takes] = "any actuator"
+    """What the robot may have."""
     fin_model: FinModelSpec | None = None
     """Fin model that the networks have learned; None for methods that ask every fin's own model."""
 
@@ -49,7 +54,10 @@ class Method(ABC):
             AllocationError: the method cannot work with these settings.
             CheckpointError: the networks are of another kind.
             DataError: a fin's force table cannot be read.
+            LayoutError: the robot has an actuator that the method does not take.
         """
+        if self.takes != "any actuator":
+            layout.only_fins(f"method {self.name}", horizontal=self.takes == "horizontal fins")
         self.layout, self.settings, self.scale, self.weights = layout, settings, scale, weights
         self.plant = plant_of(layout)
 
@@ -127,6 +135,7 @@ class LeastErrorMethod(Method):
     """A method that keeps the plain error least; `direction` is found by asking for smaller shares."""
 
     every_policy = False
+    takes: ClassVar[Takes] = "fins"
 
     @abstractmethod
     def _solve(self, targets: Array, *, seed: int, previous: Array | None) -> Solution:

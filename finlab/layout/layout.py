@@ -92,12 +92,13 @@ class Layout(Checked):
             if not isinstance(part, Fin):
                 raise LayoutError(
                     f"{what} works for robots of fins only, and {part.name!r} of layout {self.name} is of "
-                    f"type {part.type}; leave it out, or use `finlab allocate`, which takes any actuator"
+                    f"type {part.type}; method dual of `finlab allocate` takes any actuator"
                 )
             if horizontal and part.mounting_angle is None:
                 raise LayoutError(
                     f"{what} works for fins with a mounting angle only, and {part.name!r} of layout "
-                    f"{self.name} has a shaft of its own direction; use `finlab allocate`, which takes any"
+                    f"{self.name} has a shaft of its own direction; method dual of `finlab allocate` "
+                    "takes any actuator"
                 )
 
     @cached_property

@@ -6,9 +6,12 @@ begins, with the fins' own laws, and so is each answer's name. What no component
 is what the method is compared for. The answers are exact because of the search, not because of the network.
 """
 
+from typing import ClassVar
+
 import numpy as np
 
 from finlab.allocation.evaluate import costs
+from finlab.allocation.method import Takes
 from finlab.allocation.search.prepared import Prepared
 from finlab.allocation.search.search_method import Beginning, Search
 from finlab.allocation.search.settings import MdnSettings
@@ -27,6 +30,7 @@ class Mdn(Search):
     """The search, started from what a network proposes and from nowhere else."""
 
     name = "mdn"
+    takes: ClassVar[Takes] = "horizontal fins"
     settings_class = MdnSettings
     settings: MdnSettings
     weights: TrainedWeights

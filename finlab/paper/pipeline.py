@@ -1,12 +1,12 @@
 """The paper's own pipeline: sample the mixture, rank by the surrogate, refine with Adam. numpy only."""
 
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
 from finlab.allocation.evaluate import costs
 from finlab.allocation.levenberg_marquardt import CommandProblem, refine
-from finlab.allocation.method import LeastErrorMethod
+from finlab.allocation.method import LeastErrorMethod, Takes
 from finlab.allocation.policy import Policy
 from finlab.allocation.settings import Settings
 from finlab.allocation.solution import Candidates, Solution
@@ -53,6 +53,7 @@ class Paper(LeastErrorMethod):
     """Mixture density network, physics-guided ranking and gradient refinement, by the printed equations."""
 
     name = "paper"
+    takes: ClassVar[Takes] = "horizontal fins"
     settings_class = PaperSettings
     settings: PaperSettings
     weights: TrainedWeights

@@ -7,14 +7,14 @@ import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
-from typing import NamedTuple, Self
+from typing import ClassVar, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.evaluate import REACHED, effort_of, power_of
 from finlab.allocation.in_time import in_time
-from finlab.allocation.method import Method
+from finlab.allocation.method import Method, Takes
 from finlab.allocation.policy import Policy
 from finlab.allocation.search.pipeline import SEARCH, Pipeline
 from finlab.allocation.search.prepared import Prepared, resting_fins
@@ -52,6 +52,7 @@ class Search(Method):
     """Exact on any fin whose law or table is known, without a network."""
 
     name = "dual"
+    takes: ClassVar[Takes] = "fins"
     # A smaller wrench in the same direction still turns a robot to where it should go; the nearest one may
     # only push it on.
     policy_under_way = "direction"

@@ -1,0 +1,31 @@
+"""Methods that know fins only refuse other robots in one sentence."""
+
+from dataclasses import replace
+
+import pytest
+
+import finlab
+from finlab.errors import LayoutError
+from finlab.layout import Fin, load_layout
+
+
+@pytest.mark.parametrize("method", ["mdn", "paper", "qp", "sqp", "analytic", "ipopt"])
+def test_a_thruster_is_named_with_its_type(method: str) -> None:
+    with pytest.raises(LayoutError, match=f"method {method} works for .* 'lift_left' .* is of type thruster"):
+        finlab.Allocator(load_layout("turtle_hybrid"), method)
+
+
+@pytest.mark.parametrize("method", ["mdn", "paper"])
+def test_networks_name_the_fin_whose_shaft_they_do_not_know(method: str) -> None:
+    layout = load_layout("A")
+    tail = Fin("tail", (-0.4, 0.0, 0.0), shaft=(0.0, 0.0, 1.0), zero=(1.0, 0.0, 0.0))
+    with pytest.raises(LayoutError, match=f"method {method} works for .* 'tail' .* a shaft of its own"):
+        finlab.Allocator(replace(layout, actuators=(*layout.fins, tail)), method)
+
+
+@pytest.mark.parametrize("method", ["qp", "sqp", "analytic"])
+def test_other_methods_take_shafts_in_any_direction(method: str) -> None:
+    layout = load_layout("A")
+    tail = Fin("tail", (-0.4, 0.0, 0.0), shaft=(0.0, 0.0, 1.0), zero=(1.0, 0.0, 0.0))
+    allocator = finlab.Allocator(replace(layout, actuators=(*layout.fins, tail)), method)
+    assert allocator.allocate([0.5, 0.3, 0.2, 0.0, 0.0, 0.1]).err_norm < 0.05
