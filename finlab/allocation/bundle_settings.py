@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from finlab.allocation.search.settings import MdnSettings, SearchSettings
+from finlab.allocation.mdn_settings import MdnSettings
+from finlab.allocation.search.settings import SearchSettings
+from finlab.allocation.settings import Settings
 from finlab.bundle_files import ABOUT, VERSION, Files
 from finlab.errors import AllocationError, DataError
 from finlab.files.guarded import decoded
@@ -19,7 +21,7 @@ if TYPE_CHECKING:
     from finlab.allocation.allocator import Allocator
 
 FORMAT = "finlab-bundle"
-METHODS_ON_BOARD: Mapping[str, type[SearchSettings]] = {"dual": SearchSettings, "mdn": MdnSettings}
+METHODS_ON_BOARD: Mapping[str, type[Settings]] = {"dual": SearchSettings, "mdn": MdnSettings}
 """Methods that a bundle can answer with, and their settings."""
 GONE = ("energy_tradeoff",)
 """Settings that earlier bundles hold and that no method has any more."""
@@ -94,7 +96,7 @@ def read_about(files: Files, source: str) -> About:
     return About(method, checkpoint, normalization, settings)
 
 
-def _settings(kind: type[SearchSettings], values: dict[str, Any]) -> dict[str, Any]:
+def _settings(kind: type[Settings], values: dict[str, Any]) -> dict[str, Any]:
     """Settings by name from what a file holds; an `AllocationError` or a `TypeError` where that is wrong."""
     plain = {key: value for key, value in values.items() if key not in GONE}
     weights = plain.pop("effort_weights", {})
@@ -103,4 +105,5 @@ def _settings(kind: type[SearchSettings], values: dict[str, Any]) -> dict[str, A
     known = kind.__dataclass_fields__
     if unknown := [key for key in plain if key not in known]:
         raise TypeError(f"expected {', '.join(known)}, got {unknown[0]!r:.40}")
-    return vars(kind(**plain, effort_weights=EffortWeights(**weights)))
+    made: Any = kind
+    return dict(vars(made(**plain, effort_weights=EffortWeights(**weights))))

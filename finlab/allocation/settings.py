@@ -13,6 +13,8 @@ from finlab.physics.objective import Name, Objective
 
 LARGEST_WEIGHT = 100.0
 """Largest weight of a term of the effort."""
+MOST_CANDIDATES = 4096
+"""Most candidates that may be drawn; more would keep a robot from answering."""
 
 
 class Range(NamedTuple):

@@ -12,7 +12,6 @@ def export(
     zip: bool = False,
     failed: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME")] = (),
     method: Literal["dual", "mdn"] = "dual",
-    objective: Literal["power", "effort"] = "power",
     checkpoint: Annotated[str | None, arg(metavar="NAME|FOLDER")] = None,
 ) -> None:
     """Write the deployment bundle: layout graph, the fins' physics, settings, README and checksums.
@@ -22,8 +21,8 @@ def export(
         output: folder to write; a name that ends in .graph.json takes the layout graph file alone.
         zip: write one archive, DIR.zip, instead of a folder.
         failed: name of a fin that does not work.
-        method: who answers on the robot; the networks of mdn travel with it.
-        objective: what the robot keeps least, power in watts or the paper's effort.
+        method: who answers on the robot: dual keeps watts least, mdn the paper's effort; the networks of
+            mdn travel with it.
         checkpoint: of mdn, the shipped one by default.
     """
     from finlab.cli.inputs import open_robot
@@ -39,7 +38,7 @@ def export(
     failed = robot.with_failed(failed)
     from finlab.allocation import Allocator
 
-    allocator = Allocator(robot.layout, method, checkpoint=checkpoint, objective=objective)
+    allocator = Allocator(robot.layout, method, checkpoint=checkpoint)
     if graph_alone:
         from finlab.deploy.bundle import write_graph_and_tables
         from finlab.deploy.graph import build_graph

@@ -34,7 +34,7 @@ def mdn(
     steps: _Count = None,
     stop_after: _Count = None,
 ) -> None:
-    """Train the network of method `mdn` on answers of the exact search, and write a checkpoint folder.
+    """Train the network of method `mdn` on what many starts find, and write a checkpoint folder.
 
     One process writes the answers, another learns from them: two cores are busy.
 

@@ -12,7 +12,6 @@ from finlab.allocation.allocator import Allocator
 from finlab.allocation.bundle_settings import METHODS_ON_BOARD, read_about
 from finlab.allocation.methods import LEARNED, bundled_method
 from finlab.allocation.policy import CLOSEST, Policy
-from finlab.allocation.settings import AimSettings
 from finlab.arrays import Array
 from finlab.assets import shipped_checkpoints
 from finlab.bundle_files import ABOUT, GRAPH, Files, check_bundle_files, is_bundle, read_bundle_files
@@ -42,8 +41,7 @@ class DeployedRobot:
     @property
     def objective(self) -> Objective:
         """What is kept least."""
-        settings = self.allocator.settings
-        return settings.aim if isinstance(settings, AimSettings) else Objective()
+        return getattr(self.allocator.settings, "aim", Objective())
 
     def lost(self, failed: Sequence[str] = ()) -> tuple[str, ...]:
         """Fins that the bundle names as failed stay failed, whatever `failed` adds."""

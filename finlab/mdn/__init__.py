@@ -1,1 +1,1 @@
-"""Method `mdn`: a mixture density network proposes ways to deliver a wrench, a search makes them exact."""
+"""Method `mdn`: a mixture density network proposes ways to deliver a wrench, refinement makes them exact."""

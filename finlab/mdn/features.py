@@ -15,16 +15,15 @@ index  meaning
 =====  ============================================================================================
 0-2    size of p_i: root, saturating, logarithm
 3-5    block of P of the fin itself: a, b
-6      logarithm of the cost at the top beside the other fins'
-7-10   cost at `SHARES` of the largest force over the cost at the top, mean over directions
+6      logarithm of the effort at the top beside the other fins'
+7-10   effort at `SHARES` of the largest force over that at the top, mean over directions
 11-13  largest force by direction over the largest of all: mean, first Fourier term
-14-15  first Fourier term of the cost at the top by direction, over its mean
+14-15  first Fourier term of the effort at the top by direction, over its mean
 16     root of the smallest force over the largest
 17-19  arc of directions: half of it over pi, its middle where it is no full circle
-20-22  cost of turning by a radian over the cost at the top, and where turning costs nothing
-23     1 for objective `effort`, 0 for `power`
-24-25  fixed numbers by which fins that are the same in all else are distinguished
-26     number of fins
+20-22  effort of turning by a radian over that at the top, and where turning costs nothing
+23-24  fixed numbers by which fins that are the same in all else are distinguished
+25     number of fins
 =====  ============================================================================================
 
 Pair features are the block (a, b) of P between two fins, in their frames.
@@ -35,12 +34,12 @@ from typing import NamedTuple
 import numpy as np
 
 from finlab.arrays import AnyArray
-from finlab.forces.fin_envelope import COST
-from finlab.forces.force_space import PlanarProblem
+from finlab.mdn.descent import EffortProblem
+from finlab.mdn.effort_fin import EFFORT
 from finlab.mdn.network import NODE_SIZE
 
 SHARES = (0.02, 0.1, 0.3, 0.6)
-"""Shares of the largest force at which a fin's cost is looked up."""
+"""Shares of the largest force at which a fin's effort is looked up."""
 AROUND = 16
 """Directions in which it is looked up."""
 RIDGE = 1e-6
@@ -53,7 +52,7 @@ class RobotView(NamedTuple):
     """One robot of n fins as the network sees it, whatever the target."""
 
     static: AnyArray
-    """Node features 6-26 (n, 21) before their vectors are turned."""
+    """Node features 6-25 (n, 20) before their vectors are turned."""
     blocks: AnyArray
     """a and b (2, n, n) of the blocks of P, complex."""
     solver: AnyArray
@@ -66,7 +65,7 @@ class Seen(NamedTuple):
     """N targets on one robot as the network sees them."""
 
     nodes: AnyArray
-    """Node features (N, n, 27)."""
+    """Node features (N, n, 26)."""
     pairs: AnyArray
     """Pair features (N, n, n, 4), from the last but one axis (seen) to the one before (seeing)."""
     frame: AnyArray
@@ -77,8 +76,8 @@ VECTORS = (6, 8, 12, 15)
 """Where among the static features planar vectors begin."""
 
 
-def robot_view(problem: PlanarProblem, effort: bool) -> RobotView:
-    """What the network sees of one robot; `effort` tells the objective."""
+def robot_view(problem: EffortProblem) -> RobotView:
+    """What the network sees of one robot."""
     fins, n = problem.fins, len(problem.fins.maximum)
     full = fins.half >= np.pi
     evenly = np.linspace(-1.0, 1.0, AROUND + 1)[:-1, None]  # around a circle, no direction counts twice
@@ -86,13 +85,13 @@ def robot_view(problem: PlanarProblem, effort: bool) -> RobotView:
     boundary, unit = fins.boundary(direction), np.exp(1j * direction)
     ends = boundary.largest, boundary.smallest
     largest, smallest = (np.broadcast_to(values, unit.shape) for values in ends)
-    top = fins.lookup(boundary, largest)[..., COST]
+    top = fins.lookup(boundary, largest)[..., EFFORT]
     mean_top = np.maximum(top.mean(0), 1e-12)
-    shares = [fins.lookup(boundary, share * largest)[..., COST].mean(0) / mean_top for share in SHARES]
+    shares = [fins.lookup(boundary, share * largest)[..., EFFORT].mean(0) / mean_top for share in SHARES]
     reach = largest / fins.maximum
     idle = problem.idle_direction + fins.deflection(problem.idle_direction)
     counted = np.arange(n)
-    effectiveness = [
+    static = [
         np.log(mean_top / mean_top.mean()),
         *shares,
         reach.mean(0),
@@ -103,21 +102,20 @@ def robot_view(problem: PlanarProblem, effort: bool) -> RobotView:
         *_parts(np.where(full, 0.0, np.exp(1j * fins.middle))),
         problem.direction_cost / mean_top,
         *_parts(np.where(problem.direction_cost > 0.0, np.exp(1j * idle), 0.0)),
-        np.full(n, float(effort)),
         2.0 * np.mod(0.5 + counted * GOLDEN, 1.0) - 1.0,
         2.0 * np.mod(0.25 + counted * GOLDEN**2, 1.0) - 1.0,
         np.full(n, n / 12.0),
     ]
-    scaled = problem.effectiveness * np.tile(fins.maximum, 2)[:, None]
+    scaled = problem.effectiveness * np.repeat(fins.maximum, 2)[:, None]
     gram = scaled.T @ scaled
     gram += (RIDGE * np.trace(gram) + 1e-300) * np.eye(6)
     solver = np.linalg.solve(gram, scaled.T)
-    across = scaled @ solver
-    xx, xz, zx, zz = across[:n, :n], across[:n, n:], across[n:, :n], across[n:, n:]
+    across = (scaled @ solver).reshape(n, 2, n, 2)
+    xx, xz, zx, zz = across[:, 0, :, 0], across[:, 0, :, 1], across[:, 1, :, 0], across[:, 1, :, 1]
     a = 0.5 * ((xx + zz) + 1j * (zx - xz))
     b = 0.5 * ((xx - zz) + 1j * (zx + xz))
     return RobotView(
-        np.stack(effectiveness, axis=-1), np.stack([a, b]), solver[:, :n] + 1j * solver[:, n:], fins.maximum
+        np.stack(static, axis=-1), np.stack([a, b]), solver[:, 0::2] + 1j * solver[:, 1::2], fins.maximum
     )
 
 
@@ -133,7 +131,7 @@ def features(asked: AnyArray, static: AnyArray, a: AnyArray, b: AnyArray) -> See
 
     Args:
         asked: p (N, n), complex.
-        static: as in `RobotView`, (N, n, 21).
+        static: as in `RobotView`, (N, n, 20).
         a: first part of the blocks of P (N, n, n), complex.
         b: second part.
     """

@@ -1,36 +1,80 @@
-"""Method `mdn`: a mixture density network proposes ways to deliver a wrench, and each is searched to its end.
+"""Method `mdn`: a mixture density network proposes ways to deliver a wrench, and each is made exact.
 
 The paper's idea with exact physics behind it. The network gives a joint mixture over the planar forces of all
-fins; its components stand for different ways. Each proposal is where a search in force space of its own
-begins, with the fins' own laws, and so is each answer's name. What no component stands for is not found: that
-is what the method is compared for. The answers are exact because of the search, not because of the network.
+fins; its components stand for different ways. Each proposal is followed downhill to the least effort near it
+and made exact by the fins' own laws. What no component stands for is not found: nothing else is tried. The
+answers are exact because of the refinement, and cheap because of the network.
+
+Where a target is out of reach the default method says which wrench is to be delivered in its place.
 """
 
-from typing import ClassVar
+from functools import cached_property
+from typing import ClassVar, NamedTuple, Self
 
 import numpy as np
 
 from finlab.allocation.evaluate import costs
-from finlab.allocation.method import Takes
-from finlab.allocation.search.prepared import Prepared
-from finlab.allocation.search.search_method import Beginning, Search
-from finlab.allocation.search.settings import MdnSettings
+from finlab.allocation.in_time import in_time
+from finlab.allocation.mdn_settings import MdnSettings
+from finlab.allocation.method import Method, Takes
+from finlab.allocation.policy import Policy
+from finlab.allocation.search.search_method import Search as DefaultMethod
 from finlab.allocation.settings import Settings
-from finlab.allocation.solution import Candidates
+from finlab.allocation.solution import Candidates, Solution
 from finlab.arrays import Array
-from finlab.forces.force_space import polar, realize
 from finlab.layout import Layout
-from finlab.mdn.features import Seen, robot_view, see
+from finlab.mdn.answers import NOW, OTHER, Answers, Steps, follow, ranked, refined
+from finlab.mdn.descent import realize
+from finlab.mdn.features import Seen, see
 from finlab.mdn.network import ForceMixture, ForceNetworkConfig
 from finlab.mdn.proposal import Proposal, propose
+from finlab.mdn.rates import is_within_rates, previous_force, within_rates
+from finlab.mdn.robot import effort_robot
+from finlab.networks.threads import single_threaded_products
 from finlab.networks.trained import TrainedWeights
 
+USUAL_SHARE = 0.1
+"""What a robot is mostly asked for, as a share of its yardstick; wrenches are divided by that."""
+CHUNK = 64
+"""Targets that are solved together; keeps memory flat for any number of targets."""
+STEPS = Steps()
+"""Of every answer."""
+MORE = Steps(first=8, polish=3)
+"""Of answers that were not exact yet."""
+LEAVING = Steps(first=10, polish=0)
+"""Of the way to another allocation, from commands that are at the ends of their rates."""
+WIDER = 3
+"""Times as many proposals where alternatives are asked for; each of them is refined."""
+SWITCH_GAIN = 0.01
+"""Share of its effort that a robot in motion must save before it changes the way it moves."""
+WORTH_LEAVING = 0.03
+"""The same in the end, before its fins go towards a way that takes several ticks."""
+ALTERNATIVE_ERROR = 1e-3
+"""Normalized error up to which another answer is an alternative."""
+STARTS = {OTHER: "another start", NOW: "the way it moves now"}
+"""What answers are called that no component has proposed."""
 
-class Mdn(Search):
-    """The search, started from what a network proposes and from nowhere else."""
+
+class Found(NamedTuple):
+    """What was found for some targets."""
+
+    proposal: Proposal
+    """What the network proposed."""
+    answers: Answers
+    """What came of it."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What the proposals for a single target are called."""
+        return tuple(f"component {k + 1}" for k in self.proposal.component[0].tolist())
+
+
+class Mdn(Method):
+    """Exact answers of little effort, refined from what a network proposes and from nothing else."""
 
     name = "mdn"
-    takes: ClassVar[Takes] = "horizontal fins"
+    takes: ClassVar[Takes] = "fins"
+    policy_under_way = "direction"
     settings_class = MdnSettings
     settings: MdnSettings
     weights: TrainedWeights
@@ -38,35 +82,151 @@ class Mdn(Search):
     def __init__(self, layout: Layout, settings: Settings, scale: Array, weights: TrainedWeights) -> None:
         self.config = weights.network_of(ForceNetworkConfig)
         super().__init__(layout, settings, scale, weights)
+        self.sigma = USUAL_SHARE * scale
+        self.robot = effort_robot(self.plant, self.sigma, self.settings.effort_weights)
         self._network = weights.single_precision
-        self._view = robot_view(self.prepared.planar, not self.objective.convex)
+        self._one_thread = single_threaded_products()
 
-    def proposals(self, targets: Array, seed: int) -> Proposal:
-        """The network's proposals for targets (N, 6)."""
-        seen = see(self._view, targets / self.sigma)
-        drawn = self.settings.n_candidates, self.settings.temperature, seed
-        return propose(self.mixture(seen), self._view, seen, *drawn)
+    def at(self, flow: Array | None) -> Self:
+        """See `Method`."""
+        other = super().at(flow)
+        if other is not self:
+            other.robot = self.robot.at(other.plant, self.sigma)
+        return other
+
+    def in_time(self, target: Array, reference: Array) -> Array:
+        """See `Method`."""
+        return in_time(self.layout, target, reference, self.settings.period_s)
+
+    def solve(
+        self,
+        targets: Array,
+        *,
+        policy: Policy,
+        previous: Array | None = None,
+        flow: Array | None = None,
+        seed: int = 0,
+    ) -> Solution:
+        """See `Method`."""
+        if (moved := self.at(flow)) is not self:
+            return moved.solve(targets, policy=policy, previous=previous, seed=seed)
+        target = targets / self.sigma
+        if len(target) == 1:
+            found = self._one(policy, target, previous, seed)
+            return Solution(
+                self.robot.commands.feasible(found.answers.command[:, 0]),
+                candidates=lambda: self._candidates(found.answers, found.names),
+                samples=lambda: self._samples(target, found),
+            )
+        command = np.empty((len(target), self.layout.n, 3))
+        with self._one_thread():
+            for k in range(0, len(target), CHUNK):
+                some = slice(k, k + CHUNK)
+                command[some] = self._found(policy, target[some], seed + k).answers.command[:, 0]
+        return Solution(command)
+
+    def alternatives(
+        self, target: Array, *, policy: Policy, previous: Array | None, flow: Array | None, seed: int
+    ) -> Candidates:
+        """The answers, then what many more proposals lead to."""
+        if (moved := self.at(flow)) is not self:
+            return moved.alternatives(target, policy=policy, previous=previous, flow=None, seed=seed)
+        wanted = target[None] / self.sigma
+        first, count = self._one(policy, wanted, previous, seed), WIDER * self.settings.n_candidates
+        with self._one_thread():
+            more = self.proposals(wanted, seed, count)
+            wide = Found(more, follow(self.robot, wanted, more.force, count, STEPS))
+        exact = max(ALTERNATIVE_ERROR, 1.01 * float(first.answers.error[0, 0]))
+        kept = wide.answers.columns(np.flatnonzero(wide.answers.error[0] <= exact))
+        return self._candidates(first.answers, first.names).beside(self._candidates(kept, wide.names))
+
+    def proposals(self, target: Array, seed: int, count: int | None = None) -> Proposal:
+        """The network's proposals for normalized targets (N, 6); by default as many as the settings say."""
+        seen = see(self.robot.view, target)
+        count = count or self.settings.n_candidates
+        return propose(self.mixture(seen), self.robot.view, seen, count, self.settings.temperature, seed)
 
     def mixture(self, seen: Seen) -> ForceMixture:
         """What the network gives for what it sees of some targets."""
         return self.config(self._network, seen.nodes, seen.pairs)
 
-    def _beginning(self, prepared: Prepared, targets: Array, seed: int) -> Beginning:
-        proposal = self.proposals(targets, seed)
-        names = tuple(f"component {k + 1}" for k in proposal.component[0].tolist())
-        return Beginning(
-            proposal.force,
-            names,
-            lambda: _samples(prepared, proposal.force[0], targets / self.sigma, names),
+    def _one(self, policy: Policy, target: Array, previous: Array | None, seed: int) -> Found:
+        """What is found for one normalized target (1, 6)."""
+        with self._one_thread():
+            found = self._found(policy, target, seed)
+            return found if previous is None else self._in_motion(target, found, previous)
+
+    def _found(self, policy: Policy, target: Array, seed: int) -> Found:
+        """What is found for normalized targets (N, 6)."""
+        proposal = self.proposals(target, seed)
+        answers = follow(self.robot, target, proposal.force, self.settings.n_refined, STEPS)
+        missed = answers.error[:, 0] > self.robot.exact
+        if missed.any():
+            answers.replace(missed, self._at_last(policy, target[missed], answers.rows(missed)))
+        return Found(proposal, answers)
+
+    def _at_last(self, policy: Policy, target: Array, answers: Answers) -> Answers:
+        """Answers to normalized targets (M, 6) that were missed at first: after more steps, and beside the
+        default method's answer, which tells what is to be delivered where that is out of reach."""
+        robot = self.robot
+        answers = refined(robot, target, answers.command, answers.origin, MORE)
+        missed = answers.error[:, 0] > robot.exact
+        if missed.any():
+            some, asked = answers.rows(missed), target[missed]
+            command = self._by_default(policy, asked)
+            delivered = robot.commands.wrench(command)
+            reached = np.linalg.norm(delivered - asked, axis=1) <= robot.exact
+            delivered[reached] = asked[reached]
+            start = np.concatenate([command[:, None], some.command], axis=1)
+            origin = np.insert(some.origin, 0, OTHER, axis=1)
+            found = refined(robot, delivered, start, origin, MORE)
+            found = found._replace(error=np.linalg.norm(found.wrench - asked[:, None], axis=-1))
+            answers.replace(missed, found.columns(slice(some.error.shape[1])))
+        return answers
+
+    def _by_default(self, policy: Policy, target: Array) -> Array:
+        """What the default method answers (N, n, 3) to normalized targets (N, 6)."""
+        return self._default.solve(target * self.sigma, policy=policy, flow=self.plant.flow).command
+
+    @cached_property
+    def _default(self) -> Method:
+        return DefaultMethod(self.layout, DefaultMethod.settings_class(), self.scale)
+
+    def _in_motion(self, target: Array, free: Found, previous: Array) -> Found:
+        """What is found for one target within what the servos allow after a previous command (n, 3): the way
+        that the robot moves now is kept, and where another is worth it, all fins go towards that."""
+        first, period, keep = free.answers, self.settings.period_s, self.settings.n_refined
+        if is_within_rates(self.robot, previous, first.command[0, 0], period):
+            return free
+        near = within_rates(self.robot, previous, period)
+        force = np.insert(free.proposal.force, 0, previous_force(self.robot, previous), axis=1)
+        found = follow(near, target, force, keep, STEPS, kept=1)
+        found = found._replace(origin=np.where(found.origin == 0, NOW, found.origin - 1))
+        now_first = np.argsort(found.origin[0] != NOW, kind="stable")
+        found = ranked(near, found.columns(now_first), SWITCH_GAIN)
+        if found.error[0, 0] > near.exact:
+            found = refined(near, target, found.command, found.origin, MORE)
+        if first.effort[0, 0] < (1.0 - WORTH_LEAVING) * found.effort[0, 0]:
+            towards = near.commands.feasible(first.command[:, :1])
+            other = refined(near, target, towards, first.origin[:, :1], LEAVING)
+            if other.error[0, 0] <= max(near.exact, found.error[0, 0]):
+                found = other.before(found)
+        return free._replace(answers=found)
+
+    def _candidates(self, answers: Answers, names: tuple[str, ...]) -> Candidates:
+        """The refined answers to a single target, and the components they come from."""
+        command, wrench, error, _, origin = (values[0] for values in answers)
+        command = self.robot.commands.feasible(command)
+        source = tuple(names[k] if k >= 0 else STARTS[k] for k in origin.tolist())
+        return Candidates(
+            command, wrench * self.sigma, USUAL_SHARE * error, *costs(self.layout, command), source
         )
 
-
-def _samples(prepared: Prepared, force: Array, target: Array, names: tuple[str, ...]) -> Candidates:
-    """Proposed forces (K, 2, n) [N] for a single target (1, 6), normalized, as the cheapest commands with
-    them."""
-    command, _ = realize(prepared.planar, polar(prepared.planar, force.swapaxes(1, 2)))
-    command = prepared.commands.feasible(command)
-    wrench = prepared.commands.wrench(command)
-    error = np.linalg.norm(wrench - target, axis=-1)
-    layout = prepared.plant.layout
-    return Candidates(command, prepared.plant.wrench(command), error, *costs(layout, command), names)
+    def _samples(self, target: Array, found: Found) -> Candidates:
+        """The proposals for a single target as the cheapest commands with their forces."""
+        robot = self.robot
+        command, _ = realize(robot.forces, robot.forces.fins.project(found.proposal.force[0].astype(complex)))
+        command = robot.commands.feasible(command)
+        wrench = robot.commands.wrench(command)
+        error = USUAL_SHARE * np.linalg.norm(wrench - target, axis=-1)
+        return Candidates(command, wrench * self.sigma, error, *costs(self.layout, command), found.names)

@@ -15,7 +15,7 @@ from finlab.networks import layers
 from finlab.networks.layers import Weights
 from finlab.networks.trained import Shapes, check_sizes, linear_shapes, norm_shapes
 
-NODE_SIZE, PAIR_SIZE = 27, 4
+NODE_SIZE, PAIR_SIZE = 26, 4
 """Numbers of features of a fin and of a pair of fins."""
 LOG_STD = (-2.0, 2.0)
 """Middle and half width of the range of the log standard deviations."""
@@ -60,7 +60,7 @@ class ForceNetworkConfig:
         return shapes
 
     def __call__(self, w: Weights, nodes: Values, pairs: Values) -> "ForceMixture":
-        """The mixture for fins (B, n, 27) and pairs (B, n, n, 4), with these weights."""
+        """The mixture for fins (B, n, 26) and pairs (B, n, n, 4), with these weights."""
         hidden = layers.linear(w, "enter", nodes)
         for name in (f"layers.{i}" for i in range(self.layers)):
             hidden = hidden + self._look(w, name, hidden, pairs)

@@ -16,7 +16,7 @@ class Proposal(NamedTuple):
     """K proposals for each of N targets, none of them exact yet."""
 
     force: AnyArray
-    """Planar forces (N, K, 2, n) [N], horizontal and vertical."""
+    """Planar forces (N, K, n) [N], complex: horizontal, and 1j times vertical."""
     component: NDArray[np.intp]
     """Mixture component of each (N, K)."""
 
@@ -31,7 +31,7 @@ def propose(
     """
     component, root = _drawn(*mixture.complex_parts(), n_candidates, temperature, seed)
     force = shares(root) * (seen.frame * view.largest)[:, None]
-    return Proposal(np.stack([force.real, force.imag], axis=2), component)
+    return Proposal(force, component)
 
 
 def shares(root: AnyArray) -> AnyArray:

@@ -6,8 +6,7 @@ A test holds the typed options against the settings.
 from dataclasses import dataclass
 from typing import TypedDict
 
-from finlab.allocation.search.settings import MOST_CANDIDATES
-from finlab.allocation.settings import Settings, choice, number, switch
+from finlab.allocation.settings import MOST_CANDIDATES, Settings, choice, number, switch
 
 STEPS = {"none": 0, "adam": 160, "levenberg-marquardt": 20}
 """Refinement -> its number of steps where the settings name none."""

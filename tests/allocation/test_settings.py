@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from finlab.allocation import METHODS, Allocator
-from finlab.allocation.search.settings import MdnOptions, MdnSettings, SearchOptions, SearchSettings
+from finlab.allocation.mdn_settings import MdnOptions, MdnSettings
+from finlab.allocation.search.settings import SearchOptions, SearchSettings
 from finlab.assets import shipped_checkpoints, shipped_layouts
 from finlab.errors import AllocationError
 from finlab.layout import load_layout
@@ -19,7 +20,7 @@ from tests.any_robot import AnyRobot
 SURGE = [1.0, 0.0, 0.5, 0.0, 0.0, 0.1]
 OTHER: dict[str, dict[str, Any]] = {
     "dual": {"objective": "effort", "n_refined": 2, "refine_steps": 3},
-    "mdn": {"objective": "effort", "n_refined": 2},
+    "mdn": {"n_candidates": 8, "n_refined": 2},
     "paper": {"n_candidates": 4, "n_steps": 3},
     "ipopt": {"n_starts": 1},
     "qp": {"regularization": 10.0},
@@ -83,8 +84,8 @@ def test_unknown_settings_are_refused(method: str) -> None:
         ("dual", {"period_s": 0.0}, "period_s: expected a number above 0 up to 1000 s, got 0.0"),
         ("dual", {"subsets": 1}, "subsets: expected true or false, got 1"),
         ("dual", {"objective": "speed"}, "objective: expected one of power, effort, got 'speed'"),
-        ("mdn", {"copper_loss": float("nan")}, "copper_loss: expected a number .* W/.N m.\\^2, got nan"),
-        ("mdn", {"copper_loss": 10**400}, "copper_loss: expected a number .*, got 1000"),
+        ("dual", {"copper_loss": float("nan")}, "copper_loss: expected a number .* W/.N m.\\^2, got nan"),
+        ("dual", {"copper_loss": 10**400}, "copper_loss: expected a number .*, got 1000"),
         ("mdn", {"effort_weights": 3}, "effort_weights: expected EffortWeights, got 3"),
         ("mdn", {"effort_weights": EffortWeights(-1.0)}, "effort_weights: amplitude must be .*, got -1.0"),
         ("paper", {"refinement": "magic"}, "refinement: expected one of none, adam, lev"),

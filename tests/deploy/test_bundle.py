@@ -131,7 +131,7 @@ def test_settings_travel_and_can_be_changed(tmp_path: Path) -> None:
         ({"version": True}, "is a bundle of version True"),
         ({"format": "other"}, "expected format finlab-bundle"),
         ({"method": "sqp"}, "method must be one of search, mdn, got 'sqp'"),
-        ({"method": "mdn"}, "holds no networks, which method 'mdn' needs"),
+        ({"method": "mdn", "settings": {}}, "holds no networks, which method 'mdn' needs"),
         ({"normalization": {"mean": [0] * 6, "std": [1] * 5 + [0]}}, "six standard deviations above 0"),
         ({"normalization": {"mean": [1] * 6, "std": [2] * 6}}, "layout.graph.json and bundle.json differ in"),
     ],
@@ -276,13 +276,11 @@ def test_methods_that_do_not_travel_are_refused() -> None:
         make_bundle(Allocator(finlab.load_layout("A"), "sqp"))
 
 
-def test_the_command_line_chooses_method_and_objective(
+def test_the_command_line_chooses_the_method(
     tmp_path: Path, untrained_mdn: Path, with_networks: Bundle, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    line = ["export", "mixed", "-o", str(tmp_path / "mixed"), "--objective", "effort"]
-    assert main(line) == 0
-    robot = AnyRobot(tmp_path / "mixed")
-    assert (robot.name, robot.options["objective"]) == ("dual", "effort")
+    assert main(["export", "mixed", "-o", str(tmp_path / "mixed")]) == 0
+    assert Allocator.from_bundle(tmp_path / "mixed").method == "dual"
     line = ["export", "A", "-o", str(tmp_path / "A"), "--method", "mdn", "--checkpoint"]
     assert main([*line, str(untrained_mdn)]) == 0
     assert read_bundle_files(tmp_path / "A") == dict(with_networks.files)

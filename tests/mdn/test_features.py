@@ -5,19 +5,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from finlab.forces.envelopes import layout_envelopes
-from finlab.forces.force_space import PlanarProblem, planar_problem
 from finlab.layout import Fin, FinModelSpec, Layout, Limits, random_layout
+from finlab.mdn.descent import EffortProblem, wrench
+from finlab.mdn.effort_fins import EffortFins
 from finlab.mdn.features import SHARES, VECTORS, RobotView, features, robot_view, see
 from finlab.mdn.network import NODE_SIZE
-from finlab.physics.objective import Objective
+from finlab.mdn.robot import layout_problem
+from finlab.physics import plant_of
+from finlab.physics.effort import DEFAULT_WEIGHTS
 
 STD = np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.34])
-EFFORT = Objective("effort")
 
 
-def problem_of(layout: Layout, objective: Objective = EFFORT, std: np.ndarray = STD) -> PlanarProblem:
-    return planar_problem(layout, layout_envelopes(layout, objective), std, objective)
+def problem_of(layout: Layout, std: np.ndarray = STD) -> EffortProblem:
+    fins = EffortFins.of_layout(layout, DEFAULT_WEIGHTS)
+    return layout_problem(plant_of(layout).effectiveness[:, 1:] / std, fins, layout, DEFAULT_WEIGHTS)
 
 
 @pytest.fixture(params=[2, 5, 12])
@@ -36,10 +38,10 @@ def acted(view: RobotView, share: np.ndarray) -> np.ndarray:
 
 def test_forces_that_give_the_wrench_are_those_that_give_the_least_shares(layout: Layout) -> None:
     problem = problem_of(layout)
-    view, rng = robot_view(problem, True), np.random.default_rng(0)
+    view, rng = robot_view(problem), np.random.default_rng(0)
     share = rng.normal(size=(4, layout.n_fins)) + 1j * rng.normal(size=(4, layout.n_fins))
     force = share * view.largest
-    target = np.concatenate([force.real, force.imag], axis=1) @ problem.effectiveness
+    target = wrench(problem, force)
     for row in range(4):
         # P x = p for every x that gives the target, and P is a projection up to its regularization.
         np.testing.assert_allclose(acted(view, share[row]), target[row] @ view.solver, atol=1e-3)
@@ -49,7 +51,7 @@ def test_forces_that_give_the_wrench_are_those_that_give_the_least_shares(layout
 
 def seen(layout: Layout, target: np.ndarray, std: np.ndarray = STD) -> list[np.ndarray]:
     """What is seen of a target (6,) [N, N m]."""
-    found = see(robot_view(problem_of(layout, std=std), True), target[None] / std)
+    found = see(robot_view(problem_of(layout, std)), target[None] / std)
     return [found.nodes[0], found.pairs[0]]
 
 
@@ -77,7 +79,7 @@ def test_a_fin_with_stops_is_seen_within_them() -> None:
     """The mean direction of an arc of half h is sin(h) / h ahead of its middle; an even fin reaches all."""
     arc = Limits(zero_direction=(-0.5, 1.7))
     layout = Layout("arc", (Fin("a", (0.2, 0.1, 0.0), 0.3, arc), Fin("b", (-0.2, 0.1, 0.0), 2.0)))
-    static, half = robot_view(problem_of(layout), True).static, 1.1
+    static, half = robot_view(problem_of(layout)).static, 1.1
     reach = 1 + len(SHARES)
     np.testing.assert_allclose(static[:, reach], 1.0, rtol=1e-6)
     ahead = static[:, reach + 1] + 1j * static[:, reach + 2]
@@ -120,24 +122,22 @@ def test_documented_features_of_a_hand_made_fin() -> None:
     problem = problem_of(layout)
     top = problem.fins.maximum[0]
     target = 0.25 * top * problem.effectiveness[1]  # a quarter of its force, straight up
-    found = see(robot_view(problem, True), target[None])
+    found = see(robot_view(problem), target[None])
     node = found.nodes[0, 0]
     assert node.shape == (NODE_SIZE,) and found.frame[0, 0] == pytest.approx(1j, abs=1e-4)
     np.testing.assert_allclose(node[:3], [0.5, 0.2, np.log(0.251) / 7.0], atol=1e-3)
     np.testing.assert_allclose(node[3:6], [1.0, 0.0, 0.0], atol=1e-3)  # the only fin: all depends on it
     assert node[6] == 0.0 and (np.diff(node[7:11]) > 0).all()
     np.testing.assert_allclose(node[11:16], [1.0, 0.0, 0.0, 0.0, 0.0], atol=1e-6)  # the same all round
-    rest = problem.fins.minimum[0] / top
+    rest = problem.fins.smallest[0, 0] / top
     assert node[16] == pytest.approx(np.sqrt(rest), rel=1e-6)
     np.testing.assert_allclose(node[17:20], [1.0, 0.0, 0.0], atol=1e-6)  # a full circle
     # Zero direction 0 is a quarter of a turn behind straight up.
     assert node[20] > 0.0 and node[21:23] == pytest.approx([0.0, -1.0], abs=1e-3)
-    assert node[23] == 1.0 and node[26] == pytest.approx(1 / 12)
-    power = see(robot_view(problem_of(layout, Objective("power")), False), target[None]).nodes[0, 0]
-    assert power[23] == 0.0 and (power[20:23] == 0.0).all()
+    assert node[25] == pytest.approx(1 / 12)
 
 
 def test_no_target_is_no_trouble(layout: Layout) -> None:
-    found = see(robot_view(problem_of(layout), True), np.zeros((2, 6)))
+    found = see(robot_view(problem_of(layout)), np.zeros((2, 6)))
     assert np.isfinite(found.nodes).all() and np.isfinite(found.pairs).all()
     np.testing.assert_array_equal(found.frame, 1.0)

@@ -7,11 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from finlab.allocation.mdn_settings import MdnSettings
 from finlab.assets import checkpoint_path
 from finlab.errors import AllocationError, CheckpointError
 from finlab.layout import FinModelSpec, Layout, load_layout, random_layout
+from finlab.mdn.answers import follow
 from finlab.mdn.features import see
-from finlab.mdn.proposal import propose, shares
+from finlab.mdn.method import STEPS, Mdn
+from finlab.mdn.proposal import shares
 from finlab.networks.checkpoint import read_checkpoint
 from finlab.physics import Plant
 from finlab.physics.effort import command_effort
@@ -27,19 +30,12 @@ def untrained(untrained_mdn: Path) -> AnyRobot:
 
 @pytest.fixture(scope="module")
 def shipped() -> AnyRobot:
-    return AnyRobot("mdn", objective="effort")
+    return AnyRobot("mdn")
 
 
-def same_forces(layout: Layout, one: np.ndarray, other: np.ndarray) -> None:
-    """What matters of commands: those of fins that nearly rest take long to settle."""
-    plant = Plant(layout)
-    np.testing.assert_allclose(plant.force(one), plant.force(other), atol=5e-3)
-
-
-@pytest.fixture(scope="module")
-def settled(shipped: AnyRobot) -> AnyRobot:
-    """With so many steps that every search comes to its end, whatever goes on beside it."""
-    return shipped.with_settings(search_steps=60)
+def plant_force(layout: Layout, command: np.ndarray) -> np.ndarray:
+    """What matters of commands."""
+    return np.asarray(Plant(layout).force(command))
 
 
 def reachable(layout: Layout, count: int, seed: int = 0) -> np.ndarray:
@@ -47,78 +43,83 @@ def reachable(layout: Layout, count: int, seed: int = 0) -> np.ndarray:
     return plant.wrench(plant.sample(np.random.default_rng(seed), (count,)))
 
 
-@pytest.mark.parametrize("objective", ["power", "effort"])
 @pytest.mark.parametrize("n", [2, 4, 8, 12])
-def test_answers_are_exact_even_where_nothing_was_learned(
-    n: int, objective: str, untrained: AnyRobot
-) -> None:
+def test_answers_are_exact_even_where_nothing_was_learned(n: int, untrained: AnyRobot) -> None:
     layout = random_layout(np.random.default_rng(n), n_fins=n, limits="varied")
     layout = layout.replace_actuator("fin_1", model=FinModelSpec("soft", (("e", 0.2), ("d", 0.1))))
     targets = reachable(layout, 20)
-    answer = untrained.with_settings(objective=objective).allocate_batch(layout, targets)
-    error = untrained.normalization.error(Plant(layout).wrench(answer.command), targets)
+    answer = untrained.allocate_batch(layout, targets)
+    error = answer.err_norm
     assert np.mean(error < 1e-4) >= 0.95 and error.max() < 0.05
 
 
-def test_a_batch_costs_what_single_calls_do(settled: AnyRobot, layout_a: Layout) -> None:
+def test_a_batch_costs_what_single_calls_do(shipped: AnyRobot, layout_a: Layout) -> None:
     targets = reachable(layout_a, 6)
-    together = settled.allocate_batch(layout_a, targets)
+    together = shipped.allocate_batch(layout_a, targets)
     np.testing.assert_allclose(Plant(layout_a).wrench(together.command), targets, atol=1e-4)
-    alone = [settled.allocate(layout_a, target).effort for target in targets]
+    alone = [shipped.allocate(layout_a, target).effort for target in targets]
     np.testing.assert_allclose(together.effort, alone, rtol=0.01)
 
 
-def weights(method: AnyRobot, layout: Layout) -> np.ndarray:
+def method_of(robot: AnyRobot, layout: Layout) -> tuple[Mdn, np.ndarray]:
+    """The method of a robot, and `TARGET` (1, 6) as it is normalized there."""
+    method = robot.on(layout)._whole.method
+    assert isinstance(method, Mdn)
+    return method, np.array([TARGET]) / method.sigma
+
+
+def weights(robot: AnyRobot, layout: Layout) -> np.ndarray:
     """Of the mixture's components, for `TARGET`."""
-    seen = see(method._view(method.pipeline, layout), np.array([TARGET]) / method.normalization.std)
-    return method.mixture(seen).complex_parts()[0][0]
+    method, target = method_of(robot, layout)
+    return method.mixture(see(method.robot.view, target)).complex_parts()[0][0]
 
 
-def test_candidates_keep_the_name_of_their_component(settled: AnyRobot, layout_a: Layout) -> None:
-    answer, count = settled.allocate(layout_a, TARGET), settled.settings.n_candidates
-    expected = [f"component {k + 1}" for k in np.argsort(-weights(settled, layout_a))[:count]]
+def test_candidates_keep_the_name_of_their_component(shipped: AnyRobot, layout_a: Layout) -> None:
+    answer, count = shipped.allocate(layout_a, TARGET), MdnSettings().n_candidates
+    expected = [f"component {k + 1}" for k in np.argsort(-weights(shipped, layout_a))[:count]]
     assert answer.samples is not None and answer.candidates is not None
-    assert list(answer.samples.source) == expected
+    assert list(answer.samples.source[: len(expected)]) == expected
     assert set(answer.candidates.source) <= set(expected)
-    # A candidate is what the search makes of its own component's proposal, and of no other one.
-    view, target = settled._view(settled.pipeline, layout_a), np.array([TARGET])
-    seen = see(view, target / settled.normalization.std)
-    force = propose(settled.mixture(seen), view, seen, count, 1.0, 0).force
-    prepared = settled.pipeline.prepare(layout_a)
+    # A candidate is what its own component's proposal leads to, and no other one.
+    method, target = method_of(shipped, layout_a)
+    force = method.proposals(target, 0).force
     for command, source in zip(answer.candidates.command, answer.candidates.source, strict=True):
-        k = expected.index(source)
-        alone = settled.pipeline.solve(prepared, target, seeds=force[:, k : k + 1])
-        same_forces(layout_a, command, alone.command[0, 0])
+        ends = [
+            follow(method.robot, target, force[:, k : k + 1], 1, STEPS).command[0, 0]
+            for k, name in enumerate(answer.samples.source)
+            if name == source
+        ]
+        assert any(
+            np.allclose(plant_force(layout_a, command), plant_force(layout_a, end), atol=5e-3) for end in ends
+        )
 
 
 def test_from_tick_to_tick_candidates_keep_it_too(shipped: AnyRobot) -> None:
-    layout, all_kept = load_layout("octo"), shipped.with_settings(n_refined=100, subsets=False)
-    alone = all_kept.allocate(layout, TARGET)
-    again = all_kept.allocate(layout, TARGET, previous=alone.command)
+    layout = load_layout("octo")
+    alone = shipped.allocate(layout, TARGET)
+    again = shipped.allocate(layout, TARGET, previous=alone.command)
     assert alone.candidates is not None and again.candidates is not None
     # What is within the servos' rates is answered as without a past, component by component.
-    assert again.candidates.source == alone.candidates.source
-    np.testing.assert_array_equal(again.candidates.command, alone.candidates.command)
-    away = all_kept.allocate(layout, -0.5 * np.array(TARGET), previous=alone.command).candidates
+    assert again.candidates == alone.candidates
+    away = shipped.allocate(layout, -0.5 * np.array(TARGET), previous=alone.command).candidates
     assert away is not None and "the way it moves now" in away.source
 
 
 def test_more_candidates_than_components_are_drawn_by_a_seed(shipped: AnyRobot, layout_a: Layout) -> None:
-    many = shipped.with_settings(n_candidates=40)
+    many = AnyRobot("mdn", n_candidates=40)
     first, again, other = (many.allocate(layout_a, TARGET, seed=seed).samples for seed in (0, 0, 1))
     assert first is not None and other is not None
     assert len(first) == 40 and first == again and first != other
-    still = shipped.with_settings(n_candidates=40, temperature=0.0)
+    still = AnyRobot("mdn", n_candidates=40, temperature=0.0)
     means = still.allocate(layout_a, TARGET).samples
     assert means is not None and len({command.tobytes() for command in means.command.round(9)}) <= 16
 
 
 def test_components_are_drawn_as_often_as_they_weigh(shipped: AnyRobot, layout_a: Layout) -> None:
     """Behind the means, 8,000 draws; and their spread is the component's own, by the temperature."""
-    weight, view = weights(shipped, layout_a), shipped._view(shipped.pipeline, layout_a)
+    weight, (method, target) = weights(shipped, layout_a), method_of(shipped, layout_a)
     m = len(weight)
-    seen = see(view, np.array([TARGET]) / shipped.normalization.std)
-    proposal = propose(shipped.mixture(seen), view, seen, m + 8000, 1.0, 3)
+    proposal = method.proposals(target, 3, m + 8000)
     drawn = proposal.component[0, m:]
     share = np.bincount(drawn, minlength=m) / len(drawn)
     np.testing.assert_allclose(share, weight / weight.sum(), atol=0.02)
@@ -133,14 +134,6 @@ def test_it_goes_on_from_the_previous_command(shipped: AnyRobot, layout_a: Layou
     turned = np.angle(np.exp(1j * (answer.command - before.command)[:, 2]))
     assert np.abs(turned).max() < 0.4
     np.testing.assert_allclose(answer.wrench, near, atol=1e-4)
-
-
-def test_objectives_do_not_share_what_is_seen(shipped: AnyRobot) -> None:
-    layout = load_layout("octo")
-    target = [2.0, 0.0, 1.0, 0.0, 0.0, 0.1]
-    effort = shipped.allocate(layout, target)
-    power = shipped.with_settings(objective="power").allocate(layout, target)
-    assert power.power < effort.power and effort.effort < power.effort
 
 
 def test_shares_are_squares_of_roots_and_at_most_one() -> None:
@@ -167,16 +160,13 @@ def test_it_needs_no_torch() -> None:
     subprocess.run([sys.executable, "-c", code], timeout=60, check=True)
 
 
-@pytest.mark.parametrize("objective", ["power", "effort"])
-def test_samples_tell_what_the_plant_says_of_them(
-    objective: str, shipped: AnyRobot, layout_a: Layout
-) -> None:
-    method, plant = shipped.with_settings(objective=objective), Plant(layout_a)
-    told = method.allocate(layout_a, TARGET).samples
-    assert told is not None and len(told) == 16
+def test_samples_tell_what_the_plant_says_of_them(shipped: AnyRobot, layout_a: Layout) -> None:
+    plant = Plant(layout_a)
+    told = shipped.allocate(layout_a, TARGET).samples
+    assert told is not None and len(told) == 32
     assert ((told.command >= plant.lower) & (told.command <= plant.upper)).all()
     np.testing.assert_allclose(told.wrench, plant.wrench(told.command), atol=1e-9)
-    error = np.linalg.norm((told.wrench - TARGET) / method.normalization.std, axis=-1)
+    error = np.linalg.norm((told.wrench - TARGET) / shipped.on(layout_a).scale, axis=-1)
     np.testing.assert_allclose(told.err_norm, error, rtol=1e-9)
     np.testing.assert_allclose(told.effort, command_effort(told.command, plant.upper), rtol=1e-9)
     np.testing.assert_allclose(told.power, plant.power(told.command).sum(-1), rtol=1e-9)
@@ -184,11 +174,12 @@ def test_samples_tell_what_the_plant_says_of_them(
 
 def test_samples_are_the_proposed_forces(shipped: AnyRobot, layout_a: Layout) -> None:
     """As near as the compiled fins come, where a fin can give what is proposed."""
-    prepared, target = shipped.pipeline.prepare(layout_a), np.array([TARGET])
-    told, proposal = shipped.allocate(layout_a, TARGET).samples, shipped.proposals(prepared, target, 0)
+    method, target = method_of(shipped, layout_a)
+    told, force = shipped.allocate(layout_a, TARGET).samples, method.proposals(target, 0).force[0]
     assert told is not None
-    force, given = proposal.force[0].swapaxes(1, 2), Plant(layout_a).force(told.command)[..., 1:]
-    size, fins = np.linalg.norm(force, axis=-1), prepared.planar.fins
-    able = (size > 2.0 * fins.minimum) & (size < 0.99 * fins.maximum)
+    given, fins = Plant(layout_a).force(told.command), method.robot.forces.fins
+    able = (np.abs(force) > 2.0 * fins.smallest[:, 0]) & (np.abs(force) < 0.99 * fins.maximum)
     assert able.mean() > 0.5
-    np.testing.assert_allclose(given[able], force[able], atol=0.02 * fins.maximum.max())
+    np.testing.assert_allclose(
+        (given[..., 1] + 1j * given[..., 2])[able], force[able], atol=0.02 * fins.maximum.max()
+    )

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any, get_args
 
+from finlab.allocation.mdn_settings import MdnSettings
 from finlab.allocation.methods import METHODS, method_class
 from finlab.allocation.policy import AXES, KINDS
-from finlab.allocation.search.settings import MdnSettings
 from finlab.errors import FinlabError
 from finlab.layout import Layout
 from finlab.layout.damage import Health

@@ -7,9 +7,6 @@ from dataclasses import dataclass
 
 from finlab.allocation.settings import AimOptions, AimSettings, number, switch
 
-MOST_CANDIDATES = 4096
-"""Most candidates that may be drawn; more would keep a robot from answering."""
-
 
 @dataclass(frozen=True)
 class SearchSettings(AimSettings):
@@ -32,20 +29,3 @@ class SearchOptions(AimOptions, total=False):
     refine_steps: int
     subsets: bool
     period_s: float
-
-
-@dataclass(frozen=True)
-class MdnSettings(SearchSettings):
-    """How many ways the mixture proposes; each of them is searched."""
-
-    n_candidates: int = number(
-        16, 1, MOST_CANDIDATES, "proposals K: the components' means by falling weight, then samples"
-    )
-    temperature: float = number(1.0, 0.0, 100.0, "what the variances of these samples are multiplied by")
-
-
-class MdnOptions(SearchOptions, total=False):
-    """Settings of the method `mdn`."""
-
-    n_candidates: int
-    temperature: float

@@ -13,7 +13,7 @@ from finlab.mdn.training.shards import read_shard
 
 LEAST_WEIGHT = 1e-3
 """Weight below which a way is not learned from."""
-IDS = slice(18, 20)
+IDS = slice(17, 19)
 """Where among the static features the numbers are that tell equal fins apart."""
 
 
@@ -21,7 +21,7 @@ class Batch(NamedTuple):
     """B targets, each on a robot of n fins, with up to L ways to deliver it."""
 
     nodes: Tensor
-    """(B, n, 27)."""
+    """(B, n, 26)."""
     pairs: Tensor
     """(B, n, n, 4)."""
     way: Tensor

@@ -12,11 +12,11 @@ from finlab.actuators.fin.blade import Blade
 from finlab.actuators.fin.models import make_law
 from finlab.actuators.fin.table import TableLaw
 from finlab.actuators.law import FinLaw
-from finlab.forces.fin_envelope import FinEnvelope, compile_fin
 from finlab.layout import FinModelSpec, Limits
 from finlab.layout.random import random_layout
 from finlab.layout.random_fins import Numbers, log_uniform, random_fin_model
-from finlab.physics.objective import Objective
+from finlab.mdn.effort_fin import EffortFin, compile_fin
+from finlab.physics.effort import DEFAULT_WEIGHTS
 
 WEAKEST = 1e-2
 """Largest force [N] of the weakest fin worth learning from."""
@@ -46,24 +46,24 @@ NUMBERS: dict[str, Numbers] = {
 
 @dataclass(frozen=True, eq=False)
 class RandomFin:
-    """One law within its limits, compiled for both objectives."""
+    """One law within its limits, compiled."""
 
     law: FinLaw
     """What it does."""
     limits: Limits
     """Of its commands."""
-    envelopes: dict[str, FinEnvelope]
-    """Objective -> what its forces cost."""
+    compiled: EffortFin
+    """What its forces cost."""
 
 
 def random_fin(rng: np.random.Generator, limits: Limits) -> RandomFin:
     """Draw a law of a random family and compile it."""
     law = random_law(rng, str(rng.choice(list(SHARES), p=list(SHARES.values()))))
-    envelopes = {name: compile_fin(law, limits, Objective(name)) for name in ("power", "effort")}
+    compiled = compile_fin(law, limits, DEFAULT_WEIGHTS)
     # A fin that hardly pushes at all is drawn again: it has nothing to teach.
-    if envelopes["power"].largest.max() < WEAKEST:
+    if compiled.largest.max() < WEAKEST:
         return random_fin(rng, limits)
-    return RandomFin(law, limits, envelopes)
+    return RandomFin(law, limits, compiled)
 
 
 def varied_limits(rng: np.random.Generator) -> Limits:

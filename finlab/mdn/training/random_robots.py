@@ -6,14 +6,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from finlab.arrays import Array
-from finlab.forces.envelopes import Envelopes
-from finlab.forces.force_space import PlanarProblem, planar_problem
 from finlab.layout import Fin, Layout, Limits
 from finlab.layout.angles import wrapped
 from finlab.layout.arrays import force_effectiveness
 from finlab.layout.random import TRAINING_BOX
+from finlab.mdn.descent import EffortProblem, wrench
+from finlab.mdn.effort_fins import EffortFins
+from finlab.mdn.robot import layout_problem
 from finlab.mdn.training.random_fins import RandomFin, random_fin, varied_limits
-from finlab.physics.objective import Name, Objective
+from finlab.physics.effort import DEFAULT_WEIGHTS
 
 FIN_COUNTS = dict(zip(range(2, 13), (1, 2, 8, 9, 9, 8, 8, 7, 7, 7, 7), strict=True))
 """Number of fins -> how often it is drawn; with 2 or 3 there is next to nothing to choose."""
@@ -23,16 +24,14 @@ BOX = (1.5 * TRAINING_BOX[0], 1.5 * TRAINING_BOX[1], 2.0 * TRAINING_BOX[2])
 
 @dataclass(frozen=True, eq=False)
 class RandomRobot:
-    """One robot, ready for the search."""
+    """One robot, ready for the descent."""
 
     layout: Layout
     """Positions, angles and limits; the fins' models are not part of it."""
     fins: tuple[RandomFin, ...]
     """What its fins do."""
-    problem: PlanarProblem
-    """For the search in force space."""
-    objective: Objective
-    """What is kept least."""
+    problem: EffortProblem
+    """For the descent in planar forces."""
     scale: Array
     """What wrenches are divided by (6,)."""
 
@@ -46,9 +45,7 @@ class FinPool:
         self.varied = [random_fin(rng, varied_limits(rng)) for _ in range(count)]
 
 
-def random_robot(
-    rng: np.random.Generator, pool: FinPool, n: int, objective: Name, scale: Array
-) -> RandomRobot:
+def random_robot(rng: np.random.Generator, pool: FinPool, n: int, scale: Array) -> RandomRobot:
     """Draw a robot of n fins; `scale` (6,) is what its wrenches are divided by.
 
     Fins are of one kind or each of its own, half of the robots have limits of their own, and a third are
@@ -67,9 +64,10 @@ def random_robot(
             for i, (place, turn, fin) in enumerate(zip(position, angle, fins, strict=True))
         ),
     )
-    aim = Objective(objective)
-    envelopes = Envelopes.of([fin.envelopes[objective] for fin in fins])
-    return RandomRobot(layout, fins, planar_problem(layout, envelopes, scale, aim), aim, scale)
+    compiled = EffortFins.of([fin.compiled for fin in fins])
+    effectiveness = force_effectiveness(layout.position, layout.mounting_angle)[:, 1:] / scale
+    problem = layout_problem(effectiveness, compiled, layout, DEFAULT_WEIGHTS)
+    return RandomRobot(layout, fins, problem, scale)
 
 
 def _places(rng: np.random.Generator, n: int) -> tuple[Array, Array]:
@@ -122,20 +120,18 @@ def random_targets(rng: np.random.Generator, robot: RandomRobot, count: int) -> 
     share = rng.random((third, n)) ** 2 * (rng.random((third, n)) < rng.uniform(0.3, 1.0, (third, 1)))
     boundary = fins.boundary(direction)
     size = boundary.smallest + share * (boundary.largest - boundary.smallest)
-    force = np.concatenate([size * np.cos(direction), size * np.sin(direction)], axis=1)
-    by_force = force @ problem.effectiveness
+    by_force = wrench(problem, size * np.exp(1j * direction))
     return np.concatenate([by_command, by_force, _axes(rng, robot, third)])
 
 
 def _axes(rng: np.random.Generator, robot: RandomRobot, count: int) -> Array:
     """One to three axes together, as far as the fins go without leaving what each can give."""
     problem = robot.problem
-    full = problem.effectiveness * np.tile(problem.fins.maximum, 2)[:, None]
+    full = problem.effectiveness * np.repeat(problem.fins.maximum, 2)[:, None]
     signs = rng.choice([-1.0, 1.0], (count, 6)) * rng.uniform(0.2, 1.0, (count, 6))
     axes = rng.random((count, 6)).argsort(axis=1) < rng.integers(1, 4, (count, 1))
     gram = full.T @ full
     share = (axes * signs) @ np.linalg.pinv(gram, rcond=1e-6) @ full.T
-    n = robot.layout.n_fins
-    largest = np.hypot(share[:, :n], share[:, n:]).max(1, keepdims=True)
+    largest = np.hypot(share[:, 0::2], share[:, 1::2]).max(1, keepdims=True)
     share *= rng.uniform(0.03, 0.9, (count, 1)) / np.maximum(largest, 1e-9)
     return np.asarray(share @ full)

@@ -20,15 +20,13 @@ class AnswerSettings:
     """Robots per file that are made of them."""
     targets: int = 48
     """Targets for each robot."""
-    effort_share: float = 0.75
-    """Share of the robots that keep the effort least; the others keep the power least."""
     sharpness: float = 0.03
     """By how much dearer a way may be, as a share of the cost, for its weight to fall to a third."""
 
 
 @dataclass(frozen=True)
 class MdnTraining(LoopSettings):
-    """How the network of method `mdn` is trained: the likelihood of the ways that the search has found."""
+    """How the network of method `mdn` is trained: the likelihood of the ways that the teacher has found."""
 
     anneal: int = 2500
     """Steps over which components stop sharing what they stand for; at first all of them learn from all."""

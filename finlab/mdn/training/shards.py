@@ -11,7 +11,6 @@ from finlab.mdn.features import robot_view
 from finlab.mdn.training.random_robots import FIN_COUNTS, FinPool, random_robot, random_targets
 from finlab.mdn.training.recipes import AnswerSettings
 from finlab.mdn.training.teacher import root_share, shares_of_ways, ways_to_deliver
-from finlab.physics.objective import Name
 from finlab.whole_file import write_whole
 
 DATA_SEED = 130_000
@@ -29,8 +28,7 @@ def write_shard(folder: Path, settings: AnswerSettings, scale: Array, seed: int,
     groups: dict[int, list[dict[str, Array]]] = {}
     for _ in range(settings.robots):
         n = int(rng.choice(counts, p=often / often.sum()))
-        objective: Name = "effort" if rng.random() < settings.effort_share else "power"
-        groups.setdefault(n, []).append(_answers(rng, pool, n, objective, settings, scale))
+        groups.setdefault(n, []).append(_answers(rng, pool, n, settings, scale))
     arrays = {
         f"{n}.{name}": np.stack([robot[name] for robot in robots])
         for n, robots in groups.items()
@@ -43,13 +41,13 @@ def write_shard(folder: Path, settings: AnswerSettings, scale: Array, seed: int,
 
 
 def _answers(
-    rng: np.random.Generator, pool: FinPool, n: int, objective: Name, settings: AnswerSettings, scale: Array
+    rng: np.random.Generator, pool: FinPool, n: int, settings: AnswerSettings, scale: Array
 ) -> dict[str, Array]:
     """One robot, its targets and the ways to deliver them, as the network sees them."""
-    robot = random_robot(rng, pool, n, objective, scale)
+    robot = random_robot(rng, pool, n, scale)
     target = random_targets(rng, robot, settings.targets)
     ways = ways_to_deliver(rng, robot, target)
-    view = robot_view(robot.problem, objective == "effort")
+    view = robot_view(robot.problem)
     return {
         "static": view.static.astype(np.float32),
         "blocks": view.blocks.astype(np.complex64),

@@ -1,19 +1,19 @@
-"""The teacher: the exact search from many seeds, and the different ways it finds to deliver a target."""
+"""The teacher: descents from many random forces, and the different ways they find to deliver a target."""
 
 from typing import NamedTuple
 
 import numpy as np
 
-from finlab.allocation.search.prepared import resting_fins, resting_seeds
-from finlab.arrays import Array
-from finlab.forces.force_space import Planar, descend, realize
+from finlab.arrays import AnyArray, Array
+from finlab.mdn.descent import descend, realize, wrench
+from finlab.mdn.effort_fins import Projected
 from finlab.mdn.training.random_robots import RandomRobot
 
-RANDOM_SEEDS = 24
-"""Random seeds beside those that rest single fins and pairs."""
-FIRST_STEPS, LAST_STEPS = 10, 20
-"""Quadratic problems solved from every seed, and then from the best."""
-KEPT = 14
+STARTS = 64
+"""Random forces from which each target is tried."""
+FIRST_STEPS, LAST_STEPS = 10, 25
+"""Quadratic problems solved from every start, and then from the best."""
+KEPT = 20
 """Forces that are followed further."""
 MODES = 8
 """Most ways that are distinguished."""
@@ -28,50 +28,47 @@ EXACT = 0.01
 class Ways(NamedTuple):
     """Up to L ways to deliver each of N targets with n fins, cheapest first."""
 
-    force: Array
+    force: AnyArray
     """Planar forces (N, L, n) [N], complex."""
     cost: Array
     """Their costs (N, L); infinite where there are no more ways."""
 
 
 def ways_to_deliver(rng: np.random.Generator, robot: RandomRobot, target: Array) -> Ways:
-    """What the search finds for normalized targets (N, 6)."""
+    """What descents find for normalized targets (N, 6)."""
     problem, n = robot.problem, robot.layout.n_fins
     rows, maximum = len(target), robot.problem.fins.maximum
-    convex = robot.objective.convex
-    seeds = resting_seeds(maximum, ((),) if convex else resting_fins(n))
-    if not convex:
-        seeds = np.concatenate([seeds, rng.random((RANDOM_SEEDS, n)) ** 2 * maximum])
-    count = len(seeds)
-    found = descend(problem, np.repeat(target, count, axis=0), np.tile(seeds, (rows, 1)), FIRST_STEPS)
-    force, cost = _told(robot, target, found, count)
-    if not convex:
-        best = np.argsort(cost, axis=1)[:, :KEPT]
-        flat = np.take_along_axis(found.size.reshape(rows, count, n), best[..., None], axis=1)
-        found = descend(problem, np.repeat(target, best.shape[1], axis=0), flat.reshape(-1, n), LAST_STEPS)
-        more, further = _told(robot, target, found, best.shape[1])
-        force, cost = np.concatenate([more, force], axis=1), np.concatenate([further, cost], axis=1)
+    # A start's small forces are as good as at rest, so few or many fins work.
+    size = rng.random((rows * STARTS, n)) ** rng.uniform(1.0, 8.0, (rows * STARTS, 1)) * maximum
+    start = size * np.exp(1j * rng.uniform(-np.pi, np.pi, size.shape))
+    found = descend(problem, np.repeat(target, STARTS, axis=0), start, FIRST_STEPS)
+    force, cost = _told(robot, target, found)
+    best = np.argsort(cost, axis=1)[:, :KEPT]
+    again = np.take_along_axis(force, best[..., None], axis=1).reshape(-1, n)
+    found = descend(problem, np.repeat(target, KEPT, axis=0), again, LAST_STEPS)
+    more, further = _told(robot, target, found)
+    force, cost = np.concatenate([more, force], axis=1), np.concatenate([further, cost], axis=1)
     return _different(force, cost, maximum)
 
 
-def _told(robot: RandomRobot, target: Array, found: Planar, count: int) -> tuple[Array, Array]:
+def _told(robot: RandomRobot, target: Array, found: Projected) -> tuple[AnyArray, Array]:
     """Forces (N, S, n), complex, and costs (N, S), infinite where the target is missed."""
-    _, cost = realize(robot.problem, found)
-    missed = np.linalg.norm(found.residual, axis=1)
-    strength = np.linalg.norm(np.tile(robot.problem.fins.maximum, 2)[:, None] * robot.problem.effectiveness)
+    problem, count = robot.problem, len(found.size) // len(target)
+    _, cost = realize(problem, found)
+    missed = np.linalg.norm(np.repeat(target, count, axis=0) - wrench(problem, found.force), axis=1)
+    strength = np.linalg.norm(np.repeat(problem.fins.maximum, 2)[:, None] * problem.effectiveness)
     allowed = EXACT * np.minimum(np.linalg.norm(target, axis=1) + 1e-2 * strength, strength)
     cost = np.where(missed <= np.repeat(allowed, count), cost, np.inf)
-    force = found.size * np.exp(1j * found.direction)
-    return force.reshape(len(target), count, -1), cost.reshape(len(target), count)
+    return found.force.reshape(len(target), count, -1), cost.reshape(len(target), count)
 
 
-def root_share(force: Array, largest: Array) -> Array:
+def root_share(force: AnyArray, largest: Array) -> AnyArray:
     """Forces (..., n), complex, as roots of shares of the largest ones (n,): small ones count, too."""
     share = force / largest
     return np.asarray(share / np.sqrt(np.abs(share) + 1e-12))
 
 
-def _different(force: Array, cost: Array, largest: Array) -> Ways:
+def _different(force: AnyArray, cost: Array, largest: Array) -> Ways:
     """The cheapest of each group of answers that are nearly the same."""
     rows, _, n = force.shape
     place, cost = np.arange(rows), cost.copy()

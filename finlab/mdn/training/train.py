@@ -1,6 +1,6 @@
-"""`finlab train mdn`: a joint mixture over all fins' forces, taught by the exact search.
+"""`finlab train mdn`: a joint mixture over all fins' forces, taught by descents from many starts.
 
-One process lets the search answer random targets on random robots and writes shards; this one learns from
+One process answers random targets on random robots and writes shards; this one learns from
 what there is. The loss is the mixture's negative log-likelihood of the different ways to deliver a target,
 weighted by their costs: so components come to stand for ways, and the cheapest way's gets the largest weight.
 """
@@ -73,7 +73,7 @@ def train_mdn(
         trained = TrainedWeights(out.name, normalization, sizes_for_file(recipe.network), network)
         save_checkpoint(out, replace(trained, preset=preset, training={"mdn": run}))
 
-    # What takes the search a second takes a network in one process as long: each gets a core.
+    # What takes the teacher a second takes a network in one process as long: each gets a core.
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
     folder = out / "answers"

@@ -3,24 +3,23 @@
 import numpy as np
 import pytest
 
-from finlab.forces.force_space import polar, realize
+from finlab.mdn.descent import realize, wrench
 from finlab.mdn.training.random_robots import FinPool, RandomRobot, random_robot, random_targets
 from finlab.mdn.training.teacher import APART, DEAREST, Ways, root_share, shares_of_ways, ways_to_deliver
-from finlab.physics.objective import Name
 
 STD = np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.34])
 
 
-def told(objective: Name) -> tuple[RandomRobot, np.ndarray, Ways]:
+def told() -> tuple[RandomRobot, np.ndarray, Ways]:
     rng = np.random.default_rng(6)
-    robot = random_robot(rng, FinPool(rng, 2), 6, objective, STD)
+    robot = random_robot(rng, FinPool(rng, 2), 6, STD)
     target = random_targets(rng, robot, 12)
     return robot, target, ways_to_deliver(rng, robot, target)
 
 
 @pytest.fixture(scope="module")
 def effort() -> tuple[RandomRobot, np.ndarray, Ways]:
-    return told("effort")
+    return told()
 
 
 def test_ways_deliver_the_target_at_the_cost_that_is_told(
@@ -31,10 +30,8 @@ def test_ways_deliver_the_target_at_the_cost_that_is_told(
     assert known[:, 0].mean() > 0.8
     for row, k in np.argwhere(known):
         force = ways.force[row, k]
-        wrench = np.concatenate([force.real, force.imag]) @ robot.problem.effectiveness
-        assert np.linalg.norm(wrench - target[row]) < 0.05
-        planar = polar(robot.problem, np.stack([force.real, force.imag], axis=-1)[None])
-        _, cost = realize(robot.problem, planar)
+        assert np.linalg.norm(wrench(robot.problem, force[None])[0] - target[row]) < 0.05
+        _, cost = realize(robot.problem, robot.problem.fins.project(force[None]))
         assert cost[0] == pytest.approx(ways.cost[row, k], rel=0.02)
 
 
@@ -49,12 +46,6 @@ def test_ways_differ_and_the_cheapest_comes_first(effort: tuple[RandomRobot, np.
         assert (np.diff(cost[found]) >= 0).all() and cost[found[-1]] <= DEAREST * cost[0]
         for k in found[1:]:
             assert np.abs(root[row, k] - root[row, :k]).mean(-1).min() >= APART
-
-
-def test_power_has_but_one_way() -> None:
-    _, _, ways = told("power")
-    assert np.isfinite(ways.cost[:, 0]).mean() > 0.8
-    assert not np.isfinite(ways.cost[:, 1:]).any()
 
 
 def test_weights_fall_with_the_cost() -> None:

@@ -1,0 +1,37 @@
+"""What can be set of method `mdn`, and the same names for editors and type checkers."""
+
+from dataclasses import dataclass
+from typing import TypedDict
+
+from finlab.allocation.settings import MOST_CANDIDATES, Settings, number
+from finlab.physics.effort import DEFAULT_WEIGHTS, EffortWeights
+from finlab.physics.objective import Objective
+
+
+@dataclass(frozen=True)
+class MdnSettings(Settings):
+    """How many ways the mixture proposes, and how many of them are refined."""
+
+    n_candidates: int = number(
+        32, 1, MOST_CANDIDATES, "proposals K: the components' means by falling weight, then samples"
+    )
+    n_refined: int = number(6, 1, 256, "proposals that are refined and offered as candidates")
+    temperature: float = number(1.0, 0.0, 100.0, "what the variances of the samples are multiplied by")
+    period_s: float = number(0.1, 0.0, 1000.0, "time between ticks", "s", above=True)
+    effort_weights: EffortWeights = DEFAULT_WEIGHTS
+    """Weights of the effort."""
+
+    @property
+    def aim(self) -> Objective:
+        """What is kept least."""
+        return Objective("effort", self.effort_weights)
+
+
+class MdnOptions(TypedDict, total=False):
+    """Settings of the method `mdn`."""
+
+    n_candidates: int
+    n_refined: int
+    temperature: float
+    period_s: float
+    effort_weights: EffortWeights

@@ -1,0 +1,154 @@
+"""From proposed forces to exact answers: descent, Levenberg-Marquardt on commands, the least effort there."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.allocation.levenberg_marquardt import Refined, refine
+from finlab.arrays import AnyArray, Array
+from finlab.mdn.descent import EffortProblem, descend, realize, wrench
+from finlab.mdn.effort_fins import Projected
+from finlab.mdn.polish import polish
+from finlab.mdn.robot import EffortRobot
+
+PROMISING = 0.02
+"""Normalized error in force space below which a descent has succeeded: refinement removes the rest."""
+SAME = 1e-3
+"""Share by which efforts differ at least of descents that are refined as two."""
+INEXACT = 1e9
+"""Rank of inexact answers, behind every exact one. Efforts reach thousands where an arc of zero directions
+ends near zero, since the effort divides by that end."""
+
+
+OTHER, NOW = -1, -2
+"""Origins of answers that no network has proposed: other starts, and how the robot moves now."""
+
+
+class Steps(NamedTuple):
+    """How long proposals are followed."""
+
+    descent: int = 8
+    """Quadratic problems in force space."""
+    first: int = 2
+    """Levenberg-Marquardt steps from there onto the target."""
+    polish: int = 6
+    """Most quadratic problems in commands."""
+    last: int = 1
+    """Levenberg-Marquardt steps at the end."""
+
+
+class Answers(NamedTuple):
+    """P refined answers to each of N targets, best first: the exact ones by effort, then the others."""
+
+    command: Array
+    """(N, P, n, 3)."""
+    wrench: Array
+    """Normalized wrench (N, P, 6)."""
+    error: Array
+    """Normalized error (N, P)."""
+    effort: Array
+    """(N, P)."""
+    origin: NDArray[np.intp]
+    """Number of the proposal that each came from (N, P), or `OTHER` or `NOW`."""
+
+    def rows(self, rows: NDArray[np.bool_]) -> "Answers":
+        """Those to some of the targets."""
+        return Answers._make(values[rows] for values in self)
+
+    def columns(self, places: NDArray[np.intp] | slice) -> "Answers":
+        """Some of the answers to each target."""
+        return Answers._make(values[:, places] for values in self)
+
+    def before(self, other: "Answers") -> "Answers":
+        """These answers, then others."""
+        return Answers._make(np.concatenate(both, axis=1) for both in zip(self, other, strict=True))
+
+    def replace(self, rows: NDArray[np.bool_], by: "Answers") -> None:
+        """Put other answers in the place of those to some targets, in place."""
+        for kept, new in zip(self, by, strict=True):
+            kept[rows] = new
+
+
+def follow(
+    robot: EffortRobot, target: Array, force: AnyArray, keep: int, steps: Steps, kept: int = 0
+) -> Answers:
+    """Answers to normalized targets (N, 6) from proposed forces (N, K, n), complex.
+
+    Args:
+        robot: the robot.
+        target: normalized wrenches.
+        force: proposals for each.
+        keep: how many of the most promising descents are refined.
+        steps: how long.
+        kept: number of proposals, the first ones, that are refined whatever they promise.
+    """
+    rows, count, n = force.shape
+    each = np.repeat(target, count, axis=0)
+    found = descend(robot.forces, each, force.reshape(-1, n).astype(complex), steps.descent)
+    command, score = _promises(robot.forces, each, found)
+    score = score.reshape(rows, count)
+    score[:, :kept] = -1.0
+    chosen = _distinct(score)[:, :keep]
+    command = command.reshape(rows, count, n, 3)[np.arange(rows)[:, None], chosen]
+    return refined(robot, target, command, chosen, steps)
+
+
+def refined(
+    robot: EffortRobot, target: Array, command: Array, origin: NDArray[np.intp], steps: Steps
+) -> Answers:
+    """Answers to normalized targets (N, 6) near commands (N, P, n, 3)."""
+    rows, count, n, _ = command.shape
+    each = np.repeat(target, count, axis=0)
+    near = refine(robot.commands, each, command.reshape(-1, n, 3), steps.first)
+    if steps.polish:
+        near = _polished(robot, each, near, steps)
+    effort = robot.effort(near.command)
+    parts = [values.reshape(rows, count, *values.shape[1:]) for values in (*near, effort)]
+    return ranked(robot, Answers._make([*parts, origin]))
+
+
+def ranked(robot: EffortRobot, answers: Answers, bonus: float = 0.0) -> Answers:
+    """Answers, best first; the effort of the first counts less by a share `bonus`."""
+    score = answers.effort.copy()
+    score[:, 0] *= 1.0 - bonus
+    score = np.where(answers.error > robot.exact, INEXACT * (1.0 + answers.error), score)
+    order = score.argsort(axis=1, kind="stable")
+    place = np.arange(len(order))[:, None]
+    return Answers._make(values[place, order] for values in answers)
+
+
+def _polished(robot: EffortRobot, target: Array, near: Refined, steps: Steps) -> Refined:
+    """The least effort near refined commands, exact where these were."""
+    # What is far out of reach would only drive the multipliers out of bounds.
+    hopeful = near.error <= 1.0
+    if not hopeful.any():
+        return near
+    start = near if hopeful.all() else Refined(*(values[hopeful] for values in near))
+    better = polish(robot.commands, robot.effort, target[hopeful], start, steps.polish)
+    better = refine(robot.commands, target[hopeful], better.command, steps.last)
+    worse = (better.error > robot.exact) & (start.error <= robot.exact)
+    result = Refined(*(values.copy() for values in near))
+    place = np.flatnonzero(hopeful)[~worse]
+    for whole, part in zip(result, better, strict=True):
+        whole[place] = part[~worse]
+    return result
+
+
+def _promises(problem: EffortProblem, target: Array, found: Projected) -> tuple[Array, Array]:
+    """Commands (R, n, 3) at the ends of descents, and what these are sorted by (R,)."""
+    command, effort = realize(problem, found)
+    left = target - wrench(problem, found.force)
+    error = np.sqrt(np.einsum("ri,ri->r", left, left))
+    return command, np.where(error > PROMISING, INEXACT * (1.0 + error), effort)
+
+
+def _distinct(score: Array) -> NDArray[np.intp]:
+    """Places (N, K) of scores, the least first, those that hardly differ from one before them last: several
+    proposals mostly lead to the same forces."""
+    order = score.argsort(axis=1, kind="stable")
+    sorted_score = np.take_along_axis(score, order, axis=1)
+    again = np.zeros(order.shape, bool)
+    again[:, 1:] = np.diff(sorted_score) <= SAME * np.abs(sorted_score[:, :-1])
+    found: NDArray[np.intp] = np.take_along_axis(order, again.argsort(axis=1, kind="stable"), axis=1)
+    return found

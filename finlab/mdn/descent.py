@@ -1,0 +1,148 @@
+"""From rough forces to the least effort near them that delivers a wrench, in the space of planar forces.
+
+Each fin gives a planar force y_i, so the wrench is linear: w = sum_i B_i y_i. The effort of a force grows
+more slowly than the force, so the cheapest allocation rests some fins, and there are many local minima. Each
+proposal is driven downhill by solving, again and again, the quadratic problem that touches the efforts at
+the present forces from above,
+
+    min sum_i g_i (y - y_i) + 1/2 (y - y_i) H_i (y - y_i)   s.t.   sum_i B_i y_i = w,
+
+through its six multipliers l: y = shift + M B_i^T l with M = H^-1. Along a force, H is the curvature of the
+quadratic about the origin that touches the effort, or the effort's own where it is convex; across the force
+it is (dc/dT) / T. A fin that is asked for more than it can has all its mobility cut in proportion, again and
+again until it holds; one at a stop of its arc does not turn.
+
+Planar forces are complex numbers (see `effort_fins`). A symmetric 2 x 2 matrix M maps p to a p + b conj(p),
+with a real.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from finlab.arrays import AnyArray, Array
+from finlab.layout.angles import wrapped
+from finlab.mdn.effort_fin import (
+    AMPLITUDE,
+    DEFLECTION,
+    DRIFT,
+    EFFORT,
+    FREQUENCY,
+    MOBILITY,
+    STIFFNESS,
+)
+from finlab.mdn.effort_fins import LEAST, EffortFins, Projected
+from finlab.small_systems import solve
+
+RIDGE = 1e-9
+"""Relative regularization of the 6 x 6 systems."""
+HALF_STEPS = 5
+"""Steps after which forces go only half the way: those that are not settled by then jump to and fro."""
+
+
+class EffortProblem(NamedTuple):
+    """One robot of n fins as the descent sees it."""
+
+    effectiveness: Array
+    """Normalized wrench per newton (2n, 6), of each fin's horizontal and vertical force in turn."""
+    products: Array
+    """What a, real b and imaginary b of each fin's M add to B M B^T (3n, 36), slightly regularized."""
+    fins: EffortFins
+    """What the fins can do, and with what effort."""
+    direction_cost: Array
+    """Effort per squared zero direction (n,) [1/rad^2]."""
+    idle_direction: Array
+    """Zero direction (n,) [rad] to which a fin at rest turns."""
+
+
+def effort_problem(
+    effectiveness: Array, fins: EffortFins, direction_cost: Array, idle_direction: Array
+) -> EffortProblem:
+    """A problem from normalized wrenches (n, 2, 6) per newton of each fin's planar force."""
+    x, z = effectiveness[:, 0], effectiveness[:, 1]
+    xx, xz, zz = (np.einsum("ni,nj->nij", *pair) for pair in ((x, x), (x, z), (z, z)))
+    products = np.concatenate([xx + zz, xx - zz, xz + xz.swapaxes(1, 2)])
+    # The ridge of a sum is the sum of the ridges.
+    products += RIDGE * np.trace(products, axis1=1, axis2=2)[:, None, None] * np.eye(6)
+    flat = np.ascontiguousarray(effectiveness.reshape(-1, 6))
+    return EffortProblem(
+        flat, np.ascontiguousarray(products.reshape(-1, 36)), fins, direction_cost, idle_direction
+    )
+
+
+class _Response(NamedTuple):
+    """How R rows of n fins answer a pull p: with shift + a p + b conj(p).
+
+    A fin at a stop does not turn, whatever is pulled; whether it leaves the stop is seen from how it would
+    answer if there were none.
+    """
+
+    shift: AnyArray
+    a: Array
+    b: AnyArray
+    free: "tuple[AnyArray, Array, AnyArray]"
+    """The three as if fins had no stops."""
+
+
+def descend(problem: EffortProblem, target: Array, force: AnyArray, steps: int) -> Projected:
+    """Follow R forces (R, n) to cheap ones that give normalized targets (R, 6), in `steps` problems."""
+    fins = problem.fins
+    found = fins.project(force)
+    cut = np.ones(force.shape)
+    before = found.force
+    for step in range(steps):
+        response = _respond(problem, found, cut)
+        missing = target - wrench(problem, response.shift)
+        matrix = np.concatenate([response.a, response.b.real, response.b.imag], axis=1) @ problem.products
+        matrix[:, ::7] += LEAST  # the diagonal
+        multiplier = solve(matrix.reshape(-1, 6, 6), missing[..., None])[..., 0]
+        pull = (multiplier @ problem.effectiveness.T).view(complex)
+        shift, a, b = response.free
+        answer = shift + a * pull + b * pull.conj()
+        if step >= HALF_STEPS:
+            answer = 0.5 * (answer + before)
+        before = answer
+        found = fins.project(answer)
+        cut = np.minimum(cut * found.boundary.largest / np.maximum(found.wanted, LEAST), 1.0)
+    return found
+
+
+def wrench(problem: EffortProblem, force: AnyArray) -> Array:
+    """Normalized wrenches (R, 6) of planar forces (R, n), complex."""
+    return np.ascontiguousarray(force).view(float) @ problem.effectiveness
+
+
+def realize(problem: EffortProblem, found: Projected) -> tuple[Array, Array]:
+    """Commands (R, n, 3) that give forces with the least effort, and that effort (R,)."""
+    row = problem.fins.lookup(found.boundary, found.size)
+    turn = wrapped(found.direction - row[..., DEFLECTION])
+    command = np.stack([row[..., AMPLITUDE], row[..., FREQUENCY], turn], axis=-1)
+    effort = row[..., EFFORT] + problem.direction_cost * turn * turn
+    return command, effort.sum(-1)
+
+
+def _respond(problem: EffortProblem, found: Projected, cut: Array) -> _Response:
+    """The response of the quadratics that touch the efforts at the present forces, all of it `cut`."""
+    row = problem.fins.lookup(found.boundary, found.size)
+    across = np.exp(row[..., MOBILITY])
+    across *= cut
+    softness = 1.0 / row[..., STIFFNESS]
+    along = across * softness
+    turn = wrapped(found.direction - row[..., DEFLECTION])
+    size = np.maximum(found.size, LEAST)
+    # Turning towards where that costs nothing: the weaker the force, the less of it does.
+    pull = 2.0 * problem.direction_cost * across / size
+    held = 1.0 / (1.0 + pull / size)
+    drift = (row[..., DRIFT] * cut + pull * turn) * held
+    across = across * held
+    unit = found.unit
+    kept = (found.size * (1.0 - softness)) * cut * unit
+    drifting = kept - 1j * drift * unit
+    squared = unit * unit
+    a, b = 0.5 * (along + across), 0.5 * (along - across) * squared
+    free = drifting, a, b
+    if found.stopped is None:
+        return _Response(drifting, a, b, free)
+    across = np.where(found.stopped, 0.0, across)
+    shift = np.where(found.stopped, kept, drifting)
+    return _Response(shift, 0.5 * (along + across), 0.5 * (along - across) * squared, free)
