@@ -152,7 +152,7 @@ class LeastErrorMethod(Method):
     ) -> Solution:
         """See `Method`."""
         if len(targets) == 0:
-            return Solution(np.empty((0, self.layout.n_fins, 3)))
+            return Solution(np.empty((0, self.layout.n, 3)))
         if (moved := self.at(flow)) is not self:
             return moved.solve(targets, policy=policy, previous=previous, seed=seed)
         solution = self._solve(targets, seed=seed, previous=previous)

@@ -52,7 +52,7 @@ def usable_fins(layout: Layout, failed: Sequence[str], health: Health | None = N
             raise AllocationError(f"health: expected a Health, got {health!r}; make one with Health.of")
         layout = health.applied_to(layout)
     if failed == () or failed == []:
-        return Fins(layout, (), layout, np.ones(layout.n_fins, dtype=bool))
+        return Fins(layout, (), layout, np.ones(layout.n, dtype=bool))
     if isinstance(failed, str):
         raise AllocationError(
             f"failed: expected a list of fin names, got the text {failed!r}; write [{failed!r}]"
@@ -123,13 +123,13 @@ def check_previous(previous: ArrayLike, layout: Layout) -> Array:
         array = np.array(previous, dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise CommandError(
-            f"previous: expected a command of shape ({layout.n_fins}, 3), got {previous!r}"
+            f"previous: expected a command of shape ({layout.n}, 3), got {previous!r}"
         ) from error
     if np.isinf(array).any():
         raise CommandError("previous: expected finite commands (NaN only for failed fins), got infinity")
-    if array.shape != (layout.n_fins, 3):
+    if array.shape != (layout.n, 3):
         raise CommandError(
-            f"previous: expected a command of shape ({layout.n_fins}, 3) for layout {layout.name!r}, "
+            f"previous: expected a command of shape ({layout.n}, 3) for layout {layout.name!r}, "
             f"got shape {array.shape}; pass the `command` of the last allocation"
         )
     return array

@@ -26,6 +26,7 @@ def export(
         checkpoint: of mdn, the shipped one by default.
     """
     from finlab.cli.inputs import open_robot
+    from finlab.cli.layout_table import counted
     from finlab.errors import FinlabError
     from finlab.layout.load import SUFFIX
 
@@ -45,7 +46,7 @@ def export(
 
         graph = build_graph(allocator, failed)
         write_graph_and_tables(graph, output)
-        print(f"{output}: {robot.layout.n_fins} fins, {len(graph.self_test)} self-tests, method {method}")
+        print(f"{output}: {counted(robot.layout)}, {len(graph.self_test)} self-tests, method {method}")
         return
     from finlab.deploy.bundle import make_bundle
 
@@ -56,5 +57,5 @@ def export(
     else:
         bundle.write(output)
     size = sum(map(len, bundle.files.values())) / 1e6
-    print(f"{output}: {robot.layout.n_fins} fins, {len(bundle.files)} files, {size:.2f} MB")
+    print(f"{output}: {counted(robot.layout)}, {len(bundle.files)} files, {size:.2f} MB")
     print(f"check it on the robot: finlab-runtime check {output.name}")

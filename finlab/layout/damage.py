@@ -16,8 +16,12 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from finlab.errors import AllocationError
+from finlab.layout.actuator import Actuator
+from finlab.layout.azimuth import Azimuth
 from finlab.layout.fin import Fin, Limits
 from finlab.layout.layout import Layout
+from finlab.layout.rudder import Rudder
+from finlab.layout.thruster import Thruster
 
 Kind = Literal["lost", "weak", "torn", "stuck", "running", "whole"]
 """What may be true of a fin."""
@@ -109,6 +113,7 @@ class Health:
 
         Raises:
             LayoutError: there is no fin of a name, or a fin that is a table is said to have lost thrust.
+            AllocationError: an actuator that is no fin cannot be damaged so.
         """
         return _applied(self, layout)
 
@@ -118,18 +123,38 @@ def _applied(health: Health, layout: Layout) -> Layout:
     weak, stuck, running = dict(health.weak), dict(health.stuck), dict(health.running)
     thrust = dict(health.thrust)
     layout.indices((*weak, *stuck, *running, *thrust))
-    return replace(
-        layout,
-        actuators=tuple(
-            _damaged(
-                fin if fin.name not in thrust else replace(fin, model=fin.model.scaled(thrust[fin.name])),
-                weak.get(fin.name),
-                stuck.get(fin.name),
-                running.get(fin.name),
-            )
-            for fin in layout.fins
-        ),
-    )
+    parts: list[Actuator] = []
+    for part in layout.actuators:
+        name = part.name
+        if not isinstance(part, Fin):
+            if name in running or name in thrust:
+                raise AllocationError(
+                    f"health of {name!r}: {part.type}s may be weak or failed, and azimuths stuck; only fins "
+                    "run on or lose thrust"
+                )
+            parts.append(_damaged_other(part, weak.get(name), stuck.get(name)))
+            continue
+        fin = part if name not in thrust else replace(part, model=part.model.scaled(thrust[name]))
+        parts.append(_damaged(fin, weak.get(name), stuck.get(name), running.get(name)))
+    return replace(layout, actuators=tuple(parts))
+
+
+def _damaged_other(
+    part: Thruster | Azimuth | Rudder, share: float | None, angle: float | None
+) -> Thruster | Azimuth | Rudder:
+    """The actuator, no fin, with the limits that are left of it."""
+    if share is not None:
+        if isinstance(part, Rudder):
+            raise AllocationError(f"health of {part.name!r}: a rudder is failed or whole, not weak")
+        low, high = part.force
+        least = min(low, share * high) if isinstance(part, Azimuth) else share * low
+        part = replace(part, force=(least, share * high))
+    if angle is not None:
+        if not isinstance(part, Azimuth):
+            raise AllocationError(f"stuck {part.name!r}: only fins and azimuths turn")
+        held = _held(angle, part.arc)
+        part = replace(part, arc=(held, held))
+    return part
 
 
 def _damaged(fin: Fin, share: float | None, angle: float | None, command: Command | None) -> Fin:
@@ -145,11 +170,14 @@ def _damaged(fin: Fin, share: float | None, angle: float | None, command: Comman
             frequency=_weakened(limits.frequency, share),
         )
     if angle is not None:
-        # Whole turns do not matter; the one within the fin's limits is taken where there is one.
-        turns = round((0.5 * sum(limits.zero_direction) - angle) / (2 * np.pi))
-        held = angle + turns * 2 * np.pi
+        held = _held(angle, limits.zero_direction)
         limits = replace(limits, zero_direction=(held, held))
     return fin if limits is fin.limits else replace(fin, limits=limits)
+
+
+def _held(angle: float, limits: tuple[float, float]) -> float:
+    """The same angle [rad], whole turns off, within limits where there is such a one."""
+    return angle + round((0.5 * sum(limits) - angle) / (2 * np.pi)) * 2 * np.pi
 
 
 def _weakened(interval: tuple[float, float], share: float) -> tuple[float, float]:

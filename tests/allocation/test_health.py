@@ -40,7 +40,7 @@ def test_a_torn_fin_gives_its_share_at_every_command(search: AnyRobot, penta: La
     layout, bow = replace(penta, actuators=fins), penta.index("bow")
     result = search.allocate(layout, TARGET, health=Health.of(thrust={"bow": 0.4}))
     assert result.err_norm < 1e-5
-    told, law = result.forces, Plant(layout).forces(result.command)
+    told, law = result.forces, Plant(layout).fin_forces(result.command)
     assert np.linalg.norm(law[bow]) > 0.01, "the fin is in use"
     np.testing.assert_allclose(told[bow], 0.4 * law[bow], rtol=1e-9)
     np.testing.assert_allclose(np.delete(told, bow, 0), np.delete(law, bow, 0), rtol=1e-9)

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 import yaml
 
-from finlab.errors import LayoutError
+from finlab.errors import AllocationError, LayoutError
 from finlab.layout import Fin, Layout, Thruster, layout_to_dict, load_layout, own_effectiveness, parse_layout
+from finlab.layout.damage import Health
 from finlab.layout.layout import MAX_ACTUATORS
 from finlab.layout.thrust_model import PowerLaw
 from finlab.physics.plant import Plant
@@ -223,3 +224,28 @@ def test_what_works_for_fins_only_says_so():
         tail.only_fins("the app", horizontal=True)
     with pytest.raises(LayoutError, match="'tail'"):
         _ = tail.mounting_angle
+
+
+def test_damage_leaves_the_other_actuators_as_they_are():
+    layout = parse_layout(GOOD)
+    health = Health.of(weak={"side": 0.5, "lift": 0.5, "pod": 0.5}, stuck={"nose": 0.1})
+    damaged = health.applied_to(layout)
+    assert damaged.names == layout.names
+    assert damaged.upper[[0, 2, 3], [0, 0, 1]].tolist() == [0.3, 25.72, 15.0]
+    assert damaged.lower[2, 0] == pytest.approx(-19.955)
+    assert (damaged.lower[4, 0], damaged.upper[4, 0]) == (0.1, 0.1)
+    assert (damaged.actuators[1], damaged.actuators[5]) == (layout.actuators[1], layout.actuators[5])
+
+
+@pytest.mark.parametrize(
+    ("damage", "why"),
+    [
+        ({"stuck": {"lift": 0.1}}, "stuck 'lift': only fins and azimuths turn"),
+        ({"weak": {"rudder": 0.5}}, "'rudder': a rudder is failed or whole"),
+        ({"thrust": {"lift": 0.5}}, "'lift': thrusters may be weak"),
+        ({"running": {"pod": (0.1, 1.0, 0.0)}}, "'pod': azimuths may be weak"),
+    ],
+)
+def test_damage_that_an_actuator_cannot_have_is_refused(damage, why):
+    with pytest.raises(AllocationError, match=why):
+        Health.of(**damage).applied_to(parse_layout(GOOD))
