@@ -32,16 +32,17 @@ KEYS = [
     "wrench_plant",
     "unallocated",
     "err_norm",
+    "expected_error",
     "effort",
     "power",
-    "sigma",
+    "bound",
+    "scale",
     "solve_ms",
     "method",
     "checkpoint",
     "reachable",
-    "scale",
+    "share",
     "binding",
-    "evaluated_by",
     "unknown_fins",
     "notes",
 ]
@@ -52,13 +53,11 @@ def refuse_constant(name: str) -> float:
 
 
 @pytest.fixture
-def allocate(
-    untrained_checkpoint: Path, capsys: pytest.CaptureFixture[str]
-) -> Callable[..., tuple[int, str, str]]:
+def allocate(capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]]:
     """Runs `finlab allocate` and returns exit code, stdout and stderr."""
 
     def run(*argv: str) -> tuple[int, str, str]:
-        code = main(["allocate", *argv, "--checkpoint", str(untrained_checkpoint)])
+        code = main(["allocate", *argv])
         captured = capsys.readouterr()
         return code, captured.out, captured.err
 
@@ -80,9 +79,13 @@ def test_json_has_the_keys_of_the_contract(allocate: Callable[..., tuple[int, st
     assert [len(row) for row in result["command"]] == [3, 3, 3, 3]
     assert result["target"] == [1.0, 0.0, -0.5, 0.0, 0.0, 0.1]
     assert result["method"] == "dual" and result["checkpoint"] is None
+    for told, row in zip(result["actuators"], result["command"], strict=True):
+        assert told["type"] == "fin" and len(told["force_n"]) == 3
+        assert list(told["command"]) == ["amplitude_rad", "frequency_hz", "zero_direction_rad"]
+        assert list(told["command"].values()) == row
     gap = [t - w for t, w in zip(result["target"], result["wrench_plant"], strict=True)]
     assert result["unallocated"] == pytest.approx(gap)
-    scaled = sum((g / s) ** 2 for g, s in zip(gap, result["sigma"], strict=True)) ** 0.5
+    scaled = sum((g / s) ** 2 for g, s in zip(gap, result["scale"], strict=True)) ** 0.5
     assert result["err_norm"] == pytest.approx(scaled)
 
 
@@ -145,7 +148,7 @@ def test_table_for_people(allocate: Callable[..., tuple[int, str, str]]) -> None
     labels = [line.split()[0] for line in lines if line]
     assert labels[5:10] == ["Fx", "asked", "delivered", "missing", "err_norm"]
     assert "1.000   0.000  -0.500     0.000     0.000     0.100" in out
-    assert re.search(r"err_norm \S+   power \d+\.\d{3} W   effort \d+\.\d{3}   .* ms   method search\n", out)
+    assert re.search(r"err_norm \S+   power \d+\.\d{3} W   effort \d+\.\d{3}   .* ms   method dual\n", out)
 
 
 def test_says_in_words_what_is_not_reached(allocate: Callable[..., tuple[int, str, str]]) -> None:
@@ -183,7 +186,7 @@ def test_shipped_name_works_from_any_folder(
             ["D", *WRENCH, *["--failed", "front_right", "--failed", "back", "--failed", "front_left"]],
             "has no fin left",
         ),
-        (["A", *WRENCH, "--method", "magic"], "method: expected one of search, mdn, paper"),
+        (["A", *WRENCH, "--method", "magic"], "method: expected one of dual, mdn, paper"),
         (["A", *WRENCH, "--method", "learned"], "method: 'learned' is now called 'dual'"),
         (["A", *WRENCH, "--method", "fast"], "method: 'fast' has gone; 'dual' is exact on any fin"),
         (["A", *WRENCH, "--objective", "money"], "--objective"),
@@ -203,7 +206,7 @@ def test_bad_arguments_are_one_plain_message(
 
 
 def test_missing_checkpoint_is_named(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["allocate", "A", *WRENCH, "--checkpoint", "elsewhere/"]) == 2
+    assert main(["allocate", "A", *WRENCH, "--method", "mdn", "--checkpoint", "elsewhere/"]) == 2
     assert "elsewhere: no such checkpoint folder" in capsys.readouterr().err
 
 
@@ -257,17 +260,8 @@ def test_hostile_files_end_in_one_sentence(
     assert not (tmp_path / "pwned").exists()
 
 
-def test_whole_program(untrained_checkpoint: Path, tmp_path: Path) -> None:
-    command = [
-        sys.executable,
-        "-m",
-        "finlab",
-        "allocate",
-        "A",
-        "--checkpoint",
-        str(untrained_checkpoint),
-        "--json",
-    ]
+def test_whole_program(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "finlab", "allocate", "A", "--json"]
     environment = os.environ | {"OMP_NUM_THREADS": "1"}
 
     def run(*argv: str) -> subprocess.CompletedProcess[str]:
@@ -297,6 +291,6 @@ def test_a_bound_is_told_on_request(capsys: pytest.CaptureFixture[str]) -> None:
     answer = json.loads(capsys.readouterr().out)
     assert 0.98 * answer["power"] <= answer["bound"] <= answer["power"]
     assert main(["allocate", "A", *wrench, "--bound"]) == 0
-    assert f"no exact answer has less power than {answer['bound']:.4g} W" in capsys.readouterr().out
+    assert f"no exact answer takes less than {answer['bound']:.4g} W" in capsys.readouterr().out
     assert main(["allocate", "A", *wrench, "--bound", "--method", "qp"]) == 2
-    assert "method 'qp' proves no lower bound" in capsys.readouterr().err
+    assert "bound: method 'qp' proves none" in capsys.readouterr().err

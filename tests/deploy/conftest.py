@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 import finlab
-from finlab.allocation import Allocator
 from finlab.deploy.bundle import Bundle, make_bundle
 from finlab.layout import FinModelSpec, Layout
 from finlab.physics import make_law, write_table
@@ -15,13 +14,13 @@ from tests.any_robot import AnyRobot
 
 
 @pytest.fixture(scope="session")
-def shipped_allocator() -> Allocator:
+def shipped_allocator() -> AnyRobot:
     """The product's default."""
     return AnyRobot()
 
 
 @pytest.fixture(scope="session")
-def bundle(shipped_allocator: Allocator) -> Bundle:
+def bundle(shipped_allocator: AnyRobot) -> Bundle:
     """Layout A for the product's default."""
     return make_bundle(shipped_allocator.on(finlab.load_layout("A")))
 
@@ -46,6 +45,6 @@ def measured(force_table: Path) -> Layout:
 
 
 @pytest.fixture(scope="session")
-def measured_bundle(measured: Layout, shipped_allocator: Allocator) -> Bundle:
+def measured_bundle(measured: Layout, shipped_allocator: AnyRobot) -> Bundle:
     """That robot for the product's default."""
     return make_bundle(shipped_allocator.on(measured))

@@ -5,7 +5,9 @@ import json
 import os
 import zipfile
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -57,51 +59,45 @@ def test_folder_and_archive_hold_the_same_and_come_back(bundle: Bundle, tmp_path
     assert sorted(path.name for path in tmp_path.iterdir()) == ["A", "A.zip"], "nothing else is left behind"
 
 
-def test_the_library_reads_it(bundle: Bundle, shipped_allocator: Allocator, tmp_path: Path) -> None:
+def test_the_library_reads_it(bundle: Bundle, shipped_allocator: AnyRobot, tmp_path: Path) -> None:
     bundle.write(tmp_path / "A")
     bundle.write_zip(tmp_path / "A.zip")
-    layout = finlab.load_layout("A")
-    truth = shipped_allocator.allocate(layout, WRENCH)
-    for allocator in (
-        AnyRobot(tmp_path / "A"),
-        AnyRobot(str(tmp_path / "A.zip")),
-        AnyRobot("dual", checkpoint=tmp_path / "A"),
-    ):
-        assert allocator.allocate(layout, WRENCH) == truth
-    sqp = AnyRobot("sqp", checkpoint=tmp_path / "A.zip")
-    np.testing.assert_array_equal(sqp.normalization.std, shipped_allocator.normalization.std)
-    with pytest.raises(AllocationError, match="method: expected one of"):
-        AnyRobot(tmp_path / "A", checkpoint="default")
+    truth = shipped_allocator.allocate(finlab.load_layout("A"), WRENCH)
+    for place in (tmp_path / "A", str(tmp_path / "A.zip")):
+        assert Allocator.from_bundle(place).allocate(WRENCH) == truth
+    assert Allocator.from_bundle(tmp_path / "A.zip", "sqp").method == "sqp"
     with pytest.raises(AllocationError, match="method: expected one of .* got 'nowhere'"):
-        AnyRobot("nowhere")
+        Allocator.from_bundle(tmp_path / "A", "nowhere")
     with pytest.raises(
         DataError, match="holds no networks, which method 'mdn' needs; export .* --method mdn`"
     ):
-        AnyRobot("mdn", checkpoint=tmp_path / "A")
+        Allocator.from_bundle(tmp_path / "A", "mdn")
     with pytest.raises(DataError, match="method 'paper' does not run from a bundle; name its checkpoint"):
-        AnyRobot("paper", checkpoint=tmp_path / "A")
+        Allocator.from_bundle(tmp_path / "A", "paper")
 
 
 def test_networks_travel_for_the_method_that_needs_them(
     with_networks: Bundle, untrained_mdn: Path, tmp_path: Path
 ) -> None:
     with_networks.write(tmp_path)
-    layout, desk = finlab.load_layout("A"), AnyRobot("mdn", checkpoint=untrained_mdn)
+    desk = Allocator(finlab.load_layout("A"), "mdn", checkpoint=untrained_mdn)
     for name in ("config.json", "model.safetensors"):
         assert with_networks.files[f"checkpoint/{name}"] == (untrained_mdn / name).read_bytes()
-    for allocator in (AnyRobot(tmp_path), AnyRobot("mdn", checkpoint=tmp_path)):
-        assert allocator.allocate(layout, WRENCH) == desk.allocate(layout, WRENCH)
-    plain = AnyRobot("dual", checkpoint=tmp_path)
-    assert plain.name == "dual" and set(plain.options) < set(desk.options)
+    for allocator in (
+        Allocator.from_bundle(tmp_path),
+        Allocator(finlab.load_layout("A"), "mdn", checkpoint=tmp_path),
+    ):
+        assert allocator.allocate(WRENCH) == desk.allocate(WRENCH)
+    assert Allocator.from_bundle(tmp_path, "dual").method == "dual"
     assert load_robot(tmp_path).graph.checkpoint_sha256 == desk.weights.sha256  # type: ignore[union-attr]
 
 
 def test_the_command_line_takes_a_bundle_with_its_lost_fins(
-    shipped_allocator: Allocator, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    shipped_allocator: AnyRobot, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     make_bundle(shipped_allocator.on(finlab.load_layout("A")), ("back_left",)).write_zip(tmp_path / "A.zip")
     robot = str(tmp_path / "A.zip")
-    line = ["allocate", robot, "--checkpoint", robot, "--wrench", "1", "0", "0.5", "0", "0", "0", "--json"]
+    line = ["allocate", robot, "--wrench", "1", "0", "0.5", "0", "0", "0", "--json"]
     assert main(line) == 0
     values = json.loads(capsys.readouterr().out)
     assert values["failed"] == ["back_left"] and values["method"] == "dual"
@@ -111,8 +107,9 @@ def test_settings_travel_and_can_be_changed(tmp_path: Path) -> None:
     weights = EffortWeights(1.0, 0.5, 0.0, 0.0, 0.25)
     desk = AnyRobot(n_refined=2, search_steps=9, objective="effort", effort_weights=weights, copper_loss=0.5)
     make_bundle(desk.on(finlab.load_layout("octo"))).write(tmp_path)
-    assert AnyRobot(tmp_path).options == desk.options
-    assert AnyRobot(tmp_path, n_refined=8).options == desk.options | {"n_refined": 8}
+    assert Allocator.from_bundle(tmp_path).settings == desk.settings
+    changed: Any = desk.settings
+    assert Allocator.from_bundle(tmp_path, n_refined=8).settings == replace(changed, n_refined=8)
 
 
 @pytest.mark.parametrize(
@@ -130,7 +127,7 @@ def test_settings_travel_and_can_be_changed(tmp_path: Path) -> None:
         ({"version": 3}, "is a bundle of version 3, this finlab reads version 5; export it again"),
         ({"version": True}, "is a bundle of version True"),
         ({"format": "other"}, "expected format finlab-bundle"),
-        ({"method": "sqp"}, "method must be one of search, mdn, got 'sqp'"),
+        ({"method": "sqp"}, "method must be one of dual, mdn, got 'sqp'"),
         ({"method": "mdn", "settings": {}}, "holds no networks, which method 'mdn' needs"),
         ({"normalization": {"mean": [0] * 6, "std": [1] * 5 + [0]}}, "six standard deviations above 0"),
         ({"normalization": {"mean": [1] * 6, "std": [2] * 6}}, "layout.graph.json and bundle.json differ in"),
@@ -177,7 +174,7 @@ def test_parts_of_two_exports_are_refused(bundle: Bundle, with_networks: Bundle)
 
 
 def test_force_tables_travel_and_answer_from_folder_and_archive(
-    measured: Layout, measured_bundle: Bundle, shipped_allocator: Allocator, force_table: Path, tmp_path: Path
+    measured: Layout, measured_bundle: Bundle, shipped_allocator: AnyRobot, force_table: Path, tmp_path: Path
 ) -> None:
     content = force_table.read_bytes()
     assert measured_bundle.files[table_name(content)] == content
@@ -189,11 +186,11 @@ def test_force_tables_travel_and_answer_from_folder_and_archive(
         layout = finlab.load_layout(place)
         path = Path(str(layout.fins[2].model.values()["path"]))
         assert path == place / table_name(content)
-        answer = finlab.Allocator(layout, place).allocate(WRENCH, failed=["front_left"])
+        answer = Allocator.from_bundle(place).allocate(WRENCH, failed=["front_left"])
         np.testing.assert_array_equal(answer.command, truth.command)
         np.testing.assert_array_equal(answer.wrench, truth.wrench)
         # And out of the bundle another one can be made.
-        again = make_bundle(Allocator(layout, place))
+        again = make_bundle(Allocator.from_bundle(place))
         assert again.zip_bytes() == measured_bundle.zip_bytes()
 
 

@@ -15,7 +15,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import finlab
-from finlab.allocation import Allocator
 from finlab.assets import shipped_layouts
 from finlab.cli import main
 from finlab.deploy.graph import N_SELF_TEST, LayoutGraph, build_graph
@@ -173,12 +172,16 @@ def test_stands_in_for_a_layout_file_everywhere(tmp_path: Path) -> None:
 
 
 @pytest.fixture(scope="module", params=["dual", "mdn"])
-def allocator(request: pytest.FixtureRequest, untrained_mdn: Path) -> Allocator:
-    return AnyRobot(request.param, checkpoint=untrained_mdn)
+def allocator(request: pytest.FixtureRequest, untrained_mdn: Path) -> AnyRobot:
+    return method(request.param, untrained_mdn)
+
+
+def method(name: str, checkpoint: Path) -> AnyRobot:
+    return AnyRobot(name, checkpoint=checkpoint if name == "mdn" else None)
 
 
 @pytest.mark.parametrize("failed", [(), ("front_left",)], ids=["whole", "one lost"])
-def test_graph_of_an_allocator(failed: tuple[str, ...], allocator: Allocator, untrained_mdn: Path) -> None:
+def test_graph_of_an_allocator(failed: tuple[str, ...], allocator: AnyRobot, untrained_mdn: Path) -> None:
     layout = finlab.load_layout(shipped_layouts()["A"])
     graph = build_graph(allocator.on(layout), failed)
     jsonschema.validate(json.loads(graph_bytes(graph)), SCHEMA)
@@ -189,14 +192,14 @@ def test_graph_of_an_allocator(failed: tuple[str, ...], allocator: Allocator, un
     assert graph.method == allocator.name and len(graph.self_test) == N_SELF_TEST
 
 
-def test_same_input_same_bytes(allocator: Allocator, untrained_mdn: Path) -> None:
+def test_same_input_same_bytes(allocator: AnyRobot, untrained_mdn: Path) -> None:
     layout = finlab.load_layout(shipped_layouts()["ucat"])
-    again = AnyRobot(allocator.name, checkpoint=untrained_mdn)
+    again = method(allocator.name, untrained_mdn)
     assert graph_bytes(build_graph(allocator.on(layout))) == graph_bytes(build_graph(again.on(layout)))
 
 
 def test_force_tables_are_found_beside_the_graph_file(
-    measured: Layout, allocator: Allocator, tmp_path: Path
+    measured: Layout, allocator: AnyRobot, tmp_path: Path
 ) -> None:
     """A graph file alone names its tables by their places; one written relatively starts at the file."""
     path = tmp_path / "x.graph.json"
