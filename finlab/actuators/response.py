@@ -174,12 +174,23 @@ class Group(ABC):
     """What each offers, by the effectiveness of its own directions."""
     feels_flow: bool = False
     """Whether that depends on the water that meets them."""
-    beside: Array | None = None
-    """Wrench (m, 6) [N, N m] that comes on top of the answers' forces; None where there is none."""
 
     def at(self, inflow: Array | None) -> "Group":
         """Returns the group where its places move through the water with velocities (m, 3) [m/s], in own
         frames; None at rest."""
+        return self
+
+    @property
+    def beside(self) -> Array:
+        """Wrench (m, 6) [N, N m] that comes on top of forces of 0, such as the drag of a rudder."""
+        return np.zeros((len(self.responses), 6))
+
+    def beside_of(self, force: Array) -> Array:
+        """Wrenches (N, 6) [N, N m] that come on top of forces (N, m, 2) of the answers."""
+        return np.zeros((len(force), 6))
+
+    def paid(self, price: Array) -> "Group":
+        """Returns the group where what comes on top of its forces has a price (6,) [W/N, W/(N m)], too."""
         return self
 
     @abstractmethod

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from finlab.actuators.law import ActuatorLaw
-from finlab.actuators.response import CELLS, Group, Line, RadialTable
+from finlab.actuators.response import CELLS, Group, Line, RadialTable, Response
 from finlab.arrays import Array, Values
 from finlab.layout.rudder import Rudder
 
@@ -25,6 +25,8 @@ POINTS = 1001
 """Angles between chord and flow for which lift and drag are kept."""
 PEAK = 0.995
 """Share of the largest lift that is asked of a rudder: towards the peak a newton has no price."""
+LEAST_PRICE = 0.05
+"""Least price of a newton of drag, as a share of what it takes: the speed [W/N]."""
 NO_PRESSURE = 1e-9
 """Dynamic pressure times area [N] below which a rudder counts as at rest."""
 LEAST_DRAG = 1e-3
@@ -136,17 +138,14 @@ def _along(met: Met, lift: Array, drag: Array) -> Array:
 
 
 class RudderGroup(Group):
-    """What the rudders of a robot offer for prices in one flow: a lift, at the cost of its drag.
-
-    `beside` is the drag without lift.
-    """
+    """What the rudders of a robot offer for prices in one flow: a lift, at the cost of its drag, which is a
+    force, too, and comes on top."""
 
     feels_flow = True
-    beside: Array
 
-    def __init__(self, rudders: Sequence[Rudder], effectiveness: Array, inflow: Array | None = None) -> None:
-        """Takes rudders and the wrench (m, 3, 6) per newton along each own axis; see `at` for the flow."""
-        self._law, self._effectiveness = RudderLaw(rudders), effectiveness
+    def __init__(self, rudders: Sequence[Rudder], effectiveness: Array) -> None:
+        """Takes rudders and the wrench (m, 3, 6) per newton along each own axis; they are at rest."""
+        self._law, self._effectiveness = RudderLaw(rudders), effectiveness[:, 1:]
         self._limits = np.array([rudder.deflection for rudder in rudders])
         angle = np.linspace(0.0, 0.3 * np.pi, POINTS)[:, None] + np.zeros(len(rudders))
         found = self._law.coefficients(angle)
@@ -154,46 +153,69 @@ class RudderGroup(Group):
         for lift, drag in zip(found.lift.T, found.drag.T, strict=True):
             falls = np.append(np.diff(lift) <= 0.0, True)
             last = int(np.argmax(lift >= PEAK * lift[np.argmax(falls)])) + 1
-            self._curves.append((lift[:last], angle[:last, 0]))
+            self._curves.append((lift[:last], angle[:last, 0], drag[:last]))
             drag = drag[:last] + LEAST_DRAG * lift[:last] ** 2
             self._tables.append(RadialTable.of_costs(lift[:last], drag))
-        self._meet(inflow)
+        self._meet(np.zeros((len(rudders), 3)))
 
     def at(self, inflow: Array | None) -> "RudderGroup":
         """See `Group`."""
         other = copy(self)
-        other._meet(inflow)
+        other._meet(np.zeros((len(self._limits), 3)) if inflow is None else inflow)
         return other
 
-    def _meet(self, inflow: Array | None) -> None:
-        flow = np.zeros((len(self._limits), 3)) if inflow is None else inflow
-        self._met = self._law.met(flow)
-        course, pressure = self._met.course, self._met.pressure
+    def _meet(self, inflow: Array) -> None:
+        self._met = self._law.met(inflow)
+        course = self._met.course
         # Lift and drag are the same ahead and astern.
         self._turned = np.mod(course + 0.5 * np.pi, np.pi) - 0.5 * np.pi
-        self._range = self._lift(self._limits)
         across = np.stack([-np.sin(course), np.cos(course)], axis=-1)
         along = np.stack([np.cos(course), np.sin(course)], axis=-1)
-        wrench = np.einsum("mk,mkw->mw", across, self._effectiveness[:, 1:])
-        drag = -(pressure * self._law.drag)[:, None] * along
-        self.beside = np.einsum("mk,mkw->mw", drag, self._effectiveness[:, 1:])
-        self.responses = []
-        for i, (low, high) in enumerate(self._range):
-            if pressure[i] < NO_PRESSURE:
-                table = RadialTable.of_forces(1.0, np.zeros(CELLS + 1), 0.0)
-            else:
-                table = self._tables[i].scaled(pressure[i], pressure[i] * self._met.speed[i])
-            self.responses.append(Line(wrench[i], table, table, low=float(low), high=float(high)))
+        self._across = np.einsum("mk,mkw->mw", across, self._effectiveness)
+        self._against = -np.einsum("mk,mkw->mw", along, self._effectiveness)
+        self.responses = self._responses(self._met.speed)
+
+    def _responses(self, drag_price: Array) -> list[Response]:
+        """What each offers where a newton of drag costs (m,) [W/N]."""
+        responses: list[Response] = []
+        ends = zip(*self._lift(self._limits).T.tolist(), strict=True)
+        for i, (low, high) in enumerate(ends):
+            pressure = self._met.pressure[i]
+            table = RadialTable.of_forces(1.0, np.zeros(CELLS + 1), 0.0)
+            if pressure >= NO_PRESSURE:
+                table = self._tables[i].scaled(pressure, pressure * drag_price[i])
+            responses.append(Line(self._across[i], table, table, low=low, high=high))
+        return responses
+
+    def paid(self, price: Array) -> "RudderGroup":
+        """See `Group`. Where drag is welcome, it counts as if it were nearly free: a line asks for a cost."""
+        other = copy(self)
+        cost = self._met.speed - self._against @ price
+        other.responses = self._responses(np.maximum(cost, LEAST_PRICE * self._met.speed))
+        return other
+
+    @property
+    def beside(self) -> Array:
+        """See `Group`."""
+        least: Array = (self._met.pressure * self._law.drag)[:, None] * self._against
+        return least
+
+    def beside_of(self, force: Array) -> Array:
+        """See `Group`."""
+        size = np.abs(force[..., 0]) / np.maximum(self._met.pressure, NO_PRESSURE)
+        drag = [np.interp(size[:, i], lifts, drags) for i, (lifts, _, drags) in enumerate(self._curves)]
+        wrench: Array = (np.stack(drag, axis=-1) * self._met.pressure) @ self._against
+        return wrench
 
     def _lift(self, deflection: Array) -> Array:
         """Least and largest lifts (m, 2) [N] between two deflections (m, 2) [rad], without those that another
         deflection gives with less drag."""
         angle = deflection - self._turned[:, None]
-        end = np.array([angles[-1] for _, angles in self._curves])
+        end = np.array([angles[-1] for _, angles, _ in self._curves])
         parted = np.clip(0.0, angle[:, 0], angle[:, 1])
         usual = np.clip(angle, -end[:, None], end[:, None])
         near = np.where((np.abs(parted) > end)[:, None], parted[:, None], usual)
-        most = np.array([lifts[-1] for lifts, _ in self._curves])[:, None]
+        most = np.array([lifts[-1] for lifts, _, _ in self._curves])[:, None]
         lift = np.clip(self._law.coefficients(near.T).lift.T, -most, most)
         found: Array = lift * self._met.pressure[:, None]
         return found
@@ -201,8 +223,8 @@ class RudderGroup(Group):
     def commands(self, force: Array, previous: Array | None = None) -> Array:
         """See `Group`."""
         command = np.zeros((*force.shape[:-1], 3))
-        for i, (lifts, angles) in enumerate(self._curves):
-            size = np.abs(force[..., i, 0]) / max(self._met.pressure[i], 1e-300)
+        for i, (lifts, angles, _) in enumerate(self._curves):
+            size = np.abs(force[..., i, 0]) / max(self._met.pressure[i], NO_PRESSURE)
             angle = np.sign(force[..., i, 0]) * np.interp(size, lifts, angles)
             command[..., i, 0] = np.clip(angle + self._turned[i], *self._limits[i])
         return command

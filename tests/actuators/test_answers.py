@@ -125,17 +125,16 @@ def test_rudders_answer_with_a_lift_that_their_deflections_give(flow: tuple[floa
         given = law.force(command, inflow)
         most = met.pressure * 0.03
         np.testing.assert_allclose((given * across).sum(-1), force[0, :, 0], atol=most.max() * 1e-2)
-    for response, matrix in zip(group.responses, wrench, strict=True):
-        assert np.isfinite(response.effectiveness).all() and matrix.shape == (3, 6)
-    still = law.force((met.course - np.pi * np.round(met.course / np.pi))[:, None] * [1.0, 0.0, 0.0], inflow)
-    np.testing.assert_allclose(group.beside, np.einsum("ma,maw->mw", still, wrench), atol=1e-9)
+        drag = np.einsum("ma,maw->w", given - force[0, :, :1] * across, wrench)
+        np.testing.assert_allclose(group.beside_of(force)[0], drag, atol=most.max() * 1e-2)
+    np.testing.assert_allclose(group.beside.sum(axis=0), group.beside_of(np.zeros((1, 2, 2)))[0], atol=1e-12)
 
 
 def test_a_rudder_answers_a_price_with_the_lift_whose_drag_it_pays() -> None:
     part = RUDDERS[0]
     inflow = np.array([[0.0, 1.5, 0.1]])
     wrench, law = columns([part]), RudderLaw([part])
-    robot = dual_robot(RudderGroup([part], wrench, inflow).responses)
+    robot = dual_robot(RudderGroup([part], wrench).at(inflow).responses)
     price = np.linspace(-3.0, 3.0, 31)[None]
     answer = robot.answers(price, robot.sets)
     delta = np.linspace(-0.5, 0.5, 4001)[:, None, None] * [1.0, 0.0, 0.0]
@@ -143,6 +142,24 @@ def test_a_rudder_answers_a_price_with_the_lift_whose_drag_it_pays() -> None:
     lift = law.force(delta, inflow)[:, 0] @ [0.0, -np.sin(course), np.cos(course)]
     worth = price * lift[:, None] - law.power(delta, 0.0, inflow)
     np.testing.assert_allclose(answer.conjugate, worth.max(axis=0), rtol=0.02, atol=0.02)
+
+
+def test_a_price_of_drag_counts_in_the_answer_of_a_rudder() -> None:
+    part = RUDDERS[0]
+    inflow = np.array([[0.0, 1.5, 0.1]])
+    wrench, law = columns([part]), RudderLaw([part])
+    multipliers = np.array([2.0, 3.0, 0.0, 0.0, 0.0, 0.5])
+    group = RudderGroup([part], wrench).at(inflow).paid(multipliers)
+    robot = dual_robot(group.responses)
+    lift = robot.answers((robot.effectiveness @ multipliers)[:, None], robot.sets).force
+    command = group.commands(np.array([[[lift[0, 0], 0.0]]]))
+    tried = np.linspace(-0.5, 0.5, 4001)[:, None, None] * [1.0, 0.0, 0.0]
+    found, best = (
+        np.einsum("nma,maw,w->n", law.force(each, inflow), wrench, multipliers)
+        - law.power(each, 0.0, inflow)[:, 0]
+        for each in (command, tried)
+    )
+    assert found[0] >= best.max() - 1e-3 * abs(best).max()
 
 
 def test_a_rudder_at_rest_offers_nothing() -> None:
