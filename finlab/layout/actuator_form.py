@@ -58,9 +58,16 @@ FORMS: dict[str, Any] = {cls.type: form_of(cls) for cls in OTHERS}
 """Type of actuator -> the part of a layout file that describes one."""
 
 
-def actuator_of(part: Any, folder: Path | None = None, radians: bool = False) -> Thruster | Azimuth | Rudder:
-    """Returns the actuator in a part of a file, an instance of what `form_of` makes; relative paths start at
-    a folder, the working directory when None.
+def actuator_of(
+    part: Any, folder: Path | None = None, radians: bool = False, may_open: bool = True
+) -> Thruster | Azimuth | Rudder:
+    """Returns the actuator in a part of a file, an instance of what `form_of` makes.
+
+    Args:
+        part: the part.
+        folder: where relative paths start; the working directory when None.
+        radians: whether angles are in radians, as in a graph file.
+        may_open: whether a CSV file that the part names may be opened.
 
     Raises:
         LayoutError: something does not fit; the message names the key.
@@ -74,19 +81,21 @@ def actuator_of(part: Any, folder: Path | None = None, radians: bool = False) ->
             told[name] = math.radians(value) if isinstance(value, float) else tuple(map(math.radians, value))
     if "model" in told:
         try:
-            told["model"] = _model_of(told["model"], folder)
+            told["model"] = _model_of(told["model"], folder, may_open)
         except LayoutError as error:
             raise error.under("model") from None
     actuator: Thruster | Azimuth | Rudder = cls(**told)
     return actuator
 
 
-def _model_of(part: Any, folder: Path | None) -> ThrustModel:
+def _model_of(part: Any, folder: Path | None, may_open: bool) -> ThrustModel:
     if not isinstance(part, TableForm):
         return PowerLaw(**given(part))
     if (part.rows is None) == (part.path is None):
         raise LayoutError("give either rows, or the path of a CSV file, not both or neither", "rows")
     if part.path is not None:
+        if not may_open:
+            raise LayoutError("names a file, which is not opened here; write its rows", "path")
         return PowerTable.read(os.path.normpath((folder or Path.cwd()) / part.path), part.unit or "")
     return PowerTable(tuple(part.rows or ()), part.unit or "")
 

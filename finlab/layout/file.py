@@ -98,13 +98,16 @@ ANY_LAYOUT: Any = LAYOUT_OF_FINS | LAYOUT
 """A layout file: version 1, which holds horizontal fins, or version 2."""
 
 
-def parse_layout(data: Any, source: str = "layout", folder: Path | None = None) -> Layout:
+def parse_layout(
+    data: Any, source: str = "layout", folder: Path | None = None, *, may_open: bool = True
+) -> Layout:
     """Returns the layout that plain values (as read from a file) describe.
 
     Args:
         data: mappings, lists, numbers and text, as in a layout file.
         source: what to call it in error messages.
         folder: where relative paths start; the working directory when None.
+        may_open: whether tables of thrust that it names may be opened; those of fins, and meshes, are not.
 
     Raises:
         LayoutError: something is missing, unknown or out of range.
@@ -116,17 +119,17 @@ def parse_layout(data: Any, source: str = "layout", folder: Path | None = None) 
         parts = []
         for i, part in enumerate(getattr(file, key)):
             with under(f"{key}[{i}]"):
-                parts.append(actuator_of(part, folder))
+                parts.append(actuator_of(part, folder, may_open))
         try:
             return layout_of(file, parts, folder)
         except LayoutError as error:
             raise LayoutError(error.problem, error.key.replace("actuators[", f"{key}[")) from None
 
 
-def actuator_of(part: Any, folder: Path | None) -> Actuator:
+def actuator_of(part: Any, folder: Path | None, may_open: bool) -> Actuator:
     """Returns the actuator in a part of a layout file; relative paths start at a folder."""
     if type(part) in FORMS.values():
-        return other_actuator_of(part, folder)
+        return other_actuator_of(part, folder, may_open=may_open)
     angle = part.mounting_angle
     return fin_of(part, None if angle is None else math.radians(angle), folder)
 

@@ -45,7 +45,7 @@ def actuator_of_node(node: Any, folder: Path | None) -> Actuator:
     """Returns the actuator in a node; relative paths start at a folder."""
     if isinstance(node, FIN):
         return fin_of(node, node.mounting_angle, folder)
-    return actuator_of(node, folder, radians=True)
+    return actuator_of(node, folder, radians=True, may_open=False)
 
 
 def node_to_dict(actuator: Actuator, healthy: bool) -> dict[str, Any]:

@@ -66,8 +66,11 @@ def load_layout(layout: str | os.PathLike[str]) -> Layout:
     return layout_and_failed(layout)[0]
 
 
-def layout_and_failed(layout: str | os.PathLike[str]) -> tuple[Layout, tuple[str, ...]]:
-    """A layout as `load_layout` opens it, and the fins that a graph file marks as failed."""
+def layout_and_failed(
+    layout: str | os.PathLike[str], *, may_open: bool = True
+) -> tuple[Layout, tuple[str, ...]]:
+    """A layout as `load_layout` opens it, and the actuators that a graph file marks as failed; `may_open` as
+    for `parse_layout`."""
     file = layout_path(layout)
     source = str(layout)
     if is_bundle(file) or file.name.endswith(SUFFIX):
@@ -75,7 +78,8 @@ def layout_and_failed(layout: str | os.PathLike[str]) -> tuple[Layout, tuple[str
         return document.layout, document.failed
     content = read_text(file, MAX_BYTES, A_LAYOUT, LayoutError)
     parse = parse_json if file.suffix.lower() == ".json" else parse_yaml
-    return parse_layout(parse(content, source, LayoutError), source, file.resolve().parent), ()
+    data, folder = parse(content, source, LayoutError), file.resolve().parent
+    return parse_layout(data, source, folder, may_open=may_open), ()
 
 
 def layout_path(layout: str | os.PathLike[str]) -> Path:

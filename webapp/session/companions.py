@@ -22,9 +22,9 @@ from finlab.bundle_files import (
 from finlab.errors import DataError, FinlabError, LayoutError
 from finlab.files.archive import member_names, unpacked
 from finlab.files.guarded import read_file
-from finlab.layout import FinModelSpec, Layout, load_layout
+from finlab.layout import FinModelSpec, Layout
 from finlab.layout.body import MESH_SUFFIXES
-from finlab.layout.load import MAX_BYTES
+from finlab.layout.load import MAX_BYTES, layout_and_failed
 from finlab.whole_file import write_whole
 from webapp.scene.meshes.mesh_file import MAX_FACES, read_mesh, simplified, stl_of
 
@@ -97,7 +97,7 @@ def read_archive(source: str, content: bytes, folder: Path) -> Opened:
         packed = Path(place) / "upload.zip"
         try:
             file, parts = _unpacked(packed, content, source, Path(place) / "files")
-            return adopted(load_layout(file), parts, folder, source)
+            return adopted(layout_and_failed(file, may_open=False)[0], parts, folder, source)
         except FinlabError as error:
             text = str(error).replace(str(packed), source).replace(f"{place}/files/", f"{source}/")
             raise type(error)(text) from None
@@ -114,9 +114,10 @@ def adopted(layout: Layout, parts: Mapping[str, bytes], folder: Path, source: st
         source: what to call the layout in errors.
 
     Raises:
-        LayoutError: it names a force table that did not come along.
+        LayoutError: it names a force table that did not come along, or an actuator that the app cannot show.
         FinlabError: a file cannot be kept, or is no hull.
     """
+    layout.only_fins("the app", horizontal=True)
     by_name = {Path(path).name: path for path in parts}
     fins, missing = [], []
     for fin in layout.fins:

@@ -89,7 +89,7 @@ def _read_alone(source: str, content: bytes) -> Layout:
     if source.lower().endswith(SUFFIX):
         return parse_graph_document(GraphText(text, source)).layout
     parse = parse_json if source.lower().endswith(".json") else parse_yaml
-    return parse_layout(parse(text, source, LayoutError), source=source)
+    return parse_layout(parse(text, source, LayoutError), source=source, may_open=False)
 
 
 def layout_file(layout: Layout) -> tuple[str, bytes]:
