@@ -15,6 +15,7 @@ from finlab.allocation.tables import allocation_html, allocation_text
 from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.layout.arrays import layout_effectiveness
+from finlab.layout.commands import Command, command_of
 from finlab.layout.damage import Health
 from finlab.physics.known_plants import plant_of
 from finlab.physics.plant import Plant
@@ -204,6 +205,12 @@ class Allocation(Answer):
     """Settings of the method, by name."""
     previous: Array | None = None
     """Command (n, 3) of the previous tick, if it was given."""
+
+    @property
+    def commands(self) -> dict[str, Command | None]:
+        """What each actuator is told, by its name, in a type of its own; None for a failed one."""
+        parts = zip(self.layout.actuators, self.command, strict=True)
+        return {part.name: command_of(part, row) for part, row in parts}
 
     @cached_property
     def err_norm(self) -> float:

@@ -46,11 +46,12 @@ def _robot(arguments: argparse.Namespace) -> "DeployedRobot":
 
 def check(arguments: argparse.Namespace) -> int:
     """Print each question of the self-test with its answer."""
+    from finlab.deploy.record import number_of_actuators
     from finlab.deploy.self_check import self_check
 
     robot = _robot(arguments)
     print(
-        f"{arguments.bundle}: {robot.layout.name}, {robot.layout.n_fins} fins, "
+        f"{arguments.bundle}: {robot.layout.name}, {number_of_actuators(robot.layout)}, "
         f"method {robot.allocator.method}, ready in {time.perf_counter() - arguments.started:.2f} s"
     )
     findings = self_check(robot)

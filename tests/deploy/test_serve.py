@@ -14,15 +14,18 @@ from typing import IO, Any
 import numpy as np
 import pytest
 
-from finlab.allocation import Allocation
+from finlab.allocation import Allocation, Allocator
 from finlab.deploy import serve as serve_module
 from finlab.deploy.bundle import Bundle
+from finlab.deploy.graph import LayoutGraph
 from finlab.deploy.request import MAX_LINE
 from finlab.deploy.robot import DeployedRobot, parse_robot
 from finlab.deploy.serve import RECENT_S, Server, Timing
 from finlab.deploy.stopping import SIGNALS, StopSignals
 from finlab.deploy.transport import LoopbackUdp, StandardStreams, Unsent
 from finlab.errors import FinlabError
+from finlab.layout import load_layout
+from finlab.networks.normalization import Normalization
 
 GOOD: dict[str, Any] = {"wrench": [1, 0, 0.5, 0, 0, 0.1]}
 LINE = json.dumps(GOOD).encode() + b"\n"
@@ -184,6 +187,26 @@ def test_commands_change_no_faster_than_servos_do(
     np.testing.assert_allclose(np.array(server.answer(backwards)["command"]), truth.command, atol=1e-9)
     now[0] += RECENT_S
     assert server.answer(forwards)["err_norm"] < 1e-5, "commands of long ago bind no more"
+
+
+def test_thrusters_and_rudders_rest_in_their_own_words() -> None:
+    layout = load_layout("turtle_hybrid")
+    graph = LayoutGraph(
+        layout, ("lift_right",), Normalization(np.zeros(6), np.ones(6)), None, None, "dual", ()
+    )
+    script = Script(None)
+    Server(DeployedRobot(graph, Allocator(load_layout("A"))), Timing()).run(script)  # type: ignore[arg-type]
+    assert [reply["status"] for reply in script.sent] == ["neutral", "neutral"]
+    told = {part["name"]: part for part in script.sent[0]["actuators"]}
+    assert tuple(told) == layout.names and "command" not in script.sent[0]
+    assert told["lift_left"] == {
+        "name": "lift_left",
+        "type": "thruster",
+        "force_n": 0.0,
+        "command": {"force_n": 0.0},
+    }
+    assert told["lift_right"]["command"] is None
+    assert told["front_left"]["command"]["frequency_hz"] == 0.1
 
 
 def test_an_answer_that_is_no_number_is_an_error(

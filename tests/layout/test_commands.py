@@ -1,0 +1,82 @@
+"""Commands as users see them: of each type of actuator, of tables, and of a robot that pushes nothing."""
+
+import math
+
+import numpy as np
+import pytest
+
+from finlab.layout import Fin
+from finlab.layout.azimuth import Azimuth, Tilt
+from finlab.layout.commands import (
+    AzimuthCommand,
+    FinCommand,
+    RudderCommand,
+    ThrusterCommand,
+    command_of,
+    command_values,
+    input_of,
+    neutral_row,
+)
+from finlab.layout.rudder import Rudder
+from finlab.layout.thrust_model import PowerLaw, PowerTable
+from finlab.layout.thruster import Thruster
+
+AHEAD, UP, LAW = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0), PowerLaw(2.0)
+ROWS = ((1100, -40, 390), (1470, 0, 0), (1480, 0, 0), (1530, 0, 0), (1700, 10, 30), (1900, 50, 380))
+TABLE = PowerTable(tuple(tuple(map(float, row)) for row in ROWS), "us")
+FIN = Fin("fin", (0.1, 0.2, 0.3), 0.4)
+THRUSTER = Thruster("thruster", (0.0, 0.1, 0.0), AHEAD, (-40.0, 50.0), TABLE)
+AZIMUTH = Azimuth("azimuth", (0.0, 0.0, 0.2), UP, AHEAD, (0.0, 20.0), LAW)
+TILT = Tilt("tilt", (0.0, 0.0, 0.2), UP, AHEAD, (3.0, 20.0), LAW, arc=(0.2, 0.7))
+RUDDER = Rudder("rudder", (-1.0, 0.0, 0.0), UP, AHEAD, 0.03, (-0.7, 0.5), 3.0)
+
+
+def test_each_type_has_a_command_of_its_own() -> None:
+    row = np.array([0.3, 1.2, -0.5])
+    assert command_of(FIN, row) == FinCommand(0.3, 1.2, -0.5)
+    assert command_of(THRUSTER, np.array([10.0, 0.0, 0.0])) == ThrusterCommand(10.0, 1700.0)
+    assert command_of(AZIMUTH, np.array([0.3, 12.0, 0.0])) == AzimuthCommand(0.3, 12.0, None)
+    assert command_of(RUDDER, np.array([0.1, 0.0, 0.0])) == RudderCommand(0.1)
+    assert command_of(THRUSTER, np.full(3, math.nan)) is None
+
+
+def test_keys_of_files_carry_the_units() -> None:
+    assert command_values(FinCommand(1.0, 2.0, 3.0)) == {
+        "amplitude_rad": 1.0,
+        "frequency_hz": 2.0,
+        "zero_direction_rad": 3.0,
+    }
+    assert command_values(ThrusterCommand(1.0, 1500.0)) == {"force_n": 1.0, "input": 1500.0}
+    assert command_values(AzimuthCommand(0.5, 2.0)) == {"angle_rad": 0.5, "force_n": 2.0}
+    assert command_values(RudderCommand(0.5)) == {"deflection_rad": 0.5}
+    assert command_values(None) == {}
+
+
+@pytest.mark.parametrize(
+    ("force", "sent"),
+    [
+        (0.0, 1500.0),
+        (-40.0, 1100.0),
+        (-20.0, 1285.0),
+        (5.0, 1615.0),
+        (30.0, 1800.0),
+        (1e-9, 1530.0),
+        (-1e-9, 1470.0),
+    ],
+)
+def test_a_table_says_what_to_send(force: float, sent: float) -> None:
+    assert input_of(TABLE, force) == pytest.approx(sent, abs=1e-4)
+
+
+def test_neutral_pushes_least_and_an_azimuth_keeps_its_angle() -> None:
+    for actuator, row in (
+        (FIN, [0.05, 0.1, 0.0]),
+        (THRUSTER, [0.0] * 3),
+        (AZIMUTH, [0.0] * 3),
+        (TILT, [0.2, 3.0, 0.0]),
+        (RUDDER, [0.0] * 3),
+    ):
+        np.testing.assert_array_equal(neutral_row(actuator, None), row)
+    np.testing.assert_array_equal(neutral_row(AZIMUTH, np.array([1.5, 9.0, 0.0])), [1.5, 0.0, 0.0])
+    np.testing.assert_array_equal(neutral_row(AZIMUTH, np.full(3, math.nan)), [0.0] * 3)
+    np.testing.assert_array_equal(neutral_row(THRUSTER, np.array([9.0, 0.0, 0.0])), [0.0] * 3)
