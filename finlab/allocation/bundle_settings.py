@@ -1,30 +1,23 @@
 """What travels with a bundle in its `bundle.json`: the method, its yardstick, and what it is made with."""
 
 import json
-from collections.abc import Mapping
 from dataclasses import asdict, is_dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from finlab.allocation.mdn_settings import MdnSettings
-from finlab.allocation.search.settings import SearchSettings
-from finlab.allocation.settings import Settings
 from finlab.bundle_files import ABOUT, VERSION, Files
-from finlab.errors import AllocationError, DataError
+from finlab.errors import DataError
 from finlab.files.guarded import decoded
 from finlab.files.plain_values import parse_json
 from finlab.networks.normalization import Normalization
-from finlab.physics.effort import EffortWeights
 
 if TYPE_CHECKING:
     from finlab.allocation.allocator import Allocator
 
 FORMAT = "finlab-bundle"
-METHODS_ON_BOARD: Mapping[str, type[Settings]] = {"dual": SearchSettings, "mdn": MdnSettings}
-"""Methods that a bundle can answer with, and their settings."""
-GONE = ("energy_tradeoff",)
-"""Settings that earlier bundles hold and that no method has any more."""
+METHODS_ON_BOARD = ("dual", "mdn")
+"""Methods that a bundle can answer with."""
 
 
 class About(NamedTuple):
@@ -37,14 +30,7 @@ class About(NamedTuple):
     normalization: Normalization
     """Yardstick of the error."""
     settings: dict[str, Any]
-    """Settings of the method, by name."""
-
-    def settings_for(self, method: str) -> dict[str, Any]:
-        """Those settings that another method knows as well; none for methods that do not run on board."""
-        if method not in METHODS_ON_BOARD:
-            return {}
-        known = METHODS_ON_BOARD[method].__dataclass_fields__
-        return {name: value for name, value in self.settings.items() if name in known}
+    """Settings of the method, by name, as the file holds them: the method checks them."""
 
 
 def about_bundle(allocator: "Allocator", made_by: str) -> bytes:
@@ -73,7 +59,7 @@ def read_about(files: Files, source: str) -> About:
     """What the allocator on board is made with.
 
     Raises:
-        DataError: of another format, or settings that no robot should try.
+        DataError: of another format, or a method that runs on no robot.
     """
     place = f"{source}/{ABOUT}"
     document = parse_json(decoded(files[ABOUT], place, "JSON"), place)
@@ -86,24 +72,7 @@ def read_about(files: Files, source: str) -> About:
     if not isinstance(checkpoint, str | None) or not isinstance(values, dict):
         raise DataError(f"{place}: checkpoint must be a name and settings must be keys and values")
     try:
-        settings = _settings(METHODS_ON_BOARD[method], values)
-    except (AllocationError, TypeError) as error:
-        raise DataError(f"{place}: settings: {error}") from None
-    try:
         normalization = Normalization.parse(document.get("normalization"))
     except ValueError as error:
         raise DataError(f"{place}: {error}") from None
-    return About(method, checkpoint, normalization, settings)
-
-
-def _settings(kind: type[Settings], values: dict[str, Any]) -> dict[str, Any]:
-    """Settings by name from what a file holds; an `AllocationError` or a `TypeError` where that is wrong."""
-    plain = {key: value for key, value in values.items() if key not in GONE}
-    weights = plain.pop("effort_weights", {})
-    if not isinstance(weights, dict):
-        raise TypeError(f"effort_weights: expected keys and values, got {weights!r:.40}")
-    known = kind.__dataclass_fields__
-    if unknown := [key for key in plain if key not in known]:
-        raise TypeError(f"expected {', '.join(known)}, got {unknown[0]!r:.40}")
-    made: Any = kind
-    return dict(vars(made(**plain, effort_weights=EffortWeights(**weights))))
+    return About(method, checkpoint, normalization, values)

@@ -9,13 +9,14 @@ from typing import Any, Literal
 
 import numpy as np
 
-from finlab.allocation.bundle_settings import METHODS_ON_BOARD, read_about
+from finlab.allocation.bundle_settings import METHODS_ON_BOARD, About, read_about
 from finlab.allocation.method import Method
 from finlab.allocation.settings import Settings
 from finlab.bundle_files import ABOUT, CHECKPOINT, Files, checkpoint_part, is_bundle, read_bundle_files
 from finlab.errors import AllocationError, DataError
 from finlab.networks.checkpoint import parse_checkpoint, read_checkpoint, resolve_checkpoint
 from finlab.networks.trained import TrainedWeights
+from finlab.physics.effort import EffortWeights
 
 METHODS: dict[str, tuple[str, str]] = {
     "dual": ("finlab.allocation.search.search_method", "Search"),
@@ -105,7 +106,7 @@ def bundled_method(
     about = read_about(files, source)
     method = method or about.method
     kind = method_class(method)
-    chosen = checked_settings(kind, about.settings_for(method) | settings)
+    chosen = checked_settings(kind, _bundled_settings(about, f"{source}/{ABOUT}", method) | settings)
     if method not in LEARNED:
         return MethodChoice(kind, chosen)
     if method not in METHODS_ON_BOARD:
@@ -122,6 +123,24 @@ def bundled_method(
     if not all(np.array_equal(a, b) for a, b in zip(weights.normalization, about.normalization, strict=True)):
         raise DataError(f"{source}: {ABOUT} and the networks differ in normalization; export it again")
     return MethodChoice(kind, chosen, weights)
+
+
+def _bundled_settings(about: About, place: str, method: str) -> dict[str, Any]:
+    """The settings in a bundle, for a method: all of its own, and those that another one on board knows.
+
+    Raises:
+        DataError: settings that no robot should try.
+    """
+    values, kind = dict(about.settings), method_class(about.method)
+    weights = values.get("effort_weights")
+    try:
+        if isinstance(weights, dict):
+            values["effort_weights"] = EffortWeights(**weights)
+        values = vars(checked_settings(kind, values))
+    except (AllocationError, TypeError) as error:
+        raise DataError(f"{place}: settings: {error}") from None
+    known = method_class(method).option_names() if method in METHODS_ON_BOARD else []
+    return {name: value for name, value in values.items() if name in known}
 
 
 def checked_settings(kind: type[Method], settings: dict[str, Any]) -> Settings:

@@ -116,7 +116,7 @@ def test_settings_travel_and_can_be_changed(tmp_path: Path) -> None:
     ("change", "message"),
     [
         ({"settings": []}, "settings must be keys and values"),
-        ({"settings": {"n_tries": 3}}, "settings: expected objective, .*, got 'n_tries'"),
+        ({"settings": {"n_tries": 3}}, "settings: method 'dual' knows the settings .*, got 'n_tries'"),
         ({"n_refined": 10**9}, "n_refined: expected a whole number from 1 to 256"),
         ({"n_refined": 0}, "n_refined: expected a whole number from 1"),
         ({"subsets": 3}, "subsets: expected true or false, got 3"),
