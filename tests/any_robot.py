@@ -1,28 +1,59 @@
 """A method for whatever robot a test asks about."""
 
+from copy import copy
+from dataclasses import replace
 from typing import Any
 
 from finlab.allocation import Allocation, Allocator, BatchAllocation
-from finlab.allocation.methods import Checkpoint, MethodChoice, choose_method
+from finlab.allocation.method import Method
+from finlab.allocation.methods import Checkpoint, MethodChoice, checked_settings, choose_method
 from finlab.allocation.modes import Mode
-from finlab.allocation.settings import Settings
+from finlab.allocation.settings import AimSettings, Settings
 from finlab.allocation.solution import Candidates
 from finlab.layout import Layout
+from finlab.networks.checkpoint import read_normalization, resolve_checkpoint
+from finlab.networks.normalization import Normalization
+from finlab.physics.objective import Objective
 
 
 class AnyRobot:
     """Makes an allocator for each robot, and keeps it."""
 
-    def __init__(self, method: str = "dual", checkpoint: Checkpoint = None, **settings: Any) -> None:
-        self.choice: MethodChoice = choose_method(method, checkpoint, **settings)
-        self.name = method
+    def __init__(
+        self, method: str | type[Method] = "dual", checkpoint: Checkpoint = None, **settings: Any
+    ) -> None:
+        self.choice = (
+            choose_method(method, checkpoint, **settings)
+            if isinstance(method, str)
+            else MethodChoice(method, checked_settings(method, settings))
+        )
+        self.name = self.choice.kind.name
         self._made: dict[Layout, Allocator] = {}
+
+    @property
+    def normalization(self) -> Normalization:
+        """What the networks were trained with; the paper's where there are none."""
+        if self.choice.weights is not None:
+            return self.choice.weights.normalization
+        return read_normalization(resolve_checkpoint("default"))
 
     @property
     def settings(self) -> Settings:
         return self.choice.settings
 
+    @property
+    def objective(self) -> Objective:
+        assert isinstance(self.settings, AimSettings)
+        return self.settings.aim
+
+    def with_settings(self, **changes: Any) -> "AnyRobot":
+        other = copy(self)
+        settings = checked_settings(self.choice.kind, {**vars(self.settings), **changes})
+        other.choice, other._made = replace(self.choice, settings=settings), {}
+        return other
+
     def on(self, layout: Layout) -> Allocator:
+        self._last = layout
         if layout not in self._made:
             self._made[layout] = Allocator.of_choice(layout, self.choice)
         return self._made[layout]
@@ -33,8 +64,10 @@ class AnyRobot:
     def allocate_batch(self, layout: Layout, wrenches: Any, **question: Any) -> BatchAllocation:
         return self.on(layout).allocate_batch(wrenches, **question)
 
-    def explore(self, layout: Layout, result: Allocation) -> tuple[Mode, ...]:
-        return self.on(layout).explore(result)
+    def explore(self, result: Allocation) -> tuple[Mode, ...]:
+        """Of the robot that was asked about last."""
+        return self.on(self._last).explore(result)
 
-    def alternatives(self, layout: Layout, result: Allocation) -> Candidates | None:
-        return self.on(layout).alternatives(result)
+    def alternatives(self, result: Allocation) -> Candidates | None:
+        """Of the robot that was asked about last."""
+        return self.on(self._last).alternatives(result)

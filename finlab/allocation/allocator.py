@@ -1,12 +1,14 @@
 """The one interface of every allocation method: made for a robot, it checks questions and answers them."""
 
+from __future__ import annotations
+
 import os
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import islice
-from typing import Any, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self, Unpack, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -45,6 +47,10 @@ from finlab.networks.trained import TrainedWeights
 from finlab.physics.known_plants import plant_of
 from finlab.physics.plant import Plant
 
+if TYPE_CHECKING:
+    from finlab.allocation.search.settings import MdnOptions, SearchOptions
+    from finlab.paper.settings import PaperOptions
+
 SAME_COMMAND = 1e-6
 """Two commands [rad, Hz, rad] that differ by less are one answer, given on two machines."""
 MOST_PREPARED = 32
@@ -70,6 +76,37 @@ class Allocator:
     so no method can use one. Force tables are read once. An allocator can be copied and pickled.
     """
 
+    @overload
+    def __init__(
+        self, layout: Layout, method: Literal["dual"] = "dual", **settings: Unpack[SearchOptions]
+    ) -> None: ...
+    @overload
+    def __init__(
+        self,
+        layout: Layout,
+        method: Literal["mdn"],
+        *,
+        checkpoint: Checkpoint = None,
+        **settings: Unpack[MdnOptions],
+    ) -> None: ...
+    @overload
+    def __init__(
+        self,
+        layout: Layout,
+        method: Literal["paper"],
+        *,
+        checkpoint: Checkpoint = None,
+        **settings: Unpack[PaperOptions],
+    ) -> None: ...
+    @overload
+    def __init__(
+        self,
+        layout: Layout,
+        method: str | type[Method] = "dual",
+        *,
+        checkpoint: Checkpoint = None,
+        **settings: Any,
+    ) -> None: ...
     def __init__(
         self,
         layout: Layout,
@@ -104,7 +141,7 @@ class Allocator:
     @classmethod
     def from_bundle(
         cls, path: str | os.PathLike[str], method: str | None = None, **settings: Any
-    ) -> "Allocator":
+    ) -> Allocator:
         """The allocator of a bundle's robot, as `finlab export` wrote it.
 
         Args:
@@ -121,7 +158,7 @@ class Allocator:
         return cls.of_choice(load_layout(path), choice)
 
     @classmethod
-    def of_choice(cls, layout: Layout, choice: MethodChoice) -> "Allocator":
+    def of_choice(cls, layout: Layout, choice: MethodChoice) -> Allocator:
         """The allocator of a robot by a method with its networks and settings."""
         made = cls.__new__(cls)
         made._made(layout, choice)
@@ -182,7 +219,7 @@ class Allocator:
         """Names of the fins whose model the networks have not learned; answers for them are wrong."""
         return self._whole.method.unknown_fins
 
-    def with_settings(self, **changes: Any) -> "Allocator":
+    def with_settings(self, **changes: Any) -> Allocator:
         """Another allocator for the same robot, method and networks, with some settings changed.
 
         Raises:

@@ -2,7 +2,6 @@
 
 from typing import Any
 
-from finlab.allocation import Allocator
 from tests.any_robot import AnyRobot
 
 QUICK: dict[str, dict[str, Any]] = {
@@ -12,6 +11,6 @@ QUICK: dict[str, dict[str, Any]] = {
 }
 
 
-def quick_allocator(method: str) -> Allocator:
+def quick_allocator(method: str) -> AnyRobot:
     """The allocator of a method, with few starts and steps."""
     return AnyRobot(method, **QUICK.get(method, {}))

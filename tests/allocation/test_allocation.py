@@ -17,6 +17,7 @@ from finlab.errors import AllocationError, DataError
 from finlab.layout import Fin, FinModelSpec, Layout, load_layout, random_layout
 from finlab.physics import Plant
 from tests.allocation.quick import quick_allocator
+from tests.any_robot import AnyRobot
 
 SURGE = [1.0, 0.0, 0.5, 0.0, 0.0, 0.1]
 FAR = [40.0, 5.0, -30.0, 1.0, 2.0, 3.0]
@@ -50,7 +51,7 @@ def test_answers_compare_pickle_and_copy(method: str, wrench: list[float]) -> No
     assert allocator.allocate(layout, wrench, failed=["front_left"], health=health) != result
 
 
-def test_every_field_counts_but_the_time(search: Allocator) -> None:
+def test_every_field_counts_but_the_time(search: AnyRobot) -> None:
     result = search.allocate(load_layout("A"), SURGE)
     assert replace(result, solve_ms=1e3) == result
     assert result.candidates is not None
@@ -58,18 +59,15 @@ def test_every_field_counts_but_the_time(search: Allocator) -> None:
         {"command": result.command + 1e-15},
         {"command": result.command[:3]},
         {"wrench_expected": result.wrench},
-        {"power": result.power + 1e-12},
-        {"candidates": replace(result.candidates, power=result.candidates.power + 1e-12)},
         {"previous": result.command},
         {"failed": ("front_left",)},
-        {"notes": ("beware",)},
-        {"evaluated_by": "surrogate"},
-        {"candidates": replace(result.candidates, effort=result.candidates.effort + 1.0)},
-        {"candidates": None},
-        {"samples": result.candidates},
         {"seed": 1},
     ):
         assert replace(result, **changed) != result, changed
+    told = result.candidates
+    for candidates, samples in ((replace(told, power=told.power + 1e-12), None), (None, None), (told, told)):
+        assert result.with_candidates(candidates, samples) != result
+    assert result.with_candidates(told, None) == result
     assert result != "an answer" and result is not None
     with pytest.raises(TypeError, match="unhashable"):
         hash(result)
@@ -93,13 +91,13 @@ def test_all_figures_are_those_of_the_plant(method: str) -> None:
         result = quick_allocator(method).allocate(layout, wrench, failed=failed)
         plant = Plant(layout)
         np.testing.assert_allclose(result.wrench, plant.wrench(result.command), atol=1e-12)
-        np.testing.assert_allclose(result.forces, plant.forces(result.command), atol=1e-12)
-        assert result.err_norm == pytest.approx(np.linalg.norm(result.unallocated / result.sigma), abs=1e-12)
-        assert result.evaluated_by == "plant" and isinstance(result.err_norm, float)
+        np.testing.assert_allclose(result.forces, plant.fin_forces(result.command), atol=1e-12)
+        assert result.err_norm == pytest.approx(np.linalg.norm(result.unallocated / result.scale), abs=1e-12)
+        assert isinstance(result.err_norm, float)
         assert all(not np.any(result.forces[i]) for i in layout.indices(failed))
 
 
-def test_what_the_user_writes_into_an_answer_stays_there(search: Allocator) -> None:
+def test_what_the_user_writes_into_an_answer_stays_there(search: AnyRobot) -> None:
     layout = load_layout("A")
     first, second = (search.allocate(layout, SURGE) for _ in range(2))
     assert first.candidates is not None and first.candidates.command.base is not first.command
@@ -109,11 +107,11 @@ def test_what_the_user_writes_into_an_answer_stays_there(search: Allocator) -> N
 
 
 @pytest.mark.parametrize("n_fins", [1, 4, 16])
-def test_the_short_form_is_short(n_fins: int, search: Allocator) -> None:
+def test_the_short_form_is_short(n_fins: int, search: AnyRobot) -> None:
     fins = tuple(Fin(f"{'long' * 14}_{i}", (0.1, 0.01 * i, 0.0), 0.3 * i) for i in range(n_fins))
     layout = Layout("the longest name of a layout that " + "x" * 30, fins)
     result = search.allocate(layout, SURGE, failed=[fin.name for fin in fins[: n_fins // 2]])
-    assert len(repr(result)) <= 400 and "err_norm=" in repr(result) and "plant" in repr(result)
+    assert len(repr(result)) <= 400 and "err_norm=" in repr(result)
     batch = search.allocate_batch(layout, [SURGE] * 5)
     assert len(repr(batch)) <= 400 and "5 targets" in repr(batch)
     assert "0 targets" in repr(search.allocate_batch(layout, np.empty((0, 6))))
@@ -137,7 +135,7 @@ class Cells(HTMLParser):
         self.texts.append(data)
 
 
-def test_notebooks_show_the_table_of_the_command_line(search: Allocator) -> None:
+def test_notebooks_show_the_table_of_the_command_line(search: AnyRobot) -> None:
     layout = load_layout("A")
     layout = replace(layout, actuators=(replace(layout.fins[0], name="<b>bow</b> & co"), *layout.fins[1:]))
     for wrench in (SURGE, FAR):
@@ -150,7 +148,7 @@ def test_notebooks_show_the_table_of_the_command_line(search: Allocator) -> None
         assert "<b>bow</b> & co" in page.texts
 
 
-def test_an_allocator_explores_any_copy_of_its_answer(search: Allocator) -> None:
+def test_an_allocator_explores_any_copy_of_its_answer(search: AnyRobot) -> None:
     layout = load_layout("A")
     few = search.with_settings(objective="effort", n_refined=8)
     before = search.allocate(layout, SURGE, failed=["back_left"]).command
@@ -168,17 +166,18 @@ def test_an_allocator_explores_any_copy_of_its_answer(search: Allocator) -> None
         signatures = [mode.signature for mode in modes]
         assert not any(same_signature(a, b) for i, a in enumerate(signatures) for b in signatures[:i])
         assert all(allocator.explore(twin) == modes for twin in round_trips(result))
+    search.on(layout)
     with pytest.raises(AllocationError, match="another answer than this one; ask the allocator"):
         search.explore(result.with_command(result.command + 0.01))
 
 
-def test_another_command_is_judged_anew(search: Allocator) -> None:
+def test_another_command_is_judged_anew(search: AnyRobot) -> None:
     layout = load_layout("A")
     result = search.allocate(layout, SURGE, failed=["front_left"])
     least = np.where(np.isnan(result.command), np.nan, layout.lower)
     other = result.with_command(least)
     np.testing.assert_allclose(other.wrench, Plant(layout).wrench(least), atol=1e-12)
-    assert not other.reachable and other.err_norm > 0.1 > result.err_norm and other.effort < result.effort
+    assert not other.reachable and other.err_norm > 0.01 > result.err_norm and other.effort < result.effort
     assert other.wrench_expected is None and other.target is result.target
 
 
@@ -198,7 +197,7 @@ def test_a_method_that_does_not_know_the_fins_blames_no_limit() -> None:
 
 
 @pytest.mark.parametrize("k", range(5))
-def test_random_robots_too(k: int, search: Allocator) -> None:
+def test_random_robots_too(k: int, search: AnyRobot) -> None:
     rng = np.random.default_rng(k)
     layout = random_layout(rng, n_fins=2 + k)
     result = search.allocate(layout, rng.normal(size=6), failed=[layout.names[0]], seed=k)

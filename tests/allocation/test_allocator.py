@@ -3,21 +3,20 @@
 import math
 from dataclasses import replace
 from types import SimpleNamespace
-from typing import get_args
+from typing import Any, ClassVar, get_args
 
 import numpy as np
 import pytest
 
 from finlab.actuators.fin.blade import Blade
 from finlab.allocation import METHODS, Allocation, Allocator, Candidates, Solution, allocator
+from finlab.allocation.method import LeastErrorMethod
 from finlab.allocation.methods import MethodName
 from finlab.cli.allocate import allocate
 from finlab.errors import AllocationError, CommandError, LayoutError
 from finlab.layout import Fin, Layout
-from finlab.networks.normalization import Normalization
 from tests.any_robot import AnyRobot
 
-SIGMA = np.array([1.0, 2.0, 1.0, 0.5, 0.5, 0.5])
 ROBOT = Layout(
     "robot",
     (
@@ -29,29 +28,29 @@ ROBOT = Layout(
 SURGE = [1.0, 0.0, 0.0, 0.0, 0.0, 0.0]
 
 
-class Drawn(Allocator):
+class Drawn(LeastErrorMethod):
     """Answers with commands drawn from seed and target; remembers what it was asked."""
 
     name = "drawn"
+    asked: ClassVar[list[tuple[Layout, np.ndarray | None]]] = []
 
-    def __init__(self) -> None:
-        self.normalization = Normalization(np.zeros(6), SIGMA)
-        self.asked: list[tuple[Layout, np.ndarray | None]] = []
-
-    def _solve(
-        self, layout: Layout, targets: np.ndarray, *, seed: int, previous: np.ndarray | None
-    ) -> Solution:
-        self.asked.append((layout, previous))
+    def _solve(self, targets: np.ndarray, *, seed: int, previous: np.ndarray | None) -> Solution:
+        self.asked.append((self.layout, previous))
         seeds = [np.random.default_rng([seed, *np.abs(t).view(np.uint64).tolist()]) for t in targets]
-        share = np.array([rng.uniform(size=(layout.n_fins, 3)) for rng in seeds])
+        share = np.array([rng.uniform(size=(self.layout.n, 3)) for rng in seeds])
         command = np.array([0.05, 0.1, -3.0]) + share * [0.5, 1.9, 6.0]
         few = Candidates(command, targets * 0, np.zeros(1), np.zeros(1), np.zeros(1), ("drawn",))
-        return Solution(command, 0.5 * targets, lambda: few, None)
+        return Solution(command, wrench=0.5 * targets, candidates=lambda: few)
+
+    def alternatives(self, target: np.ndarray, **question: Any) -> Candidates | None:
+        found = self.solve(target[None], **question).candidates
+        return None if found is None else found()
 
 
 @pytest.fixture
-def method() -> Drawn:
-    return Drawn()
+def method() -> AnyRobot:
+    Drawn.asked.clear()
+    return AnyRobot(Drawn)
 
 
 @pytest.mark.parametrize(
@@ -73,37 +72,37 @@ def method() -> Drawn:
         ({"Fx": 1}, "wrench: expected six numbers"),
     ],
 )
-def test_refuses_a_wrench_that_is_none(method: Drawn, wrench: object, sentence: str) -> None:
+def test_refuses_a_wrench_that_is_none(method: AnyRobot, wrench: object, sentence: str) -> None:
     with pytest.raises(CommandError) as caught:
         method.allocate(ROBOT, wrench)  # type: ignore[arg-type]
     assert sentence in str(caught.value) and "\n" not in str(caught.value)
-    assert method.asked == []
+    assert Drawn.asked == []
 
 
 @pytest.mark.parametrize("wrenches", [SURGE, [[1.0, 2.0]], [[SURGE]], [[math.nan] * 6]])
-def test_refuses_many_wrenches_that_are_none(method: Drawn, wrenches: object) -> None:
+def test_refuses_many_wrenches_that_are_none(method: AnyRobot, wrenches: object) -> None:
     with pytest.raises(CommandError, match="wrench: "):
         method.allocate_batch(ROBOT, wrenches)  # type: ignore[arg-type]
 
 
-def test_refuses_unknown_fins_and_names_those_there_are(method: Drawn) -> None:
+def test_refuses_unknown_fins_and_names_those_there_are(method: AnyRobot) -> None:
     with pytest.raises(LayoutError, match="robot has no fin 'keel', it has bow, left, stern"):
         method.allocate(ROBOT, SURGE, failed=["bow", "keel"])
 
 
-def test_refuses_a_robot_without_a_working_fin(method: Drawn) -> None:
+def test_refuses_a_robot_without_a_working_fin(method: AnyRobot) -> None:
     with pytest.raises(LayoutError, match="no fin left once bow, left, stern are lost"):
         method.allocate(ROBOT, SURGE, failed=["bow", "left", "stern"])
 
 
-def test_refuses_a_bare_name_in_place_of_a_list(method: Drawn) -> None:
+def test_refuses_a_bare_name_in_place_of_a_list(method: AnyRobot) -> None:
     with pytest.raises(
         AllocationError, match=r"expected a list of fin names, got the text 'bow'; write \['bow'\]"
     ):
         method.allocate(ROBOT, SURGE, failed="bow")
 
 
-def test_refuses_a_previous_command_of_another_robot(method: Drawn) -> None:
+def test_refuses_a_previous_command_of_another_robot(method: AnyRobot) -> None:
     with pytest.raises(
         CommandError, match=r"previous: expected a command of shape \(3, 3\) for layout 'robot'"
     ):
@@ -111,14 +110,14 @@ def test_refuses_a_previous_command_of_another_robot(method: Drawn) -> None:
 
 
 @pytest.mark.parametrize("previous", ["rest", [[math.inf] * 3] * 3])
-def test_refuses_a_previous_command_that_is_none(method: Drawn, previous: object) -> None:
+def test_refuses_a_previous_command_that_is_none(method: AnyRobot, previous: object) -> None:
     with pytest.raises(CommandError, match="previous: "):
         method.allocate(ROBOT, SURGE, previous=previous)  # type: ignore[arg-type]
 
 
-def test_failed_fins_leave_the_graph_and_come_back_as_nan(method: Drawn) -> None:
+def test_failed_fins_leave_the_graph_and_come_back_as_nan(method: AnyRobot) -> None:
     result = method.allocate(ROBOT, SURGE, failed=["left"])
-    assert method.asked[0][0].names == ("bow", "stern")
+    assert Drawn.asked[0][0].names == ("bow", "stern")
     assert result.fins == ("bow", "left", "stern") and result.failed == ("left",)
     assert np.isnan(result.command[1]).all()
     expected = method.allocate(ROBOT.without(["left"]), SURGE).command
@@ -130,20 +129,20 @@ def test_failed_fins_leave_the_graph_and_come_back_as_nan(method: Drawn) -> None
     assert batch.command.shape == (2, 3, 3) and np.isnan(batch.command[:, 1]).all()
 
 
-def test_previous_commands_reach_the_method_without_the_failed_fins(method: Drawn) -> None:
+def test_previous_commands_reach_the_method_without_the_failed_fins(method: AnyRobot) -> None:
     previous = np.arange(9.0).reshape(3, 3)
     previous[0] = np.nan
     method.allocate(ROBOT, SURGE, failed=["bow"], previous=previous)
-    np.testing.assert_array_equal(method.asked[0][1], [[3, 4, 5], [6, 7, 8]])
+    np.testing.assert_array_equal(Drawn.asked[0][1], [[3, 4, 5], [6, 7, 8]])
 
 
-def test_the_same_seed_gives_the_same_answer(method: Drawn) -> None:
+def test_the_same_seed_gives_the_same_answer(method: AnyRobot) -> None:
     first, second, other = (method.allocate(ROBOT, SURGE, seed=seed).command for seed in (3, 3, 4))
     np.testing.assert_array_equal(first, second)
     assert not np.array_equal(first, other)
 
 
-def test_many_targets_get_the_answers_of_each(method: Drawn) -> None:
+def test_many_targets_get_the_answers_of_each(method: AnyRobot) -> None:
     targets = np.random.default_rng(0).normal(size=(4, 6))
     batch = method.allocate_batch(ROBOT, targets, seed=2)
     for row, target in enumerate(targets):
@@ -153,14 +152,14 @@ def test_many_targets_get_the_answers_of_each(method: Drawn) -> None:
     assert batch.solve_ms.shape == (4,)
 
 
-def test_the_target_is_a_copy(method: Drawn) -> None:
+def test_the_target_is_a_copy(method: AnyRobot) -> None:
     target = np.array(SURGE)
     result = method.allocate(ROBOT, target)
     target[0] = 99.0
     assert result.target[0] == 1.0
 
 
-def test_energy_counts_the_working_fins(method: Drawn) -> None:
+def test_energy_counts_the_working_fins(method: AnyRobot) -> None:
     result = method.allocate(ROBOT, SURGE, failed=["left"])
     whole = 0.0
     for amplitude, frequency, direction in result.command[[0, 2]] / [0.6, 2.1, math.pi]:
@@ -172,7 +171,7 @@ def test_energy_counts_the_working_fins(method: Drawn) -> None:
     np.testing.assert_allclose([batch.power[0], batch.effort[0]], [result.power, result.effort])
 
 
-def test_a_method_without_candidates_says_so(method: Drawn) -> None:
+def test_a_method_without_candidates_says_so(method: AnyRobot) -> None:
     result: Allocation = method.allocate(ROBOT, SURGE)
     assert result.samples is None
     assert result.candidates is not None and result.candidates.source == ("drawn",)
@@ -200,15 +199,20 @@ def test_the_method_comes_first_and_the_checkpoint_by_keyword() -> None:
     for name in ("analytic", "qp"):
         assert AnyRobot(name).name == name
     with pytest.raises(TypeError):
-        AnyRobot("dual", "default")  # type: ignore[misc]
+        Allocator(ROBOT, "dual", "default")  # type: ignore[misc]
+    with pytest.raises(AllocationError, match="checkpoint: method 'dual' has no networks, only"):
+        Allocator(ROBOT, checkpoint="default")
+    with pytest.raises(AllocationError, match="layout: expected a Layout, got 'A'; read a file with"):
+        Allocator("A")  # type: ignore[arg-type]
 
 
 def test_the_time_is_that_of_the_solver_shared_by_its_targets(
-    method: Drawn, monkeypatch: pytest.MonkeyPatch
+    method: AnyRobot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def clock() -> SimpleNamespace:
         return SimpleNamespace(perf_counter=iter([10.0, 40.0]).__next__)
 
+    method.on(ROBOT)
     monkeypatch.setattr(allocator, "time", clock())
     assert method.allocate(ROBOT, SURGE).solve_ms == 30_000.0
     monkeypatch.setattr(allocator, "time", clock())
@@ -217,7 +221,7 @@ def test_the_time_is_that_of_the_solver_shared_by_its_targets(
     assert method.allocate_batch(ROBOT, np.empty((0, 6))).solve_ms.tolist() == []
 
 
-def test_rows_out_of_reach_get_the_policys_answer_the_others_keep_theirs(method: Drawn) -> None:
+def test_rows_out_of_reach_get_the_policys_answer_the_others_keep_theirs(method: AnyRobot) -> None:
     """The method claims half of each target: with that, only a target of nothing is met."""
     targets = np.array([SURGE, [0.0] * 6, [0.0, 3.0, 0.0, 0.0, 0.0, 0.0]])
     batch = method.allocate_batch(ROBOT, targets, policy="direction")
@@ -232,7 +236,7 @@ def test_rows_out_of_reach_get_the_policys_answer_the_others_keep_theirs(method:
         assert np.abs(batch.wrench_expected[row]).max() < np.abs(plain.wrench_expected[row]).max()
 
 
-def test_a_changed_answer_is_noticed(method: Drawn) -> None:
+def test_a_changed_answer_is_noticed(method: AnyRobot) -> None:
     """Alternatives belong to an answer: up to a millionth it may differ, as between machines."""
     answer = method.allocate(ROBOT, SURGE, failed=["left"])
     for off, same in ((0.9e-6, True), (1.2e-6, False)):

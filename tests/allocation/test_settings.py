@@ -8,8 +8,9 @@ import pytest
 
 from finlab.allocation import METHODS, Allocator
 from finlab.allocation.mdn_settings import MdnOptions, MdnSettings
+from finlab.allocation.methods import method_class
 from finlab.allocation.search.settings import SearchOptions, SearchSettings
-from finlab.assets import shipped_checkpoints, shipped_layouts
+from finlab.assets import shipped_checkpoints
 from finlab.errors import AllocationError
 from finlab.layout import load_layout
 from finlab.paper.pipeline import PaperSettings
@@ -40,37 +41,30 @@ def test_every_method_is_here() -> None:
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_other_settings_answer_as_if_loaded_with_them(method: str) -> None:
-    layout = load_layout(shipped_layouts()["A"])
-    allocator = AnyRobot(method)
-    before = allocator.allocate(layout, SURGE).command
+def test_other_settings_answer_as_if_made_with_them(method: str) -> None:
+    layout = load_layout("A")
+    allocator = Allocator(layout, method)
+    before = allocator.allocate(SURGE).command
     other = allocator.with_settings(**OTHER[method])
-    command = other.allocate(layout, SURGE).command
-    loaded = AnyRobot(method, **OTHER[method])
-    assert type(other) is type(allocator) and other.options == loaded.options
-    np.testing.assert_array_equal(command, loaded.allocate(layout, SURGE).command)
+    command = other.allocate(SURGE).command
+    made = Allocator(layout, method, **OTHER[method])
+    assert other.method == allocator.method and other.settings == made.settings != allocator.settings
+    np.testing.assert_array_equal(command, made.allocate(SURGE).command)
     assert method in SAME_ANSWER or not np.array_equal(command, before)
-    np.testing.assert_array_equal(allocator.allocate(layout, SURGE).command, before)
+    np.testing.assert_array_equal(allocator.allocate(SURGE).command, before)
 
 
-def test_networks_and_layouts_are_shared() -> None:
-    network = AnyRobot("mdn")
-    assert vars(network.with_settings(n_refined=1))["weights"] is vars(network)["weights"]
-    layout, allocator = load_layout("A"), AnyRobot()
-    fewer = allocator.with_settings(n_refined=1)
-    assert fewer.pipeline.prepare(layout) is allocator.pipeline.prepare(layout)
-    weights = EffortWeights(1.0, 0.5, 0.0, 0.0, 0.25)
-    other = allocator.with_settings(objective="effort", effort_weights=weights)
-    expected = Allocator(layout, objective="effort", effort_weights=weights).allocate(SURGE)
-    assert other.allocate(layout, SURGE) == expected
-    assert not np.array_equal(
-        expected.command, allocator.with_settings(objective="effort").allocate(layout, SURGE).command
-    )
+def test_networks_are_shared() -> None:
+    network = Allocator(load_layout("A"), "mdn")
+    other = network.with_settings(n_refined=1)
+    assert other.weights is network.weights and other.checkpoint == "default"
+    again = Allocator(load_layout("ucat"), "mdn", checkpoint=network.weights)
+    assert again.weights is network.weights
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_unknown_settings_are_refused(method: str) -> None:
-    with pytest.raises(AllocationError, match="knows the options .*, got 'shoe_size'"):
+    with pytest.raises(AllocationError, match="knows the settings .*, got 'shoe_size'"):
         AnyRobot(method).with_settings(shoe_size=43)
 
 
@@ -110,4 +104,4 @@ def test_editors_complete_the_settings_that_there_are() -> None:
     ):
         kinds = get_type_hints(settings)
         assert get_type_hints(options) == {f.name: kinds[f.name] for f in fields(settings)}
-    assert list(get_type_hints(SearchOptions)) == AnyRobot().option_names()
+    assert list(get_type_hints(SearchOptions)) == method_class("dual").option_names()

@@ -29,8 +29,8 @@ def test_fins_that_no_network_learned_are_named(method: str) -> None:
     wide = FinModelSpec("drag", (("area", 0.03),))
     layout = with_models(front_left=FinModelSpec("lighthill"), back_right=wide)
     expected = ("front_left", "back_right") if method == "paper" else ()
-    assert allocator.unknown_fins(layout) == expected
-    assert allocator.unknown_fins(load_layout("A")) == ()
+    assert allocator.on(layout).unknown_fins == expected
+    assert allocator.on(load_layout("A")).unknown_fins == ()
 
 
 @pytest.mark.parametrize("method", METHODS)

@@ -123,7 +123,7 @@ def test_what_becomes_of_fins_without_a_word(layout_a: Layout, analytic: Allocat
     braked = (log.fin_force[:, lost] * foot).sum(axis=1)[after]
     assert braked.sum() < 0.0 and braked.max() < 1e-6, "a fin that hangs still drags"
     assert np.ptp(log.fin_motion[after, stuck, 2]) < 1e-9 and np.ptp(log.command[after, stuck, 2]) > 0.02
-    law = np.linalg.norm(swim._plant.forces(log.fin_motion), axis=-1)
+    law = np.linalg.norm(swim._plant.fin_forces(log.fin_motion), axis=-1)
     share = np.linalg.norm(log.fin_force, axis=-1)[:, weak] / law[:, weak]
     assert np.median(share[after & (log.time < 4.0)]) == pytest.approx(0.5, abs=0.06)
     assert np.median(share[log.time > 4.0]) == pytest.approx(1.0, abs=0.06)

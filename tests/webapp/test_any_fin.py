@@ -121,7 +121,7 @@ def test_one_error_everywhere() -> None:
         for c, e in zip(found.command, found.err_norm, strict=True)
     ]
     for command, error in [*told, *((mode.command, mode.err_norm) for mode in modes)]:
-        missing = (np.array(state.target) - plant.wrench(command)) / answer.sigma
+        missing = (np.array(state.target) - plant.wrench(command)) / answer.scale
         assert error == pytest.approx(float(np.linalg.norm(missing)), abs=1e-9)
     assert reply.modes.shown[0].mode.err_norm == pytest.approx(answer.err_norm, rel=1e-9)
     record = allocation_record(answer)

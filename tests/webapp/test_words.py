@@ -59,14 +59,14 @@ def test_all_that_is_said_of_an_answer_agrees(share: float, target: tuple[float,
     wrench = np.array(target)
     wrench[5] *= share
     wrench[4] += 1e-3 * (share < 1.0)
-    error = float(np.linalg.norm((wrench - target) / exact.sigma))
+    error = float(np.linalg.norm((wrench - target) / exact.scale))
     answer = replace(exact, wrench=wrench, err_norm=error)
     state = State(layout, target=tuple(target), objective="effort")  # type: ignore[arg-type]
     said, verdict = str(answer_sentence(state, answer, False)), verdict_sentence(answer, True)
     assert ("Nothing is left undone" in said) == (verdict == "Exact") == (error <= 0.01)
     assert "100 %" not in said + verdict
     if verdict != "Exact":
-        axis = int(np.argmax(np.abs((wrench - target) / answer.sigma)))
+        axis = int(np.argmax(np.abs((wrench - target) / answer.scale)))
         assert AXIS_WORDS[axis] in verdict and AXIS_WORDS[axis] in said
 
 

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from finlab.allocation import Allocator
-from finlab.allocation.baselines.ipopt import Ipopt
-from finlab.allocation.baselines.sqp import Sqp
+from finlab.allocation.baselines.ipopt import Ipopt, IpoptSettings
 from finlab.allocation.command_cost import command_cost
+from finlab.allocation.yardstick import yardstick
 from finlab.errors import AllocationError
-from finlab.layout import Fin, FinModelSpec, Layout, Limits
+from finlab.layout import Fin, FinModelSpec, Layout, Limits, load_layout
 from finlab.physics import make_law, plant_of
-from finlab.physics.objective import Name, Objective
+from finlab.physics.objective import Name
 from tests.any_robot import AnyRobot
 from tests.exhaustive import crossed
 
@@ -118,7 +118,7 @@ def robot(models: list[FinModelSpec]) -> Layout:
     return Layout("robot", tuple(Fin(f"fin_{i}", *parts) for i, parts in enumerate(fins)))
 
 
-def make(method: str, objective: Name) -> Allocator:
+def make(method: str, objective: Name) -> AnyRobot:
     if method == "ipopt":
         pytest.importorskip("casadi", reason="method ipopt is an optional extra")
     return AnyRobot(method, objective=objective, **FEW_STARTS.get(method, {}))
@@ -181,13 +181,12 @@ def test_ipopt_minimizes_what_the_plant_says(
 ) -> None:
     """Objective, gradient and Hessian of the program against the plant's, with and without formulas."""
     cs = pytest.importorskip("casadi", reason="method ipopt is an optional extra")
-    method = AnyRobot("ipopt", objective=objective, copper_loss=copper_loss)
-    assert isinstance(method, Ipopt)
-    plant = plant_of(robot(model(name)))
+    layout, settings = robot(model(name)), IpoptSettings(objective=objective, copper_loss=copper_loss)
+    method = Ipopt(layout, settings, yardstick(layout))
+    plant = plant_of(layout)
     target, at = 0.4 * plant.wrench(plant.upper), plant.sample(np.random.default_rng(4), (2,))
-    cost = command_cost(plant, method.aim, method.normalization.std, 1e-4)
-    sigma = method.normalization.std
-    solver, formulas = method._build(plant)
+    cost, sigma = command_cost(plant, method.aim, method.sigma, 1e-4), method.sigma
+    solver, formulas = method._solver
     total = cs.sumsqr(formulas.residual) + formulas.cost
     gradient = cs.gradient(total, formulas.command)
     asked = cs.Function("asked", [formulas.command, formulas.target], [total, gradient])
@@ -215,13 +214,13 @@ def test_what_is_no_objective_is_refused(method: str) -> None:
         AnyRobot(method, copper_loss=-1.0)
     with pytest.raises(AllocationError, match="expected EffortWeights"):
         AnyRobot(method, effort_weights=(1.0, 2.0))
-    with pytest.raises(AllocationError, match="knows the options .*objective, effort_weights, copper_loss"):
+    with pytest.raises(AllocationError, match="knows the settings .*objective, effort_weights, copper_loss"):
         AnyRobot(method, price=1.0)
 
 
 def test_settings_are_told_and_changed_like_any_other() -> None:
-    method = AnyRobot("sqp", objective="effort", n_steps=7)
-    assert method.options["objective"] == "effort" and method.options["n_steps"] == 7
-    other = method.with_settings(copper_loss=0.3, objective="power")
-    assert isinstance(other, Sqp) and other.settings.n_steps == 7
-    assert other.aim == Objective("power", copper_loss=0.3)
+    allocator = Allocator(load_layout("A"), "sqp", objective="effort", n_steps=7)
+    told = vars(allocator.settings)
+    assert told["objective"] == "effort" and told["n_steps"] == 7
+    other = vars(allocator.with_settings(copper_loss=0.3, objective="power").settings)
+    assert other == {**told, "copper_loss": 0.3, "objective": "power"}

@@ -7,15 +7,12 @@ import numpy as np
 import pytest
 
 from finlab.allocation import Allocator
-from finlab.allocation.baselines.analytic import Analytic
-from finlab.allocation.baselines.ipopt import Ipopt
-from finlab.allocation.baselines.qp import Qp
-from finlab.allocation.baselines.sqp import Sqp
 from finlab.errors import LayoutError
 from finlab.layout import Fin, FinModelSpec, Layout, Limits, random_layout
 from finlab.networks.normalization import Normalization
 from finlab.physics import Plant
 from finlab.physics.objective import Name
+from tests.any_robot import AnyRobot
 
 NORMALIZATION = Normalization(np.zeros(6), np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.35]))
 EXACT = ("analytic", "sqp", "ipopt")
@@ -24,12 +21,12 @@ THRUST = 4.737410112522892
 """Thrust of the default fin over f^2 sin^2(A) [N s^2]."""
 
 
-def make(method: str, **aim: Any) -> Allocator:
+def make(method: str, **aim: Any) -> AnyRobot:
     """A method, the slow ones with few starts."""
     if method == "ipopt":
         pytest.importorskip("casadi", reason="method ipopt is an optional extra")
-        return Ipopt(NORMALIZATION, n_starts=4, **aim)
-    return {"analytic": Analytic, "qp": Qp, "sqp": Sqp}[method](NORMALIZATION, **aim)
+        return AnyRobot(method, n_starts=4, **aim)
+    return AnyRobot(method, **aim)
 
 
 def one_fin(**changes: object) -> Layout:
@@ -51,7 +48,7 @@ def test_one_fin_pushes_where_it_is_asked(method: str, direction: float) -> None
     amplitude, frequency, zero_direction = result.command[0]
     assert THRUST * (frequency * math.sin(amplitude)) ** 2 == pytest.approx(1.5, abs=2e-3)
     assert math.remainder(zero_direction - direction, 2 * math.pi) == pytest.approx(0.0, abs=2e-3)
-    assert result.err_norm < 2e-3
+    assert result.err_norm < 2e-4
 
 
 @pytest.mark.parametrize("method", ALL)
@@ -68,7 +65,7 @@ def test_two_fins_turn_the_robot(method: str) -> None:
     result = make(method).allocate(layout, [0.0, 0.0, 0.0, 0.0, 0.0, 0.4])
     # Each gives 1 N: the left one backward, the right one forward. Shafts point outwards, so that a positive
     # zero direction 0 pushes the left fin backward and the right one forward.
-    np.testing.assert_allclose(Plant(layout).forces(result.command), [[-1, 0, 0], [1, 0, 0]], atol=3e-3)
+    np.testing.assert_allclose(Plant(layout).fin_forces(result.command), [[-1, 0, 0], [1, 0, 0]], atol=3e-3)
 
 
 @pytest.mark.parametrize("method", EXACT)
@@ -138,7 +135,7 @@ def test_other_fin_models_and_mixtures_of_them(method: str) -> None:
         "mixed", (Fin("a", (0.2, 0.1, 0.0), 0.5, model=lighthill), Fin("b", (-0.1, 0.1, 0.0), -1.0))
     )
     target = Plant(layout).wrench([[0.4, 1.5, 0.7], [0.5, 1.2, -2.0]])
-    assert make(method).allocate(layout, target).err_norm < 5e-3
+    assert make(method).allocate(layout, target).err_norm < 5e-4
 
 
 @pytest.mark.parametrize("method", ALL)

@@ -6,12 +6,9 @@ import warnings
 import numpy as np
 import pytest
 
-from finlab.allocation.baselines.sqp import Sqp
+from finlab.allocation import Allocator
 from finlab.layout import Fin, FinModelSpec, Layout, Limits
-from finlab.networks.normalization import Normalization
 from finlab.physics import Plant
-
-NORMALIZATION = Normalization(np.zeros(6), np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.35]))
 
 
 def strong(n_fins: int, angle: float = 1.0) -> Layout:
@@ -33,7 +30,7 @@ def test_strong_fins_on_long_levers_are_no_singular_problem(layout: Layout) -> N
     )
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        command = Sqp(NORMALIZATION).allocate_batch(layout, np.clip(targets, -1e6, 1e6)).command
+        command = Allocator(layout, "sqp").allocate_batch(np.clip(targets, -1e6, 1e6)).command
     assert ((command >= layout.lower) & (command <= layout.upper)).all()
 
 
@@ -52,8 +49,8 @@ def many_fins() -> tuple[Layout, np.ndarray]:
 def test_when_the_time_is_up_the_best_so_far_is_the_answer() -> None:
     layout, target = many_fins()
     start = time.thread_time()
-    hasty = Sqp(NORMALIZATION, time_limit_s=1e-6).allocate(layout, target)
+    hasty = Allocator(layout, "sqp", time_limit_s=1e-6).allocate(target)
     assert time.thread_time() - start < 0.3
     assert ((hasty.command >= layout.lower) & (hasty.command <= layout.upper)).all()
-    patient = Sqp(NORMALIZATION, time_limit_s=60.0).allocate(layout, target)
+    patient = Allocator(layout, "sqp", time_limit_s=60.0).allocate(target)
     assert patient.err_norm < 1e-5 and patient.power < hasty.power

@@ -32,7 +32,7 @@ def test_formulas_are_the_plant(objective: Objective) -> None:
     limits = [Limits((0.05, 0.5), (0.1, 1.5 + 0.3 * i), (-1.0, 1.5 + 0.4 * i)) for i in range(4)]
     fins = zip(layout.fins, laws, limits, strict=True)
     layout = replace(
-        layout, fins=tuple(replace(f, model=FinModelSpec(law), limits=ends) for f, law, ends in fins)
+        layout, actuators=tuple(replace(f, model=FinModelSpec(law), limits=ends) for f, law, ends in fins)
     )
     plant = Plant(layout)
     symbols, wrenches, costs = plant_formulas(casadi, plant, objective)
