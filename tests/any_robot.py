@@ -6,7 +6,7 @@ from typing import Any
 
 from finlab.allocation import Allocation, Allocator, BatchAllocation
 from finlab.allocation.method import Method
-from finlab.allocation.methods import Checkpoint, MethodChoice, checked_settings, choose_method
+from finlab.allocation.methods import LEARNED, Checkpoint, MethodChoice, checked_settings, choose_method
 from finlab.allocation.modes import Mode
 from finlab.allocation.settings import AimSettings, Settings
 from finlab.allocation.solution import Candidates
@@ -23,7 +23,7 @@ class AnyRobot:
         self, method: str | type[Method] = "dual", checkpoint: Checkpoint = None, **settings: Any
     ) -> None:
         self.choice = (
-            choose_method(method, checkpoint, **settings)
+            choose_method(method, checkpoint if method in LEARNED else None, **settings)
             if isinstance(method, str)
             else MethodChoice(method, checked_settings(method, settings))
         )
@@ -57,6 +57,10 @@ class AnyRobot:
         if layout not in self._made:
             self._made[layout] = Allocator.of_choice(layout, self.choice)
         return self._made[layout]
+
+    def method(self, layout: Layout) -> Any:
+        """The method itself, for tests of what is inside."""
+        return self.on(layout)._whole.method
 
     def allocate(self, layout: Layout, wrench: Any, **question: Any) -> Allocation:
         return self.on(layout).allocate(wrench, **question)

@@ -5,7 +5,6 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-from finlab.allocation.allocator import Allocator
 from finlab.assets import shipped_layouts
 from finlab.layout import Layout, load_layout
 from tests.any_robot import AnyRobot
@@ -68,7 +67,7 @@ def layout_a() -> Layout:
 
 
 @pytest.fixture(scope="session")
-def analytic() -> Allocator:
+def analytic() -> AnyRobot:
     """The quickest method; it takes only the normalization from a checkpoint."""
 
     return AnyRobot("analytic")

@@ -208,7 +208,7 @@ class Paper(LeastErrorMethod):
     def _candidates(self, robot: _Robot, command: AnyArray, target: AnyArray, source: str) -> Candidates:
         """Candidates (K, n, 3) of a single target (6,), in their order."""
         wrench = robot.surrogate.wrench(command).astype(np.float64)
-        error, inside = self.normalization.error(wrench, target), _inside(robot, command)
+        error, inside = np.linalg.norm((wrench - target) / self.scale, axis=-1), _inside(robot, command)
         return Candidates(inside, wrench, error, *costs(robot.layout, inside), (source,) * len(command))
 
 

@@ -65,8 +65,8 @@ def test_stored_results_belong_to_the_shipped_problems(shipped: Problems) -> Non
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ("nonsense", "expected one of search, mdn"),
-        ("search search", "expected different names, got search, search"),
+        ("nonsense", "expected one of dual, mdn"),
+        ("dual dual", "expected different names, got dual, dual"),
         ("--limit 0", "limit: expected a number of seconds above 0, got 0.0"),
         ("--sets nowhere", "sets: expected some of paper, shipped"),
         ("--problems missing.npz", "missing.npz: no such file"),

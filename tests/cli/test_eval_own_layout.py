@@ -52,7 +52,7 @@ def test_failed_fins_of_a_graph_file_stay_out(tmp_path: Path) -> None:
         ("no_such_layout", "layout 'no_such_layout' is neither a file nor a shipped layout"),
         ("A --split ood", "split: a layout has none, got 'ood' beside 'A'"),
         ("A --targets 0", "targets: expected a number of at least 1, got 0"),
-        ("A --methods nonsense", "expected one of search"),
+        ("A --methods nonsense", "expected one of dual"),
     ],
 )
 def test_bad_input_is_one_sentence(arguments: str, message: str, capsys: pytest.CaptureFixture[str]) -> None:

@@ -42,8 +42,8 @@ def until(loop: ClosedLoop, seconds: float) -> RunLog:
     return loop.log
 
 
-def test_whole_fins_are_left_alone(layout_a: Layout, analytic: Allocator) -> None:
-    loop = swim(layout_a, analytic, [])
+def test_whole_fins_are_left_alone(layout_a: Layout, analytic: AnyRobot) -> None:
+    loop = swim(layout_a, analytic.on(layout_a), [])
     log = until(loop, 30.0)
     assert loop.damage.failed == () and loop.damage.health is None
     assert log.fault_probability.max() < 0.5 and np.median(log.fault_probability) < PRIOR
@@ -51,8 +51,8 @@ def test_whole_fins_are_left_alone(layout_a: Layout, analytic: Allocator) -> Non
 
 
 @pytest.mark.parametrize("name", ["front_right", pytest.param("back_left", marks=pytest.mark.exhaustive)])
-def test_a_lost_fin_is_found_and_no_longer_used(layout_a: Layout, analytic: Allocator, name: str) -> None:
-    loop = swim(layout_a, analytic, [FinFault(name, 12.0)])
+def test_a_lost_fin_is_found_and_no_longer_used(layout_a: Layout, analytic: AnyRobot, name: str) -> None:
+    loop = swim(layout_a, analytic.on(layout_a), [FinFault(name, 12.0)])
     log = until(loop, 16.0)
     fin = layout_a.index(name)
     assert loop.damage.failed == (name,)
@@ -69,15 +69,15 @@ def test_a_lost_fin_is_found_and_no_longer_used(layout_a: Layout, analytic: Allo
 @pytest.mark.parametrize("lost", [("front_right", "back_left"), ("front_left", "back_right")])
 def test_two_fins_lost_at_one_moment_are_found(layout_a: Layout, lost: tuple[str, str]) -> None:
     """Each alone explains as little of it as any other fin would."""
-    loop = swim(layout_a, AnyRobot(), [FinFault(name, 12.0) for name in lost])
+    loop = swim(layout_a, AnyRobot().on(layout_a), [FinFault(name, 12.0) for name in lost])
     until(loop, 12.0)
     assert loop.damage.failed == ()
     until(loop, 16.0)
     assert loop.damage.failed == lost
 
 
-def test_a_weak_fin_keeps_its_share(layout_a: Layout, analytic: Allocator) -> None:
-    loop = swim(layout_a, analytic, [FinFault("back_left", 12.0, "torn", 0.4)])
+def test_a_weak_fin_keeps_its_share(layout_a: Layout, analytic: AnyRobot) -> None:
+    loop = swim(layout_a, analytic.on(layout_a), [FinFault("back_left", 12.0, "torn", 0.4)])
     log = until(loop, 30.0)
     fin = layout_a.index("back_left")
     assert loop.damage.failed == () and loop.damage.health is not None
@@ -86,8 +86,8 @@ def test_a_weak_fin_keeps_its_share(layout_a: Layout, analytic: Allocator) -> No
     assert 0.0 < log.strength_std[-1, fin] < 0.15
 
 
-def test_a_stuck_fin_is_told_from_a_lost_one(layout_a: Layout, analytic: Allocator) -> None:
-    loop = swim(layout_a, analytic, [FinFault("front_left", 12.0, "stuck")])
+def test_a_stuck_fin_is_told_from_a_lost_one(layout_a: Layout, analytic: AnyRobot) -> None:
+    loop = swim(layout_a, analytic.on(layout_a), [FinFault("front_left", 12.0, "stuck")])
     log = until(loop, 20.0)
     assert loop.damage.failed == () and loop.damage.health is not None
     held = log.fin_motion[-1, layout_a.index("front_left"), 2]
@@ -96,20 +96,20 @@ def test_a_stuck_fin_is_told_from_a_lost_one(layout_a: Layout, analytic: Allocat
     )
 
 
-def test_a_repaired_fin_is_taken_back(layout_a: Layout, analytic: Allocator) -> None:
+def test_a_repaired_fin_is_taken_back(layout_a: Layout, analytic: AnyRobot) -> None:
     events = [FinFault("back_right", 10.0), FinFault("back_right", 15.0, "whole")]
-    loop = swim(layout_a, analytic, events)
+    loop = swim(layout_a, analytic.on(layout_a), events)
     until(loop, 15.0)
     assert loop.damage.failed == ("back_right",)
     until(loop, 60.0)
     assert loop.damage.failed == () and loop.damage.health is None
 
 
-def test_fins_at_rest_cannot_be_told(layout_a: Layout, analytic: Allocator) -> None:
+def test_fins_at_rest_cannot_be_told(layout_a: Layout, analytic: AnyRobot) -> None:
     """The allocator rests a fin, of which nothing is known then: its probability stays at its prior."""
     loop = ClosedLoop(
         layout_a,
-        analytic,
+        analytic.on(layout_a),
         make_trajectory("lissajous"),
         failures=[("front_left", 0.0), FinFault("front_left", 8.0)],
         announced=True,
@@ -158,9 +158,9 @@ def test_a_single_odd_sample_decides_nothing(layout_a: Layout) -> None:
 
 
 @pytest.mark.parametrize("plant", ["ripple", "flexible"])
-def test_a_model_that_does_not_fit_raises_no_alarm(layout_a: Layout, analytic: Allocator, plant: str) -> None:
+def test_a_model_that_does_not_fit_raises_no_alarm(layout_a: Layout, analytic: AnyRobot, plant: str) -> None:
     """Fins that shake the robot by several newtons, or thrust otherwise than the model says."""
-    loop = swim(layout_a, analytic, [], plant=plant)
+    loop = swim(layout_a, analytic.on(layout_a), [], plant=plant)
     until(loop, 25.0)
     assert loop.damage.failed == () and loop.damage.health is None
 

@@ -71,7 +71,7 @@ def error(
     path: str = "circle",
 ) -> float:
     """Root mean square distance from a path [m]."""
-    loop = ClosedLoop(robot, AnyRobot(), make_trajectory(path), pilot, truth=truth, water=water)
+    loop = ClosedLoop(robot, AnyRobot().on(robot), make_trajectory(path), pilot, truth=truth, water=water)
     log = loop.run()
     return float(np.sqrt(((log.position - log.reference) ** 2).sum(1).mean()))
 

@@ -8,16 +8,16 @@ from finlab.evaluation.method_specs import is_slow, load_method_spec, load_metho
 
 @pytest.mark.parametrize("name", ["dual", "analytic", "sqp"])
 def test_the_objective_is_a_part_of_the_name_or_given_to_all(name: str) -> None:
-    assert load_method_spec(name).options["objective"] == "power"
-    assert load_method_spec(name, objective="effort").options["objective"] == "effort"
-    assert load_method_spec(f"{name}-effort").options["objective"] == "effort"
-    assert load_method_spec(f"{name}-power", objective="effort").options["objective"] == "power"
+    assert load_method_spec(name).choice.settings.objective == "power"
+    assert load_method_spec(name, objective="effort").choice.settings.objective == "effort"
+    assert load_method_spec(f"{name}-effort").choice.settings.objective == "effort"
+    assert load_method_spec(f"{name}-power", objective="effort").choice.settings.objective == "power"
 
 
 def test_methods_that_cannot_choose_are_left_as_they_are() -> None:
-    methods = load_method_specs("paper, on-board,search", objective="effort")
+    methods = load_method_specs("paper, on-board,dual", objective="effort")
     assert list(methods) == ["paper", "on-board", "dual"]
-    assert "objective" not in methods["paper"].options and methods["dual"].options["objective"] == "effort"
+    assert vars(methods["dual"].choice.settings)["objective"] == "effort"
 
 
 def test_methods_for_comparison_alone() -> None:
@@ -26,18 +26,18 @@ def test_methods_for_comparison_alone() -> None:
 
 
 def test_starts() -> None:
-    assert load_method_spec("ipopt-32").options["n_starts"] == 32
-    assert is_slow("ipopt-32") and not is_slow("search-effort")
+    assert load_method_spec("ipopt-32").choice.settings.n_starts == 32
+    assert is_slow("ipopt-32") and not is_slow("dual-effort")
 
 
 @pytest.mark.parametrize(
     ("names", "message"),
     [
         ("learned", "method: 'learned' is now called 'dual'"),
-        ("search,fast", "method: 'fast' has gone"),
-        ("search-32", "a number of starts, from 1, goes with ipopt only, got 'search-32'"),
-        ("paper-effort", "knows the options .*, got 'objective'"),
-        ("search-money", "method: expected one of search, mdn"),
+        ("dual,fast", "method: 'fast' has gone"),
+        ("dual-32", "a number of starts, from 1, goes with ipopt only, got 'dual-32'"),
+        ("paper-effort", "knows the settings .*, got 'objective'"),
+        ("dual-money", "method: expected one of dual, mdn"),
         (" , ", "expected names with commas between"),
     ],
 )

@@ -10,7 +10,6 @@ from finlab.allocation import Allocator
 from finlab.deploy.bundle import make_bundle
 from finlab.errors import LayoutError
 from finlab.layout import Interaction, Jet, Layout, layout_to_dict, load_layout, parse_layout, save_layout
-from tests.any_robot import AnyRobot
 
 
 @pytest.fixture(scope="module")
@@ -40,8 +39,8 @@ def test_bundles_take_it_along(coupled: Layout, tmp_path: Path) -> None:
     assert again.interaction == coupled.interaction
     target = [1.0, 0.0, 0.5, 0.0, 0.0, 0.1]
     here, there = (
-        allocator.allocate(layout, target)
-        for allocator, layout in ((AnyRobot(), coupled), (AnyRobot(tmp_path / "bundle"), again))
+        allocator.allocate(target)
+        for allocator in (Allocator(coupled), Allocator.from_bundle(tmp_path / "bundle"))
     )
     assert here.err_norm < 1e-4 and there.err_norm < 1e-4
     assert there.power == pytest.approx(here.power, rel=1e-6)

@@ -18,6 +18,7 @@ from safetensors.torch import load_file, save_file
 
 from finlab.assets import checkpoint_path, shipped_checkpoints
 from finlab.errors import CheckpointError
+from finlab.layout import load_layout
 from finlab.networks.checkpoint import (
     checkpoint_files,
     read_checkpoint,
@@ -65,7 +66,7 @@ def refusal(folder: Path) -> str:
     """The sentence with which a folder is refused, at the latest by the method that would answer with it."""
     with pytest.raises(CheckpointError) as caught:
         read_checkpoint(folder)
-        AnyRobot("paper", checkpoint=folder)
+        AnyRobot("paper", checkpoint=folder).on(load_layout("A"))
     message = str(caught.value)
     assert "\n" not in message and folder.name in message
     return message
@@ -229,7 +230,7 @@ def test_a_surrogate_alone_loads_but_cannot_allocate(folder: Path) -> None:
     save_checkpoint(folder, replace(read_checkpoint(folder), network_sizes=None, network={}))
     assert read_checkpoint(folder).network_sizes is None
     with pytest.raises(CheckpointError, match="holds no network, .* train it with `finlab train allocator`"):
-        AnyRobot("paper", checkpoint=folder)
+        AnyRobot("paper", checkpoint=folder).on(load_layout("A"))
 
 
 def test_a_network_over_forces_comes_back_without_a_surrogate(untrained_mdn: Path, tmp_path: Path) -> None:
@@ -237,7 +238,7 @@ def test_a_network_over_forces_comes_back_without_a_surrogate(untrained_mdn: Pat
     assert first.surrogate_sizes is None and first.network_sizes is not None
     assert save_checkpoint(tmp_path / "again", first).sha256 == first.sha256
     with pytest.raises(CheckpointError, match="fed 'forces', expected one that is fed 'raw'"):
-        AnyRobot("paper", checkpoint=untrained_mdn)
+        AnyRobot("paper", checkpoint=untrained_mdn).on(load_layout("A"))
 
 
 def test_a_checkpoint_of_an_earlier_finlab_is_refused(folder: Path) -> None:

@@ -8,21 +8,21 @@ import numpy as np
 import pytest
 import torch
 
-from finlab.assets import checkpoint_path, shipped_layouts
+from finlab.assets import shipped_layouts
 from finlab.errors import AllocationError, CheckpointError
 from finlab.layout import Fin, Layout, Limits, load_layout
 from finlab.layout.angles import is_full_turn
-from finlab.networks.checkpoint import read_checkpoint
 from finlab.networks.normalization import Normalization, clamp_to_limits, to_command, to_normalized
 from finlab.networks.trained import TrainedWeights, sizes_for_file
 from finlab.paper.network import NetworkConfig
-from finlab.paper.pipeline import ADAM_RATE, CHUNK, PaperAllocator
+from finlab.paper.pipeline import ADAM_RATE, CHUNK
 from finlab.paper.surrogate import SurrogateConfig
 from finlab.paper.training.surrogate import first_surrogate
 from finlab.physics import Plant
 from finlab.physics.effort import command_effort
 from finlab.training.first_weights import first_weights
 from finlab.training.saving import arrays_of, tensors_of
+from tests.any_robot import AnyRobot
 
 TARGET = [0.5, -0.3, 1.0, 0.05, -0.02, 0.1]
 
@@ -83,7 +83,7 @@ ABLATIONS: list[dict[str, object]] = [
 def test_every_variant_keeps_the_limits_bit_for_bit(
     options: dict[str, object], checkpoint: TrainedWeights, robot: Layout
 ) -> None:
-    method = PaperAllocator(checkpoint, n_steps=5, **options)  # type: ignore[arg-type]
+    method = AnyRobot("paper", checkpoint, n_steps=5, **options)  # type: ignore[arg-type]
     targets = np.random.default_rng(0).normal(size=(6, 6)) * np.array([[1.0], [1], [1], [50], [0], [1e5]])
     assert keeps_limits(robot, method.allocate_batch(robot, targets).command)
     result = method.allocate(robot, TARGET, seed=1)
@@ -96,7 +96,7 @@ def test_every_variant_keeps_the_limits_bit_for_bit(
 def test_the_same_seed_gives_the_same_answer(
     options: dict[str, object], checkpoint: TrainedWeights, robot: Layout
 ) -> None:
-    method = PaperAllocator(checkpoint, n_steps=5, **options)  # type: ignore[arg-type]
+    method = AnyRobot("paper", checkpoint, n_steps=5, **options)  # type: ignore[arg-type]
     first, second, other = (method.allocate(robot, TARGET, seed=seed).command for seed in (4, 4, 5))
     np.testing.assert_array_equal(first, second)
     if not options.get("mean_only"):
@@ -105,7 +105,7 @@ def test_the_same_seed_gives_the_same_answer(
 
 def test_refinement_lowers_what_the_surrogate_sees(checkpoint: TrainedWeights, robot: Layout) -> None:
     def believed(**options: object) -> float:
-        method = PaperAllocator(checkpoint, **options)  # type: ignore[arg-type]
+        method = AnyRobot("paper", checkpoint, **options)  # type: ignore[arg-type]
         wrench = method.allocate_batch(robot, targets).wrench_expected
         return float(method.normalization.error(wrench, targets).mean())
 
@@ -116,7 +116,7 @@ def test_refinement_lowers_what_the_surrogate_sees(checkpoint: TrainedWeights, r
 
 def test_candidates_come_best_first(checkpoint: TrainedWeights, robot: Layout) -> None:
     """By J, so that the answer is the first of them."""
-    method = PaperAllocator(checkpoint, n_candidates=20, n_refined=3, n_steps=5, gamma=0.01)
+    method = AnyRobot("paper", checkpoint, n_candidates=20, n_refined=3, n_steps=5, gamma=0.01)
     result = method.allocate(robot, TARGET)
     assert result.candidates is not None and result.samples is not None
     np.testing.assert_array_equal(result.candidates.command[0], result.command)
@@ -124,12 +124,12 @@ def test_candidates_come_best_first(checkpoint: TrainedWeights, robot: Layout) -
     for offered in (result.candidates, result.samples):
         j_norm = method.normalization.error(offered.wrench, np.array(TARGET)) ** 2
         assert (np.diff(j_norm + 0.01 * offered.effort) >= -1e-5).all()
-        error = method.normalization.error(offered.wrench, np.array(TARGET))
+        error = np.linalg.norm((offered.wrench - TARGET) / result.scale, axis=-1)
         np.testing.assert_allclose(offered.err_norm, error, atol=1e-3)
 
 
 def test_failed_fins_are_left_out(checkpoint: TrainedWeights, robot: Layout) -> None:
-    method = PaperAllocator(checkpoint, n_steps=5)
+    method = AnyRobot("paper", checkpoint, n_steps=5)
     lost = robot.names[2]
     result = method.allocate(robot, TARGET, failed=[lost])
     assert np.isnan(result.command[2]).all()
@@ -138,7 +138,7 @@ def test_failed_fins_are_left_out(checkpoint: TrainedWeights, robot: Layout) -> 
 
 
 def test_targets_beyond_one_chunk_get_their_answers(checkpoint: TrainedWeights) -> None:
-    method = PaperAllocator(checkpoint, n_candidates=2, refinement="none")
+    method = AnyRobot("paper", checkpoint, n_candidates=2, refinement="none")
     layout = Layout("pair", (Fin("a", (0.1, 0.0, 0.0), 0.0), Fin("b", (-0.1, 0.0, 0.0), 2.0)))
     targets = np.random.default_rng(0).normal(size=(CHUNK + 1, 6))
     batch = method.allocate_batch(layout, targets)
@@ -148,7 +148,7 @@ def test_targets_beyond_one_chunk_get_their_answers(checkpoint: TrainedWeights) 
 
 
 def test_the_shipped_networks_reach_the_target() -> None:
-    method = PaperAllocator(read_checkpoint(checkpoint_path("paper")))
+    method = AnyRobot("paper")
     layout = load_layout(shipped_layouts()["A"])
     lower = layout.lower
     upper = layout.upper
@@ -161,7 +161,7 @@ def test_the_shipped_networks_reach_the_target() -> None:
 def test_refuses_a_checkpoint_without_network(checkpoint: TrainedWeights) -> None:
     alone = replace(checkpoint, name="alone", network_sizes=None, network={})
     with pytest.raises(CheckpointError, match="checkpoint 'alone' holds no network, expected one"):
-        PaperAllocator(alone)
+        AnyRobot("paper", alone).on(load_layout("A"))
 
 
 def place_of(robot: Layout) -> list[torch.Tensor]:
@@ -171,8 +171,8 @@ def place_of(robot: Layout) -> list[torch.Tensor]:
 
 def test_adam_goes_where_torch_goes(checkpoint: TrainedWeights, robot: Layout) -> None:
     """The whole refinement in PyTorch, from the raw candidates that the method drew."""
-    method = PaperAllocator(checkpoint, n_candidates=3, n_refined=3, gamma=0.05, n_steps=25)
-    before = PaperAllocator(checkpoint, n_candidates=3, n_refined=3, gamma=0.05, refinement="none")
+    method = AnyRobot("paper", checkpoint, n_candidates=3, n_refined=3, gamma=0.05, n_steps=25)
+    before = AnyRobot("paper", checkpoint, n_candidates=3, n_refined=3, gamma=0.05, refinement="none")
     target = np.array(TARGET) * 0.3
     start = before.allocate(robot, target).candidates
     assert start is not None
@@ -212,12 +212,12 @@ def test_levenberg_marquardt_reaches_what_the_surrogate_can_give(
     checkpoint: TrainedWeights, robot: Layout
 ) -> None:
     """A target that the surrogate itself gives is met to rounding, correction included."""
-    method = PaperAllocator(checkpoint, refinement="levenberg-marquardt", n_refined=8)
+    method = AnyRobot("paper", checkpoint, refinement="levenberg-marquardt", n_refined=8)
     share = np.random.default_rng(3).random((8, robot.n_fins, 3))
     command = torch.tensor(robot.lower + share * (robot.upper - robot.lower), dtype=torch.float32)
     targets = asked(checkpoint, command, robot).numpy().astype(np.float64)
     error = method.normalization.error(method.allocate_batch(robot, targets).wrench_expected, targets)
-    raw = PaperAllocator(checkpoint, refinement="none").allocate_batch(robot, targets)
+    raw = AnyRobot("paper", checkpoint, refinement="none").allocate_batch(robot, targets)
     assert np.median(error) < 0.05 * np.median(method.normalization.error(raw.wrench_expected, targets))
 
 
@@ -226,8 +226,8 @@ def test_the_shipped_checkpoint_answers_without_torch() -> None:
         "import sys\n"
         "sys.modules['torch'] = None\n"
         "import finlab\n"
-        "allocator = AnyRobot('paper')\n"
-        "print(allocator.allocate(finlab.load_layout('A'), [1, 0, 0.5, 0, 0, 0.1]).command.shape)"
+        "allocator = finlab.Allocator(finlab.load_layout('A'), 'paper')\n"
+        "print(allocator.allocate([1, 0, 0.5, 0, 0, 0.1]).command.shape)"
     )
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True
@@ -249,7 +249,7 @@ def test_refuses_settings_that_leave_nothing_to_answer_with(
     options: dict[str, object], message: str, checkpoint: TrainedWeights
 ) -> None:
     with pytest.raises(AllocationError, match=message):
-        PaperAllocator(checkpoint, **options)
+        AnyRobot("paper", checkpoint, **options)
 
 
 def test_each_ranking_takes_what_it_ranks_first(checkpoint: TrainedWeights) -> None:
@@ -258,10 +258,11 @@ def test_each_ranking_takes_what_it_ranks_first(checkpoint: TrainedWeights) -> N
     chosen = {}
     for ranking in ("physics", "nll"):
         options = {"ranking": ranking, "refinement": "none", "n_candidates": 12, "gamma": 0.2}
-        paper = PaperAllocator(checkpoint, **options)
-        robot, std = paper._prepared(layout), paper.normalization.std
-        mixture = paper._predict(robot, (target - paper.normalization.mean) / std)
-        sampled = clamp_to_limits(to_command(paper._draw(mixture, 3), *robot.limits), *robot.limits)[0]
+        paper = AnyRobot("paper", checkpoint, **options)
+        method, std = paper.method(layout), paper.normalization.std
+        robot = method._robot
+        mixture = method._predict(robot, (target - paper.normalization.mean) / std)
+        sampled = clamp_to_limits(to_command(method._draw(mixture, 3), *robot.limits), *robot.limits)[0]
         if ranking == "nll":
             x = to_normalized(sampled[None], *robot.limits)
             best = int(np.argmax(mixture.log_prob(x).sum(-1)))

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from finlab.allocation.allocator import Allocator
 from finlab.control import FaultMonitor, TrackingController
 from finlab.errors import DataError, FinlabError, LayoutError
 from finlab.layout import Layout
@@ -34,29 +33,36 @@ def swum(swim: ClosedLoop, seconds: float) -> RunLog:
 
 
 @pytest.mark.parametrize("plant", ["mean", "ripple", "flexible"])
-def test_it_follows_a_circle_on_every_plant(layout_a: Layout, analytic: Allocator, plant: str) -> None:
-    log = swum(ClosedLoop(layout_a, analytic, make_trajectory("circle"), plant=plant, seed=7), 20.0)
+def test_it_follows_a_circle_on_every_plant(layout_a: Layout, analytic: AnyRobot, plant: str) -> None:
+    log = swum(
+        ClosedLoop(layout_a, analytic.on(layout_a), make_trajectory("circle"), plant=plant, seed=7), 20.0
+    )
     error = np.linalg.norm(log.position - log.reference, axis=1)
     assert error.max() < 0.25
     assert np.sqrt((error**2).mean()) < 0.1
 
 
-def test_same_seed_same_swim(layout_a: Layout, analytic: Allocator) -> None:
-    swims = [ClosedLoop(layout_a, analytic, make_trajectory("circle", 20.0), seed=seed) for seed in (1, 1, 2)]
+def test_same_seed_same_swim(layout_a: Layout, analytic: AnyRobot) -> None:
+    swims = [
+        ClosedLoop(layout_a, analytic.on(layout_a), make_trajectory("circle", 20.0), seed=seed)
+        for seed in (1, 1, 2)
+    ]
     first, again, other = ([swim.step() for _ in range(30)][-1].position for swim in swims)
     np.testing.assert_array_equal(first, again)
     assert (first != other).any()
 
 
-def test_a_straight_path_holds_speed_and_depth(layout_a: Layout, analytic: Allocator) -> None:
-    log = swum(ClosedLoop(layout_a, analytic, straight(0.15, 30.0), sensors=NO_NOISE), 20.0)
+def test_a_straight_path_holds_speed_and_depth(layout_a: Layout, analytic: AnyRobot) -> None:
+    log = swum(ClosedLoop(layout_a, analytic.on(layout_a), straight(0.15, 30.0), sensors=NO_NOISE), 20.0)
     late = log.time > 15.0
     assert np.abs(log.motion[late, 0] - 0.15).max() < 0.01
     assert np.abs(log.position[late, 2] + 1.0).max() < 0.02
 
 
-def test_fins_fail_and_mend(layout_a: Layout, analytic: Allocator) -> None:
-    swim = ClosedLoop(layout_a, analytic, make_trajectory("circle", 20.0), failures=[("front_left", 0.5)])
+def test_fins_fail_and_mend(layout_a: Layout, analytic: AnyRobot) -> None:
+    swim = ClosedLoop(
+        layout_a, analytic.on(layout_a), make_trajectory("circle", 20.0), failures=[("front_left", 0.5)]
+    )
     ticks = [swim.step() for _ in range(8)]
     lost = layout_a.index("front_left")
     assert [bool(tick.alive[lost]) for tick in ticks] == [True] * 5 + [False] * 3
@@ -74,18 +80,18 @@ def test_fins_fail_and_mend(layout_a: Layout, analytic: Allocator) -> None:
         swim.mend("tail")
 
 
-def test_bad_swims_are_refused(layout_a: Layout, analytic: Allocator) -> None:
+def test_bad_swims_are_refused(layout_a: Layout, analytic: AnyRobot) -> None:
     task = make_trajectory("circle", 20.0)
     with pytest.raises(LayoutError, match="no fin 'tail'"):
-        ClosedLoop(layout_a, analytic, task, failures=[("tail", 1.0)])
+        ClosedLoop(layout_a, analytic.on(layout_a), task, failures=[("tail", 1.0)])
     with pytest.raises(FinlabError, match="0 s or more"):
-        ClosedLoop(layout_a, analytic, task, failures=[("front_left", -1.0)])
+        ClosedLoop(layout_a, analytic.on(layout_a), task, failures=[("front_left", -1.0)])
     with pytest.raises(FinlabError, match="expected one of mean, ripple, flexible"):
-        ClosedLoop(layout_a, analytic, task, plant="water")
+        ClosedLoop(layout_a, analytic.on(layout_a), task, plant="water")
 
 
-def test_logs_survive_the_disk(layout_a: Layout, analytic: Allocator, tmp_path: Path) -> None:
-    swim = ClosedLoop(layout_a, analytic, make_trajectory("circle", 20.0), seed=3)
+def test_logs_survive_the_disk(layout_a: Layout, analytic: AnyRobot, tmp_path: Path) -> None:
+    swim = ClosedLoop(layout_a, analytic.on(layout_a), make_trajectory("circle", 20.0), seed=3)
     ticks = [swim.step() for _ in range(5)]
     log = swim.log
     log.save(tmp_path / "log.npz")
@@ -108,10 +114,12 @@ def log_of_ticks_like(log: object, ticks: list[Tick]) -> object:
     return log_of_ticks(ticks, seed=log.seed, **about)  # type: ignore[attr-defined]
 
 
-def test_what_becomes_of_fins_without_a_word(layout_a: Layout, analytic: Allocator) -> None:
+def test_what_becomes_of_fins_without_a_word(layout_a: Layout, analytic: AnyRobot) -> None:
     events = [FinFault("front_left", 2.0), FinFault("back_left", 2.0, "torn", 0.5)]
     events += [FinFault("back_right", 2.0, "stuck"), FinFault("back_left", 4.0, "whole")]
-    swim = ClosedLoop(layout_a, analytic, make_trajectory("circle"), failures=events, announced=False)
+    swim = ClosedLoop(
+        layout_a, analytic.on(layout_a), make_trajectory("circle"), failures=events, announced=False
+    )
     log = swum(swim, 5.0)
     lost, weak, stuck = (layout_a.index(name) for name in ("front_left", "back_left", "back_right"))
     after = log.time >= 2.0
@@ -130,8 +138,8 @@ def test_what_becomes_of_fins_without_a_word(layout_a: Layout, analytic: Allocat
     assert np.isnan(log.fault_probability).all(), "nobody watches"
 
 
-def test_what_is_announced_reaches_the_allocator(layout_a: Layout, analytic: Allocator) -> None:
-    swim = ClosedLoop(layout_a, analytic, make_trajectory("circle"))
+def test_what_is_announced_reaches_the_allocator(layout_a: Layout, analytic: AnyRobot) -> None:
+    swim = ClosedLoop(layout_a, analytic.on(layout_a), make_trajectory("circle"))
     swum(swim, 1.0)
     swim.fail("front_left", "torn", 0.4)
     swim.fail("back_left", "stuck")
@@ -147,11 +155,11 @@ def test_what_is_announced_reaches_the_allocator(layout_a: Layout, analytic: All
 
 
 @pytest.mark.parametrize(("kind", "share"), [("melted", 0.5), ("torn", 1.0), ("torn", 0.0)])
-def test_no_such_failures(layout_a: Layout, analytic: Allocator, kind: str, share: float) -> None:
+def test_no_such_failures(layout_a: Layout, analytic: AnyRobot, kind: str, share: float) -> None:
     with pytest.raises(FinlabError, match="failure of front_left: expected"):
         FinFault("front_left", 1.0, kind, share).checked()
     with pytest.raises(FinlabError, match="failure of front_left: expected"):
-        ClosedLoop(layout_a, analytic, make_trajectory("circle")).fail("front_left", kind, share)
+        ClosedLoop(layout_a, analytic.on(layout_a), make_trajectory("circle")).fail("front_left", kind, share)
 
 
 @pytest.mark.filterwarnings("error")
@@ -169,7 +177,9 @@ def test_odd_bodies_keep_loop_and_monitor_finite(layout_a: Layout, body: dict[st
     layout = replace(layout_a, body=replace(ucat_body(), **{"buoyancy_n": None, **body}))
     monitor = FaultMonitor(layout)
     task = make_trajectory("lissajous")
-    loop = ClosedLoop(layout, AnyRobot("analytic"), task, TrackingController(layout), monitor=monitor)
+    loop = ClosedLoop(
+        layout, AnyRobot("analytic").on(layout), task, TrackingController(layout), monitor=monitor
+    )
     for _ in range(60):
         tick = loop.step()
         assert np.isfinite([*tick.motion, *tick.asked, *tick.fault_probability, *tick.strength_std]).all()

@@ -6,19 +6,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from finlab.allocation.allocator import Allocator
 from finlab.fit.robot.swim_file import read_swim
 from finlab.layout import Layout
 from finlab.sim import ClosedLoop, RunLog, SteadyCurrent, make_trajectory
 from finlab.sim.log_csv import csv_of, save_csv
+from tests.any_robot import AnyRobot
 
 
 @pytest.fixture(scope="module")
-def log(layout_a: Layout, analytic: Allocator) -> RunLog:
+def log(layout_a: Layout, analytic: AnyRobot) -> RunLog:
     """A third of a circle in a current; the front left fin is lost on the way."""
     swim = ClosedLoop(
         layout_a,
-        analytic,
+        analytic.on(layout_a),
         make_trajectory("circle", 32.0),
         water=SteadyCurrent((0.03, -0.02, 0.0)),
         failures=[("front_left", 20.0)],

@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from finlab.allocation.allocator import Allocator
 from finlab.errors import LayoutError
 from finlab.layout import FinModelSpec, Layout, load_layout
 from finlab.physics import plant_of
@@ -14,6 +13,7 @@ from finlab.sim import ClosedLoop, make_trajectory, perturbed
 from finlab.vehicle.attitude import euler
 from finlab.vehicle.body import complete_body
 from finlab.vehicle.vehicle import Vehicle
+from tests.any_robot import AnyRobot
 
 
 def test_weight_elsewhere_is_felt_by_fins_and_buoyancy(layout_a: Layout) -> None:
@@ -41,7 +41,7 @@ def test_a_torn_fin_gives_a_share_of_its_thrust(layout_a: Layout) -> None:
     np.testing.assert_allclose(share, expected)
 
 
-def test_what_makes_no_sense_is_refused(layout_a: Layout, analytic: Allocator) -> None:
+def test_what_makes_no_sense_is_refused(layout_a: Layout, analytic: AnyRobot) -> None:
     for wrong in ({"damping": 0.0}, {"buoyancy": math.nan}, {"thrust": {"front_left": -0.1}}):
         with pytest.raises(LayoutError):
             perturbed(layout_a, **wrong)  # type: ignore[arg-type]
@@ -52,4 +52,4 @@ def test_what_makes_no_sense_is_refused(layout_a: Layout, analytic: Allocator) -
     with pytest.raises(LayoutError, match="table cannot be scaled"):
         perturbed(table, thrust={"front_right": 0.5})
     with pytest.raises(LayoutError, match="truth: expected the fins of A"):
-        ClosedLoop(layout_a, analytic, make_trajectory("circle"), truth=load_layout("pair"))
+        ClosedLoop(layout_a, analytic.on(layout_a), make_trajectory("circle"), truth=load_layout("pair"))

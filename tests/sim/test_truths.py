@@ -68,7 +68,7 @@ def test_a_robot_built_askew_feels_its_fins_elsewhere(robot: Layout) -> None:
 
 @pytest.mark.parametrize("name", ["wake", "inflow", "offset"])
 def test_robots_stay_afoot_on_every_truth(name: str, robot: Layout) -> None:
-    loop = ClosedLoop(robot, AnyRobot(), make_trajectory("circle"), plant=name)
+    loop = ClosedLoop(robot, AnyRobot().on(robot), make_trajectory("circle"), plant=name)
     for _ in range(120):
         loop.step()
     assert np.abs(euler(loop.state[3:7])[:2]).max() < 0.3

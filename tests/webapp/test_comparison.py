@@ -112,6 +112,6 @@ def test_every_answer_keeps_least_what_is_asked() -> None:
     assert plan.objective == "effort" and state.drawing == {} and not knows_objective("paper")
     assert "--objective effort" in command_line(replace(state, objective="effort"))
     assert "--objective" not in command_line(replace(state, method="paper", objective="effort"))
-    assert "AnyRobot('mdn', objective='effort')" in python_lines(
+    assert "finlab.Allocator(layout, 'mdn', objective='effort')" in python_lines(
         replace(state, method="mdn", objective="effort")
     )

@@ -89,7 +89,9 @@ class Search(Method):
                 refined = self.pipeline.solve(
                     prepared, targets, previous, seeds=beginning.seeds, fallback=fallback
                 )
-            return self._single(refined, self._names(beginning, previous))._replace(samples=beginning.samples)
+            return self._single(targets[0], refined, self._names(beginning, previous))._replace(
+                samples=beginning.samples
+            )
 
         def solve(start: int) -> RefinedCandidates:
             some = targets[start : start + CHUNK]
@@ -110,12 +112,10 @@ class Search(Method):
         """Where the search for targets (N, 6) begins."""
         return Beginning()
 
-    def _single(self, refined: RefinedCandidates, names: tuple[str, ...]) -> Solution:
+    def _single(self, target: Array, refined: RefinedCandidates, names: tuple[str, ...]) -> Solution:
         """The answer to one target (1, 6), and what may be asked about it; `names` of the seeds."""
         own = _sources(refined.origin[0], names)
-        return Solution(
-            refined.command[:, 0], candidates=lambda: self._candidates(self.prepared, refined, own)
-        )
+        return Solution(refined.command[:, 0], candidates=lambda: self._candidates(target, refined, own))
 
     def alternatives(
         self, target: Array, *, policy: Policy, previous: Array | None, flow: Array | None, seed: int
@@ -129,22 +129,22 @@ class Search(Method):
         first = solution.candidates()
         with self._one_thread():
             found = self.pipeline.explore(prepared, targets)
-        exact = max(SEARCH.alternative_error * prepared.exactness, 1.01 * float(first.err_norm[0]))
+        own = np.linalg.norm((first.wrench[0] - target) / self.sigma)
+        exact = max(SEARCH.alternative_error * prepared.exactness, 1.01 * float(own))
         kept = np.flatnonzero(found.error[0] <= exact)
         others = RefinedCandidates._make(values[:, kept] for values in found)
         source = _sources(others.origin[0], _seed_names(self.layout))
         # The answer's own candidates come first; the others are what the wider search has found.
-        return first.beside(self._candidates(prepared, others, source))
+        return first.beside(self._candidates(target, others, source))
 
-    def _candidates(
-        self, prepared: Prepared, refined: RefinedCandidates, source: tuple[str, ...]
-    ) -> Candidates:
-        """The refined answers to a single target, and where each comes from."""
-        command, wrench, error, cost, _ = (values[0] for values in refined)
-        layout, std = prepared.plant.layout, self.sigma
+    def _candidates(self, target: Array, refined: RefinedCandidates, source: tuple[str, ...]) -> Candidates:
+        """The refined answers to a single target (6,), and where each comes from."""
+        command, wrench, _, cost, _ = (values[0] for values in refined)
+        given = wrench * self.sigma
+        error = np.linalg.norm((given - target) / self.scale, axis=-1)
         # What was kept least is known already.
-        power = cost if self.objective.is_power else power_of(layout, command)
-        return Candidates(command, wrench * std, error, effort_of(layout, command), power, source)
+        power = cost if self.objective.is_power else power_of(self.layout, command)
+        return Candidates(command, given, error, effort_of(self.layout, command), power, source)
 
     def at(self, flow: Array | None) -> Self:
         """See `Method`."""

@@ -13,6 +13,7 @@ from finlab.evaluation.experiment import Experiment
 from finlab.evaluation.plots.style import BLUE, DASHES, VERMILION, Picture, picture
 from finlab.evaluation.progress import progress
 from finlab.evaluation.report.document import Column, Row
+from finlab.evaluation.scoring import paper_sigma
 from finlab.evaluation.splits import make_split
 from finlab.evaluation.statistics.bootstrap import mean_interval
 from finlab.layout import Layout
@@ -57,7 +58,8 @@ def run(
             for target in case.targets:
                 samples = allocator.allocate(target, seed=seed).samples
                 assert samples is not None
-                best.append((samples.err_norm**2 + settings.gamma * samples.effort).min())
+                error = np.linalg.norm((samples.wrench - target) / paper_sigma(), axis=-1)
+                best.append((error**2 + settings.gamma * samples.effort).min())
                 spread.append(diversity(samples.command, case.healthy))
                 group.append(k)
         rows.append(

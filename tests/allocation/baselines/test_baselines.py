@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from finlab.allocation import Allocator
+from finlab.allocation import Allocator, Policy
+from finlab.allocation.yardstick import yardstick
 from finlab.errors import LayoutError
 from finlab.layout import Fin, FinModelSpec, Layout, Limits, random_layout
 from finlab.networks.normalization import Normalization
@@ -106,7 +107,9 @@ def test_a_failed_fin_is_a_removed_fin(method: str) -> None:
     layout = random_layout(np.random.default_rng(9), n_fins=3)
     target = [0.5, 0.2, -0.5, 0.0, 0.0, 0.05]
     failed = make(method).allocate(layout, target, failed=["fin_2"]).command
-    removed = make(method).allocate(layout.without(["fin_2"]), target).command
+    choice, rest = make(method).choice, layout.without(["fin_2"])
+    alone = choice.kind(rest, choice.settings, yardstick(layout))  # errors are those of the whole robot
+    removed = alone.solve(np.array([target]), policy=Policy()).command[0]
     assert np.isnan(failed[1]).all()
     np.testing.assert_array_equal(failed[[0, 2]], removed)
 

@@ -20,10 +20,11 @@ OBJECTIVES: list[dict[str, Any]] = [
 @pytest.mark.parametrize("options", OBJECTIVES)
 def test_candidates_tell_what_the_plant_says_of_them(options: dict[str, Any]) -> None:
     method, layout = AnyRobot(**options), load_layout("penta")
-    told, plant = method.allocate(layout, TARGET).candidates, Plant(layout)
+    answer, plant = method.allocate(layout, TARGET), Plant(layout)
+    told = answer.candidates
     assert told is not None
     np.testing.assert_allclose(told.wrench, plant.wrench(told.command), atol=1e-9)
-    error = np.linalg.norm((told.wrench - TARGET) / method.normalization.std, axis=-1)
+    error = np.linalg.norm((told.wrench - TARGET) / answer.scale, axis=-1)
     np.testing.assert_allclose(told.err_norm, error, atol=1e-9)
     np.testing.assert_allclose(told.effort, command_effort(told.command, plant.upper), rtol=1e-9)
     np.testing.assert_allclose(told.power, plant.power(told.command).sum(-1), rtol=1e-9)

@@ -6,58 +6,53 @@ from typing import Any
 import numpy as np
 import pytest
 
-from finlab.allocation.allocator import Allocator
 from finlab.allocation.baselines.analytic import Analytic
+from finlab.allocation.method import LeastErrorMethod
+from finlab.allocation.methods import MethodChoice
 from finlab.allocation.solution import Solution
 from finlab.errors import DataError
 from finlab.evaluation import method_specs
 from finlab.evaluation.experiment import Row, load_experiment
 from finlab.evaluation.experiments.latency import first_times
 from finlab.evaluation.experiments.temperature import diversity
-from finlab.evaluation.scoring import run_method
+from finlab.evaluation.method_specs import MethodSpec, load_method_spec
+from finlab.evaluation.scoring import paper_sigma, run_method
 from finlab.evaluation.splits import make_split
 from finlab.layout import Fin, Layout, Limits
-from finlab.networks.normalization import Normalization
 from finlab.physics import Plant
-from tests.any_robot import AnyRobot
-
-SIGMA = np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.35])
 
 
 def by(rows: list[Row], *keys: str) -> dict[Any, Row]:
     return {tuple(row[key] for key in keys) if len(keys) > 1 else row[keys[0]]: row for row in rows}
 
 
-class Idle(Allocator):
+class Idle(LeastErrorMethod):
     """Answers every target with the least command."""
 
     name = "idle"
-    normalization = Normalization(np.zeros(6), SIGMA)
 
-    def _solve(
-        self, layout: Layout, targets: np.ndarray, *, seed: int, previous: np.ndarray | None
-    ) -> Solution:
-        return Solution(np.tile(layout.lower, (len(targets), 1, 1)))
+    def _solve(self, targets: np.ndarray, *, seed: int, previous: np.ndarray | None) -> Solution:
+        return Solution(np.tile(self.layout.lower, (len(targets), 1, 1)))
 
 
 class Cheat(Analytic):
     """Delivers the wrench from beyond its limits."""
 
-    def _solve(self, layout: Any, targets: Any, *, seed: int, previous: Any) -> Any:
-        solution = super()._solve(layout, targets, seed=seed, previous=previous)
+    def _solve(self, targets: Any, *, seed: int, previous: Any) -> Any:
+        solution = super()._solve(targets, seed=seed, previous=previous)
         return solution._replace(command=solution.command + [0.0, 0.0, 8 * np.pi])
 
 
 @pytest.mark.parametrize("first", [None, 2])
 def test_the_plant_scores(first: int | None) -> None:
     cases = make_split("failure", 3, 4, 11)
-    found = run_method(Idle(), cases, first=first)
+    found = run_method(MethodSpec("idle", MethodChoice(Idle, Idle.settings_class())), cases, first=first)
     expected = []
     for case in cases:
         command = case.layout.lower.copy()
         command[[name in case.failed for name in case.layout.names]] = np.nan
         wrench = Plant(case.layout).wrench(command)
-        expected.append(np.linalg.norm((wrench - case.targets[:first]) / SIGMA, axis=-1))
+        expected.append(np.linalg.norm((wrench - case.targets[:first]) / paper_sigma(), axis=-1))
     np.testing.assert_allclose(found["err_norm"], np.concatenate(expected))
     assert (found["solve_ms"] > 0).all() and np.unique(found["layout"]).tolist() == [0, 1, 2]
 
@@ -77,7 +72,7 @@ def test_the_search_costs_no_more_than_the_best_start() -> None:
 
 def test_an_answer_outside_its_limits_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("casadi")
-    cheat = Cheat(Normalization(np.zeros(6), SIGMA))
+    cheat = MethodSpec("cheat", MethodChoice(Cheat, Cheat.settings_class()))
     monkeypatch.setattr(method_specs, "load_method_spec", lambda *_: cheat)
     (row,) = load_experiment("cost").rows(
         methods=("cheat",), objectives=("power",), layouts=2, targets=1, starts=2
@@ -97,12 +92,12 @@ def surge_robot(arc: tuple[float, float] = (-math.pi, math.pi)) -> tuple[Layout,
 def test_latency_compares_with_search() -> None:
     rows = load_experiment("latency").rows(methods=("dual", "analytic"), calls=6, robots=1, seed=4711)
     search, analytic, *first = rows
-    assert (search["calls"], search["p50_over_search"]) == (6, 1.0)
-    assert analytic["p50_over_search"] == pytest.approx(analytic["p50_ms"] / search["p50_ms"])
+    assert (search["calls"], search["p50_over_dual"]) == (6, 1.0)
+    assert analytic["p50_over_dual"] == pytest.approx(analytic["p50_ms"] / search["p50_ms"])
     assert all(0 < row["p50_ms"] <= row["p99_ms"] for row in rows)
     soft = next(row for row in first if row["call"].endswith("soft"))
     assert soft["p50_ms"] > 5.0 * search["p50_ms"]  # compiling takes many times the call itself
-    assert first_times(AnyRobot(), "soft", 1, 4711)[0] < 0.5 * soft["p50_ms"]  # compiled once
+    assert first_times(load_method_spec("dual"), "soft", 1, 4711)[0] < 0.5 * soft["p50_ms"]  # compiled once
     with pytest.raises(DataError, match="fins: expected 2 to 5"):
         load_experiment("latency").rows(fins=9)
 

@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from finlab.allocation.allocator import Allocator
 from finlab.evaluation.experiments.monitor import Loss, monitoring_rows, swim_loss
 from finlab.layout import Layout
 from finlab.sim import Trajectory
+from tests.any_robot import AnyRobot
 
 QUICK = Loss("A", "bow", 1.0, True, 0, 900.0, 0.06, 0.05)
 
@@ -29,7 +29,7 @@ def test_shares_hours_and_ratios() -> None:
     assert every["ate_ratio"] == pytest.approx(1.2)
 
 
-def test_a_loss_is_swum_beside_an_announced_one(layout_a: Layout, analytic: Allocator) -> None:
+def test_a_loss_is_swum_beside_an_announced_one(layout_a: Layout, analytic: AnyRobot) -> None:
     time = np.array([0.0, 24.0])
     line = Trajectory("line", time, np.outer(time, [0.12, 0.0, 0.0]) + [0.0, 0.0, -1.0])
     lost = swim_loss(layout_a, "front_left", line, analytic, 1)

@@ -9,7 +9,6 @@ from typing import cast
 import numpy as np
 import pytest
 
-from finlab.allocation.allocator import Allocator
 from finlab.cli import main
 from finlab.evaluation.experiments.hard_days import HARD_DAYS, Case, HardDay
 from finlab.evaluation.experiments.swims import (
@@ -24,10 +23,11 @@ from finlab.evaluation.experiments.swims import (
 from finlab.sim import RunLog
 from finlab.vehicle.body import complete_body
 from finlab.vehicle.vehicle import Vehicle
+from tests.any_robot import AnyRobot
 
 
 @pytest.mark.parametrize("day", HARD_DAYS, ids=lambda day: day.name)
-def test_every_day_can_be_swum(day: HardDay, analytic: Allocator) -> None:
+def test_every_day_can_be_swum(day: HardDay, analytic: AnyRobot) -> None:
     """One tick of the first case of every layout."""
     first = {case.layout: case for case in reversed(day.cases())}
     assert set(first) == set(day.layouts)
@@ -37,7 +37,7 @@ def test_every_day_can_be_swum(day: HardDay, analytic: Allocator) -> None:
         assert (loop.monitor is None) == day.announced
 
 
-def test_what_is_true_is_not_what_is_believed(analytic: Allocator) -> None:
+def test_what_is_true_is_not_what_is_believed(analytic: AnyRobot) -> None:
     damped = DAYS["damping-double"].swim(Case("A", ()), analytic, 0)
     plain = DAYS["nominal"].swim(Case("A", ()), analytic, 0)
     assert damped.layout == plain.layout
@@ -51,7 +51,7 @@ def test_what_is_true_is_not_what_is_believed(analytic: Allocator) -> None:
     assert one != other
 
 
-def test_a_body_that_is_drawn_too_large_and_who_steers_it(analytic: Allocator) -> None:
+def test_a_body_that_is_drawn_too_large_and_who_steers_it(analytic: AnyRobot) -> None:
     low = DAYS["parameters-low"].swim(Case("B", ()), analytic, 0, controller="waypoint")
     drawn, true = low.layout, low.vehicle
     assert low.controller.name == "waypoint" and drawn == DAYS["nominal"].robot("B", 0)
@@ -157,7 +157,7 @@ def test_who_alone_keeps_the_path_and_who_loses_it() -> None:
     assert row["verdict"].startswith("loses its path")
 
 
-def test_a_short_day(analytic: Allocator) -> None:
+def test_a_short_day(analytic: AnyRobot) -> None:
     day = replace(DAYS["lost-two"], duration_s=12.0, trajectory="station")
     (swims,) = swim_day(day, {"analytic": analytic}, [1]).values()
     assert {fins for _, fins, _ in swims} == {case.fins for case in day.cases() if day.obstacle(case) is None}

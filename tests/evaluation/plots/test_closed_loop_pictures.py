@@ -5,22 +5,24 @@ from typing import Any
 import numpy as np
 import pytest
 
-from finlab.allocation.allocator import Allocator
 from finlab.layout import Layout
 from finlab.sim import NO_NOISE, ClosedLoop, RunLog, Trajectory
 
 pytest.importorskip("matplotlib")
 
 from finlab.evaluation.plots import closed_loop_run  # noqa: E402
+from tests.any_robot import AnyRobot
 
 WRENCH = ("Fx [N]", "Tx [N m]", "Fy [N]", "Ty [N m]", "Fz [N]", "Tz [N m]")
 
 
 @pytest.fixture(scope="module")
-def log(layout_a: Layout, analytic: Allocator) -> RunLog:
+def log(layout_a: Layout, analytic: AnyRobot) -> RunLog:
     """Six seconds ahead; the front left fin is lost at the third."""
     line = Trajectory("line", np.array([0.0, 6.0]), np.array([[0.0, 0.0, -1.0], [0.6, 0.0, -1.2]]))
-    return ClosedLoop(layout_a, analytic, line, sensors=NO_NOISE, failures=[("front_left", 3.0)]).run()
+    return ClosedLoop(
+        layout_a, analytic.on(layout_a), line, sensors=NO_NOISE, failures=[("front_left", 3.0)]
+    ).run()
 
 
 def _line(axis: Any, label: str) -> np.ndarray:

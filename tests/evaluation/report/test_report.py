@@ -59,7 +59,7 @@ def folder(tiny: None, tmp_path_factory: pytest.TempPathFactory) -> Path:
 def without_times(rows: Any) -> Any:
     """Rows without what the machine decides."""
     if isinstance(rows, dict):
-        return {k: without_times(v) for k, v in rows.items() if not ("_ms" in k or k == "p50_over_search")}
+        return {k: without_times(v) for k, v in rows.items() if not ("_ms" in k or k == "p50_over_dual")}
     return [without_times(row) for row in rows] if isinstance(rows, list) else rows
 
 
