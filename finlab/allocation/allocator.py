@@ -48,7 +48,8 @@ from finlab.physics.known_plants import plant_of
 from finlab.physics.plant import Plant
 
 if TYPE_CHECKING:
-    from finlab.allocation.search.settings import MdnOptions, SearchOptions
+    from finlab.allocation.mdn_settings import MdnOptions
+    from finlab.allocation.search.settings import SearchOptions
     from finlab.paper.settings import PaperOptions
 
 SAME_COMMAND = 1e-6
