@@ -5,7 +5,7 @@ first directions of planes, second directions of planes. Each answer is the grad
 `T(|s|) sign(s)`, a plane's `T(v) g` with `v = s . g` and `g` the direction of the force, its size the gauge.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -51,10 +51,14 @@ class Sets:
     half: Array
     """Halves of these arcs [rad]; pi for full circles."""
 
+    @property
+    def parts(self) -> tuple[Array, ...]:
+        """All arrays, in order."""
+        return self.low, self.high, self.low_cost, self.high_cost, self.middle, self.half
+
     def take(self, columns: NDArray[np.intp]) -> "Sets":
         """The same for some of the targets."""
-        values = (getattr(self, field.name) for field in fields(self))
-        return Sets(*(a if a.shape[-1] == 1 else a[:, columns] for a in values))
+        return Sets(*(a if a.shape[-1] == 1 else a[:, columns] for a in self.parts))
 
 
 class Answers:

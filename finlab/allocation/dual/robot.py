@@ -24,6 +24,10 @@ class DualRobot:
     """Their answers to prices."""
     sets: Sets
     """What each may give."""
+    band: Array
+    """Dead bands (n, 1) [N]: smaller forces, other than 0, cannot be held."""
+    band_cost: Array
+    """Power (n, 3) [W] at the negative end of the band, at rest, and at its positive end."""
     effectiveness: Array
     """Wrench (k, 6) per newton along each direction, lines, first directions, second directions."""
     scale: Array
@@ -131,6 +135,7 @@ def dual_robot(responses: list[Response]) -> DualRobot:
         np.array([plane.middle for plane in planes]).reshape(-1, 1),
         np.array([plane.half for plane in planes]).reshape(-1, 1),
     )
+    band = np.array([each.band for each in (*lines, *planes)])[:, None]
     rows = [line.effectiveness for line in lines]
     rows += [plane.effectiveness[0] for plane in planes] + [plane.effectiveness[1] for plane in planes]
     effectiveness = np.array(rows)
@@ -145,6 +150,8 @@ def dual_robot(responses: list[Response]) -> DualRobot:
         np.array(line_places + plane_places),
         answers,
         sets,
+        band,
+        np.concatenate([answers.cost(sign * np.minimum(band, high_)) for sign in (-1.0, 0.0, 1.0)], axis=1),
         effectiveness,
         scale,
         basis,
