@@ -202,4 +202,4 @@ class Group(ABC):
     @abstractmethod
     def reach(self, lower: Array, upper: Array) -> Array:
         """What commands between `lower` and `upper` (m, 3) can give: least and largest force [N] (of planes
-        the sizes), middle and half of the arc [rad] (0 and pi for lines), as rows (m, 4)."""
+        the sizes), middle and half of the arc [rad] (0 and 0 for lines), as rows (m, 4)."""

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from finlab.actuators.fin.models import make_law
+from finlab.actuators.fin.models import make_law, stack_laws
 from finlab.actuators.law import FinLaw
 from finlab.actuators.response import Group, Plane, RadialTable, price_grid
 from finlab.arrays import Array
@@ -27,6 +27,8 @@ PEAK = 5e-4
 """Share of the largest force that is given up where the price of the last newton has no end."""
 SIZES = 512
 """Sizes of force for which the command is kept."""
+CORRECTIONS = 2
+"""Times that a command is corrected by the law itself."""
 TURNS = 256
 """Directions in which an uneven fin is asked for its force."""
 
@@ -70,6 +72,7 @@ class FinGroup(Group):
                 kept[fin.model, fin.limits] = fin_table(fin, copper_loss)
         tables = [kept[fin.model, fin.limits] for fin in fins]
         self._laws = [make_law(fin.model) for fin in fins]
+        self._stacked = stack_laws([fin.model for fin in fins])
         self.responses = [
             Plane(matrix[1:], each.table, each.middle, each.half, each.gauge)
             for each, matrix in zip(tables, effectiveness, strict=True)
@@ -78,13 +81,39 @@ class FinGroup(Group):
         self._beat = np.array([each.beat for each in tables])
         self._deflection = np.array([np.broadcast_to(each.deflection, TURNS) for each in tables])
         self._gauge = np.array([np.ones(TURNS) if each.gauge is None else each.gauge for each in tables])
+        self._row = np.arange(len(fins))
+        limits = np.array([fin.limits.zero_direction for fin in fins])
+        self._lower, self._upper = limits.T
+        self._middle = limits.mean(axis=1)
         self._even = all(each.gauge is None for each in tables)
 
     def commands(self, force: Array, previous: Array | None = None) -> Array:
-        """See `Group`."""
+        """See `Group`. What the table leaves undone, by the laws, is asked for on top, twice."""
         x, y = force[..., 0], force[..., 1]
         angle, size = np.arctan2(y, x), np.hypot(x, y)
-        row = np.arange(len(self._largest))
+        command = self._command(angle, size)
+        asked_angle, asked_size = angle, size
+        for _ in range(CORRECTIONS):
+            given = self._force(command)
+            asked_size = asked_size + size - np.hypot(given[..., 1], given[..., 2])
+            if not self._even:
+                lean = wrapped(angle - np.arctan2(given[..., 2], given[..., 1]))
+                asked_angle = asked_angle + np.where(size > 0.0, lean, 0.0)
+            command = self._command(asked_angle, np.maximum(asked_size, 0.0))
+        return command
+
+    def _force(self, command: Array) -> Array:
+        if len(self._stacked) == 1:
+            alone: Array = self._stacked[0][1].force(command)
+            return alone
+        force = np.empty_like(command)
+        for places, law in self._stacked:
+            force[..., places, :] = law.force(command[..., places, :])
+        return force
+
+    def _command(self, angle: Array, size: Array) -> Array:
+        """Commands (N, m, 3) from the tables for directions and sizes (N, m) of the force."""
+        row = self._row
         if self._even:
             deflection = self._deflection[:, 0]
         else:
@@ -97,8 +126,10 @@ class FinGroup(Group):
         cell = np.minimum(place.astype(np.intp), SIZES - 1)
         part = (place - cell)[..., None]
         command = np.empty((*size.shape, 3))
-        command[..., :2] = self._beat[row, cell] * (1.0 - part) + self._beat[row, cell + 1] * part
-        command[..., 2] = wrapped(angle - deflection)
+        beat = self._beat[row, cell]
+        command[..., :2] = beat + (self._beat[row, cell + 1] - beat) * part
+        turn = angle - deflection
+        command[..., 2] = np.clip(self._middle + wrapped(turn - self._middle), self._lower, self._upper)
         return command
 
     def reach(self, lower: Array, upper: Array) -> Array:

@@ -99,6 +99,16 @@ class DualRobot:
         """The same robot with only some directions (6, q) of the scaled wrench asked for."""
         return replace(self, basis=basis, matrix=(self.effectiveness / self.scale) @ basis)
 
+    def restricted(self, reach: Array) -> Sets:
+        """Sets of actuators that give no more than rows (n, 4) of least and largest force [N], middle and half
+        of the arc [rad], in the robot's order; what they give beyond their tables is left out."""
+        lines = self.answers.lines
+        low = np.clip(reach[:, :1], self.sets.low, self.sets.high)
+        high = np.clip(reach[:, 1:2], self.sets.low, self.sets.high)
+        return Sets(
+            low, high, self.answers.cost(low), self.answers.cost(high), reach[lines:, 2:3], reach[lines:, 3:]
+        )
+
     def target(self, wrench: Array) -> Array:
         """Wrenches (N, 6) in the basis (r, N)."""
         found: Array = self.basis.T @ (wrench / self.scale).T

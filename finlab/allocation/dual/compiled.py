@@ -1,0 +1,68 @@
+"""A layout compiled for the dual: the answers of its actuators, and the commands for the forces found."""
+
+from copy import copy
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.actuators.registry import groups_of
+from finlab.actuators.response import Group, Plane
+from finlab.allocation.dual.answers import Sets
+from finlab.allocation.dual.robot import DualRobot, dual_robot
+from finlab.arrays import Array
+from finlab.layout import Layout
+from finlab.physics.plant import Plant
+
+
+class Compiled:
+    """The actuators of one robot, ready for prices."""
+
+    def __init__(self, layout: Layout, plant: Plant, copper_loss: float = 0.0) -> None:
+        """Compile the actuators of a layout; `plant` gives their effectiveness and the flow.
+
+        Raises:
+            DataError: a fin's force table cannot be read, or gives no thrust within its limits.
+        """
+        self.count = layout.n
+        self.groups = groups_of(layout, plant.effectiveness, copper_loss)
+        self._prepare()
+
+    def _prepare(self) -> None:
+        responses: list[object] = [None] * self.count
+        for places, group in self.groups:
+            for place, response in zip(places, group.responses, strict=True):
+                responses[place] = response
+        self.robot: DualRobot = dual_robot(responses)  # type: ignore[arg-type]
+        self.beside = sum((group.beside.sum(axis=0) for _, group in self.groups), np.zeros(6))
+        """Wrench (6,) [N, N m] that the actuators give beside their answers' forces, such as a rudder's drag."""
+
+    def at(self, inflow: Array | None) -> "Compiled":
+        """The same in another flow: velocities (n, 3) [m/s] of the actuators' places in their own frames."""
+        other = copy(self)
+        other.groups = [(places, group.at(None if inflow is None else inflow[places])) for places, group in self.groups]
+        other._prepare()
+        return other
+
+    def forces(self, force: Array) -> Array:
+        """Forces (N, n, 2) [N] of the actuators along their own directions from those of the dual (k, N)."""
+        lines, planes, order = self.robot.answers.lines, self.robot.answers.planes, self.robot.order
+        own = np.zeros((force.shape[1], self.count, 2))
+        own[:, order[: lines + planes], 0] = force[: lines + planes].T
+        own[:, order[lines:], 1] = force[lines + planes :].T
+        return own
+
+    def commands(self, force: Array, previous: Array | None = None) -> Array:
+        """Commands (N, n, 3) that give forces (k, N) [N] of the dual at least power."""
+        own = self.forces(force)
+        command = np.empty((len(own), self.count, 3))
+        for places, group in self.groups:
+            before = None if previous is None else previous[places]
+            command[:, places] = group.commands(own[:, places], before)
+        return command
+
+    def within(self, lower: Array, upper: Array) -> Sets:
+        """What commands between limits (n, 3) can give."""
+        reach = np.empty((self.count, 4))
+        for places, group in self.groups:
+            reach[places] = group.reach(lower[places], upper[places])
+        return self.robot.restricted(reach[self.robot.order])
