@@ -19,7 +19,7 @@ from finlab.networks.trained import TrainedWeights
 from finlab.physics.effort import EffortWeights
 
 METHODS: dict[str, tuple[str, str]] = {
-    "dual": ("finlab.allocation.search.search_method", "Search"),
+    "dual": ("finlab.allocation.dual.method", "Dual"),
     "mdn": ("finlab.mdn.method", "Mdn"),
     "paper": ("finlab.paper.pipeline", "Paper"),
     "qp": ("finlab.allocation.baselines.qp", "Qp"),

@@ -89,6 +89,11 @@ class Azimuth(Checked):
         return self.arc[1], self.force[1], 0.0
 
     @property
+    def rates(self) -> tuple[float, float, float]:
+        """Fastest changes of the angle [rad/s] and the force [N/s]; infinite where nothing limits them."""
+        return self.turn_rate or math.inf, self.rate or math.inf, math.inf
+
+    @property
     def frame(self) -> tuple[Vector, Vector, Vector]:
         """Own axes in the body frame: turn_axis, zero, turn_axis x zero."""
         return self.turn_axis, self.zero, cross(self.turn_axis, self.zero)

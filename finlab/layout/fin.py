@@ -247,6 +247,11 @@ class Fin(Checked):
         return self.limits.upper
 
     @property
+    def rates(self) -> tuple[float, float, float]:
+        """Fastest changes of amplitude [rad/s], frequency [Hz/s] and zero direction [rad/s]."""
+        return self.servo.amplitude_rate, self.servo.frequency_rate, self.servo.direction_rate
+
+    @property
     def frame(self) -> tuple[Vector, Vector, Vector]:
         """The fin's own axes in the body frame: shaft, zero, shaft x zero."""
         if self.shaft is None or self.zero is None:

@@ -149,6 +149,12 @@ class Layout(Checked):
         return _read_only([(s.amplitude_rate, s.frequency_rate, s.direction_rate) for s in servos])
 
     @cached_property
+    def rates(self) -> Array:
+        """How fast the commands of each actuator change at most from tick to tick (n, 3) [per second],
+        infinite where nothing limits them; read-only."""
+        return _read_only([part.rates for part in self.actuators])
+
+    @cached_property
     def speed_limit(self) -> Array:
         """How fast each fin can turn (n,) [rad/s]; read-only."""
         return _read_only([fin.servo.speed_limit for fin in self.fins])

@@ -117,6 +117,11 @@ class Rudder(Checked):
         return self.deflection[1], 0.0, 0.0
 
     @property
+    def rates(self) -> tuple[float, float, float]:
+        """Fastest changes of the command, of the deflection [rad/s]; infinite where nothing limits them."""
+        return self.rate or math.inf, math.inf, math.inf
+
+    @property
     def frame(self) -> tuple[Vector, Vector, Vector]:
         """Own axes in the body frame: shaft, zero, shaft x zero."""
         return self.shaft, self.zero, cross(self.shaft, self.zero)

@@ -1,5 +1,6 @@
 """A thruster whose axis is fixed in the robot."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, ClassVar
@@ -69,6 +70,11 @@ class Thruster(Checked):
     def upper(self) -> tuple[float, float, float]:
         """Greatest command: (force [N], 0, 0)."""
         return self.force[1], 0.0, 0.0
+
+    @property
+    def rates(self) -> tuple[float, float, float]:
+        """Fastest changes of the command, of the force [N/s]; infinite where nothing limits them."""
+        return self.rate or math.inf, math.inf, math.inf
 
     @property
     def frame(self) -> tuple[Vector, Vector, Vector]:

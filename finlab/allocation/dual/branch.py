@@ -1,8 +1,8 @@
 """Sets with gaps: wide arcs, fins that cannot rest, dead bands. The dual is that of their convex hulls.
 
-Where its answer puts an actuator into a gap, the gap is cut: an arc into two halves, a dead band into rest and
-the force beyond it. Each part is solved again, all open parts of all targets at once, and what its dual value
-proves to be no cheaper than the best answer so far is left out (branch and bound).
+Where its answer puts an actuator into a gap, the gap is cut: an arc into two halves, a dead band into rest
+and the force beyond it. Each part is solved again, all open parts of all targets at once, and what its dual
+value proves to be no cheaper than the best answer so far is left out (branch and bound).
 """
 
 from dataclasses import dataclass

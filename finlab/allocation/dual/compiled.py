@@ -3,10 +3,8 @@
 from copy import copy
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finlab.actuators.registry import groups_of
-from finlab.actuators.response import Group, Plane
 from finlab.allocation.dual.answers import Sets
 from finlab.allocation.dual.robot import DualRobot, dual_robot
 from finlab.arrays import Array
@@ -34,12 +32,15 @@ class Compiled:
                 responses[place] = response
         self.robot: DualRobot = dual_robot(responses)  # type: ignore[arg-type]
         self.beside = sum((group.beside.sum(axis=0) for _, group in self.groups), np.zeros(6))
-        """Wrench (6,) [N, N m] that the actuators give beside their answers' forces, such as a rudder's drag."""
+        """Wrench (6,) [N, N m] that the actuators give beside their answers' forces, such as a rudder's
+        drag."""
 
     def at(self, inflow: Array | None) -> "Compiled":
         """The same in another flow: velocities (n, 3) [m/s] of the actuators' places in their own frames."""
         other = copy(self)
-        other.groups = [(places, group.at(None if inflow is None else inflow[places])) for places, group in self.groups]
+        other.groups = [
+            (places, group.at(None if inflow is None else inflow[places])) for places, group in self.groups
+        ]
         other._prepare()
         return other
 

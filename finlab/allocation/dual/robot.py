@@ -100,8 +100,8 @@ class DualRobot:
         return replace(self, basis=basis, matrix=(self.effectiveness / self.scale) @ basis)
 
     def restricted(self, reach: Array) -> Sets:
-        """Sets of actuators that give no more than rows (n, 4) of least and largest force [N], middle and half
-        of the arc [rad], in the robot's order; what they give beyond their tables is left out."""
+        """Sets of actuators that give no more than rows (n, 4) of least and largest force [N], middle and
+        half of the arc [rad], in the robot's order; what they give beyond their tables is left out."""
         lines = self.answers.lines
         low = np.clip(reach[:, :1], self.sets.low, self.sets.high)
         high = np.clip(reach[:, 1:2], self.sets.low, self.sets.high)

@@ -1,0 +1,216 @@
+"""The default method: least watts by the dual, exact by the actuators' own laws.
+
+Prices give forces (`newton`, `branch`), forces give commands (`compiled`), and what the compiled laws leave
+undone is asked for on top and removed by Levenberg-Marquardt steps on the commands. A wrench out of reach
+becomes the one that the policy asks for (`policies`); from tick to tick, commands stay within what may follow
+the previous ones (`rates`).
+"""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, NamedTuple, Self, TypedDict
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.allocation.dual.answers import Sets
+from finlab.allocation.dual.branch import gaps, has_gaps, least_power
+from finlab.allocation.dual.compiled import Compiled
+from finlab.allocation.dual.newton import Prices, solve
+from finlab.allocation.dual.policies import nearest
+from finlab.allocation.dual.rates import Box, box_after
+from finlab.allocation.in_time import in_time
+from finlab.allocation.levenberg_marquardt import CommandProblem, refine
+from finlab.allocation.method import Method
+from finlab.allocation.policy import CLOSEST, Policy
+from finlab.allocation.settings import Settings, number
+from finlab.allocation.solution import Solution
+from finlab.arrays import Array
+from finlab.networks.trained import TrainedWeights
+
+EXACT = 1e-9
+"""Error, on the robot's yardstick, up to which commands need no further step."""
+COARSE = 1e-5
+"""Error from which the dual is asked again, for what is missing on top."""
+AGAIN = 4
+"""Times that it is asked again."""
+REFINE_STEPS = 12
+"""Levenberg-Marquardt steps on commands."""
+OUT_OF_RANGE = 1e-9
+"""Share of a target outside the range of the actuators from which on it counts as out of reach."""
+
+
+@dataclass(frozen=True)
+class DualSettings(Settings):
+    """What can be set of the default method."""
+
+    copper_loss: float = number(
+        0.0, 0.0, 1e6, "heat in a fin motor's windings that counts beside the mechanical power", "W/(N m)^2"
+    )
+    period_s: float = number(0.1, 0.0, 1000.0, "time between ticks", "s", above=True)
+
+
+class DualOptions(TypedDict, total=False):
+    """`DualSettings` for editors and type checkers."""
+
+    copper_loss: float
+    period_s: float
+
+
+class Forces(NamedTuple):
+    """What the dual gives for N targets."""
+
+    force: Array
+    """Forces (k, N) [N]."""
+    bound: Array
+    """Power (N,) [W] that no answer undercuts."""
+    within: NDArray[np.bool_]
+    """Which targets are within reach (N,)."""
+    prices: Array
+    """Prices (r, N) of the wrench [W]."""
+
+
+class Dual(Method):
+    """Exact and cheapest on any actuators whose laws are known, without a network."""
+
+    name = "dual"
+    # A smaller wrench in the same direction still turns a robot to where it should go; the nearest one may
+    # only push it on.
+    policy_under_way = "direction"
+    settings_class = DualSettings
+    settings: DualSettings
+
+    def __init__(
+        self, layout: Any, settings: Settings, scale: Array, weights: TrainedWeights | None = None
+    ) -> None:
+        super().__init__(layout, settings, scale, weights)
+        self.compiled = Compiled(layout, self.plant, self.settings.copper_loss)
+
+    @cached_property
+    def _problem(self) -> CommandProblem:
+        return CommandProblem.of(self.plant, self.scale)
+
+    @cached_property
+    def _gapped(self) -> bool:
+        return has_gaps(self.compiled.robot, self.compiled.robot.sets)
+
+    def at(self, flow: Array | None) -> Self:
+        """See `Method`."""
+        other = super().at(flow)
+        if other is not self:
+            inflow = other.plant.inflow(None)
+            other.compiled = self.compiled.at(inflow)
+        return other
+
+    def in_time(self, target: Array, reference: Array) -> Array:
+        """See `Method`."""
+        return in_time(self.layout, target, reference, self.settings.period_s)
+
+    def solve(
+        self,
+        targets: Array,
+        *,
+        policy: Policy,
+        previous: Array | None = None,
+        flow: Array | None = None,
+        seed: int = 0,
+    ) -> Solution:
+        """See `Method`."""
+        if len(targets) == 0:
+            return Solution(np.empty((0, self.layout.n, 3)), np.empty(0))
+        if (moved := self.at(flow)) is not self:
+            return moved.solve(targets, policy=policy, previous=previous, seed=seed)
+        robot = self.compiled.robot
+        asked = targets - self.compiled.beside
+        found = self._forces(asked, robot.sets, policy)
+        aim = np.where(found.within[:, None], asked, robot.wrench(found.force)) + self.compiled.beside
+        command, found = self._commands(aim, found, robot.sets, previous)
+        if previous is not None:
+            box = box_after(self.plant, previous, self.layout.rates, self.settings.period_s)
+            if box is not None and not box.holds(command[0]):
+                return Solution(self._within_box(aim, command, found, previous, box), found.bound)
+        return Solution(command, found.bound)
+
+    def _forces(self, targets: Array, sets: Sets, policy: Policy, prices: Array | None = None) -> Forces:
+        """Forces of least power for wrenches (N, 6), or for those that the policy gives in their place."""
+        robot = self.compiled.robot
+        target = robot.target(targets)
+        root = solve(robot, target, sets, prices)
+        within = root.solved.copy()
+        if robot.basis.shape[1] < 6:
+            rest = targets / robot.scale - (robot.basis @ target).T
+            within &= np.linalg.norm(rest, axis=1) <= OUT_OF_RANGE * (
+                1e-3 + np.linalg.norm(targets / robot.scale, axis=1)
+            )
+        force, bound = root.force, root.value
+        if self._gapped:
+            force, within = self._in_gaps(target, sets, root, within)
+        if not within.all():
+            force, bound = force.copy(), bound.copy()
+            for row in np.flatnonzero(~within):
+                near = nearest(robot, sets.take(np.array([row])), targets[row], policy, self.scale)
+                force[:, row], bound[row] = near.force, near.bound
+        return Forces(force, bound, within, root.prices)
+
+    def _in_gaps(
+        self, target: Array, sets: Sets, root: Prices, within: NDArray[np.bool_]
+    ) -> tuple[Array, NDArray[np.bool_]]:
+        """Forces (k, N) in sets with gaps, and which targets they meet (N,)."""
+        robot = self.compiled.robot
+        rows = np.flatnonzero(within & (gaps(robot, root.force, sets) > 0.0).any(axis=0))
+        if not len(rows):
+            return root.force, within
+        some = Prices(*(values[..., rows] for values in root))
+        cut = least_power(robot, target[:, rows], sets.take(rows), some)
+        force = root.force.copy()
+        force[:, rows] = cut.force
+        return force, within
+
+    def _commands(
+        self, aim: Array, found: Forces, sets: Sets, previous: Array | None = None
+    ) -> tuple[Array, Forces]:
+        """Commands (N, n, 3) that give wrenches (N, 6) exactly, by the plant."""
+        command = self.compiled.commands(found.force, previous)
+        error = self._error(command, aim)
+        if (error <= EXACT).all():
+            return command, found
+        shift = np.zeros_like(aim)
+        for _ in range(AGAIN):
+            coarse = np.flatnonzero((error > COARSE) & found.within)
+            if not len(coarse):
+                break
+            shift[coarse] += aim[coarse] - self.plant.wrench(command[coarse])
+            asked = (aim + shift)[coarse] - self.compiled.beside
+            again = self._forces(asked, sets.take(coarse), CLOSEST, found.prices[:, coarse])
+            trial = self.compiled.commands(again.force, previous)
+            now = self._error(trial, aim[coarse])
+            better = now < error[coarse]
+            command[coarse[better]], error[coarse[better]] = trial[better], now[better]
+            if not better.any():
+                break
+        rough = np.flatnonzero(error > EXACT)
+        if len(rough):
+            command[rough] = self._refined(self._problem, aim[rough], command[rough])
+        return command, found
+
+    def _error(self, command: Array, aim: Array) -> Array:
+        missing = (self.plant.wrench(command) - aim) / self.scale
+        return np.sqrt(np.einsum("ni,ni->n", missing, missing))
+
+    def _refined(self, problem: CommandProblem, aim: Array, command: Array) -> Array:
+        return refine(problem, aim / self.scale, command, REFINE_STEPS).command
+
+    def _within_box(self, aim: Array, free: Array, found: Forces, previous: Array, box: Box) -> Array:
+        """The command (1, n, 3) within a box that gives a wrench (1, 6), or comes nearest to it."""
+        sets = self.compiled.within(box.lower, box.upper)
+        near = self._forces(aim - self.compiled.beside, sets, CLOSEST, found.prices)
+        starts = np.concatenate([self.compiled.commands(near.force, previous), free])
+        starts = box.clipped(starts)
+        problem = replace(
+            self._problem, lower=box.lower, upper=box.upper, full_turn=box.free[:, 2] & self.plant.full_turn
+        )
+        command = self._refined(problem, np.repeat(aim, len(starts), axis=0), starts)
+        command = self.plant.feasible(box.clipped(command))
+        error = self._error(command, np.repeat(aim, len(command), axis=0))
+        best = int((error > max(EXACT, float(error.min()) * 1.001)).argmin())
+        return command[best : best + 1]
