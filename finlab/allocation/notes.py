@@ -8,6 +8,7 @@ from finlab.actuators.fin.models import file_stamps
 from finlab.actuators.fin.table_file import DOUBT
 from finlab.arrays import Array
 from finlab.layout import FinModelSpec, Layout, Limits
+from finlab.layout.rudder import Rudder
 from finlab.physics import FinLaw, TableLaw, make_law, plant_of
 
 RESTLESS = 0.05
@@ -20,19 +21,32 @@ BEYOND = 1e-6
 
 def fin_notes(layout: Layout, flow: Array | None = None) -> tuple[str, ...]:
     """Returns a sentence for each fin that cannot rest, and for each that may leave its table; before them,
-    why the layout itself is not to be trusted, where its description begins so; and one where a flow (6,) is
-    given that no actuator feels.
+    why the layout itself is not to be trusted, where its description begins so. After them, what rudders give
+    at rest, or that a flow (6,) is given which no actuator feels.
 
     Neither is an error: a servo may be stuck, or a fin may have been damaged so that it runs on.
     """
     notes = _made(layout, file_stamps(layout))
-    if flow is None or plant_of(layout).feels_flow:
+    if flow is None:
+        return notes + _at_rest(layout)
+    if plant_of(layout).feels_flow:
         return notes
     return (
         *notes,
         f"the flow is without effect: layout {layout.name} does not say what speed through the water takes "
         "from its fins (interaction.inflow), and it has no rudder",
     )
+
+
+def _at_rest(layout: Layout) -> tuple[str, ...]:
+    """The sentence about rudders, which need water that flows past them."""
+    if layout.is_of_fins:
+        return ()
+    names = [part.name for part in layout.actuators if isinstance(part, Rudder)]
+    if not names:
+        return ()
+    them = f"rudder {names[0]} gives" if len(names) == 1 else f"rudders {', '.join(names)} give"
+    return (f"{them} nothing at rest; tell how the robot moves through the water (flow)",)
 
 
 @lru_cache(maxsize=256)

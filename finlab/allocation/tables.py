@@ -7,14 +7,48 @@ from html import escape
 from typing import TYPE_CHECKING
 
 from finlab.allocation.policy import AXES
+from finlab.layout.commands import AzimuthCommand, Command, FinCommand, RudderCommand
 
 if TYPE_CHECKING:
     from finlab.allocation.allocation import Allocation
 
 FIN_COLUMNS = ("A [rad]", "f [Hz]", "zero direction [deg]", "force [N]")
 """Columns of the table of fins."""
+COLUMNS = ("type", "command", "force [N]")
+"""Columns of the table of actuators that are not all fins."""
 WRENCH_COLUMNS = tuple(f"{axis} [{'N' if axis.startswith('F') else 'N m'}]" for axis in AXES)
 """Columns of the table of wrenches."""
+
+
+def columns_of(result: Allocation) -> tuple[str, ...]:
+    """Columns of the table of actuators, the names first."""
+    return ("fin", *FIN_COLUMNS) if result.layout.is_of_fins else ("actuator", *COLUMNS)
+
+
+def actuator_rows(result: Allocation) -> list[tuple[str, ...]]:
+    """Name and cells of each actuator; a failed one has no cells."""
+    if result.layout.is_of_fins:
+        return fin_rows(result)
+    rows: list[tuple[str, ...]] = []
+    for part, force in zip(result.layout.actuators, result.forces, strict=True):
+        command = result.commands[part.name]
+        size = f"{math.hypot(*force):.3f}"
+        rows.append((part.name,) if command is None else (part.name, part.type, in_words(command), size))
+    return rows
+
+
+def in_words(command: Command) -> str:
+    """A command with its units."""
+    if isinstance(command, FinCommand):
+        return (
+            f"{command.amplitude:.3f} rad, {command.frequency:.3f} Hz, "
+            f"{math.degrees(command.zero_direction):.1f} deg"
+        )
+    if isinstance(command, RudderCommand):
+        return f"{math.degrees(command.deflection):.1f} deg"
+    angle = f" at {math.degrees(command.angle):.1f} deg" if isinstance(command, AzimuthCommand) else ""
+    sent = "" if command.input is None else f", input {command.input:.5g}"
+    return f"{command.force:.3f} N{angle}{sent}"
 
 
 def fin_rows(result: Allocation) -> list[tuple[str, ...]]:
@@ -59,10 +93,13 @@ def remarks(result: Allocation) -> list[str]:
 
 def allocation_text(result: Allocation) -> str:
     """The answer as plain text."""
-    width = max(len("fin"), *(len(name) for name in result.fins))
-    lines = ["  ".join([f"{'fin':<{width}}", *FIN_COLUMNS])]
-    for name, *cells in fin_rows(result):
-        padded = [f"{cell:>{len(column)}}" for cell, column in zip(cells, FIN_COLUMNS, strict=False)]
+    rows = [columns_of(result), *actuator_rows(result)]
+    full = [row for row in rows if len(row) > 1]
+    width, *widths = (max(map(len, column)) for column in zip(*full, strict=True))
+    width = max(width, *(len(row[0]) for row in rows))
+    lines = []
+    for name, *cells in rows:
+        padded = [f"{cell:>{w}}" for cell, w in zip(cells, widths, strict=False)]
         lines.append("  ".join([f"{name:<{width}}", *(padded or [" failed"])]))
     lines += ["", "  ".join([" " * 9, *WRENCH_COLUMNS])]
     for name, *cells in wrench_rows(result):
@@ -73,9 +110,9 @@ def allocation_text(result: Allocation) -> str:
 
 def allocation_html(result: Allocation) -> str:
     """The same tables for a notebook."""
-    fins = [row if len(row) > 1 else (*row, "failed") for row in fin_rows(result)]
+    rows = [row if len(row) > 1 else (*row, "failed") for row in actuator_rows(result)]
     words = "".join(f"<div>{escape(line)}</div>" for line in (summary(result), *remarks(result)))
-    return _html(("fin", *FIN_COLUMNS), fins) + _html(("", *WRENCH_COLUMNS), wrench_rows(result)) + words
+    return _html(columns_of(result), rows) + _html(("", *WRENCH_COLUMNS), wrench_rows(result)) + words
 
 
 def _html(columns: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
