@@ -7,16 +7,17 @@ force that the same cost gives in each direction.
 """
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
-from finlab.actuators.fin.models import make_law, stack_laws
+from finlab.actuators.fin.models import file_stamp, make_law, stack_laws
 from finlab.actuators.law import FinLaw
 from finlab.actuators.response import Group, Plane, RadialTable, price_grid
 from finlab.arrays import Array
 from finlab.errors import DataError
-from finlab.layout import Fin
+from finlab.layout import Fin, FinModelSpec, Limits
 from finlab.layout.angles import TURN, is_full_turn, wrapped
 
 GRID = 33, 49
@@ -56,7 +57,7 @@ class FinGroup(Group):
     """The fins of a robot."""
 
     def __init__(self, fins: Sequence[Fin], effectiveness: Array, copper_loss: float = 0.0) -> None:
-        """Compile fins; those of one model and limits are compiled once.
+        """Compile fins; those of one model and limits are compiled once in a process.
 
         Args:
             fins: the fins.
@@ -66,11 +67,7 @@ class FinGroup(Group):
         Raises:
             DataError: a fin's force table cannot be read, or gives no thrust within the limits.
         """
-        kept: dict[tuple[object, object], FinTable] = {}
-        for fin in fins:
-            if (fin.model, fin.limits) not in kept:
-                kept[fin.model, fin.limits] = fin_table(fin, copper_loss)
-        tables = [kept[fin.model, fin.limits] for fin in fins]
+        tables = [fin_table(fin, copper_loss) for fin in fins]
         self._laws = [make_law(fin.model) for fin in fins]
         self._stacked = stack_laws([fin.model for fin in fins])
         self.responses = [
@@ -148,16 +145,27 @@ class FinGroup(Group):
 
 
 def fin_table(fin: Fin, copper_loss: float = 0.0) -> FinTable:
-    """Compile one fin; arguments and errors as for `FinGroup`."""
-    law = make_law(fin.model)
-    box = _Box(law, np.array(fin.limits.lower), np.array(fin.limits.upper), copper_loss)
-    strongest = box.largest()
-    if strongest <= 0.0:
+    """One fin, compiled or kept from the last time; arguments and errors as for `FinGroup`."""
+    found = _compiled(fin.model, fin.limits, copper_loss, file_stamp(fin.model))
+    if found is None:
         raise DataError(
             f"{fin.name}: gives no thrust within its limits, amplitudes {fin.limits.amplitude[0]:.4g} to "
             f"{fin.limits.amplitude[1]:.4g} rad and frequencies {fin.limits.frequency[0]:.4g} to "
             f"{fin.limits.frequency[1]:.4g} Hz; widen the limits or leave the fin out"
         )
+    return found
+
+
+@lru_cache(maxsize=512)
+def _compiled(
+    model: FinModelSpec, limits: Limits, copper_loss: float, stamp: tuple[int, int] | None
+) -> FinTable | None:
+    """The table of a fin, None where it gives no thrust; one whose file has changed is read again."""
+    law = make_law(model)
+    box = _Box(law, np.array(limits.lower), np.array(limits.upper), copper_loss)
+    strongest = box.largest()
+    if strongest <= 0.0:
+        return None
     top = box.top_price(strongest)
     command = box.best(price_grid(top))
     force = np.maximum.accumulate(box.force(command))
