@@ -36,8 +36,10 @@ class OwnActuator:
     the two angles 0 and pi.
     """
 
-    def __init__(self, spec: Mapping[str, Any], flow: ArrayLike | None = None) -> None:
-        self.spec, self.name = spec, str(spec["name"])
+    def __init__(
+        self, spec: Mapping[str, Any], flow: ArrayLike | None = None, box: tuple[Array, Array] | None = None
+    ) -> None:
+        self.spec, self.name, self._box = spec, str(spec["name"]), box
         self.flow = np.zeros(6) if flow is None else np.asarray(flow, np.float64)
         self.kind = "azimuth" if spec["type"] == "tilt" else str(spec["type"])
         self.model = dict(spec.get("model", {"type": "drag"}))
@@ -66,6 +68,8 @@ class OwnActuator:
     @property
     def limits(self) -> tuple[Array, Array]:
         """Least and largest command (3,)."""
+        if self._box is not None:
+            return self._box
         spec = self.spec
         if self.kind == "fin":
             keys = ("amplitude_rad", "frequency_hz", "zero_direction_rad")
@@ -230,6 +234,18 @@ class OwnActuator:
             change[turn] = (change[turn] + math.pi) % (2.0 * math.pi) - math.pi
         return float((np.abs(change) / (self.rates * period_s)).max() - 1.0)
 
+    def after(self, previous: Array, period_s: float) -> "OwnActuator":
+        """The actuator with only the commands that may follow a previous one (3,) after a time [s]."""
+        low, high = self.limits
+        step, turn = self.rates * period_s, {"fin": 2, "azimuth": 0}.get(self.kind)
+        near, far = np.maximum(low, previous - step), np.minimum(high, previous + step)
+        if turn is not None and self.turns_fully:
+            whole = step[turn] >= math.pi
+            near[turn], far[turn] = low[turn], high[turn]
+            if not whole:
+                near[turn], far[turn] = previous[turn] - step[turn], previous[turn] + step[turn]
+        return OwnActuator(self.spec, self.flow, (near, far))
+
     def draw(self, rng: np.random.Generator, share: float = 1.0, count: int = 1) -> Array:
         """Commands (count, 3), uniform in the limits, the size of the force up to a share of its range."""
         low, high = self.limits
@@ -282,6 +298,14 @@ class OwnPlant:
         rows = zip(self.actuators, previous, commands, strict=True)
         return max(each.rate_excess(before, now, period_s) for each, before, now in rows)
 
+    def after(self, previous: Array, period_s: float) -> "OwnPlant":
+        """The plant with only the commands that may follow previous ones (n, 3) after a time [s]."""
+        other = OwnPlant(self.layout, self.flow)
+        rows = zip(self.actuators, previous, strict=True)
+        other.actuators = tuple(each.after(row, period_s) for each, row in rows)
+        other.scales = self.scales
+        return other
+
     def draw(self, rng: np.random.Generator, share: float = 1.0) -> Array:
         """Commands (n, 3) within limits."""
         return np.stack([each.draw(rng, share)[0] for each in self.actuators])
@@ -299,7 +323,9 @@ class OwnPlant:
         return np.repeat([np.linalg.norm(forces), max(np.linalg.norm(torques), 1e-12)], 3)
 
     def commands_of(self, result: Any) -> Array:
-        """Commands (n, 3) of a result of the library."""
+        """Commands (n, 3) of a result of the library, from its typed commands where it has them."""
+        if not hasattr(result, "commands"):
+            return np.array(result.command, np.float64)
         rows = []
         for each in self.actuators:
             given, row = result.commands.get(each.name), np.full(3, np.nan)
