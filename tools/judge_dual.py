@@ -2,11 +2,12 @@
 
     python tools/judge_dual.py heavy tail within beyond ticks --n 300 --seed 1
 
-Prints a line for each kind of robot. `over` is watts over the largest own lower bound, less 1 (where arcs are
-wide or rudders brake, no answer may come near it); `dear`, where that is over 0.1 %, watts over the least known;
-`gap` is what the answer's own bound leaves open; `false` counts bounds that are too high; `miss` counts wrenches
-within reach that were not given, and answers out of reach that are not the nearest; `broken` limits that were
-passed; `raised` answers that were none; `excess` is what is missing beyond need, as a share.
+Prints a line for each kind of robot. `over` is watts over the largest own lower bound, less 1 (where arcs
+are wide or rudders brake, no answer may come near it); `dear`, where that is over 0.1 %, watts over the
+least known; `gap` is what the answer's own bound leaves open; `false` counts bounds that are too high;
+`miss` counts wrenches within reach that were not given, and answers out of reach that are not the nearest;
+`broken` limits that were passed; `raised` answers that were none; `excess` is what is missing beyond need,
+as a share.
 """
 
 import argparse
