@@ -169,7 +169,10 @@ class BatchAllocation(Answer):
 
     @cached_property
     def effort(self) -> Array | None:
-        """Effort `J_en` (N,) of the commands, the paper's energy proxy."""
+        """Effort `J_en` (N,) of the commands, the paper's energy proxy; None where not all actuators are
+        fins."""
+        if not self.layout.is_of_fins:
+            return None
         return self._by_parts(lambda rows: judged_effort(self.layout, rows))
 
     @property
@@ -225,8 +228,8 @@ class Allocation(Answer):
 
     @cached_property
     def effort(self) -> float | None:
-        """Effort `J_en` of the command, the paper's energy proxy."""
-        return float(judged_effort(self.layout, self.command[None])[0])
+        """Effort `J_en` of the command, the paper's energy proxy; None where not all actuators are fins."""
+        return float(judged_effort(self.layout, self.command[None])[0]) if self.layout.is_of_fins else None
 
     @cached_property
     def candidates(self) -> Candidates | None:

@@ -48,7 +48,7 @@ def in_words(command: Command) -> str:
         return f"{math.degrees(command.deflection):.1f} deg"
     angle = f" at {math.degrees(command.angle):.1f} deg" if isinstance(command, AzimuthCommand) else ""
     sent = "" if command.input is None else f", input {command.input:.5g}"
-    return f"{command.force:.3f} N{angle}{sent}"
+    return f"{round(command.force, 3) + 0.0:.3f} N{angle}{sent}"
 
 
 def fin_rows(result: Allocation) -> list[tuple[str, ...]]:

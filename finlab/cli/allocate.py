@@ -69,7 +69,8 @@ def allocate(
     damage = Health.parse(health, stuck, running)
     lost = robot.with_failed(failed)
     result = allocator.allocate(wrench, failed=lost, policy=answer, health=damage, flow=flow, seed=seed)
-    lost_axes = axes_lost(robot.layout, result.layout, lost) if lost or damage is not None else None
+    told = robot.layout.is_of_fins and (lost or damage is not None)
+    lost_axes = axes_lost(robot.layout, result.layout, lost) if told else None
     record, lines = allocation_record(result), [str(result)]
     if lost_axes is not None:
         record["axes"] = lost_axes

@@ -82,3 +82,17 @@ def test_every_shipped_layout_answers_as_the_library_to_the_last_bit(
     batch, many = robot.allocator.allocate_batch(targets), desk.allocate_batch(layout, targets)
     np.testing.assert_array_equal(batch.command, many.command)
     assert (many.err_norm[:-1] < 1e-4).all()
+
+
+def test_robots_of_any_actuators_are_exported_and_answer(tmp_path: Path) -> None:
+    rudder = Rudder("tail", (-0.6, 0.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0), 0.02, (-0.5, 0.5), 3.0)
+    layout = Layout("hybrid", (*finlab.load_layout("turtle_hybrid").actuators, rudder))
+    flow, wrench, desk = [0.8, 0, 0, 0, 0, 0], [2.0, 0, 5.0, 0, 0, 0.3], finlab.Allocator(layout)
+    make_bundle(desk).write_zip(tmp_path / "x.zip")
+    robot = load_robot(tmp_path / "x.zip")
+    assert robot.layout == layout and not bad(robot)
+    answer = robot.allocate(wrench, flow=flow)
+    assert answer.err_norm < 1e-3 and answer.forces[-1].any()
+    np.testing.assert_array_equal(answer.command, desk.allocate(wrench, flow=flow).command)
+    wrench_there = plant_of(layout).wrench(answer.command, flow=np.array(flow))
+    np.testing.assert_allclose(answer.wrench, wrench_there, atol=1e-12)
