@@ -29,7 +29,6 @@ from finlab.deploy.robot import load_robot, parse_robot
 from finlab.errors import AllocationError, DataError, FinlabError
 from finlab.layout import Layout
 from finlab.layout.load import checksum_of
-from finlab.physics.effort import EffortWeights
 from tests.any_robot import AnyRobot
 
 WEIGHTS = "checkpoint/model.safetensors"
@@ -104,12 +103,11 @@ def test_the_command_line_takes_a_bundle_with_its_lost_fins(
 
 
 def test_settings_travel_and_can_be_changed(tmp_path: Path) -> None:
-    weights = EffortWeights(1.0, 0.5, 0.0, 0.0, 0.25)
-    desk = AnyRobot(n_refined=2, search_steps=9, objective="effort", effort_weights=weights, copper_loss=0.5)
-    make_bundle(desk.on(finlab.load_layout("octo"))).write(tmp_path)
+    desk = Allocator(finlab.load_layout("octo"), copper_loss=0.5, period_s=0.05)
+    make_bundle(desk).write(tmp_path)
     assert Allocator.from_bundle(tmp_path).settings == desk.settings
     changed: Any = desk.settings
-    assert Allocator.from_bundle(tmp_path, n_refined=8).settings == replace(changed, n_refined=8)
+    assert Allocator.from_bundle(tmp_path, period_s=0.2).settings == replace(changed, period_s=0.2)
 
 
 @pytest.mark.parametrize(
@@ -117,11 +115,8 @@ def test_settings_travel_and_can_be_changed(tmp_path: Path) -> None:
     [
         ({"settings": []}, "settings must be keys and values"),
         ({"settings": {"n_tries": 3}}, "settings: method 'dual' knows the settings .*, got 'n_tries'"),
-        ({"n_refined": 10**9}, "n_refined: expected a whole number from 1 to 256"),
-        ({"n_refined": 0}, "n_refined: expected a whole number from 1"),
-        ({"subsets": 3}, "subsets: expected true or false, got 3"),
+        ({"period_s": -1.0}, "period_s: expected a number"),
         ({"copper_loss": float("nan")}, "holds NaN, expected a finite number"),
-        ({"objective": "speed"}, "objective: expected one of power, effort, got 'speed'"),
         ({"version": 4.0}, "is a bundle of version 4.0, this finlab reads version 5; export it again"),
         ({"version": "4"}, "is a bundle of version '4', this finlab reads version 5; export it again"),
         ({"version": 3}, "is a bundle of version 3, this finlab reads version 5; export it again"),

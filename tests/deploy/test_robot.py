@@ -12,6 +12,7 @@ from finlab.deploy.robot import DeployedRobot, load_robot, parse_robot
 from finlab.deploy.self_check import self_check
 from finlab.errors import FinlabError
 from finlab.layout import FinModelSpec, Layout
+from finlab.layout.rudder import Rudder
 from finlab.physics import plant_of
 from tests.any_robot import AnyRobot
 from tests.exhaustive import sampled
@@ -58,14 +59,13 @@ def test_failed_fins_of_the_bundle_stay_failed(shipped_allocator: AnyRobot) -> N
     assert all(finding.good for finding in self_check(robot))
 
 
-@pytest.mark.parametrize("objective", ["power", "effort"])
 @pytest.mark.parametrize("name", sampled(["measured", *sorted(FIN_ROBOTS)], every=4))
 def test_every_shipped_layout_answers_as_the_library_to_the_last_bit(
-    name: str, objective: str, measured: Layout, tmp_path: Path
+    name: str, measured: Layout, tmp_path: Path
 ) -> None:
     """By its own physics, tables included; single, batched and from tick to tick."""
     layout = measured if name == "measured" else finlab.load_layout(name)
-    desk = AnyRobot(objective=objective)
+    desk = AnyRobot()
     make_bundle(desk.on(layout)).write_zip(tmp_path / "x.zip")
     robot = load_robot(tmp_path / "x.zip")
     assert not bad(robot)
