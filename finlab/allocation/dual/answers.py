@@ -18,6 +18,8 @@ from finlab.arrays import Array
 SMOOTHING = 1e-5
 """Price, as a share of the largest, over which an answer changes from one side of a gap to the other: the
 dual of a set that is not convex has corners there."""
+HALVINGS = 25
+"""Halvings of an interval of price that find the price of a force."""
 TINY = 1e-9
 """The same share where there is no gap: it keeps the direction of a force of no price defined."""
 
@@ -96,11 +98,18 @@ class Answers:
     def cost(self, force: Array) -> Array:
         """Power (n, N) [W] of forces (n, N) within the tables; of planes of their sizes."""
         row = self._row + ((np.arange(len(force)) < self.lines)[:, None] & (force < 0.0))
-        size, low, high = np.abs(force), np.zeros(force.shape), self._top[row] + np.zeros(force.shape)
-        for _ in range(60):
-            middle = 0.5 * (low + high)
-            enough = self.radial(middle, row)[0] >= size
-            low, high = np.where(enough, low, middle), np.where(enough, middle, high)
+        size, first, last = np.abs(force), np.zeros(force.shape, np.intp), np.full(force.shape, CELLS)
+        while (last - first > 1).any():
+            middle = (first + last) // 2
+            enough = self._ends[row, middle] >= size
+            first, last = np.where(enough, first, middle), np.where(enough, middle, last)
+        top = self._top[row] / CELLS**2
+        low, high = top * first**2, top * last**2
+        # An error of the price counts squared in the power.
+        for _ in range(HALVINGS):
+            price = 0.5 * (low + high)
+            enough = self.radial(price, row)[0] >= size
+            low, high = np.where(enough, low, price), np.where(enough, price, high)
         return high * size - self.radial(high, row)[2]
 
     def forked(self, sets: Sets) -> NDArray[np.intp]:

@@ -137,15 +137,17 @@ def dual_robot(responses: list[Response]) -> DualRobot:
     low += [plane.table.force[0] for plane in planes]
     high += [plane.table.largest for plane in planes]
     low_, high_ = np.array(low)[:, None], np.array(high)[:, None]
+    band = np.array([each.band for each in (*lines, *planes)])[:, None]
+    ends = [sign * np.minimum(band, high_) for sign in (-1.0, 0.0, 1.0)]
+    cost = answers.cost(np.concatenate([low_, high_, *ends], axis=1))
     sets = Sets(
         low_,
         high_,
-        answers.cost(low_),
-        answers.cost(high_),
+        cost[:, :1],
+        cost[:, 1:2],
         np.array([plane.middle for plane in planes]).reshape(-1, 1),
         np.array([plane.half for plane in planes]).reshape(-1, 1),
     )
-    band = np.array([each.band for each in (*lines, *planes)])[:, None]
     rows = [line.effectiveness for line in lines]
     rows += [plane.effectiveness[0] for plane in planes] + [plane.effectiveness[1] for plane in planes]
     effectiveness = np.array(rows)
@@ -161,7 +163,7 @@ def dual_robot(responses: list[Response]) -> DualRobot:
         answers,
         sets,
         band,
-        np.concatenate([answers.cost(sign * np.minimum(band, high_)) for sign in (-1.0, 0.0, 1.0)], axis=1),
+        cost[:, 2:],
         effectiveness,
         scale,
         basis,
