@@ -189,6 +189,11 @@ class Group(ABC):
         """Wrenches (N, 6) [N, N m] that come on top of forces (N, m, 2) of the answers."""
         return np.zeros((len(force), 6))
 
+    def worth(self, price: Array) -> Array | None:
+        """Returns the most (m,) [W] that all the actuators can give is worth at a price (6,) of the wrench,
+        less its power; None where that is what the responses say."""
+        return None
+
     def paid(self, price: Array) -> "Group":
         """Returns the group where what comes on top of its forces has a price (6,) [W/N, W/(N m)], too."""
         return self

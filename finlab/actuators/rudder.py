@@ -187,6 +187,17 @@ class RudderGroup(Group):
             responses.append(Line(self._across[i], table, table, low=low, high=high))
         return responses
 
+    def worth(self, price: Array) -> Array:
+        """See `Group`: by lift and drag at many deflections, whatever drag is worth."""
+        pressure, most = self._met.pressure, np.zeros(len(self._limits))
+        gain, cost = self._across @ price, self._met.speed - self._against @ price
+        for i, (lifts, _, drags) in enumerate(self._curves):
+            low, high = self._lift(self._limits)[i]
+            lift = np.clip(np.concatenate([-lifts, lifts]) * pressure[i], low, high)
+            drag = np.interp(np.abs(lift) / max(pressure[i], NO_PRESSURE), lifts, drags) * pressure[i]
+            most[i] = (gain[i] * lift - cost[i] * drag).max()
+        return most
+
     def paid(self, price: Array) -> "RudderGroup":
         """See `Group`. Where drag is welcome, it counts as if it were nearly free: a line asks for a cost."""
         other = copy(self)

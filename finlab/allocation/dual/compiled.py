@@ -44,6 +44,26 @@ class Compiled:
         other._prepare()
         return other
 
+    @property
+    def drags(self) -> bool:
+        """Whether the actuators give more than their answers' forces."""
+        return bool(self.beside.any())
+
+    def paid(self, price: Array, beside: Array) -> "Compiled":
+        """The same where what the actuators give beside their answers' forces is a wrench `beside` (6,), and
+        more of it has a price (6,) [W/N, W/(N m)]."""
+        other = copy(self)
+        other.groups = [(places, group.paid(price)) for places, group in self.groups]
+        other._prepare()
+        other.beside = beside
+        return other
+
+    def beside_of(self, force: Array) -> Array:
+        """Wrench (6,) [N, N m] that comes with forces (k, 1) [N] of the dual."""
+        own = self.forces(force)
+        found: Array = np.sum([group.beside_of(own[:, places])[0] for places, group in self.groups], axis=0)
+        return found
+
     def forces(self, force: Array) -> Array:
         """Forces (N, n, 2) [N] of the actuators along their own directions from those of the dual (k, N)."""
         lines, planes, order = self.robot.answers.lines, self.robot.answers.planes, self.robot.order

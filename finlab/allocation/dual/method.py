@@ -6,6 +6,7 @@ becomes the one that the policy asks for (`policies`); from tick to tick, comman
 the previous ones (`rates`).
 """
 
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple, Self, TypedDict
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 from finlab.allocation.dual.answers import Sets
 from finlab.allocation.dual.branch import gaps, has_gaps, least_power
 from finlab.allocation.dual.compiled import Compiled
+from finlab.allocation.dual.drag import at_the_price_of_drag
 from finlab.allocation.dual.newton import Prices, solve
 from finlab.allocation.dual.policies import nearest
 from finlab.allocation.dual.rates import Box, box_after
@@ -120,6 +122,20 @@ class Dual(Method):
             return Solution(np.empty((0, self.layout.n, 3)), np.empty(0))
         if (moved := self.at(flow)) is not self:
             return moved.solve(targets, policy=policy, previous=previous, seed=seed)
+        if self.compiled.drags:
+            return self._one_by_one(targets, policy, previous)
+        return self._solve(targets, policy, previous)
+
+    def _one_by_one(self, targets: Array, policy: Policy, previous: Array | None) -> Solution:
+        """Answers of a robot whose drag has another price for each target."""
+        found = []
+        for target in targets:
+            other = copy(self)
+            other.compiled, bound = at_the_price_of_drag(self.compiled, target)
+            found.append((other._solve(target[None], policy, previous).command, np.array([bound])))
+        return Solution(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
+
+    def _solve(self, targets: Array, policy: Policy, previous: Array | None) -> Solution:
         robot = self.compiled.robot
         asked = targets - self.compiled.beside
         found = self._forces(asked, robot.sets, policy)
