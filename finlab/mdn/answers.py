@@ -16,6 +16,8 @@ PROMISING = 0.02
 """Normalized error in force space below which a descent has succeeded: refinement removes the rest."""
 SAME = 1e-3
 """Share by which efforts differ at least of descents that are refined as two."""
+NEARLY = 5e-5
+"""Normalized error by which inexact answers may differ and count as equally near."""
 INEXACT = 1e9
 """Rank of inexact answers, behind every exact one. Efforts reach thousands where an arc of zero directions
 ends near zero, since the effort divides by that end."""
@@ -109,10 +111,15 @@ def refined(
 
 
 def ranked(robot: EffortRobot, answers: Answers, bonus: float = 0.0) -> Answers:
-    """Answers, best first; the effort of the first counts less by a share `bonus`."""
+    """Answers, best first: of those that are exact, or where none is as near as any, the cheapest.
+
+    The effort of the first given counts less by a share `bonus`.
+    """
     score = answers.effort.copy()
     score[:, 0] *= 1.0 - bonus
-    score = np.where(answers.error > robot.exact, INEXACT * (1.0 + answers.error), score)
+    least = answers.error.min(axis=1, keepdims=True)
+    allowed = np.where(least <= robot.exact, robot.exact, least + NEARLY)
+    score = np.where(answers.error > allowed, INEXACT * (1.0 + answers.error), score)
     order = score.argsort(axis=1, kind="stable")
     place = np.arange(len(order))[:, None]
     return Answers._make(values[place, order] for values in answers)
@@ -127,7 +134,7 @@ def _polished(robot: EffortRobot, target: Array, near: Refined, steps: Steps) ->
     start = near if hopeful.all() else Refined(*(values[hopeful] for values in near))
     better = polish(robot.commands, robot.effort, target[hopeful], start, steps.polish)
     better = refine(robot.commands, target[hopeful], better.command, steps.last)
-    worse = (better.error > robot.exact) & (start.error <= robot.exact)
+    worse = better.error > np.maximum(robot.exact, start.error + NEARLY)
     result = Refined(*(values.copy() for values in near))
     place = np.flatnonzero(hopeful)[~worse]
     for whole, part in zip(result, better, strict=True):
