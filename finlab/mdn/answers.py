@@ -32,7 +32,7 @@ class Steps(NamedTuple):
 
     descent: int = 8
     """Quadratic problems in force space."""
-    first: int = 2
+    first: int = 1
     """Levenberg-Marquardt steps from there onto the target."""
     polish: int = 6
     """Most quadratic problems in commands."""
@@ -104,7 +104,7 @@ def refined(
     each = np.repeat(target, count, axis=0)
     near = refine(robot.commands, each, command.reshape(-1, n, 3), steps.first)
     if steps.polish:
-        near = _polished(robot, each, near, steps)
+        near = _polished(robot, each, near, steps, count)
     effort = robot.effort(near.command)
     parts = [values.reshape(rows, count, *values.shape[1:]) for values in (*near, effort)]
     return ranked(robot, Answers._make([*parts, origin]))
@@ -125,14 +125,16 @@ def ranked(robot: EffortRobot, answers: Answers, bonus: float = 0.0) -> Answers:
     return Answers._make(values[place, order] for values in answers)
 
 
-def _polished(robot: EffortRobot, target: Array, near: Refined, steps: Steps) -> Refined:
+def _polished(robot: EffortRobot, target: Array, near: Refined, steps: Steps, each: int) -> Refined:
     """The least effort near refined commands, exact where these were."""
     # What is far out of reach would only drive the multipliers out of bounds.
     hopeful = near.error <= 1.0
     if not hopeful.any():
         return near
-    start = near if hopeful.all() else Refined(*(values[hopeful] for values in near))
-    better = polish(robot.commands, robot.effort, target[hopeful], start, steps.polish)
+    every = bool(hopeful.all())
+    start = near if every else Refined(*(values[hopeful] for values in near))
+    side_by_side = each if every else 1
+    better = polish(robot.commands, robot.effort, target[hopeful], start, steps.polish, side_by_side)
     better = refine(robot.commands, target[hopeful], better.command, steps.last)
     worse = better.error > np.maximum(robot.exact, start.error + NEARLY)
     result = Refined(*(values.copy() for values in near))

@@ -49,7 +49,7 @@ class _Model(NamedTuple):
 
 
 def polish(
-    problem: CommandProblem, effort: EffortMeter, target: Array, start: Refined, steps: int
+    problem: CommandProblem, effort: EffortMeter, target: Array, start: Refined, steps: int, each: int = 1
 ) -> Refined:
     """Lower the effort of commands at no loss of exactness.
 
@@ -59,6 +59,7 @@ def polish(
         target: normalized wrenches (R, 6).
         start: refined commands that come near.
         steps: most quadratic problems.
+        each: number of rows that are answers to one target, side by side.
     """
     here, value = start, effort(start.command)
     damping = np.full(len(value), DAMPING[0])
@@ -69,7 +70,9 @@ def polish(
         # An error costs twice what the multipliers say, so that none is left for a gain.
         weight = 2.0 * np.sqrt(np.einsum("ri,ri->r", multiplier, multiplier))
         gain = np.abs(np.einsum("rni,rni->r", model.slope, step)) + weight * here.error
-        if (gain <= SETTLED * value).all():
+        # What cannot become the cheapest need not be followed to its end.
+        best = np.repeat(value.reshape(-1, each).min(1), each)
+        if ((gain <= SETTLED * value) | (value - gain > best)).all():
             break
         # Brought back onto the target, a long step is not refused for the error that its bend leaves.
         there = refine(problem, target, here.command + step * problem.width, 1)
