@@ -13,7 +13,7 @@ class MdnSettings(Settings):
     """How many ways the mixture proposes, and how many of them are refined."""
 
     n_candidates: int = number(
-        32, 1, MOST_CANDIDATES, "proposals K: the components' means by falling weight, then samples"
+        48, 1, MOST_CANDIDATES, "proposals K: the components' means by falling weight, then samples"
     )
     n_refined: int = number(6, 1, 256, "proposals that are refined and offered as candidates")
     temperature: float = number(1.0, 0.0, 100.0, "what the variances of the samples are multiplied by")

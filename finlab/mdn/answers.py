@@ -14,8 +14,10 @@ from finlab.mdn.robot import EffortRobot
 
 PROMISING = 0.02
 """Normalized error in force space below which a descent has succeeded: refinement removes the rest."""
-SAME = 1e-3
-"""Share by which efforts differ at least of descents that are refined as two."""
+SAME = 0.03
+"""Mean difference over the fins, in roots of shares of the largest force, from which descents are two ways."""
+LAST = 1e12
+"""Added to the rank of a way that is chosen already."""
 NEARLY = 5e-5
 """Normalized error by which inexact answers may differ and count as equally near."""
 INEXACT = 1e9
@@ -91,7 +93,7 @@ def follow(
     command, score = _promises(robot.forces, each, found)
     score = score.reshape(rows, count)
     score[:, :kept] = -1.0
-    chosen = _distinct(score)[:, :keep]
+    chosen = _distinct(score, _root_shares(robot.forces, found).reshape(rows, count, n), keep)
     command = command.reshape(rows, count, n, 3)[np.arange(rows)[:, None], chosen]
     return refined(robot, target, command, chosen, steps)
 
@@ -152,12 +154,21 @@ def _promises(problem: EffortProblem, target: Array, found: Projected) -> tuple[
     return command, np.where(error > PROMISING, INEXACT * (1.0 + error), effort)
 
 
-def _distinct(score: Array) -> NDArray[np.intp]:
-    """Places (N, K) of scores, the least first, those that hardly differ from one before them last: several
-    proposals mostly lead to the same forces."""
-    order = score.argsort(axis=1, kind="stable")
-    sorted_score = np.take_along_axis(score, order, axis=1)
-    again = np.zeros(order.shape, bool)
-    again[:, 1:] = np.diff(sorted_score) <= SAME * np.abs(sorted_score[:, :-1])
-    found: NDArray[np.intp] = np.take_along_axis(order, again.argsort(axis=1, kind="stable"), axis=1)
-    return found
+def _root_shares(problem: EffortProblem, found: Projected) -> AnyArray:
+    """Forces (R, n) as roots of shares of the largest ones, complex: small ones count, too."""
+    return np.asarray(found.unit * np.sqrt(found.size / problem.fins.maximum))
+
+
+def _distinct(score: Array, root: AnyArray, keep: int) -> NDArray[np.intp]:
+    """Places (N, keep) of scores (N, K), the least first, those last whose forces (N, K, n), as roots of
+    shares, hardly differ from ones before them: several proposals mostly lead to the same forces."""
+    if score.shape[1] <= keep:
+        return np.asarray(score.argsort(axis=1, kind="stable"))
+    left, row = score.copy(), np.arange(len(score))
+    chosen = np.empty((len(score), keep), np.intp)
+    for k in range(keep):
+        chosen[:, k] = first = left.argmin(axis=1)
+        again = np.abs(root - root[row, first][:, None]).mean(-1) < SAME
+        left = np.where(again, left + LAST, left)
+        left[row, first] = np.inf
+    return chosen

@@ -163,7 +163,7 @@ def test_it_needs_no_torch() -> None:
 def test_samples_tell_what_the_plant_says_of_them(shipped: AnyRobot, layout_a: Layout) -> None:
     plant = Plant(layout_a)
     told = shipped.allocate(layout_a, TARGET).samples
-    assert told is not None and len(told) == 32
+    assert told is not None and len(told) == 48
     assert ((told.command >= plant.lower) & (told.command <= plant.upper)).all()
     np.testing.assert_allclose(told.wrench, plant.wrench(told.command), atol=1e-9)
     error = np.linalg.norm((told.wrench - TARGET) / shipped.on(layout_a).scale, axis=-1)
