@@ -15,7 +15,7 @@ from finlab.mdn.robot import EffortRobot
 PROMISING = 0.02
 """Normalized error in force space below which a descent has succeeded: refinement removes the rest."""
 SAME = 0.03
-"""Mean difference over the fins, in roots of shares of the largest force, from which descents are two ways."""
+"""Mean difference over the fins, in roots of shares of the largest force, from which ways are two."""
 LAST = 1e12
 """Added to the rank of a way that is chosen already."""
 NEARLY = 5e-5

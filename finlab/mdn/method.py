@@ -13,12 +13,12 @@ from typing import ClassVar, NamedTuple, Self
 
 import numpy as np
 
-from finlab.allocation.evaluate import costs
+from finlab.allocation.dual.method import Dual
+from finlab.allocation.evaluate import REACHED, costs
 from finlab.allocation.in_time import in_time
 from finlab.allocation.mdn_settings import MdnSettings
 from finlab.allocation.method import Method, Takes
 from finlab.allocation.policy import Policy
-from finlab.allocation.search.search_method import Search as DefaultMethod
 from finlab.allocation.settings import Settings
 from finlab.allocation.solution import Candidates, Solution
 from finlab.arrays import Array
@@ -176,9 +176,10 @@ class Mdn(Method):
             command = self._by_default(policy, asked)
             delivered = robot.commands.wrench(command)
             near = np.linalg.norm(delivered - asked, axis=1)
-            # What is missed no less by the default method is missed by what the fins cannot go below.
-            own = near + NEARLY > some.error[:, 0]
-            delivered[(near <= robot.exact) | own] = asked[(near <= robot.exact) | own]
+            # A little that all miss is what the fins cannot go below; more is what the policy decides.
+            little = some.error[:, 0] <= np.minimum(near + NEARLY, REACHED / USUAL_SHARE)
+            as_asked = little | (near <= robot.exact)
+            delivered[as_asked] = asked[as_asked]
             start = np.concatenate([command[:, None], some.command], axis=1)
             origin = np.insert(some.origin, 0, OTHER, axis=1)
             found = refined(robot, delivered, start, origin, MORE)
@@ -192,7 +193,7 @@ class Mdn(Method):
 
     @cached_property
     def _default(self) -> Method:
-        return DefaultMethod(self.layout, DefaultMethod.settings_class(), self.scale)
+        return Dual(self.layout, Dual.settings_class(), self.scale)
 
     def _in_motion(self, target: Array, free: Found, previous: Array) -> Found:
         """What is found for one target within what the servos allow after a previous command (n, 3): the way

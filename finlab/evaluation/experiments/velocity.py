@@ -23,7 +23,7 @@ SETTLED_S = 10.0
 
 def run(
     layout: str = "A",
-    methods: tuple[str, ...] = ("dual", "mdn-effort", "analytic", "on-board"),
+    methods: tuple[str, ...] = ("dual", "mdn", "analytic", "on-board"),
     runs: int = 5,
     duration: float = 30.0,
     plant: str = "mean",

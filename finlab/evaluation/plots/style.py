@@ -29,7 +29,6 @@ COLOURS = {
     "ipopt": BLACK,
     "ipopt-32": BLACK,
     "on-board": ORANGE,
-    "mdn-effort": VERMILION,
 }
 """Method -> colour."""
 DASHES: dict[str, Any] = {"color": GREY, "linestyle": (0, (2, 2)), "linewidth": 1.2}
