@@ -1,4 +1,4 @@
-"""The solver of three actuators in the examples against judges that share nothing with it."""
+"""The solver of three actuators in the examples against the library, and judges that share nothing with it."""
 
 import runpy
 from pathlib import Path
@@ -6,8 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import finlab
 from tests.least_power import lower_bound
-from tests.mixed_robots import T200, T200_FORCE, layout_of
+from tests.mixed_robots import T200, T200_FORCE, layout_of, load
 from tests.own_plant import OwnPlant
 
 PATH = Path(__file__).resolve().parents[2] / "examples" / "13_three_actuators.py"
@@ -32,3 +33,5 @@ def test_least_watts_of_three_actuators(seed: int) -> None:
     np.testing.assert_allclose(plant.effectiveness @ force, wrench, atol=1e-8)
     assert lower_bound(plant, wrench) == pytest.approx(watts, rel=1e-6)
     assert bound == pytest.approx(watts, rel=1e-9)
+    result = finlab.Allocator(load(ROBOT)).allocate(wrench)
+    assert result.power == pytest.approx(watts, rel=1e-6)
