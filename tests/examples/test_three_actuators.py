@@ -1,4 +1,4 @@
-"""The solver of three actuators in the examples against the library, and judges that share nothing with it."""
+"""The solver of three actuators in the examples, against the library and against own judges."""
 
 import runpy
 from pathlib import Path
