@@ -187,8 +187,10 @@ class RudderGroup(Group):
             responses.append(Line(self._across[i], table, table, low=low, high=high))
         return responses
 
-    def worth(self, price: Array) -> Array:
-        """See `Group`: by lift and drag at many deflections, whatever drag is worth."""
+    def worth(self, price: Array) -> Array | None:
+        """See `Group`: by lift and drag at many deflections, whatever drag is worth; None at rest."""
+        if (self._met.pressure < NO_PRESSURE).all():
+            return None
         pressure, most = self._met.pressure, np.zeros(len(self._limits))
         gain, cost = self._across @ price, self._met.speed - self._against @ price
         for i, (lifts, _, drags) in enumerate(self._curves):

@@ -47,7 +47,7 @@ class Compiled:
     @property
     def drags(self) -> bool:
         """Whether the actuators give more than their answers' forces."""
-        return bool(self.beside.any())
+        return any(group.worth(np.zeros(6)) is not None for _, group in self.groups)
 
     def paid(self, price: Array, beside: Array) -> "Compiled":
         """The same where what the actuators give beside their answers' forces is a wrench `beside` (6,), and

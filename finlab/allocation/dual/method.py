@@ -128,12 +128,12 @@ class Dual(Method):
 
     def _one_by_one(self, targets: Array, policy: Policy, previous: Array | None) -> Solution:
         """Answers of a robot whose drag has another price for each target."""
-        found = []
-        for target in targets:
+        commands, bounds = [], np.empty(len(targets))
+        for i, target in enumerate(targets):
             other = copy(self)
-            other.compiled, bound = at_the_price_of_drag(self.compiled, target)
-            found.append((other._solve(target[None], policy, previous).command, np.array([bound])))
-        return Solution(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
+            other.compiled, bounds[i] = at_the_price_of_drag(self.compiled, target)
+            commands.append(other._solve(target[None], policy, previous).command)
+        return Solution(np.concatenate(commands), bounds)
 
     def _solve(self, targets: Array, policy: Policy, previous: Array | None) -> Solution:
         robot = self.compiled.robot
@@ -151,6 +151,9 @@ class Dual(Method):
         """Forces of least power for wrenches (N, 6), or for those that the policy gives in their place."""
         robot = self.compiled.robot
         target = robot.target(targets)
+        if not len(target):  # nothing pushes, such as rudders at rest
+            nothing = np.zeros((len(robot.effectiveness), len(targets)))
+            return Forces(nothing, np.zeros(len(targets)), ~targets.any(axis=1), target)
         root = solve(robot, target, sets, prices)
         within = root.solved.copy()
         if robot.basis.shape[1] < 6:

@@ -3,6 +3,8 @@
 import numpy as np
 
 import finlab
+from finlab.layout.layout import Layout
+from finlab.layout.rudder import Rudder
 from finlab.physics.plant import Plant
 from tests.mixed_robots import load, random_flow, random_plant, random_robot, within
 
@@ -23,6 +25,15 @@ def test_answers_of_robots_with_rudders_are_exact_and_above_a_bound_that_is_met(
             gaps.append(1.0 - answer.bound / answer.power)
     assert min(gaps) > -1e-5
     assert np.median(gaps) < 1e-3
+
+
+def test_rudders_alone_give_nothing_at_rest_and_something_in_a_flow() -> None:
+    rudder = Rudder("r", (-0.5, 0, 0), (0, 0, 1), (1, 0, 0), 0.01, (-0.3, 0.3), lift_slope=3.0)
+    allocator = finlab.Allocator(Layout("rudder", (rudder,)))
+    rest = allocator.allocate([0, 1, 0, 0, 0, -0.5])
+    assert not rest.wrench.any() and rest.power == 0.0
+    moving = allocator.allocate([0, 1, 0, 0, 0, -0.5], flow=[1.5, 0, 0, 0, 0, 0])
+    np.testing.assert_allclose(moving.wrench[[1, 5]], [1, -0.5], rtol=0.05)
 
 
 def test_many_wrenches_at_once_are_answered_as_one_by_one() -> None:
