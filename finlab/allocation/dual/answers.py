@@ -110,7 +110,8 @@ class Answers:
             price = 0.5 * (low + high)
             enough = self.radial(price, row)[0] >= size
             low, high = np.where(enough, low, price), np.where(enough, price, high)
-        return high * size - self.radial(high, row)[2]
+        power: Array = high * size - self.radial(high, row)[2]
+        return power
 
     def forked(self, sets: Sets) -> NDArray[np.intp]:
         """Places of the planes whose set has a gap: wide arcs, and arcs of forces that cannot rest."""
