@@ -90,11 +90,11 @@ def test_a_table_fin_goes_through_the_whole_app(
     while session.history.redo_name is not None:
         session.redo()
     assert session.state == again.state
-    allocator = SOLVER.loaded("dual", "power")
-    graph = graph_bytes(build_graph(allocator.on(tabled)))
+    allocator = SOLVER.shipped(tabled, "dual", "power")
+    graph = graph_bytes(build_graph(allocator))
     with pytest.raises(LayoutError, match=r"fin\.csv', which did not come along"):
         files.read_layout("tabled.graph.json", graph)
-    assert len(make_bundle(allocator.on(tabled)).zip_bytes()) > len(graph), "the table travels along"
+    assert len(make_bundle(allocator).zip_bytes()) > len(graph), "the table travels along"
     assert command_line(session.state).startswith("finlab allocate tabled.yaml --wrench")
 
 

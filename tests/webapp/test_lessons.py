@@ -19,7 +19,7 @@ from webapp.session.state import State
 
 def _answer(state: State) -> Allocation:
     allocator = AnyRobot(state.method)
-    if "objective" in allocator.option_names():
+    if "objective" in allocator.choice.kind.option_names():
         allocator = allocator.with_settings(objective=state.objective)
     return allocator.allocate(state.layout, state.target, failed=state.failed, policy=state.policy)
 

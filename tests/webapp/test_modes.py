@@ -11,6 +11,7 @@ from finlab.allocation.modes import find_modes
 from finlab.allocation.solution import Candidates
 from finlab.assets import shipped_layouts
 from finlab.layout import load_layout
+from tests.any_robot import AnyRobot
 from tests.webapp.loops import AtOnce, page_of
 from tests.webapp.stand_in import StandIn
 from webapp.markup.mode_plot import LABEL, LEFT, mode_plot
@@ -87,7 +88,7 @@ def test_a_mode_is_found_again_in_another_list() -> None:
 
 
 def test_real_candidates_are_drawn_and_listed() -> None:
-    answer = StandIn().allocate(load_layout(shipped_layouts()["ucat"]), PRESETS["Turn"])
+    answer = AnyRobot(StandIn).allocate(load_layout(shipped_layouts()["ucat"]), PRESETS["Turn"])
     found = known_modes(answer)
     modes = named_modes(found)
     assert answer.candidates is not None and answer.samples is not None
@@ -140,7 +141,7 @@ def test_a_mode_stays_on_the_robot_when_all_are_known() -> None:
 @pytest.mark.parametrize("spread", [0.0, 1e-6, 0.01, 1.0])
 @pytest.mark.parametrize("sampled", [True, False])
 def test_dots_stand_at_their_values_and_their_numbers_beside_them(spread: float, sampled: bool) -> None:
-    answer = StandIn().allocate(load_layout("hexa"), PRESETS["Turn"])
+    answer = AnyRobot(StandIn).allocate(load_layout("hexa"), PRESETS["Turn"])
     first = known_modes(answer)[0]
     power = np.append(0.801 + spread * np.random.default_rng(3).uniform(size=MAX_SHOWN - 1), 0.957 + spread)
     shown = tuple(NamedMode(replace(first, power=float(watts)), f"{k}") for k, watts in enumerate(power))

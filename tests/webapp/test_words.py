@@ -15,6 +15,7 @@ from finlab.assets import shipped_layouts
 from finlab.errors import LayoutError
 from finlab.layout import FinModelSpec, load_layout
 from finlab.vehicle.body import GRAVITY
+from tests.any_robot import AnyRobot
 from tests.webapp.stand_in import StandIn
 from webapp.markup.comparison import comparison_table
 from webapp.markup.corner import corner
@@ -39,7 +40,7 @@ from webapp.theme import DELIVERED, UNLEARNED, css
 
 
 def test_reachable_and_not() -> None:
-    layout, allocator = load_layout(shipped_layouts()["ucat"]), StandIn()
+    layout, allocator = load_layout(shipped_layouts()["ucat"]), AnyRobot(StandIn)
     easy = allocator.allocate(layout, PRESETS["Turn"])
     assert easy.reachable and verdict_sentence(easy, True) == "Exact"
     assert rest_sentence(easy) == "Nothing is left undone."
@@ -55,7 +56,7 @@ def test_reachable_and_not() -> None:
 @pytest.mark.parametrize("target", [PRESETS["Turn"], (0.0, 0.0, 2.0, 0.0, 0.0, 0.1), (0.0,) * 6])
 def test_all_that_is_said_of_an_answer_agrees(share: float, target: tuple[float, ...]) -> None:
     layout = load_layout("ucat")
-    exact = StandIn().allocate(layout, target)
+    exact = AnyRobot(StandIn).allocate(layout, target)
     wrench = np.array(target)
     wrench[5] *= share
     wrench[4] += 1e-3 * (share < 1.0)
@@ -72,7 +73,7 @@ def test_all_that_is_said_of_an_answer_agrees(share: float, target: tuple[float,
 
 def test_no_verdict_stands_beside_a_new_question() -> None:
     layout = load_layout("ucat")
-    answer = StandIn().allocate(layout, PRESETS["Turn"])
+    answer = AnyRobot(StandIn).allocate(layout, PRESETS["Turn"])
     state = State(layout, target=(0.0, 0.0, 1.0, 0.0, 0.0, 0.0))
     shown = corner(state, "", answer, True, None, in_reach=True) + answer_sentence(state, answer, True)
     assert shown.count(WORKING) == 2 and "Exact" not in shown and "undone" not in shown
@@ -81,14 +82,14 @@ def test_no_verdict_stands_beside_a_new_question() -> None:
 
 def test_a_method_that_keeps_least_something_else_says_so() -> None:
     layout = load_layout("ucat")
-    answer = StandIn().allocate(layout, PRESETS["Turn"])
+    answer = AnyRobot(StandIn).allocate(layout, PRESETS["Turn"])
     for objective, told in (("power", True), ("effort", False)):
         state = State(layout, target=PRESETS["Turn"], method="mdn", objective=objective)
         assert ("mdn keeps effort least, not power" in answer_sentence(state, answer, False)) == told
 
 
 def test_fins_that_were_not_learned_are_told_in_words_of_their_own() -> None:
-    layout, allocator = load_layout("ucat"), StandIn()
+    layout, allocator = load_layout("ucat"), AnyRobot(StandIn)
     allocator.fin_model = layout.fins[0].model
     other = replace(layout.fins[2], model=FinModelSpec("lighthill"))
     strange = replace(layout, actuators=(*layout.fins[:2], other, layout.fins[3]))
