@@ -146,7 +146,8 @@ def test_dots_stand_at_their_values_and_their_numbers_beside_them(spread: float,
     power = np.append(0.801 + spread * np.random.default_rng(3).uniform(size=MAX_SHOWN - 1), 0.957 + spread)
     shown = tuple(NamedMode(replace(first, power=float(watts)), f"{k}") for k, watts in enumerate(power))
     of_samples = np.zeros(64, dtype=np.intp) if sampled else None
-    given = replace(answer, settings={"objective": "power"}, samples=answer.samples if sampled else None)
+    given = replace(answer, settings={"objective": "power"})
+    given = given.with_candidates(given.candidates, given.samples if sampled else None)
     plot = mode_plot(given, Modes(shown, MAX_SHOWN, of_samples), 3, 200)
     across = [
         float(x) for x in re.findall(r"<circle cx='([\d.]+)' cy='[\d.]+' r='[\d.]+' class='mode'", plot)

@@ -55,8 +55,9 @@ def three_digits(value: float | None) -> str:
 
 
 def objective_of(allocation: Allocation) -> str:
-    """What the method that answered keeps least; those without that choice keep the paper's effort least."""
-    return str(allocation.settings.get("objective", "effort"))
+    """What the method that answered keeps least; of those without that choice the default method keeps watts
+    least, the others the paper's effort."""
+    return str(allocation.settings.get("objective", "power" if allocation.method == "dual" else "effort"))
 
 
 def source_words(sources: Sequence[str]) -> str:

@@ -1,0 +1,157 @@
+"""An allocator is made for one robot: it is copied, sent to other processes, and keeps what it prepares."""
+
+import copy
+import pickle
+import subprocess
+import sys
+import tracemalloc
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import finlab
+from finlab.allocation import METHODS, Allocator, Health
+from finlab.allocation.allocation import CHUNK
+from finlab.allocation.allocator import MOST_PREPARED
+from finlab.allocation.method import Method
+from finlab.allocation.yardstick import yardstick
+from finlab.errors import AllocationError
+from finlab.layout import Fin, FinModelSpec, Layout, load_layout
+from tests.allocation.quick import QUICK
+
+SURGE = [1.0, 0.0, 0.5, 0.0, 0.0, 0.1]
+
+
+def wrenches(n: int) -> np.ndarray:
+    return np.random.default_rng(0).normal(size=(n, 6)) * [1.0, 0.3, 1.0, 0.05, 0.05, 0.1]
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_copies_answer_the_same(method: str) -> None:
+    allocator = Allocator(load_layout("A"), method, **QUICK.get(method, {}))
+    answer = allocator.allocate(SURGE, failed=["front_left"])
+    for twin in (copy.copy(allocator), copy.deepcopy(allocator), pickle.loads(pickle.dumps(allocator))):
+        assert (twin.layout, twin.method, twin.settings) == (
+            allocator.layout,
+            allocator.method,
+            allocator.settings,
+        )
+        assert twin.allocate(SURGE, failed=["front_left"]) == answer
+
+
+def test_another_process_answers_the_same(tmp_path: Path) -> None:
+    allocator = Allocator(load_layout("mixed"), period_s=0.2)
+    answer = allocator.allocate(SURGE)
+    (tmp_path / "both").write_bytes(pickle.dumps((allocator, answer)))
+    code = (
+        "import pickle, sys\n"
+        "allocator, answer = pickle.load(open(sys.argv[1], 'rb'))\n"
+        "assert allocator.allocate(answer.target) == answer\n"
+        "assert 'torch' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", code, str(tmp_path / "both")], check=True, timeout=60)
+
+
+def test_an_answer_needs_no_allocator(tmp_path: Path) -> None:
+    answer = Allocator(load_layout("A")).allocate(SURGE)
+    (tmp_path / "answer").write_bytes(pickle.dumps(answer))
+    code = (
+        "import pickle, sys\n"
+        "answer = pickle.load(open(sys.argv[1], 'rb'))\n"
+        "assert answer.reachable and str(answer)\n"
+        "finlab = [name for name in sys.modules if name.startswith('finlab.')]\n"
+        "assert not [name for name in finlab if 'allocator' in name or 'method' in name]"
+    )
+    subprocess.run([sys.executable, "-c", code, str(tmp_path / "answer")], check=True, timeout=60)
+
+
+def test_damaged_robots_are_prepared_when_first_asked_about(monkeypatch: pytest.MonkeyPatch) -> None:
+    allocator, made = Allocator(load_layout("A")), []
+    kind = type(allocator._whole.method)
+    first = Method.__init__
+
+    def counted(self: Method, layout: Layout, *others: object) -> None:
+        made.append(layout.names)
+        first(self, layout, *others)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(Method, "__init__", counted)
+    assert issubclass(kind, Method)
+    for _ in range(3):
+        allocator.allocate(SURGE)
+        allocator.allocate(SURGE, failed=["front_left"])
+        allocator.allocate(SURGE, health=Health.of(weak={"back_left": 0.5}))
+    assert len(made) == 2
+    for k in range(MOST_PREPARED + 3):
+        allocator.allocate(SURGE, health=Health.of(weak={"back_left": 0.5 + 0.01 * k}))
+    assert len(allocator._prepared) == MOST_PREPARED
+
+
+def test_errors_are_shares_of_what_the_robot_can_push() -> None:
+    layout = load_layout("A")
+    allocator = Allocator(layout)
+    strongest, lever = 4.737410112522892 * (2.1 * np.sin(0.6)) ** 2, np.linalg.norm(layout.position, axis=1)
+    np.testing.assert_allclose(allocator.scale[:3], 2.0 * strongest, rtol=1e-9)
+    assert 0.8 * 2.0 * strongest * lever.max() < allocator.scale[3] <= 2.0 * strongest * lever.max() * 1.0001
+    far = allocator.allocate([100.0, 0, 0, 0, 0, 0])
+    assert far.err_norm == pytest.approx((100.0 - far.wrench[0]) / allocator.scale[0], rel=1e-6)
+    assert far.expected_error == 0.0 and not far.expected_miss.any()
+    lost = allocator.allocate(SURGE, failed=["front_left"])
+    np.testing.assert_array_equal(lost.scale, allocator.scale)
+
+
+@pytest.mark.parametrize("size", [0.05, 0.2, 5.0])
+def test_the_yardstick_grows_with_the_robot(size: float) -> None:
+    """Of fins whose force grows with the area, on levers that grow with the robot."""
+    model = FinModelSpec("drag", (("area", 0.02 * size**2), ("lever", 0.1)))
+    places = [(size, 0.0, 0.0), (-size, 0.0, 0.0), (0.0, size, 0.0)]
+    robot = Layout(
+        "robot", tuple(Fin(f"f{i}", place, 0.3 * i, model=model) for i, place in enumerate(places))
+    )
+    plain = Layout(
+        "robot", tuple(replace(f, position=tuple(np.array(f.position) / size)) for f in robot.fins)
+    )
+    plain = replace(plain, actuators=tuple(replace(f, model=FinModelSpec("drag")) for f in plain.fins))
+    expected = yardstick(plain) * np.repeat([size**2, size**3], 3)
+    np.testing.assert_allclose(yardstick(robot), expected, rtol=1e-9)
+
+
+def test_many_targets_take_flat_memory() -> None:
+    allocator, targets = Allocator(load_layout("A")), wrenches(12 * CHUNK)
+    allocator.allocate_batch(targets[: CHUNK + 1])
+    tracemalloc.start()
+    batch = allocator.allocate_batch(targets)
+    kept, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    # Targets, commands, bounds: 152 bytes each.
+    assert kept < 1.1 * 152 * len(targets) and most < kept + 6000 * CHUNK
+    np.testing.assert_allclose(batch.power.sum(), batch.bound.sum(), rtol=1e-3)
+    some = allocator.allocate_batch(targets[:CHUNK])
+    np.testing.assert_array_equal(batch.command[:CHUNK], some.command)
+    np.testing.assert_array_equal(batch.wrench[:CHUNK], some.wrench)
+    np.testing.assert_array_equal(batch.err_norm[:CHUNK], some.err_norm)
+
+
+def test_streams_of_targets() -> None:
+    allocator, targets = Allocator(load_layout("A")), wrenches(CHUNK + 3)
+    parts = list(allocator.allocate_stream((row for row in targets), failed=["front_left"]))
+    assert [len(part) for part in parts] == [CHUNK, 3]
+    whole = allocator.allocate_batch(targets, failed=["front_left"])
+    np.testing.assert_allclose(np.concatenate([part.wrench for part in parts]), whole.wrench, atol=1e-9)
+    assert list(allocator.allocate_stream(iter(()))) == []
+
+
+def test_an_answer_of_another_robot_is_not_explored() -> None:
+    answer = Allocator(load_layout("A"), "mdn").allocate(SURGE)
+    with pytest.raises(AllocationError, match="this answer is of layout 'A', and this allocator is for 'B'"):
+        Allocator(load_layout("B"), "mdn").explore(answer)
+
+
+def test_what_is_no_method_is_refused() -> None:
+    layout = load_layout("A")
+    with pytest.raises(AllocationError, match="method: 'search' is now called 'dual'"):
+        Allocator(layout, "search")
+    with pytest.raises(AllocationError, match="method: expected the name of a method, got 3"):
+        Allocator(layout, 3)  # type: ignore[call-overload]
+    assert not hasattr(finlab, "load_allocator")
