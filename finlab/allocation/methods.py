@@ -150,6 +150,11 @@ def checked_settings(kind: type[Method], settings: dict[str, Any]) -> Settings:
         AllocationError: the method knows no such setting, or cannot work with its value.
     """
     known = kind.option_names()
+    if "objective" in settings and "objective" not in known:
+        raise AllocationError(
+            f"objective: method {kind.name!r} has no choice; 'dual' keeps watts least, 'mdn' and 'paper' the "
+            "paper's effort, and 'sqp' and 'ipopt' what they are told"
+        )
     if unknown := [name for name in settings if name not in known]:
         raise AllocationError(
             f"method {kind.name!r} knows the settings {', '.join(known) or 'none'}, got {unknown[0]!r}"

@@ -16,7 +16,7 @@ from tests.exhaustive import sampled
 from tests.hostile_robots import hostile_robot
 
 N_CASES = 400
-METHODS = ("dual", "dual", "dual-effort", "mdn", "analytic", "qp", "sqp", "paper")
+METHODS = ("dual", "dual", "mdn", "analytic", "qp", "sqp", "paper")
 
 
 @cache
@@ -73,7 +73,7 @@ def ask(seed: int) -> None:
     rng = np.random.default_rng([2026, seed])
     name = pick(rng, METHODS)
     robot, allocator, how = hostile_robot(seed, 2026), method(name), policy(rng)
-    if name not in ("dual", "dual-effort", "mdn") and not how.is_plain and how.kind != "direction":
+    if name not in ("dual", "mdn") and not how.is_plain and how.kind != "direction":
         how = Policy()
     plant, asked = plant_of(robot), question(rng, robot)
     reached = plant.wrench(plant.sample(rng, (1,)))[0]

@@ -6,7 +6,7 @@ from finlab.errors import AllocationError
 from finlab.evaluation.method_specs import is_slow, load_method_spec, load_method_specs
 
 
-@pytest.mark.parametrize("name", ["dual", "analytic", "sqp"])
+@pytest.mark.parametrize("name", ["qp", "analytic", "sqp"])
 def test_the_objective_is_a_part_of_the_name_or_given_to_all(name: str) -> None:
     assert load_method_spec(name).choice.settings.objective == "power"
     assert load_method_spec(name, objective="effort").choice.settings.objective == "effort"
@@ -15,9 +15,9 @@ def test_the_objective_is_a_part_of_the_name_or_given_to_all(name: str) -> None:
 
 
 def test_methods_that_cannot_choose_are_left_as_they_are() -> None:
-    methods = load_method_specs("paper, on-board,dual", objective="effort")
-    assert list(methods) == ["paper", "on-board", "dual"]
-    assert vars(methods["dual"].choice.settings)["objective"] == "effort"
+    methods = load_method_specs("paper, on-board,sqp", objective="effort")
+    assert list(methods) == ["paper", "on-board", "sqp"]
+    assert vars(methods["sqp"].choice.settings)["objective"] == "effort"
 
 
 def test_methods_for_comparison_alone() -> None:
@@ -27,7 +27,7 @@ def test_methods_for_comparison_alone() -> None:
 
 def test_starts() -> None:
     assert load_method_spec("ipopt-32").choice.settings.n_starts == 32
-    assert is_slow("ipopt-32") and not is_slow("dual-effort")
+    assert is_slow("ipopt-32") and not is_slow("sqp-effort")
 
 
 @pytest.mark.parametrize(
@@ -36,8 +36,8 @@ def test_starts() -> None:
         ("learned", "method: 'learned' is now called 'dual'"),
         ("dual,fast", "method: 'fast' has gone"),
         ("dual-32", "a number of starts, from 1, goes with ipopt only, got 'dual-32'"),
-        ("paper-effort", "knows the settings .*, got 'objective'"),
-        ("dual-money", "method: expected one of dual, mdn"),
+        ("paper-effort", "objective: method 'paper' has no choice"),
+        ("sqp-money", "method: expected one of dual, mdn"),
         (" , ", "expected names with commas between"),
     ],
 )

@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
+from finlab.allocation import Allocator
 from finlab.cli import main
 from finlab.errors import DataError
 from finlab.layout import Layout, load_layout
 from finlab.sim import RunLog
-from finlab.sim.excite import BOUNDS, ExcitingAllocator, excitation
+from finlab.sim.excite import BOUNDS, Exciting, excitation
 from finlab.vehicle.attitude import euler
 
 
@@ -41,9 +42,9 @@ def test_every_axis_and_every_fin_is_varied(swim: RunLog) -> None:
 
 def test_commands_give_the_wrench_where_the_fins_can() -> None:
     layout = load_layout("A")
-    allocator = ExcitingAllocator(layout, seed=1)
+    allocator = Allocator(layout, Exciting, seed=1)
     target = np.array([2.0, 0.5, -1.0, 0.05, 0.1, 0.1])
-    answers = [allocator.allocate(layout, target) for _ in range(50)]
+    answers = [allocator.allocate(target) for _ in range(50)]
     missed = [np.linalg.norm((answer.wrench - target)[:3]) for answer in answers]
     assert np.median(missed) < 0.5
     assert len({round(answer.command[0, 0], 3) for answer in answers}) > 1
