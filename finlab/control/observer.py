@@ -12,10 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from finlab.actuators.fin.response import largest_forces
 from finlab.arrays import Array
 from finlab.control.filters import LowPass
 from finlab.control.measurement import Measurement
-from finlab.forces.envelopes import largest_forces
 from finlab.layout import Body, Layout
 from finlab.layout.angles import wrapped
 from finlab.physics import plant_of

@@ -18,13 +18,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from finlab.actuators.fin.response import FinTable, fin_table
 from finlab.arrays import Array
-from finlab.forces.envelopes import Envelopes, layout_envelopes
-from finlab.forces.force_space import PlanarProblem
 from finlab.layout import Layout
-from finlab.layout.angles import wrapped
+from finlab.layout.angles import TURN, wrapped
 from finlab.layout.arrays import own_effectiveness
-from finlab.physics.objective import Objective
 
 LEVER = 0.2
 """Length [m] that makes torques comparable to forces: about the distance of a fin from the centre."""
@@ -32,6 +30,9 @@ SCALE = np.array([1.0, 1.0, 1.0, LEVER, LEVER, LEVER])
 """What a wrench is divided by, entry by entry."""
 HALF_TURN_TOLERANCE = 1e-9
 """By how much half an arc [rad] may exceed a quarter turn and still be convex."""
+BOUNDARY, POINTS = 48, 193
+"""Sides of the polygon around what an uneven fin can push: at most a fifth of a percent too wide; and
+directions in its arc that are looked at."""
 MAX_CUT = 3
 """Most fins whose wide sectors are cut with both halves kept, which doubles the number of parts each time."""
 
@@ -118,28 +119,30 @@ def fin_sets(layout: Layout, failed: Collection[str] = ()) -> FinSets:
     """
     layout.only_fins("what computes reach")
     lost = layout.indices(tuple(failed))
-    effectiveness = own_effectiveness(layout)[:, 1:] / SCALE
-    sets = _one_robot(effectiveness, layout_envelopes(layout, Objective()))
-    radius = sets.radius.copy()
-    radius[:, list(lost)] = 0.0
-    return sets._replace(radius=radius)
-
-
-def planar_sets(problem: PlanarProblem) -> FinSets:
-    """Returns what the compiled fins of a problem can push, in its normalized wrenches."""
-    return _one_robot(np.stack(np.split(problem.effectiveness, 2), axis=1), problem.fins)
-
-
-def _one_robot(effectiveness: Array, fins: Envelopes) -> FinSets:
-    """Compiled fins with wrenches per newton (n, 2, m) as one robot of a batch."""
-    boundary = fins.boundary_shares
+    fins = [fin_table(fin) for fin in layout.fins]
+    radius = np.array([fin.largest for fin in fins])
+    radius[list(lost)] = 0.0
+    uneven = any(fin.gauge is not None for fin in fins)
     return FinSets(
-        np.ascontiguousarray(effectiveness)[None],
-        fins.maximum[None],
-        fins.middle[None],
-        fins.half[None],
-        None if boundary is None else boundary[None],
+        np.ascontiguousarray(own_effectiveness(layout)[None, :, 1:] / SCALE),
+        radius[None],
+        np.array([[fin.middle for fin in fins]]),
+        np.array([[fin.half for fin in fins]]),
+        np.array([[_boundary(fin) for fin in fins]]) if uneven else None,
     )
+
+
+def _boundary(fin: FinTable) -> Array:
+    """How far the convex hull of what a fin can push reaches along `BOUNDARY` evenly spaced directions
+    (BOUNDARY,), as shares of its largest force."""
+    angle = fin.middle + fin.half * np.linspace(-1.0, 1.0, POINTS)
+    reach = np.ones(POINTS)
+    if fin.gauge is not None:
+        count = len(fin.gauge)
+        reach = np.interp(angle % TURN, TURN / count * np.arange(count + 1), np.append(fin.gauge, fin.gauge[0]))
+    sides = TURN / BOUNDARY * np.arange(BOUNDARY)
+    ahead = (reach[:, None] * np.cos(angle[:, None] - sides)).max(axis=0)
+    return np.asarray(np.maximum(ahead, 0.0) * fin.table.largest / fin.largest)
 
 
 def _along_boundary(boundary: Array, pull: Array, direction: Array) -> tuple[Array, Array]:

@@ -7,7 +7,7 @@ force that the same cost gives in each direction.
 """
 
 from collections.abc import Sequence
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -17,11 +17,11 @@ from finlab.actuators.law import FinLaw
 from finlab.actuators.response import Group, Plane, RadialTable, price_grid
 from finlab.arrays import Array
 from finlab.errors import DataError
-from finlab.layout import Fin, FinModelSpec, Limits
+from finlab.layout import Fin, FinModelSpec, Layout, Limits
 from finlab.layout.angles import TURN, is_full_turn, wrapped
 
-GRID = 33, 49
-"""Amplitudes and frequencies of the first grid."""
+GRID, COARSE_GRID = (33, 49), (9, 13)
+"""Amplitudes and frequencies of the first grid, and of the grid on which directions are compared."""
 STEPS = 12
 """Steps of Newton's method from the best place of the grid."""
 PEAK = 5e-4
@@ -51,6 +51,20 @@ class FinTable(NamedTuple):
     deflection: Array
     """Direction of the force minus zero direction (TURNS,) [rad] around the circle of force directions; one
     value (1,) where it is the same all round."""
+
+    @property
+    def largest(self) -> float:
+        """The largest force in any direction [N]."""
+        return self.table.largest * (1.0 if self.gauge is None else float(self.gauge.max()))
+
+
+def largest_forces(layout: Layout) -> Array:
+    """Returns the largest force (n,) [N] that each fin of a robot can give in any direction.
+
+    Raises:
+        DataError: a fin's force table cannot be read, or gives no thrust within the limits.
+    """
+    return np.array([fin_table(fin).largest for fin in layout.fins])
 
 
 class FinGroup(Group):
@@ -183,11 +197,19 @@ class _Box:
         self.law, self.lower, self.upper, self.copper_loss = law, lower, upper, copper_loss
         self.turn = float(np.clip(0.0, lower[2], upper[2]))
         if not law.uniform:
-            turns = np.linspace(lower[2], upper[2], TURNS)
-            grid = np.broadcast_to(np.append(upper[:2], 0.0), (TURNS, 3)).copy()
-            grid[:, 2] = turns
-            size = np.linalg.norm(law.force(grid)[:, 1:], axis=-1)
-            self.turn = float(turns[size.argmax()])
+            turns, across = self.all_round
+            self.turn = float(turns[np.hypot(*across.T).argmax()])
+
+    @cached_property
+    def all_round(self) -> tuple[Array, Array]:
+        """Zero directions (TURNS + 1,) [rad] and the largest forces across the shaft there (TURNS + 1, 2) [N],
+        as a coarse grid of commands has them."""
+        turns = np.linspace(self.lower[2], self.upper[2], TURNS + 1)
+        command = np.tile(self.grid(COARSE_GRID), (len(turns), 1, 1))
+        command[..., 2] = turns[:, None]
+        across = self.law.force(command.reshape(-1, 3)).reshape(command.shape)[..., 1:]
+        best = np.hypot(across[..., 0], across[..., 1]).argmax(axis=1)
+        return turns, across[np.arange(len(turns)), best]
 
     def command(self, beat: Array) -> Array:
         """Commands (..., 3) of amplitude and frequency (..., 2)."""
@@ -260,7 +282,9 @@ class _Box:
             moves = self.upper[:2] > self.lower[:2]
             if (marginal_force[0][moves] > 1e-3 * strongest).all():
                 price = -self._slope(zero, self.upper[None, :2])[0][moves] / marginal_force[0][moves]
-                return float(price.max()) if len(price) else 1e-9
+                top = float(price.max()) if len(price) else 1e-9
+                if float(self.force(self.best(np.array([top])))[0]) >= (1.0 - PEAK) * strongest:
+                    return top
         low, high = 1e-9, 1e9
         for _ in range(5):
             prices = np.geomspace(low, high, 33)
@@ -296,17 +320,9 @@ def _directions(law: FinLaw, box: _Box) -> tuple[float, float, Array | None, Arr
         force = law.force(np.append(upper[:2], box.turn))
         lean = float(wrapped(np.arctan2(force[2], force[1]) - box.turn))
         return middle + lean, half, None, np.array([lean])
-    turns = np.linspace(lower[2], upper[2], TURNS + 1)
-    grid = box.grid((9, 13))
-    reference = float(box.force(grid).max())
-    commands = np.broadcast_to(grid, (len(turns), *grid.shape)).copy()
-    commands[..., 2] = turns[:, None]
-    force = law.force(commands.reshape(-1, 3)).reshape(*commands.shape)
-    size = np.linalg.norm(force[..., 1:], axis=-1)
-    best = size.argmax(axis=1)
-    row = np.arange(len(turns))
-    size, across = size[row, best], force[row, best]
-    direction = turns + wrapped(np.arctan2(across[:, 2], across[:, 1]) - turns)
+    turns, across = box.all_round
+    size = np.hypot(across[:, 0], across[:, 1])
+    direction = turns + wrapped(np.arctan2(across[:, 1], across[:, 0]) - turns)
     lean = np.unwrap(direction - turns)
     if not full:
         middle, half = 0.5 * float(direction[0] + direction[-1]), 0.5 * float(direction[-1] - direction[0])
@@ -316,5 +332,5 @@ def _directions(law: FinLaw, box: _Box) -> tuple[float, float, Array | None, Arr
         width = 2.0 * half
         place = np.where(place > 0.5 * (width + TURN), 0.0, np.minimum(place, width))
     along = direction - direction[0]
-    gauge = np.interp(place, along, size) / reference
+    gauge = np.interp(place, along, size) / size.max()
     return middle, half, gauge, np.interp(place, along, lean)
