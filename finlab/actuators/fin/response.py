@@ -20,7 +20,7 @@ from finlab.errors import DataError
 from finlab.layout import Fin, FinModelSpec, Layout, Limits
 from finlab.layout.angles import TURN, is_full_turn, wrapped
 
-GRID, COARSE_GRID = (33, 49), (9, 13)
+GRID, COARSE_GRID = (33, 49), (13, 25)
 """Amplitudes and frequencies of the first grid, and of the grid on which directions are compared."""
 STEPS = 12
 """Steps of Newton's method from the best place of the grid."""
