@@ -14,9 +14,8 @@ from typing import Any
 
 import numpy as np
 
+from finlab.actuators.fin.response import largest_forces
 from finlab.allocation import Allocator, Policy
-from finlab.allocation.search.pipeline import Pipeline
-from finlab.allocation.search.settings import SearchSettings
 from finlab.arrays import AnyArray, Array
 from finlab.assets import PAPER_LAYOUTS
 from finlab.bench.problems import FORMAT, KINDS, VERSION, BenchRobot, Problems, Sequences, Targets
@@ -24,9 +23,6 @@ from finlab.errors import DataError
 from finlab.evaluation.cheapest_commands import CheapestCommands, has_formulas
 from finlab.evaluation.progress import progress
 from finlab.evaluation.splits import make_split, own_sigma
-from finlab.forces.envelopes import largest_forces
-from finlab.forces.fin_sets import FinSets, planar_sets
-from finlab.forces.out_of_reach import nearest_along
 from finlab.layout import Layout, layout_effectiveness, load_layout
 from finlab.layout.file import layout_to_dict
 from finlab.physics import plant_of, read_table
@@ -79,20 +75,15 @@ def robots(seed: int, per_split: int) -> Iterator[tuple[str, Layout]]:
         yield from ((split, case.healthy) for case in make_split(split, per_split, 1, seed))
 
 
-def targets(layout: Layout, sets: FinSets, sigma: Array, seed: tuple[int, ...]) -> Array:
-    """Wrenches (N, 6) [N, N m] of the kinds `ASKED`, of single precision.
-
-    Args:
-        layout: the robot.
-        sets: what its fins can push, in wrenches over sigma.
-        sigma: what errors are divided by (6,).
-        seed: of the draws.
-    """
-    rng, plant = np.random.default_rng((DOMAIN, 0, *seed)), plant_of(layout)
+def targets(allocator: Allocator, seed: tuple[int, ...]) -> Array:
+    """Wrenches (N, 6) [N, N m] of the kinds `ASKED`, of single precision, for an allocator's robot and a
+    seed."""
+    rng, plant = np.random.default_rng((DOMAIN, 0, *seed)), plant_of(allocator.layout)
     wrenches = plant.wrench(plant.sample(rng, (len(ASKED),)))
-    for row in np.flatnonzero(ASKED):
-        farthest = nearest_along(sets, FAR * wrenches[row] / sigma).wrench[0] * sigma
-        wrenches[row] = farthest * float(KINDS[ASKED[row]].partition("beyond-")[2] or 1.0)
+    beyond = np.flatnonzero(ASKED)
+    farthest = allocator.allocate_batch(FAR * wrenches[beyond], policy="direction").wrench
+    times = [float(KINDS[kind].partition("beyond-")[2] or 1.0) for kind in ASKED[beyond]]
+    wrenches[beyond] = farthest * np.array(times)[:, None]
     return single(wrenches)
 
 
@@ -141,7 +132,6 @@ class BestKnown:
         self.layout, self.sigma, self.seed = layout, sigma, seed
         self.allocator = Allocator(layout)
         self.policy = Policy(axis_weights=tuple((self.allocator.scale / sigma).tolist()))
-        self.sets = planar_sets(Pipeline(sigma, SearchSettings()).prepare(layout).planar)
 
     def least_errors(self, wrenches: Array) -> Array:
         """The least errors (N,) known for wrenches (N, 6)."""
@@ -171,7 +161,7 @@ def make_problems(seed: int = SEED, per_split: int = PER_SPLIT, costs: bool = Tr
     for k in progress(range(len(bots)), "robot"):
         layout, sigma = problems.layout(k), problems.sigma(k)
         best.append(BestKnown(layout, sigma, seed))
-        wrenches = targets(layout, best[k].sets, sigma, (seed, k))
+        wrenches = targets(best[k].allocator, (seed, k))
         errors = np.where(ASKED, best[k].least_errors(wrenches), 0.0)
         for kind, wrench, error in zip(ASKED, wrenches, errors, strict=True):
             asked = costs and KINDS[kind] == "inside"

@@ -48,8 +48,8 @@ from finlab.physics.known_plants import plant_of
 from finlab.physics.plant import Plant
 
 if TYPE_CHECKING:
+    from finlab.allocation.dual.method import DualOptions
     from finlab.allocation.mdn_settings import MdnOptions
-    from finlab.allocation.search.settings import SearchOptions
     from finlab.paper.settings import PaperOptions
 
 SAME_COMMAND = 1e-6
@@ -79,7 +79,7 @@ class Allocator:
 
     @overload
     def __init__(
-        self, layout: Layout, method: Literal["dual"] = "dual", **settings: Unpack[SearchOptions]
+        self, layout: Layout, method: Literal["dual"] = "dual", **settings: Unpack[DualOptions]
     ) -> None: ...
     @overload
     def __init__(

@@ -10,11 +10,11 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
+from finlab.analysis.least_power import MovedFins
 from finlab.arrays import Array
 from finlab.errors import LayoutError
 from finlab.forces.extent import weakest
 from finlab.forces.fin_sets import SCALE, FinSets
-from finlab.forces.least_power import cheapest, power_problem, variant
 from finlab.forces.reach import COARSE, FINE, max_wrench_along
 from finlab.layout import Layout
 
@@ -33,8 +33,6 @@ MISSION = (
 """Wrenches [N, N m] of a mission when none are given: cruise, turn left, turn right, dive."""
 UNREACHED = 100.0
 """What a wrench out of reach costs [W], more than allocations do."""
-ALL_THERE = 1e-6
-"""Share of a wrench that may be missing when it counts as within reach."""
 LEAST_FINS = 4
 """Fewest fins of which one may fail while six axes remain."""
 QUICK_SEARCH: dict[str, Any] = {"n_random": 8, "n_walks": 4, "fine": False}
@@ -87,16 +85,14 @@ def _after_worst_failure(of_rest: Goal) -> Goal:
 
 def _mission_power(layout: Layout, mission: Array, fine: bool) -> Goal:
     """Mean least power; a wrench out of reach costs by what is missing."""
-    wanted = mission / SCALE
-    problem = power_problem(layout)
-    tolerance = FINE if fine else COARSE
+    fins, tolerance = MovedFins(layout), FINE if fine else COARSE
 
     def goal(sets: FinSets) -> Array:
-        targets = np.tile(wanted, (len(sets.radius), 1))
-        missing = _missing(sets.repeat(len(wanted)), targets, tolerance).reshape(-1, len(wanted))
-        power = np.stack([cheapest(variant(problem, sets, k), wanted) for k in range(len(sets.radius))])
-        cost = np.where(np.isnan(power), UNREACHED, power)
-        cost = np.where(missing < ALL_THERE, cost, UNREACHED * (1.0 + missing))
+        cost = fins.least_power(sets, mission)
+        robot, wrench = np.nonzero(np.isnan(cost))
+        if len(robot):
+            missing = _missing(sets.take(robot), mission[wrench] / SCALE, tolerance)
+            cost[robot, wrench] = UNREACHED * (1.0 + missing)
         return np.asarray(-cost.mean(axis=1))
 
     return goal

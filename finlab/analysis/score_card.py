@@ -15,9 +15,9 @@ from finlab.analysis.authority import (
     held_axes,
     losses,
 )
+from finlab.analysis.least_power import least_power
 from finlab.forces.extent import singular_values
 from finlab.forces.fin_sets import MAX_CUT, fin_sets, wide_fins
-from finlab.forces.least_power import least_power
 from finlab.layout import Layout
 
 UNIT = (1.0, 1.0, 1.0, 0.1, 0.1, 0.1)

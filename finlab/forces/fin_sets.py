@@ -138,8 +138,8 @@ def _boundary(fin: FinTable) -> Array:
     angle = fin.middle + fin.half * np.linspace(-1.0, 1.0, POINTS)
     reach = np.ones(POINTS)
     if fin.gauge is not None:
-        count = len(fin.gauge)
-        reach = np.interp(angle % TURN, TURN / count * np.arange(count + 1), np.append(fin.gauge, fin.gauge[0]))
+        count, gauge = len(fin.gauge), np.append(fin.gauge, fin.gauge[0])
+        reach = np.interp(angle % TURN, TURN / count * np.arange(count + 1), gauge)
     sides = TURN / BOUNDARY * np.arange(BOUNDARY)
     ahead = (reach[:, None] * np.cos(angle[:, None] - sides)).max(axis=0)
     return np.asarray(np.maximum(ahead, 0.0) * fin.table.largest / fin.largest)

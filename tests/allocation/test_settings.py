@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from finlab.allocation import METHODS, Allocator
+from finlab.allocation.dual.method import DualOptions, DualSettings
 from finlab.allocation.mdn_settings import MdnOptions, MdnSettings
 from finlab.allocation.methods import method_class
-from finlab.allocation.search.settings import SearchOptions, SearchSettings
 from finlab.assets import shipped_checkpoints
 from finlab.errors import AllocationError
 from finlab.layout import load_layout
@@ -20,7 +20,7 @@ from tests.any_robot import AnyRobot
 
 SURGE = [1.0, 0.0, 0.5, 0.0, 0.0, 0.1]
 OTHER: dict[str, dict[str, Any]] = {
-    "dual": {"objective": "effort", "n_refined": 2, "refine_steps": 3},
+    "dual": {"copper_loss": 2.0},
     "mdn": {"n_candidates": 8, "n_refined": 2},
     "paper": {"n_candidates": 4, "n_steps": 3},
     "ipopt": {"n_starts": 1},
@@ -71,13 +71,11 @@ def test_unknown_settings_are_refused(method: str) -> None:
 @pytest.mark.parametrize(
     ("method", "wrong", "message"),
     [
-        ("dual", {"n_refined": 0}, "n_refined: expected a whole number from 1 to 256, got 0"),
-        ("dual", {"n_refined": "5"}, "n_refined: expected a whole number .*, got '5'"),
-        ("dual", {"n_refined": True}, "n_refined: expected a whole number .*, got True"),
-        ("dual", {"search_steps": 0}, "search_steps: expected a whole number from 1 to 100, got 0"),
+        ("mdn", {"n_refined": 0}, "n_refined: expected a whole number from 1 to 256, got 0"),
+        ("mdn", {"n_refined": "5"}, "n_refined: expected a whole number .*, got '5'"),
+        ("mdn", {"n_refined": True}, "n_refined: expected a whole number .*, got True"),
         ("dual", {"period_s": 0.0}, "period_s: expected a number above 0 up to 1000 s, got 0.0"),
-        ("dual", {"subsets": 1}, "subsets: expected true or false, got 1"),
-        ("dual", {"objective": "speed"}, "objective: expected one of power, effort, got 'speed'"),
+        ("sqp", {"objective": "speed"}, "objective: expected one of power, effort, got 'speed'"),
         ("dual", {"copper_loss": float("nan")}, "copper_loss: expected a number .* W/.N m.\\^2, got nan"),
         ("dual", {"copper_loss": 10**400}, "copper_loss: expected a number .*, got 1000"),
         ("mdn", {"effort_weights": 3}, "effort_weights: expected EffortWeights, got 3"),
@@ -98,10 +96,10 @@ def test_impossible_settings_are_refused(method: str, wrong: dict[str, Any], mes
 
 def test_editors_complete_the_settings_that_there_are() -> None:
     for options, settings in (
-        (SearchOptions, SearchSettings),
+        (DualOptions, DualSettings),
         (MdnOptions, MdnSettings),
         (PaperOptions, PaperSettings),
     ):
         kinds = get_type_hints(settings)
         assert get_type_hints(options) == {f.name: kinds[f.name] for f in fields(settings)}
-    assert list(get_type_hints(SearchOptions)) == method_class("dual").option_names()
+    assert list(get_type_hints(DualOptions)) == method_class("dual").option_names()

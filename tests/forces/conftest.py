@@ -8,16 +8,11 @@ from numpy.typing import NDArray
 from scipy.optimize import linprog
 
 from finlab.assets import shipped_layouts
-from finlab.forces.envelopes import layout_envelopes
 from finlab.forces.fin_sets import FinSets
-from finlab.forces.force_space import PlanarProblem, planar_problem
 from finlab.layout import Fin, Layout, Limits, load_layout
-from finlab.physics.objective import Objective
 
 Array = NDArray[np.float64]
 
-SIGMA = np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.35])
-"""What wrenches are normalized by here [N, N m]: about what robots of such fins do."""
 THRUST = 4.0 * 1000.0 * 0.15 * 0.02 * 0.1**2 * (2.0 * np.pi * 2.1) ** 2 * np.sin(0.6) ** 2
 """Largest thrust [N] of the default fin, from the contract's law."""
 
@@ -40,12 +35,6 @@ def wide() -> Layout:
             for i, (place, angle, arc) in enumerate(zip(places, angles, arcs, strict=True))
         ),
     )
-
-
-def problem_of(layout: Layout, objective: Objective | None = None) -> PlanarProblem:
-    """A layout in force space, with its own fins."""
-    aim = objective or Objective()
-    return planar_problem(layout, layout_envelopes(layout, aim), SIGMA, aim)
 
 
 def largest_by_polygons(sets: FinSets, direction: Array, corners: int, outer: bool) -> float:

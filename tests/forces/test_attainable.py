@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from finlab.actuators.fin.response import fin_table
 from finlab.analysis import AttainableSet, attainable_set
 from finlab.errors import LayoutError
 from finlab.forces.attainable import _sphere
-from finlab.forces.envelopes import layout_envelopes
 from finlab.forces.fin_sets import SCALE, fin_sets
 from finlab.layout import Layout
 from finlab.physics import Plant
-from finlab.physics.objective import Objective
 from tests.forces.conftest import THRUST
 
 Array = NDArray[np.float64]
@@ -47,8 +46,9 @@ def test_no_sampled_wrench_lies_outside(shipped: Layouts, name: str, kind: str) 
     body = attainable_set(layout, kind, alone=False)
     points = sampled(layout)[:, OWN[kind]]
     # Fins may depart from their convex sets: they cannot rest, and tables are uneven.
-    fins = layout_envelopes(layout, Objective())
-    off = fins.minimum + fins.maximum - fins.largest.min(axis=1)
+    fins = [fin_table(fin) for fin in layout.fins]
+    shares = [1.0 if fin.gauge is None else fin.gauge.min() for fin in fins]
+    off = np.array([f.table.force[0] + f.largest * (1.0 - s) for f, s in zip(fins, shares, strict=True)])
     error = (np.linalg.norm(fin_sets(layout).effectiveness[0], axis=1) * off[:, None]).sum(axis=0) * SCALE
     assert body.dimension == 3
     assert not body.hull

@@ -84,10 +84,12 @@ class FinGroup(Group):
         tables = [fin_table(fin, copper_loss) for fin in fins]
         self._laws = [make_law(fin.model) for fin in fins]
         self._stacked = stack_laws([fin.model for fin in fins])
-        self.responses = [
+        self.planes = [
             Plane(matrix[1:], each.table, each.middle, each.half, each.gauge)
             for each, matrix in zip(tables, effectiveness, strict=True)
         ]
+        """What each offers."""
+        self.responses = list(self.planes)
         self._largest = np.array([each.table.largest for each in tables])
         self._beat = np.array([each.beat for each in tables])
         self._deflection = np.array([np.broadcast_to(each.deflection, TURNS) for each in tables])
@@ -202,8 +204,8 @@ class _Box:
 
     @cached_property
     def all_round(self) -> tuple[Array, Array]:
-        """Zero directions (TURNS + 1,) [rad] and the largest forces across the shaft there (TURNS + 1, 2) [N],
-        as a coarse grid of commands has them."""
+        """Zero directions (TURNS + 1,) [rad] and the largest forces across the shaft (TURNS + 1, 2) [N] that
+        a coarse grid of commands has there."""
         turns = np.linspace(self.lower[2], self.upper[2], TURNS + 1)
         command = np.tile(self.grid(COARSE_GRID), (len(turns), 1, 1))
         command[..., 2] = turns[:, None]

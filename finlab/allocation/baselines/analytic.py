@@ -1,16 +1,16 @@
-"""Method `analytic`: force-space pseudo-inverse, each fin's force looked up in its own envelope."""
+"""Method `analytic`: force-space pseudo-inverse, each fin's force turned into its cheapest command."""
 
 from dataclasses import dataclass
 from functools import cached_property
 
 from finlab.allocation.baselines.model_based import ModelBased
 from finlab.allocation.baselines.pseudo_inverse import RCOND, PseudoInverse
-from finlab.allocation.settings import AimSettings, number
+from finlab.allocation.settings import Settings, number
 from finlab.arrays import Array
 
 
 @dataclass(frozen=True)
-class AnalyticSettings(AimSettings):
+class AnalyticSettings(Settings):
     """Settings of method `analytic`."""
 
     rcond: float = number(RCOND, 0.0, 1.0, "singular values below this share of the largest count as zero")
@@ -30,7 +30,7 @@ class Analytic(ModelBased):
 
     @cached_property
     def _inverse(self) -> PseudoInverse:
-        return PseudoInverse(self.plant, self.sigma, self.aim, self.settings.rcond)
+        return PseudoInverse(self.plant, self.sigma, rcond=self.settings.rcond)
 
     def _commands(self, targets: Array, seed: int) -> Array:
         return self._inverse.command(targets)

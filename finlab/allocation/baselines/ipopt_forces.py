@@ -1,4 +1,4 @@
-"""IPOPT in the space of forces: the least cost over the planar forces of the fins, by their compiled tables.
+"""IPOPT in the space of forces: the least power over the planar forces of the fins, as they are compiled.
 
 The wrench is linear in the forces, and what a force costs is known from the compiled fins: two variables for
 each fin remain, and where no arc is wider than half a turn but no full circle, one start finds the least.
@@ -8,12 +8,16 @@ from typing import Any
 
 import numpy as np
 
+from finlab.actuators.response import Plane
 from finlab.allocation.baselines.pseudo_inverse import PseudoInverse
+from finlab.allocation.dual.answers import Answers
 from finlab.arrays import Array
-from finlab.forces.envelopes import Envelopes
-from finlab.forces.fin_envelope import COST, LEVELS, levels
-from finlab.layout.angles import wrapped
+from finlab.layout.angles import TURN
 
+LEVELS = np.sin(0.5 * np.pi * np.linspace(0.0, 1.0, 65)) ** 4
+"""Shares of the range of sizes at which a cost is looked up: dense at both ends, where costs bend."""
+DIRECTIONS = np.linspace(-1.0, 1.0, 97)
+"""Places in an arc at which an uneven fin is looked up, from end to end."""
 SMOOTH = 1e-4
 """Share of its largest force below which the size of a force is rounded off: it has slopes at rest, too."""
 REST = 1e-3
@@ -23,28 +27,30 @@ NARROW = 1e-6
 
 
 class ForceProgram:
-    """`err_norm^2 + weight * cost` over the planar forces of one robot, the target as its parameter.
+    """`err_norm^2 + weight * power` over the planar forces of one robot, the target as its parameter.
 
     Args:
         casadi: the module.
         inverse: the robot; where the search starts, and what turns forces into commands.
         sigma: per-axis standard deviation (6,) of the error.
-        weight: of the cost.
+        weight: of the power.
         options: of IPOPT.
     """
 
     def __init__(
         self, casadi: Any, inverse: PseudoInverse, sigma: Array, weight: float, options: dict[str, Any]
     ) -> None:
-        self._inverse, self._fins = inverse, inverse.fins
-        n, half = len(self._fins.half), self._fins.half
-        self.convex = bool(((half <= 0.5 * np.pi) | (half >= np.pi)).all())
+        self._inverse, planes = inverse, inverse.fins.planes
+        n, self._half = len(planes), np.array([plane.half for plane in planes])
+        self._middle = np.array([plane.middle for plane in planes])
+        self.convex = bool(((self._half <= 0.5 * np.pi) | (self._half >= np.pi)).all())
         """Whether one start is enough, as far as fins can rest."""
         share, target = casadi.MX.sym("share", 2 * n), casadi.MX.sym("target", 6)
-        self._most = np.repeat(np.maximum(self._fins.maximum, 1e-12), 2)
-        residual = casadi.DM(inverse.effectiveness * self._most / sigma[:, None]) @ share
+        self._largest = np.array([plane.table.largest for plane in planes])
+        most = np.repeat(self._largest, 2)
+        residual = casadi.DM(inverse.effectiveness * most / sigma[:, None]) @ share
         residual -= target / casadi.DM(sigma)
-        fins = [_Fin(casadi, self._fins, i, share[2 * i : 2 * i + 2]) for i in range(n)]
+        fins = [_Fin(casadi, plane, share[2 * i : 2 * i + 2]) for i, plane in enumerate(planes)]
         program = {
             "x": share,
             "p": target,
@@ -57,8 +63,9 @@ class ForceProgram:
 
     def command(self, target: Array, start: Array) -> Array:
         """The command (n, 3) for a target (6,) where IPOPT ends from planar forces (n, 2) [N]."""
-        answer = self._solver(x0=start.ravel() / self._most, p=target, **self._bounds)
-        force = np.array(answer["x"], np.float64).ravel() * self._most
+        most = np.repeat(self._largest, 2)
+        answer = self._solver(x0=start.ravel() / most, p=target, **self._bounds)
+        force = np.array(answer["x"], np.float64).ravel() * most
         kept = force.reshape(start.shape) if np.isfinite(force).all() else start
         command: Array = self._inverse.decoded(kept[None])[0]
         return command
@@ -68,39 +75,36 @@ class ForceProgram:
         first = self._inverse.force(target[None])
         if self.convex:
             return first
-        fins, rng = self._fins, np.random.default_rng(seed)
-        angle = fins.middle + rng.uniform(-1.0, 1.0, (n_random, len(fins.half))) * fins.half
-        size = rng.uniform(0.0, 1.0, angle.shape) * fins.maximum
+        rng = np.random.default_rng(seed)
+        angle = self._middle + rng.uniform(-1.0, 1.0, (n_random, len(self._half))) * self._half
+        size = rng.uniform(0.0, 1.0, angle.shape) * self._largest
         drawn = np.stack([size * np.cos(angle), size * np.sin(angle)], axis=-1)
         return np.concatenate([first, drawn])
 
 
 class _Fin:
-    """One compiled fin in CasADi; `share` (2,) is its planar force over its largest."""
+    """One compiled fin in CasADi; `share` (2,) is its planar force over the largest one of its table."""
 
-    def __init__(self, casadi: Any, fins: Envelopes, place: int, share: Any) -> None:
+    def __init__(self, casadi: Any, plane: Plane, share: Any) -> None:
         self._casadi = casadi
-        count, most = fins.largest.shape[1], max(float(fins.maximum[place]), 1e-12)
-        middle, half = float(fins.middle[place]), float(fins.half[place])
+        middle, half, table = plane.middle, plane.half, plane.table
         ahead = np.cos(middle) * share[0] + np.sin(middle) * share[1]
         aside = np.cos(middle) * share[1] - np.sin(middle) * share[0]
         size = casadi.sqrt(ahead * ahead + aside * aside + SMOOTH**2)
-        largest, smallest = fins.largest[place] / most, fins.smallest[place] / most
-        table = fins.table.reshape(-1, count, LEVELS, fins.table.shape[-1])[place, :, :, COST]
-        spread = float(fins.domain[1, place])
-        if count == 1 or spread < NARROW:
-            high, low = float(largest[0]), float(smallest[0])
-            self.cost = self._spline([levels()], table[0])((size - low) / max(high - low, 1e-9))
-        else:
-            along = wrapped(fins.domain[0, place] - middle) + spread * np.linspace(-1.0, 1.0, count)
+        low, high = float(table.force[0]) / table.largest, 1.0
+        if plane.gauge is not None:
             turn = casadi.atan2(aside, ahead + SMOOTH)  # at rest it has a slope, too
-            high, low = (self._spline([along], values)(turn) for values in (largest, smallest))
-            level = (size - low) / casadi.fmax(high - low, 1e-9)
-            self.cost = self._spline([along, levels()], table)(casadi.vertcat(turn, level))
+            count, along = len(plane.gauge), max(half, NARROW) * DIRECTIONS
+            known = np.append(plane.gauge, plane.gauge[0])
+            gauge = np.interp((middle + along) % TURN, TURN / count * np.arange(count + 1), known)
+            high = self._spline(along, gauge)(turn)
+        force = table.largest * (low + (1.0 - low) * LEVELS)
+        cost = self._spline(LEVELS, Answers([], [plane]).cost(force[None])[0])
+        self.cost = cost((size / high - low) / max(1.0 - low, 1e-9))
         self.limits: list[tuple[Any, float, float]] = [(size - high, -np.inf, 0.0)]
         """Values in CasADi, and between which two numbers they must lie."""
-        if smallest.max() > REST:
-            self.limits.append((size - low, 0.0, np.inf))
+        if low > REST:
+            self.limits.append((size - low * high, 0.0, np.inf))
         if half < NARROW:
             self.limits += [(aside, 0.0, 0.0), (ahead, 0.0, np.inf)]
         elif half <= 0.5 * np.pi:
@@ -109,7 +113,5 @@ class _Fin:
         elif half < np.pi:
             self.limits.append((ahead - size * np.cos(half), 0.0, np.inf))
 
-    def _spline(self, grid: list[Array], values: Array) -> Any:
-        return self._casadi.interpolant(
-            "spline", "bspline", [axis.tolist() for axis in grid], values.ravel(order="F")
-        )
+    def _spline(self, grid: Array, values: Array) -> Any:
+        return self._casadi.interpolant("spline", "bspline", [grid.tolist()], values)

@@ -14,6 +14,7 @@ from finlab.allocation.solution import Solution
 from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.networks.trained import TrainedWeights
+from finlab.physics.objective import Objective
 
 ENERGY_TRADEOFF = 1e-4
 """Weight of the cost beside the squared normalized error where a method weighs both; see `command_cost`."""
@@ -40,14 +41,14 @@ class TimeLimit:
 class ModelBased(LeastErrorMethod):
     """A method that optimizes over the fins' own laws and tables, those that score every method."""
 
-    settings_class: ClassVar[type[Settings]] = AimSettings
-    settings: AimSettings
+    settings_class: ClassVar[type[Settings]] = Settings
 
     def __init__(
         self, layout: Layout, settings: Settings, scale: Array, weights: TrainedWeights | None = None
     ) -> None:
         super().__init__(layout, settings, scale, weights)
-        self.aim = self.settings.aim
+        self.aim = self.settings.aim if isinstance(self.settings, AimSettings) else Objective()
+        """What is kept least."""
         self.sigma = USUAL_SHARE * scale
         """What wrenches (6,) are divided by: what a robot is mostly asked for."""
 
@@ -59,7 +60,7 @@ class ModelBased(LeastErrorMethod):
     @cached_property
     def _inverse(self) -> PseudoInverse:
         """What answers by the pseudo-inverse, and where others start."""
-        return PseudoInverse(self.plant, self.sigma, self.aim)
+        return PseudoInverse(self.plant, self.sigma, self.aim.copper_loss)
 
     @abstractmethod
     def _commands(self, targets: Array, seed: int) -> Array:

@@ -1,20 +1,15 @@
-"""The pseudo-inverse in force space, each fin's force looked up in its own envelope."""
+"""The pseudo-inverse in force space, each fin's force turned into its cheapest command."""
 
 import numpy as np
 
+from finlab.actuators.fin.response import FinGroup, largest_forces
 from finlab.arrays import Array
-from finlab.forces.envelopes import layout_envelopes
-from finlab.forces.force_space import planar_problem, polar
 from finlab.layout import layout_effectiveness
+from finlab.layout.angles import wrapped
 from finlab.physics import Plant
-from finlab.physics.objective import Objective
 
 RCOND = 1e-3
 """Singular values below this share of the largest count as zero."""
-STEPS = 1
-"""Newton steps by the fins' own laws: one takes the looked-up forces from 1e-3 to 1e-6 of their size."""
-RIDGE = 1e-12
-"""Regularization of these steps, relative to the squared slopes."""
 
 
 class PseudoInverse:
@@ -23,18 +18,19 @@ class PseudoInverse:
     Args:
         plant: the robot.
         sigma: scales the rows (6,).
-        objective: by which the cheapest command for each force is chosen.
+        copper_loss: heat of a motor that counts as power [W/(N m)^2].
         rcond: see `RCOND`.
     """
 
-    def __init__(self, plant: Plant, sigma: Array, objective: Objective, rcond: float = RCOND) -> None:
+    def __init__(self, plant: Plant, sigma: Array, copper_loss: float = 0.0, rcond: float = RCOND) -> None:
         self.plant = plant
-        self.fins = fins = layout_envelopes(plant.layout, objective)
-        """What the fins can do, and at what cost."""
+        self.fins = FinGroup(plant.layout.fins, plant.effectiveness, copper_loss)
+        """What the fins can do, and by which commands."""
         self.effectiveness = layout_effectiveness(plant.layout)
         """Wrench (6, 2 n) per newton of each fin's horizontal and vertical force."""
-        self._forces = planar_problem(plant.layout, fins, sigma, objective)
-        most = np.repeat(np.maximum(fins.maximum, 1e-9), 2)
+        planes = self.fins.planes
+        self._middle, self._half = (np.array([getattr(p, k) for p in planes]) for k in ("middle", "half"))
+        most = np.repeat(np.maximum(largest_forces(plant.layout), 1e-9), 2)
         scaled = self.effectiveness * most / sigma[:, None]
         self.inverse = (most[:, None] * np.linalg.pinv(scaled, rcond=rcond) / sigma).T.copy()
         """Target (6,) times this (6, 2 n) gives each fin's horizontal and vertical force [N]."""
@@ -50,41 +46,10 @@ class PseudoInverse:
     def decoded(self, force: Array) -> Array:
         """The cheapest commands (N, n, 3) for planar forces (N, n, 2) [N], by the fins' own laws; what a fin
         cannot give is cut off."""
-        found = polar(self._forces, force)
-        point = np.stack([np.cos(found.direction), np.sin(found.direction)], axis=-1)
-        return self._sharpened(self.plant.feasible(found.command), found.size[..., None] * point)
-
-    def _sharpened(self, command: Array, wanted: Array) -> Array:
-        """Commands (N, n, 3) whose planar forces are nearer to those wanted (N, n, 2), by their frequency and
-        zero direction, or by their amplitude where the frequency has come to a limit."""
-        plant = self.plant
-        best, error = command, np.full(command.shape[:-1], np.inf)
-        for step in range(STEPS + 1):
-            last = step == STEPS
-            force, jacobian = (plant.force(command), None) if last else plant.force_and_jacobian(command)
-            missing = wanted - force[..., 1:]
-            off: Array = np.hypot(missing[..., 0], missing[..., 1])
-            better = off < error
-            best, error = np.where(better[..., None], command, best), np.minimum(off, error)
-            if jacobian is None:
-                break
-            frequency = command[..., 1]
-            stuck = (frequency <= plant.lower[:, 1]) | (frequency >= plant.upper[:, 1])
-            range_ = plant.width * np.stack([stuck, ~stuck, np.ones_like(stuck)], axis=-1)
-            command = plant.feasible(
-                command + range_ * _least_change(jacobian[..., 1:] * range_[..., None], missing)
-            )
-        return best
-
-
-def _least_change(jacobian: Array, missing: Array) -> Array:
-    """The least change (..., 3) of commands that makes up for forces (..., 2), by slopes (..., 3, 2)."""
-    x, y = jacobian[..., 0], jacobian[..., 1]
-    xx, xy, yy = (x * x).sum(-1), (x * y).sum(-1), (y * y).sum(-1)
-    ridge = RIDGE * (xx + yy) + 1e-30
-    xx, yy = xx + ridge, yy + ridge
-    determinant = xx * yy - xy * xy
-    by_x = (yy * missing[..., 0] - xy * missing[..., 1]) / determinant
-    by_y = (xx * missing[..., 1] - xy * missing[..., 0]) / determinant
-    change: Array = x * by_x[..., None] + y * by_y[..., None]
-    return change
+        angle = wrapped(np.arctan2(force[..., 1], force[..., 0]) - self._middle)
+        held = np.clip(angle, -self._half, self._half)
+        excess = np.minimum(np.abs(angle - held), 0.5 * np.pi)
+        size = np.hypot(force[..., 0], force[..., 1]) * np.cos(excess)
+        angle = self._middle + held
+        inside = size[..., None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+        return self.plant.feasible(self.fins.commands(inside))

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from finlab.allocation.baselines.model_based import ModelBased
-from finlab.allocation.settings import AimSettings, number
+from finlab.allocation.settings import Settings, number
 from finlab.arrays import Array
 from finlab.physics import Plant
 
@@ -33,7 +33,7 @@ class LinearMap:
 
 
 @dataclass(frozen=True)
-class QpSettings(AimSettings):
+class QpSettings(Settings):
     """Settings of method `qp`."""
 
     regularization: float = number(1.0, 0.0, 1e6, "weight of the distance from the middle of the limits")
@@ -44,7 +44,7 @@ class Qp(ModelBased):
 
     Minimizes `||(w_ref + J du - target) / sigma||^2 + regularization ||du||^2` over commands as positions
     between their limits, where `w_ref` and `J` belong to the middle of the limits. What commands cost plays
-    no part: the answer is the same whatever the objective. (What the paper's QP regularizes it does not say.)
+    no part. (What the paper's QP regularizes it does not say.)
     """
 
     name = "qp"

@@ -99,6 +99,12 @@ class DualRobot:
         """The same robot with only some directions (6, q) of the scaled wrench asked for."""
         return replace(self, basis=basis, matrix=(self.effectiveness / self.scale) @ basis)
 
+    def moved(self, effectiveness: Array) -> "DualRobot":
+        """The same actuators elsewhere: with another effectiveness (k, 6)."""
+        scale, basis = _range(effectiveness, np.concatenate([self.most, self.most[self.answers.lines :]]))
+        matrix = (effectiveness / scale) @ basis
+        return replace(self, effectiveness=effectiveness, scale=scale, basis=basis, matrix=matrix)
+
     def restricted(self, reach: Array) -> Sets:
         """Sets of actuators that give no more than rows (n, 4) of least and largest force [N], middle and
         half of the arc [rad], in the robot's order; what they give beyond their tables is left out."""
@@ -123,6 +129,14 @@ class DualRobot:
 def _products(a: Array, b: Array) -> Array:
     """Outer products (m, r, r) of rows (m, r)."""
     return np.asarray(a[:, :, None] * b[:, None, :])
+
+
+def _range(effectiveness: Array, most: Array) -> tuple[Array, Array]:
+    """Scale and basis, as in `DualRobot`, of directions (k, 6) whose largest forces are `most` (k, 1)."""
+    size = np.sqrt(((effectiveness * most) ** 2).sum(axis=0))
+    scale = np.where(size > RANK * max(size.max(), 1e-300), size, 1.0)
+    left, values, _ = np.linalg.svd((effectiveness * most / scale).T, full_matrices=False)
+    return scale, left[:, values > RANK * max(values[0], 1e-300)]
 
 
 def dual_robot(responses: list[Response]) -> DualRobot:
@@ -154,10 +168,7 @@ def dual_robot(responses: list[Response]) -> DualRobot:
     most = np.abs(
         np.concatenate([np.maximum(-low_, high_)[: len(lines)], high_[len(lines) :], high_[len(lines) :]])
     )
-    size = np.sqrt(((effectiveness * most) ** 2).sum(axis=0))
-    scale = np.where(size > RANK * max(size.max(), 1e-300), size, 1.0)
-    left, values, _ = np.linalg.svd((effectiveness * most / scale).T, full_matrices=False)
-    basis = left[:, values > RANK * max(values[0], 1e-300)]
+    scale, basis = _range(effectiveness, most)
     return DualRobot(
         np.array(line_places + plane_places),
         answers,

@@ -12,7 +12,6 @@ from finlab.errors import LayoutError
 from finlab.layout import Fin, FinModelSpec, Layout, Limits, random_layout
 from finlab.networks.normalization import Normalization
 from finlab.physics import Plant
-from finlab.physics.objective import Name
 from tests.any_robot import AnyRobot
 
 NORMALIZATION = Normalization(np.zeros(6), np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.35]))
@@ -149,14 +148,13 @@ def test_unknown_and_last_fins_cannot_fail(method: str) -> None:
         make(method).allocate(one_fin(), np.zeros(6), failed=["nobody"])
 
 
-@pytest.mark.parametrize("objective", ["power", "effort"])
-def test_sqp_needs_hardly_more_than_the_search(objective: Name) -> None:
+def test_sqp_needs_hardly_more_than_the_default() -> None:
     layout = random_layout(np.random.default_rng(21), n_fins=5)
     targets = Plant(layout).wrench(
         np.random.default_rng(22).uniform([0.05, 0.1, -3], [0.6, 2.1, 3], (20, 5, 3))
     )
-    least = Allocator(layout, objective=objective).allocate_batch(targets)
-    answer = make("sqp", objective=objective).allocate_batch(layout, targets)
-    cost, best = (getattr(found, "power" if objective == "power" else "effort") for found in (answer, least))
+    least = Allocator(layout).allocate_batch(targets)
+    answer = make("sqp").allocate_batch(layout, targets)
+    cost, best = answer.power, least.power
     exact = (answer.err_norm < 1e-3) & (least.err_norm < 1e-3)
     assert exact.sum() >= 15 and cost[exact].sum() < 1.06 * best[exact].sum()
