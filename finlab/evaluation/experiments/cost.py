@@ -25,6 +25,8 @@ TRACKED = 1e-3
 """Normalized error up to which a method counts as delivering a target."""
 CHEAPER = 1.0 - 1e-4
 """Cost over the reference's below which a method has won."""
+KEEPS: dict[str, Name] = {"dual": "power", "mdn": "effort", "paper": "effort"}
+"""What methods without a choice keep least; they are compared in that alone."""
 UNITS: dict[Name, str] = {"power": "W", "effort": "J_en"}
 """What may be kept least, and what its cost is counted in."""
 
@@ -44,7 +46,8 @@ def run(
     Args:
         split: names as in eval wrench, or axes (pure axes on the symmetric shipped layouts), axes-mixed (two
             or three of them together), or all.
-        methods: names as in eval wrench; those that can choose are given the objective.
+        methods: names as in eval wrench; those that can choose are given the objective,
+            others are compared in what they keep least.
         objectives: power, effort or both.
         layouts: of each split.
         targets: on each layout.
@@ -61,8 +64,9 @@ def run(
     for name in names:
         cases = (symmetric_cases if name in SETS else make_split)(name, layouts, targets, seed)
         for objective in UNITS:
-            if objective in objectives:
-                rows += _rows(name, cases, methods, objective, starts, checkpoint, seed)
+            able = tuple(each for each in methods if KEEPS.get(each, objective) == objective)
+            if objective in objectives and able:
+                rows += _rows(name, cases, able, objective, starts, checkpoint, seed)
     return rows
 
 
