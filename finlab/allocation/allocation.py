@@ -186,8 +186,9 @@ class BatchAllocation(Answer):
     def __repr__(self) -> str:
         worst = f"{self.err_norm.max():.2e}" if len(self) else "none"
         return (
-            f"BatchAllocation({len(self)} targets, layout={self.layout.name!r:.60}, fins={len(self.fins)}, "
-            f"method={self.method!r}, delivered={int(self.reachable.sum())}, largest err_norm={worst})"
+            f"BatchAllocation({len(self)} targets, layout={self.layout.name!r:.60}, "
+            f"actuators={len(self.fins)}, method={self.method!r}, delivered={int(self.reachable.sum())}, "
+            f"largest err_norm={worst})"
         )
 
 
@@ -261,6 +262,12 @@ class Allocation(Answer):
         """
         if self.reachable or self.unknown_fins:
             return ()
+        if not self.layout.is_of_fins:
+            lower, upper = self.layout.lower, self.layout.upper
+            slack = 1e-3 * (upper - lower)
+            ends = (self.command <= lower + slack) | (self.command >= upper - slack)
+            full = (ends & (upper > lower)).any(axis=-1)
+            return tuple(f"{name} at a limit" for name, at_end in zip(self.fins, full, strict=True) if at_end)
         missing = self.unallocated / self.scale**2
         pull = (missing @ layout_effectiveness(self.layout)).reshape(-1, 2)
         return tuple(describe_binding(self.fins, self.command, self.layout.lower, self.layout.upper, pull))
@@ -287,7 +294,7 @@ class Allocation(Answer):
         failed = f", failed={', '.join(self.failed)!r:.60}" if self.failed else ""
         effort = "" if self.effort is None else f", effort={self.effort:.3f}"
         return (
-            f"Allocation(layout={self.layout.name!r:.60}, fins={len(self.fins)}{failed}, "
+            f"Allocation(layout={self.layout.name!r:.60}, actuators={len(self.fins)}{failed}, "
             f"method={self.method!r}, err_norm={self.err_norm:.2e}, "
             f"power={self.power:.3g} W{effort}, reachable={self.reachable}, "
             f"solve_ms={self.solve_ms:.1f})"

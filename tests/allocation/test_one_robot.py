@@ -133,6 +133,16 @@ def test_many_targets_take_flat_memory() -> None:
     np.testing.assert_array_equal(batch.err_norm[:CHUNK], some.err_norm)
 
 
+@pytest.mark.parametrize("name", ["bluerov2_heavy", "turtle_hybrid"])
+def test_robots_with_other_actuators_are_told_as_well(name: str) -> None:
+    allocator = Allocator(load_layout(name))
+    for wrench in (SURGE, [1e4, 0.0, 0.0, 0.0, 0.0, 0.0]):
+        answer = allocator.allocate(wrench)
+        assert pickle.loads(pickle.dumps(answer)) == answer and answer.effort is None
+        assert answer.reachable or any("at a limit" in words for words in answer.binding)
+        assert "effort" not in repr(answer) + str(answer) and "<table>" in answer._repr_html_()
+
+
 def test_streams_of_targets() -> None:
     allocator, targets = Allocator(load_layout("A")), wrenches(CHUNK + 3)
     parts = list(allocator.allocate_stream((row for row in targets), failed=["front_left"]))
