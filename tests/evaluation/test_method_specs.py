@@ -6,7 +6,7 @@ from finlab.errors import AllocationError
 from finlab.evaluation.method_specs import is_slow, load_method_spec, load_method_specs
 
 
-@pytest.mark.parametrize("name", ["qp", "analytic", "sqp"])
+@pytest.mark.parametrize("name", ["sqp", "ipopt"])
 def test_the_objective_is_a_part_of_the_name_or_given_to_all(name: str) -> None:
     assert load_method_spec(name).choice.settings.objective == "power"
     assert load_method_spec(name, objective="effort").choice.settings.objective == "effort"

@@ -93,8 +93,10 @@ class _Fin:
         size = casadi.sqrt(ahead * ahead + aside * aside + SMOOTH**2)
         low, high = float(table.force[0]) / table.largest, 1.0
         if plane.gauge is not None:
+            end = max(half, NARROW)
             turn = casadi.atan2(aside, ahead + SMOOTH)  # at rest it has a slope, too
-            count, along = len(plane.gauge), max(half, NARROW) * DIRECTIONS
+            turn = casadi.fmin(casadi.fmax(turn, -end), end)
+            count, along = len(plane.gauge), end * DIRECTIONS
             known = np.append(plane.gauge, plane.gauge[0])
             gauge = np.interp((middle + along) % TURN, TURN / count * np.arange(count + 1), known)
             high = self._spline(along, gauge)(turn)

@@ -69,7 +69,7 @@ def test_it_agrees_with_the_search_on_any_fin_and_arc(model: FinModelSpec, arc: 
 
 def test_it_keeps_watts_least_and_nothing_else() -> None:
     with pytest.raises(AllocationError, match="space 'forces' keeps power least, got objective 'effort'"):
-        AnyRobot("ipopt", space="forces", objective="effort")
+        Allocator(load_layout("A"), "ipopt", space="forces", objective="effort")
 
 
 def test_out_of_reach_it_comes_as_near_as_the_search() -> None:
