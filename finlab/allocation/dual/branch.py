@@ -40,7 +40,7 @@ class Branched(NamedTuple):
     """Which targets are met by forces in the sets (N,)."""
 
 
-@dataclass(eq=False)
+@dataclass(frozen=True, eq=False)
 class _Parts:
     """Open parts: whose they are, their sets, and prices to begin with."""
 

@@ -26,6 +26,8 @@ MOST_STEPS = 200
 RIDGE, SATURATED_RIDGE, LEAST_RIDGE = 1e-6, 1e-2, 1e-12
 """Ridge to begin with, as a share of the trace, where no actuator is at its limit and where some are; and the
 least one."""
+UNDRIVEN = 1e-9
+"""Share of the trace of the first Hessian that every direction has at least."""
 SLACK = 1e-12
 """Share of the dual value that rounding may take."""
 
@@ -89,6 +91,8 @@ def start(robot: DualRobot, target: Array, sets: Sets) -> tuple[Array, NDArray[n
     fit = np.sqrt(np.minimum(np.maximum(share, 1e-4), 1.0))
     weight = gain * np.concatenate([fit, fit[lines:]])
     hessian = (robot.squares @ weight).T.reshape(-1, *robot.shape)
+    # Of a robot with only some directions asked for, nothing may drive one of them.
+    hessian = hessian + (UNDRIVEN * np.einsum("nii->n", hessian))[:, None, None] * robot.unit
     return solve_systems(hessian, target.T[..., None])[..., 0].T, saturated
 
 
