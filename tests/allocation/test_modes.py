@@ -69,7 +69,8 @@ def test_angles_are_compared_the_shorter_way_round() -> None:
     assert not same_signature(one, signature_of(np.array([PUSH, (0.4, 1.5, 0.6 - math.pi)])))
 
 
-def test_modes_of_an_answer_deliver_the_wrench_in_different_ways(search: AnyRobot) -> None:
+def test_modes_of_an_answer_deliver_the_wrench_in_different_ways() -> None:
+    search = AnyRobot("mdn")
     layout = load_layout(shipped_layouts()["penta"])
     target = np.array([1.0, 0.5, 2.0, 0.0, 0.1, 0.1])
     before = search.allocate(layout, 0.9 * target).command

@@ -59,9 +59,7 @@ def test_a_table_without_thrust_within_the_limits_is_refused(tmp_path: Path) -> 
     rows = [",".join(f"{value:.12g}" for value in row) for row in np.hstack([grid, force])]
     (tmp_path / "fin.csv").write_text("\n".join(["A,f,phi,Fx,Fy,Fz", *rows]))
     layout = robot(Limits((0.05, 0.2)), tmp_path / "fin.csv")
-    with pytest.raises(
-        DataError, match="gives no thrust within its limits, amplitudes 0.05 to 0.2 rad"
-    ):
+    with pytest.raises(DataError, match="gives no thrust within its limits, amplitudes 0.05 to 0.2 rad"):
         Allocator(layout, "analytic").allocate([0.5, 0, 0, 0, 0, 0])
 
 
