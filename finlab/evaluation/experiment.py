@@ -18,7 +18,7 @@ from finlab.evaluation.plots.style import Picture
 from finlab.evaluation.report.document import Block, Column, Figure, Row, Table
 
 EXPERIMENTS = (
-    *("wrench", "cost", "latency", "ablation", "temperature"),
+    *("wrench", "cost", "latency", "ablation", "temperature", "proposals"),
     *("trajectory", "faults", "velocity", "swims", "monitor", "fit", "robots"),
 )
 """Names, which are those of their modules in `finlab.evaluation.experiments`, in the order of the report."""

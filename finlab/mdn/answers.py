@@ -40,6 +40,8 @@ class Steps(NamedTuple):
     """Most quadratic problems in commands."""
     last: int = 1
     """Levenberg-Marquardt steps at the end."""
+    each: bool = False
+    """Whether each proposal is polished to its end, not only those that may become the cheapest."""
 
 
 class Answers(NamedTuple):
@@ -135,7 +137,7 @@ def _polished(robot: EffortRobot, target: Array, near: Refined, steps: Steps, ea
         return near
     every = bool(hopeful.all())
     start = near if every else Refined(*(values[hopeful] for values in near))
-    side_by_side = each if every else 1
+    side_by_side = each if every and not steps.each else 1
     better = polish(robot.commands, robot.effort, target[hopeful], start, steps.polish, side_by_side)
     better = refine(robot.commands, target[hopeful], better.command, steps.last)
     worse = better.error > np.maximum(robot.exact, start.error + NEARLY)

@@ -27,7 +27,7 @@ from finlab.mdn.answers import NEARLY, NOW, OTHER, Answers, Steps, follow, ranke
 from finlab.mdn.descent import realize
 from finlab.mdn.features import Seen, see
 from finlab.mdn.network import ForceMixture, ForceNetworkConfig
-from finlab.mdn.proposal import Proposal, propose
+from finlab.mdn.proposal import RANDOM, Proposal, propose, random_proposal
 from finlab.mdn.rates import is_within_rates, previous_force, within_rates
 from finlab.mdn.robot import effort_robot
 from finlab.networks.threads import single_threaded_products
@@ -41,9 +41,11 @@ STEPS = Steps()
 """Of every answer."""
 MORE = Steps(first=8, polish=3)
 """Of answers that were not exact yet."""
+WIDE = Steps(descent=16, polish=12, each=True)
+"""Of alternatives, which are told apart by where they end."""
 LEAVING = Steps(first=10, polish=0)
 """Of the way to another allocation, from commands that are at the ends of their rates."""
-WIDER = 3
+WIDER = 4
 """Times as many proposals where alternatives are asked for; each of them is refined."""
 SWITCH_GAIN = 0.01
 """Share of its effort that a robot in motion must save before it changes the way it moves."""
@@ -66,7 +68,8 @@ class Found(NamedTuple):
     @property
     def names(self) -> tuple[str, ...]:
         """What the proposals for a single target are called."""
-        return tuple(f"component {k + 1}" for k in self.proposal.component[0].tolist())
+        components = self.proposal.component[0].tolist()
+        return tuple("a random force" if k == RANDOM else f"component {k + 1}" for k in components)
 
 
 class Mdn(Method):
@@ -135,15 +138,17 @@ class Mdn(Method):
         first, count = self._one(policy, wanted, previous, seed), WIDER * self.settings.n_candidates
         with self._one_thread():
             more = self.proposals(wanted, seed, count)
-            wide = Found(more, follow(self.robot, wanted, more.force, count, STEPS))
+            wide = Found(more, follow(self.robot, wanted, more.force, count, WIDE))
         exact = max(ALTERNATIVE_ERROR, 1.01 * float(first.answers.error[0, 0]))
         kept = wide.answers.columns(np.flatnonzero(wide.answers.error[0] <= exact))
         return self._candidates(first.answers, first.names).beside(self._candidates(kept, wide.names))
 
     def proposals(self, target: Array, seed: int, count: int | None = None) -> Proposal:
         """The network's proposals for normalized targets (N, 6); by default as many as the settings say."""
-        seen = see(self.robot.view, target)
         count = count or self.settings.n_candidates
+        if self.settings.starts == "random":
+            return random_proposal(self.robot.view, len(target), count, seed)
+        seen = see(self.robot.view, target)
         return propose(self.mixture(seen), self.robot.view, seen, count, self.settings.temperature, seed)
 
     def mixture(self, seen: Seen) -> ForceMixture:

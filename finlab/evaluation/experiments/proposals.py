@@ -1,0 +1,145 @@
+"""What the network of method `mdn` is worth: its proposals beside random ones, refined in the same way."""
+
+import time
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from finlab.allocation import Allocator
+from finlab.allocation.evaluate import REACHED
+from finlab.allocation.modes import Mode, same_signature
+from finlab.arrays import Array
+from finlab.errors import DataError
+from finlab.evaluation.experiment import Experiment
+from finlab.evaluation.progress import progress
+from finlab.evaluation.report.document import Column, Row
+from finlab.evaluation.splits import SPLITS, Case, make_split
+from finlab.evaluation.statistics.bootstrap import ratio_interval
+
+STARTS = ("network", "random")
+"""What is compared."""
+WIDE: dict[str, Any] = {"starts": "random", "n_candidates": 256}
+"""Settings of the wide search whose least effort and modes count as all that there is."""
+ASKED_FOR_MODES = 4
+"""Targets on each layout whose modes are looked for, which takes a tenth of a second each."""
+NEAR = 1.05
+"""Effort over the least up to which a mode counts."""
+
+
+def run(
+    split: tuple[str, ...] = ("id", "ood-fins", "many-fins"),
+    layouts: int = 20,
+    targets: int = 32,
+    candidates: tuple[int, ...] = (4, 16, 48),
+    checkpoint: str | None = None,
+    seed: int = 0,
+) -> list[Row]:
+    """Two rows for each split and number of proposals: with the network, and with random forces.
+
+    Args:
+        split: names as in eval wrench.
+        layouts: of each split.
+        targets: on each layout, answered as one batch.
+        candidates: proposals for each target; a quarter of them, six at most, are refined.
+        checkpoint: of method mdn, a shipped name or a folder.
+        seed: of the cases and of all draws.
+    """
+    if unknown := [name for name in split if name not in SPLITS]:
+        raise DataError(f"split: expected some of {', '.join(SPLITS)}, got {unknown[0]!r:.60}")
+    return [row for name in split for row in _rows(name, layouts, targets, candidates, checkpoint, seed)]
+
+
+def _rows(
+    split: str, layouts: int, targets: int, candidates: tuple[int, ...], checkpoint: str | None, seed: int
+) -> list[Row]:
+    cases = make_split(split, layouts, targets, seed)
+    settings = {
+        (starts, count): {"starts": starts, "n_candidates": count, "n_refined": min(6, max(1, count // 4))}
+        for count, starts in product(candidates, STARTS)
+    }
+    effort = {key: list[Array]() for key in (*settings, "wide")}
+    spent = {key: list[float]() for key in settings}
+    kept = {key: list[float]() for key in settings}
+    for case in progress(cases, "layout", split):
+        wide = Allocator(case.healthy, "mdn", checkpoint=checkpoint, **WIDE)
+        effort["wide"].append(_efforts(wide, case, seed)[0])
+        known = [_modes(wide, target, seed) for target in case.targets[:ASKED_FOR_MODES]]
+        for key, chosen in settings.items():
+            allocator = wide.with_settings(**chosen)
+            found, seconds = _efforts(allocator, case, seed)
+            effort[key].append(found)
+            spent[key].append(1e3 * seconds / len(case.targets))
+            for target, modes in zip(case.targets, known, strict=False):
+                own = _modes(allocator, target, seed)
+                kept[key] += [_is_among(mode, own) for mode in modes]
+    all_efforts = {key: np.concatenate(parts) for key, parts in effort.items()}
+    least = np.min(list(all_efforts.values()), axis=0)
+    group = np.repeat(np.arange(len(cases)), [len(case.targets) for case in cases])
+    rows: list[Row] = []
+    for starts, count in settings:
+        cost = all_efforts[starts, count]
+        both = np.isfinite(cost)
+        ratio = cost[both] / least[both]
+        rows.append(
+            {
+                "split": split,
+                "starts": starts,
+                "candidates": count,
+                "n": len(cost),
+                "tracked": float(both.mean()),
+                "cost_ratio": float(cost[both].sum() / least[both].sum()),
+                "cost_ratio_interval": list(ratio_interval(cost[both], least[both], group[both])),
+                "ratio_p95": float(np.quantile(ratio, 0.95)),
+                "modes_found": float(np.mean(kept[starts, count])),
+                "target_ms": float(np.median(spent[starts, count])),
+            }
+        )
+    return rows
+
+
+def _efforts(allocator: Allocator, case: Case, seed: int) -> tuple[Array, float]:
+    """Efforts (N,) of the answers to a case's targets, infinite where one was missed, and the time [s]."""
+    start = time.process_time()
+    answer = allocator.allocate_batch(case.targets, seed=seed)
+    seconds = time.process_time() - start
+    assert answer.effort is not None
+    return np.where(answer.err_norm <= REACHED, answer.effort, np.inf), seconds
+
+
+def _modes(allocator: Allocator, target: Array, seed: int) -> list[Mode]:
+    """The modes that an allocator knows for a target, of those within `NEAR` of its cheapest."""
+    modes = allocator.explore(allocator.allocate(target, seed=seed))
+    best = min(mode.effort for mode in modes)
+    return [mode for mode in modes if mode.effort <= NEAR * best]
+
+
+def _is_among(mode: Mode, modes: list[Mode]) -> float:
+    return float(any(same_signature(mode.signature, other.signature) for other in modes))
+
+
+experiment = Experiment(
+    name="proposals",
+    question="What is the network of method `mdn` worth, beside random proposals that are refined alike?",
+    columns=(
+        Column("split", "split", "code"),
+        Column("starts", "proposals"),
+        Column("candidates", "each", "count"),
+        Column("n", "targets", "count"),
+        Column("tracked", "delivered", "share"),
+        Column("cost_ratio", "effort over the least", "ratio", "cost_ratio_interval"),
+        Column("ratio_p95", "95 % up to", "ratio"),
+        Column("modes_found", "modes found", "share"),
+        Column("target_ms", "a target", "three", unit="ms"),
+    ),
+    run=run,
+    note=(
+        "The least effort is that of all rows and of a wide search from 256 random forces. Modes are counted "
+        "among those of the wide search within 5 % of the least effort; a row finds those to which four "
+        "times its proposals lead. Time is the processor's for a target of a batch."
+    ),
+    quick={"layouts": 4, "targets": 8},
+    full={"layouts": 30},
+    each="split",
+    timed=True,
+)
