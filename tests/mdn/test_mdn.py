@@ -183,3 +183,40 @@ def test_samples_are_the_proposed_forces(shipped: AnyRobot, layout_a: Layout) ->
     np.testing.assert_allclose(
         (given[..., 1] + 1j * given[..., 2])[able], force[able], atol=0.02 * fins.maximum.max()
     )
+
+
+def test_random_proposals_are_an_ablation(layout_a: Layout) -> None:
+    method = AnyRobot("mdn", starts="random")
+    answer = method.allocate(layout_a, TARGET)
+    assert answer.err_norm < 1e-6 and answer.candidates is not None
+    assert set(answer.candidates.source) == {"a random force"}
+    assert answer == method.allocate(layout_a, TARGET)
+
+
+@pytest.mark.parametrize("policy", ["closest", "direction", "priority"])
+def test_out_of_reach_it_delivers_what_the_default_method_does(
+    policy: str, shipped: AnyRobot, layout_a: Layout
+) -> None:
+    far = 20.0 * np.array(TARGET)
+    answer, other = (method.allocate(layout_a, far, policy=policy) for method in (shipped, AnyRobot()))
+    np.testing.assert_allclose(answer.wrench, other.wrench, atol=1e-3 * answer.scale[0])
+    assert answer.effort is not None and other.effort is not None
+    assert answer.effort <= other.effort * (1.0 + 1e-6)
+    batch = shipped.allocate_batch(layout_a, [far, TARGET], policy=policy)
+    np.testing.assert_allclose(batch.wrench[0], other.wrench, atol=1e-3 * answer.scale[0])
+    assert batch.err_norm[1] < 1e-6
+
+
+def test_from_tick_to_tick_no_fin_turns_faster_than_its_servo(shipped: AnyRobot) -> None:
+    layout, before = load_layout("hexa"), None
+    plant, worst = Plant(layout), 0.0
+    for k in range(30):
+        wanted = np.array(TARGET) * np.cos(0.2 * k)
+        answer = shipped.allocate(layout, wanted, previous=before)
+        if before is not None:
+            change = np.abs(answer.command - before)
+            turn = change[:, 2]
+            change[:, 2] = np.where(plant.full_turn, np.minimum(turn, 2.0 * np.pi - turn), turn)
+            assert (change <= 0.1 * layout.servo_rates + 1e-12).all()
+        before, worst = answer.command, max(worst, answer.err_norm)
+    assert worst < 0.05

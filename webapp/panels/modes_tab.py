@@ -16,9 +16,8 @@ from webapp.session.state import knows_objective
 ORIGINS = {
     "dual": "The search knows each fin's own law and draws nothing. It begins with all fins at work and, "
     "for other ways, with some of them at rest.",
-    "mdn": "A network proposes ways to share the wrench, drawn from its mixture; the search, by the fins' "
-    "own laws, takes each to its exact end. A mode names the components that led to it; all others are the "
-    "wider search's alone.",
+    "mdn": "A network proposes ways to share the wrench, drawn from its mixture; each is followed to the "
+    "least effort near it and made exact by the fins' own laws. A mode names the components that led to it.",
     "paper": "The paper's network draws candidates; the best are refined by Adam on a learned surrogate, "
     "which leaves an error.",
 }

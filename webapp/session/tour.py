@@ -90,7 +90,7 @@ STEPS = (
     ),
     Step(
         "Another robot, and a network",
-        "Six fins now, and the method is mdn: a network proposes, and the search makes each proposal exact; "
+        "Six fins now, and the method is mdn: a network proposes, and each proposal is made exact; "
         "the small dots in the drawer are its draws. Finish brings your work back.",
         "hexa",
         (1.5, 0.5, -1.0, 0.0, 0.0, 0.15),

@@ -32,6 +32,7 @@ TINY: dict[str, dict[str, Any]] = {
     "cost": {"split": ("id",), "methods": ("dual",), "layouts": 2, "targets": 1, "starts": 4},
     "latency": {"methods": ("dual", "qp"), "calls": 2, "robots": 1},
     "ablation": {"variants": ("ours",), "layouts": 2, "targets": 1, "candidates": 4},
+    "proposals": {"split": ("id",), "layouts": 2, "targets": 2, "candidates": (4,)},
     "temperature": {"temperatures": (0.01, 1.0), "layouts": 2, "targets": 1, "candidates": 4},
 }
 FINLAB = [sys.executable, "-m", "finlab"]

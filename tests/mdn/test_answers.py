@@ -1,0 +1,94 @@
+"""From proposals to answers: descents end at the target, and polish goes down to a minimum."""
+
+import numpy as np
+import pytest
+
+from finlab.allocation.levenberg_marquardt import refine
+from finlab.arrays import Array
+from finlab.layout import FinModelSpec, Layout, random_layout
+from finlab.mdn.answers import Answers, Steps, follow, ranked, refined
+from finlab.mdn.descent import descend, wrench
+from finlab.mdn.polish import polish
+from finlab.mdn.robot import EffortRobot, effort_robot
+from finlab.physics import plant_of
+from finlab.physics.effort import DEFAULT_WEIGHTS
+
+SCALE = np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.34])
+
+
+def robot_of(n: int, limits: str = "nominal") -> EffortRobot:
+    layout = random_layout(np.random.default_rng(n), n_fins=n, limits=limits)  # type: ignore[arg-type]
+    uneven = FinModelSpec("soft", (("e", 0.2), ("d", 0.1)))
+    return effort_robot(plant_of(layout.replace_actuator("fin_1", model=uneven)), SCALE, DEFAULT_WEIGHTS)
+
+
+def targets_of(robot: EffortRobot, count: int) -> tuple[Array, Array]:
+    """Normalized targets (N, 6), and needlessly dear commands (N, n, 3) that give them."""
+    command = robot.plant.sample(np.random.default_rng(1), (count,))
+    return robot.commands.wrench(command), command
+
+
+def random_forces(robot: EffortRobot, rows: int) -> Array:
+    rng, largest = np.random.default_rng(2), robot.forces.fins.maximum
+    shape = rows, len(largest)
+    return np.asarray(rng.random(shape) ** 3 * largest * np.exp(1j * rng.uniform(-np.pi, np.pi, shape)))
+
+
+@pytest.mark.parametrize(("n", "limits"), [(4, "nominal"), (8, "nominal"), (6, "varied")])
+def test_descents_end_near_the_target_with_less_effort_than_at_first(n: int, limits: str) -> None:
+    robot = robot_of(n, limits)
+    target, _ = targets_of(robot, 40)
+    found = descend(robot.forces, target, random_forces(robot, 40), 30)
+    missed = np.linalg.norm(wrench(robot.forces, found.force) - target, axis=1)
+    assert np.median(missed) < 2e-3 and (missed < 0.05).mean() > (0.9 if limits == "nominal" else 0.6)
+
+
+@pytest.mark.parametrize("n", [3, 5, 8])
+def test_polish_is_as_exact_and_never_dearer_and_ends_at_a_minimum(n: int) -> None:
+    robot = robot_of(n)
+    target, command = targets_of(robot, 12)
+    start = refine(robot.commands, target, command, 0)
+    found = polish(robot.commands, robot.effort, target, start, 60)
+    found = refine(robot.commands, target, found.command, 1)
+    assert (found.command >= robot.plant.lower).all() and (found.command <= robot.plant.upper).all()
+    assert found.error.max() < 1e-6
+    spent, before = robot.effort(found.command), robot.effort(command)
+    assert (spent <= before * (1.0 + 1e-6)).all() and spent.sum() < 0.98 * before.sum()
+    again = polish(robot.commands, robot.effort, target, found, 20)
+    assert np.median(robot.effort(again.command) / spent) > 0.999, "nothing is left to gain"
+
+
+def test_answers_are_exact_and_the_cheapest_comes_first() -> None:
+    robot = robot_of(6)
+    target, _ = targets_of(robot, 3)
+    found = follow(robot, target, random_forces(robot, 72).reshape(3, 24, 6), 5, Steps())
+    assert found.command.shape == (3, 5, 6, 3) and (found.error[:, 0] <= robot.exact).all()
+    given = robot.commands.wrench(found.command.reshape(-1, 6, 3)).reshape(3, 5, 6)
+    np.testing.assert_allclose(given, found.wrench, atol=1e-12)
+    for error, effort in zip(found.error, found.effort, strict=True):
+        assert (np.diff(effort[error <= robot.exact]) >= 0.0).all()
+    # Each of a batch is answered as if it were alone.
+    alone = follow(robot, target[1:2], random_forces(robot, 72).reshape(3, 24, 6)[1:2], 5, Steps(each=True))
+    np.testing.assert_allclose(alone.effort[0, 0], found.effort[1, 0], rtol=5e-3)
+
+
+def test_where_none_is_exact_the_cheapest_of_the_nearest_is_first() -> None:
+    robot = robot_of(4)
+    error = np.array([[0.1, 0.10003, 0.3], [0.0, 0.0, 1e-3]])
+    effort = np.array([[3.0, 2.0, 1.0], [2.0, 1.99, 1.0]])
+    given = Answers(np.zeros((2, 3, 4, 3)), np.zeros((2, 3, 6)), error, effort, np.arange(6).reshape(2, 3))
+    assert ranked(robot, given).origin.tolist() == [[1, 0, 2], [4, 3, 5]]
+    assert ranked(robot, given, bonus=0.01).origin[1].tolist() == [3, 4, 5], "a switch must pay"
+
+
+def test_hopeless_targets_are_left_where_they_are_nearest() -> None:
+    robot = robot_of(4)
+    target, command = targets_of(robot, 2)
+    far = refined(robot, 50.0 * target, command[:, None], np.zeros((2, 1), int), Steps(first=10))
+    assert np.isfinite(far.command).all() and (far.error > 1.0).all()
+
+
+def test_robots_of_one_layout_see_the_same(layout_a: Layout) -> None:
+    one, other = (effort_robot(plant_of(layout_a), s, DEFAULT_WEIGHTS) for s in (SCALE, 3.0 * SCALE))
+    np.testing.assert_allclose(one.view.static, other.view.static)
+    np.testing.assert_allclose(one.view.solver, other.view.solver / 3.0, rtol=1e-9)
