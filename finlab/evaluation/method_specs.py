@@ -12,6 +12,7 @@ from finlab.allocation.baselines.ipopt import IpoptSettings
 from finlab.allocation.methods import LEARNED, MethodChoice, checked_settings, choose_method
 from finlab.errors import AllocationError
 from finlab.evaluation.ahead import AnalyticAhead
+from finlab.evaluation.cones import Cones
 from finlab.evaluation.on_board import OnBoard
 from finlab.layout import Layout
 from finlab.physics.objective import Name
@@ -20,8 +21,12 @@ SLOW = ("ipopt",)
 """Methods that take a tenth of a second per target, each from several starts; they run on a subsample."""
 QUICK = ("dual", "mdn", "paper", "qp", "sqp", "analytic")
 """Methods that run on every target."""
-OWN = (OnBoard, AnalyticAhead)
+OWN = (OnBoard, AnalyticAhead, Cones)
 """Methods that are for comparison alone."""
+IN_FORCES = "ipopt-forces"
+"""IPOPT in the space of forces, its best form."""
+NEEDS = {"ipopt": "casadi", IN_FORCES: "casadi", Cones.name: "clarabel"}
+"""Packages without which a method cannot run."""
 PATIENCE_S = 60.0
 """Processor time [s] that a target may take where answers count and not times; starts and steps end every
 method long before."""
@@ -36,7 +41,12 @@ def is_slow(name: str) -> bool:
 
 def installed_methods() -> list[str]:
     """All methods of the library that can run here."""
-    return [name for name in (*QUICK, *SLOW) if name != "ipopt" or find_spec("casadi") is not None]
+    return [name for name in (*QUICK, *SLOW) if can_run(name)]
+
+
+def can_run(name: str) -> bool:
+    """Whether the package that a method needs is installed."""
+    return name not in NEEDS or find_spec(NEEDS[name]) is not None
 
 
 @dataclass(frozen=True)
@@ -95,8 +105,9 @@ def load_method_spec(
     """The method of a specification.
 
     Args:
-        name: a method; `ipopt-32`, say, for 32 starts; `sqp-effort`, say, for an objective of its own; or
-            `on-board`, U-CAT's own method; or `analytic-ahead`, the pseudo-inverse with the lag of the fins.
+        name: a method; `ipopt-32`, say, for 32 starts; `sqp-effort`, say, for an objective of its own; or one
+            for comparison alone: `on-board`, U-CAT's own; `analytic-ahead`, the pseudo-inverse with the lag
+            of the fins; `ipopt-forces` and `clarabel`, solvers in the space of forces.
         checkpoint: of learned methods, as for `finlab.Allocator`.
         objective: what the methods that can choose keep least; each one's default where None.
 
@@ -105,6 +116,8 @@ def load_method_spec(
     """
     if own := next((kind for kind in OWN if kind.name == name), None):
         return MethodSpec(name, MethodChoice(own, own.settings_class()))
+    if name == IN_FORCES:
+        return MethodSpec(name, _choice("ipopt", checkpoint, space="forces"))
     if named := _WITH_OBJECTIVE.fullmatch(name):
         return MethodSpec(name, _choice(named[1], checkpoint, objective=named[2]))
     method, starts = method_and_starts(name)

@@ -1,120 +1,226 @@
-"""How long one call takes: methods one after the other in one run, and first answers for fins never seen.
+"""How long one call takes: near and far from the limits of robots, out of reach and from tick to tick.
 
-A fin is compiled once, whatever its law, and kept by content: the first call of a robot with new fins pays
-for compiling them.
+Methods answer the same targets in one run, the default one beside solvers in the space of forces, which are
+the best form of theirs. All times are the processor's. A fin is compiled once, whatever its law, and kept by
+content: the first call of a robot with new fins pays for that.
 """
 
+import math
+import re
 import time
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
+from finlab.allocation.allocation import Allocation
+from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.evaluation.experiment import Experiment
-from finlab.evaluation.method_specs import MethodSpec, load_method_spec, load_method_specs
+from finlab.evaluation.method_specs import IN_FORCES, MethodSpec, can_run, load_method_spec, load_method_specs
 from finlab.evaluation.noisy_tables import noisy_table
 from finlab.evaluation.paper_figures import paper_figures
 from finlab.evaluation.progress import progress
 from finlab.evaluation.report.document import Column, Row
-from finlab.evaluation.splits import Case, make_split
 from finlab.layout import Fin, Layout, load_layout, random_layout
+from finlab.layout.random import TRAINING_BOX
 from finlab.layout.random_fins import FAMILIES, random_fin_model
+from finlab.layout.thrust_model import PowerLaw
+from finlab.layout.thruster import Thruster
+from finlab.physics import plant_of
 
 DOMAIN = 0xF1257
-"""Leads the seed of every robot with new fins."""
+"""Leads the seed of every robot."""
 REFERENCE = "dual"
 """The method that the others are compared with, where it takes part."""
 LAYOUTS = 5
-"""Layouts whose calls are timed."""
+"""Robots of each kind whose calls are timed."""
+TARGETS = 40
+"""Directions of wrenches on each of them."""
 WARM_UP = 2
-"""First calls on each layout that are not counted; a robot keeps its layout for long."""
+"""First calls on each robot that are not counted; a robot keeps its layout for long."""
+FAR = 1e3
+"""How many times a wrench lies beyond its robot's reach for certain."""
+TICK, AT = 0.05, 0.6
+"""From tick to tick a target goes by this share of the way to the next direction, at this share of reach."""
+BATCH, BATCHES = 4096, 3
+"""Targets of a batch, and how many batches are timed."""
+FORCE, POWER = (-39.91, 51.44), PowerLaw(0.997, 1.449)
+"""Limits [N] and power of a thruster: Blue Robotics' T200 at 16 V."""
+NEW = "new-fins"
+"""Name of the robots whose first answers are timed."""
 NEW_FINS = 4
-"""Fins of a robot with new fins, each with a model of its own."""
+"""Their fins, each with a model of its own."""
 KINDS = (*FAMILIES, "table")
 """Models of new fins; a table is one of a random fin, with noise."""
 SMALL = np.array([0.02, 0.02, 0.02, 0.002, 0.002, 0.002])
 """Size of their targets [N, N m], within reach of the weakest fins."""
+_ROBOT = re.compile(r"(fins|thrusters)-(\d{1,2})")
+
+
+class Timed(NamedTuple):
+    """A robot and what it is asked for."""
+
+    layout: Layout
+    """The robot."""
+    rim: Array
+    """The largest wrenches (N, 6) [N, N m] that it delivers in drawn directions."""
 
 
 def run(
-    methods: tuple[str, ...] = ("dual", "mdn", "paper", "analytic", "qp", "sqp"),
-    fins: int = 4,
+    robots: tuple[str, ...] = ("fins-4", "fins-8", "thrusters-4", "thrusters-8", NEW),
+    methods: tuple[str, ...] = (REFERENCE, IN_FORCES, "clarabel"),
+    reach: tuple[float, ...] = (0.3, 0.9, 0.98, 1.5),
     calls: int = 200,
-    budget: float = 20.0,
-    robots: int = 3,
+    budget: float = 2.0,
+    new: int = 3,
     checkpoint: str | None = None,
     seed: int = 0,
 ) -> list[Row]:
-    """One row for each method, and one for the first answers of `dual` on each kind of new fins.
+    """One row for each robot, call and method that takes such a robot.
 
     Args:
-        methods: names as in eval wrench; ipopt needs its extra.
-        fins: of the layouts, 2 to 5.
+        robots: fins-N or thrusters-N, random ones of so many; or new-fins, for the first answers of dual.
+        methods: names as in eval wrench, ipopt-forces, clarabel; left out where their package is missing.
+        reach: targets over the most that the robot gives in their direction.
         calls: of each method.
-        budget: seconds after which a slow method stops.
-        robots: with new fins, of each kind of fin.
+        budget: seconds of the processor after which a slow method stops.
+        new: robots with new fins, of each kind of fin.
         checkpoint: of the learned methods, a shipped name or a folder.
-        seed: of layouts and targets.
+        seed: of robots and targets.
     """
-    if not 2 <= fins <= 5:
-        raise DataError(f"fins: expected 2 to 5, the fin counts of split id, got {fins}")
-    cases = [case for case in make_split("id", 100, 50, seed) if case.layout.n_fins == fins][:LAYOUTS]
-    rows: list[Row] = []
-    for name, method in progress(load_method_specs(methods, checkpoint).items(), "method"):
-        times = call_times(method, cases, calls, budget)
-        rows.append(_row(name, "same fins as before", times))
-    reference = next((row["p50_ms"] for row in rows if row["method"] == REFERENCE), None)
-    for row in rows:
-        row["p50_over_dual"] = None if reference is None else row["p50_ms"] / reference
-    ours = load_method_spec(REFERENCE, checkpoint)
-    ours.on(load_layout("A")).allocate(np.zeros(6))  # what a process does once is not the fins' doing
-    return rows + [
-        _row(
-            REFERENCE,
-            f"first answer, {NEW_FINS} new fins: {kind}",
-            first_times(ours, kind, robots, seed),
+    kinds = {name: _ROBOT.fullmatch(name) for name in robots if name != NEW}
+    if wrong := [name for name, kind in kinds.items() if kind is None or not 2 <= int(kind[2]) <= 64]:
+        raise DataError(
+            f"robots: expected fins-N, thrusters-N (N from 2 to 64) or {NEW}, got {wrong[0]!r:.60}"
         )
-        for kind in progress(KINDS, "kind of fin")
-    ]
+    if min(reach) <= 0.0:
+        raise DataError(f"reach: expected numbers above 0, got {min(reach):g}")
+    specs = load_method_specs([name for name in methods if can_run(name)] or [REFERENCE], checkpoint)
+    ours = load_method_spec(REFERENCE, checkpoint)
+    rows = list[Row]()
+    for name, kind in kinds.items():
+        assert kind is not None
+        timed = [_robot(ours, kind[1], int(kind[2]), seed, k) for k in range(LAYOUTS)]
+        able = {each: spec for each, spec in specs.items() if kind[1] == "fins" or _takes_any(spec)}
+        for share in (*reach, None):
+            rows += _rows(name, timed, able, share, calls, budget)
+        rows.append({"robot": name, "call": f"batch of {BATCH}", **batch_row(ours, timed)})
+    if NEW in robots:
+        ours.on(load_layout("A")).allocate(np.zeros(6))  # what a process does once is not the fins' doing
+        for law in progress(KINDS, "kind of fin"):
+            times = first_times(ours, law, new, seed)
+            about = {"robot": NEW, "call": f"first answer: {law}", "method": REFERENCE}
+            rows.append(about | _quantiles(times))
+    return rows
 
 
-def _row(method: str, what: str, times: Sequence[float]) -> Row:
+def _robot(method: MethodSpec, kind: str, count: int, seed: int, k: int) -> Timed:
+    """Robot k of a kind: fins of U-CAT's law with horizontal shafts, or thrusters anyhow."""
+    rng = np.random.default_rng([DOMAIN, seed, len(kind), count, k])
+    layout = random_layout(rng, f"{kind}-{count}", n_fins=count)
+    if kind == "thrusters":
+        axes = rng.standard_normal((count, 3))
+        axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+        places = (rng.uniform(-1.0, 1.0, (count, 3)) * TRAINING_BOX).tolist()
+        each = zip(places, axes.tolist(), strict=True)
+        parts = (Thruster(f"t{i}", tuple(p), tuple(a), FORCE, POWER) for i, (p, a) in enumerate(each))
+        layout = Layout(layout.name, tuple(parts))
+    plant, allocator = plant_of(layout), method.on(layout)
+    wrenches = plant.wrench(plant.sample(rng, (TARGETS,)))
+    return Timed(layout, allocator.allocate_batch(FAR * wrenches, policy="direction").wrench)
+
+
+def _takes_any(method: MethodSpec) -> bool:
+    return method.choice.kind.takes == "any actuator"
+
+
+def _rows(
+    name: str,
+    timed: Sequence[Timed],
+    methods: dict[str, MethodSpec],
+    share: float | None,
+    calls: int,
+    budget: float,
+) -> list[Row]:
+    """A row for each method; without a share of reach, targets wander and the command before is known."""
+    what = f"{share:g} of reach" if share is not None else "next tick"
+    rows, answers = list[Row](), dict[str, list[Allocation]]()
+    for method, spec in progress(methods.items(), "method", f"{name}, {what}"):
+        times, answers[method] = call_times(spec, timed, share, calls, budget)
+        rows.append({"robot": name, "call": what, "method": method, **_quantiles(times)})
+    for row in rows if REFERENCE in answers else ():
+        row["p50_over_dual"] = row["p50_ms"] / rows[list(answers).index(REFERENCE)]["p50_ms"]
+        pairs = zip(answers[row["method"]], answers[REFERENCE], strict=False)
+        watts = np.array(
+            [(mine.power, best.power) for mine, best in pairs if mine.reachable and best.reachable]
+        )
+        row["power_over_dual"] = watts[:, 0].sum() / watts[:, 1].sum() if len(watts) else math.nan
+    for row in rows:
+        row["delivered"] = float(np.mean([answer.reachable for answer in answers[row["method"]]]))
+    return rows
+
+
+def _quantiles(times: Sequence[float]) -> Row:
     low, middle, high = (float(np.quantile(times, q)) for q in (0.05, 0.5, 0.99))
-    return {
-        "method": method,
-        "call": what,
-        "calls": len(times),
-        "p5_ms": low,
-        "p50_ms": middle,
-        "p99_ms": high,
-    }
+    return {"calls": len(times), "p5_ms": low, "p50_ms": middle, "p99_ms": high}
 
 
-def call_times(method: MethodSpec, cases: Sequence[Case], n_calls: int, budget_s: float) -> list[float]:
-    """Wall time of each counted call [ms], of layouts visited one after the other.
+def call_times(
+    method: MethodSpec, timed: Sequence[Timed], share: float | None, calls: int, budget: float
+) -> tuple[list[float], list[Allocation]]:
+    """The processor's time of each counted call [ms], of robots visited in turn, and its answer.
 
     Args:
         method: who answers.
-        cases: layouts with targets.
-        n_calls: at most so many.
-        budget_s: no further call on a layout after its part of this time [s].
+        timed: the robots.
+        share: of reach, of the targets; None for targets that wander, with the command of the tick before.
+        calls: at most so many.
+        budget: no further call on a robot after its part of this time [s].
     """
-    times: list[float] = []
-    per_case = -(-n_calls // len(cases))
-    for case in cases:
-        allocator, begin = method.on(case.layout), time.perf_counter()
-        for k in range(WARM_UP + min(per_case, n_calls - len(times))):
-            start = time.perf_counter()
-            allocator.allocate(case.targets[k % len(case.targets)], failed=case.failed)
-            end = time.perf_counter()
+    times, answers, ahead = list[float](), list[Allocation](), -(-calls // len(timed))
+    for robot in timed:
+        allocator, spent, previous = method.on(robot.layout), 0.0, None
+        for k in range(WARM_UP + min(ahead, calls - len(times))):
+            target = _wandering(robot.rim, k) if share is None else share * robot.rim[k % TARGETS]
+            start = time.process_time()
+            answer = allocator.allocate(target, previous=previous)
+            took = time.process_time() - start
+            previous = answer.command if share is None else None
             if k >= WARM_UP:
-                times.append((end - start) * 1e3)
-                if end - begin > budget_s / len(cases):
+                times.append(1e3 * took)
+                answers.append(answer)
+                spent += took
+                if spent > budget / len(timed):
                     break
-        if len(times) >= n_calls:
-            break
-    return times
+    return times, answers
+
+
+def _wandering(rim: Array, tick: int) -> Array:
+    """The target (6,) at a tick: on the straight way from one direction to the next."""
+    place, rest = divmod(TICK * tick, 1.0)
+    first, then = (rim[(int(place) + i) % len(rim)] for i in range(2))
+    return np.asarray(AT * ((1.0 - rest) * first + rest * then))
+
+
+def batch_row(method: MethodSpec, timed: Sequence[Timed]) -> Row:
+    """Targets per second of the processor in a batch, over robots in turn; targets are wrenches of random
+    commands."""
+    times = []
+    for robot in timed[:BATCHES]:
+        plant, allocator = plant_of(robot.layout), method.on(robot.layout)
+        targets = plant.wrench(plant.sample(np.random.default_rng(DOMAIN), (BATCH,)))
+        allocator.allocate_batch(targets[: BATCH // 8])
+        start = time.process_time()
+        allocator.allocate_batch(targets)
+        times.append((time.process_time() - start) * 1e3 / BATCH)
+    return {
+        "method": REFERENCE,
+        **_quantiles(times),
+        "calls": BATCH * len(times),
+        "per_s": 1e3 / np.median(times),
+    }
 
 
 def first_times(method: MethodSpec, kind: str, robots: int, seed: int) -> list[float]:
@@ -149,23 +255,33 @@ def _printed(rows: Sequence[Row]) -> list[Row]:
 
 experiment = Experiment(
     name="latency",
-    question="How long does one call take?",
+    question="How long does one call take, by the processor's time?",
     columns=(
-        Column("method", "method", "code"),
+        Column("robot", "robot"),
         Column("call", "call"),
+        Column("method", "method", "code"),
         Column("calls", "calls", "count"),
         Column("p50_ms", "median", "three", unit="ms"),
         Column("p99_ms", "99th percentile", "three", unit="ms"),
         Column("p50_over_dual", "times that of dual", "three"),
+        Column("delivered", "delivered", "share"),
+        Column("power_over_dual", "power over dual's", "ratio"),
+        Column("per_s", "targets per s", "three"),
     ),
     run=run,
     note=(
-        "Whole calls of allocate, one target each, one after the other; a report runs nothing beside them. "
-        "First answers in the processor's time: a fin is compiled once, whatever its law, and kept by "
-        "content."
+        "Whole calls of allocate, one target each, one after the other. Reach: the most that a robot gives "
+        "in the direction of the target; beyond it, methods answer with the nearest wrench. Next tick: "
+        f"targets wander at {AT:g} of reach, and the command before is known. `ipopt-forces` and `clarabel` "
+        "solve for the forces, `clarabel` with power that grows with the force to 1.5. Power: where both "
+        "deliver. First answers: a fin is compiled once, whatever its law, and kept by content."
     ),
-    quick={"calls": 20, "budget": 1.0, "robots": 1},
-    full={"robots": 2},
+    quick={"robots": ("fins-4", "thrusters-8", NEW), "calls": 20, "budget": 0.5, "new": 1},
+    full={
+        "methods": (REFERENCE, "mdn", "paper", "analytic", "qp", "sqp", IN_FORCES, "clarabel"),
+        "budget": 1.0,
+        "new": 2,
+    },
     timed=True,
     printed=_printed,
 )

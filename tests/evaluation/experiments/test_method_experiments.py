@@ -10,7 +10,7 @@ from finlab.allocation.baselines.analytic import Analytic
 from finlab.allocation.method import LeastErrorMethod
 from finlab.allocation.methods import MethodChoice
 from finlab.allocation.solution import Solution
-from finlab.errors import DataError
+from finlab.errors import AllocationError, DataError
 from finlab.evaluation import method_specs
 from finlab.evaluation.experiment import Row, load_experiment
 from finlab.evaluation.experiments.latency import first_times
@@ -57,7 +57,7 @@ def test_the_plant_scores(first: int | None) -> None:
     assert (found["solve_ms"] > 0).all() and np.unique(found["layout"]).tolist() == [0, 1, 2]
 
 
-def test_the_search_costs_no_more_than_the_best_start() -> None:
+def test_dual_costs_no_more_than_the_best_start() -> None:
     pytest.importorskip("casadi")
     sizes = {"layouts": 3, "targets": 1, "seed": 6, "starts": 8, "methods": ("dual",)}
     rows = load_experiment("cost").rows(split=("id", "failure", "axes"), objectives=("power",), **sizes)
@@ -91,17 +91,53 @@ def surge_robot(arc: tuple[float, float] = (-math.pi, math.pi)) -> tuple[Layout,
     return layout, float(np.linalg.norm(Plant(layout).fin_forces(full)[0]))
 
 
-def test_latency_compares_with_search() -> None:
-    rows = load_experiment("latency").rows(methods=("dual", "analytic"), calls=6, robots=1, seed=4711)
-    search, analytic, *first = rows
-    assert (search["calls"], search["p50_over_dual"]) == (6, 1.0)
-    assert analytic["p50_over_dual"] == pytest.approx(analytic["p50_ms"] / search["p50_ms"])
+def test_latency_compares_methods_on_the_same_targets(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("clarabel")
+    monkeypatch.setattr("finlab.evaluation.experiments.latency.LAYOUTS", 2)
+    monkeypatch.setattr("finlab.evaluation.experiments.latency.TARGETS", 5)
+    monkeypatch.setattr("finlab.evaluation.experiments.latency.BATCH", 512)
+    names = ("dual", "analytic", "clarabel")
+    sizes = {"robots": ("fins-3", "thrusters-7"), "reach": (0.9, 1.5), "calls": 6, "seed": 4711}
+    rows = load_experiment("latency").rows(methods=names, **sizes)
+    found = by(rows, "robot", "call", "method")
+    assert len(rows) == 3 * 3 + 1 + 3 * 2 + 1  # the pseudo-inverse knows fins alone; batches
     assert all(0 < row["p50_ms"] <= row["p99_ms"] for row in rows)
-    soft = next(row for row in first if row["call"].endswith("soft"))
-    assert soft["p50_ms"] > 5.0 * search["p50_ms"]  # compiling takes many times the call itself
-    assert first_times(load_method_spec("dual"), "soft", 1, 4711)[0] < 0.5 * soft["p50_ms"]  # compiled once
-    with pytest.raises(DataError, match="fins: expected 2 to 5"):
-        load_experiment("latency").rows(fins=9)
+    for robot in sizes["robots"]:
+        assert found[robot, "batch of 512", "dual"]["per_s"] > 1e3
+        for method in ("dual", "clarabel"):
+            near, beyond = (found[robot, f"{share} of reach", method] for share in (0.9, 1.5))
+            assert (near["delivered"], beyond["delivered"]) == (1.0, 0.0)
+            assert near["power_over_dual"] == pytest.approx(1.0, abs=2e-3)
+            assert beyond["power_over_dual"] is None
+    dual, inverse = (found["fins-3", "next tick", name] for name in ("dual", "analytic"))
+    assert dual["p50_over_dual"] == 1.0 and dual["calls"] == 6
+    assert inverse["p50_over_dual"] == pytest.approx(inverse["p50_ms"] / dual["p50_ms"])
+    with pytest.raises(DataError, match="robots: expected fins-N, thrusters-N .* got 'fins-99'"):
+        load_experiment("latency").rows(robots=("fins-99",))
+
+
+def test_fins_are_compiled_once() -> None:
+    dual = load_method_spec("dual")
+    (first,), (again,) = (first_times(dual, "soft", 1, 4711) for _ in range(2))
+    assert again < 0.5 * first
+
+
+@pytest.mark.parametrize("name", ["clarabel", "ipopt-forces"])
+def test_solvers_in_the_space_of_forces_miss_no_more_and_take_no_more(name: str) -> None:
+    pytest.importorskip("clarabel" if name == "clarabel" else "casadi")
+    for case in make_split("ood-fins", 2, 3, 8):
+        ours, theirs = (load_method_spec(each).on(case.layout) for each in ("dual", name))
+        best, found = ours.allocate_batch(case.targets), theirs.allocate_batch(case.targets)
+        assert found.reachable.all()
+        np.testing.assert_allclose(found.power, best.power, rtol=2e-3)
+        best, found = ours.allocate_batch(5.0 * case.targets), theirs.allocate_batch(5.0 * case.targets)
+        np.testing.assert_allclose(found.err_norm, best.err_norm, rtol=1e-3, atol=1e-3)
+
+
+def test_clarabel_refuses_arcs() -> None:
+    pytest.importorskip("clarabel")
+    with pytest.raises(AllocationError, match="expected fins and azimuths that turn fully"):
+        load_method_spec("clarabel").on(surge_robot((-1.0, 1.0))[0])
 
 
 def test_more_temperature_more_diversity_and_none_between_equals() -> None:
