@@ -1,0 +1,134 @@
+"""The default method on any fin: exact, and as cheap as brute force finds."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from finlab.allocation import Allocator
+from finlab.assets import shipped_layouts
+from finlab.evaluation.splits import make_split
+from finlab.layout import Fin, FinModelSpec, Layout, load_layout
+from finlab.physics import Plant
+from finlab.physics.objective import Objective
+from tests.allocation.dual.brute_force import least_cost
+from tests.any_robot import AnyRobot
+from tests.exhaustive import crossed, sampled
+from tests.random_fins import KINDS, random_robot
+
+Array = NDArray[np.float64]
+LAWS = KINDS[:3]
+AXES = np.concatenate([np.diag([1.0, 1.0, 1.0, 0.1, 0.1, 0.1]), -np.diag([1.0, 1.0, 1.0, 0.1, 0.1, 0.1])])
+
+
+def reachable(layout: Layout, n: int, seed: int = 0) -> Array:
+    plant = Plant(layout)
+    return plant.wrench(plant.sample(np.random.default_rng(seed), (n,)))
+
+
+def with_arcs(name: str, arcs: dict[int, tuple[float, float]]) -> Layout:
+    """A shipped layout with other arcs of zero directions [rad] for some of its fins."""
+    layout = load_layout(shipped_layouts()[name])
+    held = {i: replace(layout.fins[i].limits, zero_direction=arc) for i, arc in arcs.items()}
+    fins = (replace(fin, limits=held.get(i, fin.limits)) for i, fin in enumerate(layout.fins))
+    return replace(layout, actuators=tuple(fins))
+
+
+@pytest.mark.parametrize(
+    ("limits", "kinds"),
+    crossed(
+        ["nominal", "varied"],
+        [("drag",), ("lighthill",), ("soft",), LAWS, ("table",), KINDS],
+        every=7,
+    ),
+)
+def test_exact_on_any_fin(kinds: tuple[str, ...], limits: str, tmp_path: Path) -> None:
+    method = AnyRobot()
+    for seed in range(4):
+        layout = random_robot(np.random.default_rng(seed), kinds, tmp_path, limits=limits, n_fins=(2, 7))
+        batch = method.allocate_batch(layout, reachable(layout, 12, seed))
+        lower, upper = layout.lower, layout.upper
+        assert (batch.command >= lower).all() and (batch.command <= upper).all()
+        assert np.quantile(batch.err_norm, 0.95) < 1e-5
+        assert "table" in kinds or batch.err_norm.max() < 2e-5
+
+
+def test_no_more_than_brute_force_finds() -> None:
+    method, ratio = AnyRobot(), []
+    for seed in range(2):
+        layout = random_robot(np.random.default_rng(seed), LAWS, n_fins=(2, 4))
+        for target in reachable(layout, 2, seed) * [[1.0], [0.5]]:
+            answer = method.allocate(layout, target)
+            if answer.err_norm < 1e-5:
+                least = least_cost(layout, target, answer.scale, Objective(), n_starts=6, also=answer.command)
+                ratio.append(answer.power / least)
+    assert len(ratio) >= 3
+    assert np.max(ratio) < 1.001
+
+
+@pytest.mark.parametrize("target", AXES, ids=str)
+def test_robots_with_stops_are_as_cheap(target: Array) -> None:
+    """Fins that start outside their arcs must come back to where they are pulled."""
+    layout = load_layout(shipped_layouts()["restricted"])
+    answer = Allocator(layout).allocate(target)
+    least = least_cost(layout, target, answer.scale, Objective(), n_starts=6, also=answer.command)
+    assert answer.err_norm < 1e-5 and answer.power < 1.002 * least
+
+
+@pytest.mark.parametrize("axis", sampled(range(12), 5))
+def test_arcs_wider_than_half_a_turn_are_as_cheap(axis: int) -> None:
+    """Which side of the gap each fin takes is no convex question."""
+    layout, target = with_arcs("A", dict.fromkeys(range(4), (-2.4, 2.4))), AXES[axis]
+    answer = Allocator(layout).allocate(target)
+    least = least_cost(layout, target, answer.scale, Objective(), n_starts=6, also=answer.command)
+    assert answer.err_norm < 1e-5 and answer.power < 1.002 * least
+
+
+@pytest.mark.parametrize("name", ["A", "B", "penta", "hexa", "octo"])
+def test_pure_axes_of_symmetric_robots(name: str) -> None:
+    layout, method = load_layout(shipped_layouts()[name]), AnyRobot()
+    for target in AXES[[0, 2, 5, 6]]:
+        answer = method.allocate(layout, target)
+        assert answer.err_norm < 1e-5
+
+
+def test_coincident_fins_share() -> None:
+    """Two at one place: each gives half."""
+    pair = Layout("twins", tuple(Fin(name, (0.1, 0.05, 0.0), 0.3) for name in "ab"))
+    plant, method = Plant(pair), AnyRobot()
+    for force in (0.5, 2.0, 6.0, 12.0):
+        command = np.array([[0.6, 2.1, 0.4]] * 2)
+        target = plant.wrench(command) * force / 13.32
+        answer = method.allocate(pair, target)
+        size = np.linalg.norm(answer.forces, axis=1)
+        assert answer.err_norm < 1e-5 and size[0] == pytest.approx(size[1], rel=1e-3)
+
+
+def test_near_the_peak_of_soft_fins_it_is_as_cheap() -> None:
+    case = make_split("fins", 10, 4, 77)[3]
+    answer = Allocator(case.layout).allocate(case.targets[3])
+    goal = Objective("power")
+    least = least_cost(case.layout, answer.target, answer.scale, goal, n_starts=8, also=answer.command)
+    assert answer.err_norm < 1e-5 and answer.power < 1.001 * least
+
+
+@pytest.mark.parametrize("area", [2e-2, 2e-4, 1e-5])
+def test_tiny_fins_are_as_exact_beside_their_own_strength(area: float) -> None:
+    layout = load_layout(shipped_layouts()["A"])
+    model = FinModelSpec("drag", (("area", area),))
+    tiny = replace(layout, actuators=tuple(replace(fin, model=model) for fin in layout.fins))
+    method = AnyRobot()
+    for target in reachable(tiny, 6):
+        answer = method.allocate(tiny, target)
+        assert answer.err_norm < 1e-4 * 1.0
+
+
+def test_batches_are_single_answers() -> None:
+    layout = random_robot(np.random.default_rng(5), LAWS, n_fins=5)
+    targets, method = reachable(layout, 30), AnyRobot()
+    batch = method.allocate_batch(layout, targets)
+    power = [method.allocate(layout, target).power for target in targets]
+    assert batch.err_norm.max() < 1e-5
+    np.testing.assert_allclose(batch.power, power, rtol=1e-6)

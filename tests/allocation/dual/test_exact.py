@@ -1,0 +1,166 @@
+"""The default method: exact by the plant on any fin, inside limits, never NaN."""
+
+import math
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from finlab.allocation import Allocator
+from finlab.allocation.allocation import CHUNK
+from finlab.assets import shipped_layouts
+from finlab.layout import Fin, FinModelSpec, Layout, Limits, load_layout, random_layout
+from finlab.physics import Plant, make_law, write_table
+from tests.any_robot import AnyRobot
+
+GOOD = 1e-5
+"""Normalized error below which an answer counts as exact, here."""
+
+
+def reachable(layout: Layout, n: int, seed: int = 0) -> np.ndarray:
+    """Wrenches (n, 6) of random commands, by the plant."""
+    lower, upper = bounds(layout)
+    share = np.random.default_rng(seed).uniform(size=(n, layout.n, 3))
+    return Plant(layout).wrench(lower + share * (upper - lower))
+
+
+def bounds(layout: Layout) -> tuple[np.ndarray, np.ndarray]:
+    return (
+        layout.lower,
+        layout.upper,
+    )
+
+
+def keeps_limits(layout: Layout, command: np.ndarray) -> bool:
+    lower, upper = bounds(layout)
+    return bool(np.isfinite(command).all() and (command >= lower).all() and (command <= upper).all())
+
+
+def errors(method: Allocator, layout: Layout, targets: np.ndarray) -> np.ndarray:
+    """Normalized errors by the plant; commands must keep their limits to the last bit."""
+    command = method.allocate_batch(layout, targets).command
+    assert keeps_limits(layout, command)
+    return method.normalization.error(Plant(layout).wrench(command), targets)
+
+
+@pytest.mark.parametrize("name", list(shipped_layouts()))
+def test_exact_on_shipped_layouts(name: str, search: AnyRobot) -> None:
+    layout = load_layout(shipped_layouts()[name])
+    assert errors(search, layout, reachable(layout, 25)).max() < GOOD
+
+
+@pytest.mark.parametrize("limits", ["nominal", "varied"])
+def test_exact_on_random_layouts(limits: str, search: AnyRobot) -> None:
+    for seed in range(5000, 5015):
+        layout = random_layout(np.random.default_rng(seed), limits=limits)  # type: ignore[arg-type]
+        assert errors(search, layout, reachable(layout, 20, seed)).max() < GOOD, seed
+
+
+def test_exact_outside_the_training_box_and_with_more_fins(search: AnyRobot) -> None:
+    for seed in range(5000, 5005):
+        rng = np.random.default_rng(seed)
+        wide = random_layout(rng, box=(0.45, 0.45, 0.2), outside=(0.3, 0.3, 0.1))
+        many = random_layout(rng, n_fins=(6, 8))
+        for layout in (wide, many):
+            assert errors(search, layout, reachable(layout, 10, seed)).max() < GOOD, seed
+
+
+@pytest.mark.parametrize("name", ["A", "B", "C", "D"])
+def test_exact_after_the_loss_of_any_fin(name: str, search: AnyRobot) -> None:
+    layout = load_layout(shipped_layouts()[name])
+    for fin in layout.names:
+        for target in reachable(layout.without([fin]), 2):
+            result = search.allocate(layout, target, failed=[fin])
+            assert result.err_norm < GOOD
+            assert np.isnan(result.command[layout.index(fin)]).all()
+
+
+SHARED = (0.1, 0.05, 0.0)
+HOSTILE = {
+    "one fin": Layout("one", (Fin("a", (0.0, 0.0, 0.0), 0.0),)),
+    "two at one place": Layout("twins", (Fin("a", SHARED, 0.3), Fin("b", SHARED, 0.3))),
+    "all parallel": Layout("rake", tuple(Fin(f"f{i}", (0.1 * i, 0.0, 0.0), 0.5) for i in range(4))),
+    "no width": Layout(
+        "stiff",
+        (
+            Fin("a", (0.1, 0.0, 0.0), 0.0, Limits((0.3, 0.3), (1.0, 1.0), (0.5, 0.5))),
+            Fin("b", (-0.1, 0.0, 0.0), 1.0, Limits((0.05, 0.6), (2.0, 2.0), (-1.0, 1.0))),
+            Fin("c", (0.0, 0.1, 0.0), 2.0),
+        ),
+    ),
+    "may rest": Layout(
+        "rest", (Fin("a", SHARED, 0.0, Limits((0.0, 0.6), (0.0, 2.1))), Fin("b", (0, 0, 0), 2.0))
+    ),
+    "far out": Layout("far", (Fin("a", (10.0, 10.0, 10.0), 0.0), Fin("b", (-10.0, 0.0, 0.0), 1.0))),
+    "sixteen": Layout("many", tuple(Fin(f"f{i}", (0.1, 0.02 * i, 0.0), 0.4 * i) for i in range(16))),
+}
+
+
+@pytest.mark.parametrize("name", ["one fin", "two at one place", "all parallel", "may rest", "sixteen"])
+def test_hostile_layouts_still_get_what_they_can_do(name: str, search: AnyRobot) -> None:
+    layout = HOSTILE[name]
+    error = errors(search, layout, reachable(layout, 10))
+    assert error.max() < GOOD
+
+
+def test_what_cannot_be_done_is_done_as_far_as_possible(search: AnyRobot) -> None:
+    result = search.allocate(HOSTILE["one fin"], [0.0, 50.0, 0.0, 0.0, 0.0, 0.0])
+    np.testing.assert_allclose(result.command[0], [0.6, 2.1, 0.0], atol=1e-2)
+    assert result.unallocated[1] > 40.0
+
+
+def test_the_same_question_gets_the_same_answer(search: AnyRobot) -> None:
+    layout = load_layout(shipped_layouts()["A"])
+    target = reachable(layout, 1)[0]
+    first = search.allocate(layout, target, seed=3)
+    search.allocate(layout, -target, seed=9)  # what was asked in between leaves no trace
+    for other in (search, AnyRobot()):
+        again = other.allocate(layout, target, seed=3)
+        np.testing.assert_array_equal(again.command, first.command)
+
+
+def test_many_targets_are_answered_as_well_as_one(search: AnyRobot) -> None:
+    layout = load_layout(shipped_layouts()["A"])
+    targets = reachable(layout, CHUNK + 3)
+    batch = search.allocate_batch(layout, targets)
+    error = search.normalization.error(Plant(layout).wrench(batch.command), targets)
+    assert error.max() < GOOD
+    for row in (0, 1, CHUNK - 1, CHUNK, CHUNK + 2):  # around the seam of two chunks
+        assert search.allocate(layout, targets[row]).err_norm < GOOD
+    assert batch.wrench_expected is None
+
+
+def test_no_targets_get_no_answers(search: AnyRobot) -> None:
+    assert search.allocate_batch(HOSTILE["one fin"], np.zeros((0, 6))).command.shape == (0, 1, 3)
+
+
+def test_a_force_table_that_was_measured_again_is_read_again(search: AnyRobot, tmp_path: Path) -> None:
+    grid = np.linspace(0.0, 0.6, 9), np.linspace(0.0, 2.1, 10), np.linspace(-np.pi, np.pi, 13)
+    table = FinModelSpec("table", (("path", str(tmp_path / "fin.csv")),))
+    layout = load_layout("A")
+    layout = replace(layout, actuators=tuple(replace(fin, model=table) for fin in layout.fins))
+    for hour, area in enumerate((0.02, 0.03)):
+        write_table(tmp_path / "fin.csv", make_law(FinModelSpec("drag", (("area", area),))), *grid)
+        os.utime(tmp_path / "fin.csv", (3600 * hour, 3600 * hour))
+        assert search.allocate(layout, [1.0, 0.0, 0.5, 0.0, 0.0, 0.1]).err_norm < GOOD
+
+
+def test_turning_the_robot_does_not_make_it_worse(search: AnyRobot) -> None:
+    layout = load_layout(shipped_layouts()["C"])
+    yaw = 0.8
+    c, s = math.cos(yaw), math.sin(yaw)
+    rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    fins = [
+        Fin(fin.name, tuple((rotation @ fin.position).tolist()), fin.mounting_angle + yaw, fin.limits)
+        for fin in layout.fins
+    ]
+    turned = Layout("turned", tuple(fins))
+    targets = reachable(layout, 10)
+    rotated = np.concatenate([targets[:, :3] @ rotation.T, targets[:, 3:] @ rotation.T], axis=1)
+    straight = search.allocate_batch(layout, targets).command
+    again = search.allocate_batch(turned, rotated).command
+    assert search.normalization.error(Plant(turned).wrench(again), rotated).max() < GOOD
+    # Forces in the fins' own frames know nothing of where forward is: the old answer serves the new robot.
+    np.testing.assert_allclose(Plant(turned).wrench(straight), rotated, atol=1e-5)

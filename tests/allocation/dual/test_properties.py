@@ -1,0 +1,179 @@
+"""What holds for any layout, whichever fins it has: limits, symmetries, repeatability, no NaN."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from finlab.allocation import Allocation
+from finlab.allocation.modes import force_sizes, mode_signature, same_signature
+from finlab.layout import Layout, random_layout
+from finlab.physics import Plant
+from tests.any_robot import AnyRobot
+
+GOOD = 1e-5
+"""Normalized error below which an answer counts as exact here."""
+SEEDS = st.integers(0, 2**32 - 1)
+LIMITS = st.sampled_from(["nominal", "varied"])
+MIRROR = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
+"""What becomes of a wrench when y changes its sign."""
+
+
+def few(examples: int) -> settings:
+    """Always the same examples, and not many."""
+    return settings(derandomize=True, max_examples=examples, deadline=None, database=None)
+
+
+def bounds(layout: Layout) -> tuple[np.ndarray, np.ndarray]:
+    return (
+        layout.lower,
+        layout.upper,
+    )
+
+
+def inside(layout: Layout, command: np.ndarray) -> bool:
+    """To the last bit."""
+    lower, upper = bounds(layout)
+    return bool(np.isfinite(command).all() and (command >= lower).all() and (command <= upper).all())
+
+
+def drawn(seed: int, limits: str = "nominal") -> tuple[Layout, np.ndarray]:
+    """A layout and a wrench of one of its commands."""
+    rng = np.random.default_rng(seed)
+    layout = random_layout(rng, limits=limits)  # type: ignore[arg-type]
+    return layout, reachable(layout, rng)
+
+
+def reachable(layout: Layout, rng: np.random.Generator) -> np.ndarray:
+    lower, upper = bounds(layout)
+    return Plant(layout).wrench(lower + rng.uniform(size=lower.shape) * (upper - lower))
+
+
+def same_power(one: Allocation, other: Allocation, share: float) -> bool:
+    return abs(one.power - other.power) <= share * one.power
+
+
+def wrapped(angle: float) -> float:
+    return (angle + math.pi) % (2.0 * math.pi) - math.pi
+
+
+@few(20)
+@given(seed=SEEDS, limits=LIMITS, size=st.sampled_from([0.0, 1e-6, 0.5, 1.0, 5.0, 1e5]))
+def test_limits_hold_to_the_last_bit(search: AnyRobot, seed: int, limits: str, size: float) -> None:
+    layout, target = drawn(seed, limits)
+    assert inside(layout, search.allocate_batch(layout, [size * target, -size * target]).command[0])
+    first = search.allocate(layout, size * target)
+    again = search.allocate(layout, -target, previous=first.command)
+    assert inside(layout, first.command) and inside(layout, again.command)
+
+
+@few(5)
+@given(seed=SEEDS, limits=LIMITS, policy=st.sampled_from(["direction", "priority"]))
+def test_limits_hold_out_of_reach(search: AnyRobot, seed: int, limits: str, policy: str) -> None:
+    layout, target = drawn(seed, limits)
+    assert inside(layout, search.allocate(layout, 20.0 * target, policy=policy).command)
+
+
+@few(20)
+@given(seed=SEEDS)
+def test_the_order_of_the_fins_does_not_matter(search: AnyRobot, seed: int) -> None:
+    layout, target = drawn(seed)
+    order = np.random.default_rng(seed).permutation(layout.n_fins)
+    shuffled = replace(layout, actuators=tuple(layout.fins[i] for i in order))
+    one, other = search.allocate(layout, target), search.allocate(shuffled, target)
+    assert one.err_norm < GOOD and other.err_norm < GOOD
+    assert search.normalization.error(one.wrench, other.wrench) < GOOD
+    assert same_power(one, other, 0.002)
+
+
+@few(20)
+@given(seed=SEEDS, limits=LIMITS, yaw=st.floats(-math.pi, math.pi))
+def test_a_turned_robot_gets_the_turned_answer(search: AnyRobot, seed: int, limits: str, yaw: float) -> None:
+    layout, target = drawn(seed, limits)
+    c, s = math.cos(yaw), math.sin(yaw)
+    rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    fins = [
+        replace(
+            fin,
+            position=tuple((rotation @ fin.position).tolist()),
+            mounting_angle=wrapped(fin.mounting_angle + yaw),
+        )
+        for fin in layout.fins
+    ]
+    turned = replace(layout, actuators=tuple(fins))
+    one = search.allocate(layout, target)
+    other = search.allocate(turned, np.concatenate([rotation @ target[:3], rotation @ target[3:]]))
+    assert one.err_norm < GOOD and other.err_norm < GOOD
+    assert same_power(one, other, 0.002)
+
+
+@few(20)
+@given(seed=SEEDS, limits=LIMITS)
+def test_a_mirrored_robot_gets_the_mirrored_answer(search: AnyRobot, seed: int, limits: str) -> None:
+    layout, target = drawn(seed, limits)
+    # The thrust axis e_h is mirrored, so zero directions and with them the energy stay what they are.
+    fins = [
+        replace(
+            fin,
+            position=(fin.position[0], -fin.position[1], fin.position[2]),
+            mounting_angle=wrapped(math.pi - fin.mounting_angle),
+        )
+        for fin in layout.fins
+    ]
+    one = search.allocate(layout, target)
+    other = search.allocate(replace(layout, actuators=tuple(fins)), MIRROR * target)
+    assert one.err_norm < GOOD and other.err_norm < GOOD
+    assert same_power(one, other, 0.002)
+
+
+@few(15)
+@given(seed=SEEDS, limits=LIMITS, lost=st.integers(0, 4))
+def test_failed_is_removed(search: AnyRobot, seed: int, limits: str, lost: int) -> None:
+    layout, target = drawn(seed, limits)
+    name = layout.names[lost % layout.n_fins]
+    # What is nearest depends on the yardstick, which is that of the whole robot.
+    failed = search.allocate(layout, target, failed=[name], policy="direction")
+    removed = search.allocate(layout.without([name]), target, policy="direction")
+    alive = [i for i, fin in enumerate(layout.names) if fin != name]
+    np.testing.assert_allclose(failed.command[alive], removed.command, atol=1e-6)
+    assert np.isnan(failed.command[layout.index(name)]).all()
+    np.testing.assert_allclose(failed.wrench, removed.wrench, atol=1e-6)
+    assert failed.power == pytest.approx(removed.power)
+
+
+@few(10)
+@given(seed=SEEDS, draw=st.integers(0, 1000), scale=st.sampled_from([1.0, 10.0]))
+def test_the_same_seed_gives_the_same_answer(search: AnyRobot, seed: int, draw: int, scale: float) -> None:
+    layout, target = drawn(seed)
+    first = search.allocate(layout, scale * target, seed=draw, previous=None)
+    search.allocate(layout, -target, seed=draw + 1, previous=first.command)
+    again = search.allocate(layout, scale * target, seed=draw)
+    np.testing.assert_array_equal(again.command, first.command)
+
+
+@few(15)
+@given(seed=SEEDS)
+def test_a_small_change_of_the_layout_changes_the_answer_little(search: AnyRobot, seed: int) -> None:
+    layout, target = drawn(seed)
+    rng = np.random.default_rng(seed + 1)
+    fins = [
+        replace(
+            fin,
+            position=tuple((np.array(fin.position) + rng.uniform(-1e-5, 1e-5, 3)).tolist()),
+            mounting_angle=wrapped(fin.mounting_angle + float(rng.uniform(-1e-5, 1e-5))),
+        )
+        for fin in layout.fins
+    ]
+    one, other = (
+        search.allocate(layout, target),
+        search.allocate(replace(layout, actuators=tuple(fins)), target),
+    )
+    # A robot of few fins may have been moved away from the target.
+    moved = search.normalization.error(Plant(other.layout).wrench(one.command), target)
+    assert other.err_norm <= max(GOOD, moved) and same_power(one, other, 0.002)
+    ways = [mode_signature(a.command, force_sizes(a.layout, a.command)) for a in (one, other)]
+    if same_signature(*ways):
+        np.testing.assert_allclose(one.forces, other.forces, atol=0.05)

@@ -1,0 +1,166 @@
+"""From tick to tick: with the previous command, commands change no faster than the servos are meant to."""
+
+import math
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from finlab.layout import Layout, load_layout
+from finlab.layout.angles import wrapped
+from finlab.physics import Plant
+from tests.any_robot import AnyRobot
+
+TICKS = np.arange(150) * 0.1
+"""15 s at 10 Hz."""
+SLOW_PATH = np.array([0.98, 0.98, 1.4, 0.175, 0.175, 0.175])
+"""Amplitudes of the path [N, N m], about 0.7 standard deviations of what random commands give."""
+TARGET = [1.0, 0.5, 2.0, 0.0, 0.1, 0.1]
+STEP = np.array([0.1, 0.3, 0.5])
+"""What the usual servo's commands change by in a tick [rad, Hz, rad]."""
+
+
+class Drive(NamedTuple):
+    """Answers along a path."""
+
+    command: np.ndarray
+    """(T, n, 3)."""
+    cost: np.ndarray
+    """Power (T,) [W]."""
+    error: np.ndarray
+    """(T,), by the plant."""
+
+    @property
+    def change(self) -> np.ndarray:
+        """What each command changes by from tick to tick (T - 1, n, 3), the shorter way round."""
+        change = np.diff(self.command, axis=0)
+        change[..., 2] = wrapped(change[..., 2])
+        return np.abs(change)
+
+
+def drive(method: AnyRobot, layout: Layout, path: np.ndarray, *, bound: bool) -> Drive:
+    previous, results = None, []
+    for wrench in path:
+        result = method.allocate(layout, wrench, previous=previous)
+        previous = result.command if bound else None
+        results.append(result)
+    return Drive(
+        np.array([result.command for result in results]),
+        np.array([result.power for result in results]),
+        np.array([result.err_norm for result in results]),
+    )
+
+
+def smooth_path(seed: int) -> np.ndarray:
+    """Slow sines (T, 6) in all axes."""
+    rng = np.random.default_rng(seed)
+    return SLOW_PATH * np.sin(rng.uniform(0.15, 0.6, 6) * TICKS[:, None] + rng.uniform(0.0, 2.0 * math.pi, 6))
+
+
+@pytest.fixture(scope="module")
+def penta() -> Layout:
+    return load_layout("penta")
+
+
+@pytest.fixture(scope="module")
+def method() -> AnyRobot:
+    return AnyRobot()
+
+
+@pytest.fixture(scope="module")
+def free(method: AnyRobot, penta: Layout) -> Drive:
+    return drive(method, penta, smooth_path(0), bound=False)
+
+
+@pytest.fixture(scope="module")
+def steady(method: AnyRobot, penta: Layout) -> Drive:
+    return drive(method, penta, smooth_path(0), bound=True)
+
+
+def test_no_command_changes_faster_than_its_servo(free: Drive, steady: Drive) -> None:
+    assert (steady.change <= STEP + 1e-9).all()
+    assert (free.change.max((0, 1)) > STEP)[2]  # left to themselves, fins turn by more
+
+
+def test_the_path_is_still_tracked_at_about_the_same_cost(free: Drive, steady: Drive) -> None:
+    assert free.error.max() < 1e-5
+    assert steady.error.max() < 0.02 and np.median(steady.error) < 1e-6
+    assert steady.cost.mean() < 1.002 * free.cost.mean()
+
+
+def test_rates_are_those_of_each_fin(search: AnyRobot, penta: Layout) -> None:
+    first = replace(penta.fins[0], servo=replace(penta.fins[0].servo, frequency_rate=0.5, direction_rate=1.0))
+    other = replace(penta, actuators=(first, *penta.fins[1:]))
+    ride = drive(search, other, smooth_path(1)[:60], bound=True)
+    assert (ride.change[:, 0] <= np.array([0.1, 0.05, 0.1]) + 1e-9).all()
+    assert (ride.change[:, 1:, 2] > 0.1).any()
+
+
+def test_ticks_may_be_longer(penta: Layout) -> None:
+    slow = AnyRobot(period_s=0.4)
+    before = slow.allocate(penta, TARGET).command
+    after = slow.allocate(penta, -np.array(TARGET), previous=before).command
+    change = np.abs(after - before)
+    assert np.abs(wrapped(change[:, 2])).max() == pytest.approx(2.0)
+    assert change[:, 1].max() <= 1.2 + 1e-9
+
+
+def test_commands_stay_inside_the_limits_across_the_seam(steady: Drive, penta: Layout) -> None:
+    assert ((steady.command >= penta.lower) & (steady.command <= penta.upper)).all()
+    jumps = np.abs(np.diff(steady.command[..., 2], axis=0)) > math.pi
+    assert jumps.any()  # fins do pass the seam
+
+
+def test_a_fin_follows_a_turning_force_over_the_seam(search: AnyRobot) -> None:
+    layout = load_layout("pair")
+    previous = None
+    for angle in np.linspace(0.0, 4.0 * math.pi, 80):
+        command = np.column_stack([np.full(2, 0.4), np.full(2, 1.5), np.full(2, wrapped(angle))])
+        result = search.allocate(layout, Plant(layout).wrench(command), previous=previous)
+        assert result.err_norm < 1e-5
+        assert ((result.command >= layout.lower) & (result.command <= layout.upper)).all()
+        previous = result.command
+
+
+def test_arcs_are_kept(search: AnyRobot) -> None:
+    layout = load_layout("restricted")
+    ride = drive(search, layout, smooth_path(1)[:60], bound=True)
+    assert ((ride.command >= layout.lower) & (ride.command <= layout.upper)).all()
+
+
+def test_a_previous_command_that_is_the_answer_stays(method: AnyRobot, penta: Layout, free: Drive) -> None:
+    plant = Plant(penta)
+    for tick in (0, 50, 120):
+        before = free.command[tick]
+        result = method.allocate(penta, smooth_path(0)[tick], previous=before)
+        np.testing.assert_allclose(result.forces, plant.fin_forces(before), atol=1e-3)
+        again = method.allocate(penta, smooth_path(0)[tick], previous=result.command)
+        np.testing.assert_allclose(again.forces, result.forces, atol=1e-3)
+        assert result.power < 1.005 * free.cost[tick]
+
+
+def test_the_first_tick_knows_no_past(free: Drive, steady: Drive) -> None:
+    np.testing.assert_array_equal(steady.command[0], free.command[0])
+
+
+def test_a_failed_fin_comes_back(search: AnyRobot, penta: Layout) -> None:
+    lost = search.allocate(penta, TARGET, failed=["port_back"])
+    still = search.allocate(penta, TARGET, failed=["port_back"], previous=lost.command)
+    assert np.isnan(still.command[2]).all() and np.isfinite(still.command[[0, 1, 3, 4]]).all()
+    back = search.allocate(penta, TARGET, previous=lost.command)
+    assert np.isfinite(back.command).all() and back.err_norm < 1e-5
+    known = [0, 1, 3, 4]
+    assert (np.abs(back.command - lost.command)[known] <= STEP + 1e-9).all()
+
+
+def test_a_target_that_needs_a_turn_is_reached_tick_by_tick(method: AnyRobot, penta: Layout) -> None:
+    """From rise to dive all fins turn by half a circle: seven ticks, in which less and less is missing."""
+    target = np.array([0.0, 0.0, 12.0, 0.0, 0.0, 0.0])
+    previous, missing = method.allocate(penta, target).command, []
+    for _ in range(12):
+        result = method.allocate(penta, -target, previous=previous)
+        previous = result.command
+        missing.append(result.err_norm)
+    assert missing[0] > 1.0 and (np.diff(missing) <= 1e-9).all()
+    assert missing[-1] < 1e-5
