@@ -96,7 +96,7 @@ def test_turning_the_robot_changes_nothing(layout: Layout) -> None:
         replace(
             fin,
             position=tuple((rotation @ fin.position).tolist()),
-            mounting_angle=float(np.angle(np.exp(1j * (fin.mounting_angle + yaw)))),
+            mounting_angle=float(np.angle(np.exp(1j * (fin.shaft_azimuth + yaw)))),
         )
         for fin in layout.fins
     )

@@ -58,7 +58,7 @@ def test_a_batch_costs_what_single_calls_do(shipped: AnyRobot, layout_a: Layout)
     together = shipped.allocate_batch(layout_a, targets)
     np.testing.assert_allclose(Plant(layout_a).wrench(together.command), targets, atol=1e-4)
     alone = [shipped.allocate(layout_a, target).effort for target in targets]
-    np.testing.assert_allclose(together.effort, alone, rtol=0.01)
+    np.testing.assert_allclose(np.array(together.effort), np.array(alone), rtol=0.01)
 
 
 def method_of(robot: AnyRobot, layout: Layout) -> tuple[Mdn, np.ndarray]:
@@ -71,7 +71,7 @@ def method_of(robot: AnyRobot, layout: Layout) -> tuple[Mdn, np.ndarray]:
 def weights(robot: AnyRobot, layout: Layout) -> np.ndarray:
     """Of the mixture's components, for `TARGET`."""
     method, target = method_of(robot, layout)
-    return method.mixture(see(method.robot.view, target)).complex_parts()[0][0]
+    return np.asarray(method.mixture(see(method.robot.view, target)).complex_parts()[0][0])
 
 
 def test_candidates_keep_the_name_of_their_component(shipped: AnyRobot, layout_a: Layout) -> None:
