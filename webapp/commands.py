@@ -9,7 +9,7 @@ import viser
 from webapp.page import Page
 from webapp.session.lessons import LESSONS
 from webapp.session.looking import TASKS
-from webapp.session.state import AXIS_WORDS, OBJECTIVES
+from webapp.session.state import AXIS_WORDS, LEAST
 from webapp.session.targets import PRESETS
 
 CTRL, CTRL_SHIFT, ALT = "cmd/ctrl", "cmd/ctrl+shift", "alt"
@@ -71,10 +71,7 @@ def commands(page: Page) -> list[Command]:
             Command("Wrench", f"Ask for {word} alone", partial(session.set_only_axis, axis))
             for axis, word in enumerate(AXIS_WORDS)
         ),
-        *(
-            Command("Wrench", f"Keep least: {word}", partial(session.set_setting, "objective", word))
-            for word in OBJECTIVES
-        ),
+        *(Command("Wrench", f"Keep {word} least", partial(session.keep_least, word)) for word in LEAST),
         Command("Wrench", "Compare the methods", compare),
         Command("Wrench", "Stop the sweep", page.sweep.stop),
         Command("Swim", "Swim: pause or go on", swim_on, "B"),

@@ -53,7 +53,7 @@
 
   // How fins flap: amplitude, frequency and direction of each; null for one that hangs limp.
 
-  const flaps = () => !frozen && speed > 0 && fins.some(Boolean) && viewer()?.nodeRefFromName['/robot']?.visible !== false;
+  const flaps = () => !frozen && speed > 0 && fins.some((fin) => fin && fin[0] * fin[1] > 0) && viewer()?.nodeRefFromName['/robot']?.visible !== false;
 
   function pose() {
     const view = viewer();

@@ -22,7 +22,7 @@ from webapp.markup.snippets import command_line
 from webapp.markup.verdict import verdict_sentence
 from webapp.session import Session, files
 from webapp.session.session_files import restore, to_dict
-from webapp.session.state import OBJECTIVES, State
+from webapp.session.state import LEAST, State
 from webapp.session.targets import PRESETS
 from webapp.tasks.solver import Solver
 
@@ -54,8 +54,8 @@ def tabled(tmp_path: Path) -> Layout:
 @pytest.mark.parametrize("name", FIN_ROBOTS)
 def test_every_shipped_layout_is_answered_exactly(name: str) -> None:
     layout = load_layout(name)
-    for objective in OBJECTIVES:
-        answer = SOLVER.solve(State(layout, target=reachable(layout), objective=objective))
+    for method in LEAST.values():
+        answer = SOLVER.solve(State(layout, target=reachable(layout), method=method))
         assert answer.err_norm < 1e-4 and answer.power > 0.0
         assert answer.notes == () and verdict_sentence(answer, True) == "Exact"
 
@@ -78,7 +78,7 @@ def test_a_table_fin_goes_through_the_whole_app(
     session.open_layout(files.read_layout(*files.layout_file(tabled)).layout)
     for axis, value in enumerate(reachable(tabled)):
         session.set_target(axis, round(value, 4))
-    reply = SOLVER.reply(session.state)
+    reply = SOLVER.reply(replace(session.state, method="mdn"))
     assert reply.answer.err_norm < 1e-4 and reply.answer.notes == () and len(SOLVER.modes(reply).shown) > 0
     again = Session(load_layout("ucat"))
     restore(again, json.loads(json.dumps(to_dict(session))))
@@ -90,7 +90,7 @@ def test_a_table_fin_goes_through_the_whole_app(
     while session.history.redo_name is not None:
         session.redo()
     assert session.state == again.state
-    allocator = SOLVER.shipped(tabled, "dual", "power")
+    allocator = SOLVER.shipped(tabled, "dual")
     graph = graph_bytes(build_graph(allocator))
     with pytest.raises(LayoutError, match=r"fin\.csv', which did not come along"):
         files.read_layout("tabled.graph.json", graph)

@@ -13,14 +13,13 @@ from finlab.allocation.allocation import Allocation
 from finlab.assets import shipped_checkpoints, shipped_layouts
 from finlab.layout import load_layout
 from tests.webapp.loops import page_of
-from tests.webapp.stand_in import load_stand_in
+from tests.webapp.stand_in import StandIn, load_stand_in
 from webapp.markup.comparison import comparison_table
 from webapp.markup.corner import corner
 from webapp.markup.mode_plot import mode_plot
 from webapp.markup.snippets import command_line, python_lines
 from webapp.markup.words import source_words, three_digits
-from webapp.session.state import COMPARED, OBJECTIVES, State, knows_objective
-from webapp.session.swim_plan import SwimSettings
+from webapp.session.state import COMPARED, LEAST, State
 from webapp.session.targets import PRESETS
 from webapp.tasks.background import Worker
 from webapp.tasks.comparison import Comparison
@@ -57,19 +56,16 @@ def test_a_method_that_fails_keeps_nobody_else_waiting() -> None:
 
 
 def test_the_table_tells_what_is_kept_least() -> None:
-    answers = {
-        method: Allocator.of_choice(UCAT, load_stand_in(method)).allocate(PRESETS["Turn"])
-        for method in ("mdn", "qp")
-    }
-    answers["dual"] = Allocator(UCAT).allocate(PRESETS["Turn"])
+    answers = {method: Allocator(UCAT, method).allocate(PRESETS["Turn"]) for method in ("qp", "dual")}
+    answers["mdn"] = Allocator(UCAT, StandIn).allocate(PRESETS["Turn"])
     comparison: Any = SimpleNamespace(state=State(UCAT), answers=answers)
     table = comparison_table(comparison, False)
     assert three_digits(answers["dual"].power) in table and three_digits(answers["qp"].effort) in table
-    assert "Kept least: power" in table and "mdn keep" in table, "this stand-in cannot be asked"
+    assert "<td>mdn</td><td>effort</td>" in table and "<td>dual</td><td>watts</td>" in table
 
 
 @pytest.mark.skipif("default" not in shipped_checkpoints(), reason="no trained checkpoint in the tree")
-def test_each_mode_of_mdn_tells_its_components_and_search_has_no_samples() -> None:
+def test_each_mode_of_mdn_tells_its_components_and_dual_has_one_answer() -> None:
     solver, state = Solver(), State(UCAT, target=PRESETS["Turn"], method="mdn")
     reply = solver.reply(state)
     samples, modes = reply.answer.samples, solver.modes(reply)
@@ -77,40 +73,40 @@ def test_each_mode_of_mdn_tells_its_components_and_search_has_no_samples() -> No
     assert modes.shown[0].mode.sources[0].startswith("component "), "the answer comes from the network"
     led = {samples.source[k] for k in np.flatnonzero(modes.of_samples == 0)}
     assert led and led <= set(modes.shown[0].mode.sources)
-    dear = replace(samples, power=np.full(len(samples), 1e4))
+    dear = replace(samples, effort=np.full(len(samples), 1e4))
     far = mode_plot(reply.answer.with_candidates(reply.answer.candidates, dear), modes, 0, 200)
     assert "1e+04" not in far and "e+" not in far, "samples that are far too dear stand at the edge"
-    searched = solver.reply(replace(state, method="dual"))
-    found = solver.modes(searched)
-    assert searched.answer.samples is None and found.of_samples is None
-    assert not any(s.startswith("component") for mode, _ in found.shown for s in mode.sources)
-    assert {source_words(mode.sources).split(" ")[0] for mode, _ in found.shown} <= {"found", "from"}
+    one = solver.reply(replace(state, method="dual"))
+    assert one.answer.samples is None and solver.modes(one).shown == ()
+    assert {source_words(mode.sources).split(" ")[0] for mode, _ in modes.shown} <= {"from"}
 
 
 def test_what_a_page_tries_out_stays_with_its_own_answers() -> None:
     solver, target = Solver(load=load_stand_in), PRESETS["Turn"]
-    shipped = solver.shipped(UCAT, "mdn", "power")
+    shipped = solver.shipped(UCAT, "mdn")
     state = State(UCAT, target=target, method="mdn", n_candidates=8, temperature=1.5)
-    few = vars(solver.allocator(state).settings)
-    assert few["n_candidates"] == 8 and few["temperature"] == 1.5
-    assert solver.shipped(UCAT, "mdn", "power") is shipped and vars(shipped.settings)["n_candidates"] == 64
-    usual = solver.allocator(replace(state, n_candidates=None, temperature=None))
-    assert usual.settings == shipped.settings
-    other = solver.allocator(State(UCAT, target=target, method="sqp", n_candidates=8))
-    assert other.settings == solver.shipped(UCAT, "sqp", "power").settings
+    few = solver.allocator(state)
+    assert vars(few.settings)["n_candidates"] == 8 and vars(few.settings)["temperature"] == 1.5
+    assert solver.shipped(UCAT, "mdn") is shipped and vars(shipped.settings)["n_candidates"] == 64
+    assert solver.allocator(replace(state, n_candidates=None, temperature=None)) is shipped
+    assert solver.allocator(replace(state, method="sqp")) is solver.shipped(UCAT, "sqp")
+
+
+def test_an_allocator_is_kept_until_its_robot_changes() -> None:
+    solver, state = Solver(), State(UCAT, target=PRESETS["Turn"])
+    first = solver.allocator(state)
+    assert solver.allocator(state.with_target(0, 2.0).with_failure_toggled(UCAT.names[0])) is first
+    moved = UCAT.replace_actuator(UCAT.names[0], position=(0.2, -0.1, 0.0))
+    assert solver.allocator(state.with_layout(moved)) is not first
 
 
 def test_every_answer_keeps_least_what_is_asked() -> None:
-    solver, state = Solver(), State(UCAT, target=PRESETS["Turn"], method="sqp")
-    power, effort = (solver.solve(replace(state, objective=name)) for name in OBJECTIVES)
-    assert power.power < effort.power and power.effort > effort.effort
-    assert [answer.settings["objective"] for answer in (power, effort)] == ["power", "effort"]
+    solver, state = Solver(), State(UCAT, target=PRESETS["Turn"])
+    power, effort = (solver.solve(replace(state, method=method)) for method in LEAST.values())
+    assert power.power < effort.power
+    assert power.effort is not None and effort.effort is not None and power.effort > effort.effort
     assert "least power" in corner(state, "", power, False, None)
     assert "least effort" in corner(state, "", effort, False, None)
-    plan = SwimSettings().plan(replace(state, objective="effort"), None)
-    assert plan.objective == "effort" and state.drawing == {} and not knows_objective("paper")
-    assert "--objective effort" in command_line(replace(state, objective="effort"))
-    assert "--objective" not in command_line(replace(state, method="paper", objective="effort"))
-    assert "finlab.Allocator(layout, 'mdn', objective='effort')" in python_lines(
-        replace(state, method="mdn", objective="effort")
-    )
+    assert mode_plot(power, listed_modes(known_modes(power), None), 0, 200) == ""
+    assert "--method mdn" in command_line(replace(state, method="mdn"))
+    assert "finlab.Allocator(layout, 'mdn')" in python_lines(replace(state, method="mdn"))

@@ -6,10 +6,9 @@ from html import unescape
 
 import pytest
 
-from finlab.allocation import Allocation
+from finlab.allocation import Allocation, Allocator
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
-from tests.any_robot import AnyRobot
 from tests.webapp.hands import turn_fin
 from webapp.markup.guide_cards import lesson_card
 from webapp.session import Session
@@ -18,10 +17,8 @@ from webapp.session.state import State
 
 
 def _answer(state: State) -> Allocation:
-    allocator = AnyRobot(state.method)
-    if "objective" in allocator.choice.kind.option_names():
-        allocator = allocator.with_settings(objective=state.objective)
-    return allocator.allocate(state.layout, state.target, failed=state.failed, policy=state.policy)
+    allocator = Allocator(state.layout, state.method)
+    return allocator.allocate(state.target, failed=state.failed, policy=state.policy)
 
 
 def _turn_a_shaft(session: Session) -> None:
@@ -31,7 +28,7 @@ def _turn_a_shaft(session: Session) -> None:
 
 SOLVED: dict[str, Callable[[Session], object]] = {
     "two-ways": lambda session: session.show_mode(1),
-    "watts-or-effort": lambda session: session.set_setting("objective", "power"),
+    "watts-or-effort": lambda session: session.keep_least("watts"),
     "lost-fin": lambda session: session.toggle_failure("front_left"),
     "no-yaw": _turn_a_shaft,
     "out-of-reach": lambda session: session.set_setting("policy", "direction"),

@@ -1,7 +1,6 @@
 """What the app says about an answer, and what it writes into files."""
 
 import re
-from copy import copy
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -9,14 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from finlab.allocation import Allocator
+from finlab.allocation import Allocation, Allocator
 from finlab.analysis import score_card
 from finlab.analysis.score_card import quick_check
 from finlab.assets import shipped_layouts
 from finlab.errors import LayoutError
 from finlab.layout import FinModelSpec, load_layout
 from finlab.vehicle.body import GRAVITY
-from tests.any_robot import AnyRobot
 from tests.webapp.stand_in import StandIn
 from webapp.markup.comparison import comparison_table
 from webapp.markup.corner import corner
@@ -25,6 +23,7 @@ from webapp.markup.verdict import (
     WORKING,
     Verdict,
     answer_sentence,
+    bound_sentence,
     rest_sentence,
     verdict_of,
     verdict_sentence,
@@ -36,20 +35,29 @@ from webapp.session.state import AXIS_WORDS, State
 from webapp.session.targets import PRESETS, axis_reach, full_thrust
 from webapp.session.tour import STEPS
 from webapp.tasks.analyst import Question, find
-from webapp.tasks.solver import Solver, is_within
+from webapp.tasks.solver import Solver
 from webapp.theme import DELIVERED, UNLEARNED, css
 
 
+def delivering(answer: Allocation, wrench: Any) -> Allocation:
+    """The same answer with another delivered wrench."""
+    other = replace(answer)
+    vars(other)["wrench"] = wrench
+    return other
+
+
 def test_reachable_and_not() -> None:
-    layout, allocator = load_layout(shipped_layouts()["ucat"]), AnyRobot(StandIn)
-    easy = allocator.allocate(layout, PRESETS["Turn"])
+    layout = load_layout("ucat")
+    allocator = Allocator(layout, StandIn)
+    easy = allocator.allocate(PRESETS["Turn"])
     assert easy.reachable and verdict_sentence(easy, True) == "Exact"
     assert rest_sentence(easy) == "Nothing is left undone."
-    hard = allocator.allocate(layout, [0, 0, 60, 0, 0, 0])
+    hard = allocator.allocate([0, 0, 60, 0, 0, 0])
     assert not hard.reachable
     told = verdict_sentence(hard, False)
     assert told.startswith("Out of reach: ") and "of the heave force" in told and "at the limit" in told
-    assert not is_within(layout, (0, 0, 60, 0, 0, 0), ()) and is_within(layout, PRESETS["Turn"], ())
+    state = State(layout, target=(0.0, 0.0, 60.0, 0.0, 0.0, 0.0), method="sqp")
+    assert not Solver().reply(state).in_reach
     assert "N of heave" in rest_sentence(hard) and rest_sentence(hard).endswith("left undone.")
 
 
@@ -57,14 +65,13 @@ def test_reachable_and_not() -> None:
 @pytest.mark.parametrize("target", [PRESETS["Turn"], (0.0, 0.0, 2.0, 0.0, 0.0, 0.1), (0.0,) * 6])
 def test_all_that_is_said_of_an_answer_agrees(share: float, target: tuple[float, ...]) -> None:
     layout = load_layout("ucat")
-    exact = AnyRobot(StandIn).allocate(layout, target)
+    exact = Allocator(layout, StandIn).allocate(target)
     wrench = np.array(target)
     wrench[5] *= share
     wrench[4] += 1e-2 * (share < 1.0)
     error = float(np.linalg.norm((wrench - target) / exact.scale))
-    answer = copy(exact)
-    vars(answer).update(wrench=wrench, err_norm=error)
-    state = State(layout, target=tuple(target), objective="effort")  # type: ignore[arg-type]
+    answer = delivering(exact, wrench)
+    state = State(layout, target=tuple(target))  # type: ignore[arg-type]
     said, verdict = str(answer_sentence(state, answer, False)), verdict_sentence(answer, True)
     assert ("Nothing is left undone" in said) == (verdict == "Exact") == (error <= 1e-3)
     assert "100 %" not in said + verdict
@@ -75,37 +82,37 @@ def test_all_that_is_said_of_an_answer_agrees(share: float, target: tuple[float,
 
 def test_no_verdict_stands_beside_a_new_question() -> None:
     layout = load_layout("ucat")
-    answer = AnyRobot(StandIn).allocate(layout, PRESETS["Turn"])
+    answer = Allocator(layout, StandIn).allocate(PRESETS["Turn"])
     state = State(layout, target=(0.0, 0.0, 1.0, 0.0, 0.0, 0.0))
     shown = corner(state, "", answer, True, None, in_reach=True) + answer_sentence(state, answer, True)
     assert shown.count(WORKING) == 2 and "Exact" not in shown and "undone" not in shown
     assert css(DELIVERED) not in shown
 
 
-def test_a_method_that_keeps_least_something_else_says_so() -> None:
+def test_how_far_the_watts_may_be_from_the_least_is_told() -> None:
     layout = load_layout("ucat")
-    answer = AnyRobot(StandIn).allocate(layout, PRESETS["Turn"])
-    for objective, told in (("power", True), ("effort", False)):
-        state = State(layout, target=PRESETS["Turn"], method="mdn", objective=objective)
-        assert ("mdn keeps effort least, not power" in answer_sentence(state, answer, False)) == told
+    answer = Allocator(layout).allocate(PRESETS["Turn"])
+    state = State(layout, target=PRESETS["Turn"])
+    assert "proved least" in answer_sentence(state, answer, False)
+    dearer = replace(answer, bound=answer.power / 1.25)
+    assert "at most 25 % above the least" in answer_sentence(state, dearer, False)
+    assert bound_sentence(Allocator(layout, StandIn).allocate(PRESETS["Turn"])) == ""
 
 
-def test_fins_that_were_not_learned_are_told_in_words_of_their_own(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_fins_that_were_not_learned_are_told_in_words_of_their_own() -> None:
     layout = load_layout("ucat")
-    monkeypatch.setattr(StandIn, "fin_model", layout.fins[0].model)
-    allocator = AnyRobot(StandIn)
+    learned = type("Learned", (StandIn,), {"fin_model": layout.fins[0].model})
     other = replace(layout.fins[2], model=FinModelSpec("lighthill"))
     strange = replace(layout, actuators=(*layout.fins[:2], other, layout.fins[3]))
+    allocator = Allocator(strange, learned)
     for wrench in (PRESETS["Turn"], [0, 0, 60, 0, 0, 0]):  # even where the numbers happen to fit
-        answer = allocator.allocate(strange, wrench)
+        answer = allocator.allocate(wrench)
         assert verdict_sentence(answer, True) == "Not learned: fin 3. Choose another method"
         shown = corner(State(strange), "", answer, False, None)
         assert css(UNLEARNED) in shown and css(DELIVERED) not in shown and "reach" not in shown
         comparison: Any = SimpleNamespace(state=State(strange), answers={"mdn": answer})
         assert "Not learned: fin 3" in comparison_table(comparison, False)
-    without = allocator.allocate(strange, PRESETS["Turn"], failed=[other.name])
+    without = allocator.allocate(PRESETS["Turn"], failed=[other.name])
     assert verdict_of(without, True) is Verdict.EXACT
 
 
@@ -113,12 +120,12 @@ def test_what_a_method_cannot_is_not_what_the_fins_cannot() -> None:
     """A method that shares out a linear model misses what the others give exactly."""
     layout = load_layout("mixed")
     answer = Allocator(layout, "qp").allocate(PRESETS["Zero"])
-    assert not answer.reachable and is_within(layout, PRESETS["Zero"], ())
+    assert not answer.reachable
     state = State(layout, target=PRESETS["Zero"], method="qp")
     assert Solver().reply(state).in_reach
     assert verdict_of(answer, True) is Verdict.APPROXIMATE
     told = verdict_sentence(answer, True)
-    assert told.startswith("Approximate: ") and told.endswith("; the fins can, qp does not")
+    assert told.startswith("Approximate: ") and told.endswith("; the robot can, qp does not")
     assert len({verdict.color for verdict in Verdict}) == len({verdict.value for verdict in Verdict}) == 4
 
 
@@ -126,12 +133,12 @@ def test_robot_without_yaw_says_so() -> None:
     layout = load_layout(shipped_layouts()["no_yaw"])
     sentence = authority_sentence(layout, (), axis_reach(layout))
     assert sentence is not None and "cannot" in sentence and "yaw" in sentence
-    ucat = load_layout(shipped_layouts()["ucat"])
+    ucat = load_layout("ucat")
     assert authority_sentence(ucat, (), axis_reach(ucat)) is None
 
 
 def test_reach_is_a_bound_that_is_met_on_heave() -> None:
-    layout = load_layout(shipped_layouts()["ucat"])
+    layout = load_layout("ucat")
     assert axis_reach(layout)[2] == pytest.approx(full_thrust(layout).sum())
     assert axis_reach(layout, ("front_left",))[2] == pytest.approx(full_thrust(layout)[1:].sum())
 
@@ -144,7 +151,7 @@ def test_arrow_scale_fits_and_rests() -> None:
 
 
 def test_layout_files_go_out_and_come_back() -> None:
-    layout = load_layout(shipped_layouts()["ucat"])
+    layout = load_layout("ucat")
     assert files.read_layout("x.yaml", files.layout_file(layout)[1]).layout == layout
 
 
@@ -165,7 +172,7 @@ def test_bad_uploads_are_refused_by_name(name: str, content: bytes, said: str) -
 
 
 def test_fins_in_the_way_are_told() -> None:
-    layout = load_layout(shipped_layouts()["ucat"])
+    layout = load_layout("ucat")
     assert warnings(layout) == ()
     crowded = layout.replace_actuator("front_left", position=layout.fins[0].position)
     assert "may touch" in warnings(crowded)[0]
@@ -214,7 +221,7 @@ def test_every_stop_of_the_tour_stands() -> None:
 
 
 def test_the_best_mode_is_shown_again_after_a_tour() -> None:
-    session = Session(load_layout(shipped_layouts()["ucat"]))
+    session = Session(load_layout("ucat"))
     for leave in (session.end_tour, session.start_over):
         session.next_stop()
         session.next_stop()

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.policy import AXES
 from finlab.arrays import Array
+from finlab.layout import Actuator, Fin, Thruster
 from webapp.markup.html import html
 from webapp.markup.words import damage_words, saturated
 from webapp.session.state import AXIS_WORDS, State
@@ -16,10 +17,15 @@ from webapp.session.targets import nice_limit
 from webapp.theme import DEAD, css, fin_color, ink
 
 HEADER = Markup(
-    "<tr><th>fin</th><th title='half amplitude'>A [°]</th><th title='frequency'>f [Hz]</th>"
+    "<tr><th>{}</th><th title='half amplitude'>A [°]</th><th title='frequency'>f [Hz]</th>"
     "<th title='zero direction'>dir. [°]</th><th>force [N]</th>"
     "<th title='share of the full thrust'>load</th></tr>"
 )
+PLAIN_HEADER = Markup(
+    "<tr><th>{}</th><th colspan='3'>actuator</th><th>force [N]</th>"
+    "<th title='share of the full thrust'>load</th></tr>"
+)
+"""Of a robot without fins."""
 
 
 def wrench_bars(asked: ArrayLike, given: ArrayLike | None, sentence: str) -> str:
@@ -103,7 +109,7 @@ def fin_table(state: State, allocation: Allocation | None, full: Array, selected
     """
     limits = None if allocation is None else saturated(allocation)
     rows = []
-    for i, fin in enumerate(state.layout.fins):
+    for i, fin in enumerate(state.layout.actuators):
         failed = allocation is not None and not np.isfinite(allocation.command[i, 0])
         kind = " ".join(["dead"] * failed + ["chosen"] * (fin.name == selected))
         first = html("{}<span class='name' title='{}'>{}</span>", swatch(i, failed), fin.name, fin.name)
@@ -115,18 +121,32 @@ def fin_table(state: State, allocation: Allocation | None, full: Array, selected
             cells = Markup("<td colspan='5'>failed</td>")
         else:
             force = float(np.linalg.norm(allocation.forces[i]))
-            cells = _cells(allocation.command[i], limits[i], force, full[i], i)
+            cells = _cells(fin, allocation.command[i], limits[i], force, full[i], i)
         rows.append(html("<tr class='{}'><td>{}</td>{}</tr>", kind, first, cells))
-    return html("<div class='fl'><table class='fins'>{}{}</table></div>", HEADER, rows)
+    header = html(HEADER if state.layout.fins else PLAIN_HEADER, "fin" if state.layout.is_of_fins else "")
+    return html("<div class='fl'><table class='fins'>{}{}</table></div>", header, rows)
 
 
-def _cells(command: Array, limits: NDArray[np.bool_], force: float, full: float, index: int) -> str:
+def _cells(
+    part: Actuator, command: Array, limits: NDArray[np.bool_], force: float, full: float, index: int
+) -> str:
     amplitude, frequency, direction = command
-    degrees = f"{round(math.degrees(direction)):+d}".replace("-", "−")
     share = min(force / max(full, 1e-9), 1.0)
     bar = f"width:{100 * share:.0f}%;background:{css(fin_color(index))}"
     meter = html("<span class='meter'><i style='{}'></i></span>", bar)
     at_limit = ["full" if one else "" for one in limits]
+    if not isinstance(part, Fin):
+        along = command[0] if isinstance(part, Thruster) else force
+        told = part.type if isinstance(part, Thruster) else f"{part.type}, {_degrees(command[0])}°"
+        words = html("<td colspan='3' class='words'>{}</td>", told)
+        given = html(
+            "<td class='{}'>{}</td>", "full" if limits.any() else "", f"{along:.2f}".replace("-", "−")
+        )
+        return html("{}{}<td>{}</td>", words, given, meter)
     bounded = "<td class='{}'>{:.1f}</td><td class='{}'>{:.2f}</td>"
     first = html(bounded, at_limit[0], math.degrees(amplitude), at_limit[1], frequency)
-    return html("{}<td>{}</td><td>{:.2f}</td><td>{}</td>", first, degrees, force, meter)
+    return html("{}<td>{}</td><td>{:.2f}</td><td>{}</td>", first, _degrees(direction), force, meter)
+
+
+def _degrees(angle: float) -> str:
+    return f"{round(math.degrees(angle)):+d}".replace("-", "−")

@@ -6,8 +6,8 @@ from finlab.allocation.allocation import Allocation
 from finlab.allocation.evaluate import REACHED
 from webapp.markup.html import html
 from webapp.markup.verdict import verdict_of
-from webapp.markup.words import error_digits, listed, objective_of, three_digits, unlearned_sentence
-from webapp.session.state import COMPARED
+from webapp.markup.words import error_digits, three_digits, unlearned_sentence
+from webapp.session.state import COMPARED, least_of
 from webapp.tasks.comparison import Comparison
 from webapp.theme import NEARLY, css
 
@@ -19,7 +19,7 @@ def comparison_table(comparison: Comparison, stale: bool) -> str:
             "<div class='fl dim'>Several methods on the same wrench: error, power, effort, time side by side."
             "</div>"
         )
-    rows, others = [], []
+    rows = []
     in_reach = any(
         isinstance(answer, Allocation) and answer.reachable for answer in comparison.answers.values()
     )
@@ -35,22 +35,17 @@ def comparison_table(comparison: Comparison, stale: bool) -> str:
             cells = error + Markup().join(html("<td>{}</td>", three_digits(value)) for value in figures)
         else:
             cells = html("<td colspan='4' class='words dim'>{}</td>", "…" if answer is None else answer)
-        if isinstance(answer, Allocation) and objective_of(answer) != comparison.state.objective:
-            others.append(method)
-        rows.append(html("<tr><td>{}</td>{}</tr>", method, cells))
+        rows.append(html("<tr><td>{}</td><td>{}</td>{}</tr>", method, least_of(method), cells))
     header = Markup(
-        "<tr><th>method</th><th>error</th><th>power [W]</th><th>effort</th><th>time [ms]</th></tr>"
+        "<tr><th>method</th><th>least</th><th>error</th><th>power [W]</th><th>effort</th><th>time [ms]</th>"
+        "</tr>"
     )
-    kept = f"Kept least: {comparison.state.objective}"
-    if others:
-        kept += f"; {listed(others)} keep{'s' * (len(others) == 1)} effort least whatever is asked"
     said = html(
         "<div class='said'><span class='given'>Green</span>: exact, an error of at most {}. <span "
         "style='color:{}'>Ochre</span>: approximate, another method is exact. <span "
-        "class='missing'>Orange</span>: out of reach of all. {}.</div>",
+        "class='missing'>Orange</span>: out of reach of all.</div>",
         REACHED,
         css(NEARLY),
-        kept,
     )
     note = (
         Markup("<div class='missing'>The question has changed since; compare again.</div>") if stale else ""

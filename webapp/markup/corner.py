@@ -10,9 +10,9 @@ from finlab.allocation.policy import AXES
 from webapp.markup.html import html
 from webapp.markup.swim_card import pace_words, robots
 from webapp.markup.verdict import WORKING, verdict_of, verdict_sentence
-from webapp.markup.words import error_digits, objective_of, three_digits
+from webapp.markup.words import error_digits, parts_word, three_digits
 from webapp.scene.wrench_nodes import set_scale
-from webapp.session.state import AXIS_UNITS, State
+from webapp.session.state import AXIS_UNITS, State, least_of
 from webapp.tasks.analyst import Findings
 from webapp.tasks.moment import ERROR
 from webapp.tasks.swimming import Swimming
@@ -97,7 +97,7 @@ def corner(
         least: whether it is the answer itself, not another way to do the same.
         in_reach: whether any command of the working fins gives what is asked.
     """
-    fins = f"{len(state.healthy)} of {state.layout.n_fins} fins"
+    fins = f"{len(state.healthy)} of {state.layout.n} {parts_word(state.layout)}"
     parts = [html("<span class='aside'>{}</span>", fins)]
     if error is not None:
         parts.append(html("<span class='missing'>{}</span>", error))
@@ -118,8 +118,11 @@ def _figures(allocation: Allocation, least: bool, in_reach: bool) -> list[str]:
         for axis, value, unit in zip(AXES, allocation.unallocated, AXIS_UNITS, strict=True)
     ).replace("-", "−")
     costs = []
-    for word, value, unit in (("power", allocation.power, " W"), ("effort", allocation.effort, "")):
-        kept = f"least {word}" if word == objective_of(allocation) and least else word
+    kinds = (("power", "watts", allocation.power, " W"), ("effort", "effort", allocation.effort, ""))
+    for word, kind, value, unit in kinds:
+        if value is None:  # effort is of fins
+            continue
+        kept = f"least {word}" if kind == least_of(allocation.method) and least else word
         cost = html("<b class='{}'>{}</b>{}", word, three_digits(value), unit)
         costs.append(html("<span><span class='dim'>{}</span> {}</span>", kept, cost))
     method, ms = allocation.method, allocation.solve_ms
@@ -127,7 +130,7 @@ def _figures(allocation: Allocation, least: bool, in_reach: bool) -> list[str]:
     error = "<span class='dim'>error</span> <b class='err'>{}</b>"
     return [
         html(
-            "<span title='missing, by the fins’ own laws: {}'>{}</span>",
+            "<span title='missing, as a share of what the robot can push: {}'>{}</span>",
             rest,
             html(error, error_digits(allocation.err_norm)),
         ),

@@ -7,6 +7,7 @@ import math
 
 from markupsafe import Markup
 
+from finlab.layout import Fin
 from webapp.markup.answer import swatch
 from webapp.markup.html import html
 from webapp.presses import press
@@ -47,8 +48,10 @@ def fin_list(state: State, selection: tuple[str, ...]) -> str:
 
 
 def _row(state: State, index: int, chosen: bool) -> str:
-    fin = state.layout.fins[index]
-    places = (*(f"{value:.3f}" for value in fin.position), f"{math.degrees(fin.shaft_azimuth):.0f}")
+    fin = state.layout.actuators[index]
+    horizontal = isinstance(fin, Fin) and fin.mounting_angle is not None
+    shaft = f"{math.degrees(math.atan2(*fin.frame[0][1::-1])):.0f}" if horizontal else ""
+    places = (*(f"{value:.3f}" for value in fin.position), shaft)
     twin = partner(state.links, fin.name)
     return html(
         "<tr class='{}' data-fin='{}' {}><td>{}<span class='name' title='{}'>{}</span>{}</td>{}</tr>",
@@ -58,12 +61,16 @@ def _row(state: State, index: int, chosen: bool) -> str:
         swatch(index, fin.name in state.failed),
         fin.name,
         fin.name,
-        "" if twin is None else html("<span class='dim' title='moves with {}'>⇄</span>", twin),
+        html("<div class='dim'>{}</div>", fin.type)
+        if not isinstance(fin, Fin)
+        else ""
+        if twin is None
+        else html("<span class='dim' title='moves with {}'>⇄</span>", twin),
         [_cell(shown) for shown in places],
     )
 
 
 def _cell(shown: str) -> str:
     # Zero has no sign: rounded numbers may have lost all but that.
-    plain = (shown if float(shown) else shown.lstrip("-")).replace("-", "−")
+    plain = (shown if float(shown or 0) else shown.lstrip("-")).replace("-", "−")
     return html("<td class='place'>{}</td>", plain)

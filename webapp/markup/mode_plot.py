@@ -1,4 +1,4 @@
-"""The modes of an answer as numbered dots that can be picked: what is kept least against what else counts."""
+"""The modes of an answer as numbered dots that can be picked: effort against error."""
 
 import math
 
@@ -9,7 +9,6 @@ from finlab.allocation.allocation import Allocation
 from finlab.arrays import Array
 from webapp.markup.html import html
 from webapp.markup.plot import EXACT, RIGHT, TOP, WIDTH, Plot, Point, cost_axis, error_axis
-from webapp.markup.words import objective_of
 from webapp.presses import press
 from webapp.tasks.mode_names import Modes
 from webapp.theme import DEAD, Rgb, css, mode_color
@@ -19,7 +18,7 @@ LEFT = 54
 FAR = 2.0
 """Samples that cost more than so many times the dearest mode are counted, not drawn: modes keep apart."""
 LEGEND = (("refined", 5.0, 6), ("on the robot", 0.0, 72), ("sampled", 2.6, 176))
-"""Word, radius and place of what is drawn; radius 0 is the ring. The last one is for methods that sample."""
+"""Word, radius and place of what is drawn; radius 0 is the ring."""
 DOT = 4.5
 """Radius of the dot of a mode [px]."""
 LABEL = (13.0, 12.0)
@@ -29,7 +28,7 @@ FAR_PX = 14.0
 
 
 def mode_plot(answer: Allocation, modes: Modes, shown: int, height: int) -> str:
-    """What the method keeps least, against the error where samples are drawn, else against the other cost.
+    """Effort, which methods with modes keep least, against the error.
 
     Samples are small dots, modes numbered ones, which can be clicked.
 
@@ -39,28 +38,20 @@ def mode_plot(answer: Allocation, modes: Modes, shown: int, height: int) -> str:
         shown: mode on the robot.
         height: of the plot [px].
     """
-    if not modes.shown:
-        return ""
     samples = answer.samples
-    words, order = ("power [W]", "effort"), (0, 1) if objective_of(answer) == "power" else (1, 0)
-    costs = np.array([(mode.power, mode.effort) for mode, _ in modes.shown])[:, order]
-    refined = raw = costs
-    if samples is not None:
-        error = np.array([mode.err_norm for mode, _ in modes.shown])
-        refined = np.stack([costs[:, 0], _logarithm(error)], axis=1)
-        raw = np.stack([(samples.power, samples.effort)[order[0]], _logarithm(samples.err_norm)], axis=1)
-    near = raw[:, 0] <= FAR * costs[:, 0].max()
+    if not modes.shown or samples is None:
+        return ""
+    error = np.array([mode.err_norm for mode, _ in modes.shown])
+    effort = np.array([mode.effort for mode, _ in modes.shown])
+    refined = np.stack([effort, _logarithm(error)], axis=1)
+    raw = np.stack([samples.effort, _logarithm(samples.err_norm)], axis=1)
+    near = raw[:, 0] <= FAR * effort.max()
     points = np.concatenate([refined, raw[near]])
     if not np.isfinite(points).all():
         return ""
-    across = cost_axis(words[order[0]], points[:, 0])
-    up = cost_axis(words[order[1]], points[:, 1]) if samples is None else error_axis(points[:, 1])
-
-    plot = Plot(across, up, height, LEFT)
-    parts = [_legend(samples is not None)]
-    if samples is not None:
-        dots = [plot.place(*point) if close else None for point, close in zip(raw, near, strict=True)]
-        parts.append(_sample_dots(dots, modes))
+    plot = Plot(cost_axis("effort", points[:, 0]), error_axis(points[:, 1]), height, LEFT)
+    dots = [plot.place(*point) if close else None for point, close in zip(raw, near, strict=True)]
+    parts = [_legend(), _sample_dots(dots, modes)]
     parts += _mode_dots([plot.place(*point) for point in refined], plot.floor, shown)
     return html("<div class='fl'>{}</div>", plot.drawn(parts, upright=True))
 
@@ -137,9 +128,9 @@ def _labels(places: list[Point], floor: float) -> list[Point]:
     return labels
 
 
-def _legend(sampled: bool) -> str:
+def _legend() -> str:
     parts = []
-    for word, radius, place in LEGEND if sampled else LEGEND[:-1]:
+    for word, radius, place in LEGEND:
         dot = html("<circle cx='{}' cy='10' r='{}' fill='currentColor' opacity='.55'/>", LEFT + place, radius)
         parts.append(dot if radius else _ring(LEFT + place, 10, 5.5))
         parts.append(html("<text x='{}' y='14'>{}</text>", LEFT + place + 9, word))

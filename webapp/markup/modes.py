@@ -18,7 +18,7 @@ def mode_table(modes: Modes, searching: bool, shown: int) -> str:
         shown: which mode moves the fins.
     """
     if not modes.shown:
-        return Markup("<div class='fl dim'>This method gives one answer and no candidates.</div>")
+        return ""
     rows = []
     for k, (mode, name) in enumerate(modes.shown):
         kind = "chosen" if k == shown else ""
@@ -39,7 +39,7 @@ def mode_table(modes: Modes, searching: bool, shown: int) -> str:
             )
         )
     header = Markup(
-        "<tr><th>#</th><th class='words'>mode</th><th>error [σ]</th><th>power&nbsp;[W]</th><th>effort</th>"
+        "<tr><th>#</th><th class='words'>mode</th><th>error</th><th>power&nbsp;[W]</th><th>effort</th>"
         "<th title='largest share of a range of amplitude or frequency that is used'>used</th></tr>"
     )
     left = modes.count - len(modes.shown)

@@ -17,7 +17,7 @@ RIGHT, TOP, BOTTOM = 8, 24, 34
 MOST_TICKS = 6
 """Steps between ticks at most."""
 EXACT = 1e-6
-"""Error [σ] below which all answers are drawn as equally exact."""
+"""Error below which all answers are drawn as equally exact."""
 Point = tuple[float, float]
 """Across and down [px]."""
 
@@ -60,7 +60,7 @@ def error_axis(logs: Array) -> Axis:
         raised = str(power).replace("-", "−")
         ticks.append((float(power), html("{}10<tspan dy='-4' font-size='8'>{}</tspan>", below, raised)))
     margin = 0.06 * (high - low)
-    return Axis("error [σ]", low - margin, high + margin, tuple(ticks))
+    return Axis("error", low - margin, high + margin, tuple(ticks))
 
 
 class Plot(NamedTuple):

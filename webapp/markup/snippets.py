@@ -4,7 +4,7 @@ import math
 import shlex
 
 from webapp.session.files import file_stem, shipped_name
-from webapp.session.state import State, knows_objective
+from webapp.session.state import State
 
 
 def command_line(state: State) -> str:
@@ -26,7 +26,6 @@ def python_lines(state: State) -> str:
     """The same question in Python."""
     name = _layout_name(state)
     chosen = [repr(state.method)] if state.method != "dual" else []
-    chosen += [f"objective={state.objective!r}"] if _asks_objective(state) else []
     target = ", ".join(f"{value:g}" for value in state.target)
     options = [f"failed={list(state.failed)!r}"] if state.failed else []
     if state.policy != "closest":
@@ -57,13 +56,8 @@ def _layout_name(state: State) -> str:
 
 
 def _method(state: State) -> list[str]:
-    """The method and the objective, where they are not the usual ones."""
-    method = ["--method", state.method] if state.method != "dual" else []
-    return [*method, "--objective", state.objective] if _asks_objective(state) else method
-
-
-def _asks_objective(state: State) -> bool:
-    return state.objective != "power" and knows_objective(state.method)
+    """The method, where it is not the usual one."""
+    return ["--method", state.method] if state.method != "dual" else []
 
 
 def _failures(state: State) -> list[str]:

@@ -68,7 +68,6 @@ def swim_card(swimming: Swimming, settings: SwimSettings) -> str:
     first = swimming.swimmers[0]
     shown = swimming.seen[0]
     head = html("<b>{:.1f} s</b> of {:.0f} s, {}", shown.time, first.duration_s, pace_words(swimming))
-    head += f"; least {swimming.objective}"
     rows, packs = [], []
     for robot, moment, color, name in robots(swimming):
         dot = html("<span class='swatch' style='background:{};min-width:10px'>&nbsp;</span>", css(color))

@@ -10,7 +10,6 @@ from webapp.markup.words import (
     authority_sentence,
     fins_words,
     listed,
-    objective_of,
     saturated,
     unlearned_sentence,
 )
@@ -23,18 +22,23 @@ WORKING = "Working …"
 SPOKEN = 0.3
 """Share of the largest miss, each axis over its scale, from which another axis is spoken of, too."""
 
+PROVED = 1e-4
+"""Share of its watts that an answer may lie above the bound and count as proved least."""
+LEAST_WATTS = 1e-3
+"""Bound [W] that shares are taken of where it is smaller, or nothing."""
+
 
 class Verdict(Enum):
     """One of four, each with a word and a colour."""
 
     EXACT = "Exact"
-    """The fins give what is asked."""
+    """The robot gives what is asked."""
     APPROXIMATE = "Approximate"
     """They could, but this answer does not."""
     UNLEARNED = "Not learned"
     """The method does not know a fin, so its commands for it are wrong."""
     OUT_OF_REACH = "Out of reach"
-    """No command of these fins gives it."""
+    """No command of what works gives it."""
 
     @property
     def color(self) -> Rgb:
@@ -81,9 +85,11 @@ def verdict_sentence(allocation: Allocation, in_reach: bool) -> str:
         word = "missing" if share < 100.0 else "too much"
         sentence = f"{verdict.value}: {_amount(given - target, axis)} {word}"
     if verdict is Verdict.APPROXIMATE:
-        return f"{sentence}; the fins can, {allocation.method} does not"
+        return f"{sentence}; the robot can, {allocation.method} does not"
     full = np.flatnonzero(saturated(allocation).any(axis=1))
-    return f"{sentence}; {fins_words(full.tolist())} at the limit" if len(full) else sentence
+    return (
+        f"{sentence}; {fins_words(full.tolist(), allocation.layout)} at the limit" if len(full) else sentence
+    )
 
 
 def rest_sentence(allocation: Allocation) -> str:
@@ -93,6 +99,16 @@ def rest_sentence(allocation: Allocation) -> str:
     rest, size = allocation.unallocated, np.abs(allocation.unallocated / allocation.scale)
     parts = [_amount(rest[k], k) for k in np.argsort(-size) if size[k] >= SPOKEN * size.max()]
     return f"{listed(parts)} {'is' if len(parts) == 1 else 'are'} left undone."
+
+
+def bound_sentence(allocation: Allocation) -> str:
+    """How far an answer may be from the least watts, by the bound that its method proves; else nothing."""
+    if allocation.bound is None:
+        return ""
+    gap = (allocation.power - allocation.bound) / max(allocation.bound, LEAST_WATTS)
+    if gap <= PROVED:
+        return "Its watts are proved least."
+    return f"Its watts are at most {100 * gap:.2g} % above the least."
 
 
 def answer_sentence(state: State, allocation: Allocation | None, busy: bool) -> Markup:
@@ -113,9 +129,8 @@ def answer_sentence(state: State, allocation: Allocation | None, busy: bool) -> 
             told = [f"{share} % of what is asked"] if 0 <= share < 100 else []
             told += [*allocation.binding, *allocation.notes]
             sentences.append("; ".join(told) + "." if told else "")
-        kept = objective_of(allocation)
-        if kept != state.objective:
-            sentences.append(_warning(f"{allocation.method} keeps {kept} least, not {state.objective}."))
+        elif allocation.reachable:
+            sentences.append(bound_sentence(allocation))
     elif busy:
         sentences.append(WORKING)
     blind = authority_sentence(state.layout, state.failed, axis_reach(state.able, state.failed))

@@ -8,13 +8,14 @@ from numpy.typing import NDArray
 
 from finlab.allocation.allocation import Allocation
 from finlab.arrays import Array
-from finlab.layout import Layout
+from finlab.errors import LayoutError
+from finlab.layout import Azimuth, Fin, Layout
 from finlab.vehicle.body import complete_body
 from finlab.vehicle.vehicle import Vehicle
 from webapp.session.state import AXIS_WORDS, State
 
-SMALL = 0.01
-"""Share of the robot's yardstick that is too small to speak of, on one axis."""
+SMALL = 3e-4
+"""Share of what the robot can push that is too small to draw, on one axis; an exact answer lacks no more."""
 ROUNDING = 1e-9
 """Normalized error below which the digits are those of the computer's rounding."""
 AT_LIMIT = 0.995
@@ -27,9 +28,10 @@ def listed(items: Sequence[str]) -> str:
     return items[0] if len(items) == 1 else f"{', '.join(items[:-1])} and {items[-1]}"
 
 
-def fins_words(numbers: Sequence[int]) -> str:
-    """`fin 2`, `fins 1 and 3`: fins by their places, from 0, in the layout."""
-    return f"fin{'s' if len(numbers) > 1 else ''} {listed([str(k + 1) for k in numbers])}"
+def fins_words(numbers: Sequence[int], layout: Layout | None = None) -> str:
+    """`fin 2`, `fins 1 and 3`: fins, or actuators of a layout with others, by their places from 0 in it."""
+    word = "fin" if layout is None or layout.is_of_fins else "actuator"
+    return f"{word}{'s' if len(numbers) > 1 else ''} {listed([str(k + 1) for k in numbers])}"
 
 
 def small(value: float) -> str:
@@ -54,12 +56,15 @@ def three_digits(value: float | None) -> str:
     return f"{value:.{max(2 - whole, 0)}f}".replace("-", "−")
 
 
+<<<<<<< HEAD
 def objective_of(allocation: Allocation) -> str:
     """What the method that answered keeps least; of those without that choice the default method keeps watts
     least, the others the paper's effort."""
     return str(allocation.settings.get("objective", "power" if allocation.method == "dual" else "effort"))
 
 
+=======
+>>>>>>> 2e49a668 (App on allocators that are kept per robot; robots of any actuators are shown)
 def source_words(sources: Sequence[str]) -> str:
     """Where a mode comes from: the components of a mixture, or where the search began."""
     numbers = [s.removeprefix("component ") for s in sources if s.startswith("component ")]
@@ -86,7 +91,9 @@ def authority_sentence(layout: Layout, failed: tuple[str, ...], reach: Array) ->
     blind = [AXIS_WORDS[k] for k in range(6) if reach[k] < 1e-6]
     if not blind:
         return None
-    without = f"Without {fins_words([layout.index(name) for name in failed])} this" if failed else "This"
+    without = (
+        f"Without {fins_words([layout.index(name) for name in failed], layout)} this" if failed else "This"
+    )
     return f"{without} robot cannot {listed(blind)}."
 
 
@@ -105,10 +112,31 @@ def trim_sentence(layout: Layout, reach: Array) -> str | None:
 
 
 def saturated(allocation: Allocation) -> NDArray[np.bool_]:
-    """Which amplitudes and frequencies (n, 2) are at their upper limits."""
-    upper = np.array([fin.limits.upper[:2] for fin in allocation.layout.fins])
+    """Which numbers of commands (n, 2) are at their limits: amplitude and frequency of a fin at the upper
+    ones, force of a thruster or azimuth and deflection of a rudder at either."""
+    layout, command = allocation.layout, allocation.command[:, :2]
+    of_fins = np.array([isinstance(part, Fin) for part in layout.actuators])[:, None]
+    turns = np.array(
+        [[False, False] if not isinstance(part, Azimuth) else [True, False] for part in layout.actuators]
+    )
     with np.errstate(invalid="ignore"):
-        return np.asarray(allocation.command[:, :2] >= AT_LIMIT * upper)
+        high = (command >= AT_LIMIT * layout.upper[:, :2]) & (layout.upper[:, :2] > 0.0)
+        low = (command <= AT_LIMIT * layout.lower[:, :2]) & (layout.lower[:, :2] < 0.0)
+    return np.asarray((high | (low & ~of_fins)) & ~turns)
+
+
+def fins_only(layout: Layout, what: str) -> str:
+    """Why a robot with other actuators cannot have something yet; nothing where it can."""
+    try:
+        layout.only_fins(what, horizontal=True)
+    except LayoutError as error:
+        return f"{str(error)[0].upper()}{str(error)[1:]}."
+    return ""
+
+
+def parts_word(layout: Layout) -> str:
+    """What a robot pushes with, in a word."""
+    return "fins" if layout.is_of_fins else "actuators"
 
 
 def damage_words(state: State, name: str) -> str:

@@ -89,6 +89,7 @@ class FinModelPanel:
         session = self._page.session
         if session.selected is None:
             raise FinlabError("no fin is selected; click the one that was measured, or choose it in the list")
+        session.state.layout.only_fins("a fit in the app", horizontal=True)
         self._page.fitting.start(session.selected, name, content)
         session.show_task("Design")
 

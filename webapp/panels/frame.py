@@ -15,12 +15,14 @@ from markupsafe import Markup
 from webapp.handles import add_html, put
 from webapp.markup.html import html
 from webapp.markup.picking import marker
+from webapp.markup.words import fins_only
 from webapp.page import Page, Panel
 from webapp.panels.places import DRAWER, LEFT, PLACES, REGIONS, RIGHT, SIMULATE, Place
 from webapp.panels.status import Corner
 from webapp.presses import press
 from webapp.session import Session
 from webapp.session.looking import DRAWERS
+from webapp.session.state import can_be_edited
 from webapp.theme import ASKED, DELIVERED, MISSING, css
 from webapp.viser_internals import run_script
 
@@ -72,25 +74,33 @@ class Section:
         place = self.place
         about = ("", "robot" if session.selected is None else "fins", *["guide"] * session.guided)
         opened = place.region != DRAWER or place.title == session.drawer
-        return session.task in place.tasks and place.about in about and opened
+        fits = place.fins_only != "" or can_be_edited(session.state.layout)
+        return session.task in place.tasks and place.about in about and opened and fits
 
     def refresh(self) -> None:
         """Write the session and the answer into it. The browser builds its widgets when it is met first, so
         that a first page does not wait for those of other tasks; from then on they stay."""
         self._met = self._met or self.is_there(self._page.session)
+        layout = self._page.session.state.layout
+        if self.place.fins_only is not None and not can_be_edited(layout):
+            self._say(html("<div class='fl dim'>{}</div>", fins_only(layout, self.place.fins_only)))
+            return
         try:
             for write in self._bound:
                 write()
             self._panel.refresh()
         except Exception as error:
-            name = self._page.session.state.layout.name
-            text = html("<div class='fl missing'>This cannot be shown of {}: {}</div>", name, str(error))
-            put(self._sentence, content=text, visible=True)
-            put(self._folder, visible=False)
+            text = "<div class='fl missing'>This cannot be shown of {}: {}</div>"
+            self._say(html(text, layout.name, str(error)))
             self._page.fault(error)
         else:
             put(self._folder, visible=self._met)
             put(self._sentence, visible=False)
+
+    def _say(self, text: str) -> None:
+        """A sentence in place of the panel."""
+        put(self._sentence, content=text, visible=True)
+        put(self._folder, visible=False)
 
 
 class Frame:

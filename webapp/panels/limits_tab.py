@@ -16,7 +16,7 @@ from webapp.markup.words import fins_words, three_digits
 from webapp.page import Page
 from webapp.panels.damage import FinButtons
 from webapp.session.display import DRAWN
-from webapp.session.files import shipped
+from webapp.session.files import comparable
 from webapp.session.search_request import GOAL_WORDS, WAY, SearchRequest
 
 SAVED = "saved state"
@@ -33,7 +33,7 @@ class ReachPanel:
         free = "Forces without any torque, torques without any force; else they are free."
         self._alone = page.bind_display(gui.add_checkbox("Alone", True, hint=free), "alone")
         self._beside = gui.add_dropdown(
-            "Beside", (SAVED, *shipped()), hint="The layout that stands next to this one on the card."
+            "Beside", (SAVED, *comparable()), hint="The layout that stands next to this one on the card."
         )
         page.on_change(self._beside, self._compare)
         self._card = gui.add_html("")

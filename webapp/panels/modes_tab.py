@@ -11,17 +11,19 @@ from webapp.markup.mode_plot import mode_plot
 from webapp.markup.modes import mode_table
 from webapp.markup.picking import marker
 from webapp.page import Page
-from webapp.session.state import knows_objective
+from webapp.session.state import State
 
 ORIGINS = {
-    "dual": "The search knows each fin's own law and draws nothing. It begins with all fins at work and, "
-    "for other ways, with some of them at rest.",
     "mdn": "A network proposes ways to share the wrench, drawn from its mixture; each is followed to the "
     "least effort near it and made exact by the fins' own laws. A mode names the components that led to it.",
     "paper": "The paper's network draws candidates; the best are refined by Adam on a learned surrogate, "
     "which leaves an error.",
 }
 """Where the answer and its modes come from, by method."""
+ONE = "Method {} has one answer. Keep effort least, and a network proposes several ways."
+"""What is said of a method without candidates."""
+UNKNOWN = "The network knows fins alone, so it proposes nothing for this robot."
+"""What is said of a robot with other actuators."""
 DRAWN = {"n_candidates": 64.0, "temperature": 0.02, "gamma": 0.01}
 """What the widgets of drawing show at first."""
 
@@ -73,7 +75,7 @@ class CandidatesPanel:
 
     def refresh(self) -> None:
         page, state = self._page, self._page.session.state
-        put(self._origin, content=html("<div class='fl dim'>{}</div>", _origin_words(state.method)))
+        put(self._origin, content=html("<div class='fl dim'>{}</div>", _origin_words(state)))
         drawing = state.drawing
         put(self._draws, visible=bool(drawing))
         for key, widget in self._settings.items():
@@ -86,10 +88,11 @@ class CandidatesPanel:
             put(self._plot, content=plot)
 
 
-def _origin_words(method: str) -> str:
-    """Where the answer and its modes come from, and what is kept least where the user has no say in it."""
-    words = ORIGINS.get(method, "One answer by optimization over the fins' own laws; no candidates.")
-    return words if knows_objective(method) else f"{words} It keeps effort least whatever is chosen."
+def _origin_words(state: State) -> str:
+    """Where the answer and its modes come from, or why there is but one."""
+    if not state.layout.is_of_fins:
+        return UNKNOWN
+    return ORIGINS.get(state.method, ONE.format(state.method))
 
 
 def placed(key: str, count: int) -> int:

@@ -49,6 +49,9 @@ class Place(NamedTuple):
     about: str = ""
     """What must be selected for it to be there: `fins`, or none of them (`robot`); `guide` where a tour or a
     lesson must be under way; nothing where it is there always."""
+    fins_only: str | None = None
+    """What a robot with other actuators is told that it cannot have yet; where it is empty, the panel is
+    not there for such a robot. None for panels that take any robot."""
 
 
 PLACES = (
@@ -60,23 +63,23 @@ PLACES = (
     Place(LEFT, TASKS, "Guide", partial(Card, guide), about="guide"),
     Place(LEFT, (DESIGN,), "Fins", FinList),
     Place(LEFT, (DESIGN,), "Designs", DesignPanel),
-    Place(RIGHT, (DESIGN,), "Fin", FinInspector, about="fins"),
+    Place(RIGHT, (DESIGN,), "Fin", FinInspector, about="fins", fins_only="the inspector"),
     Place(RIGHT, (DESIGN,), "Body", BodyInspector, about="robot"),
     Place(RIGHT, (DESIGN,), "Hull", HullPanel, folded=True, about="robot"),
-    Place(RIGHT, (DESIGN,), "Check", partial(Card, check)),
-    Place(DRAWER, (DESIGN,), "Reach", ReachPanel),
-    Place(DRAWER, (DESIGN,), "Improve", ImprovePanel),
+    Place(RIGHT, (DESIGN,), "Check", partial(Card, check), fins_only="the check"),
+    Place(DRAWER, (DESIGN,), "Reach", ReachPanel, fins_only="the picture of reach and the score card"),
+    Place(DRAWER, (DESIGN,), "Improve", ImprovePanel, fins_only="the search for a better layout"),
     Place(LEFT, (ALLOCATE,), "Fins", FinsPanel),
-    Place(LEFT, (ALLOCATE,), "Damage a fin", DamagePanel, folded=True),
+    Place(LEFT, (ALLOCATE,), "Damage a fin", DamagePanel, folded=True, fins_only=""),
     Place(RIGHT, (ALLOCATE,), "Wrench", TargetPanel),
     Place(RIGHT, (ALLOCATE,), "Asked and delivered", partial(Card, answer)),
     Place(DRAWER, (ALLOCATE,), "Candidates", CandidatesPanel),
-    Place(DRAWER, (ALLOCATE,), "Comparison", ComparePanel),
+    Place(DRAWER, (ALLOCATE,), "Comparison", ComparePanel, fins_only="the comparison of methods"),
     Place(DRAWER, (ALLOCATE,), "Sweep", SweepPanel),
-    Place(LEFT, (SIMULATE,), "Scenario", ScenarioPanel),
-    Place(RIGHT, (SIMULATE,), "Run", RunPanel, swims=True),
-    Place(RIGHT, (SIMULATE,), "Figures", SwimCardPanel, swims=True),
-    Place(DRAWER, (SIMULATE,), "Swim over time", Timeline, swims=True),
+    Place(LEFT, (SIMULATE,), "Scenario", ScenarioPanel, fins_only="a swim"),
+    Place(RIGHT, (SIMULATE,), "Run", RunPanel, swims=True, fins_only=""),
+    Place(RIGHT, (SIMULATE,), "Figures", SwimCardPanel, swims=True, fins_only=""),
+    Place(DRAWER, (SIMULATE,), "Swim over time", Timeline, swims=True, fins_only=""),
     Place(RIGHT, (EXPORT,), "Files", FilesTab),
     Place(VIEW, TASKS, "Camera", partial(Card, camera)),
     Place(VIEW, TASKS, "Display", ViewPanel, folded=True),

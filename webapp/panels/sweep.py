@@ -6,6 +6,7 @@ import numpy as np
 import viser
 from markupsafe import Markup
 
+from finlab.allocation.evaluate import REACHED
 from webapp.handles import option_index, put
 from webapp.markup.html import html
 from webapp.markup.words import error_digits, three_digits
@@ -14,8 +15,6 @@ from webapp.panels.line_plot import FIN_LINES, LinePlot, top_of
 from webapp.session.state import AXIS_UNITS, AXIS_WORDS, MAX_TARGET, number
 from webapp.tasks.sweeping import Sweep
 
-EXACT = 0.01
-"""Error [σ] up to which a wrench counts as delivered."""
 EVERY_S = 0.25
 """How often the plot is drawn while the sweep runs [s]."""
 
@@ -81,13 +80,13 @@ def _sentence(sweep: Sweep) -> str:
     known = np.isfinite(sweep.error)
     if not known.any():
         return ""
-    exact = known & (sweep.error <= EXACT)
+    exact = known & (sweep.error <= REACHED)
     if not exact.any():
         return Markup("<span class='missing'>Nowhere along the way is the wrench delivered exactly.</span>")
     if exact[known].all():
         low, high = (three_digits(float(value)) for value in (np.nanmin(sweep.power), np.nanmax(sweep.power)))
         error = error_digits(float(np.nanmax(sweep.error)))
-        return f"Exact all the way: the largest error is {error} σ; power from {low} to {high} W."
+        return f"Exact all the way: the largest error is {error}; power from {low} to {high} W."
     low, high = (f"{value:.3g}".replace("-", "−") for value in sweep.values[exact][[0, -1]])
     beyond = Markup("<span class='missing'>beyond, something is missing.</span>")
     return f"Exact from {low} to {high} {AXIS_UNITS[sweep.axis]}; {beyond}"

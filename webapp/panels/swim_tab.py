@@ -155,6 +155,7 @@ class RunPanel(SwimPanel):
 
     def _start(self) -> None:
         session = self._page.session
+        session.state.layout.only_fins("a swim", horizontal=True)
         self._page.swimming.start(session.swim.plan(session.state, self._page.swimming.own_path))
 
     def refresh(self) -> None:

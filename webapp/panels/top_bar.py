@@ -12,12 +12,22 @@ from webapp.page import Page
 from webapp.presses import press
 from webapp.session.design_links import MAX_LINK
 from webapp.session.lessons import LESSONS
-from webapp.session.state import OBJECTIVES
+from webapp.session.state import LEAST, least_of
 from webapp.session.tour import STEPS
 from webapp.tasks.opening import KINDS
 
 DESIGNS = ".yaml,.yml,.json,.zip"
 """How the names of files of designs end."""
+METHOD_WORDS = {
+    "dual": "least watts, any actuator",
+    "mdn": "least effort, a network proposes",
+    "paper": "the paper's pipeline",
+    "qp": "one linear step",
+    "sqp": "a general solver",
+    "analytic": "the pseudo-inverse",
+    "ipopt": "a general solver, slow",
+}
+"""Methods in a few words each."""
 PALETTE = (
     "document.documentElement.dispatchEvent(new KeyboardEvent('keydown', "
     "{ key: 'k', code: 'KeyK', ctrlKey: true, bubbles: true }))"
@@ -68,11 +78,12 @@ class AnsweringBar:
 
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         session = page.session
-        methods = gui.add_dropdown("Method", tuple(METHODS), hint="The method that answers.")
+        about = "Watts, proved least by method dual; or the paper's effort, by the network of method mdn."
+        least = gui.add_dropdown("Least", tuple(LEAST), hint=about)
+        page.bind(least, session.keep_least, lambda: least_of(session.state.method))
+        about = " ".join(f"{name}: {words}." for name, words in METHOD_WORDS.items())
+        methods = gui.add_dropdown("Method", tuple(METHODS), hint=about)
         page.bind(methods, partial(session.set_setting, "method"), lambda: session.state.method)
-        about = "Power in watts, or the paper's effort: for all answers, comparisons, sweeps and swims."
-        least = gui.add_dropdown("Keep least", OBJECTIVES, hint=about)
-        page.bind(least, partial(session.set_setting, "objective"), lambda: session.state.objective)
         template = (
             "<div class='fl-help'><button title='{} lessons with a task each' {}>Lessons</button>"
             "<button title='a tour in {} stops (T)' {}>Tour</button>"

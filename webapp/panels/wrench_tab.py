@@ -84,7 +84,11 @@ class TargetPanel:
         ranges, error = self._page.ranging.findings, self._page.ranging.error
         if not self._changes(ranges, error):
             return
-        sentence = "" if error is None else html("<div class='fl missing'>What is in reach: {}</div>", error)
+        sentence = (
+            ""
+            if error is None or not state.layout.is_of_fins
+            else html("<div class='fl missing'>What is in reach: {}</div>", error)
+        )
         put(self._end, content=marker("fl-reach-end") + sentence)
         for k, slider in enumerate(self._sliders):
             if ranges is None:

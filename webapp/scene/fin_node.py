@@ -1,17 +1,22 @@
-"""One fin in the scene: its gizmos, and under them blade, sweep and force; and how all fins flap."""
+"""One actuator in the scene: its gizmos, and under them what moves, its sweep and its force.
+
+A fin or a rudder is a blade, a thruster a duct. Gizmos, sweep and beat are for fins.
+"""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 import viser
 from numpy.typing import NDArray
+from viser.transforms import SO3
 
 from finlab.arrays import Array
-from finlab.layout import Fin
+from finlab.layout import Actuator, Azimuth, Fin, Rudder, Thruster
 from webapp.handles import put
 from webapp.scene.meshes import fin as fin_mesh
+from webapp.scene.meshes import thruster
 from webapp.scene.meshes.hull import AnyHull
 from webapp.scene.meshes.mesh import NOTHING, Mesh, force_arrow, tube
 from webapp.scene.shape import Shape
@@ -64,25 +69,55 @@ class FinShapes:
     ) -> None:
         """Add the nodes under `parent`, for the fin at this place of the layout; `arrow`: options of that."""
         self.color, self._angle = fin_color(index), math.nan
-        blade, shaft = fin_mesh.blade(), fin_mesh.shaft()
-        self.blade = Shape(scene, f"{parent}/blade", self.color, blade, opacity=opacity).node
-        self.shaft = Shape(scene, f"{parent}/shaft", LIGHT.metal, shaft, opacity=opacity).node
+        self._blade = Shape(scene, f"{parent}/blade", self.color, opacity=opacity)
+        self.blade = self._blade.node
+        self.shaft = Shape(scene, f"{parent}/shaft", LIGHT.metal, fin_mesh.shaft(), opacity=opacity).node
         self.force = Shape(scene, f"{parent}/force", self.color, opacity=opacity, **arrow)
+        self._root = np.zeros(3)
+
+    def become(self, part: Actuator) -> None:
+        """Look like an actuator."""
+        is_blade = isinstance(part, (Fin, Rudder))
+        put(self.shaft, visible=is_blade)
+        self._blade.show(_moving_part, type(part))
+        self._root = np.array([fin_mesh.ROOT + fin_mesh.SPAN / 2 if is_blade else 0.0, 0.0, 0.0])
 
     def paint(self, alive: bool) -> None:
         """In its own colour, or that of a failed fin."""
         put(self.blade, color=self.color if alive else DEAD)
 
-    def push(self, arrow: Array, mounting_angle: float, thickness: float) -> None:
-        """Show the force as an arrow (3,) [m] of the body frame."""
-        root = np.array([fin_mesh.ROOT + fin_mesh.SPAN / 2, 0.0, 0.0])
-        self.force.show(force_arrow, fin_mesh.mounting(mounting_angle).T @ arrow, root, thickness)
+    def push(self, arrow: Array, frame: Array, thickness: float) -> None:
+        """Show the force as an arrow (3,) [m] of the body frame, given the actuator's own axes (3, 3)."""
+        self.force.show(force_arrow, frame @ arrow, self._root, thickness)
 
     def pose(self, angle: float) -> None:
         """Turn the blade about its shaft to an angle [rad]; one that rests is not sent again."""
         if angle != self._angle:
             self._angle = angle
             self.blade.wxyz = quaternion(angle, 0)
+
+
+def _moving_part(kind: type[Actuator]) -> Mesh:
+    """What of an actuator moves, in its own frame."""
+    if issubclass(kind, (Thruster, Azimuth)):
+        return thruster.duct() if issubclass(kind, Thruster) else thruster.pod()
+    return fin_mesh.blade()
+
+
+def motion(parts: Sequence[Actuator], command: Array) -> Array:
+    """How actuators move (n, 3), as a fin's half amplitude [rad], frequency [Hz] and direction [rad]: others
+    only turn to an angle, or not at all."""
+    moving = command.copy()
+    for row, part in zip(moving, parts, strict=True):
+        if not isinstance(part, Fin):
+            angle = 0.0 if isinstance(part, Thruster) else row[0]
+            row[:] = 0.0 * row[0], 0.0, angle
+    return moving
+
+
+def turn_of(frame: Array) -> Array:
+    """Own axes (3, 3), rows in the body frame, as a turn of a node: w, x, y, z (4,)."""
+    return np.asarray(SO3.from_matrix(frame.T).wxyz)
 
 
 def quaternion(angle: float, axis: int) -> Array:
@@ -164,38 +199,43 @@ class FinNode:
         put(self._turn, active_axes=(False,) * 3)
         put(self._strut.node, visible=False)
 
-    def place(self, fin: Fin, hull: AnyHull, selected: bool, label: str | None, owned_by_user: bool) -> None:
-        """Show a fin.
+    def place(
+        self, part: Actuator, hull: AnyHull, selected: bool, label: str | None, owned_by_user: bool
+    ) -> None:
+        """Show an actuator.
 
         Args:
-            fin: the fin.
+            part: the actuator.
             hull: what its strut ends at.
             selected: whether its gizmos are shown.
             label: text at its root, None for none.
             owned_by_user: True while it is dragged; the gizmo's pose is then left alone.
         """
+        frame = np.array(part.frame)
+        self.shapes.become(part)
         put(self._move, visible=True, active_axes=(selected,) * 3)
         put(self._turn, active_axes=(selected, selected, False))
         if not owned_by_user:
-            put(self._move, position=np.array(fin.position))
-            put(self._turn, wxyz=quaternion(fin.shaft_azimuth, 2))
+            put(self._move, position=np.array(part.position))
+            put(self._turn, wxyz=turn_of(frame))
         put(self._label, visible=label is not None, text=label or "", position=np.array([0.0, 0.0, 0.04]))
-        shaft = np.array([math.cos(fin.shaft_azimuth), math.sin(fin.shaft_azimuth), 0.0])
-        servo = np.array(fin.position) - 0.03 * shaft
+        servo = np.array(part.position) - (0.03 if isinstance(part, (Fin, Rudder)) else 0.0) * frame[0]
         self._strut.show(_strut, servo, hull)
         put(self._strut.node, visible=True)
 
-    def command(self, command: Array | None, arrow: Array, mounting_angle: float, fans: bool) -> None:
-        """Show a command (3,), None for a failed fin, and its force as a body-frame arrow (3,) [m]."""
+    def command(self, command: Array | None, arrow: Array, frame: Array, fans: bool) -> None:
+        """Show a motion (3,), None for what has failed, and its force as a body-frame arrow (3,) [m], given
+        the own axes (3, 3)."""
         alive = command is not None
         self.shapes.paint(alive)
-        put(self._fan.node, visible=fans and alive)
         put(self.shapes.force.node, visible=alive)
         if command is None:
+            put(self._fan.node, visible=False)
             return
+        put(self._fan.node, visible=fans and bool(command[0] > 0.0))
         self._fan.show(fin_mesh.sweep, float(command[0]))
         put(self._fan.node, wxyz=quaternion(float(command[2]), 0))
-        self.shapes.push(arrow, mounting_angle, 0.007)
+        self.shapes.push(arrow, frame, 0.007)
 
 
 def _strut(servo: Array, hull: AnyHull) -> Mesh:

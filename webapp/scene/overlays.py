@@ -30,14 +30,14 @@ def moved_fins(other: Layout | None, layout: Layout) -> tuple[Fin, ...]:
     """The fins of another version of a layout that stand elsewhere now."""
     if other is None or other.name != layout.name:
         return ()
-    now = {fin.name: (fin.position, fin.shaft_azimuth) for fin in layout.fins}
-    return tuple(fin for fin in other.fins if now.get(fin.name) != (fin.position, fin.shaft_azimuth))
+    now = {fin.name: (fin.position, fin.frame) for fin in layout.fins}
+    return tuple(fin for fin in other.fins if now.get(fin.name) != (fin.position, fin.frame))
 
 
 def _blades(fins: tuple[Fin, ...]) -> Mesh:
     parts = []
     for fin in fins:
-        turn = fin_mesh.mounting(fin.shaft_azimuth)
+        frame = np.array(fin.frame)
         for part in (fin_mesh.blade(), fin_mesh.shaft()):
-            parts.append(Mesh(part.vertices @ turn.T + np.array(fin.position), part.faces))
+            parts.append(Mesh(part.vertices @ frame + np.array(fin.position), part.faces))
     return joined(*parts)

@@ -10,13 +10,13 @@ from finlab.arrays import Array
 from finlab.layout import Layout
 from webapp.handles import put
 from webapp.markup.words import damage_words, missing_part
-from webapp.scene.fin_node import FinNode, Flapping
+from webapp.scene.fin_node import FinNode, Flapping, motion
 from webapp.scene.meshes.hull import hull_of
 from webapp.scene.meshes.mesh import LONGEST_TURN
 from webapp.scene.overlays import Ghost, moved_fins
 from webapp.scene.stage import Stage, aim_camera
 from webapp.scene.wrench_nodes import LENGTH, AttainableNodes, WrenchNodes, fitting_newtons, fitting_torque
-from webapp.session.state import State, chosen
+from webapp.session.state import State, can_be_edited, chosen
 from webapp.tasks.analyst import Findings
 from webapp.tasks.context import Context
 from webapp.theme import DELIVERED, HALF_TURN
@@ -82,7 +82,7 @@ class RobotScene:
         hull = hull_of(layout)
         center, size = np.array(hull.center), 2.6 * float(np.linalg.norm(hull.half))
         if session.selected is not None:
-            center, size = np.array(layout.fins[layout.index(session.selected)].position), 0.55
+            center, size = layout.position[layout.index(session.selected)], 0.55
         way = place - target
         self.aim(center + way / max(float(np.linalg.norm(way)), 1e-6) * size, center)
 
@@ -105,27 +105,30 @@ class RobotScene:
             # Glass within glass is not drawn; inside an attainable set the hull is a net.
             net = display.drawn != "none"
             self._stage.refresh(hull, display.dark, display.shadows, display.center, net)
-        while len(self._fins) < state.layout.n_fins:
+        while len(self._fins) < state.layout.n:
             self._fins.append(FinNode(self._client.scene, len(self._fins), self._clicked, self._drag))
-        for node in self._fins[state.layout.n_fins :]:
+        for node in self._fins[state.layout.n :]:
             node.hide()
         self.newtons = fitting_newtons(_largest(state, allocation), self.newtons)
         scale = LENGTH / self.newtons
         fits = allocation is not None and allocation.layout.names == state.layout.names
-        for i, fin in enumerate(state.layout.fins):
-            selected = fin.name == self._session.selected
-            label = _label(state, i, fin.name in self._session.selection) if display.labels else None
-            gizmos = selected and self.editing
-            self._fins[i].place(fin, hull, gizmos, label, i == self.dragged)
-            if fin.name in state.failed or allocation is None:
-                self._fins[i].command(None, np.zeros(3), 0.0, False)
-            elif fits and np.isfinite(allocation.command[i, 0]):
+        moves = (
+            motion(state.layout.actuators, allocation.command) if fits and allocation is not None else None
+        )
+        for i, part in enumerate(state.layout.actuators):
+            selected = part.name == self._session.selected
+            label = _label(state, i, part.name in self._session.selection) if display.labels else None
+            gizmos = selected and self.editing and can_be_edited(state.layout)
+            self._fins[i].place(part, hull, gizmos, label, i == self.dragged)
+            if part.name in state.failed or allocation is None:
+                self._fins[i].command(None, np.zeros(3), np.eye(3), False)
+            elif moves is not None and np.isfinite(moves[i, 0]):
                 force = allocation.forces[i]
-                # The force belongs to the answer's own mounting angle, which a drag may have left behind.
-                angle = allocation.layout.fins[i].shaft_azimuth
-                self._fins[i].command(allocation.command[i], force * scale, angle, display.fans)
-        if fits and allocation is not None:
-            self._flapping.take(allocation.command)
+                # The force belongs to the answer's own axes, which a drag may have left behind.
+                frame = allocation.layout.frames[i]
+                self._fins[i].command(moves[i], force * scale, frame, display.fans)
+        if moves is not None:
+            self._flapping.take(moves)
         self._proposed.show(moved_fins(offered if display.proposed else None, state.layout))
         left = self._session.saved if display.ghost and offered is None else None
         self._ghost.show(moved_fins(left, state.layout))
@@ -155,7 +158,7 @@ class RobotScene:
 
     def _drag(self, index: int, phase: str, position: tuple[float, float, float], angle: float) -> None:
         session = self._session
-        if index >= session.state.layout.n_fins:
+        if index >= session.state.layout.n:
             return
         self.dragged = None if phase == "end" else index
         if phase == "start":

@@ -6,7 +6,7 @@ import viser
 from finlab.arrays import Array
 from finlab.layout import Layout
 from webapp.handles import put
-from webapp.scene.fin_node import LIMP, FinShapes, Flapping, quaternion
+from webapp.scene.fin_node import LIMP, FinShapes, Flapping, turn_of
 from webapp.scene.meshes.hull import hull_of
 from webapp.scene.meshes.mesh import NOTHING, Mesh, force_arrow, joined, tube
 from webapp.scene.shape import Shape
@@ -42,7 +42,7 @@ class SwimRobot:
         self._top = 0.0
         self._flapping = Flapping()
         self._names: tuple[str, ...] = ()
-        self._angles: list[float] = []
+        self._axes: Array = np.zeros((0, 3, 3))
         self._ahead: Moment | None = None
         self._behind: Moment | None = None
         self._clock = 0.0
@@ -54,16 +54,17 @@ class SwimRobot:
         self._hull.become(hull.mesh())
         self._bow.become(hull.bow())
         self._top = hull.center[2] + hull.half[2] + ABOVE
-        while len(self._fins) < layout.n_fins:
+        while len(self._fins) < layout.n:
             index = len(self._fins)
             name = f"{self._name}/fin{index}"
             self._frames.append(self._scene.add_frame(name, show_axes=False))
             self._fins.append(FinShapes(self._scene, name, index, self._opacity))
-        for frame, fin in zip(self._frames, layout.fins, strict=False):
-            put(frame, position=np.array(fin.position), visible=True, wxyz=quaternion(fin.shaft_azimuth, 2))
-        for spare in self._frames[layout.n_fins :]:
+        self._axes = layout.frames
+        for frame, shapes, part in zip(self._frames, self._fins, layout.actuators, strict=False):
+            shapes.become(part)
+            put(frame, position=np.array(part.position), visible=True, wxyz=turn_of(np.array(part.frame)))
+        for spare in self._frames[layout.n :]:
             put(spare, visible=False)
-        self._angles = [fin.shaft_azimuth for fin in layout.fins]
         self._flapping = Flapping()
         self._names = layout.names
         self._flap(moment)
@@ -121,8 +122,8 @@ class SwimRobot:
         ):
             shape.show(force_arrow, wrench[:3] * scale, top, thickness)
         self._flap(moment)
-        for node, force, angle in zip(self._fins, moment.force, self._angles, strict=False):
-            node.push(force * scale, angle, 0.006)
+        for node, force, frame in zip(self._fins, moment.force, self._axes, strict=False):
+            node.push(force * scale, frame, 0.006)
         places = moment.record[:, PLACE : PLACE + 3]
         places = places[:: max(1, len(places) // TRAIL_POINTS)]
         if len(places) > 1:

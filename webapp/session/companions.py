@@ -22,7 +22,7 @@ from finlab.bundle_files import (
 from finlab.errors import DataError, FinlabError, LayoutError
 from finlab.files.archive import member_names, unpacked
 from finlab.files.guarded import read_file
-from finlab.layout import FinModelSpec, Layout
+from finlab.layout import Fin, FinModelSpec, Layout
 from finlab.layout.body import MESH_SUFFIXES
 from finlab.layout.load import MAX_BYTES, layout_and_failed
 from finlab.whole_file import write_whole
@@ -114,24 +114,23 @@ def adopted(layout: Layout, parts: Mapping[str, bytes], folder: Path, source: st
         source: what to call the layout in errors.
 
     Raises:
-        LayoutError: it names a force table that did not come along, or an actuator that the app cannot show.
+        LayoutError: it names a force table that did not come along.
         FinlabError: a file cannot be kept, or is no hull.
     """
-    layout.only_fins("the app", horizontal=True)
     by_name = {Path(path).name: path for path in parts}
-    fins, missing = [], []
-    for fin in layout.fins:
-        if fin.model.type == "table":
-            path = str(fin.model.values()["path"])
+    actuators, missing = [], []
+    for part in layout.actuators:
+        if isinstance(part, Fin) and part.model.type == "table":
+            path = str(part.model.values()["path"])
             path = path if path in parts else by_name.get(Path(path).name, path)
             if path not in parts:
                 raise LayoutError(
-                    f"fin {fin.name!r:.40} names the table {Path(path).name!r:.60}, which did not come "
+                    f"fin {part.name!r:.40} names the table {Path(path).name!r:.60}, which did not come "
                     "along; put the layout and its tables into one ZIP archive, and open that",
                     source=source,
                 )
-            fin = replace(fin, model=stored_table(parts[path], folder / TABLE_FOLDER))
-        fins.append(fin)
+            part = replace(part, model=stored_table(parts[path], folder / TABLE_FOLDER))
+        actuators.append(part)
     body = layout.body
     if body is not None and body.hull is not None and body.hull.mesh is not None:
         mesh = body.hull.mesh
@@ -142,7 +141,7 @@ def adopted(layout: Layout, parts: Mapping[str, bytes], folder: Path, source: st
         else:
             missing.append(Path(mesh).name[-60:])
             body = replace(body, hull=None)
-    return Opened(replace(layout, actuators=tuple(fins), body=body), tuple(missing))
+    return Opened(replace(layout, actuators=tuple(actuators), body=body), tuple(missing))
 
 
 def stored_mesh(name: str, content: bytes, scale: float, folder: Path) -> str:

@@ -207,7 +207,16 @@ class Core:
     def _selected_name(self) -> str:
         if self.selected is None:
             raise FinlabError("no fin is selected; click one, or choose it in the list")
+        self._check_editable()
         return self.selected
+
+    def _check_editable(self) -> None:
+        """Refuse a robot whose actuators the page cannot place and turn.
+
+        Raises:
+            LayoutError: an actuator is no fin, or a fin's shaft is not horizontal.
+        """
+        self.state.layout.only_fins("editing in the app", horizontal=True)
 
     def start_over(self) -> None:
         """Everything as at first sight; the way here can be undone."""

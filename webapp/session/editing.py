@@ -17,12 +17,7 @@ class Editing(Core):
     """Changes of the layout."""
 
     def open_layout(self, layout: Layout, step: str = "") -> None:
-        """Another layout; the target stays, damage and links are forgotten. `step` is what undo calls it.
-
-        Raises:
-            LayoutError: an actuator is no fin, or a fin's shaft is not horizontal.
-        """
-        layout.only_fins("the app", horizontal=True)
+        """Another layout; the target stays, damage and links are forgotten. `step` is what undo calls it."""
         whole = replace(self.state, layout=layout, failed=(), weak=(), stuck=(), links=())
         self._commit(step or f"Open {layout.name}", whole)
         self.saved = layout
@@ -42,6 +37,7 @@ class Editing(Core):
 
     def drag_fin(self, name: str, position: Vector, angle: float) -> None:
         """A fin on its way in the user's hand: one step of undo for the whole drag."""
+        self._check_editable()
         layout = layout_edits.moved(self.state.layout, name, position)
         self._drag(name, layout_edits.turned(layout, name, angle))
 
@@ -57,6 +53,7 @@ class Editing(Core):
 
     def add_fin(self) -> None:
         """One more fin; it is selected."""
+        self._check_editable()
         layout, name = layout_edits.added(self.state.layout)
         self._edit(f"Add {name}", layout)
         self.selected = name

@@ -39,9 +39,13 @@ MAX_PATH_BYTES = 2_000_000
 
 @cache
 def shipped() -> dict[str, Layout]:
-    """Shipped layouts of fins by the name that the command line knows them by."""
-    layouts = {name: load_layout(path) for name, path in shipped_layouts().items()}
-    return {name: layout for name, layout in layouts.items() if layout.is_of_fins}
+    """Shipped layouts by the name that the command line knows them by."""
+    return {name: load_layout(path) for name, path in shipped_layouts().items()}
+
+
+def comparable() -> tuple[str, ...]:
+    """Names of the shipped layouts of fins, which have score cards."""
+    return tuple(name for name, layout in shipped().items() if layout.is_of_fins)
 
 
 def shipped_name(layout: Layout) -> str | None:

@@ -236,5 +236,5 @@ def balanced(layout: Layout, center: Vector) -> Layout:
     hull = replace(described, center_m=moved(drawn.center))
     buoyancy = body.center_of_buoyancy_m
     body = replace(body, hull=hull, center_of_buoyancy_m=None if buoyancy is None else moved(buoyancy))
-    fins = tuple(replace(fin, position=moved(fin.position)) for fin in layout.fins)
-    return replace(layout, actuators=fins, body=body)
+    parts = tuple(replace(part, position=moved(part.position)) for part in layout.actuators)
+    return replace(layout, actuators=parts, body=body)

@@ -10,12 +10,10 @@ from finlab.allocation.allocation import Allocation
 from finlab.errors import FinlabError
 from webapp.session.files import shipped
 from webapp.session.looking import Desk
-from webapp.session.state import State
+from webapp.session.state import State, least_of
 from webapp.session.targets import PRESETS
 from webapp.session.tour import Guiding
 
-DELIVERED = 1e-3
-"""Normalized error up to which a wrench counts as delivered."""
 ALIGNED = 0.999
 """Cosine from which what is delivered points where it was asked."""
 
@@ -35,7 +33,7 @@ class Seen(NamedTuple):
     @property
     def delivered(self) -> bool:
         """Whether the wrench is what was asked for."""
-        return bool(self.answer.err_norm <= DELIVERED)
+        return self.answer.reachable
 
 
 @dataclass(frozen=True)
@@ -58,14 +56,14 @@ class Lesson:
     """Wrench that is asked for [N, N m]."""
     done: Callable[[Seen], bool]
     """Whether the exercise is done."""
-    objective: str = "power"
-    """What answers keep least at first."""
+    method: str = "dual"
+    """Method that answers at first."""
     task: str = "Allocate"
     """Task of the page that is opened."""
 
     def state(self, now: State) -> State:
         """The prepared state, with nothing left of the present one but its numbers for drawing."""
-        plain = State(shipped()[self.layout], target=self.target, objective=self.objective)
+        plain = State(shipped()[self.layout], target=self.target, method=self.method)
         kept = {key: getattr(now, key) for key in ("n_candidates", "temperature", "gamma")}
         return replace(plain, **kept)
 
@@ -81,32 +79,32 @@ LESSONS = (
     Lesson(
         "two-ways",
         "One wrench, several ways",
-        "Four fins have twelve numbers, a wrench has six. With the paper's effort kept least, the search "
-        "finds several minima: the numbered dots below, each another way to push and turn the robot.",
+        "Four fins have twelve numbers, a wrench has six. Where the paper's effort is kept least, there are "
+        "several minima: a network proposes them, and the numbered dots below are its ways, made exact.",
         "Show another dot than the first. Which fins change, and what stays?",
         "The fins changed, the green arrows did not: the robot feels the same force and torque.",
         "ucat",
         PRESETS["Turn"],
         lambda seen: seen.mode > 0 and seen.delivered,
-        objective="effort",
+        method="mdn",
     ),
     Lesson(
         "watts-or-effort",
         "Watts are not effort",
         "Effort, the paper's measure, adds up how far and how fast fins flap. Its cheapest answer lets some "
         "fins rest. Watts grow faster than force, so they are least where all fins share the work.",
-        "In the bar above, keep power least. What do the resting fins do now?",
+        "In the bar above, keep watts least. What do the resting fins do now?",
         "More fins work, each a little, and the robot needs fewer watts for the same wrench.",
         "hexa",
         (1.5, 0.0, 0.0, 0.0, 0.0, 0.1),
-        lambda seen: seen.state.objective == "power" and seen.delivered,
-        objective="effort",
+        lambda seen: least_of(seen.state.method) == "watts" and seen.delivered,
+        method="mdn",
     ),
     Lesson(
         "lost-fin",
         "A fin is lost",
-        "Nothing has to be built or trained for it: the search leaves the fin out and divides the wrench "
-        "among the others, as long as they can give it.",
+        "Nothing has to be built or trained for it: the fin is left out, and the wrench is divided among the "
+        "others, as long as they can give it.",
         "Fail a fin by its number at the left, so that nothing is left undone.",
         "Three fins are enough for this turn. Fail a second one: which axis is missing then?",
         "ucat",

@@ -5,7 +5,7 @@ from typing import Any
 
 from finlab.layout import Layout
 from webapp.session.core import Core
-from webapp.session.files import shipped
+from webapp.session.files import comparable, shipped
 from webapp.session.search_request import SearchRequest
 from webapp.session.state import chosen
 
@@ -95,7 +95,7 @@ class Looking(Core):
             FinlabError: there is no such layout.
         """
         if name is not None:
-            chosen(name, "layout", shipped())
+            chosen(name, "layout", comparable())
         self.beside = name
 
     @property

@@ -6,7 +6,7 @@ from typing import Any
 from finlab.allocation.policy import AXES
 from finlab.errors import FinlabError
 from webapp.session.core import Core
-from webapp.session.state import AXIS_WORDS
+from webapp.session.state import AXIS_WORDS, LEAST, chosen
 from webapp.session.targets import PRESETS, axis_reach
 
 SHARE = 0.25
@@ -55,8 +55,12 @@ class Questions(Core):
         self._commit(f"Only {AXIS_WORDS[axis]}", only)
 
     def set_setting(self, key: str, value: Any) -> None:
-        """K, T, gamma, the method or the objective; `key` is the field of `State`."""
+        """K, T, gamma, the method or the policy; `key` is the field of `State`."""
         self._commit(f"Set {key.replace('_', ' ')}", self.state.with_setting(key, value), key)
+
+    def keep_least(self, word: str) -> None:
+        """Watts or effort, by the method that keeps them least."""
+        self.set_setting("method", LEAST[chosen(word, "least", LEAST)])
 
     def toggle_failure(self, name: str) -> None:
         """A fin fails, or is repaired."""

@@ -3,17 +3,15 @@
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from functools import cache
-from typing import Any, get_args
+from typing import Any
 
 from finlab.allocation.mdn_settings import MdnSettings
-from finlab.allocation.methods import METHODS, method_class
+from finlab.allocation.methods import METHODS
 from finlab.allocation.policy import AXES, KINDS
 from finlab.errors import FinlabError
-from finlab.layout import Layout
+from finlab.layout import Fin, Layout
 from finlab.layout.damage import Health
 from finlab.paper.settings import PaperSettings
-from finlab.physics.objective import Name as Objective
 from webapp.session.links import Links, kept, linked
 
 AXIS_WORDS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
@@ -27,9 +25,9 @@ STRENGTH_RANGE = (0.05, 1.0)
 """Shares that may be left of a weak fin's largest amplitude and frequency."""
 COMPARED = ("dual", "mdn", "paper", "analytic", "qp", "sqp")
 """Methods that answer quickly enough to be compared while one waits."""
-OBJECTIVES: tuple[str, ...] = get_args(Objective)
-"""What answers may keep least."""
-CHOICES: dict[str, tuple[str, ...]] = {"method": tuple(METHODS), "objective": OBJECTIVES, "policy": KINDS}
+LEAST = {"watts": "dual", "effort": "mdn"}
+"""What answers may keep least, and the method that does it best."""
+CHOICES: dict[str, tuple[str, ...]] = {"method": tuple(METHODS), "policy": KINDS}
 """Settings that are one of some words."""
 NUMBERS = ("n_candidates", "temperature", "gamma")
 """Settings that are numbers, which the methods check. None stands for the method's own value."""
@@ -61,8 +59,6 @@ class State:
     """Weight of the effort in the ranking."""
     method: str = "dual"
     """Name of the allocation method."""
-    objective: str = "power"
-    """What answers keep least: one of `OBJECTIVES`."""
     policy: str = "closest"
     """What to do about a wrench that is out of reach: one of `KINDS`."""
     links: Links = ()
@@ -102,9 +98,9 @@ class State:
         """One fin failed or repaired; the last working fin cannot fail."""
         self.layout.index(name)
         lost = set(self.failed) ^ {name}
-        if len(lost) == self.layout.n_fins:
+        if len(lost) == self.layout.n:
             raise FinlabError(
-                f"{name} is the last fin that works, so it cannot fail too; repair another one first"
+                f"{name} is the last one that works, so it cannot fail too; repair another one first"
             )
         return replace(self, failed=tuple(n for n in self.layout.names if n in lost))
 
@@ -130,7 +126,7 @@ class State:
         return replace(
             self,
             layout=layout,
-            failed=() if len(failed) == layout.n_fins else failed,
+            failed=() if len(failed) == layout.n else failed,
             weak=tuple(pair for pair in self.weak if pair[0] in layout.names),
             stuck=tuple(pair for pair in self.stuck if pair[0] in layout.names),
             links=kept(self.links, layout),
@@ -162,7 +158,7 @@ class State:
         return replace(self, links=linked(self.links, a, b))
 
     def with_setting(self, key: str, value: Any) -> "State":
-        """K, T, gamma, the method, the objective or the policy changed: `key` is one of `SETTINGS`."""
+        """K, T, gamma, the method or the policy changed: `key` is one of `SETTINGS`."""
         if key not in SETTINGS:
             raise FinlabError(f"there is no setting {key!r:.40}")
         checked: Any = value
@@ -178,10 +174,14 @@ class State:
         return replace(self, **{key: checked})
 
 
-@cache
-def knows_objective(method: str) -> bool:
-    """Whether a method keeps least what is asked; the others keep the paper's effort least."""
-    return "objective" in method_class(method).option_names()
+def can_be_edited(layout: Layout) -> bool:
+    """Whether all actuators are fins with horizontal shafts, which the page can place and turn so far."""
+    return all(isinstance(part, Fin) and part.mounting_angle is not None for part in layout.actuators)
+
+
+def least_of(method: str) -> str:
+    """What a method keeps least: a key of `LEAST`. The two with networks know the paper's effort alone."""
+    return "effort" if method in DRAWING else "watts"
 
 
 def chosen(value: Any, name: str, choices: Iterable[str]) -> Any:

@@ -154,7 +154,6 @@ class SwimSettings:
             path,
             (self.method,) if self.rival in (ALONE, self.method) else (self.method, self.rival),
             self.plant,
-            state.objective,
             self.controller,
             self.scenario,
             self.water,
@@ -195,8 +194,6 @@ class Plan(NamedTuple):
     """Allocation methods, one robot each."""
     plant: str = "mean"
     """How the fins' forces are simulated: one of `PLANTS`."""
-    objective: str = "power"
-    """What the fins keep least."""
     controller: str = CONTROLLERS[0]
     """Who steers."""
     scenario: str = "nominal"

@@ -6,8 +6,8 @@ from functools import lru_cache
 import numpy as np
 
 from finlab.arrays import Array
-from finlab.forces.fin_sets import SCALE, fin_sets
 from finlab.layout import Layout
+from finlab.physics import plant_of
 
 PRESETS: dict[str, tuple[float, float, float, float, float, float]] = {
     "Cruise": (2.0, 0.0, 0.0, 0.0, 0.0, 0.0),
@@ -22,18 +22,31 @@ FIRST = PRESETS["Turn"]
 """What a new session asks for: gently forward, turning left."""
 
 
-@lru_cache(maxsize=64)
+STEPS = (5, 5, 73)
+"""Values of each of its three numbers that an actuator is tried with: a fin's directions lie 5 deg apart."""
+
+
 def axis_reach(layout: Layout, failed: tuple[str, ...] = ()) -> Array:
-    """Largest size of each wrench component (6,) [N, N m] that the working fins give with the others free."""
-    sets = fin_sets(layout, failed)
-    both = sets.tile(12).farthest(np.concatenate([np.eye(6), -np.eye(6)]))[0]
-    return np.asarray(both.reshape(2, 6).max(axis=0) * SCALE)
+    """Largest size of each wrench component (6,) [N, N m] that the working actuators give with the others
+    free, at rest."""
+    works = np.array([name not in failed for name in layout.names])
+    return np.asarray(_extents(layout)[1][:, works].sum(axis=1).max(axis=0))
+
+
+def full_thrust(layout: Layout) -> Array:
+    """Largest force (n,) of each actuator, at rest [N]."""
+    return _extents(layout)[0]
 
 
 @lru_cache(maxsize=64)
-def full_thrust(layout: Layout) -> Array:
-    """Mean thrust (n,) of each fin at its largest amplitude and frequency [N]."""
-    return np.asarray(fin_sets(layout).radius[0])
+def _extents(layout: Layout) -> tuple[Array, Array]:
+    """Largest force (n,) of each actuator, and what it gives at most along each axis either way (2, n, 6)."""
+    plant = plant_of(layout)
+    share = np.stack(np.meshgrid(*(np.linspace(0.0, 1.0, count) for count in STEPS), indexing="ij"), -1)
+    force = plant.force(plant.lower + share.reshape(-1, 1, 3) * plant.width)
+    wrench = np.einsum("kni,niw->knw", force, plant.effectiveness)
+    both = np.stack([wrench.max(axis=0), -wrench.min(axis=0)])
+    return np.linalg.norm(force, axis=-1).max(axis=0), np.maximum(both, 0.0)
 
 
 def slider_end(reach: float) -> float:

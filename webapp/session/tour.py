@@ -32,7 +32,7 @@ class Step:
     """What lies uppermost in the drawer; its task is open."""
 
     def state(self, now: State) -> State:
-        """The state of this stop, with the objective and the settings of the present one."""
+        """The state of this stop, with the settings of the present one."""
         return replace(
             now,
             layout=shipped()[self.layout],
@@ -56,16 +56,17 @@ STEPS = (
     ),
     Step(
         "One wrench has many answers",
-        "Four fins have twelve numbers, the wrench only six. This is another answer than before. In the "
-        "drawer below each numbered dot is one, with the power that it takes. Click some: the fins change, "
-        "the green sum stays.",
+        "Four fins have twelve numbers, the wrench only six. Here a network proposes ways, each is made "
+        "exact, and this is the second best. In the drawer below each numbered dot is one. Click some: the "
+        "fins change, the green sum stays.",
         "ucat",
         PRESETS["Turn"],
         mode=1,
+        method="mdn",
     ),
     Step(
         "A fin fails",
-        "Fin 2 hangs down. The search leaves it out and answers at once with the other three. Fail another "
+        "Fin 2 hangs down. It is left out, and the other three answer at once. Fail another "
         "one in the list, and read below the bars what is left undone.",
         "ucat",
         PRESETS["Turn"],
@@ -81,7 +82,7 @@ STEPS = (
     ),
     Step(
         "It swims",
-        "Ten times a second the controller asks for a wrench and the search answers. The blue ball is where "
+        "Ten times a second the controller asks for a wrench and the fins answer. The blue ball is where "
         "the robot should be. Break a fin by its number, and watch the others take over.",
         "ucat",
         PRESETS["Turn"],
@@ -89,12 +90,11 @@ STEPS = (
         drawer="Swim over time",
     ),
     Step(
-        "Another robot, and a network",
-        "Six fins now, and the method is mdn: a network proposes, and each proposal is made exact; "
-        "the small dots in the drawer are its draws. Finish brings your work back.",
-        "hexa",
-        (1.5, 0.5, -1.0, 0.0, 0.0, 0.15),
-        method="mdn",
+        "Not fins alone",
+        "Two thrusters lift this robot beside its four fins. Fins take little power at light load, thrusters "
+        "take what is heavy: ask for more heave, and see who carries it. Finish brings your work back.",
+        "turtle_hybrid",
+        (1.2, 0.0, 4.0, 0.0, 0.0, 0.25),
     ),
 )
 """The stops in order."""

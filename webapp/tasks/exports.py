@@ -53,10 +53,10 @@ class Exports:
         self._send_made(".zip", lambda *robot: make_bundle(*robot).zip_bytes())
 
     def _send_made(self, suffix: str, make: Callable[[Allocator, tuple[str, ...]], bytes]) -> None:
-        """Send what is made of the robot and its allocator, as that is shipped but for the objective."""
+        """Send what is made of the robot and its allocator, as that is shipped."""
         state, shipped = self._session.state, self._context.solver.shipped
         name = f"{file_stem(state.layout.name)}{suffix}"
-        self._send(name, lambda: make(shipped(state.layout, state.method, state.objective), state.failed))
+        self._send(name, lambda: make(shipped(state.layout, state.method), state.failed))
 
     def swim(self, records: Sequence[Recorded]) -> None:
         """Send the logs of robots that swim as CSV; an archive of them where there are several."""

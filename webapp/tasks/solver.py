@@ -1,6 +1,6 @@
 """From a state to an answer with all that a page shows of it: picks the allocator and keeps it."""
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -9,19 +9,18 @@ import numpy as np
 
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.allocator import Allocator
-from finlab.allocation.methods import MethodChoice, checked_settings, choose_method
+from finlab.allocation.methods import MethodChoice, choose_method
 from finlab.allocation.modes import Mode
 from finlab.allocation.solution import Candidates
 from finlab.arrays import Array
-from finlab.forces.reach import axis_ranges
 from finlab.layout import Layout
 from finlab.physics import plant_of
 from webapp.session.state import State
 from webapp.tasks.mode_names import Modes, known_modes, listed_modes
 
 Load = Callable[..., MethodChoice]
-KEPT = 8
-"""Allocators that are kept."""
+KEPT = 24
+"""Allocators that are kept: to make one takes as long as a hundred answers."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,21 +44,21 @@ class Solver:
         """`checkpoint` is a name or folder, None for the shipped one; `load` is replaced in tests."""
         self._checkpoint = checkpoint
         self._load = load
-        self._choices: dict[tuple[str, str], MethodChoice] = {}
-        self._made: dict[tuple[Layout, str, str, str], Allocator] = {}
+        self._choices: dict[str, MethodChoice] = {}
+        self._made: dict[tuple[Layout, str, str], Allocator] = {}
 
     @cached_property
     def aside(self) -> "Solver":
         """Another solver with the same checkpoint, for another thread."""
         return Solver(self._checkpoint, self._load)
 
-    def shipped(self, layout: Layout, method: str, objective: str) -> Allocator:
+    def shipped(self, layout: Layout, method: str) -> Allocator:
         """The allocator of a robot by a method as it is shipped, whose networks are loaded once.
 
         Raises:
             FinlabError: it cannot be made.
         """
-        return self._on(layout, method, objective, {})
+        return self._on(layout, method, {})
 
     def allocator(self, state: State) -> Allocator:
         """The allocator for the state's robot and method with the state's settings.
@@ -68,14 +67,14 @@ class Solver:
             FinlabError: it cannot be made.
         """
         drawing = {key: v for key, v in state.drawing.items() if getattr(state, key) is not None}
-        return self._on(state.layout, state.method, state.objective, drawing)
+        return self._on(state.layout, state.method, drawing)
 
-    def _on(self, layout: Layout, method: str, objective: str, drawing: Mapping[str, object]) -> Allocator:
+    def _on(self, layout: Layout, method: str, drawing: Mapping[str, object]) -> Allocator:
         """An allocator, one of the last few or made now."""
-        key = layout, method, objective, repr(sorted(drawing.items()))
+        key = layout, method, repr(sorted(drawing.items()))
         found = self._made.pop(key, None)
         if found is None:
-            choice = self._choice(method, objective)
+            choice = self._choice(method)
             known = choice.kind.option_names()
             own = {name: value for name, value in drawing.items() if name in known}
             settings = replace(choice.settings, **own)
@@ -85,17 +84,12 @@ class Solver:
             self._made.pop(next(iter(self._made)))
         return found
 
-    def _choice(self, method: str, objective: str) -> MethodChoice:
-        """A method with its networks, loaded once for each objective that it knows."""
-        known = self._choices
-        if (method, objective) not in known:
+    def _choice(self, method: str) -> MethodChoice:
+        """A method with its networks, loaded once."""
+        if method not in self._choices:
             checkpoint = self._checkpoint if method == "mdn" else None
-            choice = self._load(method, checkpoint=checkpoint)
-            if "objective" in choice.kind.option_names():
-                settings = checked_settings(choice.kind, {"objective": objective})
-                choice = replace(choice, settings=settings)
-            known[method, objective] = choice
-        return known[method, objective]
+            self._choices[method] = self._load(method, checkpoint=checkpoint)
+        return self._choices[method]
 
     def reply(self, state: State) -> Reply:
         """The answer to a state with all that a page shows of it, computed to the end.
@@ -103,9 +97,11 @@ class Solver:
         Raises:
             FinlabError: the method cannot be loaded or cannot answer.
         """
-        answer, failed = judged(self.solve(state)), state.failed
+        answer = judged(self.solve(state))
         modes = listed_modes(known_modes(answer), answer.samples)
-        in_reach = answer.reachable or is_within(answer.layout, state.target, failed)
+        in_reach = answer.reachable
+        if not in_reach and state.method != "dual":  # which misses nothing that can be reached
+            in_reach = self.solve(replace(state, method="dual")).reachable
         return Reply(state, answer, modes, in_reach)
 
     def modes(self, reply: Reply) -> Modes:
@@ -158,14 +154,3 @@ def judged_modes(answer: Allocation, modes: tuple[Mode, ...]) -> tuple[Mode, ...
         replace(mode, wrench=wrench, err_norm=float(error))
         for mode, wrench, error in zip(modes, wrenches, errors, strict=True)
     )
-
-
-EDGE = 1e-4
-"""Share of a range by which a component may lie beyond its end and still count as within."""
-
-
-def is_within(layout: Layout, target: tuple[float, ...], failed: Collection[str]) -> bool:
-    """Whether the working fins can give a wrench (6,): no component is beyond its range beside the others."""
-    low, high = axis_ranges(layout, target, failed)
-    slack = EDGE * (np.abs(high) + np.abs(low)) + EDGE
-    return bool((np.isfinite(low) & (low - slack <= target) & (target <= high + slack)).all())

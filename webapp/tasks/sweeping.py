@@ -35,7 +35,7 @@ class Sweep:
         self.force: Array = np.full((0, POINTS), np.nan)
         """Mean force of each fin at each value (n, POINTS) [N]; NaN where it is not known yet."""
         self.error: Array = np.full(POINTS, np.nan)
-        """Error at each value (POINTS,) [σ]."""
+        """Error at each value (POINTS,)."""
         self.power: Array = np.full(POINTS, np.nan)
         """Power at each value (POINTS,) [W]."""
 

@@ -70,11 +70,6 @@ class Swimming:
         return bool(self.swimmers) and self.swimmers[0].shown.done
 
     @property
-    def objective(self) -> str:
-        """What its fins keep least."""
-        return "" if self._start.question is None else self._start.question.objective
-
-    @property
     def time(self) -> float:
         """Simulated time [s]."""
         return self.swimmers[0].shown.time if self.swimmers else 0.0
@@ -87,7 +82,7 @@ class Swimming:
 
     def _made(self, plan: Plan) -> tuple[Swimmer, ...]:
         def allocator(method: str) -> Allocator:
-            return self._solver.allocator(State(plan.layout, method=method, objective=plan.objective))
+            return self._solver.allocator(State(plan.layout, method=method))
 
         return tuple(Swimmer(method, plan, closed_loop(plan, allocator(method))) for method in plan.methods)
 

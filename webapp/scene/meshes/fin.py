@@ -6,7 +6,6 @@ A fin that points aft pushes forward, so the blade lies opposite to its thrust.
 import numpy as np
 from trimesh.convex import convex_hull
 
-from finlab.arrays import Array
 from webapp.scene.meshes.mesh import Mesh, joined, revolved, triangles, tube
 
 CHORD = 0.18
@@ -33,12 +32,6 @@ def shaft() -> Mesh:
     housing = np.array([[-0.045, 0, 0], [-0.041, 0, 0], [-0.006, 0, 0], [-0.002, 0, 0]], dtype=float)
     rod = np.array([[-0.002, 0, 0], [ROOT + 0.86 * SPAN, 0, 0]], dtype=float)
     return joined(tube(housing, np.array([0.014, 0.018, 0.018, 0.013]), 20), tube(rod, 0.0055, 12))
-
-
-def mounting(angle: float) -> Array:
-    """The matrix (3, 3) from the frame of a fin under a mounting angle [rad] to the body frame."""
-    cos, sin = np.cos(angle), np.sin(angle)
-    return np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
 
 
 def sweep(amplitude: float) -> Mesh:

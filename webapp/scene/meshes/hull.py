@@ -84,7 +84,7 @@ AnyHull = HullShape | MeshHull
 
 
 def hull_of(layout: Layout) -> AnyHull:
-    """The hull that the layout describes, or one that fits between its fins."""
+    """The hull that the layout describes, or one that fits between its actuators."""
     described = layout.body.hull if layout.body is not None else None
     if described is not None and described.mesh is not None:
         x, y, z = described.center_m
@@ -94,7 +94,7 @@ def hull_of(layout: Layout) -> AnyHull:
         length, width, height = described.size_m
         x, y, z = described.center_m
         return HullShape(described.shape, (length / 2, width / 2, height / 2), (x, y, z))
-    reach = np.abs([fin.position for fin in layout.fins]).max(axis=0)
+    reach = np.abs(layout.position).max(axis=0)
     half = np.maximum(reach * [1.06, 0.86, 0.86], [0.16, 0.09, 0.08])
     slender = half[0] > 2.4 * max(half[1], half[2])
     round_plan = half[1] > 0.8 * half[0]
