@@ -107,6 +107,6 @@ def test_every_answer_keeps_least_what_is_asked() -> None:
     assert power.effort is not None and effort.effort is not None and power.effort > effort.effort
     assert "least power" in corner(state, "", power, False, None)
     assert "least effort" in corner(state, "", effort, False, None)
-    assert mode_plot(power, listed_modes(known_modes(power), None), 0, 200) == ""
+    assert mode_plot(power, solver.modes(solver.reply(state)), 0, 200) == "", "one answer"
     assert "--method mdn" in command_line(replace(state, method="mdn"))
     assert "finlab.Allocator(layout, 'mdn')" in python_lines(replace(state, method="mdn"))

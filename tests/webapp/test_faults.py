@@ -64,11 +64,11 @@ DRAWN = (
 class Tab:
     """One page on a server of its own."""
 
-    def __init__(self, workers: Workers, layout: Any) -> None:
+    def __init__(self, workers: Workers, layout: Any, solver: Solver | None = None) -> None:
         self.server = start_server()
         self.client: Any = SilentClient(self.server)
         session = Session(layout, DISPLAY)
-        solver = Solver(load=load_stand_in)
+        solver = solver or Solver(load=load_stand_in)
         loop = self.server.get_event_loop()
         self.view: View = self.on_loop(lambda: View(self.client, session, solver, workers, loop))
         self.meet_all(session)

@@ -1,22 +1,120 @@
-"""Robots that the app cannot show yet are refused in a sentence, and nothing that they name is opened."""
+"""Robots with thrusters, azimuths and rudders are shown in every task; what is for fins only says so."""
 
 import json
+from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from finlab.assets import shipped_layouts
 from finlab.errors import LayoutError
-from webapp.session.files import read_layout, read_together, shipped
+from finlab.layout import Azimuth, Fin, Layout, Rudder, Thruster, load_layout
+from finlab.layout.thrust_model import PowerLaw
+from tests.webapp.test_faults import Tab
+from webapp.markup.answer import fin_table
+from webapp.markup.fin_list import fin_list
+from webapp.session import Session, files
+from webapp.session.state import State
+from webapp.session.targets import axis_reach, full_thrust
+from webapp.tasks.background import Workers
+from webapp.tasks.solver import Solver
+
+HYBRID, BLUEROV = load_layout("turtle_hybrid"), load_layout("bluerov2_heavy")
+FISH = Layout(
+    "fish",
+    (
+        Azimuth(
+            name="pod",
+            position=(-0.1, 0.0, -0.1),
+            turn_axis=(0.0, 0.0, 1.0),
+            zero=(1.0, 0.0, 0.0),
+            force=(0.0, 20.0),
+            model=PowerLaw(1.0, 1.4, 1.5),
+        ),
+        Rudder(
+            name="rudder",
+            position=(-0.4, 0.0, 0.0),
+            shaft=(0.0, 0.0, 1.0),
+            zero=(1.0, 0.0, 0.0),
+            area=0.01,
+            deflection=(-np.pi / 6, np.pi / 6),
+            aspect_ratio=2.0,
+        ),
+        Fin(name="tail", position=(-0.5, 0.0, 0.0), shaft=(0.0, 0.0, 1.0), zero=(1.0, 0.0, 0.0)),
+        Fin(name="left", position=(0.2, 0.15, 0.0), mounting_angle=np.pi / 2),
+    ),
+)
 
 
-def test_a_thruster_is_named() -> None:
-    content = shipped_layouts()["turtle_hybrid"].read_bytes()
-    with pytest.raises(LayoutError, match="the app works for robots of fins only, and 'lift_left'"):
-        read_layout("mine.yaml", content)
-    with pytest.raises(LayoutError, match="the app works for robots of fins only, and 'lift_left'"):
-        read_together({"mine.yaml": content})
-    assert "turtle_hybrid" not in shipped() and "ucat" in shipped()
+@pytest.fixture(scope="module")
+def tab() -> Iterator[Tab]:
+    """One page, at a robot of fins."""
+    workers = Workers()
+    tab = Tab(workers, load_layout("ucat"), Solver())
+    yield tab
+    tab.close()
+    workers.stop()
+
+
+@pytest.mark.parametrize("layout", [HYBRID, BLUEROV, FISH], ids=lambda layout: layout.name)
+def test_every_task_shows_the_robot(tab: Tab, layout: Layout, capsys: pytest.CaptureFixture[str]) -> None:
+    tab.client.notes.clear()
+    tab.open(layout)
+    session = tab.view.session
+    tab.on_loop(lambda: tab.view.do(lambda: session.set_target(0, 3.0)))
+    tab.meet_all(session)
+    tab.settle()
+    told = " ".join(tab.figures())
+    assert tab.client.notes == [] and "Traceback" not in capsys.readouterr().err
+    assert f"{layout.n} of {layout.n} actuators" in told and "Exact" in told and "proved least" in told
+    assert all(name in told for name in layout.names) and "cannot be shown" not in told
+    assert "A swim works for " in told and "The comparison of methods works for" in told
+    nodes = tab.nodes()
+    assert all(f"/robot/fins/{k}/turn/blade" in nodes for k in range(layout.n))
+    assert f"/robot/fins/{layout.n}/turn/blade" not in nodes
+    first = layout.names[0]
+    tab.on_loop(lambda: tab.view.do(lambda: session.toggle_failure(first)))
+    tab.settle()
+    assert "failed" in " ".join(tab.figures()) and tab.client.notes == []
+    for act in (session.add_fin, partial(session.drag_fin, first, (0.0, 0.0, 0.0), 0.0)):
+        tab.on_loop(partial(tab.view.do, act))
+    assert all("editing in the app works for" in note for note in tab.client.notes[-2:])
+    tab.on_loop(lambda: tab.view.do(lambda: session.undo()))
+
+
+@pytest.mark.parametrize("layout", [HYBRID, BLUEROV, FISH], ids=lambda layout: layout.name)
+def test_a_file_goes_out_and_comes_back(
+    layout: Layout, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    opened = files.read_layout(*files.layout_file(layout)).layout
+    assert opened.actuators == layout.actuators
+    assert {"turtle_hybrid", "bluerov2_heavy"} <= set(files.shipped())
+    session = Session(load_layout("ucat"))
+    session.open_layout(opened)
+    session.set_center_of_gravity((0.01, 0.0, 0.0))
+    moved = session.state.layout.position - opened.position
+    np.testing.assert_allclose(moved, moved[:1].repeat(layout.n, axis=0), err_msg="all move along")
+
+
+def test_each_actuator_has_a_row_with_its_type_and_force() -> None:
+    state = State(FISH, target=(3.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+    answer = Solver().solve(state)
+    table = fin_table(state, answer, full_thrust(FISH), None)
+    assert "azimuth, " in table and "rudder, " in table and table.count("<tr") == 5
+    assert "thruster" in fin_table(State(BLUEROV), Solver().solve(State(BLUEROV)), full_thrust(BLUEROV), None)
+    listed = fin_list(state, ("rudder",))
+    assert "rudder" in listed and "azimuth" in listed
+    assert isinstance(BLUEROV.actuators[0], Thruster)
+
+
+def test_reach_of_thrusters_is_the_sum_of_what_each_gives() -> None:
+    upward = [part for part in BLUEROV.actuators if isinstance(part, Thruster) and abs(part.axis[2]) > 0.9]
+    most = sum(max(part.force[1] * part.axis[2], part.force[0] * part.axis[2]) for part in upward)
+    least = sum(max(-part.force[1] * part.axis[2], -part.force[0] * part.axis[2]) for part in upward)
+    assert axis_reach(BLUEROV)[2] == pytest.approx(max(most, least))
+    assert axis_reach(FISH)[1] > 0.0 and full_thrust(FISH)[1] == 0.0, "a rudder at rest gives nothing"
 
 
 def test_a_table_of_thrust_on_the_server_is_not_opened(tmp_path: Path) -> None:
@@ -26,6 +124,9 @@ def test_a_table_of_thrust_on_the_server_is_not_opened(tmp_path: Path) -> None:
     robot = {"format": "finlab-layout", "version": 2, "name": "x"}
     robot["actuators"] = [{**thruster, "force_n": [-5, 5], "model": model}]
     content = json.dumps(robot).encode()
-    for read in (lambda: read_layout("x.json", content), lambda: read_together({"x.json": content})):
+    for read in (
+        lambda: files.read_layout("x.json", content),
+        lambda: files.read_together({"x.json": content}),
+    ):
         with pytest.raises(LayoutError, match="model.path: names a file, which is not opened here"):
             read()

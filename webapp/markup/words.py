@@ -56,15 +56,6 @@ def three_digits(value: float | None) -> str:
     return f"{value:.{max(2 - whole, 0)}f}".replace("-", "−")
 
 
-<<<<<<< HEAD
-def objective_of(allocation: Allocation) -> str:
-    """What the method that answered keeps least; of those without that choice the default method keeps watts
-    least, the others the paper's effort."""
-    return str(allocation.settings.get("objective", "power" if allocation.method == "dual" else "effort"))
-
-
-=======
->>>>>>> 2e49a668 (App on allocators that are kept per robot; robots of any actuators are shown)
 def source_words(sources: Sequence[str]) -> str:
     """Where a mode comes from: the components of a mixture, or where the search began."""
     numbers = [s.removeprefix("component ") for s in sources if s.startswith("component ")]
