@@ -30,9 +30,3 @@ def force_table(tmp_path: Path) -> str:
 def search() -> AnyRobot:
     """The product's default method."""
     return AnyRobot()
-
-
-@pytest.fixture(scope="session")
-def effort() -> AnyRobot:
-    """The same with the paper's effort kept least."""
-    return AnyRobot(objective="effort")
