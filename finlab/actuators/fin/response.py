@@ -30,7 +30,7 @@ SIZES = 512
 """Sizes of force for which the command is kept."""
 CORRECTIONS = 2
 """Times that a command is corrected by the law itself."""
-TURNS = 256
+TURNS = 512
 """Directions in which an uneven fin is asked for its force."""
 
 
@@ -207,11 +207,16 @@ class _Box:
         """Zero directions (TURNS + 1,) [rad] and the largest forces across the shaft (TURNS + 1, 2) [N] that
         a coarse grid of commands has there."""
         turns = np.linspace(self.lower[2], self.upper[2], TURNS + 1)
+        return turns, self.strongest(turns)
+
+    def strongest(self, turns: Array) -> Array:
+        """The largest forces across the shaft (K, 2) [N] of a coarse grid of commands at zero directions (K,)."""
         command = np.tile(self.grid(COARSE_GRID), (len(turns), 1, 1))
         command[..., 2] = turns[:, None]
         across = self.law.force(command.reshape(-1, 3)).reshape(command.shape)[..., 1:]
         best = np.hypot(across[..., 0], across[..., 1]).argmax(axis=1)
-        return turns, across[np.arange(len(turns)), best]
+        found: Array = across[np.arange(len(turns)), best]
+        return found
 
     def command(self, beat: Array) -> Array:
         """Commands (..., 3) of amplitude and frequency (..., 2)."""
@@ -323,16 +328,17 @@ def _directions(law: FinLaw, box: _Box) -> tuple[float, float, Array | None, Arr
         lean = float(wrapped(np.arctan2(force[2], force[1]) - box.turn))
         return middle + lean, half, None, np.array([lean])
     turns, across = box.all_round
-    size = np.hypot(across[:, 0], across[:, 1])
-    direction = turns + wrapped(np.arctan2(across[:, 1], across[:, 0]) - turns)
-    lean = np.unwrap(direction - turns)
+    direction = np.arctan2(across[:, 1], across[:, 0])
+    direction = turns + np.unwrap(wrapped(direction - turns))
     if not full:
         middle, half = 0.5 * float(direction[0] + direction[-1]), 0.5 * float(direction[-1] - direction[0])
-    angle = np.linspace(0.0, TURN, TURNS, endpoint=False)
+    angle = np.arange(TURNS) * (TURN / TURNS)
     place = (angle - direction[0]) % TURN
     if not full:  # beyond its arc a fin is taken to be as at the nearer end
         width = 2.0 * half
         place = np.where(place > 0.5 * (width + TURN), 0.0, np.minimum(place, width))
-    along = direction - direction[0]
-    gauge = np.interp(place, along, size) / size.max()
-    return middle, half, gauge, np.interp(place, along, lean)
+    turn = np.interp(place, direction - direction[0], turns)
+    across = box.strongest(turn)
+    reference = float(np.linalg.norm(box.strongest(np.array([box.turn]))))
+    gauge = np.hypot(across[:, 0], across[:, 1]) / reference
+    return middle, half, gauge, wrapped(np.arctan2(across[:, 1], across[:, 0]) - turn)
