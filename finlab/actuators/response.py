@@ -15,13 +15,13 @@ import numpy as np
 
 from finlab.arrays import Array
 
-CELLS = 512
-"""Intervals of price of a table; their ends are `top (j / CELLS)^2`."""
+CELLS = 1024
+"""Intervals of price of a table; their ends are `top (j / CELLS)^4`."""
 
 
 def price_grid(top: float, points: int = CELLS + 1) -> Array:
     """Prices (points,) [W/N] from 0 to `top`, the ends of a table's intervals."""
-    grid: Array = top * np.linspace(0.0, 1.0, points) ** 2
+    grid: Array = top * np.linspace(0.0, 1.0, points) ** 4
     return grid
 
 
@@ -90,15 +90,18 @@ class RadialTable:
         )
 
     def polynomials(self) -> Array:
-        """Coefficients (CELLS, 5): of the force in `t` from 0 to 1 along each interval, rising powers, and
-        the conjugate at its beginning [W]."""
-        width = np.diff(price_grid(self.top))
+        """Coefficients (CELLS + 1, 5): of the force in rising powers of the price, as a share of the largest,
+        from the beginning of each interval on, and the conjugate there [W]; the last are those beyond the
+        table."""
+        width = np.diff(price_grid(1.0))
         first, last = self.force[:-1], self.force[1:]
-        m0, m1 = self.slope[:-1] * width, self.slope[1:] * width
+        m0, m1 = self.slope[:-1] * self.top * width, self.slope[1:] * self.top * width
         rise = last - first
         part = np.stack([first, m0, 3.0 * rise - 2.0 * m0 - m1, m0 + m1 - 2.0 * rise], axis=1)
-        gain = width * (part @ (1.0 / np.arange(1.0, 5.0)))
-        start = np.concatenate([[0.0], np.cumsum(gain)[:-1]]) - self.rest
+        gain = self.top * width * (part @ (1.0 / np.arange(1.0, 5.0)))
+        start = np.concatenate([[0.0], np.cumsum(gain)]) - self.rest
+        part /= width[:, None] ** np.arange(4)
+        part = np.concatenate([part, [[self.force[-1], 0.0, 0.0, 0.0]]])
         return np.concatenate([part, start[:, None]], axis=1)
 
 
@@ -188,6 +191,11 @@ class Group(ABC):
     def beside_of(self, force: Array) -> Array:
         """Wrenches (N, 6) [N, N m] that come on top of forces (N, m, 2) of the answers."""
         return np.zeros((len(force), 6))
+
+    def radial_worth(self, price: Array) -> Array | None:
+        """Returns the most (N, m) [W] that force along its own direction is worth at prices (N, m) [W/N],
+        less its power, by the law itself (of lines signed prices); None where that is what the tables say."""
+        return None
 
     def worth(self, price: Array) -> Array | None:
         """Returns the most (m,) [W] that all the actuators can give is worth at a price (6,) of the wrench,

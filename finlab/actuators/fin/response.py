@@ -20,7 +20,7 @@ from finlab.errors import DataError
 from finlab.layout import Fin, FinModelSpec, Layout, Limits
 from finlab.layout.angles import TURN, is_full_turn, wrapped
 
-GRID, COARSE_GRID = (33, 49), (13, 25)
+GRID, COARSE_GRID = (17, 33), (13, 25)
 """Amplitudes and frequencies of the first grid, and of the grid on which directions are compared."""
 STEPS = 12
 """Steps of Newton's method from the best place of the grid."""
@@ -48,6 +48,8 @@ class FinTable(NamedTuple):
     round."""
     beat: Array
     """Amplitude [rad] and frequency [Hz] (SIZES + 1, 2) that give the force `largest (j / SIZES)^2`."""
+    box: "_Box"
+    """The law within the limits."""
     deflection: Array
     """Direction of the force minus zero direction (TURNS,) [rad] around the circle of force directions; one
     value (1,) where it is the same all round."""
@@ -82,6 +84,7 @@ class FinGroup(Group):
             DataError: a fin's force table cannot be read, or gives no thrust within the limits.
         """
         tables = [fin_table(fin, copper_loss) for fin in fins]
+        self._tables = tables
         self._laws = [make_law(fin.model) for fin in fins]
         self._stacked = stack_laws([fin.model for fin in fins])
         self.planes = [
@@ -145,6 +148,18 @@ class FinGroup(Group):
         command[..., 2] = np.clip(self._middle + wrapped(turn - self._middle), self._lower, self._upper)
         return command
 
+    def radial_worth(self, price: Array) -> Array:
+        """See `Group`: from the commands of the table on both sides of each price, by the law."""
+        found = np.empty(price.shape)
+        for i, table in enumerate(self._tables):
+            paid = np.maximum(price[:, i], 0.0)
+            place = np.interp(paid, price_grid(table.table.top), table.table.force) / self._largest[i]
+            cell = np.minimum((np.sqrt(place) * SIZES).astype(np.intp), SIZES - 1)
+            starts = np.stack([table.beat[np.clip(cell + k, 0, SIZES)] for k in (-1, 0, 1, 2)])
+            command = table.box.best(paid, starts)
+            found[:, i] = price[:, i] * table.box.force(command) - table.box.power(command)
+        return found
+
     def reach(self, lower: Array, upper: Array) -> Array:
         """See `Group`: sizes are those of a few commands between the limits, at the middle of the arc."""
         share = np.stack(np.meshgrid(*[np.linspace(0.0, 1.0, 5)] * 2, indexing="ij"), axis=-1).reshape(-1, 2)
@@ -189,7 +204,7 @@ def _compiled(
     size = force[-1] * np.linspace(0.0, 1.0, SIZES + 1) ** 2
     beat = np.stack([np.interp(size, force, command[:, k]) for k in range(2)], axis=-1)
     middle, half, gauge, deflection = _directions(law, box)
-    return FinTable(table, middle, half, gauge, beat, deflection)
+    return FinTable(table, middle, half, gauge, beat, box, deflection)
 
 
 class _Box:
@@ -241,16 +256,22 @@ class _Box:
         beat = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
         return self.command(beat)
 
-    def best(self, price: Array) -> Array:
-        """Commands (K, 3) that are worth most at prices (K,) [W/N]: from the best place of a grid by Newton's
-        method within the limits."""
-        grid = self.grid()
-        worth = price[:, None] * self.force(grid) - self.power(grid)
-        beat = grid[worth.argmax(axis=1), :2]
+    def best(self, price: Array, starts: Array | None = None) -> Array:
+        """Commands (K, 3) that are worth most at prices (K,) [W/N]: from the best of starts (S, K, 2), or of
+        a grid, by Newton's method within the limits."""
+        row = np.arange(len(price))
+        if starts is None:
+            grid = self.grid()
+            worth = price[:, None] * self.force(grid) - self.power(grid)
+            beat = grid[worth.argmax(axis=1), :2]
+        else:
+            command = self.command(starts)
+            worth = (price * self.force(command) - self.power(command)).T
+            beat = starts[worth.argmax(axis=1), row]
         low, high = self.lower[:2], self.upper[:2]
         span = high - low
         longest = 2.0 * span / (np.array(GRID) - 1.0)
-        value, row = worth.max(axis=1), np.arange(len(price))
+        value = worth.max(axis=1)
         for _ in range(STEPS):
             slope, curve = self._worth_derivatives(price, beat, 1e-6 * span + 1e-15)
             step = np.clip(_uphill_steps(beat, slope, curve), -longest, longest)
@@ -259,6 +280,8 @@ class _Box:
             found = price * self.force(command) - self.power(command)
             best = found.argmax(axis=0)
             better = found[best, row] > value
+            if not better.any():
+                break
             beat = np.where(better[:, None], trial[best, row], beat)
             value = np.where(better, found[best, row], value)
         return self.command(beat)

@@ -6,6 +6,7 @@ first directions of planes, second directions of planes. Each answer is the grad
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,6 +21,8 @@ SMOOTHING = 1e-5
 dual of a set that is not convex has corners there."""
 HALVINGS = 25
 """Halvings of an interval of price that find the price of a force."""
+_EDGES = np.linspace(0.0, 1.0, CELLS + 1) ** 4
+"""Ends of the tables' intervals, as shares of the largest price."""
 TINY = 1e-9
 """The same share where there is no gap: it keeps the direction of a force of no price defined."""
 
@@ -53,6 +56,28 @@ class Sets:
     half: Array
     """Halves of these arcs [rad]; pi for full circles."""
 
+    whole: bool = False
+    """Whether these are all that the actuators' tables give, from rest on: then nothing needs to be cut
+    off."""
+
+    @cached_property
+    def arcs(self) -> bool:
+        """Whether any arc is less than a full circle."""
+        return bool((self.half < np.pi).any())
+
+    @cached_property
+    def rests(self) -> bool:
+        """Whether all planes can rest."""
+        return not (self.low[len(self.low) - len(self.half) :] > 0.0).any()
+
+    @cached_property
+    def forked(self) -> NDArray[np.intp]:
+        """Places of the planes whose set has a gap: wide arcs, and arcs of forces that cannot rest."""
+        arc = self.half < np.pi
+        low = self.low[len(self.low) - len(self.half) :]
+        wide = arc & ((self.half > 0.5 * np.pi) | ((low > 0.0) & (self.half > 0.0)))
+        return np.flatnonzero(wide.any(axis=1))
+
     @property
     def parts(self) -> tuple[Array, ...]:
         """All arrays, in order."""
@@ -60,7 +85,9 @@ class Sets:
 
     def take(self, columns: NDArray[np.intp]) -> "Sets":
         """The same for some of the targets."""
-        return Sets(*(a if a.shape[-1] == 1 else a[:, columns] for a in self.parts))
+        if self.low.shape[-1] == 1:
+            return self
+        return Sets(*(a if a.shape[-1] == 1 else a[:, columns] for a in self.parts), self.whole)
 
 
 class Answers:
@@ -72,7 +99,7 @@ class Answers:
         sides = [(line.forward, line.reverse or line.forward) for line in lines]
         sides += [(plane.table, plane.table) for plane in planes]
         tables = [table for both in sides for table in both]
-        self._coefficients = np.array([table.polynomials() for table in tables]).reshape(-1, 5).T.copy()
+        self._coefficients = np.concatenate([table.polynomials() for table in tables]).T.copy()
         self._top = np.array([table.top for table in tables])
         self.tops = self._top.reshape(-1, 2).max(axis=1)
         self._ends = np.array([table.force for table in tables])
@@ -81,18 +108,19 @@ class Answers:
         self._tiny = TINY * self._top[2 * self.lines :: 2, None]
 
     def radial(self, price: Array, row: NDArray[np.intp]) -> tuple[Array, Array, Array]:
-        """Force [N], its derivative and conjugate [W] (m, N) at prices (m, N) in rows (m, 1) or (m, N) of the
-        tables, two for each actuator."""
+        """Force [N], its derivative and conjugate [W] (m, N) at prices (m, N) from 0 on in rows (m, 1) or (m,
+        N) of the tables, two for each actuator."""
         top = self._top[row]
-        share = np.clip(price / top, 0.0, 1.0)
-        cell = np.minimum((np.sqrt(share) * CELLS).astype(np.intp), CELLS - 1)
-        a0, a1, a2, a3, start = self._coefficients[:, row * CELLS + cell]
-        odd = 2 * cell + 1
-        t = (share * CELLS**2 - cell * cell) / odd
-        width = odd * (top / CELLS**2)
-        force = a0 + t * (a1 + t * (a2 + t * a3))
-        slope = (a1 + t * (2.0 * a2 + 3.0 * t * a3)) / width
-        conjugate = start + width * t * (a0 + t * (a1 / 2.0 + t * (a2 / 3.0 + t * (a3 / 4.0))))
+        share = price / top
+        cell = (np.sqrt(np.sqrt(share)) * CELLS).astype(np.intp)
+        np.minimum(cell, CELLS, out=cell)
+        a0, a1, a2, a3, start = self._coefficients[:, row * (CELLS + 1) + cell]
+        x = share - _EDGES[cell]
+        cubic = x * a3
+        square = a2 + cubic
+        force = a0 + x * (a1 + x * square)
+        slope = (a1 + x * (square + square + cubic)) / top
+        conjugate = start + top * x * (a0 + x * (a1 / 2.0 + x * (a2 / 3.0 + cubic / 4.0)))
         return force, slope, conjugate
 
     def cost(self, force: Array) -> Array:
@@ -103,8 +131,7 @@ class Answers:
             middle = (first + last) // 2
             enough = self._ends[row, middle] >= size
             first, last = np.where(enough, first, middle), np.where(enough, middle, last)
-        top = self._top[row] / CELLS**2
-        low, high = top * first**2, top * last**2
+        low, high = self._top[row] * _EDGES[first], self._top[row] * _EDGES[last]
         # An error of the price counts squared in the power.
         for _ in range(HALVINGS):
             price = 0.5 * (low + high)
@@ -113,28 +140,30 @@ class Answers:
         power: Array = high * size - self.radial(high, row)[2]
         return power
 
-    def forked(self, sets: Sets) -> NDArray[np.intp]:
-        """Places of the planes whose set has a gap: wide arcs, and arcs of forces that cannot rest."""
-        arc = sets.half < np.pi
-        wide = arc & ((sets.half > 0.5 * np.pi) | ((sets.low[self.lines :] > 0.0) & (sets.half > 0.0)))
-        return np.flatnonzero(wide.any(axis=1))
-
     def __call__(self, price: Array, sets: Sets) -> Answer:
         """Answers to prices (k, N)."""
         lines, planes = self.lines, self.planes
-        sign = np.where(price[:lines] < 0.0, -1.0, 1.0)
+        sign = np.where(price[:lines] < 0.0, -1.0, 1.0) if lines else None
         if not planes:
             force, slope, conjugate = self._limited(price, sign, self._row, sets)
             return Answer(force, slope, conjugate.sum(axis=0))
         first, second = price[lines : lines + planes], price[lines + planes :]
         fan = self._fan(first, second, sets)
-        value = np.concatenate([price[:lines], first * fan.first + second * fan.second])
-        sign = np.concatenate([sign, np.ones_like(first)])
+        value = first * fan.first + second * fan.second
+        if sign is not None:
+            value = np.concatenate([price[:lines], value])
+            sign = np.concatenate([sign, np.ones_like(first)])
         size, slope, conjugate = self._limited(value, sign, self._row, sets)
         planar = _Planar.of(fan, size[lines:], slope[lines:], conjugate[lines:])
         total = conjugate.sum(axis=0)
-        if fan.beyond is not None and len(forked := self.forked(sets)):
-            total += self._fork(forked, planar, fan, first, second, sets)
+        if fan.beyond is not None and len(sets.forked):
+            total += self._fork(sets.forked, planar, fan, first, second, sets)
+        if not lines:
+            return Answer(
+                np.concatenate([planar.first, planar.second]),
+                np.concatenate([planar.xx, planar.xy, planar.yy]),
+                total,
+            )
         return Answer(
             np.concatenate([size[:lines], planar.first, planar.second]),
             np.concatenate([slope[:lines], planar.xx, planar.xy, planar.yy]),
@@ -142,11 +171,17 @@ class Answers:
         )
 
     def _limited(
-        self, price: Array, sign: Array, row: NDArray[np.intp], sets: Sets, of: Any = slice(None)
+        self, price: Array, sign: Array | None, row: NDArray[np.intp], sets: Sets, of: Any = slice(None)
     ) -> tuple[Array, Array, Array]:
-        """Forces, derivatives and conjugates (m, N) for prices (m, N) within the limits of some actuators."""
-        force, slope, conjugate = self.radial(np.maximum(price * sign, 0.0), row + (sign < 0.0))
-        force = force * sign
+        """Forces, derivatives and conjugates (m, N) for prices (m, N) within the limits of some actuators;
+        prices without a sign are those of planes."""
+        if sign is None:
+            force, slope, conjugate = self.radial(np.maximum(price, 0.0), row)
+        else:
+            force, slope, conjugate = self.radial(np.maximum(price * sign, 0.0), row + (sign < 0.0))
+            force = force * sign
+        if sets.whole:
+            return force, slope, conjugate
         low, high = sets.low[of], sets.high[of]
         below, above = force <= low, force >= high
         conjugate = np.where(below, price * low - sets.low_cost[of], conjugate)
@@ -163,7 +198,7 @@ class Answers:
         if self.gauges:
             fan_x, fan_y, tangent = self._uneven(x, y, tangent)
         xx, xy, yy = tangent * (1.0 - x * x), -tangent * x * y, tangent * (1.0 - y * y)
-        if (sets.half >= np.pi).all():
+        if not sets.arcs:
             return _Fan(fan_x, fan_y, xx, xy, yy, None, None)
         cos, sin = np.cos(sets.middle), np.sin(sets.middle)
         ahead, aside = fan_x * cos + fan_y * sin, fan_y * cos - fan_x * sin
@@ -186,8 +221,9 @@ class Answers:
 
     def _gap(self, sets: Sets) -> Array:
         """Prices (p, 1) or (p, N) below which a plane's direction is undecided."""
-        rests = sets.low[self.lines :] <= 0.0
-        return np.where(rests, self._tiny, self._tiny * (SMOOTHING / TINY))
+        if sets.rests:
+            return self._tiny
+        return np.where(sets.low[self.lines :] <= 0.0, self._tiny, self._tiny * (SMOOTHING / TINY))
 
     def _uneven(self, x: Array, y: Array, tangent: Array) -> tuple[Array, Array, Array]:
         """Directions of the force with the gauges' sizes, and the weights of their change, for directions of
@@ -226,7 +262,7 @@ class Answers:
         x, y = (values[places] for values in self._end(fan.other + np.zeros_like(first)))
         price = first[places] * x + second[places] * y
         row = self.lines + places
-        size, slope, conjugate = self._limited(price, np.ones_like(price), self._row[row], sets, row)
+        size, slope, conjugate = self._limited(price, None, self._row[row], sets, row)
         other = _Planar(size * x, size * y, slope * x * x, slope * x * y, slope * y * y, conjugate)
         width = SMOOTHING * self._top[2 * row, None] * sets.high[row]
         ahead = planar.conjugate[places] - conjugate

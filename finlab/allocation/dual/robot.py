@@ -139,6 +139,14 @@ def _range(effectiveness: Array, most: Array) -> tuple[Array, Array]:
     return scale, left[:, values > RANK * max(values[0], 1e-300)]
 
 
+def _is_whole(line: Line, low: float, high: float) -> bool:
+    """Whether limits of a line are those of its tables, which begin at rest."""
+    reverse = line.reverse
+    if reverse is None or line.forward.force[0] or reverse.force[0]:
+        return False
+    return low == -reverse.largest and high == line.forward.largest
+
+
 def dual_robot(responses: list[Response]) -> DualRobot:
     """Prepare a robot of the responses of its actuators."""
     line_places = [i for i, each in enumerate(responses) if isinstance(each, Line)]
@@ -161,6 +169,8 @@ def dual_robot(responses: list[Response]) -> DualRobot:
         cost[:, 1:2],
         np.array([plane.middle for plane in planes]).reshape(-1, 1),
         np.array([plane.half for plane in planes]).reshape(-1, 1),
+        all(map(_is_whole, lines, low, high))
+        and not any(plane.half < np.pi and plane.table.force[0] for plane in planes),
     )
     rows = [line.effectiveness for line in lines]
     rows += [plane.effectiveness[0] for plane in planes] + [plane.effectiveness[1] for plane in planes]
