@@ -35,6 +35,8 @@ class Later(NamedTuple):
     """Gives the refined candidates."""
     samples: Callable[[], Candidates | None] = lambda: None
     """Gives the raw candidates."""
+    bound: Callable[[], Array | None] = lambda: None
+    """Gives the power (N,) [W] that no answer can undercut."""
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -44,7 +46,7 @@ class Answer(PlainData):
     What is dear to tell is told when it is first asked for, and kept; copies have all of it.
     """
 
-    TOLD: ClassVar[tuple[str, ...]] = ("forces", "wrench", "err_norm", "power", "effort", "notes")
+    TOLD: ClassVar[tuple[str, ...]] = ("forces", "wrench", "err_norm", "power", "effort", "bound", "notes")
     """What is told when it is asked for."""
 
     layout: Layout
@@ -149,10 +151,14 @@ class Answer(PlainData):
 class BatchAllocation(Answer):
     """Answers to N targets on one layout: plain data, as an `Allocation` is."""
 
-    bound: Array | None = None
-    """Power (N,) [W] that no answer can undercut; None for methods that prove none."""
     solve_ms: Array = field(compare=False)
     """Time per target (N,) [ms]: the whole time divided by N."""
+
+    @cached_property
+    def bound(self) -> Array | None:
+        """Power (N,) [W] that no answer for the wrenches delivered can undercut; None for methods that prove
+        none."""
+        return None if self.later is None else self.later.bound()
 
     @cached_property
     def err_norm(self) -> Array:
@@ -201,8 +207,6 @@ class Allocation(Answer):
 
     TOLD: ClassVar[tuple[str, ...]] = (*Answer.TOLD, "candidates", "samples")
 
-    bound: float | None = None
-    """Power [W] that no answer can undercut; None for methods that prove none."""
     solve_ms: float = field(compare=False)
     """Time spent solving [ms], judging not included."""
     settings: Mapping[str, Any] = field(default_factory=dict)
@@ -215,6 +219,12 @@ class Allocation(Answer):
         """What each actuator is told, by its name, in a type of its own; None for a failed one."""
         parts = zip(self.layout.actuators, self.command, strict=True)
         return {part.name: command_of(part, row) for part, row in parts}
+
+    @cached_property
+    def bound(self) -> float | None:
+        """Power [W] that no answer for the same wrench can undercut; None for methods that prove none."""
+        found = None if self.later is None else self.later.bound()
+        return None if found is None else float(found[0])
 
     @cached_property
     def err_norm(self) -> float:
@@ -287,7 +297,13 @@ class Allocation(Answer):
         """The same answer, even a copy, that can tell again what is told later."""
         if self.later is not None:
             return self
-        told = Later(self._plant, lambda: self.notes, lambda: self.candidates, lambda: self.samples)
+        told = Later(
+            self._plant,
+            lambda: self.notes,
+            lambda: self.candidates,
+            lambda: self.samples,
+            lambda: None if self.bound is None else np.array([self.bound]),
+        )
         return replace(self, later=told)
 
     def __repr__(self) -> str:

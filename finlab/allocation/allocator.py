@@ -284,7 +284,6 @@ class Allocator:
             command=fins.among_all(solution.command)[0].copy(),
             scale=self._scale,
             method=self.method,
-            bound=None if solution.bound is None else float(solution.bound[0]),
             solve_ms=solve_ms,
             checkpoint=self.checkpoint,
             settings=vars(self.settings).copy(),
@@ -299,6 +298,7 @@ class Allocator:
                 partial(self._notes, ready, water),
                 partial(_among_all, solution.candidates, fins),
                 partial(_among_all, solution.samples, fins),
+                solution.bound or _no_bound,
             ),
         )
 
@@ -382,7 +382,6 @@ class Allocator:
             command=solution.command,
             scale=self._scale,
             method=self.method,
-            bound=solution.bound,
             solve_ms=np.broadcast_to(elapsed_ms / max(len(targets), 1), len(targets)),
             checkpoint=self.checkpoint,
             policy=policy,
@@ -390,7 +389,9 @@ class Allocator:
             seed=int(seed),
             wrench_expected=solution.wrench,
             unknown_fins=method.unknown_fins,
-            later=Later(ready.plant.at(water), partial(self._notes, ready, water)),
+            later=Later(
+                ready.plant.at(water), partial(self._notes, ready, water), bound=solution.bound or _no_bound
+            ),
         )
 
     def allocate_stream(self, wrenches: Iterable[ArrayLike], **question: Any) -> Iterator[BatchAllocation]:
@@ -439,6 +440,10 @@ class Allocator:
         return f"Allocator({self._layout.name!r:.60}, method={self.method!r})"
 
 
+def _no_bound() -> None:
+    """No bound is proved."""
+
+
 def _among_all(make: Callable[[], Candidates] | None, fins: Fins) -> Candidates | None:
     """Candidates of the healthy fins, put among all."""
     if make is None:
@@ -450,7 +455,7 @@ def _among_all(make: Callable[[], Candidates] | None, fins: Fins) -> Candidates 
 def _joined(parts: Iterable[Solution], n: int, fins: Fins) -> Solution:
     """Solutions one after the other, the commands among those of all fins."""
     command = np.full((n, len(fins.alive), 3), np.nan)
-    bound: Array | None = None
+    bounds: list[Callable[[], Array]] = []
     wrench: Array | None = None
     start = 0
     for part in parts:
@@ -458,11 +463,11 @@ def _joined(parts: Iterable[Solution], n: int, fins: Fins) -> Solution:
         start = rows.stop
         command[rows] = fins.among_all(part.command)
         if part.bound is not None:
-            bound = np.full(n, np.nan) if bound is None else bound
-            bound[rows] = part.bound
+            bounds.append(part.bound)
         if part.wrench is not None:
             wrench = np.empty((n, 6)) if wrench is None else wrench
             wrench[rows] = part.wrench
+    bound = (lambda: np.concatenate([part() for part in bounds])) if bounds else None
     return Solution(command, bound, wrench)
 
 

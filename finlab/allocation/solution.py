@@ -69,8 +69,8 @@ class Solution(NamedTuple):
 
     command: Array
     """Chosen commands (N, n, 3)."""
-    bound: Array | None = None
-    """Power (N,) [W] that no answer can undercut; None for methods that prove none."""
+    bound: Callable[[], Array] | None = None
+    """Gives the power (N,) [W] that no answer can undercut; None for methods that prove none."""
     wrench: Array | None = None
     """Wrench (N, 6) that the method itself expects, where it has a model of its own."""
     candidates: Callable[[], Candidates] | None = None

@@ -28,7 +28,7 @@ PEAK = 5e-4
 """Share of the largest force that is given up where the price of the last newton has no end."""
 SIZES = 512
 """Sizes of force for which the command is kept."""
-CORRECTIONS = 2
+CORRECTIONS = 1
 """Times that a command is corrected by the law itself."""
 TURNS = 512
 """Directions in which an uneven fin is asked for its force."""

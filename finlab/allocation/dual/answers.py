@@ -170,6 +170,20 @@ class Answers:
             total,
         )
 
+    def worth(self, price: Array, sets: Sets) -> tuple[Array, Array]:
+        """Prices (n, N) [W/N] along the forces that answer prices (k, N), of lines with their sign, and what
+        these forces are worth, less their power [W], by the tables."""
+        lines, planes = self.lines, self.planes
+        first, second = price[lines : lines + planes], price[lines + planes :]
+        along = np.empty((lines + planes, price.shape[1]))
+        along[:lines] = price[:lines]
+        if planes:
+            fan = self._fan(first, second, sets)
+            along[lines:] = first * fan.first + second * fan.second
+        sign = np.where(along < 0.0, -1.0, 1.0)
+        sign[lines:] = 1.0
+        return along, self._limited(along, sign, self._row, sets)[2]
+
     def _limited(
         self, price: Array, sign: Array | None, row: NDArray[np.intp], sets: Sets, of: Any = slice(None)
     ) -> tuple[Array, Array, Array]:

@@ -1,8 +1,9 @@
 """Sets with gaps: wide arcs, fins that cannot rest, dead bands. The dual is that of their convex hulls.
 
 Where its answer puts an actuator into a gap, the gap is cut: an arc into two halves, a dead band into rest
-and the force beyond it. Each part is solved again, all open parts of all targets at once, and what its dual
-value proves to be no cheaper than the best answer so far is left out (branch and bound).
+and the force beyond it. First every gap is left on its nearer side, which mostly gives a good answer. Then
+both sides are solved, all open parts of all targets at once, and what its dual value proves to be no cheaper
+than the best answer so far is left out (branch and bound).
 """
 
 from dataclasses import dataclass
@@ -17,16 +18,18 @@ from finlab.allocation.dual.robot import DualRobot
 from finlab.arrays import Array
 from finlab.layout.angles import wrapped
 
-ROUNDS = 9
-"""Times that sets are cut: arcs are then narrow enough for what is left of their gap not to count."""
-MOST_PARTS = 96
+DIVES = 5
+"""Times that gaps are left on their nearer side."""
+ROUNDS = 12
+"""Times that sets are cut."""
+MOST_PARTS = 48
 """Open parts of one target that are followed, the cheapest first."""
-SAME = 1e-4
+SAME = 2e-4
 """Share of the power by which a part must be able to be cheaper to be followed."""
 OUTSIDE = 1e-4
 """Angle [rad] by which a force may lie outside its arc."""
 SMALL = 1e-3
-"""Least force, as a share of the largest, up to which a fin that cannot rest counts as one that can."""
+"""Least force, as a share of the largest force of the answer, up to which it does not count."""
 NARROW = 0.2
 """Half of an arc [rad] up to which the chord stands for the arc of the least forces."""
 
@@ -52,52 +55,82 @@ class _Parts:
 def gaps(robot: DualRobot, force: Array, sets: Sets) -> Array:
     """How far (n, N) forces (k, N) are in a gap of their sets, as a share; 0 where they are not."""
     lines, planes = robot.answers.lines, robot.answers.planes
-    found = np.zeros((lines + planes, force.shape[1]))
+    x, y = force[lines : lines + planes], force[lines + planes :]
+    size = np.concatenate([np.abs(force[:lines]), np.hypot(x, y)])
+    found = np.zeros(size.shape)
     if lines:
-        size, band = np.abs(force[:lines]), robot.band[:lines]
-        inside = (size < band * (1.0 - 1e-9)) & (size > 1e-9 * robot.most[:lines])
+        band = robot.band[:lines]
+        inside = (size[:lines] < band * (1.0 - 1e-9)) & (size[:lines] > 1e-9 * robot.most[:lines])
         found[:lines] = np.where(inside & (sets.low[:lines] < sets.high[:lines]), 1.0, 0.0)
     if planes:
-        x, y = force[lines : lines + planes], force[lines + planes :]
-        size, low = np.hypot(x, y), sets.low[lines:]
+        low, radial = sets.low[lines:], size[lines:]
         off = np.abs(wrapped(np.arctan2(y, x) - sets.middle)) - sets.half
-        aside = (off > OUTSIDE) & (size > 1e-6 * robot.most[lines:])
-        hole = (low > SMALL * robot.most[lines:]) & (size < 0.98 * low)
+        aside = (off > OUTSIDE) & (radial > 1e-6 * robot.most[lines:])
+        hole = (low > SMALL * size.max(axis=0)) & (radial < 0.98 * low)
         wide = sets.half > NARROW
-        found[lines:] = np.where(aside & wide, off, 0.0) + np.where(
-            hole & wide, 1.0 - size / (low + 1e-300), 0.0
-        )
+        found[lines:] = np.where(aside & wide, off, 0.0)
+        found[lines:] += np.where(hole & wide, 1.0 - radial / np.maximum(low, 1e-300), 0.0)
     return found
 
 
-def has_gaps(robot: DualRobot, sets: Sets) -> bool:
-    """Whether any actuator has a set with a gap that counts."""
-    lines = robot.answers.lines
-    wide = (sets.half > 0.5 * np.pi) & (sets.half < np.pi)
-    holes = sets.low[lines:] > SMALL * robot.most[lines:]
-    return bool(wide.any() or holes.any() or robot.band.any())
+def may_have_gaps(robot: DualRobot, sets: Sets, force: Array) -> bool:
+    """Whether forces (k, N) may lie in gaps: a quick look."""
+    if robot.band.any() or len(sets.forked):
+        return True
+    if sets.rests:
+        return False
+    lines, planes = robot.answers.lines, robot.answers.planes
+    size = np.hypot(force[lines : lines + planes], force[lines + planes :])
+    return bool((size < 0.98 * sets.low[lines:]).any())
 
 
 def least_power(robot: DualRobot, target: Array, sets: Sets, root: Prices) -> Branched:
     """Forces in the sets for targets (r, N) some of whose answers `root` are in gaps."""
     count = target.shape[1]
     best, force, found = np.full(count, np.inf), root.force.copy(), np.zeros(count, bool)
-    parts = _Parts(np.arange(count), _columns(sets, count), root.prices)
-    answer = root
-    for round_ in range(ROUNDS):
-        amount = gaps(robot, answer.force, parts.sets)
+
+    def keep(parts: _Parts, answer: Prices, amount: Array) -> NDArray[np.bool_]:
+        """Remember answers without a gap; those that have one and could still be cheaper."""
         whole = answer.solved & ~(amount > 0.0).any(axis=0)
         for i in np.flatnonzero(whole):
-            if answer.value[i] < best[parts.row[i]]:
-                row = parts.row[i]
+            row = parts.row[i]
+            if answer.value[i] < best[row]:
                 best[row], force[:, row], found[row] = answer.value[i], answer.force[:, i], True
-        open_ = answer.solved & ~whole & (answer.value < best[parts.row] * (1.0 - SAME))
-        if round_ == ROUNDS - 1 or not open_.any():
+        return answer.solved & ~whole & (answer.value < best[parts.row] * (1.0 - SAME))
+
+    start = _Parts(np.arange(count), _columns(sets, count), root.prices)
+    parts, answer = start, root
+    for _ in range(DIVES):
+        amount = gaps(robot, answer.force, parts.sets)
+        open_ = np.flatnonzero(keep(parts, answer, amount))
+        if not len(open_):
             break
-        kept = _cheapest(np.flatnonzero(open_), parts.row, answer.value)
+        parts = _dive(robot, parts, open_, amount[:, open_], answer)
+        answer = solve(robot, target[:, parts.row], parts.sets, parts.prices)
+    parts, answer = start, root
+    for _ in range(ROUNDS):
+        amount = gaps(robot, answer.force, parts.sets)
+        kept = _cheapest(np.flatnonzero(keep(parts, answer, amount)), parts.row, answer.value)
+        if not len(kept):
+            break
         parts = _cut(robot, parts, kept, amount[:, kept], answer)
         answer = solve(robot, target[:, parts.row], parts.sets, parts.prices)
+    else:
+        keep(parts, answer, gaps(robot, answer.force, parts.sets))
     return Branched(force, found)
+
+
+def halves(robot: DualRobot, sets: Sets, force: Array) -> list[Sets] | None:
+    """Both parts of the sets of one target whose forces (k,) lie in a gap; None where they do not."""
+    amount = gaps(robot, force[:, None], sets)
+    if not amount.any():
+        return None
+    whole = _columns(sets, 1)
+    chosen = np.zeros(amount.shape, bool)
+    chosen[amount[:, 0].argmax(), 0] = True
+    return [
+        narrowed(robot, whole, force[:, None], chosen, np.full(amount.shape, side)) for side in (-1.0, 1.0)
+    ]
 
 
 def _columns(sets: Sets, count: int) -> Sets:
@@ -106,41 +139,69 @@ def _columns(sets: Sets, count: int) -> Sets:
 
 def _cheapest(places: NDArray[np.intp], row: NDArray[np.intp], value: Array) -> NDArray[np.intp]:
     """Of parts at some places, the cheapest of each target."""
+    if not len(places):
+        return places
     places = places[np.lexsort((value[places], row[places]))]
     rows = row[places]
     first = np.concatenate([[0], np.flatnonzero(np.diff(rows)) + 1])
     rank = np.arange(len(rows)) - np.repeat(first, np.diff(np.append(first, len(rows))))
-    return places[rank < MOST_PARTS // 2]
+    return places[rank < MOST_PARTS]
 
 
 def _cut(robot: DualRobot, parts: _Parts, kept: NDArray[np.intp], amount: Array, answer: Prices) -> _Parts:
     """Both parts of each open part, whose worst gap is cut."""
-    lines, m = robot.answers.lines, len(kept)
-    worst = amount.argmax(axis=0)
-    twice = np.tile(kept, 2)
-    sets = Sets(*(values[:, twice] for values in parts.sets.parts))
-    side = np.repeat([-1.0, 1.0], m)
-    column, worst = np.arange(2 * m), np.tile(worst, 2)
-    planar = worst >= lines
-    at, plane = column[planar], worst[planar] - lines
-    force = answer.force[:, twice]
-    angle = np.arctan2(force[worst[planar] + robot.answers.planes, at], force[worst[planar], at])
-    full = sets.half[plane, at] >= np.pi
-    middle = np.where(full, angle, sets.middle[plane, at])
-    half = np.where(full, np.pi, sets.half[plane, at])
-    sets.half[plane, at] = 0.5 * half
-    # A full circle is cut so that the force lies in the middle of one half.
-    turn = np.where(full, np.where(side[at] > 0.0, 0.0, np.pi), 0.5 * side[at] * half)
-    sets.middle[plane, at] = wrapped(middle + turn)
-    at, line = column[~planar], worst[~planar]
-    beyond, positive = side[at] > 0.0, force[line, at] > 0.0
-    edge = np.where(beyond, np.where(positive, 1.0, -1.0) * robot.band[line, 0], 0.0)
-    cost = robot.band_cost[line, np.where(beyond, np.where(positive, 2, 0), 1)]
-    from_below = beyond == positive  # the part lies above the edge
-    for limit, costs, moved in (
-        (sets.low, sets.low_cost, from_below),
-        (sets.high, sets.high_cost, ~from_below),
-    ):
-        limit[line, at] = np.where(moved, edge, limit[line, at])
-        costs[line, at] = np.where(moved, cost, costs[line, at])
+    twice, side = np.tile(kept, 2), np.repeat([-1.0, 1.0], len(kept))
+    chosen = np.arange(len(amount))[:, None] == np.tile(amount.argmax(axis=0), 2)
+    sets = narrowed(
+        robot, parts.sets.take(twice), answer.force[:, twice], chosen, side + np.zeros(chosen.shape)
+    )
     return _Parts(parts.row[twice], sets, answer.prices[:, twice])
+
+
+def _dive(robot: DualRobot, parts: _Parts, kept: NDArray[np.intp], amount: Array, answer: Prices) -> _Parts:
+    """Each open part with all its gaps left on their nearer sides; fins that cannot rest keep that force."""
+    lines, planes = robot.answers.lines, robot.answers.planes
+    force, sets, chosen = answer.force[:, kept], parts.sets.take(kept), amount > 0.0
+    x, y = force[lines : lines + planes], force[lines + planes :]
+    angle, size = np.arctan2(y, x), np.hypot(x, y)
+    hole = chosen[lines:] & (size < 0.98 * sets.low[lines:])
+    side = np.where(np.abs(force[:lines]) > 0.5 * robot.band[:lines], 1.0, -1.0)
+    side = np.concatenate([side, np.where(wrapped(angle - sets.middle) < 0.0, -1.0, 1.0)])
+    cut = chosen.copy()
+    cut[lines:] &= ~hole
+    sets = narrowed(robot, sets, force, cut, side)
+    inside = sets.middle + np.clip(wrapped(angle - sets.middle), -sets.half, sets.half)
+    ring = force.copy()
+    ring[lines : lines + planes] = np.where(hole, sets.low[lines:] * np.cos(inside), x)
+    ring[lines + planes :] = np.where(hole, sets.low[lines:] * np.sin(inside), y)
+    fixed = np.zeros(chosen.shape, bool)
+    fixed[lines:] = hole
+    return _Parts(parts.row[kept], robot.frozen(sets, ring, fixed), answer.prices[:, kept])
+
+
+def narrowed(robot: DualRobot, sets: Sets, force: Array, chosen: NDArray[np.bool_], side: Array) -> Sets:
+    """Sets (n, N) of which chosen ones (n, N) are cut, and one side is kept: of an arc the half towards
+    smaller (-1) or larger angles (1), of a full circle the half away from or around the force, of a dead band
+    rest or the forces beyond it, by forces (k, N)."""
+    lines, planes = robot.answers.lines, robot.answers.planes
+    low, high, low_cost, high_cost, middle, half = (np.array(values) for values in sets.parts)
+    if planes:
+        plane, turn = chosen[lines:], side[lines:]
+        angle = np.arctan2(force[lines + planes :], force[lines : lines + planes])
+        full = half >= np.pi
+        moved = np.where(full, angle + np.where(turn > 0.0, 0.0, np.pi), middle + 0.5 * turn * half)
+        middle, half = np.where(plane, wrapped(moved), middle), np.where(plane, 0.5 * half, half)
+    if lines:
+        cut, beyond, positive = chosen[:lines], side[:lines] > 0.0, force[:lines] > 0.0
+        edge = np.where(beyond, np.where(positive, 1.0, -1.0) * robot.band[:lines], 0.0)
+        row = np.arange(lines)[:, None]
+        cost = robot.band_cost[row, np.where(beyond, np.where(positive, 2, 0), 1)]
+        above = cut & (beyond == positive)  # the part lies above the edge
+        low[:lines], low_cost[:lines] = (
+            np.where(above, edge, low[:lines]),
+            np.where(above, cost, low_cost[:lines]),
+        )
+        below = cut & ~above
+        high[:lines] = np.where(below, edge, high[:lines])
+        high_cost[:lines] = np.where(below, cost, high_cost[:lines])
+    return Sets(low, high, low_cost, high_cost, middle, half)

@@ -8,14 +8,15 @@ the previous ones (`rates`).
 
 from copy import copy
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, NamedTuple, Self, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.dual.answers import Sets
-from finlab.allocation.dual.branch import gaps, has_gaps, least_power
+from finlab.allocation.dual.bounds import proved_power
+from finlab.allocation.dual.branch import gaps, least_power, may_have_gaps
 from finlab.allocation.dual.compiled import Compiled
 from finlab.allocation.dual.drag import at_the_price_of_drag
 from finlab.allocation.dual.newton import Prices, solve
@@ -30,7 +31,7 @@ from finlab.allocation.solution import Solution
 from finlab.arrays import Array
 from finlab.networks.trained import TrainedWeights
 
-EXACT = 1e-9
+EXACT = 1e-8
 """Error, on the robot's yardstick, up to which commands need no further step."""
 COARSE = 1e-5
 """Error from which the dual is asked again, for what is missing on top."""
@@ -64,12 +65,12 @@ class Forces(NamedTuple):
 
     force: Array
     """Forces (k, N) [N]."""
-    bound: Array
-    """Power (N,) [W] that no answer undercuts."""
+    price: Array
+    """Prices (N, 6) of the wrench [W/N, W/(N m)]."""
     within: NDArray[np.bool_]
     """Which targets are within reach (N,)."""
     prices: Array
-    """Prices (r, N) of the wrench [W]."""
+    """The same (r, N) in the robot's basis [W]."""
 
 
 class Dual(Method):
@@ -91,10 +92,6 @@ class Dual(Method):
     @cached_property
     def _problem(self) -> CommandProblem:
         return CommandProblem.of(self.plant, self.scale)
-
-    @cached_property
-    def _gapped(self) -> bool:
-        return has_gaps(self.compiled.robot, self.compiled.robot.sets)
 
     def at(self, flow: Array | None) -> Self:
         """See `Method`."""
@@ -119,7 +116,7 @@ class Dual(Method):
     ) -> Solution:
         """See `Method`."""
         if len(targets) == 0:
-            return Solution(np.empty((0, self.layout.n, 3)), np.empty(0))
+            return Solution(np.empty((0, self.layout.n, 3)), lambda: np.empty(0))
         if (moved := self.at(flow)) is not self:
             return moved.solve(targets, policy=policy, previous=previous, seed=seed)
         if self.compiled.drags:
@@ -133,7 +130,7 @@ class Dual(Method):
             other = copy(self)
             other.compiled, bounds[i] = at_the_price_of_drag(self.compiled, target)
             commands.append(other._solve(target[None], policy, previous).command)
-        return Solution(np.concatenate(commands), bounds)
+        return Solution(np.concatenate(commands), lambda: bounds)
 
     def _solve(self, targets: Array, policy: Policy, previous: Array | None) -> Solution:
         robot = self.compiled.robot
@@ -141,11 +138,17 @@ class Dual(Method):
         found = self._forces(asked, robot.sets, policy)
         aim = np.where(found.within[:, None], asked, robot.wrench(found.force)) + self.compiled.beside
         command, found = self._commands(aim, found, robot.sets, previous)
+        bound = None if self._unproved else partial(proved_power, self.compiled, aim, found.price)
         if previous is not None:
             box = box_after(self.plant, previous, self.layout.rates, self.settings.period_s)
             if box is not None and not box.holds(command[0]):
-                return Solution(self._within_box(aim, command, found, previous, box), found.bound)
-        return Solution(command, found.bound)
+                return Solution(self._within_box(aim, command, found, previous, box), bound)
+        return Solution(command, bound)
+
+    @property
+    def _unproved(self) -> bool:
+        """Whether the bound would be one of something else than the power of the answer."""
+        return self.layout.interaction is not None or self.settings.copper_loss > 0.0
 
     def _forces(self, targets: Array, sets: Sets, policy: Policy, prices: Array | None = None) -> Forces:
         """Forces of least power for wrenches (N, 6), or for those that the policy gives in their place."""
@@ -153,7 +156,7 @@ class Dual(Method):
         target = robot.target(targets)
         if not len(target):  # nothing pushes, such as rudders at rest
             nothing = np.zeros((len(robot.effectiveness), len(targets)))
-            return Forces(nothing, np.zeros(len(targets)), ~targets.any(axis=1), target)
+            return Forces(nothing, np.zeros((len(targets), 6)), ~targets.any(axis=1), target)
         root = solve(robot, target, sets, prices)
         within = root.solved.copy()
         if robot.basis.shape[1] < 6:
@@ -161,29 +164,28 @@ class Dual(Method):
             within &= np.linalg.norm(rest, axis=1) <= OUT_OF_RANGE * (
                 1e-3 + np.linalg.norm(targets / robot.scale, axis=1)
             )
-        force, bound = root.force, root.value
-        if self._gapped:
-            force, within = self._in_gaps(target, sets, root, within)
+        force, prices = root.force, root.prices
+        if may_have_gaps(robot, sets, force):
+            force = self._in_gaps(target, sets, root, within)
         if not within.all():
-            force, bound = force.copy(), bound.copy()
+            force, prices = force.copy(), prices.copy()
             for row in np.flatnonzero(~within):
                 near = nearest(robot, sets.take(np.array([row])), targets[row], policy, self.scale)
-                force[:, row], bound[row] = near.force, near.bound
-        return Forces(force, bound, within, root.prices)
+                force[:, row], prices[:, row] = near.force, near.prices
+        return Forces(force, robot.price(prices), within, prices)
 
-    def _in_gaps(
-        self, target: Array, sets: Sets, root: Prices, within: NDArray[np.bool_]
-    ) -> tuple[Array, NDArray[np.bool_]]:
-        """Forces (k, N) in sets with gaps, and which targets they meet (N,)."""
+    def _in_gaps(self, target: Array, sets: Sets, root: Prices, within: NDArray[np.bool_]) -> Array:
+        """Forces (k, N) in sets with gaps; `within` loses the targets that they do not meet."""
         robot = self.compiled.robot
         rows = np.flatnonzero(within & (gaps(robot, root.force, sets) > 0.0).any(axis=0))
         if not len(rows):
-            return root.force, within
+            return root.force
         some = Prices(*(values[..., rows] for values in root))
         cut = least_power(robot, target[:, rows], sets.take(rows), some)
         force = root.force.copy()
         force[:, rows] = cut.force
-        return force, within
+        within[rows[~cut.found]] = False
+        return force
 
     def _commands(
         self, aim: Array, found: Forces, sets: Sets, previous: Array | None = None

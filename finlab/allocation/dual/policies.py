@@ -6,11 +6,14 @@ of one group after the other, the groups before it met exactly. At the wrench th
 finds the least watts.
 """
 
+import heapq
+from itertools import count
 from typing import NamedTuple
 
 import numpy as np
 
 from finlab.allocation.dual.answers import Sets
+from finlab.allocation.dual.branch import halves
 from finlab.allocation.dual.newton import Prices, Terms, solve
 from finlab.allocation.dual.robot import DualRobot
 from finlab.allocation.policy import Policy
@@ -20,6 +23,8 @@ STIFFNESS = (10.0, 1e3, 1e5, 1e7)
 """Costs of a miss, one after the other, as multiples of the robot's largest power per actuator."""
 REWARD = 10.0
 """Reward for a share of a target, as a multiple of the same."""
+MOST_PARTS = 12
+"""Parts of sets with gaps in which the nearest answer is looked for."""
 RIM = 1e-6
 """Share of a wrench on the boundary of the reach that is given up where rounding puts it beyond."""
 UNWEIGHTED = 1e-4
@@ -37,12 +42,14 @@ class Nearest(NamedTuple):
 
     force: Array
     """Forces (k,) [N] of the robot's directions."""
-    bound: float
-    """Least power [W] of the wrench that they give, by the dual."""
+    prices: Array
+    """Prices (r,) of the wrench that they give, at its least power."""
 
 
 def nearest(robot: DualRobot, sets: Sets, wrench: Array, policy: Policy, yardstick: Array) -> Nearest:
     """Forces for one wrench (6,) [N, N m] that no forces within the sets give.
+
+    Sets with gaps are cut until the best answer of all parts lies in none.
 
     Args:
         robot: the robot.
@@ -52,14 +59,44 @@ def nearest(robot: DualRobot, sets: Sets, wrench: Array, policy: Policy, yardsti
         yardstick: scales (6,) of the missing wrench [N, N m].
     """
     weight = robot.scale / yardstick
+    asked = wrench / robot.scale
+
+    def served(part: Sets) -> tuple[tuple[float, ...], int, Array, Sets]:
+        """How badly a part serves the policy, and its forces."""
+        if policy.kind == "direction":
+            force = direction(robot, part, asked)
+        elif policy.kind == "priority":
+            force = priority(robot, part, asked, policy.groups, weight)
+        else:
+            force = closest(robot, part, asked, weight * _axis_weights(policy))
+        return _missed(robot, force, asked, policy, weight), next(number), force, part
+
+    number = count()
+    parts = [served(sets)]
+    for _ in range(MOST_PARTS):
+        _, _, force, part = heapq.heappop(parts)
+        cut = halves(robot, part, force)
+        if cut is None:
+            break
+        for each in cut:
+            heapq.heappush(parts, served(each))
+    return _cheapest(robot, part, force)
+
+
+def _axis_weights(policy: Policy) -> Array:
+    weights = np.array(policy.axis_weights)
+    return np.maximum(weights / weights.max(), UNWEIGHTED)
+
+
+def _missed(robot: DualRobot, force: Array, asked: Array, policy: Policy, weight: Array) -> tuple[float, ...]:
+    """How much forces (k,) leave undone of a scaled wrench (6,), by what counts to a policy."""
+    missing = (asked - robot.effectiveness.T @ force / robot.scale) * weight
+    if policy.kind == "priority":
+        return tuple(round(float(np.linalg.norm(missing[group])), 6) for group in policy.groups)
     if policy.kind == "direction":
-        force = direction(robot, sets, wrench / robot.scale)
-    elif policy.kind == "priority":
-        force = priority(robot, sets, wrench / robot.scale, policy.groups, weight)
-    else:
-        weight = weight * np.maximum(np.array(policy.axis_weights) / max(policy.axis_weights), UNWEIGHTED)
-        force = closest(robot, sets, wrench / robot.scale, weight)
-    return _cheapest(robot, sets, force)
+        along = asked * weight
+        return (float(missing @ along),)
+    return (float(np.linalg.norm(missing * _axis_weights(policy))),)
 
 
 def _cheapest(robot: DualRobot, sets: Sets, force: Array) -> Nearest:
@@ -68,8 +105,8 @@ def _cheapest(robot: DualRobot, sets: Sets, force: Array) -> Nearest:
     for share in (1.0, 1.0 - RIM):
         found = solve(robot, share * target, sets)
         if found.solved[0]:
-            return Nearest(found.force[:, 0], float(found.value[0]))
-    return Nearest(force, float(found.value[0]))
+            return Nearest(found.force[:, 0], found.prices[:, 0])
+    return Nearest(force, found.prices[:, 0])
 
 
 def closest(robot: DualRobot, sets: Sets, wrench: Array, weight: Array) -> Array:
@@ -162,7 +199,7 @@ def priority(robot: DualRobot, sets: Sets, wrench: Array, groups: list[Array], w
         held = basis
         if missed > MISSED * np.linalg.norm(basis.T @ aim):
             normal = _unanswered(part, found.prices, sets)[:, 0]
-            sets = frozen(
+            sets = _kept_at_limits(
                 robot, sets, force, np.abs(part.matrix @ normal) > DRIVEN * np.abs(part.matrix @ normal).max()
             )
             held = _beside(basis, normal)
@@ -185,19 +222,9 @@ def _spanned(basis: Array) -> Array:
     return touched
 
 
-def frozen(robot: DualRobot, sets: Sets, force: Array, directions: Array) -> Sets:
-    """The sets in which the actuators of some directions (k,) keep their forces (k,)."""
+def _kept_at_limits(robot: DualRobot, sets: Sets, force: Array, directions: Array) -> Sets:
+    """Sets in which the actuators of some directions (k,) keep their forces (k,)."""
     lines, planes = robot.answers.lines, robot.answers.planes
-    x, y = force[lines : lines + planes], force[lines + planes :]
-    size = np.concatenate([force[:lines], np.hypot(x, y)])[:, None]
     planar = directions[lines : lines + planes] | directions[lines + planes :]
     fixed = np.concatenate([directions[:lines], planar])[:, None]
-    cost = robot.answers.cost(size)
-    return Sets(
-        np.where(fixed, size, sets.low),
-        np.where(fixed, size, sets.high),
-        np.where(fixed, cost, sets.low_cost),
-        np.where(fixed, cost, sets.high_cost),
-        np.where(planar[:, None], np.arctan2(y, x)[:, None], sets.middle),
-        np.where(planar[:, None], 0.0, sets.half),
-    )
+    return robot.frozen(sets, force[:, None], fixed)

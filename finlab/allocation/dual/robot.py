@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finlab.actuators.response import Line, Plane, Response
 from finlab.allocation.dual.answers import Answers, Sets
@@ -105,6 +106,22 @@ class DualRobot:
         matrix = (effectiveness / scale) @ basis
         return replace(self, effectiveness=effectiveness, scale=scale, basis=basis, matrix=matrix)
 
+    def frozen(self, sets: Sets, force: Array, fixed: NDArray[np.bool_]) -> Sets:
+        """Sets in which fixed actuators (n, N) give their forces (k, N) [N] and nothing else."""
+        lines, planes = self.answers.lines, self.answers.planes
+        x, y = force[lines : lines + planes], force[lines + planes :]
+        size = np.concatenate([force[:lines], np.hypot(x, y)])
+        cost = self.answers.cost(np.clip(size, sets.low, sets.high))
+        planar = fixed[lines:]
+        return Sets(
+            np.where(fixed, size, sets.low),
+            np.where(fixed, size, sets.high),
+            np.where(fixed, cost, sets.low_cost),
+            np.where(fixed, cost, sets.high_cost),
+            np.where(planar, np.arctan2(y, x), sets.middle),
+            np.where(planar, 0.0, sets.half),
+        )
+
     def restricted(self, reach: Array) -> Sets:
         """Sets of actuators that give no more than rows (n, 4) of least and largest force [N], middle and
         half of the arc [rad], in the robot's order; what they give beyond their tables is left out."""
@@ -118,6 +135,11 @@ class DualRobot:
     def target(self, wrench: Array) -> Array:
         """Wrenches (N, 6) in the basis (r, N)."""
         found: Array = self.basis.T @ (wrench / self.scale).T
+        return found
+
+    def price(self, prices: Array) -> Array:
+        """Prices (N, 6) [W/N, W/(N m)] of the wrench from those in the basis (r, N) [W]."""
+        found: Array = (self.basis @ prices).T / self.scale
         return found
 
     def wrench(self, force: Array) -> Array:

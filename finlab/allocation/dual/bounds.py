@@ -1,0 +1,25 @@
+"""What no answer can undercut: the dual value at the prices found, by the laws of the actuators themselves.
+
+For any price `p` of the wrench, an answer that gives the wrench `w` takes at least `p.w` less what all that
+the actuators can give is worth at most at that price (weak duality). Compiled tables find the price; here
+each actuator's own law says what its best command is worth, so that the bound does not lean on the tables.
+"""
+
+import numpy as np
+
+from finlab.allocation.dual.compiled import Compiled
+from finlab.arrays import Array
+
+
+def proved_power(compiled: Compiled, wrench: Array, price: Array) -> Array:
+    """Power (N,) [W] that no answer for wrenches (N, 6) undercuts, by prices (N, 6) [W/N, W/(N m)]."""
+    robot = compiled.robot
+    value, table = robot.answers.worth((price @ robot.effectiveness.T).T, robot.sets)
+    radial = np.empty(value.shape)
+    worth = np.empty(value.shape)
+    radial[robot.order], worth[robot.order] = value, table
+    for places, group in compiled.groups:
+        own = group.radial_worth(radial[places].T)
+        if own is not None:
+            worth[places] = own.T
+    return np.asarray(np.einsum("ni,ni->n", price, wrench - compiled.beside) - worth.sum(axis=0))
