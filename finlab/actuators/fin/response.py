@@ -225,7 +225,8 @@ class _Box:
         return turns, self.strongest(turns)
 
     def strongest(self, turns: Array) -> Array:
-        """The largest forces across the shaft (K, 2) [N] of a coarse grid of commands at zero directions (K,)."""
+        """The largest forces across the shaft (K, 2) [N] of a coarse grid of commands at zero directions
+        (K,)."""
         command = np.tile(self.grid(COARSE_GRID), (len(turns), 1, 1))
         command[..., 2] = turns[:, None]
         across = self.law.force(command.reshape(-1, 3)).reshape(command.shape)[..., 1:]

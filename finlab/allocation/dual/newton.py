@@ -157,7 +157,10 @@ def _step(robot: DualRobot, state: _State, terms: Terms, ridge: Array) -> Array:
     if state.stretch is not None:
         hessian = hessian + np.einsum("n,in,jn->nij", state.stretch, state.target, state.target)
     hessian = hessian + (ridge * trace)[:, None, None] * robot.unit
-    step: Array = solve_systems(hessian, state.residual.T[..., None])[..., 0].T
+    with np.errstate(invalid="ignore"):
+        step: Array = solve_systems(hessian, state.residual.T[..., None])[..., 0].T
+    if not np.isfinite(step).all():  # a matrix without inverse: along the gradient
+        step = np.where(np.isfinite(step), step, state.residual / trace)
     return step
 
 
