@@ -85,8 +85,6 @@ class Sets:
 
     def take(self, columns: NDArray[np.intp]) -> "Sets":
         """The same for some of the targets."""
-        if self.low.shape[-1] == 1:
-            return self
         return Sets(*(a if a.shape[-1] == 1 else a[:, columns] for a in self.parts), self.whole)
 
 
@@ -191,9 +189,13 @@ class Answers:
         prices without a sign are those of planes."""
         if sign is None:
             force, slope, conjugate = self.radial(np.maximum(price, 0.0), row)
+            if sets.arcs:  # a price away from the arc's end moves nothing
+                slope = np.where(price > 0.0, slope, 0.0)
         else:
             force, slope, conjugate = self.radial(np.maximum(price * sign, 0.0), row + (sign < 0.0))
             force = force * sign
+            if sets.arcs:
+                slope = np.where(price * sign > 0.0, slope, 0.0)
         if sets.whole:
             return force, slope, conjugate
         low, high = sets.low[of], sets.high[of]

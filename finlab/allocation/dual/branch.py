@@ -152,9 +152,8 @@ def _cut(robot: DualRobot, parts: _Parts, kept: NDArray[np.intp], amount: Array,
     """Both parts of each open part, whose worst gap is cut."""
     twice, side = np.tile(kept, 2), np.repeat([-1.0, 1.0], len(kept))
     chosen = np.arange(len(amount))[:, None] == np.tile(amount.argmax(axis=0), 2)
-    sets = narrowed(
-        robot, parts.sets.take(twice), answer.force[:, twice], chosen, side + np.zeros(chosen.shape)
-    )
+    doubled = Sets(*(values[:, twice] for values in parts.sets.parts))
+    sets = narrowed(robot, doubled, answer.force[:, twice], chosen, side + np.zeros(chosen.shape))
     return _Parts(parts.row[twice], sets, answer.prices[:, twice])
 
 

@@ -33,9 +33,12 @@ class Gauges:
         count = self._rho.shape[1]
         place = (angle / TURN) % 1.0 * count
         cell = place.astype(np.intp) % count
-        part = place - np.floor(place)
+        t = place - np.floor(place)
         row = np.arange(len(self._rho))[:, None]
-        found: Array = self._rho[row, cell] * (1.0 - part) + self._rho[row, (cell + 1) % count] * part
+        before, first, last, after = (self._rho[row, (cell + k) % count] for k in (-1, 0, 1, 2))
+        m0, m1 = 0.5 * (last - before), 0.5 * (after - first)
+        rise = last - first
+        found: Array = first + t * (m0 + t * (3.0 * rise - 2.0 * m0 - m1 + t * (m0 + m1 - 2.0 * rise)))
         return found
 
     def support(self, angle: Array) -> tuple[Array, Array, Array]:
