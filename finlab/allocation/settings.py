@@ -5,7 +5,7 @@ All that asks for settings (a call, a bundle, the app) makes such an object, whi
 
 from dataclasses import Field, dataclass, field, fields
 from numbers import Integral, Real
-from typing import Any, NamedTuple, TypedDict
+from typing import Any, NamedTuple
 
 from finlab.errors import AllocationError
 from finlab.physics.effort import DEFAULT_WEIGHTS, EffortWeights
@@ -123,11 +123,3 @@ class AimSettings(Settings):
     def aim(self) -> Objective:
         """The three as one."""
         return Objective(self.objective, self.effort_weights, self.copper_loss)
-
-
-class AimOptions(TypedDict, total=False):
-    """`AimSettings` for editors and type checkers."""
-
-    objective: Name
-    effort_weights: EffortWeights
-    copper_loss: float

@@ -6,9 +6,6 @@ from typing import Any
 
 import yaml
 
-PAPER_METHODS = {"paper": "ours", "qp": "qp", "sqp": "sqp"}
-"""Our method name -> the paper's; its `ours` is the pipeline that `paper` rebuilds."""
-
 
 @cache
 def paper_figures() -> dict[str, Any]:

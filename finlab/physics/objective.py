@@ -3,16 +3,14 @@
 Both are sums over the fins of a cost of amplitude and frequency; effort adds a little for the zero direction.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
 
-from finlab.actuators.law import FinLaw
 from finlab.arrays import Array
 from finlab.errors import AllocationError
-from finlab.physics.effort import DEFAULT_WEIGHTS, EffortMeter, EffortWeights, effort_of_shares, effort_scale
+from finlab.physics.effort import DEFAULT_WEIGHTS, EffortMeter, EffortWeights
 from finlab.physics.plant import Plant
 
 Name = Literal["power", "effort"]
@@ -44,35 +42,6 @@ class Objective:
                 f"copper_loss: expected watts per (N m)^2, from 0, got {self.copper_loss!r}"
             )
         object.__setattr__(self, "copper_loss", float(self.copper_loss))
-
-    @property
-    def convex(self) -> bool:
-        """Whether cost grows faster than force, so that one search finds the least; else fins that rest must
-        be tried."""
-        return self.name == "power"
-
-    @property
-    def is_power(self) -> bool:
-        """Whether cost is the mechanical power and nothing else."""
-        return self.name == "power" and self.copper_loss == 0.0
-
-    def fin_cost(self, law: FinLaw, upper: Array) -> Callable[[Array], Array]:
-        """Returns the cost of commands (..., 3) of one fin with upper limits (3,), its direction left out."""
-        if self.name == "power":
-            return lambda command: np.asarray(law.power(command, self.copper_loss))
-        scale = effort_scale(upper)
-
-        def effort(command: Array) -> Array:
-            share = command / scale
-            return np.asarray(effort_of_shares(share[..., 0], share[..., 1], 0.0, self.weights))
-
-        return effort
-
-    def direction_cost(self, upper: Array) -> Array:
-        """Returns the cost (n,) per squared zero direction [1/rad^2] of fins with upper limits (n, 3)."""
-        if self.name == "power":
-            return np.zeros(len(upper))
-        return np.asarray(self.weights.zero_direction / effort_scale(upper)[:, 2] ** 2)
 
     def meter(self, plant: Plant) -> "CostMeter":
         """Returns the meter of the cost of a robot's commands."""
