@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from finlab.actuators.fin.models import file_stamp, make_law, stack_laws
-from finlab.actuators.law import FinLaw
+from finlab.actuators.law import FinLaw, PlanarLaw
 from finlab.actuators.response import Group, Plane, RadialTable, price_grid
 from finlab.arrays import Array
 from finlab.errors import DataError
@@ -215,13 +215,18 @@ class _Box:
         self.turn = float(np.clip(0.0, lower[2], upper[2]))
         if not law.uniform:
             turns, across = self.all_round
-            self.turn = float(turns[np.hypot(*across.T).argmax()])
+            within = (turns >= lower[2] - 1e-9) & (turns <= upper[2] + 1e-9)
+            size = np.where(within, np.hypot(*across.T), -1.0)
+            self.turn = float(turns[size.argmax()]) if within.any() else self.turn
 
     @cached_property
     def all_round(self) -> tuple[Array, Array]:
         """Zero directions (TURNS + 1,) [rad] and the largest forces across the shaft (TURNS + 1, 2) [N] that
         a coarse grid of commands has there."""
-        turns = np.linspace(self.lower[2], self.upper[2], TURNS + 1)
+        low, high = self.lower[2], self.upper[2]
+        if isinstance(self.law, PlanarLaw):  # a formula holds beyond the limits, too
+            low, high = 0.5 * (low + high) - np.pi, 0.5 * (low + high) + np.pi
+        turns = np.linspace(low, high, TURNS + 1)
         return turns, self.strongest(turns)
 
     def strongest(self, turns: Array) -> Array:
@@ -355,12 +360,12 @@ def _directions(law: FinLaw, box: _Box) -> tuple[float, float, Array | None, Arr
     direction = np.arctan2(across[:, 1], across[:, 0])
     direction = turns + np.unwrap(wrapped(direction - turns))
     if not full:
-        middle, half = 0.5 * float(direction[0] + direction[-1]), 0.5 * float(direction[-1] - direction[0])
+        ends = np.interp([lower[2], upper[2]], turns, direction)
+        middle, half = 0.5 * float(ends.sum()), 0.5 * float(np.diff(ends)[0])
     angle = np.arange(TURNS) * (TURN / TURNS)
-    place = (angle - direction[0]) % TURN
-    if not full:  # beyond its arc a fin is taken to be as at the nearer end
-        width = 2.0 * half
-        place = np.where(place > 0.5 * (width + TURN), 0.0, np.minimum(place, width))
+    place, width = (angle - direction[0]) % TURN, float(direction[-1] - direction[0])
+    # Beyond what its law knows a fin is taken to be as at the nearer end.
+    place = np.where(place > 0.5 * (width + TURN), 0.0, np.minimum(place, width))
     turn = np.interp(place, direction - direction[0], turns)
     across = box.strongest(turn)
     reference = float(np.linalg.norm(box.strongest(np.array([box.turn]))))

@@ -17,14 +17,16 @@ from finlab.allocation.dual.gauges import Gauges
 from finlab.arrays import Array
 
 SMOOTHING = 1e-5
-"""Price, as a share of the largest, over which an answer changes from one side of a gap to the other: the
-dual of a set that is not convex has corners there."""
+"""Worth, as a share of the largest power, over which an answer changes from one end of an arc to the other:
+the dual of a set that is not convex has corners there."""
+ROUNDING = 1e-2
+"""Price, as a share of the mean one of the least force, over which a force that cannot rest turns round."""
 HALVINGS = 25
 """Halvings of an interval of price that find the price of a force."""
 _EDGES = np.linspace(0.0, 1.0, CELLS + 1) ** 4
 """Ends of the tables' intervals, as shares of the largest price."""
 TINY = 1e-9
-"""The same share where there is no gap: it keeps the direction of a force of no price defined."""
+"""Price, as a share of the largest, below which a force that can rest has no direction of its own."""
 
 
 class Answer(NamedTuple):
@@ -178,6 +180,9 @@ class Answers:
         if planes:
             fan = self._fan(first, second, sets)
             along[lines:] = first * fan.first + second * fan.second
+            if not sets.rests:  # at least force, a small price along any direction counts in full
+                size = np.hypot(first, second)
+                along[lines:] *= np.sqrt(size * size + self._gap(sets) ** 2) / np.maximum(size, 1e-300)
         sign = np.where(along < 0.0, -1.0, 1.0)
         sign[lines:] = 1.0
         return along, self._limited(along, sign, self._row, sets)[2]
@@ -239,7 +244,9 @@ class Answers:
         """Prices (p, 1) or (p, N) below which a plane's direction is undecided."""
         if sets.rests:
             return self._tiny
-        return np.where(sets.low[self.lines :] <= 0.0, self._tiny, self._tiny * (SMOOTHING / TINY))
+        low = sets.low[self.lines :]
+        marginal = ROUNDING * sets.low_cost[self.lines :] / np.maximum(low, 1e-300)
+        return np.where(low <= 0.0, self._tiny, np.maximum(marginal, self._tiny))
 
     def _uneven(self, x: Array, y: Array, tangent: Array) -> tuple[Array, Array, Array]:
         """Directions of the force with the gauges' sizes, and the weights of their change, for directions of
@@ -280,7 +287,7 @@ class Answers:
         row = self.lines + places
         size, slope, conjugate = self._limited(price, None, self._row[row], sets, row)
         other = _Planar(size * x, size * y, slope * x * x, slope * x * y, slope * y * y, conjugate)
-        width = SMOOTHING * self._top[2 * row, None] * sets.high[row]
+        width = SMOOTHING * sets.high_cost[row] + 1e-12
         ahead = planar.conjugate[places] - conjugate
         root = np.sqrt(ahead * ahead + width * width)
         share = np.where(fan.beyond[places], 0.5 * (1.0 + ahead / root), 1.0)

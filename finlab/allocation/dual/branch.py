@@ -41,6 +41,8 @@ class Branched(NamedTuple):
     """Forces (k, N) [N]."""
     found: NDArray[np.bool_]
     """Which targets are met by forces in the sets (N,)."""
+    value: Array
+    """Power (N,) [W] that no forces in the sets undercut, by the tables."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,17 +109,21 @@ def least_power(robot: DualRobot, target: Array, sets: Sets, root: Prices) -> Br
             break
         parts = _dive(robot, parts, open_, amount[:, open_], answer)
         answer = solve(robot, target[:, parts.row], parts.sets, parts.prices)
-    parts, answer = start, root
+    parts, answer, value = start, root, np.full(count, np.inf)
     for _ in range(ROUNDS):
         amount = gaps(robot, answer.force, parts.sets)
         kept = _cheapest(np.flatnonzero(keep(parts, answer, amount)), parts.row, answer.value)
+        left = np.ones(len(parts.row), bool)
+        left[kept] = False
+        np.minimum.at(value, parts.row[left], answer.value[left])
         if not len(kept):
             break
         parts = _cut(robot, parts, kept, amount[:, kept], answer)
         answer = solve(robot, target[:, parts.row], parts.sets, parts.prices)
     else:
         keep(parts, answer, gaps(robot, answer.force, parts.sets))
-    return Branched(force, found)
+        np.minimum.at(value, parts.row, answer.value)
+    return Branched(force, found, value)
 
 
 def halves(robot: DualRobot, sets: Sets, force: Array) -> list[Sets] | None:

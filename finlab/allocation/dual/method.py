@@ -39,6 +39,8 @@ AGAIN = 4
 """Times that it is asked again."""
 REFINE_STEPS = 12
 """Levenberg-Marquardt steps on commands."""
+TABLES = 1e-5
+"""Share of a power by which the compiled tables may be off."""
 OUT_OF_RANGE = 1e-9
 """Share of a target outside the range of the actuators from which on it counts as out of reach."""
 
@@ -71,6 +73,8 @@ class Forces(NamedTuple):
     """Which targets are within reach (N,)."""
     prices: Array
     """The same (r, N) in the robot's basis [W]."""
+    value: Array
+    """Power (N,) [W] that branches on gaps have proved to be needed; 0 where there was none."""
 
 
 class Dual(Method):
@@ -138,12 +142,16 @@ class Dual(Method):
         found = self._forces(asked, robot.sets, policy)
         aim = np.where(found.within[:, None], asked, robot.wrench(found.force)) + self.compiled.beside
         command, found = self._commands(aim, found, robot.sets, previous)
-        bound = None if self._unproved else partial(proved_power, self.compiled, aim, found.price)
+        bound = None if self._unproved else partial(self._bound, aim, found)
         if previous is not None:
             box = box_after(self.plant, previous, self.layout.rates, self.settings.period_s)
             if box is not None and not box.holds(command[0]):
                 return Solution(self._within_box(aim, command, found, previous, box), bound)
         return Solution(command, bound)
+
+    def _bound(self, aim: Array, found: Forces) -> Array:
+        """Power (N,) [W] that no answer for wrenches (N, 6) undercuts."""
+        return np.maximum(proved_power(self.compiled, aim, found.price), found.value)
 
     @property
     def _unproved(self) -> bool:
@@ -156,7 +164,9 @@ class Dual(Method):
         target = robot.target(targets)
         if not len(target):  # nothing pushes, such as rudders at rest
             nothing = np.zeros((len(robot.effectiveness), len(targets)))
-            return Forces(nothing, np.zeros((len(targets), 6)), ~targets.any(axis=1), target)
+            return Forces(
+                nothing, np.zeros((len(targets), 6)), ~targets.any(axis=1), target, np.zeros(len(targets))
+            )
         root = solve(robot, target, sets, prices)
         within = root.solved.copy()
         if robot.basis.shape[1] < 6:
@@ -164,28 +174,33 @@ class Dual(Method):
             within &= np.linalg.norm(rest, axis=1) <= OUT_OF_RANGE * (
                 1e-3 + np.linalg.norm(targets / robot.scale, axis=1)
             )
-        force, prices = root.force, root.prices
+        force, prices, value = root.force, root.prices, np.zeros(len(targets))
         if may_have_gaps(robot, sets, force):
-            force = self._in_gaps(target, sets, root, within)
+            force, value = self._in_gaps(target, sets, root, within)
         if not within.all():
             force, prices = force.copy(), prices.copy()
             for row in np.flatnonzero(~within):
                 near = nearest(robot, sets.take(np.array([row])), targets[row], policy, self.scale)
                 force[:, row], prices[:, row] = near.force, near.prices
-        return Forces(force, robot.price(prices), within, prices)
+        return Forces(force, robot.price(prices), within, prices, value)
 
-    def _in_gaps(self, target: Array, sets: Sets, root: Prices, within: NDArray[np.bool_]) -> Array:
-        """Forces (k, N) in sets with gaps; `within` loses the targets that they do not meet."""
+    def _in_gaps(
+        self, target: Array, sets: Sets, root: Prices, within: NDArray[np.bool_]
+    ) -> tuple[Array, Array]:
+        """Forces (k, N) in sets with gaps, and the power (N,) [W] that is proved to be needed there; `within`
+        loses the targets that they do not meet."""
         robot = self.compiled.robot
         rows = np.flatnonzero(within & (gaps(robot, root.force, sets) > 0.0).any(axis=0))
+        value = np.zeros(len(within))
         if not len(rows):
-            return root.force
+            return root.force, value
         some = Prices(*(values[..., rows] for values in root))
         cut = least_power(robot, target[:, rows], sets.take(rows), some)
         force = root.force.copy()
         force[:, rows] = cut.force
         within[rows[~cut.found]] = False
-        return force
+        value[rows] = np.where(cut.found, cut.value * (1.0 - TABLES), 0.0)
+        return force, value
 
     def _commands(
         self, aim: Array, found: Forces, sets: Sets, previous: Array | None = None
