@@ -20,7 +20,7 @@ from finlab.layout.damage import Health
 from finlab.physics.known_plants import plant_of
 from finlab.physics.plant import Plant
 
-CHUNK = 4096
+CHUNK = 1024
 """Answers that are judged together; keeps memory flat for any number of targets."""
 
 

@@ -90,9 +90,11 @@ def start(robot: DualRobot, target: Array, sets: Sets) -> tuple[Array, NDArray[n
     saturated = (share > 0.8).any(axis=0)
     fit = np.sqrt(np.minimum(np.maximum(share, 1e-4), 1.0))
     weight = gain * np.concatenate([fit, fit[lines:]])
-    hessian = (robot.squares @ weight).T.reshape(-1, *robot.shape)
+    hessian = weight.T @ robot.squares.T
+    diagonal = hessian[:, :: robot.shape[0] + 1]
     # Of a robot with only some directions asked for, nothing may drive one of them.
-    hessian = hessian + (UNDRIVEN * np.einsum("nii->n", hessian))[:, None, None] * robot.unit
+    diagonal += UNDRIVEN * diagonal.sum(axis=1, keepdims=True)
+    hessian = hessian.reshape(-1, *robot.shape)
     return solve_systems(hessian, target.T[..., None])[..., 0].T, saturated
 
 
@@ -150,15 +152,16 @@ def _state(robot: DualRobot, target: Array, prices: Array, sets: Sets, terms: Te
 
 def _step(robot: DualRobot, state: _State, terms: Terms, ridge: Array) -> Array:
     """Steps (r, N) of the prices."""
-    hessian = (robot.outer @ state.answer.derivative).T.reshape(-1, *robot.shape)
+    hessian = state.answer.derivative.T @ robot.outer.T
     trace = np.maximum(robot.trace @ state.answer.derivative, robot.least_trace)
     if terms.penalty is not None:
-        hessian = hessian + terms.penalty
+        hessian += terms.penalty.ravel()
     if state.stretch is not None:
-        hessian = hessian + np.einsum("n,in,jn->nij", state.stretch, state.target, state.target)
-    hessian = hessian + (ridge * trace)[:, None, None] * robot.unit
+        weighted = state.stretch * state.target
+        hessian += np.einsum("in,jn->nij", weighted, state.target).reshape(hessian.shape)
+    hessian[:, :: robot.shape[0] + 1] += (ridge * trace)[:, None]
     with np.errstate(invalid="ignore"):
-        step: Array = solve_systems(hessian, state.residual.T[..., None])[..., 0].T
+        step: Array = solve_systems(hessian.reshape(-1, *robot.shape), state.residual.T[..., None])[..., 0].T
     if not np.isfinite(step).all():  # a matrix without inverse: along the gradient
         step = np.where(np.isfinite(step), step, state.residual / trace)
     return step
