@@ -43,4 +43,3 @@ def test_what_each_objective_counts() -> None:
     np.testing.assert_allclose(Objective().meter(plant)(command), plant.power(command).sum(-1))
     effort = command_effort(command, layout.upper, DEFAULT_WEIGHTS)
     np.testing.assert_allclose(Objective("effort").meter(plant)(command), effort)
-    np.testing.assert_array_equal(Objective().direction_cost(layout.upper), np.zeros(3))
