@@ -73,7 +73,6 @@ def commands(page: Page) -> list[Command]:
         ),
         *(Command("Wrench", f"Keep {word} least", partial(session.keep_least, word)) for word in LEAST),
         Command("Wrench", "Compare the methods", compare),
-        Command("Wrench", "Stop the sweep", page.sweep.stop),
         Command("Swim", "Swim: pause or go on", swim_on, "B"),
         Command("Swim", "Swim: back to the design", page.scenery.end_swim),
         Command("View", "Frame what is selected", robot.frame, "F"),

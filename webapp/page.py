@@ -33,7 +33,6 @@ from webapp.tasks.improving import Improver
 from webapp.tasks.opening import Opening
 from webapp.tasks.reading import Reading
 from webapp.tasks.solver import Solver
-from webapp.tasks.sweeping import Sweep
 from webapp.tasks.swimming import Swimming
 from webapp.theme import VERMILLION
 from webapp.uploads import Uploads
@@ -86,7 +85,6 @@ class Page(ABC):
         self.fitting = Fitting(context)
         self.comparison = Comparison(context)
         self.swimming = Swimming(context, self._swam)
-        self.sweep = Sweep(context)
         self.exports = Exports(context)
         self.scenery = Scenery(context, self.swimming)
         self.bound: list[Callable[[], None]] = []
@@ -241,7 +239,6 @@ class Page(ABC):
 
     def _take_in(self) -> None:
         """What follows from what is on the robot now, before anything is written."""
-        self.sweep.note(self.answering)
         if self.shown is not None and not self.busy:
             self.session.take(self.shown)
 
@@ -283,7 +280,6 @@ class Page(ABC):
         """The browser has gone."""
         self._loop.close()
         self._uploads.close()
-        self.sweep.stop()
         self.swimming.stop()
         self.comparison.cancel()
         self.improver.forget()

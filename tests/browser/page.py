@@ -81,7 +81,6 @@ class Page:
             self.session.draft, self.session.swim = SearchRequest(), SwimSettings()
             self.session.compare_with(None)
             self.view.improver.forget()
-            self.view.sweep.stop()
             self.view.scenery.end_swim()
             self.view.scenery.robot.look_from("3D")
             done.set()

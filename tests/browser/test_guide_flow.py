@@ -29,7 +29,7 @@ def test_the_tour_sets_each_stop_and_brings_the_work_back(page: Any) -> None:
     page.press("Next")
     page.until(lambda: not page.view.swimming.active)
     page.visible("/robot")
-    page.until(lambda: "6 of 6 fins" in page.text(".fl-status"))
+    page.until(lambda: "6 of 6 actuators" in page.text(".fl-status"))
     page.press("Finish")
     page.until(lambda: page.session.state == mine and not page.session.guided)
     assert page.session.drawer == "Improve" and page.session.history.undo_name == "Set Fy"
@@ -44,13 +44,13 @@ def test_a_lesson_sees_when_its_task_is_done(page: Any) -> None:
     page.press("Lessons")
     page.until(lambda: "One wrench, several ways" in page.text(".fl-lesson"))
     page.until(lambda: not page.view.busy and len(page.view.answering.modes.shown) > 1)
-    assert "○" in page.text(".fl-lesson") and page.session.state.objective == "effort"
+    assert "○" in page.text(".fl-lesson") and page.session.state.method == "mdn"
     page.page.locator("table.modes tr.pick").nth(1).click()
     page.until(lambda: "✓" in page.text(".fl-lesson"))
     assert "the green arrows did not" in page.text(".fl-lesson")
     page.press("Next lesson")
     page.until(lambda: "Watts are not effort" in page.text(".fl-lesson"))
-    page.choose("Keep least", "power")
+    page.choose("Least", "watts")
     page.until(lambda: "✓" in page.text(".fl-lesson"))
     page.press("Close")
     page.until(lambda: not page.session.guided and page.session.state == mine)

@@ -38,7 +38,7 @@ def test_failed_and_damaged_fins(page: Any) -> None:
         page.press(number)
         page.until(lambda number=number: session.state.layout.names[int(number) - 1] in session.state.failed)
     page.press("4")
-    page.until(lambda: any("last fin that works" in note for note in page.notes()))
+    page.until(lambda: any("last one that works" in note for note in page.notes()))
     page.unfold("Damage a fin", "Which fin")
     page.press("All fins")
     page.until(lambda: session.state.failed == ())
@@ -53,29 +53,46 @@ def test_failed_and_damaged_fins(page: Any) -> None:
     page.page.locator(".damage").wait_for(state="detached")
 
 
-def test_candidates_of_search_and_network(page: Any) -> None:
+def test_candidates_of_the_network_beside_either_answer(page: Any) -> None:
     session, answering = page.session, page.view.answering
     page.tab("Candidates")
-    watts = answering.best.power
-    assert page.page.locator("svg.plot:visible .samples").count() == 0, "search draws nothing"
-    page.choose("Keep least", "effort")
-    page.until(lambda: session.state.objective == "effort" and not page.view.busy)
-    page.until(lambda: "least effort" in page.text(".fl-status") and answering.best.power > watts)
     rows = page.page.locator("table.modes tr.pick")
     page.until(lambda: rows.count() > 1 and not answering.searching)
+    assert "the answer" in rows.first.inner_text() and "from component" in rows.last.inner_text()
+    page.until(lambda: "proved least" in page.text(".said"))
+    watts = answering.best.power
+    page.choose("Least", "effort")
+    page.until(lambda: session.state.method == "mdn" and not page.view.busy)
+    page.until(lambda: "least effort" in page.text(".fl-status") and answering.best.power > watts)
+    page.until(lambda: rows.count() > 1 and not answering.searching)
+    page.until(lambda: "from component" in rows.first.inner_text())
     best = answering.best
     rows.nth(1).click()
     page.until(lambda: session.mode == 1 and page.view.shown is not best)
     page.until(lambda: page.text("table.modes tr.chosen").startswith("2"))
     page.page.locator("svg.plot:visible g.pick circle").last.click()  # the best one is drawn last
     page.until(lambda: session.mode == 0)
-    page.choose("Method", "mdn")
-    page.until(lambda: session.state.method == "mdn" and not page.view.busy)
-    page.until(lambda: "from component" in page.text("table.modes"))
     page.type("Candidates K", "24")
     page.until(lambda: session.state.n_candidates == 24 and not page.view.busy)
     assert len(answering.best.samples.effort) == 24
     page.until(lambda: page.page.locator("svg.plot:visible .samples circle").count() > 4)
+    assert page.problems == []
+
+
+def test_a_robot_with_thrusters_is_shown_and_answered(page: Any) -> None:
+    session = page.session
+    page.tab("Design")
+    page.choose("Layout", "turtle_hybrid")
+    page.until(lambda: session.state.layout.name == "turtle_hybrid" and not page.view.busy)
+    page.node("/robot/fins/5/turn/blade")
+    page.tab("Allocate")
+    page.type("Fz [N]", "40")
+    page.until(lambda: "thruster" in page.text("table.fins") and "Exact" in page.text(".fl-status"))
+    page.press("6")
+    page.until(lambda: session.state.failed == ("lift_right",) and "5 of 6" in page.text(".fl-status"))
+    page.visible("/robot/fins/5/turn/force", False)
+    page.tab("Simulate")
+    page.until(lambda: page.page.get_by_text("A swim works for robots of fins only").is_visible())
     assert page.problems == []
 
 

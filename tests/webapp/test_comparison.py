@@ -74,11 +74,23 @@ def test_each_mode_of_mdn_tells_its_components_and_dual_has_one_answer() -> None
     led = {samples.source[k] for k in np.flatnonzero(modes.of_samples == 0)}
     assert led and led <= set(modes.shown[0].mode.sources)
     dear = replace(samples, effort=np.full(len(samples), 1e4))
-    far = mode_plot(reply.answer.with_candidates(reply.answer.candidates, dear), modes, 0, 200)
+    far = mode_plot(replace(modes, samples=dear), 0, 200)
     assert "1e+04" not in far and "e+" not in far, "samples that are far too dear stand at the edge"
-    one = solver.reply(replace(state, method="dual"))
-    assert one.answer.samples is None and solver.modes(one).shown == ()
     assert {source_words(mode.sources).split(" ")[0] for mode, _ in modes.shown} <= {"from"}
+
+
+@pytest.mark.skipif("default" not in shipped_checkpoints(), reason="no trained checkpoint in the tree")
+def test_beside_the_one_answer_of_dual_stands_what_the_network_proposes() -> None:
+    solver, state = Solver(), State(UCAT, target=PRESETS["Turn"])
+    reply = solver.reply(state)
+    assert reply.modes.shown == () and reply.answer.samples is None
+    modes = solver.modes(reply)
+    first, *others = (mode for mode, _ in modes.shown)
+    assert source_words(first.sources) == "the answer" and first.power == pytest.approx(reply.answer.power)
+    assert others and all(mode.err_norm < 1e-3 and mode.power >= first.power for mode in others)
+    assert modes.samples is not None and mode_plot(modes, 0, 200).count("class='mode'") == len(modes.shown)
+    beyond = solver.reply(state.with_target(0, 500.0))
+    assert solver.modes(beyond).shown == (), "there is nothing to compare"
 
 
 def test_what_a_page_tries_out_stays_with_its_own_answers() -> None:
@@ -107,6 +119,5 @@ def test_every_answer_keeps_least_what_is_asked() -> None:
     assert power.effort is not None and effort.effort is not None and power.effort > effort.effort
     assert "least power" in corner(state, "", power, False, None)
     assert "least effort" in corner(state, "", effort, False, None)
-    assert mode_plot(power, solver.modes(solver.reply(state)), 0, 200) == "", "one answer"
     assert "--method mdn" in command_line(replace(state, method="mdn"))
     assert "finlab.Allocator(layout, 'mdn')" in python_lines(replace(state, method="mdn"))

@@ -99,7 +99,7 @@ def test_real_candidates_are_drawn_and_listed() -> None:
         assert place == (led_here[0] if led_here else -1), "the mode that its component led to"
     strange = replace(answer.samples, source=("sample",) * len(led))
     assert set(led_to(strange, modes)) == {-1}, "of no component"
-    plot = mode_plot(answer, listed, 0, 200)
+    plot = mode_plot(listed, 0, 200)
     assert plot.count("data-press='mode'") == len(modes)
     assert plot.count("r='3'") == len(answer.samples.effort)
     table = mode_table(listed, False, 0)
@@ -143,7 +143,7 @@ def test_dots_stand_at_their_values_and_their_numbers_beside_them(spread: float)
     first = known_modes(answer)[0]
     effort = np.append(0.801 + spread * np.random.default_rng(3).uniform(size=MAX_SHOWN - 1), 0.957 + spread)
     shown = tuple(NamedMode(replace(first, effort=float(value)), f"{k}") for k, value in enumerate(effort))
-    plot = mode_plot(answer, Modes(shown, MAX_SHOWN, np.zeros(64, dtype=np.intp)), 3, 200)
+    plot = mode_plot(Modes(shown, MAX_SHOWN, answer.samples, np.zeros(64, dtype=np.intp)), 3, 200)
     across = [
         float(x) for x in re.findall(r"<circle cx='([\d.]+)' cy='[\d.]+' r='[\d.]+' class='mode'", plot)
     ]

@@ -5,7 +5,6 @@ import math
 import numpy as np
 from markupsafe import Markup
 
-from finlab.allocation.allocation import Allocation
 from finlab.arrays import Array
 from webapp.markup.html import html
 from webapp.markup.plot import EXACT, RIGHT, TOP, WIDTH, Plot, Point, cost_axis, error_axis
@@ -27,18 +26,17 @@ FAR_PX = 14.0
 """Distance of a number from its dot above which a line joins them [px]."""
 
 
-def mode_plot(answer: Allocation, modes: Modes, shown: int, height: int) -> str:
-    """Effort, which methods with modes keep least, against the error.
+def mode_plot(modes: Modes, shown: int, height: int) -> str:
+    """Effort, which the network's proposals keep least, against the error.
 
     Samples are small dots, modes numbered ones, which can be clicked.
 
     Args:
-        answer: what the dots are of.
-        modes: its modes, which give the samples their colours.
+        modes: an answer's modes, which give the samples their colours.
         shown: mode on the robot.
         height: of the plot [px].
     """
-    samples = answer.samples
+    samples = modes.samples
     if not modes.shown or samples is None:
         return ""
     error = np.array([mode.err_norm for mode, _ in modes.shown])

@@ -11,6 +11,7 @@ from webapp.markup.words import (
     fins_words,
     listed,
     saturated,
+    three_digits,
     unlearned_sentence,
 )
 from webapp.session.state import AXIS_UNITS, AXIS_WORDS, State
@@ -140,7 +141,7 @@ def answer_sentence(state: State, allocation: Allocation | None, busy: bool) -> 
 
 
 def _amount(value: float, axis: int) -> str:
-    return f"{abs(value):.2g} {AXIS_UNITS[axis]} of {AXIS_WORDS[axis]}"
+    return f"{three_digits(abs(value))} {AXIS_UNITS[axis]} of {AXIS_WORDS[axis]}"
 
 
 def _warning(text: str) -> Markup:

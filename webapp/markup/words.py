@@ -16,6 +16,10 @@ from webapp.session.state import AXIS_WORDS, State
 
 SMALL = 3e-4
 """Share of what the robot can push that is too small to draw, on one axis; an exact answer lacks no more."""
+OWN = "the answer"
+"""Source of a mode that is the answer of a method without candidates."""
+MOST_LISTED = 4
+"""Components of a mixture that are named; of more their number is told."""
 ROUNDING = 1e-9
 """Normalized error below which the digits are those of the computer's rounding."""
 AT_LIMIT = 0.995
@@ -58,7 +62,11 @@ def three_digits(value: float | None) -> str:
 
 def source_words(sources: Sequence[str]) -> str:
     """Where a mode comes from: the components of a mixture, or where the search began."""
+    if OWN in sources:
+        return OWN
     numbers = [s.removeprefix("component ") for s in sources if s.startswith("component ")]
+    if len(numbers) > MOST_LISTED:
+        numbers = [*numbers[:MOST_LISTED], f"{len(numbers) - MOST_LISTED} more"]
     if numbers:
         return f"from component{'s' if len(numbers) > 1 else ''} {listed(numbers)}"
     first = sources[0]
@@ -121,7 +129,8 @@ def fins_only(layout: Layout, what: str) -> str:
     try:
         layout.only_fins(what, horizontal=True)
     except LayoutError as error:
-        return f"{str(error)[0].upper()}{str(error)[1:]}."
+        text = str(error).partition(";")[0]
+        return f"{text[0].upper()}{text[1:]}."
     return ""
 
 

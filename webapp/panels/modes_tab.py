@@ -20,8 +20,12 @@ ORIGINS = {
     "which leaves an error.",
 }
 """Where the answer and its modes come from, by method."""
-ONE = "Method {} has one answer. Keep effort least, and a network proposes several ways."
+ONE = "Method {} has one answer, number 1. The others are a network's, for least effort, each made exact."
 """What is said of a method without candidates."""
+BEYOND = (
+    "Method {} has one answer. Where the wrench is not delivered whole, the network is not asked beside it."
+)
+"""The same where there is nothing to compare."""
 UNKNOWN = "The network knows fins alone, so it proposes nothing for this robot."
 """What is said of a robot with other actuators."""
 DRAWN = {"n_candidates": 64.0, "temperature": 0.02, "gamma": 0.01}
@@ -75,24 +79,24 @@ class CandidatesPanel:
 
     def refresh(self) -> None:
         page, state = self._page, self._page.session.state
-        put(self._origin, content=html("<div class='fl dim'>{}</div>", _origin_words(state)))
+        exact = page.answering.best is None or page.answering.best.reachable
+        put(self._origin, content=html("<div class='fl dim'>{}</div>", _origin_words(state, exact)))
         drawing = state.drawing
         put(self._draws, visible=bool(drawing))
         for key, widget in self._settings.items():
             put(widget, visible=key in drawing)
         answering, shown = page.answering, self._shown
         put(self._table, content=mode_table(answering.modes, answering.searching, shown))
-        answer, modes = answering.best, answering.modes
-        if self._plotted(answer, modes, shown):
-            plot = "" if answer is None else mode_plot(answer, modes, shown, PLOT_PX)
-            put(self._plot, content=plot)
+        modes = answering.modes
+        if self._plotted(modes, shown):
+            put(self._plot, content=mode_plot(modes, shown, PLOT_PX))
 
 
-def _origin_words(state: State) -> str:
+def _origin_words(state: State, exact: bool) -> str:
     """Where the answer and its modes come from, or why there is but one."""
     if not state.layout.is_of_fins:
         return UNKNOWN
-    return ORIGINS.get(state.method, ONE.format(state.method))
+    return ORIGINS.get(state.method, (ONE if exact else BEYOND).format(state.method))
 
 
 def placed(key: str, count: int) -> int:

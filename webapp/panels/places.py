@@ -18,7 +18,6 @@ from webapp.panels.fin_list import FinList
 from webapp.panels.hull_panel import HullPanel
 from webapp.panels.limits_tab import ImprovePanel, ReachPanel
 from webapp.panels.modes_tab import CandidatesPanel
-from webapp.panels.sweep import SweepPanel
 from webapp.panels.swim_tab import RunPanel, ScenarioPanel, SwimCardPanel
 from webapp.panels.timeline import Timeline
 from webapp.panels.top_bar import AnsweringBar, FileBar, HistoryBar
@@ -61,23 +60,22 @@ PLACES = (
     Place(TOP, TASKS, "Tasks", partial(Card, tasks)),
     Place(TOP, TASKS, "Answers", AnsweringBar),
     Place(LEFT, TASKS, "Guide", partial(Card, guide), about="guide"),
-    Place(LEFT, (DESIGN,), "Fins", FinList),
+    Place(LEFT, (DESIGN,), "Actuators", FinList),
     Place(LEFT, (DESIGN,), "Designs", DesignPanel),
-    Place(RIGHT, (DESIGN,), "Fin", FinInspector, about="fins", fins_only="the inspector"),
+    Place(RIGHT, (DESIGN,), "Fin", FinInspector, about="fins", fins_only="the inspector of a fin"),
     Place(RIGHT, (DESIGN,), "Body", BodyInspector, about="robot"),
     Place(RIGHT, (DESIGN,), "Hull", HullPanel, folded=True, about="robot"),
-    Place(RIGHT, (DESIGN,), "Check", partial(Card, check), fins_only="the check"),
-    Place(DRAWER, (DESIGN,), "Reach", ReachPanel, fins_only="the picture of reach and the score card"),
+    Place(RIGHT, (DESIGN,), "Check", partial(Card, check), fins_only=""),
+    Place(DRAWER, (DESIGN,), "Reach", ReachPanel, fins_only="reach with its score card"),
     Place(DRAWER, (DESIGN,), "Improve", ImprovePanel, fins_only="the search for a better layout"),
-    Place(LEFT, (ALLOCATE,), "Fins", FinsPanel),
+    Place(LEFT, (ALLOCATE,), "Actuators", FinsPanel),
     Place(LEFT, (ALLOCATE,), "Damage a fin", DamagePanel, folded=True, fins_only=""),
     Place(RIGHT, (ALLOCATE,), "Wrench", TargetPanel),
     Place(RIGHT, (ALLOCATE,), "Asked and delivered", partial(Card, answer)),
     Place(DRAWER, (ALLOCATE,), "Candidates", CandidatesPanel),
     Place(DRAWER, (ALLOCATE,), "Comparison", ComparePanel, fins_only="the comparison of methods"),
-    Place(DRAWER, (ALLOCATE,), "Sweep", SweepPanel),
-    Place(LEFT, (SIMULATE,), "Scenario", ScenarioPanel, fins_only="a swim"),
-    Place(RIGHT, (SIMULATE,), "Run", RunPanel, swims=True, fins_only=""),
+    Place(LEFT, (SIMULATE,), "Scenario", ScenarioPanel, fins_only=""),
+    Place(RIGHT, (SIMULATE,), "Run", RunPanel, swims=True, fins_only="a swim"),
     Place(RIGHT, (SIMULATE,), "Figures", SwimCardPanel, swims=True, fins_only=""),
     Place(DRAWER, (SIMULATE,), "Swim over time", Timeline, swims=True, fins_only=""),
     Place(RIGHT, (EXPORT,), "Files", FilesTab),

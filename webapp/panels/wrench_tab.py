@@ -28,8 +28,8 @@ class FinsPanel:
         self._page = page
         self._failures = FinButtons(
             page,
-            "Fail a fin",
-            "Press a number to fail or repair a fin; X does it to the selected one.",
+            "Fail",
+            "Press a number to fail or repair it; X does it to the selected one.",
             "fl-fails",
             page.session.toggle_failure,
         )

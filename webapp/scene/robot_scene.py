@@ -11,7 +11,7 @@ from finlab.layout import Layout
 from webapp.handles import put
 from webapp.markup.words import damage_words, missing_part
 from webapp.scene.fin_node import FinNode, Flapping, motion
-from webapp.scene.meshes.hull import hull_of
+from webapp.scene.meshes.hull import has_inside, hull_of
 from webapp.scene.meshes.mesh import LONGEST_TURN
 from webapp.scene.overlays import Ghost, moved_fins
 from webapp.scene.stage import Stage, aim_camera
@@ -104,7 +104,8 @@ class RobotScene:
         if self.dragged is None:  # a hull that breathes with the fin one drags is hard to aim at
             # Glass within glass is not drawn; inside an attainable set the hull is a net.
             net = display.drawn != "none"
-            self._stage.refresh(hull, display.dark, display.shadows, display.center, net)
+            glass = display.center or has_inside(state.layout)
+            self._stage.refresh(hull, display.dark, display.shadows, display.center, net, glass)
         while len(self._fins) < state.layout.n:
             self._fins.append(FinNode(self._client.scene, len(self._fins), self._clicked, self._drag))
         for node in self._fins[state.layout.n :]:

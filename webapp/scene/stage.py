@@ -77,9 +77,9 @@ class Stage:
         fade: dict[str, Any] = {"fade_distance": 5.0, "fade_strength": 1.6, "shadow_opacity": 0.22}
         self._grid = add_floor(scene, "/floor", 6.0, 0.1, 0.5, **fade)
 
-    def refresh(self, hull: AnyHull, dark: bool, shadows: bool, center: bool, net: bool) -> None:
+    def refresh(self, hull: AnyHull, dark: bool, shadows: bool, center: bool, net: bool, glass: bool) -> None:
         """Show another hull, theme or quality; a hull of glass, or a mere net, lets one look inside."""
-        opacity = 0.35 if center or net else None
+        opacity = 0.35 if glass or net else None
         put(self._body.node, opacity=opacity, wireframe=net)
         put(self._bow.node, opacity=opacity, visible=not net)
         put(self._center, visible=center)

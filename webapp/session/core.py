@@ -34,8 +34,6 @@ class History(Generic[Snapshot]):
         self.merge_key: str | None = None
         """Key of the step that is still being merged into, if any."""
         self._merge_time = 0.0
-        self._before: list[tuple[str, Snapshot]] = []  # what could be redone before the last step
-        self._dropped: list[tuple[str, Snapshot]] = []  # what could be undone before it, and cannot any more
 
     def commit(self, name: str, state: Snapshot, merge_key: str | None = None, timed: bool = True) -> None:
         """Make `state` the present one.
@@ -52,8 +50,7 @@ class History(Generic[Snapshot]):
         same = merge_key is not None and merge_key == self.merge_key
         if not (same and self.past and (not timed or now - self._merge_time < MERGE_WINDOW_S)):
             self.past.append((name, self.state))
-            self._dropped, self.past = self.past[:-MAX_STEPS], self.past[-MAX_STEPS:]
-            self._before, self.future = self.future, []
+            self.past, self.future = self.past[-MAX_STEPS:], []
         self.merge_key, self._merge_time = merge_key, now
         self.state = state
 
@@ -67,15 +64,6 @@ class History(Generic[Snapshot]):
     def end_merge(self) -> None:
         """The next change starts a step of its own."""
         self.merge_key = None
-
-    def abandon(self) -> bool:
-        """Take the step back that is being merged into, leaving no trace of it; False if there is none."""
-        if self.merge_key is None or not self.past:
-            return False
-        _, self.state = self.past.pop()
-        self.past = self._dropped + self.past
-        self.future, self.merge_key = self._before, None
-        return True
 
     @property
     def undo_name(self) -> str | None:

@@ -13,7 +13,7 @@ TASKS = ("Design", "Allocate", "Simulate", "Export")
 """What a page can be used for."""
 DRAWERS: dict[str, tuple[str, ...]] = {
     "Design": ("Reach", "Improve"),
-    "Allocate": ("Candidates", "Comparison", "Sweep"),
+    "Allocate": ("Candidates", "Comparison"),
     "Simulate": ("Swim over time",),
     "Export": (),
 }

@@ -20,16 +20,6 @@ class Questions(Core):
         """One component of the target wrench [N or N m]."""
         self._commit(f"Set {AXES[axis]}", self.state.with_target(axis, value), f"target{axis}")
 
-    def sweep_target(self, axis: int, value: float) -> None:
-        """One component of the target [N or N m] on its way through a range; one step of undo in all."""
-        self._commit(f"Sweep {AXES[axis]}", self.state.with_target(axis, value), f"sweep{axis}", timed=False)
-
-    def end_sweep(self) -> None:
-        """The sweep is over: what was asked before it comes back, and no step is left of it."""
-        if (self.history.merge_key or "").startswith("sweep") and self.history.abandon():
-            self._settled()
-        self.history.end_merge()
-
     def set_preset(self, name: str) -> None:
         """The target wrench of a preset."""
         if name not in PRESETS:

@@ -15,6 +15,7 @@ from finlab.allocation.modes import (
     same_signature,
 )
 from finlab.allocation.solution import Candidates
+from webapp.markup.words import OWN as OWN
 from webapp.markup.words import fins_words
 from webapp.theme import MODE_COLORS
 
@@ -39,26 +40,31 @@ class Modes:
     """The first `MAX_SHOWN` of them, the best one first, no two of the same name."""
     count: int
     """How many there are."""
-    of_samples: NDArray[np.intp] | None
-    """For each raw sample (K,) the shown mode that its component led to, -1 where that is none of them; None
+    samples: Candidates | None = None
+    """What a network proposed, before it was refined."""
+    of_samples: NDArray[np.intp] | None = None
+    """For each sample (K,) the shown mode that its component led to, -1 where that is none of them; None
     where there are no samples."""
 
 
-NO_MODES = Modes((), 0, None)
+NO_MODES = Modes((), 0)
 """Of no answer."""
 
 
 def listed_modes(modes: tuple[Mode, ...], samples: Candidates | None) -> Modes:
     """Modes with names, and which of them each raw sample's component led to."""
     shown = named_modes(modes)
-    return Modes(shown, len(modes), None if samples is None else led_to(samples, shown))
+    return Modes(shown, len(modes), samples, None if samples is None else led_to(samples, shown))
 
 
 def known_modes(answer: Allocation) -> tuple[Mode, ...]:
     """The modes among the candidates that an answer has refined anyway: a few, but they cost no time."""
-    if answer.candidates is None:
-        return ()
-    layout, candidates = answer.layout, answer.candidates
+    return () if answer.candidates is None else modes_of(answer, answer.candidates)
+
+
+def modes_of(answer: Allocation, candidates: Candidates) -> tuple[Mode, ...]:
+    """The modes among candidates for the question of an answer."""
+    layout = answer.layout
     return find_modes(candidates, force_sizes(layout, candidates.command), layout.lower, layout.upper)
 
 

@@ -15,8 +15,8 @@ from finlab.allocation.solution import Candidates
 from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.physics import plant_of
-from webapp.session.state import State
-from webapp.tasks.mode_names import Modes, known_modes, listed_modes
+from webapp.session.state import DRAWING, State
+from webapp.tasks.mode_names import OWN, Modes, known_modes, listed_modes, modes_of
 
 Load = Callable[..., MethodChoice]
 KEPT = 24
@@ -98,6 +98,12 @@ class Solver:
             FinlabError: the method cannot be loaded or cannot answer.
         """
         answer = judged(self.solve(state))
+        _ = (
+            answer.bound,
+            answer.forces,
+            answer.power,
+            answer.effort,
+        )  # told here, not where the page is written
         modes = listed_modes(known_modes(answer), answer.samples)
         in_reach = answer.reachable
         if not in_reach and state.method != "dual":  # which misses nothing that can be reached
@@ -105,9 +111,24 @@ class Solver:
         return Reply(state, answer, modes, in_reach)
 
     def modes(self, reply: Reply) -> Modes:
-        """All distinct ways to do what an answer does: a search of its own, tens of milliseconds."""
-        answer = reply.answer
-        return listed_modes(judged_modes(answer, self.allocator(reply.state).explore(answer)), answer.samples)
+        """All distinct ways to do what an answer does, tens of milliseconds: those of its method, or beside
+        its one answer those that the network proposes."""
+        answer, state = reply.answer, reply.state
+        if state.method in DRAWING:
+            found = judged_modes(answer, self.allocator(state).explore(answer))
+            return listed_modes(found, answer.samples)
+        if not (answer.reachable and answer.layout.is_of_fins and answer.effort is not None):
+            return reply.modes
+        network = self.allocator(replace(state, method="mdn"))
+        proposed = self.solve(replace(state, method="mdn"))
+        others = network.alternatives(proposed)
+        if others is None or proposed.samples is None:
+            return reply.modes
+        costs = np.array([answer.effort]), np.array([answer.power])
+        own = Candidates(
+            answer.command[None], answer.wrench[None], np.array([answer.err_norm]), *costs, (OWN,)
+        )
+        return listed_modes(modes_of(answer, own.beside(others)), proposed.samples)
 
     def solve(self, state: State) -> Allocation:
         """The answer to a state.

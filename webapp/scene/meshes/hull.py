@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from finlab.arrays import Array
 from finlab.errors import FinlabError
-from finlab.layout import Layout
+from finlab.layout import Fin, Layout
 from webapp.scene.meshes.mesh import Mesh, revolved
 from webapp.scene.meshes.mesh_hull import MeshHull, Triangles
 
@@ -100,3 +100,10 @@ def hull_of(layout: Layout) -> AnyHull:
     round_plan = half[1] > 0.8 * half[0]
     shape = "torpedo" if slender else "ellipsoid" if round_plan else "ucat"
     return HullShape(shape, (float(half[0]), float(half[1]), float(half[2])))
+
+
+@lru_cache(maxsize=8)
+def has_inside(layout: Layout) -> bool:
+    """Whether a thruster sits inside the hull, where it could not be seen."""
+    places = [part.position for part in layout.actuators if not isinstance(part, Fin)]
+    return bool(places) and bool(hull_of(layout).contains(np.array(places)).any())
