@@ -137,8 +137,12 @@ def test_graph_and_bundle_are_sent(server: viser.ViserServer, view: View) -> Non
     on_loop(server, lambda: view.do(view.exports.graph))
     until(lambda: "ucat.graph.json" in view.client.files)
     on_loop(server, lambda: view.do(view.exports.bundle))
+    until(lambda: "ucat.zip" in view.client.files)
+    on_loop(server, lambda: view.do(lambda: view.session.set_setting("method", "sqp")))
+    on_loop(server, lambda: view.do(view.exports.bundle))
     until(lambda: any("Not exported" in note for note in view.client.notes))
     assert "cannot be exported" in view.client.notes[-1]
+    on_loop(server, lambda: view.do(view.session.undo))
 
 
 def test_sharing_is_off(server: viser.ViserServer, app: App) -> None:

@@ -15,6 +15,7 @@ from tests.webapp.test_faults import Tab
 from webapp.markup.answer import fin_table
 from webapp.markup.fin_list import fin_list
 from webapp.session import Session, files
+from webapp.session.session_files import restore, to_dict
 from webapp.session.state import State
 from webapp.session.targets import axis_reach, full_thrust
 from webapp.tasks.background import Workers
@@ -85,6 +86,20 @@ def test_every_task_shows_the_robot(tab: Tab, layout: Layout, capsys: pytest.Cap
         tab.on_loop(partial(tab.view.do, act))
     assert all("editing in the app works for" in note for note in tab.client.notes[-2:])
     tab.on_loop(lambda: tab.view.do(lambda: session.undo()))
+
+
+def test_a_method_for_fins_says_so_and_watts_go_on(tab: Tab, capsys: pytest.CaptureFixture[str]) -> None:
+    session = tab.view.session
+    tab.open(HYBRID)
+    tab.on_loop(lambda: tab.view.do(lambda: session.keep_least("effort")))
+    tab.settle()
+    assert "method mdn works for robots of fins only" in " ".join(tab.figures())
+    tab.on_loop(lambda: tab.view.do(lambda: session.keep_least("watts")))
+    tab.settle()
+    assert "Exact" in " ".join(tab.figures()) and "Traceback" not in capsys.readouterr().err
+    again = Session(load_layout("ucat"))
+    restore(again, json.loads(json.dumps(to_dict(session))))
+    assert again.state == session.state
 
 
 @pytest.mark.parametrize("layout", [HYBRID, BLUEROV, FISH], ids=lambda layout: layout.name)

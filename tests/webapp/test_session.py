@@ -77,7 +77,7 @@ def test_bad_settings_change_nothing(session: Session) -> None:
 def test_last_fin_can_neither_fail_nor_go(session: Session) -> None:
     for name in session.state.layout.names[:3]:
         session.toggle_failure(name)
-    with pytest.raises(FinlabError, match="last fin that works"):
+    with pytest.raises(FinlabError, match="last one that works"):
         session.toggle_failure(session.state.layout.names[3])
     for name in session.state.layout.names[:3]:
         session.select(name)
