@@ -344,7 +344,7 @@ def _uphill_steps(beat: Array, slope: Array, curve: Array) -> Array:
             up = np.einsum("ki,ki->k", way, slope)
             bend = np.einsum("ki,kij,kj->k", way, curve, way)
             steps.append(way * (up / np.where(bend < 0.0, -bend, np.abs(up) + 1e-300))[:, None])
-    return np.nan_to_num(np.stack(steps), posinf=0.0, neginf=0.0)
+    return np.asarray(np.nan_to_num(np.stack(steps), posinf=0.0, neginf=0.0))
 
 
 def _directions(law: FinLaw, box: _Box) -> tuple[float, float, Array | None, Array]:
