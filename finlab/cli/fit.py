@@ -19,24 +19,20 @@ def fin(
     angles: Literal["rad", "deg"] | None = None,
     amplitude: Literal["half", "peak-to-peak"] | None = None,
     frequency: Literal["hz", "rpm"] | None = None,
-    sensor_turn: Annotated[tuple[float, float, float], arg(metavar="X Y Z")] = (0.0, 0.0, 0.0),
-    lever: float | None = None,
     seed: int = 0,
 ) -> None:
     """Fit a fin to a load cell's measurements, and write it for layouts to name.
 
-    Files hold cycle means (A, f, Fy, Fz and perhaps phi, Fx, P and standard deviations sFx, sFy, sFz) or raw
-    series (t, angle, Fy, Fz and perhaps Fx, P); A is half the stroke, phi the zero direction, forces are in
-    the fin frame (x' shaft, y' horizontal thrust axis, z' up). Units may stand in the header, `A [deg]`.
+    Files hold cycle means (A, f, Fy, Fz and perhaps phi, Fx, P and standard deviations sFx, sFy, sFz); A is
+    half the stroke, phi the zero direction, forces are in the fin frame (x' shaft, y' horizontal thrust axis,
+    z' up). Units may stand in the header, `A [deg]`.
 
     Args:
         data: CSV files of one fin.
         output: the fitted fin.
-        angles: unit of amplitudes, zero directions and angles; recognized where it is not given.
+        angles: unit of amplitudes and zero directions; recognized where it is not given.
         amplitude: whether amplitudes are half the stroke or the whole; recognized where it is beyond doubt.
         frequency: unit of frequencies; recognized where it is beyond doubt.
-        sensor_turn: how the load cell is turned against the fin frame, about x', then y', then z' [deg].
-        lever: distance along the shaft from the load cell to the fin's centre [m], for moments My, Mz.
         seed: draws samples where there are too many.
     """
     with _progress_bar() as tell:
@@ -47,7 +43,7 @@ def fin(
         from finlab.fit.measurements import read_measurements
 
         check_fin_path(output)
-        conventions = Conventions(angles, amplitude, frequency, sensor_turn, lever)
+        conventions = Conventions(angles, amplitude, frequency)
         tell("reading", 0.05)
         measurements = read_measurements(data, conventions)
         fit = fit_fin(measurements, seed, lambda words, share: tell(words, 0.1 + 0.7 * share))

@@ -19,17 +19,14 @@ from finlab.layout.fin import MAX_AMPLITUDE, MAX_FREQUENCY
 UNITS = {
     "rad": 1.0, "deg": math.pi / 180.0, "°": math.pi / 180.0,
     "hz": 1.0, "rpm": 1.0 / 60.0, "bpm": 1.0 / 60.0, "rev/min": 1.0 / 60.0, "rad/s": 1.0 / TURN,
-    "n": 1.0, "mn": 1e-3, "gf": 9.80665e-3, "nm": 1.0, "n m": 1.0, "nmm": 1e-3, "mnm": 1e-3,
-    "w": 1.0, "mw": 1e-3, "s": 1.0, "ms": 1e-3,
+    "n": 1.0, "mn": 1e-3, "gf": 9.80665e-3, "w": 1.0, "mw": 1e-3,
 }  # fmt: skip
 """Units that a header may name, in SI (frequencies in Hz)."""
 
 NAMES = {
     "a": "A", "amplitude": "A", "f": "f", "frequency": "f",
     "phi": "phi", "zero_direction": "phi", "direction": "phi",
-    "fx": "Fx", "fy": "Fy", "fz": "Fz", "mx": "Mx", "my": "My", "mz": "Mz",
-    "tx": "Mx", "ty": "My", "tz": "Mz",
-    "p": "P", "power": "P", "t": "t", "time": "t", "angle": "angle", "theta": "angle",
+    "fx": "Fx", "fy": "Fy", "fz": "Fz", "p": "P", "power": "P",
     "sfx": "sFx", "sfy": "sFy", "sfz": "sFz", "fx_sd": "sFx", "fy_sd": "sFy", "fz_sd": "sFz",
     "fx_std": "sFx", "fy_std": "sFy", "fz_std": "sFz",
 }  # fmt: skip
@@ -41,21 +38,11 @@ class Conventions:
     """How a file is to be read where its header does not say. What is None is recognized."""
 
     angles: Literal["rad", "deg"] | None = None
-    """Unit of amplitude, zero direction and angle."""
+    """Unit of amplitude and zero direction."""
     amplitude: Literal["half", "peak-to-peak"] | None = None
     """Whether an amplitude is measured from the middle of the stroke or from end to end."""
     frequency: Literal["hz", "rpm"] | None = None
     """Unit of the frequency."""
-    sensor_turn: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """How the load cell is turned against the fin frame: about x', then y', then z' [deg]."""
-    lever: float | None = None
-    """Distance along the shaft from the load cell to the fin's centre [m], for files that hold moments."""
-
-    def __post_init__(self) -> None:
-        if self.lever is not None and not (math.isfinite(self.lever) and self.lever > 0.0):
-            raise DataError(f"lever: expected metres above 0, got {self.lever:g}")
-        if not all(map(math.isfinite, self.sensor_turn)):
-            raise DataError(f"sensor-turn: expected three angles in degrees, got {self.sensor_turn}")
 
 
 @dataclass
@@ -75,9 +62,7 @@ class Columns:
 def named_column(header: str) -> tuple[str, float | None]:
     """Returns what a header cell stands for and its unit in SI, where it has one: `A [deg]`, `amplitude_deg`,
     `f (rpm)`, `Fx`; "" for what no fit reads."""
-    parts = re.fullmatch(
-        r"\s*([A-Za-z_]+?)\s*(?:[\[(](.+)[\])]|_(deg|rad|hz|rpm|mN|N|W|mW|ms|s))?\s*", header
-    )
+    parts = re.fullmatch(r"\s*([A-Za-z_]+?)\s*(?:[\[(](.+)[\])]|_(deg|rad|hz|rpm|mN|N|W|mW))?\s*", header)
     if parts is None:
         return "", None
     name = NAMES.get(parts[1].lower(), "")
@@ -86,30 +71,21 @@ def named_column(header: str) -> tuple[str, float | None]:
 
 
 def to_fin_frame(columns: Columns, conventions: Conventions) -> None:
-    """Bring angles, frequencies and forces to finlab's conventions, in place, with a note on each guess.
+    """Bring angles and frequencies to finlab's conventions, in place, with a note on each guess.
 
     Raises:
-        DataError: a value can be in no known unit, the guess is ambiguous, or moments come without a lever.
+        DataError: a value can be in no known unit, or the guess is ambiguous.
     """
     _convert_angles(columns, conventions)
     _convert_frequency(columns, conventions)
-    _forces_from_moments(columns, conventions)
-    turn = np.radians(conventions.sensor_turn)
-    if turn.any():
-        from scipy.spatial.transform import Rotation
-
-        none = np.zeros_like(columns.values["Fz"])
-        seen = np.stack([columns.values.get(name, none) for name in ("Fx", "Fy", "Fz")], axis=-1)
-        turned = Rotation.from_euler("xyz", turn).apply(seen)
-        columns.values |= {name: turned[:, k] for k, name in enumerate(("Fx", "Fy", "Fz"))}
 
 
 def _convert_angles(columns: Columns, conventions: Conventions) -> None:
     """Radians, and half amplitudes."""
     values, source = columns.values, columns.source
-    angular = [name for name in ("A", "phi", "angle") if name in values and name not in columns.told]
+    angular = [name for name in ("A", "phi") if name in values and name not in columns.told]
     reach = {name: float(np.ptp(values[name]) if name != "A" else values[name].max()) for name in angular}
-    most = {"A": 2 * MAX_AMPLITUDE, "phi": TURN + FILE_TURN_TOLERANCE, "angle": 2 * TURN}
+    most = {"A": 2 * MAX_AMPLITUDE, "phi": TURN + FILE_TURN_TOLERANCE}
     beyond = [name for name in angular if reach[name] > most[name]]
     if conventions.angles == "deg" or (conventions.angles is None and beyond):
         for name in angular:
@@ -118,8 +94,6 @@ def _convert_angles(columns: Columns, conventions: Conventions) -> None:
             columns.notes.append(
                 f"column {beyond[0]} reaches {reach[beyond[0]]:.4g}: angles are taken for degrees (--angles)"
             )
-    if "A" not in values:
-        return
     largest = float(values["A"].max())
     kind = conventions.amplitude
     if kind is None and MAX_AMPLITUDE + 1e-9 < largest <= 2 * MAX_AMPLITUDE + 1e-9:
@@ -139,8 +113,6 @@ def _convert_angles(columns: Columns, conventions: Conventions) -> None:
 
 def _convert_frequency(columns: Columns, conventions: Conventions) -> None:
     """Hz."""
-    if "f" not in columns.values:
-        return
     largest = float(columns.values["f"].max())
     rpm = conventions.frequency == "rpm"
     if conventions.frequency is None and "f" not in columns.told and largest > MAX_FREQUENCY:
@@ -154,20 +126,3 @@ def _convert_frequency(columns: Columns, conventions: Conventions) -> None:
             f"{columns.source}: frequencies from {low:.4g} to {high:.4g} Hz, expected 0 to "
             f"{MAX_FREQUENCY:g}; name the unit in the header, `f [rpm]`, or with --frequency"
         )
-
-
-def _forces_from_moments(columns: Columns, conventions: Conventions) -> None:
-    """Forces across the shaft from the moments that they make at a load cell down the shaft."""
-    values = columns.values
-    if {"Fy", "Fz"} <= set(values):
-        return
-    if not {"My", "Mz"} <= set(values):
-        missing = next(name for name in ("Fy", "Fz") if name not in values)
-        raise DataError(
-            f"{columns.source}: column {missing} is missing, expected A, f, phi and forces Fy, Fz (or "
-            "moments My, Mz with --lever), or a raw series of t, angle and forces"
-        )
-    if conventions.lever is None:
-        raise DataError(f"{columns.source}: holds moments My, Mz; give the load cell's --lever in metres")
-    values["Fy"], values["Fz"] = values["Mz"] / conventions.lever, -values["My"] / conventions.lever
-    columns.notes.append(f"forces come from the moments My, Mz over a lever of {conventions.lever:g} m")

@@ -1,4 +1,4 @@
-"""What a load cell measured of one fin, read from CSV files: cycle means, or raw series of time and angle."""
+"""What a load cell measured of one fin, cycle means, read from CSV files."""
 
 import os
 from collections.abc import Sequence
@@ -13,11 +13,10 @@ from finlab.errors import DataError
 from finlab.files.csv_table import read_table
 from finlab.fit.conventions import Columns, Conventions, named_column, to_fin_frame
 from finlab.fit.sensor_checks import check_sensors
-from finlab.fit.time_series import cycle_means
 from finlab.layout.angles import FILE_TURN_TOLERANCE, TURN
 
-MAX_BYTES = 500_000_000
-"""Largest file that is read [bytes]; a raw series of an hour at 1 kHz has half of it."""
+MAX_BYTES = 50_000_000
+"""Largest file that is read [bytes]."""
 MIN_SAMPLES = 20
 """Fewest samples from which a fin can be fitted."""
 SAME = 1e-3
@@ -90,9 +89,8 @@ def read_measurements(
 ) -> Measurements:
     """Returns the samples of all files together.
 
-    Each file has a header; columns come in any order, units may stand behind names (`A [deg]`). Cycle means:
-    A, f, Fy, Fz and perhaps phi, Fx, P, sFx, sFy, sFz (standard deviations). Raw series: t, angle, Fy, Fz and
-    perhaps Fx, P.
+    Each file has a header; columns come in any order, units may stand behind names (`A [deg]`). They are
+    cycle means: A, f, Fy, Fz and perhaps phi, Fx, P, sFx, sFy, sFz (standard deviations).
 
     Raises:
         DataError: a file is missing, too large, lacks a column or holds what no fin can do; or there are too
@@ -108,20 +106,16 @@ def read_measurements(
 def _read(path: Path, conventions: Conventions) -> tuple[Columns, tuple[str, ...]]:
     """A file's columns in finlab's conventions, one row per sample, and the place of each."""
     columns, lines = _read_columns(path)
-    raw = "t" in columns.values and "angle" in columns.values
-    to_fin_frame(columns, conventions)
-    if raw:
-        columns, starts = cycle_means(columns, lines)
-        return columns, tuple(f"{path.name} from line {line}" for line in starts)
-    for name in ("A", "f"):
+    for name in ("A", "f", "Fy", "Fz"):
         if name not in columns.values:
             raise DataError(f"{path}: column {name} is missing, expected A, f, phi, Fx, Fy, Fz in any order")
+    to_fin_frame(columns, conventions)
     return columns, tuple(f"{path.name} line {line}" for line in lines)
 
 
 def _read_columns(path: Path) -> tuple[Columns, NDArray[np.intp]]:
     """The columns that a fit reads, as they stand, and the line of each row."""
-    table = read_table(path, MAX_BYTES, "a CSV file of measurements; cut longer series, or write cycle means")
+    table = read_table(path, MAX_BYTES, "a CSV file of measurements")
     named = [named_column(cell) for cell in table.header]
     used = [i for i, (name, _) in enumerate(named) if name]
     names = [named[i][0] for i in used]

@@ -40,7 +40,7 @@ class FinModelPanel:
                 icon=viser.Icon.UPLOAD,
                 mime_type=CSV,
                 hint=(
-                    "For the selected fin: noisy rows of A, f, phi, Fx, Fy, Fz, a raw series, or a finished "
+                    "For the selected fin: noisy rows of A, f, phi, Fx, Fy, Fz, or a finished "
                     f"force table. Up to {MAX_BYTES // 1_000_000} MB."
                 ),
             )
