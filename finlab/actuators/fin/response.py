@@ -34,6 +34,10 @@ TURNS = 512
 """Directions in which an uneven fin is asked for its force."""
 
 
+_SHARES = np.array([[[a, f, 0.5]] for a in np.linspace(0.0, 1.0, 5) for f in np.linspace(0.0, 1.0, 5)])
+"""Commands (25, 1, 3) between limits, as shares, at the middle of an arc."""
+
+
 class FinTable(NamedTuple):
     """How a fin answers a price, and by which commands."""
 
@@ -162,17 +166,13 @@ class FinGroup(Group):
 
     def reach(self, lower: Array, upper: Array) -> Array:
         """See `Group`: sizes are those of a few commands between the limits, at the middle of the arc."""
-        share = np.stack(np.meshgrid(*[np.linspace(0.0, 1.0, 5)] * 2, indexing="ij"), axis=-1).reshape(-1, 2)
-        found = np.empty((len(self._laws), 4))
-        for i, law in enumerate(self._laws):
-            command = np.empty((len(share), 3))
-            command[:, :2] = lower[i, :2] + share * (upper[i, :2] - lower[i, :2])
-            command[:, 2] = 0.5 * (lower[i, 2] + upper[i, 2])
-            force = law.force(command)[:, 1:]
-            size = np.hypot(force[:, 0], force[:, 1])
-            lean = wrapped(np.arctan2(force[size.argmax(), 1], force[size.argmax(), 0]) - command[0, 2])
-            found[i] = size.min(), size.max(), command[0, 2] + lean, 0.5 * (upper[i, 2] - lower[i, 2])
-        return found
+        command = lower + _SHARES * (upper - lower)
+        force = self._force(command)
+        size, row = np.hypot(force[..., 1], force[..., 2]), self._row
+        middle, most = command[0, :, 2], size.argmax(axis=0)
+        angle = middle + wrapped(np.arctan2(force[most, row, 2], force[most, row, 1]) - middle)
+        size = size / self._gauge[row, np.rint(angle / TURN * TURNS).astype(np.intp) % TURNS]
+        return np.stack([size.min(axis=0), size.max(axis=0), angle, 0.5 * (upper - lower)[:, 2]], axis=-1)
 
 
 def fin_table(fin: Fin, copper_loss: float = 0.0) -> FinTable:

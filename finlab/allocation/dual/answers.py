@@ -21,8 +21,8 @@ SMOOTHING = 1e-5
 the dual of a set that is not convex has corners there."""
 ROUNDING = 1e-2
 """Price, as a share of the mean one of the least force, over which a force that cannot rest turns round."""
-HALVINGS = 25
-"""Halvings of an interval of price that find the price of a force."""
+PRICE_STEPS = 6
+"""Steps of Newton's method that find the price of a force in an interval of prices."""
 _EDGES = np.linspace(0.0, 1.0, CELLS + 1) ** 4
 """Ends of the tables' intervals, as shares of the largest price."""
 TINY = 1e-9
@@ -103,6 +103,9 @@ class Answers:
         self._top = np.array([table.top for table in tables])
         self.tops = self._top.reshape(-1, 2).max(axis=1)
         self._ends = np.array([table.force for table in tables])
+        shares = self._ends / self._ends[:, -1:]
+        self._shares = (shares + 2.0 * np.arange(len(tables))[:, None]).ravel()
+        """The tables' forces as shares of the largest, one table after the other."""
         self._row = 2 * np.arange(len(sides))[:, None]
         self.gauges = Gauges([plane.gauge for plane in planes])
         self._tiny = TINY * self._top[2 * self.lines :: 2, None]
@@ -126,18 +129,22 @@ class Answers:
     def cost(self, force: Array) -> Array:
         """Power (n, N) [W] of forces (n, N) within the tables; of planes of their sizes."""
         row = self._row + ((np.arange(len(force)) < self.lines)[:, None] & (force < 0.0))
-        size, first, last = np.abs(force), np.zeros(force.shape, np.intp), np.full(force.shape, CELLS)
-        while (last - first > 1).any():
-            middle = (first + last) // 2
-            enough = self._ends[row, middle] >= size
-            first, last = np.where(enough, first, middle), np.where(enough, middle, last)
-        low, high = self._top[row] * _EDGES[first], self._top[row] * _EDGES[last]
+        size, largest = np.abs(force), self._ends[row, -1]
+        place = np.searchsorted(self._shares, (size / largest + 2.0 * row).ravel()).reshape(size.shape)
+        cell = np.clip(place - row * (CELLS + 1) - 1, 0, CELLS - 1)
+        a0, a1, a2, a3, start = self._coefficients[:, row * (CELLS + 1) + cell]
+        width = _EDGES[cell + 1] - _EDGES[cell]
+        rise = self._ends[row, cell + 1] - a0
+        x = width * np.divide(size - a0, rise, out=np.zeros_like(size), where=rise > 0.0)
         # An error of the price counts squared in the power.
-        for _ in range(HALVINGS):
-            price = 0.5 * (low + high)
-            enough = self.radial(price, row)[0] >= size
-            low, high = np.where(enough, low, price), np.where(enough, price, high)
-        power: Array = high * size - self.radial(high, row)[2]
+        for _ in range(PRICE_STEPS):
+            slope = a1 + x * (2.0 * a2 + 3.0 * x * a3)
+            excess = a0 + x * (a1 + x * (a2 + x * a3)) - size
+            change = np.divide(excess, slope, out=np.zeros_like(x), where=slope > 0.0)
+            x = np.minimum(np.maximum(x - change, 0.0), width)
+        top = self._top[row]
+        conjugate = start + top * x * (a0 + x * (a1 / 2.0 + x * (a2 / 3.0 + x * (a3 / 4.0))))
+        power: Array = top * (_EDGES[cell] + x) * size - conjugate
         return power
 
     def __call__(self, price: Array, sets: Sets) -> Answer:

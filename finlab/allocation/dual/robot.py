@@ -128,9 +128,8 @@ class DualRobot:
         lines = self.answers.lines
         low = np.clip(reach[:, :1], self.sets.low, self.sets.high)
         high = np.clip(reach[:, 1:2], self.sets.low, self.sets.high)
-        return Sets(
-            low, high, self.answers.cost(low), self.answers.cost(high), reach[lines:, 2:3], reach[lines:, 3:]
-        )
+        cost = self.answers.cost(np.concatenate([low, high], axis=1))
+        return Sets(low, high, cost[:, :1], cost[:, 1:], reach[lines:, 2:3], reach[lines:, 3:])
 
     def target(self, wrench: Array) -> Array:
         """Wrenches (N, 6) in the basis (r, N)."""
