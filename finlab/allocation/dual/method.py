@@ -21,7 +21,7 @@ from finlab.allocation.dual.compiled import Compiled
 from finlab.allocation.dual.drag import at_the_price_of_drag
 from finlab.allocation.dual.newton import Prices, solve
 from finlab.allocation.dual.policies import nearest
-from finlab.allocation.dual.rates import Box, box_after
+from finlab.allocation.dual.rates import Rates, within_tick
 from finlab.allocation.in_time import in_time
 from finlab.allocation.levenberg_marquardt import CommandProblem, refine
 from finlab.allocation.method import Method
@@ -39,6 +39,8 @@ AGAIN = 4
 """Times that it is asked again."""
 REFINE_STEPS = 12
 """Levenberg-Marquardt steps on commands."""
+TICK_STEPS = 5
+"""The same where a command of a tick is not exact."""
 TABLES = 1e-5
 """Share of a power by which the compiled tables may be off."""
 OUT_OF_RANGE = 1e-9
@@ -97,6 +99,10 @@ class Dual(Method):
     def _problem(self) -> CommandProblem:
         return CommandProblem.of(self.plant, self.scale)
 
+    @cached_property
+    def _rates(self) -> Rates:
+        return Rates.of(self.plant, self.layout.rates, self.settings.period_s)
+
     def at(self, flow: Array | None) -> Self:
         """See `Method`."""
         other = super().at(flow)
@@ -143,10 +149,8 @@ class Dual(Method):
         aim = np.where(found.within[:, None], asked, robot.wrench(found.force)) + self.compiled.beside
         command, found = self._commands(aim, found, robot.sets, previous)
         bound = None if self._unproved else partial(self._bound, aim, found)
-        if previous is not None:
-            box = box_after(self.plant, previous, self.layout.rates, self.settings.period_s)
-            if box is not None and not box.holds(command[0]):
-                return Solution(self._within_box(aim, command, found, previous, box), bound)
+        if previous is not None and not self._rates.allow(previous, command[0]):
+            command = self._in_a_tick(aim, found, previous)
         return Solution(command, bound)
 
     def _bound(self, aim: Array, found: Forces) -> Array:
@@ -236,17 +240,17 @@ class Dual(Method):
     def _refined(self, problem: CommandProblem, aim: Array, command: Array) -> Array:
         return refine(problem, aim / self.scale, command, REFINE_STEPS).command
 
-    def _within_box(self, aim: Array, free: Array, found: Forces, previous: Array, box: Box) -> Array:
-        """The command (1, n, 3) within a box that gives a wrench (1, 6), or comes nearest to it."""
+    def _in_a_tick(self, aim: Array, found: Forces, previous: Array) -> Array:
+        """The command (1, n, 3) that gives a wrench (1, 6) or comes nearest to it among those that may follow
+        a previous one (n, 3); `found` is the answer without limits of that kind."""
+        box = self._rates.box(previous)
         sets = self.compiled.within(box.lower, box.upper)
-        near = self._forces(aim - self.compiled.beside, sets, CLOSEST, found.prices)
-        starts = np.concatenate([self.compiled.commands(near.force, previous), free])
-        starts = box.clipped(starts)
+        force = within_tick(self.compiled.robot, sets, aim - self.compiled.beside, found.prices, 1.0 / self.scale)
+        start = self.plant.feasible(box.clipped(self.compiled.commands(force, previous)))
+        if self._error(start, aim)[0] <= EXACT:
+            return start
         problem = replace(
             self._problem, lower=box.lower, upper=box.upper, full_turn=box.free[:, 2] & self.plant.full_turn
         )
-        command = self._refined(problem, np.repeat(aim, len(starts), axis=0), starts)
-        command = self.plant.feasible(box.clipped(command))
-        error = self._error(command, np.repeat(aim, len(command), axis=0))
-        best = int((error > max(EXACT, float(error.min()) * 1.001)).argmin())
-        return command[best : best + 1]
+        command = refine(problem, aim / self.scale, box.clipped(start), TICK_STEPS).command
+        return self.plant.feasible(box.clipped(command))

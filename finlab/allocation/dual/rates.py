@@ -1,13 +1,21 @@
 """From tick to tick: commands change no faster than the drives of the actuators allow."""
 
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from finlab.allocation.dual.answers import Sets
+from finlab.allocation.dual.newton import Terms, solve
+from finlab.allocation.dual.robot import DualRobot
 from finlab.arrays import Array
 from finlab.layout.angles import wrapped
 from finlab.physics.plant import Plant
+
+STIFFNESS = (10.0, 1e3)
+"""Costs of a miss, one after the other, as multiples of the robot's largest power: what they leave undone,
+steps on the commands find."""
 
 
 class Box(NamedTuple):
@@ -19,14 +27,7 @@ class Box(NamedTuple):
     """Largest commands (n, 3)."""
     free: NDArray[np.bool_]
     """Angles (n, 3) that may be any."""
-
-    def holds(self, command: Array) -> bool:
-        """Whether a command (n, 3) is in the box."""
-        middle = 0.5 * (self.lower + self.upper)
-        turned = np.where(self.turns, middle + wrapped(command - middle), command)
-        return bool(((turned >= self.lower) & (turned <= self.upper) | self.free).all())
-
-    turns: NDArray[np.bool_] = np.zeros((1, 3), bool)
+    turns: NDArray[np.bool_]
     """Angles (n, 3) that are counted around the circle."""
 
     def clipped(self, command: Array) -> Array:
@@ -36,28 +37,62 @@ class Box(NamedTuple):
         return np.clip(turned, self.lower, self.upper)
 
 
-def box_after(plant: Plant, previous: Array, rates: Array, period_s: float) -> Box | None:
-    """What may follow a previous command.
+@dataclass(frozen=True, eq=False)
+class Rates:
+    """How far the commands of a robot may change in a tick."""
+
+    lower: Array
+    """Lower limits (n, 3)."""
+    upper: Array
+    """Upper limits (n, 3)."""
+    step: Array
+    """Largest changes (n, 3); infinite where nothing limits them."""
+    turns: NDArray[np.bool_]
+    """Angles (n, 3) that turn freely."""
+
+    @classmethod
+    def of(cls, plant: Plant, rates: Array, period_s: float) -> Self:
+        """Those of a robot whose commands change no faster than `rates` (n, 3) [per second], in ticks of
+        `period_s` [s]."""
+        return cls(plant.lower, plant.upper, rates * period_s, plant.turns)
+
+    def allow(self, previous: Array, command: Array) -> bool:
+        """Whether a command (n, 3) may follow a previous one (n, 3), of which actuators may be NaN."""
+        change = np.abs(command - previous)
+        around = np.minimum(change, np.abs(2.0 * np.pi - change))
+        return not (np.where(self.turns, around, change) > self.step).any()
+
+    def box(self, previous: Array) -> Box:
+        """What may follow a previous command (n, 3); an actuator with NaN is left free."""
+        lower, upper, step = self.lower, self.upper, self.step
+        known = np.isfinite(previous).all(axis=1)[:, None]
+        turns = self.turns & known & (step < np.pi)
+        center = np.where(known, np.where(turns, previous, np.clip(previous, lower, upper)), lower)
+        low, high = np.maximum(center - step, lower), np.minimum(center + step, upper)
+        low, high = np.where(turns, center - step, low), np.where(turns, center + step, high)
+        low, high = np.where(known, low, lower), np.where(known, high, upper)
+        free = self.turns & ~turns
+        return Box(np.where(free, lower, low), np.where(free, upper, high), free, turns)
+
+
+def within_tick(robot: DualRobot, sets: Sets, wrench: Array, prices: Array, weight: Array) -> Array:
+    """Forces (k, 1) [N] within the sets of a tick that give a wrench (1, 6) [N, N m], or come near to it.
 
     Args:
-        plant: the robot.
-        previous: commands (n, 3); an actuator with NaN is left free.
-        rates: fastest changes (n, 3) [per second]; infinite where nothing limits them.
-        period_s: time between ticks [s].
-
-    Returns:
-        The box, or None where nothing is limited.
+        robot: the robot.
+        sets: what may follow the previous command.
+        wrench: the target.
+        prices: where to begin (r, 1), such as those of the answer without limits of a tick.
+        weight: of the missing wrench along each axis (6,) [1/N, 1/(N m)].
     """
-    known = np.isfinite(previous).all(axis=1)[:, None]
-    step = rates * period_s
-    turns = plant.turns & known & (step < np.pi)
-    lower, upper = plant.lower, plant.upper
-    center = np.where(known, np.where(turns, previous, np.clip(previous, lower, upper)), lower)
-    low, high = np.maximum(center - step, lower), np.minimum(center + step, upper)
-    low, high = np.where(turns, center - step, low), np.where(turns, center + step, high)
-    low, high = np.where(known, low, lower), np.where(known, high, upper)
-    free = plant.turns & ~turns
-    low, high = np.where(free, lower, low), np.where(free, upper, high)
-    if (low <= lower).all() and (high >= upper).all() and not turns.any():
-        return None
-    return Box(low, high, free, turns)
+    target = robot.target(wrench)
+    found = solve(robot, target, sets, prices)
+    if found.solved[0]:
+        return found.force
+    metric = robot.basis.T * (weight * robot.scale) ** 2
+    unit = float(np.maximum(sets.low_cost, sets.high_cost).sum()) + 1e-12
+    penalty = np.linalg.inv(metric @ robot.basis) / unit
+    for stiffness in STIFFNESS:
+        found = solve(robot, target, sets, prices, Terms(penalty=penalty / stiffness))
+        prices = found.prices
+    return found.force
