@@ -103,7 +103,7 @@ class Answers:
         self._top = np.array([table.top for table in tables])
         self.tops = self._top.reshape(-1, 2).max(axis=1)
         self._ends = np.array([table.force for table in tables])
-        shares = self._ends / self._ends[:, -1:]
+        shares = self._ends / np.maximum(self._ends[:, -1:], 1e-300)
         self._shares = (shares + 2.0 * np.arange(len(tables))[:, None]).ravel()
         """The tables' forces as shares of the largest, one table after the other."""
         self._row = 2 * np.arange(len(sides))[:, None]
@@ -129,7 +129,7 @@ class Answers:
     def cost(self, force: Array) -> Array:
         """Power (n, N) [W] of forces (n, N) within the tables; of planes of their sizes."""
         row = self._row + ((np.arange(len(force)) < self.lines)[:, None] & (force < 0.0))
-        size, largest = np.abs(force), self._ends[row, -1]
+        size, largest = np.abs(force), np.maximum(self._ends[row, -1], 1e-300)
         place = np.searchsorted(self._shares, (size / largest + 2.0 * row).ravel()).reshape(size.shape)
         cell = np.clip(place - row * (CELLS + 1) - 1, 0, CELLS - 1)
         a0, a1, a2, a3, start = self._coefficients[:, row * (CELLS + 1) + cell]

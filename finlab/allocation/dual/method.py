@@ -41,6 +41,8 @@ REFINE_STEPS = 12
 """Levenberg-Marquardt steps on commands."""
 TICK_STEPS = 5
 """The same where a command of a tick is not exact."""
+NEAREST = 1e-3
+"""Error above that of forces without gaps up to which the answer of a tick counts as the nearest."""
 TABLES = 1e-5
 """Share of a power by which the compiled tables may be off."""
 OUT_OF_RANGE = 1e-9
@@ -244,13 +246,25 @@ class Dual(Method):
         """The command (1, n, 3) that gives a wrench (1, 6) or comes nearest to it among those that may follow
         a previous one (n, 3); `found` is the answer without limits of that kind."""
         box = self._rates.box(previous)
-        sets = self.compiled.within(box.lower, box.upper)
-        force = within_tick(self.compiled.robot, sets, aim - self.compiled.beside, found.prices, 1.0 / self.scale)
-        start = self.plant.feasible(box.clipped(self.compiled.commands(force, previous)))
-        if self._error(start, aim)[0] <= EXACT:
-            return start
+        sets, asked = self.compiled.within(box.lower, box.upper), aim - self.compiled.beside
         problem = replace(
             self._problem, lower=box.lower, upper=box.upper, full_turn=box.free[:, 2] & self.plant.full_turn
         )
-        command = refine(problem, aim / self.scale, box.clipped(start), TICK_STEPS).command
-        return self.plant.feasible(box.clipped(command))
+
+        def realized(force: Array) -> tuple[Array, float]:
+            """A command in the box for forces (k, 1), and its error."""
+            command = self.plant.feasible(box.clipped(self.compiled.commands(force, previous)))
+            error = self._error(command, aim)
+            if error[0] > EXACT:
+                command = refine(problem, aim / self.scale, box.clipped(command), TICK_STEPS).command
+                command = self.plant.feasible(box.clipped(command))
+                error = self._error(command, aim)
+            return command, float(error[0])
+
+        force = within_tick(self.compiled.robot, sets, asked, found.prices, 1.0 / self.scale)
+        command, error = realized(force)
+        least = float(np.linalg.norm((self.compiled.robot.wrench(force) - asked) / self.scale))
+        if error > least + NEAREST:  # what may follow has gaps
+            other, its_error = realized(self._forces(asked, sets, CLOSEST, found.prices).force)
+            command = other if its_error < error else command
+        return command

@@ -13,7 +13,7 @@ from finlab.arrays import Array
 from finlab.layout.angles import wrapped
 from finlab.physics.plant import Plant
 
-STIFFNESS = (10.0, 1e3)
+STIFFNESS = (100.0, 1e4)
 """Costs of a miss, one after the other, as multiples of the robot's largest power: what they leave undone,
 steps on the commands find."""
 
