@@ -20,7 +20,7 @@ from finlab.allocation.dual.branch import gaps, least_power, may_have_gaps
 from finlab.allocation.dual.compiled import Compiled
 from finlab.allocation.dual.drag import at_the_price_of_drag
 from finlab.allocation.dual.newton import Prices, solve
-from finlab.allocation.dual.policies import nearest
+from finlab.allocation.dual.policies import OUT_OF_RANGE, nearest
 from finlab.allocation.dual.rates import Rates, within_tick
 from finlab.allocation.in_time import in_time
 from finlab.allocation.levenberg_marquardt import CommandProblem, refine
@@ -45,8 +45,6 @@ NEAREST = 1e-3
 """Error above that of forces without gaps up to which the answer of a tick counts as the nearest."""
 TABLES = 1e-5
 """Share of a power by which the compiled tables may be off."""
-OUT_OF_RANGE = 1e-9
-"""Share of a target outside the range of the actuators from which on it counts as out of reach."""
 
 
 @dataclass(frozen=True)

@@ -33,6 +33,9 @@ MISSED = 1e-7
 """Share of a group's target from which it counts as missed."""
 DRIVEN = 1e-6
 """Share of the largest price from which an actuator counts as driven to its limit."""
+OUT_OF_RANGE = 1e-6
+"""Share of a target outside the range of the actuators up to which it is left out without a word: targets of
+single precision have some."""
 FAR = 1e9
 """Price, as a multiple of the largest, at which every actuator is at its limit."""
 
@@ -149,7 +152,7 @@ def _unanswered(robot: DualRobot, prices: Array, sets: Sets) -> Array:
 def direction(robot: DualRobot, sets: Sets, wrench: Array) -> Array:
     """Forces (k,) [N] that give the largest share of a scaled wrench (6,)."""
     target = (robot.basis.T @ wrench)[:, None]
-    if np.linalg.norm(robot.basis @ target[:, 0] - wrench) > 1e-9 * np.linalg.norm(wrench):
+    if np.linalg.norm(robot.basis @ target[:, 0] - wrench) > OUT_OF_RANGE * np.linalg.norm(wrench):
         return solve(robot, 0.0 * target, sets).force[:, 0]
     target = target / max(float(np.linalg.norm(target)) / 4.0, 1.0)  # farther than any robot reaches
     unit = _unit(sets)
