@@ -31,8 +31,8 @@ def bench(
     Example: finlab bench my_method.py:allocate --quick
 
     Args:
-        methods: a method of finlab (search, analytic, ipopt-32, search-effort, ...), or a Python function as
-            module:function or file.py:function; method search where nothing is named.
+        methods: a method of finlab (dual, analytic, ipopt-32, sqp-effort, ...), or a Python function as
+            module:function or file.py:function; method dual where nothing is named.
         command: a program that speaks JSON lines on stdin and stdout, with its arguments.
         quick: the first robot of each set and the first paths, within a minute.
         sets: sets of robots with commas between, such as paper,tiny.

@@ -164,3 +164,14 @@ def test_turning_the_robot_does_not_make_it_worse(search: AnyRobot) -> None:
     assert search.normalization.error(Plant(turned).wrench(again), rotated).max() < GOOD
     # Forces in the fins' own frames know nothing of where forward is: the old answer serves the new robot.
     np.testing.assert_allclose(Plant(turned).wrench(straight), rotated, atol=1e-5)
+
+
+def test_targets_of_single_precision_are_delivered_by_few_fins() -> None:
+    """Two fins span four directions; rounded to single precision a target lies a little beside them."""
+    for seed in range(5):
+        layout = random_layout(np.random.default_rng(seed), n_fins=2)
+        allocator = Allocator(layout)
+        rounded = reachable(layout, 5, seed).astype(np.float32).astype(float)
+        assert allocator.allocate_batch(rounded).err_norm.max() < 1e-6
+        far = allocator.allocate(10.0 * rounded[0], policy="direction")
+        assert 0.1 - 1e-6 < far.share < 1.0
