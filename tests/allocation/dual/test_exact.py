@@ -173,5 +173,5 @@ def test_targets_of_single_precision_are_delivered_by_few_fins() -> None:
         allocator = Allocator(layout)
         rounded = reachable(layout, 5, seed).astype(np.float32).astype(float)
         assert allocator.allocate_batch(rounded).err_norm.max() < 1e-6
-        far = allocator.allocate(10.0 * rounded[0], policy="direction")
-        assert 0.1 - 1e-6 < far.share < 1.0
+        far = allocator.allocate(1000.0 * rounded[0], policy="direction")
+        assert 0.001 - 1e-6 < far.share < 1.0
