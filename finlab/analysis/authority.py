@@ -12,7 +12,6 @@ from finlab.forces.reach import max_wrench_along_exactly
 from finlab.layout import Layout
 
 AXES = ("surge", "sway", "heave", "roll", "pitch", "yaw")
-"""Names of the six axes, in the order of a wrench."""
 NOTHING = 1e-4
 """Largest wrench [N, scaled] below which an axis counts as out of reach; the solver is exact to about
 1e-5."""
@@ -23,7 +22,6 @@ class HeldAxes:
     """Axes that fins hold, before any limit. Torques are scaled by the lever 0.2 m."""
 
     rank: int
-    """How many of the six axes the fins act on independently."""
     condition: float | None
     """Largest over smallest singular value; None below rank 6."""
     without_authority: tuple[str, ...]
@@ -69,9 +67,7 @@ class Loss:
     """What the loss of one fin costs."""
 
     fin: str
-    """Its name."""
     rank: int
-    """Rank that is left."""
     reachable: tuple[str, ...]
     """Axes still reachable alone."""
     lost: tuple[str, ...]

@@ -20,7 +20,6 @@ from finlab.layout import Layout
 
 GoalName = Literal["weakest_direction", "mission_power", "worst_single_failure"]
 GOALS: tuple[GoalName, ...] = get_args(GoalName)
-"""Names of the goals."""
 Goal = Callable[[FinSets], Array]
 """What variants (P) are worth (P,): more is better."""
 

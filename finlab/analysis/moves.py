@@ -105,7 +105,6 @@ class Moves:
         if missing:
             raise LayoutError(f"fin {missing[0]} is to be moved but has no bounds; give it some")
         self.leaders = tuple(leaders)
-        """Fins that move by themselves."""
         self._lead = layout.indices(leaders)
         self._twin = [layout.index(twins[name]) if name in twins else -1 for name in leaders]
         self.names = tuple(name for name in layout.names if name in leaders or twins.get(name) in leaders)

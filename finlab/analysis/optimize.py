@@ -30,9 +30,7 @@ class Progress:
     """Where a search stands."""
 
     round: int
-    """Rounds done."""
     n_rounds: int
-    """Most rounds there will be; it may settle earlier."""
     before: float
     """The goal's measure at the start, more is better."""
     best: float
@@ -44,23 +42,16 @@ class Improvement:
     """What a search found."""
 
     layout: Layout
-    """The improved layout, or the one given when nothing better was found."""
     improved: bool
-    """Whether it is better than before."""
     cancelled: bool
-    """Whether the search was stopped before its end."""
     goal: str
-    """Name of the goal."""
     value_before: float
     """The goal's measure at the start: more is better; energies are negative."""
     value_after: float
     """The same for `layout`."""
     moved: tuple[str, ...]
-    """Fins that were free to move, twins included."""
     card_before: ScoreCard
-    """Score card at the start."""
     card_after: ScoreCard
-    """Score card of `layout`."""
 
 
 def optimize_layout(

@@ -29,11 +29,8 @@ class ScoreCard:
     """What a layout's working fins can do. Torques meet forces at the lever 0.2 m."""
 
     layout: str
-    """The layout's name."""
     failed: tuple[str, ...]
-    """Fins that push nothing."""
     n_fins: int
-    """Fins that work."""
     authority: Authority
     """Rank, conditioning, largest wrenches, weakest direction."""
     losses: tuple[Loss, ...]

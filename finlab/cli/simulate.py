@@ -1,4 +1,4 @@
-"""`finlab simulate`: a robot swims a trajectory, fins fail on the way, a log and pictures are written."""
+"""`finlab simulate`: a robot swims a trajectory, fins fail on the way, a log is written."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def simulate(
         noise: whether the sensors are noisy.
         seed: of the noise.
         checkpoint: trained checkpoint; the shipped one of the method by default.
-        output: new or empty folder for the log (log.npz, and log.csv for other programs) and pictures;
+        output: new or empty folder for the log (log.npz, and log.csv for other programs);
             without it only the summary is printed.
     """
     from tqdm import tqdm
@@ -134,14 +134,13 @@ def _controller(layout: Layout, name: str) -> Controller:
 
 
 def _write(log: RunLog, output: Path) -> list[str]:
-    """Log and pictures in a folder; their names."""
-    from finlab.evaluation.plots.closed_loop_run import save_pictures
+    """The log in a folder; the names of its files."""
     from finlab.sim.log_csv import save_csv
 
     with whole_folder(output) as folder:
         log.save(folder / "log.npz")
         save_csv(log, folder / "log.csv")
-        return ["log.npz", "log.csv", *(path.name for path in save_pictures(log, folder))]
+        return ["log.npz", "log.csv"]
 
 
 def summary(log: RunLog) -> str:

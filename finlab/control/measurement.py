@@ -57,7 +57,6 @@ class Controller(Protocol):
     """Turns measurements into a wrench; called at a fixed rate."""
 
     name: str
-    """What it is called in logs and tables."""
     axes: tuple[str, ...]
     """Axes of the wrench that it commands; the others are to stay as near zero as the fins can hold them, but
     for the free ones."""

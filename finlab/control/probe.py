@@ -21,7 +21,6 @@ FEWEST = 3
 """Working fins from which on those that would rest push a little: two have none to spare, and would
 lead the robot off its course."""
 SIZES = 24
-"""Points of the table from thrust to frequency."""
 
 
 class Probe:

@@ -83,7 +83,6 @@ class TrackingController:
         self._passing = 0.0
         self._wrench = np.zeros(6)
         self.estimate: Estimate | None = None
-        """What was believed at the last call."""
 
     def wrench(self, measurement: Measurement, setpoint: Setpoint, given: Array) -> Array:
         """Returns the wrench (6,) along the trajectory [N, N m]; `given` is that of the fins until now."""

@@ -30,7 +30,6 @@ NAMES = {
     "sfx": "sFx", "sfy": "sFy", "sfz": "sFz", "fx_sd": "sFx", "fy_sd": "sFy", "fz_sd": "sFz",
     "fx_std": "sFx", "fy_std": "sFy", "fz_std": "sFz",
 }  # fmt: skip
-"""What columns may be called, in small letters, and what they are."""
 
 
 @dataclass(frozen=True)
@@ -52,9 +51,7 @@ class Columns:
     values: dict[str, Array]
     """Column -> its numbers (n,)."""
     told: set[str]
-    """Columns whose unit the header names."""
     source: str
-    """The file's name, for sentences."""
     notes: list[str] = field(default_factory=list)
     """What was recognized, a sentence each."""
 

@@ -35,7 +35,6 @@ class FinFit:
     """A fin's forces as Gaussian processes, one for each axis of the frame that turns with the fin."""
 
     measurements: Measurements
-    """The samples that were used."""
     outliers: tuple[str, ...]
     """Where the samples stand that were left out."""
     components: tuple[Component, Component, Component]

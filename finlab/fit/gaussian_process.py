@@ -17,7 +17,6 @@ TUNED_ON = 250
 NOISE = (1e-8, 1.0)
 """Ends of the fitted variance of the noise, over the largest force squared."""
 FIRST_NOISE = 1e-3
-"""Where its fit begins."""
 LEAST_NOISE = 1e-10
 """Added to every variance, so that samples at the same command leave the covariance regular."""
 TAILS = 5.0

@@ -18,7 +18,6 @@ from finlab.layout.angles import FILE_TURN_TOLERANCE, TURN
 MAX_BYTES = 50_000_000
 """Largest file that is read [bytes]."""
 MIN_SAMPLES = 20
-"""Fewest samples from which a fin can be fitted."""
 SAME = 1e-3
 """Amplitudes [rad] or frequencies [Hz] all closer than this are one and the same."""
 SAME_DIRECTION = 0.05

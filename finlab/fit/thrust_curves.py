@@ -8,7 +8,6 @@ from finlab.arrays import Array
 from finlab.fit.fin_fit import FinFit
 
 POINTS = 60
-"""Of a curve."""
 DIRECTIONS = 8
 """Zero directions over which a thrust is averaged."""
 

@@ -19,9 +19,7 @@ class ThrustKernel(NamedTuple):
     """
 
     even: float = 1.0
-    """Variance of what is the same all round."""
     uneven: float = 0.05
-    """Variance of what is not."""
     amplitude: float = 1.0
     """Length scale of amplitudes over the largest one."""
     frequency: float = 1.0

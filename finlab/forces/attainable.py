@@ -90,7 +90,6 @@ Kind = Literal["force", "torque"]
 N_DIRECTIONS = 120
 """Directions that are looked at first; faces that are too far off add theirs."""
 MAX_ROUNDS = 4
-"""Most times that directions are added."""
 SPECK = 1e-5
 """Share of the sum of all thrusts below which a point counts as the origin; the solver is no more exact."""
 TOLERANCE = 0.01
@@ -103,11 +102,9 @@ class AttainableSet(Polytope):
     by the fins or, where `hull` says so, by the convex hulls of what they can push."""
 
     kind: Kind
-    """What it is a set of: `force` or `torque`."""
     alone: bool
     """Whether all else is zero (torque for forces, force for torques) or free."""
     failed: tuple[str, ...]
-    """Names of the fins that push nothing."""
     gap: float
     """Nothing attainable lies further than this outside any face [N] or [N m]."""
     hull: bool

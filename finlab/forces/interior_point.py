@@ -16,7 +16,6 @@ from finlab.forces.fin_sets import FinSets
 from finlab.small_systems import solve
 
 ITERATIONS = 40
-"""Most Newton steps; usually about 10 are taken."""
 GAP = 1e-11
 """Mean product of a limit's multiplier and slack that ends the search, relative to the wrench's error plus
 one, where the strongest fin's wrench is one."""

@@ -23,13 +23,10 @@ from finlab.networks.normalization import Normalization
 from finlab.networks.trained import State, TrainedWeights, check_arrays
 
 FORMAT = "finlab-checkpoint"
-"""Value of the key `format`."""
 VERSION = 1
-"""Value of the key `version`."""
 WEIGHTS_FILE = "model.safetensors"
 """Weights, with the prefixes `surrogate.` and `network.`."""
 CONFIG_FILE = "config.json"
-"""Everything else."""
 LARGEST = {CONFIG_FILE: 1_000_000, WEIGHTS_FILE: 50_000_000}
 """Largest size of each file [bytes]."""
 

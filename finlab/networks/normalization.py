@@ -18,7 +18,6 @@ class Normalization(NamedTuple):
     """Mean and standard deviation of the wrench over a data set, each of shape (6,) [N, N m]."""
 
     mean: Array
-    """Per-axis mean."""
     std: Array
     """Per-axis standard deviation; `sigma` in the error measure."""
 

@@ -17,7 +17,6 @@ State = Mapping[str, AnyArray]
 Shapes = dict[str, tuple[int, ...]]
 
 LARGEST_SIZE = 4096
-"""Largest width or count that a network may have."""
 LARGEST_WEIGHT = 1e6
 """Largest magnitude of a weight; training stays below 100, and far beyond this answers would be NaN."""
 
@@ -26,11 +25,9 @@ class Sizes(Protocol):
     """The sizes of a network: a frozen dataclass of whole numbers, with the shapes that follow from them."""
 
     features: ClassVar[str]
-    """What the network is fed, by its name in files."""
     joint: ClassVar[bool]
     """Whether one component is chosen for all fins together."""
     verb: ClassVar[str]
-    """What `finlab train` calls it."""
 
     def shapes(self) -> Shapes:
         """Shape of each array; a `ValueError` where there is no network of these sizes."""
@@ -45,13 +42,10 @@ class TrainedWeights:
     """The contents of a checkpoint."""
 
     name: str
-    """Name shown to users; the checkpoint folder's."""
     normalization: Normalization
-    """Per-axis statistics of the wrench."""
     network_sizes: Mapping[str, Any] | None = None
     """Sizes of the network and what it is fed, as in the file; None where only a surrogate was trained."""
     network: State = field(default_factory=dict)
-    """The network; empty where there is none."""
     surrogate_sizes: Mapping[str, Any] | None = None
     """Sizes of the paper's surrogate, as in the file; None where there is none."""
     surrogate: State = field(default_factory=dict)
@@ -59,7 +53,6 @@ class TrainedWeights:
     fin_model: Mapping[str, Any] = field(default_factory=dict)
     """Fin model that the surrogate learned, as in a layout file: {type, parameters}."""
     preset: str = "default"
-    """Name of the training recipe."""
     training: Mapping[str, Any] = field(default_factory=dict)
     """Settings of the runs that made it."""
     metrics: Mapping[str, Any] = field(default_factory=dict)

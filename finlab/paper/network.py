@@ -26,19 +26,13 @@ class NetworkConfig:
     """Sizes of the paper's network."""
 
     features: ClassVar[str] = "raw"
-    """What it is fed, by its name in files."""
     joint: ClassVar[bool] = False
     """Whether one component is chosen for all fins together."""
     verb: ClassVar[str] = "allocator"
-    """What `finlab train` calls it."""
     width: int = 128
-    """Width of every hidden layer."""
     heads: int = 4
-    """Attention heads of GATv2 and of the Transformer."""
     graph_layers: int = 2
-    """Number of GATv2 layers."""
     transformer_layers: int = 3
-    """Number of Transformer encoder layers."""
     feedforward: int = 512
     """Hidden width of the Transformer's feed-forward blocks; not printed."""
     n_components: int = 8

@@ -36,9 +36,7 @@ class _Robot(NamedTuple):
     """One layout of n healthy fins, ready for the pipeline."""
 
     layout: Layout
-    """The fins."""
     surrogate: LayoutSurrogate
-    """Learned fin physics."""
     problem: CommandProblem
     """The surrogate in normalized wrenches, and the limits."""
     limits: tuple[AnyArray, AnyArray]
@@ -46,7 +44,6 @@ class _Robot(NamedTuple):
     features: AnyArray
     """The network's node features (1, n, 10)."""
     effort: EffortMeter
-    """J_en."""
 
 
 class Paper(LeastErrorMethod):

@@ -26,7 +26,6 @@ from finlab.physics.wrench import wrench_of_forces
 FORCE_UNIT = 4.0
 """Force [N] of order one for the perceptron's outputs."""
 DESCRIPTOR = 64
-"""Width of the layout descriptor."""
 BLOCK = 64
 """Robots whose fins are worked on at once: some hundred rows of the hidden layers, half a megabyte."""
 

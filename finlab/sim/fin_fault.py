@@ -16,11 +16,9 @@ class FinFault(NamedTuple):
     """One event of a swim; `("front_left", 30.0)` is a fin that is lost."""
 
     fin: str
-    """Its name."""
     time_s: float
     """When [s]."""
     kind: Kind = "lost"
-    """One of `KINDS`."""
     share: float = 0.5
     """Share of the thrust that is left of a torn fin, above 0 and below 1; of no meaning for the others."""
 

@@ -98,7 +98,6 @@ class SoftFin:
     damping: float = 0.02
     """Of the tip's spring [N m s/rad]."""
     blade: Blade = field(default_factory=Blade)
-    """The whole fin."""
 
 
 class FlexibleForce:

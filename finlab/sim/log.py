@@ -102,19 +102,12 @@ class RunLog:
     """A whole swim: each column of `Tick` as an array with N rows, and what was swum."""
 
     layout: str
-    """Name of the layout."""
     fins: tuple[str, ...]
-    """Names of the fins, in the order of the columns."""
     method: str
-    """Name of the allocation method."""
     controller: str
-    """Name of the controller."""
     task: str
-    """Name of the trajectory."""
     plant: str
-    """How the fins' forces were simulated."""
     water: str
-    """How the water moved."""
     seed: int
     """Seed of the sensors' noise."""
     columns: dict[str, AnyArray]

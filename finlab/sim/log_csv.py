@@ -20,7 +20,6 @@ MEASURED = (
     *("x [m]", "y [m]", "z [m]", "roll [rad]", "pitch [rad]", "yaw [rad]"),
     *("u [m/s]", "v [m/s]", "w [m/s]", "p [rad/s]", "q [rad/s]", "r [rad/s]"),
 )
-"""Columns of what the sensors said last."""
 WRENCH = ("Fx [N]", "Fy [N]", "Fz [N]", "Tx [N m]", "Ty [N m]", "Tz [N m]")
 """Columns of a wrench in the body frame."""
 COMMAND = ("A [rad]", "f [Hz]", "phi [rad]")

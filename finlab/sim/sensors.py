@@ -35,7 +35,6 @@ class Sensor:
 
 
 NAMES = ("marker", "pressure", "dvl", "imu")
-"""The sensors."""
 
 
 @dataclass(frozen=True)

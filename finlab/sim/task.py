@@ -23,7 +23,6 @@ RESTING = 0.005
 SHORTEST_S = 1.0
 """Least duration [s]; ten control periods."""
 MAX_BYTES = 20_000_000
-"""Largest file that is read."""
 COLUMNS = ("t", "x", "y", "z")
 """Columns of a trajectory file: time [s], position in the world [m]."""
 

@@ -77,9 +77,7 @@ class Changing:
     """Water that becomes another one on the way, as a gust comes and goes: a smoothstep."""
 
     before: "Water"
-    """How it moves until then."""
     after: "Water"
-    """How it moves once it has changed."""
     time_s: float
     """When it begins to change [s]."""
     over_s: float = 4.0
@@ -133,7 +131,6 @@ class Waves:
     current: Sequence[float] = REST
     """Velocity of the water without waves (3,) [m/s]."""
     components: int = 20
-    """How many waves are added."""
     seed: int = 0
     """Of phases and headings."""
 

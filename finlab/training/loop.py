@@ -31,11 +31,8 @@ class LoopSettings:
     """What every training has to say, whatever it learns."""
 
     steps: int
-    """Optimizer steps in all."""
     batch_size: int
-    """Samples per step."""
     learning_rate: float
-    """Peak learning rate of Adam."""
     warmup: int = 0
     """Steps over which it rises linearly, if there are as many."""
     cosine: bool = True
@@ -47,11 +44,8 @@ class LoopSettings:
 
 
 CLIP = 1.0
-"""Largest norm of the gradient."""
 LOG_EVERY = 20
-"""Steps between rows of the log."""
 SAVE_EVERY_S = 60.0
-"""Seconds between saved states."""
 
 
 def learning_rate(settings: LoopSettings, step: int, elapsed: float = 0.0) -> float:

@@ -16,7 +16,6 @@ STATE_FILE = "resume.pt"
 """Steps and seconds done, the run's settings, weights, optimizer and running average of the weights."""
 
 Tensors = dict[str, Tensor]
-"""Weights by name."""
 
 
 def save_state(

@@ -17,7 +17,6 @@ from typing import Any, Generic, NamedTuple, TypeVar
 Vector = TypeVar("Vector")
 """A sequence of numbers: a tuple of floats, or an array whose first axis it is."""
 Number = TypeVar("Number")
-"""A float or an array."""
 
 
 class Dynamics(NamedTuple, Generic[Vector, Number]):

@@ -39,7 +39,6 @@ class Vehicle:
         self.acceleration = (0.0, 0.0, 0.0)
         """Its acceleration (3,) [m/s^2]."""
         self.dynamics = dynamics = dynamics_of(body)
-        """Its numbers."""
         self.inertia = dynamics.inertia
         """Diagonal of M (6,) [kg, kg m^2]."""
         self.weight, self.lift = dynamics.weight, dynamics.lift

@@ -19,11 +19,8 @@ class Column:
     """A column of a table."""
 
     key: str
-    """Of the rows."""
     title: str
-    """In words."""
     format: str = "text"
-    """Key of `FORMATS`."""
     interval: str | None = None
     """Key of an interval [low, high] that stands behind the number."""
     unit: str = ""
@@ -45,9 +42,7 @@ class Table:
     """A table; a row with `_kind` `ours` stands out."""
 
     columns: tuple[Column, ...]
-    """From left to right."""
     rows: Sequence[Row]
-    """From top to bottom."""
 
     def cell(self, row: Row, column: Column) -> str:
         """A cell's text, its interval in brackets."""
@@ -67,9 +62,7 @@ class Figure:
     name: str
     """Of its file, without the ending."""
     draw: Callable[[], Picture]
-    """Draws it, with matplotlib."""
     caption: str
-    """What is to be seen."""
 
     @cached_property
     def svg(self) -> str:
@@ -86,8 +79,5 @@ class Document:
     """A whole page."""
 
     title: str
-    """Its name."""
     subtitle: str
-    """One line about it."""
     blocks: tuple[Block, ...]
-    """From top to bottom."""

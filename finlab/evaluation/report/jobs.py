@@ -32,9 +32,7 @@ class Part:
     """One run of an experiment."""
 
     experiment: str
-    """Its name."""
     options: dict[str, Any]
-    """All of them, plain values."""
     source: str
     """Digest of the code and the weights: another one gives other results."""
 

@@ -15,7 +15,6 @@ import finlab
 from finlab.networks.checkpoint import resolve_checkpoint
 
 CHECKPOINTS = ("default", "paper")
-"""Shipped networks that methods use."""
 
 
 def source_commit() -> str:

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from finlab.evaluation.report.document import Block, Figure, Table
 
 WIDTH = 110
-"""Columns of a paragraph."""
 
 
 def to_text(*blocks: Block) -> str:

@@ -20,16 +20,13 @@ SPREAD = 2.772
 TAIL = 0.002787
 """Share of a normal variable below -SPREAD: the percentiles of the interval."""
 REPLICATES = 2000
-"""Times that layouts are drawn again."""
 
 
 class Interval(NamedTuple):
     """Ends of an interval."""
 
     low: float
-    """Lower end."""
     high: float
-    """Upper end."""
 
 
 def mean_interval(values: Array, group: NDArray[np.int64]) -> Interval:

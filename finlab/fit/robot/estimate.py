@@ -30,11 +30,8 @@ DEVIATION = np.array([0.02, 0.02, 0.01, 0.01, 0.01, 0.02, 0.01, 0.01, 0.01, 0.01
 START_DEVIATION = np.array([0.1] * 3 + [0.1] * 3 + [0.1] * 3 + [0.2] * 3)
 """How far a window may begin from the smoothed measurements."""
 DIFFERENCE = 1e-3
-"""Step of the differences, in scales."""
 MOST_STEPS = 16
-"""Most Gauss-Newton steps, those included that are undone."""
 DAMPING = Damping(first=1e-3, better=0.1, worse=(10.0, 0.0), least=1e-6, most=1e6)
-"""Levenberg's."""
 SETTLED = 1e-4
 """Relative gain below which they end."""
 FOLDS = 6
@@ -59,7 +56,6 @@ class Fitted:
     """Unknowns, and the problem near them, the windows' beginnings eliminated."""
 
     unknowns: Unknowns
-    """What they are."""
     vector: Array
     """(size,), in scales."""
     start: Array

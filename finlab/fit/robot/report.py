@@ -4,12 +4,10 @@ from finlab.actuators.fin.table_file import DOUBT
 from finlab.fit.robot.robot_fit import UNTOLD, RobotFit
 
 MEANINGS = {
-    "beat": "forces that swing within the beat",
     "shape": "thrust that grows otherwise with amplitude and frequency",
     "jets": "what fins take from each other by their jets",
     "inflow": "what speed through the water takes",
 }
-"""What the blocks that are tried besides stand for."""
 
 
 def summary(fit: RobotFit) -> tuple[str, ...]:

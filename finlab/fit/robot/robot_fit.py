@@ -39,13 +39,10 @@ class Trial:
     """Whether something more helps."""
 
     name: str
-    """Block of unknowns."""
     gain: float
     """By how much the half squared error of a window not seen falls, mean over windows."""
     error: float
-    """Its standard error."""
     used: bool
-    """Whether it was kept."""
 
 
 @dataclass(frozen=True)
@@ -53,15 +50,11 @@ class RobotFit:
     """A robot as its swims show it."""
 
     model: RobotModel
-    """What was believed, and the swims."""
     fitted: Fitted
-    """What was found."""
     deviation: Array
     """Of each channel (12,): the sensors' noise and what the model does not explain [m, rad, m/s, rad/s]."""
     explained: float
-    """Share of the motion within windows that simulated swims explain."""
     trials: tuple[Trial, ...]
-    """What was tried besides."""
     notes: tuple[str, ...]
     """What to know of the data."""
 

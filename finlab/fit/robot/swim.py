@@ -17,7 +17,6 @@ CHANNELS = ("x", "y", "z", "roll", "pitch", "yaw", "u", "v", "w", "p", "q", "r")
 """What sensors may say: position in the world [m], attitude [rad], velocity [m/s] and angular rates [rad/s]
 in the body frame."""
 ANGLES = slice(3, 6)
-"""Those that are angles."""
 
 
 @dataclass(frozen=True)
@@ -25,7 +24,6 @@ class Swim:
     """N steps of one robot with n fins."""
 
     name: str
-    """What it is called in messages: its file."""
     motion: Array
     """What the fins did, (N, SUBSTEPS, n, 3): amplitude [rad], frequency [Hz], direction [rad]; zero
     amplitude and frequency for a fin that was lost."""

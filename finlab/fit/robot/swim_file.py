@@ -31,7 +31,6 @@ SHORTEST_S = 30.0
 LONGEST_GAP_S = 1.0
 """Longest time [s] between two rows; what the fins did meanwhile is not known."""
 COMMANDS = ("A", "f", "phi")
-"""Columns of each fin, behind its name and a point."""
 DEGREES = ("deg", "deg/s", "degrees")
 """Units in a header that are turned into radians."""
 
@@ -109,9 +108,7 @@ class _Column(NamedTuple):
     name: str
     """Of `t`, `CHANNELS` or a fin's command."""
     place: int | None
-    """Where it stands; None where it is not there."""
     factor: float
-    """What its numbers are multiplied by."""
 
 
 def _columns(header: list[str], layout: Layout, path: Path) -> list[_Column]:

@@ -7,18 +7,14 @@ from functools import cached_property
 import numpy as np
 
 from finlab.arrays import Array
-from finlab.fit.robot.swing import TERMS
 
 AXES = ("surge", "sway", "heave", "roll", "pitch", "yaw")
-"""Names of the body's axes of motion."""
 BASE = (
     *("strength", "mounting", "lean", "center", "bias"),
     *("buoyancy", "lift", "current", "inertia", "linear", "quadratic", "delay"),
 )
-"""Blocks that every fit looks for."""
-RESIDUAL = ("beat", "shape", "jets", "inflow")
-"""What is looked for besides, where it helps: forces within the beat and of fins that turn, another law of
-thrust, jets, inflow."""
+RESIDUAL = ("shape", "jets", "inflow")
+"""What is looked for besides, where it helps: another law of thrust, jets, inflow."""
 
 SENSORS = {
     "position and heading": (0, 1, 5),
@@ -37,11 +33,8 @@ class Block:
     """Unknowns of one kind."""
 
     name: str
-    """What they are called in code."""
     labels: tuple[str, ...]
-    """What each is called in reports."""
     unit: str
-    """In which they are given."""
     scale: Array
     """How far each may be off: one standard deviation of what is believed before a swim."""
     force: bool
@@ -71,7 +64,6 @@ def blocks_of(names: Sequence[str], damping: Array) -> dict[str, Block]:
         f"{kind} jet of {a} on {b}" for a in names for b in names if a != b for kind in ("wide", "narrow")
     ]
     form = ("thrust of half a jet, logarithm", "narrowness of jets, logarithm")
-    swings = [f"force within the beat, {k}" for k in range(1, TERMS + 1)]
     blocks = (
         block("strength", [f"strength of {name}, logarithm" for name in names], 0.3, ""),
         block("mounting", [f"mounting angle of {name}" for name in names], 0.1, "rad"),
@@ -85,7 +77,6 @@ def blocks_of(names: Sequence[str], damping: Array) -> dict[str, Block]:
         block("linear", [f"linear damping in {axis}" for axis in AXES], damping[0], "N s/m, N m s", False),
         block("quadratic", [f"quadratic damping in {axis}" for axis in AXES], damping[1], "", False),
         block("delay", [f"delay of {sensor}" for sensor in SENSORS], 0.05, "s", False),
-        block("beat", [*swings, "delay of thrust [s]"], np.array([1.0] * TERMS + [0.1]), ""),
         block("shape", [f"thrust by {name}" for name in shape], (0.5, 0.5, 0.3, 0.3, 0.3), ""),
         block("jets", [*jets, *form], np.array([0.15] * len(jets) + [0.7, 0.4]), ""),
         block("inflow", ["inflow", "inflow squared"], 0.4, ""),
@@ -105,13 +96,10 @@ class Unknowns:
             for block, end, size in zip(self.blocks, ends, sizes, strict=True)
         }
         self.size = int(ends[-1])
-        """How many there are."""
         self.scale = np.concatenate([block.scale for block in self.blocks])
         """(size,)."""
         self.labels = tuple(label for block in self.blocks for label in block.labels)
-        """What each is called."""
         self.units = tuple(block.unit for block in self.blocks for _ in block.labels)
-        """In which each is given."""
         self.force = np.array([block.force for block in self.blocks for _ in block.labels])
         """Whether the wrench of the fins depends on each (size,)."""
 

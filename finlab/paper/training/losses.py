@@ -15,9 +15,7 @@ class Surrogate(NamedTuple):
     """The surrogate with some weights, on the robots of a batch."""
 
     config: SurrogateConfig
-    """Its sizes."""
     weights: Tensors
-    """Its weights."""
 
     def wrench(self, command: Tensor, batch: Batch) -> Tensor:
         """Wrenches (B, 6) [N, N m] of commands (B, n, 3)."""

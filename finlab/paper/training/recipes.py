@@ -39,13 +39,9 @@ class PaperRecipe:
     """The paper's surrogate and the network that it guides."""
 
     surrogate_training: SampledTraining
-    """How the surrogate is trained."""
     allocator_training: AllocatorTraining
-    """How the network is trained."""
     surrogate: SurrogateConfig = field(default_factory=SurrogateConfig)
-    """Sizes of the surrogate."""
     network: NetworkConfig = field(default_factory=NetworkConfig)
-    """Sizes of the network."""
 
 
 _PAPER = PaperRecipe(
@@ -78,4 +74,3 @@ RECIPES = {
         ),
     ),
 }
-"""Name -> recipe of `finlab train surrogate` and `finlab train allocator`."""
