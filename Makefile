@@ -18,7 +18,7 @@ help:
 	@echo "make test-near    the tests near what was changed since the branch main"
 	@echo "make test-fast    every test but those of the browser and the packaging"
 	@echo "make check        ruff, ruff format and mypy"
-	@echo "make schemas      write the JSON Schemas of layout and graph files"
+	@echo "make schemas      write the JSON Schema of layout files"
 	@echo "make figures      the tables of figures in docs/*.md, or of one page: make figures PAGE=evaluation"
 	@echo "make format       let ruff correct what it can"
 	@echo "make checkpoint   train what is shipped, PRESET=default or PRESET=paper (hours)"

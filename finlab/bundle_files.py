@@ -1,7 +1,7 @@
 """The files of a deployment bundle, from a folder or a zip archive that may come from a stranger.
 
 Nothing is unpacked, no link is followed, nothing is read beyond its largest size, and no content is believed
-before its checksum fits. What the files mean is known to the rooms that read them: layout graph and force
+before its checksum fits. What the files mean is known to the rooms that read them: robot and force
 tables to `finlab.layout` and `finlab.physics`, weights to `finlab.networks`, settings to `finlab.allocation`.
 """
 
@@ -17,16 +17,16 @@ from finlab.files.archive import member_names, unpacked
 from finlab.files.guarded import is_regular, read_file
 from finlab.files.plain_values import parse_json
 
-VERSION = 5
+VERSION = 6
 """Version of the bundle; a reader knows exactly one."""
-GRAPH, ABOUT = "layout.graph.json", "bundle.json"
+ROBOT, ABOUT = "robot.json", "bundle.json"
 TABLES = "tables/"
 """Folder of the fins' force tables, each named by the SHA-256 of its content."""
 CHECKPOINT = "checkpoint/"
 """Folder of the weights, itself a checkpoint; there for methods with networks."""
 README, CHECKSUMS = "README.md", "SHA256SUMS"
 LARGEST = {
-    GRAPH: 1_000_000,
+    ROBOT: 1_000_000,
     ABOUT: 100_000,
     f"{CHECKPOINT}config.json": 1_000_000,
     f"{CHECKPOINT}model.safetensors": 50_000_000,
@@ -40,7 +40,7 @@ LARGEST_BUNDLE = 100_000_000
 """Largest size of all files together [bytes]."""
 MOST_FILES = len(LARGEST) + 64
 """Most files; a robot has up to 64 actuators, each with a table at most."""
-REQUIRED = (GRAPH, ABOUT, CHECKSUMS)
+REQUIRED = (ROBOT, ABOUT, CHECKSUMS)
 
 Files = Mapping[str, bytes]
 """Contents by name."""
@@ -144,7 +144,7 @@ def _in_archive(source: str) -> dict[str, bytes]:
     # The version comes first: files of another one are not the news.
     _check_version(about.get(ABOUT), source)
     if strangers := [name for name in names if largest(name) < 0]:
-        layout = strangers[0].endswith((".yaml", ".graph.json"))
+        layout = strangers[0].endswith((".yaml", ".yml"))
         hint = "; unpack it, and name the layout file in it" if layout else ""
         raise DataError(f"{source}: holds {strangers[0]!r:.60}, which is no part of a bundle{hint}")
     if len(names) > MOST_FILES:

@@ -7,17 +7,13 @@ from pathlib import Path
 import msgspec
 
 from finlab.layout.file import ANY_LAYOUT
-from finlab.layout.graph_form import Graph
 
 PACKAGE = Path(__file__).parents[1] / "finlab"
 
 
 def schemas() -> dict[Path, str]:
     """Returns the text of each schema by its file."""
-    kinds = {
-        "layout/layout.schema.json": ("finlab-layout-2", ANY_LAYOUT),
-        "deploy/graph.schema.json": ("finlab-graph-3", Graph),
-    }
+    kinds = {"layout/layout.schema.json": ("finlab-layout-2", ANY_LAYOUT)}
     texts = {}
     for name, (title, kind) in kinds.items():
         head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "$id": f"{title}.schema.json"}

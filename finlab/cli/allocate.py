@@ -38,7 +38,7 @@ def allocate(
     """Find the command of each fin that gives a target wrench.
 
     Args:
-        layout: layout file, layout graph file, or the name of a shipped layout.
+        layout: layout file, bundle, or the name of a shipped layout.
         wrench: target in the body frame [N, N m].
         failed: name of a fin that does not work.
         method: dual, mdn, paper, qp, sqp, analytic or ipopt.

@@ -1,4 +1,4 @@
-"""What a user may name at the command line: a layout file, a graph file, a bundle or a shipped layout."""
+"""What a user may name at the command line: a layout file, a bundle or a shipped layout."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class OpenedRobot(NamedTuple):
     layout: Layout
     """All fins."""
     failed: tuple[str, ...] = ()
-    """Names of fins that a graph file marks as failed."""
+    """Names of fins that a bundle marks as failed."""
 
     def with_failed(self, names: tuple[str, ...]) -> tuple[str, ...]:
         """Names of all failed fins: those of the file and those named now, each once."""

@@ -54,7 +54,7 @@ def show(
     """Print the actuators of a layout and, of fins, the score card: what it can do, what it can lose.
 
     Args:
-        layout: layout file, layout graph file, or the name of a shipped layout.
+        layout: layout file, bundle, or the name of a shipped layout.
         failed: name of an actuator that does not work.
         json: file for one JSON object; it is printed in place of the tables where no file is named.
     """
@@ -116,7 +116,7 @@ def export_layout(
     """Write a layout as a robot description (URDF) or a table (CSV).
 
     Args:
-        layout: layout file, layout graph file, or the name of a shipped layout.
+        layout: layout file, bundle, or the name of a shipped layout.
         output: file to write; its ending says in which format.
     """
     from finlab.cli.inputs import open_robot

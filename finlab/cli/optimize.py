@@ -36,7 +36,7 @@ def optimize(
     """Move fins within bounds to raise a goal, and write the layout that results.
 
     Args:
-        layout: layout file, layout graph file, or the name of a shipped layout.
+        layout: layout file, bundle, or the name of a shipped layout.
         fins: fins that may move; mirrored twins follow.
         output: layout file to write.
         goal: weakest_direction, mission_power or worst_single_failure.

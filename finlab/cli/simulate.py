@@ -45,7 +45,7 @@ def simulate(
     Example: finlab simulate A --trajectory circle --fail front_left@30 -o swim
 
     Args:
-        layout: layout file, layout graph file, or the name of a shipped layout.
+        layout: layout file, bundle, or the name of a shipped layout.
         trajectory: circle, lissajous, square, dive, station, or a CSV file with the columns t, x, y, z.
         excite: shake every axis and fin on the spot instead, for at most 300 s, within bounds of depth and
             attitude; `finlab fit robot` learns the robot from the log.

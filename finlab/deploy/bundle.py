@@ -1,4 +1,4 @@
-"""The bundle that a robot runs: layout graph, the fins' physics, settings, a README and checksums.
+"""The bundle that a robot runs: the robot, the fins' physics, settings, a README and checksums.
 
 `finlab.load_layout` and `finlab.Allocator.from_bundle` read it, so the robot runs the library itself. The
 same layout and settings give the same bytes, as a folder and as a zip archive.
@@ -8,7 +8,6 @@ import io
 import os
 import zipfile
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -22,21 +21,20 @@ from finlab.bundle_files import (
     ABOUT,
     CHECKPOINT,
     CHECKSUMS,
-    GRAPH,
     LARGEST_BUNDLE,
     LARGEST_TABLE,
     README,
-    TABLES,
+    ROBOT,
     checksums,
     largest,
     table_name,
 )
-from finlab.deploy.graph import LayoutGraph, build_graph
-from finlab.deploy.graph_file import graph_bytes, write_graph
+from finlab.deploy.self_check import self_tests
 from finlab.distribution import NAME
 from finlab.errors import AllocationError, DataError
 from finlab.layout import Fin, FinModelSpec, Layout
 from finlab.layout.commands import command_of, command_values
+from finlab.layout.robot_file import Robot, robot_bytes
 from finlab.networks.checkpoint import checkpoint_files
 from finlab.whole_file import write_whole
 
@@ -103,36 +101,20 @@ def make_bundle(allocator: Allocator, failed: tuple[str, ...] = ()) -> Bundle:
         raise AllocationError(
             f"method {allocator.method!r} cannot be exported; a bundle runs {' or '.join(METHODS_ON_BOARD)}"
         )
-    layout, graph = allocator.layout, build_graph(allocator, failed)
+    layout, weights, cases = allocator.layout, allocator.weights, self_tests(allocator, failed)
     inside, tables = with_tables_inside(layout)
-    checkpoint = {} if allocator.weights is None else checkpoint_files(allocator.weights)
+    checkpoint = {} if weights is None else checkpoint_files(weights)
+    sha256 = None if weights is None else weights.sha256
     files = {
-        GRAPH: graph_bytes(replace(graph, layout=inside)),
+        ROBOT: robot_bytes(Robot(inside, failed, sha256, cases)),
         ABOUT: about_bundle(allocator, finlab.__version__),
         **tables,
         **{CHECKPOINT + name: content for name, content in checkpoint.items()},
-        README: readme_text(graph).encode(),
+        README: readme_text(allocator, failed).encode(),
     }
     if sum(map(len, files.values())) > LARGEST_BUNDLE:
         raise DataError(f"layout {layout.name!r}: its bundle would be larger than {LARGEST_BUNDLE:,} bytes")
     return Bundle({**files, CHECKSUMS: checksums(files)})
-
-
-def write_graph_and_tables(graph: LayoutGraph, path: str | os.PathLike[str]) -> None:
-    """Write a graph file, and beside it the force tables that it names, so that they can travel together.
-
-    Raises:
-        LayoutError: a file cannot be written, or the name does not end in `.graph.json`.
-        DataError: a table cannot be read, or is too large to travel.
-    """
-    inside, tables = with_tables_inside(graph.layout)
-    folder = Path(path).parent
-    if tables:
-        with suppress(OSError):  # the first table tells why it cannot be written
-            (folder / TABLES).mkdir(exist_ok=True)
-    for name, content in tables.items():
-        write_whole(folder / name, content)
-    write_graph(replace(graph, layout=inside), path)
 
 
 def with_tables_inside(layout: Layout) -> tuple[Layout, dict[str, bytes]]:
@@ -155,23 +137,23 @@ def with_tables_inside(layout: Layout) -> tuple[Layout, dict[str, bytes]]:
     return replace(layout, actuators=tuple(parts)), tables
 
 
-def readme_text(graph: LayoutGraph) -> str:
-    """The README of a bundle with this graph: `bundle_readme.md`, beside this module, filled in."""
+def readme_text(allocator: Allocator, failed: tuple[str, ...]) -> str:
+    """The README of a bundle: `bundle_readme.md`, beside this module, filled in."""
     rows = []
-    for part in graph.layout.actuators:
+    for part in allocator.layout.actuators:
         x, y, z = part.position
         low, high = (command_values(command_of(part, np.array(end))) for end in (part.lower, part.upper))
         ranges = "; ".join(f"{key} {low[key]:.4g}..{high[key]:.4g}" for key in low)
-        works = "no" if part.name in graph.failed else "yes"
+        works = "no" if part.name in failed else "yes"
         name = part.name.replace("|", "\\|")
         rows.append(f"| {name} | {part.type} | {x:g}, {y:g}, {z:g} | {ranges} | {works} |")
     template = Path(__file__).with_name("bundle_readme.md").read_text("utf-8")
     return template.format(
-        name=graph.layout.name,
+        name=allocator.layout.name,
         version=finlab.__version__,
         wheel=NAME.replace("-", "_"),
-        method=graph.method,
-        networks="" if graph.checkpoint is None else f" with checkpoint `{graph.checkpoint}`",
+        method=allocator.method,
+        networks="" if allocator.checkpoint is None else f" with checkpoint `{allocator.checkpoint}`",
         actuators="\n".join(rows),
-        failed=list(graph.failed),
+        failed=list(failed),
     )

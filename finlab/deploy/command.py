@@ -147,7 +147,7 @@ def _parser() -> argparse.ArgumentParser:
             run.__name__, help=text, description=text, example=example
         )
         made.set_defaults(run=run)
-        about = "folder or zip archive made by `finlab export`, or a layout graph file"
+        about = "folder or zip archive made by `finlab export`"
         made.add_argument("bundle", metavar="BUNDLE", help=about)
         return made
 

@@ -9,18 +9,14 @@ from numpy.typing import ArrayLike
 
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.allocator import Allocator
-from finlab.allocation.bundle_settings import METHODS_ON_BOARD, read_about
-from finlab.allocation.methods import LEARNED, bundled_method
+from finlab.allocation.methods import bundled_method
 from finlab.allocation.policy import CLOSEST, Policy
 from finlab.arrays import Array
-from finlab.assets import shipped_checkpoints
-from finlab.bundle_files import ABOUT, GRAPH, Files, check_bundle_files, is_bundle, read_bundle_files
-from finlab.deploy.graph import LayoutGraph
-from finlab.deploy.graph_file import parse_graph, read_graph
+from finlab.bundle_files import ROBOT, Files, check_bundle_files, is_bundle, read_bundle_files
 from finlab.errors import AllocationError, DataError
 from finlab.layout import Layout
 from finlab.layout.commands import neutral_row
-from finlab.layout.load import bundle_graph_text
+from finlab.layout.robot_file import Case, robot_of
 from finlab.physics.objective import Objective
 
 
@@ -28,15 +24,17 @@ from finlab.physics.objective import Objective
 class DeployedRobot:
     """What `finlab-runtime` works with."""
 
-    graph: LayoutGraph
-    """The robot, failed fins included, and self-tests."""
     allocator: Allocator
     """Made of the bundle's settings and, where there are any, networks."""
+    failed: tuple[str, ...] = ()
+    """Actuators that the bundle names as failed."""
+    self_test: tuple[Case, ...] = ()
+    """Targets with the answers of the computer that made the bundle."""
 
     @property
     def layout(self) -> Layout:
         """All fins."""
-        return self.graph.layout
+        return self.allocator.layout
 
     @property
     def objective(self) -> Objective:
@@ -45,7 +43,7 @@ class DeployedRobot:
 
     def lost(self, failed: Sequence[str] = ()) -> tuple[str, ...]:
         """Fins that the bundle names as failed stay failed, whatever `failed` adds."""
-        return tuple(dict.fromkeys([*self.graph.failed, *failed]))
+        return tuple(dict.fromkeys([*self.failed, *failed]))
 
     def allocate(
         self,
@@ -93,37 +91,17 @@ class DeployedRobot:
 
 
 def load_robot(path: str | os.PathLike[str]) -> DeployedRobot:
-    """The robot in a bundle, a folder or a zip archive; or in a layout graph file, which answers with the
-    usual settings.
+    """The robot in a bundle, a folder or a zip archive.
 
     Raises:
-        FinlabError: it is neither, was changed, or cannot be run.
+        FinlabError: it is none, was changed, or cannot be run.
     """
-    if is_bundle(path) or not str(path).endswith((".json", ".yaml", ".yml")):
-        robot = parse_robot(read_bundle_files(path), str(path))
-    elif not str(path).endswith(".json"):
+    if not is_bundle(path) and str(path).endswith((".json", ".yaml", ".yml")) and os.path.exists(path):
         raise DataError(f"{path}: is a layout file; run what `finlab export {path} -o DIR` makes of it")
-    else:
-        robot = _graph_robot(read_graph(path), str(path))
-    if robot.graph.failed:  # what is left is prepared now, not at the first answer
-        robot.allocator.allocate(np.zeros(6), failed=robot.graph.failed)
+    robot = parse_robot(read_bundle_files(path), str(path))
+    if robot.failed:  # what is left is prepared now, not at the first answer
+        robot.allocator.allocate(np.zeros(6), failed=robot.failed)
     return robot
-
-
-def _graph_robot(graph: LayoutGraph, source: str) -> DeployedRobot:
-    learned = graph.method in LEARNED
-    if graph.method in METHODS_ON_BOARD and (not learned or graph.checkpoint in shipped_checkpoints()):
-        allocator = Allocator(graph.layout, graph.method, checkpoint=graph.checkpoint if learned else None)
-        if _sha256(allocator) == graph.checkpoint_sha256:
-            return DeployedRobot(graph, allocator)
-    raise DataError(
-        f"{source}: was made for method {graph.method!r}, whose networks are not here; run the bundle that "
-        "`finlab export LAYOUT -o DIR` makes, which brings them"
-    )
-
-
-def _sha256(allocator: Allocator) -> str | None:
-    return None if allocator.weights is None else allocator.weights.sha256
 
 
 def parse_robot(files: Files, source: str = "bundle") -> DeployedRobot:
@@ -132,10 +110,8 @@ def parse_robot(files: Files, source: str = "bundle") -> DeployedRobot:
     Force tables are read from the folder or archive `source` once they are needed.
     """
     check_bundle_files(files, source)
-    graph = parse_graph(bundle_graph_text(files, source))
-    allocator = Allocator.of_choice(graph.layout, bundled_method(files, source))
-    if _sha256(allocator) != graph.checkpoint_sha256:
-        raise DataError(f"{source}: {GRAPH} and the weights are of different checkpoints; export again")
-    if not all(map(np.array_equal, read_about(files, source).normalization, graph.normalization)):
-        raise DataError(f"{source}: {GRAPH} and {ABOUT} differ in normalization; export again")
-    return DeployedRobot(graph, allocator)
+    robot = robot_of(files, source)
+    allocator = Allocator.of_choice(robot.layout, bundled_method(files, source))
+    if (None if allocator.weights is None else allocator.weights.sha256) != robot.weights_sha256:
+        raise DataError(f"{source}: {ROBOT} and the weights are of different checkpoints; export again")
+    return DeployedRobot(allocator, robot.failed, robot.self_test)

@@ -9,12 +9,19 @@ from typing import NamedTuple
 
 import numpy as np
 
+from finlab.allocation.allocator import Allocator
 from finlab.allocation.evaluate import REACHED
-from finlab.deploy.graph import SELF_TEST_TOLERANCE
+from finlab.arrays import Array
 from finlab.deploy.robot import DeployedRobot
 from finlab.errors import DataError
+from finlab.layout.robot_file import Case
 from finlab.physics import plant_of
 
+N_SELF_TEST = 4
+"""Self-test wrenches in a bundle: enough to notice a wrong file, few enough to read."""
+SELF_TEST_TOLERANCE = 1e-6
+"""Allowed normalized error between the wrench of a self-test's command and what another machine computes for
+it; both are written with nine digits."""
 ERROR_TOLERANCE = 1e-5
 """Normalized error by which an answer may be worse than the stored one."""
 COST_TOLERANCE = 0.01
@@ -37,21 +44,45 @@ class Finding(NamedTuple):
         return self.value <= self.limit
 
 
+def self_tests(allocator: Allocator, failed: tuple[str, ...]) -> tuple[Case, ...]:
+    """Targets that can be reached, wrenches of random commands, with an allocator's answers.
+
+    They depend on the layout and the allocator alone.
+
+    Raises:
+        LayoutError: an unknown failed actuator, or none left.
+        DataError: a fin's force table cannot be read.
+    """
+    layout = allocator.layout
+    plant = plant_of(layout.without(failed) if failed else layout)
+    cases = []
+    for wrench in plant.wrench(plant.sample(np.random.default_rng(0), (N_SELF_TEST,))):
+        target = _rounded(wrench)
+        answer = _rounded(allocator.allocate(target, failed=failed).command)
+        delivered = _rounded(plant.wrench(answer[~np.isnan(answer).any(axis=1)]))
+        rows = [
+            None if name in failed else tuple(row)
+            for name, row in zip(layout.names, answer.tolist(), strict=True)
+        ]
+        cases.append(Case(tuple(target.tolist()), tuple(rows), tuple(delivered.tolist())))
+    return tuple(cases)
+
+
 def self_check(robot: DeployedRobot) -> list[Finding]:
     """Ask everything.
 
     Raises:
         DataError: the bundle has no self-tests, or a force table cannot be read.
     """
-    cases, layout, failed = robot.graph.self_test, robot.layout, robot.graph.failed
-    if not cases:
+    if not robot.self_test:
         raise DataError("the bundle has no self-tests; export it again")
+    layout, failed = robot.layout, robot.failed
     alive = [i for i, name in enumerate(layout.names) if name not in failed]
-    plant, scale = plant_of(robot.graph.healthy), robot.allocator.scale
+    plant, scale = plant_of(layout.without(failed) if failed else layout), robot.allocator.scale
     cost = robot.objective.meter(plant)
 
     differs, errors, worse, dearer = [], [], [], []
-    for case in cases:
+    for case in robot.self_test:
         stored = np.array([case.command[i] for i in alive], dtype=np.float64)
         target, delivered = np.array(case.wrench), np.array(case.delivered_wrench)
         answer = robot.allocator.allocate(case.wrench, failed=failed)
@@ -71,3 +102,8 @@ def self_check(robot: DeployedRobot) -> list[Finding]:
 def worst(values: Iterable[float]) -> float:
     """The largest value, not below 0; NaN if any value is NaN."""
     return float(np.max([0.0, *values]))
+
+
+def _rounded(values: Array) -> Array:
+    """Nine significant digits: more than any servo has, and the same text on most machines."""
+    return np.array([float(f"{value:.9g}") for value in values.flat]).reshape(values.shape)

@@ -110,7 +110,7 @@ def actuator_to_dict(actuator: Thruster | Azimuth | Rudder, radians: bool = Fals
         if field.name == "name" or (field.default is not MISSING and value == field.default):
             continue
         if field.name in degrees:
-            value = _rounded(value)
+            value = degrees_of(value)
         data[keys.get(field.name, field.name)] = value
         if field.name == "model":
             data["model"] = _model_to_dict(value)
@@ -119,9 +119,14 @@ def actuator_to_dict(actuator: Thruster | Azimuth | Rudder, radians: bool = Fals
     return data
 
 
-def _rounded(value: Any) -> Any:
-    """Degrees of radians [rad], one or a tuple, without the error of rounding that conversion leaves."""
-    return tuple(map(_rounded, value)) if isinstance(value, tuple) else round(math.degrees(value), 12)
+def degrees_of(value: Any) -> Any:
+    """Returns degrees of radians [rad], one or a tuple: twelve digits give back what people wrote; where they
+    do not, more are taken, so that reading gives the same radians."""
+    if isinstance(value, tuple):
+        return tuple(map(degrees_of, value))
+    exact = math.degrees(value)
+    near = (round(exact, 12), exact, math.nextafter(exact, math.inf), math.nextafter(exact, -math.inf))
+    return next((angle for angle in near if math.radians(angle) == value), near[0])
 
 
 def _model_to_dict(model: ThrustModel) -> dict[str, Any]:

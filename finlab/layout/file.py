@@ -23,7 +23,7 @@ from finlab.errors import LayoutError
 from finlab.files.plain_values import yaml_text
 from finlab.files.schema import checked, shown
 from finlab.layout.actuator import Actuator
-from finlab.layout.actuator_form import FORMS
+from finlab.layout.actuator_form import FORMS, degrees_of
 from finlab.layout.actuator_form import actuator_of as other_actuator_of
 from finlab.layout.actuator_form import actuator_to_dict as other_actuator_to_dict
 from finlab.layout.body import Body, Hull
@@ -235,9 +235,8 @@ def _actuator_to_dict(part: Actuator) -> dict[str, Any]:
 
 def fin_to_dict(fin: Fin) -> dict[str, Any]:
     """Returns the plain values of a fin in a file, without its type."""
-    # Degrees from radians carry a rounding error of 1e-14; twelve digits give back what people wrote.
     if fin.mounting_angle is not None:
-        direction: dict[str, Any] = {"mounting_angle_deg": round(math.degrees(fin.mounting_angle), 12)}
+        direction: dict[str, Any] = {"mounting_angle_deg": degrees_of(fin.mounting_angle)}
     else:
         direction = {"shaft": list(fin.shaft or ()), "zero": list(fin.zero or ())}
     data = {

@@ -37,11 +37,11 @@ def test_targets_are_seeded_and_within_reach() -> None:
     assert finlab.Allocator(layout).allocate_batch(case.targets).reachable.all()
 
 
-def test_failed_fins_of_a_graph_file_stay_out(tmp_path: Path) -> None:
-    file, graph = tmp_path / "rows.json", tmp_path / "A.graph.json"
-    assert main(["export", "A", "--failed", "front_left", "-o", str(graph)]) == 0
+def test_failed_fins_of_a_bundle_stay_out(tmp_path: Path) -> None:
+    file, bundle = tmp_path / "rows.json", tmp_path / "A"
+    assert main(["export", "A", "--failed", "front_left", "-o", str(bundle)]) == 0
     arguments = ["--targets", "3", "--methods", "dual", "--json", str(file)]
-    assert main(["eval", "wrench", str(graph), *arguments]) == 0
+    assert main(["eval", "wrench", str(bundle), *arguments]) == 0
     row = json.loads(file.read_text())["rows"][0]
     assert row["success_0.01"] == 1.0
 

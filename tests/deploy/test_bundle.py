@@ -17,7 +17,7 @@ from finlab.allocation import Allocator
 from finlab.bundle_files import (
     ABOUT,
     CHECKSUMS,
-    GRAPH,
+    ROBOT,
     TABLES,
     checksums,
     read_bundle_files,
@@ -28,7 +28,7 @@ from finlab.deploy.bundle import Bundle, make_bundle
 from finlab.deploy.robot import load_robot, parse_robot
 from finlab.errors import AllocationError, DataError, FinlabError
 from finlab.layout import Layout
-from finlab.layout.load import checksum_of
+from finlab.networks.checkpoint import read_checkpoint
 from tests.any_robot import AnyRobot
 
 WEIGHTS = "checkpoint/model.safetensors"
@@ -88,7 +88,7 @@ def test_networks_travel_for_the_method_that_needs_them(
     ):
         assert allocator.allocate(WRENCH) == desk.allocate(WRENCH)
     assert Allocator.from_bundle(tmp_path, "dual").method == "dual"
-    assert load_robot(tmp_path).graph.checkpoint_sha256 == desk.weights.sha256  # type: ignore[union-attr]
+    assert read_checkpoint(tmp_path / "checkpoint").sha256 == desk.weights.sha256
 
 
 def test_the_command_line_takes_a_bundle_with_its_lost_fins(
@@ -117,15 +117,14 @@ def test_settings_travel_and_can_be_changed(tmp_path: Path) -> None:
         ({"settings": {"n_tries": 3}}, "settings: method 'dual' knows the settings .*, got 'n_tries'"),
         ({"period_s": -1.0}, "period_s: expected a number"),
         ({"copper_loss": float("nan")}, "holds NaN, expected a finite number"),
-        ({"version": 4.0}, "is a bundle of version 4.0, this finlab reads version 5; export it again"),
-        ({"version": "4"}, "is a bundle of version '4', this finlab reads version 5; export it again"),
-        ({"version": 3}, "is a bundle of version 3, this finlab reads version 5; export it again"),
+        ({"version": 4.0}, "is a bundle of version 4.0, this finlab reads version 6; export it again"),
+        ({"version": "4"}, "is a bundle of version '4', this finlab reads version 6; export it again"),
+        ({"version": 3}, "is a bundle of version 3, this finlab reads version 6; export it again"),
         ({"version": True}, "is a bundle of version True"),
         ({"format": "other"}, "expected format finlab-bundle"),
         ({"method": "sqp"}, "method must be one of dual, mdn, got 'sqp'"),
         ({"method": "mdn", "settings": {}}, "holds no networks, which method 'mdn' needs"),
         ({"normalization": {"mean": [0] * 6, "std": [1] * 5 + [0]}}, "six standard deviations above 0"),
-        ({"normalization": {"mean": [1] * 6, "std": [2] * 6}}, "layout.graph.json and bundle.json differ in"),
     ],
 )
 def test_settings_no_robot_should_try_are_refused(
@@ -155,7 +154,7 @@ def test_a_changed_file_is_named(measured_bundle: Bundle, with_networks: Bundle)
 
 
 def test_parts_of_two_exports_are_refused(bundle: Bundle, with_networks: Bundle) -> None:
-    mixed = {**with_networks.files, GRAPH: bundle.files[GRAPH]}
+    mixed = {**with_networks.files, ROBOT: bundle.files[ROBOT]}
     with pytest.raises(DataError, match="are of different checkpoints"):
         parse_robot(resealed(mixed))
     mixed = {**bundle.files, ABOUT: with_networks.files[ABOUT]}
@@ -190,23 +189,21 @@ def test_force_tables_travel_and_answer_from_folder_and_archive(
 
 
 @pytest.mark.parametrize(
-    "path", ["/etc/passwd", "../secret.csv", "tables/../../secret.csv", "secret.csv", GRAPH]
+    "path", ["/etc/passwd", "../secret.csv", "tables/../../secret.csv", "secret.csv", ROBOT]
 )
 @pytest.mark.parametrize("archive", [False, True])
 def test_a_force_table_outside_the_bundle_is_refused(
     path: str, archive: bool, measured_bundle: Bundle, tmp_path: Path
 ) -> None:
     (tmp_path / "secret.csv").write_text("A,f,phi,Fx,Fy,Fz\n")
-    document = json.loads(measured_bundle.files[GRAPH])
-    document["graph"]["nodes"][2]["model"]["path"] = path
-    document["checksum"] = checksum_of(document)
-    forged = Bundle(resealed({**measured_bundle.files, GRAPH: json.dumps(document).encode()}))
+    document = json.loads(measured_bundle.files[ROBOT])
+    parts = document["layout"]
+    parts.get("fins", parts.get("actuators"))[2]["model"]["path"] = path
+    forged = Bundle(resealed({**measured_bundle.files, ROBOT: json.dumps(document).encode()}))
     place = tmp_path / ("x.zip" if archive else "x")
     (forged.write_zip if archive else forged.write)(place)
     for read in (finlab.load_layout, load_robot):
-        with pytest.raises(
-            FinlabError, match=r"graph.nodes\[2\].model.path: names a force table that is not in the bundle"
-        ):
+        with pytest.raises(FinlabError, match=r"model.path: names a force table that is not in the bundle"):
             read(place)
 
 
@@ -221,7 +218,7 @@ def archive_of(path: Path, **files: bytes) -> Path:
     ("make", "message"),
     [
         (lambda p: p / "nowhere", "no such file"),
-        (lambda p: p, "layout.graph.json is missing; a bundle is made by `finlab export"),
+        (lambda p: p, "robot.json is missing; a bundle is made by `finlab export"),
         (lambda p: archive_of(p / "a.zip", **{"../evil": b"x"}), "'../evil', which is no part of a bundle"),
         (lambda p: archive_of(p / "a.zip", **{WEIGHTS: bytes(50_000_001)}), "larger than 50,000,000 bytes"),
         (
@@ -279,6 +276,26 @@ def test_the_command_line_chooses_the_method(
     capsys.readouterr()
 
 
-def test_export_refuses_names_that_are_neither(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["export", "A", "-o", "A.graph.json", "--zip"]) == 2
-    assert "a graph file alone is not zipped" in capsys.readouterr().err
+def test_export_refuses_the_name_of_a_file(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["export", "A", "-o", "A.json"]) == 2
+    assert capsys.readouterr().err.startswith("finlab: error: A.json: expected a folder")
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda d: d.update(surprise=1), "surprise: unknown key"),
+        (lambda d: d.pop("layout"), "layout: required key is missing"),
+        (lambda d: d.update(failed=["nobody"]), "no fin 'nobody'"),
+        (lambda d: d["layout"].update(surprise=1), "layout: surprise: unknown key"),
+        (lambda d: d["self_test"][0]["command"].pop(), r"self_test\[0\].command: expected 4 rows"),
+        (lambda d: d["self_test"][0].pop("wrench"), r"self_test\[0\].wrench: required key is missing"),
+    ],
+)
+def test_a_robot_that_is_none_is_refused(
+    change: Callable[[dict[str, Any]], None], message: str, bundle: Bundle
+) -> None:
+    document = json.loads(bundle.files[ROBOT])
+    change(document)
+    with pytest.raises(FinlabError, match=message):
+        parse_robot(resealed({**bundle.files, ROBOT: json.dumps(document).encode()}))

@@ -1,4 +1,4 @@
-"""What `finlab-runtime` prints, and what it takes: bundles, and layout graph files on their own."""
+"""What `finlab-runtime` prints, and what it takes."""
 
 import json
 import os
@@ -11,11 +11,10 @@ import numpy as np
 import pytest
 
 import finlab
-from finlab.cli import main as finlab_main
 from finlab.deploy import self_check
 from finlab.deploy.bundle import Bundle
 from finlab.deploy.command import main
-from finlab.layout import Layout, save_layout
+from finlab.layout import save_layout
 
 TARGET = [1.0, 0.0, 0.5, 0.0, 0.0, 0.1]
 WRENCH = ["--wrench", *map(str, TARGET)]
@@ -35,7 +34,7 @@ def test_nothing_heavy_is_loaded(folder: Path) -> None:
         f"for name in {HEAVY!r}: sys.modules[name] = None\n"
         "from finlab.deploy.command import main\n"
         f"assert main(['check', {str(folder)!r}]) == 0\n"
-        f"assert main(['allocate', {str(folder / 'layout.graph.json')!r}, *{WRENCH!r}]) == 0\n"
+        f"assert main(['allocate', {str(folder)!r}, *{WRENCH!r}]) == 0\n"
         "import os; assert os.environ['OPENBLAS_NUM_THREADS'] == '1'\n"
     )
     environment = {name: value for name, value in os.environ.items() if not name.endswith("NUM_THREADS")}
@@ -62,29 +61,6 @@ def test_allocate_prints_a_table_or_one_object(folder: Path, capsys: Any) -> Non
     assert lines[0].split()[:5] == ["fin", "A", "[rad]", "f", "[Hz]"], "the table of the library"
     assert lines[1 + lost].split() == ["back_left", "failed"]
     assert any(line.startswith("err_norm ") for line in lines)
-
-
-@pytest.mark.parametrize("method", ["dual", "mdn"])
-def test_a_layout_graph_file_runs(
-    method: str, measured: Layout, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """Whatever its fins, tables included; with networks where the installed ones are those that it names."""
-    save_layout(measured, tmp_path / "robot.yaml")
-    graph = str(tmp_path / "robot.graph.json")
-    assert finlab_main(["export", str(tmp_path / "robot.yaml"), "-o", graph, "--method", method]) == 0
-    assert main(["check", graph]) == 0
-    assert "FAILED" not in capsys.readouterr().out
-    assert main(["allocate", graph, *WRENCH, "--json"]) == 0
-    shown = json.loads(capsys.readouterr().out)
-    truth = finlab.Allocator(measured, method).allocate(TARGET)
-    np.testing.assert_allclose(shown["command"], truth.command, rtol=1e-9)
-    if method == "mdn":
-        document = json.loads(Path(graph).read_text())
-        document["checkpoint"]["sha256"] = "0" * 64
-        document["checksum"] = finlab.layout.load.checksum_of(document)
-        Path(graph).write_text(json.dumps(document))
-        assert main(["check", graph]) == 2
-        assert "whose networks are not here; run the bundle that" in capsys.readouterr().err
 
 
 def test_a_layout_file_is_refused_with_the_way_out(

@@ -1,6 +1,5 @@
 """A robot out of its bundle: the library's answers, and a self-check that notices what is wrong."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,26 +10,17 @@ from finlab.deploy.bundle import Bundle, make_bundle
 from finlab.deploy.robot import DeployedRobot, load_robot, parse_robot
 from finlab.deploy.self_check import self_check
 from finlab.errors import FinlabError
-from finlab.layout import FinModelSpec, Layout
+from finlab.layout import Layout
 from finlab.layout.rudder import Rudder
 from finlab.physics import plant_of
 from tests.any_robot import AnyRobot
 from tests.exhaustive import sampled
 from tests.fin_robots import FIN_ROBOTS
 
-HEAVY = ("torch", "scipy", "viser", "matplotlib", "yaml", "tyro", "tqdm", "threadpoolctl")
-WRENCH = ["--wrench", "1", "0", "0.5", "0", "0", "0.1"]
-
 
 @pytest.fixture(scope="module")
 def robot(bundle: Bundle) -> DeployedRobot:
     return parse_robot(bundle.files)
-
-
-def with_model(robot: DeployedRobot, model: FinModelSpec) -> DeployedRobot:
-    """The same robot, had all its fins another model than the one that it was exported for."""
-    fins = tuple(replace(fin, model=model) for fin in robot.layout.fins)
-    return DeployedRobot(replace(robot.graph, layout=replace(robot.layout, actuators=fins)), robot.allocator)
 
 
 def bad(robot: DeployedRobot) -> list[str]:

@@ -17,7 +17,6 @@ import pytest
 from finlab.allocation import Allocation, Allocator
 from finlab.deploy import serve as serve_module
 from finlab.deploy.bundle import Bundle
-from finlab.deploy.graph import LayoutGraph
 from finlab.deploy.request import MAX_LINE
 from finlab.deploy.robot import DeployedRobot, parse_robot
 from finlab.deploy.serve import RECENT_S, Server, Timing
@@ -25,7 +24,6 @@ from finlab.deploy.stopping import SIGNALS, StopSignals
 from finlab.deploy.transport import LoopbackUdp, StandardStreams, Unsent
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
-from finlab.networks.normalization import Normalization
 
 GOOD: dict[str, Any] = {"wrench": [1, 0, 0.5, 0, 0, 0.1]}
 LINE = json.dumps(GOOD).encode() + b"\n"
@@ -149,7 +147,7 @@ class Slow(DeployedRobot):
     """A robot whose computer is busy."""
 
     def __init__(self, robot: DeployedRobot, delay: float) -> None:
-        super().__init__(robot.graph, robot.allocator)
+        super().__init__(robot.allocator)
         vars(self)["delay"] = delay
 
     def allocate(self, *args: Any, **options: Any) -> Allocation:
@@ -190,15 +188,11 @@ def test_commands_change_no_faster_than_servos_do(
 
 
 def test_thrusters_and_rudders_rest_in_their_own_words() -> None:
-    layout = load_layout("turtle_hybrid")
-    graph = LayoutGraph(
-        layout, ("lift_right",), Normalization(np.zeros(6), np.ones(6)), None, None, "dual", ()
-    )
     script = Script(None)
-    Server(DeployedRobot(graph, Allocator(load_layout("A"))), Timing()).run(script)  # type: ignore[arg-type]
+    Server(DeployedRobot(Allocator(load_layout("turtle_hybrid")), ("lift_right",)), Timing()).run(script)  # type: ignore[arg-type]
     assert [reply["status"] for reply in script.sent] == ["neutral", "neutral"]
     told = {part["name"]: part for part in script.sent[0]["actuators"]}
-    assert tuple(told) == layout.names and "command" not in script.sent[0]
+    assert tuple(told) == load_layout("turtle_hybrid").names and "command" not in script.sent[0]
     assert told["lift_left"] == {
         "name": "lift_left",
         "type": "thruster",

@@ -20,23 +20,19 @@ import trimesh
 
 from finlab.actuators.fin.table_file import read_table
 from finlab.allocation import Allocator
-from finlab.bundle_files import CHECKSUMS, GRAPH, checksums
+from finlab.bundle_files import CHECKSUMS, ROBOT, checksums
 from finlab.deploy.bundle import make_bundle
-from finlab.deploy.graph import build_graph
-from finlab.deploy.graph_file import graph_bytes, read_graph
 from finlab.deploy.robot import load_robot
 from finlab.errors import FinlabError
 from finlab.exchange import read_csv, read_urdf, write_csv, write_urdf
 from finlab.fit.measurements import read_measurements
 from finlab.fit.robot.swim_file import read_swim
 from finlab.layout import FinModelSpec, load_layout, save_layout
-from finlab.layout.load import checksum_of
 from finlab.networks.checkpoint import read_checkpoint
 from finlab.physics import make_law, write_table
 from finlab.sim import load_log
 from finlab.sim.log import Tick, log_of_ticks
 from finlab.sim.task import make_trajectory
-from tests.any_robot import AnyRobot
 from tests.fit.cell import columns_of, commands, measured, soft, write
 from tests.fit.robot.swims import write_csv as write_swim
 from webapp.scene.meshes.mesh_hull import MeshHull
@@ -99,21 +95,10 @@ def repacked(rng: np.random.Generator, content: bytes) -> bytes:
 
 def forged(parts: dict[str, bytes]) -> dict[str, bytes]:
     """The files of a bundle with checksums that fit again; other files as they are."""
-    if GRAPH in parts:
-        try:
-            graph = json.loads(parts[GRAPH])
-            graph["checksum"] = checksum_of(graph)
-            parts[GRAPH] = json.dumps(graph).encode()
-        except (ValueError, TypeError, RecursionError):
-            pass
+    if ROBOT in parts:
         rest = {key: content for key, content in parts.items() if key != CHECKSUMS}
         return {**rest, CHECKSUMS: checksums(rest)}
     return parts
-
-
-def signed_graph(rng: np.random.Generator, content: bytes) -> bytes:
-    """A damaged graph file whose checksum fits."""
-    return forged({GRAPH: changed(rng, content)})[GRAPH]
 
 
 def parts_of(archive: bytes) -> dict[str, bytes]:
@@ -184,8 +169,6 @@ def kinds(tmp_path_factory: pytest.TempPathFactory, untrained_mdn: Path) -> list
         rows = [[0.1 * k, 0.1 * k, np.sin(k), -1.0] for k in range(60)]
         csv.writer(file).writerows([["t", "x", "y", "z"], *rows])
     bundle = make_bundle(Allocator(layout, "mdn", checkpoint=untrained_mdn))
-    allocator = AnyRobot()
-    graph = graph_bytes(build_graph(allocator.on(PAIR)))
     box = trimesh.creation.icosphere(subdivisions=2, radius=0.2)
     names = [path.relative_to(untrained_mdn).as_posix() for path in untrained_mdn.iterdir()]
     checkpoint = packed({name: (untrained_mdn / name).read_bytes() for name in names})
@@ -232,7 +215,6 @@ def kinds(tmp_path_factory: pytest.TempPathFactory, untrained_mdn: Path) -> list
     return [
         Kind("layout.yaml", yaml, load_layout),
         Kind("layout.json", (place / "a.json").read_bytes(), load_layout),
-        Kind("robot.graph.json", graph, read_graph, signed_graph),
         Kind("bundle.zip", bundle.zip_bytes(), simple_answer, repacked),
         Kind("checkpoint.bin", checkpoint, from_parts, signed),
         Kind("fins.csv", (place / "a.csv").read_bytes(), read_csv),
@@ -246,7 +228,6 @@ def kinds(tmp_path_factory: pytest.TempPathFactory, untrained_mdn: Path) -> list
         Kind("path.csv", (place / "path.csv").read_bytes(), make_trajectory),
         *(Kind(name, export(kind), mesh) for name, kind in shapes.items()),
         Kind("upload.zip", travelling, upload, repacked),
-        Kind("upload.graph.json", graph, upload, signed_graph),
         Kind("plain.link", links["y"], link),
         Kind("tables.link", links["t"], link),
     ]

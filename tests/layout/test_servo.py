@@ -1,4 +1,4 @@
-"""The drive of a fin, in layouts, layout files, graph files and bundles."""
+"""The drive of a fin, in layouts, layout files and bundles."""
 
 import json
 from pathlib import Path
@@ -38,15 +38,11 @@ def test_files_hold_what_is_not_usual(slow: Layout, tmp_path: Path, suffix: str)
     assert set(own.values()) == {None}
 
 
-def test_bundles_and_graph_files_take_it_along(slow: Layout, tmp_path: Path) -> None:
-    import jsonschema
-
+def test_bundles_take_it_along(slow: Layout, tmp_path: Path) -> None:
     make_bundle(Allocator(slow)).write(tmp_path / "bundle")
     assert load_layout(tmp_path / "bundle") == slow
-    graph = json.loads((tmp_path / "bundle" / "layout.graph.json").read_text())
-    schema = json.loads(Path("finlab/deploy/graph.schema.json").read_text())
-    jsonschema.Draft202012Validator(schema).validate(graph)
-    assert [node["id"] for node in graph["graph"]["nodes"] if "servo" in node] == ["back_left"]
+    robot = json.loads((tmp_path / "bundle" / "robot.json").read_text())
+    assert [fin["name"] for fin in robot["layout"]["fins"] if "servo" in fin] == ["back_left"]
 
 
 @pytest.mark.parametrize("field", ["amplitude_pole", "frequency_pole", "direction_pole", "speed_limit"])

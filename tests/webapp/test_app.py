@@ -132,10 +132,8 @@ def test_names_are_escaped(server: viser.ViserServer, view: View) -> None:
     on_loop(server, lambda: view.do(lambda: view.session.toggle_failure(evil)))
 
 
-def test_graph_and_bundle_are_sent(server: viser.ViserServer, view: View) -> None:
+def test_a_bundle_that_cannot_be_made_is_told(server: viser.ViserServer, view: View) -> None:
     until(lambda: not view.busy)
-    on_loop(server, lambda: view.do(view.exports.graph))
-    until(lambda: "ucat.graph.json" in view.client.files)
     on_loop(server, lambda: view.do(view.exports.bundle))
     until(lambda: "ucat.zip" in view.client.files)
     on_loop(server, lambda: view.do(lambda: view.session.set_setting("method", "sqp")))

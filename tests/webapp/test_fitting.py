@@ -7,7 +7,6 @@ import zipfile
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -26,7 +25,6 @@ from webapp.session.companions import archive_of, read_archive, stored_table
 from webapp.session.layout_edits import with_model
 from webapp.tasks import fitting
 from webapp.tasks.background import Worker
-from webapp.tasks.exports import Exports
 from webapp.tasks.fitting import Fitting
 
 LAW = soft(k=4.0, p=1.4, x0=0.9, q=4.0, e=0.15, phi_e=1.0, d=0.12)
@@ -275,23 +273,6 @@ def test_a_layout_carries_its_tables_elsewhere(tmp_path: Path, cache: Path) -> N
     assert files.layout_file(load_layout("ucat"))[0] == "ucat.yaml"
 
 
-def test_a_graph_file_travels_with_its_tables(tmp_path: Path, cache: Path, worker: Worker) -> None:
-    sent: list[tuple[str, bytes]] = []
-    client: Any = SimpleNamespace(send_file_download=lambda name, content, **_: sent.append((name, content)))
-    layout = robot(tmp_path, cache)
-    session = Session(layout)
-    Exports(page_of(worker, session, client=client)).graph()
-    until(lambda: bool(sent))
-    ((name, content),) = sent
-    assert name == "my_robot.graph.zip"
-    for path in cache.glob("*.csv"):
-        path.unlink()
-    opened = files.read_layout(name, content).layout
-    assert opened.fins[2].model == layout.fins[2].model and table_bytes(
-        dict(opened.fins[2].model.parameters)["path"]
-    )
-
-
 def test_limits_beyond_what_was_measured_are_told(tmp_path: Path, cache: Path) -> None:
     fin = robot(tmp_path, cache).fins[2]
     assert "at the edge" not in model_card(fin)
@@ -306,7 +287,7 @@ def test_a_bundle_opens_in_the_app(tmp_path: Path, cache: Path) -> None:
     content = make_bundle(Allocator(layout)).zip_bytes()
     assert files.read_layout("robot.zip", content).layout.fins[2].model == layout.fins[2].model
     with pytest.raises(DataError, match=r"^robot\.zip: is damaged"):
-        files.read_layout("robot.zip", content.replace(b"finlab-graph", b"finlab-gr@ph"))
+        files.read_layout("robot.zip", content.replace(b"robot.json", b"rob@t.json", 1))
 
 
 @pytest.mark.parametrize(

@@ -174,24 +174,20 @@ def test_what_comes_along_is_kept_and_goes_along(tmp_path: Path, table: bytes, c
 def test_a_bundle_names_only_what_is_in_it(tmp_path: Path, table: bytes) -> None:
     import json
 
-    from finlab.bundle_files import CHECKSUMS, GRAPH, checksums
+    from finlab.bundle_files import CHECKSUMS, ROBOT, checksums
     from finlab.deploy.bundle import make_bundle
-    from finlab.layout.load import checksum_of
 
     bundle = make_bundle(Allocator(load_layout("ucat"))).zip_bytes()
     with zipfile.ZipFile(io.BytesIO(bundle)) as archive:
         parts = {name: archive.read(name) for name in archive.namelist()}
     for path in secrets_of(tmp_path, table)[:9]:
-        graph = json.loads(parts[GRAPH])
-        graph["graph"]["nodes"][0]["model"] = {"type": "table", "path": path}
-        graph["checksum"] = checksum_of(graph)
-        forged = {**parts, GRAPH: json.dumps(graph).encode()}
+        robot = json.loads(parts[ROBOT])
+        robot["layout"]["fins"][0]["model"] = {"type": "table", "path": path}
+        forged = {**parts, ROBOT: json.dumps(robot).encode()}
         del forged[CHECKSUMS]
         forged[CHECKSUMS] = checksums(forged)
-        for name, content in (("robot.zip", packed(forged)), ("robot.graph.json", forged[GRAPH])):
-            sentence = refused(name, content)
-            assert "not in the bundle" in sentence or "did not come along" in sentence
-            assert seen_of(tmp_path) == [], path
+        assert "not in the bundle" in refused("robot.zip", packed(forged))
+        assert seen_of(tmp_path) == [], path
 
 
 def test_a_mesh_that_names_other_files_reads_none(tmp_path: Path) -> None:
@@ -206,7 +202,7 @@ def test_a_mesh_that_names_other_files_reads_none(tmp_path: Path) -> None:
     "content", [b"\xff\xfe", b"", b"[" * 100_000, b"a: &a [*a]", b"!!python/object:os.system x"]
 )
 def test_any_bytes_are_refused_in_a_sentence(content: bytes) -> None:
-    for name in ("a.yaml", "a.json", "a.zip", "a.graph.json", "../../etc/passwd.yaml"):
+    for name in ("a.yaml", "a.json", "a.zip", "../../etc/passwd.yaml"):
         with pytest.raises((LayoutError, DataError)) as error:
             files.read_layout(name, content)
         assert "/etc" not in str(error.value).replace("passwd.yaml", "")

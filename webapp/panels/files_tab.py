@@ -14,19 +14,11 @@ class FilesTab:
 
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         self._page = page
-        about = "Graph, the fins' physics, README and checksums: what finlab export makes."
+        about = "The robot, its fins' physics, README and checksums: what finlab export makes."
         add_html(gui, marker("fl-primary"))
         icon = viser.Icon.PACKAGE_EXPORT
         page.add_button("Export the bundle (ZIP)", page.exports.bundle, icon=icon, hint=about)
-        parts = {
-            "Graph file": page.exports.graph,
-            "Picture (PNG)": page.exports.picture,
-        }
-        page.add_buttons(
-            "Single files",
-            parts,
-            hint="The layout graph, and what is seen.",
-        )
+        page.add_buttons("Single files", {"Picture (PNG)": page.exports.picture}, hint="What is seen.")
         self._command = gui.add_html("")
 
     def refresh(self) -> None:

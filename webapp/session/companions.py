@@ -61,11 +61,6 @@ def with_hull_inside(layout: Layout) -> tuple[Layout, dict[str, bytes]]:
     return replace(layout, body=replace(layout.body, hull=replace(hull, mesh=name))), {name: content}
 
 
-def has_tables(layout: Layout) -> bool:
-    """Whether a fin is known by a table, so that the layout needs more than its own file."""
-    return any(fin.model.type == "table" for fin in layout.fins)
-
-
 def archive_of(name: str, document: bytes, tables: dict[str, bytes]) -> bytes:
     """A document and the force tables that it names, as one zip archive; the same bytes each time."""
     buffer = io.BytesIO()

@@ -15,7 +15,7 @@ from finlab.files.guarded import decoded
 from finlab.files.plain_values import parse_json, parse_yaml, yaml_text
 from finlab.layout import Layout, layout_to_dict, load_layout, parse_layout
 from finlab.layout.body import Hull
-from finlab.layout.load import A_LAYOUT, MAX_BYTES, SUFFIX, GraphText, parse_graph_document
+from finlab.layout.load import A_LAYOUT, MAX_BYTES
 from finlab.physics import plant_of
 from finlab.sim import Trajectory
 from finlab.sim.task import COLUMNS, read_trajectory
@@ -59,7 +59,7 @@ def file_stem(name: str) -> str:
 
 
 def read_layout(name: str, content: bytes) -> Opened:
-    """The layout in an uploaded layout file, graph file, bundle, or archive of a layout with its files.
+    """The layout in an uploaded layout file, bundle, or archive of a layout with its files.
 
     Raises:
         LayoutError: the file is too large, no text or no layout, or names a force table that did not come
@@ -90,8 +90,6 @@ def _read_alone(source: str, content: bytes) -> Layout:
     if len(content) > MAX_BYTES:
         raise LayoutError(f"is larger than {MAX_BYTES:,} bytes, a layout has a few thousand", source=source)
     text = decoded(content, source, A_LAYOUT, LayoutError)
-    if source.lower().endswith(SUFFIX):
-        return parse_graph_document(GraphText(text, source)).layout
     parse = parse_json if source.lower().endswith(".json") else parse_yaml
     return parse_layout(parse(text, source, LayoutError), source=source, may_open=False)
 

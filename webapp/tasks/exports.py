@@ -2,19 +2,15 @@
 
 import threading
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from functools import partial
-from typing import Any
 
 import imageio.v3 as iio
 
 from finlab.allocation.allocator import Allocator
-from finlab.deploy.bundle import make_bundle, with_tables_inside
-from finlab.deploy.graph import build_graph
-from finlab.deploy.graph_file import graph_bytes
+from finlab.deploy.bundle import make_bundle
 from finlab.errors import FinlabError
 from finlab.sim.log_csv import csv_of
-from webapp.session.companions import archive_of, has_tables
+from webapp.session.companions import archive_of
 from webapp.session.files import file_stem
 from webapp.tasks.context import Context
 from webapp.tasks.recorded import Recorded
@@ -30,20 +26,6 @@ class Exports:
         """Send what the page's session holds to its browser."""
         self._context, self._session = context, context.session
         self._picturing = False
-
-    def graph(self) -> None:
-        """Send the layout graph file; where fins are known by tables, an archive with them."""
-        layout = self._session.state.layout
-        name = f"{file_stem(layout.name)}.graph.json"
-
-        def archive(*robot: Any) -> bytes:
-            inside, tables = with_tables_inside(layout)
-            return archive_of(name, graph_bytes(replace(build_graph(*robot), layout=inside)), tables)
-
-        if has_tables(layout):
-            self._send_made(".graph.zip", archive)
-        else:
-            self._send_made(".graph.json", lambda *robot: graph_bytes(build_graph(*robot)))
 
     def bundle(self) -> None:
         """Send the bundle for the robot: the same bytes as `finlab export --zip`.
