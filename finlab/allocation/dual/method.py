@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from finlab.allocation.dual.answers import Sets
 from finlab.allocation.dual.bounds import proved_power
-from finlab.allocation.dual.branch import gaps, least_power, may_have_gaps
+from finlab.allocation.dual.branch import gaps, halves, least_power, may_have_gaps
 from finlab.allocation.dual.compiled import Compiled
 from finlab.allocation.dual.drag import at_the_price_of_drag
 from finlab.allocation.dual.newton import Prices, solve
@@ -41,6 +41,8 @@ REFINE_STEPS = 12
 """Levenberg-Marquardt steps on commands."""
 TICK_STEPS = 5
 """The same where a command of a tick is not exact."""
+TICK_CUTS = 3
+"""Times that what may follow is cut where that has gaps."""
 NEAREST = 1e-3
 """Error above that of forces without gaps up to which the answer of a tick counts as the nearest."""
 TABLES = 1e-5
@@ -259,10 +261,19 @@ class Dual(Method):
                 error = self._error(command, aim)
             return command, float(error[0])
 
-        force = within_tick(self.compiled.robot, sets, asked, found.prices, 1.0 / self.scale)
-        command, error = realized(force)
-        least = float(np.linalg.norm((self.compiled.robot.wrench(force) - asked) / self.scale))
-        if error > least + NEAREST:  # what may follow has gaps
-            other, its_error = realized(self._forces(asked, sets, CLOSEST, found.prices).force)
-            command = other if its_error < error else command
+        def tried(part: Sets) -> tuple[float, Array, Array, Sets]:
+            """Error and command of a part of the sets, the dual's forces there, and the part."""
+            force = within_tick(robot, part, asked, found.prices, 1.0 / self.scale)
+            command, error = realized(force)
+            return error, command, force, part
+
+        robot = self.compiled.robot
+        error, command, force, part = tried(sets)
+        least = float(np.linalg.norm((robot.wrench(force) - asked) / self.scale))
+        for _ in range(TICK_CUTS):
+            if error <= least + NEAREST or (cut := halves(robot, part, force[:, 0])) is None:
+                break
+            _, _, force, part = now = min(map(tried, cut), key=lambda each: each[0])
+            if now[0] < error:
+                error, command = now[:2]
         return command

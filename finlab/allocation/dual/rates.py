@@ -86,6 +86,8 @@ def within_tick(robot: DualRobot, sets: Sets, wrench: Array, prices: Array, weig
         weight: of the missing wrench along each axis (6,) [1/N, 1/(N m)].
     """
     target = robot.target(wrench)
+    if not len(target):  # nothing pushes, such as rudders at rest
+        return np.zeros((len(robot.effectiveness), 1))
     found = solve(robot, target, sets, prices)
     if found.solved[0]:
         return found.force

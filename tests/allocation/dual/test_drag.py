@@ -36,6 +36,14 @@ def test_rudders_alone_give_nothing_at_rest_and_something_in_a_flow() -> None:
     np.testing.assert_allclose(moving.wrench[[1, 5]], [1, -0.5], rtol=0.05)
 
 
+def test_rudders_at_rest_turn_back_no_faster_than_their_drives() -> None:
+    rudder = Rudder("r", (-0.5, 0, 0), (0, 0, 1), (1, 0, 0), 0.01, (-0.3, 0.3), lift_slope=3.0, rate=0.5)
+    result = finlab.Allocator(Layout("rudder", (rudder,))).allocate(
+        [0, 1, 0, 0, 0, -0.5], previous=[[0.3, 0.0, 0.0]]
+    )
+    assert 0.25 - 1e-12 <= result.command[0, 0] <= 0.3
+
+
 def test_many_wrenches_at_once_are_answered_as_one_by_one() -> None:
     robot = load(random_robot("rudders", 1, 7))
     flow, own = random_flow("rudders", 1, 7), random_plant("rudders", 1, 7)
