@@ -28,7 +28,7 @@ from finlab.allocation.method import Method
 from finlab.allocation.policy import CLOSEST, Policy
 from finlab.allocation.settings import Settings, number
 from finlab.allocation.solution import Solution
-from finlab.arrays import Array
+from finlab.arrays import AnyArray, Array
 from finlab.networks.trained import TrainedWeights
 
 EXACT = 1e-8
@@ -148,16 +148,20 @@ class Dual(Method):
         robot = self.compiled.robot
         asked = targets - self.compiled.beside
         found = self._forces(asked, robot.sets, policy)
-        aim = np.where(found.within[:, None], asked, robot.wrench(found.force)) + self.compiled.beside
+        aim = targets
+        if not found.within.all():
+            aim = np.where(found.within[:, None], asked, robot.wrench(found.force)) + self.compiled.beside
         command, found = self._commands(aim, found, robot.sets, previous)
-        bound = None if self._unproved else partial(self._bound, aim, found)
+        # Any prices prove a bound; of single precision they take half the memory.
+        bound = partial(self._bound, aim, found.price.astype(np.float32), found.value)
         if previous is not None and not self._rates.allow(previous, command[0]):
             command = self._in_a_tick(aim, found, previous)
-        return Solution(command, bound)
+        return Solution(command, None if self._unproved else bound)
 
-    def _bound(self, aim: Array, found: Forces) -> Array:
-        """Power (N,) [W] that no answer for wrenches (N, 6) undercuts."""
-        return np.maximum(proved_power(self.compiled, aim, found.price), found.value)
+    def _bound(self, aim: Array, price: AnyArray, value: Array) -> Array:
+        """Power (N,) [W] that no answer for wrenches (N, 6) undercuts, by prices (N, 6) and what the branch
+        has proved (N,)."""
+        return np.maximum(proved_power(self.compiled, aim, np.asarray(price, np.float64)), value)
 
     @property
     def _unproved(self) -> bool:
@@ -180,7 +184,7 @@ class Dual(Method):
             within &= np.linalg.norm(rest, axis=1) <= OUT_OF_RANGE * (
                 1e-3 + np.linalg.norm(targets / robot.scale, axis=1)
             )
-        force, prices, value = root.force, root.prices, np.zeros(len(targets))
+        force, prices, value = root.force, root.prices, np.broadcast_to(0.0, len(targets))
         if may_have_gaps(robot, sets, force):
             force, value = self._in_gaps(target, sets, root, within)
         if not within.all():
@@ -197,9 +201,9 @@ class Dual(Method):
         loses the targets that they do not meet."""
         robot = self.compiled.robot
         rows = np.flatnonzero(within & (gaps(robot, root.force, sets) > 0.0).any(axis=0))
-        value = np.zeros(len(within))
         if not len(rows):
-            return root.force, value
+            return root.force, np.broadcast_to(0.0, len(within))
+        value = np.zeros(len(within))
         some = Prices(*(values[..., rows] for values in root))
         cut = least_power(robot, target[:, rows], sets.take(rows), some)
         force = root.force.copy()
