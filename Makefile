@@ -8,7 +8,7 @@ HOST_PORT ?= 8080
 THREADS := OMP_NUM_THREADS=1 MKL_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
 .DEFAULT_GOAL := help
-.PHONY: schemas figures help setup app test test-all test-near test-fast check format checkpoint checkpoint-default checkpoint-paper wheel wheel-check clean
+.PHONY: schemas figures help setup app test test-all test-near test-fast check format checkpoint wheel wheel-check clean
 
 help:
 	@echo "make setup        make .venv with everything pinned in constraints.txt"
@@ -21,7 +21,7 @@ help:
 	@echo "make schemas      write the JSON Schema of layout files"
 	@echo "make figures      the tables of figures in docs/*.md, or of one page: make figures PAGE=evaluation"
 	@echo "make format       let ruff correct what it can"
-	@echo "make checkpoint   train what is shipped, PRESET=default or PRESET=paper (hours)"
+	@echo "make checkpoint   train the network that is shipped (hours)"
 	@echo "make wheel-check  build the wheel, install it in an empty environment of each Python here and try it"
 
 setup: $(STAMP)
@@ -64,19 +64,9 @@ format: setup
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
-# The shipped checkpoints, each by one command: make checkpoint PRESET=default, make checkpoint PRESET=paper.
-# A run that was stopped goes on where it was.
-PRESET ?= default
-
-checkpoint: setup checkpoint-$(PRESET)
-
-checkpoint-default:
+# The checkpoint `default`.
+checkpoint: setup
 	$(BIN)/finlab train mdn -o runs/default
-
-checkpoint-paper:
-	$(BIN)/finlab train surrogate -o runs/surrogate-paper
-	$(BIN)/finlab train allocator --surrogate runs/surrogate-paper -o runs/paper-printed --layouts 100000 --commands 50 --stop-after 23452
-	$(BIN)/finlab train allocator --preset annealed --start runs/paper-printed --surrogate runs/surrogate-paper -o runs/paper --layouts 100000 --commands 50 --seed 1
 
 wheel: setup
 	$(BIN)/python -m pip wheel --disable-pip-version-check --no-deps --no-build-isolation -w dist .

@@ -23,20 +23,24 @@ def untrained_checkpoint(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
     from finlab.networks.normalization import Normalization
     from finlab.networks.trained import TrainedWeights, sizes_for_file
-    from finlab.paper.training.recipes import RECIPES
+    from finlab.paper.network import NetworkConfig
+    from finlab.paper.surrogate import SurrogateConfig
     from finlab.training.first_weights import first_weights
     from finlab.training.saving import arrays_of, save_checkpoint
 
-    recipe = RECIPES["smoke"]
+    surrogate = SurrogateConfig(hidden=(16, 16))
+    network = NetworkConfig(
+        width=32, heads=2, graph_layers=1, transformer_layers=1, feedforward=32, n_components=4
+    )
     folder = tmp_path_factory.mktemp("checkpoints") / "untrained"
     checkpoint = TrainedWeights(
         name=folder.name,
-        surrogate_sizes=recipe.surrogate.for_file(),
-        surrogate=arrays_of(first_weights(recipe.surrogate.shapes(), 0)),
+        surrogate_sizes=surrogate.for_file(),
+        surrogate=arrays_of(first_weights(surrogate.shapes(), 0)),
         normalization=Normalization(np.zeros(6), np.array([1.0, 1.0, 1.0, 0.1, 0.2, 0.3])),
         fin_model={"type": "drag"},
-        network_sizes=sizes_for_file(recipe.network),
-        network=arrays_of(first_weights(recipe.network.shapes(), 0)),
+        network_sizes=sizes_for_file(network),
+        network=arrays_of(first_weights(network.shapes(), 0)),
         preset="smoke",
     )
     save_checkpoint(folder, checkpoint)

@@ -19,8 +19,6 @@ EXAMPLES = {
     "layout export": "finlab layout export A -o A.urdf",
     "train": "finlab train mdn -o runs/mine --preset smoke",
     "train mdn": "finlab train mdn -o runs/mine --preset smoke",
-    "train surrogate": "finlab train surrogate -o runs/surrogate --preset smoke",
-    "train allocator": "finlab train allocator --surrogate runs/surrogate -o runs/paper --preset smoke",
     "eval": "finlab eval wrench --split id --layouts 10 --targets 10 --methods dual,sqp",
     "eval report": "finlab eval report -o runs/report --quick",
     "bench": "finlab bench dual analytic --quick --json bench.json",

@@ -29,7 +29,7 @@ class ForceNetworkConfig:
     """What it is fed, by its name in files."""
     joint: ClassVar[bool] = True
     """Whether one component is chosen for all fins together."""
-    verb: ClassVar[str] = "mdn"
+    shipped: ClassVar[str] = "default"
     """What `finlab train` calls it."""
     width: int = 64
     """Width of every hidden layer."""

@@ -27,7 +27,8 @@ class Sizes(Protocol):
     features: ClassVar[str]
     joint: ClassVar[bool]
     """Whether one component is chosen for all fins together."""
-    verb: ClassVar[str]
+    shipped: ClassVar[str]
+    """The checkpoint with such a network that is shipped."""
 
     def shapes(self) -> Shapes:
         """Shape of each array; a `ValueError` where there is no network of these sizes."""
@@ -71,8 +72,8 @@ class TrainedWeights:
         if (known.get("features"), known.get("joint")) != (kind.features, kind.joint):
             has = f"a network that is fed {known.get('features')!r:.40}" if known else "no network"
             raise CheckpointError(
-                f"checkpoint {self.name!r} holds {has}, expected one that is fed {kind.features!r}; train it "
-                f"with `finlab train {kind.verb}`"
+                f"checkpoint {self.name!r} holds {has}, expected one that is fed {kind.features!r}, as that "
+                f"of the shipped `{kind.shipped}`"
             )
         try:
             sizes = kind(**{key: value for key, value in known.items() if key not in ("features", "joint")})

@@ -9,8 +9,6 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
-import numpy as np
-
 from finlab.arrays import Values, library_of
 from finlab.networks import layers
 from finlab.networks.layers import Weights
@@ -28,7 +26,7 @@ class NetworkConfig:
     features: ClassVar[str] = "raw"
     joint: ClassVar[bool] = False
     """Whether one component is chosen for all fins together."""
-    verb: ClassVar[str] = "allocator"
+    shipped: ClassVar[str] = "paper"
     width: int = 128
     heads: int = 4
     graph_layers: int = 2
@@ -62,29 +60,28 @@ class NetworkConfig:
             | linear_shapes("weight", width, m)
         )
 
-    def __call__(self, w: Weights, x: Values, target: Values, mask: Values | None = None) -> "Mixture":
+    def __call__(self, w: Weights, x: Values, target: Values) -> "Mixture":
         """The mixtures that a network of these sizes gives.
 
         Args:
             w: its weights.
             x: node features (B, n, 10).
             target: normalized, centred targets (B, 6).
-            mask: (B, n), True where a fin exists; None where all do.
         """
         xp = library_of(x)
         hidden = layers.linear(w, "enter", x)
         for name in self._named("graph", self.graph_layers):
-            hidden = hidden + layers.elu(graph_attention(w, name, self.heads, hidden, mask))
+            hidden = hidden + layers.elu(graph_attention(w, name, self.heads, hidden))
         wrench = layers.linear(w, "wrench", target)[:, None]
         wrench = xp.broadcast_to(wrench, (*hidden.shape[:-1], wrench.shape[-1]))
         hidden = layers.linear(w, "join", xp.concatenate([hidden, wrench], -1))
         for name in self._named("transformer.layers", self.transformer_layers):
             seen = layers.layer_norm(w, f"{name}.norm1", hidden)
-            hidden = hidden + self_attention(w, f"{name}.self_attn", self.heads, seen, mask)
+            hidden = hidden + self_attention(w, f"{name}.self_attn", self.heads, seen)
             seen = layers.layer_norm(w, f"{name}.norm2", hidden)
             hidden = hidden + layers.feed_forward(w, f"{name}.linear1", f"{name}.linear2", seen)
         hidden = layers.layer_norm(w, "norm", hidden)
-        raw, logits = (_single(layers.linear(w, end, hidden)) for end in ("head", "weight"))
+        raw, logits = (layers.linear(w, end, hidden) for end in ("head", "weight"))
         raw = raw.reshape(*raw.shape[:-1], self.n_components, 6)
         return Mixture(logits, raw[..., :3], LOG_STD_BOUND * xp.tanh(0.5 * raw[..., 3:]))
 
@@ -129,19 +126,19 @@ class Mixture(NamedTuple):
         return (mean + library_of(log_std).exp(log_std) * normal).swapaxes(1, 2)
 
 
-def graph_attention(w: Weights, name: str, heads: int, x: Values, mask: Values | None = None) -> Values:
+def graph_attention(w: Weights, name: str, heads: int, x: Values) -> Values:
     """A GATv2 layer on complete graphs with self loops: features (B, n, width) of features (B, n, F); heads
-    are concatenated. `mask` (B, n) is True where a node exists, None where all do."""
+    are concatenated."""
     source, target = layers.linear(w, f"{name}.source", x), layers.linear(w, f"{name}.target", x)
     hidden = layers.leaky_relu(source[:, None] + target[:, :, None])  # (B, n, n, width)
     score = layers.head_scores(w[f"{name}.attention"], hidden)
-    weight = layers.softmax(_masked(score, mask, (slice(None), None, slice(None), None)), 2)
+    weight = layers.softmax(score, 2)
     split = source.reshape(*source.shape[:2], heads, -1)
     seen = library_of(x).einsum("bijh,bjhc->bihc", weight, split)
     return seen.reshape(source.shape) + w[f"{name}.bias"]
 
 
-def self_attention(w: Weights, name: str, heads: int, x: Values, mask: Values | None = None) -> Values:
+def self_attention(w: Weights, name: str, heads: int, x: Values) -> Values:
     """Scaled dot-product attention of a Transformer: features (B, n, width) of the same."""
     width = x.shape[-1]
     packed = {"in.weight": w[f"{name}.in_proj_weight"], "in.bias": w[f"{name}.in_proj_bias"]}
@@ -149,15 +146,5 @@ def self_attention(w: Weights, name: str, heads: int, x: Values, mask: Values | 
     parts = (qkv[..., k * width : (k + 1) * width] for k in range(3))
     q, k, v = (part.reshape(*x.shape[:2], heads, -1).swapaxes(1, 2) for part in parts)
     score = (q @ k.swapaxes(2, 3)) * (width // heads) ** -0.5
-    weight = layers.softmax(_masked(score, mask, (slice(None), None, None)))
+    weight = layers.softmax(score)
     return layers.linear(w, f"{name}.out_proj", (weight @ v).swapaxes(1, 2).reshape(x.shape))
-
-
-def _masked(score: Values, mask: Values | None, place: tuple[slice | None, ...]) -> Values:
-    """Scores, minus infinity where what is looked at does not exist."""
-    return score if mask is None else library_of(score).where(mask[place], score, -math.inf)
-
-
-def _single(x: Values) -> Values:
-    """In single precision: training runs the layers in less."""
-    return x if library_of(x) is np else x.float()

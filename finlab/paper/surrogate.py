@@ -59,9 +59,7 @@ class SurrogateConfig:
         """The sizes of the surrogate of a checkpoint; a `CheckpointError` where it holds none."""
         sizes = weights.surrogate_sizes
         if sizes is None:
-            raise CheckpointError(
-                f"checkpoint {weights.name!r} holds no surrogate; train one with `finlab train surrogate`"
-            )
+            raise CheckpointError(f"checkpoint {weights.name!r} holds no surrogate; `paper` does")
         try:
             if set(sizes) != {"kind", "hidden"} or sizes["kind"] != "mlp":
                 raise ValueError("expected the kind 'mlp' and the widths of its hidden layers")
@@ -79,20 +77,16 @@ class SurrogateConfig:
         mounting_angle: Values,
         lower: Values,
         upper: Values,
-        mask: Values | None = None,
     ) -> Values:
         """Wrenches (..., 6) [N, N m] of commands (..., n, 3) on layouts broadcastable to them, by a surrogate
-        with these weights; `mask` (..., n) is True where a fin exists."""
+        with these weights."""
         xp = library_of(command)
         x = raw_features(position, mounting_angle, lower, upper)
         x = xp.broadcast_to(x, (*command.shape[:-1], x.shape[-1]))
         force = perceptron(self, w, of_fins(w, x), to_normalized(command, lower, upper))
-        if mask is not None:
-            force = force * mask[..., None]
         # The perceptron answers in the body frame, that of a fin whose shaft points forward.
         wrench = wrench_of_forces(force, force_effectiveness(position, 0.0 * mounting_angle))
-        here = xp.ones_like(x[..., 0]) if mask is None else mask * xp.ones_like(x[..., 0])
-        scale, bias = correction(w, x, here)
+        scale, bias = correction(w, x)
         return wrench * (1.0 + scale) + bias
 
 
@@ -123,14 +117,10 @@ def perceptron(
     return z * FORCE_UNIT
 
 
-def correction(w: Weights, features: Values, here: Values) -> tuple[Values, Values]:
-    """By how much a layout's wrench is stretched, and what is added to it, (..., 6) each.
-
-    `here` (..., n) is 1 where a fin exists, else 0.
-    """
-    described = library_of(features).tanh(layers.linear(w, "descriptor.0", features)) * here[..., None]
-    pooled = described.sum(-2) / here.sum(-1)[..., None]
-    both = layers.linear(w, "affine", pooled)
+def correction(w: Weights, features: Values) -> tuple[Values, Values]:
+    """By how much a layout's wrench is stretched, and what is added to it, (..., 6) each."""
+    described = library_of(features).tanh(layers.linear(w, "descriptor.0", features))
+    both = layers.linear(w, "affine", described.mean(-2))
     return both[..., :6], both[..., 6:]
 
 
@@ -146,7 +136,7 @@ class LayoutSurrogate:
         self._fins = of_fins(self._w, features)
         self._lower, self._upper = (limit.astype(np.float32) for limit in (layout.lower, layout.upper))
         self._half = np.maximum(0.5 * (self._upper - self._lower), np.float32(1e-9))
-        scale, self.bias = correction(self._w, features, np.ones(len(features), np.float32))
+        scale, self.bias = correction(self._w, features)
         """Wrench (6,) [N, N m] of fins that give no force."""
         effectiveness = force_effectiveness(layout.position, np.zeros_like(layout.mounting_angle))
         self.effectiveness: AnyArray = effectiveness * (1.0 + scale)

@@ -1,2 +1,2 @@
-"""Training: the loop, its state and its device. It needs PyTorch, as do `finlab.paper.training` and
-`finlab.mdn.training`, which say what is learned."""
+"""Training: the loop, its state and its device. It needs PyTorch, as does `finlab.mdn.training`,
+which says what is learned."""

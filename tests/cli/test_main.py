@@ -124,7 +124,7 @@ def test_files_are_written_before_anything_is_printed(tmp_path: Path) -> None:
 def test_unwritable_output_is_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "file"
     file.write_text("in the way")
-    assert main(["train", "surrogate", "--preset", "smoke", "--output", str(file / "below")]) == 2
+    assert main(["train", "mdn", "--preset", "smoke", "--output", str(file / "below")]) == 2
     err = capsys.readouterr().err
     assert err.startswith("finlab: error: ") and len(err.splitlines()) == 1
 

@@ -1,4 +1,4 @@
-"""`finlab train mdn|surrogate|allocator`: a few steps, then an allocation with the result."""
+"""`finlab train mdn`: a few steps, then an allocation with the result."""
 
 import json
 import resource
@@ -26,18 +26,6 @@ sys.exit(main(sys.argv[1:]))
 SMOKE = ["--preset", "smoke", "--steps", "3"]
 
 
-def test_trains_both_and_allocates_with_them(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    surrogate, whole = str(tmp_path / "surrogate"), str(tmp_path / "whole")
-    assert main(["train", "surrogate", "-o", surrogate, *SMOKE]) == 0
-    assert "surrogate wrench_error_norm" in capsys.readouterr().out
-    assert main(["train", "allocator", "-o", whole, "--surrogate", surrogate, *SMOKE]) == 0
-    assert f"{whole}: checkpoint whole, preset smoke, sha256 " in capsys.readouterr().out
-    command = ["allocate", "A", "--wrench", "1", "0", "0", "0", "0", "0", "--checkpoint", whole, "--json"]
-    command += ["--method", "paper"]
-    assert main(command) == 0
-    assert json.loads(capsys.readouterr().out)["checkpoint"] == "whole"
-
-
 def test_trains_the_network_over_forces_and_allocates_with_it(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -53,15 +41,9 @@ def test_trains_the_network_over_forces_and_allocates_with_it(
 @pytest.mark.parametrize(
     ("argv", "message"),
     [
-        (["surrogate", "--preset", "magic"], "preset: expected one of paper, annealed, smoke"),
         (["mdn", "--preset", "paper"], "preset: expected one of default, smoke, got 'paper'"),
         (["mdn", "--minutes", "0"], "minutes: expected a number of at least 1, got 0"),
-        (["surrogate", "--steps", "0"], "steps: expected a number of at least 1, got 0"),
-        (
-            ["allocator", "--surrogate", "nowhere/", "--layouts", "-4"],
-            "layouts: expected a number of at least 1",
-        ),
-        (["allocator", "--surrogate", "nowhere/"], "'nowhere' is not among the shipped ones"),
+        (["mdn", "--steps", "0"], "steps: expected a number of at least 1, got 0"),
     ],
 )
 def test_refuses_in_one_sentence(
@@ -72,18 +54,16 @@ def test_refuses_in_one_sentence(
     assert message in err and len(err.splitlines()) == 1
 
 
-@pytest.mark.parametrize("verb", ["surrogate", "allocator --surrogate paper", "mdn"])
-def test_says_what_to_install_where_torch_is_missing(verb: str, tmp_path: Path) -> None:
-    command = [sys.executable, "-c", WITHOUT_TORCH, "train", *verb.split(), "-o", str(tmp_path / "out")]
+def test_says_what_to_install_where_torch_is_missing(tmp_path: Path) -> None:
+    command = [sys.executable, "-c", WITHOUT_TORCH, "train", "mdn", "-o", str(tmp_path / "out")]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60)
     assert done.returncode == 2 and done.stdout == ""
     assert done.stderr == "finlab: error: torch is not installed; run: pip install 'finlab-marine[train]'\n"
 
 
-@pytest.mark.parametrize("verb", ["surrogate", "mdn"])
-def test_a_full_disk_is_one_sentence_with_the_path(verb: str, tmp_path: Path) -> None:
+def test_a_full_disk_is_one_sentence_with_the_path(tmp_path: Path) -> None:
     out = tmp_path / "out"
-    command = [sys.executable, "-m", "finlab", "train", verb, "-o", str(out), *SMOKE]
+    command = [sys.executable, "-m", "finlab", "train", "mdn", "-o", str(out), *SMOKE]
     done = subprocess.run(
         command,
         capture_output=True,

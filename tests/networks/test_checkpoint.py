@@ -229,7 +229,7 @@ def test_refuses_sizes_and_statistics_that_cannot_be(
 def test_a_surrogate_alone_loads_but_cannot_allocate(folder: Path) -> None:
     save_checkpoint(folder, replace(read_checkpoint(folder), network_sizes=None, network={}))
     assert read_checkpoint(folder).network_sizes is None
-    with pytest.raises(CheckpointError, match="holds no network, .* train it with `finlab train allocator`"):
+    with pytest.raises(CheckpointError, match="holds no network, .* of the shipped `paper`"):
         AnyRobot("paper", checkpoint=folder).on(load_layout("A"))
 
 

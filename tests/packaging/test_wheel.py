@@ -141,7 +141,7 @@ def test_installed_package_finds_its_own_files(bare: Path, tmp_path: Path) -> No
 def test_without_extras_what_needs_one_says_so_in_a_sentence(bare: Path, tmp_path: Path) -> None:
     for name in ("torch", "viser", "matplotlib", "pytest"):
         assert bare_run(bare, tmp_path, "-c", f"import {name}").returncode == 1
-    for extra, words in {"train": "train surrogate -o out --preset smoke", "app": "app"}.items():
+    for extra, words in {"train": "train mdn -o out --preset smoke", "app": "app"}.items():
         done = bare_run(bare, tmp_path, "-m", "finlab", *words.split())
         assert done.returncode == 2 and done.stderr.count("\n") == 1
         assert done.stderr.endswith(f"run: pip install '{NAME}[{extra}]'\n")

@@ -27,11 +27,13 @@ def arrays(weights: dict[str, torch.Tensor]) -> dict[str, np.ndarray]:
     return {name: value.numpy() for name, value in weights.items()}
 
 
-def random_robots() -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
-    """Features of 12 robots of 2 to 5 fins, targets, and the mask of fins that exist."""
-    drawn = [torch.from_numpy(part) for part in random_layouts(np.random.default_rng(5), 12, limits="mixed")]
+def random_robots() -> tuple[torch.Tensor, torch.Tensor]:
+    """Features of 12 robots of 5 fins, and targets."""
+    drawn = [
+        torch.from_numpy(part) for part in random_layouts(np.random.default_rng(5), 12, 5, limits="mixed")
+    ]
     target = torch.randn(12, 6, generator=torch.Generator().manual_seed(5))
-    return raw_features(*drawn[:4]).float(), target, drawn[4]
+    return raw_features(*drawn[:4]).float(), target
 
 
 @pytest.mark.parametrize("n", [2, 5])
@@ -45,18 +47,14 @@ def test_graph_attention_is_that_of_pytorch_geometric(n: int) -> None:
         reference.att.copy_(weights["graph.0.attention"][None])
         reference.bias.copy_(weights["graph.0.bias"])
     edges = torch.tensor([(i, j) for i in range(n) for j in range(n) if i != j]).T
-    x = torch.randn(3, 6, CONFIG.width)
-    mask = torch.arange(6).expand(3, -1) < n
-    padded = graph_attention(weights, "graph.0", CONFIG.heads, x, mask)
-    alone = graph_attention(weights, "graph.0", CONFIG.heads, x[:, :n])
+    x = torch.randn(3, n, CONFIG.width)
+    found = graph_attention(weights, "graph.0", CONFIG.heads, x)
     for row in range(3):
-        expected = reference(x[row, :n], edges).detach()
-        torch.testing.assert_close(padded[row, :n], expected, atol=1e-4, rtol=1e-4)
-        torch.testing.assert_close(alone[row], expected, atol=1e-4, rtol=1e-4)
+        torch.testing.assert_close(found[row], reference(x[row], edges).detach(), atol=1e-4, rtol=1e-4)
 
 
 def reference_network(
-    w: dict[str, torch.Tensor], x: torch.Tensor, target: torch.Tensor, mask: torch.Tensor
+    w: dict[str, torch.Tensor], x: torch.Tensor, target: torch.Tensor
 ) -> tuple[torch.Tensor, torch.Tensor]:
     """Raw outputs and logits of PyTorch's own layers, but for the graph's."""
 
@@ -65,7 +63,7 @@ def reference_network(
 
     hidden = linear("enter", x)
     for name in ("graph.0", "graph.1"):
-        seen = graph_attention(w, name, CONFIG.heads, hidden, mask)
+        seen = graph_attention(w, name, CONFIG.heads, hidden)
         hidden = hidden + torch.nn.functional.elu(seen)
     wrench = linear("wrench", target)[:, None].expand(-1, x.shape[1], -1)
     hidden = linear("join", torch.cat([hidden, wrench], dim=-1))
@@ -75,26 +73,26 @@ def reference_network(
     encoder = torch.nn.TransformerEncoder(layer, CONFIG.transformer_layers, enable_nested_tensor=False)
     named = {k.removeprefix("transformer."): v for k, v in w.items() if k.startswith("transformer.")}
     encoder.load_state_dict(named, strict=True)
-    hidden = encoder.eval()(hidden, src_key_padding_mask=~mask).detach()
+    hidden = encoder.eval()(hidden).detach()
     hidden = torch.nn.functional.layer_norm(hidden, (CONFIG.width,), w["norm.weight"], w["norm.bias"])
     return linear("head", hidden), linear("weight", hidden)
 
 
 def test_the_whole_network_is_that_of_pytorchs_layers() -> None:
-    weights, (x, target, mask) = random_weights(), random_robots()
-    got = CONFIG(weights, x, target, mask)
-    raw, logits = reference_network(weights, x, target, mask)
+    weights, (x, target) = random_weights(), random_robots()
+    got = CONFIG(weights, x, target)
+    raw, logits = reference_network(weights, x, target)
     raw = raw.unflatten(-1, (CONFIG.n_components, 6))
-    torch.testing.assert_close(got.logits[mask], logits[mask], atol=1e-4, rtol=1e-4)
-    torch.testing.assert_close(got.mean[mask], raw[..., :3][mask], atol=1e-4, rtol=1e-4)
+    torch.testing.assert_close(got.logits, logits, atol=1e-4, rtol=1e-4)
+    torch.testing.assert_close(got.mean, raw[..., :3], atol=1e-4, rtol=1e-4)
     log_std = LOG_STD_BOUND * torch.tanh(0.5 * raw[..., 3:])
-    torch.testing.assert_close(got.log_std[mask], log_std[mask], atol=1e-4, rtol=1e-4)
+    torch.testing.assert_close(got.log_std, log_std, atol=1e-4, rtol=1e-4)
 
 
 def test_numpy_and_torch_agree_with_the_shipped_weights() -> None:
     weights = read_checkpoint(resolve_checkpoint("paper"))
     config = weights.network_of(NetworkConfig)
-    x, target, _ = random_robots()
+    x, target = random_robots()
     got = config(weights.network, x.numpy(), target.numpy())
     expected = config({k: torch.tensor(v) for k, v in weights.network.items()}, x, target)
     for a, b in zip(got, expected, strict=True):
@@ -102,16 +100,11 @@ def test_numpy_and_torch_agree_with_the_shipped_weights() -> None:
         np.testing.assert_allclose(a, b.numpy(), atol=2e-3, rtol=1e-3)
 
 
-def test_padding_does_not_leak_and_fins_may_come_in_any_order() -> None:
-    weights, (x, target, mask) = random_weights(), random_robots()
-    clean = CONFIG(weights, x, target, mask)
-    garbage = torch.where(mask[..., None], x, 1e3 * torch.randn(x.shape))
+def test_fins_may_come_in_any_order() -> None:
+    weights, (x, target) = random_weights(), random_robots()
     order = torch.tensor([3, 0, 4, 1, 2])
-    turned = CONFIG(weights, x[:, order], target, mask[:, order])
-    for got, dirty, expected in zip(turned, CONFIG(weights, garbage, target, mask), clean, strict=True):
-        torch.testing.assert_close(dirty[mask], expected[mask], atol=1e-5, rtol=1e-5)
-        seen = mask[:, order]
-        torch.testing.assert_close(got[seen], expected[:, order][seen], atol=1e-4, rtol=1e-4)
+    for got, expected in zip(CONFIG(weights, x[:, order], target), CONFIG(weights, x, target), strict=True):
+        torch.testing.assert_close(got, expected[:, order], atol=1e-4, rtol=1e-4)
 
 
 def test_huge_inputs_are_no_warning(recwarn: pytest.WarningsRecorder) -> None:

@@ -17,7 +17,6 @@ from finlab.networks.trained import TrainedWeights, sizes_for_file
 from finlab.paper.network import NetworkConfig
 from finlab.paper.pipeline import ADAM_RATE, CHUNK
 from finlab.paper.surrogate import SurrogateConfig
-from finlab.paper.training.surrogate import first_surrogate
 from finlab.physics import Plant
 from finlab.physics.effort import command_effort
 from finlab.training.first_weights import first_weights
@@ -35,7 +34,7 @@ def checkpoint() -> TrainedWeights:
     return TrainedWeights(
         name="tiny",
         surrogate_sizes=surrogate.for_file(),
-        surrogate=arrays_of(first_surrogate(surrogate, 1)),
+        surrogate=arrays_of(first_weights(surrogate.shapes(), 1)),
         normalization=Normalization(np.full(6, 0.01), np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.34])),
         fin_model={"type": "drag"},
         network_sizes=sizes_for_file(sizes),

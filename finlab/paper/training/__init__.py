@@ -1,1 +1,0 @@
-"""What the paper's surrogate and network learn from, and by which losses: torch."""
