@@ -9,7 +9,7 @@ from pathlib import Path
 from finlab.errors import LayoutError
 from finlab.files.guarded import read_text
 from finlab.layout import MAX_ACTUATORS, Fin, Layout, Limits
-from finlab.layout.file import under
+from finlab.layout.file_form import under
 from finlab.layout.load import MAX_BYTES
 from finlab.whole_file import write_whole
 

@@ -23,7 +23,7 @@ from finlab.distribution import install
 from finlab.errors import LayoutError
 from finlab.files.guarded import read_text
 from finlab.layout import Body, Fin, Layout
-from finlab.layout.file import under
+from finlab.layout.file_form import under
 from finlab.whole_file import write_whole
 
 MAX_BYTES = 5_000_000

@@ -30,7 +30,6 @@ class Azimuth(Checked):
         "arc": ("arc_deg", tuple[AngleDegrees, AngleDegrees]),
         "turn_rate": ("turn_rate_deg_s", TurnRateDegrees),
     }
-    """Fields in radians -> their keys and types in a file, in degrees."""
     type: ClassVar[str] = "azimuth"
 
     name: Name

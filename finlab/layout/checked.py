@@ -28,6 +28,10 @@ class Checked:
 
     KEYS: ClassVar[Mapping[str, str]] = {}
     """Fields -> their keys in a file, where the two differ."""
+    DEGREES: ClassVar[Mapping[str, tuple[str, Any]]] = {}
+    """Fields in radians -> their keys and types in a file, in degrees."""
+    WRITTEN: ClassVar[Collection[str]] = ()
+    """Fields that a file is given even where they are as usual."""
     type: ClassVar[str] = ""
     """What a file calls it under the key `type`, where it may hold one of several."""
 
@@ -98,7 +102,10 @@ def form(
     parts = [(name, kind | None, None) if name in free else (name, kind) for name, kind in told]
     parts.sort(key=len)
     rename = cls.KEYS if keys is None and issubclass(cls, Checked) else dict(keys or {})
-    about = {"__doc__": (cls.__doc__ or "").split("\n")[0].replace(" Checked on construction.", "")}
+    about: dict[str, Any] = {
+        "__doc__": (cls.__doc__ or "").split("\n")[0].replace(" Checked on construction.", "")
+    }
+    about |= {"stands_for": cls}
     if tag is None and issubclass(cls, Checked) and cls.type:
         tag = ("type", cls.type)
     key, value = tag or (None, None)

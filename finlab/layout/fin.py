@@ -1,7 +1,7 @@
 """Which fin model a fin follows, by name and numbers; the formulas live in `finlab.physics`."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Union
 
@@ -153,6 +153,7 @@ class Limits(Checked):
         "frequency": "frequency_hz",
         "zero_direction": "zero_direction_rad",
     }
+    WRITTEN: ClassVar[Collection[str]] = ("amplitude", "frequency", "zero_direction")
 
     amplitude: tuple[Amplitude, Amplitude] = (0.05, 0.6)
     """Half amplitude [rad], (minimum, maximum)."""
@@ -197,6 +198,10 @@ class Fin(Checked):
     """One fin on the hull, its shaft horizontal or in any direction. Checked on construction."""
 
     KEYS: ClassVar[Mapping[str, str]] = {"position": "position_m"}
+    DEGREES: ClassVar[Mapping[str, tuple[str, Any]]] = {
+        "mounting_angle": ("mounting_angle_deg", Annotated[float, Meta(ge=-360.0, le=360.0)])
+    }
+    WRITTEN: ClassVar[Collection[str]] = ("limits", "model")
     type: ClassVar[str] = "fin"
 
     name: Name

@@ -13,7 +13,8 @@ from finlab.files.guarded import decoded
 from finlab.files.plain_values import parse_json
 from finlab.files.schema import checked
 from finlab.layout.checked import Name
-from finlab.layout.file import layout_to_dict, parse_layout, under
+from finlab.layout.file import layout_to_dict, parse_layout
+from finlab.layout.file_form import under
 from finlab.layout.layout import Layout
 
 Wrench = tuple[float, float, float, float, float, float]

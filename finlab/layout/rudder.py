@@ -44,7 +44,6 @@ class Rudder(Checked):
         "stall": ("stall_deg", StallDegrees),
         "rate": ("rate_deg_s", TurnRateDegrees),
     }
-    """Fields in radians -> their keys and types in a file, in degrees."""
     type: ClassVar[str] = "rudder"
 
     name: Name

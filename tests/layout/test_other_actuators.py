@@ -1,18 +1,17 @@
 """Thrusters, azimuths and rudders in a file: what is read, what is refused and why, and what is written."""
 
 from pathlib import Path
-from typing import Any, Union
+from typing import Any
 
 import numpy as np
 import pytest
 
 from finlab.errors import LayoutError
 from finlab.files.schema import checked
-from finlab.layout.actuator_form import FORMS, actuator_of, actuator_to_dict
+from finlab.layout.file_form import ACTUATOR, Reader, plain
 from finlab.layout.rudder import Rudder
 from finlab.layout.thrust_model import PowerTable
 
-PART: Any = Union[tuple(FORMS.values())]  # noqa: UP007
 THRUSTER = {
     "name": "lift",
     "type": "thruster",
@@ -49,13 +48,13 @@ RUDDER = {
 
 
 def _read(data: Any, folder: Path | None = None) -> Any:
-    return actuator_of(checked(data, PART), folder)
+    return Reader(folder).value(checked(data, ACTUATOR))
 
 
 @pytest.mark.parametrize("data", [THRUSTER, {**THRUSTER, "model": TABLE}, AZIMUTH, TILT, RUDDER])
 def test_what_is_written_is_read_the_same(data: dict[str, Any]) -> None:
     actuator = _read(data)
-    assert _read(actuator_to_dict(actuator)) == actuator
+    assert _read(plain(actuator)) == actuator
     axes = np.array(actuator.frame)
     np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-15)
     assert np.linalg.det(axes) > 0.0
@@ -99,7 +98,7 @@ def test_degrees_become_radians() -> None:
         ({**AZIMUTH, "zero": [0, 0, 1]}, "zero: must stand across turn_axis, got 0 degrees"),
         ({**RUDDER, "deflection_deg": [5, 5]}, "deflection_deg: expected a least below"),
         ({**RUDDER, "aspect_ratio": None}, "aspect_ratio: required key is missing; give it, or lift_slope"),
-        ({**RUDDER, "type": "jet"}, "type: expected one of thruster, azimuth, tilt, rudder, got 'jet'"),
+        ({**RUDDER, "type": "jet"}, "type: expected one of fin, thruster, azimuth, tilt, rudder, got 'jet'"),
     ],
 )
 def test_what_is_wrong_is_one_sentence_with_the_key(data: dict[str, Any], sentence: str) -> None:

@@ -1,0 +1,151 @@
+"""Parts of a layout file and the values that they stand for, both ways.
+
+What holds degrees in a file is kept in radians; paths become absolute; a table of thrust in a CSV file
+becomes rows.
+"""
+
+import math
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Annotated, Any, Union
+
+from msgspec import Meta, Struct, structs
+
+from finlab.errors import LayoutError
+from finlab.layout.azimuth import Azimuth, Tilt
+from finlab.layout.body import Body, Hull
+from finlab.layout.checked import Checked, form
+from finlab.layout.fin import Fin, FinModelSpec, Limits, Model
+from finlab.layout.interaction import Interaction, Jet
+from finlab.layout.rudder import Rudder
+from finlab.layout.servo import Servo
+from finlab.layout.thrust_model import MAX_ROWS, PowerLaw, PowerTable, Row
+from finlab.layout.thruster import Thruster
+
+
+class TableForm(Struct, tag="table", tag_field="type", forbid_unknown_fields=True):
+    """Force and power over the thruster's own command: rows, or the CSV file that has them."""
+
+    rows: Annotated[list[Row], Meta(min_length=3, max_length=MAX_ROWS)] | None = None
+    path: Annotated[str, Meta(min_length=1, max_length=4096, description="a CSV file of thrust")] | None = (
+        None
+    )
+    unit: Annotated[str, Meta(max_length=20)] | None = None
+
+
+def _form(cls: type[Checked], **others: Any) -> Any:
+    """The form of a class whose angles are in degrees, with other types of some fields."""
+    keys = {name: key for name, (key, _) in cls.DEGREES.items()}
+    kinds = {name: kind for name, (_, kind) in cls.DEGREES.items()}
+    return form(cls, {**cls.KEYS, **keys}, **{**kinds, **others})
+
+
+_THRUST: Any = form(PowerLaw) | TableForm
+_FIN: dict[str, Any] = {"limits": form(Limits), "model": Model, "servo": form(Servo)}
+HORIZONTAL_FIN = _form(
+    Fin, called="HorizontalFin", tag=(), required=["mounting_angle"], shaft=None, zero=None, **_FIN
+)
+"""A fin of version 1."""
+_KINDS = {
+    Fin: _form(Fin, **_FIN),
+    Thruster: _form(Thruster, model=_THRUST),
+    Azimuth: _form(Azimuth, model=_THRUST),
+    Tilt: _form(Tilt, model=_THRUST),
+    Rudder: _form(Rudder),
+}
+ACTUATOR: Any = Union[tuple(_KINDS.values())]  # noqa: UP007
+"""An actuator of version 2."""
+BODY = form(Body, hull=form(Hull))
+INTERACTION = form(Interaction, jets=list[form(Jet)])  # type: ignore[misc]
+
+
+@contextmanager
+def under(key: str = "", source: str = "") -> Iterator[None]:
+    """Puts `key` before the keys of layout errors raised inside, and `source`, their file, before that."""
+    try:
+        yield
+    except LayoutError as error:
+        raise error.under(key, source) from None
+
+
+@dataclass(frozen=True)
+class Reader:
+    """Makes values of parts of a file."""
+
+    folder: Path | None = None
+    """Where relative paths start; the working directory when None."""
+    may_open: bool = True
+    """Whether a CSV file of thrust that a part names may be opened."""
+
+    def value(self, part: Any) -> Any:
+        """Returns what a part stands for, an instance of a form, a list of them, or a plain value.
+
+        Raises:
+            LayoutError: something does not fit; the message names the key in the part.
+        """
+        if isinstance(part, list | tuple):
+            values = []
+            for i, item in enumerate(part):
+                with under(f"[{i}]"):
+                    values.append(self.value(item))
+            return tuple(values)
+        if not isinstance(part, Struct):
+            return part
+        told = {}
+        for field in structs.fields(part):
+            value = getattr(part, field.name)
+            if value is not None:
+                with under(field.encode_name):
+                    told[field.name] = self.value(value)
+        for key in {"path", "mesh"} & set(told):
+            told[key] = os.path.normpath((self.folder or Path.cwd()) / told[key])
+        if isinstance(part, TableForm):
+            return self._table(told)
+        cls: Any = getattr(type(part), "stands_for", None)
+        if cls is None:
+            return FinModelSpec(str(part.__struct_config__.tag), tuple(told.items()))
+        for name in set(cls.DEGREES) & set(told):
+            value = told[name]
+            told[name] = tuple(map(math.radians, value)) if isinstance(value, tuple) else math.radians(value)
+        return cls(**told)
+
+    def _table(self, told: dict[str, Any]) -> PowerTable:
+        if ("rows" in told) == ("path" in told):
+            raise LayoutError("give either rows, or the path of a CSV file, not both or neither", "rows")
+        if "rows" in told:
+            return PowerTable(**told)
+        if not self.may_open:
+            raise LayoutError("names a file, which is not opened here; write its rows", "path")
+        return PowerTable.read(told["path"], told.get("unit", ""))
+
+
+def plain(value: Any) -> Any:
+    """Returns the plain values of a part of a layout file; what is as usual is left out."""
+    if isinstance(value, FinModelSpec):
+        return {"type": value.type, **dict(value.parameters)}
+    if isinstance(value, tuple):
+        return [plain(item) for item in value]
+    if not isinstance(value, Checked):
+        return value
+    keys = {**value.KEYS, **{name: key for name, (key, _) in value.DEGREES.items()}}
+    data = {}
+    for field in fields(value):  # type: ignore[arg-type]
+        own = getattr(value, field.name)
+        if own != field.default or field.name in value.WRITTEN:
+            own = degrees_of(own) if field.name in value.DEGREES else own
+            data[keys.get(field.name, field.name)] = plain(own)
+    name = {"name": data.pop("name")} if "name" in data else {}
+    return {**name, **({"type": value.type} if value.type else {}), **data}
+
+
+def degrees_of(value: Any) -> Any:
+    """Returns degrees of radians [rad], one or a tuple: twelve digits give back what people wrote; where they
+    do not, more are taken, so that reading gives the same radians."""
+    if isinstance(value, tuple):
+        return tuple(map(degrees_of, value))
+    exact = math.degrees(value)
+    near = (round(exact, 12), exact, math.nextafter(exact, math.inf), math.nextafter(exact, -math.inf))
+    return next((angle for angle in near if math.radians(angle) == value), near[0])
