@@ -6,6 +6,7 @@ becomes the one that the policy asks for (`policies`); from tick to tick, comman
 the previous ones (`rates`).
 """
 
+from collections.abc import Callable
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
@@ -28,7 +29,7 @@ from finlab.allocation.method import Method
 from finlab.allocation.policy import CLOSEST, Policy
 from finlab.allocation.settings import Settings, number
 from finlab.allocation.solution import Solution
-from finlab.arrays import AnyArray, Array
+from finlab.arrays import Array
 from finlab.networks.trained import TrainedWeights
 
 EXACT = 1e-8
@@ -146,22 +147,32 @@ class Dual(Method):
 
     def _solve(self, targets: Array, policy: Policy, previous: Array | None) -> Solution:
         robot = self.compiled.robot
+        aim, found = self._aimed(targets, policy)
+        command, found = self._commands(aim, found, robot.sets, previous)
+        bound: Callable[[], Array] = partial(self._bound, aim, found)
+        if len(targets) > 1:
+            bound = partial(self._bound_again, targets, policy)
+        if previous is not None and not self._rates.allow(previous, command[0]):
+            command = self._in_a_tick(aim, found, previous)
+        return Solution(command, None if self._unproved else bound)
+
+    def _aimed(self, targets: Array, policy: Policy) -> tuple[Array, Forces]:
+        """What is given for targets (N, 6): themselves, or what the policy asks for; and by which forces."""
+        robot = self.compiled.robot
         asked = targets - self.compiled.beside
         found = self._forces(asked, robot.sets, policy)
         aim = targets
         if not found.within.all():
             aim = np.where(found.within[:, None], asked, robot.wrench(found.force)) + self.compiled.beside
-        command, found = self._commands(aim, found, robot.sets, previous)
-        # Any prices prove a bound; of single precision they take half the memory.
-        bound = partial(self._bound, aim, found.price.astype(np.float32), found.value)
-        if previous is not None and not self._rates.allow(previous, command[0]):
-            command = self._in_a_tick(aim, found, previous)
-        return Solution(command, None if self._unproved else bound)
+        return aim, found
 
-    def _bound(self, aim: Array, price: AnyArray, value: Array) -> Array:
-        """Power (N,) [W] that no answer for wrenches (N, 6) undercuts, by prices (N, 6) and what the branch
-        has proved (N,)."""
-        return np.maximum(proved_power(self.compiled, aim, np.asarray(price, np.float64)), value)
+    def _bound(self, aim: Array, found: Forces) -> Array:
+        """Power (N,) [W] that no answer for wrenches (N, 6) undercuts."""
+        return np.maximum(proved_power(self.compiled, aim, found.price), found.value)
+
+    def _bound_again(self, targets: Array, policy: Policy) -> Array:
+        """The same of many targets (N, 6), whose prices are found again, so that nothing of them is kept."""
+        return self._bound(*self._aimed(targets, policy))
 
     @property
     def _unproved(self) -> bool:
