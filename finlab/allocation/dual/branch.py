@@ -24,6 +24,8 @@ ROUNDS = 12
 """Times that sets are cut."""
 MOST_PARTS = 48
 """Open parts of one target that are followed, the cheapest first."""
+TURNS = 2.4, 1.6, 0.8, 0.4, 0.2, 0.1, 0.05
+"""Angles [rad] by which fins that cannot rest are turned to find where that costs least."""
 SAME = 2e-4
 """Share of the power by which a part must be able to be cheaper to be followed."""
 OUTSIDE = 1e-4
@@ -75,6 +77,14 @@ def gaps(robot: DualRobot, force: Array, sets: Sets) -> Array:
     return found
 
 
+def _holes(robot: DualRobot, force: Array, sets: Sets) -> NDArray[np.bool_]:
+    """Which forces (n, N) of planes are smaller than their least ones."""
+    lines, planes = robot.answers.lines, robot.answers.planes
+    found = np.zeros((lines + planes, force.shape[1]), bool)
+    found[lines:] = np.hypot(force[lines : lines + planes], force[lines + planes :]) < 0.98 * sets.low[lines:]
+    return found
+
+
 def may_have_gaps(robot: DualRobot, sets: Sets, force: Array) -> bool:
     """Whether forces (k, N) may lie in gaps: a quick look."""
     if robot.band.any() or len(sets.forked):
@@ -89,30 +99,22 @@ def may_have_gaps(robot: DualRobot, sets: Sets, force: Array) -> bool:
 def least_power(robot: DualRobot, target: Array, sets: Sets, root: Prices) -> Branched:
     """Forces in the sets for targets (r, N) some of whose answers `root` are in gaps."""
     count = target.shape[1]
-    best, force, found = np.full(count, np.inf), root.force.copy(), np.zeros(count, bool)
-
-    def keep(parts: _Parts, answer: Prices, amount: Array) -> NDArray[np.bool_]:
-        """Remember answers without a gap; those that have one and could still be cheaper."""
-        whole = answer.solved & ~(amount > 0.0).any(axis=0)
-        for i in np.flatnonzero(whole):
-            row = parts.row[i]
-            if answer.value[i] < best[row]:
-                best[row], force[:, row], found[row] = answer.value[i], answer.force[:, i], True
-        return answer.solved & ~whole & (answer.value < best[parts.row] * (1.0 - SAME))
-
     start = _Parts(np.arange(count), _columns(sets, count), root.prices)
+    best = _Best(robot, target, start, root)
     parts, answer = start, root
     for _ in range(DIVES):
         amount = gaps(robot, answer.force, parts.sets)
-        open_ = np.flatnonzero(keep(parts, answer, amount))
+        open_ = np.flatnonzero(best.keep(parts, answer, amount))
         if not len(open_):
             break
         parts = _dive(robot, parts, open_, amount[:, open_], answer)
         answer = solve(robot, target[:, parts.row], parts.sets, parts.prices)
+    best.turn()
     parts, answer, value = start, root, np.full(count, np.inf)
-    for _ in range(ROUNDS):
+    for round_ in range(ROUNDS + 1):
         amount = gaps(robot, answer.force, parts.sets)
-        kept = _cheapest(np.flatnonzero(keep(parts, answer, amount)), parts.row, answer.value)
+        open_ = best.keep(parts, answer, amount)
+        kept = _cheapest(np.flatnonzero(open_ & (round_ < ROUNDS)), parts.row, answer.value)
         left = np.ones(len(parts.row), bool)
         left[kept] = False
         np.minimum.at(value, parts.row[left], answer.value[left])
@@ -120,10 +122,58 @@ def least_power(robot: DualRobot, target: Array, sets: Sets, root: Prices) -> Br
             break
         parts = _cut(robot, parts, kept, amount[:, kept], answer)
         answer = solve(robot, target[:, parts.row], parts.sets, parts.prices)
-    else:
-        keep(parts, answer, gaps(robot, answer.force, parts.sets))
-        np.minimum.at(value, parts.row, answer.value)
-    return Branched(force, found, value)
+    best.turn()
+    return Branched(best.force, best.found, value)
+
+
+class _Best:
+    """The cheapest answers without a gap so far, of N targets."""
+
+    def __init__(self, robot: DualRobot, target: Array, parts: _Parts, root: Prices) -> None:
+        self._robot, self._target = robot, target
+        self._value = np.full(target.shape[1], np.inf)
+        self._sets = [np.array(values) for values in parts.sets.parts]
+        self._prices = root.prices.copy()
+        self.force = root.force.copy()
+        """Forces (k, N) [N]; those of the hulls where there is no answer yet."""
+        self.found = np.zeros(target.shape[1], bool)
+        """Where there is one (N,)."""
+
+    def keep(self, parts: _Parts, answer: Prices, amount: Array) -> NDArray[np.bool_]:
+        """Remember answers without a gap; which of those that have one (N,) could still be cheaper."""
+        whole = answer.solved & ~(amount > 0.0).any(axis=0) & ~self._hollow(answer.force, parts.sets)
+        for i in np.flatnonzero(whole):
+            row = parts.row[i]
+            if answer.value[i] < self._value[row]:
+                self._value[row], self.found[row] = answer.value[i], True
+                self.force[:, row], self._prices[:, row] = answer.force[:, i], answer.prices[:, i]
+                for own, new in zip(self._sets, parts.sets.parts, strict=True):
+                    own[:, row] = new[:, i]
+        return answer.solved & ~whole & (answer.value < self._value[parts.row] * (1.0 - SAME))
+
+    def _hollow(self, force: Array, sets: Sets) -> NDArray[np.bool_]:
+        """Where the smoothed dual of a narrow arc has a force (k, N) that is smaller than any in it."""
+        lines, planes = self._robot.answers.lines, self._robot.answers.planes
+        size = np.hypot(force[lines : lines + planes], force[lines + planes :])
+        found: NDArray[np.bool_] = ((size < 0.9 * sets.low[lines:]) & (sets.half <= NARROW)).any(axis=0)
+        return found
+
+    def turn(self) -> None:
+        """Turn the fins that keep their least force to where that costs less, by smaller and smaller
+        angles."""
+        lines = self._robot.answers.lines
+        for step in TURNS:
+            low, high, *_, half = self._sets
+            fixed = (half == 0.0) & (low[lines:] == high[lines:]) & (low[lines:] > 0.0)
+            plane, row = np.nonzero(fixed & self.found)
+            if not len(row):
+                return
+            row, plane = np.tile(row, 2), np.tile(plane, 2)
+            columns = [values[:, row] for values in self._sets]
+            columns[4][plane, np.arange(len(row))] += np.repeat([-step, step], len(row) // 2)
+            sets = Sets(*columns)
+            answer = solve(self._robot, self._target[:, row], sets, self._prices[:, row])
+            self.keep(_Parts(row, sets, self._prices), answer, gaps(self._robot, answer.force, sets))
 
 
 def halves(robot: DualRobot, sets: Sets, force: Array) -> list[Sets] | None:
