@@ -23,7 +23,7 @@ from finlab.networks.trained import TrainedWeights
 
 EXPONENT = 1.5
 """Of the force in the power."""
-MISS = 1e5
+MISS = 1e7
 """Price of the squared error beside the power over the largest one."""
 MOST_BEYOND = 1e-6
 """Share of a full turn by which an arc may fall short of it."""

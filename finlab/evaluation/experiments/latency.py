@@ -272,7 +272,8 @@ experiment = Experiment(
     note=(
         "Whole calls of allocate, one target each, one after the other. Reach: the most that a robot gives "
         "in the direction of the target; beyond it, methods answer with the nearest wrench. Next tick: "
-        f"targets wander at {AT:g} of reach, and the command before is known. `ipopt-forces` and `clarabel` "
+        f"targets wander at {AT:g} of reach, and the command before is known, whose rates `dual` and `mdn` "
+        "alone keep to. `ipopt-forces` and `clarabel` "
         "solve for the forces, `clarabel` with power that grows with the force to 1.5. Power: where both "
         "deliver. First answers: a fin is compiled once, whatever its law, and kept by content."
     ),
