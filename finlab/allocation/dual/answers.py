@@ -128,6 +128,11 @@ class Answers:
 
     def cost(self, force: Array) -> Array:
         """Power (n, N) [W] of forces (n, N) within the tables; of planes of their sizes."""
+        return self.marginal(force)[1]
+
+    def marginal(self, force: Array) -> tuple[Array, Array]:
+        """Prices (n, N) [W/N] at which forces (n, N) are given, without a sign, and their power [W]; as
+        `cost`."""
         row = self._row + ((np.arange(len(force)) < self.lines)[:, None] & (force < 0.0))
         size, largest = np.abs(force), np.maximum(self._ends[row, -1], 1e-300)
         place = np.searchsorted(self._shares, (size / largest + 2.0 * row).ravel()).reshape(size.shape)
@@ -144,8 +149,8 @@ class Answers:
             x = np.minimum(np.maximum(x - change, 0.0), width)
         top = self._top[row]
         conjugate = start + top * x * (a0 + x * (a1 / 2.0 + x * (a2 / 3.0 + x * (a3 / 4.0))))
-        power: Array = top * (_EDGES[cell] + x) * size - conjugate
-        return power
+        price = top * (_EDGES[cell] + x)
+        return price, price * size - conjugate
 
     def __call__(self, price: Array, sets: Sets) -> Answer:
         """Answers to prices (k, N)."""

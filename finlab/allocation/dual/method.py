@@ -22,7 +22,7 @@ from finlab.allocation.dual.compiled import Compiled
 from finlab.allocation.dual.drag import at_the_price_of_drag
 from finlab.allocation.dual.newton import Prices, solve
 from finlab.allocation.dual.policies import OUT_OF_RANGE, nearest
-from finlab.allocation.dual.rates import Rates, within_tick
+from finlab.allocation.dual.rates import Rates, implied_prices, within_tick
 from finlab.allocation.in_time import in_time
 from finlab.allocation.levenberg_marquardt import CommandProblem, refine
 from finlab.allocation.method import Method
@@ -147,7 +147,7 @@ class Dual(Method):
 
     def _solve(self, targets: Array, policy: Policy, previous: Array | None) -> Solution:
         robot = self.compiled.robot
-        aim, found = self._aimed(targets, policy)
+        aim, found = self._aimed(targets, policy, self._first_prices(previous))
         command, found = self._commands(aim, found, robot.sets, previous)
         bound: Callable[[], Array] = partial(self._bound, aim, found)
         if len(targets) > 1:
@@ -156,15 +156,24 @@ class Dual(Method):
             command = self._in_a_tick(aim, found, previous)
         return Solution(command, None if self._unproved else bound)
 
-    def _aimed(self, targets: Array, policy: Policy) -> tuple[Array, Forces]:
+    def _aimed(self, targets: Array, policy: Policy, prices: Array | None = None) -> tuple[Array, Forces]:
         """What is given for targets (N, 6): themselves, or what the policy asks for; and by which forces."""
         robot = self.compiled.robot
         asked = targets - self.compiled.beside
-        found = self._forces(asked, robot.sets, policy)
+        found = self._forces(asked, robot.sets, policy, prices)
         aim = targets
         if not found.within.all():
             aim = np.where(found.within[:, None], asked, robot.wrench(found.force)) + self.compiled.beside
         return aim, found
+
+    def _first_prices(self, previous: Array | None) -> Array | None:
+        """Prices (r, 1) to begin with: fins with arcs are many steps away from those of a cold start."""
+        robot = self.compiled.robot
+        if previous is None or robot.answers.lines or not robot.sets.arcs or not self.layout.is_of_fins:
+            return None
+        if not np.isfinite(previous).all():
+            return None
+        return implied_prices(robot, self.plant.force(previous)[robot.order, 1:])
 
     def _bound(self, aim: Array, found: Forces) -> Array:
         """Power (N,) [W] that no answer for wrenches (N, 6) undercuts."""
