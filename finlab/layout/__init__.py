@@ -1,10 +1,8 @@
 """What a robot is: fins, limits and body, as frozen values, files and padded arrays. numpy and msgspec."""
 
 from finlab.layout.actuator import Actuator as Actuator
-from finlab.layout.arrays import LayoutArrays as LayoutArrays
 from finlab.layout.arrays import layout_effectiveness as layout_effectiveness
 from finlab.layout.arrays import own_effectiveness as own_effectiveness
-from finlab.layout.arrays import stack_layouts as stack_layouts
 from finlab.layout.azimuth import Azimuth as Azimuth
 from finlab.layout.azimuth import Tilt as Tilt
 from finlab.layout.body import Body as Body
@@ -22,9 +20,7 @@ from finlab.layout.interaction import Jet as Jet
 from finlab.layout.layout import MAX_ACTUATORS as MAX_ACTUATORS
 from finlab.layout.layout import Layout as Layout
 from finlab.layout.load import load_layout as load_layout
-from finlab.layout.random import layout_from_arrays as layout_from_arrays
 from finlab.layout.random import random_layout as random_layout
-from finlab.layout.random import random_layouts as random_layouts
 from finlab.layout.rudder import Rudder as Rudder
 from finlab.layout.servo import Servo as Servo
 from finlab.layout.thruster import Thruster as Thruster

@@ -1,56 +1,11 @@
-"""Layouts as padded arrays, and the geometry of their forces. numpy only."""
+"""The geometry of a layout's forces, for numpy's arrays and torch's tensors."""
 
-from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finlab.arrays import Array, library_of
-from finlab.errors import LayoutError
-from finlab.layout.fin import Limits
 from finlab.layout.layout import Layout
-
-
-class LayoutArrays(NamedTuple):
-    """A batch of B layouts padded to n fins, float64. Padding is a fin at the origin with nominal limits."""
-
-    position: Array
-    """Where each fin's force acts, body frame [m], (B, n, 3)."""
-    mounting_angle: Array
-    """Azimuth of each shaft [rad], (B, n)."""
-    lower: Array
-    """Least (amplitude [rad], frequency [Hz], zero direction [rad]), (B, n, 3)."""
-    upper: Array
-    """Greatest (amplitude [rad], frequency [Hz], zero direction [rad]), (B, n, 3)."""
-    mask: NDArray[np.bool_]
-    """True where there is a fin, False where there is padding, (B, n)."""
-
-
-def empty_arrays(n_layouts: int, n_fins: int) -> LayoutArrays:
-    """Returns a batch of nothing but padding, to be filled in."""
-    nominal = Limits()
-    return LayoutArrays(
-        position=np.zeros((n_layouts, n_fins, 3)),
-        mounting_angle=np.zeros((n_layouts, n_fins)),
-        lower=np.tile(np.array(nominal.lower), (n_layouts, n_fins, 1)),
-        upper=np.tile(np.array(nominal.upper), (n_layouts, n_fins, 1)),
-        mask=np.zeros((n_layouts, n_fins), dtype=bool),
-    )
-
-
-def stack_layouts(layouts: Sequence[Layout]) -> LayoutArrays:
-    """Returns layouts as one batch padded to the most fins; a `LayoutError` where there are none."""
-    if len(layouts) == 0:
-        raise LayoutError("expected at least one layout to stack, got none")
-    width = max(layout.n_fins for layout in layouts)
-    arrays = empty_arrays(len(layouts), width)
-    for b, layout in enumerate(layouts):
-        n = layout.n_fins
-        arrays.position[b, :n], arrays.mounting_angle[b, :n] = layout.position, layout.mounting_angle
-        arrays.lower[b, :n], arrays.upper[b, :n] = layout.lower, layout.upper
-        arrays.mask[b, :n] = True
-    return arrays
 
 
 def force_effectiveness(position: Any, mounting_angle: Any) -> Any:

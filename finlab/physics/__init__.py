@@ -9,6 +9,5 @@ from finlab.actuators.law import FinLaw as FinLaw
 from finlab.actuators.law import PlanarLaw as PlanarLaw
 from finlab.physics.known_plants import plant_of as plant_of
 from finlab.physics.plant import Plant as Plant
-from finlab.physics.wrench import assemble_wrench as assemble_wrench
 from finlab.physics.wrench import body_force as body_force
 from finlab.physics.wrench import wrench_of_forces as wrench_of_forces

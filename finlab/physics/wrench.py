@@ -1,12 +1,10 @@
-"""Forces of fins to the wrench on the body, for numpy's arrays and torch's tensors, padded batches included.
+"""Forces of fins to the wrench on the body, for numpy's arrays and torch's tensors.
 
 Frames: fin frame x' = shaft, y' = e_h, z' = e_z (see `finlab.layout.fin`); body frame FLU about the centre of
 gravity. Wrench order [Fx, Fy, Fz, Tx, Ty, Tz] in N and N m.
 """
 
-from finlab.actuators.law import FinLaw
-from finlab.arrays import Values, library_of
-from finlab.layout.arrays import force_effectiveness
+from finlab.arrays import Values
 
 
 def body_force(own_force: Values, frames: Values) -> Values:
@@ -36,24 +34,3 @@ def wrench_of_forces(fin_force: Values, effectiveness: Values) -> Values:
         return fin_force.reshape(*fin_force.shape[:-2], 3 * n) @ flat
     row = fin_force.reshape(*fin_force.shape[:-2], 1, 3 * n)
     return (row @ flat)[..., 0, :]
-
-
-def assemble_wrench(
-    law: FinLaw, command: Values, position: Values, mounting_angle: Values, mask: Values
-) -> Values:
-    """Returns the wrench (..., 6) [N, N m] that commands cause on padded robots with fins of one law.
-
-    Whatever padding holds, NaN included, never leaks.
-
-    Args:
-        law: the fins' law.
-        command: (..., n, 3) [rad, Hz, rad].
-        position: (..., n, 3), body frame [m].
-        mounting_angle: (..., n) [rad].
-        mask: (..., n), False for padding and lost fins.
-    """
-    xp = library_of(command)
-    keep = mask[..., None]
-    force = law.force(xp.where(keep, command, xp.zeros_like(command)))
-    force = xp.where(keep, force, xp.zeros_like(force))
-    return wrench_of_forces(force, force_effectiveness(position, mounting_angle))

@@ -1,2 +1,2 @@
-"""Training: the loop, its state and its device. It needs PyTorch, as does `finlab.mdn.training`,
+"""Training: the loop and its state. It needs PyTorch, as does `finlab.mdn.training`,
 which says what is learned."""

@@ -35,8 +35,6 @@ class LoopSettings:
     learning_rate: float
     warmup: int = 0
     """Steps over which it rises linearly, if there are as many."""
-    cosine: bool = True
-    """Whether it falls to a hundredth along a cosine (True) or stays (the paper prints one rate)."""
     ema: float = 0.0
     """Decay of the running average of the weights that is shipped; 0 ships the last weights."""
     seconds: float | None = None
@@ -52,8 +50,6 @@ def learning_rate(settings: LoopSettings, step: int, elapsed: float = 0.0) -> fl
     """Learning rate of a step, a function of the step alone so that a resumed run goes on exactly; of the
     seconds gone by where the run's time is limited."""
     rise = min(1.0, (step + 1) / max(min(settings.warmup, settings.steps), 1))
-    if not settings.cosine:
-        return settings.learning_rate * rise
     done = step / max(settings.steps, 1)
     if settings.seconds is not None:
         done = min(1.0, max(done, elapsed / settings.seconds))

@@ -8,7 +8,7 @@ import torch
 from torch.distributions import Categorical, Independent, MixtureSameFamily, Normal
 from torch_geometric.nn import GATv2Conv
 
-from finlab.layout import Fin, Layout, Limits, random_layouts, stack_layouts
+from finlab.layout import Fin, Layout, Limits, random_layout
 from finlab.networks.checkpoint import read_checkpoint, resolve_checkpoint
 from finlab.paper.features import RAW_SIZE, raw_features
 from finlab.paper.network import LOG_STD_BOUND, Mixture, NetworkConfig, graph_attention
@@ -29,11 +29,12 @@ def arrays(weights: dict[str, torch.Tensor]) -> dict[str, np.ndarray]:
 
 def random_robots() -> tuple[torch.Tensor, torch.Tensor]:
     """Features of 12 robots of 5 fins, and targets."""
-    drawn = [
-        torch.from_numpy(part) for part in random_layouts(np.random.default_rng(5), 12, 5, limits="mixed")
-    ]
+    rng = np.random.default_rng(5)
+    layouts = [random_layout(rng, n_fins=5, limits="varied") for _ in range(12)]
+    parts = ("position", "mounting_angle", "lower", "upper")
+    drawn = [torch.tensor(np.array([getattr(layout, part) for layout in layouts])) for part in parts]
     target = torch.randn(12, 6, generator=torch.Generator().manual_seed(5))
-    return raw_features(*drawn[:4]).float(), target
+    return raw_features(*drawn).float(), target
 
 
 @pytest.mark.parametrize("n", [2, 5])
@@ -118,7 +119,9 @@ def test_documented_meaning_of_the_features() -> None:
     limits = Limits((0.06, 0.3), (0.21, 2.1), (-1.0, 2.0))
     layout = Layout("one", (Fin("bow", (0.3, -0.15, 0.06), math.pi / 2, limits),))
     expected = [1.0, -0.5, 0.2, 0.5, 0.1, 0.5, 0.1, 1.0, -1.0 / math.pi, 2.0 / math.pi]
-    np.testing.assert_allclose(raw_features(*stack_layouts([layout])[:4])[0, 0], expected)
+    np.testing.assert_allclose(
+        raw_features(layout.position, layout.mounting_angle, layout.lower, layout.upper)[0], expected
+    )
 
 
 def random_mixture() -> Mixture:

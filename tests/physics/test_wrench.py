@@ -1,4 +1,4 @@
-"""Assembling wrenches, as training does: symmetries, padding, derivatives, numpy against tensors."""
+"""Wrenches of forces: symmetries, derivatives, numpy against tensors."""
 
 import math
 
@@ -7,15 +7,16 @@ import pytest
 import torch
 
 from finlab.layout import FinModelSpec
-from finlab.physics import assemble_wrench, body_force, make_law
+from finlab.layout.arrays import force_effectiveness
+from finlab.physics import body_force, make_law
+from finlab.physics.wrench import wrench_of_forces
 
 F64 = torch.float64
 DRAG = make_law(FinModelSpec())
 
 
-def drag_wrench(command, position, angle, mask=None):
-    mask = torch.ones(angle.shape, dtype=torch.bool) if mask is None else mask
-    return assemble_wrench(DRAG, command, position, angle, mask)
+def drag_wrench(command, position, angle):
+    return wrench_of_forces(DRAG.force(command), force_effectiveness(position, angle))
 
 
 @pytest.fixture
@@ -57,18 +58,6 @@ def test_turning_the_whole_robot_turns_the_wrench(robots):
     torch.testing.assert_close(turned[:, 3:], wrench[:, 3:] @ rotation.T)
 
 
-@pytest.mark.parametrize("rubbish", [1e6, float("inf"), float("nan")])
-def test_padding_never_leaks_into_wrench_or_gradient(robots, rubbish):
-    command, position, angle = robots
-    mask = torch.tensor([True, True, False, True, False]).expand(6, 5)
-    clean = drag_wrench(command[:, [0, 1, 3]], position[:, [0, 1, 3]], angle[:, [0, 1, 3]])
-    dirty = command.masked_fill(~mask.unsqueeze(-1), rubbish).requires_grad_()
-    wrench = drag_wrench(dirty, position, angle, mask)
-    torch.testing.assert_close(wrench, clean)
-    (gradient,) = torch.autograd.grad(wrench.square().sum(), dirty)
-    assert torch.isfinite(gradient).all() and not gradient[~mask].any()
-
-
 def test_the_wrench_is_differentiable_by_command_and_geometry(robots):
     inputs = tuple(part[:1, :2].clone().requires_grad_() for part in robots)
     assert torch.autograd.gradcheck(lambda u, r, a: drag_wrench(u, r, a), inputs)
@@ -77,7 +66,7 @@ def test_the_wrench_is_differentiable_by_command_and_geometry(robots):
 def test_arrays_and_tensors_give_the_same_wrench(robots):
     tensors = drag_wrench(*robots).numpy()
     command, position, angle = (part.numpy() for part in robots)
-    arrays = assemble_wrench(DRAG, command, position, angle, np.ones(angle.shape, dtype=bool))
+    arrays = drag_wrench(command, position, angle)
     np.testing.assert_allclose(arrays, tensors, rtol=1e-13, atol=1e-14)
     # By hand: forces in the body frame, and their moments.
     force = body_force(DRAG.force(command), frames(torch.from_numpy(angle)).numpy())
