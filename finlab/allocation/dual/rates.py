@@ -67,7 +67,7 @@ class Rates:
     def box(self, previous: Array) -> Box:
         """What may follow a previous command (n, 3); an actuator with NaN is left free."""
         lower, upper, step = self.lower, self.upper, self.step
-        known = np.isfinite(previous).all(axis=1)[:, None]
+        known = np.asarray(np.isfinite(previous).all(axis=1))[:, None]
         turns = self.turns & known & (step < np.pi)
         center = np.where(known, np.where(turns, previous, np.clip(previous, lower, upper)), lower)
         low, high = np.maximum(center - step, lower), np.minimum(center + step, upper)
@@ -95,7 +95,7 @@ def within_tick(robot: DualRobot, sets: Sets, wrench: Array, prices: Array, weig
         return found.force
     metric = robot.basis.T * (weight * robot.scale) ** 2
     unit = float(np.maximum(sets.low_cost, sets.high_cost).sum()) + 1e-12
-    penalty = np.linalg.inv(metric @ robot.basis) / unit
+    penalty: Array = np.linalg.inv(metric @ robot.basis) / unit
     for stiffness in STIFFNESS:
         found = solve(robot, target, sets, prices, Terms(penalty=penalty / stiffness))
         prices = found.prices
