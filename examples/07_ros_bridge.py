@@ -4,13 +4,13 @@ You will see what it publishes for three wrenches; without ROS, a stand-in plays
 """
 
 from collections.abc import Callable
-from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import SimpleNamespace as Message
 
 import finlab
 from finlab.deploy.bundle import make_bundle
-from finlab.exchange import flippers
+
+MOTORS = ("front_right", "back_right", "back_left", "front_left")
 
 
 class Bridge:
@@ -24,7 +24,13 @@ class Bridge:
         force, torque = message.wrench.force, message.wrench.torque
         wrench = [force.x, force.y, force.z, torque.x, torque.y, torque.z]
         answer = self.allocator.allocate(wrench)
-        self.publish(Message(flippers=[m._asdict() for m in flippers(answer.fins, answer.command)]))
+        self.publish(Message(flippers=[*map(flipper, answer.fins, answer.command)]))
+
+
+def flipper(name: str, beat: tuple[float, float, float]) -> dict[str, float]:
+    """One message of U-CAT's simulator, whose amplitude is the whole stroke."""
+    a, f, phi = beat
+    return {"motor_number": MOTORS.index(name) + 1, "frequency": f, "zero_direction": phi, "amplitude": 2 * a}
 
 
 def wrench_stamped(fx: float, fz: float, tz: float) -> Message:
@@ -36,17 +42,14 @@ def wrench_stamped(fx: float, fz: float, tz: float) -> Message:
 def show(message: Message) -> None:
     """A stand-in for a publisher."""
     for fin in message.flippers:
-        number, amplitude = fin["motor_number"], fin["amplitude"]
-        print(f"motor {number}: {fin['frequency']:.2f} Hz, {amplitude:.3f} rad from end to end", end="; ")
+        print("motor {motor_number}: {frequency:.2f} Hz, {amplitude:.3f} rad".format(**fin), end="; ")
     print()
 
 
 def main() -> None:
-    layout = finlab.load_layout("ucat")
     with TemporaryDirectory() as folder:
-        bundle = Path(folder) / "ucat"
-        make_bundle(finlab.Allocator(layout)).write(bundle)
-        bridge = Bridge(str(bundle), show)
+        make_bundle(finlab.Allocator(finlab.load_layout("ucat"))).write(folder)
+        bridge = Bridge(folder, show)
         for wrench in (wrench_stamped(1.0, 0.5, 0.0), wrench_stamped(0.5, 0.0, 0.1), wrench_stamped(0, 0, 0)):
             bridge.on_wrench(wrench)
 

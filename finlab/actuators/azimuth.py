@@ -7,22 +7,21 @@ points along cos(a) zero + sin(a) (turn_axis x zero). There is none within the d
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finlab.actuators.law import ActuatorLaw
 from finlab.actuators.response import Group, Plane
-from finlab.actuators.thrust_power import by_model, held, power_of, radial_table
+from finlab.actuators.thrust_power import ThrustPower, held, radial_table
 from finlab.arrays import Array, Values
 from finlab.layout.angles import TURN, is_full_turn, wrapped
 from finlab.layout.azimuth import Azimuth
 
 
 class AzimuthLaw(ActuatorLaw):
-    """n turning thrusters whose models are of one kind."""
+    """n turning thrusters."""
 
     def __init__(self, azimuths: Sequence[Azimuth]) -> None:
         """Takes n turning thrusters."""
-        self.power_curve = power_of([azimuth.model for azimuth in azimuths])
+        self.power_curve = ThrustPower([azimuth.model for azimuth in azimuths])
         self.dead_band = np.array([azimuth.dead_band for azimuth in azimuths])
 
     def force(self, command: Values, inflow: Array | None = None) -> Values:
@@ -53,11 +52,6 @@ class AzimuthLaw(ActuatorLaw):
         gradient = np.zeros(command.shape)
         gradient[..., 1] = self.power_curve.marginal(held(command[..., 1], self.dead_band))
         return gradient
-
-
-def azimuth_laws(azimuths: Sequence[Azimuth]) -> list[tuple[NDArray[np.intp], ActuatorLaw]]:
-    """Returns the laws of n turning thrusters, each with the places of its own."""
-    return [*by_model(azimuths, AzimuthLaw)]
 
 
 class AzimuthGroup(Group):

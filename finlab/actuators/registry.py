@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.actuators.azimuth import AzimuthGroup, azimuth_laws
+from finlab.actuators.azimuth import AzimuthGroup, AzimuthLaw
 from finlab.actuators.fin.models import stack_laws
 from finlab.actuators.fin.response import FinGroup
 from finlab.actuators.law import ActuatorLaw
 from finlab.actuators.response import Group
 from finlab.actuators.rudder import RudderGroup, RudderLaw
-from finlab.actuators.thruster import ThrusterGroup, thruster_laws
+from finlab.actuators.thruster import ThrusterGroup, ThrusterLaw
 from finlab.arrays import Array
 from finlab.layout.layout import Layout
 
@@ -33,16 +33,22 @@ class Kind:
     """Which of its commands is an angle that may turn freely."""
 
 
-_AZIMUTH = Kind(azimuth_laws, lambda parts, wrench, _: AzimuthGroup(parts, wrench), angle=0)
+def _kind(law: Callable[[Sequence[Any]], ActuatorLaw], group: Any, angle: int | None = None) -> Kind:
+    """A kind whose actuators have one law together, and no motors whose losses count."""
+    return Kind(
+        lambda parts: [(np.arange(len(parts)), law(parts))],
+        lambda parts, wrench, _: group(parts, wrench),
+        angle,
+    )
+
+
+_AZIMUTH = _kind(AzimuthLaw, AzimuthGroup, angle=0)
 KINDS: dict[str, Kind] = {
     "fin": Kind(lambda fins: stack_laws([fin.model for fin in fins]), FinGroup, angle=2),
-    "thruster": Kind(thruster_laws, lambda parts, wrench, _: ThrusterGroup(parts, wrench)),
+    "thruster": _kind(ThrusterLaw, ThrusterGroup),
     "azimuth": _AZIMUTH,
     "tilt": _AZIMUTH,
-    "rudder": Kind(
-        lambda rudders: [(np.arange(len(rudders)), RudderLaw(rudders))],
-        lambda parts, wrench, _: RudderGroup(parts, wrench),
-    ),
+    "rudder": _kind(RudderLaw, RudderGroup),
 }
 """Type of an actuator in a layout -> what is known of it."""
 

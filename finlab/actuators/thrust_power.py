@@ -1,37 +1,21 @@
 """Power of a propeller over its force: a power law, or a convex curve through a table of measurements."""
 
-from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import lru_cache
-from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finlab.actuators.response import RadialTable
 from finlab.arrays import AnyArray, Array
 from finlab.layout.thrust_model import PowerLaw, PowerTable, ThrustModel, lower_hull, side_points
 
-Law = TypeVar("Law")
 STEEP = 1e-9
 """Share of the largest marginal cost by which the marginal cost of a curve rises at least from its one end to
 the other, so that each price has one answer."""
 
 
-class ThrustPower(ABC):
-    """Watts over newtons, convex, of n propellers (..., n)."""
-
-    @abstractmethod
-    def watts(self, force: AnyArray) -> AnyArray:
-        """Returns the power [W] of forces [N], negative ones in reverse."""
-
-    @abstractmethod
-    def marginal(self, force: AnyArray) -> AnyArray:
-        """Returns its derivative [W/N] by the force."""
-
-
-class ByPower(ThrustPower):
-    """Watts that grow with a power of the force; parameters are numbers or arrays (n,)."""
+class ByPower:
+    """Watts that grow with a power of the force, of n propellers."""
 
     def __init__(self, models: Sequence[PowerLaw]) -> None:
         """Takes n models."""
@@ -41,16 +25,10 @@ class ByPower(ThrustPower):
         )
         self.exponent = np.array([model.exponent for model in models])
 
-    def watts(self, force: AnyArray) -> AnyArray:
-        """See `ThrustPower`."""
-        power: AnyArray = np.where(force < 0.0, self.reverse, self.forward) * np.abs(force) ** self.exponent
-        return power
-
-    def marginal(self, force: AnyArray) -> AnyArray:
-        """See `ThrustPower`."""
-        factor = np.where(force < 0.0, -self.reverse, self.forward) * self.exponent
-        slope: AnyArray = factor * np.abs(force) ** (self.exponent - 1.0)
-        return slope
+    def at(self, force: AnyArray) -> tuple[AnyArray, AnyArray]:
+        """Returns power [W] and marginal cost [W/N] of forces (..., n) [N]."""
+        slope = np.where(force < 0.0, -self.reverse, self.forward) * np.abs(force) ** (self.exponent - 1.0)
+        return slope * force, self.exponent * slope
 
 
 class Curve:
@@ -130,28 +108,31 @@ def sides_of(model: PowerTable) -> Sides:
     return Sides(model)
 
 
-class ByTable(ThrustPower):
-    """Watts by tables, one for each of n propellers."""
+class ThrustPower:
+    """Watts over newtons, convex, of n propellers, whatever their models; those of one model together."""
 
-    def __init__(self, models: Sequence[PowerTable]) -> None:
-        """Takes n tables; those that are the same are evaluated together."""
-        self._groups = [
-            (np.array([i for i, own in enumerate(models) if own == model]), sides_of(model))
-            for model in dict.fromkeys(models)
-        ]
+    def __init__(self, models: Sequence[ThrustModel]) -> None:
+        """Takes n models."""
+        kinds = [model if isinstance(model, PowerTable) else None for model in models]
+        self._groups: list[tuple[AnyArray | slice, ByPower | Sides]] = []
+        for kind in dict.fromkeys(kinds):
+            own = [i for i, other in enumerate(kinds) if other == kind]
+            laws = [model for model in models if isinstance(model, PowerLaw)]
+            places = slice(None) if len(own) == len(models) else np.array(own)
+            self._groups.append((places, ByPower(laws) if kind is None else sides_of(kind)))
 
     def watts(self, force: AnyArray) -> AnyArray:
-        """See `ThrustPower`."""
+        """Returns the power [W] of forces (..., n) [N], negative ones in reverse."""
         return self._both(force, 0)
 
     def marginal(self, force: AnyArray) -> AnyArray:
-        """See `ThrustPower`."""
+        """Returns its derivative [W/N] by the force."""
         return self._both(force, 1)
 
     def _both(self, force: AnyArray, which: int) -> AnyArray:
         result: AnyArray = np.empty(np.shape(force))
-        for places, sides in self._groups:
-            result[..., places] = sides.at(force[..., places])[which]
+        for places, power in self._groups:
+            result[..., places] = power.at(force[..., places])[which]
         return result
 
 
@@ -164,7 +145,7 @@ def radial_table(model: ThrustModel, sign: int, least: float, most: float) -> Ra
         least: least size of the force [N].
         most: largest size [N].
     """
-    own = power_of([model])
+    own = ThrustPower([model])
     ends = np.array([[sign * least], [sign * most]])
     rest = float(own.watts(ends)[0, 0])
     top = abs(float(own.marginal(ends)[1, 0]))
@@ -191,23 +172,3 @@ def held(force: AnyArray, dead_band: Array) -> AnyArray:
     """Returns the forces (..., n) [N] that come of commanded ones: none within the dead bands (n,) [N]."""
     result: AnyArray = np.where(np.abs(force) < dead_band * (1.0 - 1e-9), 0.0, force)
     return result
-
-
-def power_of(models: Sequence[ThrustModel]) -> ThrustPower:
-    """Returns the power of n propellers whose models are of one kind."""
-    laws = [model for model in models if isinstance(model, PowerLaw)]
-    tables = [model for model in models if isinstance(model, PowerTable)]
-    assert not (laws and tables), "one kind of model at a time"
-    return ByPower(laws) if laws else ByTable(tables)
-
-
-def by_model(
-    propellers: Sequence[Any], law: Callable[[Sequence[Any]], Law]
-) -> list[tuple[NDArray[np.intp], Law]]:
-    """Returns the laws of n propellers, one for each kind of model, with the places of its propellers."""
-    kinds = [type(propeller.model) for propeller in propellers]
-    found = []
-    for kind in dict.fromkeys(kinds):
-        places = np.array([i for i, own in enumerate(kinds) if own is kind])
-        found.append((places, law([propellers[i] for i in places])))
-    return found

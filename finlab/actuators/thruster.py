@@ -7,21 +7,20 @@ reaction torque of the propeller is part of the effectiveness.
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finlab.actuators.law import ActuatorLaw
 from finlab.actuators.response import Group, Line
-from finlab.actuators.thrust_power import by_model, held, power_of, radial_table
+from finlab.actuators.thrust_power import ThrustPower, held, radial_table
 from finlab.arrays import Array, Values
 from finlab.layout.thruster import Thruster
 
 
 class ThrusterLaw(ActuatorLaw):
-    """n thrusters whose models are of one kind."""
+    """n thrusters."""
 
     def __init__(self, thrusters: Sequence[Thruster]) -> None:
         """Takes n thrusters."""
-        self.power_curve = power_of([thruster.model for thruster in thrusters])
+        self.power_curve = ThrustPower([thruster.model for thruster in thrusters])
         self.dead_band = np.array([thruster.dead_band for thruster in thrusters])
 
     def force(self, command: Values, inflow: Array | None = None) -> Values:
@@ -46,11 +45,6 @@ class ThrusterLaw(ActuatorLaw):
         gradient = np.zeros(command.shape)
         gradient[..., 0] = self.power_curve.marginal(held(command[..., 0], self.dead_band))
         return gradient
-
-
-def thruster_laws(thrusters: Sequence[Thruster]) -> list[tuple[NDArray[np.intp], ActuatorLaw]]:
-    """Returns the laws of n thrusters, each with the places of its own."""
-    return [*by_model(thrusters, ThrusterLaw)]
 
 
 class ThrusterGroup(Group):

@@ -26,7 +26,6 @@ def export(
         checkpoint: of mdn, the shipped one by default.
     """
     from finlab.cli.inputs import open_robot
-    from finlab.cli.layout_table import counted
     from finlab.errors import FinlabError
 
     if output.suffix == ".json":
@@ -45,5 +44,5 @@ def export(
     else:
         bundle.write(output)
     size = sum(map(len, bundle.files.values())) / 1e6
-    print(f"{output}: {counted(robot.layout)}, {len(bundle.files)} files, {size:.2f} MB")
+    print(f"{output}: {robot.layout.counted}, {len(bundle.files)} files, {size:.2f} MB")
     print(f"check it on the robot: finlab-runtime check {output.name}")

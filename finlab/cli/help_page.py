@@ -15,7 +15,7 @@ EXAMPLES = {
     "layout check": "finlab layout check my_robot.yaml",
     "layout show": "finlab layout show A --failed front_right",
     "layout optimize": "finlab layout optimize A --fins front_right front_left -o better.yaml",
-    "layout import": "finlab layout import fins.csv -o my_robot.yaml",
+    "layout import": "finlab layout import robot.urdf --fins LINK -o my_robot.yaml",
     "layout export": "finlab layout export A -o A.urdf",
     "train": "finlab train mdn -o runs/mine --preset smoke",
     "train mdn": "finlab train mdn -o runs/mine --preset smoke",

@@ -5,17 +5,14 @@ from __future__ import annotations
 import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 from tyro.conf import Positional, UseAppendAction, arg
 from tyro.extras import SubcommandApp
 
 from finlab.cli.json_file import JsonFile, check_json_file, put_json
-from finlab.cli.layout_table import counted, layout_text
+from finlab.cli.layout_table import layout_text
 from finlab.cli.optimize import optimize
-
-if TYPE_CHECKING:
-    pass
 
 verbs = SubcommandApp()
 verbs.command(optimize)
@@ -41,7 +38,7 @@ def check(layouts: Annotated[Positional[tuple[str, ...]], arg(metavar="LAYOUT...
             print(f"finlab: error: {error}", file=sys.stderr)
             n_bad += 1
         else:
-            print(f"{text}: ok, layout {layout.name} with {counted(layout)}")
+            print(f"{text}: ok, layout {layout.name} with {layout.counted}")
     return 2 if n_bad else 0
 
 
@@ -77,30 +74,25 @@ def show(
 
 @verbs.command(name="import")
 def import_layout(
-    file: Annotated[Positional[Path], arg(metavar="FILE.urdf|FILE.csv")],
+    file: Annotated[Positional[Path], arg(metavar="FILE.urdf")],
     output: Annotated[Path, arg(metavar="LAYOUT.yaml", aliases=["-o"])],
     fins: Annotated[tuple[str, ...], arg(metavar="LINK...")] = (),
     origin: Literal["gravity", "base"] = "gravity",
     name: Annotated[str | None, arg(metavar="TEXT")] = None,
 ) -> None:
-    """Make a layout file from a robot description (URDF) or a table (CSV).
+    """Make a layout file from a robot description (URDF).
 
     Args:
-        file: a URDF file, or a CSV file with the columns x_m, y_m, z_m and, if wanted, name,
-            mounting_angle_deg and limits.
+        file: a URDF file.
         output: layout file to write.
-        fins: links of the URDF file that are fins; a joint's origin gives the position, its axis the shaft.
+        fins: links that are fins; a joint's origin gives the position, its axis the shaft.
         origin: where the layout's origin goes: the centre of gravity of all links, or the root link's frame.
         name: what to call the layout.
     """
-    from finlab.errors import CommandError
-    from finlab.exchange import read_csv, read_urdf
+    from finlab.exchange import read_urdf
     from finlab.layout import save_layout
 
-    kind = file.suffix.lower()
-    if kind not in (".urdf", ".xml", ".csv"):
-        raise CommandError(f"{file}: expected a file that ends in .urdf or .csv")
-    layout = read_csv(file) if kind == ".csv" else read_urdf(file, fins, origin)
+    layout = read_urdf(file, fins, origin)
     if name is not None:
         layout = replace(layout, name=name)
     save_layout(layout, output)
@@ -111,21 +103,20 @@ def import_layout(
 @verbs.command(name="export")
 def export_layout(
     layout: Annotated[Positional[str], arg(metavar="LAYOUT")],
-    output: Annotated[Path, arg(metavar="FILE.urdf|FILE.csv", aliases=["-o"])],
+    output: Annotated[Path, arg(metavar="FILE.urdf", aliases=["-o"])],
 ) -> None:
-    """Write a layout as a robot description (URDF) or a table (CSV).
+    """Write a layout as a robot description (URDF).
 
     Args:
         layout: layout file, bundle, or the name of a shipped layout.
-        output: file to write; its ending says in which format.
+        output: file to write.
     """
     from finlab.cli.inputs import open_robot
     from finlab.errors import CommandError
-    from finlab.exchange import write_csv, write_urdf
+    from finlab.exchange import write_urdf
 
-    writers = {".urdf": write_urdf, ".csv": write_csv}
-    if output.suffix.lower() not in writers:
-        raise CommandError(f"{output}: expected a file that ends in .urdf or .csv")
+    if output.suffix.lower() != ".urdf":
+        raise CommandError(f"{output}: expected a file that ends in .urdf")
     robot = open_robot(layout, fins_for="layout export")
-    writers[output.suffix.lower()](robot.layout, output)
+    write_urdf(robot.layout, output)
     print(f"{output}: {robot.layout.n_fins} fins")

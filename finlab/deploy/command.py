@@ -46,12 +46,11 @@ def _robot(arguments: argparse.Namespace) -> "DeployedRobot":
 
 def check(arguments: argparse.Namespace) -> int:
     """Print each question of the self-test with its answer."""
-    from finlab.deploy.record import number_of_actuators
     from finlab.deploy.self_check import self_check
 
     robot = _robot(arguments)
     print(
-        f"{arguments.bundle}: {robot.layout.name}, {number_of_actuators(robot.layout)}, "
+        f"{arguments.bundle}: {robot.layout.name}, {robot.layout.counted}, "
         f"method {robot.allocator.method}, ready in {time.perf_counter() - arguments.started:.2f} s"
     )
     findings = self_check(robot)
@@ -87,19 +86,13 @@ def serve(arguments: argparse.Namespace) -> int:
     stop = StopSignals()  # before the robot is loaded, so that no signal is missed
     robot = _robot(arguments)
     from finlab.deploy.serve import Server, Timing
-    from finlab.deploy.transport import LoopbackUdp, StandardStreams, Transport
+    from finlab.deploy.transport import StandardStreams
 
     deadline = None if arguments.deadline_ms is None else arguments.deadline_ms / 1e3
     timing = Timing(deadline, None if arguments.no_watchdog else arguments.watchdog_s)
-    transport: Transport
-    if arguments.udp is None:
-        if sys.stdin is None:
-            raise FinlabError("standard input is closed; connect it, or use --udp PORT")
-        transport = StandardStreams(sys.stdin.fileno(), sys.stdout.fileno(), stop)
-    else:
-        transport = LoopbackUdp(arguments.udp, stop)
-        print(f"listening on 127.0.0.1:{transport.port}", file=sys.stderr, flush=True)
-    Server(robot, timing).run(transport)
+    if sys.stdin is None:
+        raise FinlabError("standard input is closed; connect it")
+    Server(robot, timing).run(StandardStreams(sys.stdin.fileno(), sys.stdout.fileno(), stop))
     return 0
 
 
@@ -169,7 +162,6 @@ def _parser() -> argparse.ArgumentParser:
         "Read targets as JSON lines, write commands as JSON lines.",
         """echo '{"wrench": [1, 0, 0.5, 0, 0, 0.1]}' | finlab-runtime serve my_robot""",
     )
-    loop.add_argument("--udp", type=int, metavar="PORT", help="UDP on 127.0.0.1, not stdin and stdout")
     loop.add_argument(
         "--deadline-ms", type=_within(0.001, 1e6), metavar="MS", help="answer no later than this"
     )

@@ -45,11 +45,6 @@ def command_record(layout: Layout, command: Array, forces: Array) -> dict[str, o
     return record
 
 
-def number_of_actuators(layout: Layout) -> str:
-    """How many actuators a robot has, in words."""
-    return f"{layout.n} {'fins' if layout.is_of_fins else 'actuators'}"
-
-
 def actuator_values(layout: Layout, command: Array, forces: Array) -> list[dict[str, object]]:
     """What each actuator of a robot is told and gives, as plain values; a failed one is told nothing.
 

@@ -31,7 +31,7 @@ import numpy as np
 from finlab.allocation.allocation import Allocation
 from finlab.arrays import Array
 from finlab.deploy.record import command_record
-from finlab.deploy.request import parse_request
+from finlab.deploy.request import Request, parse_request
 from finlab.deploy.robot import DeployedRobot
 from finlab.deploy.transport import Transport, Unsent
 from finlab.errors import FinlabError
@@ -98,8 +98,8 @@ class Server:
         name: Any = None
         try:
             request = parse_request(line)
-            name = request.get("id")
-            self._failed = tuple(request.get("failed", ()))
+            name = request.id
+            self._failed = tuple(request.failed)
             answer = self._solve(request, start)
         except TooLate:
             neutral = self._neutral()
@@ -118,19 +118,19 @@ class Server:
         self._sent, self._sent_at = answer.command, time.monotonic()
         return reply
 
-    def _solve(self, request: Mapping[str, Any], start: float) -> Allocation:
+    def _solve(self, request: Request, start: float) -> Allocation:
         """The robot's answer, or `TooLate` when the deadline passes first."""
         fresh = time.monotonic() - self._sent_at < RECENT_S
         previous = self._sent if fresh else None
 
         def work() -> Allocation:
             return self._robot.allocate(
-                request["wrench"],
+                request.wrench,
                 failed=self._failed,
                 previous=previous,
-                reference=request.get("reference"),
-                policy=request.get("policy", "closest"),
-                flow=request.get("flow"),
+                reference=request.reference,
+                policy=request.policy,
+                flow=request.flow,
             )
 
         if self._timing.deadline is None:

@@ -1,11 +1,10 @@
-"""How the server's lines travel: over standard input and output, or as UDP datagrams on this machine.
+"""How the server's lines travel: over standard input and output.
 
-Both wait for lines, for signals and, where it matters, for the reader of answers at once, in one thread.
+Lines, signals and the reader of answers are waited for at once, in one thread.
 """
 
 import os
 import select
-import socket
 import time
 from typing import Protocol
 
@@ -19,8 +18,6 @@ CHUNK = 65_536
 """Bytes that are read at once."""
 BURST = 16
 """Chunks that are read before the newest line in them is answered, however fast more come."""
-MOST_DATAGRAMS = 1000
-"""Datagrams that are read before the newest of them is answered."""
 
 
 class Transport(Protocol):
@@ -116,41 +113,3 @@ class StandardStreams:
         *lines, part = (self._part + (chunk or b"\n")).split(b"\n")
         self._part = part[: MAX_LINE + 1]  # enough to refuse it
         self._line = next((line for line in reversed(lines) if line.strip()), self._line)
-
-
-class LoopbackUdp:
-    """Datagrams on 127.0.0.1; answers go to whoever sent last."""
-
-    def __init__(self, port: int, stop: StopSignals) -> None:
-        """Listen on a port, for 0 on a free one; a `FinlabError` where the port is taken."""
-        self._socket, self._stop = socket.socket(socket.AF_INET, socket.SOCK_DGRAM), stop
-        try:
-            self._socket.bind(("127.0.0.1", port))
-        except (OSError, OverflowError) as error:
-            raise FinlabError(f"cannot listen on 127.0.0.1:{port}: {error}") from None
-        self._socket.setblocking(False)
-        self.port = int(self._socket.getsockname()[1])
-        self._sender: tuple[str, int] | None = None
-
-    def newest(self, timeout: float | None) -> bytes | None:
-        """See `Transport`."""
-        if not self._stop.came:
-            select.select([self._socket.fileno(), self._stop.fileno()], [], [], timeout)
-        if self._stop.came:
-            raise EOFError
-        line = None
-        for _ in range(MOST_DATAGRAMS):
-            try:
-                line, self._sender = self._socket.recvfrom(MAX_LINE)  # no datagram is longer
-            except BlockingIOError:
-                break
-        return line
-
-    def send(self, line: bytes) -> None:
-        """See `Transport`."""
-        if self._sender is None:
-            return
-        try:
-            self._socket.sendto(line, self._sender)
-        except OSError:  # no reader any more; the watchdog sends to the next one
-            self._sender = None

@@ -1,5 +1,6 @@
 """A layout: the actuators of one robot, in order, and optionally its body."""
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
@@ -178,6 +179,12 @@ class Layout(Checked):
     def n_fins(self) -> int:
         """How many fins there are."""
         return len(self.fins)
+
+    @property
+    def counted(self) -> str:
+        """How many actuators there are of each type, such as `4 fins and 2 thrusters`."""
+        counts = Counter(part.type for part in self.actuators)
+        return " and ".join(f"{n} {kind}s" for kind, n in counts.items())
 
     def index(self, name: str) -> int:
         """Returns the place of the actuator called `name`.

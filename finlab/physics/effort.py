@@ -1,4 +1,4 @@
-"""The paper's energy proxy `J_en`, a sum of squares and one product of normalized commands, or its power."""
+"""The paper's energy proxy `J_en`, a sum of squares and one product of normalized commands."""
 
 from dataclasses import dataclass
 
@@ -20,9 +20,6 @@ class EffortWeights:
     """Weight of the squared normalized zero direction."""
     product: float = 1.0
     """Weight of normalized amplitude times normalized frequency."""
-    inertial: float = 0.0
-    """Weight of the squared normalized amplitude times the cubed normalized frequency, to which the power
-    that the paper measures, I alpha omega, is proportional."""
 
 
 DEFAULT_WEIGHTS = EffortWeights()
@@ -46,8 +43,7 @@ def effort_of_shares(
 ) -> Values:
     """One fin's summand of `J_en`, from commands over their scale: arrays, tensors or symbols."""
     a, f, d, w = amplitude, frequency, zero_direction, weights
-    effort = w.amplitude * a * a + w.frequency * f * f + w.zero_direction * d * d + w.product * a * f
-    return effort + w.inertial * (a * f) ** 2 * f if w.inertial else effort
+    return w.amplitude * a * a + w.frequency * f * f + w.zero_direction * d * d + w.product * a * f
 
 
 def fin_effort(command: Values, upper: Values, weights: EffortWeights = DEFAULT_WEIGHTS) -> Values:
@@ -76,42 +72,17 @@ class EffortMeter:
 
     def __call__(self, command: NDArray[np.floating]) -> AnyArray:
         """Energies (R,) of commands (R, n, 3)."""
-        return self._effort(command, self._quadratic_jacobian(command))
+        return self.with_gradient(command)[0]
 
     def gradient(self, command: NDArray[np.floating]) -> AnyArray:
         """Derivatives (R, n, 3) of the energies by commands (R, n, 3)."""
-        return self._gradient(command, self._quadratic_jacobian(command))
-
-    def with_gradient(self, command: NDArray[np.floating]) -> tuple[AnyArray, AnyArray]:
-        """Both, for little more than the price of one."""
-        quadratic = self._quadratic_jacobian(command)
-        return self._effort(command, quadratic), self._gradient(command, quadratic)
-
-    def _effort(self, command: NDArray[np.floating], quadratic: AnyArray) -> AnyArray:
-        # Of a quadratic form, half the slopes times the commands.
-        effort: AnyArray = np.einsum("rni,rni->r", quadratic, command)
-        effort *= 0.5
-        if self.weights.inertial:
-            a, f = self._beat(command)
-            effort += self.weights.inertial * ((a * f) ** 2 * f).sum(-1)
-        return effort
-
-    def _gradient(self, command: NDArray[np.floating], gradient: AnyArray) -> AnyArray:
-        """All slopes, in place of the quadratic ones."""
-        if self.weights.inertial:
-            a, f = self._beat(command)
-            gradient[..., 0] += self.weights.inertial * 2.0 * a * f**3 / self._scale[:, 0]
-            gradient[..., 1] += self.weights.inertial * 3.0 * (a * f) ** 2 / self._scale[:, 1]
-        return gradient
-
-    def _quadratic_jacobian(self, command: NDArray[np.floating]) -> AnyArray:
-        """Derivatives (R, n, 3) of all but the inertial part."""
         gradient: AnyArray = command * self._twice
         gradient[..., 0] += self._product * command[..., 1]
         gradient[..., 1] += self._product * command[..., 0]
         return gradient
 
-    def _beat(self, command: NDArray[np.floating]) -> tuple[AnyArray, AnyArray]:
-        """Normalized amplitudes and frequencies (R, n)."""
-        share = command[..., :2] / self._scale[:, :2]
-        return share[..., 0], share[..., 1]
+    def with_gradient(self, command: NDArray[np.floating]) -> tuple[AnyArray, AnyArray]:
+        """Both, for little more than the price of one."""
+        gradient = self.gradient(command)
+        # Of a quadratic form, half the slopes times the commands.
+        return 0.5 * np.einsum("rni,rni->r", gradient, command), gradient

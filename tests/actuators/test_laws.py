@@ -106,7 +106,7 @@ def test_power_laws_of_the_t200_meet_its_tables(
 ) -> None:
     """Published fits of F^1.5, and the root of the mean square of what they miss [W]."""
     _, force, power = PowerTable(t200_rows(volts)).columns
-    missed = ByPower([PowerLaw(forward, reverse)]).watts(force[:, None])[:, 0] - power
+    missed = ByPower([PowerLaw(forward, reverse)]).at(force[:, None])[0][:, 0] - power
     for side, most in zip((force > 0.0, force < 0.0), rms, strict=True):
         assert math.sqrt((missed[side] ** 2).mean()) <= most
 

@@ -15,7 +15,6 @@ from finlab.physics.objective import Objective
 SIGMA = np.array([1.4, 1.4, 2.0, 0.35, 0.3, 0.4])
 AIMS = [
     Objective("effort", EffortWeights(1.0, 2.0, 0.4, 0.7)),
-    Objective("effort", EffortWeights(1.0, 2.0, 0.4, 0.7, 3.0)),
     Objective("power"),
     Objective("power", copper_loss=0.3),
 ]

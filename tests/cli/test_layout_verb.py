@@ -36,7 +36,7 @@ def test_check_wants_a_layout(capsys: pytest.CaptureFixture[str]) -> None:
 def test_show_lists_fins_and_what_they_can_push(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["layout", "show", "A"]) == 0
     out = capsys.readouterr().out
-    assert "front_right   0.258  -0.150   0.000        -60.0" in out
+    assert "front_right   fin   0.258  -0.150   0.000   shaft at -60.0 deg" in out
     assert "4 fins push in 6 of 6 independent directions." in out
 
 

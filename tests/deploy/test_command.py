@@ -97,7 +97,6 @@ def test_check_prints_each_finding(
         (["check"], "the following arguments are required: BUNDLE"),
         (["allocate", "bundle", "--wrench", "1"], "--wrench: expected 6 arguments"),
         (["allocate", "bundle", "--wrench", *"123456", "--policy=hope"], "invalid choice: 'hope'"),
-        (["serve", "bundle", "--udp=here"], "--udp: invalid int value: 'here'"),
         (["serve", "bundle", "--watchdog-s=2", "--no-watchdog"], "not allowed with argument"),
     ],
 )

@@ -3,7 +3,6 @@
 import json
 import os
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -21,7 +20,7 @@ from finlab.deploy.request import MAX_LINE
 from finlab.deploy.robot import DeployedRobot, parse_robot
 from finlab.deploy.serve import RECENT_S, Server, Timing
 from finlab.deploy.stopping import SIGNALS, StopSignals
-from finlab.deploy.transport import LoopbackUdp, StandardStreams, Unsent
+from finlab.deploy.transport import StandardStreams, Unsent
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
 
@@ -83,7 +82,7 @@ def test_answers_like_the_library(robot: DeployedRobot) -> None:
     assert end["status"] == "neutral" and end["command"][2] is None, "a lost fin gets no command at the end"
 
 
-@pytest.mark.parametrize("id_", [None, 0, -1.5, "a", "\ud800", [1, "x"], {"of": [None, True]}, 10**300])
+@pytest.mark.parametrize("id_", [None, 0, -1.5, "a", [1, "x"], {"of": [None, True]}])
 def test_an_id_of_any_kind_comes_back(id_: Any, robot: DeployedRobot) -> None:
     assert served(robot, {**GOOD, "id": id_})[0]["id"] == id_
 
@@ -91,25 +90,25 @@ def test_an_id_of_any_kind_comes_back(id_: Any, robot: DeployedRobot) -> None:
 @pytest.mark.parametrize(
     ("request_", "message"),
     [
-        (b"nonsense", "expected one JSON object in a line$"),
-        (b"[" * 60_000, "expected one JSON object"),
+        (b"nonsense", "request: is not valid JSON"),
+        (b"[" * 60_000, "request: is nested too deeply"),
         (b"x" * 70_000, "longer than 65536 bytes"),
         (LINE.strip().ljust(MAX_LINE + 1), "longer than 65536 bytes"),
         ({"wrench": [1, 2]}, "expected six numbers"),
-        ({"force": [1, 2]}, "expected {.wrench.:"),
-        ({**GOOD, "speed": 3}, "unknown key 'speed'"),
-        ({**GOOD, "failed": "back_left"}, "failed: expected a list of fin names"),
+        ({"force": [1, 2]}, "force: unknown key, expected one of wrench, id"),
+        ({**GOOD, "speed": 3}, "request: speed: unknown key"),
+        ({**GOOD, "failed": "back_left"}, "failed: expected a list, got 'back_left'"),
         ({**GOOD, "failed": ["nobody"]}, "no fin 'nobody'"),
         ({**GOOD, "policy": "hope"}, "policy: expected one of"),
-        ({**GOOD, "policy": 3}, "policy: expected a name"),
+        ({**GOOD, "policy": 3}, "policy: expected text, got 3"),
         ({**GOOD, "flow": [1, 0, 0]}, "flow: expected six numbers"),
         ({**GOOD, "reference": [1, 0, 0, 0, 0, 0]}, r"reference: expected an array of shape \(N, 6\)"),
         ({**GOOD, "id": "x" * 1000}, "id: longer than 1000 characters"),
-        ({**GOOD, "id": float("nan")}, "NaN is no number in JSON"),
-        ({**GOOD, "id": [float("-inf")]}, "-Infinity is no number in JSON"),
-        (LINE.replace(b"}", b', "id": 1e999}'), "1e999 is too large"),
-        ({"wrench": [float("nan")] * 6}, "NaN is no number in JSON"),
-        ({"wrench": [10**400, 0, 0, 0, 0, 0]}, "10+ is too large"),
+        ({**GOOD, "id": float("nan")}, "holds NaN, expected a finite number"),
+        ({**GOOD, "id": [float("-inf")]}, "holds -Infinity, expected a finite"),
+        (LINE.replace(b"}", b', "id": 1e999}'), "holds 1e999, expected a finite"),
+        ({"wrench": [float("nan")] * 6}, "holds NaN, expected a finite number"),
+        ({"wrench": [10**400, 0, 0, 0, 0, 0]}, "a number of 401 digits"),
     ],
 )
 def test_bad_requests_get_one_sentence_and_no_commands(
@@ -260,26 +259,10 @@ def test_a_signal_ends_waiting_and_sending(stop: StopSignals, monkeypatch: pytes
     os.write(requests, LINE)
     streams = StandardStreams(source, sink, stop)
     signal.raise_signal(signal.SIGTERM)
-    for transport in (streams, LoopbackUdp(0, stop)):
-        with pytest.raises(EOFError):
-            transport.newest(None)
+    with pytest.raises(EOFError):
+        streams.newest(None)
     with pytest.raises(Unsent, match="its reader took nothing for 0.05 s"):
         streams.send(b"x" * 1_000_000)
-
-
-def test_datagrams_on_this_machine_only(stop: StopSignals) -> None:
-    transport = LoopbackUdp(0, stop)
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as client:
-        client.settimeout(5)
-        transport.send(b"to nobody")
-        assert transport.newest(0.0) is None and transport.newest(0.01) is None
-        for line in (b"one", b"two"):
-            client.sendto(line, ("127.0.0.1", transport.port))
-        assert transport.newest(1.0) == b"two"
-        transport.send(b"answer")
-        assert client.recv(100) == b"answer"
-    with pytest.raises(FinlabError, match="cannot listen on 127.0.0.1"):
-        LoopbackUdp(transport.port, stop)
 
 
 def started(folder: Path, *options: str, **streams: Any) -> subprocess.Popen[bytes]:

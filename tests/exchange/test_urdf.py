@@ -90,4 +90,4 @@ def test_verbs_import_and_export(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert main(["layout", "export", str(made), "-o", str(out)]) == 0
     assert read_urdf(out, FINS).n_fins == 3
     assert main(["layout", "export", str(made), "-o", str(tmp_path / "x.pdf")]) == 2
-    assert "expected a file that ends in .urdf or .csv" in capsys.readouterr().err
+    assert "expected a file that ends in .urdf" in capsys.readouterr().err

@@ -10,14 +10,14 @@ from finlab.physics.effort import DEFAULT_WEIGHTS, EffortWeights, command_effort
 from finlab.physics.objective import Objective
 from tests.random_fins import KINDS, random_robot
 
-INERTIAL = EffortWeights(0.0, 0.0, 0.0, 0.0, 1.0)
+PRODUCT = EffortWeights(0.0, 0.0, 0.0, 1.0)
 
 OBJECTIVES = [
     Objective(),
     Objective("power", copper_loss=1.5),
     Objective("effort"),
-    Objective("effort", EffortWeights(2.0, 0.5, 0.3, 0.7, 1.1)),
-    Objective("effort", INERTIAL),
+    Objective("effort", EffortWeights(2.0, 0.5, 0.3, 0.7)),
+    Objective("effort", PRODUCT),
 ]
 
 

@@ -22,7 +22,7 @@ SIGMA = np.array([1.4, 1.2, 2.0, 0.35, 0.3, 0.4])
     [
         Objective("power", copper_loss=0.3),
         Objective("effort"),
-        Objective("effort", EffortWeights(1.0, 0.7, 0.3, 0.4, 0.6)),
+        Objective("effort", EffortWeights(1.0, 0.7, 0.3, 0.4)),
     ],
 )
 def test_formulas_are_the_plant(objective: Objective) -> None:
