@@ -49,7 +49,7 @@ def run(
     """One row for each split and method.
 
     Args:
-        layout: a layout file, graph file or shipped name in place of a split: one case, of that many targets,
+        layout: a layout file, bundle or shipped name in place of a split: one case, of that many targets,
             with errors over the robot's own wrenches.
         split: names, or all: id, ood, ood-fins, limits, failure, near-singular, fins, fins-mixed, tables,
             many-fins, big, tiny.
