@@ -4,14 +4,11 @@ import asyncio
 import contextlib
 import json
 import time
-from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 
 import viser
 
 from finlab.layout import Layout
 from webapp.session import Display, Session
-from webapp.session.session_files import SessionFiles
 from webapp.session.store import SessionStore
 from webapp.tasks.background import Workers
 from webapp.tasks.solver import Solver
@@ -20,8 +17,6 @@ from webapp.viser_internals import disable_sharing, enter, stored
 
 FRAME_S = 1 / 25
 """Time between two poses of robots that swim [s]."""
-KEEP_S = 2.0
-"""How often changed sessions are written to disk [s]."""
 STORAGE_KEY = "finlab-sessions"
 """Where a browser keeps the keys of its sessions."""
 PATIENCE_S = (0.5, 1.0, 1.5, 2.0, 4.0, 8.0, 16.0, 30.0, 30.0)
@@ -41,7 +36,6 @@ class App:
         solver: Solver,
         layout: Layout,
         display: Display | None = None,
-        folder: Path | None = None,
     ) -> None:
         """Take over a server.
 
@@ -50,20 +44,16 @@ class App:
             solver: answers their questions.
             layout: what a new session opens.
             display: how a new session looks.
-            folder: where sessions are kept beyond the life of the server; None keeps none.
         """
         self._server = server
         self._solver = solver
         self._workers = Workers()
         self._workers.readers.warm()
-        self._store = SessionStore(
-            lambda: Session(layout, display), None if folder is None else SessionFiles(folder)
-        )
+        self._store = SessionStore(lambda: Session(layout, display))
         self.views: dict[int, View] = {}
         """The pages that are open, by client."""
         self._keys: dict[int, str] = {}
         self._loop = server.get_event_loop()
-        self._files = ThreadPoolExecutor(1, "finlab-sessions")
         server.scene.world_axes.visible = False
         # With the first words to a browser: it would else draw its own light and shadows before ours.
         server.scene.configure_environment_map(None)
@@ -71,19 +61,14 @@ class App:
         disable_sharing(server)
         server.on_client_connect(self._connected)
         server.on_client_disconnect(self._disconnected)
-        self._clocks = [
-            asyncio.run_coroutine_threadsafe(run(), self._loop) for run in (self._animate, self._keep)
-        ]
+        self._clock = asyncio.run_coroutine_threadsafe(self._animate(), self._loop)
 
     def stop(self) -> None:
-        """Stop clocks and workers; the server is stopped by its owner."""
-        for clock in self._clocks:
-            clock.cancel()
-        with contextlib.suppress(TimeoutError, RuntimeError):  # one turn of the loop, so that they end
+        """Stop clock and workers; the server is stopped by its owner."""
+        self._clock.cancel()
+        with contextlib.suppress(TimeoutError, RuntimeError):  # one turn of the loop, so that it ends
             asyncio.run_coroutine_threadsafe(asyncio.sleep(0.01), self._loop).result(2.0)
         self._workers.stop()
-        self._files.shutdown()
-        self._store.write(self._store.changed())
 
     async def _connected(self, client: viser.ClientHandle) -> None:
         """Wait for the page to say which sessions it knows; one that says nothing is dropped in time."""
@@ -96,15 +81,12 @@ class App:
         # A connection that broke may still count as open; its tab is perhaps the one that is coming back.
         rivals = [known for known, key in self._keys.items() if key in remembered]
         await asyncio.gather(*(self._drop_if_gone(rival) for rival in rivals))
-        absent, found = self._store.absent(remembered), {}
-        if absent:
-            found = await self._loop.run_in_executor(self._workers.readers.pool, self._store.read, absent)
         if client.client_id in self._server.get_clients():
-            self._open(client, remembered, found)
+            self._open(client, remembered)
 
-    def _open(self, client: viser.ClientHandle, remembered: list[str], found: dict[str, Session]) -> None:
+    def _open(self, client: viser.ClientHandle, remembered: list[str]) -> None:
         enter(client)
-        key, session = self._store.enter(remembered, found)
+        key, session = self._store.enter(remembered)
         self._keys[client.client_id] = key
         if key not in remembered:
             remembered = [key, *remembered]
@@ -128,11 +110,6 @@ class App:
             view.close()
         if key is not None:
             self._store.leave(key)
-
-    async def _keep(self) -> None:
-        while True:
-            await asyncio.sleep(KEEP_S)
-            await self._loop.run_in_executor(self._files, self._store.write, self._store.changed())
 
     async def _animate(self) -> None:
         before = time.monotonic()

@@ -1,25 +1,11 @@
-// Files that are dropped anywhere on the page. The server hears their names first, and says when to send each; then it
-// goes the way of one that is chosen by the Open button. On a row of the list of fins it is for that fin.
+// A file that is dropped anywhere on the page goes the way of one that is chosen by the Open button. On a row of the
+// list of fins it is for that fin. Several files, or a folder, are refused by the server.
 (() => {
   if (window.finlabDropping) return;
+  window.finlabDropping = true;
   const page = document.documentElement;
   const isFiles = (event) => [...(event.dataTransfer?.types ?? [])].includes('Files');
   const show = (over) => page.classList.toggle('fl-dropping', over);
-  let held = [];
-
-  window.finlabDropping = {
-    sendNext(tries = 0) {
-      // viser only closes the note of the upload that it heard of last
-      if (document.querySelector('.mantine-Notification-loader') && tries < 40)
-        return void setTimeout(() => this.sendNext(tries + 1), 50);
-      const file = held.shift(), one = new DataTransfer();
-      if (!file) return;
-      one.items.add(file);
-      const box = document.querySelector('div:has(> .fl-file) ~ div input[type=file]');
-      box.files = one.files;
-      box.dispatchEvent(new Event('change', { bubbles: true }));
-    },
-  };
 
   const listen = (kind, hear) => window.addEventListener(kind, (event) => isFiles(event) && hear(event), { capture: true });
   listen('dragover', (event) => {
@@ -33,11 +19,12 @@
     event.stopPropagation();
     show(false);
     const { tell } = window.finlabPresses;
+    const { files, items } = event.dataTransfer;
+    if (files.length !== 1 || items[0].webkitGetAsEntry?.()?.isDirectory) return void tell('dropped', '', '');
     const row = event.target.closest?.('.fin-list [data-press=fin]');
     if (row) tell('fin', row.dataset.key, '');
-    const items = [...event.dataTransfer.items].filter((item) => item.kind === 'file');
-    const folders = items.map((item) => item.webkitGetAsEntry?.()?.isDirectory ?? false);
-    held = items.map((item) => item.getAsFile());
-    tell('dropped', '', JSON.stringify(held.map((file, k) => [file.name, file.size, folders[k]])));
+    const box = document.querySelector('div:has(> .fl-file) ~ div input[type=file]');
+    box.files = files;
+    box.dispatchEvent(new Event('change', { bubbles: true }));
   });
 })();

@@ -91,7 +91,7 @@ class Page(ABC):
         """Each writes what the session holds into a widget; the panel that is being built takes them."""
         self.presses = Presses(client.gui, self.do)
         self.designs = Designs(context, self.exports, self.presses)
-        self.opening = Opening(client.gui, self.presses, self.designs.open_together)
+        self.opening = Opening(client.gui, self.presses)
         self._uploads = Uploads(client.gui, MAX_UPLOAD, partial(self.notify, "Not possible"))
         self._panels: list[Panel] = []
         self._panels, self._swim_panels = self._build()
@@ -259,7 +259,7 @@ class Page(ABC):
 
     def _swam(self) -> None:
         """The swim has gone on: ten times a second, so only what shows it is written."""
-        if self.scenery.swims != bool(self.swimming.swimmers):
+        if self.scenery.swims != (self.swimming.swimmer is not None):
             self._refresh()
             return
         with self.client.atomic():

@@ -9,7 +9,6 @@ from finlab.errors import FinlabError
 from finlab.layout import load_layout
 from webapp.app import App
 from webapp.guard import Guard
-from webapp.session.files import cache_folder
 from webapp.session.state import State
 from webapp.session.targets import FIRST
 from webapp.tasks.solver import Solver
@@ -42,7 +41,7 @@ def serve(
     solver.solve(State(first, target=FIRST))
     guard = Guard.of(host)
     server = start_server(guard, port)
-    app = App(server, solver, first, folder=cache_folder() / "sessions")
+    app = App(server, solver, first)
     try:
         if port not in (0, server.get_port()):
             raise FinlabError(f"port {port} was taken while the app started; choose another --port")

@@ -20,8 +20,6 @@ DELIVERED = GREEN
 """The wrench that the fins give."""
 MISSING = VERMILLION
 """What is left undone, and every warning."""
-OTHER: Rgb = (170, 68, 153)
-"""The second of two robots that swim the same way."""
 WATER = SKY
 """How the water flows."""
 NEARLY: Rgb = (150, 112, 0)

@@ -23,7 +23,7 @@ def test_the_tour_sets_each_stop_and_brings_the_work_back(page: Any) -> None:
     for stop in range(2, 6):
         page.press("Next")
         page.until(lambda stop=stop: f"{stop} of 6" in page.text(".tour"))
-    page.until(lambda: len(page.view.swimming.swimmers) == 1 and page.view.swimming.time > 0.3)
+    page.until(lambda: page.view.swimming.swimmer is not None and page.view.swimming.time > 0.3)
     page.visible("/robot", False)
     page.until(lambda: "off the path" in page.text(".fl-status"))
     page.press("Next")

@@ -1,6 +1,5 @@
 """Weak and stuck fins: what is asked for, what comes of it, and what is kept of it."""
 
-import json
 import math
 
 import pytest
@@ -8,15 +7,13 @@ import pytest
 from finlab.assets import shipped_layouts
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
-from finlab.sim import SHIPPED
 from tests.webapp.stand_in import load_stand_in
 from webapp.markup.answer import fin_table
-from webapp.markup.snippets import command_line, python_lines
+from webapp.markup.snippets import command_line
 from webapp.markup.words import damage_words
 from webapp.session import Session
 from webapp.session.search_request import SearchRequest
-from webapp.session.session_files import restore, to_dict
-from webapp.session.swim_plan import ALONE, OWN, SwimSettings
+from webapp.session.swim_plan import SwimSettings
 from webapp.session.targets import axis_reach, full_thrust
 from webapp.tasks.solver import Solver
 
@@ -45,7 +42,6 @@ def test_a_weak_and_a_stuck_fin_keep_to_what_is_left(session: Session) -> None:
     assert state.layout == UCAT, "the layout itself stays whole"
     line = command_line(state)
     assert "--health front_left=0.5" in line and "--stuck back_left=30" in line
-    assert "Health.of(weak={'front_left': 0.5}, stuck={'back_left': 0.5236})" in python_lines(state)
 
 
 def test_damage_is_mended_undone_and_goes_with_its_fin(session: Session) -> None:
@@ -78,7 +74,7 @@ def test_the_page_may_send_anything(session: Session) -> None:
             session.jam("front_left", angle)
     with pytest.raises(FinlabError, match="nobody"):
         session.weaken("nobody", 0.5)
-    for key, value in (("path", "nowhere"), ("speed", math.nan), ("method", OWN), ("color", "red")):
+    for key, value in (("path", "nowhere"), ("speed", math.nan), ("method", "nobody"), ("color", "red")):
         with pytest.raises(FinlabError):
             session.set_swim(key, value)
     draft = session.draft
@@ -92,29 +88,8 @@ def test_the_page_may_send_anything(session: Session) -> None:
     assert session.state == before and session.draft == SearchRequest() and session.swim == SwimSettings()
 
 
-def test_damage_draft_and_swim_outlive_the_server(session: Session) -> None:
-    session.weaken("front_left", 0.5)
-    session.jam("back_left", -2.0)
-    way = (0.01, 0.02, 0.03, 40.0)
-    draft = session.draft.with_goal("power for a mission").with_held_toggled("back_right")
-    session.set_draft(draft.with_way(way))
-    for key, value in (("path", list(SHIPPED)[-1]), ("rival", "qp"), ("speed", 2.5)):
-        session.set_swim(key, value)
-    again = Session(UCAT)
-    restore(again, json.loads(json.dumps(to_dict(session))))
-    assert again.state == session.state and again.draft == session.draft and again.swim == session.swim
-    assert set(again.draft.bounds(UCAT)) == set(UCAT.names) - {"back_right"}
-    session.set_swim("path", OWN)
-    restore(again, json.loads(json.dumps(to_dict(session))))
-    assert again.swim.path in SHIPPED, "the file of the path is not there any more"
-
-
 def test_a_plan_is_made_of_the_settings(session: Session) -> None:
     settings = SwimSettings()
-    assert settings.rival == ALONE and len(settings.plan(session.state, None).methods) == 1
-    assert settings.with_value("rival", "qp").plan(session.state, None).methods == ("dual", "qp")
-    assert settings.with_value("rival", "dual").plan(session.state, None).methods == ("dual",)
-    with pytest.raises(FinlabError, match="own"):
-        settings.with_value("path", OWN).plan(session.state, None)
+    assert settings.plan(session.state).method == "dual"
     session.jam("front_left", 0.5)
-    assert settings.plan(session.state, None).layout.fins[1].limits.zero_direction == (0.5, 0.5)
+    assert settings.plan(session.state).layout.fins[1].limits.zero_direction == (0.5, 0.5)

@@ -111,9 +111,8 @@ def test_every_widget_survives_a_fault_in_what_it_does(
         "webapp.panels.limits_tab.ImprovePanel.refresh",
         "webapp.panels.damage.button_colors",
         "webapp.panels.hull_panel.hull_of",
-        "webapp.panels.files_tab.python_lines",
+        "webapp.panels.files_tab.command_line",
         "webapp.panels.swim_tab.swim_card",
-        "webapp.panels.swim_tab.scenario_card",
         "webapp.panels.fin_model.model_card",
     ],
 )

@@ -1,22 +1,12 @@
-"""Foreign origins and strangers stay out; a session survives the server."""
+"""Foreign origins and strangers stay out."""
 
 import http.client
-from pathlib import Path
 
 import pytest
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
-from finlab.assets import shipped_layouts
-from finlab.layout import load_layout
-from tests.webapp.hands import move_fin
-from tests.webapp.stand_in import load_stand_in
-from webapp.app import App
 from webapp.guard import COOKIE, Guard, is_loopback
-from webapp.session import Session
-from webapp.session.session_files import SessionFiles, to_dict
-from webapp.session.store import SessionStore
-from webapp.tasks.solver import Solver
 from webapp.viser_internals import start_server, stop_server
 
 OWN = {"host": "localhost:8080"}
@@ -84,50 +74,3 @@ def test_real_server_refuses_before_anything_is_shown() -> None:
             pass
     finally:
         stop_server(server)
-
-
-def test_session_survives_the_server(tmp_path: Path) -> None:
-    layout = load_layout(shipped_layouts()["ucat"])
-    keys = []
-    for life in range(2):
-        server = start_server()
-        app = App(server, Solver(load=load_stand_in), layout, folder=tmp_path)
-        key, session = app._store.enter(keys, app._store.read(keys))
-        if life == 0:
-            keys.append(key)
-            session.set_target(1, 0.5)
-            session.toggle_failure("back_left")
-            session.select("front_left")
-            session.mirror_fin()
-            move_fin(session, "front_left", (0.2, 0.2, 0.0))
-            session.set_display("dark", True)
-            session.undo()
-            before = session
-        else:
-            assert key == keys[0] and to_dict(session) == to_dict(before)
-            assert session.display.dark
-        app.stop()
-        stop_server(server)
-
-
-def test_kept_files_are_checked(tmp_path: Path) -> None:
-    files = SessionFiles(tmp_path)
-    session = Session(load_layout(shipped_layouts()["A"]))
-
-    def fresh() -> Session:
-        return Session(load_layout(shipped_layouts()["ucat"]))
-
-    files.write("../../escape", session)
-    assert list(tmp_path.iterdir()) == [] and not files.read("../../etc/passwd", fresh())
-    files.write("a" * 16, session)
-    found = fresh()
-    assert files.read("a" * 16, found) and found.state == session.state
-    path = tmp_path / f"{'a' * 16}.json"
-    assert path.stat().st_mode & 0o077 == 0
-    for text in ("", "{", "[]", "{}", '{"layout": 1}', path.read_text().replace("dual", "<script>")):
-        path.write_text(text)
-        assert not files.read("a" * 16, fresh())
-    store = SessionStore(lambda: Session(load_layout(shipped_layouts()["A"])), files)
-    assert store.enter(["a" * 16], store.read(["a" * 16]))[1].state.layout.name == "A", (
-        "a broken file costs the session, not the page"
-    )

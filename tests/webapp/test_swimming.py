@@ -11,12 +11,11 @@ import pytest
 from finlab.assets import shipped_layouts
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
-from finlab.sim import make_trajectory
+from finlab.sim import Trajectory, make_trajectory
 from tests.webapp.loops import page_of
 from tests.webapp.stand_in import load_stand_in
 from webapp.markup.corner import swim_corner
 from webapp.markup.swim_card import findings_words, swim_card
-from webapp.session.files import read_path
 from webapp.session.state import State
 from webapp.session.swim_plan import Plan, SwimSettings
 from webapp.tasks.background import Worker
@@ -26,7 +25,7 @@ from webapp.tasks.solver import Solver
 from webapp.tasks.swimming import Swimming
 
 UCAT = load_layout(shipped_layouts()["ucat"])
-SHORT = read_path("short.csv", b"t,x,y,z\n0,0,0,-1\n2,0.2,0,-1\n")
+SHORT = Trajectory("short", np.array([0.0, 2.0]), np.array([[0.0, 0.0, -1.0], [0.2, 0.0, -1.0]]))
 
 
 def until(condition: Callable[[], bool]) -> None:
@@ -48,26 +47,26 @@ def swimming() -> Iterator[Swimming]:
 
 
 def begin(swimming: Swimming, **settings: Any) -> None:
-    swimming.start(Plan(UCAT, (), **{"path": SHORT, "methods": ("analytic",), **settings}))
-    until(lambda: bool(swimming.swimmers))
+    swimming.start(Plan(UCAT, (), **{"path": SHORT, "method": "analytic", **settings}))
+    until(lambda: swimming.swimmer is not None)
 
 
 def test_swims_to_the_end_and_tells_how(swimming: Swimming) -> None:
-    assert "Start" in swim_card(swimming, SwimSettings())
-    begin(swimming, methods=("analytic", "qp"))
+    assert "Start" in swim_card(swimming)
+    begin(swimming, method="analytic")
     while not swimming.done:
         swimming.tick(0.05)
         time.sleep(0.002)
     assert not swimming.running and swimming.time == pytest.approx(2.0)
-    first, second = swimming.swimmers
+    first = swimming.swimmer
+    assert first is not None
     record = first.shown.record
     assert record.shape == (20, FORCES + 8) and np.isfinite(record).all()
     assert np.all(np.diff(record[:, TIME]) > 0) and record[0, ERROR] < 0.1
-    assert second.shown.record[-1, TIME] == record[-1, TIME], "both swim the same way at the same time"
     figures = first.shown.figures
     assert figures is not None and figures.track_m < 0.3
-    assert "arrived" in swim_card(swimming, SwimSettings()) and "qp" in swim_card(swimming, SwimSettings())
-    assert "arrived" in swim_corner(swimming, 2.0)
+    assert "arrived" in swim_card(swimming)
+    assert "arrived" in swim_corner(swimming, first, 2.0)
     swimming.set_running(True)
     assert not swimming.running, "there is no way left"
 
@@ -91,7 +90,7 @@ def test_pause_step_and_speed(swimming: Swimming) -> None:
     for wrong in (float("nan"), 0.0, "2", 99.0):
         with pytest.raises(FinlabError):
             SwimSettings().with_value("speed", wrong)
-    assert "paused" in swim_card(swimming, SwimSettings())
+    assert "paused" in swim_card(swimming)
 
 
 def test_fins_break_and_are_mended_while_it_swims(swimming: Swimming) -> None:
@@ -100,36 +99,36 @@ def test_fins_break_and_are_mended_while_it_swims(swimming: Swimming) -> None:
     begin(swimming)
     swimming.set_running(False)
     swimming.toggle("front_left")
-    until(lambda: swimming.swimmers[0].shown.failed == ("front_left",))
+    until(lambda: swimming.swimmer.shown.failed == ("front_left",))
     swimming.step()
     until(lambda: swimming.time > 0)
-    assert swimming.swimmers[0].shown.force[1].max() < 1e-6  # it hangs, and the robot is at rest
+    assert swimming.swimmer.shown.force[1].max() < 1e-6  # it hangs, and the robot is at rest
     for name in ("front_right", "back_left"):
         swimming.toggle(name)
-        until(lambda name=name: name in swimming.swimmers[0].shown.failed)
-    assert "drift off" in swim_card(swimming, SwimSettings())
+        until(lambda name=name: name in swimming.swimmer.shown.failed)
+    assert "drift off" in swim_card(swimming)
     with pytest.raises(FinlabError, match="last fin"):
         swimming.toggle("back_right")
     swimming.toggle("front_left")
-    until(lambda: "front_left" not in swimming.swimmers[0].shown.failed)
+    until(lambda: "front_left" not in swimming.swimmer.shown.failed)
 
 
 def test_a_robot_that_no_fins_can_steer_is_told_with_all_its_fins(swimming: Swimming) -> None:
     aligned = replace(UCAT, actuators=tuple(replace(fin, mounting_angle=0.0) for fin in UCAT.fins))
-    swimming.start(Plan(aligned, (), path=SHORT, methods=("analytic",)))
-    until(lambda: bool(swimming.swimmers))
-    assert swimming.swimmers[0].shown.failed == ()
-    assert "With these fins surge, heave and yaw are not free" in swim_card(swimming, SwimSettings())
+    swimming.start(Plan(aligned, (), path=SHORT, method="analytic"))
+    until(lambda: swimming.swimmer is not None)
+    assert swimming.swimmer.shown.failed == ()
+    assert "With these fins surge, heave and yaw are not free" in swim_card(swimming)
 
 
 def test_bad_plans_and_methods_out_of_order(swimming: Swimming) -> None:
-    settings = SwimSettings(method="qp", rival="qp")
-    assert settings.plan(State(UCAT), None).methods == ("qp",), "nobody swims beside himself"
-    for key, wrong in (("path", "moon"), ("method", "ipopt"), ("rival", "ipopt"), ("plant", "jelly")):
+    settings = SwimSettings(method="qp")
+    assert settings.plan(State(UCAT)).method == "qp"
+    for key, wrong in (("path", "moon"), ("method", "ipopt"), ("plant", "jelly")):
         with pytest.raises(FinlabError, match=wrong):
             settings.with_value(key, wrong)
     swimming._solver = Solver(load=lambda *_, **__: load_stand_in("ipopt"))
-    swimming.start(Plan(UCAT, (), make_trajectory("circle"), ("qp",)))
+    swimming.start(Plan(UCAT, (), make_trajectory("circle"), "qp"))
     until(lambda: bool(swimming.notes))  # type: ignore[attr-defined]
     assert not swimming.active
 
@@ -137,35 +136,30 @@ def test_bad_plans_and_methods_out_of_order(swimming: Swimming) -> None:
 def test_a_long_record_is_thinned(swimming: Swimming) -> None:
     begin(swimming, path=make_trajectory("circle"))
     swimming.set_running(False)
-    swimmer = swimming.swimmers[0]
+    swimmer = swimming.swimmer
+    assert swimmer is not None
     for _ in range(POINTS + 50):
         swimmer.step()
     assert len(swimmer.moment().record) <= POINTS
 
 
-def test_files_with_ways_are_checked() -> None:
-    with pytest.raises(FinlabError, match=r"bad\.csv"):
-        read_path("../bad.csv", b"t,x\n0,1\n")
-    with pytest.raises(FinlabError, match="bytes"):
-        read_path("big.csv", b"0" * 3_000_000)
-
-
 def test_a_fin_that_breaks_without_a_word_is_found(swimming: Swimming) -> None:
     begin(swimming, path=make_trajectory("circle"))
     swimming.set_running(False)
-    swimmer = swimming.swimmers[0]
+    swimmer = swimming.swimmer
+    assert swimmer is not None
     while swimmer.swim.time < 12.0:
         swimmer.step()
     swimming.toggle("front_left", announced=False)
-    until(lambda: swimming.swimmers[0].shown.lost == ("front_left",))
+    until(lambda: swimming.swimmer.shown.lost == ("front_left",))
     assert swimmer.shown.failed == () and swimmer.shown.found == ()
-    assert "does not know yet" in swim_card(swimming, SwimSettings())
+    assert "does not know yet" in swim_card(swimming)
     while not swimmer.swim.damage.failed and swimmer.swim.time < 20.0:
         swimmer.step()
     swimmer.shown = swimmer.moment()
     ((name, seconds),) = swimmer.shown.found
     assert (name, swimmer.shown.failed) == ("front_left", ("front_left",)) and 0.0 < seconds < 8.0
-    assert f"found front_left lost {seconds:.1f} s after" in swim_card(swimming, SwimSettings())
+    assert f"found front_left lost {seconds:.1f} s after" in swim_card(swimming)
     doubts = swimmer.shown.record[:, FORCES + 4 :]
     assert doubts[-1, UCAT.index("front_left")] > 0.99 and doubts[0].max() < 0.1
     assert swimmer.shown.doubted == ("front_left",)
@@ -174,8 +168,8 @@ def test_a_fin_that_breaks_without_a_word_is_found(swimming: Swimming) -> None:
     wrong = blind._replace(lost=())
     assert "The monitor takes front_left for torn or stuck" in findings_words(wrong)[0]
     swimming.toggle("front_left", announced=False)
-    until(lambda: swimming.swimmers[0].shown.lost == ())
-    assert "front_left works, but the allocator takes it for lost" in swim_card(swimming, SwimSettings())
+    until(lambda: swimming.swimmer.shown.lost == ())
+    assert "front_left works, but the allocator takes it for lost" in swim_card(swimming)
 
 
 def test_whether_the_allocator_is_told_is_a_setting() -> None:

@@ -8,13 +8,14 @@ from markupsafe import Markup
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.policy import AXES
 from webapp.markup.html import html
-from webapp.markup.swim_card import pace_words, robots
+from webapp.markup.swim_card import pace_words
 from webapp.markup.verdict import WORKING, verdict_of, verdict_sentence
 from webapp.markup.words import error_digits, parts_word, three_digits
 from webapp.scene.wrench_nodes import set_scale
 from webapp.session.state import AXIS_UNITS, State, least_of
 from webapp.tasks.analyst import Findings
 from webapp.tasks.moment import ERROR
+from webapp.tasks.swimmer import Swimmer
 from webapp.tasks.swimming import Swimming
 from webapp.theme import ASKED, DEAD, DELIVERED, HALF_TURN, WATER, css
 
@@ -140,12 +141,12 @@ def _figures(allocation: Allocation, least: bool, in_reach: bool) -> list[str]:
     ]
 
 
-def swim_corner(swimming: Swimming, newtons: float) -> str:
-    """The same while robots swim."""
-    first, shown = swimming.swimmers[0], swimming.seen[0]
+def swim_corner(swimming: Swimming, first: Swimmer, newtons: float) -> str:
+    """The same while a robot swims."""
+    shown = first.shown
     line = "<svg width='44' height='10'><path d='M0 5H44' stroke='{}' stroke-width='3.5'/></svg>"
-    named = [(f"{name}, {robot.about}", color) for robot, _, color, name in robots(swimming)]
-    trails = [_key(html(line, css(color)), word) for word, color in (("the path", ASKED), *named)]
+    named = (("the path", ASKED), (f"{first.method}, {first.about}", DELIVERED))
+    trails = [_key(html(line, css(color)), word) for word, color in named]
     speed = 100.0 * float(np.linalg.norm(shown.flow))
     if speed >= 0.05:
         trails.append(_key(_arrow(css(WATER), 0.9), f"water, {speed:.1f} cm/s"))

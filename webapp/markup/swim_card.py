@@ -1,25 +1,25 @@
-"""How a swim goes, in a few words and a row per robot."""
-
-from collections.abc import Iterator
+"""How a swim goes, in a few words and figures."""
 
 from markupsafe import Markup
 
 from webapp.markup.html import html, row
-from webapp.markup.words import fins_words, three_digits, unlearned_sentence
-from webapp.session.swim_plan import SwimSettings
+from webapp.markup.words import fins_words, unlearned_sentence
 from webapp.tasks.moment import Figures, Moment
 from webapp.tasks.swimmer import Swimmer
 from webapp.tasks.swimming import Swimming
-from webapp.theme import DELIVERED, OTHER, Rgb, css
 
-SLOWEST = 0.01
-"""Mean speed over ground [m/s] below which a robot keeps a place, and its range means nothing."""
+FIGURES = (
+    "off the path, root mean square",
+    "off in depth",
+    "mean power of the fins",
+    "over the last second",
+    "energy so far",
+)
+"""What a swim comes to, in words."""
 
 
 def pace_words(swimming: Swimming) -> str:
     """At what pace it goes, in words: what is asked for, or what the machine can do."""
-    if swimming.at is not None:
-        return "looking back"
     if swimming.done:
         return "arrived"
     if not swimming.running:
@@ -53,84 +53,44 @@ def findings_words(shown: Moment) -> list[str]:
     return sentences
 
 
-def robots(swimming: Swimming) -> Iterator[tuple[Swimmer, Moment, Rgb, str]]:
-    """Everyone on the page: the robot, its moment, its colour and its name in words."""
-    for swimmer, moment, color in zip(swimming.swimmers, swimming.seen, (DELIVERED, OTHER), strict=False):
-        yield swimmer, moment, color, swimmer.method
-
-
-def swim_card(swimming: Swimming, settings: SwimSettings) -> str:
-    """Time, pace, and per robot: distance from where it should be, depth error, power, what a pack lasts."""
+def swim_card(swimming: Swimming) -> str:
+    """Time, pace, distance from where the robot should be, depth error, power, energy and speed."""
     if not swimming.active:
         return Markup("<div class='fl dim'>Start lets this robot swim, with the fins that work.</div>")
-    if not swimming.swimmers:
+    swimmer = swimming.swimmer
+    if swimmer is None:
         return Markup("<div class='fl dim'>making ready …</div>")
-    first = swimming.swimmers[0]
-    shown = swimming.seen[0]
-    head = html("<b>{:.1f} s</b> of {:.0f} s, {}", shown.time, first.duration_s, pace_words(swimming))
-    rows, packs = [], []
-    for robot, moment, color, name in robots(swimming):
-        dot = html("<span class='swatch' style='background:{};min-width:10px'>&nbsp;</span>", css(color))
-        title = html("<span title='{}'>{}{}</span>", robot.about, dot, name)
-        rows.append(row(title, *_errors(moment.figures)))
-        packs.append(row(title, *_pack(moment.figures, settings)))
-    header = Markup(
-        "<tr><th>method</th>"
-        "<th title='root mean square distance from where it should be'>off the path</th>"
-        "<th title='the same of the depth'>depth</th>"
-        "<th title='mean of all fins, with motor losses'>mean</th>"
-        "<th title='the same over the last second'>now</th></tr>"
-    )
-    other = "the fins alone" if not settings.electronics_w else f"fins and {settings.electronics_w:g} W"
-    pack_header = html(
-        "<tr><th>{:g} Wh, {}</th><th title='by all fins so far, with motor losses'>used</th>"
-        "<th title='at the mean power so far'>lasts</th><th title='at the mean speed over "
-        "ground so far'>range</th></tr>",
-        settings.pack_wh,
-        other,
-    )
+    shown = swimmer.shown
+    head = html("<b>{:.1f} s</b> of {:.0f} s, {}", shown.time, swimmer.duration_s, pace_words(swimming))
+    rows = (row(*line) for line in zip(FIGURES, _figures(shown.figures), strict=True))
     return html(
-        "<div class='fl swim'><div class='said'>{}</div><table>{}{}</table><table>{}{}</table>{}</div>",
+        "<div class='fl swim'><div class='said'>{}</div><table>{}</table>{}</div>",
         head,
-        header,
         rows,
-        pack_header,
-        packs,
-        _warnings(swimming, shown),
+        _warnings(swimmer, shown),
     )
 
 
-def _errors(figures: Figures | None) -> tuple[str, ...]:
+def _figures(figures: Figures | None) -> tuple[str, ...]:
     if figures is None:
-        return ("–",) * 4
+        return ("–",) * len(FIGURES)
     return (
         f"{100 * figures.track_m:.1f} cm",
         f"{100 * figures.depth_m:.1f} cm",
         f"{figures.mean_w:.2f} W",
         f"{figures.now_w:.2f} W",
+        f"{figures.energy_wh * 1000:.1f} mWh",
     )
 
 
-def _pack(figures: Figures | None, settings: SwimSettings) -> tuple[str, ...]:
-    """What has been used, how long a pack lasts, and how far the robot gets with it."""
-    if figures is None or figures.mean_w + settings.electronics_w <= 0.0:
-        return ("–",) * 3
-    hours = settings.pack_wh / (figures.mean_w + settings.electronics_w)
-    far = 3.6 * figures.speed_m_s * hours
-    range_km = f"{three_digits(far)} km" if figures.speed_m_s >= SLOWEST else "–"
-    return f"{figures.energy_wh * 1000:.1f} mWh", f"{three_digits(hours)} h", range_km
-
-
-def _warnings(swimming: Swimming, shown: Moment) -> str:
+def _warnings(swimmer: Swimmer, shown: Moment) -> str:
     """What should not be overlooked, and what the monitor has found."""
-    first = swimming.swimmers[0]
-    warning = Markup().join(
-        html("<div class='missing'>{}: {}.</div>", s.method, unlearned_sentence(s.layout, s.unknown_fins))
-        for s in swimming.swimmers
-        if s.unknown_fins
-    )
+    warning = Markup()
+    if swimmer.unknown_fins:
+        words = unlearned_sentence(swimmer.layout, swimmer.unknown_fins)
+        warning += html("<div class='missing'>{}: {}.</div>", swimmer.method, words)
     if not shown.controllable:
-        lost = [first.fins.index(name) for name in shown.failed]
+        lost = [swimmer.fins.index(name) for name in shown.failed]
         fins = f"Without {fins_words(lost)}" if lost else "With these fins"
         warning += html(
             "<div class='missing'>{} surge, heave and yaw are not free of each other: expect it "

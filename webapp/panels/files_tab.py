@@ -1,16 +1,16 @@
-"""Export: what the robot needs, what is seen and found, and the question as a command to copy."""
+"""Export: what the robot needs, and the question as a command to copy."""
 
 import viser
 
 from webapp.handles import add_html, put
 from webapp.markup.html import html
 from webapp.markup.picking import marker
-from webapp.markup.snippets import command_line, python_lines
+from webapp.markup.snippets import command_line
 from webapp.page import Page
 
 
 class FilesTab:
-    """Buttons for files, and the same question as a command."""
+    """A button for the robot's bundle, and the same question as a command."""
 
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         self._page = page
@@ -18,16 +18,12 @@ class FilesTab:
         add_html(gui, marker("fl-primary"))
         icon = viser.Icon.PACKAGE_EXPORT
         page.add_button("Export the bundle (ZIP)", page.exports.bundle, icon=icon, hint=about)
-        page.add_buttons("Single files", {"Picture (PNG)": page.exports.picture}, hint="What is seen.")
         self._command = gui.add_html("")
 
     def refresh(self) -> None:
         state = self._page.session.state
-        texts = {
-            "The same question on the command line": command_line(state),
-            "The same in Python": python_lines(state),
-        }
-        put(self._command, content=html("<div class='fl'>{}</div>", map(_copied, texts, texts.values())))
+        words = "The same question on the command line"
+        put(self._command, content=html("<div class='fl'>{}</div>", _copied(words, command_line(state))))
 
 
 def _copied(title: str, text: str) -> str:

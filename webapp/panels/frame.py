@@ -136,7 +136,7 @@ class Frame:
 
     def refresh(self) -> None:
         session = self._page.session
-        plots = session.task != SIMULATE or bool(self._page.swimming.swimmers)
+        plots = session.task != SIMULATE or self._page.swimming.swimmer is not None
         put(self._shown, content=_style(self._sections, session, plots))
         assert self._strip is not None
         put(

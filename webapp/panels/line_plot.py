@@ -30,7 +30,6 @@ class LinePlot:
         below: str = "",
         *,
         height: int = 100,
-        widths: Sequence[float] = (1.5,),
         visible: bool = False,
     ) -> None:
         """Build it, empty.
@@ -41,19 +40,14 @@ class LinePlot:
             title: beside the vertical axis; where it is empty there is no such axis.
             below: below the horizontal axis.
             height: of the plot [px].
-            widths: of the lines [px], the last one for all that follow.
             visible: whether it is shown from the start.
         """
         self._n_lines = len(colors)
-        thick = [widths[min(k, len(widths) - 1)] for k in range(len(colors))]
         self._plot = gui.add_uplot(
             (np.array([0.0, 1.0]), *(np.full(2, np.nan) for _ in colors)),
             (
                 uplot.Series(label="x"),
-                *(
-                    uplot.Series(label="", stroke=color, width=width, spanGaps=True)
-                    for color, width in zip(colors, thick, strict=True)
-                ),
+                *(uplot.Series(label="", stroke=color, width=1.5, spanGaps=True) for color in colors),
             ),
             scales=_scales((0.0, 1.0)),
             axes=_axes(title, below),
@@ -86,17 +80,6 @@ class LinePlot:
 def top_of(lines: Iterable[Array], least: float) -> float:
     """Where a vertical axis ends that shows all of some lines, and at least a value."""
     return ROOM * nice_limit(max(float(np.nanmax(line, initial=least)) for line in lines) / 1.2)
-
-
-def with_cursor(
-    x: Array, lines: Sequence[Array], at: float, ends: tuple[float, float]
-) -> tuple[Array, list[Array]]:
-    """`x` and lines with one place more, where the lines go on, and before them an upright line there."""
-    place = int(np.searchsorted(x, at))
-    widened = [np.insert(line, place, [np.interp(at, x, line)] * 2) for line in lines]
-    upright = np.full(len(x) + 2, np.nan)
-    upright[place : place + 2] = ends
-    return np.insert(x, place, [at, at]), [upright, *widened]
 
 
 def _scales(ends: tuple[float, float], across: float | None = None) -> dict[str, uplot.Scale]:

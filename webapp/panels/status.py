@@ -25,8 +25,8 @@ class Corner:
 
     def _written(self) -> str:
         page, answering = self._page, self._page.answering
-        if page.swimming.swimmers:
-            return swim_corner(page.swimming, ARROWS_N)
+        if page.swimming.swimmer is not None:
+            return swim_corner(page.swimming, page.swimming.swimmer, ARROWS_N)
         reply = answering.reply
         return corner(
             page.session.state,

@@ -64,15 +64,13 @@ class Flapping:
 class FinShapes:
     """Blade, shaft and force of one fin, in the frame of its mounting."""
 
-    def __init__(
-        self, scene: viser.SceneApi, parent: str, index: int, opacity: float | None = None, **arrow: Any
-    ) -> None:
+    def __init__(self, scene: viser.SceneApi, parent: str, index: int, **arrow: Any) -> None:
         """Add the nodes under `parent`, for the fin at this place of the layout; `arrow`: options of that."""
         self.color, self._angle = fin_color(index), math.nan
-        self._blade = Shape(scene, f"{parent}/blade", self.color, opacity=opacity)
+        self._blade = Shape(scene, f"{parent}/blade", self.color)
         self.blade = self._blade.node
-        self.shaft = Shape(scene, f"{parent}/shaft", LIGHT.metal, fin_mesh.shaft(), opacity=opacity).node
-        self.force = Shape(scene, f"{parent}/force", self.color, opacity=opacity, **arrow)
+        self.shaft = Shape(scene, f"{parent}/shaft", LIGHT.metal, fin_mesh.shaft()).node
+        self.force = Shape(scene, f"{parent}/force", self.color, **arrow)
         self._root = np.zeros(3)
 
     def become(self, part: Actuator) -> None:

@@ -44,7 +44,7 @@ class Scenery:
         display = self._session.display
         self.robot.refresh(answering.shown, findings, offered)
         self.robot.flap()
-        self.swims = bool(self._swimming.swimmers)
+        self.swims = self._swimming.swimmer is not None
         self.robot.show(not self.swims)
         drawn = set_rows(findings if display.drawn != "none" else None)
         self.legend = legend(self.robot.newtons, self.robot.torque, self.robot.cut, drawn)
@@ -87,7 +87,7 @@ class Scenery:
         self.robot.look_from("3D")
         self.robot.frame()
         if stop is not None and STEPS[stop].swims:
-            self._swimming.start(SwimSettings().plan(session.state, None))
+            self._swimming.start(SwimSettings().plan(session.state))
 
     def _apply_theme(self) -> None:
         """Light or dark."""

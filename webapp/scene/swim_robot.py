@@ -6,12 +6,12 @@ import viser
 from finlab.arrays import Array
 from finlab.layout import Layout
 from webapp.handles import put
-from webapp.scene.fin_node import LIMP, FinShapes, Flapping, turn_of
+from webapp.scene.fin_node import FinShapes, Flapping, turn_of
 from webapp.scene.meshes.hull import hull_of
 from webapp.scene.meshes.mesh import NOTHING, Mesh, force_arrow, joined, tube
 from webapp.scene.shape import Shape
 from webapp.tasks.moment import PLACE, Moment
-from webapp.theme import ASKED, DELIVERED, LIGHT, Rgb
+from webapp.theme import ASKED, DELIVERED, LIGHT
 
 NO_LINE = np.zeros((1, 2, 3), dtype=np.float32)
 TRAIL_POINTS = 250
@@ -23,22 +23,22 @@ ABOVE = 0.1
 class SwimRobot:
     """The nodes of one robot. Made once, given another layout when another one swims."""
 
-    def __init__(self, scene: viser.SceneApi, name: str, trail: Rgb, opacity: float | None) -> None:
-        """Build the nodes, hidden; `opacity` makes a robot that others shine through."""
-        self._scene, self._name, self._opacity = scene, name, opacity
+    def __init__(self, scene: viser.SceneApi, name: str) -> None:
+        """Build the nodes, hidden."""
+        self._scene, self._name = scene, name
         self._root = scene.add_frame(name, show_axes=False, visible=False)
-        self._hull = Shape(scene, f"{name}/hull", LIGHT.hull, opacity=opacity, side="double")
-        self._bow = Shape(scene, f"{name}/bow", LIGHT.glass, opacity=opacity, side="double")
+        self._hull = Shape(scene, f"{name}/hull", LIGHT.hull, side="double")
+        self._bow = Shape(scene, f"{name}/bow", LIGHT.glass, side="double")
         self._frames: list[viser.FrameHandle] = []
         self._fins: list[FinShapes] = []
         self._wrench = [
-            Shape(scene, f"{name}/{word}", color, opacity=opacity, cast_shadow=False)
+            Shape(scene, f"{name}/{word}", color, cast_shadow=False)
             for word, color in (("asked", ASKED), ("delivered", DELIVERED))
         ]
         self._trail = scene.add_line_segments(
-            f"{name}_trail", NO_LINE, trail, thickness=3.5, thickness_units="screen", visible=False
+            f"{name}_trail", NO_LINE, DELIVERED, thickness=3.5, thickness_units="screen", visible=False
         )
-        self._color = np.array(trail, dtype=np.uint8)
+        self._color = np.array(DELIVERED, dtype=np.uint8)
         self._top = 0.0
         self._flapping = Flapping()
         self._names: tuple[str, ...] = ()
@@ -46,7 +46,6 @@ class SwimRobot:
         self._ahead: Moment | None = None
         self._behind: Moment | None = None
         self._clock = 0.0
-        self._stood = False
 
     def begin(self, layout: Layout, moment: Moment) -> None:
         """Take the shape of a layout and stand at the start."""
@@ -58,7 +57,7 @@ class SwimRobot:
             index = len(self._fins)
             name = f"{self._name}/fin{index}"
             self._frames.append(self._scene.add_frame(name, show_axes=False))
-            self._fins.append(FinShapes(self._scene, name, index, self._opacity))
+            self._fins.append(FinShapes(self._scene, name, index))
         self._axes = layout.frames
         for frame, shapes, part in zip(self._frames, self._fins, layout.actuators, strict=False):
             shapes.become(part)
@@ -69,7 +68,6 @@ class SwimRobot:
         self._names = layout.names
         self._flap(moment)
         self._ahead = self._behind = moment
-        self._stood = False
         self._clock = moment.time
         put(self._trail, points=NO_LINE, colors=self._color)
         put(self._root, visible=True)
@@ -87,27 +85,12 @@ class SwimRobot:
         put(self._trail, visible=False)
 
     def take(self, moment: Moment, scale: float) -> None:
-        """Swim on to a moment; arrows are `scale` [m/N] long. Where it stood, it is there at once."""
-        if self._stood:
-            self.stand(moment, scale)
-            self._stood = False
+        """Swim on to a moment; arrows are `scale` [m/N] long."""
         if self._is_at(moment) or self._ahead is None:
             return
         self._behind, self._ahead = self._ahead, moment
         self._clock = self._behind.time
         self._draw(moment, scale)
-
-    def stand(self, moment: Moment, scale: float) -> None:
-        """Be at a moment at once, with the blades as they were."""
-        if self._stood and self._is_at(moment):
-            return
-        self._stood = True
-        self._behind = self._ahead = moment
-        self._clock = moment.time
-        self._draw(moment, scale)
-        put(self._root, position=moment.pose[:3], wxyz=moment.pose[3:])
-        for node, angle, name in zip(self._fins, moment.angle.tolist(), self._names, strict=False):
-            node.pose(LIMP if name in moment.lost else angle)
 
     def _is_at(self, moment: Moment) -> bool:
         """Whether this moment is shown already."""

@@ -1,26 +1,23 @@
-"""The water while robots swim: the way to go, where they should be, and up to two of them."""
+"""The water while robots swim: the way to go, where the robot should be, and the robot."""
 
 from typing import Any
 
 import numpy as np
 import viser
 
-from finlab.layout import Layout
+from finlab.arrays import Array
 from webapp.handles import put
 from webapp.scene.meshes.mesh import force_arrow
 from webapp.scene.shape import Shape
 from webapp.scene.stage import add_floor, aim_camera, paint_floor
 from webapp.scene.swim_robot import SwimRobot, goal
 from webapp.scene.wrench_nodes import LENGTH
-from webapp.tasks.moment import Moment
 from webapp.tasks.swimmer import Swimmer
 from webapp.tasks.swimming import Swimming
-from webapp.theme import ASKED, DELIVERED, OTHER, WATER
+from webapp.theme import ASKED, WATER
 
 ARROWS_N = 1.0
 """Force that an arrow of 0.1 m stands for while robots swim [N]: one for all, so that they compare."""
-ROBOTS = ((DELIVERED, None), (OTHER, 0.45))
-"""Colours of the robots' trails, and how opaque the robots are."""
 SCALE = LENGTH / ARROWS_N
 """Length of arrows [m/N]."""
 FLOW_S = 6.0
@@ -44,64 +41,42 @@ class SwimScene:
         fade: dict[str, Any] = {"fade_distance": 14.0, "fade_strength": 1.4, "shadow_opacity": 0.18}
         self._water = Shape(scene, "/swim/water", WATER, opacity=0.9, visible=False, cast_shadow=False)
         self._floor = add_floor(scene, "/swim/floor", 14.0, 0.25, 1.0, visible=False, **fade)
-        self._robots: dict[int, SwimRobot] = {}
-        self._shown: tuple[Swimmer, ...] = ()
+        self._robot = SwimRobot(scene, "/swim/robot0")
+        self._shown: Swimmer | None = None
 
     def refresh(self, dark: bool) -> None:
-        """Show the moment that is looked at."""
-        swimming = self._swimming
-        swimmers = swimming.swimmers
-        visible = bool(swimmers)
-        put(self._goal.node, visible=visible)
-        put(self._reference, visible=visible)
-        put(self._floor, visible=visible)
-        put(self._water.node, visible=visible)
+        """Show the newest moment."""
+        swimmer = self._swimming.swimmer
+        visible = swimmer is not None
+        for node in (self._goal.node, self._reference, self._floor, self._water.node):
+            put(node, visible=visible)
         paint_floor(self._floor, dark)
-        if not visible:
-            for robot in self._robots.values():
-                robot.hide()
-            self._shown = ()
+        if swimmer is None:
+            self._robot.hide()
+            self._shown = None
             return
-        moments = swimming.seen
-        if swimmers != self._shown:
-            self._begin(moments)
-        put(self._reference, position=moments[0].reference)
-        self._draw_water(moments[0].flow)
-        for k, moment in enumerate(moments):
-            if swimming.at is None:
-                self._robots[k].take(moment, SCALE)
-            else:
-                self._robots[k].stand(moment, SCALE)
+        if swimmer is not self._shown:
+            self._begin(swimmer)
+        put(self._reference, position=swimmer.shown.reference)
+        self._draw_water(swimmer)
+        self._robot.take(swimmer.shown, SCALE)
 
-    def _begin(self, moments: tuple[Moment, ...]) -> None:
-        """Another swim: its robots, its way, and the camera where all of it can be seen."""
-        self._shown = self._swimming.swimmers
-        for k, robot in self._robots.items():
-            if k >= len(self._shown):
-                robot.hide()
-        for k, (swimmer, moment) in enumerate(zip(self._shown, moments, strict=True)):
-            self._robot(k, swimmer.layout, moment)
-        path = self._shown[0].path
-        self._goal.show(goal, path)
-        put(self._floor, position=np.array([0.0, 0.0, path[:, 2].min() - DEPTH_BELOW]))
-        self._look()
+    def _begin(self, swimmer: Swimmer) -> None:
+        """Another swim: its robot, its way, and the camera where all of it can be seen."""
+        self._shown = swimmer
+        self._robot.begin(swimmer.layout, swimmer.shown)
+        self._goal.show(goal, swimmer.path)
+        put(self._floor, position=np.array([0.0, 0.0, swimmer.path[:, 2].min() - DEPTH_BELOW]))
+        self._look(swimmer.path)
 
-    def _robot(self, k: int, layout: Layout, moment: Moment) -> SwimRobot:
-        """A robot at its start; it is made when it is first needed."""
-        if k not in self._robots:
-            self._robots[k] = SwimRobot(self._client.scene, f"/swim/robot{k}", *ROBOTS[k])
-        self._robots[k].begin(layout, moment)
-        return self._robots[k]
-
-    def _draw_water(self, flow: np.ndarray) -> None:
+    def _draw_water(self, swimmer: Swimmer) -> None:
         """An arrow for the velocity of the water, beyond the path."""
-        path = self._shown[0].path
+        path, flow = swimmer.path, swimmer.shown.flow
         place = np.array([path[:, 0].min() - BEYOND_M, path[:, 1].max() + BEYOND_M, path[:, 2].mean()])
         self._water.show(force_arrow, np.round(FLOW_S * flow, 2), place, 0.03)
 
-    def _look(self) -> None:
-        """Let the camera stand where the whole path can be seen."""
-        path = self._shown[0].path
+    def _look(self, path: Array) -> None:
+        """Let the camera stand where the whole path (N, 3) can be seen."""
         low, high = path.min(axis=0), path.max(axis=0)
         distance = max(0.75 * float(np.linalg.norm((high - low)[:2])), 1.2)
         # The lower part of the view is behind the plots, so the path belongs into the upper one.
@@ -110,10 +85,7 @@ class SwimScene:
         aim_camera(self._client, place, middle - np.array([0.0, 0.0, 0.1]))
 
     def animate(self, elapsed: float) -> None:
-        """Let the robots move by some time on the wall [s]."""
+        """Let the robot move by some time on the wall [s]."""
         swimming = self._swimming
-        if not swimming.swimmers or swimming.swimmers != self._shown:
-            return
-        rate = swimming.pace.rate or swimming.pace.speed
-        for robot in self._robots.values():
-            robot.animate(elapsed * rate)
+        if swimming.swimmer is not None and swimming.swimmer is self._shown:
+            self._robot.animate(elapsed * (swimming.pace.rate or swimming.pace.speed))

@@ -119,12 +119,6 @@ class Core:
         self.revision = 0
         """Grows with every change of the state; an answer carries the revision it was made for."""
 
-    def resume(self, state: State) -> None:
-        """Go on from a state that was kept; what led there is not known any more."""
-        self.history = History(state)
-        self.saved = state.layout
-        self._names = state.layout.names
-
     @property
     def state(self) -> State:
         """The present state."""

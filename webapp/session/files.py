@@ -1,24 +1,21 @@
-"""Layouts, hulls, paths and bundles as files that a browser sends and takes; the layouts that are shipped."""
+"""Layouts, hulls and bundles as files that a browser sends and takes; the layouts that are shipped."""
 
 import os
 import re
-import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
 from finlab.assets import shipped_layouts
 from finlab.deploy.bundle import with_tables_inside
-from finlab.errors import DataError, FinlabError, LayoutError
+from finlab.errors import FinlabError, LayoutError
 from finlab.files.guarded import decoded
 from finlab.files.plain_values import parse_json, parse_yaml, yaml_text
 from finlab.layout import Layout, layout_to_dict, load_layout, parse_layout
 from finlab.layout.body import Hull
 from finlab.layout.load import A_LAYOUT, MAX_BYTES
 from finlab.physics import plant_of
-from finlab.sim import Trajectory
-from finlab.sim.task import COLUMNS, read_trajectory
 from webapp.scene.meshes.mesh import Mesh
 from webapp.scene.meshes.mesh_file import stl_of
 from webapp.scene.meshes.mesh_hull import UNITS, MeshHull
@@ -32,9 +29,6 @@ from webapp.session.companions import (
     with_hull_inside,
 )
 from webapp.session.state import chosen
-
-MAX_PATH_BYTES = 2_000_000
-"""Largest file of a way to swim that is taken."""
 
 
 @cache
@@ -73,16 +67,6 @@ def read_layout(name: str, content: bytes) -> Opened:
         opened = adopted(_read_alone(source, content), {}, cache_folder(), source)
     plant_of(opened.layout)  # reads the tables of its fins
     return opened
-
-
-def read_together(parts: Mapping[str, bytes]) -> Opened:
-    """The layout in files that were sent at once, by their names.
-
-    Raises:
-        LayoutError, DataError: as above.
-    """
-    (first, document), *others = parts.items()
-    return read_layout("files.zip", archive_of(first, document, dict(others)))
 
 
 def _read_alone(source: str, content: bytes) -> Layout:
@@ -139,27 +123,3 @@ def reshaped_hull(hull: Hull, change: Callable[[Mesh], Mesh]) -> Hull:
     drawn = MeshHull.load(hull.mesh, hull.scale, (0.0, 0.0, 0.0))
     content = stl_of(change(drawn.mesh()))
     return replace(hull, mesh=stored_mesh("hull.stl", content, 1.0, cache_folder()), scale=1.0)
-
-
-def is_path(content: bytes) -> bool:
-    """Whether a CSV file has the columns of a way to swim."""
-    names = content[:200].decode("utf-8-sig", "replace").split("\n", 1)[0].split(",")
-    return {name.strip() for name in names} >= set(COLUMNS)
-
-
-def read_path(name: str, content: bytes) -> Trajectory:
-    """The way in a CSV file with the columns t, x, y, z.
-
-    Raises:
-        DataError: it is too large or no such table; the message names the file.
-    """
-    short = Path(str(name)).name[-60:] or "upload.csv"
-    if len(content) > MAX_PATH_BYTES:
-        raise DataError(f"{short}: is {len(content):,} bytes long, expected at most {MAX_PATH_BYTES:,}")
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "way.csv"
-        path.write_bytes(content)
-        try:
-            return read_trajectory(path)
-        except DataError as error:
-            raise DataError(str(error).replace(str(path), short)) from None

@@ -1,7 +1,6 @@
 """What a search for a better layout may do: which fins move, and how far."""
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -92,16 +91,3 @@ class SearchRequest:
         if not bounds:
             raise FinlabError("no fin may move; press the numbers of those that may")
         return bounds
-
-
-def restored_request(values: Mapping[str, Any]) -> SearchRequest:
-    """A request that was kept as plain values, checked like anything that a page sends.
-
-    Raises:
-        FinlabError: a value is not allowed. So may KeyError, TypeError and ValueError tell.
-    """
-    request = SearchRequest().with_goal(values["goal"]).with_way(tuple(values["way"]))
-    request = request.with_apart(values["apart_m"]).with_symmetry(values["symmetric"])
-    for name in values["held"]:
-        request = request.with_held_toggled(str(name))
-    return request

@@ -31,10 +31,6 @@ class Designs:
         """A design from a file that the browser sent."""
         self._read(partial(files.read_layout, name, content))
 
-    def open_together(self, parts: dict[str, bytes]) -> None:
-        """A design from files that the browser sent at once, by their names."""
-        self._read(partial(files.read_together, parts))
-
     def open_link(self, text: str) -> None:
         """A design from the part of an address behind the #; it may be anything."""
         self._read(partial(unpacked, text.removeprefix(FRAGMENT)))

@@ -34,9 +34,6 @@ class Figures(NamedTuple):
     """The same over the last second [W]."""
     energy_wh: float
     """Energy of that so far [Wh]."""
-    speed_m_s: float
-    """Mean speed of its way over ground, or of that which it should have gone where that is shorter: waves
-    move a robot to and fro, and it gets nowhere [m/s]."""
 
 
 class Moment(NamedTuple):
@@ -104,12 +101,10 @@ def figures_of(rows: Array, period_s: float) -> Figures | None:
     if not len(rows):
         return None
     power, duration = rows[:, POWER], len(rows) * period_s
-    ways = [np.linalg.norm(np.diff(rows[:, at : at + 3], axis=0), axis=1).sum() for at in (PLACE, WANTED)]
     return Figures(
         track_m=float(np.sqrt(np.mean(rows[:, ERROR] ** 2))),
         depth_m=float(np.sqrt(np.mean(rows[:, DEPTH_ERROR] ** 2))),
         mean_w=float(power.mean()),
         now_w=float(power[-NOW:].mean()),
         energy_wh=float(power.mean()) * duration / 3600.0,
-        speed_m_s=float(min(ways)) / duration,
     )

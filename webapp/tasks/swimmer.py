@@ -7,21 +7,18 @@ import numpy as np
 from finlab.allocation.allocator import Allocator
 from finlab.arrays import Array
 from finlab.control import PATH_CONTROLLERS, FaultMonitor
-from finlab.sim import Changing, ClosedLoop, RunLog, SteadyCurrent, Tick, Water, perturbed
+from finlab.sim import ClosedLoop, RunLog, Tick, perturbed
 from finlab.sim.log import log_of_ticks
-from finlab.vehicle.body import complete_body
-from finlab.vehicle.vehicle import Vehicle
 from webapp.session.swim_plan import Plan
 from webapp.tasks.moment import FORCES, POINTS, Moment, doubted, figures_of, row_of, thinned
-from webapp.tasks.recorded import Recorded
 
 
 class Swimmer:
     """A `ClosedLoop` on the worker's thread, and the last moment taken from it for the page."""
 
-    def __init__(self, method: str, plan: Plan, swim: ClosedLoop) -> None:
+    def __init__(self, plan: Plan, swim: ClosedLoop) -> None:
         """Take over a swim that is at its start."""
-        self.method, self.swim, self._plan = method, swim, plan
+        self.method, self.swim, self._plan = plan.method, swim, plan
         self.layout, self.fins, self.period_s = swim.layout, swim.layout.names, swim.period_s
         times = np.linspace(0.0, swim.task.duration_s, POINTS)
         self.path: Array = np.array([swim.task.setpoint(float(t)).position for t in times])
@@ -29,11 +26,9 @@ class Swimmer:
         self.duration_s = swim.task.duration_s
         self.unknown_fins = swim.allocator.unknown_fins
         """Fins that its method has not learned."""
-        self._water = swim.water
         self._rows: list[Array] = []
         self._ticks: list[Tick] = []
         self._found: dict[str, float] = {}
-        self._recorded: Recorded | None = None
         start = swim.log
         self._about = {f.name: getattr(start, f.name) for f in fields(RunLog) if f.name != "columns"}
         self.shown = self.moment()
@@ -51,23 +46,6 @@ class Swimmer:
         self._ticks.append(tick)
         self._note_findings()
 
-    def meet(self, water: Water, buoyancy: float) -> None:
-        """The water begins to become this; the robot's buoyancy is its layout's by a factor from now on."""
-        if water != self._water:
-            self._water = water
-            self.swim.water = Changing(self._water_now(), water, self.swim.time)
-        truth = perturbed(self.layout, **{**self._plan.truth, "buoyancy": buoyancy})
-        self.swim.vehicle = Vehicle(complete_body(truth))
-
-    def _water_now(self) -> Water:
-        """The water as it is, of which nothing is known but its velocity where it is just changing."""
-        swim = self.swim
-        if not isinstance(swim.water, Changing):
-            return swim.water
-        if swim.time >= swim.water.end_s:
-            return swim.water.after
-        return SteadyCurrent(swim.water.flow(swim.state[:3].tolist(), swim.time).velocity)
-
     def _note_findings(self) -> None:
         """When the monitor detected an unannounced loss; forgotten once the fin is whole or taken for it."""
         swim = self.swim
@@ -78,17 +56,9 @@ class Swimmer:
             if name in swim.damage.failed
         }
 
-    def recorded(self) -> Recorded:
-        """All so far, to look at any moment of it; called on the page's thread, after the first step."""
-        ticks = self._ticks.copy()  # while another thread may swim on
-        if self._recorded is None or self._recorded.log.n_ticks != len(ticks):
-            log = log_of_ticks(ticks, **{**self._about, "water": self.swim.water.name})
-            rows = np.array(self._rows[: len(ticks)])
-            found = tuple(self._found.items())
-            self._recorded = Recorded(
-                self.method, self.about, self.layout, self.path, self.duration_s, log, rows, found
-            )
-        return self._recorded
+    def log(self) -> RunLog:
+        """All so far; called on the page's thread, after the first step."""
+        return log_of_ticks(self._ticks.copy(), **self._about)  # while another thread may swim on
 
     def moment(self) -> Moment:
         """What there is to show after the last step; called on the thread that swims."""

@@ -5,17 +5,15 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from finlab.allocation.allocator import Allocator
 from finlab.errors import FinlabError
 from finlab.layout.damage import Kind
-from finlab.sim import Trajectory, Water
+from finlab.sim import RunLog
 from webapp.session.state import State
 from webapp.session.swim_plan import Plan
 from webapp.tasks.background import Newest
 from webapp.tasks.context import Context
 from webapp.tasks.moment import Moment
 from webapp.tasks.pace import Pace
-from webapp.tasks.recorded import Recorded
 from webapp.tasks.swimmer import Swimmer, closed_loop
 
 BUDGET_S = 0.06
@@ -28,7 +26,7 @@ class Stretch:
 
     n_steps: int
     """How many are due."""
-    swimmers: tuple[Swimmer, ...]
+    swimmer: Swimmer
     """Who swims."""
 
 
@@ -42,16 +40,12 @@ class Swimming:
         loop, worker = context.loop, context.workers.swims
         self._start = Newest(loop, worker, self._made, self._begin)
         self._stretch = Newest(loop, worker, self._advance, self._take)
-        self.swimmers: tuple[Swimmer, ...] = ()
-        """The robots; none while they are being made."""
+        self.swimmer: Swimmer | None = None
+        """The robot; None while it is being made."""
         self.running = False
         """Whether the clock runs."""
         self.pace = Pace()
         """At what speed it is to go, and goes."""
-        self.at: float | None = None
-        """The moment that is looked at again [s]; None for the newest one."""
-        self.own_path: Trajectory | None = None
-        """A path that was uploaded."""
         self._acts: deque[Callable[[Swimmer], None]] = deque()
 
     @property
@@ -67,12 +61,12 @@ class Swimming:
     @property
     def done(self) -> bool:
         """Whether it has come to its end."""
-        return bool(self.swimmers) and self.swimmers[0].shown.done
+        return self.swimmer is not None and self.swimmer.shown.done
 
     @property
     def time(self) -> float:
         """Simulated time [s]."""
-        return self.swimmers[0].shown.time if self.swimmers else 0.0
+        return self.swimmer.shown.time if self.swimmer is not None else 0.0
 
     def start(self, plan: Plan) -> None:
         """Begin at the beginning; a swim that is under way is given up."""
@@ -80,17 +74,15 @@ class Swimming:
         self.running = True
         self._start.ask(plan)
 
-    def _made(self, plan: Plan) -> tuple[Swimmer, ...]:
-        def allocator(method: str) -> Allocator:
-            return self._solver.allocator(State(plan.layout, method=method))
-
-        return tuple(Swimmer(method, plan, closed_loop(plan, allocator(method))) for method in plan.methods)
+    def _made(self, plan: Plan) -> Swimmer:
+        allocator = self._solver.allocator(State(plan.layout, method=plan.method))
+        return Swimmer(plan, closed_loop(plan, allocator))
 
     def _begin(self) -> None:
         if self._start.error is not None:
             self._give_up(self._start.error)
             return
-        self.swimmers = self._start.findings or ()
+        self.swimmer = self._start.findings
         self._changed()
 
     def _give_up(self, text: str) -> None:
@@ -101,14 +93,13 @@ class Swimming:
         """Give up and forget."""
         self._start.forget()
         self._stretch.forget()
-        self.swimmers, self.running, self.at = (), False, None
+        self.swimmer, self.running = None, False
         self._acts.clear()
         self.pace.start_anew()
 
     def set_running(self, running: bool) -> None:
         """Let the clock run, or hold it."""
         self.running = running and self.active and not self.done
-        self.at = None
         self.pace.start_anew()
 
     def step(self) -> None:
@@ -117,97 +108,59 @@ class Swimming:
         self._submit(1)
 
     def toggle(self, name: str, announced: bool = True) -> None:
-        """A fin of all robots breaks, or is mended, before the next step, announced to allocators or not."""
-        if not self.swimmers:
+        """A fin breaks, or is mended, before the next step, announced to the allocator or not."""
+        if self.swimmer is None:
             raise FinlabError("nothing swims yet; press Start")
-        lost = self.swimmers[0].shown.lost
+        lost = self.swimmer.shown.lost
         broken = name in lost
-        if not broken and len(lost) + 1 >= len(self.swimmers[0].fins):
+        if not broken and len(lost) + 1 >= len(self.swimmer.fins):
             raise FinlabError(f"{name} is the last fin that works; mend another one first")
         kind: Kind = "whole" if broken else "lost"
-        self._act(lambda swimmer: swimmer.swim.fail(name, kind, announced=announced))
-
-    def meet(self, water: Water, buoyancy: float) -> None:
-        """Before the next step of all robots the water becomes another, and their buoyancy (a factor)."""
-        if self.active:
-            self._act(lambda swimmer: swimmer.meet(water, buoyancy))
-
-    def _act(self, act: Callable[[Swimmer], None]) -> None:
-        self._acts.append(act)
-        self.at = None  # what happens happens now
+        self._acts.append(lambda swimmer: swimmer.swim.fail(name, kind, announced=announced))
         if not self.running:
             self._submit(0)
 
-    def look_at(self, time: float) -> None:
-        """Hold the clock, and look at an earlier moment [s]; at the newest one where it is not earlier.
+    def log(self) -> RunLog:
+        """The swim so far.
 
         Raises:
             FinlabError: nothing has been swum yet.
         """
-        self._check_swum()
-        self.set_running(False)
-        self.at = None if time > self.time - 0.5 * self.swimmers[0].period_s else max(0.0, time)
-
-    @property
-    def seen(self) -> tuple[Moment, ...]:
-        """The moments of all robots that are looked at."""
-        if self.at is None:
-            return tuple(swimmer.shown for swimmer in self.swimmers)
-        return tuple(swimmer.recorded().moment(self.at) for swimmer in self.swimmers)
-
-    @property
-    def seen_time(self) -> float:
-        """Their time [s]."""
-        return self.time if self.at is None else self.at
-
-    def records(self) -> tuple[Recorded, ...]:
-        """All robots' swims so far.
-
-        Raises:
-            FinlabError: nothing has been swum yet.
-        """
-        self._check_swum()
-        return tuple(swimmer.recorded() for swimmer in self.swimmers)
-
-    def _check_swum(self) -> None:
-        if self.time == 0.0:
+        if self.swimmer is None or self.time == 0.0:
             raise FinlabError("nothing has been swum yet; press Start")
+        return self.swimmer.log()
 
     def tick(self, elapsed: float) -> None:
         """Time has passed on the wall [s]; swim that far, if the last stretch is done."""
-        if not self.running or not self.swimmers:
+        if not self.running or self.swimmer is None:
             return
-        n_steps = self.pace.due(elapsed, self.swimmers[0].period_s)
+        n_steps = self.pace.due(elapsed, self.swimmer.period_s)
         if n_steps:
             self._submit(n_steps)
 
     def _submit(self, n_steps: int) -> None:
-        if self.swimmers and not self._stretch.busy:
-            self._stretch.ask(Stretch(n_steps, self.swimmers))
+        if self.swimmer is not None and not self._stretch.busy:
+            self._stretch.ask(Stretch(n_steps, self.swimmer))
 
-    def _advance(self, stretch: Stretch) -> tuple[int, tuple[Moment, ...]]:
+    def _advance(self, stretch: Stretch) -> tuple[int, Moment]:
         """On the worker's thread: some steps, but no longer than the others can wait."""
-        end, done, swimmers = time.monotonic() + BUDGET_S, 0, stretch.swimmers
+        end, done, swimmer = time.monotonic() + BUDGET_S, 0, stretch.swimmer
         while self._acts:
-            act = self._acts.popleft()
-            for swimmer in swimmers:
-                act(swimmer)
-        while done < stretch.n_steps and not swimmers[0].swim.done:
-            for swimmer in swimmers:
-                swimmer.step()
+            self._acts.popleft()(swimmer)
+        while done < stretch.n_steps and not swimmer.swim.done:
+            swimmer.step()
             done += 1
             if time.monotonic() > end:
                 break
-        return done, tuple(swimmer.moment() for swimmer in swimmers)
+        return done, swimmer.moment()
 
     def _take(self) -> None:
-        if self._stretch.findings is None:
+        swimmer = self.swimmer
+        if self._stretch.findings is None or swimmer is None:
             self._give_up(self._stretch.error or "")
             return
-        done, moments = self._stretch.findings
-        for swimmer, moment in zip(self.swimmers, moments, strict=True):
-            swimmer.shown = moment
-        self.pace.paid(done * self.swimmers[0].period_s, self.time)
+        done, swimmer.shown = self._stretch.findings
+        self.pace.paid(done * swimmer.period_s, self.time)
         if self.done:
             self.running = False
         self._changed()

@@ -1,0 +1,90 @@
+"""What swims come to, and their logs."""
+
+from collections.abc import Iterator
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from finlab.errors import FinlabError
+from finlab.layout import load_layout
+from finlab.sim import make_trajectory
+from tests.webapp.loops import page_of
+from tests.webapp.test_swimming import until
+from webapp.markup.swim_card import swim_card
+from webapp.session.swim_plan import Plan
+from webapp.tasks.background import Worker
+from webapp.tasks.exports import Exports
+from webapp.tasks.moment import POWER, Figures
+from webapp.tasks.swimmer import Swimmer
+from webapp.tasks.swimming import Swimming
+
+UCAT = load_layout("ucat")
+
+
+class Shelf:
+    """A page's tasks, and what was sent to its browser."""
+
+    def __init__(self) -> None:
+        self.worker, self.sent, self.notes = Worker(), {}, []  # type: ignore[var-annotated]
+        client = SimpleNamespace(send_file_download=lambda name, data, **_: self.sent.update({name: data}))
+        context = page_of(self.worker, client=client, notify=lambda _, text: self.notes.append(text))
+        self.swimming = Swimming(context, lambda: None)
+        self.files = Exports(context)
+
+    def begun(self) -> Swimmer:
+        assert self.swimming.swimmer is not None
+        return self.swimming.swimmer
+
+    def swim(self, seconds: float, method: str) -> None:
+        self.swimming.start(Plan(UCAT, (), make_trajectory("circle"), method))
+        until(lambda: self.swimming.swimmer is not None)
+        self.swimming.set_running(False)
+        swimmer = self.begun()
+        while swimmer.swim.time < seconds - 1e-6:
+            swimmer.step()
+        swimmer.shown = swimmer.moment()
+
+
+@pytest.fixture
+def shelf() -> Iterator[Shelf]:
+    shelf = Shelf()
+    yield shelf
+    shelf.swimming.stop()
+    shelf.worker.stop()
+
+
+def test_what_a_swim_comes_to(shelf: Shelf) -> None:
+    shelf.swim(10.0, "analytic")
+    swimmer = shelf.begun()
+    figures, log = swimmer.shown.figures, swimmer.log()
+    assert isinstance(figures, Figures)
+    power = log.driving_power.sum(axis=1)
+    off = np.linalg.norm(log.position - log.reference, axis=1)
+    assert figures.mean_w == pytest.approx(power.mean()) and figures.now_w == pytest.approx(
+        power[-10:].mean()
+    )
+    assert figures.energy_wh == pytest.approx(power.sum() * 0.1 / 3600)
+    assert figures.track_m == pytest.approx(np.sqrt((off**2).mean()))
+    assert figures.depth_m == pytest.approx(np.sqrt(((log.position - log.reference)[:, 2] ** 2).mean()))
+    swimmer.shown = swimmer.shown._replace(figures=figures._replace(mean_w=2.0, energy_wh=0.0042))
+    card = swim_card(shelf.swimming)
+    assert "<td>2.00 W</td>" in card and "<td>4.2 mWh</td>" in card
+
+
+def test_the_log_is_sent_as_a_table(shelf: Shelf) -> None:
+    with pytest.raises(FinlabError, match="nothing has been swum"):
+        shelf.files.swim(shelf.swimming)
+    shelf.swim(2.0, "analytic")
+    shelf.files.swim(shelf.swimming)
+    until(lambda: bool(shelf.sent))
+    ((name, content),) = shelf.sent.items()
+    assert name == "ucat_analytic_nominal_tracking.csv"
+    header, *rows = content.decode().splitlines()
+    assert header.startswith("t [s],x [m],") and len(rows) == 20
+
+
+def test_power_is_a_column_of_the_record(shelf: Shelf) -> None:
+    shelf.swim(1.0, "analytic")
+    swimmer = shelf.begun()
+    assert swimmer.moment().record[:, POWER] == pytest.approx(swimmer.log().driving_power.sum(axis=1))
