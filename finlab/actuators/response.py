@@ -18,6 +18,9 @@ from finlab.arrays import Array
 CELLS = 1024
 """Intervals of price of a table; their ends are `top (j / CELLS)^4`."""
 
+POINTS = 512
+"""Directions around a circle, and sizes of a force, for which a fin is asked."""
+
 
 def price_grid(top: float, points: int = CELLS + 1) -> Array:
     """Prices (points,) [W/N] from 0 to `top`, the ends of a table's intervals."""

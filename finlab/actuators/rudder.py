@@ -18,17 +18,14 @@ from finlab.actuators.law import ActuatorLaw
 from finlab.actuators.response import CELLS, Group, Line, RadialTable, Response
 from finlab.arrays import Array, Values
 from finlab.layout.rudder import Rudder
+from finlab.precision import NOTHING
 
 SHARPNESS = 50.0
 """How fast the flow separates around the angle of stall [1/rad]."""
-POINTS = 1001
-"""Angles between chord and flow for which lift and drag are kept."""
 PEAK = 0.995
 """Share of the largest lift that is asked of a rudder: towards the peak a newton has no price."""
 LEAST_PRICE = 0.05
 """Least price of a newton of drag, as a share of what it takes: the speed [W/N]."""
-NO_PRESSURE = 1e-9
-"""Dynamic pressure times area [N] below which a rudder counts as at rest."""
 LEAST_DRAG = 1e-3
 """Drag coefficient per squared lift coefficient that counts at least, so that each price has one answer."""
 
@@ -147,7 +144,7 @@ class RudderGroup(Group):
         """Takes rudders and the wrench (m, 3, 6) per newton along each own axis; they are at rest."""
         self._law, self._effectiveness = RudderLaw(rudders), effectiveness[:, 1:]
         self._limits = np.array([rudder.deflection for rudder in rudders])
-        angle = np.linspace(0.0, 0.3 * np.pi, POINTS)[:, None] + np.zeros(len(rudders))
+        angle = np.linspace(0.0, 0.3 * np.pi, CELLS)[:, None] + np.zeros(len(rudders))
         found = self._law.coefficients(angle)
         self._curves, self._tables = [], []
         for lift, drag in zip(found.lift.T, found.drag.T, strict=True):
@@ -182,21 +179,21 @@ class RudderGroup(Group):
         for i, (low, high) in enumerate(ends):
             pressure = self._met.pressure[i]
             table = RadialTable.of_forces(1.0, np.zeros(CELLS + 1), 0.0)
-            if pressure >= NO_PRESSURE:
+            if pressure >= NOTHING:
                 table = self._tables[i].scaled(pressure, pressure * drag_price[i])
             responses.append(Line(self._across[i], table, table, low=low, high=high))
         return responses
 
     def worth(self, price: Array) -> Array | None:
         """See `Group`: by lift and drag at many deflections, whatever drag is worth; None at rest."""
-        if (self._met.pressure < NO_PRESSURE).all():
+        if (self._met.pressure < NOTHING).all():
             return None
         pressure, most = self._met.pressure, np.zeros(len(self._limits))
         gain, cost = self._across @ price, self._met.speed - self._against @ price
         for i, (lifts, _, drags) in enumerate(self._curves):
             low, high = self._lift(self._limits)[i]
             lift = np.clip(np.concatenate([-lifts, lifts]) * pressure[i], low, high)
-            drag = np.interp(np.abs(lift) / max(pressure[i], NO_PRESSURE), lifts, drags) * pressure[i]
+            drag = np.interp(np.abs(lift) / max(pressure[i], NOTHING), lifts, drags) * pressure[i]
             most[i] = (gain[i] * lift - cost[i] * drag).max()
         return most
 
@@ -215,7 +212,7 @@ class RudderGroup(Group):
 
     def beside_of(self, force: Array) -> Array:
         """See `Group`."""
-        size = np.abs(force[..., 0]) / np.maximum(self._met.pressure, NO_PRESSURE)
+        size = np.abs(force[..., 0]) / np.maximum(self._met.pressure, NOTHING)
         drag = [np.interp(size[:, i], lifts, drags) for i, (lifts, _, drags) in enumerate(self._curves)]
         wrench: Array = (np.stack(drag, axis=-1) * self._met.pressure) @ self._against
         return wrench
@@ -237,7 +234,7 @@ class RudderGroup(Group):
         """See `Group`."""
         command = np.zeros((*force.shape[:-1], 3))
         for i, (lifts, angles, _) in enumerate(self._curves):
-            size = np.abs(force[..., i, 0]) / max(self._met.pressure[i], NO_PRESSURE)
+            size = np.abs(force[..., i, 0]) / max(self._met.pressure[i], NOTHING)
             angle = np.sign(force[..., i, 0]) * np.interp(size, lifts, angles)
             command[..., i, 0] = np.clip(angle + self._turned[i], *self._limits[i])
         return command

@@ -8,10 +8,7 @@ import numpy as np
 from finlab.actuators.response import RadialTable
 from finlab.arrays import AnyArray, Array
 from finlab.layout.thrust_model import PowerLaw, PowerTable, ThrustModel, lower_hull, side_points
-
-STEEP = 1e-9
-"""Share of the largest marginal cost by which the marginal cost of a curve rises at least from its one end to
-the other, so that each price has one answer."""
+from finlab.precision import NOTHING
 
 
 class ByPower:
@@ -53,7 +50,7 @@ class Curve:
         self.size = np.insert(size, gaps, size[:-1] + share * step)
         """Sizes of the force [N] at the knots."""
         marginal = np.maximum.accumulate(np.maximum(np.insert(slope, gaps, between), 0.0))
-        self.marginal = marginal + STEEP * slope[-1] * self.size / size[-1]
+        self.marginal = marginal + NOTHING * slope[-1] * self.size / size[-1]
         """Marginal cost [W/N] there."""
         gain = 0.5 * (self.marginal[1:] + self.marginal[:-1]) * np.diff(self.size)
         self.watts = watts[0] + np.insert(np.cumsum(gain), 0, 0.0)

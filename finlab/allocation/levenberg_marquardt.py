@@ -14,10 +14,9 @@ from numpy.typing import NDArray
 from finlab.arrays import AnyArray, Array
 from finlab.least_squares import Damping, levenberg_marquardt
 from finlab.physics.plant import Plant
+from finlab.precision import NOTHING
 from finlab.small_systems import solve, step_within
 
-AT_LIMIT = 1e-9
-"""How near [rad, Hz, rad] to a limit a command counts as being at it."""
 RIDGE = (1e-9, 1e-14)
 """Regularization of the 6 x 6 systems: absolute, and relative to their trace. Without the latter those of
 strong fins on long levers are singular to rounding."""
@@ -78,7 +77,7 @@ class CommandProblem:
     @cached_property
     def edges(self) -> tuple[AnyArray, AnyArray]:
         """Below the first and above the second (n, 3), a command is at its limit; full circles have none."""
-        low, high = self.lower + AT_LIMIT, self.upper - AT_LIMIT
+        low, high = self.lower + NOTHING, self.upper - NOTHING
         low[self.full_turn, 2], high[self.full_turn, 2] = -np.inf, np.inf
         return low, high
 

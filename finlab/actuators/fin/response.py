@@ -14,24 +14,17 @@ import numpy as np
 
 from finlab.actuators.fin.models import file_stamp, make_law, stack_laws
 from finlab.actuators.law import FinLaw, PlanarLaw
-from finlab.actuators.response import Group, Plane, RadialTable, price_grid
+from finlab.actuators.response import POINTS, Group, Plane, RadialTable, price_grid
 from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.layout import Fin, FinModelSpec, Layout, Limits
 from finlab.layout.angles import TURN, is_full_turn, wrapped
+from finlab.precision import NEARLY, NOTHING, ROUNDING, ROUNDS
 
-GRID, COARSE_GRID = (17, 33), (13, 25)
-"""Amplitudes and frequencies of the first grid, and of the grid on which directions are compared."""
-STEPS = 12
-"""Steps of Newton's method from the best place of the grid."""
+GRID = 17, 33
+"""Amplitudes and frequencies of the first grid; half as many where directions are compared."""
 PEAK = 5e-4
 """Share of the largest force that is given up where the price of the last newton has no end."""
-SIZES = 512
-"""Sizes of force for which the command is kept."""
-CORRECTIONS = 1
-"""Times that a command is corrected by the law itself."""
-TURNS = 512
-"""Directions in which an uneven fin is asked for its force."""
 
 
 _SHARES = np.array([[[a, f, 0.5]] for a in np.linspace(0.0, 1.0, 5) for f in np.linspace(0.0, 1.0, 5)])
@@ -48,14 +41,14 @@ class FinTable(NamedTuple):
     half: float
     """Half of it [rad]; pi for a full circle."""
     gauge: Array | None
-    """Share (TURNS,) of the table's force in each direction, from 0 on; None where it is the same all
+    """Share (POINTS,) of the table's force in each direction, from 0 on; None where it is the same all
     round."""
     beat: Array
-    """Amplitude [rad] and frequency [Hz] (SIZES + 1, 2) that give the force `largest (j / SIZES)^2`."""
+    """Amplitude [rad] and frequency [Hz] (POINTS + 1, 2) that give the force `largest (j / POINTS)^2`."""
     box: "_Box"
     """The law within the limits."""
     deflection: Array
-    """Direction of the force minus zero direction (TURNS,) [rad] around the circle of force directions; one
+    """Direction of the force minus zero direction (POINTS,) [rad] around the circle of force directions; one
     value (1,) where it is the same all round."""
 
     @property
@@ -99,8 +92,8 @@ class FinGroup(Group):
         self.responses = list(self.planes)
         self._largest = np.array([each.table.largest for each in tables])
         self._beat = np.array([each.beat for each in tables])
-        self._deflection = np.array([np.broadcast_to(each.deflection, TURNS) for each in tables])
-        self._gauge = np.array([np.ones(TURNS) if each.gauge is None else each.gauge for each in tables])
+        self._deflection = np.array([np.broadcast_to(each.deflection, POINTS) for each in tables])
+        self._gauge = np.array([np.ones(POINTS) if each.gauge is None else each.gauge for each in tables])
         self._row = np.arange(len(fins))
         limits = np.array([fin.limits.zero_direction for fin in fins])
         self._lower, self._upper = limits.T
@@ -108,19 +101,16 @@ class FinGroup(Group):
         self._even = all(each.gauge is None for each in tables)
 
     def commands(self, force: Array, previous: Array | None = None) -> Array:
-        """See `Group`. What the table leaves undone, by the laws, is asked for on top, twice."""
+        """See `Group`. What the table leaves undone, by the laws, is asked for on top."""
         x, y = force[..., 0], force[..., 1]
         angle, size = np.arctan2(y, x), np.hypot(x, y)
         command = self._command(angle, size)
-        asked_angle, asked_size = angle, size
-        for _ in range(CORRECTIONS):
-            given = self._force(command)
-            asked_size = asked_size + size - np.hypot(given[..., 1], given[..., 2])
-            if not self._even:
-                lean = wrapped(angle - np.arctan2(given[..., 2], given[..., 1]))
-                asked_angle = asked_angle + np.where(size > 0.0, lean, 0.0)
-            command = self._command(asked_angle, np.maximum(asked_size, 0.0))
-        return command
+        given = self._force(command)
+        asked = np.maximum(2.0 * size - np.hypot(given[..., 1], given[..., 2]), 0.0)
+        if not self._even:
+            lean = wrapped(angle - np.arctan2(given[..., 2], given[..., 1]))
+            angle = angle + np.where(size > 0.0, lean, 0.0)
+        return self._command(angle, asked)
 
     def _force(self, command: Array) -> Array:
         if len(self._stacked) == 1:
@@ -137,13 +127,13 @@ class FinGroup(Group):
         if self._even:
             deflection = self._deflection[:, 0]
         else:
-            place = (angle / TURN) % 1.0 * TURNS
-            cell = place.astype(np.intp) % TURNS
-            part, after = place - np.floor(place), (cell + 1) % TURNS
+            place = (angle / TURN) % 1.0 * POINTS
+            cell = place.astype(np.intp) % POINTS
+            part, after = place - np.floor(place), (cell + 1) % POINTS
             deflection = self._deflection[row, cell] * (1.0 - part) + self._deflection[row, after] * part
             size = size / (self._gauge[row, cell] * (1.0 - part) + self._gauge[row, after] * part)
-        place = np.sqrt(np.minimum(size / self._largest, 1.0)) * SIZES
-        cell = np.minimum(place.astype(np.intp), SIZES - 1)
+        place = np.sqrt(np.minimum(size / self._largest, 1.0)) * POINTS
+        cell = np.minimum(place.astype(np.intp), POINTS - 1)
         part = (place - cell)[..., None]
         command = np.empty((*size.shape, 3))
         beat = self._beat[row, cell]
@@ -158,8 +148,8 @@ class FinGroup(Group):
         for i, table in enumerate(self._tables):
             paid = np.maximum(price[:, i], 0.0)
             place = np.interp(paid, price_grid(table.table.top), table.table.force) / self._largest[i]
-            cell = np.minimum((np.sqrt(place) * SIZES).astype(np.intp), SIZES - 1)
-            starts = np.stack([table.beat[np.clip(cell + k, 0, SIZES)] for k in (-1, 0, 1, 2)])
+            cell = np.minimum((np.sqrt(place) * POINTS).astype(np.intp), POINTS - 1)
+            starts = np.stack([table.beat[np.clip(cell + k, 0, POINTS)] for k in (-1, 0, 1, 2)])
             command = table.box.best(paid, starts)
             found[:, i] = price[:, i] * table.box.force(command) - table.box.power(command)
         return found
@@ -171,7 +161,7 @@ class FinGroup(Group):
         size, row = np.hypot(force[..., 1], force[..., 2]), self._row
         middle, most = command[0, :, 2], size.argmax(axis=0)
         angle = middle + wrapped(np.arctan2(force[most, row, 2], force[most, row, 1]) - middle)
-        size = size / self._gauge[row, np.rint(angle / TURN * TURNS).astype(np.intp) % TURNS]
+        size = size / self._gauge[row, np.rint(angle / TURN * POINTS).astype(np.intp) % POINTS]
         return np.stack([size.min(axis=0), size.max(axis=0), angle, 0.5 * (upper - lower)[:, 2]], axis=-1)
 
 
@@ -201,7 +191,7 @@ def _compiled(
     command = box.best(price_grid(top))
     force = np.maximum.accumulate(box.force(command))
     table = RadialTable.of_forces(top, force, float(box.power(command[:1])[0]))
-    size = force[-1] * np.linspace(0.0, 1.0, SIZES + 1) ** 2
+    size = force[-1] * np.linspace(0.0, 1.0, POINTS + 1) ** 2
     beat = np.stack([np.interp(size, force, command[:, k]) for k in range(2)], axis=-1)
     middle, half, gauge, deflection = _directions(law, box)
     return FinTable(table, middle, half, gauge, beat, box, deflection)
@@ -215,24 +205,24 @@ class _Box:
         self.turn = float(np.clip(0.0, lower[2], upper[2]))
         if not law.uniform:
             turns, across = self.all_round
-            within = (turns >= lower[2] - 1e-9) & (turns <= upper[2] + 1e-9)
+            within = (turns >= lower[2] - NOTHING) & (turns <= upper[2] + NOTHING)
             size = np.where(within, np.hypot(*across.T), -1.0)
             self.turn = float(turns[size.argmax()]) if within.any() else self.turn
 
     @cached_property
     def all_round(self) -> tuple[Array, Array]:
-        """Zero directions (TURNS + 1,) [rad] and the largest forces across the shaft (TURNS + 1, 2) [N] that
-        a coarse grid of commands has there."""
+        """Zero directions (POINTS + 1,) [rad] and the largest forces across the shaft (POINTS + 1, 2) [N]
+        that a coarse grid of commands has there."""
         low, high = self.lower[2], self.upper[2]
         if isinstance(self.law, PlanarLaw):  # a formula holds beyond the limits, too
             low, high = 0.5 * (low + high) - np.pi, 0.5 * (low + high) + np.pi
-        turns = np.linspace(low, high, TURNS + 1)
+        turns = np.linspace(low, high, POINTS + 1)
         return turns, self.strongest(turns)
 
     def strongest(self, turns: Array) -> Array:
         """The largest forces across the shaft (K, 2) [N] of a coarse grid of commands at zero directions
         (K,)."""
-        command = np.tile(self.grid(COARSE_GRID), (len(turns), 1, 1))
+        command = np.tile(self.grid((GRID[0] // 2 + 1, GRID[1] // 2 + 1)), (len(turns), 1, 1))
         command[..., 2] = turns[:, None]
         across = self.law.force(command.reshape(-1, 3)).reshape(command.shape)[..., 1:]
         best = np.hypot(across[..., 0], across[..., 1]).argmax(axis=1)
@@ -278,8 +268,8 @@ class _Box:
         span = high - low
         longest = 2.0 * span / (np.array(GRID) - 1.0)
         value = worth.max(axis=1)
-        for _ in range(STEPS):
-            slope, curve = self._worth_derivatives(price, beat, 1e-6 * span + 1e-15)
+        for _ in range(ROUNDS):
+            slope, curve = self._worth_derivatives(price, beat, NEARLY * span + 1e-15)
             step = np.clip(_uphill_steps(beat, slope, curve), -longest, longest)
             trial = np.clip(np.concatenate([step, 0.2 * step]) + beat, low, high)
             command = self.command(trial)
@@ -310,7 +300,7 @@ class _Box:
     def top_price(self, strongest: float) -> float:
         """The price [W/N] at which the fin gives its largest force, or nearly so where that has no end."""
         corner = self.command(self.upper[None, :2])
-        if float(self.force(corner)[0]) >= strongest * (1.0 - 1e-12):
+        if float(self.force(corner)[0]) >= strongest * (1.0 - ROUNDING):
             zero = np.zeros(1)
             marginal_force = self._slope(zero + 1.0, self.upper[None, :2]) - self._slope(
                 zero, self.upper[None, :2]
@@ -318,10 +308,10 @@ class _Box:
             moves = self.upper[:2] > self.lower[:2]
             if (marginal_force[0][moves] > 1e-3 * strongest).all():
                 price = -self._slope(zero, self.upper[None, :2])[0][moves] / marginal_force[0][moves]
-                top = float(price.max()) if len(price) else 1e-9
+                top = float(price.max()) if len(price) else NOTHING
                 if float(self.force(self.best(np.array([top])))[0]) >= (1.0 - PEAK) * strongest:
                     return top
-        low, high = 1e-9, 1e9
+        low, high = NOTHING, 1.0 / NOTHING
         for _ in range(5):
             prices = np.geomspace(low, high, 33)
             enough = self.force(self.best(prices)) >= (1.0 - PEAK) * strongest
@@ -348,7 +338,7 @@ def _uphill_steps(beat: Array, slope: Array, curve: Array) -> Array:
 
 
 def _directions(law: FinLaw, box: _Box) -> tuple[float, float, Array | None, Array]:
-    """Middle and half of the arc of force directions [rad], gauge (TURNS,) or None, and deflection."""
+    """Middle and half of the arc of force directions [rad], gauge (POINTS,) or None, and deflection."""
     lower, upper = box.lower, box.upper
     full = bool(is_full_turn(upper[2] - lower[2]))
     middle, half = 0.5 * float(lower[2] + upper[2]), np.pi if full else 0.5 * float(upper[2] - lower[2])
@@ -362,7 +352,7 @@ def _directions(law: FinLaw, box: _Box) -> tuple[float, float, Array | None, Arr
     if not full:
         ends = np.interp([lower[2], upper[2]], turns, direction)
         middle, half = 0.5 * float(ends.sum()), 0.5 * float(np.diff(ends)[0])
-    angle = np.arange(TURNS) * (TURN / TURNS)
+    angle = np.arange(POINTS) * (TURN / POINTS)
     place, width = (angle - direction[0]) % TURN, float(direction[-1] - direction[0])
     # Beyond what its law knows a fin is taken to be as at the nearer end.
     place = np.where(place > 0.5 * (width + TURN), 0.0, np.minimum(place, width))

@@ -15,18 +15,12 @@ from numpy.typing import NDArray
 from finlab.actuators.response import CELLS, Line, Plane
 from finlab.allocation.dual.gauges import Gauges
 from finlab.arrays import Array
+from finlab.precision import FINE, NOTHING, ROUNDS
 
-SMOOTHING = 1e-5
-"""Worth, as a share of the largest power, over which an answer changes from one end of an arc to the other:
-the dual of a set that is not convex has corners there."""
-ROUNDING = 1e-2
+TURNING = 1e-2
 """Price, as a share of the mean one of the least force, over which a force that cannot rest turns round."""
-PRICE_STEPS = 6
-"""Steps of Newton's method that find the price of a force in an interval of prices."""
 _EDGES = np.linspace(0.0, 1.0, CELLS + 1) ** 4
 """Ends of the tables' intervals, as shares of the largest price."""
-TINY = 1e-9
-"""Price, as a share of the largest, below which a force that can rest has no direction of its own."""
 
 
 class Answer(NamedTuple):
@@ -108,7 +102,7 @@ class Answers:
         """The tables' forces as shares of the largest, one table after the other."""
         self._row = 2 * np.arange(len(sides))[:, None]
         self.gauges = Gauges([plane.gauge for plane in planes])
-        self._tiny = TINY * self._top[2 * self.lines :: 2, None]
+        self._tiny = NOTHING * self._top[2 * self.lines :: 2, None]
 
     def radial(self, price: Array, row: NDArray[np.intp]) -> tuple[Array, Array, Array]:
         """Force [N], its derivative and conjugate [W] (m, N) at prices (m, N) from 0 on in rows (m, 1) or (m,
@@ -142,7 +136,7 @@ class Answers:
         rise = self._ends[row, cell + 1] - a0
         x = width * np.divide(size - a0, rise, out=np.zeros_like(size), where=rise > 0.0)
         # An error of the price counts squared in the power.
-        for _ in range(PRICE_STEPS):
+        for _ in range(ROUNDS):
             slope = a1 + x * (2.0 * a2 + 3.0 * x * a3)
             excess = a0 + x * (a1 + x * (a2 + x * a3)) - size
             change = np.divide(excess, slope, out=np.zeros_like(x), where=slope > 0.0)
@@ -257,7 +251,7 @@ class Answers:
         if sets.rests:
             return self._tiny
         low = sets.low[self.lines :]
-        marginal = ROUNDING * sets.low_cost[self.lines :] / np.maximum(low, 1e-300)
+        marginal = TURNING * sets.low_cost[self.lines :] / np.maximum(low, 1e-300)
         return np.where(low <= 0.0, self._tiny, np.maximum(marginal, self._tiny))
 
     def _uneven(self, x: Array, y: Array, tangent: Array) -> tuple[Array, Array, Array]:
@@ -299,7 +293,7 @@ class Answers:
         row = self.lines + places
         size, slope, conjugate = self._limited(price, None, self._row[row], sets, row)
         other = _Planar(size * x, size * y, slope * x * x, slope * x * y, slope * y * y, conjugate)
-        width = SMOOTHING * sets.high_cost[row] + 1e-12
+        width = FINE * sets.high_cost[row] + 1e-12
         ahead = planar.conjugate[places] - conjugate
         root = np.sqrt(ahead * ahead + width * width)
         share = np.where(fan.beyond[places], 0.5 * (1.0 + ahead / root), 1.0)

@@ -17,19 +17,12 @@ from finlab.allocation.dual.newton import Prices, solve
 from finlab.allocation.dual.robot import DualRobot
 from finlab.arrays import Array
 from finlab.layout.angles import wrapped
+from finlab.precision import CLOSE, NEARLY, NOTHING, ROUNDS
 
-DIVES = 5
-"""Times that gaps are left on their nearer side."""
-ROUNDS = 12
-"""Times that sets are cut."""
 MOST_PARTS = 48
 """Open parts of one target that are followed, the cheapest first."""
 TURNS = 2.4, 1.6, 0.8, 0.4, 0.2, 0.1, 0.05
 """Angles [rad] by which fins that cannot rest are turned to find where that costs least."""
-SAME = 2e-4
-"""Share of the power by which a part must be able to be cheaper to be followed."""
-OUTSIDE = 1e-4
-"""Angle [rad] by which a force may lie outside its arc."""
 SMALL = 1e-3
 """Least force, as a share of the largest force of the answer, up to which it does not count."""
 NARROW = 0.2
@@ -64,12 +57,12 @@ def gaps(robot: DualRobot, force: Array, sets: Sets) -> Array:
     found = np.zeros(size.shape)
     if lines:
         band = robot.band[:lines]
-        inside = (size[:lines] < band * (1.0 - 1e-9)) & (size[:lines] > 1e-9 * robot.most[:lines])
+        inside = (size[:lines] < band * (1.0 - NOTHING)) & (size[:lines] > NOTHING * robot.most[:lines])
         found[:lines] = np.where(inside & (sets.low[:lines] < sets.high[:lines]), 1.0, 0.0)
     if planes:
         low, radial = sets.low[lines:], size[lines:]
         off = np.abs(wrapped(np.arctan2(y, x) - sets.middle)) - sets.half
-        aside = (off > OUTSIDE) & (radial > 1e-6 * robot.most[lines:])
+        aside = (off > CLOSE) & (radial > NEARLY * robot.most[lines:])
         hole = (low > SMALL * size.max(axis=0)) & (radial < 0.98 * low)
         wide = sets.half > NARROW
         found[lines:] = np.where(aside & wide, off, 0.0)
@@ -102,7 +95,7 @@ def least_power(robot: DualRobot, target: Array, sets: Sets, root: Prices) -> Br
     start = _Parts(np.arange(count), _columns(sets, count), root.prices)
     best = _Best(robot, target, start, root)
     parts, answer = start, root
-    for _ in range(DIVES):
+    for _ in range(ROUNDS):
         amount = gaps(robot, answer.force, parts.sets)
         open_ = np.flatnonzero(best.keep(parts, answer, amount))
         if not len(open_):
@@ -149,7 +142,7 @@ class _Best:
                 self.force[:, row], self._prices[:, row] = answer.force[:, i], answer.prices[:, i]
                 for own, new in zip(self._sets, parts.sets.parts, strict=True):
                     own[:, row] = new[:, i]
-        return answer.solved & ~whole & (answer.value < self._value[parts.row] * (1.0 - SAME))
+        return answer.solved & ~whole & (answer.value < self._value[parts.row] * (1.0 - CLOSE))
 
     def _hollow(self, force: Array, sets: Sets) -> NDArray[np.bool_]:
         """Where the smoothed dual of a narrow arc has a force (k, N) that is smaller than any in it."""

@@ -9,18 +9,14 @@ import numpy as np
 from finlab.allocation.dual.compiled import Compiled
 from finlab.allocation.dual.newton import solve
 from finlab.arrays import Array
-
-TURNS = 10
-"""Times that prices are found with the drag that the last ones gave."""
-SETTLED = 1e-7
-"""Change of the drag, as a share of what the robot can push, up to which it counts as found."""
+from finlab.precision import NEARLY, ROUNDS
 
 
 def at_the_price_of_drag(compiled: Compiled, wrench: Array) -> tuple[Compiled, float]:
     """Returns the robot as it is for one wrench (6,), with its drag and the cost of more of it, and the power
     [W] that no answer undercuts; the robot as it was where the wrench is out of reach or nothing settles."""
     now, prices, bound = compiled, None, 0.0
-    for _ in range(TURNS):
+    for _ in range(ROUNDS):
         robot = now.robot
         found = solve(robot, robot.target((wrench - now.beside)[None]), None, prices)
         if not found.solved[0]:
@@ -29,7 +25,7 @@ def at_the_price_of_drag(compiled: Compiled, wrench: Array) -> tuple[Compiled, f
         price = robot.basis @ prices[:, 0] / robot.scale
         bound = max(bound, _dual_value(now, wrench, found.force, price))
         beside = now.beside_of(found.force)
-        if np.linalg.norm((beside - now.beside) / robot.scale) < SETTLED:
+        if np.linalg.norm((beside - now.beside) / robot.scale) < NEARLY:
             return now, bound
         now = compiled.paid(price, beside)
     return compiled, bound

@@ -6,11 +6,9 @@ with `sigma(theta) = max over psi of rho(psi) cos(theta - psi)`, the support fun
 
 import numpy as np
 
+from finlab.actuators.response import POINTS
 from finlab.arrays import Array
 from finlab.layout.angles import TURN
-
-ANGLES = 512
-"""Directions of a price at which a support function is kept, cubic between them."""
 
 
 class Gauges:
@@ -43,11 +41,11 @@ class Gauges:
 
     def support(self, angle: Array) -> tuple[Array, Array, Array]:
         """Support function and its first two derivatives (g, N) for directions (g, N) of the price."""
-        step = TURN / ANGLES
-        place = (angle / TURN) % 1.0 * ANGLES
-        cell = place.astype(np.intp) % ANGLES
+        step = TURN / POINTS
+        place = (angle / TURN) % 1.0 * POINTS
+        cell = place.astype(np.intp) % POINTS
         t = place - np.floor(place)
-        row, after = np.arange(len(self._sigma))[:, None], (cell + 1) % ANGLES
+        row, after = np.arange(len(self._sigma))[:, None], (cell + 1) % POINTS
         first, last = self._sigma[row, cell], self._sigma[row, after]
         m0, m1 = self._slope[row, cell] * step, self._slope[row, after] * step
         rise = last - first
@@ -57,14 +55,14 @@ class Gauges:
 
 
 def _support(gauge: Array) -> tuple[Array, Array]:
-    """Support function and its derivative (ANGLES,) of one gauge (G,); the parabola through the best three
+    """Support function and its derivative (POINTS,) of one gauge (G,); the parabola through the best three
     directions stands for the gauge between them."""
     count, step = len(gauge), TURN / len(gauge)
-    angle = np.arange(ANGLES) * TURN / ANGLES
+    angle = np.arange(POINTS) * TURN / POINTS
     psi = np.arange(count) * step
     worth = gauge * np.cos(angle[:, None] - psi)
     best = worth.argmax(axis=1)
-    row = np.arange(ANGLES)
+    row = np.arange(POINTS)
     before, at, after = (worth[row, (best + k) % count] for k in (-1, 0, 1))
     bend = before - 2.0 * at + after
     offset = np.clip(np.where(bend < 0.0, 0.5 * (before - after) / np.minimum(bend, -1e-300), 0.0), -0.5, 0.5)

@@ -21,7 +21,7 @@ from finlab.allocation.dual.branch import gaps, halves, least_power, may_have_ga
 from finlab.allocation.dual.compiled import Compiled
 from finlab.allocation.dual.drag import at_the_price_of_drag
 from finlab.allocation.dual.newton import Prices, solve
-from finlab.allocation.dual.policies import OUT_OF_RANGE, nearest
+from finlab.allocation.dual.policies import nearest
 from finlab.allocation.dual.rates import Rates, implied_prices, within_tick
 from finlab.allocation.in_time import in_time
 from finlab.allocation.levenberg_marquardt import CommandProblem, refine
@@ -31,23 +31,16 @@ from finlab.allocation.settings import Settings, number
 from finlab.allocation.solution import Solution
 from finlab.arrays import Array
 from finlab.networks.trained import TrainedWeights
+from finlab.precision import FINE, NEARLY, ROUNDS
 
 EXACT = 1e-8
 """Error, on the robot's yardstick, up to which commands need no further step."""
-COARSE = 1e-5
-"""Error from which the dual is asked again, for what is missing on top."""
-AGAIN = 4
-"""Times that it is asked again."""
-REFINE_STEPS = 12
-"""Levenberg-Marquardt steps on commands."""
 TICK_STEPS = 5
 """The same where a command of a tick is not exact."""
 TICK_CUTS = 3
 """Times that what may follow is cut where that has gaps."""
 NEAREST = 1e-3
 """Error above that of forces without gaps up to which the answer of a tick counts as the nearest."""
-TABLES = 1e-5
-"""Share of a power by which the compiled tables may be off."""
 
 
 @dataclass(frozen=True)
@@ -201,7 +194,7 @@ class Dual(Method):
         within = root.solved.copy()
         if robot.basis.shape[1] < 6:
             rest = targets / robot.scale - (robot.basis @ target).T
-            within &= np.linalg.norm(rest, axis=1) <= OUT_OF_RANGE * (
+            within &= np.linalg.norm(rest, axis=1) <= NEARLY * (
                 1e-3 + np.linalg.norm(targets / robot.scale, axis=1)
             )
         force, prices, value = root.force, root.prices, np.broadcast_to(0.0, len(targets))
@@ -229,7 +222,7 @@ class Dual(Method):
         force = root.force.copy()
         force[:, rows] = cut.force
         within[rows[~cut.found]] = False
-        value[rows] = np.where(cut.found, cut.value * (1.0 - TABLES), 0.0)
+        value[rows] = np.where(cut.found, cut.value * (1.0 - FINE), 0.0)
         return force, value
 
     def _commands(
@@ -241,8 +234,8 @@ class Dual(Method):
         if (error <= EXACT).all():
             return command, found
         shift = np.zeros_like(aim)
-        for _ in range(AGAIN):
-            coarse = np.flatnonzero((error > COARSE) & found.within)
+        for _ in range(ROUNDS):
+            coarse = np.flatnonzero((error > FINE) & found.within)
             if not len(coarse):
                 break
             shift[coarse] += aim[coarse] - self.plant.wrench(command[coarse])
@@ -264,7 +257,7 @@ class Dual(Method):
         return np.sqrt(np.einsum("ni,ni->n", missing, missing))
 
     def _refined(self, problem: CommandProblem, aim: Array, command: Array) -> Array:
-        return refine(problem, aim / self.scale, command, REFINE_STEPS).command
+        return refine(problem, aim / self.scale, command, ROUNDS).command
 
     def _in_a_tick(self, aim: Array, found: Forces, previous: Array) -> Array:
         """The command (1, n, 3) that gives a wrench (1, 6) or comes nearest to it among those that may follow

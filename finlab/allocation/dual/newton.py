@@ -17,19 +17,15 @@ from numpy.typing import NDArray
 from finlab.allocation.dual.answers import Answer, Sets
 from finlab.allocation.dual.robot import DualRobot
 from finlab.arrays import Array
+from finlab.precision import NEARLY, NOTHING, ROUNDING
 from finlab.small_systems import solve as solve_systems
 
 TOLERANCE = 1e-10
 """Scaled wrench that may be left of a target."""
+SATURATED_RIDGE = 1e-2
+"""Ridge to begin with, as a share of the trace, where an actuator may be at its limit; NEARLY elsewhere."""
 MOST_STEPS = 200
 """Steps after which a target is given up."""
-RIDGE, SATURATED_RIDGE, LEAST_RIDGE = 1e-6, 1e-2, 1e-12
-"""Ridge to begin with, as a share of the trace, where no actuator is at its limit and where some are; and the
-least one."""
-UNDRIVEN = 1e-9
-"""Share of the trace of the first Hessian that every direction has at least."""
-SLACK = 1e-12
-"""Share of the dual value that rounding may take."""
 
 
 class Prices(NamedTuple):
@@ -93,7 +89,7 @@ def start(robot: DualRobot, target: Array, sets: Sets) -> tuple[Array, NDArray[n
     hessian = weight.T @ robot.squares.T
     diagonal = hessian[:, :: robot.shape[0] + 1]
     # Of a robot with only some directions asked for, nothing may drive one of them.
-    diagonal += UNDRIVEN * diagonal.sum(axis=1, keepdims=True)
+    diagonal += NOTHING * diagonal.sum(axis=1, keepdims=True)
     hessian = hessian.reshape(-1, *robot.shape)
     return solve_systems(hessian, target.T[..., None])[..., 0].T, saturated
 
@@ -118,9 +114,9 @@ def solve(
     count = target.shape[1]
     if prices is None:
         prices, saturated = start(robot, target, sets)
-        ridge = np.where(saturated, SATURATED_RIDGE, RIDGE)
+        ridge = np.where(saturated, SATURATED_RIDGE, NEARLY)
     else:
-        ridge = np.full(count, RIDGE)
+        ridge = np.full(count, NEARLY)
     most = np.maximum(sets.low_cost, sets.high_cost).sum(axis=0) * (1.0 + 1e-9) + 1e-9 + np.zeros(count)
     proves = terms.penalty is None and terms.reward is None
     state = _state(robot, target, prices, sets, terms)
@@ -170,7 +166,7 @@ def _step(robot: DualRobot, state: _State, terms: Terms, ridge: Array) -> Array:
 def _accepted(state: _State, trial: _State, left: Array) -> NDArray[np.bool_]:
     """Which steps are kept (N,): the slope left along the step is uphill, or the value rose, or is the same
     to rounding and the residual fell."""
-    slack = SLACK * np.abs(state.value)
+    slack = ROUNDING * np.abs(state.value)
     return (
         (left >= 0.0)
         | (trial.value > state.value)
@@ -181,7 +177,7 @@ def _accepted(state: _State, trial: _State, left: Array) -> NDArray[np.bool_]:
 def _next_ridge(ridge: Array, left: Array, good: NDArray[np.bool_]) -> Array:
     kept = np.where(np.abs(left) < 0.5, 0.1, np.where(left > 0.5, 0.3, 1.0))
     grown = np.minimum(np.maximum(-left, 2.0), 10.0)
-    return np.maximum(ridge * np.where(good, kept, grown), LEAST_RIDGE)
+    return np.maximum(ridge * np.where(good, kept, grown), ROUNDING)
 
 
 def _one(robot: DualRobot, state: _State, sets: Sets, terms: Terms, ridge: float, most: float) -> Prices:
@@ -197,13 +193,13 @@ def _one(robot: DualRobot, state: _State, sets: Sets, terms: Terms, ridge: float
         if (
             left >= 0.0
             or rose > 0.0
-            or (rose > -SLACK * abs(state.value[0]) and trial.size[0] < 0.9 * state.size[0])
+            or (rose > -ROUNDING * abs(state.value[0]) and trial.size[0] < 0.9 * state.size[0])
         ):
             state = trial
             ridge *= 0.1 if abs(left) < 0.5 else 0.3 if left > 0.5 else 1.0
         else:
             ridge *= min(max(-left, 2.0), 10.0)
-        ridge = max(ridge, LEAST_RIDGE)
+        ridge = max(ridge, ROUNDING)
     solved = state.size <= TOLERANCE
     beyond = ~solved & (state.value > most)
     return Prices(state.prices, state.answer.force, state.value, solved, beyond, np.array([steps]))

@@ -18,26 +18,12 @@ from finlab.allocation.dual.newton import Prices, Terms, solve
 from finlab.allocation.dual.robot import DualRobot
 from finlab.allocation.policy import Policy
 from finlab.arrays import Array
+from finlab.precision import CLOSE, NEARLY, NOTHING, ROUNDS
 
 STIFFNESS = (10.0, 1e3, 1e5, 1e7)
 """Costs of a miss, one after the other, as multiples of the robot's largest power per actuator."""
 REWARD = 10.0
 """Reward for a share of a target, as a multiple of the same."""
-MOST_PARTS = 12
-"""Parts of sets with gaps in which the nearest answer is looked for."""
-RIM = 1e-6
-"""Share of a wrench on the boundary of the reach that is given up where rounding puts it beyond."""
-UNWEIGHTED = 1e-4
-"""Weight of an axis whose miss does not count."""
-MISSED = 1e-7
-"""Share of a group's target from which it counts as missed."""
-DRIVEN = 1e-6
-"""Share of the largest price from which an actuator counts as driven to its limit."""
-OUT_OF_RANGE = 1e-6
-"""Share of a target outside the range of the actuators up to which it is left out without a word: targets of
-single precision have some."""
-FAR = 1e9
-"""Price, as a multiple of the largest, at which every actuator is at its limit."""
 
 
 class Nearest(NamedTuple):
@@ -76,7 +62,7 @@ def nearest(robot: DualRobot, sets: Sets, wrench: Array, policy: Policy, yardsti
 
     number = count()
     parts = [served(sets)]
-    for _ in range(MOST_PARTS):
+    for _ in range(ROUNDS):
         _, _, force, part = heapq.heappop(parts)
         cut = halves(robot, part, force)
         if cut is None:
@@ -88,7 +74,7 @@ def nearest(robot: DualRobot, sets: Sets, wrench: Array, policy: Policy, yardsti
 
 def _axis_weights(policy: Policy) -> Array:
     weights = np.array(policy.axis_weights)
-    return np.maximum(weights / weights.max(), UNWEIGHTED)
+    return np.maximum(weights / weights.max(), CLOSE)
 
 
 def _missed(robot: DualRobot, force: Array, asked: Array, policy: Policy, weight: Array) -> tuple[float, ...]:
@@ -105,7 +91,7 @@ def _missed(robot: DualRobot, force: Array, asked: Array, policy: Policy, weight
 def _cheapest(robot: DualRobot, sets: Sets, force: Array) -> Nearest:
     """The least power for the wrench that some forces (k,) give."""
     target = (robot.matrix.T @ force)[:, None]
-    for share in (1.0, 1.0 - RIM):
+    for share in (1.0, 1.0 - NEARLY):
         found = solve(robot, share * target, sets)
         if found.solved[0]:
             return Nearest(found.force[:, 0], found.prices[:, 0])
@@ -144,7 +130,7 @@ def _unanswered(robot: DualRobot, prices: Array, sets: Sets) -> Array:
     answer = robot.answers(robot.matrix @ prices, sets)
     hessian = (robot.outer @ answer.derivative).reshape(robot.shape)
     values, vectors = np.linalg.eigh(hessian)
-    still = vectors[:, values <= 1e-9 * max(values[-1], robot.least_trace)]
+    still = vectors[:, values <= NOTHING * max(values[-1], robot.least_trace)]
     part: Array = still @ (still.T @ prices)
     return part
 
@@ -152,14 +138,14 @@ def _unanswered(robot: DualRobot, prices: Array, sets: Sets) -> Array:
 def direction(robot: DualRobot, sets: Sets, wrench: Array) -> Array:
     """Forces (k,) [N] that give the largest share of a scaled wrench (6,)."""
     target = (robot.basis.T @ wrench)[:, None]
-    if np.linalg.norm(robot.basis @ target[:, 0] - wrench) > OUT_OF_RANGE * np.linalg.norm(wrench):
+    if np.linalg.norm(robot.basis @ target[:, 0] - wrench) > NEARLY * np.linalg.norm(wrench):
         return solve(robot, 0.0 * target, sets).force[:, 0]
     target = target / max(float(np.linalg.norm(target)) / 4.0, 1.0)  # farther than any robot reaches
     unit = _unit(sets)
     found, reward = solve(robot, target, sets, None, Terms(reward=REWARD * unit)), REWARD
     for _ in range(4):
         share = _share(robot, found, target)
-        if share >= (1.0 - 1e-6) * _most_share(robot, sets, found.prices, target):
+        if share >= (1.0 - NEARLY) * _most_share(robot, sets, found.prices, target):
             break
         reward *= 10.0
         prices = found.prices + 9.0 * _unanswered(robot, found.prices, sets)
@@ -178,7 +164,7 @@ def _most_share(robot: DualRobot, sets: Sets, prices: Array, target: Array) -> f
     worth = float(prices[:, 0] @ target[:, 0])
     if worth <= 0.0:
         return np.inf
-    far = robot.answers(robot.matrix @ (prices * FAR / max(float(np.abs(prices).max()), 1e-300)), sets)
+    far = robot.answers(robot.matrix @ (prices / NOTHING / max(float(np.abs(prices).max()), 1e-300)), sets)
     return float(prices[:, 0] @ (robot.matrix.T @ far.force[:, 0])) / worth
 
 
@@ -200,10 +186,10 @@ def priority(robot: DualRobot, sets: Sets, wrench: Array, groups: list[Array], w
         got = (robot.effectiveness.T @ force) / robot.scale
         missed = np.linalg.norm(basis.T @ (got - aim))
         held = basis
-        if missed > MISSED * np.linalg.norm(basis.T @ aim):
+        if missed > NEARLY * np.linalg.norm(basis.T @ aim):
             normal = _unanswered(part, found.prices, sets)[:, 0]
             sets = _kept_at_limits(
-                robot, sets, force, np.abs(part.matrix @ normal) > DRIVEN * np.abs(part.matrix @ normal).max()
+                robot, sets, force, np.abs(part.matrix @ normal) > NEARLY * np.abs(part.matrix @ normal).max()
             )
             held = _beside(basis, normal)
         aim = np.where(_spanned(held), got, aim)

@@ -9,10 +9,7 @@ from numpy.typing import NDArray
 from finlab.actuators.response import Line, Plane, Response
 from finlab.allocation.dual.answers import Answers, Sets
 from finlab.arrays import Array
-
-RANK = 1e-9
-"""Share of the largest singular value of the scaled effectiveness below which a direction counts as out of
-reach of all actuators."""
+from finlab.precision import NOTHING
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,9 +152,9 @@ def _products(a: Array, b: Array) -> Array:
 def _range(effectiveness: Array, most: Array) -> tuple[Array, Array]:
     """Scale and basis, as in `DualRobot`, of directions (k, 6) whose largest forces are `most` (k, 1)."""
     size = np.sqrt(((effectiveness * most) ** 2).sum(axis=0))
-    scale = np.where(size > RANK * max(size.max(), 1e-300), size, 1.0)
+    scale = np.where(size > NOTHING * max(size.max(), 1e-300), size, 1.0)
     left, values, _ = np.linalg.svd((effectiveness * most / scale).T, full_matrices=False)
-    return scale, left[:, values > RANK * max(values[0], 1e-300)]
+    return scale, left[:, values > NOTHING * max(values[0], 1e-300)]
 
 
 def _is_whole(line: Line, low: float, high: float) -> bool:
