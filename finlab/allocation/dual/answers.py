@@ -5,6 +5,7 @@ first directions of planes, second directions of planes. Each answer is the grad
 `T(|s|) sign(s)`, a plane's `T(v) g` with `v = s . g` and `g` the direction of the force, its size the gauge.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -74,6 +75,12 @@ class Sets:
         wide = arc & ((self.half > 0.5 * np.pi) | ((low > 0.0) & (self.half > 0.0)))
         return np.flatnonzero(wide.any(axis=1))
 
+    @classmethod
+    def of(cls, parts: Iterable[Array], whole: bool = False) -> "Sets":
+        """The sets of all arrays, in order."""
+        low, high, low_cost, high_cost, middle, half = parts
+        return cls(low, high, low_cost, high_cost, middle, half, whole)
+
     @property
     def parts(self) -> tuple[Array, ...]:
         """All arrays, in order."""
@@ -81,7 +88,7 @@ class Sets:
 
     def take(self, columns: NDArray[np.intp]) -> "Sets":
         """The same for some of the targets."""
-        return Sets(*(a if a.shape[-1] == 1 else a[:, columns] for a in self.parts), self.whole)
+        return Sets.of((a if a.shape[-1] == 1 else a[:, columns] for a in self.parts), self.whole)
 
 
 class Answers:
@@ -288,6 +295,8 @@ class Answers:
     ) -> Array:
         """Blend the answers of planes beyond their arcs with those of the other ends; the change (N,) of the
         sum of conjugates."""
+        assert fan.beyond is not None and fan.other is not None
+        beyond = fan.beyond[places]
         x, y = (values[places] for values in self._end(fan.other + np.zeros_like(first)))
         price = first[places] * x + second[places] * y
         row = self.lines + places
@@ -296,8 +305,8 @@ class Answers:
         width = FINE * sets.high_cost[row] + 1e-12
         ahead = planar.conjugate[places] - conjugate
         root = np.sqrt(ahead * ahead + width * width)
-        share = np.where(fan.beyond[places], 0.5 * (1.0 + ahead / root), 1.0)
-        turn = np.where(fan.beyond[places], 0.5 * width * width / root**3, 0.0)
+        share = np.where(beyond, 0.5 * (1.0 + ahead / root), 1.0)
+        turn = np.where(beyond, 0.5 * width * width / root**3, 0.0)
         dx, dy = planar.first[places] - other.first, planar.second[places] - other.second
         for name, extra in (
             ("first", 0.0),
@@ -308,7 +317,7 @@ class Answers:
         ):
             own, others = getattr(planar, name), getattr(other, name)
             own[places] = share * own[places] + (1.0 - share) * others + turn * extra
-        gain: Array = np.where(fan.beyond[places], 0.5 * (root - ahead), 0.0).sum(axis=0)
+        gain: Array = np.where(beyond, 0.5 * (root - ahead), 0.0).sum(axis=0)
         return gain
 
 

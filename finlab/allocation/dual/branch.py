@@ -97,10 +97,10 @@ def least_power(robot: DualRobot, target: Array, sets: Sets, root: Prices) -> Br
     parts, answer = start, root
     for _ in range(ROUNDS):
         amount = gaps(robot, answer.force, parts.sets)
-        open_ = np.flatnonzero(best.keep(parts, answer, amount))
-        if not len(open_):
+        nearer = np.flatnonzero(best.keep(parts, answer, amount))
+        if not len(nearer):
             break
-        parts = _dive(robot, parts, open_, amount[:, open_], answer)
+        parts = _dive(robot, parts, nearer, amount[:, nearer], answer)
         answer = solve(robot, target[:, parts.row], parts.sets, parts.prices)
     best.turn()
     parts, answer, value = start, root, np.full(count, np.inf)
@@ -148,8 +148,7 @@ class _Best:
         """Where the smoothed dual of a narrow arc has a force (k, N) that is smaller than any in it."""
         lines, planes = self._robot.answers.lines, self._robot.answers.planes
         size = np.hypot(force[lines : lines + planes], force[lines + planes :])
-        found: NDArray[np.bool_] = ((size < 0.9 * sets.low[lines:]) & (sets.half <= NARROW)).any(axis=0)
-        return found
+        return np.asarray(((size < 0.9 * sets.low[lines:]) & (sets.half <= NARROW)).any(axis=0))
 
     def turn(self) -> None:
         """Turn the fins that keep their least force to where that costs less, by smaller and smaller
@@ -164,7 +163,7 @@ class _Best:
             row, plane = np.tile(row, 2), np.tile(plane, 2)
             columns = [values[:, row] for values in self._sets]
             columns[4][plane, np.arange(len(row))] += np.repeat([-step, step], len(row) // 2)
-            sets = Sets(*columns)
+            sets = Sets.of(columns)
             answer = solve(self._robot, self._target[:, row], sets, self._prices[:, row])
             self.keep(_Parts(row, sets, self._prices), answer, gaps(self._robot, answer.force, sets))
 
@@ -183,7 +182,7 @@ def halves(robot: DualRobot, sets: Sets, force: Array) -> list[Sets] | None:
 
 
 def _columns(sets: Sets, count: int) -> Sets:
-    return Sets(*(np.broadcast_to(values, (len(values), count)) for values in sets.parts))
+    return Sets.of(np.broadcast_to(values, (len(values), count)) for values in sets.parts)
 
 
 def _cheapest(places: NDArray[np.intp], row: NDArray[np.intp], value: Array) -> NDArray[np.intp]:
@@ -194,14 +193,14 @@ def _cheapest(places: NDArray[np.intp], row: NDArray[np.intp], value: Array) -> 
     rows = row[places]
     first = np.concatenate([[0], np.flatnonzero(np.diff(rows)) + 1])
     rank = np.arange(len(rows)) - np.repeat(first, np.diff(np.append(first, len(rows))))
-    return places[rank < MOST_PARTS]
+    return np.asarray(places[rank < MOST_PARTS])
 
 
 def _cut(robot: DualRobot, parts: _Parts, kept: NDArray[np.intp], amount: Array, answer: Prices) -> _Parts:
     """Both parts of each open part, whose worst gap is cut."""
     twice, side = np.tile(kept, 2), np.repeat([-1.0, 1.0], len(kept))
     chosen = np.arange(len(amount))[:, None] == np.tile(amount.argmax(axis=0), 2)
-    doubled = Sets(*(values[:, twice] for values in parts.sets.parts))
+    doubled = Sets.of(values[:, twice] for values in parts.sets.parts)
     sets = narrowed(robot, doubled, answer.force[:, twice], chosen, side + np.zeros(chosen.shape))
     return _Parts(parts.row[twice], sets, answer.prices[:, twice])
 

@@ -178,8 +178,10 @@ class Dual(Method):
 
     @property
     def _unproved(self) -> bool:
-        """Whether the bound would be one of something else than the power of the answer."""
-        return self.layout.interaction is not None or self.settings.copper_loss > 0.0
+        """Whether the bound would be one of something else than the power of the answer: of fins without
+        their interaction, with a motor's heat, or of the smooth shape that stands for a measured table."""
+        measured = any(fin.model.type == "table" for fin in self.layout.fins)
+        return measured or self.layout.interaction is not None or self.settings.copper_loss > 0.0
 
     def _forces(self, targets: Array, sets: Sets, policy: Policy, prices: Array | None = None) -> Forces:
         """Forces of least power for wrenches (N, 6), or for those that the policy gives in their place."""
@@ -188,7 +190,11 @@ class Dual(Method):
         if not len(target):  # nothing pushes, such as rudders at rest
             nothing = np.zeros((len(robot.effectiveness), len(targets)))
             return Forces(
-                nothing, np.zeros((len(targets), 6)), ~targets.any(axis=1), target, np.zeros(len(targets))
+                nothing,
+                np.zeros((len(targets), 6)),
+                np.asarray(~targets.any(axis=1)),
+                target,
+                np.zeros(len(targets)),
             )
         root = solve(robot, target, sets, prices)
         within = root.solved.copy()
@@ -217,8 +223,7 @@ class Dual(Method):
         if not len(rows):
             return root.force, np.broadcast_to(0.0, len(within))
         value = np.zeros(len(within))
-        some = Prices(*(values[..., rows] for values in root))
-        cut = least_power(robot, target[:, rows], sets.take(rows), some)
+        cut = least_power(robot, target[:, rows], sets.take(rows), root.take(rows))
         force = root.force.copy()
         force[:, rows] = cut.force
         within[rows[~cut.found]] = False
@@ -254,7 +259,8 @@ class Dual(Method):
 
     def _error(self, command: Array, aim: Array) -> Array:
         missing = (self.plant.wrench(command) - aim) / self.scale
-        return np.sqrt(np.einsum("ni,ni->n", missing, missing))
+        error: Array = np.sqrt(np.einsum("ni,ni->n", missing, missing))
+        return error
 
     def _refined(self, problem: CommandProblem, aim: Array, command: Array) -> Array:
         return refine(problem, aim / self.scale, command, ROUNDS).command

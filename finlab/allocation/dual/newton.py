@@ -44,6 +44,12 @@ class Prices(NamedTuple):
     steps: NDArray[np.intp]
     """Steps taken (N,)."""
 
+    def take(self, columns: NDArray[np.intp]) -> "Prices":
+        """The same for some of the targets."""
+        prices, force = self.prices[:, columns], self.force[:, columns]
+        solved, beyond = self.solved[columns], self.beyond[columns]
+        return Prices(prices, force, self.value[columns], solved, beyond, self.steps[columns])
+
 
 @dataclass(frozen=True, eq=False)
 class Terms:
@@ -83,7 +89,7 @@ def start(robot: DualRobot, target: Array, sets: Sets) -> tuple[Array, NDArray[n
             [size[:lines], np.hypot(force[lines : lines + planes], force[lines + planes :])]
         )
     share = size / robot.most
-    saturated = (share > 0.8).any(axis=0)
+    saturated = np.asarray((share > 0.8).any(axis=0))
     fit = np.sqrt(np.minimum(np.maximum(share, 1e-4), 1.0))
     weight = gain * np.concatenate([fit, fit[lines:]])
     hessian = weight.T @ robot.squares.T
@@ -91,7 +97,8 @@ def start(robot: DualRobot, target: Array, sets: Sets) -> tuple[Array, NDArray[n
     # Of a robot with only some directions asked for, nothing may drive one of them.
     diagonal += NOTHING * diagonal.sum(axis=1, keepdims=True)
     hessian = hessian.reshape(-1, *robot.shape)
-    return solve_systems(hessian, target.T[..., None])[..., 0].T, saturated
+    prices: Array = solve_systems(hessian, target.T[..., None])[..., 0].T
+    return prices, saturated
 
 
 def solve(
@@ -246,13 +253,28 @@ def _many(robot: DualRobot, state: _State, sets: Sets, terms: Terms, ridge: Arra
 
 
 def _columns(state: _State, columns: NDArray[np.intp]) -> _State:
-    answer = Answer(*(values[..., columns] for values in state.answer))
-    parts = (None if values is None else values[..., columns] for values in state[3:])
-    return _State(state.target[:, columns], state.prices[:, columns], answer, *parts)
+    stretch = None if state.stretch is None else state.stretch[columns]
+    return _State(
+        state.target[:, columns],
+        state.prices[:, columns],
+        Answer(*(values[..., columns] for values in state.answer)),
+        state.residual[:, columns],
+        state.value[columns],
+        state.size[columns],
+        stretch,
+    )
 
 
 def _merged(good: NDArray[np.bool_], trial: _State, state: _State) -> _State:
-    answer = Answer(*(np.where(good, a, b) for a, b in zip(trial.answer, state.answer, strict=True)))
-    pairs = zip(trial[3:], state[3:], strict=True)
-    parts = (None if a is None else np.where(good, a, b) for a, b in pairs)
-    return _State(state.target, np.where(good, trial.prices, state.prices), answer, *parts)
+    stretch = None
+    if trial.stretch is not None and state.stretch is not None:
+        stretch = np.where(good, trial.stretch, state.stretch)
+    return _State(
+        state.target,
+        np.where(good, trial.prices, state.prices),
+        Answer(*(np.where(good, a, b) for a, b in zip(trial.answer, state.answer, strict=True))),
+        np.where(good, trial.residual, state.residual),
+        np.where(good, trial.value, state.value),
+        np.where(good, trial.size, state.size),
+        stretch,
+    )

@@ -11,6 +11,7 @@ from itertools import count
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finlab.allocation.dual.answers import Sets
 from finlab.allocation.dual.branch import halves
@@ -18,7 +19,7 @@ from finlab.allocation.dual.newton import Prices, Terms, solve
 from finlab.allocation.dual.robot import DualRobot
 from finlab.allocation.policy import Policy
 from finlab.arrays import Array
-from finlab.precision import CLOSE, NEARLY, NOTHING, ROUNDS
+from finlab.precision import CLOSE, NEARLY, NOTHING, ROUNDING, ROUNDS
 
 STIFFNESS = (10.0, 1e3, 1e5, 1e7)
 """Costs of a miss, one after the other, as multiples of the robot's largest power per actuator."""
@@ -74,7 +75,7 @@ def nearest(robot: DualRobot, sets: Sets, wrench: Array, policy: Policy, yardsti
 
 def _axis_weights(policy: Policy) -> Array:
     weights = np.array(policy.axis_weights)
-    return np.maximum(weights / weights.max(), CLOSE)
+    return np.asarray(np.maximum(weights / weights.max(), CLOSE))
 
 
 def _missed(robot: DualRobot, force: Array, asked: Array, policy: Policy, weight: Array) -> tuple[float, ...]:
@@ -103,8 +104,9 @@ def closest(robot: DualRobot, sets: Sets, wrench: Array, weight: Array) -> Array
     (6,)."""
     metric = robot.basis.T * weight**2
     inner = metric @ robot.basis
-    target = np.linalg.solve(inner, metric @ wrench)[:, None]
-    return _nearer(robot, sets, target, np.linalg.inv(inner)).force[:, 0]
+    target: Array = np.linalg.solve(inner, metric @ wrench)[:, None]
+    compliance: Array = np.linalg.inv(inner)
+    return _nearer(robot, sets, target, compliance).force[:, 0]
 
 
 def _nearer(robot: DualRobot, sets: Sets, target: Array, compliance: Array) -> Prices:
@@ -168,7 +170,9 @@ def _most_share(robot: DualRobot, sets: Sets, prices: Array, target: Array) -> f
     return float(prices[:, 0] @ (robot.matrix.T @ far.force[:, 0])) / worth
 
 
-def priority(robot: DualRobot, sets: Sets, wrench: Array, groups: list[Array], weight: Array) -> Array:
+def priority(
+    robot: DualRobot, sets: Sets, wrench: Array, groups: list[NDArray[np.bool_]], weight: Array
+) -> Array:
     """Forces (k,) [N] that serve groups of axes (masks (6,)) of a scaled wrench (6,), each as far as those
     before it allow.
 
@@ -205,13 +209,12 @@ def _beside(basis: Array, normal: Array) -> Array:
     return basis @ right[1:].T
 
 
-def _spanned(basis: Array) -> Array:
+def _spanned(basis: Array) -> NDArray[np.bool_]:
     """Which axes (6,) a basis (6, q) touches."""
-    touched: Array = (np.abs(basis) > 1e-12).any(axis=1)
-    return touched
+    return np.asarray((np.abs(basis) > ROUNDING).any(axis=1))
 
 
-def _kept_at_limits(robot: DualRobot, sets: Sets, force: Array, directions: Array) -> Sets:
+def _kept_at_limits(robot: DualRobot, sets: Sets, force: Array, directions: NDArray[np.bool_]) -> Sets:
     """Sets in which the actuators of some directions (k,) keep their forces (k,)."""
     lines, planes = robot.answers.lines, robot.answers.planes
     planar = directions[lines : lines + planes] | directions[lines + planes :]

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from finlab.actuators.response import Line, Plane, Response
 from finlab.allocation.dual.answers import Answers, Sets
 from finlab.arrays import Array
-from finlab.precision import NOTHING
+from finlab.precision import NEARLY, NOTHING
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +64,7 @@ class DualRobot:
     @cached_property
     def squares(self) -> Array:
         """Products (r r, k) that make the Hessian of weights of the directions."""
-        return np.einsum("ki,kj->ijk", self.matrix, self.matrix).reshape(-1, len(self.matrix))
+        return np.asarray(np.einsum("ki,kj->ijk", self.matrix, self.matrix).reshape(-1, len(self.matrix)))
 
     @cached_property
     def first_force(self) -> Array:
@@ -76,12 +76,12 @@ class DualRobot:
     @cached_property
     def trace(self) -> Array:
         """Row (l + 3 p,) that makes the trace of the Hessian."""
-        return self.outer.reshape(*self.shape, -1).trace()
+        return np.asarray(self.outer.reshape(*self.shape, -1).trace())
 
     @cached_property
     def least_trace(self) -> float:
         """Least trace that a ridge is a share of: that of the quadratic costs, times 1e-6."""
-        return 1e-6 * float((self.squares @ self.gain).reshape(self.shape).trace())
+        return NEARLY * float((self.squares @ self.gain).reshape(self.shape).trace())
 
     @cached_property
     def unit(self) -> Array:
