@@ -276,7 +276,7 @@ class Allocation(Answer):
             lower, upper = self.layout.lower, self.layout.upper
             slack = 1e-3 * (upper - lower)
             ends = (self.command <= lower + slack) | (self.command >= upper - slack)
-            full = (ends & (upper > lower)).any(axis=-1)
+            full = np.asarray((ends & (upper > lower)).any(axis=-1))
             return tuple(f"{name} at a limit" for name, at_end in zip(self.fins, full, strict=True) if at_end)
         missing = self.unallocated / self.scale**2
         pull = (missing @ layout_effectiveness(self.layout)).reshape(-1, 2)

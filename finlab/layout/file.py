@@ -54,7 +54,7 @@ LAYOUT_OF_FINS = form(
     called="LayoutOfFins",
     tag=("version", 1),
     actuators=None,
-    fins=Annotated[list[HORIZONTAL_FIN], _COUNT],  # type: ignore[valid-type]
+    fins=Annotated[list[HORIZONTAL_FIN], _COUNT],
     **_OF_A_LAYOUT,
 )
 LAYOUT = form(Layout, {}, tag=("version", 2), actuators=Annotated[list[ACTUATOR], _COUNT], **_OF_A_LAYOUT)

@@ -104,8 +104,8 @@ def closest(robot: DualRobot, sets: Sets, wrench: Array, weight: Array) -> Array
     (6,)."""
     metric = robot.basis.T * weight**2
     inner = metric @ robot.basis
-    target: Array = np.linalg.solve(inner, metric @ wrench)[:, None]
-    compliance: Array = np.linalg.inv(inner)
+    target = np.linalg.solve(inner, metric @ wrench)[:, None].astype(np.float64)
+    compliance = np.linalg.inv(inner).astype(np.float64)
     return _nearer(robot, sets, target, compliance).force[:, 0]
 
 
@@ -206,7 +206,7 @@ def _beside(basis: Array, normal: Array) -> Array:
     if size == 0.0:
         return basis
     _, _, right = np.linalg.svd((normal / size)[None], full_matrices=True)
-    return basis @ right[1:].T
+    return np.asarray(basis @ right[1:].T)
 
 
 def _spanned(basis: Array) -> NDArray[np.bool_]:

@@ -177,7 +177,7 @@ def dual_robot(responses: list[Response]) -> DualRobot:
     low += [plane.table.force[0] for plane in planes]
     high += [plane.table.largest for plane in planes]
     low_, high_ = np.array(low)[:, None], np.array(high)[:, None]
-    band = np.array([each.band for each in (*lines, *planes)])[:, None]
+    band = np.array([line.band for line in lines] + [plane.band for plane in planes])[:, None]
     ends = [sign * np.minimum(band, high_) for sign in (-1.0, 0.0, 1.0)]
     cost = answers.cost(np.concatenate([low_, high_, *ends], axis=1))
     sets = Sets(
