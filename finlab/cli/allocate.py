@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 from tyro.conf import Positional, UseAppendAction, arg
 
 from finlab.cli.json_file import JsonFile, check_json_file, put_json
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from finlab.layout import Layout
 
 Wrench = tuple[float, float, float, float, float, float]
 Flow = Wrench
@@ -69,29 +64,9 @@ def allocate(
     damage = Health.parse(health, stuck, running)
     lost = robot.with_failed(failed)
     result = allocator.allocate(wrench, failed=lost, policy=answer, health=damage, flow=flow, seed=seed)
-    told = robot.layout.is_of_fins and (lost or damage is not None)
-    lost_axes = axes_lost(robot.layout, result.layout, lost) if told else None
-    record, lines = allocation_record(result), [str(result)]
-    if lost_axes is not None:
-        record["axes"] = lost_axes
-        lines.append(loss_text(lost_axes))
+    lines = [str(result)]
     if bound and result.bound is None:
         raise FinlabError(f"bound: method {method!r} proves none; leave --bound out")
     if bound:
         lines.append(f"no exact answer takes less than {result.bound:.4g} W")
-    put_json(record, json, "\n".join(lines))
-
-
-def axes_lost(whole: Layout, damaged: Layout, failed: Sequence[str]) -> dict[str, list[str]]:
-    """Which axes can be had alone, `before` and `after` what happened to the fins, and which were `lost`."""
-    from finlab.analysis import authority
-
-    before, after = authority(whole).reachable, authority(damaged, failed).reachable
-    lost = [axis for axis in before if axis not in after]
-    return {"before": list(before), "after": list(after), "lost": lost}
-
-
-def loss_text(axes: dict[str, list[str]]) -> str:
-    """`axes_lost` in words."""
-    before, after, lost = (", ".join(axes[key]) or "none" for key in ("before", "after", "lost"))
-    return f"reachable alone before: {before}; after: {after}; lost: {lost}"
+    put_json(allocation_record(result), json, "\n".join(lines))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -78,7 +77,6 @@ def import_layout(
     output: Annotated[Path, arg(metavar="LAYOUT.yaml", aliases=["-o"])],
     fins: Annotated[tuple[str, ...], arg(metavar="LINK...")] = (),
     origin: Literal["gravity", "base"] = "gravity",
-    name: Annotated[str | None, arg(metavar="TEXT")] = None,
 ) -> None:
     """Make a layout file from a robot description (URDF).
 
@@ -87,14 +85,11 @@ def import_layout(
         output: layout file to write.
         fins: links that are fins; a joint's origin gives the position, its axis the shaft.
         origin: where the layout's origin goes: the centre of gravity of all links, or the root link's frame.
-        name: what to call the layout.
     """
     from finlab.exchange import read_urdf
     from finlab.layout import save_layout
 
     layout = read_urdf(file, fins, origin)
-    if name is not None:
-        layout = replace(layout, name=name)
     save_layout(layout, output)
     print(f"{output}: layout {layout.name} with {layout.n_fins} fins; look at it with")
     print(f"finlab layout show {output}")

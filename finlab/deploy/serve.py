@@ -33,7 +33,7 @@ from finlab.arrays import Array
 from finlab.deploy.record import command_record
 from finlab.deploy.request import Request, parse_request
 from finlab.deploy.robot import DeployedRobot
-from finlab.deploy.transport import Transport, Unsent
+from finlab.deploy.transport import StandardStreams, Unsent
 from finlab.errors import FinlabError
 from finlab.physics import plant_of
 
@@ -62,7 +62,7 @@ class Server:
         self._failed: tuple[str, ...] = ()
         self._busy: Future[Allocation] | None = None
 
-    def run(self, transport: Transport) -> None:
+    def run(self, transport: StandardStreams) -> None:
         """Serve until the requests end or a signal asks to stop; then the fins rest.
 
         Raises:
@@ -80,7 +80,7 @@ class Server:
         finally:
             self._worker.shutdown(wait=False, cancel_futures=True)
 
-    def _loop(self, transport: Transport) -> None:
+    def _loop(self, transport: StandardStreams) -> None:
         fresh = time.monotonic()  # when the last good target came
         while True:
             patience = self._timing.watchdog

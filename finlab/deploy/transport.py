@@ -6,7 +6,6 @@ Lines, signals and the reader of answers are waited for at once, in one thread.
 import os
 import select
 import time
-from typing import Protocol
 
 from finlab.deploy.request import MAX_LINE
 from finlab.deploy.stopping import StopSignals
@@ -18,21 +17,6 @@ CHUNK = 65_536
 """Bytes that are read at once."""
 BURST = 16
 """Chunks that are read before the newest line in them is answered, however fast more come."""
-
-
-class Transport(Protocol):
-    """How requests come and answers go."""
-
-    def newest(self, timeout: float | None) -> bytes | None:
-        """The newest request that waits; None after `timeout` seconds without one.
-
-        Raises:
-            EOFError: the requests have ended, or a signal asks to stop.
-            Unsent: answers are no longer read.
-        """
-
-    def send(self, line: bytes) -> None:
-        """Send one answer to whoever asked last; `Unsent` where it is not taken."""
 
 
 class Unsent(FinlabError):
@@ -52,7 +36,12 @@ class StandardStreams:
         self._ended = False
 
     def newest(self, timeout: float | None) -> bytes | None:
-        """See `Transport`."""
+        """The newest request that waits; None after `timeout` seconds without one.
+
+        Raises:
+            EOFError: the requests have ended, or a signal asks to stop.
+            Unsent: answers are no longer read.
+        """
         end = None if timeout is None else time.monotonic() + timeout
         for _ in range(BURST):
             if not self._wait(0, 0.0):
@@ -70,7 +59,7 @@ class StandardStreams:
         raise EOFError
 
     def send(self, line: bytes) -> None:
-        """See `Transport`."""
+        """Send one answer; `Unsent` where it is not taken."""
         rest, end = memoryview(line), None
         while rest:
             if self._stop.came:

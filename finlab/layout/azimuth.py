@@ -9,8 +9,9 @@ from msgspec import Meta
 
 from finlab.errors import LayoutError
 from finlab.layout.angles import FILE_TURN_TOLERANCE, TURN, is_full_turn
-from finlab.layout.axes import Direction3, Vector, axes_across, cross
-from finlab.layout.checked import Checked, Name
+from finlab.layout.axes import Direction3
+from finlab.layout.checked import Name
+from finlab.layout.commanded import Commanded
 from finlab.layout.thrust_model import KEYS, MAX_FORCE, ThrustModel, check_force
 from finlab.layout.thruster import ForceRate, Metres, Place, Seconds, Threshold
 
@@ -22,7 +23,7 @@ Push = Annotated[float, Meta(ge=0.0, le=MAX_FORCE)]
 
 
 @dataclass(frozen=True)
-class Azimuth(Checked):
+class Azimuth(Commanded):
     """A thruster that turns and pushes one way; its command is angle and force. Checked on construction."""
 
     KEYS: ClassVar[Mapping[str, str]] = KEYS
@@ -30,6 +31,7 @@ class Azimuth(Checked):
         "arc": ("arc_deg", tuple[AngleDegrees, AngleDegrees]),
         "turn_rate": ("turn_rate_deg_s", TurnRateDegrees),
     }
+    LIMITS, RATES, AXES = ("arc", "force"), ("turn_rate", "rate"), ("turn_axis", "zero")
     type: ClassVar[str] = "azimuth"
 
     name: Name
@@ -59,9 +61,6 @@ class Azimuth(Checked):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        turn_axis, zero = axes_across(("turn_axis", self.turn_axis), ("zero", self.zero))
-        object.__setattr__(self, "turn_axis", turn_axis)
-        object.__setattr__(self, "zero", zero)
         if not self.force[0] < self.force[1]:
             raise LayoutError(
                 f"expected a least below the most force, got {self.force[0]:g} and {self.force[1]:g}",
@@ -76,26 +75,6 @@ class Azimuth(Checked):
             low, high = map(math.degrees, self.arc)
             raise LayoutError(f"must rise, by at most one turn, got {low:g} and {high:g}", "arc_deg")
         check_force(self.model, self.force)
-
-    @property
-    def lower(self) -> tuple[float, float, float]:
-        """Least command: (angle [rad], force [N], 0)."""
-        return self.arc[0], self.force[0], 0.0
-
-    @property
-    def upper(self) -> tuple[float, float, float]:
-        """Greatest command: (angle [rad], force [N], 0)."""
-        return self.arc[1], self.force[1], 0.0
-
-    @property
-    def rates(self) -> tuple[float, float, float]:
-        """Fastest changes of the angle [rad/s] and the force [N/s]; infinite where nothing limits them."""
-        return self.turn_rate or math.inf, self.rate or math.inf, math.inf
-
-    @property
-    def frame(self) -> tuple[Vector, Vector, Vector]:
-        """Own axes in the body frame: turn_axis, zero, turn_axis x zero."""
-        return self.turn_axis, self.zero, cross(self.turn_axis, self.zero)
 
 
 @dataclass(frozen=True)

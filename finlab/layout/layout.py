@@ -91,16 +91,15 @@ class Layout(Checked):
         """
         for part in self.actuators:
             if not isinstance(part, Fin):
-                raise LayoutError(
-                    f"{what} works for robots of fins only, and {part.name!r} of layout {self.name} is of "
-                    f"type {part.type}; method dual of `finlab allocate` takes any actuator"
-                )
-            if horizontal and part.mounting_angle is None:
-                raise LayoutError(
-                    f"{what} works for fins with a mounting angle only, and {part.name!r} of layout "
-                    f"{self.name} has a shaft of its own direction; method dual of `finlab allocate` "
-                    "takes any actuator"
-                )
+                wanted, found = "robots of fins", f"is of type {part.type}"
+            elif horizontal and part.mounting_angle is None:
+                wanted, found = "fins with a mounting angle", "has a shaft of its own direction"
+            else:
+                continue
+            raise LayoutError(
+                f"{what} works for {wanted} only, and {part.name!r} of layout {self.name} {found}; "
+                "method dual of `finlab allocate` takes any actuator"
+            )
 
     @cached_property
     def position(self) -> Array:
@@ -141,13 +140,6 @@ class Layout(Checked):
         """Double poles of amplitude, frequency and zero direction of each fin (n, 3) [rad/s]; read-only."""
         servos = [fin.servo for fin in self.fins]
         return _read_only([(s.amplitude_pole, s.frequency_pole, s.direction_pole) for s in servos])
-
-    @cached_property
-    def servo_rates(self) -> Array:
-        """How fast the commands of each fin change at most from tick to tick (n, 3) [rad/s, Hz/s, rad/s];
-        read-only."""
-        servos = [fin.servo for fin in self.fins]
-        return _read_only([(s.amplitude_rate, s.frequency_rate, s.direction_rate) for s in servos])
 
     @cached_property
     def rates(self) -> Array:

@@ -8,9 +8,10 @@ from typing import Annotated, Any, ClassVar
 from msgspec import Meta
 
 from finlab.errors import LayoutError
-from finlab.layout.axes import Direction3, Vector, axes_across, cross
+from finlab.layout.axes import Direction3
 from finlab.layout.azimuth import TurnRate, TurnRateDegrees
-from finlab.layout.checked import Checked, Name
+from finlab.layout.checked import Name
+from finlab.layout.commanded import Commanded
 from finlab.layout.thruster import Place, Seconds
 
 EFFICIENCY = 0.9
@@ -23,7 +24,7 @@ Coefficient = Annotated[float, Meta(ge=0.0, le=10.0)]
 
 
 @dataclass(frozen=True)
-class Rudder(Checked):
+class Rudder(Commanded):
     """A foil on a shaft; its command is the deflection. Checked on construction.
 
     Its force is that of the flow: with the speed U across the shaft and the angle a between chord and flow,
@@ -44,6 +45,7 @@ class Rudder(Checked):
         "stall": ("stall_deg", StallDegrees),
         "rate": ("rate_deg_s", TurnRateDegrees),
     }
+    LIMITS, RATES, AXES = ("deflection",), ("rate",), ("shaft", "zero")
     type: ClassVar[str] = "rudder"
 
     name: Name
@@ -78,9 +80,6 @@ class Rudder(Checked):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        shaft, zero = axes_across(("shaft", self.shaft), ("zero", self.zero))
-        object.__setattr__(self, "shaft", shaft)
-        object.__setattr__(self, "zero", zero)
         if not self.deflection[0] < self.deflection[1]:
             low, high = map(math.degrees, self.deflection)
             raise LayoutError(
@@ -104,26 +103,6 @@ class Rudder(Checked):
             return self.induced_drag
         ratio = self.aspect_ratio or _aspect_ratio(self.slope)
         return 1.0 / (math.pi * EFFICIENCY * ratio)
-
-    @property
-    def lower(self) -> tuple[float, float, float]:
-        """Least command: (deflection [rad], 0, 0)."""
-        return self.deflection[0], 0.0, 0.0
-
-    @property
-    def upper(self) -> tuple[float, float, float]:
-        """Greatest command: (deflection [rad], 0, 0)."""
-        return self.deflection[1], 0.0, 0.0
-
-    @property
-    def rates(self) -> tuple[float, float, float]:
-        """Fastest changes of the command, of the deflection [rad/s]; infinite where nothing limits them."""
-        return self.rate or math.inf, math.inf, math.inf
-
-    @property
-    def frame(self) -> tuple[Vector, Vector, Vector]:
-        """Own axes in the body frame: shaft, zero, shaft x zero."""
-        return self.shaft, self.zero, cross(self.shaft, self.zero)
 
 
 def _aspect_ratio(slope: float) -> float:

@@ -1,6 +1,5 @@
 """A thruster whose axis is fixed in the robot."""
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, ClassVar
@@ -9,7 +8,8 @@ from msgspec import Meta
 
 from finlab.errors import LayoutError
 from finlab.layout.axes import Direction3, Vector, cross, unit_vector
-from finlab.layout.checked import Checked, Name
+from finlab.layout.checked import Name
+from finlab.layout.commanded import Commanded
 from finlab.layout.thrust_model import KEYS, MAX_FORCE, Newtons, ThrustModel, check_force
 
 Metres = Annotated[float, Meta(ge=-100.0, le=100.0)]
@@ -21,10 +21,11 @@ Threshold = Annotated[float, Meta(ge=0.0, le=MAX_FORCE)]
 
 
 @dataclass(frozen=True)
-class Thruster(Checked):
+class Thruster(Commanded):
     """A thruster with a fixed axis; its command is the force. Checked on construction."""
 
     KEYS: ClassVar[Mapping[str, str]] = KEYS
+    LIMITS, RATES = ("force",), ("rate",)
     type: ClassVar[str] = "thruster"
 
     name: Name
@@ -60,21 +61,6 @@ class Thruster(Checked):
                 f"leaves no force, got {self.dead_band:g} beside {least:g} .. {most:g} N", "dead_band_n"
             )
         check_force(self.model, self.force)
-
-    @property
-    def lower(self) -> tuple[float, float, float]:
-        """Least command: (force [N], 0, 0)."""
-        return self.force[0], 0.0, 0.0
-
-    @property
-    def upper(self) -> tuple[float, float, float]:
-        """Greatest command: (force [N], 0, 0)."""
-        return self.force[1], 0.0, 0.0
-
-    @property
-    def rates(self) -> tuple[float, float, float]:
-        """Fastest changes of the command, of the force [N/s]; infinite where nothing limits them."""
-        return self.rate or math.inf, math.inf, math.inf
 
     @property
     def frame(self) -> tuple[Vector, Vector, Vector]:

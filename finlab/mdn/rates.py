@@ -19,7 +19,7 @@ def within_rates(robot: EffortRobot, previous: Array, period_s: float) -> Effort
     """
     known, problem = np.isfinite(previous[:, 2]), robot.commands
     least, most, turns = problem.lower, problem.upper, problem.full_turn
-    step = robot.plant.layout.servo_rates * period_s
+    step = robot.plant.layout.rates * period_s
     center = np.clip(np.where(known[:, None], previous, least), least, most)
     # A fin that turns fully may pass the seam at +-pi: its arc is kept in one piece and wrapped at the end.
     center[turns, 2] = np.where(known, previous[:, 2], 0.0)[turns]
@@ -43,7 +43,7 @@ def is_within_rates(robot: EffortRobot, previous: Array, command: Array, period_
     """Whether a command (n, 3) may follow a previous one (n, 3); what nothing is known of may follow."""
     change = np.abs(command - previous)
     change[:, 2] = np.where(robot.commands.full_turn, np.abs(wrapped(change[:, 2])), change[:, 2])
-    return not (change > robot.plant.layout.servo_rates * period_s).any()
+    return not (change > robot.plant.layout.rates * period_s).any()
 
 
 def previous_force(robot: EffortRobot, command: Array) -> AnyArray:

@@ -44,7 +44,9 @@ class Plant:
         """Fins (n,) whose zero direction does."""
         self.effectiveness: Array = own_effectiveness(layout)
         """Wrench (n, 3, 6) of 1 N along the own axes of each actuator."""
-        self._laws = laws_of(layout)
+        laws = laws_of(layout)
+        # A robot of one law is spared the copies of fancy indexing.
+        self._laws: list[tuple[Any, ActuatorLaw]] = [(slice(None), laws[0][1])] if len(laws) == 1 else laws
         self.feels_flow = any(law.feels_flow for _, law in self._laws)
         """Whether forces depend on the flow."""
         self.flow: Array | None = None
@@ -101,9 +103,6 @@ class Plant:
 
     def _force(self, command: Array, inflow: Array | None) -> Array:
         """`force` of each actuator by itself, at velocities (..., n, 3) of their places, see `inflow`."""
-        if len(self._laws) == 1 and inflow is None:
-            alone: Array = self._laws[0][1].force(command)
-            return alone
         force = np.empty(_broadcast(command, inflow))
         for places, law in self._laws:
             force[..., places, :] = law.force(command[..., places, :], *_met(law, inflow, places))
@@ -111,8 +110,6 @@ class Plant:
 
     def _force_and_jacobian(self, command: Array, inflow: Array | None) -> tuple[Array, Array]:
         """`_force` and its derivatives (..., n, 3 commands, 3 axes)."""
-        if len(self._laws) == 1 and inflow is None:
-            return self._laws[0][1].force_and_jacobian(command)
         shape = _broadcast(command, inflow)
         force, jacobian = np.empty(shape), np.empty((*shape, 3))
         for places, law in self._laws:
@@ -143,8 +140,6 @@ class Plant:
         """Returns each actuator's power (..., n) [W] of commands (..., n, 3), NaN for a failed one's; of fins
         with a motor's loss [W/(N m)^2], see `ActuatorLaw.power`."""
         inflow = self.inflow(flow)
-        if len(self._laws) == 1 and inflow is None:
-            return np.asarray(self._laws[0][1].power(command, copper_loss))
         power = np.empty(_broadcast(command, inflow)[:-1])
         for places, law in self._laws:
             power[..., places] = law.power(command[..., places, :], copper_loss, *_met(law, inflow, places))

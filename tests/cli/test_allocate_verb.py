@@ -277,11 +277,8 @@ def test_whole_program(tmp_path: Path) -> None:
     assert bad.stderr.startswith("finlab: error: ") and "Traceback" not in bad.stderr
 
 
-def test_json_tells_what_a_damage_costs(allocate: Callable[..., tuple[int, str, str]]) -> None:
-    lost = answer(allocate("no_yaw", *WRENCH, "--json", "--failed", "front"))["axes"]
-    assert set(lost["lost"]) == set(lost["before"]) - set(lost["after"])
+def test_a_fin_that_is_stuck_keeps_its_direction(allocate: Callable[..., tuple[int, str, str]]) -> None:
     stuck = answer(allocate("A", *WRENCH, "--json", "--stuck", "front_left=30"))
-    assert stuck["axes"]["before"] == ["surge", "sway", "heave", "roll", "pitch", "yaw"]
     assert stuck["command"][1][2] == pytest.approx(0.5235987755982988)
 
 

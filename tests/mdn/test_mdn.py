@@ -217,6 +217,6 @@ def test_from_tick_to_tick_no_fin_turns_faster_than_its_servo(shipped: AnyRobot)
             change = np.abs(answer.command - before)
             turn = change[:, 2]
             change[:, 2] = np.where(plant.full_turn, np.minimum(turn, 2.0 * np.pi - turn), turn)
-            assert (change <= 0.1 * layout.servo_rates + 1e-12).all()
+            assert (change <= 0.1 * layout.rates + 1e-12).all()
         before, worst = answer.command, max(worst, answer.err_norm)
     assert worst < 0.05

@@ -1,0 +1,51 @@
+"""What thrusters, azimuths and rudders have in common: limits, rates and axes in fields of their own."""
+
+import math
+from typing import Any, ClassVar
+
+from finlab.layout.axes import Vector, axes_across, cross
+from finlab.layout.checked import Checked
+
+
+class Commanded(Checked):
+    """Base of actuators; `Checked` otherwise."""
+
+    LIMITS: ClassVar[tuple[str, ...]]
+    """Fields with the least and greatest of each command."""
+    RATES: ClassVar[tuple[str, ...]]
+    """Fields with how fast each command changes at most; None in one where nothing limits it."""
+    AXES: ClassVar[tuple[str, ...]] = ()
+    """Fields with two own axes that stand across each other."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.AXES:
+            first, second = ((name, getattr(self, name)) for name in self.AXES)
+            for (name, _), axis in zip((first, second), axes_across(first, second), strict=True):
+                object.__setattr__(self, name, axis)
+
+    @property
+    def lower(self) -> Vector:
+        """Least command, in radians and newtons; what the actuator does not have is 0."""
+        return _three([getattr(self, name)[0] for name in self.LIMITS], 0.0)
+
+    @property
+    def upper(self) -> Vector:
+        """Greatest command, as `lower`."""
+        return _three([getattr(self, name)[1] for name in self.LIMITS], 0.0)
+
+    @property
+    def rates(self) -> Vector:
+        """Fastest changes of the command [rad/s, N/s]; infinite where nothing limits them."""
+        return _three([getattr(self, name) or math.inf for name in self.RATES], math.inf)
+
+    @property
+    def frame(self) -> tuple[Vector, Vector, Vector]:
+        """Own axes in the body frame: the two of `AXES`, and the first x the second."""
+        first, second = (getattr(self, name) for name in self.AXES)
+        return first, second, cross(first, second)
+
+
+def _three(values: list[Any], rest: float) -> Vector:
+    first, second, third = (*values, rest, rest, rest)[:3]
+    return first, second, third
