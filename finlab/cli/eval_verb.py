@@ -59,7 +59,7 @@ def verb_of(experiment: Experiment) -> Callable[..., None]:
         coming = inspect.isgeneratorfunction(experiment.run) and json != STDOUT
         rows = _as_they_come(experiment, found, json) if coming else list(found)
         if picture is not None and experiment.draw is not None:
-            experiment.draw(rows).save(picture)
+            experiment.draw(rows).figure.savefig(picture)
         blocks = [f"*{experiment.note}*"] if coming else [*experiment.words(), *experiment.results(rows)]
         put_json({"rows": rows}, json, to_text(*blocks))
 
