@@ -35,7 +35,7 @@ def untrained_checkpoint(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("checkpoints") / "untrained"
     checkpoint = TrainedWeights(
         name=folder.name,
-        surrogate_sizes=surrogate.for_file(),
+        surrogate_sizes={"kind": "mlp", "hidden": [16, 16]},
         surrogate=arrays_of(first_weights(surrogate.shapes(), 0)),
         normalization=Normalization(np.zeros(6), np.array([1.0, 1.0, 1.0, 0.1, 0.2, 0.3])),
         fin_model={"type": "drag"},

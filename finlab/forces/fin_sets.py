@@ -170,21 +170,17 @@ def wide_fins(sets: FinSets) -> NDArray[np.intp]:
     return np.flatnonzero((half > np.pi / 2 + HALF_TURN_TOLERANCE) & (half < np.pi) & alive)
 
 
-def convex_parts(sets: FinSets, force: Array | None = None) -> FinSets:
+def convex_parts(sets: FinSets) -> FinSets:
     """Returns convex sets of R robots with the same arcs, P of each, one round of robots after the other.
 
     Wide sectors are cut along their middle. Of the first `MAX_CUT` of them both halves are kept, in all
     combinations: their union is exactly what each robot can push. Further ones stay what they are, with
-    their hulls, or with forces (R, n, 2) the half is kept into which these point.
+    their hulls.
     """
-    wide = wide_fins(sets)
-    cut, rest = wide[:MAX_CUT], wide[MAX_CUT:]
+    cut = wide_fins(sets)[:MAX_CUT]
     signs = np.zeros((2 ** len(cut), 1, sets.radius.shape[1]))
     signs[:, 0, cut] = list(product((-0.5, 0.5), repeat=len(cut)))
     signs = np.repeat(signs, len(sets.radius), axis=1)
-    if force is not None:
-        angle = np.arctan2(force[..., 1], force[..., 0]) - sets.middle
-        signs[:, :, rest] = np.where(np.sin(angle) >= 0.0, 0.5, -0.5)[:, rest]
     signs = signs.reshape(-1, signs.shape[-1])
     parts = sets.tile(2 ** len(cut))
     return parts._replace(

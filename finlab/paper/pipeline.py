@@ -5,7 +5,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from finlab.allocation.evaluate import costs
-from finlab.allocation.levenberg_marquardt import CommandProblem, refine
+from finlab.allocation.levenberg_marquardt import CommandProblem
 from finlab.allocation.method import LeastErrorMethod, Takes
 from finlab.allocation.policy import Policy
 from finlab.allocation.settings import Settings
@@ -18,7 +18,7 @@ from finlab.networks.threads import single_threaded_products
 from finlab.networks.trained import TrainedWeights
 from finlab.paper.features import raw_features
 from finlab.paper.network import Mixture, NetworkConfig
-from finlab.paper.settings import STEPS, PaperSettings
+from finlab.paper.settings import PaperSettings
 from finlab.paper.surrogate import LayoutSurrogate, SurrogateConfig, blocks_of
 from finlab.physics.effort import EffortMeter
 
@@ -28,8 +28,6 @@ ADAM_RATE = 0.03
 """Adam's first step, in units of half a limit range; it falls to a twentieth of that."""
 ADAM_DECAY = (0.9, 0.999)
 """Decays of Adam's running means of the gradient and of its square (Kingma and Ba, 2015)."""
-LM_DAMPING = 4e-4
-"""First damping of Levenberg-Marquardt, in squared normalized error per squared limit range."""
 
 
 class _Robot(NamedTuple):
@@ -150,15 +148,12 @@ class Paper(LeastErrorMethod):
 
     def _refine(self, robot: _Robot, command: AnyArray, wanted: AnyArray) -> AnyArray:
         """Refined commands (N, K, n, 3), inside the limits."""
-        shape, kind = command.shape, self.settings.refinement
-        steps = STEPS[kind] if self.settings.n_steps is None else self.settings.n_steps
-        flat, target = command.reshape(-1, *shape[2:]), np.repeat(wanted, shape[1], axis=0)
-        if kind == "none":
+        if self.settings.refinement == "none":
             return command
-        if kind == "adam":
-            parts = [self._adam(robot, flat[k], target[k], steps) for k in blocks_of(len(flat))]
-            return np.concatenate(parts).reshape(shape)
-        return refine(robot.problem, target, flat, steps, damping=LM_DAMPING).command.reshape(shape)
+        shape, steps = command.shape, self.settings.n_steps
+        flat, target = command.reshape(-1, *shape[2:]), np.repeat(wanted, shape[1], axis=0)
+        parts = [self._adam(robot, flat[k], target[k], steps) for k in blocks_of(len(flat))]
+        return np.concatenate(parts).reshape(shape)
 
     def _adam(self, robot: _Robot, command: AnyArray, target: AnyArray, steps: int) -> AnyArray:
         """Adam on J for commands (R, n, 3) and normalized targets (R, 6); the best step of each.

@@ -8,8 +8,8 @@ from typing import TypedDict
 
 from finlab.allocation.settings import MOST_CANDIDATES, Settings, choice, number, switch
 
-STEPS = {"none": 0, "adam": 160, "levenberg-marquardt": 20}
-"""Refinement -> its number of steps where the settings name none."""
+STEPS = 160
+"""Steps of Adam."""
 
 
 @dataclass(frozen=True)
@@ -25,8 +25,8 @@ class PaperSettings(Settings):
     temperature: float = number(0.02, 0.0, 100.0, "T of the sampling; 0.02 in the paper")
     gamma: float = number(1e-4, 0.0, 1e6, "weight of the effort in J = J_norm + gamma J_en")
     n_refined: int = number(4, 1, 256, "best-ranked candidates that are refined")
-    refinement: str = choice("adam", tuple(STEPS), "how candidates are refined; all but adam are ablations")
-    n_steps: int | None = number(None, 0, 10_000, "steps of the refinement; None for its usual number")
+    refinement: str = choice("adam", ("none", "adam"), "how candidates are refined; none is an ablation")
+    n_steps: int = number(STEPS, 0, 10_000, "steps of the refinement")
     warm_start: str = choice("mdn", ("mdn", "random"), "where candidates come from; random is an ablation")
     ranking: str = choice("physics", ("physics", "nll"), "by J, or by likelihood, which is an ablation")
     mean_only: bool = switch(False, "take the mixture's mean and nothing else, which is an ablation")
@@ -40,7 +40,7 @@ class PaperOptions(TypedDict, total=False):
     gamma: float
     n_refined: int
     refinement: str
-    n_steps: int | None
+    n_steps: int
     warm_start: str
     ranking: str
     mean_only: bool

@@ -21,7 +21,6 @@ from finlab.networks.layers import Weights
 from finlab.networks.normalization import to_normalized
 from finlab.networks.trained import Shapes, TrainedWeights, check_sizes, check_state, linear_shapes
 from finlab.paper.features import RAW_SIZE, raw_features
-from finlab.physics.wrench import wrench_of_forces
 
 FORCE_UNIT = 4.0
 """Force [N] of order one for the perceptron's outputs."""
@@ -50,10 +49,6 @@ class SurrogateConfig:
         """Names of the perceptron's layers, between which activations stand."""
         return [f"net.{2 * i}" for i in range(len(self.hidden) + 1)]
 
-    def for_file(self) -> dict[str, object]:
-        """The sizes for a file, and what tells their kind."""
-        return {"kind": "mlp", "hidden": list(self.hidden)}
-
     @classmethod
     def of(cls, weights: TrainedWeights) -> "SurrogateConfig":
         """The sizes of the surrogate of a checkpoint; a `CheckpointError` where it holds none."""
@@ -68,26 +63,6 @@ class SurrogateConfig:
         except (TypeError, ValueError) as error:
             raise CheckpointError(f"checkpoint {weights.name!r}: damaged surrogate ({error})") from error
         return config
-
-    def wrench(
-        self,
-        w: Weights,
-        command: Values,
-        position: Values,
-        mounting_angle: Values,
-        lower: Values,
-        upper: Values,
-    ) -> Values:
-        """Wrenches (..., 6) [N, N m] of commands (..., n, 3) on layouts broadcastable to them, by a surrogate
-        with these weights."""
-        xp = library_of(command)
-        x = raw_features(position, mounting_angle, lower, upper)
-        x = xp.broadcast_to(x, (*command.shape[:-1], x.shape[-1]))
-        force = perceptron(self, w, of_fins(w, x), to_normalized(command, lower, upper))
-        # The perceptron answers in the body frame, that of a fin whose shaft points forward.
-        wrench = wrench_of_forces(force, force_effectiveness(position, 0.0 * mounting_angle))
-        scale, bias = correction(w, x)
-        return wrench * (1.0 + scale) + bias
 
 
 def of_fins(w: Weights, features: Values) -> Values:
@@ -105,7 +80,7 @@ def perceptron(
         w: its weights.
         fins: see `of_fins`.
         x: commands.
-        slopes: takes the derivatives of the activations, layer by layer.
+        jacobian: takes the derivatives of the activations, layer by layer.
     """
     z = layers.linear({"command.weight": w["net.0.weight"][:, RAW_SIZE:]}, "command", x) + fins
     for name in config.layers()[1:]:

@@ -10,6 +10,7 @@ from finlab.networks.checkpoint import read_checkpoint, resolve_checkpoint
 from finlab.networks.normalization import Normalization
 from finlab.networks.trained import TrainedWeights
 from finlab.paper.surrogate import BLOCK, LayoutSurrogate, SurrogateConfig
+from tests.paper.asked_in_torch import wrench_in_torch
 
 
 @pytest.fixture
@@ -31,7 +32,7 @@ def untrained(*hidden: int) -> TrainedWeights:
     return TrainedWeights(
         "random",
         normalization,
-        surrogate_sizes=config.for_file(),
+        surrogate_sizes={"kind": "mlp", "hidden": list(config.hidden)},
         surrogate=state,
         fin_model={"type": "drag"},
     )
@@ -41,9 +42,8 @@ def in_torch(weights: TrainedWeights, robot: Layout, command: torch.Tensor) -> t
     """The same surrogate asked with tensors in double precision."""
     state = {name: torch.tensor(values, dtype=torch.float64) for name, values in weights.surrogate.items()}
     place = robot.position, robot.mounting_angle, robot.lower, robot.upper
-    tensors = (torch.tensor(part, dtype=torch.float64) for part in place)
-    wrench: torch.Tensor = SurrogateConfig.of(weights).wrench(state, command, *tensors)
-    return wrench
+    x, angle, lower, upper = (torch.tensor(part, dtype=torch.float64) for part in place)
+    return wrench_in_torch(SurrogateConfig.of(weights), state, command, (x, angle, lower, upper))
 
 
 def commands(robot: Layout, rows: int) -> np.ndarray:
