@@ -8,6 +8,7 @@ import pytest
 pytest.importorskip("matplotlib")
 
 from finlab.evaluation.plots.dots import draw_dots  # noqa: E402
+from finlab.evaluation.plots.style import picture  # noqa: E402
 
 
 def test_dots_stand_at_their_values_with_their_intervals() -> None:
