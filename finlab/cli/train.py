@@ -29,13 +29,13 @@ def mdn(
 ) -> None:
     """Train the network of method `mdn` on what many starts find, and write a checkpoint folder.
 
-    One process writes the answers, another learns from them: two cores are busy.
+    The answers are written first, on all cores.
 
     Args:
         output: folder for checkpoint, answers, log and resume state.
         preset: recipe: default or smoke.
         seed: seed of the answers and of the first weights.
-        minutes: time after which the training ends, instead of the recipe's.
+        minutes: time after which the learning ends, instead of the recipe's.
         steps: most optimizer steps instead of the recipe's.
         stop_after: stop after so many steps; call again to go on.
     """

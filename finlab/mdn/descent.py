@@ -22,16 +22,16 @@ import numpy as np
 
 from finlab.arrays import AnyArray, Array
 from finlab.layout.angles import wrapped
-from finlab.mdn.effort_fin import (
+from finlab.mdn.effort_fins import (
     AMPLITUDE,
-    DEFLECTION,
-    DRIFT,
     EFFORT,
     FREQUENCY,
+    LEAST,
     MOBILITY,
     STIFFNESS,
+    EffortFins,
+    Projected,
 )
-from finlab.mdn.effort_fins import LEAST, EffortFins, Projected
 from finlab.small_systems import solve
 
 RIDGE = 1e-9
@@ -103,7 +103,7 @@ def descend(problem: EffortProblem, target: Array, force: AnyArray, steps: int) 
             answer = 0.5 * (answer + before)
         before = answer
         found = fins.project(answer)
-        cut = np.minimum(cut * found.boundary.largest / np.maximum(found.wanted, LEAST), 1.0)
+        cut = np.minimum(cut * fins.largest * found.gauge / np.maximum(found.wanted, LEAST), 1.0)
     return found
 
 
@@ -114,8 +114,8 @@ def wrench(problem: EffortProblem, force: AnyArray) -> Array:
 
 def realize(problem: EffortProblem, found: Projected) -> tuple[Array, Array]:
     """Commands (R, n, 3) that give forces with the least effort, and that effort (R,)."""
-    row = problem.fins.lookup(found.boundary, found.size)
-    turn = wrapped(found.direction - row[..., DEFLECTION])
+    row, direction = problem.fins.lookup(found.size / found.gauge), found.direction
+    turn = wrapped(direction - problem.fins.deflection(direction))
     command = np.stack([row[..., AMPLITUDE], row[..., FREQUENCY], turn], axis=-1)
     effort = row[..., EFFORT] + problem.direction_cost * turn * turn
     return command, effort.sum(-1)
@@ -123,17 +123,18 @@ def realize(problem: EffortProblem, found: Projected) -> tuple[Array, Array]:
 
 def _respond(problem: EffortProblem, found: Projected, cut: Array) -> _Response:
     """The response of the quadratics that touch the efforts at the present forces, all of it `cut`."""
-    row = problem.fins.lookup(found.boundary, found.size)
-    across = np.exp(row[..., MOBILITY])
+    row, direction = problem.fins.lookup(found.size / found.gauge), found.direction
+    # The same command gives less in weaker directions, so a newton more costs more there.
+    across = np.exp(row[..., MOBILITY]) * found.gauge**2
     across *= cut
     softness = 1.0 / row[..., STIFFNESS]
     along = across * softness
-    turn = wrapped(found.direction - row[..., DEFLECTION])
+    turn = wrapped(direction - problem.fins.deflection(direction))
     size = np.maximum(found.size, LEAST)
     # Turning towards where that costs nothing: the weaker the force, the less of it does.
     pull = 2.0 * problem.direction_cost * across / size
     held = 1.0 / (1.0 + pull / size)
-    drift = (row[..., DRIFT] * cut + pull * turn) * held
+    drift = pull * turn * held
     across = across * held
     unit = found.unit
     kept = (found.size * (1.0 - softness)) * cut * unit

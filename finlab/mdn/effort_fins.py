@@ -1,38 +1,49 @@
-"""The compiled fins of one robot, side by side: what they can do, looked up for many forces at once.
+"""The fins of one robot, side by side: the forces that they can give, and the least effort of each.
+
+For sizes of force between the smallest and the largest one, the pair of amplitude and frequency with the
+least effort is found on a grid of commands, in the fin's strongest direction. The arc of directions, and by
+how much a fin is weaker in the others, are those of the compiled fins of the default method. What the zero
+direction adds to the effort is left out here: it does not depend on the size.
 
 A planar force is a complex number: its horizontal part, and 1j times its vertical part, in newton.
 """
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from finlab.actuators.fin.models import file_stamp
+from finlab.actuators.fin.response import fin_table
+from finlab.actuators.response import POINTS
 from finlab.arrays import AnyArray, Array
-from finlab.layout import Layout
+from finlab.layout import Fin, Layout
 from finlab.layout.angles import TURN
-from finlab.mdn.effort_fin import DEFLECTION, LEVELS, EffortFin, effort_fin
-from finlab.physics.effort import EffortWeights
+from finlab.physics.effort import EffortWeights, effort_of_shares, effort_scale
 
+LEVELS = 49
+"""Sizes of force."""
+AMPLITUDES, FREQUENCIES = 193, 49
+"""Commands at which a law is asked."""
+FLAT = 1e-5
+"""By how much, as a share, a force may fall short of a size and still count as giving it."""
+CONVEX = 0.3
+"""Least elasticity of the marginal effort that is followed; below it, and where effort is concave, a steeper
+quadratic is touched, which never overshoots."""
+STIFFEST = 10.0
+"""Elasticities above this one count as this one."""
+MARGINAL = 1e-3
+"""Least marginal effort, as a share of the mean one."""
 LEAST = 1e-12
 """What sizes are kept above before something is divided by them."""
 PLACES = 2.0 / np.pi * (LEVELS - 1) * (1.0 - 1e-12)
 """From the angle of a force in the table to its place among the levels, of which none is past the last."""
 
-
-class Boundary(NamedTuple):
-    """What R rows of n fins can do in given directions; (n,) where all fins are the same all round."""
-
-    smallest: Array
-    """Force at rest (R, n) [N]."""
-    largest: Array
-    """Largest force (R, n) [N]."""
-    first: NDArray[np.intp]
-    """Row of the table (R, n) with which the direction just before this one begins."""
-    part: Array | None
-    """How far towards the next row (R, n); None where there is but one."""
+AMPLITUDE, FREQUENCY, EFFORT, MOBILITY, STIFFNESS = range(5)
+"""Columns of a table: amplitude [rad], frequency [Hz], effort, logarithm of the mobility T / (dc/dT),
+elasticity of dc/dT."""
 
 
 class Projected(NamedTuple):
@@ -44,8 +55,8 @@ class Projected(NamedTuple):
     """Size of the force (R, n) [N]."""
     wanted: Array
     """The size (R, n) [N] that is given in that direction where limits of size do not hold."""
-    boundary: Boundary
-    """In these directions."""
+    gauge: Array
+    """Share of the table's force in that direction (R, n), or (n,) ones where all fins are even."""
     stopped: NDArray[np.bool_] | None
     """Where a stop keeps the fin from pointing along the given force (R, n); None where no fin has stops."""
 
@@ -62,53 +73,48 @@ class Projected(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class EffortFins:
-    """n compiled fins; each may be kept within a part of its arc."""
+    """n fins; each may be kept within a part of its arc."""
 
     smallest: Array
-    """Force at rest (n, K) [N] by direction; K is 1 where all fins are the same all round."""
+    """Force at rest (n,) [N], in the strongest direction."""
     largest: Array
-    """Largest force (n, K) [N] by direction."""
+    """Largest force (n,) [N] there."""
     table: Array
-    """The tables of the compiled fins (n * K * LEVELS, 7)."""
-    domain: Array
-    """Middle and half (2, n) [rad] of the arcs over which the K directions are spread."""
+    """What sizes between them cost (n, LEVELS, 5), see the columns above."""
+    gauge: Array | None
+    """Share (n, POINTS) of the same command's force in each direction; None where all fins are even."""
+    lean: Array
+    """Direction of the force minus zero direction (n, POINTS) [rad], by the first."""
     middle: Array
     """Middle of the arc (n,) of force directions that are allowed [rad]."""
     half: Array
     """Half of that arc (n,) [rad]; pi for a full circle."""
 
     @classmethod
-    def of(cls, fins: list[EffortFin]) -> Self:
-        """Stack compiled fins."""
-        count = max(len(fin.largest) for fin in fins)
-
-        def spread(values: Array) -> Array:
-            return values if len(values) == count else np.repeat(values, count, axis=0)
-
-        table = np.stack([spread(fin.table) for fin in fins])
-        middle, half = np.array([fin.middle for fin in fins]), np.array([fin.half for fin in fins])
-        return cls(
-            np.stack([spread(fin.smallest) for fin in fins]),
-            np.stack([spread(fin.largest) for fin in fins]),
-            np.ascontiguousarray(table.reshape(-1, table.shape[-1])),
-            np.stack([middle, half]),
-            middle,
-            half,
-        )
-
-    @classmethod
-    def of_layout(cls, layout: Layout, weights: EffortWeights) -> Self:
-        """The compiled fins of a layout.
+    def of(cls, layout: Layout, weights: EffortWeights) -> Self:
+        """The fins of a layout.
 
         Raises:
-            DataError: a fin's force table cannot be read.
+            DataError: a fin's force table cannot be read, or gives no thrust within the limits.
         """
-        return cls.of([effort_fin(fin.model, fin.limits, weights) for fin in layout.fins])
+        compiled = [fin_table(fin) for fin in layout.fins]
+        costs = [_costs(fin, weights, file_stamp(fin.model)) for fin in layout.fins]
+        even = all(each.gauge is None for each in compiled)
+        gauges = [np.ones(POINTS) if each.gauge is None else each.gauge for each in compiled]
+        return cls(
+            np.array([size[0] for size, _ in costs]),
+            np.array([size[-1] for size, _ in costs]),
+            np.stack([table for _, table in costs]),
+            None if even else np.array(gauges),
+            np.array([np.broadcast_to(each.deflection, POINTS) for each in compiled]),
+            np.array([each.middle for each in compiled]),
+            np.array([each.half for each in compiled]),
+        )
 
     @cached_property
     def maximum(self) -> Array:
         """Largest force of each fin in any direction (n,) [N]."""
-        return np.asarray(self.largest.max(axis=1))
+        return self.largest if self.gauge is None else self.largest * self.gauge.max(axis=1)
 
     @cached_property
     def turns_fully(self) -> bool:
@@ -117,64 +123,46 @@ class EffortFins:
 
     @cached_property
     def _steps(self) -> Array:
-        """Rows of the table, and how much is added to them up to the next ones (n * K * LEVELS, 2, 7)."""
-        return np.stack([self.table, np.diff(self.table, axis=0, append=self.table[-1:])], axis=1)
+        """Rows of all tables, and how much is added to them up to the next ones (n * LEVELS, 2, 5)."""
+        rows = self.table.reshape(-1, self.table.shape[-1])
+        return np.stack([rows, np.diff(rows, axis=0, append=rows[-1:])], axis=1)
 
     @cached_property
-    def _all_round(self) -> Boundary:
-        """What fins that are the same all round can do."""
-        first = np.arange(len(self.largest)) * LEVELS
-        return Boundary(self.smallest[:, 0], self.largest[:, 0], first, None)
+    def _first(self) -> NDArray[np.intp]:
+        """Where each fin's rows begin (n,)."""
+        return np.arange(len(self.largest)) * LEVELS
 
     def within(self, middle: Array, half: Array) -> "EffortFins":
         """The same fins kept within arcs (n,) of force directions [rad]."""
         return replace(self, middle=middle, half=half)
 
-    def deflection(self, zero_direction: Array) -> Array:
-        """By how much (n,) [rad] strong forces lean off zero directions (n,) [rad]."""
-        found: Array = self.lookup(self.boundary(zero_direction[None]), self.maximum[None])
-        return np.asarray(found[0, :, DEFLECTION])
+    def deflection(self, direction: Array) -> Array:
+        """By how much (..., n) [rad] forces in directions (..., n) [rad] lean off the zero directions."""
+        return self._around(self.lean, direction)
 
-    def boundary(self, direction: Array) -> Boundary:
-        """What the fins can do in directions (R, n) [rad]."""
-        count = self.largest.shape[1]
-        if count == 1:
-            return self._all_round
-        middle, half = self.domain
-        gap = np.maximum(2.0 * half / (count - 1), LEAST)
-        # Directions just before an arc belong to its start, not to its end; a circle has none such.
-        before = np.where(half < np.pi, 0.5 * gap, 0.0)
-        place = np.mod(direction - (middle - half) + before, TURN)
-        place = np.clip((place - before) / gap, 0.0, count - 1)
-        row = np.minimum(place.astype(np.intp), count - 2)
-        part = place - row
-        row = row + np.arange(len(half)) * count
-        low, high = (
-            values.take(row) + part * (values.take(row + 1) - values.take(row))
-            for values in (self.smallest.ravel(), self.largest.ravel())
-        )
-        return Boundary(low, high, row * LEVELS, part)
+    def gauges(self, direction: Array) -> Array:
+        """Shares (..., n) of the table's force in directions (..., n) [rad]."""
+        return np.ones(len(self.half)) if self.gauge is None else self._around(self.gauge, direction)
 
-    def lookup(self, boundary: Boundary, size: Array) -> Array:
-        """Rows (R, n, 7) of the tables for forces of sizes (R, n) [N] in the directions of a boundary."""
-        place = size - boundary.smallest
-        place /= boundary.largest - boundary.smallest + LEAST
+    def _around(self, values: Array, direction: Array) -> Array:
+        """Of values (n, POINTS), those nearest to directions (..., n)."""
+        cell = np.rint(direction * (POINTS / TURN)).astype(np.intp) % POINTS
+        found: Array = values.ravel().take(cell + np.arange(len(values)) * POINTS)
+        return found
+
+    def lookup(self, size: Array) -> Array:
+        """Rows (R, n, 5) of the tables for forces of sizes (R, n) [N] in the strongest directions."""
+        place = size - self.smallest
+        place /= self.largest - self.smallest + LEAST
         np.minimum(np.maximum(place, 0.0, out=place), 1.0, out=place)
         np.sqrt(np.sqrt(place, out=place), out=place)
         np.arcsin(place, out=place)
         place *= PLACES
         level = place.astype(np.intp)
         place -= level
-        part = place[..., None]
-        level += boundary.first
-        found = self._between(level, part)
-        if boundary.part is not None:
-            found += (self._between(level + LEVELS, part) - found) * boundary.part[..., None]
-        return found
-
-    def _between(self, row: NDArray[np.intp], part: Array) -> Array:
-        step = self._steps.take(row, axis=0)
-        found: Array = step[..., 1, :] * part
+        level += self._first
+        step = self._steps.take(level, axis=0)
+        found: Array = step[..., 1, :] * place[..., None]
         found += step[..., 0, :]
         return found
 
@@ -189,8 +177,45 @@ class EffortFins:
             stopped = excess > 0.0
             wanted = np.where(excess < 0.5 * np.pi, wanted * np.cos(excess), 0.0)
             unit = np.exp(1j * (self.middle + held))
-        boundary = self._all_round
-        if self.largest.shape[1] > 1:
-            boundary = self.boundary(np.angle(unit))
-        size = np.minimum(np.maximum(wanted, boundary.smallest), boundary.largest)
-        return Projected(unit, size, wanted, boundary, stopped)
+        gauge = np.ones(len(self.half)) if self.gauge is None else self.gauges(np.angle(unit))
+        size = np.minimum(np.maximum(wanted, self.smallest * gauge), self.largest * gauge)
+        return Projected(unit, size, wanted, gauge, stopped)
+
+
+@lru_cache(maxsize=512)
+def _costs(fin: Fin, weights: EffortWeights, stamp: tuple[int, int] | None) -> tuple[Array, Array]:
+    """Sizes of force (LEVELS,) [N] and their table (LEVELS, 5); a force table whose file has changed is read
+    again."""
+    box = fin_table(fin).box
+    scale = effort_scale(box.upper)
+    ends = zip(box.lower, box.upper, (AMPLITUDES, FREQUENCIES), strict=False)
+    amplitude, frequency = (np.linspace(low, high, count) for low, high, count in ends)
+    grid = np.stack(np.meshgrid(amplitude, frequency, indexing="ij"), axis=-1)
+    force = box.force(box.command(grid))
+    # Dense near zero, where both commands grow like fourth roots, and near the top, which may be flat.
+    share = np.sin(0.5 * np.pi * np.linspace(0.0, 1.0, LEVELS)) ** 4
+    size = force[0, 0] + (force.max() - force[0, 0]) * share
+    # Between grid points the square root of the force is nearly a straight line.
+    rising = np.sqrt(np.maximum.accumulate(force, axis=1))
+    rising += np.arange(FREQUENCIES) * 1e-13 * np.maximum(rising[:, -1:], 1e-12)  # where it stays, the first
+    found = np.array([np.interp(np.sqrt(size), row, frequency) for row in rising])
+    effort = effort_of_shares(amplitude[:, None] / scale[0], found / scale[1], 0.0, weights)
+    effort[np.sqrt(size) > rising[:, -1:] * (1.0 + FLAT) + 1e-15] = np.inf
+    best = effort.argmin(axis=0)
+    level = np.arange(LEVELS)
+    slopes = _slopes(effort[best, level], size)
+    return size, np.stack([amplitude[best], found[best, level], effort[best, level], *slopes], axis=-1)
+
+
+def _slopes(effort: Array, size: Array) -> tuple[Array, Array]:
+    """The columns that follow from the slope of the effort (LEVELS,) by size."""
+    span = size[-1] - size[0]
+    if span <= 1e-12:
+        return np.log(np.maximum(size, 1e-300)), np.ones(LEVELS)
+    level = np.arange(LEVELS)
+    least = MARGINAL * max(float(np.ptp(effort)), 1e-12) / span
+    marginal = np.maximum(np.gradient(effort, size + level * 1e-15 * size[-1]), least)
+    height = np.log(np.maximum(size, 1e-9 * size[-1])) + level * 1e-9
+    stiffness = np.gradient(np.log(marginal), height)
+    stiffness = np.where(stiffness > CONVEX, np.minimum(stiffness, STIFFEST), 1.0)
+    return np.log(np.maximum(size, 1e-5 * size[-1]) / marginal), stiffness

@@ -16,9 +16,9 @@ index  meaning
 0-2    size of p_i: root, saturating, logarithm
 3-5    block of P of the fin itself: a, b
 6      logarithm of the effort at the top beside the other fins'
-7-10   effort at `SHARES` of the largest force over that at the top, mean over directions
+7-10   effort at `SHARES` of the largest force over that at the top
 11-13  largest force by direction over the largest of all: mean, first Fourier term
-14-15  first Fourier term of the effort at the top by direction, over its mean
+14-15  first Fourier term of the directions
 16     root of the smallest force over the largest
 17-19  arc of directions: half of it over pi, its middle where it is no full circle
 20-22  effort of turning by a radian over that at the top, and where turning costs nothing
@@ -35,7 +35,7 @@ import numpy as np
 
 from finlab.arrays import AnyArray
 from finlab.mdn.descent import EffortProblem
-from finlab.mdn.effort_fin import EFFORT
+from finlab.mdn.effort_fins import EFFORT
 from finlab.mdn.network import NODE_SIZE
 
 SHARES = (0.02, 0.1, 0.3, 0.6)
@@ -82,25 +82,22 @@ def robot_view(problem: EffortProblem) -> RobotView:
     full = fins.half >= np.pi
     evenly = np.linspace(-1.0, 1.0, AROUND + 1)[:-1, None]  # around a circle, no direction counts twice
     direction = fins.middle + fins.half * np.where(full, evenly, np.linspace(-1.0, 1.0, AROUND)[:, None])
-    boundary, unit = fins.boundary(direction), np.exp(1j * direction)
-    ends = boundary.largest, boundary.smallest
-    largest, smallest = (np.broadcast_to(values, unit.shape) for values in ends)
-    top = fins.lookup(boundary, largest)[..., EFFORT]
-    mean_top = np.maximum(top.mean(0), 1e-12)
-    shares = [fins.lookup(boundary, share * largest)[..., EFFORT].mean(0) / mean_top for share in SHARES]
-    reach = largest / fins.maximum
+    gauge, unit = np.broadcast_to(fins.gauges(direction), direction.shape), np.exp(1j * direction)
+    top = np.maximum(fins.table[:, -1, EFFORT], 1e-12)
+    shares = [fins.lookup(share * fins.largest)[..., EFFORT] / top for share in SHARES]
+    reach = gauge * fins.largest / fins.maximum
     idle = problem.idle_direction + fins.deflection(problem.idle_direction)
     counted = np.arange(n)
     static = [
-        np.log(mean_top / mean_top.mean()),
+        np.log(top / top.mean()),
         *shares,
         reach.mean(0),
         *_parts(2.0 * (reach * unit).mean(0)),
-        *_parts(2.0 * (top * unit).mean(0) / mean_top),
-        np.sqrt(smallest.mean(0) / fins.maximum),
+        *_parts(2.0 * unit.mean(0)),
+        np.sqrt(fins.smallest * gauge.mean(0) / fins.maximum),
         fins.half / np.pi,
         *_parts(np.where(full, 0.0, np.exp(1j * fins.middle))),
-        problem.direction_cost / mean_top,
+        problem.direction_cost / top,
         *_parts(np.where(problem.direction_cost > 0.0, np.exp(1j * idle), 0.0)),
         2.0 * np.mod(0.5 + counted * GOLDEN, 1.0) - 1.0,
         2.0 * np.mod(0.25 + counted * GOLDEN**2, 1.0) - 1.0,

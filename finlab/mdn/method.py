@@ -14,6 +14,7 @@ from typing import ClassVar, NamedTuple, Self
 import numpy as np
 
 from finlab.allocation.dual.method import Dual
+from finlab.allocation.dual.rates import Rates
 from finlab.allocation.evaluate import REACHED, costs
 from finlab.allocation.in_time import in_time
 from finlab.allocation.mdn_settings import MdnSettings
@@ -28,7 +29,6 @@ from finlab.mdn.descent import realize
 from finlab.mdn.features import Seen, see
 from finlab.mdn.network import ForceMixture, ForceNetworkConfig
 from finlab.mdn.proposal import RANDOM, Proposal, propose, random_proposal
-from finlab.mdn.rates import is_within_rates, previous_force, within_rates
 from finlab.mdn.robot import effort_robot
 from finlab.networks.threads import single_threaded_products
 from finlab.networks.trained import TrainedWeights
@@ -203,12 +203,14 @@ class Mdn(Method):
     def _in_motion(self, target: Array, free: Found, previous: Array) -> Found:
         """What is found for one target within what the servos allow after a previous command (n, 3): the way
         that the robot moves now is kept, and where another is worth it, all fins go towards that."""
-        first, period, keep = free.answers, self.settings.period_s, self.settings.n_refined
-        if is_within_rates(self.robot, previous, first.command[0, 0], period):
+        first, plant = free.answers, self.plant
+        rates = Rates.of(plant, self.layout.servo_rates, self.settings.period_s)
+        if rates.allow(previous, first.command[0, 0]):
             return free
-        near = within_rates(self.robot, previous, period)
-        force = np.insert(free.proposal.force, 0, previous_force(self.robot, previous), axis=1)
-        found = follow(near, target, force, keep, STEPS, kept=1)
+        near = self.robot.within(rates.box(previous))
+        moves = plant.force(plant.feasible(np.where(np.isfinite(previous), previous, plant.lower)))
+        force = np.insert(free.proposal.force, 0, moves[:, 1] + 1j * moves[:, 2], axis=1)
+        found = follow(near, target, force, self.settings.n_refined, STEPS, kept=1)
         found = found._replace(origin=np.where(found.origin == 0, NOW, found.origin - 1))
         now_first = np.argsort(found.origin[0] != NOW, kind="stable")
         found = ranked(near, found.columns(now_first), SWITCH_GAIN)

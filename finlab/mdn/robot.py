@@ -1,12 +1,13 @@
 """What method `mdn` needs to know of a robot, computed once and kept."""
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
+from finlab.allocation.dual.rates import Box
 from finlab.allocation.levenberg_marquardt import CommandProblem
 from finlab.arrays import Array
-from finlab.layout import Layout
 from finlab.mdn.descent import EffortProblem, effort_problem
 from finlab.mdn.effort_fins import EffortFins
 from finlab.mdn.features import RobotView, robot_view
@@ -38,6 +39,14 @@ class EffortRobot(NamedTuple):
         """The same robot in a flow, as a plant at that flow says; refinement knows of it."""
         return self._replace(plant=plant, commands=CommandProblem.of(plant, scale))
 
+    def within(self, box: Box) -> "EffortRobot":
+        """The same robot, each fin kept within what may follow a previous command."""
+        fins, free, (lower, upper) = self.forces.fins, box.free[:, 2], (box.lower[:, 2], box.upper[:, 2])
+        middle, half = 0.5 * (lower + upper), np.where(free, np.pi, 0.5 * (upper - lower))
+        forces = self.forces._replace(fins=fins.within(middle + fins.deflection(middle), half))
+        commands = replace(self.commands, lower=box.lower, upper=box.upper, full_turn=free)
+        return self._replace(forces=forces, commands=commands)
+
 
 def effort_robot(plant: Plant, scale: Array, weights: EffortWeights) -> EffortRobot:
     """Prepare a robot of fins; `scale` (6,) is what wrenches are divided by.
@@ -46,18 +55,9 @@ def effort_robot(plant: Plant, scale: Array, weights: EffortWeights) -> EffortRo
         DataError: a fin's force table cannot be read.
     """
     layout = plant.layout
-    forces = layout_problem(
-        plant.effectiveness[:, 1:] / scale, EffortFins.of_layout(layout, weights), layout, weights
-    )
-    effort, commands = EffortMeter(plant.upper, weights), CommandProblem.of(plant, scale)
-    return EffortRobot(plant, forces, commands, effort, robot_view(forces))
-
-
-def layout_problem(
-    effectiveness: Array, fins: EffortFins, layout: Layout, weights: EffortWeights
-) -> EffortProblem:
-    """The problem in planar forces of compiled fins with the limits of a layout; normalized wrenches
-    (n, 2, 6) per newton of their planar forces."""
     turning = weights.zero_direction / effort_scale(layout.upper)[:, 2] ** 2
     idle = np.clip(0.0, layout.lower[:, 2], layout.upper[:, 2])
-    return effort_problem(effectiveness, fins, turning, idle)
+    fins = EffortFins.of(layout, weights)
+    forces = effort_problem(plant.effectiveness[:, 1:] / scale, fins, turning, idle)
+    effort, commands = EffortMeter(plant.upper, weights), CommandProblem.of(plant, scale)
+    return EffortRobot(plant, forces, commands, effort, robot_view(forces))

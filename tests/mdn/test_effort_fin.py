@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from finlab.layout import Fin, FinModelSpec, Layout, Limits
-from finlab.mdn.descent import realize
-from finlab.mdn.effort_fins import EffortFins
-from finlab.mdn.robot import layout_problem
+from finlab.mdn.descent import EffortProblem, realize
+from finlab.mdn.robot import effort_robot
 from finlab.physics import plant_of
 from finlab.physics.effort import DEFAULT_WEIGHTS, effort_of_shares
 
@@ -20,18 +19,17 @@ KINDS = [
 ]
 
 
-def compiled(model: FinModelSpec, limits: Limits) -> tuple[Layout, EffortFins]:
+def compiled(model: FinModelSpec, limits: Limits) -> tuple[Layout, EffortProblem]:
     layout = Layout("one", (Fin("a", (0.2, 0.1, 0.0), 0.3, limits, model=model),))
-    return layout, EffortFins.of_layout(layout, DEFAULT_WEIGHTS)
+    return layout, effort_robot(plant_of(layout), np.ones(6), DEFAULT_WEIGHTS).forces
 
 
 @pytest.mark.parametrize(("model", "limits"), KINDS)
 def test_commands_give_the_forces_with_the_least_effort(model: FinModelSpec, limits: Limits) -> None:
-    layout, fins = compiled(model, limits)
-    plant, rng = plant_of(layout), np.random.default_rng(0)
-    problem = layout_problem(plant.effectiveness[:, 1:], fins, layout, DEFAULT_WEIGHTS)
+    layout, problem = compiled(model, limits)
+    fins, plant, rng = problem.fins, plant_of(layout), np.random.default_rng(0)
     direction = fins.middle + fins.half * rng.uniform(-0.9, 0.9, (40, 1))
-    wanted = rng.uniform(0.05, 0.9, (40, 1)) * fins.boundary(direction).largest
+    wanted = rng.uniform(0.05, 0.9, (40, 1)) * fins.gauges(direction) * fins.largest
     found = fins.project(wanted * np.exp(1j * direction))
     np.testing.assert_allclose(found.size, wanted, rtol=1e-9)
     command, effort = realize(problem, found)
@@ -49,10 +47,10 @@ def test_commands_give_the_forces_with_the_least_effort(model: FinModelSpec, lim
 
 
 def test_what_a_fin_cannot_give_becomes_the_nearest_that_it_can() -> None:
-    _, fins = compiled(FinModelSpec("drag", ()), ARC)
+    fins = compiled(FinModelSpec("drag", ()), ARC)[1].fins
     asked = np.array([2.0 * fins.maximum * np.exp(0.4j), [1.0 * np.exp(2.0j)], [0.0j], [np.exp(-2.9j)]])
     found = fins.project(asked)
     np.testing.assert_allclose(found.force[0], fins.maximum * np.exp(0.4j))
     np.testing.assert_allclose(found.force[1], np.cos(0.6) * np.exp(1.4j))
-    np.testing.assert_allclose(found.size[2:], fins.smallest[:1].repeat(2, axis=0))
+    np.testing.assert_allclose(found.size[2:], fins.smallest[[0, 0], None])
     assert found.stopped is not None and found.stopped[:, 0].tolist() == [False, True, False, True]

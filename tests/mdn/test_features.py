@@ -7,10 +7,9 @@ import pytest
 
 from finlab.layout import Fin, FinModelSpec, Layout, Limits, random_layout
 from finlab.mdn.descent import EffortProblem, wrench
-from finlab.mdn.effort_fins import EffortFins
 from finlab.mdn.features import SHARES, VECTORS, RobotView, features, robot_view, see
 from finlab.mdn.network import NODE_SIZE
-from finlab.mdn.robot import layout_problem
+from finlab.mdn.robot import effort_robot
 from finlab.physics import plant_of
 from finlab.physics.effort import DEFAULT_WEIGHTS
 
@@ -18,8 +17,7 @@ STD = np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.34])
 
 
 def problem_of(layout: Layout, std: np.ndarray = STD) -> EffortProblem:
-    fins = EffortFins.of_layout(layout, DEFAULT_WEIGHTS)
-    return layout_problem(plant_of(layout).effectiveness[:, 1:] / std, fins, layout, DEFAULT_WEIGHTS)
+    return effort_robot(plant_of(layout), std, DEFAULT_WEIGHTS).forces
 
 
 @pytest.fixture(params=[2, 5, 12])
@@ -129,7 +127,7 @@ def test_documented_features_of_a_hand_made_fin() -> None:
     np.testing.assert_allclose(node[3:6], [1.0, 0.0, 0.0], atol=1e-3)  # the only fin: all depends on it
     assert node[6] == 0.0 and (np.diff(node[7:11]) > 0).all()
     np.testing.assert_allclose(node[11:16], [1.0, 0.0, 0.0, 0.0, 0.0], atol=1e-6)  # the same all round
-    rest = problem.fins.smallest[0, 0] / top
+    rest = problem.fins.smallest[0] / top
     assert node[16] == pytest.approx(np.sqrt(rest), rel=1e-6)
     np.testing.assert_allclose(node[17:20], [1.0, 0.0, 0.0], atol=1e-6)  # a full circle
     # Zero direction 0 is a quarter of a turn behind straight up.

@@ -10,10 +10,8 @@ from finlab.training.loop import LoopSettings
 class AnswerSettings:
     """What the teacher answers: files of random targets on random robots."""
 
-    shards: int = 80
-    """Most files; what is not there in time is not learned from."""
-    first: int = 2
-    """Files that must be there to begin, at least two: the first one is held out."""
+    files: int = 48
+    """Files, the first of which is held out."""
     fins: int = 18
     """Random fins per file with nominal limits, and as many with limits of their own."""
     robots: int = 240
@@ -51,7 +49,7 @@ RECIPES = {
     "default": _MDN,
     "smoke": MdnRecipe(
         replace(_MDN.training, steps=30, batch_size=16, warmup=5, ema=0.9, anneal=10),
-        AnswerSettings(shards=2, fins=2, robots=6, targets=8),
+        AnswerSettings(files=2, fins=2, robots=6, targets=8),
         ForceNetworkConfig(width=16, heads=2, layers=1, feedforward=16, n_components=4),
     ),
 }

@@ -5,9 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 from finlab.arrays import AnyArray, Array
-from finlab.mdn.descent import descend, realize, wrench
+from finlab.mdn.descent import EffortProblem, descend, realize, wrench
 from finlab.mdn.effort_fins import Projected
-from finlab.mdn.training.random_robots import RandomRobot
 
 STARTS = 64
 """Random forces from which each target is tried."""
@@ -34,26 +33,26 @@ class Ways(NamedTuple):
     """Their costs (N, L); infinite where there are no more ways."""
 
 
-def ways_to_deliver(rng: np.random.Generator, robot: RandomRobot, target: Array) -> Ways:
+def ways_to_deliver(rng: np.random.Generator, problem: EffortProblem, target: Array) -> Ways:
     """What descents find for normalized targets (N, 6)."""
-    problem, n = robot.problem, robot.layout.n_fins
-    rows, maximum = len(target), robot.problem.fins.maximum
+    rows, maximum = len(target), problem.fins.maximum
+    n = len(maximum)
     # A start's small forces are as good as at rest, so few or many fins work.
     size = rng.random((rows * STARTS, n)) ** rng.uniform(1.0, 8.0, (rows * STARTS, 1)) * maximum
     start = size * np.exp(1j * rng.uniform(-np.pi, np.pi, size.shape))
     found = descend(problem, np.repeat(target, STARTS, axis=0), start, FIRST_STEPS)
-    force, cost = _told(robot, target, found)
+    force, cost = _told(problem, target, found)
     best = np.argsort(cost, axis=1)[:, :KEPT]
     again = np.take_along_axis(force, best[..., None], axis=1).reshape(-1, n)
     found = descend(problem, np.repeat(target, KEPT, axis=0), again, LAST_STEPS)
-    more, further = _told(robot, target, found)
+    more, further = _told(problem, target, found)
     force, cost = np.concatenate([more, force], axis=1), np.concatenate([further, cost], axis=1)
     return _different(force, cost, maximum)
 
 
-def _told(robot: RandomRobot, target: Array, found: Projected) -> tuple[AnyArray, Array]:
+def _told(problem: EffortProblem, target: Array, found: Projected) -> tuple[AnyArray, Array]:
     """Forces (N, S, n), complex, and costs (N, S), infinite where the target is missed."""
-    problem, count = robot.problem, len(found.size) // len(target)
+    count = len(found.size) // len(target)
     _, cost = realize(problem, found)
     missed = np.linalg.norm(np.repeat(target, count, axis=0) - wrench(problem, found.force), axis=1)
     strength = np.linalg.norm(np.repeat(problem.fins.maximum, 2)[:, None] * problem.effectiveness)

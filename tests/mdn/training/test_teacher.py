@@ -4,40 +4,44 @@ import numpy as np
 import pytest
 
 from finlab.mdn.descent import realize, wrench
-from finlab.mdn.training.random_robots import FinPool, RandomRobot, random_robot, random_targets
+from finlab.mdn.robot import EffortRobot, effort_robot
+from finlab.mdn.training.random_robots import random_kinds, random_robot, random_targets
 from finlab.mdn.training.teacher import APART, DEAREST, Ways, root_share, shares_of_ways, ways_to_deliver
+from finlab.physics import Plant
+from finlab.physics.effort import DEFAULT_WEIGHTS
 
 STD = np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.34])
 
 
-def told() -> tuple[RandomRobot, np.ndarray, Ways]:
+def told() -> tuple[EffortRobot, np.ndarray, Ways]:
     rng = np.random.default_rng(6)
-    robot = random_robot(rng, FinPool(rng, 2), 6, STD)
+    layout = random_robot(rng, random_kinds(rng, 2), 6)
+    robot = effort_robot(Plant(layout), STD, DEFAULT_WEIGHTS)
     target = random_targets(rng, robot, 12)
-    return robot, target, ways_to_deliver(rng, robot, target)
+    return robot, target, ways_to_deliver(rng, robot.forces, target)
 
 
 @pytest.fixture(scope="module")
-def effort() -> tuple[RandomRobot, np.ndarray, Ways]:
+def effort() -> tuple[EffortRobot, np.ndarray, Ways]:
     return told()
 
 
 def test_ways_deliver_the_target_at_the_cost_that_is_told(
-    effort: tuple[RandomRobot, np.ndarray, Ways],
+    effort: tuple[EffortRobot, np.ndarray, Ways],
 ) -> None:
     robot, target, ways = effort
     known = np.isfinite(ways.cost)
     assert known[:, 0].mean() > 0.8
     for row, k in np.argwhere(known):
         force = ways.force[row, k]
-        assert np.linalg.norm(wrench(robot.problem, force[None])[0] - target[row]) < 0.05
-        _, cost = realize(robot.problem, robot.problem.fins.project(force[None]))
+        assert np.linalg.norm(wrench(robot.forces, force[None])[0] - target[row]) < 0.05
+        _, cost = realize(robot.forces, robot.forces.fins.project(force[None]))
         assert cost[0] == pytest.approx(ways.cost[row, k], rel=0.02)
 
 
-def test_ways_differ_and_the_cheapest_comes_first(effort: tuple[RandomRobot, np.ndarray, Ways]) -> None:
+def test_ways_differ_and_the_cheapest_comes_first(effort: tuple[EffortRobot, np.ndarray, Ways]) -> None:
     robot, _, ways = effort
-    root = root_share(ways.force, robot.problem.fins.maximum)
+    root = root_share(ways.force, robot.forces.fins.maximum)
     assert np.isfinite(ways.cost[:, 1]).any()
     for row, cost in enumerate(ways.cost):
         found = np.flatnonzero(np.isfinite(cost))
