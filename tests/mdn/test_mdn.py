@@ -142,7 +142,7 @@ def test_shares_are_squares_of_roots_and_at_most_one() -> None:
 
 
 def test_refuses_other_networks_and_settings() -> None:
-    with pytest.raises(CheckpointError, match="fed 'raw', expected one that is fed 'forces'; .*train mdn`"):
+    with pytest.raises(CheckpointError, match="fed 'raw', expected one that is fed 'forces'"):
         AnyRobot("mdn", read_checkpoint(checkpoint_path("paper"))).on(load_layout("A"))
     with pytest.raises(AllocationError, match="n_candidates: expected"):
         AnyRobot("mdn", n_candidates=0)
