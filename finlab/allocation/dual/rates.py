@@ -12,12 +12,11 @@ from finlab.allocation.dual.robot import DualRobot
 from finlab.arrays import Array
 from finlab.layout.angles import wrapped
 from finlab.physics.plant import Plant
+from finlab.precision import NEARLY
 
 STIFFNESS = (100.0, 1e4)
 """Costs of a miss, one after the other, as multiples of the robot's largest power: what they leave undone,
 steps on the commands find."""
-INSIDE = 1e-6
-"""Angle [rad] from the end of an arc from which a force counts as inside."""
 
 
 class Box(NamedTuple):
@@ -112,7 +111,7 @@ def implied_prices(robot: DualRobot, force: Array) -> Array:
     along, across = (first * x + second * y) / size, (second * x - first * y) / size
     off = np.abs(wrapped(np.arctan2(y, x) - robot.sets.middle))
     weight = np.sqrt(size / np.maximum(value, 1e-300))
-    rows = np.concatenate([along * weight, across * weight * (off < robot.sets.half - INSIDE)])
+    rows = np.concatenate([along * weight, across * weight * (off < robot.sets.half - NEARLY)])
     wanted = np.concatenate([value * weight, 0.0 * value])
-    found: Array = np.linalg.lstsq(rows, wanted, rcond=INSIDE)[0]
+    found: Array = np.linalg.lstsq(rows, wanted, rcond=NEARLY)[0]
     return found
