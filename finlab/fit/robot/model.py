@@ -6,6 +6,7 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.fit.robot.swim import STEP_S, Swim
+from finlab.fit.robot.swing import swing_forces
 from finlab.fit.robot.unknowns import SENSORS, Unknowns, blocks_of
 from finlab.layout import Layout
 from finlab.layout.arrays import force_effectiveness
@@ -51,6 +52,7 @@ class RobotModel:
         """Amplitudes and frequencies between which nearly all were; the law is fitted no further."""
         self._shapes = self.shape_terms(self.motion)
         self.length = plant.blade.length
+        self._beat = np.concatenate([swing_forces(layout, swim.command) for swim in swims])
         self.velocity = np.zeros((len(self.motion), 6))
         """How the robot moved through the water (M, 6) [m/s, rad/s], as far as is known."""
         self.late = [0] * len(SENSORS)
@@ -85,6 +87,10 @@ class RobotModel:
             foot = inflow_of(self.velocity, position, columns[..., :3])[:, None]
             kept -= inflow_terms(force, self.motion, foot, self.length) @ inflow
         mean = (force * kept[..., None]).mean(axis=1)
+        beat = unknowns.part("beat", vector)
+        if beat is not None:
+            mean -= beat[-1] * np.gradient(mean, STEP_S, axis=0)
+            mean[..., 1:] += self._beat @ beat[:-1]
         wrench: Array = mean.reshape(len(mean), -1) @ columns.reshape(-1, 6)
         wrench[:, [0, 1, 5]] += unknowns.of("bias", vector)
         return wrench

@@ -4,6 +4,7 @@ from finlab.actuators.fin.table_file import DOUBT
 from finlab.fit.robot.robot_fit import UNTOLD, RobotFit
 
 MEANINGS = {
+    "beat": "forces that swing within the beat",
     "shape": "thrust that grows otherwise with amplitude and frequency",
     "jets": "what fins take from each other by their jets",
     "inflow": "what speed through the water takes",

@@ -7,14 +7,16 @@ from functools import cached_property
 import numpy as np
 
 from finlab.arrays import Array
+from finlab.fit.robot.swing import TERMS
 
 AXES = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 BASE = (
     *("strength", "mounting", "lean", "center", "bias"),
     *("buoyancy", "lift", "current", "inertia", "linear", "quadratic", "delay"),
 )
-RESIDUAL = ("shape", "jets", "inflow")
-"""What is looked for besides, where it helps: another law of thrust, jets, inflow."""
+RESIDUAL = ("beat", "shape", "jets", "inflow")
+"""What is looked for besides, where it helps: forces within the beat and of fins that turn, another law of
+thrust, jets, inflow."""
 
 SENSORS = {
     "position and heading": (0, 1, 5),
@@ -64,6 +66,7 @@ def blocks_of(names: Sequence[str], damping: Array) -> dict[str, Block]:
         f"{kind} jet of {a} on {b}" for a in names for b in names if a != b for kind in ("wide", "narrow")
     ]
     form = ("thrust of half a jet, logarithm", "narrowness of jets, logarithm")
+    swings = [f"force within the beat, {k}" for k in range(1, TERMS + 1)]
     blocks = (
         block("strength", [f"strength of {name}, logarithm" for name in names], 0.3, ""),
         block("mounting", [f"mounting angle of {name}" for name in names], 0.1, "rad"),
@@ -77,6 +80,7 @@ def blocks_of(names: Sequence[str], damping: Array) -> dict[str, Block]:
         block("linear", [f"linear damping in {axis}" for axis in AXES], damping[0], "N s/m, N m s", False),
         block("quadratic", [f"quadratic damping in {axis}" for axis in AXES], damping[1], "", False),
         block("delay", [f"delay of {sensor}" for sensor in SENSORS], 0.05, "s", False),
+        block("beat", [*swings, "delay of thrust [s]"], np.array([1.0] * TERMS + [0.1]), ""),
         block("shape", [f"thrust by {name}" for name in shape], (0.5, 0.5, 0.3, 0.3, 0.3), ""),
         block("jets", [*jets, *form], np.array([0.15] * len(jets) + [0.7, 0.4]), ""),
         block("inflow", ["inflow", "inflow squared"], 0.4, ""),

@@ -1,0 +1,46 @@
+"""Forces that swing within the beat: no mean, and those of a rigid plate where the simulation has them."""
+
+import numpy as np
+import pytest
+
+from finlab.fit.robot.swim import STEP_S
+from finlab.fit.robot.swing import KINDS, MOMENTS, TERMS, swing_forces
+from finlab.layout import Layout, load_layout
+from finlab.sim.fin_force import MeanForce, RippleForce
+from finlab.vehicle.fin_motion import FinMotion
+
+
+@pytest.fixture(scope="module")
+def pair() -> Layout:
+    return load_layout("pair")
+
+
+def test_fins_that_beat_steadily_have_no_mean(pair: Layout) -> None:
+    command = np.tile([[0.5, 1.0, 0.7], [0.3, 2.0, -2.0]], (80, 1, 1))
+    found = swing_forces(pair, command)
+    assert found.shape == (80, 2, 2, TERMS)
+    swings = found[40:]  # the servos have come to rest; four and eight whole beats
+    largest = np.abs(swings).max(axis=(0, 2))
+    beating = largest[0, : KINDS - 3]
+    assert (beating > 0.05).all()
+    of_beats = np.arange(TERMS) % KINDS < KINDS - 3
+    assert (np.abs(swings.mean(axis=0)).max(axis=1) <= 0.01 * largest + 1e-9)[:, of_beats].all()
+    assert (largest[:, KINDS - 3 : KINDS] < 1e-3).all(), "neither fin turns any more"
+    assert (np.abs(swings[:, 0, :, KINDS : 2 * KINDS]) < 1e-9).all(), (
+        "what changes with the frequency counts from 1 Hz"
+    )
+
+
+def test_a_plates_water_and_drag_are_those_of_the_simulation(pair: Layout) -> None:
+    rng = np.random.default_rng(0)
+    command = np.repeat(pair.lower + rng.random((12, 2, 3)) * (pair.upper - pair.lower), 5, axis=0)
+    found = swing_forces(pair, command)
+    ripple, mean, fins = RippleForce(pair), MeanForce(pair), FinMotion(pair)
+    dt = STEP_S / MOMENTS
+    for k, row in enumerate(command):
+        true = np.zeros((2, 3))
+        for _ in range(MOMENTS):
+            fins.step(row, dt)
+            pulses = mean.step(fins, dt) * (1.0 - np.cos(2.0 * fins.phase))[:, None]
+            true += (ripple.step(fins, dt) - pulses) / MOMENTS
+        np.testing.assert_allclose(found[k, :, :, 0] + found[k, :, :, 2], true[:, 1:], atol=1e-9)
