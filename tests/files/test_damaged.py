@@ -158,10 +158,6 @@ def kinds(tmp_path_factory: pytest.TempPathFactory, untrained_mdn: Path) -> list
     write_urdf(layout, place / "a.urdf")
     rig = commands(60)
     write(place / "rig.csv", columns_of(rig, measured(soft(), rig)))
-    t = np.arange(0.0, 30.0, 0.02)
-    angle = np.where(t < 15.0, 0.3 * np.sin(2 * np.pi * t), 0.5 * np.sin(3 * np.pi * t))
-    raw = {"t": t, "angle": angle, "Fy": np.sin(t), "Fz": np.cos(t)}
-    write(place / "raw.csv", raw)
     rng = np.random.default_rng(1)
     write_swim(place / "swim.csv", PAIR, np.full((330, 2, 3), 0.5), rng.random((330, 12)).cumsum(axis=0) / 99)
     with (place / "path.csv").open("w", newline="") as file:
@@ -219,7 +215,6 @@ def kinds(tmp_path_factory: pytest.TempPathFactory, untrained_mdn: Path) -> list
         Kind("robot.urdf", (place / "a.urdf").read_bytes(), lambda p: read_urdf(p, layout.names, "base")),
         Kind("table.csv", fin_table, read_table),
         Kind("rig.csv", (place / "rig.csv").read_bytes(), lambda path: read_measurements([path])),
-        Kind("raw.csv", (place / "raw.csv").read_bytes(), lambda path: read_measurements([path])),
         Kind("swim.csv", (place / "swim.csv").read_bytes(), lambda path: read_swim(path, PAIR)),
         Kind("log.npz", swim_log(place / "log.npz").read_bytes(), load_log, repacked),
         Kind("swim.npz", (place / "log.npz").read_bytes(), lambda path: read_swim(path, PAIR), repacked),
