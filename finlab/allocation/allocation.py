@@ -20,6 +20,8 @@ from finlab.layout.damage import Health
 from finlab.physics.known_plants import plant_of
 from finlab.physics.plant import Plant
 
+TOLD_GAP = 0.01
+"""Share by which the power may exceed its bound untold."""
 CHUNK = 1024
 """Answers that are judged together; keeps memory flat for any number of targets."""
 
@@ -102,7 +104,11 @@ class Answer(PlainData):
     @cached_property
     def notes(self) -> tuple[str, ...]:
         """Sentences that the user should read, such as a fin model that the checkpoint never saw."""
-        return self.later.notes() if self.later is not None else ()
+        return (*self.later.notes(), *self._doubts()) if self.later is not None else ()
+
+    def _doubts(self) -> tuple[str, ...]:
+        """Sentences about this answer."""
+        return ()
 
     @property
     def expected_miss(self) -> Array:
@@ -251,6 +257,15 @@ class Allocation(Answer):
     def samples(self) -> Candidates | None:
         """Raw candidates before refinement, best first; None for methods that draw none."""
         return self.later.samples() if self.later is not None else None
+
+    def _doubts(self) -> tuple[str, ...]:
+        if not self.bound or self.power <= (1.0 + TOLD_GAP) * self.bound:
+            return ()
+        gap = 100.0 * (1.0 - self.bound / self.power)
+        return (
+            f"of its power, {gap:.2g} % may be more than needed: where an actuator cannot rest, or has a "
+            "wide arc, a dead band or drag, the least is not proved",
+        )
 
     @property
     def reachable(self) -> bool:

@@ -68,6 +68,17 @@ class Sets:
         return not (self.low[len(self.low) - len(self.half) :] > 0.0).any()
 
     @cached_property
+    def squared_gap(self) -> Array:
+        """Squares of the prices (p, 1) or (p, N) [W^2/N^2] below which a plane's direction is undecided."""
+        planes = slice(len(self.low) - len(self.half), None)
+        low, least = (
+            self.low[planes],
+            NOTHING * self.high_cost[planes] / np.maximum(self.high[planes], 1e-300),
+        )
+        turning = TURNING * self.low_cost[planes] / np.maximum(low, 1e-300)
+        return np.asarray(np.where(low > 0.0, np.maximum(turning, least), least) ** 2 + 1e-300)
+
+    @cached_property
     def forked(self) -> NDArray[np.intp]:
         """Places of the planes whose set has a gap: wide arcs, and arcs of forces that cannot rest."""
         arc = self.half < np.pi
@@ -109,23 +120,23 @@ class Answers:
         """The tables' forces as shares of the largest, one table after the other."""
         self._row = 2 * np.arange(len(sides))[:, None]
         self.gauges = Gauges([plane.gauge for plane in planes])
-        self._tiny = NOTHING * self._top[2 * self.lines :: 2, None]
 
     def radial(self, price: Array, row: NDArray[np.intp]) -> tuple[Array, Array, Array]:
         """Force [N], its derivative and conjugate [W] (m, N) at prices (m, N) from 0 on in rows (m, 1) or (m,
         N) of the tables, two for each actuator."""
         top = self._top[row]
         share = price / top
-        cell = (np.sqrt(np.sqrt(share)) * CELLS).astype(np.intp)
-        np.minimum(cell, CELLS, out=cell)
+        cell = np.minimum((np.sqrt(np.sqrt(share)) * CELLS).astype(np.intp), CELLS)
         a0, a1, a2, a3, start = self._coefficients[:, row * (CELLS + 1) + cell]
         x = share - _EDGES[cell]
-        cubic = x * a3
+        linear, cubic = x * a1, x * a3
         square = a2 + cubic
-        force = a0 + x * (a1 + x * square)
+        bend = x * x * square
+        force = a0 + linear + bend
         slope = (a1 + x * (square + square + cubic)) / top
-        conjugate = start + top * x * (a0 + x * (a1 / 2.0 + x * (a2 / 3.0 + cubic / 4.0)))
-        return force, slope, conjugate
+        # Of the mean force along the interval, the last part is exact to x^4.
+        mean = a0 + 0.5 * linear + x * x * (a2 / 3.0 + 0.25 * cubic)
+        return force, slope, start + top * x * mean
 
     def cost(self, force: Array) -> Array:
         """Power (n, N) [W] of forces (n, N) within the tables; of planes of their sizes."""
@@ -195,7 +206,7 @@ class Answers:
             along[lines:] = first * fan.first + second * fan.second
             if not sets.rests:  # at least force, a small price along any direction counts in full
                 size = np.hypot(first, second)
-                along[lines:] *= np.sqrt(size * size + self._gap(sets) ** 2) / np.maximum(size, 1e-300)
+                along[lines:] *= np.sqrt(size * size + sets.squared_gap) / np.maximum(size, 1e-300)
         sign = np.where(along < 0.0, -1.0, 1.0)
         sign[lines:] = 1.0
         return along, self._limited(along, sign, self._row, sets)[2]
@@ -206,8 +217,10 @@ class Answers:
         """Forces, derivatives and conjugates (m, N) for prices (m, N) within the limits of some actuators;
         prices without a sign are those of planes."""
         if sign is None:
-            force, slope, conjugate = self.radial(np.maximum(price, 0.0), row)
-            if sets.arcs:  # a price away from the arc's end moves nothing
+            if not sets.arcs:
+                force, slope, conjugate = self.radial(price, row)
+            else:  # a price away from the arc's end moves nothing
+                force, slope, conjugate = self.radial(np.maximum(price, 0.0), row)
                 slope = np.where(price > 0.0, slope, 0.0)
         else:
             force, slope, conjugate = self.radial(np.maximum(price * sign, 0.0), row + (sign < 0.0))
@@ -224,8 +237,7 @@ class Answers:
 
     def _fan(self, first: Array, second: Array, sets: Sets) -> "_Fan":
         """Directions in which planes answer prices (p, N)."""
-        gap = self._gap(sets)
-        size = np.sqrt(first * first + second * second + gap * gap)
+        size = np.sqrt(first * first + second * second + sets.squared_gap)
         x, y = first / size, second / size
         tangent = 1.0 / size
         fan_x, fan_y = x, y
@@ -252,14 +264,6 @@ class Answers:
             beyond,
             sets.middle - nearer * sets.half,
         )
-
-    def _gap(self, sets: Sets) -> Array:
-        """Prices (p, 1) or (p, N) below which a plane's direction is undecided."""
-        if sets.rests:
-            return self._tiny
-        low = sets.low[self.lines :]
-        marginal = TURNING * sets.low_cost[self.lines :] / np.maximum(low, 1e-300)
-        return np.where(low <= 0.0, self._tiny, np.maximum(marginal, self._tiny))
 
     def _uneven(self, x: Array, y: Array, tangent: Array) -> tuple[Array, Array, Array]:
         """Directions of the force with the gauges' sizes, and the weights of their change, for directions of

@@ -31,6 +31,7 @@ from finlab.allocation.settings import Settings, number
 from finlab.allocation.solution import Solution
 from finlab.arrays import Array
 from finlab.networks.trained import TrainedWeights
+from finlab.physics.wrench import wrench_of_forces
 from finlab.precision import FINE, NEARLY, ROUNDS
 
 EXACT = 1e-8
@@ -258,7 +259,8 @@ class Dual(Method):
         return command, found
 
     def _error(self, command: Array, aim: Array) -> Array:
-        missing = (self.plant.wrench(command) - aim) / self.scale
+        given = wrench_of_forces(self.plant.force(command), self.plant.effectiveness)
+        missing = (given - aim) / self.scale
         error: Array = np.sqrt(np.einsum("ni,ni->n", missing, missing))
         return error
 

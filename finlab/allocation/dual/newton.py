@@ -127,9 +127,10 @@ def solve(
     most = np.maximum(sets.low_cost, sets.high_cost).sum(axis=0) * (1.0 + 1e-9) + 1e-9 + np.zeros(count)
     proves = terms.penalty is None and terms.reward is None
     state = _state(robot, target, prices, sets, terms)
-    if count == 1:
-        return _one(robot, state, sets, terms, float(ridge[0]), float(most[0]) if proves else np.inf)
-    return _many(robot, state, sets, terms, ridge, most if proves else np.full(count, np.inf))
+    with np.errstate(invalid="ignore"):  # systems without an inverse are told by what is not finite
+        if count == 1:
+            return _one(robot, state, sets, terms, float(ridge[0]), float(most[0]) if proves else np.inf)
+        return _many(robot, state, sets, terms, ridge, most if proves else np.full(count, np.inf))
 
 
 def _state(robot: DualRobot, target: Array, prices: Array, sets: Sets, terms: Terms) -> _State:
@@ -163,8 +164,7 @@ def _step(robot: DualRobot, state: _State, terms: Terms, ridge: Array) -> Array:
         weighted = state.stretch * state.target
         hessian += np.einsum("in,jn->nij", weighted, state.target).reshape(hessian.shape)
     hessian[:, :: robot.shape[0] + 1] += (ridge * trace)[:, None]
-    with np.errstate(invalid="ignore"):
-        step: Array = solve_systems(hessian.reshape(-1, *robot.shape), state.residual.T[..., None])[..., 0].T
+    step: Array = solve_systems(hessian.reshape(-1, *robot.shape), state.residual.T[..., None])[..., 0].T
     if not np.isfinite(step).all():  # a matrix without inverse: along the gradient
         step = np.where(np.isfinite(step), step, state.residual / trace)
     return step
