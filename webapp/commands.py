@@ -9,7 +9,7 @@ import viser
 from webapp.page import Page
 from webapp.session.lessons import LESSONS
 from webapp.session.looking import TASKS
-from webapp.session.state import AXIS_WORDS, LEAST
+from webapp.session.state import LEAST
 from webapp.session.targets import PRESETS
 
 CTRL, CTRL_SHIFT, ALT = "cmd/ctrl", "cmd/ctrl+shift", "alt"
@@ -19,11 +19,8 @@ class Command(NamedTuple):
     """One thing to do."""
 
     group: str
-    """What it is about."""
     label: str
-    """In words."""
     act: Callable[[], object]
-    """Does it."""
     key: str = ""
     """As viser calls it; none where it is done from the list alone."""
     modifier: str = ""
@@ -58,7 +55,6 @@ def commands(page: Page) -> list[Command]:
         Command("Design", "Mirror the selected fin", session.mirror_fin, "M"),
         Command("Design", "Delete the selected fin", session.delete_fin, "delete"),
         Command("Design", "Add a fin", session.add_fin, "I"),
-        Command("Design", "Select all fins", session.select_all, "A", CTRL),
         Command("Design", "New design", page.designs.new),
         Command("Design", "Save the design", page.designs.save, "S", CTRL),
         Command("Design", "Share the design by a link", page.designs.share),
@@ -67,10 +63,6 @@ def commands(page: Page) -> list[Command]:
         Command("Design", "Start over", session.start_over),
         Command("Wrench", "Fail or repair the selected fin", fail_selected, "X"),
         *(Command("Wrench", f"Ask for: {name}", partial(session.set_preset, name)) for name in PRESETS),
-        *(
-            Command("Wrench", f"Ask for {word} alone", partial(session.set_only_axis, axis))
-            for axis, word in enumerate(AXIS_WORDS)
-        ),
         *(Command("Wrench", f"Keep {word} least", partial(session.keep_least, word)) for word in LEAST),
         Command("Wrench", "Compare the methods", compare),
         Command("Swim", "Swim: pause or go on", swim_on, "B"),
@@ -81,7 +73,6 @@ def commands(page: Page) -> list[Command]:
             for view, key in (("3D", "1"), ("Top", "2"), ("Side", "3"), ("Front", "4"))
         ),
         Command("View", "Freeze or move the fins", partial(session.toggle, "frozen"), "P"),
-        Command("View", "Show or hide the centre of gravity", partial(session.toggle, "center")),
         Command("View", "Dark or light theme", partial(session.toggle, "dark")),
         Command("Help", "Tour: start, or next stop", session.next_stop, "T"),
         *(

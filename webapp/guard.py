@@ -48,9 +48,7 @@ class Admission:
     """What to answer a request that is not let through, or that brings the token along."""
 
     status: HTTPStatus
-    """Status of the answer."""
     text: str
-    """What to say."""
     headers: dict[str, str] = field(default_factory=dict)
     """Headers of the answer."""
 

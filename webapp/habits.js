@@ -1,19 +1,12 @@
 // What the page of viser does otherwise: with Ctrl the camera stays where it is, keys have their usual second names,
-// buttons have hints, and the first card comes and goes.
+// and buttons have hints.
 (() => {
   if (window.finlabFrame) return;
   const page = document.documentElement;
   const MOVES = /^(Key[WASDQE]|Arrow)/;
-  const MET = 'finlab-met';
   const typing = (target) => target.closest?.('input, textarea, [contenteditable=true]');
 
-  function kept(name) { try { return localStorage.getItem(name); } catch { return null; } }
-  function keep(name, value) { try { localStorage.setItem(name, value); } catch { /* a browser that forbids it */ } }
-
-  window.finlabFrame = {
-    met() { page.classList.remove('fl-first'); keep(MET, '1'); },
-  };
-  if (!kept(MET)) page.classList.add('fl-first');
+  window.finlabFrame = true;
 
   window.addEventListener('keydown', (event) => {
     const held = event.ctrlKey || event.metaKey;

@@ -253,7 +253,7 @@ class Page(ABC):
             self._robot = _robot(session)
             for task in (self.answering, self.analyst, self.ranging):
                 task.forget()
-        self.analyst.ask(Question(state.able, state.failed, session.reference, display.drawn, display.alone))
+        self.analyst.ask(Question(state.able, state.failed, session.saved, display.drawn))
         self.ranging.ask(State(state.able, state.failed, target=state.target))
         self.answering.ask()
 

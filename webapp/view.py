@@ -1,7 +1,6 @@
 """One browser's page with everything on it: the frame with its panels, and commands by key or from a list."""
 
 from webapp.commands import commands, register
-from webapp.markup.first_sight import welcome
 from webapp.page import Page, Panel
 from webapp.panels.frame import Frame
 
@@ -14,4 +13,4 @@ class View(Page):
         gui.main_panel.dock_right()
         gui.set_panel_label("finlab")
         register(gui, self, commands(self))
-        return Frame(gui, self, welcome()).panels
+        return Frame(gui, self).panels

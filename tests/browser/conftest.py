@@ -101,11 +101,11 @@ def new_page(browser: Any, served: Served) -> Iterator[Callable[[], Any]]:
 
     contexts = []
 
-    def open_page(context: Any = None, first: bool = False) -> Page:
+    def open_page(context: Any = None) -> Page:
         if context is None:
             context = browser.new_context(viewport={"width": 1400, "height": 860}, accept_downloads=True)
             contexts.append(context)
-        return Page(context.new_page(), served, first=first)
+        return Page(context.new_page(), served)
 
     yield open_page
     for context in contexts:

@@ -38,9 +38,8 @@ PROJECT = """([name, point]) => {
 class Page:
     """One tab."""
 
-    def __init__(self, page: Any, served: Any, patience: float = 1.0, first: bool = False) -> None:
-        """Open the app and wait until the robot stands; `patience` makes all waits longer, `first` is a first
-        visit."""
+    def __init__(self, page: Any, served: Any, patience: float = 1.0) -> None:
+        """Open the app and wait until the robot stands; `patience` makes all waits longer."""
         self.patience = patience
         self.page = page
         self._served = served
@@ -49,8 +48,6 @@ class Page:
         page.set_default_timeout(WAIT_MS * patience)
         page.on("console", lambda m: self.problems.append(m.text) if m.type == "error" else None)
         before = set(served.app.views)
-        if not first:
-            page.add_init_script("localStorage.setItem('finlab-met', '1')")
         page.goto(served.url)
         self.ready()
         self.until(lambda: bool(set(served.app.views) - before))
@@ -79,7 +76,6 @@ class Page:
             self.session.display = self._display
             self.session.desk = Desk()
             self.session.draft, self.session.swim = SearchRequest(), SwimSettings()
-            self.session.compare_with(None)
             self.view.improver.forget()
             self.view.scenery.end_swim()
             self.view.scenery.robot.look_from("3D")

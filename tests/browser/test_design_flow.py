@@ -149,7 +149,6 @@ def test_the_gizmo_moves_a_linked_pair(page: Any) -> None:
     right, left = session.state.layout.fins[:2]
     assert left.position[0] == pytest.approx(before.fins[1].position[0] + 0.06, abs=0.02)
     assert right.position == pytest.approx((left.position[0], -left.position[1], left.position[2]))
-    page.visible("/robot/ghost")
     page.key("Control+z")
     page.until(lambda: session.state.layout == before)
 
@@ -165,8 +164,6 @@ def test_reach_draws_sets_and_compares_layouts(page: Any) -> None:
     page.until(lambda: page.session.state.failed == ("front_right",))
     page.until(lambda: page.vertices("/robot/attainable/now") != whole and page.text(".score") != card)
     page.visible("/robot/attainable/whole")
-    page.choose("Beside", "pair")
-    page.until(lambda: not page.view.analyst.busy and "pair" in page.text(".score"))
     page.choose("Draw the set of", "none")
     page.visible("/robot/attainable/now", False)
 

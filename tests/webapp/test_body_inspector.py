@@ -66,7 +66,8 @@ def test_the_inertia_of_ucats_hull_is_near_that_of_its_drawings_and_a_bare_hull_
 
 def test_the_water_is_that_of_the_fins(session: Session) -> None:
     assert water_density(session.state.layout) == 1000.0
-    session.select_all()
+    for name in session.state.layout.names:
+        session.select_also(name)
     session.set_parameter("density", 1025.0)
     assert water_density(session.state.layout) == 1025.0
     session.estimate()

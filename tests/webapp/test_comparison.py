@@ -17,7 +17,7 @@ from tests.webapp.stand_in import StandIn, load_stand_in
 from webapp.markup.comparison import comparison_table
 from webapp.markup.corner import corner
 from webapp.markup.mode_plot import mode_plot
-from webapp.markup.snippets import command_line, python_lines
+from webapp.markup.snippets import command_line
 from webapp.markup.words import source_words, three_digits
 from webapp.session.state import COMPARED, LEAST, State
 from webapp.session.targets import PRESETS
@@ -120,4 +120,3 @@ def test_every_answer_keeps_least_what_is_asked() -> None:
     assert "least power" in corner(state, "", power, False, None)
     assert "least effort" in corner(state, "", effort, False, None)
     assert "--method mdn" in command_line(replace(state, method="mdn"))
-    assert "finlab.Allocator(layout, 'mdn')" in python_lines(replace(state, method="mdn"))

@@ -27,7 +27,7 @@ from webapp.view import View
 from webapp.viser_internals import start_server, stop_server
 
 BEFORE, OPENED, AFTER = (load_layout(shipped_layouts()[name]) for name in ("A", "B", "ucat"))
-DISPLAY = Display(frozen=True, drawn="forces", ghost=False)
+DISPLAY = Display(frozen=True, drawn="forces")
 WORDS = "out of order"
 
 COMPUTED = (

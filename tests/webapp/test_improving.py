@@ -92,7 +92,7 @@ def test_analyst_answers_only_the_question_that_stays() -> None:
         analyst: Newest[Question, Findings] = Newest(running(), worker, find, asked.set, 0.1)
         for k in range(20):
             moved = layout.replace_actuator(layout.names[0], position=(0.01 * k, 0.2, 0.0))
-            analyst.ask(Question(moved, (), layout, "none", True))
+            analyst.ask(Question(moved, (), layout, "none"))
             await asyncio.sleep(0.01)
         while analyst.busy:
             await asyncio.sleep(0.02)
@@ -134,7 +134,7 @@ def test_what_is_proposed_can_be_built() -> None:
         assert math.degrees(fin.mounting_angle) == pytest.approx(
             round(math.degrees(fin.mounting_angle)), abs=1e-9
         )
-    afterwards = find(Question(layout, (), layout, "none", True)).card
+    afterwards = find(Question(layout, (), layout, "none")).card
     assert afterwards.authority.weakest == found.card_after.authority.weakest
     assert [loss.weakest for loss in afterwards.losses] == [loss.weakest for loss in found.card_after.losses]
     worker.stop()

@@ -30,14 +30,14 @@ def choose(session: Session, *names: str) -> None:
         session.select_also(name)
 
 
-def test_selection_grows_shrinks_and_spans(session: Session) -> None:
+def test_selection_grows_and_shrinks(session: Session) -> None:
     choose(session, "back_left", "front_right")
     assert session.selection == ("front_right", "back_left") and session.selected == "front_right"
-    session.select_to("front_left")
+    session.select_also("front_left")
     assert session.selected == "front_left" and set(session.selection) == {*FRONT, "back_left"}
     session.select_also("back_left")
     assert session.selection == FRONT
-    session.select_all()
+    choose(session, *session.state.layout.names)
     with pytest.raises(FinlabError, match="these are all fins"):
         session.delete_fin()
     session.select(None)

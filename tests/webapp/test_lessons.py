@@ -69,7 +69,7 @@ def test_closing_gives_back_what_was_there_and_next_goes_on_to_the_end() -> None
     session = Session(load_layout("penta"))
     session.set_target(1, 0.5)
     session.select("bow")
-    session.set_display("center", True)
+    session.set_display("dark", True)
     session.show_drawer("Reach")
 
     def all_there_is() -> tuple[object, ...]:
@@ -77,7 +77,7 @@ def test_closing_gives_back_what_was_there_and_next_goes_on_to_the_end() -> None
 
     before = all_there_is()
     session.next_lesson()
-    session.set_display("center", False)
+    session.set_display("dark", False)
     names = [session.lesson.name if session.lesson else None]
     while session.lesson is not None:
         session.next_lesson()

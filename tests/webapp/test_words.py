@@ -183,7 +183,7 @@ def test_fins_in_the_way_are_told() -> None:
 
 def test_cards_say_what_a_layout_can_do() -> None:
     ucat, blind = (load_layout(shipped_layouts()[name]) for name in ("ucat", "no_yaw"))
-    found = find(Question(ucat, ("front_left",), blind, "forces", True))
+    found = find(Question(ucat, ("front_left",), blind, "forces"))
     assert found.now is not None and found.whole is not None
     assert found.before is not None and found.before.layout == "no_yaw", "any layout may stand beside"
     table = score_table(ucat, found.card, None)

@@ -53,8 +53,7 @@ def set_rows(findings: Findings | None) -> str:
     rows = [_key(_patch(css(DELIVERED, 0.5)), "working fins")]
     if findings.whole is not None:
         asked = findings.question
-        other = "before" if asked.beside.name == asked.layout.name else asked.beside.name
-        word = "all fins" if asked.failed else other
+        word = "all fins" if asked.failed else "before"
         rows.append(_key(_patch(css(DEAD, 0.45)), word))
     ball = html("<svg width='44' height='12'><circle cx='22' cy='6' r='5' fill='{}'/></svg>", css(ASKED))
     unit = "N" if findings.now.kind == "force" else "N m"

@@ -39,7 +39,7 @@ def fin_list(state: State, selection: tuple[str, ...]) -> str:
     )
     return html(
         "<div class='fl fin-list'><table><tr><th></th>{}<th class='place' title='Azimuth of the shaft'>"
-        "shaft</th></tr>{}{}</table><div class='dim units'>Press to select, with Ctrl or Shift several. "
+        "shaft</th></tr>{}{}</table><div class='dim units'>Press to select, with Ctrl several. "
         "<span class='place'>x, y, z in m, shaft in °.</span></div></div>",
         heads,
         robot,

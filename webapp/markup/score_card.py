@@ -24,16 +24,15 @@ FIGURES: dict[str, Callable[[ScoreCard], float | None]] = {
 """Words -> figure of a whole robot; None where it has none, as the worst loss of a single fin."""
 
 
-def score_table(layout: Layout, card: ScoreCard, before: ScoreCard | None, name: str = "before") -> str:
+def score_table(layout: Layout, card: ScoreCard, before: ScoreCard | None) -> str:
     """The score card.
 
     Args:
         layout: the robot, for its fins' colours.
         card: what it can do.
-        before: what the layout beside it can do, None where it is the same.
-        name: what that one is called.
+        before: what it could do before, None where that is the same.
     """
-    parts = [_summary(card, before, name), _axes(card, before, name), _losses(layout, card)]
+    parts = [_summary(card, before), _axes(card, before), _losses(layout, card)]
     parts += [html("<div class='said dim'>{}</div>", note) for note in card.notes]
     return html("<div class='fl score'>{}</div>", parts)
 
@@ -53,11 +52,11 @@ def rank_sentence(a: Authority | QuickCheck) -> str:
     return text
 
 
-def _summary(card: ScoreCard, before: ScoreCard | None, name: str) -> str:
+def _summary(card: ScoreCard, before: ScoreCard | None) -> str:
     head = ""
     if before is not None:
         ranks = row("axes independent", *(f"{one.authority.rank} of 6" for one in (before, card)), "")
-        head = html("<tr><th></th><th>{}</th><th>now</th><th></th></tr>{}", name, ranks)
+        head = html("<tr><th></th><th>before</th><th>now</th><th></th></tr>{}", ranks)
     rows = (
         _alone(words, of(card)) if before is None else _beside(words, of(card), of(before))
         for words, of in FIGURES.items()
@@ -83,7 +82,7 @@ def _beside(words: str, now: float | None, old: float | None) -> str:
     return row(words, *figures, html("<span class='{}'>{}</span>", kind, sign))
 
 
-def _axes(card: ScoreCard, before: ScoreCard | None, name: str) -> str:
+def _axes(card: ScoreCard, before: ScoreCard | None) -> str:
     known = [one.authority for one in (before, card) if one is not None]
     rows = []
     for k, word in enumerate(AXES):
@@ -98,7 +97,7 @@ def _axes(card: ScoreCard, before: ScoreCard | None, name: str) -> str:
                 "–" if power is None else three_digits(power),
             )
         )
-    columns = ("",) if before is None else (name, "now")
+    columns = ("",) if before is None else ("before", "now")
     head = html(
         "<tr><th>largest on its own</th>{}<th title='after the worst loss of a fin'>one lost</th>"
         "<th title='least power for 1 N, or 0.1 N m'>power [W]</th></tr>",

@@ -55,8 +55,7 @@ class FinList:
 
     def _select(self, key: str, held: str) -> None:
         session = self._page.session
-        select = {"shift": session.select_to, "ctrl": session.select_also}.get(held, session.select)
-        select(self._named(key))
+        (session.select_also if held else session.select)(self._named(key))
 
     def _copy_around(self, count: int) -> None:
         self._page.session.ring_of_fins(count, RINGS.get(self._axis.value, "z"))

@@ -11,7 +11,6 @@ from webapp.markup.fin_model import model_card
 from webapp.markup.html import html
 from webapp.markup.thrust_curves import thrust_curves
 from webapp.page import Page
-from webapp.session.files import file_stem
 from webapp.session.fin_edits import FORMULAS, words
 from webapp.tasks.fitting import MAX_BYTES, Fitted
 
@@ -55,7 +54,6 @@ class FinModelPanel:
             self._card = gui.add_html("")
             results = {
                 "On all like it": page.fitting.put_on_all,
-                "Table (CSV)": self._send_table,
                 "Close": page.fitting.forget,
             }
             self._results = page.add_buttons(
@@ -93,19 +91,6 @@ class FinModelPanel:
         self._page.fitting.start(session.selected, name, content)
         session.show_task("Design")
 
-    def _found(self) -> Fitted:
-        found = self._page.fitting.findings
-        if found is None:
-            raise FinlabError("there is no fit; upload a file of measurements first")
-        return found
-
-    def _send_table(self) -> None:
-        from finlab.actuators.fin.table_file import table_bytes
-
-        found = self._found()
-        path = str(found.model.values()["path"])
-        self._page.exports.download(f"{file_stem(found.upload.fin)}.csv", table_bytes(path))
-
     def refresh(self) -> None:
         session, fitting = self._page.session, self._page.fitting
         layout = session.state.layout
@@ -121,9 +106,6 @@ class FinModelPanel:
         put(self._bar, visible=fitting.busy)
         put(self._cancel, visible=fitting.busy)
         found = fitting.findings
-        if found is not None:
-            middle = "Fit it" if found.fit is None else "Table (CSV)"
-            put(self._results, options=("On all like it", middle, "Close"))
         put(self._results, visible=found is not None)
         if self._changes(found, fitting.busy, fitting.progress, fitting.error):
             put(self._card, content=self._written(found))

@@ -106,11 +106,11 @@ class Section:
 class Frame:
     """All regions of one page with their sections."""
 
-    def __init__(self, gui: viser.GuiApi, page: Page, over: str) -> None:
-        """Build everything; `over` is markup that may lie over the page for a while."""
+    def __init__(self, gui: viser.GuiApi, page: Page) -> None:
+        """Build everything."""
         self._page = page
         run_script(gui, NAMED)
-        add_html(gui, html("{}{}{}", STYLE, marker("fl-chrome"), over))
+        add_html(gui, html("{}{}", STYLE, marker("fl-chrome")))
         self._shown = gui.add_html("")
         self._listen()
         self._corner = Corner(gui, page)

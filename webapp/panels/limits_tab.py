@@ -16,43 +16,29 @@ from webapp.markup.words import fins_words, three_digits
 from webapp.page import Page
 from webapp.panels.damage import FinButtons
 from webapp.session.display import DRAWN
-from webapp.session.files import comparable
 from webapp.session.search_request import GOAL_WORDS, WAY, SearchRequest
-
-SAVED = "saved state"
-"""Entry of the list of layouts for the one that was opened or saved last."""
 
 
 class ReachPanel:
-    """Switches and the card."""
+    """What is drawn, and the card."""
 
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         self._page = page
-        about = "Everything that the fins can give, as a body in the view."
-        page.bind_display(gui.add_dropdown("Draw the set of", tuple(DRAWN), hint=about), "drawn")
-        free = "Forces without any torque, torques without any force; else they are free."
-        self._alone = page.bind_display(gui.add_checkbox("Alone", True, hint=free), "alone")
-        self._beside = gui.add_dropdown(
-            "Beside", (SAVED, *comparable()), hint="The layout that stands next to this one on the card."
+        about = (
+            "Forces that the fins can give without torque, or torques without force, as a body in the view."
         )
-        page.on_change(self._beside, self._compare)
+        page.bind_display(gui.add_dropdown("Draw the set of", tuple(DRAWN), hint=about), "drawn")
         self._card = gui.add_html("")
         self._changes = Changes()
 
-    def _compare(self, name: str) -> None:
-        self._page.session.compare_with(None if name == SAVED else name)
-
     def refresh(self) -> None:
-        session = self._page.session
-        put(self._beside, value=session.beside or SAVED)
-        analyst, display = self._page.analyst, self._page.session.display
-        put(self._alone, visible=display.drawn != "none")
-        if self._changes(analyst.findings, analyst.busy, analyst.error, session.beside):
+        analyst = self._page.analyst
+        if self._changes(analyst.findings, analyst.busy, analyst.error):
             put(self._card, content=self._findings())
 
     def _findings(self) -> str:
         """The card, and what to know about the drawn set."""
-        analyst, beside = self._page.analyst, self._page.session.beside
+        analyst = self._page.analyst
         found = analyst.findings
         if analyst.error is not None:
             return Markup("<div class='fl missing'>This layout cannot be analysed.</div>")
@@ -63,7 +49,7 @@ class ReachPanel:
             unit = "N" if found.now.kind == "force" else "N m"
             gap = three_digits(found.now.gap)
             note += html("<span class='dim'>The body lacks at most {} {} of the true set.</span>", gap, unit)
-        table = score_table(found.question.layout, found.card, found.before, beside or "before")
+        table = score_table(found.question.layout, found.card, found.before)
         return html("<div class='fl'>{}</div>{}", note, table)
 
 
@@ -93,17 +79,6 @@ class ImprovePanel:
             lambda: self._way[3],
             digits=2,
         )
-        page.bind_number(
-            gui.add_number("Apart [m]", 0.02, step=0.01, hint="Least distance between what two fins sweep."),
-            partial(self._draft, SearchRequest.with_apart),
-            lambda: page.session.draft.apart_m,
-        )
-        hint = "Mirror pairs stay pairs, fins in the mirror plane stay in it."
-        page.bind(
-            gui.add_checkbox("Symmetric", True, hint=hint),
-            partial(self._draft, SearchRequest.with_symmetry),
-            lambda: page.session.draft.symmetric,
-        )
         stops = "Takes up to a minute; it can be stopped any time."
         offered = "What was found so far is offered."
         self._start = page.add_button("Search", self._search, icon=viser.Icon.SPARKLES, hint=stops)
@@ -113,8 +88,6 @@ class ImprovePanel:
         )
         self._card = gui.add_html("")
         add_html(gui, marker("fl-verdict"))
-        hint = "Where the fins would stand, in green; off: as they stand now."
-        self._proposed = page.bind_display(gui.add_checkbox("Show after", True, hint=hint), "proposed")
         verdicts = {"Accept": self._accept, "Leave": page.improver.forget}
         self._verdict = page.add_buttons("Result", verdicts, visible=False, hint="Accepting can be undone.")
 
@@ -149,7 +122,6 @@ class ImprovePanel:
         if progress is not None:
             put(self._bar, value=100.0 * progress.round / progress.n_rounds)
         put(self._verdict, visible=found is not None and found.improved)
-        put(self._proposed, visible=found is not None and found.improved)
         text = ""
         if improver.error is not None:
             text = html("<div class='missing'>{}</div>", improver.error)

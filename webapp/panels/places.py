@@ -40,7 +40,6 @@ class Place(NamedTuple):
     title: str
     """Its heading; in the drawer the name of its tab, which `DRAWERS` knows; nothing in the bar."""
     make: Callable[[viser.GuiApi, Page], Panel]
-    """Builds it."""
     swims: bool = False
     """Whether it shows a swim, and is to follow it."""
     folded: bool = False

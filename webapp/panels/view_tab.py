@@ -1,4 +1,4 @@
-"""How the robot is shown: motion, what is drawn, and theme."""
+"""How the robot is shown: motion, shadows and theme."""
 
 from functools import partial
 
@@ -8,10 +8,6 @@ from webapp.page import Page
 
 SWITCHES = {
     "frozen": ("Freeze", "Fins hold still at their zero direction (P)."),
-    "fans": ("Sweep fans", "The angle that each fin sweeps."),
-    "labels": ("Fin numbers", "A number at the root of each fin."),
-    "ghost": ("Ghost", "Where moved fins stood when the layout was opened or saved."),
-    "center": ("Centre of gravity", "Mark it, and look through the hull."),
     "shadows": ("Shadows", "Slow without a graphics card."),
     "dark": ("Dark", "Dark theme."),
 }

@@ -50,11 +50,6 @@ class TargetPanel:
         self._page = page
         presets = gui.add_button_group("Preset", tuple(PRESETS), hint="Target wrenches to start from.")
         page.on_change(presets, page.session.set_preset)
-        page.add_buttons(
-            "One axis",
-            {axis: partial(page.session.set_only_axis, k) for k, axis in enumerate(AXES)},
-            hint="This axis alone, at a quarter of what the fins can give; press again to reverse it.",
-        )
         add_html(gui, marker("fl-reach"))
         self._sliders = [self._add_slider(gui, k) for k in range(6)]
         self._end = add_html(gui, marker("fl-reach-end"))

@@ -197,16 +197,14 @@ class FinNode:
         put(self._turn, active_axes=(False,) * 3)
         put(self._strut.node, visible=False)
 
-    def place(
-        self, part: Actuator, hull: AnyHull, selected: bool, label: str | None, owned_by_user: bool
-    ) -> None:
+    def place(self, part: Actuator, hull: AnyHull, selected: bool, label: str, owned_by_user: bool) -> None:
         """Show an actuator.
 
         Args:
             part: the actuator.
             hull: what its strut ends at.
             selected: whether its gizmos are shown.
-            label: text at its root, None for none.
+            label: text at its root.
             owned_by_user: True while it is dragged; the gizmo's pose is then left alone.
         """
         frame = np.array(part.frame)
@@ -216,12 +214,12 @@ class FinNode:
         if not owned_by_user:
             put(self._move, position=np.array(part.position))
             put(self._turn, wxyz=turn_of(frame))
-        put(self._label, visible=label is not None, text=label or "", position=np.array([0.0, 0.0, 0.04]))
+        put(self._label, text=label, position=np.array([0.0, 0.0, 0.04]))
         servo = np.array(part.position) - (0.03 if isinstance(part, (Fin, Rudder)) else 0.0) * frame[0]
         self._strut.show(_strut, servo, hull)
         put(self._strut.node, visible=True)
 
-    def command(self, command: Array | None, arrow: Array, frame: Array, fans: bool) -> None:
+    def command(self, command: Array | None, arrow: Array, frame: Array) -> None:
         """Show a motion (3,), None for what has failed, and its force as a body-frame arrow (3,) [m], given
         the own axes (3, 3)."""
         alive = command is not None
@@ -230,7 +228,7 @@ class FinNode:
         if command is None:
             put(self._fan.node, visible=False)
             return
-        put(self._fan.node, visible=fans and bool(command[0] > 0.0))
+        put(self._fan.node, visible=bool(command[0] > 0.0))
         self._fan.show(fin_mesh.sweep, float(command[0]))
         put(self._fan.node, wxyz=quaternion(float(command[2]), 0))
         self.shapes.push(arrow, frame, 0.007)

@@ -1,4 +1,4 @@
-"""What is drawn over the robot: pale blades."""
+"""What is drawn over the robot: where a search would put its fins."""
 
 import numpy as np
 import viser
@@ -8,30 +8,23 @@ from webapp.handles import put
 from webapp.scene.meshes import fin as fin_mesh
 from webapp.scene.meshes.mesh import Mesh, joined
 from webapp.scene.shape import Shape
-from webapp.theme import DEAD, Rgb
+from webapp.theme import DELIVERED
 
 
-class Ghost:
-    """Blades of some fins: pale where they stood, full where a search puts them."""
+class Offered:
+    """Blades of the fins that a search would put elsewhere, where it would put them."""
 
-    def __init__(
-        self, scene: viser.SceneApi, name: str, color: Rgb = DEAD, opacity: float | None = 0.3
-    ) -> None:
-        self._shape = Shape(scene, name, color, opacity=opacity, visible=False, cast_shadow=False)
+    def __init__(self, scene: viser.SceneApi) -> None:
+        self._shape = Shape(scene, "/robot/proposed", DELIVERED, visible=False, cast_shadow=False)
 
-    def show(self, fins: tuple[Fin, ...]) -> None:
-        """Show fins; none hides the node."""
-        put(self._shape.node, visible=bool(fins))
-        if fins:
-            self._shape.show(_blades, fins)
-
-
-def moved_fins(other: Layout | None, layout: Layout) -> tuple[Fin, ...]:
-    """The fins of another version of a layout that stand elsewhere now."""
-    if other is None or other.name != layout.name:
-        return ()
-    now = {fin.name: (fin.position, fin.frame) for fin in layout.fins}
-    return tuple(fin for fin in other.fins if now.get(fin.name) != (fin.position, fin.frame))
+    def show(self, other: Layout | None, layout: Layout) -> None:
+        """Show the fins of a better version of a layout that stand elsewhere now; None hides the node."""
+        now = {fin.name: (fin.position, fin.frame) for fin in layout.fins}
+        fins = () if other is None or other.name != layout.name else other.fins
+        moved = tuple(fin for fin in fins if now.get(fin.name) != (fin.position, fin.frame))
+        put(self._shape.node, visible=bool(moved))
+        if moved:
+            self._shape.show(_blades, moved)
 
 
 def _blades(fins: tuple[Fin, ...]) -> Mesh:

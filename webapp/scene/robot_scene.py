@@ -13,13 +13,13 @@ from webapp.markup.words import damage_words, missing_part
 from webapp.scene.fin_node import FinNode, Flapping, motion
 from webapp.scene.meshes.hull import has_inside, hull_of
 from webapp.scene.meshes.mesh import LONGEST_TURN
-from webapp.scene.overlays import Ghost, moved_fins
+from webapp.scene.overlays import Offered
 from webapp.scene.stage import Stage, aim_camera
 from webapp.scene.wrench_nodes import LENGTH, AttainableNodes, WrenchNodes, fitting_newtons, fitting_torque
 from webapp.session.state import State, can_be_edited, chosen
 from webapp.tasks.analyst import Findings
 from webapp.tasks.context import Context
-from webapp.theme import DELIVERED, HALF_TURN
+from webapp.theme import HALF_TURN
 from webapp.viser_internals import run_script
 
 CAMERAS = {
@@ -40,8 +40,7 @@ class RobotScene:
         self._root = scene.add_frame("/robot", show_axes=False)
         self._stage = Stage(scene, hull_of(session.state.layout))
         self._wrench = WrenchNodes(scene)
-        self._ghost = Ghost(scene, "/robot/ghost")
-        self._proposed = Ghost(scene, "/robot/proposed", DELIVERED, None)
+        self._offered = Offered(scene)
         self._attainable = AttainableNodes(scene)
         self._fins: list[FinNode] = []
         self.dragged: int | None = None
@@ -104,8 +103,7 @@ class RobotScene:
         if self.dragged is None:  # a hull that breathes with the fin one drags is hard to aim at
             # Glass within glass is not drawn; inside an attainable set the hull is a net.
             net = display.drawn != "none"
-            glass = display.center or has_inside(state.layout)
-            self._stage.refresh(hull, display.dark, display.shadows, display.center, net, glass)
+            self._stage.refresh(hull, display.dark, display.shadows, net, has_inside(state.layout))
         while len(self._fins) < state.layout.n:
             self._fins.append(FinNode(self._client.scene, len(self._fins), self._clicked, self._drag))
         for node in self._fins[state.layout.n :]:
@@ -118,21 +116,19 @@ class RobotScene:
         )
         for i, part in enumerate(state.layout.actuators):
             selected = part.name == self._session.selected
-            label = _label(state, i, part.name in self._session.selection) if display.labels else None
+            label = _label(state, i, part.name in self._session.selection)
             gizmos = selected and self.editing and can_be_edited(state.layout)
             self._fins[i].place(part, hull, gizmos, label, i == self.dragged)
             if part.name in state.failed or allocation is None:
-                self._fins[i].command(None, np.zeros(3), np.eye(3), False)
+                self._fins[i].command(None, np.zeros(3), np.eye(3))
             elif moves is not None and np.isfinite(moves[i, 0]):
                 force = allocation.forces[i]
                 # The force belongs to the answer's own axes, which a drag may have left behind.
                 frame = allocation.layout.frames[i]
-                self._fins[i].command(moves[i], force * scale, frame, display.fans)
+                self._fins[i].command(moves[i], force * scale, frame)
         if moves is not None:
             self._flapping.take(moves)
-        self._proposed.show(moved_fins(offered if display.proposed else None, state.layout))
-        left = self._session.saved if display.ghost and offered is None else None
-        self._ghost.show(moved_fins(left, state.layout))
+        self._offered.show(offered, state.layout)
         target = np.array(state.target)
         self._attainable.refresh(findings if display.drawn != "none" else None, target)
         given = None if allocation is None else allocation.wrench

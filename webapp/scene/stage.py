@@ -64,25 +64,17 @@ class Stage:
         mesh, bow = hull.mesh(), hull.bow()
         self._body = Shape(scene, "/robot/hull", LIGHT.hull, mesh, side="double")
         self._bow = Shape(scene, "/robot/hull/bow", LIGHT.glass, bow, side="double", cast_shadow=False)
-        self._center = scene.add_label(
-            "/robot/axes/center",
-            "⊕ centre of gravity",
-            anchor="bottom-left",
-            font_screen_scale=0.85,
-            visible=False,
-        )
         scene.add_frame(
             "/robot/axes", axes_length=0.09, axes_radius=0.004, origin_radius=0.009, origin_color=(40, 40, 40)
         )
         fade: dict[str, Any] = {"fade_distance": 5.0, "fade_strength": 1.6, "shadow_opacity": 0.22}
         self._grid = add_floor(scene, "/floor", 6.0, 0.1, 0.5, **fade)
 
-    def refresh(self, hull: AnyHull, dark: bool, shadows: bool, center: bool, net: bool, glass: bool) -> None:
+    def refresh(self, hull: AnyHull, dark: bool, shadows: bool, net: bool, glass: bool) -> None:
         """Show another hull, theme or quality; a hull of glass, or a mere net, lets one look inside."""
         opacity = 0.35 if glass or net else None
         put(self._body.node, opacity=opacity, wireframe=net)
         put(self._bow.node, opacity=opacity, visible=not net)
-        put(self._center, visible=center)
         if hull != self._hull:
             self._hull = hull
             self._body.become(hull.mesh())

@@ -106,8 +106,6 @@ class Core:
         self._names = layout.names
         self.saved = layout
         """The layout as it was opened or saved last."""
-        self.beside: str | None = None
-        """With what the score card compares: a shipped layout's name, or None for the saved one."""
         self.draft = SearchRequest()
         """What a search for a better layout is to do."""
         self.swim = SwimSettings()
@@ -166,19 +164,6 @@ class Core:
         self.state.layout.index(name)
         others = tuple(other for other in self._chosen if other != name)
         self._chosen = others if name in self._chosen else (*others, name)
-        self.history.end_merge()
-
-    def select_to(self, name: str) -> None:
-        """All fins from the selected one to this one, in the order of the layout."""
-        names = self.state.layout.names
-        start, end = self.state.layout.index(self.selected or name), self.state.layout.index(name)
-        span = names[start : end + 1] if start <= end else names[end : start + 1][::-1]
-        self._chosen = (*(other for other in self._chosen if other not in span), *span)
-        self.history.end_merge()
-
-    def select_all(self) -> None:
-        """All fins."""
-        self._chosen = self.state.layout.names
         self.history.end_merge()
 
     def select_next(self) -> None:

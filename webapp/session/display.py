@@ -19,24 +19,12 @@ class Display:
     """Fins hold still at their zero direction."""
     speed: float = 0.5
     """Time of the animation per real time."""
-    fans: bool = True
-    """Show the sweep of each fin."""
-    labels: bool = True
-    """Show the numbers of the fins."""
     shadows: bool = True
     """Cast shadows; slow without a graphics card."""
     dark: bool = False
     """Dark theme."""
-    ghost: bool = True
-    """Show where moved fins stood when the layout was opened or saved."""
-    proposed: bool = True
-    """Show where a search for a better layout puts the fins."""
     drawn: str = "none"
     """Key of `DRAWN`: the attainable set that is shown."""
-    alone: bool = True
-    """Attainable forces without torques, torques without forces."""
-    center: bool = False
-    """Mark the centre of gravity."""
 
     def with_value(self, key: str, value: Any) -> "Display":
         """One field changed; the page may send anything.

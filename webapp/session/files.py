@@ -37,11 +37,6 @@ def shipped() -> dict[str, Layout]:
     return {name: load_layout(path) for name, path in shipped_layouts().items()}
 
 
-def comparable() -> tuple[str, ...]:
-    """Names of the shipped layouts of fins, which have score cards."""
-    return tuple(name for name, layout in shipped().items() if layout.is_of_fins)
-
-
 def shipped_name(layout: Layout) -> str | None:
     """The name of the shipped layout that this one equals, None if it is none of them."""
     return next((name for name, known in shipped().items() if known == layout), None)

@@ -41,13 +41,9 @@ class Lesson:
     """A prepared state, and what to do in it."""
 
     name: str
-    """What commands call it."""
     title: str
-    """What it is about."""
     text: str
-    """What is to be seen."""
     exercise: str
-    """What to do."""
     praise: str
     """What has been shown once it is done."""
     layout: str

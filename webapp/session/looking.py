@@ -3,9 +3,7 @@
 from dataclasses import dataclass, replace
 from typing import Any
 
-from finlab.layout import Layout
 from webapp.session.core import Core
-from webapp.session.files import comparable, shipped
 from webapp.session.search_request import SearchRequest
 from webapp.session.state import chosen
 
@@ -38,7 +36,7 @@ class Desk:
 
 
 class Looking(Core):
-    """Tasks, modes, samples, switches, and the layout to compare with."""
+    """Tasks, modes and switches."""
 
     desk = Desk()
     """Which task is open, and what lies in the drawers."""
@@ -87,18 +85,3 @@ class Looking(Core):
     def set_draft(self, draft: SearchRequest) -> None:
         """What the next search for a better layout is to do."""
         self.draft = draft
-
-    def compare_with(self, name: str | None) -> None:
-        """Compare with a shipped layout, or (None) with the saved one.
-
-        Raises:
-            FinlabError: there is no such layout.
-        """
-        if name is not None:
-            chosen(name, "layout", comparable())
-        self.beside = name
-
-    @property
-    def reference(self) -> Layout:
-        """The layout that the score card compares with."""
-        return self.saved if self.beside is None else shipped()[self.beside]

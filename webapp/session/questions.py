@@ -6,11 +6,8 @@ from typing import Any
 from finlab.allocation.policy import AXES
 from finlab.errors import FinlabError
 from webapp.session.core import Core
-from webapp.session.state import AXIS_WORDS, LEAST, chosen
-from webapp.session.targets import PRESETS, axis_reach
-
-SHARE = 0.25
-"""Share of the largest wrench along an axis that its preset asks for."""
+from webapp.session.state import LEAST, chosen
+from webapp.session.targets import PRESETS
 
 
 class Questions(Core):
@@ -25,24 +22,6 @@ class Questions(Core):
         if name not in PRESETS:
             raise FinlabError(f"there is no preset {name!r:.40}")
         self._commit(f"Preset {name}", replace(self.state, target=PRESETS[name]))
-
-    def set_only_axis(self, axis: int) -> None:
-        """Nothing but one axis, at a quarter of what the working fins give at most; again turns it round.
-
-        Raises:
-            FinlabError: the fins cannot act on this axis.
-        """
-        if not 0 <= axis < 6:
-            raise FinlabError(f"axis: expected 0 to 5, got {axis!r:.40}")
-        state = self.state
-        reach = float(axis_reach(state.able, state.failed)[axis])
-        if reach < 1e-6:
-            raise FinlabError(f"no working fin of this robot acts on {AXIS_WORDS[axis]}")
-        value = float(f"{SHARE * reach:.2g}")
-        alone = all(v == 0.0 for k, v in enumerate(state.target) if k != axis)
-        sign = -1.0 if alone and state.target[axis] > 0.0 else 1.0
-        only = replace(state, target=(0.0,) * 6).with_target(axis, sign * value)
-        self._commit(f"Only {AXIS_WORDS[axis]}", only)
 
     def set_setting(self, key: str, value: Any) -> None:
         """K, T, gamma, the method or the policy; `key` is the field of `State`."""

@@ -32,10 +32,6 @@ class SearchRequest:
     """Fins that may not move."""
     way: Way = WAY
     """How far fins may go along x, y, z [m] and turn [deg]."""
-    apart_m: float = 0.02
-    """Least distance between what two fins sweep [m]."""
-    symmetric: bool = True
-    """Whether mirror pairs stay pairs, and fins in the mirror plane stay there."""
 
     def with_goal(self, goal: Any) -> "SearchRequest":
         """Another goal.
@@ -61,18 +57,6 @@ class SearchRequest:
         )
         return replace(self, way=(x, y, z, number(way[3], "turn of the shaft [°]", 0.0, 180.0)))
 
-    def with_apart(self, apart: Any) -> "SearchRequest":
-        """Another least distance between what fins sweep [m].
-
-        Raises:
-            FinlabError: it is none.
-        """
-        return replace(self, apart_m=number(apart, "distance of swept fins [m]", 0.0, 1.0))
-
-    def with_symmetry(self, symmetric: Any) -> "SearchRequest":
-        """Symmetric, or not."""
-        return replace(self, symmetric=bool(symmetric))
-
     def bounds(self, layout: Layout) -> dict[str, Bounds]:
         """Where each fin that may move may go from where it is.
 
@@ -84,7 +68,7 @@ class SearchRequest:
             if fin.name not in self.held:
                 *reach, turn = self.way
                 around = Bounds.around(fin, reach, math.radians(turn))
-                if self.symmetric and is_mirrored(fin, fin):
+                if is_mirrored(fin, fin):  # it stays in the mirror plane
                     y, angle = fin.position[1], fin.shaft_azimuth
                     around = replace(around, y=(y, y), mounting_angle=(angle, angle))
                 bounds[fin.name] = around

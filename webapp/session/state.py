@@ -42,7 +42,6 @@ class State:
     """A layout, its failures and the question asked of it."""
 
     layout: Layout
-    """The robot."""
     failed: tuple[str, ...] = ()
     """Names of failed fins, in the order of the layout."""
     weak: tuple[tuple[str, float], ...] = ()

@@ -13,7 +13,6 @@ class Step:
     """One stop of the tour."""
 
     title: str
-    """What it is about."""
     text: str
     """What to look at and what to try."""
     layout: str
@@ -25,9 +24,7 @@ class Step:
     mode: int = 0
     """Which mode is shown."""
     method: str = "dual"
-    """Method that answers."""
     swims: bool = False
-    """Whether the robot swims."""
     drawer: str = "Candidates"
     """What lies uppermost in the drawer; its task is open."""
 

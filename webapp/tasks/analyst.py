@@ -17,15 +17,11 @@ class Question:
     """What is to be worked out."""
 
     layout: Layout
-    """The robot."""
     failed: tuple[str, ...]
-    """Names of failed fins."""
     beside: Layout
     """The layout to compare with."""
     drawn: str
     """Key of `DRAWN`."""
-    alone: bool
-    """Whether the set keeps all else at zero."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +29,6 @@ class Findings:
     """What came of it."""
 
     question: Question
-    """What was asked."""
     card: ScoreCard
     """What the working fins can do."""
     before: ScoreCard | None
@@ -57,11 +52,11 @@ def find(question: Question) -> Findings:
     kind = DRAWN[question.drawn]
     now = whole = None
     if kind is not None:
-        now = attainable_set(layout, kind, failed=failed, alone=question.alone)
+        now = attainable_set(layout, kind, failed=failed, alone=True)
         if failed:
-            whole = attainable_set(layout, kind, alone=question.alone)
+            whole = attainable_set(layout, kind, alone=True)
         elif other:
-            whole = attainable_set(beside, kind, alone=question.alone)
+            whole = attainable_set(beside, kind, alone=True)
     card = score_card(layout, failed)
     before = score_card(beside, lost) if other and len(lost) < beside.n_fins else None
     return Findings(question, card, before, now, whole)

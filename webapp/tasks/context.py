@@ -16,17 +16,12 @@ class Context:
     """One page, as its tasks and its scene see it."""
 
     client: viser.ClientHandle
-    """The browser."""
     session: Session
-    """What it shows."""
     solver: Solver
-    """Answers its questions."""
     workers: Workers
     """On whose threads all is computed."""
     loop: EventLoop
-    """Where all else runs."""
     reading: Reading
-    """Reads files beside it."""
     do: Callable[[Callable[[], object]], None]
     """Carries out an intent of the user."""
     changed: Callable[[], None]

@@ -32,13 +32,10 @@ class Upload:
     """A file that was dropped on a fin."""
 
     fin: str
-    """Name of the fin."""
     model: FinModelSpec
     """The fin's model before."""
     name: str
-    """The file's name."""
     content: bytes
-    """The file."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +45,6 @@ class Fitted:
     upload: Upload
     """What it was made of; without its content."""
     model: FinModelSpec
-    """The fin's new model."""
     fit: "FinFit | None" = None
     """The fit; None where the file was a finished table."""
     curves: "tuple[ThrustCurve, ...]" = ()

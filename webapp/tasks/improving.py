@@ -14,6 +14,8 @@ from webapp.session.search_request import GOAL_WORDS, SearchRequest
 from webapp.tasks.background import Newest
 from webapp.tasks.context import Context
 
+APART_M = 0.02
+"""Least distance between what two fins sweep."""
 GRID = 0.001, math.radians(1.0)
 """What is proposed is round: steps of places [m] and shafts [rad]."""
 
@@ -29,9 +31,6 @@ class Search:
     bounds: Mapping[str, Bounds]
     """Where each fin that may move may go."""
     room: Room
-    """Where fins may stand."""
-    symmetric: bool
-    """Whether mirror pairs stay pairs."""
     stop: threading.Event = field(default_factory=threading.Event)
     """Ends it after the present round."""
 
@@ -53,8 +52,8 @@ class Improver(Newest[Search, Improvement]):
         """
         if self.busy:
             raise FinlabError("a search is running already; cancel it first")
-        room, goal = Room(layout, request.apart_m), GOAL_WORDS[request.goal]
-        search = Search(layout, goal, request.bounds(layout), room, request.symmetric)
+        room, goal = Room(layout, APART_M), GOAL_WORDS[request.goal]
+        search = Search(layout, goal, request.bounds(layout), room)
         self.forget()
         self.ask(search)
 
@@ -76,7 +75,6 @@ class Improver(Newest[Search, Improvement]):
             tuple(search.bounds),
             search.bounds,
             search.goal,
-            None if search.symmetric else (),
             rule=search.room.broken,
             grid=GRID,
             progress=lambda progress: self._loop.post(partial(self._note, search, progress)),

@@ -40,7 +40,6 @@ class Moment(NamedTuple):
     """What the page shows of a robot."""
 
     time: float
-    """Simulated time [s]."""
     pose: Array
     """Position (3,) and quaternion w, x, y, z (7,)."""
     motion: Array
@@ -58,7 +57,6 @@ class Moment(NamedTuple):
     flow: Array
     """Velocity of the water where it is (3,), in the world [m/s]."""
     lost: tuple[str, ...]
-    """Fins that are lost."""
     failed: tuple[str, ...]
     """Those that the allocator takes for lost."""
     found: tuple[tuple[str, float], ...]
@@ -68,7 +66,6 @@ class Moment(NamedTuple):
     controllable: bool
     """Whether the working fins hold surge, heave and yaw."""
     done: bool
-    """Whether the task is over."""
     figures: Figures | None
     """What the swim has come to; None before the first step."""
     record: Array

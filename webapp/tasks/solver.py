@@ -28,9 +28,7 @@ class Reply:
     """An answer and what belongs to it."""
 
     state: State
-    """The question."""
     answer: Allocation
-    """The answer itself."""
     modes: Modes
     """Those of its modes that are known anyway: a few."""
     in_reach: bool

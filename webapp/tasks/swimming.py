@@ -27,7 +27,6 @@ class Stretch:
     n_steps: int
     """How many are due."""
     swimmer: Swimmer
-    """Who swims."""
 
 
 class Swimming:
