@@ -24,7 +24,7 @@ from finlab.allocation.methods import (
 )
 from finlab.allocation.modes import Mode, find_modes, force_sizes
 from finlab.allocation.notes import fin_notes
-from finlab.allocation.policy import CLOSEST, Policy, as_policy
+from finlab.allocation.policy import AXES, CLOSEST, Policy, as_policy
 from finlab.allocation.question import (
     Fins,
     check_flow,
@@ -295,7 +295,7 @@ class Allocator:
             unknown_fins=method.unknown_fins,
             later=Later(
                 ready.plant.at(water),
-                partial(self._notes, ready, water),
+                partial(self._notes, ready, water, target),
                 partial(_among_all, solution.candidates, fins),
                 partial(_among_all, solution.samples, fins),
                 solution.bound or _no_bound,
@@ -424,9 +424,11 @@ class Allocator:
         method = choice.kind(fins.healthy, choice.settings, self._scale, choice.weights)
         return Ready(fins, method, plant_of(fins.layout))
 
-    def _notes(self, ready: Ready, flow: Array | None) -> tuple[str, ...]:
+    def _notes(self, ready: Ready, flow: Array | None, target: Array | None = None) -> tuple[str, ...]:
         """Sentences that the user should read before trusting an answer."""
         method, notes = ready.method, fin_notes(ready.fins.healthy, flow)
+        if target is not None and (left := [axis for axis in method.undriven if target[AXES.index(axis)]]):
+            notes = (*notes, f"no actuator gives {' or '.join(left)}: what is asked of it is left out")
         if not method.unknown_fins or method.fin_model is None:
             return notes
         return (

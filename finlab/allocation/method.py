@@ -119,6 +119,11 @@ class Method(ABC):
         return other
 
     @property
+    def undriven(self) -> tuple[str, ...]:
+        """Names of the axes of a wrench that no actuator gives, as far as the method knows."""
+        return ()
+
+    @property
     def unknown_fins(self) -> tuple[str, ...]:
         """Names of the fins whose model the networks have not learned; answers for them are wrong."""
         known = self.fin_model

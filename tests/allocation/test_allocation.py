@@ -213,3 +213,9 @@ def test_without_its_force_table_no_method_answers(method: str, tmp_path: Path) 
     for answer in (allocator.allocate, lambda *asked, **how: allocator.allocate_batch(*asked, **how)):
         with pytest.raises(DataError, match=r"gone\.csv: no such file, expected a CSV table"):
             answer(tables, SURGE if answer == allocator.allocate else [SURGE], failed=["front_left"])
+
+
+def test_an_axis_that_nothing_drives_is_told_where_it_is_asked_for() -> None:
+    allocator = Allocator(load_layout("no_yaw"))
+    assert any("no actuator gives Tz" in note for note in allocator.allocate([1, 0, 0.5, 0, 0, 0.1]).notes)
+    assert not any("no actuator" in note for note in allocator.allocate([1, 0, 0.5, 0, 0, 0]).notes)

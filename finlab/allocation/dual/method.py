@@ -26,13 +26,13 @@ from finlab.allocation.dual.rates import Rates, implied_prices, within_tick
 from finlab.allocation.in_time import in_time
 from finlab.allocation.levenberg_marquardt import CommandProblem, refine
 from finlab.allocation.method import Method
-from finlab.allocation.policy import CLOSEST, Policy
+from finlab.allocation.policy import AXES, CLOSEST, Policy
 from finlab.allocation.settings import Settings, number
 from finlab.allocation.solution import Solution
 from finlab.arrays import Array
 from finlab.networks.trained import TrainedWeights
 from finlab.physics.wrench import wrench_of_forces
-from finlab.precision import FINE, NEARLY, ROUNDS
+from finlab.precision import FINE, NEARLY, NOTHING, ROUNDS
 
 EXACT = 1e-8
 """Error, on the robot's yardstick, up to which commands need no further step."""
@@ -168,6 +168,12 @@ class Dual(Method):
         if not np.isfinite(previous).all():
             return None
         return implied_prices(robot, self.plant.force(previous)[robot.order, 1:])
+
+    @property
+    def undriven(self) -> tuple[str, ...]:
+        """See `Method`."""
+        size = np.abs(self.compiled.robot.effectiveness).max(axis=0)
+        return tuple(axis for axis, most in zip(AXES, size, strict=True) if most <= NOTHING * size.max())
 
     def _bound(self, aim: Array, found: Forces) -> Array:
         """Power (N,) [W] that no answer for wrenches (N, 6) undercuts."""
