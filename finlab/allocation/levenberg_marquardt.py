@@ -6,7 +6,7 @@ error that the compiled fins' tables leave. The paper's method uses it with its 
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple, Protocol, Self
+from typing import NamedTuple, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,19 +20,6 @@ from finlab.small_systems import solve, step_within
 RIDGE = (1e-9, 1e-14)
 """Regularization of the 6 x 6 systems: absolute, and relative to their trace. Without the latter those of
 strong fins on long levers are singular to rounding."""
-
-
-class CommandLimits(NamedTuple):
-    """The limits of n fins in one floating-point type."""
-
-    lower: AnyArray
-    """(n, 3)."""
-    upper: AnyArray
-    """(n, 3)."""
-    seam: AnyArray
-    """Zero direction (n,) [rad], half a turn before the middle of the arc, from where angles are counted."""
-    turn: np.floating[Any]
-    """A whole turn [rad]."""
 
 
 class FinForces(Protocol):
@@ -81,45 +68,18 @@ class CommandProblem:
         low[self.full_turn, 2], high[self.full_turn, 2] = -np.inf, np.inf
         return low, high
 
-    @cached_property
-    def _limits(self) -> dict[str, CommandLimits]:
-        """The limits by the name of a type: double precision, and single precision."""
-        middle = 0.5 * (self.lower[:, 2] + self.upper[:, 2])
-        kinds: tuple[Any, ...] = (np.float64, np.float32)
-        return {
-            kind.__name__: CommandLimits(
-                self.lower.astype(kind),
-                self.upper.astype(kind),
-                middle.astype(kind) - kind(np.pi),
-                kind(2 * np.pi),
-            )
-            for kind in kinds
-        }
-
-    @cached_property
-    def effectiveness_float32(self) -> AnyArray:
-        """The columns (3n, 6) in single precision."""
-        return self.effectiveness.reshape(-1, 6).astype(np.float32)
-
     def wrench(self, command: AnyArray) -> AnyArray:
         """Normalized wrenches (R, 6) of commands (R, n, 3)."""
         effectiveness = self.effectiveness.reshape(-1, 6)
         return self.fin.force(command).reshape(len(command), len(effectiveness)) @ effectiveness
 
     def feasible(self, command: AnyArray) -> AnyArray:
-        """Commands (..., n, 3) inside the limits, zero directions wrapped first; the type is kept."""
-        return self.make_feasible(command.copy())
-
-    def make_feasible(self, command: AnyArray) -> AnyArray:
-        """`feasible` that overwrites its argument."""
-        limits = self._limits[command.dtype.name]
-        direction = command[..., 2]
-        direction -= limits.seam
-        np.mod(direction, limits.turn, out=direction)
-        direction += limits.seam
-        np.maximum(command, limits.lower, out=command)
-        np.minimum(command, limits.upper, out=command)
-        return command
+        """Commands (..., n, 3) inside the limits, zero directions wrapped first."""
+        seam = 0.5 * (self.lower[:, 2] + self.upper[:, 2]) - np.pi
+        within = command.copy()
+        within[..., 2] = np.mod(command[..., 2] - seam, 2.0 * np.pi) + seam
+        np.maximum(within, self.lower, out=within)
+        return np.minimum(within, self.upper, out=within)
 
 
 class Refined(NamedTuple):
@@ -156,7 +116,7 @@ def refine(
         there = _step(problem, at, jacobian, damping)
         there *= problem.width
         there += at.command
-        return _evaluated(problem, target, problem.make_feasible(there), at.jacobian if last else None)
+        return _evaluated(problem, target, problem.feasible(there), at.jacobian if last else None)
 
     # Where nothing better is found this is the answer: it must not lie outside by a turn or a rounding error.
     start = _evaluated(problem, target, problem.feasible(command), None if steps else _NO_GRADIENT)

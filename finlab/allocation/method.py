@@ -7,10 +7,8 @@ from functools import cached_property
 from typing import ClassVar, Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
-from finlab.allocation.evaluate import REACHED
-from finlab.allocation.policy import Policy, largest_share
+from finlab.allocation.policy import Policy
 from finlab.allocation.settings import Settings
 from finlab.allocation.solution import Candidates, Solution
 from finlab.arrays import Array
@@ -33,7 +31,7 @@ class Method(ABC):
     policy_under_way: ClassVar[str] = "closest"
     """What a control loop asks for by default where a wrench is out of reach."""
     every_policy: ClassVar[bool] = True
-    """Whether axis weights and priorities are known."""
+    """Whether more than the least plain error may be asked for."""
     takes: ClassVar[Takes] = "any actuator"
     """What the robot may have."""
     fin_model: FinModelSpec | None = None
@@ -98,10 +96,10 @@ class Method(ABC):
 
     def check_policy(self, policy: Policy) -> None:
         """Raise an `AllocationError` at a policy that the method does not know."""
-        if not (self.every_policy or policy.is_plain or policy.kind == "direction"):
+        if not (self.every_policy or policy.is_plain):
             raise AllocationError(
-                f"policy: method {self.name!r} minimizes the plain error and knows neither axis weights nor "
-                "priorities; use method 'dual', or policy 'closest' or 'direction'"
+                f"policy: method {self.name!r} minimizes the plain error and knows nothing else; use method "
+                "'dual', or policy 'closest' without axis weights"
             )
 
     def at(self, flow: Array | None) -> Self:
@@ -137,7 +135,7 @@ class Method(ABC):
 
 
 class LeastErrorMethod(Method):
-    """A method that keeps the plain error least; `direction` is found by asking for smaller shares."""
+    """A method that keeps the plain error least, whatever else is asked for."""
 
     every_policy = False
     takes: ClassVar[Takes] = "fins"
@@ -160,32 +158,4 @@ class LeastErrorMethod(Method):
             return Solution(np.empty((0, self.layout.n, 3)))
         if (moved := self.at(flow)) is not self:
             return moved.solve(targets, policy=policy, previous=previous, seed=seed)
-        solution = self._solve(targets, seed=seed, previous=previous)
-        if policy.is_plain:
-            return solution
-        missed = np.flatnonzero(~self._reaches(solution, targets))
-        if len(targets) == 1:
-            return self._largest(targets, seed, previous) if len(missed) else solution
-        command, wrench = solution.command.copy(), solution.wrench
-        wrench = None if wrench is None else wrench.copy()
-        for row in missed:
-            answer = self._largest(targets[row : row + 1], seed, None)
-            command[row] = answer.command[0]
-            if wrench is not None and answer.wrench is not None:
-                wrench[row] = answer.wrench[0]
-        return Solution(command, wrench=wrench)
-
-    def _largest(self, target: Array, seed: int, previous: Array | None) -> Solution:
-        """The largest share of a target (1, 6) that is delivered whole."""
-
-        def reached(shares: Array) -> NDArray[np.bool_]:
-            targets = shares[:, None] * target
-            return self._reaches(self._solve(targets, seed=seed, previous=None), targets)
-
-        return self._solve(largest_share(reached) * target, seed=seed, previous=previous)
-
-    def _reaches(self, solution: Solution, targets: Array) -> NDArray[np.bool_]:
-        """Which of the targets (N, 6) are met, by the method's own model, or the plant where it has none."""
-        wrench = self.plant.wrench(solution.command) if solution.wrench is None else solution.wrench
-        error: Array = np.linalg.norm((wrench - targets) / self.scale, axis=-1)
-        return error <= REACHED
+        return self._solve(targets, seed=seed, previous=previous)

@@ -1,6 +1,6 @@
 """What to do when a robot cannot deliver the wrench it is asked for."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -73,27 +73,6 @@ CLOSEST = Policy()
 def as_policy(policy: Policy | str) -> Policy:
     """A policy from its name."""
     return policy if isinstance(policy, Policy) else Policy(policy)
-
-
-def largest_share(reached: Callable[[Array], NDArray[np.bool_]], rounds: int = 3, width: int = 16) -> float:
-    """The largest share s in [0, 1] of a wrench that is reached.
-
-    `reached` answers for many shares at once; each round narrows the interval `width`-fold. What a
-    share reaches, smaller ones are taken to reach as well: exactly so where the fins' forces form
-    convex sets around zero.
-    """
-    low, high = 0.0, 1.0
-    for _ in range(rounds):
-        shares = np.linspace(low, high, width + 1)[1:]
-        good = np.flatnonzero(reached(shares))
-        if len(good) == 0:
-            high = float(shares[0])
-            continue
-        best = int(good[-1])
-        if best == width - 1:
-            return float(shares[-1])
-        low, high = float(shares[best]), float(shares[best + 1])
-    return low
 
 
 def describe_binding(

@@ -10,7 +10,7 @@ the present forces from above,
 through its six multipliers l: y = shift + M B_i^T l with M = H^-1. Along a force, H is the curvature of the
 quadratic about the origin that touches the effort, or the effort's own where it is convex; across the force
 it is (dc/dT) / T. A fin that is asked for more than it can has all its mobility cut in proportion, again and
-again until it holds; one at a stop of its arc does not turn.
+again until it holds.
 
 Planar forces are complex numbers (see `effort_fins`). A symmetric 2 x 2 matrix M maps p to a p + b conj(p),
 with a real.
@@ -70,20 +70,6 @@ def effort_problem(
     )
 
 
-class _Response(NamedTuple):
-    """How R rows of n fins answer a pull p: with shift + a p + b conj(p).
-
-    A fin at a stop does not turn, whatever is pulled; whether it leaves the stop is seen from how it would
-    answer if there were none.
-    """
-
-    shift: AnyArray
-    a: Array
-    b: AnyArray
-    free: "tuple[AnyArray, Array, AnyArray]"
-    """The three as if fins had no stops."""
-
-
 def descend(problem: EffortProblem, target: Array, force: AnyArray, steps: int) -> Projected:
     """Follow R forces (R, n) to cheap ones that give normalized targets (R, 6), in `steps` problems."""
     fins = problem.fins
@@ -91,13 +77,12 @@ def descend(problem: EffortProblem, target: Array, force: AnyArray, steps: int) 
     cut = np.ones(force.shape)
     before = found.force
     for step in range(steps):
-        response = _respond(problem, found, cut)
-        missing = target - wrench(problem, response.shift)
-        matrix = np.concatenate([response.a, response.b.real, response.b.imag], axis=1) @ problem.products
+        shift, a, b = _respond(problem, found, cut)
+        missing = target - wrench(problem, shift)
+        matrix = np.concatenate([a, b.real, b.imag], axis=1) @ problem.products
         matrix[:, ::7] += LEAST  # the diagonal
         multiplier = solve(matrix.reshape(-1, 6, 6), missing[..., None])[..., 0]
         pull = (multiplier @ problem.effectiveness.T).view(complex)
-        shift, a, b = response.free
         answer = shift + a * pull + b * pull.conj()
         if step >= HALF_STEPS:
             answer = 0.5 * (answer + before)
@@ -121,12 +106,12 @@ def realize(problem: EffortProblem, found: Projected) -> tuple[Array, Array]:
     return command, effort.sum(-1)
 
 
-def _respond(problem: EffortProblem, found: Projected, cut: Array) -> _Response:
-    """The response of the quadratics that touch the efforts at the present forces, all of it `cut`."""
+def _respond(problem: EffortProblem, found: Projected, cut: Array) -> tuple[AnyArray, Array, AnyArray]:
+    """How fins answer a pull p, all of it `cut`: shift + a p + b conj(p), three arrays (R, n), by the
+    quadratics that touch the efforts at the present forces."""
     row, direction = problem.fins.lookup(found.size / found.gauge), found.direction
     # The same command gives less in weaker directions, so a newton more costs more there.
-    across = np.exp(row[..., MOBILITY]) * found.gauge**2
-    across *= cut
+    across = np.exp(row[..., MOBILITY]) * found.gauge**2 * cut
     softness = 1.0 / row[..., STIFFNESS]
     along = across * softness
     turn = wrapped(direction - problem.fins.deflection(direction))
@@ -134,16 +119,7 @@ def _respond(problem: EffortProblem, found: Projected, cut: Array) -> _Response:
     # Turning towards where that costs nothing: the weaker the force, the less of it does.
     pull = 2.0 * problem.direction_cost * across / size
     held = 1.0 / (1.0 + pull / size)
-    drift = pull * turn * held
     across = across * held
     unit = found.unit
-    kept = (found.size * (1.0 - softness)) * cut * unit
-    drifting = kept - 1j * drift * unit
-    squared = unit * unit
-    a, b = 0.5 * (along + across), 0.5 * (along - across) * squared
-    free = drifting, a, b
-    if found.stopped is None:
-        return _Response(drifting, a, b, free)
-    across = np.where(found.stopped, 0.0, across)
-    shift = np.where(found.stopped, kept, drifting)
-    return _Response(shift, 0.5 * (along + across), 0.5 * (along - across) * squared, free)
+    shift = (found.size * (1.0 - softness) * cut - 1j * pull * turn * held) * unit
+    return shift, 0.5 * (along + across), 0.5 * (along - across) * unit * unit

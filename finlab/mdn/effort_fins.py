@@ -57,8 +57,6 @@ class Projected(NamedTuple):
     """The size (R, n) [N] that is given in that direction where limits of size do not hold."""
     gauge: Array
     """Share of the table's force in that direction (R, n), or (n,) ones where all fins are even."""
-    stopped: NDArray[np.bool_] | None
-    """Where a stop keeps the fin from pointing along the given force (R, n); None where no fin has stops."""
 
     @property
     def force(self) -> AnyArray:
@@ -168,18 +166,17 @@ class EffortFins:
 
     def project(self, force: AnyArray) -> Projected:
         """What the fins can do nearest to forces (R, n), complex."""
-        wanted, stopped = np.abs(force) + LEAST, None
+        wanted = np.abs(force) + LEAST
         unit = force / wanted
         if not self.turns_fully:
             offset = np.angle(unit * np.exp(-1j * self.middle))
             held = np.clip(offset, -self.half, self.half)
             excess = np.abs(offset - held)
-            stopped = excess > 0.0
             wanted = np.where(excess < 0.5 * np.pi, wanted * np.cos(excess), 0.0)
             unit = np.exp(1j * (self.middle + held))
         gauge = np.ones(len(self.half)) if self.gauge is None else self.gauges(np.angle(unit))
         size = np.minimum(np.maximum(wanted, self.smallest * gauge), self.largest * gauge)
-        return Projected(unit, size, wanted, gauge, stopped)
+        return Projected(unit, size, wanted, gauge)
 
 
 @lru_cache(maxsize=512)

@@ -189,7 +189,7 @@ class Paper(LeastErrorMethod):
     ) -> tuple[AnyArray, AnyArray]:
         """J (R,) of commands (R, n, 3), and its derivatives (R, n, 3) by them."""
         rows = len(command)
-        effectiveness = robot.problem.effectiveness_float32
+        effectiveness = robot.problem.effectiveness.reshape(-1, 6).astype(np.float32)
         force, pull = robot.surrogate.force_and_pullback(command)
         error = force.reshape(rows, -1) @ effectiveness - target
         gamma = np.float32(self.settings.gamma)

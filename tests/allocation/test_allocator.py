@@ -221,21 +221,6 @@ def test_the_time_is_that_of_the_solver_shared_by_its_targets(
     assert method.allocate_batch(ROBOT, np.empty((0, 6))).solve_ms.tolist() == []
 
 
-def test_rows_out_of_reach_get_the_policys_answer_the_others_keep_theirs(method: AnyRobot) -> None:
-    """The method claims half of each target: with that, only a target of nothing is met."""
-    targets = np.array([SURGE, [0.0] * 6, [0.0, 3.0, 0.0, 0.0, 0.0, 0.0]])
-    batch = method.allocate_batch(ROBOT, targets, policy="direction")
-    plain = method.allocate_batch(ROBOT, targets)
-    assert batch.wrench_expected is not None and plain.wrench_expected is not None
-    np.testing.assert_array_equal(batch.command[1], plain.command[1])
-    for row in (0, 2):
-        alone = method.allocate(ROBOT, targets[row], policy="direction")
-        assert alone.wrench_expected is not None
-        np.testing.assert_array_equal(batch.command[row], alone.command)
-        np.testing.assert_array_equal(batch.wrench_expected[row], alone.wrench_expected)
-        assert np.abs(batch.wrench_expected[row]).max() < np.abs(plain.wrench_expected[row]).max()
-
-
 def test_a_changed_answer_is_noticed(method: AnyRobot) -> None:
     """Alternatives belong to an answer: up to a millionth it may differ, as between machines."""
     answer = method.allocate(ROBOT, SURGE, failed=["left"])

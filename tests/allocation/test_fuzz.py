@@ -73,7 +73,7 @@ def ask(seed: int) -> None:
     rng = np.random.default_rng([2026, seed])
     name = pick(rng, METHODS)
     robot, allocator, how = hostile_robot(seed, 2026), method(name), policy(rng)
-    if name not in ("dual", "mdn") and not how.is_plain and how.kind != "direction":
+    if name not in ("dual", "mdn") and not how.is_plain:
         how = Policy()
     plant, asked = plant_of(robot), question(rng, robot)
     reached = plant.wrench(plant.sample(rng, (1,)))[0]

@@ -4,14 +4,13 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from finlab.allocation import METHODS, Allocation, Allocator
+from finlab.allocation import METHODS, Allocation
 from finlab.allocation.policy import (
     AXES,
     CLOSEST,
     Policy,
     as_policy,
     describe_binding,
-    largest_share,
     policy_from,
 )
 from finlab.assets import shipped_layouts
@@ -197,17 +196,15 @@ def test_methods_without_weights_say_so() -> None:
         if name in ("dual", "mdn", "paper") or name in PATIENT:
             continue
         method = AnyRobot(name)
-        for policy in (Policy("priority"), Policy(axis_weights=(2.0, 1.0, 1.0, 1.0, 1.0, 1.0))):
+        for policy in (
+            Policy("priority"),
+            Policy("direction"),
+            Policy(axis_weights=(2.0, 1.0, 1.0, 1.0, 1.0, 1.0)),
+        ):
             with pytest.raises(AllocationError, match=f"method '{name}' minimizes the plain error") as caught:
                 method.allocate(layout, FAR, policy=policy)
             assert "use method 'dual'" in str(caught.value) and "\n" not in str(caught.value)
         assert np.isfinite(method.allocate(layout, FAR, policy=CLOSEST).command).all()
-
-
-def test_direction_is_known_to_every_method() -> None:
-    layout = shipped("A")
-    result = Allocator(layout, "analytic").allocate(HEAVY, policy="direction")
-    assert cosine(result) > 0.999 and 0.5 < result.share < 0.8
 
 
 @pytest.mark.parametrize(
@@ -243,12 +240,6 @@ def test_policies_from_words() -> None:
 def test_groups_end_with_the_axes_that_are_not_named() -> None:
     groups = Policy("priority", order=(("Fz",), ("Tx", "Ty"))).groups
     assert [tuple(np.array(AXES)[group]) for group in groups] == [("Fz",), ("Tx", "Ty"), ("Fx", "Fy", "Tz")]
-
-
-@pytest.mark.parametrize("share", [0.0, 1e-4, 0.0625, 0.123, 0.5, 0.999, 1.0])
-def test_the_largest_share_is_found(share: float) -> None:
-    found = largest_share(lambda shares: shares <= share)
-    assert found <= share < found + 1e-3
 
 
 @pytest.mark.parametrize(

@@ -53,4 +53,3 @@ def test_what_a_fin_cannot_give_becomes_the_nearest_that_it_can() -> None:
     np.testing.assert_allclose(found.force[0], fins.maximum * np.exp(0.4j))
     np.testing.assert_allclose(found.force[1], np.cos(0.6) * np.exp(1.4j))
     np.testing.assert_allclose(found.size[2:], fins.smallest[[0, 0], None])
-    assert found.stopped is not None and found.stopped[:, 0].tolist() == [False, True, False, True]
