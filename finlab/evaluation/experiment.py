@@ -19,7 +19,7 @@ from finlab.evaluation.report.document import Block, Column, Figure, Row, Table
 
 EXPERIMENTS = (
     *("wrench", "cost", "latency", "ablation", "temperature", "proposals"),
-    *("trajectory", "faults", "velocity", "swims", "monitor", "fit", "robots"),
+    *("trajectory", "faults", "velocity", "swims", "monitor"),
 )
 """Names, which are those of their modules in `finlab.evaluation.experiments`, in the order of the report."""
 MOST, MOST_SEED = 1_000_000, 2**63 - 1
@@ -61,8 +61,6 @@ class Experiment:
     """Of the picture."""
     printed: Callable[[Sequence[Row]], list[Row]] | None = None
     """Figures that the paper prints beside our rows, as rows that stand below them."""
-    less_is_better: tuple[str, ...] = ()
-    """Keys by which methods are compared, row by row: those that differ in `method` alone."""
 
     def options(self) -> dict[str, inspect.Parameter]:
         """The parameters of `run`, with their types resolved."""

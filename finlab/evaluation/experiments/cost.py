@@ -171,5 +171,4 @@ experiment = Experiment(
     needs=("casadi",),
     draw=_draw,
     caption="Power over that of the best start, with the interval of another seed; below 1 is cheaper.",
-    less_is_better=("cost_ratio",),
 )

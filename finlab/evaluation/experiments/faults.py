@@ -129,5 +129,4 @@ experiment = Experiment(
     "runs took place in a pool.",
     quick={"runs": 1, "methods": ("dual",)},
     printed=_printed,
-    less_is_better=("ate", "driving_w"),
 )

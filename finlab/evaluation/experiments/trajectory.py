@@ -83,5 +83,4 @@ experiment = Experiment(
     quick={"layouts": ("A", "C"), "methods": ("dual",), "runs": 1},
     full={"runs": 2},
     printed=_printed,
-    less_is_better=("ate", "driving_w"),
 )

@@ -90,5 +90,4 @@ experiment = Experiment(
     "alpha omega, of its magnitudes. The paper's runs took place in a pool.",
     quick={"runs": 1},
     printed=_printed,
-    less_is_better=("mae_settled", "driving_w"),
 )

@@ -154,5 +154,4 @@ experiment = Experiment(
     draw=_draw,
     caption="Mean normalized error with the interval of another seed; below 1e-8 it is rounding.",
     printed=_printed,
-    less_is_better=("err_norm_mean",),
 )

@@ -8,11 +8,10 @@ from typing import Any, Literal
 
 from finlab.errors import DataError
 from finlab.evaluation.experiment import EXPERIMENTS, Experiment, load_experiment
-from finlab.evaluation.report.document import Block, Document, Figure, Row, Table
+from finlab.evaluation.report.document import Block, Document, Figure, Row
 from finlab.evaluation.report.jobs import THREADS, Part, run_parts
 from finlab.evaluation.report.pages import to_html, to_markdown
 from finlab.evaluation.report.provenance import machine, source_commit, source_digest
-from finlab.evaluation.report.standings import COLUMNS, LEVEL, standings
 from finlab.whole_file import write_whole
 
 PAGE, TWIN, TABLES, PICTURES = "index.html", "report.md", "tables.json", "pictures"
@@ -27,10 +26,6 @@ ABOUT = (
     "well a model fits a fin in the water. No robot swam and no fin was measured for this report: fin laws "
     "are means over a cycle in still water, bodies, water and sensors are simulated. Methods and "
     f"controllers were developed on other seeds than {SEED}."
-)
-LEADS = (
-    "Method `dual` against the others: a method leads where its interval and the other's lie apart by more "
-    f"than {LEVEL:g}, which is the solvers' rounding."
 )
 Size = Literal["quick", "full"]
 
@@ -88,11 +83,9 @@ def plan_of(experiment: Experiment, size: Size, seed: int, digest: str) -> list[
 def make_document(rows: dict[str, list[Row]], how_made: Sequence[str], size: Size) -> Document:
     """The page, from the rows of each experiment."""
     blocks: list[Block] = [ABOUT]
-    experiments = [load_experiment(name) for name in rows]
-    if compared := [row for each in experiments for row in standings(each, rows[each.name])]:
-        blocks += ["## Who leads", LEADS, Table(COLUMNS, compared)]
-    for experiment in experiments:
-        blocks += [*experiment.words(), *experiment.results(rows[experiment.name])]
+    for name, found in rows.items():
+        experiment = load_experiment(name)
+        blocks += [*experiment.words(), *experiment.results(found)]
     blocks += ["## How this was made", "\n".join(f"- {line}" for line in how_made)]
     note = "" if size == "full" else " A quick look on few cases: intervals are wide."
     return Document(

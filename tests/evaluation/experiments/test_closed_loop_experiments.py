@@ -89,9 +89,6 @@ def test_on_board_is_exact_within_its_limits_and_scales_beyond(layout_a: Layout,
         (["swims", "--seeds", "0"], "seeds: expected a number of at least 1"),
         (["swims", "--scenarios", "nominal,gale"], "expected some of nominal, damping-half"),
         (["monitor", "--whole", "-1"], "whole: expected a number of at least 0"),
-        (["robots", "--plants", "offset,mars"], "got 'mars'"),
-        (["fit", "--samples", "19"], "samples: expected at least 20, got 19"),
-        (["fit", "--noise", "1.5"], "noise: expected a share from 0 to 1, got 1.5"),
     ],
 )
 def test_bad_input_is_one_sentence(argv: list[str], message: str, capsys: pytest.CaptureFixture[str]) -> None:

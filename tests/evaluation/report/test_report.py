@@ -18,11 +18,9 @@ import pytest
 
 from finlab.cli import main
 from finlab.errors import DataError
-from finlab.evaluation.experiment import Row
 from finlab.evaluation.report import jobs, make
 from finlab.evaluation.report.jobs import Part, run_parts
 from finlab.evaluation.report.make import PAGE, PICTURES, TABLES, TWIN, make_report
-from finlab.evaluation.report.standings import standings
 
 pytest.importorskip("matplotlib")
 pytest.importorskip("casadi")
@@ -69,7 +67,7 @@ def test_page_markdown_pictures_and_rows_say_the_same(folder: Path) -> None:
     page, twin = (folder / PAGE).read_text("utf-8"), (folder / TWIN).read_text("utf-8")
     tables = json.loads((folder / TABLES).read_text("utf-8"))
     assert list(tables) == list(TINY)
-    for words in ("Who leads", "How far off are the wrenches", "0.086", "seed 3"):
+    for words in ("How far off are the wrenches", "0.086", "seed 3"):
         assert words in page and words in twin
     names = {path.name for path in (folder / PICTURES).iterdir()}
     assert names == {"wrench.svg", "cost.svg", "temperature.svg"}
@@ -161,19 +159,6 @@ def test_a_full_disk_is_a_sentence_with_the_path(tiny: None, tmp_path: Path) -> 
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
     files = [path for path in tmp_path.rglob("*") if path.is_file()]
     assert len(files) == 2 and all(json.loads(path.read_text())["rows"] for path in files)
-
-
-def test_a_lead_needs_intervals_that_lie_apart() -> None:
-    from finlab.evaluation.experiment import load_experiment
-
-    def row(split: str, method: str, low: float, high: float) -> Row:
-        return {"split": split, "method": method, "err_norm_mean_interval": [low, high]}
-
-    rows = [row("id", "dual", 1.0, 2.0), row("id", "qp", 3.0, 4.0), row("id", "paper", 1.5, 9.0)]
-    rows += [row("ood", "dual", 5.0, 6.0), row("ood", "qp", 3.0, 4.0), row("limits", "qp", 0.0, 1.0)]
-    qp, paper = standings(load_experiment("wrench"), rows)
-    assert (qp["against"], qp["cases"], qp["leads"], qp["level"], qp["trails"]) == ("qp", 2, 1, 0, 1)
-    assert (paper["cases"], paper["leads"], paper["level"], paper["trails"]) == (1, 0, 1, 0)
 
 
 @pytest.mark.parametrize(
