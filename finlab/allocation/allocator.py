@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import islice
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self, Unpack, overload
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -47,11 +47,6 @@ from finlab.networks.trained import TrainedWeights
 from finlab.physics.known_plants import plant_of
 from finlab.physics.plant import Plant
 
-if TYPE_CHECKING:
-    from finlab.allocation.dual.method import DualOptions
-    from finlab.allocation.mdn_settings import MdnOptions
-    from finlab.paper.settings import PaperOptions
-
 SAME_COMMAND = 1e-6
 """Two commands [rad, Hz, rad] that differ by less are one answer, given on two machines."""
 MOST_PREPARED = 32
@@ -77,37 +72,6 @@ class Allocator:
     so no method can use one. Force tables are read once. An allocator can be copied and pickled.
     """
 
-    @overload
-    def __init__(
-        self, layout: Layout, method: Literal["dual"] = "dual", **settings: Unpack[DualOptions]
-    ) -> None: ...
-    @overload
-    def __init__(
-        self,
-        layout: Layout,
-        method: Literal["mdn"],
-        *,
-        checkpoint: Checkpoint = None,
-        **settings: Unpack[MdnOptions],
-    ) -> None: ...
-    @overload
-    def __init__(
-        self,
-        layout: Layout,
-        method: Literal["paper"],
-        *,
-        checkpoint: Checkpoint = None,
-        **settings: Unpack[PaperOptions],
-    ) -> None: ...
-    @overload
-    def __init__(
-        self,
-        layout: Layout,
-        method: str | type[Method] = "dual",
-        *,
-        checkpoint: Checkpoint = None,
-        **settings: Any,
-    ) -> None: ...
     def __init__(
         self,
         layout: Layout,
@@ -277,29 +241,12 @@ class Allocator:
         solution = method.solve(target[None], policy=policy, previous=before, flow=water, seed=seed)
         solve_ms = (time.perf_counter() - start) * 1e3
         return Allocation(
-            layout=fins.layout,
-            failed=fins.failed,
-            health=health,
-            target=target,
+            **self._about(target, ready, solution, policy, health, water, seed),
             command=fins.among_all(solution.command)[0].copy(),
-            scale=self._scale,
-            method=self.method,
             solve_ms=solve_ms,
-            checkpoint=self.checkpoint,
             settings=vars(self.settings).copy(),
-            policy=policy,
-            flow=water,
-            seed=int(seed),
             previous=None if before is None else fins.among_all(before),
             wrench_expected=None if solution.wrench is None else solution.wrench[0],
-            unknown_fins=method.unknown_fins,
-            later=Later(
-                ready.plant.at(water),
-                partial(self._notes, ready, water, target),
-                partial(_among_all, solution.candidates, fins),
-                partial(_among_all, solution.samples, fins),
-                solution.bound or _no_bound,
-            ),
         )
 
     def explore(self, result: Allocation) -> tuple[Mode, ...]:
@@ -375,24 +322,45 @@ class Allocator:
         solution = _joined(parts, len(targets), fins)
         elapsed_ms = (time.perf_counter() - start) * 1e3
         return BatchAllocation(
-            layout=fins.layout,
-            failed=fins.failed,
-            health=health,
-            target=targets,
+            **self._about(targets, ready, solution, policy, health, water, seed),
             command=solution.command,
-            scale=self._scale,
-            method=self.method,
             solve_ms=np.broadcast_to(elapsed_ms / max(len(targets), 1), len(targets)),
-            checkpoint=self.checkpoint,
-            policy=policy,
-            flow=water,
-            seed=int(seed),
             wrench_expected=solution.wrench,
-            unknown_fins=method.unknown_fins,
-            later=Later(
-                ready.plant.at(water), partial(self._notes, ready, water), bound=solution.bound or _no_bound
-            ),
         )
+
+    def _about(
+        self,
+        target: Array,
+        ready: Ready,
+        solution: Solution,
+        policy: Policy,
+        health: Health | None,
+        flow: Array | None,
+        seed: int,
+    ) -> dict[str, Any]:
+        """What answers to one target and to many tell of the question and the robot."""
+        fins = ready.fins
+        later = Later(
+            ready.plant.at(flow),
+            partial(self._notes, ready, flow, target),
+            partial(_among_all, solution.candidates, fins),
+            partial(_among_all, solution.samples, fins),
+            solution.bound or _no_bound,
+        )
+        return {
+            "target": target,
+            "layout": fins.layout,
+            "failed": fins.failed,
+            "health": health,
+            "scale": self._scale,
+            "method": self.method,
+            "checkpoint": self.checkpoint,
+            "policy": policy,
+            "flow": flow,
+            "seed": int(seed),
+            "unknown_fins": ready.method.unknown_fins,
+            "later": later,
+        }
 
     def allocate_stream(self, wrenches: Iterable[ArrayLike], **question: Any) -> Iterator[BatchAllocation]:
         """Commands for any number of targets, a few thousand at a time.
@@ -424,10 +392,10 @@ class Allocator:
         method = choice.kind(fins.healthy, choice.settings, self._scale, choice.weights)
         return Ready(fins, method, plant_of(fins.layout))
 
-    def _notes(self, ready: Ready, flow: Array | None, target: Array | None = None) -> tuple[str, ...]:
+    def _notes(self, ready: Ready, flow: Array | None, target: Array) -> tuple[str, ...]:
         """Sentences that the user should read before trusting an answer."""
         method, notes = ready.method, fin_notes(ready.fins.healthy, flow)
-        if target is not None and (left := [axis for axis in method.undriven if target[AXES.index(axis)]]):
+        if left := [axis for axis in method.undriven if target[..., AXES.index(axis)].any()]:
             notes = (*notes, f"no actuator gives {' or '.join(left)}: what is asked of it is left out")
         if not method.unknown_fins or method.fin_model is None:
             return notes

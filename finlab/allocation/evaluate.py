@@ -31,23 +31,13 @@ def judged_power(plant: Plant, command: Array) -> Array:
 def judged_effort(layout: Layout, command: Array) -> Array:
     """Effort `J_en` (N,) of commands (N, n, 3), the paper's energy proxy, without what has failed (NaN)."""
     failed = np.isnan(command).any(axis=-1, keepdims=True)
-    return effort_of(layout, np.where(failed, 0.0, command) if failed.any() else command)
+    effort: Array = _meter(layout)(np.where(failed, 0.0, command) if failed.any() else command)
+    return effort
 
 
 def costs(layout: Layout, command: Array) -> tuple[Array, Array]:
     """Effort (K,) and power (K,) [W] of commands (K, n, 3) of fins that all work."""
-    return effort_of(layout, command), power_of(layout, command)
-
-
-def effort_of(layout: Layout, command: Array) -> Array:
-    """Effort (K,) of commands (K, n, 3) of fins that all work."""
-    return _meter(layout)(command)
-
-
-def power_of(layout: Layout, command: Array) -> Array:
-    """Mean mechanical power (K,) [W] of commands (K, n, 3) of fins that all work."""
-    power: Array = plant_of(layout).power(command).sum(-1)
-    return power
+    return _meter(layout)(command), judged_power(plant_of(layout), command)
 
 
 @lru_cache(maxsize=256)

@@ -1,7 +1,6 @@
-"""What can be set of method `mdn`, and the same names for editors and type checkers."""
+"""What can be set of method `mdn`."""
 
 from dataclasses import dataclass
-from typing import TypedDict
 
 from finlab.allocation.settings import MOST_CANDIDATES, Settings, choice, number
 from finlab.physics.effort import DEFAULT_WEIGHTS, EffortWeights
@@ -28,14 +27,3 @@ class MdnSettings(Settings):
     def aim(self) -> Objective:
         """What is kept least."""
         return Objective("effort", self.effort_weights)
-
-
-class MdnOptions(TypedDict, total=False):
-    """Settings of the method `mdn`."""
-
-    n_candidates: int
-    n_refined: int
-    temperature: float
-    starts: str
-    period_s: float
-    effort_weights: EffortWeights

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass
 from importlib import import_module
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -27,8 +27,7 @@ METHODS: dict[str, tuple[str, str]] = {
     "analytic": ("finlab.allocation.baselines.analytic", "Analytic"),
     "ipopt": ("finlab.allocation.baselines.ipopt", "Ipopt"),
 }
-"""Name -> module and class; modules are loaded only when their method is asked for. The one list of methods:
-tests hold `MethodName` and the command line's words against it."""
+"""Name -> module and class; modules are loaded only when their method is asked for."""
 GONE = {
     **dict.fromkeys(("search", "learned"), "is now called 'dual'"),
     "fast": "has gone; 'dual' is exact on any fin and needs no network",
@@ -37,8 +36,6 @@ GONE = {
 """Earlier names -> what to say to those who ask for them."""
 LEARNED = {"mdn": "default", "paper": "paper"}
 """Methods that need a trained network -> the shipped checkpoint that holds it."""
-MethodName = Literal["dual", "mdn", "paper", "qp", "sqp", "analytic", "ipopt"]
-"""The names again, for type checkers and editors."""
 Checkpoint = str | os.PathLike[str] | TrainedWeights | None
 """A checkpoint folder, a bundle, the name of a shipped checkpoint, or the contents of one."""
 

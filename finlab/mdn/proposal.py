@@ -1,7 +1,6 @@
 """What the network of method `mdn` proposes: K ways to share a target among the fins, as planar forces."""
 
 import math
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -63,21 +62,11 @@ def _drawn(
     first = mean[place, component]
     if count <= m:
         return component, first
-    uniform, normal = _draws(seed, rows, count - m, n)
+    rng, more = np.random.default_rng(seed), count - m
+    uniform = rng.random((rows, more, 1), dtype=np.float32)
+    parts = rng.standard_normal((rows, more, n, 2), dtype=np.float32)
     cumulative = weight.cumsum(1)
-    more = (uniform * cumulative[:, None, -1:] > cumulative[:, None, :-1]).sum(-1)
-    drawn = mean[place, more] + math.sqrt(temperature) * std[place, more] * normal
-    return np.concatenate([component, more], axis=1), np.concatenate([first, drawn], axis=1)
-
-
-@lru_cache(maxsize=16)
-def _draws(seed: int, rows: int, count: int, n: int) -> tuple[AnyArray, AnyArray]:
-    """Uniform (rows, count, 1) and complex normal (rows, count, n) random numbers of a seed, kept: a control
-    loop uses one seed for every tick."""
-    rng = np.random.default_rng(seed)
-    uniform = rng.random((rows, count, 1), dtype=np.float32)
-    parts = rng.standard_normal((rows, count, n, 2), dtype=np.float32)
-    normal = parts[..., 0] + 1j * parts[..., 1]
-    for array in (uniform, normal):
-        array.setflags(write=False)
-    return uniform, normal
+    others = (uniform * cumulative[:, None, -1:] > cumulative[:, None, :-1]).sum(-1)
+    spread = math.sqrt(temperature) * std[place, others]
+    drawn = mean[place, others] + spread * (parts[..., 0] + 1j * parts[..., 1])
+    return np.concatenate([component, others], axis=1), np.concatenate([first, drawn], axis=1)

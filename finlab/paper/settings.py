@@ -1,10 +1,6 @@
-"""What can be set of method `paper`, and the same names for editors and type checkers.
-
-A test holds the typed options against the settings.
-"""
+"""What can be set of method `paper`."""
 
 from dataclasses import dataclass
-from typing import TypedDict
 
 from finlab.allocation.settings import MOST_CANDIDATES, Settings, choice, number, switch
 
@@ -30,17 +26,3 @@ class PaperSettings(Settings):
     warm_start: str = choice("mdn", ("mdn", "random"), "where candidates come from; random is an ablation")
     ranking: str = choice("physics", ("physics", "nll"), "by J, or by likelihood, which is an ablation")
     mean_only: bool = switch(False, "take the mixture's mean and nothing else, which is an ablation")
-
-
-class PaperOptions(TypedDict, total=False):
-    """Settings of the method `paper`."""
-
-    n_candidates: int
-    temperature: float
-    gamma: float
-    n_refined: int
-    refinement: str
-    n_steps: int
-    warm_start: str
-    ranking: str
-    mean_only: bool

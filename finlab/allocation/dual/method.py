@@ -10,7 +10,7 @@ from collections.abc import Callable
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import Any, NamedTuple, Self, TypedDict
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,13 +52,6 @@ class DualSettings(Settings):
         0.0, 0.0, 1e6, "heat in a fin motor's windings that counts beside the mechanical power", "W/(N m)^2"
     )
     period_s: float = number(0.1, 0.0, 1000.0, "time between ticks", "s", above=True)
-
-
-class DualOptions(TypedDict, total=False):
-    """`DualSettings` for editors and type checkers."""
-
-    copper_loss: float
-    period_s: float
 
 
 class Forces(NamedTuple):
