@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from tyro.conf import Positional, arg
 from tyro.extras import SubcommandApp
 
-from finlab.cli.json_file import STDOUT, JsonFile, check_json_file, put_json
+from finlab.cli.json_file import JsonFile, check_json_file, put_json
 from finlab.errors import DataError
 
 if TYPE_CHECKING:
     from finlab.evaluation.experiment import Experiment
-    from finlab.evaluation.report.document import Row
 
 
 def add_experiments(verbs: SubcommandApp, argv: Sequence[str]) -> None:
@@ -55,13 +54,10 @@ def verb_of(experiment: Experiment) -> Callable[..., None]:
         check_json_file(picture, "picture")
         begin(experiment.name)
         chosen = {name: _parsed(name, options[name], value) for name, value in given.items()}
-        found = experiment.stream(**chosen)
-        coming = inspect.isgeneratorfunction(experiment.run) and json != STDOUT
-        rows = _as_they_come(experiment, found, json) if coming else list(found)
+        rows = experiment.rows(**chosen)
         if picture is not None and experiment.draw is not None:
             experiment.draw(rows).figure.savefig(picture)
-        blocks = [f"*{experiment.note}*"] if coming else [*experiment.words(), *experiment.results(rows)]
-        put_json({"rows": rows}, json, to_text(*blocks))
+        put_json({"rows": rows}, json, to_text(*experiment.words(), *experiment.results(rows)))
 
     shown = {name: _shown(each) for name, each in options.items()}
     shown["json"] = _file("json", JsonFile, "file for the rows, {'rows': [...]}; the rows alone without one")
@@ -73,22 +69,6 @@ def verb_of(experiment: Experiment) -> Callable[..., None]:
     verb.__signature__ = inspect.Signature(list(shown.values()))  # type: ignore[attr-defined]
     verb.__annotations__ = {name: each.annotation for name, each in shown.items()}
     return verb
-
-
-def _as_they_come(experiment: Experiment, found: Iterable[Row], json: Path | None) -> list[Row]:
-    """All rows, each printed and written as soon as it is there."""
-    from finlab.evaluation.report.text import to_text
-
-    print(to_text(*experiment.words()), end="\n\n", flush=True)
-    rows: list[Row] = []
-    for row in found:
-        rows.append(row)
-        if json is not None:
-            put_json({"rows": rows}, json)
-        lines = to_text(experiment.table(rows)).splitlines()
-        print("\n".join(lines[-1 if len(rows) > 1 else 0 :]), flush=True)
-    print()
-    return rows
 
 
 def _shown(option: inspect.Parameter) -> inspect.Parameter:

@@ -7,7 +7,7 @@ asked for.
 
 import inspect
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import import_module
 from types import NoneType
@@ -38,11 +38,11 @@ class Experiment:
     """Of the table. Rows may have more keys, which are in the JSON alone; intervals [low, high] are under
     `<key>_interval`."""
     run: Callable[..., Iterable[Row]]
-    """From keyword options to rows of plain values; those of a generator are printed as they come. The
-    options of the verb are its parameters: their types (int, float, bool, str, Literal, a tuple of str, int
-    or float, each perhaps None), their defaults and their words under `Args` in its docstring. An int whose
-    default is 0 may be 0, any other is at least 1. A parameter `layout` is given by position. Times depend on
-    the machine; all other values on the options alone."""
+    """From keyword options to rows of plain values. The options of the verb are its parameters: their types
+    (int, float, bool, str, Literal, a tuple of str, int or float, each perhaps None), their defaults and
+    their words under `Args` in its docstring. An int whose default is 0 may be 0, any other is at least 1. A
+    parameter `layout` is given by position. Times depend on the machine; all other values on the options
+    alone."""
     note: str = ""
     """How the columns are to be read, in Markdown."""
     quick: Mapping[str, Any] = field(default_factory=dict)
@@ -89,12 +89,8 @@ class Experiment:
         return values
 
     def rows(self, **chosen: Any) -> list[Row]:
-        """Run it; options as in `check`."""
-        return list(self.stream(**chosen))
-
-    def stream(self, **chosen: Any) -> Iterator[Row]:
-        """Run it, row by row; options as in `check`. A number that is not finite becomes None."""
-        return map(_finite, self.run(**self.check(chosen)))
+        """Run it; options as in `check`. A number that is not finite becomes None."""
+        return [_finite(row) for row in self.run(**self.check(chosen))]
 
     def parts(self, chosen: Mapping[str, Any]) -> list[dict[str, Any]]:
         """Options of runs whose rows, one after the other, are those of one run."""
@@ -121,6 +117,16 @@ class Experiment:
             blocks.append(Figure(self.name, lambda: draw(rows), self.caption))
         blocks.append(self.table(rows))
         return [*blocks, f"*{self.note}*"] if self.note else blocks
+
+
+def check_names(option: str, names: Sequence[str], known: Collection[str]) -> None:
+    """Refuse unknown names before the work.
+
+    Raises:
+        DataError: one of the names is not known.
+    """
+    if unknown := [name for name in names if name not in known]:
+        raise DataError(f"{option}: expected some of {', '.join(known)}, got {unknown[0]!r:.60}")
 
 
 def _finite(value: Any) -> Any:

@@ -11,7 +11,6 @@ from finlab.allocation.allocator import Allocator
 from finlab.allocation.baselines.ipopt import IpoptSettings
 from finlab.allocation.methods import LEARNED, MethodChoice, checked_settings, choose_method
 from finlab.errors import AllocationError
-from finlab.evaluation.ahead import AnalyticAhead
 from finlab.evaluation.cones import Cones
 from finlab.evaluation.on_board import OnBoard
 from finlab.layout import Layout
@@ -21,7 +20,7 @@ SLOW = ("ipopt",)
 """Methods that take a tenth of a second per target, each from several starts; they run on a subsample."""
 QUICK = ("dual", "mdn", "paper", "qp", "sqp", "analytic")
 """Methods that run on every target."""
-OWN = (OnBoard, AnalyticAhead, Cones)
+OWN = (OnBoard, Cones)
 """Methods that are for comparison alone."""
 IN_FORCES = "ipopt-forces"
 """IPOPT in the space of forces, its best form."""
@@ -106,8 +105,8 @@ def load_method_spec(
 
     Args:
         name: a method; `ipopt-32`, say, for 32 starts; `sqp-effort`, say, for an objective of its own; or one
-            for comparison alone: `on-board`, U-CAT's own; `analytic-ahead`, the pseudo-inverse with the lag
-            of the fins; `ipopt-forces` and `clarabel`, solvers in the space of forces.
+            for comparison alone: `on-board`, U-CAT's own; `ipopt-forces` and `clarabel`, solvers in the space
+            of forces.
         checkpoint: of learned methods, as for `finlab.Allocator`.
         objective: what the methods that can choose keep least; each one's default where None.
 

@@ -32,7 +32,7 @@ def test_a_body_that_is_given_it_follows_a_path_of_changing_speed() -> None:
 
 def test_fins_that_turn_before_the_wrench_comes_keep_nearer_to_a_square() -> None:
     robot, error = load_layout("A"), {}
-    for name in ("analytic", "analytic-ahead"):
+    for name in ("analytic", "dual"):
         log = ClosedLoop(robot, load_method_spec(name).on(robot), make_trajectory("square"), seed=3).run()
         error[name] = np.sqrt(np.square(log.position - log.reference).sum(axis=1).mean())
-    assert error["analytic-ahead"] < 0.93 * error["analytic"]
+    assert error["dual"] < 0.93 * error["analytic"]

@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 
 from finlab.allocation.methods import choose_method
-from finlab.errors import DataError
-from finlab.evaluation.experiment import Experiment
+from finlab.evaluation.experiment import Experiment, check_names
 from finlab.evaluation.method_specs import MethodSpec
 from finlab.evaluation.paper_figures import paper_figures
 from finlab.evaluation.progress import progress
@@ -52,8 +51,7 @@ def run(
         checkpoint: of method paper, a shipped name or a folder.
         seed: of all draws; all rows have the same cases and candidates.
     """
-    if unknown := [name for name in variants if name not in VARIANTS]:
-        raise DataError(f"variants: expected some of {', '.join(VARIANTS)}, got {unknown[0]!r:.60}")
+    check_names("variants", variants, VARIANTS)
     cases = make_split(split, layouts, targets, seed)
     rows: list[Row] = []
     for variant in variants:

@@ -5,7 +5,7 @@ Systems, IROS 2012. Robot and reference share one world frame and one clock, so 
 are paired by time. Only positions count: the reference prescribes no attitude.
 """
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -100,16 +100,6 @@ def swim(
     """
     pilot = PATH_CONTROLLERS[controller](layout)
     return ClosedLoop(layout, method.on(layout), path, pilot, failures=faults, plant=plant, seed=seed).run()
-
-
-def check_names(option: str, names: Sequence[str], known: Collection[str]) -> None:
-    """Refuse unknown names before the work.
-
-    Raises:
-        DataError: one of the names is not known.
-    """
-    if unknown := [name for name in names if name not in known]:
-        raise DataError(f"{option}: expected some of {', '.join(known)}, got {unknown[0]!r:.60}")
 
 
 POWER = (

@@ -6,9 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.arrays import Array
-from finlab.errors import DataError
 from finlab.evaluation.cheapest_commands import CheapestCommands, has_formulas
-from finlab.evaluation.experiment import Experiment
+from finlab.evaluation.experiment import Experiment, check_names
 from finlab.evaluation.method_specs import MethodSpec, load_method_specs
 from finlab.evaluation.plots.dots import draw_dots
 from finlab.evaluation.plots.style import Picture
@@ -17,7 +16,6 @@ from finlab.evaluation.report.document import Column, Row
 from finlab.evaluation.scoring import sigma_of
 from finlab.evaluation.splits import SPLITS, Case, make_split
 from finlab.evaluation.statistics.bootstrap import ratio_interval
-from finlab.evaluation.symmetric_cases import SETS, symmetric_cases
 from finlab.physics import plant_of
 from finlab.physics.objective import Name, Objective
 
@@ -44,8 +42,7 @@ def run(
     """One row for each split, objective and method.
 
     Args:
-        split: names as in eval wrench, or axes (pure axes on the symmetric shipped layouts), axes-mixed (two
-            or three of them together), or all.
+        split: names as in eval wrench, or all.
         methods: names as in eval wrench; those that can choose are given the objective,
             others are compared in what they keep least.
         objectives: power, effort or both.
@@ -55,14 +52,12 @@ def run(
         checkpoint: of the learned methods, a shipped name or a folder.
         seed: of the cases and of the starts.
     """
-    known = [*SPLITS, *SETS]
-    names = known if split == ("all",) else split
-    for what, chosen, possible in (("split", names, known), ("objectives", objectives, list(UNITS))):
-        if unknown := [name for name in chosen if name not in possible]:
-            raise DataError(f"{what}: expected one of {', '.join(possible)}, got {unknown[0]!r:.60}")
+    names = list(SPLITS) if split == ("all",) else split
+    check_names("split", names, SPLITS)
+    check_names("objectives", objectives, UNITS)
     rows: list[Row] = []
     for name in names:
-        cases = (symmetric_cases if name in SETS else make_split)(name, layouts, targets, seed)
+        cases = make_split(name, layouts, targets, seed)
         for objective in UNITS:
             able = tuple(each for each in methods if KEEPS.get(each, objective) == objective)
             if objective in objectives and able:
@@ -154,14 +149,14 @@ experiment = Experiment(
         f"error up to {TRACKED:g} by the plant. Effort is the paper's J_en."
     ),
     quick={
-        "split": ("id", "axes"),
+        "split": ("id", "limits"),
         "methods": ("dual", "mdn", "sqp"),
         "layouts": 3,
         "targets": 1,
         "starts": 8,
     },
     full={
-        "split": ("id", "ood-fins", "limits", "failure", "fins-mixed", "axes", "axes-mixed"),
+        "split": ("id", "ood-fins", "limits", "failure", "fins-mixed"),
         "methods": ("dual", "mdn", "sqp", "analytic"),
         "layouts": 12,
         "targets": 2,

@@ -10,8 +10,7 @@ from finlab.allocation import Allocator
 from finlab.allocation.evaluate import REACHED
 from finlab.allocation.modes import Mode, same_signature
 from finlab.arrays import Array
-from finlab.errors import DataError
-from finlab.evaluation.experiment import Experiment
+from finlab.evaluation.experiment import Experiment, check_names
 from finlab.evaluation.progress import progress
 from finlab.evaluation.report.document import Column, Row
 from finlab.evaluation.splits import SPLITS, Case, make_split
@@ -45,8 +44,7 @@ def run(
         checkpoint: of method mdn, a shipped name or a folder.
         seed: of the cases and of all draws.
     """
-    if unknown := [name for name in split if name not in SPLITS]:
-        raise DataError(f"split: expected some of {', '.join(SPLITS)}, got {unknown[0]!r:.60}")
+    check_names("split", split, SPLITS)
     return [row for name in split for row in _rows(name, layouts, targets, candidates, checkpoint, seed)]
 
 

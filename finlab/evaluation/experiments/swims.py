@@ -1,20 +1,19 @@
-"""Every method through the hard days, with one controller for all, and who leads where."""
+"""Every method through the hard days, with one controller for all."""
 
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from itertools import product
 from typing import Literal
 
 import numpy as np
 
 from finlab.control.completion import LEVER_M
-from finlab.evaluation.experiment import Experiment
-from finlab.evaluation.experiments.closed_loop import ABOUT_ERRORS, LOST_M, check_names, follow_row
+from finlab.evaluation.experiment import Experiment, check_names
+from finlab.evaluation.experiments.closed_loop import ABOUT_ERRORS, LOST_M, follow_row
 from finlab.evaluation.experiments.hard_days import HARD_DAYS, HardDay
 from finlab.evaluation.method_specs import MethodSpec, load_method_specs
 from finlab.evaluation.progress import progress
 from finlab.evaluation.report.document import Column, Row
-from finlab.evaluation.statistics.bootstrap import Interval, spread_interval
 from finlab.layout.angles import command_change
 from finlab.sim import RunLog
 
@@ -27,10 +26,6 @@ REPORTED = (
 GAP_N = 0.1
 """A tick whose wrench misses what was asked by more than this, torques as forces at `LEVER_M`, counts as out
 of reach [N]."""
-OURS = ("dual", "mdn")
-"""Beginnings of our methods' names; all others are baselines."""
-COMPARED = {"ate": "error", "driving_w": "power"}
-"""What methods are compared by with the best baseline, in words."""
 FIGURES = (*("ate", "rte", "depth_rmse", "driving_w", "peak_w", "out_of_reach", "cpu_s_per_min", "turn"),)
 """All figures of a swim."""
 LARGEST = ("turn", "peak_w")
@@ -47,7 +42,7 @@ def run(
     controller: Literal["tracking", "waypoint"] = "tracking",
     checkpoint: str | None = None,
     seed: int = 0,
-) -> Iterator[Row]:
+) -> list[Row]:
     """One row for each day and method.
 
     dual, analytic and on-board take two minutes of the processor each per seed.
@@ -56,16 +51,18 @@ def run(
         scenarios: names of days.
         methods: names; on-board is U-CAT's own law at a fixed frequency. Slow ones (sqp, paper) are best
             tried on a few scenarios.
-        seeds: how many; verdicts need two or more.
+        seeds: how many.
         controller: of all methods: tracking, or waypoint (heads for a point ahead, as in the paper).
         checkpoint: of the learned methods, a shipped name or a folder.
         seed: the first seed of noise, biases, waves and mixed fins.
     """
     check_names("scenarios", scenarios, DAYS)
     specs = load_method_specs(methods, checkpoint)
-    for name in scenarios:
-        done = swim_day(DAYS[name], specs, range(seed, seed + seeds), controller)
-        yield from day_rows(DAYS[name], done)
+    return [
+        row
+        for day in map(DAYS.__getitem__, scenarios)
+        for row in day_rows(day, swim_day(day, specs, range(seed, seed + seeds), controller))
+    ]
 
 
 def swim_day(
@@ -103,11 +100,7 @@ def swim_figures(log: RunLog, cpu_s: float) -> Row:
 
 
 def day_rows(day: HardDay, done: Mapping[str, Swims]) -> list[Row]:
-    """One row per method: means over its swims, and the largest steps and peaks.
-
-    Our methods have `ate_ratio` and `driving_w_ratio` over the least of the baselines that keep their path,
-    and from two seeds on intervals of these, swim against swim of the same case and seed, and verdicts.
-    """
+    """One row per method: means over its swims, and the largest steps and peaks."""
     rows = []
     for method, swims in done.items():
         row: Row = {"scenario": day.name, "method": method, "about": day.about, "swims": len(swims)}
@@ -116,41 +109,7 @@ def day_rows(day: HardDay, done: Mapping[str, Swims]) -> list[Row]:
             values = np.array([figures[key] for figures in swims.values()])
             row[key] = float(values.max() if key in LARGEST else values.mean())
         rows.append(row)
-    for row in rows:
-        if row["method"].startswith(OURS):
-            row |= _against(row, [other for other in rows if not other["method"].startswith(OURS)], done)
     return rows
-
-
-def _against(row: Row, baselines: Sequence[Row], done: Mapping[str, Swims]) -> Row:
-    """Ratios and verdicts of one of our rows against the best baselines."""
-    keeping = [other for other in baselines if not other["lost"]]
-    if not baselines:
-        return {}
-    if not keeping and not row["lost"]:
-        return {"verdict": "alone keeps its path"}
-    found: Row = {}
-    words = ["loses its path"] if row["lost"] and keeping else []
-    for key, title in COMPARED.items():
-        best = min(keeping or baselines, key=lambda other: float(other[key]))
-        found |= {f"{key}_ratio": row[key] / best[key], f"{key}_best": best["method"]}
-        if (interval := paired_interval(done[row["method"]], done[best["method"]], key)) is not None:
-            low, high = interval
-            found[f"{key}_ratio_interval"] = [1.0 + low / best[key], 1.0 + high / best[key]]
-            words.append(f"{title} {'better' if high < 0.0 else 'worse' if low > 0.0 else 'level'}")
-    return {**found, "verdict": ", ".join(words)}
-
-
-def paired_interval(own: Swims, other: Swims, key: str) -> Interval | None:
-    """Where another seed should land: by how much a figure of one method is more than another's, each swim
-    against that of the same case and seed, by Student's t over seeds; None for a single seed."""
-    by_seed: dict[int, list[float]] = {}
-    for swim, figures in own.items():
-        by_seed.setdefault(swim[-1], []).append(figures[key] - other[swim][key])
-    if len(by_seed) < 2:
-        return None
-    means = np.array([np.mean(values) for values in by_seed.values()])
-    return spread_interval(float(means.mean()), float(means.std(ddof=1)), len(means))
 
 
 experiment = Experiment(
@@ -161,21 +120,17 @@ experiment = Experiment(
         Column("method", "method", "code"),
         Column("swims", "swims", "count"),
         Column("ate", "ATE", "metres", unit="m"),
-        Column("ate_ratio", "over best", "ratio", "ate_ratio_interval"),
         Column("driving_w", "power", "three", unit="W"),
-        Column("driving_w_ratio", "over best", "ratio", "driving_w_ratio_interval"),
         Column("peak_w", "peak", "three", unit="W"),
         Column("lost", "lost", "count"),
         Column("turn", "turn", "ratio", unit="rad"),
         Column("out_of_reach", "out of reach", "share"),
         Column("cpu_s_per_min", "CPU per min", "three", unit="s"),
-        Column("verdict", "verdict"),
     ),
     run=run,
     note=f"{ABOUT_ERRORS} Means over swims; peaks and turns (of a zero direction from tick to tick) are the "
-    "largest. Power with the motors' losses. Best: the least of the baselines that keep their path, for "
-    "error and power each; intervals over seeds, in which another seed should land; a verdict needs an "
-    f"interval without 1. Lost: swims that were ever farther than {LOST_M:g} m away. Out of reach: ticks at "
+    "largest. Power with the motors' losses. "
+    f"Lost: swims that were ever farther than {LOST_M:g} m away. Out of reach: ticks at "
     f"which commands miss more than {GAP_N:g} N of what is asked, torques at {LEVER_M:g} m. Processor's time "
     "with the simulation's. What the days are: `finlab/evaluation/experiments/hard_days.py`.",
     quick={"scenarios": ("nominal", "current", "lost-one"), "methods": ("dual", "analytic"), "seeds": 1},

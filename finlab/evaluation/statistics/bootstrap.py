@@ -5,13 +5,11 @@ seed is as uncertain as the run at hand: the difference of the two has sqrt(2) t
 percentiles are those of a normal variable at sqrt(2) x 1.96, so that the rerun lies inside 95 times of 100.
 """
 
-import math
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
 
 from finlab.arrays import Array
 
@@ -53,12 +51,6 @@ def share_interval(holds: NDArray[np.bool_], group: NDArray[np.int64]) -> Interv
     half = SPREAD / (1 + SPREAD**2 / n) * np.sqrt(share * (1 - share) / n + SPREAD**2 / (4 * n**2))
     low, high = min(drawn.low, centre - half), max(drawn.high, centre + half)
     return Interval(max(0.0, float(low)), min(1.0, float(high)))
-
-
-def spread_interval(mean: float, std: float, runs: int) -> Interval:
-    """Of the mean of at least two runs with a standard deviation, by Student's t."""
-    half = math.sqrt(2.0 / runs) * std * float(stats.t.ppf(0.975, runs - 1))
-    return Interval(mean - half, mean + half)
 
 
 def _members(group: NDArray[np.int64]) -> tuple[NDArray[np.intp], int]:

@@ -1,22 +1,16 @@
-"""The suite of hard days: every swim can be built, its figures on made-up logs, who leads on made-up rows."""
+"""The suite of hard days: every swim can be built, and its figures on made-up logs."""
 
-import json
 from dataclasses import replace
-from pathlib import Path
 from types import SimpleNamespace
 from typing import cast
 
 import numpy as np
 import pytest
 
-from finlab.cli import main
 from finlab.evaluation.experiments.hard_days import HARD_DAYS, Case, HardDay
 from finlab.evaluation.experiments.swims import (
     DAYS,
-    FIGURES,
-    Swims,
     day_rows,
-    paired_interval,
     swim_day,
     swim_figures,
 )
@@ -112,51 +106,6 @@ def test_figures_of_a_swim() -> None:
     assert found["cpu_s_per_min"] == pytest.approx(2.0)
 
 
-def _swims(ate: list[float], watts: list[float], farthest: float = 0.1) -> Swims:
-    """Swims of A by hand, one for each seed."""
-    figures = dict.fromkeys(FIGURES, 1.0) | {"max": farthest}
-    pairs = enumerate(zip(ate, watts, strict=True))
-    return {("A", (), seed): figures | {"ate": error, "driving_w": power} for seed, (error, power) in pairs}
-
-
-def test_swims_of_the_same_noise_are_compared_with_each_other() -> None:
-    """Seeds differ by far more than methods do, but all in the same way."""
-    errors = [0.05, 0.10, 0.15, 0.20, 0.25]
-    ours = _swims(errors, [1.0] * 5)
-    theirs = _swims(
-        [e + more for e, more in zip(errors, (0.004, 0.005, 0.006, 0.005, 0.005), strict=True)], [1.0] * 5
-    )
-    low, high = paired_interval(ours, theirs, "ate") or (0.0, 0.0)
-    assert -0.007 < low < -0.005 < high < -0.003
-    assert paired_interval(dict([*ours.items()][:1]), theirs, "ate") is None
-    row = day_rows(DAYS["nominal"], {"dual": ours, "analytic": theirs})[0]
-    assert row["ate_ratio_interval"][0] < row["ate_ratio"] < row["ate_ratio_interval"][1] < 1.0
-    assert row["verdict"] == "error better, power level"
-
-
-def test_the_best_baseline_is_another_for_each_figure() -> None:
-    errors = [0.001 * seed for seed in range(4)]
-    done = {
-        "dual": _swims([0.05 + e for e in errors], [2.0, 3.0, 4.0, 5.0]),
-        "analytic": _swims([0.10 + e for e in errors], [4.0] * 4),
-        "on-board": _swims([0.20] * 4, [3.0] * 4),
-        "qp": _swims([0.01] * 4, [0.1] * 4, farthest=2.0),  # loses its path: is no baseline
-    }
-    own, *others = day_rows(DAYS["nominal"], done)
-    assert own["ate_best"] == "analytic" and own["ate_ratio"] == pytest.approx(0.0515 / 0.1015)
-    assert own["driving_w_best"] == "on-board" and own["driving_w_ratio"] == pytest.approx(3.5 / 3.0)
-    assert own["verdict"] == "error better, power level"
-    assert all("verdict" not in row for row in others) and others[-1]["lost"] == 4
-
-
-def test_who_alone_keeps_the_path_and_who_loses_it() -> None:
-    kept, lost = _swims([0.1, 0.1], [1.0, 1.0]), _swims([0.1, 0.1], [1.0, 1.0], farthest=3.0)
-    row = day_rows(DAYS["nominal"], {"dual": kept, "analytic": lost})[0]
-    assert row["verdict"] == "alone keeps its path" and "ate_ratio" not in row
-    row = day_rows(DAYS["nominal"], {"dual": lost, "analytic": kept})[0]
-    assert row["verdict"].startswith("loses its path")
-
-
 def test_a_short_day(analytic: AnyRobot) -> None:
     day = replace(DAYS["lost-two"], duration_s=12.0, trajectory="station")
     (swims,) = swim_day(day, {"analytic": analytic}, [1]).values()
@@ -164,22 +113,3 @@ def test_a_short_day(analytic: AnyRobot) -> None:
     (row,) = day_rows(day, {"analytic": swims})
     assert row["swims"] == 4 and 0.0 < row["ate"] < 0.5
     assert row["driving_w"] < row["peak_w"] and row["cpu_s_per_min"] > 0.0
-
-
-def test_rows_are_shown_and_written_as_they_come(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The second day fails: the first one is there."""
-    file, swum = tmp_path / "rows.json", list[str]()
-
-    def day(day: HardDay, *_: object) -> dict[str, Swims]:
-        swum.append(day.name)
-        if len(swum) == 2:
-            raise KeyboardInterrupt
-        return {"analytic": _swims([0.1234], [1.0])}
-
-    monkeypatch.setattr("finlab.evaluation.experiments.swims.swim_day", day)
-    argv = ["eval", "swims", "--scenarios", "nominal,circle", "--methods", "analytic", "--json", str(file)]
-    assert main(argv) == 130
-    assert swum == ["nominal", "circle"] and "0.1234" in capsys.readouterr().out
-    assert [row["scenario"] for row in json.loads(file.read_text())["rows"]] == ["nominal"]
