@@ -2,7 +2,7 @@
 
 Fins whose laws are formulas become CasADi symbols, with exact first and second derivatives. A robot with a
 force table has no formula: it becomes a CasADi callback that asks the plant (`plant_in_casadi`), with the
-table's exact Jacobian and a Hessian by differences of it.
+table's exact Jacobian and IPOPT's own approximation of the Hessian.
 """
 
 from __future__ import annotations
@@ -140,10 +140,10 @@ class Ipopt(ModelBased):
         """What the robot's commands give and cost."""
         cs, plant, sigma = self._casadi, self.plant, self._casadi.DM(self.sigma)
         if not all(isinstance(make_law(fin.model), PlanarLaw) for fin in plant.layout.fins):
-            answer, hessian = plant_in_casadi(cs, plant, self._cost, self.sigma)
+            answer = plant_in_casadi(cs, plant, self._cost)
             command, target = cs.MX.sym("command", 3 * plant.n_fins), cs.MX.sym("target", 6)
             given = answer(command)
-            options = {"hess_lag": hessian}
+            options = {"ipopt.hessian_approximation": "limited-memory"}
             return Formulas(command, target, (given[:6] - target) / sigma, given[6], options, answer)
         command, wrench, cost = plant_formulas(cs, plant, self.aim)
         target = cs.SX.sym("target", 6)

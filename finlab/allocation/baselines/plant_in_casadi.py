@@ -10,9 +10,6 @@ from finlab.physics import PlanarLaw, Plant, make_law
 from finlab.physics.effort import effort_of_shares, effort_scale
 from finlab.physics.objective import Objective
 
-DIFFERENCE = 1e-4
-"""Half width of the differences, as a share of each command's range."""
-
 
 def plant_formulas(casadi: Any, plant: Plant, objective: Objective) -> tuple[Any, Any, Any]:
     """Returns symbols of the commands (3 n,), and the wrench (6,) and the cost that they give, as formulas.
@@ -39,21 +36,16 @@ def plant_formulas(casadi: Any, plant: Plant, objective: Objective) -> tuple[Any
     return command, wrench, cost
 
 
-def plant_in_casadi(casadi: Any, plant: Plant, cost: CommandCost, sigma: Array) -> tuple[Any, Any]:
-    """Returns two functions, which must be kept as long as what is built of them.
+def plant_in_casadi(casadi: Any, plant: Plant, cost: CommandCost) -> Any:
+    """Returns a function that turns commands (3 n,) into the wrench (6,) and the cost behind it.
 
-    The first turns commands (3 n,) into the wrench (6,) and the cost behind it, and knows its exact Jacobian.
-    The second is the Hessian (3 n, 3 n), upper half, of `err_norm^2 + cost`, with the signature of
-    `hess_lag`. Each fin's own second derivatives are central differences of its exact first ones, one-sided
-    at the limits, beyond which a table has no slope.
+    It knows its exact Jacobian, and must be kept as long as what is built of it.
 
     Args:
         casadi: the module.
         plant: the robot.
         cost: what its commands cost.
-        sigma: per-axis standard deviation (6,) of the error.
     """
-    shift = DIFFERENCE * plant.width * np.eye(3)[:, None]
     size, shape = 3 * plant.n_fins, (1, plant.n_fins, 3)
 
     def answer(command: Array) -> Array:
@@ -64,27 +56,9 @@ def plant_in_casadi(casadi: Any, plant: Plant, cost: CommandCost, sigma: Array) 
         at = command.reshape(shape)
         return np.concatenate([plant.linearize(at)[1][0], cost.gradient(at).reshape(1, -1)])
 
-    def curvature(command: Array, target: Array, factor: Array, *_: Array) -> Array:
-        at = command.reshape(shape)
-        wrench, jacobian = plant.linearize(at)
-        slope = jacobian[0] / sigma[:, None]
-        half = slope.T @ slope
-        before, after = np.maximum(at - shift, plant.lower), np.minimum(at + shift, plant.upper)
-        around = np.concatenate([before, after])
-        pull = plant.effectiveness @ ((wrench[0] - target) / sigma**2)
-        by = np.einsum("rnka,na->rnk", plant.force_and_jacobian(around)[1], pull)
-        by = by + 0.5 * cost.gradient(around)
-        hessian = (by[3:] - by[:3]) / np.maximum((after - before).sum(-1, keepdims=True), 1e-300)
-        first = 3 * np.arange(plant.n_fins)
-        for i, j in np.ndindex(3, 3):
-            half[first + i, first + j] += 0.5 * (hessian[i, :, j] + hessian[j, :, i])
-        return np.asarray(2.0 * factor * half)
-
-    dense, upper = casadi.Sparsity.dense, casadi.Sparsity.upper(size)
+    dense = casadi.Sparsity.dense
     jacobian = _function(casadi, "slopes", gradient, [dense(size), dense(7)], dense(7, size))
-    called = _function(casadi, "answer", answer, [dense(size)], dense(7), jacobian)
-    given = [dense(size), dense(6), dense(1), dense(0)]
-    return called, _function(casadi, "curvature", curvature, given, upper)
+    return _function(casadi, "answer", answer, [dense(size)], dense(7), jacobian)
 
 
 def _function(
@@ -108,7 +82,7 @@ def _function(
 
         def eval(self, arguments: Any) -> list[Any]:
             values = compute(*(np.array(argument).ravel() for argument in arguments))
-            return [casadi.DM(values) if result.is_dense() else casadi.triu(casadi.DM(values))]
+            return [casadi.DM(values)]
 
         def has_jacobian(self) -> bool:
             return jacobian is not None
