@@ -24,7 +24,6 @@ class Command(NamedTuple):
     key: str = ""
     """As viser calls it; none where it is done from the list alone."""
     modifier: str = ""
-    """What is held with it."""
 
 
 def commands(page: Page) -> list[Command]:

@@ -86,17 +86,6 @@ def on_user_change(handle: Any, act: Callable[[Any], None]) -> None:
     listen(changed)
 
 
-def hold_kind(handle: Any) -> None:
-    """Keep an input that is only read later to values of its own kind."""
-    on_user_change(handle, lambda _: None)
-
-
-def option_index(dropdown: Any) -> int:
-    """Place of the chosen option; 0 for a text that is none, which our page does not send."""
-    options = dropdown.options
-    return options.index(dropdown.value) if dropdown.value in options else 0
-
-
 def _alike(known: Any, value: Any) -> bool:
     """Whether two values are of the same kind: texts, switches, numbers, or as many numbers."""
     if isinstance(known, (tuple, list)):

@@ -156,8 +156,3 @@ def disable_sharing(server: viser.ViserServer) -> None:
     """The public share tunnel stays closed: viser lets every connected page ask for it."""
     for message in (_messages.ShareUrlRequest, _messages.ShareUrlDisconnect):
         server._websock_server.unregister_handler(message)
-
-
-def disconnect_all(server: viser.ViserServer) -> None:
-    """Drop every connection, as a bad network would; for tests."""
-    server._websock_server.disconnect_all_clients()

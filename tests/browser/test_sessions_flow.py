@@ -10,7 +10,7 @@ from webapp.app import App
 from webapp.guard import Guard
 from webapp.session import Display
 from webapp.tasks.solver import Solver
-from webapp.viser_internals import disconnect_all, start_server, stop_server
+from webapp.viser_internals import start_server, stop_server
 
 
 def test_reload_and_reconnect_restore_and_tabs_are_apart(
@@ -33,7 +33,7 @@ def test_reload_and_reconnect_restore_and_tabs_are_apart(
     page.tab("Allocate")
     page.shows("Fy [N]", "0.5")
     before = page.view
-    disconnect_all(served.server)
+    served.server._websock_server.disconnect_all_clients()
     page.until(lambda: before not in served.app.views.values())
     back = served.app.views
     page.until(lambda: any(view.session is page.session for view in back.values()))

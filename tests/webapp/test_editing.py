@@ -71,19 +71,6 @@ def test_ring_around_the_vertical_axis(session: Session) -> None:
     assert session.state.layout.n_fins == 12
 
 
-@pytest.mark.parametrize("axis", ["x", "y"])
-@pytest.mark.parametrize("name", ["A", "octo", "pair"])
-def test_copies_around_other_axes_are_refused(session: Session, axis: str, name: str) -> None:
-    session.open_layout(load_layout(name))
-    before = session.state
-    for fin in before.layout.names:
-        for count in (2, 3, 4):
-            session.select(fin)
-            with pytest.raises(FinlabError, match=f"copies around {axis}.*{fin}.*around z, or mirror"):
-                session.ring_of_fins(count, axis)
-    assert session.state == before
-
-
 def test_stuck_fin_stands_off_the_surface_along_its_normal(session: Session) -> None:
     move_fin(session, "front_left", (0.1, 0.4, 0.0))
     session.select("front_left")

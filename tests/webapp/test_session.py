@@ -64,7 +64,7 @@ def test_bad_settings_change_nothing(session: Session) -> None:
     ):
         with pytest.raises(FinlabError):
             session.set_setting(key, value)
-    for key, value in (("drawn", "1 km"), ("speed", math.nan)):
+    for key, value in (("drawn", "1 km"), ("frozen", math.nan)):
         with pytest.raises(FinlabError):
             session.set_display(key, value)
     with pytest.raises(FinlabError, match="no fin"):

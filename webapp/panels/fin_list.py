@@ -7,15 +7,13 @@ import viser
 
 from finlab.errors import FinlabError
 from finlab.layout.layout import MAX_ACTUATORS
-from webapp.handles import add_html, hold_kind, put
+from webapp.handles import add_html, put
 from webapp.markup.fin_list import fin_list
 from webapp.markup.picking import marker
 from webapp.page import Page
 
-RINGS = {"z, up": "z", "x, forward": "x", "y, to the left": "y"}
-"""Axes that copies can stand around, by what they are called."""
 RING_SIZES = (2, 3, 4, 5, 6, 8)
-"""How many fins can stand around an axis."""
+"""How many fins can stand around the vertical axis."""
 
 
 class FinList:
@@ -39,12 +37,9 @@ class FinList:
         }
         hint = "What Mirror (M) makes moves along until it is unlinked."
         page.add_buttons("Selected fin", edits, hint=hint)
-        about = "Axis through the centre of gravity that copies stand around."
-        self._axis = gui.add_dropdown("Copies around", tuple(RINGS), hint=about)
-        hold_kind(self._axis)
-        rings = {str(count): partial(self._copy_around, count) for count in RING_SIZES}
-        about = "Copies of the selected fin, so that so many stand evenly around the axis."
-        page.add_buttons("How many", rings, hint=about)
+        rings = {str(count): partial(session.ring_of_fins, count) for count in RING_SIZES}
+        about = "Copies of the selected fin, so that so many stand evenly around the vertical axis."
+        page.add_buttons("Copies around", rings, hint=about)
 
     def _named(self, key: str) -> str:
         """The name of the fin at a place."""
@@ -56,9 +51,6 @@ class FinList:
     def _select(self, key: str, held: str) -> None:
         session = self._page.session
         (session.select_also if held else session.select)(self._named(key))
-
-    def _copy_around(self, count: int) -> None:
-        self._page.session.ring_of_fins(count, RINGS.get(self._axis.value, "z"))
 
     def refresh(self) -> None:
         session = self._page.session

@@ -30,7 +30,6 @@ class LinePlot:
         below: str = "",
         *,
         height: int = 100,
-        visible: bool = False,
     ) -> None:
         """Build it, empty.
 
@@ -40,7 +39,6 @@ class LinePlot:
             title: beside the vertical axis; where it is empty there is no such axis.
             below: below the horizontal axis.
             height: of the plot [px].
-            visible: whether it is shown from the start.
         """
         self._n_lines = len(colors)
         self._plot = gui.add_uplot(
@@ -54,16 +52,12 @@ class LinePlot:
             legend=uplot.Legend(show=False),
             cursor=uplot.Cursor(show=False),
             height=height,
-            visible=visible,
+            visible=False,
         )
 
     def show(self, visible: bool) -> None:
         """Show it, or hide it."""
         put(self._plot, visible=visible)
-
-    def name(self, title: str, below: str) -> None:
-        """Other words at the axes."""
-        put(self._plot, axes=_axes(title, below))
 
     def draw(
         self, x: Array, lines: Sequence[Array], ends: tuple[float, float], across: float | None = None

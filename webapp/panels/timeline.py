@@ -6,12 +6,11 @@ import numpy as np
 import viser
 
 from finlab.arrays import Array
-from webapp.handles import Changes, add_html, hold_kind, option_index, put
+from webapp.handles import Changes, add_html, put
 from webapp.markup.html import html
 from webapp.markup.picking import marker
 from webapp.page import Page
 from webapp.panels.line_plot import FIN_LINES, LinePlot, top_of
-from webapp.session.state import AXIS_UNITS, AXIS_WORDS
 from webapp.tasks.moment import ASKED as ASKED_COLUMN
 from webapp.tasks.moment import DELIVERED as DELIVERED_COLUMN
 from webapp.tasks.moment import DEPTH_ERROR, ERROR, FORCES, POWER, TIME
@@ -44,9 +43,6 @@ class Timeline:
         self._page = page
         add_html(gui, marker("fl-timeline"))
         self._none = add_html(gui, html("<div class='fl dim fl-unswum'>{}</div>", UNSWUM))
-        wrench = "Asked in blue, delivered in green."
-        self._axis = gui.add_dropdown("Plot wrench", AXIS_WORDS, hint=wrench)
-        hold_kind(self._axis)
         self._plots = SwimPlots(gui)
 
     def refresh(self) -> None:
@@ -54,10 +50,9 @@ class Timeline:
         swimmer = swimming.swimmer
         there = swimmer is not None
         put(self._none, visible=not there)
-        put(self._axis, visible=there)
         self._plots.show(there)
         if swimmer is not None:
-            self._plots.refresh(swimmer, swimming.running, option_index(self._axis))
+            self._plots.refresh(swimmer, swimming.running)
 
 
 class SwimPlots:
@@ -84,12 +79,12 @@ class SwimPlots:
         for plot in (self._error, self._depth, self._power, self._wrench, self._force, self._broken):
             plot.show(visible)
 
-    def refresh(self, swimmer: Swimmer, running: bool, axis: int) -> None:
-        """Draw errors, power, one axis of the wrench, forces and the monitor's doubts, but no more often than
+    def refresh(self, swimmer: Swimmer, running: bool) -> None:
+        """Draw errors, power, surge asked and delivered, forces and the monitor's doubts, no more often than
         an eye can follow."""
         record = swimmer.shown.record
         soon = time.monotonic() - self._drawn < EVERY_S and running
-        if soon or not len(record) or not self._changes(axis, swimmer.shown):
+        if soon or not len(record) or not self._changes(swimmer.shown):
             return
         self._drawn = time.monotonic()
         seconds = np.ascontiguousarray(record[:, TIME])
@@ -101,8 +96,7 @@ class SwimPlots:
         ):
             lines = [_line(record, column, scale)]
             plot.draw(seconds, lines, (0.0, top_of(lines, SMALL)), end)
-        both = [record[:, column + axis] for column in (ASKED_COLUMN, DELIVERED_COLUMN)]
-        self._wrench.name(f"{AXIS_WORDS[axis]} [{AXIS_UNITS[axis]}]", "time [s]")
+        both = [record[:, column] for column in (ASKED_COLUMN, DELIVERED_COLUMN)]
         ends = (-top_of([-both[0], -both[1]], SMALL), top_of(both, SMALL))
         self._wrench.draw(seconds, both, ends, end)
         n_fins = len(swimmer.fins)

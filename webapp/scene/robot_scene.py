@@ -29,6 +29,8 @@ CAMERAS = {
     "Front": (1.3, 0.0, 0.1),
 }
 """Where the camera stands in each view [m]."""
+SPEED = 0.5
+"""Time of the flapping per real time."""
 
 
 class RobotScene:
@@ -142,9 +144,8 @@ class RobotScene:
 
     def flap(self) -> None:
         """Let the page move the fins (`frames.js`): commands of all, and how fast."""
-        display = self._session.display
         fins = [row if np.isfinite(row[0]) else None for row in self._flapping.command.tolist()]
-        told = json.dumps([fins, display.speed, display.frozen])[1:-1]
+        told = json.dumps([fins, SPEED, self._session.display.frozen])[1:-1]
         if told != self._flaps:
             self._flaps = told
             run_script(self._client.gui, f"finlabFrames.flap({told});")

@@ -5,7 +5,7 @@ from typing import Any
 
 from finlab.errors import FinlabError
 from finlab.forces.attainable import Kind
-from webapp.session.state import chosen, number
+from webapp.session.state import chosen
 
 DRAWN: dict[str, Kind | None] = {"none": None, "forces": "force", "torques": "torque"}
 """What set can be drawn, by the word on its button."""
@@ -17,8 +17,6 @@ class Display:
 
     frozen: bool = False
     """Fins hold still at their zero direction."""
-    speed: float = 0.5
-    """Time of the animation per real time."""
     shadows: bool = True
     """Cast shadows; slow without a graphics card."""
     dark: bool = False
@@ -37,8 +35,6 @@ class Display:
             raise FinlabError(f"there is no switch {key!r:.40}")
         if key == "drawn":
             chosen(value, key, DRAWN)
-        if key == "speed":
-            value = number(value, "speed of the animation", 0.02, 1.0)
         if isinstance(now, bool) and not isinstance(value, bool):
             raise FinlabError(f"{key}: expected on or off, got {value!r:.40}")
         return replace(self, **{key: value})

@@ -80,10 +80,10 @@ class Editing(Core):
             raise FinlabError(f"{name} is not linked to another fin; Mirror links it to its image")
         self._commit(f"Unlink {name}", replace(self.state, links=unlinked(self.state.links, name)))
 
-    def ring_of_fins(self, count: int, axis: str = "z") -> None:
-        """Copies of the selected fin, so that `count` stand evenly around a body axis."""
+    def ring_of_fins(self, count: int) -> None:
+        """Copies of the selected fin, so that `count` stand evenly around the vertical body axis."""
         name = self._selected_name()
-        self._edit(f"{count} around {axis}", layout_edits.ring(self.state.layout, name, count, axis))
+        self._edit(f"{count} copies of {name}", layout_edits.ring(self.state.layout, name, count))
 
     def stick_fin(self) -> None:
         """The selected fin onto the hull."""

@@ -19,8 +19,6 @@ UNTOUCHED = 1e-6
 """Change [m], [rad] up to which a coordinate or an angle counts as left alone: a page's own rounding."""
 MAX_COORDINATE = 2.0
 """How far out a fin may be placed in the browser [m]."""
-AXES = ("x", "y", "z")
-"""Body axes that copies can stand around: forward, left, up."""
 CLEAR, STEP_UP = 0.12, 0.05
 """How far a new fin, and a copy, stands from all others if there is room [m]."""
 ROUND = (180, 150, -150, 120, -120, 90, -90, 60, -60, 30, -30, 0)
@@ -74,22 +72,16 @@ def mirrored(layout: Layout, name: str) -> tuple[Layout, str]:
     return (layout, there) if there is not None else _added(layout, image(fin), _mirror_name(name))
 
 
-def ring(layout: Layout, name: str, count: int, axis: str = "z") -> Layout:
+def ring(layout: Layout, name: str, count: int) -> Layout:
     """The layout with copies of a fin, so that `count` of them stand evenly around the vertical body axis.
 
     Raises:
-        FinlabError: around x or y, where shafts would leave the horizontal, which no fin can have yet; or the
-            fin stands on the axis.
+        FinlabError: the fin stands on the axis.
     """
-    if chosen(axis, "axis", AXES) != "z":
-        raise FinlabError(
-            f"copies around {axis} would turn the shaft of {name} out of the horizontal, and shafts are "
-            "horizontal so far; make copies around z, or mirror the fin"
-        )
     fin = layout.fins[layout.index(name)]
     x, y, z = fin.position
     if math.hypot(x, y) < 1e-3:
-        raise FinlabError(f"{name} stands on the axis {axis}, so its copies would all be in one place")
+        raise FinlabError(f"{name} stands on the vertical axis, so its copies would all be in one place")
     whole = round(number(count, "fins around the axis", 2, MAX_ACTUATORS))
     for k in range(1, whole):
         turn = 2 * math.pi * k / whole

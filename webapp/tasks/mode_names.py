@@ -27,7 +27,6 @@ class NamedMode(NamedTuple):
     """One way to deliver the wrench, as people call it."""
 
     mode: Mode
-    """The way itself."""
     name: str
     """What makes it different from the others that are shown."""
 
@@ -39,7 +38,6 @@ class Modes:
     shown: tuple[NamedMode, ...]
     """The first `MAX_SHOWN` of them, the best one first, no two of the same name."""
     count: int
-    """How many there are."""
     samples: Candidates | None = None
     """What a network proposed, before it was refined."""
     of_samples: NDArray[np.intp] | None = None
