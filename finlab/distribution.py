@@ -9,7 +9,6 @@ EXTRAS = {
     "yourdfpy": "urdf",
     "casadi": "ipopt",
     "matplotlib": "plot",
-    "markdown_it": "plot",
 }
 """Packages that some parts need beside the base install, and the extra that brings each."""
 

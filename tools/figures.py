@@ -19,7 +19,7 @@ from pathlib import Path
 from finlab.evaluation.experiment import Experiment, load_experiment
 from finlab.evaluation.progress import begin
 from finlab.evaluation.report.document import Document, Table
-from finlab.evaluation.report.pages import to_markdown
+from finlab.evaluation.report.markdown import to_markdown
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = {path.stem: path for path in sorted((ROOT / "docs").glob("*.md"))}

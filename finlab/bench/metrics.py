@@ -65,8 +65,6 @@ def figures(problems: Problems, answers: Answers) -> Row:
         part = score(mine, problems, robot, asked.wrench[rows], asked.best_error[rows])
         for values, found in zip(scores, part, strict=True):
             values[rows] = found
-    sets = np.array([robot.set for robot in problems.robots])[asked.robot]
-    solved = scores.relative <= SOLVED
     every = answers.targets + [answer for path in answers.sequences for answer in path]
     failed = [answer.failure for answer in every if answer.failure is not None]
     counts = Counter(failure.kind for failure in failed)
@@ -81,8 +79,6 @@ def figures(problems: Problems, answers: Answers) -> Row:
     return {
         "method": answers.method,
         "summary": {**summary, "turn": paths.get("noisy", {}).get("turn"), "p50_ms": p50, "p99_ms": p99},
-        "solved_by_set": {name: _mean(solved[sets == name]) for name in dict.fromkeys(sets.tolist())},
-        "solved_by_kind": {name: _mean(solved[asked.kind == k]) for k, name in enumerate(KINDS)},
         "paths": paths,
         "failures": {kind: counts[kind] for kind in FAILURES if counts[kind]},
         "examples": list(dict.fromkeys(f"{f.kind}: {f.words}" for f in failed))[:EXAMPLES],
@@ -105,22 +101,24 @@ def _summary(scores: Scores, problems: Problems) -> Row:
 
 
 def _path_row(problems: Problems, answers: Answers, noisy: bool) -> Row | None:
-    """Errors on the paths with or without noise, and changes of commands from tick to tick [rad, Hz, rad]."""
-    errors, steps = [], [np.empty((0, 3))]
+    """Errors on the paths with or without noise, and the mean turn of a zero direction per tick [rad]."""
+    errors, turns = [], [np.empty(0)]
     for k in np.flatnonzero(problems.sequences.noisy == noisy).tolist():
         path, wrench = answers.sequences[k], problems.sequences.wrench[k]
         robot, best = int(problems.sequences.robot[k]), problems.sequences.best_error[k]
         errors.append(score(path, problems, robot, wrench, best).relative)
         for last, now in zip(path[:-1], path[1:], strict=True):
             if last.command is not None and now.command is not None:
-                steps.append(command_change([last.command, now.command])[0])
+                turns.append(command_change([last.command, now.command])[0, :, 2])
     if not errors:
         return None
-    error, step = np.concatenate(errors), np.concatenate(steps)
-    row: Row = {"ticks": len(error), "solved": float((error <= SOLVED).mean()), "error": float(error.mean())}
-    for k, name in enumerate(("amplitude", "frequency", "turn")):
-        row |= {name: _mean(step[:, k]), f"{name}_max": float(step[:, k].max()) if len(step) else None}
-    return row
+    error, turn = np.concatenate(errors), _mean(np.concatenate(turns))
+    return {
+        "ticks": len(error),
+        "solved": float((error <= SOLVED).mean()),
+        "error": float(error.mean()),
+        "turn": turn,
+    }
 
 
 def _mean(values: Array | NDArray[np.bool_]) -> float | None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from tyro.conf import Positional, arg
@@ -49,21 +48,16 @@ def verb_of(experiment: Experiment) -> Callable[..., None]:
     options = experiment.options()
 
     def verb(**given: Any) -> None:
-        json, picture = given.pop("json"), given.pop("picture", None)
+        json = given.pop("json")
         check_json_file(json)
-        check_json_file(picture, "picture")
         begin(experiment.name)
         chosen = {name: _parsed(name, options[name], value) for name, value in given.items()}
         rows = experiment.rows(**chosen)
-        if picture is not None and experiment.draw is not None:
-            experiment.draw(rows).figure.savefig(picture)
         put_json({"rows": rows}, json, to_text(*experiment.words(), *experiment.results(rows)))
 
     shown = {name: _shown(each) for name, each in options.items()}
-    shown["json"] = _file("json", JsonFile, "file for the rows, {'rows': [...]}; the rows alone without one")
-    if experiment.draw is not None:
-        kind = Annotated[Path | None, arg(metavar="FILE")]
-        shown["picture"] = _file("picture", kind, "file for a picture of the rows (PNG)")
+    told = Annotated[JsonFile, arg(help="file for the rows, {'rows': [...]}; the rows alone without one")]
+    shown["json"] = inspect.Parameter("json", inspect.Parameter.KEYWORD_ONLY, default=None, annotation=told)
     arguments = inspect.cleandoc(experiment.run.__doc__ or "").partition("Args:")[2].partition("\n\n")[0]
     verb.__doc__ = f"{experiment.question}\n\nArgs:{arguments}"
     verb.__signature__ = inspect.Signature(list(shown.values()))  # type: ignore[attr-defined]
@@ -103,9 +97,3 @@ def _parsed(name: str, option: inspect.Parameter, value: Any) -> Any:
         pass
     what = "names" if kind is str else "numbers"
     raise DataError(f"{name.replace('_', '-')}: expected {what} with commas between, got {value!r:.60}")
-
-
-def _file(name: str, kind: Any, words: str) -> inspect.Parameter:
-    """An option for a file that is written."""
-    told = Annotated[kind, arg(help=words)]
-    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=told)

@@ -19,7 +19,7 @@ def report(
     seed: Annotated[int, arg(metavar="N")] = 6143,
     processes: Annotated[int | None, arg(metavar="N")] = None,
 ) -> None:
-    """Run every experiment and make one page of them: HTML, Markdown, pictures, rows.
+    """Run every experiment and make one page of them in Markdown, with pictures and rows.
 
     What is done is kept in DIR/records: a report that was stopped goes on where it was.
 

@@ -93,7 +93,6 @@ def test_a_terminal_is_told_before_the_work(monkeypatch: pytest.MonkeyPatch) -> 
         ("wrench --targets 1000000000", "targets: expected a number of at most 1000000, got 1000000000"),
         ("temperature --temperatures 1,x", "temperatures: expected numbers with commas between, got '1,x'"),
         ("temperature --temperatures 1,inf", "temperatures: expected a finite number, got inf"),
-        ("wrench --methods qp --picture missing/dots.png", "picture: expected a file in an existing folder"),
         (
             "wrench --methods qp --json missing/folder/rows.json",
             "json: expected a file in an existing folder",

@@ -165,7 +165,7 @@ def test_without_extras_every_method_but_ipopt_allocates(bare: Path, tmp_path: P
 def test_without_extras_it_simulates_evaluates_and_exports(bare: Path, tmp_path: Path) -> None:
     for line in (
         "simulate A --duration 12",
-        "eval wrench --split id --layouts 2 --targets 3 --methods search,paper,sqp",
+        "eval wrench --split id --layouts 2 --targets 3 --methods dual,paper,sqp",
         "bench analytic --quick --sets paper",
         "export mixed -o robot --objective effort",
     ):

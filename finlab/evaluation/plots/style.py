@@ -5,11 +5,7 @@ from __future__ import annotations
 import io
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
-
-from finlab.errors import DataError
-from finlab.whole_file import write_whole
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -34,8 +30,6 @@ DASHES: dict[str, Any] = {"color": GREY, "linestyle": (0, (2, 2)), "linewidth": 
 """Of a line at a figure of the paper."""
 WIDTH = 9.6
 FONT = 9.5
-DPI = 110
-"""Of a PNG."""
 
 
 @contextmanager
@@ -83,12 +77,6 @@ class Picture:
 
     def __init__(self, figure: Figure, axes: list[Axes]) -> None:
         self.figure, self.axes = figure, axes
-
-    def save(self, path: Path) -> None:
-        """Write a PNG; a `DataError` where the file cannot be written."""
-        canvas = io.BytesIO()
-        self.figure.savefig(canvas, format="png", dpi=DPI)
-        write_whole(path, canvas.getvalue(), DataError)
 
     def svg(self, name: str) -> str:
         """The picture; `name` keeps its identifiers apart from those of other pictures on the page."""

@@ -1,11 +1,10 @@
-"""A document as a list of blocks: written once, turned into HTML and into Markdown by `pages`.
+"""A document as a list of blocks: turned into Markdown by `markdown`, and into plain text by `text`.
 
 A heading, a paragraph or a list is a string of Markdown; a paragraph *all in italics* is a remark in small.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 from finlab.evaluation.plots.style import Picture
@@ -63,11 +62,6 @@ class Figure:
     """Of its file, without the ending."""
     draw: Callable[[], Picture]
     caption: str
-
-    @cached_property
-    def svg(self) -> str:
-        """The picture itself."""
-        return self.draw().svg(self.name)
 
 
 Block = str | Table | Figure

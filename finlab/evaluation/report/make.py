@@ -1,4 +1,4 @@
-"""`finlab eval report`: run what is missing, then write the page, its Markdown, the pictures and the rows."""
+"""`finlab eval report`: run what is missing, then write the page, its pictures and the rows."""
 
 import json
 from collections.abc import Sequence
@@ -10,11 +10,11 @@ from finlab.errors import DataError
 from finlab.evaluation.experiment import EXPERIMENTS, Experiment, load_experiment
 from finlab.evaluation.report.document import Block, Document, Figure, Row
 from finlab.evaluation.report.jobs import THREADS, Part, run_parts
-from finlab.evaluation.report.pages import to_html, to_markdown
+from finlab.evaluation.report.markdown import to_markdown
 from finlab.evaluation.report.provenance import machine, source_commit, source_digest
 from finlab.whole_file import write_whole
 
-PAGE, TWIN, TABLES, PICTURES = "index.html", "report.md", "tables.json", "pictures"
+PAGE, TABLES, PICTURES = "report.md", "tables.json", "pictures"
 """What a report's folder holds, beside `records`."""
 SEED = 6143
 """Of a report, unless another one is given; kept apart from those on which methods were developed."""
@@ -109,7 +109,7 @@ def _missing(names: Sequence[str]) -> list[str]:
 
 
 def write_report(out: Path, document: Document, rows: dict[str, list[Row]]) -> None:
-    """Page, Markdown, pictures and rows.
+    """Page, pictures and rows.
 
     Raises:
         DataError: a file cannot be written; it is then as it was before.
@@ -120,9 +120,8 @@ def write_report(out: Path, document: Document, rows: dict[str, list[Row]]) -> N
     except OSError as error:
         raise DataError(f"{pictures}: cannot be made: {error.strerror}") from None
     for figure in (block for block in document.blocks if isinstance(block, Figure)):
-        write_whole(pictures / f"{figure.name}.svg", figure.svg, DataError)
-    write_whole(out / PAGE, to_html(document), DataError)
-    write_whole(out / TWIN, to_markdown(document, PICTURES), DataError)
+        write_whole(pictures / f"{figure.name}.svg", figure.draw().svg(figure.name), DataError)
+    write_whole(out / PAGE, to_markdown(document, PICTURES), DataError)
     lines = [
         f"{json.dumps(name)}: [\n" + ",\n".join(json.dumps(_rounded(row)) for row in each) + "\n]"
         for name, each in rows.items()

@@ -6,10 +6,10 @@ import platform
 import re
 import subprocess
 from contextlib import suppress
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from threadpoolctl import threadpool_info
+import numpy as np
+import scipy
 
 import finlab
 from finlab.networks.checkpoint import resolve_checkpoint
@@ -49,17 +49,13 @@ def source_digest() -> str:
 
 
 def machine() -> dict[str, str]:
-    """What this runs on: processor, cores, threads and versions of what is installed."""
-    versions = {}
-    for package in ("numpy", "scipy", "torch"):
-        with suppress(PackageNotFoundError):
-            versions[package] = version(package)
+    """What this runs on: processor, cores, and versions of what answers rest on."""
     return {
         "processor": _processor(),
         "cores": str(os.cpu_count()),
-        "threads": str(max((pool["num_threads"] for pool in threadpool_info()), default=1)),
         "python": platform.python_version(),
-        **versions,
+        "numpy": np.__version__,
+        "scipy": scipy.__version__,
     }
 
 

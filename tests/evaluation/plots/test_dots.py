@@ -1,6 +1,4 @@
-"""Dots with intervals, read from the drawn axes, and pictures in files."""
-
-from pathlib import Path
+"""Dots with intervals, read from the drawn axes."""
 
 import numpy as np
 import pytest
@@ -8,7 +6,6 @@ import pytest
 pytest.importorskip("matplotlib")
 
 from finlab.evaluation.plots.dots import draw_dots  # noqa: E402
-from finlab.evaluation.plots.style import picture  # noqa: E402
 
 
 def test_dots_stand_at_their_values_with_their_intervals() -> None:
@@ -33,17 +30,3 @@ def test_dots_stand_at_their_values_with_their_intervals() -> None:
 def test_rounding_is_drawn_at_the_floor() -> None:
     (axis,) = draw_dots([{"method": "qp", "split": "id", "error": 0.0}], "error", "split", "", log=True).axes
     assert axis.containers[0][0].get_ydata() == pytest.approx([1e-8]) and axis.get_yscale() == "log"
-
-
-def test_a_saved_picture_has_its_colours_and_size(tmp_path: Path) -> None:
-    from PIL import Image
-
-    with picture(height=2.0) as view:
-        view.axes[0].plot([0, 1], [0, 1], color="#0072B2", lw=20)
-    view.save(tmp_path / "line.png")
-    image = Image.open(tmp_path / "line.png")
-    assert image.size == (1056, 220)
-    red, green, blue = (np.asarray(image.convert("RGB"))[..., k].astype(int) for k in range(3))
-    drawn = (abs(red - 0x00) < 12) & (abs(green - 0x72) < 12) & (abs(blue - 0xB2) < 12)
-    assert 0.02 < drawn.mean() < 0.3
-    assert view.svg("line").count("<svg") == 1

@@ -5,8 +5,8 @@ from typing import Any
 import pytest
 
 from finlab.evaluation.report.document import Column, Document, Figure, Table
+from finlab.evaluation.report.markdown import to_markdown
 from finlab.evaluation.report.numbers import FORMATS
-from finlab.evaluation.report.pages import to_html, to_markdown
 from finlab.evaluation.report.text import to_text
 
 COLUMNS = (Column("name", "method"), Column("value", "error <", "error", "ends"))
@@ -39,17 +39,6 @@ DOCUMENT = Document(
         "- one\n- two",
     ),
 )
-
-
-def test_html() -> None:
-    page = to_html(DOCUMENT)
-    assert "<title>A title &amp; more</title>" in page and "<strong>line</strong>" in page
-    assert '<a href="#first-section">First section</a>' in page and '<h2 id="first-section">' in page
-    assert '<a href="docs/x.md">the docs</a>, <code>code</code> and 1 &lt; 2.' in page
-    assert "<strong><code>ours</code></strong>" in page and ">0.00029 (0.00020 – 0.00040)</td>" in page
-    assert '<figure><svg><path id="dots"/></svg>' in page
-    for outside in ("<?xml", "<script", "http://", "src=", "@import", "url("):
-        assert outside not in page
 
 
 def test_markdown() -> None:
