@@ -8,6 +8,7 @@ from typing import ClassVar, Literal, Self
 
 import numpy as np
 
+from finlab.allocation.in_time import in_time
 from finlab.allocation.policy import Policy
 from finlab.allocation.settings import Settings
 from finlab.allocation.solution import Candidates, Solution
@@ -91,8 +92,10 @@ class Method(ABC):
         return None
 
     def in_time(self, target: Array, reference: Array) -> Array:
-        """Which wrench (6,) is answered: a target (6,), or one of those that are expected (K, 6)."""
-        return target
+        """Which wrench (6,) is answered: a target (6,), or, where the time between ticks is a setting, one of
+        those that are expected (K, 6)."""
+        period_s = vars(self.settings).get("period_s")
+        return target if period_s is None else in_time(self.layout, target, reference, period_s)
 
     def check_policy(self, policy: Policy) -> None:
         """Raise an `AllocationError` at a policy that the method does not know."""

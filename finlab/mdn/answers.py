@@ -132,19 +132,17 @@ def ranked(robot: EffortRobot, answers: Answers, bonus: float = 0.0) -> Answers:
 def _polished(robot: EffortRobot, target: Array, near: Refined, steps: Steps, each: int) -> Refined:
     """The least effort near refined commands, exact where these were."""
     # What is far out of reach would only drive the multipliers out of bounds.
-    hopeful = near.error <= 1.0
-    if not hopeful.any():
+    hopeful = np.flatnonzero(near.error <= 1.0)
+    if not len(hopeful):
         return near
-    every = bool(hopeful.all())
-    start = near if every else Refined(*(values[hopeful] for values in near))
-    side_by_side = each if every and not steps.each else 1
-    better = polish(robot.commands, robot.effort, target[hopeful], start, steps.polish, side_by_side)
-    better = refine(robot.commands, target[hopeful], better.command, steps.last)
-    worse = better.error > np.maximum(robot.exact, start.error + NEARLY)
+    start, wanted = Refined(*(values[hopeful] for values in near)), target[hopeful]
+    side_by_side = each if len(hopeful) == len(target) and not steps.each else 1
+    better = polish(robot.commands, robot.effort, wanted, start, steps.polish, side_by_side)
+    better = refine(robot.commands, wanted, better.command, steps.last)
+    kept = better.error <= np.maximum(robot.exact, start.error + NEARLY)
     result = Refined(*(values.copy() for values in near))
-    place = np.flatnonzero(hopeful)[~worse]
     for whole, part in zip(result, better, strict=True):
-        whole[place] = part[~worse]
+        whole[hopeful[kept]] = part[kept]
     return result
 
 

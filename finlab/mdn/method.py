@@ -16,7 +16,6 @@ import numpy as np
 from finlab.allocation.dual.method import Dual
 from finlab.allocation.dual.rates import Rates
 from finlab.allocation.evaluate import REACHED, costs
-from finlab.allocation.in_time import in_time
 from finlab.allocation.mdn_settings import MdnSettings
 from finlab.allocation.method import Method, Takes
 from finlab.allocation.policy import Policy
@@ -96,10 +95,6 @@ class Mdn(Method):
         if other is not self:
             other.robot = self.robot.at(other.plant, self.sigma)
         return other
-
-    def in_time(self, target: Array, reference: Array) -> Array:
-        """See `Method`."""
-        return in_time(self.layout, target, reference, self.settings.period_s)
 
     def solve(
         self,

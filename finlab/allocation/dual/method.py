@@ -23,7 +23,6 @@ from finlab.allocation.dual.drag import at_the_price_of_drag
 from finlab.allocation.dual.newton import Prices, solve
 from finlab.allocation.dual.policies import nearest
 from finlab.allocation.dual.rates import Rates, implied_prices, within_tick
-from finlab.allocation.in_time import in_time
 from finlab.allocation.levenberg_marquardt import CommandProblem, refine
 from finlab.allocation.method import Method
 from finlab.allocation.policy import AXES, CLOSEST, Policy
@@ -100,10 +99,6 @@ class Dual(Method):
             inflow = other.plant.inflow(None)
             other.compiled = self.compiled.at(inflow)
         return other
-
-    def in_time(self, target: Array, reference: Array) -> Array:
-        """See `Method`."""
-        return in_time(self.layout, target, reference, self.settings.period_s)
 
     def solve(
         self,

@@ -8,12 +8,10 @@ from finlab.arrays import AnyArray, Array
 from finlab.mdn.descent import EffortProblem, descend, realize, wrench
 from finlab.mdn.effort_fins import Projected
 
-STARTS = 64
+STARTS = 32
 """Random forces from which each target is tried."""
-FIRST_STEPS, LAST_STEPS = 10, 25
-"""Quadratic problems solved from every start, and then from the best."""
-KEPT = 20
-"""Forces that are followed further."""
+STEPS = 35
+"""Quadratic problems solved from every start."""
 MODES = 8
 """Most ways that are distinguished."""
 APART = 0.08
@@ -40,14 +38,8 @@ def ways_to_deliver(rng: np.random.Generator, problem: EffortProblem, target: Ar
     # A start's small forces are as good as at rest, so few or many fins work.
     size = rng.random((rows * STARTS, n)) ** rng.uniform(1.0, 8.0, (rows * STARTS, 1)) * maximum
     start = size * np.exp(1j * rng.uniform(-np.pi, np.pi, size.shape))
-    found = descend(problem, np.repeat(target, STARTS, axis=0), start, FIRST_STEPS)
-    force, cost = _told(problem, target, found)
-    best = np.argsort(cost, axis=1)[:, :KEPT]
-    again = np.take_along_axis(force, best[..., None], axis=1).reshape(-1, n)
-    found = descend(problem, np.repeat(target, KEPT, axis=0), again, LAST_STEPS)
-    more, further = _told(problem, target, found)
-    force, cost = np.concatenate([more, force], axis=1), np.concatenate([further, cost], axis=1)
-    return _different(force, cost, maximum)
+    found = descend(problem, np.repeat(target, STARTS, axis=0), start, STEPS)
+    return _different(*_told(problem, target, found), maximum)
 
 
 def _told(problem: EffortProblem, target: Array, found: Projected) -> tuple[AnyArray, Array]:
