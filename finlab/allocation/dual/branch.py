@@ -70,14 +70,6 @@ def gaps(robot: DualRobot, force: Array, sets: Sets) -> Array:
     return found
 
 
-def _holes(robot: DualRobot, force: Array, sets: Sets) -> NDArray[np.bool_]:
-    """Which forces (n, N) of planes are smaller than their least ones."""
-    lines, planes = robot.answers.lines, robot.answers.planes
-    found = np.zeros((lines + planes, force.shape[1]), bool)
-    found[lines:] = np.hypot(force[lines : lines + planes], force[lines + planes :]) < 0.98 * sets.low[lines:]
-    return found
-
-
 def may_have_gaps(robot: DualRobot, sets: Sets, force: Array) -> bool:
     """Whether forces (k, N) may lie in gaps: a quick look."""
     if robot.band.any() or len(sets.forked):
