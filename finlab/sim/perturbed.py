@@ -18,7 +18,6 @@ from finlab.vehicle.body import complete_body
 from finlab.vehicle.vehicle import Vehicle
 
 Factor = Annotated[float, Meta(gt=0.0, le=100.0)]
-Offset = Annotated[float, Meta(ge=-1.0, le=1.0)]
 
 
 def perturbed(
@@ -28,8 +27,6 @@ def perturbed(
     added_mass: float = 1.0,
     inertia: float = 1.0,
     buoyancy: float = 1.0,
-    gravity_offset_m: Sequence[float] = (0.0, 0.0, 0.0),
-    ballasted: bool = False,
     thrust: Mapping[str, float] | None = None,
 ) -> Layout:
     """A layout's robot with some numbers changed; what its body does not say is U-CAT's, as in any swim.
@@ -40,10 +37,6 @@ def perturbed(
         added_mass: factor of the added mass.
         inertia: factor of the moments of inertia; the mass stays, and with it the weight.
         buoyancy: factor of the buoyant force; 1.01 is a robot that rises.
-        gravity_offset_m: where the centre of gravity truly is, as the layout's frame sees it (3,) [m]. Fins
-            and centre of buoyancy stay where they are on the hull, so the robot lies askew.
-        ballasted: whether weights have brought it level again, the centre of buoyancy as far above the true
-            centre of gravity as the layout says.
         thrust: share of its law's thrust that each named fin gives; fins that are tables take a
             `FinFault(name, 0.0, "torn", share)` instead.
 
@@ -53,9 +46,7 @@ def perturbed(
     factors = {"damping": damping, "added_mass": added_mass, "inertia": inertia, "buoyancy": buoyancy}
     for name, factor in factors.items():
         checked(factor, Factor, key=name)
-    away = checked(gravity_offset_m, tuple[Offset, Offset, Offset], key="gravity_offset_m")
     body = complete_body(layout)
-    center = body.center_of_buoyancy_m or (0.0, 0.0, 0.0)
     changed = replace(
         body,
         linear_damping=_scaled(body.linear_damping, damping),
@@ -63,17 +54,14 @@ def perturbed(
         added_mass=_scaled(body.added_mass, added_mass),
         inertia_kgm2=_scaled(body.inertia_kgm2, inertia),
         buoyancy_n=buoyancy * _lift(body),
-        center_of_buoyancy_m=center if ballasted else _moved(center, away),
     )
     shares = dict(thrust or {})
     layout.indices(tuple(shares))
     fins = []
     for fin in layout.fins:
-        x, y, z = _moved(fin.position, away)
-        moved = replace(fin, position=(x, y, z))
         if (share := shares.get(fin.name, 1.0)) != 1.0:
-            moved = replace(moved, model=fin.model.scaled(checked(share, Factor, key=fin.name)))
-        fins.append(moved)
+            fin = replace(fin, model=fin.model.scaled(checked(share, Factor, key=fin.name)))
+        fins.append(fin)
     return replace(layout, actuators=tuple(fins), body=changed)
 
 
@@ -87,10 +75,6 @@ def checked_truth(layout: Layout, truth: Layout) -> Layout:
 
 def _scaled(values: Sequence[float] | None, factor: float) -> tuple[float, ...] | None:
     return None if values is None else tuple(factor * value for value in values)
-
-
-def _moved(point: Sequence[float], away: Sequence[float]) -> tuple[float, ...]:
-    return tuple(a - b for a, b in zip(point, away, strict=True))
 
 
 def _lift(body: Body) -> float:

@@ -10,26 +10,7 @@ from finlab.errors import LayoutError
 from finlab.layout import FinModelSpec, Layout, load_layout
 from finlab.physics import plant_of
 from finlab.sim import ClosedLoop, make_trajectory, perturbed
-from finlab.vehicle.attitude import euler
-from finlab.vehicle.body import complete_body
-from finlab.vehicle.vehicle import Vehicle
 from tests.any_robot import AnyRobot
-
-
-def test_weight_elsewhere_is_felt_by_fins_and_buoyancy(layout_a: Layout) -> None:
-    """A robot whose weight lies 2 cm ahead hangs with its nose down, its buoyancy above its weight."""
-    true = perturbed(layout_a, gravity_offset_m=(0.02, 0.0, 0.0))
-    np.testing.assert_allclose(true.position, layout_a.position - (0.02, 0.0, 0.0))
-    height = complete_body(layout_a).center_of_buoyancy_m[2]  # type: ignore[index]
-    vehicle, state = Vehicle(complete_body(true)), np.zeros(13)
-    state[3] = 1.0
-    for _ in range(6000):
-        state = vehicle.step(state, [0.0] * 6, 0.02)
-    pitch = euler(state[3:7])[1]
-    assert pitch == pytest.approx(math.atan2(0.02, height), abs=5e-3), "positive with the nose down"
-    level = perturbed(layout_a, gravity_offset_m=(0.02, 0.0, 0.0), ballasted=True)
-    assert complete_body(level).center_of_buoyancy_m == complete_body(layout_a).center_of_buoyancy_m
-    np.testing.assert_allclose(level.position, true.position)
 
 
 def test_a_torn_fin_gives_a_share_of_its_thrust(layout_a: Layout) -> None:

@@ -143,14 +143,7 @@ class Case(NamedTuple):
 
 HARD_DAYS = (
     HardDay("nominal", "Everything is as drawn; sensors are noisy, biased and late.", PAPER_LAYOUTS),
-    HardDay("damping-half", "The body is damped half as much.", truth={"damping": 0.5}),
     HardDay("damping-double", "The body is damped twice as much.", truth={"damping": 2.0}),
-    HardDay(
-        "parameters-low",
-        "Damping, added mass and inertia are 30 % less than drawn.",
-        PAPER_LAYOUTS,
-        truth={"damping": 0.7, "added_mass": 0.7, "inertia": 0.7},
-    ),
     HardDay(
         "parameters-high",
         "Damping, added mass and inertia are 30 % more than drawn.",
@@ -164,19 +157,10 @@ HARD_DAYS = (
         water=Changing(SteadyCurrent(CURRENT), SteadyCurrent((0.05, 0.05, 0.0)), 45.0, 5.0),
     ),
     HardDay("buoyant", "The robot is 1 % too buoyant.", truth={"buoyancy": 1.01}),
-    HardDay("heavy", "The robot is 1 % too heavy for its buoyancy.", truth={"buoyancy": 0.99}),
-    HardDay(
-        "gravity-off",
-        "The centre of gravity is 2 cm ahead of where it is drawn; weights have brought the robot level.",
-        truth={"gravity_offset_m": (0.02, 0.0, 0.0), "ballasted": True},
-    ),
     HardDay("late", "All sensors are 100 ms later.", sensors=SensorSettings().later(0.1)),
-    HardDay("circle", "A circle.", trajectory="circle"),
-    HardDay("dive", "Down by a metre and up again.", trajectory="dive"),
     HardDay("square", "A square with stops at its corners.", trajectory="square"),
     HardDay("waves", "Keep a place in waves of 0.2 m.", trajectory="station", water=Waves()),
     HardDay("hexa", "Six fins.", ("hexa",)),
-    HardDay("octo", "Eight fins.", ("octo",)),
     HardDay(
         "fins-mixed",
         "Each fin of A follows a law of its own, which all methods but `paper` know.",
@@ -193,13 +177,6 @@ HARD_DAYS = (
         announced=False,
     ),
     HardDay("lost-two", "Two fins are lost half-way, announced.", ("A",), lost=2),
-    HardDay(
-        "lost-two-unannounced",
-        "Two fins are lost half-way, and a monitor has to find out.",
-        ("A",),
-        lost=2,
-        announced=False,
-    ),
     HardDay("restricted", "Stops keep the fins within arcs.", ("restricted",)),
     HardDay("saturated", "The path asks for more than the fins can give.", duration_s=36.0),
     HardDay("flexible", "Fins have soft tips, which no method is given.", plant="flexible"),

@@ -2,11 +2,11 @@
 
 import math
 from collections.abc import Iterable, Sequence
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from finlab.control import PATH_CONTROLLERS, FaultMonitor
+from finlab.control import FaultMonitor, TrackingController
 from finlab.evaluation.experiment import Experiment
 from finlab.evaluation.experiments.closed_loop import absolute_error
 from finlab.evaluation.method_specs import MethodSpec, load_method_spec
@@ -45,9 +45,6 @@ def run(
     trajectory: str = "lissajous",
     method: str = "dual",
     seeds: int = 4,
-    whole: int = 0,
-    plant: str = "mean",
-    controller: Literal["tracking", "waypoint"] = "tracking",
     seed: int = 0,
 ) -> list[Row]:
     """One row for each layout, and one over all.
@@ -60,22 +57,19 @@ def run(
         method: who allocates.
         seeds: how many; each loses every fin of every layout once, at a random time in a random current, and
             swims once without a loss.
-        whole: more seeds without a loss, for the false alarms: with four layouts ten make an hour.
-        plant: what the fins really do; see finlab simulate --help.
-        controller: tracking, or waypoint (heads for a point ahead, as in the paper).
         seed: the first seed of times, currents and noise.
     """
     robots, path = [load_layout(name) for name in layouts], make_trajectory(trajectory)
     spec = load_method_spec(method)
     cases: list[tuple[int, Layout, str | None]] = [
         (each, robot, fin)
-        for each in range(seed, seed + seeds + whole)
+        for each in range(seed, seed + seeds)
         for robot in robots
-        for fin in (None, *(robot.names if each < seed + seeds else ()))
+        for fin in (None, *robot.names)
     ]
     losses = []
     for each, robot, fin in progress(cases, "swim"):
-        losses.append(swim_loss(robot, fin, path, spec, each, plant, controller))
+        losses.append(swim_loss(robot, fin, path, spec, each))
     return monitoring_rows(losses)
 
 
@@ -85,23 +79,20 @@ def swim_loss(
     trajectory: Trajectory,
     method: MethodSpec,
     seed: int,
-    plant: str = "mean",
-    controller: str = "tracking",
 ) -> Loss:
     """One loss, or none; the seed draws time, current and noise."""
     rng = np.random.default_rng([seed, 14, 0 if fin is None else 1 + layout.index(fin)])
     at = float(rng.uniform(QUIET_S, trajectory.duration_s - QUIET_S))
     speed, heading = rng.uniform(0.0, CURRENT_M_S), rng.uniform(0.0, 2 * math.pi)
     current = SteadyCurrent((speed * math.cos(heading), speed * math.sin(heading), 0.0))
-    steer, allocator = PATH_CONTROLLERS[controller], method.on(layout)
+    allocator = method.on(layout)
 
     def loop(monitor: FaultMonitor | None) -> ClosedLoop:
         return ClosedLoop(
             layout,
             allocator,
             trajectory,
-            steer(layout),
-            plant=plant,
+            TrackingController(layout),
             water=current,
             failures=[] if fin is None else [FinFault(fin, at)],
             announced=monitor is None,

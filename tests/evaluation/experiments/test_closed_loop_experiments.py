@@ -87,8 +87,7 @@ def test_on_board_is_exact_within_its_limits_and_scales_beyond(layout_a: Layout,
         (["faults", "--methods", ","], "methods: expected names"),
         (["velocity", "--duration", "5"], "more than 10 s"),
         (["swims", "--seeds", "0"], "seeds: expected a number of at least 1"),
-        (["swims", "--scenarios", "nominal,gale"], "expected some of nominal, damping-half"),
-        (["monitor", "--whole", "-1"], "whole: expected a number of at least 0"),
+        (["swims", "--scenarios", "nominal,gale"], "expected some of nominal, damping-double"),
     ],
 )
 def test_bad_input_is_one_sentence(argv: list[str], message: str, capsys: pytest.CaptureFixture[str]) -> None:

@@ -45,12 +45,12 @@ def test_what_is_true_is_not_what_is_believed(analytic: AnyRobot) -> None:
     assert one != other
 
 
-def test_a_body_that_is_drawn_too_large_and_who_steers_it(analytic: AnyRobot) -> None:
-    low = DAYS["parameters-low"].swim(Case("B", ()), analytic, 0, controller="waypoint")
-    drawn, true = low.layout, low.vehicle
-    assert low.controller.name == "waypoint" and drawn == DAYS["nominal"].robot("B", 0)
+def test_a_body_that_is_drawn_too_small_and_who_steers_it(analytic: AnyRobot) -> None:
+    high = DAYS["parameters-high"].swim(Case("B", ()), analytic, 0, controller="waypoint")
+    drawn, true = high.layout, high.vehicle
+    assert high.controller.name == "waypoint" and drawn == DAYS["nominal"].robot("B", 0)
     moments = np.array(true.inertia[3:]) / np.array(Vehicle(complete_body(drawn)).inertia[3:])
-    np.testing.assert_allclose(moments, 0.7)
+    np.testing.assert_allclose(moments, 1.3)
 
 
 def test_fins_of_a_day_are_known_and_drawn_by_the_seed() -> None:
