@@ -1,16 +1,13 @@
-"""What travels with a bundle in its `bundle.json`: the method, its yardstick, and what it is made with."""
+"""What travels with a bundle in its `bundle.json`: the method and what it is made with."""
 
 import json
 from dataclasses import asdict, is_dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-import numpy as np
-
 from finlab.bundle_files import ABOUT, VERSION, Files
 from finlab.errors import DataError
 from finlab.files.guarded import decoded
 from finlab.files.plain_values import parse_json
-from finlab.networks.normalization import Normalization
 
 if TYPE_CHECKING:
     from finlab.allocation.allocator import Allocator
@@ -27,8 +24,6 @@ class About(NamedTuple):
     """One of `METHODS_ON_BOARD`."""
     checkpoint: str | None
     """Name of the checkpoint that the networks come from; None for methods without."""
-    normalization: Normalization
-    """Yardstick of the error."""
     settings: dict[str, Any]
     """Settings of the method, by name, as the file holds them: the method checks them."""
 
@@ -36,23 +31,15 @@ class About(NamedTuple):
 def about_bundle(allocator: "Allocator", made_by: str) -> bytes:
     """The contents of `bundle.json` for an allocator, made by a version of finlab."""
     options = vars(allocator.settings).items()
-    statistics = normalization_of(allocator)._asdict().items()
     document = {
         "format": FORMAT,
         "version": VERSION,
         "finlab": made_by,
         "method": allocator.method,
         "checkpoint": allocator.checkpoint,
-        "normalization": {key: value.tolist() for key, value in statistics},
         "settings": {key: asdict(value) if is_dataclass(value) else value for key, value in options},  # type: ignore[arg-type]
     }
     return (json.dumps(document, indent=1, allow_nan=False) + "\n").encode()
-
-
-def normalization_of(allocator: "Allocator") -> Normalization:
-    """What the networks of an allocator were trained with; the robot's yardstick for methods without."""
-    weights = allocator.weights
-    return Normalization(np.zeros(6), allocator.scale) if weights is None else weights.normalization
 
 
 def read_about(files: Files, source: str) -> About:
@@ -71,8 +58,4 @@ def read_about(files: Files, source: str) -> About:
         raise DataError(f"{place}: method must be one of {known}, got {method!r:.40}")
     if not isinstance(checkpoint, str | None) or not isinstance(values, dict):
         raise DataError(f"{place}: checkpoint must be a name and settings must be keys and values")
-    try:
-        normalization = Normalization.parse(document.get("normalization"))
-    except ValueError as error:
-        raise DataError(f"{place}: {error}") from None
-    return About(method, checkpoint, normalization, values)
+    return About(method, checkpoint, values)

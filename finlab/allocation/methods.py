@@ -7,8 +7,6 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
-import numpy as np
-
 from finlab.allocation.bundle_settings import METHODS_ON_BOARD, About, read_about
 from finlab.allocation.method import Method
 from finlab.allocation.settings import Settings
@@ -117,8 +115,6 @@ def bundled_method(
             f"`finlab export LAYOUT -o DIR --method {method}`"
         )
     weights = parse_checkpoint(part, f"{source}/{CHECKPOINT.rstrip('/')}", about.checkpoint)
-    if not all(np.array_equal(a, b) for a, b in zip(weights.normalization, about.normalization, strict=True)):
-        raise DataError(f"{source}: {ABOUT} and the networks differ in normalization; export it again")
     return MethodChoice(kind, chosen, weights)
 
 
