@@ -4,7 +4,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 from tyro.conf import Positional, arg
 from tyro.extras import SubcommandApp
@@ -16,36 +16,28 @@ verbs = SubcommandApp()
 def fin(
     data: Annotated[Positional[tuple[Path, ...]], arg(metavar="DATA.csv...")],
     output: Annotated[Path, arg(metavar="FIN.csv", aliases=["-o"])],
-    angles: Literal["rad", "deg"] | None = None,
-    amplitude: Literal["half", "peak-to-peak"] | None = None,
-    frequency: Literal["hz", "rpm"] | None = None,
     seed: int = 0,
 ) -> None:
     """Fit a fin to a load cell's measurements, and write it for layouts to name.
 
     Files hold cycle means (A, f, Fy, Fz and perhaps phi, Fx, P and standard deviations sFx, sFy, sFz); A is
     half the stroke, phi the zero direction, forces are in the fin frame (x' shaft, y' horizontal thrust axis,
-    z' up). Units may stand in the header, `A [deg]`.
+    z' up). Units may stand in the header, `A [deg]`, as may `stroke` for whole strokes in place of A.
 
     Args:
         data: CSV files of one fin.
         output: the fitted fin.
-        angles: unit of amplitudes and zero directions; recognized where it is not given.
-        amplitude: whether amplitudes are half the stroke or the whole; recognized where it is beyond doubt.
-        frequency: unit of frequencies; recognized where it is beyond doubt.
         seed: draws samples where there are too many.
     """
     with _progress_bar() as tell:
         from finlab.fit.advice import next_measurements
-        from finlab.fit.conventions import Conventions
         from finlab.fit.fin_file import check_fin_path, summary, write_fin
         from finlab.fit.fin_fit import fit_fin
         from finlab.fit.measurements import read_measurements
 
         check_fin_path(output)
-        conventions = Conventions(angles, amplitude, frequency)
         tell("reading", 0.05)
-        measurements = read_measurements(data, conventions)
+        measurements = read_measurements(data)
         fit = fit_fin(measurements, seed, lambda words, share: tell(words, 0.1 + 0.7 * share))
         tell("writing the table", 0.8)
         write_fin(fit, output)

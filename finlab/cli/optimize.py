@@ -12,10 +12,8 @@ from tyro.conf import Positional, UseAppendAction, arg
 from finlab.cli.json_file import JsonFile, check_json_file, put_json
 
 if TYPE_CHECKING:
-    from finlab.analysis import Bounds, Improvement
-    from finlab.layout import Layout
+    from finlab.analysis import Improvement
 
-Box = tuple[float, float, float, float, float, float]
 Wrench = tuple[float, float, float, float, float, float]
 
 
@@ -24,7 +22,6 @@ def optimize(
     fins: Annotated[tuple[str, ...], arg(metavar="NAME...")],
     output: Annotated[Path, arg(metavar="FILE.yaml", aliases=["-o"])],
     goal: Annotated[str, arg(metavar="NAME")] = "weakest_direction",
-    bounds: Annotated[Box | None, arg(metavar="X0 X1 Y0 Y1 Z0 Z1")] = None,
     reach: Annotated[float, arg(metavar="M")] = 0.05,
     turn: Annotated[float, arg(metavar="DEG")] = 90.0,
     mirror: bool = True,
@@ -40,7 +37,6 @@ def optimize(
         fins: fins that may move; mirrored twins follow.
         output: layout file to write.
         goal: weakest_direction, mission_power or worst_single_failure.
-        bounds: box in the body frame that the fins may not leave [m]; overrides --reach.
         reach: how far each fin may go from where it is, either way along x, y and z [m].
         turn: how far each shaft may turn from where it points, either way [deg].
         mirror: keep fins that are each other's mirror image so.
@@ -51,7 +47,7 @@ def optimize(
     """
     from tqdm import tqdm
 
-    from finlab.analysis import Progress, optimize_layout
+    from finlab.analysis import Bounds, Progress, optimize_layout
     from finlab.analysis.goals import MISSION
     from finlab.cli.inputs import check_positive, open_robot
     from finlab.errors import FinlabError
@@ -65,7 +61,7 @@ def optimize(
         raise FinlabError(
             f"expected --reach from 0 m and --turn from 0 to 180 degrees, got {reach:g}, {turn:g}"
         )
-    space = {name: _bounds(robot, name, bounds, reach, math.radians(turn)) for name in fins}
+    space = {name: Bounds.around(robot.fins[robot.index(name)], reach, math.radians(turn)) for name in fins}
     bar = tqdm(total=rounds, desc=goal, unit="round", disable=None, leave=False, file=sys.stderr)
 
     def report(progress: Progress) -> None:
@@ -118,13 +114,3 @@ def improvement_text(found: Improvement, output: Path) -> str:
         f"{output}: written." if found.improved else f"{output}: written unchanged, nothing better was found."
     )
     return "\n".join(lines)
-
-
-def _bounds(layout: Layout, name: str, box: Box | None, reach: float, turn: float) -> Bounds:
-    from finlab.analysis import Bounds
-
-    fin = layout.fins[layout.index(name)]
-    if box is None:
-        return Bounds.around(fin, reach, turn)
-    angle = (fin.shaft_azimuth - turn, fin.shaft_azimuth + turn)
-    return Bounds((box[0], box[1]), (box[2], box[3]), (box[4], box[5]), angle)

@@ -68,8 +68,7 @@ def simulate(
         noise: whether the sensors are noisy.
         seed: of the noise.
         checkpoint: trained checkpoint; the shipped one of the method by default.
-        output: new or empty folder for the log (log.npz, and log.csv for other programs);
-            without it only the summary is printed.
+        output: new or empty folder for the log (log.npz); without it only the summary is printed.
     """
     from tqdm import tqdm
 
@@ -118,7 +117,11 @@ def simulate(
             if (now := monitored(loop)) != found[-1][1]:
                 found.append((loop.time - loop.period_s, now))
             bar.update(loop.period_s)
-    written = [] if output is None else [f"\n{output}: written {', '.join(_write(loop.log, output))}."]
+    written = []
+    if output is not None:
+        with whole_folder(output) as folder:
+            loop.log.save(folder / "log.npz")
+        written = [f"\n{output}: written log.npz."]
     told = excitation_summary(loop.log) if excite else summary(loop.log)
     changes = [f"{time:.1f} s: the monitor takes {what}" for time, what in found[1:]]
     print("\n".join([told, *changes, *written]))
@@ -131,16 +134,6 @@ def _controller(layout: Layout, name: str) -> Controller:
     if name == "tracking":
         return TrackingController(layout)
     return WaypointController(PAPER_WAYPOINT_GAINS if name == "waypoint-paper" else None)
-
-
-def _write(log: RunLog, output: Path) -> list[str]:
-    """The log in a folder; the names of its files."""
-    from finlab.sim.log_csv import save_csv
-
-    with whole_folder(output) as folder:
-        log.save(folder / "log.npz")
-        save_csv(log, folder / "log.csv")
-        return ["log.npz", "log.csv"]
 
 
 def summary(log: RunLog) -> str:

@@ -4,9 +4,8 @@ Nothing here uses what `finlab.sim` knows to be true; fits come from data alone.
 `[fit]`.
 """
 
-from finlab.fit.conventions import Conventions
 from finlab.fit.fin_file import write_fin
 from finlab.fit.fin_fit import FinFit, fit_fin
 from finlab.fit.measurements import Measurements, read_measurements
 
-__all__ = ["Conventions", "FinFit", "Measurements", "fit_fin", "read_measurements", "write_fin"]
+__all__ = ["FinFit", "Measurements", "fit_fin", "read_measurements", "write_fin"]

@@ -48,7 +48,7 @@ class FinFit:
     largest_power: float
     """Largest power that was measured [W]."""
     notes: tuple[str, ...]
-    """What was recognized, filled in or left out, a sentence each."""
+    """What was filled in or left out, a sentence each."""
 
     def predict(self, command: Array) -> tuple[Array, Array]:
         """Returns forces [N] in the fin frame and their standard deviations (..., 3) at commands (..., 3)."""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.files.csv_table import read_table
-from finlab.fit.conventions import Columns, Conventions, named_column, to_fin_frame
+from finlab.fit.conventions import check_units, named_column
 from finlab.fit.sensor_checks import check_sensors
 from finlab.layout.angles import FILE_TURN_TOLERANCE, TURN
 
@@ -39,7 +39,7 @@ class Measurements:
     places: tuple[str, ...]
     """Where each sample stands, file and line."""
     notes: tuple[str, ...]
-    """What was recognized, filled in or left out, a sentence each."""
+    """What was filled in or left out, a sentence each."""
     turned: bool = True
     """Whether several zero directions were measured; if not, the fin counts as the same all round."""
 
@@ -83,37 +83,25 @@ class Measurements:
         )
 
 
-def read_measurements(
-    paths: Sequence[str | os.PathLike[str]], conventions: Conventions | None = None
-) -> Measurements:
+def read_measurements(paths: Sequence[str | os.PathLike[str]]) -> Measurements:
     """Returns the samples of all files together.
 
-    Each file has a header; columns come in any order, units may stand behind names (`A [deg]`). They are
-    cycle means: A, f, Fy, Fz and perhaps phi, Fx, P, sFx, sFy, sFz (standard deviations).
+    Each file has a header; columns come in any order, units may stand behind names (`A [deg]`), else
+    they are SI. They are cycle means: A (or stroke), f, Fy, Fz and perhaps phi, Fx, P,
+    sFx, sFy, sFz (standard deviations).
 
     Raises:
         DataError: a file is missing, too large, lacks a column or holds what no fin can do; or there are too
             few samples, or only one amplitude or frequency.
     """
-    conventions = conventions or Conventions()
-    read = [_read(Path(path), conventions) for path in paths]
+    read = [_read(Path(path)) for path in paths]
     if not read:
         raise DataError("expected at least one CSV file of measurements, got none")
     return _checked(read, ", ".join(str(path) for path in paths))
 
 
-def _read(path: Path, conventions: Conventions) -> tuple[Columns, tuple[str, ...]]:
-    """A file's columns in finlab's conventions, one row per sample, and the place of each."""
-    columns, lines = _read_columns(path)
-    for name in ("A", "f", "Fy", "Fz"):
-        if name not in columns.values:
-            raise DataError(f"{path}: column {name} is missing, expected A, f, phi, Fx, Fy, Fz in any order")
-    to_fin_frame(columns, conventions)
-    return columns, tuple(f"{path.name} line {line}" for line in lines)
-
-
-def _read_columns(path: Path) -> tuple[Columns, NDArray[np.intp]]:
-    """The columns that a fit reads, as they stand, and the line of each row."""
+def _read(path: Path) -> tuple[dict[str, Array], tuple[str, ...]]:
+    """The columns (n,) of a file that a fit reads in SI, by name, and the place of each sample."""
     table = read_table(path, MAX_BYTES, "a CSV file of measurements")
     named = [named_column(cell) for cell in table.header]
     used = [i for i, (name, _) in enumerate(named) if name]
@@ -121,26 +109,27 @@ def _read_columns(path: Path) -> tuple[Columns, NDArray[np.intp]]:
     if len(set(names)) < len(names):
         raise DataError(f"{path}: two columns stand for {_repeated(names)}; keep one")
     numbers, lines = table.numbers(used)
-    values = dict(zip(names, numbers.T.copy(), strict=True))
-    told = {names[k] for k, i in enumerate(used) if named[i][1] is not None}
-    for k, i in enumerate(used):
-        values[names[k]] *= named[i][1] or 1.0
-    return Columns(values, told, str(path)), lines
+    values = dict(zip(names, numbers.T * np.array([[named[i][1]] for i in used]), strict=True))
+    for name in ("A", "f", "Fy", "Fz"):
+        if name not in values:
+            raise DataError(f"{path}: column {name} is missing, expected A, f, phi, Fx, Fy, Fz in any order")
+    check_units(values, str(path))
+    return values, tuple(f"{path.name} line {line}" for line in lines)
 
 
 def _repeated(names: list[str]) -> str:
     return next(name for name in names if names.count(name) > 1)
 
 
-def _checked(read: list[tuple[Columns, tuple[str, ...]]], source: str) -> Measurements:
+def _checked(read: list[tuple[dict[str, Array], tuple[str, ...]]], source: str) -> Measurements:
     """The samples of all files, with what is wrong with them as a whole said in a sentence."""
     places = tuple(place for _, own in read for place in own)
-    notes = [note for columns, _ in read for note in columns.notes]
+    notes: list[str] = []
     if len(places) < MIN_SAMPLES:
         raise DataError(
             f"{source}: {len(places)} samples, expected at least {MIN_SAMPLES}; 300 are a good number"
         )
-    files = [columns.values for columns, _ in read]
+    files = [values for values, _ in read]
     shared = [name for name in files[0] if all(name in values for values in files)]
     columns = {name: np.concatenate([values[name] for values in files]) for name in shared}
     for name, unit in (("A", "rad"), ("f", "Hz")):
@@ -171,7 +160,8 @@ def _directions(columns: dict[str, Array], source: str, notes: list[str]) -> tup
     phi = columns.get("phi")
     if phi is not None and np.ptp(phi) > TURN + FILE_TURN_TOLERANCE:
         raise DataError(
-            f"{source}: the zero directions span {np.ptp(phi):.4g} rad; say their unit with --angles"
+            f"{source}: the zero directions span {np.ptp(phi):.4g} rad; name their unit in the header, "
+            "`phi [deg]`"
         )
     if phi is not None and np.ptp(phi) >= SAME_DIRECTION:
         return phi, True

@@ -1,5 +1,6 @@
 """The record of a swim: one row per control tick, as arrays, in memory and in an NPZ file."""
 
+import io
 import json
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -125,12 +126,17 @@ class RunLog:
         """How many ticks there are."""
         return len(self.columns["time"])
 
-    def save(self, path: str | Path) -> None:
-        """Writes an NPZ file: one array per column, and `meta`, a JSON object with the rest."""
+    def npz(self) -> bytes:
+        """An NPZ file: one array per column, and `meta`, a JSON object with the rest."""
         meta: dict[str, Any] = {"format": FORMAT, "version": VERSION}
         meta |= {field.name: getattr(self, field.name) for field in fields(self) if field.name != "columns"}
-        with Path(path).open("wb") as file:
-            np.savez_compressed(file, allow_pickle=False, meta=np.array(json.dumps(meta)), **self.columns)
+        file = io.BytesIO()
+        np.savez_compressed(file, allow_pickle=False, meta=np.array(json.dumps(meta)), **self.columns)
+        return file.getvalue()
+
+    def save(self, path: str | Path) -> None:
+        """Writes the NPZ file."""
+        Path(path).write_bytes(self.npz())
 
 
 def log_of_ticks(ticks: list[Tick], **about: Any) -> RunLog:

@@ -5,6 +5,8 @@ from typing import Any
 
 import pytest
 
+from finlab.sim import load_log
+
 BOTTOMS = "all => all.map(one => one.getBoundingClientRect().bottom)"
 
 
@@ -60,9 +62,7 @@ def test_a_fin_lost_in_a_current_is_found(page: Any, tmp_path: Path) -> None:
     assert swimming.swimmer.shown.found[0][1] < 5.0
 
     held = swimming.time
-    table = page.download("Table (CSV)", tmp_path / "swim.csv")
-    header, *rows = table.read_text().splitlines()
-    assert header.startswith("t [s],x [m]") and len(rows) == round(held / 0.1)
+    assert load_log(page.download("Log (NPZ)", tmp_path / "swim.npz")).n_ticks == round(held / 0.1)
     page.press("Go on")
     page.until(lambda: swimming.time > held)
     page.press("End")

@@ -8,7 +8,6 @@ import pytest
 
 from finlab.arrays import Array
 from finlab.errors import DataError
-from finlab.fit.conventions import Conventions
 from finlab.fit.measurements import Measurements, read_measurements
 from tests.fit.cell import columns_of, commands, measured, soft, write
 
@@ -21,8 +20,8 @@ def columns() -> Columns:
     return columns_of(command, measured(soft(d=0.1), command))
 
 
-def read(tmp_path: Path, columns: Columns, conventions: Conventions | None = None) -> Measurements:
-    return read_measurements([write(tmp_path / "cell.csv", columns)], conventions)
+def read(tmp_path: Path, columns: Columns) -> Measurements:
+    return read_measurements([write(tmp_path / "cell.csv", columns)])
 
 
 def test_a_plain_file_is_read_as_it_stands(tmp_path: Path, columns: Columns) -> None:
@@ -37,42 +36,22 @@ def renamed(columns: Columns, name: str, header: str, factor: float) -> Columns:
     return {k if k != name else header: v if k != name else factor * v for k, v in columns.items()}
 
 
-def in_degrees(c: Columns) -> Columns:
-    return c | {"A": np.degrees(c["A"]), "phi": np.degrees(c["phi"])}
-
-
 @pytest.mark.parametrize(
-    ("change", "conventions", "noted"),
+    ("name", "header", "factor"),
     [
-        (in_degrees, None, "taken for degrees"),
-        (in_degrees, Conventions(angles="deg"), ""),
-        (lambda c: c | {"A": 4.0 * c["A"]}, Conventions(amplitude="peak-to-peak"), ""),
-        (lambda c: renamed(c, "A", "A [deg]", 180.0 / np.pi), None, ""),
-        (lambda c: c | {"f": 60.0 * c["f"]}, None, "beats per minute"),
-        (lambda c: renamed(c, "f", "f (rpm)", 60.0), None, ""),
-        (lambda c: renamed(c, "Fy", "Fy [mN]", 1e3), None, ""),
+        ("A", "A [deg]", 180.0 / np.pi),
+        ("A", "stroke [deg]", 360.0 / np.pi),
+        ("phi", "phi_deg", 180.0 / np.pi),
+        ("f", "f (rpm)", 60.0),
+        ("Fy", "Fy [mN]", 1e3),
     ],
 )
-def test_units_are_told_or_recognized(
-    tmp_path: Path,
-    columns: Columns,
-    change: Callable[[Columns], Columns],
-    conventions: Conventions | None,
-    noted: str,
+def test_units_stand_in_the_header(
+    tmp_path: Path, columns: Columns, name: str, header: str, factor: float
 ) -> None:
-    plain = read(tmp_path, columns)
-    found = read(tmp_path, change(columns), conventions)
-    factor = 2.0 if conventions is not None and conventions.amplitude else 1.0
-    np.testing.assert_allclose(found.command, plain.command * [factor, 1.0, 1.0], rtol=1e-6)
+    plain, found = read(tmp_path, columns), read(tmp_path, renamed(columns, name, header, factor))
+    np.testing.assert_allclose(found.command, plain.command, rtol=1e-6)
     np.testing.assert_allclose(found.force, plain.force, rtol=1e-6, atol=1e-12)
-    assert noted in " ".join(found.notes) and bool(found.notes) == bool(noted)
-
-
-def test_whole_strokes_are_recognized_where_halves_are_impossible(tmp_path: Path, columns: Columns) -> None:
-    wide = columns | {"A": columns["A"] * 4.0}
-    found = read(tmp_path, wide)
-    np.testing.assert_allclose(found.command[:, 0], 2.0 * columns["A"], rtol=1e-6)
-    assert "peak-to-peak" in found.notes[0]
 
 
 def test_one_zero_direction_is_filled_by_symmetry_and_said(tmp_path: Path, columns: Columns) -> None:
@@ -110,6 +89,8 @@ def emptied(columns: Columns, tmp_path: Path) -> Path:
         (lambda c: c | {"amplitude": c["A"]}, "two columns stand for A"),
         (lambda c: c | {"A": -c["A"]}, "half amplitudes from -0"),
         (lambda c: c | {"f": 2000.0 * c["f"]}, "expected 0 to 20"),
+        (lambda c: c | {"A": np.degrees(c["A"])}, r"header, `A \[deg\]`"),
+        (lambda c: c | {"phi": np.degrees(c["phi"])}, r"header, `phi \[deg\]`"),
         (lambda c: c | {"P": -c["A"]}, "expected the mean power that drives the fin"),
         (lambda c: c | {"sFy": 0.0 * c["A"]}, "a standard deviation is 0"),
     ],

@@ -115,7 +115,9 @@ class SwimCardPanel:
         self._page = page
         self._card = gui.add_html("")
         page.add_buttons(
-            "Save", {"Table (CSV)": partial(page.exports.swim, page.swimming)}, hint="The log with units."
+            "Save",
+            {"Log (NPZ)": partial(page.exports.swim, page.swimming)},
+            hint="For numpy and `fit robot`.",
         )
 
     def refresh(self) -> None:

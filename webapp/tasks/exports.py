@@ -4,7 +4,6 @@ from collections.abc import Callable
 from functools import partial
 
 from finlab.deploy.bundle import make_bundle
-from finlab.sim.log_csv import csv_of
 from webapp.session.files import file_stem
 from webapp.tasks.context import Context
 from webapp.tasks.swimming import Swimming
@@ -29,12 +28,12 @@ class Exports:
         )
 
     def swim(self, swimming: Swimming) -> None:
-        """Send the log of the robot that swims as CSV."""
+        """Send the log of the robot that swims as NPZ."""
         log = swimming.log()
         swimmer = swimming.swimmer
         assert swimmer is not None
         name = file_stem(f"{swimmer.layout.name}_{swimmer.method}_{swimmer.about}")
-        self._send(f"{name}.csv", lambda: csv_of(log).encode())
+        self._send(f"{name}.npz", log.npz)
 
     def _send(self, name: str, make: Callable[[], bytes]) -> None:
         """Have the worker make a file, and send it; of each name only the newest that is asked for."""
