@@ -34,7 +34,6 @@ def serve(
         FinlabError: the port is taken, or layout or checkpoint cannot be read.
     """
     first = load_layout(layout or FIRST_LAYOUT)
-    first.only_fins("the app", horizontal=True)
     _check_port(host, port)
     solver = Solver(checkpoint)
     # A missing checkpoint is reported now, not in the browser; and the first page finds a warm solver.
