@@ -259,7 +259,7 @@ def _wander(free: Asked, held: Asked, n: int, period: float, rng: np.random.Gene
     for k in range(n):
         part = (k % 50) / 50.0
         wrench = (1.0 - part) * ends[k // 50] + part * ends[k // 50 + 1]
-        options = {} if before is None else {"previous": before}
+        options: dict[str, Any] = {} if before is None else {"previous": before}
         found, best = held.ask(wrench, f"tick {k}", **options), free.ask(wrench, f"tick {k}")
         if found is None or best is None:
             continue

@@ -23,7 +23,6 @@ def bench(
     sets: Annotated[str, arg(metavar="A,B,...")] = "all",
     limit: Annotated[float, arg(metavar="SECONDS")] = 1.0,
     cpu: bool = False,
-    problems: Annotated[Path | None, arg(metavar="FILE")] = None,
     json: JsonFile = None,
 ) -> None:
     """Measure allocation methods, yours or finlab's, on the same problems: error, power, turn, time.
@@ -38,7 +37,6 @@ def bench(
         sets: sets of robots with commas between, such as paper,tiny.
         limit: longest time for one target; a later answer is a failure.
         cpu: time Python functions by the processor's time, which other work on the machine does not prolong.
-        problems: file of problems; the shipped one by default.
         json: file for the results; they are printed in place of the table where no file is named.
     """
     from tqdm import tqdm
@@ -48,10 +46,10 @@ def bench(
     check_json_file(json)
     with tqdm(desc="bench", unit="target", disable=None, leave=False, file=sys.stderr) as bar:
         from finlab.bench.metrics import figures
-        from finlab.bench.problems import FILE, open_problems
+        from finlab.bench.problems import open_problems
         from finlab.bench.runner import LIMIT_S, run_method
 
-        asked = open_problems(problems or FILE)
+        asked = open_problems()
         part = asked if sets == "all" else asked.of_sets([name.strip() for name in sets.split(",")])
         chosen = part.quick() if quick else part
         tested, found = _tested(methods, command, cpu), []

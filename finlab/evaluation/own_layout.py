@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from finlab.errors import DataError
 from finlab.evaluation.splits import Case, own_sigma
 from finlab.layout import Layout
 from finlab.physics import plant_of
@@ -23,12 +22,9 @@ def own_case(layout: Layout, failed: tuple[str, ...], n_targets: int, seed: int)
         seed: not negative.
 
     Raises:
-        DataError: a number out of range, or a force table that cannot be read.
+        DataError: a force table that cannot be read.
         LayoutError: no fin is left.
     """
-    for value, what, least in ((n_targets, "targets", 1), (seed, "seed", 0)):
-        if value < least:
-            raise DataError(f"{what}: expected a number of at least {least}, got {value}")
     plant = plant_of(layout.without(failed))
     target_seed, sigma_seed = np.random.SeedSequence((DOMAIN, seed)).spawn(2)
     targets = plant.wrench(plant.sample(np.random.default_rng(target_seed), (n_targets,)))

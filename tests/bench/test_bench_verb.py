@@ -69,8 +69,6 @@ def test_stored_results_belong_to_the_shipped_problems(shipped: Problems) -> Non
         ("dual dual", "expected different names, got dual, dual"),
         ("--limit 0", "limit: expected a number of seconds above 0, got 0.0"),
         ("--sets nowhere", "sets: expected some of paper, shipped"),
-        ("--problems missing.npz", "missing.npz: no such file"),
-        ("--problems README.md", "README.md: "),
         ("README.md:f --sets paper", "README.md"),
         ("--command /no/such/program --sets paper", "/no/such/program: cannot be started"),
     ],

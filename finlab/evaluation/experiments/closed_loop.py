@@ -83,7 +83,6 @@ def swim(
     method: MethodSpec,
     path: Trajectory,
     seed: int,
-    plant: str,
     controller: str = "waypoint",
     faults: Sequence[tuple[str, float]] = (),
 ) -> RunLog:
@@ -94,12 +93,11 @@ def swim(
         method: who allocates.
         path: what is followed.
         seed: of the sensors' noise.
-        plant: how fin forces are simulated.
         controller: one of `finlab.control.PATH_CONTROLLERS`.
         faults: fins, each with the time [s] at which it is lost.
     """
     pilot = PATH_CONTROLLERS[controller](layout)
-    return ClosedLoop(layout, method.on(layout), path, pilot, failures=faults, plant=plant, seed=seed).run()
+    return ClosedLoop(layout, method.on(layout), path, pilot, failures=faults, seed=seed).run()
 
 
 POWER = (

@@ -15,7 +15,6 @@ from finlab.evaluation.experiments.closed_loop import (
     over_seeds,
     swim,
 )
-from finlab.evaluation.experiments.trajectory import Controller
 from finlab.evaluation.method_specs import load_method_specs
 from finlab.evaluation.paper_figures import paper_figures
 from finlab.evaluation.progress import progress
@@ -46,12 +45,12 @@ class Fault:
         return f"{' + '.join(self.fins)} lost{when}" if self.fins else HEALTHY
 
 
-def all_faults(layout: Layout, half_way_s: float, controller: str = "waypoint") -> list[Fault]:
+def all_faults(layout: Layout, half_way_s: float) -> list[Fault]:
     """Healthy, each fin, each pair, and each fin half-way."""
     names = layout.names
     lost = [((), 0.0), *(((name,), 0.0) for name in names)]
     lost += [(pair, 0.0) for pair in combinations(names, 2)] + [((name,), half_way_s) for name in names]
-    axes = PATH_CONTROLLERS[controller](layout).axes
+    axes = PATH_CONTROLLERS["waypoint"](layout).axes
     return [
         Fault(tuple(fins), time, Completion(layout, fins, axes).controllable)
         for fins, time in lost
@@ -64,8 +63,6 @@ def run(
     trajectory: str = "circle",
     methods: tuple[str, ...] = ("dual", "on-board"),
     runs: int = 3,
-    plant: str = "mean",
-    controller: Controller = "waypoint",
     checkpoint: str | None = None,
     seed: int = 0,
 ) -> list[Row]:
@@ -76,21 +73,16 @@ def run(
         trajectory: circle, lissajous, square, dive, station, or a CSV file with the columns t, x, y, z.
         methods: names; on-board is U-CAT's own law at a fixed frequency.
         runs: of each, with other noise.
-        plant: what the fins really do; see finlab simulate --help.
-        controller: waypoint (heads for a point ahead, as in the paper), or tracking.
         checkpoint: of the learned methods, a shipped name or a folder.
         seed: of the first run's noise.
     """
     robot, path = load_layout(layout), make_trajectory(trajectory)
-    faults, specs = (
-        all_faults(robot, path.duration_s / 2, controller),
-        load_method_specs(methods, checkpoint),
-    )
+    faults, specs = all_faults(robot, path.duration_s / 2), load_method_specs(methods, checkpoint)
     cases = [(fault, name) for fault, name in product(faults, specs) if fault.controllable]
     done: dict[tuple[Fault, str], list[Row]] = {}
     for (fault, name), k in progress(list(product(cases, range(runs))), "swim"):
         lost = [(fin, fault.time_s) for fin in fault.fins]
-        log = swim(robot, specs[name], path, seed + k, plant, controller, lost)
+        log = swim(robot, specs[name], path, seed + k, faults=lost)
         done.setdefault((fault, name), []).append(follow_row(log))
     rows: list[Row] = []
     for (fault, name), found in done.items():

@@ -3,7 +3,6 @@
 import time
 from collections.abc import Mapping, Sequence
 from itertools import product
-from typing import Literal
 
 import numpy as np
 
@@ -39,7 +38,6 @@ def run(
     scenarios: tuple[str, ...] = tuple(DAYS),
     methods: tuple[str, ...] = ("dual", "analytic", "on-board"),
     seeds: int = 5,
-    controller: Literal["tracking", "waypoint"] = "tracking",
     checkpoint: str | None = None,
     seed: int = 0,
 ) -> list[Row]:
@@ -52,7 +50,6 @@ def run(
         methods: names; on-board is U-CAT's own law at a fixed frequency. Slow ones (sqp, paper) are best
             tried on a few scenarios.
         seeds: how many.
-        controller: of all methods: tracking, or waypoint (heads for a point ahead, as in the paper).
         checkpoint: of the learned methods, a shipped name or a folder.
         seed: the first seed of noise, biases, waves and mixed fins.
     """
@@ -61,18 +58,16 @@ def run(
     return [
         row
         for day in map(DAYS.__getitem__, scenarios)
-        for row in day_rows(day, swim_day(day, specs, range(seed, seed + seeds), controller))
+        for row in day_rows(day, swim_day(day, specs, range(seed, seed + seeds)))
     ]
 
 
-def swim_day(
-    day: HardDay, methods: Mapping[str, MethodSpec], seeds: Sequence[int], controller: str = "tracking"
-) -> dict[str, Swims]:
+def swim_day(day: HardDay, methods: Mapping[str, MethodSpec], seeds: Sequence[int]) -> dict[str, Swims]:
     """Figures of each method's swims; hopeless cases are left out."""
     cases = [case for case in day.cases() if day.obstacle(case) is None]
     swims: dict[str, dict[tuple[str, tuple[str, ...], int], Row]] = {name: {} for name in methods}
     for case, name, seed in progress(list(product(cases, methods, seeds)), "swim", day.name):
-        loop = day.swim(case, methods[name], seed, controller=controller)
+        loop = day.swim(case, methods[name], seed)
         start = time.process_time()
         log = loop.run()
         swims[name][case.layout, case.fins, seed] = swim_figures(log, time.process_time() - start)

@@ -90,7 +90,7 @@ def diversity(command: Array, layout: Layout) -> float:
 
 def _draw(rows: Sequence[Row]) -> Picture:
     temperature = [row["temperature"] for row in rows]
-    with picture(1, 2, height=2.8, legend=0) as view:
+    with picture(1, 2, height=2.8) as view:
         for axis, key, colour, title in zip(
             view.axes,
             ("diversity", "best_j_mean"),

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from itertools import product
-from typing import Literal
 
 from finlab.evaluation.experiment import Experiment
 from finlab.evaluation.experiments.closed_loop import (
@@ -20,16 +19,12 @@ from finlab.evaluation.report.document import Column, Row
 from finlab.layout import load_layout
 from finlab.sim import make_trajectory
 
-Controller = Literal["waypoint", "tracking"]
-
 
 def run(
     layouts: tuple[str, ...] = ("A", "B", "C", "D"),
     trajectory: str = "lissajous",
     methods: tuple[str, ...] = ("dual", "paper"),
     runs: int = 3,
-    plant: str = "mean",
-    controller: Controller = "waypoint",
     checkpoint: str | None = None,
     seed: int = 0,
 ) -> list[Row]:
@@ -40,8 +35,6 @@ def run(
         trajectory: circle, lissajous, square, dive, station, or a CSV file with the columns t, x, y, z.
         methods: names; on-board is U-CAT's own law at a fixed frequency.
         runs: of each, with other noise.
-        plant: what the fins really do; see finlab simulate --help.
-        controller: waypoint (heads for a point ahead, as in the paper), or tracking.
         checkpoint: of the learned methods, a shipped name or a folder.
         seed: of the first run's noise.
     """
@@ -49,7 +42,7 @@ def run(
     specs = load_method_specs(methods, checkpoint)
     done: dict[tuple[str, str], list[Row]] = {}
     for robot, (name, method), k in progress(list(product(robots, specs.items(), range(runs))), "swim"):
-        row = follow_row(swim(robot, method, path, seed + k, plant, controller))
+        row = follow_row(swim(robot, method, path, seed + k))
         done.setdefault((robot.name, name), []).append(row)
         done.setdefault(("all", name), []).append(row)
     order = sorted(done, key=lambda key: key[0] == "all")

@@ -26,7 +26,6 @@ def run(
     methods: tuple[str, ...] = ("dual", "mdn", "analytic", "on-board"),
     runs: int = 5,
     duration: float = 30.0,
-    plant: str = "mean",
     checkpoint: str | None = None,
     seed: int = 0,
 ) -> list[Row]:
@@ -37,7 +36,6 @@ def run(
         methods: names; on-board is U-CAT's own law at a fixed frequency.
         runs: of each, with other noise.
         duration: of a run [s].
-        plant: what the fins really do; see finlab simulate --help.
         checkpoint: of the learned methods, a shipped name or a folder.
         seed: of the first run's noise.
     """
@@ -46,7 +44,7 @@ def run(
     robot, specs = load_layout(layout), load_method_specs(methods, checkpoint)
     done: dict[tuple[float | None, str], list[Row]] = {}
     for speed, (name, method), k in progress(list(product(SPEEDS, specs.items(), range(runs))), "swim"):
-        row = _row(swim(robot, method, straight(speed, duration), seed + k, plant, "tracking"))
+        row = _row(swim(robot, method, straight(speed, duration), seed + k, "tracking"))
         done.setdefault((speed, name), []).append(row)
         done.setdefault((None, name), []).append(row)
     order = sorted(done, key=lambda key: key[0] is None)

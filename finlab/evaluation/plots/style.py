@@ -39,8 +39,6 @@ def picture(
     *,
     height: float = 3.2,
     grid: str = "both",
-    legend: int = 10,
-    **options: Any,
 ) -> Iterator[Picture]:
     """Axes to draw on, in the common look: hairlines behind the data, no box around it, and one legend for
     all axes, above them, where a name that several share is shown once.
@@ -50,8 +48,6 @@ def picture(
         columns: of axes.
         height: of the picture in inches.
         grid: axes with hairlines.
-        legend: most names in a line of the legend; 0 for none.
-        options: of `Figure.subplots`.
     """
     import matplotlib
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -60,16 +56,17 @@ def picture(
     with matplotlib.rc_context(LOOK):
         figure = Figure(figsize=(WIDTH, height), layout="constrained")
         FigureCanvasAgg(figure)
-        axes = list(figure.subplots(rows, columns, squeeze=False, **options).flat)
+        axes = list(figure.subplots(rows, columns, squeeze=False).flat)
         yield Picture(figure, axes)
         names: dict[str, Any] = {}
         for axis in axes:
             clean(axis, grid)
             for handle, label in zip(*axis.get_legend_handles_labels(), strict=True):
                 names.setdefault(label, handle)
-        if legend and names:
-            where: dict[str, Any] = {"loc": "outside upper left", "ncols": min(len(names), legend)}
-            figure.legend(list(names.values()), list(names), frameon=False, **where)
+        if names:
+            figure.legend(
+                list(names.values()), list(names), frameon=False, loc="outside upper left", ncols=len(names)
+            )
 
 
 class Picture:

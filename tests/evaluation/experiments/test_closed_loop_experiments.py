@@ -40,7 +40,7 @@ def test_paths_are_followed_by_the_papers_controller_or_by_ours(
     layout_a: Layout, analytic: AnyRobot, line: str
 ) -> None:
     path = make_trajectory(line)
-    logs = [swim(layout_a, analytic, path, 0, "mean", *named) for named in ((), ("tracking",))]
+    logs = [swim(layout_a, analytic, path, 0, *named) for named in ((), ("tracking",))]
     assert [log.controller for log in logs] == ["waypoint", "tracking"]
 
 
