@@ -12,7 +12,6 @@ from finlab.allocation.baselines.ipopt import IpoptSettings
 from finlab.allocation.methods import LEARNED, MethodChoice, checked_settings, choose_method
 from finlab.errors import AllocationError
 from finlab.evaluation.cones import Cones
-from finlab.evaluation.on_board import OnBoard
 from finlab.layout import Layout
 from finlab.physics.objective import Name
 
@@ -20,8 +19,6 @@ SLOW = ("ipopt",)
 """Methods that take a tenth of a second per target, each from several starts; they run on a subsample."""
 QUICK = ("dual", "mdn", "paper", "qp", "sqp", "analytic")
 """Methods that run on every target."""
-OWN = (OnBoard, Cones)
-"""Methods that are for comparison alone."""
 IN_FORCES = "ipopt-forces"
 """IPOPT in the space of forces, its best form."""
 NEEDS = {"ipopt": "casadi", IN_FORCES: "casadi", Cones.name: "clarabel"}
@@ -105,16 +102,15 @@ def load_method_spec(
 
     Args:
         name: a method; `ipopt-32`, say, for 32 starts; `sqp-effort`, say, for an objective of its own; or one
-            for comparison alone: `on-board`, U-CAT's own; `ipopt-forces` and `clarabel`, solvers in the space
-            of forces.
+            for comparison alone: `ipopt-forces` and `clarabel`, solvers in the space of forces.
         checkpoint: of learned methods, as for `finlab.Allocator`.
         objective: what the methods that can choose keep least; each one's default where None.
 
     Raises:
         AllocationError: unknown method, or starts or an objective for a method that has none.
     """
-    if own := next((kind for kind in OWN if kind.name == name), None):
-        return MethodSpec(name, MethodChoice(own, own.settings_class()))
+    if name == Cones.name:
+        return MethodSpec(name, MethodChoice(Cones, Cones.settings_class()))
     if name == IN_FORCES:
         return MethodSpec(name, _choice("ipopt", checkpoint, space="forces"))
     if named := _WITH_OBJECTIVE.fullmatch(name):

@@ -35,7 +35,7 @@ def test_the_block_blocks() -> None:
 
 
 def test_eval_wrench() -> None:
-    methods = "dual,analytic,qp,on-board"
+    methods = "dual,analytic,qp"
     sizes = ("--split", "limits", "--layouts", "2", "--targets", "3")
     shown = _run("eval", "wrench", *sizes, "--methods", methods)
     assert all(name in shown for name in methods.split(","))

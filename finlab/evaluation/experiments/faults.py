@@ -61,7 +61,7 @@ def all_faults(layout: Layout, half_way_s: float) -> list[Fault]:
 def run(
     layout: str = "A",
     trajectory: str = "circle",
-    methods: tuple[str, ...] = ("dual", "on-board"),
+    methods: tuple[str, ...] = ("dual", "analytic"),
     runs: int = 3,
     checkpoint: str | None = None,
     seed: int = 0,
@@ -71,7 +71,7 @@ def run(
     Args:
         layout: a layout file or shipped name.
         trajectory: circle, lissajous, square, dive, station, or a CSV file with the columns t, x, y, z.
-        methods: names; on-board is U-CAT's own law at a fixed frequency.
+        methods: names as in eval wrench.
         runs: of each, with other noise.
         checkpoint: of the learned methods, a shipped name or a folder.
         seed: of the first run's noise.

@@ -36,19 +36,18 @@ Swims = Mapping[tuple[str, tuple[str, ...], int], Row]
 
 def run(
     scenarios: tuple[str, ...] = tuple(DAYS),
-    methods: tuple[str, ...] = ("dual", "analytic", "on-board"),
+    methods: tuple[str, ...] = ("dual", "analytic"),
     seeds: int = 5,
     checkpoint: str | None = None,
     seed: int = 0,
 ) -> list[Row]:
     """One row for each day and method.
 
-    dual, analytic and on-board take two minutes of the processor each per seed.
+    dual and analytic take two minutes of the processor each per seed.
 
     Args:
         scenarios: names of days.
-        methods: names; on-board is U-CAT's own law at a fixed frequency. Slow ones (sqp, paper) are best
-            tried on a few scenarios.
+        methods: names as in eval wrench; slow ones (sqp, paper) are best tried on a few scenarios.
         seeds: how many.
         checkpoint: of the learned methods, a shipped name or a folder.
         seed: the first seed of noise, biases, waves and mixed fins.

@@ -33,7 +33,7 @@ def run(
     Args:
         layouts: names or files.
         trajectory: circle, lissajous, square, dive, station, or a CSV file with the columns t, x, y, z.
-        methods: names; on-board is U-CAT's own law at a fixed frequency.
+        methods: names as in eval wrench.
         runs: of each, with other noise.
         checkpoint: of the learned methods, a shipped name or a folder.
         seed: of the first run's noise.

@@ -23,7 +23,7 @@ SETTLED_S = 10.0
 
 def run(
     layout: str = "A",
-    methods: tuple[str, ...] = ("dual", "mdn", "analytic", "on-board"),
+    methods: tuple[str, ...] = ("dual", "mdn", "analytic"),
     runs: int = 5,
     duration: float = 30.0,
     checkpoint: str | None = None,
@@ -33,7 +33,7 @@ def run(
 
     Args:
         layout: a layout file or shipped name.
-        methods: names; on-board is U-CAT's own law at a fixed frequency.
+        methods: names as in eval wrench.
         runs: of each, with other noise.
         duration: of a run [s].
         checkpoint: of the learned methods, a shipped name or a folder.

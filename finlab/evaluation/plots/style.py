@@ -24,7 +24,6 @@ COLOURS = {
     "qp": GREY,
     "ipopt": BLACK,
     "ipopt-32": BLACK,
-    "on-board": ORANGE,
 }
 DASHES: dict[str, Any] = {"color": GREY, "linestyle": (0, (2, 2)), "linewidth": 1.2}
 """Of a line at a figure of the paper."""

@@ -10,7 +10,6 @@ from finlab.cli import main
 from finlab.evaluation.experiment import load_experiment
 from finlab.evaluation.experiments.closed_loop import swim
 from finlab.evaluation.experiments.faults import all_faults
-from finlab.evaluation.on_board import OnBoard
 from finlab.evaluation.report.text import to_text
 from finlab.layout import Layout
 from finlab.sim import make_trajectory
@@ -60,23 +59,9 @@ def test_faults(layout_a: Layout, line: str) -> None:
 
 
 def test_velocity() -> None:
-    rows = load_experiment("velocity").rows(methods=("analytic", "on-board"), runs=1, duration=12.0)
+    rows = load_experiment("velocity").rows(methods=("analytic", "dual"), runs=1, duration=12.0)
     assert [row["speed"] for row in rows] == [0.1, 0.1, 0.15, 0.15, 0.2, 0.2, None, None]
-    assert rows[0]["inertial_w"] < rows[1]["inertial_w"], "a fixed fast beat costs more"
     assert rows[-2]["mae"] == pytest.approx(np.mean([row["mae"] for row in rows[:6:2]]))
-
-
-def test_on_board_is_exact_within_its_limits_and_scales_beyond(layout_a: Layout, analytic: AnyRobot) -> None:
-    method = AnyRobot(OnBoard)
-    modest = method.allocate(layout_a, [4.0, 0.3, 1.0, 0.1, 0.1, 0.2])
-    assert modest.err_norm < 0.005
-    assert (modest.command[:, 1] == 2.0).all()
-    huge = method.allocate(layout_a, [60.0, 0, 0, 0, 0, 0])
-    assert huge.command[:, 0].max() == pytest.approx(0.6)
-    assert huge.wrench[0] > 15.0 and np.abs(huge.wrench[1:]).max() < 1e-6
-    one_lost = method.allocate(layout_a, [2.0, 0, 0.3, 0, 0, 0.1], failed=["front_left"])
-    assert np.isnan(one_lost.command[layout_a.index("front_left")]).all()
-    assert one_lost.err_norm < 0.005
 
 
 @pytest.mark.parametrize(
