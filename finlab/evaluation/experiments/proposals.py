@@ -8,7 +8,6 @@ import numpy as np
 
 from finlab.allocation import Allocator
 from finlab.allocation.evaluate import REACHED
-from finlab.allocation.modes import Mode, same_signature
 from finlab.arrays import Array
 from finlab.evaluation.experiment import Experiment, check_names
 from finlab.evaluation.progress import progress
@@ -19,11 +18,7 @@ from finlab.evaluation.statistics.bootstrap import ratio_interval
 STARTS = ("network", "random")
 """What is compared."""
 WIDE: dict[str, Any] = {"starts": "random", "n_candidates": 256}
-"""Settings of the wide search whose least effort and modes count as all that there is."""
-ASKED_FOR_MODES = 4
-"""Targets on each layout whose modes are looked for, which takes a tenth of a second each."""
-NEAR = 1.05
-"""Effort over the least up to which a mode counts."""
+"""Settings of the wide search whose effort counts among the least."""
 
 
 def run(
@@ -58,19 +53,13 @@ def _rows(
     }
     effort = {key: list[Array]() for key in (*settings, "wide")}
     spent = {key: list[float]() for key in settings}
-    kept = {key: list[float]() for key in settings}
     for case in progress(cases, "layout", split):
         wide = Allocator(case.healthy, "mdn", checkpoint=checkpoint, **WIDE)
         effort["wide"].append(_efforts(wide, case, seed)[0])
-        known = [_modes(wide, target, seed) for target in case.targets[:ASKED_FOR_MODES]]
         for key, chosen in settings.items():
-            allocator = wide.with_settings(**chosen)
-            found, seconds = _efforts(allocator, case, seed)
+            found, seconds = _efforts(wide.with_settings(**chosen), case, seed)
             effort[key].append(found)
             spent[key].append(1e3 * seconds / len(case.targets))
-            for target, modes in zip(case.targets, known, strict=False):
-                own = _modes(allocator, target, seed)
-                kept[key] += [_is_among(mode, own) for mode in modes]
     all_efforts = {key: np.concatenate(parts) for key, parts in effort.items()}
     least = np.min(list(all_efforts.values()), axis=0)
     group = np.repeat(np.arange(len(cases)), [len(case.targets) for case in cases])
@@ -89,7 +78,6 @@ def _rows(
                 "cost_ratio": float(cost[both].sum() / least[both].sum()),
                 "cost_ratio_interval": list(ratio_interval(cost[both], least[both], group[both])),
                 "ratio_p95": float(np.quantile(ratio, 0.95)),
-                "modes_found": float(np.mean(kept[starts, count])),
                 "target_ms": float(np.median(spent[starts, count])),
             }
         )
@@ -105,17 +93,6 @@ def _efforts(allocator: Allocator, case: Case, seed: int) -> tuple[Array, float]
     return np.where(answer.err_norm <= REACHED, answer.effort, np.inf), seconds
 
 
-def _modes(allocator: Allocator, target: Array, seed: int) -> list[Mode]:
-    """The modes that an allocator knows for a target, of those within `NEAR` of its cheapest."""
-    modes = allocator.explore(allocator.allocate(target, seed=seed))
-    best = min(mode.effort for mode in modes)
-    return [mode for mode in modes if mode.effort <= NEAR * best]
-
-
-def _is_among(mode: Mode, modes: list[Mode]) -> float:
-    return float(any(same_signature(mode.signature, other.signature) for other in modes))
-
-
 experiment = Experiment(
     name="proposals",
     question="What is the network of method `mdn` worth, beside random proposals that are refined alike?",
@@ -127,14 +104,12 @@ experiment = Experiment(
         Column("tracked", "delivered", "share"),
         Column("cost_ratio", "effort over the least", "ratio", "cost_ratio_interval"),
         Column("ratio_p95", "95 % up to", "ratio"),
-        Column("modes_found", "modes found", "share"),
         Column("target_ms", "a target", "three", unit="ms"),
     ),
     run=run,
     note=(
-        "The least effort is that of all rows and of a wide search from 256 random forces. Modes are counted "
-        "among those of the wide search within 5 % of the least effort; a row finds those to which four "
-        "times its proposals lead. Time is the processor's for a target of a batch."
+        "The least effort is that of all rows and of a wide search from 256 random forces. Time is "
+        "the processor's for a target of a batch."
     ),
     quick={"layouts": 4, "targets": 8},
     full={"layouts": 30},
