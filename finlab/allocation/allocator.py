@@ -46,6 +46,7 @@ from finlab.layout.load import load_layout
 from finlab.networks.trained import TrainedWeights
 from finlab.physics.known_plants import plant_of
 from finlab.physics.plant import Plant
+from finlab.precision import NEARLY
 
 SAME_COMMAND = 1e-6
 """Two commands [rad, Hz, rad] that differ by less are one answer, given on two machines."""
@@ -395,7 +396,8 @@ class Allocator:
     def _notes(self, ready: Ready, flow: Array | None, target: Array) -> tuple[str, ...]:
         """Sentences that the user should read before trusting an answer."""
         method, notes = ready.method, fin_notes(ready.fins.healthy, flow)
-        if left := [axis for axis in method.undriven if target[..., AXES.index(axis)].any()]:
+        asked = (np.abs(target) > NEARLY * self._scale).reshape(-1, 6).any(axis=0)
+        if left := [axis for axis in method.undriven if asked[AXES.index(axis)]]:
             notes = (*notes, f"no actuator gives {' or '.join(left)}: what is asked of it is left out")
         if not method.unknown_fins or method.fin_model is None:
             return notes
