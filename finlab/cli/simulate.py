@@ -15,8 +15,6 @@ from finlab.errors import FinlabError
 from finlab.whole_file import check_new_folder, whole_folder
 
 if TYPE_CHECKING:
-    from finlab.control.measurement import Controller
-    from finlab.layout import Layout
     from finlab.sim import ClosedLoop, FinFault, RunLog
     from finlab.sim.water import Water
 
@@ -32,7 +30,6 @@ def simulate(
     objective: Literal["power", "effort"] = "power",
     duration: Annotated[float | None, arg(metavar="SECONDS")] = None,
     plant: Annotated[str, arg(metavar="NAME")] = "mean",
-    controller: Literal["tracking", "waypoint", "waypoint-paper"] = "tracking",
     current: Annotated[tuple[float, float, float], arg(metavar="VX VY VZ")] = (0.0, 0.0, 0.0),
     waves: Annotated[tuple[float, float], arg(metavar="HEIGHT SECONDS")] = (0.0, 3.0),
     noise: bool = True,
@@ -60,9 +57,6 @@ def simulate(
         plant: what the fins really do: mean (the fin law), ripple (within the flapping cycle), flexible (fins
             with soft tips), wake (fins in each other's jets), inflow (thrust falls with speed) or offset
             (centre of gravity and fins not where the layout says).
-        controller: tracking (follows velocity and acceleration, learns current and unknown forces; its gains
-            follow from the robot), waypoint (heads for a point ahead) or waypoint-paper (the same with the
-            paper's proportional terms alone).
         current: velocity of the water in the world [m/s].
         waves: significant height [m] and peak period [s] of waves that run along the world's x.
         noise: whether the sensors are noisy.
@@ -93,18 +87,16 @@ def simulate(
             from finlab.control import FaultMonitor
             from finlab.evaluation.method_specs import load_method_spec
 
-            pilot = _controller(robot.layout, controller)
             loop = ClosedLoop(
                 robot.layout,
                 load_method_spec(method, checkpoint, objective).on(robot.layout),
                 make_trajectory(trajectory, duration),
-                pilot,
                 plant=plant,
                 sensors=sensors,
                 water=water,
                 failures=faults,
                 announced=announced,
-                monitor=FaultMonitor(robot.layout, period_s=pilot.period_s) if monitor else None,
+                monitor=FaultMonitor(robot.layout) if monitor else None,
                 seed=seed,
             )
             for sentence in _uncontrollable(loop, faults):
@@ -125,15 +117,6 @@ def simulate(
     told = excitation_summary(loop.log) if excite else summary(loop.log)
     changes = [f"{time:.1f} s: the monitor takes {what}" for time, what in found[1:]]
     print("\n".join([told, *changes, *written]))
-
-
-def _controller(layout: Layout, name: str) -> Controller:
-    """The controller of a path."""
-    from finlab.control import PAPER_WAYPOINT_GAINS, TrackingController, WaypointController
-
-    if name == "tracking":
-        return TrackingController(layout)
-    return WaypointController(PAPER_WAYPOINT_GAINS if name == "waypoint-paper" else None)
 
 
 def summary(log: RunLog) -> str:

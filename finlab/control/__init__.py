@@ -4,18 +4,14 @@ Any object with the shape of `Controller` plugs into `finlab.sim.ClosedLoop`.
 """
 
 from finlab.control.completion import Completion as Completion
-from finlab.control.controllers import WaypointController as WaypointController
 from finlab.control.fault_monitor import Diagnosis as Diagnosis
 from finlab.control.fault_monitor import FaultMonitor as FaultMonitor
-from finlab.control.gains import PAPER_WAYPOINT_GAINS as PAPER_WAYPOINT_GAINS
-from finlab.control.gains import WaypointGains as WaypointGains
 from finlab.control.measurement import Controller as Controller
 from finlab.control.measurement import Foresighted as Foresighted
 from finlab.control.measurement import Measurement as Measurement
 from finlab.control.measurement import Setpoint as Setpoint
 from finlab.control.monitor_settings import MonitorSettings as MonitorSettings
 from finlab.control.observer import MotionObserver as MotionObserver
-from finlab.control.path_controllers import PATH_CONTROLLERS as PATH_CONTROLLERS
 from finlab.control.tracking_controller import TrackingController as TrackingController
 from finlab.control.tracking_controller import TrackingGains as TrackingGains
 from finlab.control.tracking_controller import gains_for as gains_for

@@ -14,7 +14,6 @@ import numpy as np
 
 from finlab.actuators.fin.response import largest_forces
 from finlab.arrays import Array
-from finlab.control.filters import LowPass
 from finlab.control.measurement import Measurement
 from finlab.layout import Body, Layout
 from finlab.layout.angles import wrapped
@@ -90,8 +89,8 @@ class MotionObserver:
         self._sensors = np.array([VELOCITY_NOISE] * 3 + [RATE_NOISE]) ** 2
         self._transition = np.eye(9)
         self._transition[DRIVEN, range(4, 7)] = period_s
-        self._pose_share = LowPass(POSE_S, period_s).share
-        self._tilt_share = LowPass(TILT_S, period_s).share
+        self._pose_share = 1.0 - math.exp(-period_s / POSE_S)
+        self._tilt_share = 1.0 - math.exp(-period_s / TILT_S)
         self._state = np.zeros(9)
         self._first = np.diag([*self._sensors, *self._noise[UNKNOWN] * 100.0, *[CURRENT_SPEED**2] * 2])
         self._covariance = self._first

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from finlab.allocation.allocator import Allocator
-from finlab.control import FaultMonitor, Measurement, MonitorSettings, WaypointController
+from finlab.control import FaultMonitor, Measurement, MonitorSettings
 from finlab.errors import LayoutError
 from finlab.layout import Layout
 from finlab.sim import NOISE_ALONE, ClosedLoop, FinFault, RunLog, SteadyCurrent, make_trajectory
@@ -19,13 +19,11 @@ PRIOR = 0.01
 
 
 def swim(layout: Layout, allocator: Allocator, failures: list[FinFault], **options: object) -> ClosedLoop:
-    """A swim with noise and a current, watched, of whose failures the allocator is not told; by the
-    controller that the monitor's parameters were chosen with."""
+    """A swim with noise and a current, watched, of whose failures the allocator is not told."""
     return ClosedLoop(
         layout,
         allocator,
         make_trajectory("lissajous"),
-        WaypointController(),
         announced=False,
         monitor=FaultMonitor(layout),
         sensors=NOISE_ALONE,
@@ -51,8 +49,8 @@ def test_whole_fins_are_left_alone(layout_a: Layout, analytic: AnyRobot) -> None
 
 
 @pytest.mark.parametrize("name", ["front_right", pytest.param("back_left", marks=pytest.mark.exhaustive)])
-def test_a_lost_fin_is_found_and_no_longer_used(layout_a: Layout, analytic: AnyRobot, name: str) -> None:
-    loop = swim(layout_a, analytic.on(layout_a), [FinFault(name, 12.0)])
+def test_a_lost_fin_is_found_and_no_longer_used(layout_a: Layout, name: str) -> None:
+    loop = swim(layout_a, AnyRobot().on(layout_a), [FinFault(name, 12.0)])
     log = until(loop, 16.0)
     fin = layout_a.index(name)
     assert loop.damage.failed == (name,)
@@ -96,9 +94,9 @@ def test_a_stuck_fin_is_told_from_a_lost_one(layout_a: Layout, analytic: AnyRobo
     )
 
 
-def test_a_repaired_fin_is_taken_back(layout_a: Layout, analytic: AnyRobot) -> None:
+def test_a_repaired_fin_is_taken_back(layout_a: Layout) -> None:
     events = [FinFault("back_right", 10.0), FinFault("back_right", 15.0, "whole")]
-    loop = swim(layout_a, analytic.on(layout_a), events)
+    loop = swim(layout_a, AnyRobot().on(layout_a), events)
     until(loop, 15.0)
     assert loop.damage.failed == ("back_right",)
     until(loop, 60.0)

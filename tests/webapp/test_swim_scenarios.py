@@ -59,7 +59,7 @@ def test_a_fin_is_lost_without_which_an_own_robot_can_be_steered(layout: str) ->
     ("key", "wrong"),
     [
         ("scenario", "hexa"),
-        ("controller", "autopilot"),
+        ("plant", "autopilot"),
     ],
 )
 def test_settings_of_swims_are_checked(key: str, wrong: Any) -> None:

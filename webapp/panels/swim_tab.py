@@ -15,7 +15,7 @@ from webapp.page import Page
 from webapp.panels.damage import FinButtons
 from webapp.session.scenarios import SCENARIOS
 from webapp.session.state import COMPARED
-from webapp.session.swim_plan import CONTROLLERS, SPEEDS
+from webapp.session.swim_plan import SPEEDS
 from webapp.session.targets import axis_reach
 
 
@@ -42,8 +42,6 @@ class ScenarioPanel(SwimPanel):
         self._bind("path", gui.add_dropdown("Path", tuple(SHIPPED), hint="Where to swim."))
         who = "Who allocates, ten times a second."
         self._bind("method", gui.add_dropdown("Swim with", COMPARED, hint=who))
-        steers = "Tracking learns the current and other forces; waypoint is the paper's way."
-        self._bind("controller", gui.add_dropdown("Controller", CONTROLLERS, hint=steers))
         forces = "The fin law, its ripple, or what no layout says: soft fins, jets, inflow, offsets."
         self._bind("plant", gui.add_dropdown("Fin forces", tuple(PLANTS), hint=forces))
 

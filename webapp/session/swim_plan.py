@@ -6,7 +6,7 @@ from itertools import combinations
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-from finlab.control import PATH_CONTROLLERS, Completion, TrackingController
+from finlab.control import Completion, TrackingController
 from finlab.errors import FinlabError
 from finlab.evaluation.experiments.hard_days import HardDay
 from finlab.layout import Layout
@@ -23,14 +23,11 @@ from finlab.sim import (
 from webapp.session.scenarios import SCENARIOS
 from webapp.session.state import COMPARED, State, chosen, number
 
-CONTROLLERS = tuple(PATH_CONTROLLERS)
-"""Who steers."""
 SPEEDS = (0.1, 8.0)
 """Simulated time per time on the wall that may be asked for."""
 CHOICES: dict[str, tuple[str, ...]] = {
     "path": tuple(SHIPPED),
     "method": COMPARED,
-    "controller": CONTROLLERS,
     "plant": tuple(PLANTS),
 }
 """Settings that are one of some words."""
@@ -46,8 +43,6 @@ class SwimSettings:
     """Name of a shipped trajectory."""
     method: str = COMPARED[0]
     """Who allocates."""
-    controller: str = CONTROLLERS[0]
-    """Who steers: one of `CONTROLLERS`."""
     plant: str = next(iter(PLANTS))
     """How the fins' forces are simulated: one of `PLANTS`."""
     speed: float = 1.0
@@ -95,7 +90,6 @@ class SwimSettings:
             path,
             self.method,
             self.plant,
-            self.controller,
             self.scenario,
             day.water,
             day.truth,
@@ -135,8 +129,6 @@ class Plan(NamedTuple):
     """Allocation method."""
     plant: str = "mean"
     """How the fins' forces are simulated: one of `PLANTS`."""
-    controller: str = CONTROLLERS[0]
-    """Who steers."""
     scenario: str = "nominal"
     """What it is called."""
     water: Water = Still()

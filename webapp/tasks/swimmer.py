@@ -6,7 +6,7 @@ import numpy as np
 
 from finlab.allocation.allocator import Allocator
 from finlab.arrays import Array
-from finlab.control import PATH_CONTROLLERS, FaultMonitor
+from finlab.control import FaultMonitor
 from finlab.sim import ClosedLoop, RunLog, Tick, perturbed
 from finlab.sim.log import log_of_ticks
 from webapp.session.swim_plan import Plan
@@ -36,8 +36,8 @@ class Swimmer:
 
     @property
     def about(self) -> str:
-        """Scenario and controller, in words."""
-        return f"{self._plan.scenario}, {self._plan.controller}"
+        """The scenario."""
+        return self._plan.scenario
 
     def step(self) -> None:
         """Swim for one control period."""
@@ -93,7 +93,6 @@ def closed_loop(plan: Plan, allocator: Allocator) -> ClosedLoop:
         layout,
         allocator,
         plan.path,
-        PATH_CONTROLLERS[plan.controller](layout),
         plant=plan.plant,
         sensors=plan.sensors,
         water=plan.water,

@@ -10,7 +10,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from finlab.arrays import Array
-from finlab.control import PATH_CONTROLLERS
 from finlab.errors import DataError
 from finlab.evaluation.method_specs import MethodSpec
 from finlab.evaluation.report.document import Column, Row
@@ -83,7 +82,6 @@ def swim(
     method: MethodSpec,
     path: Trajectory,
     seed: int,
-    controller: str = "waypoint",
     faults: Sequence[tuple[str, float]] = (),
 ) -> RunLog:
     """One swim.
@@ -93,11 +91,9 @@ def swim(
         method: who allocates.
         path: what is followed.
         seed: of the sensors' noise.
-        controller: one of `finlab.control.PATH_CONTROLLERS`.
         faults: fins, each with the time [s] at which it is lost.
     """
-    pilot = PATH_CONTROLLERS[controller](layout)
-    return ClosedLoop(layout, method.on(layout), path, pilot, failures=faults, seed=seed).run()
+    return ClosedLoop(layout, method.on(layout), path, failures=faults, seed=seed).run()
 
 
 POWER = (

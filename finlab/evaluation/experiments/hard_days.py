@@ -10,7 +10,7 @@ from itertools import combinations, islice
 from typing import Any, NamedTuple
 
 from finlab.assets import PAPER_LAYOUTS
-from finlab.control import PATH_CONTROLLERS, Completion, FaultMonitor, TrackingController
+from finlab.control import Completion, FaultMonitor, TrackingController
 from finlab.evaluation.method_specs import MethodSpec
 from finlab.evaluation.splits import make_split
 from finlab.layout import Layout, load_layout
@@ -101,16 +101,13 @@ class HardDay:
             "heave and yaw independently"
         )
 
-    def swim(
-        self, case: "Case", method: MethodSpec, seed: int, *, controller: str = "tracking"
-    ) -> ClosedLoop:
+    def swim(self, case: "Case", method: MethodSpec, seed: int) -> ClosedLoop:
         """The swim, ready to start.
 
         Args:
             case: of `cases()`.
             method: who allocates.
             seed: of noise, biases, waves and mixed fins.
-            controller: one of `finlab.control.PATH_CONTROLLERS`.
         """
         robot, path = self.robot(case.layout, seed), self.path()
         weak = {} if self.weak is None else dict.fromkeys(case.fins, self.weak)
@@ -120,7 +117,6 @@ class HardDay:
             robot,
             method.on(robot),
             path,
-            PATH_CONTROLLERS[controller](robot),
             plant=self.plant,
             sensors=self.sensors,
             water=water,

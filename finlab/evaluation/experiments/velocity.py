@@ -44,7 +44,7 @@ def run(
     robot, specs = load_layout(layout), load_method_specs(methods, checkpoint)
     done: dict[tuple[float | None, str], list[Row]] = {}
     for speed, (name, method), k in progress(list(product(SPEEDS, specs.items(), range(runs))), "swim"):
-        row = _row(swim(robot, method, straight(speed, duration), seed + k, "tracking"))
+        row = _row(swim(robot, method, straight(speed, duration), seed + k))
         done.setdefault((speed, name), []).append(row)
         done.setdefault((None, name), []).append(row)
     order = sorted(done, key=lambda key: key[0] is None)

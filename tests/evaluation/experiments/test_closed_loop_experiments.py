@@ -8,12 +8,9 @@ import pytest
 
 from finlab.cli import main
 from finlab.evaluation.experiment import load_experiment
-from finlab.evaluation.experiments.closed_loop import swim
 from finlab.evaluation.experiments.faults import all_faults
 from finlab.evaluation.report.text import to_text
 from finlab.layout import Layout
-from finlab.sim import make_trajectory
-from tests.any_robot import AnyRobot
 
 
 @pytest.fixture
@@ -33,14 +30,6 @@ def test_trajectory(line: str, tmp_path: Path, capsys: pytest.CaptureFixture[str
     assert 0.0 < one["ate"] < 0.3 and one["ate_std"] > 0.0
     shown = capsys.readouterr().out
     assert "paper's method, printed" in shown and "0.1335" in shown
-
-
-def test_paths_are_followed_by_the_papers_controller_or_by_ours(
-    layout_a: Layout, analytic: AnyRobot, line: str
-) -> None:
-    path = make_trajectory(line)
-    logs = [swim(layout_a, analytic, path, 0, *named) for named in ((), ("tracking",))]
-    assert [log.controller for log in logs] == ["waypoint", "tracking"]
 
 
 def test_faults(layout_a: Layout, line: str) -> None:

@@ -46,9 +46,9 @@ def test_what_is_true_is_not_what_is_believed(analytic: AnyRobot) -> None:
 
 
 def test_a_body_that_is_drawn_too_small_and_who_steers_it(analytic: AnyRobot) -> None:
-    high = DAYS["parameters-high"].swim(Case("B", ()), analytic, 0, controller="waypoint")
+    high = DAYS["parameters-high"].swim(Case("B", ()), analytic, 0)
     drawn, true = high.layout, high.vehicle
-    assert high.controller.name == "waypoint" and drawn == DAYS["nominal"].robot("B", 0)
+    assert drawn == DAYS["nominal"].robot("B", 0)
     moments = np.array(true.inertia[3:]) / np.array(Vehicle(complete_body(drawn)).inertia[3:])
     np.testing.assert_allclose(moments, 1.3)
 
