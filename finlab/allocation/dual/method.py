@@ -124,6 +124,16 @@ class Dual(Method):
         for i, target in enumerate(targets):
             other = copy(self)
             other.compiled, bounds[i] = at_the_price_of_drag(self.compiled, target)
+            if bounds[i] == 0.0 and policy.kind == "direction":
+                low, high = 0.0, 1.0
+                for _ in range(ROUNDS):  # halve the share of the target that is within reach
+                    share = 0.5 * (low + high)
+                    found, bound = at_the_price_of_drag(self.compiled, share * target)
+                    if bound > 0.0:
+                        low, other.compiled, bounds[i] = share, found, bound
+                    else:
+                        high = share
+                target = low * target
             commands.append(other._solve(target[None], policy, previous).command)
         return Solution(np.concatenate(commands), lambda: bounds)
 
