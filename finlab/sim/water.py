@@ -92,11 +92,6 @@ class Changing:
         """That of the water it becomes."""
         return self.after.name
 
-    @property
-    def end_s(self) -> float:
-        """When it has changed [s]."""
-        return self.time_s + self.over_s
-
     def flow(self, position: Sequence[float], time: float) -> Flow:
         """Some of both."""
         share, rate = _smoothstep((time - self.time_s) / self.over_s)
@@ -116,7 +111,7 @@ class Waves:
     """Irregular waves on deep water, and a steady current besides.
 
     Linear theory: the sum of waves of Bretschneider's spectrum (ITTC), each with as much energy as any other;
-    headings are normally distributed about one. Their motion decays with depth as exp(k z), with
+    headings are normally distributed about the world's x. Their motion decays with depth as exp(k z), with
     k = (2 pi / T)^2 / g. Second-order drift, and what waves do to a pressure sensor, are left out.
     """
 
@@ -124,8 +119,6 @@ class Waves:
     """Significant height [m]: mean of the highest third, crest to trough."""
     period_s: float = 3.0
     """Period of the peak of the spectrum [s]."""
-    heading_rad: float = 0.0
-    """Where the waves run to, from the world's x, counter-clockwise [rad]."""
     spread_rad: float = 0.35
     """Standard deviation of the components' headings [rad]; 0 for long crests."""
     current: Sequence[float] = REST
@@ -140,7 +133,6 @@ class Waves:
         object.__setattr__(self, "current", _vector(self.current))
         _positive("height_m", self.height_m)
         _positive("period_s", self.period_s)
-        _finite("heading_rad", self.heading_rad)
         if not (math.isfinite(self.spread_rad) and self.spread_rad >= 0.0):
             raise FinlabError(f"water: spread_rad: expected a number from 0, got {self.spread_rad}")
         if not self.components >= 1:
@@ -156,7 +148,7 @@ class Waves:
         pace = 2 * math.pi / self.period_s * (1.25 / -np.log(share)) ** 0.25
         speed = pace * 0.25 * self.height_m * math.sqrt(2.0 / n)
         number = pace**2 / GRAVITY
-        heading = self.heading_rad + self.spread_rad * rng.standard_normal(n)
+        heading = self.spread_rad * rng.standard_normal(n)
         vectors = np.stack([number * np.cos(heading), number * np.sin(heading), number])
         return pace, speed, vectors, rng.uniform(0.0, 2 * math.pi, n)
 
