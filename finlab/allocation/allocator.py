@@ -396,7 +396,7 @@ class Allocator:
     def _notes(self, ready: Ready, flow: Array | None, target: Array) -> tuple[str, ...]:
         """Sentences that the user should read before trusting an answer."""
         method, notes = ready.method, fin_notes(ready.fins.healthy, flow)
-        asked = (np.abs(target) > NEARLY * self._scale).reshape(-1, 6).any(axis=0)
+        asked = np.asarray((np.abs(target) > NEARLY * self._scale).reshape(-1, 6).any(axis=0))
         if left := [axis for axis in method.undriven if asked[AXES.index(axis)]]:
             notes = (*notes, f"no actuator gives {' or '.join(left)}: what is asked of it is left out")
         if not method.unknown_fins or method.fin_model is None:
