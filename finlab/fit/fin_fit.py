@@ -70,17 +70,6 @@ class FinFit:
         mean, deviation = self.largest * found.transpose(1, 2, 0)
         return mean.reshape(command.shape), deviation.reshape(command.shape)
 
-    def mean_thrust(self, command: Array) -> Array:
-        """Returns the forces of `thrust` (..., 3) alone, which is much quicker."""
-        inputs = self.measurements.scaled(command)
-        found = np.stack([component.expect(inputs) for component in self.components], axis=-1)
-        return np.asarray(self.largest * found.reshape(command.shape))
-
-    @cached_property
-    def measured(self) -> Array:
-        """The forces of the samples [N], as `thrust` has them (n, 3)."""
-        return self.measurements.thrust()[0]
-
     def predict_power(self, command: Array) -> Array | None:
         """Returns the power [W], (...), at commands (..., 3); None where none was measured."""
         if self.power is None:

@@ -1,22 +1,15 @@
-"""What a fit of a fin is worth: the verdict first, samples and fit in a plot, and what to measure next."""
+"""What a fit of a fin is worth: the verdict first, and what to measure next."""
 
 import math
 
 import numpy as np
 from markupsafe import Markup
 
-from finlab.fit.fin_fit import BAND, FinFit
-from finlab.fit.thrust_curves import ThrustCurve
+from finlab.fit.fin_fit import FinFit
 from webapp.markup.html import html, row
-from webapp.markup.plot import Plot, positive
 from webapp.markup.words import three_digits
 from webapp.tasks.fitting import Fitted
-from webapp.theme import BLUE, GREEN, ORANGE, css
 
-HEIGHT = 214
-"""Height of the plot [px]."""
-COLORS = (ORANGE, GREEN, BLUE)
-"""Of the curves, from the lowest frequency to the highest."""
 MOST_NAMED = 8
 """Samples left out that are named one by one."""
 
@@ -35,7 +28,6 @@ def fit_card(found: Fitted) -> str:
     parts = [
         html("<div class='said'>{}</div>", verdict),
         _figures(fit),
-        thrust_plot(found.curves),
         _left_out(fit),
     ]
     if found.advice is not None:
@@ -81,21 +73,3 @@ def _advice(found: Fitted) -> str:
     return html(
         "<div class='said'>Measure next, the most telling first:</div><table>{}{}</table>", head, rows
     )
-
-
-def thrust_plot(curves: tuple[ThrustCurve, ...]) -> str:
-    """Thrust over amplitude at a few frequencies: samples, the fit, and its 95 % band."""
-    values = np.concatenate([np.append(curve.thrust, curve.samples[:, 1]) for curve in curves])
-    across = positive("half amplitude [rad]", curves[0].amplitude[-1:])
-    plot = Plot(across, positive("thrust [N]", values), HEIGHT)
-    dots, lines = [], []
-    for k, (curve, color) in enumerate(zip(curves, COLORS, strict=False)):
-        places = (plot.place(*sample) for sample in curve.samples)
-        circles = (html("<circle cx='{:.1f}' cy='{:.1f}' r='1.7'/>", *place) for place in places)
-        dots.append(html("<g fill='{}'>{}</g>", css(color, 0.5), circles))
-        band, a = BAND * curve.deviation, curve.amplitude
-        outline = np.append(a, a[::-1]), np.append(curve.thrust + band, (curve.thrust - band)[::-1])
-        lines.append(html("<polygon points='{}' fill='{}'/>", plot.points(*outline), css(color, 0.22)))
-        lines.append(plot.curve(a, curve.thrust, color))
-        lines.append(plot.key(116 * k, color, f"{curve.band[0]:.1f} to {curve.band[1]:.1f} Hz"))
-    return plot.drawn([*dots, *lines])

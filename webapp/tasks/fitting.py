@@ -19,12 +19,9 @@ from webapp.tasks.context import Context
 
 if TYPE_CHECKING:  # scipy takes its time, and only who fits needs it
     from finlab.fit.fin_fit import FinFit
-    from finlab.fit.thrust_curves import ThrustCurve
 
 MAX_BYTES = 50_000_000
 """Largest file that the page takes; the command line reads ten times as much."""
-CURVES = 3
-"""Frequencies in the plot."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,8 +44,6 @@ class Fitted:
     model: FinModelSpec
     fit: "FinFit | None" = None
     """The fit; None where the file was a finished table."""
-    curves: "tuple[ThrustCurve, ...]" = ()
-    """What the plot shows."""
     advice: Array | None = None
     """Commands (5, 3) to measure next."""
 
@@ -132,15 +127,13 @@ class Fitting(Newest[Upload, Fitted]):
             from finlab.fit.fin_file import fin_csv
             from finlab.fit.fin_fit import fit_fin
             from finlab.fit.measurements import read_measurements
-            from finlab.fit.thrust_curves import thrust_curves
         except ImportError as error:
             raise FinlabError(f"fitting needs {error.name}; run: {install('fit')}") from None
         tell = partial(self._tell, upload)
         fit = fit_fin(read_measurements([path]), progress=tell)
         tell("writing the table")
         model = stored_table(fin_csv(fit).encode(), table_folder())
-        curves = tuple(thrust_curves(fit, CURVES))
-        return Fitted(done, model, fit, curves, next_measurements(fit))
+        return Fitted(done, model, fit, next_measurements(fit))
 
     def _tell(self, upload: Upload, words: str, done: float = 1.0) -> None:
         """On the worker's thread, before each step: a fit whose result is not waited for ends here."""
