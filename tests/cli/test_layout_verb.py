@@ -73,7 +73,6 @@ def test_check_and_show_take_any_actuator(capsys: pytest.CaptureFixture[str]) ->
         ("layout optimize", ["layout", "optimize", "turtle_hybrid", "--fins", "front_left", "-o", "x.yaml"]),
         ("layout export", ["layout", "export", "turtle_hybrid", "-o", "x.urdf"]),
         ("fit robot", ["fit", "robot", "turtle_hybrid", "swim.csv", "-o", "x.yaml"]),
-        ("the app", ["app", "--layout", "turtle_hybrid"]),
     ],
 )
 def test_verbs_for_fins_only_name_the_actuator(

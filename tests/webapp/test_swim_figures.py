@@ -1,5 +1,6 @@
 """What swims come to, and their logs."""
 
+import io
 from collections.abc import Iterator
 from types import SimpleNamespace
 
@@ -72,16 +73,16 @@ def test_what_a_swim_comes_to(shelf: Shelf) -> None:
     assert "<td>2.00 W</td>" in card and "<td>4.2 mWh</td>" in card
 
 
-def test_the_log_is_sent_as_a_table(shelf: Shelf) -> None:
+def test_the_log_is_sent_whole(shelf: Shelf) -> None:
     with pytest.raises(FinlabError, match="nothing has been swum"):
         shelf.files.swim(shelf.swimming)
     shelf.swim(2.0, "analytic")
     shelf.files.swim(shelf.swimming)
     until(lambda: bool(shelf.sent))
     ((name, content),) = shelf.sent.items()
-    assert name == "ucat_analytic_nominal_tracking.csv"
-    header, *rows = content.decode().splitlines()
-    assert header.startswith("t [s],x [m],") and len(rows) == 20
+    assert name == "ucat_analytic_nominal.npz"
+    with np.load(io.BytesIO(content), allow_pickle=False) as log:
+        assert len(log["time"]) == 20
 
 
 def test_power_is_a_column_of_the_record(shelf: Shelf) -> None:

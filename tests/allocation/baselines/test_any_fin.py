@@ -191,7 +191,9 @@ def test_ipopt_minimizes_what_the_plant_says(
     total = cs.sumsqr(formulas.residual) + formulas.cost
     gradient = cs.gradient(total, formulas.command)
     asked = cs.Function("asked", [formulas.command, formulas.target], [total, gradient])
-    hessian = solver.get_function("nlp_hess_l")
+    # Of fins by tables IPOPT approximates the Hessian itself.
+    by_formula = all(fin.model.type != "table" for fin in layout.fins)
+    hessian = solver.get_function("nlp_hess_l") if by_formula else None
     for command in at:
         value, slope = asked(command.ravel(), target)
         wrench, jacobian = plant.linearize(command)
@@ -199,6 +201,8 @@ def test_ipopt_minimizes_what_the_plant_says(
         assert float(value) == pytest.approx(float(residual @ residual + cost(command[None])[0]), rel=1e-9)
         by = 2.0 * (residual / sigma) @ jacobian + cost.gradient(command[None])[0].ravel()
         np.testing.assert_allclose(np.array(slope).ravel(), by, rtol=1e-6, atol=1e-8)
+        if hessian is None:
+            continue
         second = np.array(hessian(command.ravel(), target, 1.0, []))
         second = second + np.triu(second, 1).T
         for k, offset in enumerate(1e-5 * np.eye(3 * plant.n_fins)):
