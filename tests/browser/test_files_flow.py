@@ -111,4 +111,4 @@ def test_what_is_exported(page: Any, tmp_path: Path) -> None:
     assert main(["export", "ucat", "-o", str(tmp_path / "ucat"), "--zip"]) == 0
     assert bundle.read_bytes() == (tmp_path / "ucat.zip").read_bytes()
     state = page.session.state
-    assert finlab.Allocator(state.layout, bundle).allocate(state.target).err_norm < 1e-3
+    assert finlab.Allocator.from_bundle(bundle).allocate(state.target).err_norm < 1e-3
