@@ -1,0 +1,1 @@
+"""The laws of actuators: force of a command and power, with derivatives; one kind per file."""

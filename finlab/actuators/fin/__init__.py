@@ -1,0 +1,1 @@
+"""Flapping fins: laws with a formula, and tables."""
