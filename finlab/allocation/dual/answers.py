@@ -13,14 +13,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.actuators.response import CELLS, Line, Plane
+from finlab.actuators.response import CELLS, Line, Plane, price_grid
 from finlab.allocation.dual.gauges import Gauges
 from finlab.arrays import Array
 from finlab.precision import FINE, NOTHING, ROUNDS
 
 TURNING = 1e-2
 """Price, as a share of the mean one of the least force, over which a force that cannot rest turns round."""
-_EDGES = np.linspace(0.0, 1.0, CELLS + 1) ** 4
+_EDGES = price_grid(1.0)
 """Ends of the tables' intervals, as shares of the largest price."""
 
 

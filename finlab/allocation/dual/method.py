@@ -140,7 +140,7 @@ class Dual(Method):
     def _solve(self, targets: Array, policy: Policy, previous: Array | None) -> Solution:
         robot = self.compiled.robot
         aim, found = self._aimed(targets, policy, self._first_prices(previous))
-        command, found = self._commands(aim, found, robot.sets, previous)
+        command = self._commands(aim, found, robot.sets, previous)
         bound: Callable[[], Array] = partial(self._bound, aim, found)
         if len(targets) > 1:
             bound = partial(self._bound_again, targets, policy)
@@ -235,14 +235,12 @@ class Dual(Method):
         value[rows] = np.where(cut.found, cut.value * (1.0 - FINE), 0.0)
         return force, value
 
-    def _commands(
-        self, aim: Array, found: Forces, sets: Sets, previous: Array | None = None
-    ) -> tuple[Array, Forces]:
+    def _commands(self, aim: Array, found: Forces, sets: Sets, previous: Array | None = None) -> Array:
         """Commands (N, n, 3) that give wrenches (N, 6) exactly, by the plant."""
         command = self.compiled.commands(found.force, previous)
         error = self._error(command, aim)
         if (error <= EXACT).all():
-            return command, found
+            return command
         shift = np.zeros_like(aim)
         for _ in range(ROUNDS):
             coarse = np.flatnonzero((error > FINE) & found.within)
@@ -260,7 +258,7 @@ class Dual(Method):
         rough = np.flatnonzero(error > EXACT)
         if len(rough):
             command[rough] = self._refined(self._problem, aim[rough], command[rough])
-        return command, found
+        return command
 
     def _error(self, command: Array, aim: Array) -> Array:
         given = wrench_of_forces(self.plant.force(command), self.plant.effectiveness)

@@ -3,8 +3,8 @@
     max over l of  g(l) = l.w - sum c*(B'l) - 1/2 l'El,   with gradient  w - sum B y(B'l) - El
 
 `g` is concave. The Hessian is `G + E` with `G = sum B (dy/ds) B'`. Where actuators are at their limits, `G`
-loses
-rank: a ridge `mu tr(G)` keeps the step finite and is adapted to what a step brought (Levenberg, Marquardt).
+loses rank: a ridge `mu tr(G)` keeps the step finite and is adapted to what a step brought (Levenberg,
+Marquardt).
 With a reward, the target is `t w` with `t` in [0, 1], paid `rho (2 t - t^2 / 2)`.
 """
 
