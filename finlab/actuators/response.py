@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from finlab.arrays import Array
+from finlab.layout.thrust_model import lower_hull
 
 CELLS = 1024
 """Intervals of price of a table; their ends are `top (j / CELLS)^4`."""
@@ -22,9 +23,9 @@ POINTS = 512
 """Directions around a circle, and sizes of a force, for which a fin is asked."""
 
 
-def price_grid(top: float, points: int = CELLS + 1) -> Array:
-    """Prices (points,) [W/N] from 0 to `top`, the ends of a table's intervals."""
-    grid: Array = top * np.linspace(0.0, 1.0, points) ** 4
+def price_grid(top: float) -> Array:
+    """Prices (CELLS + 1,) [W/N] from 0 to `top`, the ends of a table's intervals."""
+    grid: Array = top * np.linspace(0.0, 1.0, CELLS + 1) ** 4
     return grid
 
 
@@ -58,8 +59,7 @@ class RadialTable:
     def of_costs(cls, force: Array, cost: Array) -> "RadialTable":
         """A table from points of force (K,) [N], rising, and power (K,) [W]: that of their convex hull, with
         a quadratic cost between its points."""
-        keep = _lower_hull(force, cost)
-        force, cost = force[keep], cost[keep]
+        force, cost = lower_hull(force, cost)
         if len(force) == 1:
             return cls.of_forces(1e-9, np.full(CELLS + 1, force[0]), float(cost[0]))
         chord = np.diff(cost) / np.diff(force)
@@ -117,19 +117,6 @@ def monotone_slopes(x: Array, y: Array) -> Array:
     slope[-1] = chord[-1] + (chord[-1] - chord[-2]) * width[-1] / (width[-1] + width[-2])
     most = 3.0 * np.minimum(np.append(chord, chord[-1]), np.insert(chord, 0, chord[0]))
     return np.clip(slope, 0.0, most)
-
-
-def _lower_hull(x: Array, y: Array) -> Array:
-    """Places of the points of the lower convex hull, from left to right."""
-    kept: list[int] = []
-    for i in range(len(x)):
-        while len(kept) > 1 and (
-            (y[kept[-1]] - y[kept[-2]]) * (x[i] - x[kept[-2]])
-            >= (y[i] - y[kept[-2]]) * (x[kept[-1]] - x[kept[-2]])
-        ):
-            kept.pop()
-        kept.append(i)
-    return np.array(kept)
 
 
 @dataclass(frozen=True, eq=False)

@@ -92,6 +92,12 @@ class Sets:
         low, high, low_cost, high_cost, middle, half = parts
         return cls(low, high, low_cost, high_cost, middle, half, whole)
 
+    @cached_property
+    def most_cost(self) -> Array:
+        """Power (1,) or (N,) [W] of all actuators at the dearer ends of their sets."""
+        found: Array = np.maximum(self.low_cost, self.high_cost).sum(axis=0)
+        return found
+
     @property
     def parts(self) -> tuple[Array, ...]:
         """All arrays, in order."""
@@ -120,6 +126,12 @@ class Answers:
         """The tables' forces as shares of the largest, one table after the other."""
         self._row = 2 * np.arange(len(sides))[:, None]
         self.gauges = Gauges([plane.gauge for plane in planes])
+
+    def sizes(self, force: Array) -> Array:
+        """Sizes (p, N) [N] of the planes' forces, of forces (k, N) along all directions."""
+        _, first, second = np.split(force, [self.lines, self.lines + self.planes])
+        size: Array = np.hypot(first, second)
+        return size
 
     def radial(self, price: Array, row: NDArray[np.intp]) -> tuple[Array, Array, Array]:
         """Force [N], its derivative and conjugate [W] (m, N) at prices (m, N) from 0 on in rows (m, 1) or (m,

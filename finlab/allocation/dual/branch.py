@@ -76,9 +76,7 @@ def may_have_gaps(robot: DualRobot, sets: Sets, force: Array) -> bool:
         return True
     if sets.rests:
         return False
-    lines, planes = robot.answers.lines, robot.answers.planes
-    size = np.hypot(force[lines : lines + planes], force[lines + planes :])
-    return bool((size < 0.98 * sets.low[lines:]).any())
+    return bool((robot.answers.sizes(force) < 0.98 * sets.low[robot.answers.lines :]).any())
 
 
 def least_power(robot: DualRobot, target: Array, sets: Sets, root: Prices) -> Branched:
@@ -138,9 +136,8 @@ class _Best:
 
     def _hollow(self, force: Array, sets: Sets) -> NDArray[np.bool_]:
         """Where the smoothed dual of a narrow arc has a force (k, N) that is smaller than any in it."""
-        lines, planes = self._robot.answers.lines, self._robot.answers.planes
-        size = np.hypot(force[lines : lines + planes], force[lines + planes :])
-        return np.asarray(((size < 0.9 * sets.low[lines:]) & (sets.half <= NARROW)).any(axis=0))
+        size, low = self._robot.answers.sizes(force), sets.low[self._robot.answers.lines :]
+        return np.asarray(((size < 0.9 * low) & (sets.half <= NARROW)).any(axis=0))
 
     def turn(self) -> None:
         """Turn the fins that keep their least force to where that costs less, by smaller and smaller

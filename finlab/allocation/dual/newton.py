@@ -82,12 +82,7 @@ def start(robot: DualRobot, target: Array, sets: Sets) -> tuple[Array, NDArray[n
     made once to fit a cost `~ T^1.5`."""
     gain, lines = robot.gain, robot.answers.lines
     force = robot.first_force @ target
-    size = np.abs(force)
-    planes = robot.answers.planes
-    if planes:
-        size = np.concatenate(
-            [size[:lines], np.hypot(force[lines : lines + planes], force[lines + planes :])]
-        )
+    size = np.concatenate([np.abs(force[:lines]), robot.answers.sizes(force)])
     share = size / robot.most
     saturated = np.asarray((share > 0.8).any(axis=0))
     fit = np.sqrt(np.minimum(np.maximum(share, 1e-4), 1.0))
@@ -124,7 +119,7 @@ def solve(
         ridge = np.where(saturated, SATURATED_RIDGE, NEARLY)
     else:
         ridge = np.full(count, NEARLY)
-    most = np.maximum(sets.low_cost, sets.high_cost).sum(axis=0) * (1.0 + 1e-9) + 1e-9 + np.zeros(count)
+    most = sets.most_cost * (1.0 + 1e-9) + 1e-9 + np.zeros(count)
     proves = terms.penalty is None and terms.reward is None
     state = _state(robot, target, prices, sets, terms)
     with np.errstate(invalid="ignore"):  # systems without an inverse are told by what is not finite

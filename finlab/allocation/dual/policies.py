@@ -124,7 +124,7 @@ def _nearer(robot: DualRobot, sets: Sets, target: Array, compliance: Array) -> P
 
 def _unit(sets: Sets) -> float:
     """The largest power per actuator [W]."""
-    return float(np.maximum(sets.low_cost, sets.high_cost).sum(axis=0)[0]) / len(sets.high) + 1e-12
+    return float(sets.most_cost[0]) / len(sets.high) + 1e-12
 
 
 def _unanswered(robot: DualRobot, prices: Array, sets: Sets) -> Array:

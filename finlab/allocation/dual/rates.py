@@ -93,7 +93,7 @@ def within_tick(robot: DualRobot, sets: Sets, wrench: Array, prices: Array, weig
     if found.solved[0]:
         return found.force
     metric = robot.basis.T * (weight * robot.scale) ** 2
-    unit = float(np.maximum(sets.low_cost, sets.high_cost).sum()) + 1e-12
+    unit = float(sets.most_cost[0]) + 1e-12
     penalty = np.asarray(np.linalg.inv(metric @ robot.basis) / unit, np.float64)
     for stiffness in STIFFNESS:
         found = solve(robot, target, sets, prices, Terms(penalty=penalty / stiffness))
