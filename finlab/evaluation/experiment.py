@@ -19,7 +19,7 @@ from finlab.evaluation.report.document import Block, Column, Figure, Row, Table
 
 EXPERIMENTS = (
     *("wrench", "cost", "latency", "ablation", "temperature", "proposals"),
-    *("trajectory", "faults", "velocity", "swims", "monitor"),
+    *("trajectory", "faults", "velocity", "swims"),
 )
 """Names, which are those of their modules in `finlab.evaluation.experiments`, in the order of the report."""
 MOST, MOST_SEED = 1_000_000, 2**63 - 1
