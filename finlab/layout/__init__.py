@@ -24,3 +24,4 @@ from finlab.layout.random import random_layout as random_layout
 from finlab.layout.rudder import Rudder as Rudder
 from finlab.layout.servo import Servo as Servo
 from finlab.layout.thruster import Thruster as Thruster
+from finlab.layout.uncertainty import Uncertainty as Uncertainty

@@ -14,6 +14,7 @@ from finlab.layout.checked import Name
 from finlab.layout.commanded import Commanded
 from finlab.layout.thrust_model import KEYS, MAX_FORCE, ThrustModel, check_force
 from finlab.layout.thruster import ForceRate, Metres, Place, Seconds, Threshold
+from finlab.layout.uncertainty import Uncertainty
 
 Angle = Annotated[float, Meta(ge=-TURN - 1e-9, le=TURN + 1e-9)]
 TurnRate = Annotated[float, Meta(ge=1e-3, le=1000.0)]
@@ -58,6 +59,8 @@ class Azimuth(Commanded):
     """Time in which the force comes to 63 % of a new one [s]."""
     rate: ForceRate | None = None
     """How fast the commanded force changes at most [N/s]; None where nothing limits it."""
+    uncertainty: Uncertainty | None = None
+    """How far its force may be from that; None where nothing is known of it."""
 
     def __post_init__(self) -> None:
         super().__post_init__()

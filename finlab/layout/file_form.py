@@ -24,6 +24,7 @@ from finlab.layout.rudder import Rudder
 from finlab.layout.servo import Servo
 from finlab.layout.thrust_model import MAX_ROWS, PowerLaw, PowerTable, Row
 from finlab.layout.thruster import Thruster
+from finlab.layout.uncertainty import Uncertainty
 
 
 class TableForm(Struct, tag="table", tag_field="type", forbid_unknown_fields=True):
@@ -44,17 +45,18 @@ def _form(cls: type[Checked], **others: Any) -> Any:
 
 
 _THRUST: Any = form(PowerLaw) | TableForm
-_FIN: dict[str, Any] = {"limits": form(Limits), "model": Model, "servo": form(Servo)}
+_UNCERTAINTY: dict[str, Any] = {"uncertainty": form(Uncertainty)}
+_FIN: dict[str, Any] = {"limits": form(Limits), "model": Model, "servo": form(Servo), **_UNCERTAINTY}
 HORIZONTAL_FIN = _form(
     Fin, called="HorizontalFin", tag=(), required=["mounting_angle"], shaft=None, zero=None, **_FIN
 )
 """A fin of version 1."""
 _KINDS = {
     Fin: _form(Fin, **_FIN),
-    Thruster: _form(Thruster, model=_THRUST),
-    Azimuth: _form(Azimuth, model=_THRUST),
-    Tilt: _form(Tilt, model=_THRUST),
-    Rudder: _form(Rudder),
+    Thruster: _form(Thruster, model=_THRUST, **_UNCERTAINTY),
+    Azimuth: _form(Azimuth, model=_THRUST, **_UNCERTAINTY),
+    Tilt: _form(Tilt, model=_THRUST, **_UNCERTAINTY),
+    Rudder: _form(Rudder, **_UNCERTAINTY),
 }
 ACTUATOR: Any = Union[tuple(_KINDS.values())]  # noqa: UP007
 """An actuator of version 2."""

@@ -13,6 +13,7 @@ from finlab.layout.angles import FULL_TURN_TOLERANCE, TURN
 from finlab.layout.axes import Direction3, Vector, axes_across, cross
 from finlab.layout.checked import Checked, Name, given
 from finlab.layout.servo import Servo
+from finlab.layout.uncertainty import Uncertainty
 
 
 @dataclass(frozen=True)
@@ -223,6 +224,8 @@ class Fin(Checked):
     """Unit vector across the shaft: the thrust's direction at zero direction 0; from there it turns towards
     shaft x zero. None where
     `mounting_angle` is given; zero is e_z x shaft then."""
+    uncertainty: Uncertainty | None = None
+    """How far its force may be from that; None where nothing is known of it."""
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -13,6 +13,7 @@ from finlab.layout.azimuth import TurnRate, TurnRateDegrees
 from finlab.layout.checked import Name
 from finlab.layout.commanded import Commanded
 from finlab.layout.thruster import Place, Seconds
+from finlab.layout.uncertainty import Uncertainty
 
 EFFICIENCY = 0.9
 """Induced drag of an elliptic wing over that of such a foil (Whicker and Fehlner, 1958)."""
@@ -77,6 +78,8 @@ class Rudder(Commanded):
     """Time in which the deflection comes to 63 % of a new one [s]."""
     rate: TurnRate | None = None
     """How fast the deflection changes at most [rad/s]; None where nothing limits it."""
+    uncertainty: Uncertainty | None = None
+    """How far its force may be from that; None where nothing is known of it."""
 
     def __post_init__(self) -> None:
         super().__post_init__()

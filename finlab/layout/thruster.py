@@ -11,6 +11,7 @@ from finlab.layout.axes import Direction3, Vector, cross, unit_vector
 from finlab.layout.checked import Name
 from finlab.layout.commanded import Commanded
 from finlab.layout.thrust_model import KEYS, MAX_FORCE, Newtons, ThrustModel, check_force
+from finlab.layout.uncertainty import Uncertainty
 
 Metres = Annotated[float, Meta(ge=-100.0, le=100.0)]
 """A coordinate of a place on a robot, or an arm of torque [m]."""
@@ -46,6 +47,8 @@ class Thruster(Commanded):
     """Time in which the force comes to 63 % of a new one [s]."""
     rate: ForceRate | None = None
     """How fast the commanded force changes at most [N/s]; None where nothing limits it."""
+    uncertainty: Uncertainty | None = None
+    """How far its force may be from that; None where nothing is known of it."""
 
     def __post_init__(self) -> None:
         super().__post_init__()

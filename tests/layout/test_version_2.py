@@ -11,7 +11,16 @@ import pytest
 import yaml
 
 from finlab.errors import AllocationError, LayoutError
-from finlab.layout import Fin, Layout, Thruster, layout_to_dict, load_layout, own_effectiveness, parse_layout
+from finlab.layout import (
+    Fin,
+    Layout,
+    Thruster,
+    Uncertainty,
+    layout_to_dict,
+    load_layout,
+    own_effectiveness,
+    parse_layout,
+)
 from finlab.layout.damage import Health
 from finlab.layout.layout import MAX_ACTUATORS
 from finlab.layout.thrust_model import PowerLaw
@@ -249,3 +258,32 @@ def test_damage_leaves_the_other_actuators_as_they_are():
 def test_damage_that_an_actuator_cannot_have_is_refused(damage, why):
     with pytest.raises(AllocationError, match=why):
         Health.of(**damage).applied_to(parse_layout(GOOD))
+
+
+UNCERTAIN = {"share": 0.05, "floor_n": 0.1, "common": "bench", "correlation": 0.4}
+
+
+@pytest.mark.parametrize("i", range(6))
+def test_any_actuator_may_be_uncertain(i: int) -> None:
+    data = copy.deepcopy(GOOD)
+    data["actuators"][i]["uncertainty"] = UNCERTAIN
+    layout = parse_layout(data)
+    assert layout.actuators[i].uncertainty == Uncertainty(0.05, 0.1, "bench", 0.4)
+    assert [part.uncertainty for k, part in enumerate(layout.actuators) if k != i] == [None] * 5
+    assert parse_layout(layout_to_dict(layout)) == layout != parse_layout(GOOD)
+
+
+@pytest.mark.parametrize(
+    ("key", "value"), [("share", -0.1), ("floor_n", math.inf), ("common", ""), ("correlation", 1.1), ("x", 1)]
+)
+def test_uncertainty_that_cannot_be_is_refused_with_its_key(key: str, value: object) -> None:
+    data = copy.deepcopy(GOOD)
+    data["actuators"][2]["uncertainty"] = {**UNCERTAIN, key: value}
+    with pytest.raises(LayoutError, match=rf"actuators\[2\]\.uncertainty\.{key}: "):
+        parse_layout(data)
+
+
+def test_fins_of_version_1_may_be_uncertain() -> None:
+    layout = load_layout("A").replace_actuator("front_right", uncertainty=Uncertainty(0.02))
+    assert layout_to_dict(layout)["version"] == 1
+    assert parse_layout(layout_to_dict(layout)) == layout
