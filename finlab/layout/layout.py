@@ -176,7 +176,7 @@ class Layout(Checked):
     def counted(self) -> str:
         """How many actuators there are of each type, such as `4 fins and 2 thrusters`."""
         counts = Counter(part.type for part in self.actuators)
-        return " and ".join(f"{n} {kind}s" for kind, n in counts.items())
+        return " and ".join(f"{n} {kind}{'s' if n > 1 else ''}" for kind, n in counts.items())
 
     def index(self, name: str) -> int:
         """Returns the place of the actuator called `name`.

@@ -13,9 +13,11 @@ AXES = ["Fx", "Fy", "Fz", "Tx", "Ty", "Tz"]
 
 
 def columns(layout):
-    """Wrenches (6, k) of 1 N along all directions in which the actuators push, without azimuths."""
+    """Wrenches (6, k) of 1 N along all directions in which the actuators push, rudders by their lift when
+    the water comes from ahead."""
+    pushes = {"fin": slice(1, 3), "azimuth": slice(1, 3), "thruster": slice(0, 1), "rudder": slice(2, 3)}
     own = zip(layout.actuators, own_effectiveness(layout), strict=True)
-    return np.concatenate([axes[1:] if part.type == "fin" else axes[:1] for part, axes in own]).T
+    return np.concatenate([axes[pushes[part.type]] for part, axes in own]).T
 
 
 def rank(layout):
@@ -62,6 +64,10 @@ def test_there_is_something_to_teach():
         ("ucat", 6, []),
         ("turtle_hybrid", 6, []),
         ("bluerov2_heavy", 6, []),
+        ("bluerov2", 5, []),
+        ("torpedo", 4, []),
+        ("catamaran", 3, ["Fz", "Tx", "Ty"]),
+        ("fish", 5, []),
     ],
 )
 def test_rank_and_missing_axes(name, expected, missing):
