@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from finlab.arrays import Array
 from finlab.bench.problems import KINDS, Problems
-from finlab.bench.protocol import FAILURES
-from finlab.bench.runner import Answer, Answers
+from finlab.bench.runner import FAILURES, Answer, Answers
 from finlab.layout.angles import command_change
 from finlab.physics import plant_of
 from finlab.physics.effort import command_effort

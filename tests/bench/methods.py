@@ -1,14 +1,11 @@
 """Methods that go wrong, each in its own way."""
 
-import os
 import time
 from typing import Any
 
 import numpy as np
 
 import finlab
-
-calls = 0
 
 
 def rests(layout: finlab.Layout, targets: np.ndarray) -> np.ndarray:
@@ -27,15 +24,6 @@ def raises(targets: np.ndarray) -> np.ndarray:
     raise RuntimeError("no idea")
 
 
-def ends(targets: np.ndarray) -> np.ndarray:
-    os._exit(3)
-
-
-def sleeps(targets: np.ndarray) -> np.ndarray:
-    time.sleep(60.0)
-    return targets
-
-
 def is_slow(layout: finlab.Layout, targets: np.ndarray) -> np.ndarray:
     time.sleep(0.06)
     return rests(layout, targets)
@@ -51,14 +39,6 @@ def says_nan(layout: finlab.Layout, targets: np.ndarray) -> np.ndarray:
 
 def leaves_limits(robot: dict[str, Any], targets: np.ndarray) -> list[Any]:
     return [[[0.61, 1.0, 0.0] for _ in robot["fins"]] for _ in targets]
-
-
-def ends_at_eighth(layout: finlab.Layout, targets: np.ndarray) -> np.ndarray:
-    global calls
-    calls += 1
-    if calls == 8:
-        os._exit(3)
-    return rests(layout, targets)
 
 
 def wants_more(targets: np.ndarray, weather: str) -> np.ndarray:
