@@ -18,7 +18,7 @@ from finlab.layout import FinModelSpec, Layout
 from finlab.networks.trained import TrainedWeights
 from finlab.physics import plant_of
 
-Takes = Literal["any actuator", "fins", "horizontal fins"]
+Takes = Literal["any actuator", "fins", "horizontal fins", "thrusters"]
 """What a method's robot may have."""
 
 
@@ -55,10 +55,17 @@ class Method(ABC):
             DataError: a fin's force table cannot be read.
             LayoutError: the robot has an actuator that the method does not take.
         """
-        if self.takes != "any actuator":
-            layout.only_fins(f"method {self.name}", horizontal=self.takes == "horizontal fins")
+        self.check_robot(layout)
         self.layout, self.settings, self.scale, self.weights = layout, settings, scale, weights
         self.plant = plant_of(layout)
+
+    @classmethod
+    def check_robot(cls, layout: Layout) -> None:
+        """Raise a `LayoutError` at an actuator that the method does not take."""
+        if cls.takes == "thrusters":
+            layout.only_thrusters(f"method {cls.name}")
+        elif cls.takes != "any actuator":
+            layout.only_fins(f"method {cls.name}", horizontal=cls.takes == "horizontal fins")
 
     @classmethod
     def option_names(cls) -> list[str]:

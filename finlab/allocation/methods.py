@@ -22,6 +22,8 @@ METHODS: dict[str, tuple[str, str]] = {
     "paper": ("finlab.paper.pipeline", "Paper"),
     "qp": ("finlab.allocation.baselines.qp", "Qp"),
     "sqp": ("finlab.allocation.baselines.sqp", "Sqp"),
+    "px4": ("finlab.allocation.baselines.px4", "Px4"),
+    "ardusub": ("finlab.allocation.baselines.ardusub", "ArduSub"),
     "analytic": ("finlab.allocation.baselines.analytic", "Analytic"),
     "ipopt": ("finlab.allocation.baselines.ipopt", "Ipopt"),
 }

@@ -36,7 +36,7 @@ def allocate(
         layout: layout file, bundle, or the name of a shipped layout.
         wrench: target in the body frame [N, N m].
         failed: name of a fin that does not work.
-        method: dual, mdn, paper, qp, sqp, analytic or ipopt.
+        method: dual, mdn, paper, qp, sqp, px4, ardusub, analytic or ipopt.
         objective: what is kept least, power in watts (the default) or the paper's effort.
         checkpoint: trained checkpoint; the shipped one of the method by default.
         policy: for a wrench out of reach: closest, direction (same direction, scaled down) or priority.

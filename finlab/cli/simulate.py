@@ -51,7 +51,7 @@ def simulate(
             front_left@60:whole (it is repaired).
         announced: whether what happens to fins is announced to the allocator.
         monitor: let a FaultMonitor watch the robot and tell the allocator what it finds.
-        method: dual, mdn, paper, qp, sqp, analytic or ipopt.
+        method: dual, mdn, paper, qp, sqp, px4, ardusub, analytic or ipopt.
         objective: what the method keeps least: power in watts, or effort, the paper's J_en.
         duration: time for a shipped trajectory.
         plant: what the fins really do: mean (the fin law), ripple (within the flapping cycle), flexible (fins

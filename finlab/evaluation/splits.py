@@ -13,6 +13,14 @@ from finlab.evaluation.noisy_tables import noisy_table
 from finlab.layout import FinModelSpec, Layout, random_layout
 from finlab.layout.angles import wrapped
 from finlab.layout.random import TRAINING_BOX
+from finlab.layout.random_actuators import Draw as ActuatorDraw
+from finlab.layout.random_actuators import (
+    random_azimuth,
+    random_robot,
+    random_shaft_fin,
+    random_thruster,
+    random_tilt,
+)
 from finlab.layout.random_fins import random_fin_model
 from finlab.physics import Plant
 
@@ -30,7 +38,10 @@ BIG, TINY = 10.0, 1.0 / 6.0
 """Length of splits `big` and `tiny` over that of the training layouts: fins out to 3 m and to 5 cm."""
 DOMAIN = 0x7E57
 """Leads the seed of every test case; training seeds begin otherwise."""
-OWN_SIGMA = ("fins", "fins-mixed", "tables", "big", "tiny")
+OWN_SIGMA = (
+    *("fins", "fins-mixed", "tables", "big", "tiny"),
+    *("thrusters", "azimuths", "mixed-actuators", "any-shaft"),
+)
 """Splits whose robots are each measured by their own wrenches, which are smaller or larger than those of
 training: errors there are relative to what the robot can do."""
 N_SIGMA = 4096
@@ -172,6 +183,11 @@ def _tables(rng: np.random.Generator, name: str) -> tuple[Layout, tuple[str, ...
     ), ()
 
 
+def _robots(*kinds: ActuatorDraw, count: tuple[int, int], each: bool = False) -> Draw:
+    """Robots of random actuators of some kinds; options of `random_robot`."""
+    return lambda rng, name: (random_robot(rng, name, count, kinds, each), ())
+
+
 SPLITS: dict[str, tuple[int, Draw]] = {
     "id": (0, _whole()),
     "ood": (1, _whole(box=OOD_BOX, outside=TRAINING_BOX)),
@@ -185,6 +201,13 @@ SPLITS: dict[str, tuple[int, Draw]] = {
     "many-fins": (9, _whole(n_fins=MANY_FINS)),
     "big": (16, _scaled(BIG)),
     "tiny": (17, _scaled(TINY)),
+    "thrusters": (18, _robots(random_thruster, count=(4, 10))),
+    "azimuths": (19, _robots(random_azimuth, count=(2, 6))),
+    "mixed-actuators": (
+        20,
+        _robots(*(random_shaft_fin, random_thruster, random_azimuth, random_tilt), count=(4, 10), each=True),
+    ),
+    "any-shaft": (21, _robots(random_shaft_fin, count=(2, 8))),
 }
 """Name -> a number that is part of the seed and of no other split, and how a layout and its failed fins are
 drawn."""

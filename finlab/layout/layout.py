@@ -17,6 +17,7 @@ from finlab.layout.body import Body
 from finlab.layout.checked import Checked, Name
 from finlab.layout.fin import Fin
 from finlab.layout.interaction import Interaction
+from finlab.layout.thruster import Thruster
 
 MAX_ACTUATORS = 64
 """Most actuators a layout may have."""
@@ -96,10 +97,23 @@ class Layout(Checked):
                 wanted, found = "fins with a mounting angle", "has a shaft of its own direction"
             else:
                 continue
-            raise LayoutError(
-                f"{what} works for {wanted} only, and {part.name!r} of layout {self.name} {found}; "
-                "method dual of `finlab allocate` takes any actuator"
-            )
+            raise self._refusal(what, wanted, part, found)
+
+    def only_thrusters(self, what: str) -> None:
+        """Refuses a robot that is not of thrusters alone, as `only_fins` does.
+
+        Raises:
+            LayoutError: an actuator is no thruster with a fixed axis.
+        """
+        for part in self.actuators:
+            if not isinstance(part, Thruster):
+                raise self._refusal(what, "robots of thrusters", part, f"is of type {part.type}")
+
+    def _refusal(self, what: str, wanted: str, part: Actuator, found: str) -> LayoutError:
+        return LayoutError(
+            f"{what} works for {wanted} only, and {part.name!r} of layout {self.name} {found}; "
+            "method dual of `finlab allocate` takes any actuator"
+        )
 
     @cached_property
     def position(self) -> Array:

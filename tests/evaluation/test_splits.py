@@ -19,8 +19,15 @@ FINS = {
     "many-fins": (9, 12),
 }
 """Least and most fins where they are not two and five."""
-QUICK = [split for split in SPLITS if split != "tables"]
-"""Splits of which many cases are drawn in no time; `tables` is `fins-mixed` with files."""
+ROBOTS = {
+    "thrusters": (4, 10, {"thruster"}),
+    "azimuths": (2, 6, {"azimuth"}),
+    "mixed-actuators": (4, 10, {"fin", "thruster", "azimuth", "tilt"}),
+    "any-shaft": (2, 8, {"fin"}),
+}
+"""Least and most actuators, and their types, in splits of other robots than those of horizontal fins."""
+QUICK = [split for split in SPLITS if split != "tables" and split not in ROBOTS]
+"""Splits of fins of which many cases are drawn in no time; `tables` is `fins-mixed` with files."""
 
 
 @cache
@@ -49,7 +56,7 @@ def test_a_small_run_is_the_beginning_of_a_large_one(split: str) -> None:
 
 def test_seeds_and_splits_differ() -> None:
     layouts = [make_split(split, 1, 1, seed)[0].layout for split in SPLITS for seed in (0, 1)]
-    assert len({layout.fins for layout in layouts}) == len(layouts)
+    assert len({layout.actuators for layout in layouts}) == len(layouts)
 
 
 def test_fin_counts() -> None:
@@ -57,6 +64,18 @@ def test_fin_counts() -> None:
         least, most = FINS.get(split, (2, 5))
         counts = {case.layout.n_fins for case in _cases(split)}
         assert counts == set(range(least, most + 1))
+
+
+@pytest.mark.parametrize("split", ROBOTS)
+def test_other_robots_have_the_actuators_that_they_are_said_to_have(split: str) -> None:
+    least, most, types = ROBOTS[split]
+    layouts = [case.layout for case in _cases(split)]
+    assert {layout.n for layout in layouts} == set(range(least, most + 1))
+    found = [{part.type for part in layout.actuators} for layout in layouts]
+    assert all(each == types for each in found)
+    assert all((np.abs(layout.position) <= (0.3, 0.3, 0.15)).all() for layout in layouts)
+    frames = np.concatenate([layout.frames[:, 0] for layout in layouts])
+    assert np.abs(frames.mean(axis=0)).max() < 0.2 and (np.abs(frames).mean(axis=0) > 0.4).all()
 
 
 def test_boxes() -> None:

@@ -24,6 +24,8 @@ METHOD_WORDS = {
     "paper": "the paper's pipeline",
     "qp": "one linear step",
     "sqp": "a general solver",
+    "px4": "PX4's, thrusters only",
+    "ardusub": "ArduSub's, thrusters only",
     "analytic": "the pseudo-inverse",
     "ipopt": "a general solver, slow",
 }

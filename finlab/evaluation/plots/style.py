@@ -22,6 +22,8 @@ COLOURS = {
     "analytic": GREEN,
     "sqp": PURPLE,
     "qp": GREY,
+    "px4": VERMILION,
+    "ardusub": SKY,
     "ipopt": BLACK,
     "ipopt-32": BLACK,
 }

@@ -1,0 +1,120 @@
+"""Random actuators of each kind, of about one size per robot, for held-out splits."""
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from finlab.arrays import Array
+from finlab.layout.actuator import Actuator
+from finlab.layout.azimuth import Azimuth, Tilt
+from finlab.layout.fin import Fin
+from finlab.layout.layout import Layout
+from finlab.layout.random_fins import log_uniform, random_fin_model
+from finlab.layout.thrust_model import PowerLaw
+from finlab.layout.thruster import Thruster
+
+EXTENT = (0.3, 0.3, 0.15)
+"""Largest |x|, |y|, |z| of an actuator [m]."""
+STRENGTH = (4.0, 30.0)
+"""Largest force of a thruster [N], times the robot's size from `SIZE`."""
+SIZE = (0.3, 3.0)
+ONE_WAY, SYMMETRIC = 0.1, 0.1
+"""Shares of thrusters that push one way only, and as much in reverse as ahead."""
+REACTION = 0.03
+"""Largest reaction torque of a propeller per newton [m]; half of them have one."""
+ARC = (math.radians(20.0), math.radians(300.0))
+"""Width of the arc of an azimuth [rad], where it has one, as half of them do."""
+TILT = (math.radians(20.0), math.radians(120.0))
+"""Width of the arc of a tilt [rad]."""
+
+Draw = Callable[[np.random.Generator, str, float], Actuator]
+"""From a generator, a name and the robot's size to an actuator."""
+
+
+def random_robot(
+    rng: np.random.Generator, name: str, count: tuple[int, int], kinds: Sequence[Draw], each: bool = False
+) -> Layout:
+    """Returns a robot of random actuators `a1`, `a2`, ...
+
+    Args:
+        rng: source of randomness.
+        name: of the layout.
+        count: least and most actuators.
+        kinds: what they are drawn of, each kind as often.
+        each: whether there is at least one of each kind.
+    """
+    n, size = int(rng.integers(count[0], count[1] + 1)), log_uniform(rng, *SIZE)
+    chosen = [kinds[k] for k in rng.integers(len(kinds), size=n)]
+    if each:
+        chosen[: len(kinds)] = kinds
+    return Layout(name, tuple(make(rng, f"a{i + 1}", size) for i, make in enumerate(chosen)))
+
+
+def random_thruster(rng: np.random.Generator, name: str, size: float) -> Thruster:
+    """Returns a thruster in any direction, with forces and a power law of its own."""
+    most = size * rng.uniform(*STRENGTH)
+    reverse = rng.choice([0.0, 1.0, rng.uniform(0.2, 1.2)], p=[ONE_WAY, SYMMETRIC, 1.0 - ONE_WAY - SYMMETRIC])
+    reaction = rng.uniform(-REACTION, REACTION) * rng.integers(2)
+    return Thruster(
+        name,
+        _position(rng),
+        _vector(_unit(rng)),
+        (-float(reverse * most), most),
+        _law(rng),
+        torque_per_newton=float(reaction),
+    )
+
+
+def random_azimuth(rng: np.random.Generator, name: str, size: float) -> Azimuth:
+    """Returns an azimuth about any axis, half of them within an arc."""
+    arc = _arc(rng, *ARC) if rng.integers(2) else (-math.pi, math.pi)
+    return Azimuth(
+        name, _position(rng), *_across(rng), (0.0, size * rng.uniform(*STRENGTH)), _law(rng), arc=arc
+    )
+
+
+def random_tilt(rng: np.random.Generator, name: str, size: float) -> Tilt:
+    """Returns a tilt about any axis."""
+    force = 0.0, size * rng.uniform(*STRENGTH)
+    return Tilt(name, _position(rng), *_across(rng), force, _law(rng), arc=_arc(rng, *TILT))
+
+
+def random_shaft_fin(rng: np.random.Generator, name: str, size: float) -> Fin:
+    """Returns a fin of a random model with a shaft in any direction; its size is its own."""
+    shaft, zero = _across(rng)
+    return Fin(name, _position(rng), model=random_fin_model(rng), shaft=shaft, zero=zero)
+
+
+def _position(rng: np.random.Generator) -> tuple[float, float, float]:
+    return _vector(rng.uniform(-1.0, 1.0, 3) * EXTENT)
+
+
+def _vector(values: Array) -> tuple[float, float, float]:
+    x, y, z = values.tolist()
+    return x, y, z
+
+
+def _unit(rng: np.random.Generator) -> Array:
+    drawn = rng.normal(size=3)
+    return np.asarray(drawn / np.linalg.norm(drawn))
+
+
+def _across(rng: np.random.Generator) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+    """A unit vector, and one across it."""
+    axis = _unit(rng)
+    across = np.cross(axis, _unit(rng))
+    return _vector(axis), _vector(across / np.linalg.norm(across))
+
+
+def _arc(rng: np.random.Generator, least: float, most: float) -> tuple[float, float]:
+    width = rng.uniform(least, most)
+    start = rng.uniform(-math.pi, math.pi - width)
+    return start, start + width
+
+
+def _law(rng: np.random.Generator) -> PowerLaw:
+    """Half of the laws are those of an ideal propeller at rest."""
+    exponent = float(rng.choice([1.5, rng.uniform(1.2, 2.5)]))
+    forward = log_uniform(rng, 0.3, 3.0) * 20.0 ** (1.5 - exponent)
+    return PowerLaw(forward, forward * rng.uniform(0.8, 3.0), exponent)
