@@ -13,7 +13,7 @@ from finlab.allocation.policy import Policy
 from finlab.allocation.settings import Settings
 from finlab.allocation.solution import Candidates, Solution
 from finlab.arrays import Array
-from finlab.errors import AllocationError
+from finlab.errors import AllocationError, LayoutError
 from finlab.layout import FinModelSpec, Layout
 from finlab.networks.trained import TrainedWeights
 from finlab.physics import plant_of
@@ -66,6 +66,15 @@ class Method(ABC):
             layout.only_thrusters(f"method {cls.name}")
         elif cls.takes != "any actuator":
             layout.only_fins(f"method {cls.name}", horizontal=cls.takes == "horizontal fins")
+
+    @classmethod
+    def fits(cls, layout: Layout) -> bool:
+        """Whether the method takes all actuators of a robot."""
+        try:
+            cls.check_robot(layout)
+        except LayoutError:
+            return False
+        return True
 
     @classmethod
     def option_names(cls) -> list[str]:

@@ -9,7 +9,7 @@ from typing import Any
 
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.baselines.ipopt import IpoptSettings
-from finlab.allocation.methods import LEARNED, MethodChoice, checked_settings, choose_method
+from finlab.allocation.methods import LEARNED, MethodChoice, checked_settings, choose_method, method_class
 from finlab.errors import AllocationError
 from finlab.evaluation.cones import Cones
 from finlab.layout import Layout
@@ -17,7 +17,7 @@ from finlab.physics.objective import Name
 
 SLOW = ("ipopt",)
 """Methods that take a tenth of a second per target, each from several starts; they run on a subsample."""
-QUICK = ("dual", "mdn", "paper", "qp", "sqp", "analytic")
+QUICK = ("dual", "mdn", "paper", "qp", "sqp", "px4", "ardusub", "analytic")
 """Methods that run on every target."""
 IN_FORCES = "ipopt-forces"
 """IPOPT in the space of forces, its best form."""
@@ -35,9 +35,9 @@ def is_slow(name: str) -> bool:
     return method_and_starts(name)[0] in SLOW
 
 
-def installed_methods() -> list[str]:
-    """All methods of the library that can run here."""
-    return [name for name in (*QUICK, *SLOW) if can_run(name)]
+def installed_methods(layout: Layout) -> list[str]:
+    """All methods of the library that can run here and take a robot."""
+    return [name for name in (*QUICK, *SLOW) if can_run(name) and method_class(name).fits(layout)]
 
 
 def can_run(name: str) -> bool:

@@ -2,7 +2,12 @@
 
 from typing import Any
 
+from finlab.allocation import METHODS
+from finlab.allocation.methods import method_class
 from tests.any_robot import AnyRobot
+
+OF_FINS = tuple(name for name in METHODS if method_class(name).takes != "thrusters")
+"""Methods that take robots of fins."""
 
 QUICK: dict[str, dict[str, Any]] = {
     "paper": {"n_candidates": 4, "n_steps": 2},

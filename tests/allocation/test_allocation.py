@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from finlab.allocation import METHODS, Allocation, Allocator, Health
+from finlab.allocation import Allocation, Allocator, Health
 from finlab.allocation.modes import same_signature
 from finlab.allocation.solution import equal
 from finlab.assets import shipped_checkpoints
 from finlab.errors import AllocationError, DataError
 from finlab.layout import Fin, FinModelSpec, Layout, load_layout, random_layout
 from finlab.physics import Plant
-from tests.allocation.quick import quick_allocator
+from tests.allocation.quick import OF_FINS, quick_allocator
 from tests.any_robot import AnyRobot
 
 SURGE = [1.0, 0.0, 0.5, 0.0, 0.0, 0.1]
@@ -31,7 +31,7 @@ def round_trips(result: Allocation) -> list[Allocation]:
     return [pickle.loads(pickle.dumps(result)), copy.copy(result), copy.deepcopy(result)]
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", OF_FINS)
 @pytest.mark.parametrize("wrench", [SURGE, FAR])
 def test_answers_compare_pickle_and_copy(method: str, wrench: list[float]) -> None:
     allocator = quick_allocator(method)
@@ -84,7 +84,7 @@ def test_nan_equals_nan_and_kinds_differ() -> None:
     assert not equal(1.0, nan) and not equal(None, np.ones(2))
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", OF_FINS)
 def test_all_figures_are_those_of_the_plant(method: str) -> None:
     layout = load_layout("ucat")
     for wrench, failed in ((SURGE, []), (FAR, [layout.names[1]])):
@@ -205,7 +205,7 @@ def test_random_robots_too(k: int, search: AnyRobot) -> None:
     assert len(repr(result)) <= 400
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", OF_FINS)
 def test_without_its_force_table_no_method_answers(method: str, tmp_path: Path) -> None:
     allocator, layout = quick_allocator(method), load_layout("A")
     table = FinModelSpec("table", (("path", str(tmp_path / "gone.csv")),))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from finlab.allocation import METHODS, Allocation
+from finlab.allocation import Allocation
 from finlab.allocation.policy import (
     AXES,
     CLOSEST,
@@ -18,6 +18,7 @@ from finlab.errors import AllocationError, CommandError
 from finlab.layout import Layout, load_layout
 from finlab.layout.arrays import layout_effectiveness
 from finlab.physics import Plant
+from tests.allocation.quick import OF_FINS
 from tests.any_robot import AnyRobot
 
 FAR = (30.0, 5.0, 20.0, 1.0, 1.0, 1.0)
@@ -192,7 +193,7 @@ def test_nothing_binds_where_the_target_is_delivered(search: AnyRobot) -> None:
 
 def test_methods_without_weights_say_so() -> None:
     layout = shipped("pair")
-    for name in METHODS:
+    for name in OF_FINS:
         if name in ("dual", "mdn", "paper") or name in PATIENT:
             continue
         method = AnyRobot(name)

@@ -21,7 +21,7 @@ def test_every_method_on_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[st
     sizes = ["--targets", "4", "--subsample", "1"]
     assert main(["eval", "wrench", str(path), *sizes, "--json", str(file)]) == 0
     rows = json.loads(file.read_text())["rows"]
-    assert [row["method"] for row in rows] == installed_methods()
+    assert [row["method"] for row in rows] == installed_methods(layout)
     assert {row["split"] for row in rows} == {"layout pair"} and "layout pair" in capsys.readouterr().out
     by_name = {row["method"]: row for row in rows}
     assert by_name["dual"]["err_norm_max"] < 1e-4 and by_name["dual"]["n"] == 4

@@ -29,7 +29,8 @@ GROUPS = ((0, 1, 3), (2, 4, 5))
 ORDER = (("Tx", "Ty", "Fz"), ("Tz", "Fx", "Fy"))
 """The same as groups of axes; neither is meant to give way to the other."""
 SMALL = 0.15
-"""Share of the strongest thruster on an axis below which geometry suggests no factor."""
+"""Share of the strongest thruster on an axis below which geometry suggests no factor, and of the strongest
+force or torque below which a frame of ArduSub does not serve an axis."""
 ALIKE = 0.3
 """By how much each factor of a frame may differ from what geometry suggests."""
 
@@ -76,15 +77,19 @@ def frame_factors(effectiveness: Array) -> Array:
     strongest = np.abs(effectiveness).max(axis=0)
     suggested = effectiveness / np.maximum(strongest, 1e-9)
     suggested[np.abs(suggested) < SMALL] = 0.0
+    forces, torques = (np.isin(COLUMNS, part) for part in ([0, 1, 2], [3, 4, 5]))
+    most = np.where(forces, strongest[forces].max(), strongest[torques].max())
+    served = np.where(strongest >= SMALL * most, suggested, 0.0)
     for frame in sorted(FRAMES.values(), key=len):
         if len(frame) < len(suggested):
             continue
-        apart = np.abs(suggested[None] - np.array([frame, -frame])[:, :, None])  # (2, frame, own, 6)
+        known = frame / np.maximum(np.abs(frame).max(axis=0), 1e-9)
+        apart = np.abs(served - np.array([known, -known])[:, :, None])  # (2, frame, own, 6)
         distance = apart.max(axis=-1)
         row, own = linear_sum_assignment(distance.min(axis=0))
         if distance.min(axis=0)[row, own].max() <= ALIKE:
             sign = np.where(distance[0, row, own] <= distance[1, row, own], 1.0, -1.0)
-            found = np.empty_like(suggested)
+            found = np.empty_like(served)
             found[own] = sign[:, None] * frame[row]
             return found
     return suggested

@@ -103,7 +103,7 @@ def run(
     for name, kind in kinds.items():
         assert kind is not None
         timed = [_robot(ours, kind[1], int(kind[2]), seed, k) for k in range(LAYOUTS)]
-        able = {each: spec for each, spec in specs.items() if kind[1] == "fins" or _takes_any(spec)}
+        able = {each: spec for each, spec in specs.items() if spec.choice.kind.fits(timed[0].layout)}
         for share in (*reach, None):
             rows += _rows(name, timed, able, share, calls, budget)
         rows.append({"robot": name, "call": f"batch of {BATCH}", **batch_row(ours, timed)})
@@ -130,10 +130,6 @@ def _robot(method: MethodSpec, kind: str, count: int, seed: int, k: int) -> Time
     plant, allocator = plant_of(layout), method.on(layout)
     wrenches = plant.wrench(plant.sample(rng, (TARGETS,)))
     return Timed(layout, allocator.allocate_batch(FAR * wrenches, policy="direction").wrench)
-
-
-def _takes_any(method: MethodSpec) -> bool:
-    return method.choice.kind.takes == "any actuator"
 
 
 def _rows(
@@ -279,7 +275,7 @@ experiment = Experiment(
     ),
     quick={"robots": ("fins-4", "thrusters-8", NEW), "calls": 20, "budget": 0.5, "new": 1},
     full={
-        "methods": (REFERENCE, "mdn", "paper", "analytic", "qp", "sqp", IN_FORCES, "clarabel"),
+        "methods": (REFERENCE, "mdn", "paper", "analytic", "qp", "sqp", "px4", IN_FORCES, "clarabel"),
         "budget": 1.0,
         "new": 2,
     },

@@ -52,9 +52,10 @@ def run(
         layout: a layout file, bundle or shipped name in place of a split: one case, of that many targets,
             with errors over the robot's own wrenches.
         split: names, or all: id, ood, ood-fins, limits, failure, near-singular, fins, fins-mixed, tables,
-            many-fins, big, tiny.
+            many-fins, big, tiny, thrusters, azimuths, mixed-actuators, any-shaft.
         methods: names; by default dual and paper, on LAYOUT all that are installed. An objective may
-            follow, as in sqp-effort, and a number of starts ipopt, as in ipopt-32.
+            follow, as in sqp-effort, and a number of starts ipopt, as in ipopt-32. Of several splits each
+            method answers those whose robots it takes.
         layouts: of each split.
         targets: on each layout.
         subsample: ipopt answers only the first so many of each layout; column n says how many.
@@ -63,12 +64,13 @@ def run(
         seed: of all draws.
     """
     sets = _cases(layout, split, layouts, targets, seed)
-    usual = ("dual", "paper") if layout is None else installed_methods()
+    usual = ("dual", "paper") if layout is None else installed_methods(layout_and_failed(layout)[0])
     specs = load_method_specs(methods or usual, checkpoint, objective, patient=True)
     return [
         {"split": name, "method": method, "n": len(found["layout"]), "scored_by": "plant", **figures(found)}
         for name, cases in sets.items()
         for method, spec in specs.items()
+        if len(sets) == 1 or spec.choice.kind.fits(cases[0].layout)
         for found in [run_method(spec, cases, first=subsample if is_slow(method) else None)]
     ]
 
@@ -139,8 +141,8 @@ experiment = Experiment(
     run=run,
     note=(
         "Scored by the plant, the fins' own laws or tables. Errors in standard deviations of the wrenches "
-        "of random layouts; on fins, fins-mixed, tables, big and tiny and on a layout of your own, of the "
-        "robot's wrenches. Intervals: where another seed lands, 95 times of 100. Time: that of all targets "
+        "of random layouts; on fins, fins-mixed, tables, big and tiny, on robots of other actuators and on a "
+        "layout of your own, of the robot's wrenches. Intervals: where another seed lands, 95 times of 100. Time: that of all targets "
         "of a layout over their number. Printed: the paper's figures, on its own layouts and targets."
     ),
     quick={"split": HARD[:4], "methods": ("dual", "paper", "sqp"), "layouts": 10, "targets": 5},

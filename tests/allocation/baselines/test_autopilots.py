@@ -1,0 +1,143 @@
+"""PX4's and ArduSub's allocation: numbers by hand, what they promise at limits, and what robots they take."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from finlab import Allocator, load_layout
+from finlab.allocation.baselines.ardusub import ArduSub, frame_factors
+from finlab.allocation.baselines.px4 import Px4, Px4Settings, normalised
+from finlab.allocation.yardstick import yardstick
+from finlab.arrays import Array
+from finlab.errors import AllocationError, LayoutError
+from finlab.evaluation.splits import make_split
+from finlab.exchange.ardusub_frames import FRAMES, SIGNS
+from finlab.layout import Layout
+from finlab.physics import plant_of
+
+HEAVY = load_layout("bluerov2_heavy")
+GOLDEN = {
+    (20, 0, 0, 0, 0, 0): (-7.0711, -7.0711, 7.0711, 7.0711, 0.4661, 0.4661, -0.4661, -0.4661),
+    (0, 20, 0, 0, 0, 0): (-7.2202, 7.2202, -6.9219, 6.9219, -0.2558, 0.2558, -0.2558, 0.2558),
+    (0, 0, 20, 0, 0, 0): (0, 0, 0, 0, -5, -5, -5, -5),
+    (0, 0, 0, 2, 0, 0): (0, 0, 0, 0, 2.3256, -2.3256, 2.3256, -2.3256),
+    (0, 0, 0, 0, 2, 0): (0, 0, 0, 0, 4.2373, 4.2373, -4.2373, -4.2373),
+    (0, 0, 0, 0, 0, 2): (-2.9836, 2.9836, 2.9836, -2.9836, 0, 0, 0, 0),
+    (30, 15, -20, 0, 1, 3): (-20.4971, -0.7161, 9.8905, 11.3227, 7.6259, 8.0097, 1.9903, 2.3741),
+}
+"""Wrench [N, N m] -> forces of the pseudo-inverse [N]."""
+
+
+def px4(layout: Layout, desaturation: str = "airmode 0") -> Px4:
+    return Px4(layout, Px4Settings(desaturation), yardstick(layout))
+
+
+def forces(layout: Layout, method: str, target: Array, **settings: str) -> Array:
+    found: Array = Allocator(layout, method, **settings).allocate(target).command[:, 0]
+    return found
+
+
+@pytest.mark.parametrize("wrench", GOLDEN)
+@pytest.mark.parametrize("form", ["none", "airmode 0", "airmode 1", "airmode 2", "axes"])
+def test_within_its_limits_px4_is_the_pseudo_inverse(wrench: tuple[float, ...], form: str) -> None:
+    np.testing.assert_allclose(
+        forces(HEAVY, "px4", np.array(wrench, float), desaturation=form), GOLDEN[wrench], atol=6e-5
+    )
+
+
+def test_the_mix_is_normalised_as_px4_does() -> None:
+    mix = px4(HEAVY).mix
+    tilt = np.sqrt((mix[:, :2] ** 2).sum(axis=0) / ((mix[:, :2] != 0.0).sum(axis=0) / 2.0))
+    assert tilt.max() == pytest.approx(1.0) and mix[:, 2].max() == pytest.approx(1.0)
+    assert np.linalg.norm(mix[:, 3:], axis=1).mean() == pytest.approx(1.0)
+    # A quadrotor by hand: four rotors up, at arms of 1, with a torque of 0.05 N m per newton.
+    x, y, turn = np.array([1.0, -1, 1, -1]), np.array([1.0, -1, -1, 1]), np.array([1.0, 1, -1, -1])
+    quad = np.array([-y, x, 0.05 * turn, 0 * x, 0 * x, -np.ones(4)])
+    mix, scale = normalised(np.linalg.pinv(quad))
+    expected = np.array([-y * 0.5**0.5, x * 0.5**0.5, turn, 0 * x, 0 * x, -np.ones(4)]).T
+    np.testing.assert_allclose(mix, expected, atol=1e-12)
+    np.testing.assert_allclose(scale, [0.25 * 2**0.5] * 2 + [5.0] + [0.25] * 3)
+
+
+def test_at_its_limits_px4_keeps_roll_and_gives_up_yaw_and_lift() -> None:
+    plant = plant_of(HEAVY)
+    wanted = np.array([0.0, 0, 150, 12, 0, 60])
+    given = plant.wrench(Allocator(HEAVY, "px4").allocate(wanted).command)
+    clipped = plant.wrench(Allocator(HEAVY, "px4", desaturation="none").allocate(wanted).command)
+    assert given[3] == pytest.approx(12.0, rel=1e-3) and clipped[3] < 11.5
+    assert given[2] < 150 and 0 < given[5] < 60
+
+
+def test_desaturation_makes_the_excess_of_both_sides_alike() -> None:
+    """Of a column along which outputs are moved as they like, both ends are equally far beyond."""
+    method = px4(HEAVY)
+    u = np.zeros((1, 8))
+    u[0, :4] = 1.5, -0.2, -0.2, 1.0  # along yaw, + - - +
+    moved = method._desaturated(u, 2)
+    np.testing.assert_allclose(moved[0, 4:], 0.0)
+    # First by -0.5: 1.0, 0.3, 0.3, 0.5; then nothing is beyond.
+    np.testing.assert_allclose(moved[0, :4], [1.0, 0.3, 0.3, 0.5], atol=1e-9)
+
+
+@pytest.mark.parametrize("name", FRAMES)
+def test_a_frame_of_ardusub_is_known_in_any_order_and_any_way_round(name: str) -> None:
+    factors = FRAMES[name]
+    rng = np.random.default_rng(len(factors))
+    order, sign = rng.permutation(len(factors)), rng.choice([-1.0, 1.0], len(factors))
+    lever = rng.uniform(0.85, 1.0, factors.shape) * np.array([0.2, 0.12, 0.17, 1, 0.7, 0.7])
+    own = sign[:, None] * factors[order] * lever
+    found = frame_factors(own + rng.uniform(-0.01, 0.01, own.shape) * (own == 0.0))
+    np.testing.assert_array_equal(found, sign[:, None] * factors[order])
+
+
+def test_bluerov2_heavy_has_the_factors_of_its_frame() -> None:
+    method = ArduSub(HEAVY, ArduSub.settings_class(), yardstick(HEAVY))
+    np.testing.assert_array_equal(method.factors, FRAMES["VECTORED_6DOF"])
+    lost = HEAVY.without(["rear_left", "lift_front_left"])
+    method = ArduSub(lost, ArduSub.settings_class(), yardstick(HEAVY))
+    np.testing.assert_array_equal(method.factors, np.delete(FRAMES["VECTORED_6DOF"], [3, 5], axis=0))
+
+
+@pytest.mark.parametrize("axis", range(6))
+def test_one_axis_of_ardusub_alone_gives_what_is_asked_up_to_its_limits(axis: int) -> None:
+    """Without arms that couple axes a demand gives its wrench; too much of it gives the same direction."""
+    level = [replace(part, position=(*part.position[:2], 0.0)) for part in HEAVY.actuators]
+    plant = plant_of(replace(HEAVY, actuators=tuple(level)))
+    allocator, target = Allocator(plant.layout, "ardusub"), np.zeros(6)
+    target[axis] = 5.0 if axis < 3 else 1.0
+    near = plant.wrench(allocator.allocate(target).command)
+    assert near[axis] == pytest.approx(target[axis])
+    far = allocator.allocate(1e3 * target).command
+    np.testing.assert_allclose(plant.wrench(far)[axis] * near / target[axis], plant.wrench(far), atol=1e-9)
+    assert ((far == plant.lower) | (far == plant.upper))[:, 0].any()
+
+
+def test_ardusub_scales_its_groups_apart() -> None:
+    allocator = Allocator(HEAVY, "ardusub")
+    both = allocator.allocate([400.0, 0, 20, 0, 0, 0]).command[:, 0]
+    np.testing.assert_allclose(both[4:], [-5.0] * 4)
+    np.testing.assert_allclose(np.abs(both[:4]), [39.91] * 4)
+    signs = SIGNS[4] * FRAMES["VECTORED_6DOF"][:4, 4]
+    np.testing.assert_array_equal(np.sign(both[:4]), signs)
+
+
+@pytest.mark.parametrize("method", ["px4", "ardusub"])
+def test_they_keep_to_limits_and_know_lost_thrusters(method: str) -> None:
+    for case in make_split("thrusters", 6, 8, 5):
+        lost = case.layout.names[0]
+        for targets in (case.targets, 10.0 * case.targets, 0.0 * case.targets):
+            command = Allocator(case.layout, method).allocate_batch(targets, failed=[lost]).command[:, 1:]
+            assert np.isfinite(command).all()
+            assert (command >= case.layout.lower[1:]).all() and (command <= case.layout.upper[1:]).all()
+        assert not command.any()
+
+
+@pytest.mark.parametrize("method", ["px4", "ardusub"])
+def test_they_take_thrusters_alone_and_no_policy(method: str) -> None:
+    with pytest.raises(
+        LayoutError, match=f"method {method} works for robots of thrusters only, and .* is of type"
+    ):
+        Allocator(load_layout("turtle_hybrid"), method)
+    with pytest.raises(AllocationError, match=f"method '{method}' minimizes the plain error"):
+        Allocator(HEAVY, method).allocate(np.zeros(6), policy="priority")
