@@ -75,7 +75,7 @@ def frame_factors(effectiveness: Array) -> Array:
     of which may be lost.
     """
     strongest = np.abs(effectiveness).max(axis=0)
-    suggested = effectiveness / np.maximum(strongest, 1e-9)
+    suggested: Array = effectiveness / np.maximum(strongest, 1e-9)
     suggested[np.abs(suggested) < SMALL] = 0.0
     forces, torques = (np.isin(COLUMNS, part) for part in ([0, 1, 2], [3, 4, 5]))
     most = np.where(forces, strongest[forces].max(), strongest[torques].max())
@@ -89,7 +89,7 @@ def frame_factors(effectiveness: Array) -> Array:
         row, own = linear_sum_assignment(distance.min(axis=0))
         if distance.min(axis=0)[row, own].max() <= ALIKE:
             sign = np.where(distance[0, row, own] <= distance[1, row, own], 1.0, -1.0)
-            found = np.empty_like(served)
+            found: Array = np.empty_like(served)
             found[own] = sign[:, None] * frame[row]
             return found
     return suggested
