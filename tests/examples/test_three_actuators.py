@@ -11,7 +11,7 @@ from tests.least_power import lower_bound
 from tests.mixed_robots import T200, T200_FORCE, layout_of, load
 from tests.own_plant import OwnPlant
 
-PATH = Path(__file__).resolve().parents[2] / "examples" / "13_three_actuators.py"
+PATH = Path(__file__).resolve().parents[2] / "examples" / "12_three_actuators.py"
 ROBOT = layout_of(
     "three",
     [
