@@ -8,7 +8,6 @@ EXTRAS = {
     "trimesh": "app",
     "yourdfpy": "urdf",
     "casadi": "ipopt",
-    "matplotlib": "plot",
 }
 """Packages that some parts need beside the base install, and the extra that brings each."""
 

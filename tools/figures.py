@@ -18,8 +18,7 @@ from pathlib import Path
 
 from finlab.evaluation.experiment import Experiment, load_experiment
 from finlab.evaluation.progress import begin
-from finlab.evaluation.report.document import Document, Table
-from finlab.evaluation.report.markdown import to_markdown
+from finlab.evaluation.report.document import Table, to_markdown
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = {path.stem: path for path in sorted((ROOT / "docs").glob("*.md"))}
@@ -49,8 +48,8 @@ def table_of(name: str, keys: list[str]) -> str:
     columns = {column.key: replace(column, interval=None) for column in table.columns}
     shown = Table(tuple(columns[key] for key in keys or columns), table.rows)
     print(f"{name}: {time.monotonic() - began:.0f} s", flush=True)
-    made = to_markdown(Document("", "", (shown,)), "")
-    return f"\n`{command_of(experiment)}`:\n\n{made[made.index('|') :].rstrip()}\n\n"
+    made = to_markdown(shown)
+    return f"\n`{command_of(experiment)}`:\n\n{made.rstrip()}\n\n"
 
 
 def command_of(experiment: Experiment) -> str:

@@ -8,7 +8,6 @@ from tyro.conf import arg
 from tyro.extras import SubcommandApp
 
 from finlab.cli.eval_verb import add_experiments
-from finlab.cli.inputs import check_positive
 from finlab.errors import DataError
 
 
@@ -17,20 +16,17 @@ def report(
     quick: bool = False,
     sections: Annotated[str, arg(metavar="A,B,...")] = "all",
     seed: Annotated[int, arg(metavar="N")] = 6143,
-    processes: Annotated[int | None, arg(metavar="N")] = None,
 ) -> None:
-    """Run every experiment and make one page of them in Markdown, with pictures and rows.
+    """Run every experiment and make one page of them in Markdown, and a file of their rows.
 
     What is done is kept in DIR/records: a report that was stopped goes on where it was.
 
     Args:
         out: folder for the report.
-        quick: a look on few cases, in three minutes; the whole takes a quarter of an hour on two cores.
+        quick: a look on few cases, in minutes; the whole takes half an hour.
         sections: run only these experiments; the page shows all that are complete.
         seed: of all draws.
-        processes: parts that run at once; the number of cores by default.
     """
-    check_positive(processes=processes)
     if out.exists() and not out.is_dir():
         raise DataError(f"out: expected a folder, got the file {out}")
     from finlab.evaluation.progress import begin
@@ -39,7 +35,7 @@ def report(
     from finlab.evaluation.report.make import make_report
 
     names = [name.strip() for name in sections.split(",") if name.strip()]
-    print(make_report(out, size="quick" if quick else "full", seed=seed, names=names, processes=processes))
+    print(make_report(out, size="quick" if quick else "full", seed=seed, names=names))
 
 
 def verbs(argv: Sequence[str]) -> SubcommandApp:

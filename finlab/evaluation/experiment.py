@@ -1,6 +1,6 @@
 """An experiment is one value: what is asked, what is run, and the columns of its rows.
 
-The verb `finlab eval NAME`, its `--json FILE`, and the section of the report (question, table, picture, size)
+The verb `finlab eval NAME`, its `--json FILE`, and the section of the report (question, table, size)
 follow from it. Each module of `EXPERIMENTS` holds one under the name `experiment`, and is imported when it is
 asked for.
 """
@@ -14,8 +14,7 @@ from types import NoneType
 from typing import Any, get_args, get_type_hints
 
 from finlab.errors import DataError
-from finlab.evaluation.plots.style import Picture
-from finlab.evaluation.report.document import Block, Column, Figure, Row, Table
+from finlab.evaluation.report.document import Block, Column, Row, Table
 
 EXPERIMENTS = (
     *("wrench", "cost", "latency", "ablation", "temperature", "proposals"),
@@ -49,16 +48,8 @@ class Experiment:
     """Options of the quick report where they differ from the defaults."""
     full: Mapping[str, Any] = field(default_factory=dict)
     """Options of the whole report where they differ from the defaults."""
-    each: str | None = None
-    """Option whose values, a tuple, may be run one by one: their rows follow each other."""
-    timed: bool = False
-    """Whether it measures time, so that nothing may run beside it."""
     needs: tuple[str, ...] = ()
     """Packages without which the report leaves it out."""
-    draw: Callable[[Sequence[Row]], Picture] | None = None
-    """Draws the picture from the rows; its module is imported there, since it needs matplotlib."""
-    caption: str = ""
-    """Of the picture."""
     printed: Callable[[Sequence[Row]], list[Row]] | None = None
     """Figures that the paper prints beside our rows, as rows that stand below them."""
 
@@ -92,13 +83,6 @@ class Experiment:
         """Run it; options as in `check`. A number that is not finite becomes None."""
         return [_finite(row) for row in self.run(**self.check(chosen))]
 
-    def parts(self, chosen: Mapping[str, Any]) -> list[dict[str, Any]]:
-        """Options of runs whose rows, one after the other, are those of one run."""
-        values = self.check(chosen)
-        if self.each is None:
-            return [values]
-        return [values | {self.each: (value,)} for value in values[self.each]]
-
     def table(self, rows: Sequence[Row]) -> Table:
         """The rows of the default method stand out; below them are those that the paper prints."""
         ours = [{**row, "_kind": "ours"} if str(row.get("method")) == "dual" else row for row in rows]
@@ -110,13 +94,8 @@ class Experiment:
         return [f"## {self.name.capitalize()}", self.question]
 
     def results(self, rows: Sequence[Row]) -> list[Block]:
-        """Picture, table and note."""
-        blocks: list[Block] = []
-        if self.draw is not None:
-            draw = self.draw
-            blocks.append(Figure(self.name, lambda: draw(rows), self.caption))
-        blocks.append(self.table(rows))
-        return [*blocks, f"*{self.note}*"] if self.note else blocks
+        """Table and note."""
+        return [self.table(rows), f"*{self.note}*"] if self.note else [self.table(rows)]
 
 
 def check_names(option: str, names: Sequence[str], known: Collection[str]) -> None:

@@ -7,7 +7,6 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from finlab.cli import main
@@ -15,7 +14,6 @@ from finlab.errors import DataError
 from finlab.evaluation.experiment import EXPERIMENTS, load_experiment
 from finlab.evaluation.experiments import wrench
 from finlab.evaluation.report.text import to_text
-from finlab.evaluation.splits import SPLITS
 
 WRENCH = ["eval", "wrench", "--layouts", "2", "--targets", "3", "--methods", "analytic,qp"]
 
@@ -27,8 +25,7 @@ def test_every_experiment_can_be_shown_and_made(name: str, capsys: pytest.Captur
     keys = [column.key for column in experiment.columns]
     assert len(set(keys)) == len(keys)
     for options in (experiment.quick, experiment.full):
-        parts = experiment.parts(options)
-        assert parts and all(set(part) == set(experiment.options()) for part in parts)
+        assert set(experiment.check(options)) == set(experiment.options())
     assert main(["eval", name, "--help"]) == 0
     shown = capsys.readouterr().out
     assert all(
@@ -53,16 +50,6 @@ def test_rows_table_and_json_are_the_same(tmp_path: Path, capsys: pytest.Capture
     assert main([*WRENCH, "--split", "limits", "--seed", "1000", "--json", "-"]) == 0
     again = json.loads(capsys.readouterr().out)["rows"]
     assert [row["err_norm_mean"] for row in again] == [row["err_norm_mean"] for row in rows]
-
-
-def test_parts_make_the_whole() -> None:
-    experiment = load_experiment("wrench")
-    chosen = {"split": ("all",), "methods": ("qp",), "layouts": 1, "targets": 2}
-    parts = experiment.parts(chosen | {"split": tuple(SPLITS)[:3]})
-    whole = experiment.rows(**chosen | {"split": tuple(SPLITS)[:3]})
-    apart = [row for part in parts for row in experiment.rows(**part)]
-    assert [row["split"] for row in apart] == [row["split"] for row in whole] == list(SPLITS)[:3]
-    np.testing.assert_array_equal([r["err_norm_mean"] for r in apart], [r["err_norm_mean"] for r in whole])
 
 
 def test_a_terminal_is_told_before_the_work(monkeypatch: pytest.MonkeyPatch) -> None:

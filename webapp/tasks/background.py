@@ -120,8 +120,7 @@ class Workers:
     readers: Readers = field(default_factory=Readers)
     """Files from browsers: milliseconds to seconds, in processes of their own."""
     fits: Worker = field(default_factory=Worker)
-    """Fins fitted to measurements, and files of swims: seconds. Both draw with matplotlib, which is for one
-    thread."""
+    """Fins fitted to measurements, and files of swims: seconds."""
 
     def stop(self) -> None:
         """End all threads."""

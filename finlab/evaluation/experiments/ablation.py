@@ -122,6 +122,5 @@ experiment = Experiment(
     ),
     quick={"layouts": 5, "targets": 4},
     full={"layouts": 40, "targets": 5},
-    each="variants",
     printed=_printed,
 )

@@ -9,8 +9,6 @@ from finlab.arrays import Array
 from finlab.evaluation.cheapest_commands import CheapestCommands, has_formulas
 from finlab.evaluation.experiment import Experiment, check_names
 from finlab.evaluation.method_specs import MethodSpec, load_method_specs
-from finlab.evaluation.plots.dots import draw_dots
-from finlab.evaluation.plots.style import Picture
 from finlab.evaluation.progress import progress
 from finlab.evaluation.report.document import Column, Row
 from finlab.evaluation.scoring import sigma_of
@@ -122,11 +120,6 @@ def _figures(cost: Array, error: Array, best: Array, group: NDArray[np.int64]) -
     }
 
 
-def _draw(rows: Sequence[Row]) -> Picture:
-    shown = [row for row in rows if row["objective"].startswith("power")]
-    return draw_dots(shown, "cost_ratio", "split", "power over that of the best start")
-
-
 experiment = Experiment(
     name="cost",
     question="What do answers cost over the best of many random starts, where both deliver the wrench?",
@@ -162,8 +155,5 @@ experiment = Experiment(
         "targets": 2,
         "starts": 16,
     },
-    each="split",
     needs=("casadi",),
-    draw=_draw,
-    caption="Power over that of the best start, with the interval of another seed; below 1 is cheaper.",
 )

@@ -279,6 +279,5 @@ experiment = Experiment(
         "budget": 1.0,
         "new": 2,
     },
-    timed=True,
     printed=_printed,
 )

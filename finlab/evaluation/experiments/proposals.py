@@ -113,6 +113,4 @@ experiment = Experiment(
     ),
     quick={"layouts": 4, "targets": 8},
     full={"layouts": 30},
-    each="split",
-    timed=True,
 )

@@ -129,5 +129,4 @@ experiment = Experiment(
     "with the simulation's. What the days are: `finlab/evaluation/experiments/hard_days.py`.",
     quick={"scenarios": ("nominal", "current", "lost-one"), "methods": ("dual", "analytic"), "seeds": 1},
     full={"scenarios": REPORTED, "seeds": 2, "methods": ("dual", "analytic")},
-    each="scenarios",
 )

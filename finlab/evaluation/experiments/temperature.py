@@ -1,6 +1,5 @@
 """The paper's figure A: what the temperature of the draw does to the candidates of its network."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +9,6 @@ from finlab.allocation.methods import choose_method
 from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.evaluation.experiment import Experiment
-from finlab.evaluation.plots.style import BLUE, DASHES, VERMILION, Picture, picture
 from finlab.evaluation.progress import progress
 from finlab.evaluation.report.document import Column, Row
 from finlab.evaluation.scoring import paper_sigma
@@ -88,25 +86,6 @@ def diversity(command: Array, layout: Layout) -> float:
     return float(np.sqrt(((gap / width) ** 2).mean(axis=(1, 2))).mean())
 
 
-def _draw(rows: Sequence[Row]) -> Picture:
-    temperature = [row["temperature"] for row in rows]
-    with picture(1, 2, height=2.8) as view:
-        for axis, key, colour, title in zip(
-            view.axes,
-            ("diversity", "best_j_mean"),
-            (BLUE, VERMILION),
-            ("diversity", "mean of the best J"),
-            strict=True,
-        ):
-            axis.plot(temperature, [row[key] for row in rows], "o-", color=colour, markersize=4)
-            axis.set(xscale="log", xlabel="temperature T", title=title)
-            axis.axvline(PAPER_TEMPERATURE, **DASHES)
-        ends = np.array([row["best_j_mean_interval"] for row in rows])
-        view.axes[1].fill_between(temperature, *ends.T, color=VERMILION, alpha=0.15, linewidth=0)
-        view.axes[1].set(yscale="log")
-    return view
-
-
 experiment = Experiment(
     name="temperature",
     question="What does the temperature of the draw do to the candidates of the paper's network (figure A)?",
@@ -124,7 +103,4 @@ experiment = Experiment(
     ),
     quick={"layouts": 10, "targets": 1},
     full={"layouts": 60},
-    each="temperatures",
-    draw=_draw,
-    caption="Dashes: the paper's temperature; band: the interval of another seed.",
 )

@@ -9,8 +9,6 @@ from finlab.evaluation.experiment import Experiment
 from finlab.evaluation.method_specs import installed_methods, is_slow, load_method_specs
 from finlab.evaluation.own_layout import own_case
 from finlab.evaluation.paper_figures import paper_wrench_rows
-from finlab.evaluation.plots.dots import draw_dots
-from finlab.evaluation.plots.style import Picture
 from finlab.evaluation.report.document import Column, Row
 from finlab.evaluation.scoring import Columns, run_method
 from finlab.evaluation.splits import SPLITS, Case, make_split
@@ -118,10 +116,6 @@ def _printed(rows: Sequence[Row]) -> list[Row]:
     return [row for split in dict.fromkeys(row["split"] for row in rows) for row in paper_wrench_rows(split)]
 
 
-def _draw(rows: Sequence[Row]) -> Picture:
-    return draw_dots(rows, "err_norm_mean", "split", "mean error", log=True)
-
-
 experiment = Experiment(
     name="wrench",
     question="How far off are the wrenches of each method, of those that a robot can deliver?",
@@ -153,8 +147,5 @@ experiment = Experiment(
         "layouts": 40,
         "targets": 8,
     },
-    each="split",
-    draw=_draw,
-    caption="Mean normalized error with the interval of another seed; below 1e-8 it is rounding.",
     printed=_printed,
 )

@@ -1,1 +1,1 @@
-"""The whole evaluation as one page: jobs give records, records tables and pictures, and those the page."""
+"""The whole evaluation as one page: experiments give rows, rows tables, and those the page."""

@@ -1,13 +1,12 @@
-"""A document as a list of blocks: turned into Markdown by `markdown`, and into plain text by `text`.
+"""A document as a list of blocks, and the same in Markdown; `text` has it for the command line.
 
 A heading, a paragraph or a list is a string of Markdown; a paragraph *all in italics* is a remark in small.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from finlab.evaluation.plots.style import Picture
 from finlab.evaluation.report.numbers import FORMATS
 
 Row = dict[str, Any]
@@ -54,24 +53,23 @@ class Table:
         )
 
 
-@dataclass(frozen=True)
-class Figure:
-    """A picture, drawn when the page is written; printed text does without."""
-
-    name: str
-    """Of its file, without the ending."""
-    draw: Callable[[], Picture]
-    caption: str
-
-
-Block = str | Table | Figure
+Block = str | Table
 """A string is Markdown."""
 
 
-@dataclass(frozen=True)
-class Document:
-    """A whole page."""
+def to_markdown(*blocks: Block) -> str:
+    """The text of a page."""
+    return "\n\n".join(block if isinstance(block, str) else _text_table(block) for block in blocks) + "\n"
 
-    title: str
-    subtitle: str
-    blocks: tuple[Block, ...]
+
+def _text_table(table: Table) -> str:
+    keys = [column.key for column in table.columns]
+    named = keys.index("method") if "method" in keys else 0
+    lines = [[column.heading for column in table.columns]]
+    lines.append(["---:" if column.is_number else "---" for column in table.columns])
+    for row in table.rows:
+        cells = [table.cell(row, column) for column in table.columns]
+        if row.get("_kind") == "ours":
+            cells[named] = f"**{cells[named]}**"
+        lines.append(cells)
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines)

@@ -1,21 +1,23 @@
-"""`finlab eval report`: run what is missing, then write the page, its pictures and the rows."""
+"""`finlab eval report`: run what is missing, then write the page and the rows."""
 
 import json
+import time
 from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Literal
 
+from threadpoolctl import threadpool_limits
+
 from finlab.errors import DataError
 from finlab.evaluation.experiment import EXPERIMENTS, Experiment, load_experiment
-from finlab.evaluation.report.document import Block, Document, Figure, Row
-from finlab.evaluation.report.jobs import THREADS, Part, run_parts
-from finlab.evaluation.report.markdown import to_markdown
+from finlab.evaluation.progress import progress
+from finlab.evaluation.report.document import Block, Row, to_markdown
 from finlab.evaluation.report.provenance import machine, source_commit, source_digest
 from finlab.whole_file import write_whole
 
-PAGE, TABLES, PICTURES = "report.md", "tables.json", "pictures"
-"""What a report's folder holds, beside `records`."""
+PAGE, TABLES, RECORDS = "report.md", "tables.json", "records"
+"""What a report's folder holds."""
 SEED = 6143
 """Of a report, unless another one is given; kept apart from those on which methods were developed."""
 DIGITS = 6
@@ -30,22 +32,14 @@ ABOUT = (
 Size = Literal["quick", "full"]
 
 
-def make_report(
-    out: Path,
-    *,
-    size: Size = "full",
-    seed: int = SEED,
-    names: Sequence[str] = ("all",),
-    processes: int | None = None,
-) -> Path:
-    """Make the report; parts that are done are taken from its folder `records`.
+def make_report(out: Path, *, size: Size = "full", seed: int = SEED, names: Sequence[str] = ("all",)) -> Path:
+    """Make the report; experiments that are done are taken from its folder `records`.
 
     Args:
         out: folder for the report, made if need be.
-        size: how much of everything: minutes, or a quarter of an hour on two cores.
+        size: how much of everything: minutes, or half an hour.
         seed: of all draws.
-        names: experiments whose missing parts are run, or all; the page shows all that are complete.
-        processes: parts that run at once; the number of cores by default, 0 for this process alone.
+        names: experiments that are run if they are missing, or all; the page shows all that are complete.
 
     Returns:
         The page.
@@ -55,78 +49,84 @@ def make_report(
     """
     if unknown := [name for name in names if name not in (*EXPERIMENTS, "all")]:
         raise DataError(f"sections: expected all or some of {', '.join(EXPERIMENTS)}, got {unknown[0]!r:.60}")
-    digest, records = source_digest(), out / "records"
-    plan = {name: plan_of(load_experiment(name), size, seed, digest) for name in EXPERIMENTS}
-    wanted = EXPERIMENTS if "all" in names else names
-    run_parts([part for name in wanted for part in plan[name]], records, processes=processes)
-    complete = {name: parts for name, parts in plan.items() if parts and all(p.done(records) for p in parts)}
-    rows = {name: [row for part in parts for row in part.rows(records)] for name, parts in complete.items()}
-    seconds = sum(part.record(records)["seconds"] for parts in complete.values() for part in parts)
+    try:
+        (out / RECORDS).mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise DataError(f"{out / RECORDS}: cannot be made: {error.strerror}") from None
+    digest, done = source_digest(), dict[str, dict[str, Any]]()
+    for name in progress(EXPERIMENTS, "experiment", "report"):
+        experiment = load_experiment(name)
+        key = {"options": _options(experiment, size, seed), "source": digest}
+        record = _read(out / RECORDS / f"{name}.json", key)
+        if record is None and ("all" in names or name in names) and _can_run(experiment):
+            record = _run(experiment, key, out / RECORDS / f"{name}.json")
+        if record is not None:
+            done[name] = record
+    rows: dict[str, list[Row]] = {name: record["rows"] for name, record in done.items()}
+    seconds = sum(record["seconds"] for record in done.values())
     command = f"finlab eval report -o {out}" + (" --quick" if size == "quick" else "")
     command += f" --seed {seed}" if seed != SEED else ""
-    left = [name for name in EXPERIMENTS if name not in complete]
-    document = make_document(rows, [*_how_made(command, seconds, seed), *_missing(left)], size)
-    write_report(out, document, rows)
-    return out / PAGE
-
-
-def plan_of(experiment: Experiment, size: Size, seed: int, digest: str) -> list[Part]:
-    """The parts of an experiment; none where a package that it needs is not installed."""
-    if any(find_spec(package) is None for package in experiment.needs):
-        return []
-    chosen = dict(experiment.quick if size == "quick" else experiment.full)
-    if "seed" in experiment.options():
-        chosen["seed"] = seed
-    return [Part(experiment.name, options, digest) for options in experiment.parts(chosen)]
-
-
-def make_document(rows: dict[str, list[Row]], how_made: Sequence[str], size: Size) -> Document:
-    """The page, from the rows of each experiment."""
-    blocks: list[Block] = [ABOUT]
-    for name, found in rows.items():
-        experiment = load_experiment(name)
-        blocks += [*experiment.words(), *experiment.results(found)]
-    blocks += ["## How this was made", "\n".join(f"- {line}" for line in how_made)]
-    note = "" if size == "full" else " A quick look on few cases: intervals are wide."
-    return Document(
-        "finlab evaluation", f"Allocation methods and simulated swims, side by side.{note}", tuple(blocks)
-    )
-
-
-def _how_made(command: str, seconds: float, seed: int) -> list[str]:
-    about = machine() | {"threads": str(THREADS)}
-    return [
-        f"Command `{command}`, seed {seed}, {seconds / 60.0:.0f} minutes of one core for all parts",
-        f"Commit `{source_commit()}`",
-        "Machine: " + ", ".join(f"{key} {value}" for key, value in about.items()),
-        "Every section is also printed by `finlab eval NAME`; printed figures are those of Y. Hamamatsu, "
-        "M. Kruusmaa, A. Ristolainen, Layout-independent actuation allocator for fin-actuated marine robots",
-    ]
-
-
-def _missing(names: Sequence[str]) -> list[str]:
-    return [f"Not run: {', '.join(names)}"] if names else []
-
-
-def write_report(out: Path, document: Document, rows: dict[str, list[Row]]) -> None:
-    """Page, pictures and rows.
-
-    Raises:
-        DataError: a file cannot be written; it is then as it was before.
-    """
-    pictures = out / PICTURES
-    try:
-        pictures.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise DataError(f"{pictures}: cannot be made: {error.strerror}") from None
-    for figure in (block for block in document.blocks if isinstance(block, Figure)):
-        write_whole(pictures / f"{figure.name}.svg", figure.draw().svg(figure.name), DataError)
-    write_whole(out / PAGE, to_markdown(document, PICTURES), DataError)
+    left = [name for name in EXPERIMENTS if name not in done]
+    how_made = _how_made(command, seconds, seed) + ([f"Not run: {', '.join(left)}"] if left else [])
+    write_whole(out / PAGE, to_markdown(*_page(rows, how_made, size)), DataError)
     lines = [
         f"{json.dumps(name)}: [\n" + ",\n".join(json.dumps(_rounded(row)) for row in each) + "\n]"
         for name, each in rows.items()
     ]
     write_whole(out / TABLES, "{\n" + ",\n".join(lines) + "\n}\n", DataError)
+    return out / PAGE
+
+
+def _options(experiment: Experiment, size: Size, seed: int) -> dict[str, Any]:
+    chosen = experiment.check(experiment.quick if size == "quick" else experiment.full)
+    return chosen | ({"seed": seed} if "seed" in chosen else {})
+
+
+def _can_run(experiment: Experiment) -> bool:
+    """Whether the packages that it needs are installed."""
+    return all(find_spec(package) is not None for package in experiment.needs)
+
+
+def _read(path: Path, key: dict[str, Any]) -> dict[str, Any] | None:
+    """What was kept of an experiment with these options and this code; None where that was not run."""
+    try:
+        record: dict[str, Any] = json.loads(path.read_text("utf-8"))
+        same = record["key"] == json.loads(json.dumps(key)) and {"rows", "seconds"} <= record.keys()
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise DataError(f"{path}: not a file of rows ({error}); delete it and run again") from None
+    return record if same else None
+
+
+def _run(experiment: Experiment, key: dict[str, Any], path: Path) -> dict[str, Any]:
+    """Run an experiment on one thread, so that times are of one core, and keep its rows."""
+    start = time.process_time()
+    with threadpool_limits(1):
+        rows = experiment.rows(**key["options"])
+    record = {"key": key, "rows": rows, "seconds": round(time.process_time() - start, 1)}
+    write_whole(path, json.dumps(record, indent=1, allow_nan=False) + "\n", DataError)
+    return record
+
+
+def _page(rows: dict[str, list[Row]], how_made: Sequence[str], size: Size) -> list[Block]:
+    note = "" if size == "full" else " A quick look on few cases: intervals are wide."
+    about = f"Allocation methods and simulated swims, side by side.{note}"
+    blocks: list[Block] = ["# finlab evaluation", about, ABOUT]
+    for name, found in rows.items():
+        experiment = load_experiment(name)
+        blocks += [*experiment.words(), *experiment.results(found)]
+    return [*blocks, "## How this was made", "\n".join(f"- {line}" for line in how_made)]
+
+
+def _how_made(command: str, seconds: float, seed: int) -> list[str]:
+    return [
+        f"Command `{command}`, seed {seed}, {seconds / 60.0:.0f} minutes of one core",
+        f"Commit `{source_commit()}`",
+        "Machine: " + ", ".join(f"{key} {value}" for key, value in machine().items()),
+        "Every section is also printed by `finlab eval NAME`; printed figures are those of Y. Hamamatsu, "
+        "M. Kruusmaa, A. Ristolainen, Layout-independent actuation allocator for fin-actuated marine robots",
+    ]
 
 
 def _rounded(value: Any) -> Any:

@@ -1,31 +1,25 @@
-"""Blocks as plain text, for the command line: the words and tables of the page, without its pictures."""
+"""Blocks as plain text, for the command line: the words and tables of the page."""
 
 import textwrap
 from collections.abc import Sequence
 
-from finlab.evaluation.report.document import Block, Figure, Table
+from finlab.evaluation.report.document import Block
 
 WIDTH = 110
 
 
 def to_text(*blocks: Block) -> str:
     """Headings without their marks, paragraphs in lines, tables with aligned columns."""
-    return "\n\n".join(text for text in map(_block, blocks) if text)
+    return "\n\n".join(map(_block, blocks))
 
 
 def _block(block: Block) -> str:
-    match block:
-        case str():
-            return "\n".join(
-                textwrap.fill(line.strip("#* ").replace("`", ""), WIDTH) for line in block.splitlines()
-            )
-        case Table():
-            head = [column.heading for column in block.columns]
-            cells = [[block.cell(row, column) for column in block.columns] for row in block.rows]
-            lines = [[cell.replace("`", "") for cell in line] for line in cells]
-            return aligned(head, lines, [not column.is_number for column in block.columns])
-        case Figure():
-            return ""
+    if isinstance(block, str):
+        lines = (line.strip("#* ").replace("`", "") for line in block.splitlines())
+        return "\n".join(textwrap.fill(line, WIDTH) for line in lines)
+    head = [column.heading for column in block.columns]
+    cells = [[block.cell(row, column).replace("`", "") for column in block.columns] for row in block.rows]
+    return aligned(head, cells, [not column.is_number for column in block.columns])
 
 
 def aligned(head: Sequence[str], rows: Sequence[Sequence[str]], words: Sequence[bool]) -> str:

@@ -4,8 +4,7 @@ from typing import Any
 
 import pytest
 
-from finlab.evaluation.report.document import Column, Document, Figure, Table
-from finlab.evaluation.report.markdown import to_markdown
+from finlab.evaluation.report.document import Column, Table, to_markdown
 from finlab.evaluation.report.numbers import FORMATS
 from finlab.evaluation.report.text import to_text
 
@@ -16,44 +15,18 @@ ROWS: list[dict[str, Any]] = [
 ]
 
 
-class Drawn:
-    """A picture that needs no matplotlib."""
-
-    def svg(self, name: str) -> str:
-        return f'<?xml version="1.0"?>\n<!DOCTYPE svg>\n<svg><path id="{name}"/></svg>'
-
-
-def _drawn() -> Any:
-    return Drawn()
-
-
-PICTURE = Figure("dots", _drawn, "Some dots.")
-DOCUMENT = Document(
-    "A title & more",
-    "One **line**.",
-    (
-        "## First section",
-        "See [the docs](docs/x.md), `code` and 1 < 2.",
-        Table(COLUMNS, ROWS),
-        PICTURE,
-        "- one\n- two",
-    ),
-)
+BLOCKS = ("# A title & more", "One **line**.", "## First section", Table(COLUMNS, ROWS), "- one\n- two")
 
 
 def test_markdown() -> None:
-    text = to_markdown(DOCUMENT, "pictures")
+    text = to_markdown(*BLOCKS)
     assert text.startswith("# A title & more\n\nOne **line**.")
     assert "| method | error < |\n| --- | ---: |\n| **`ours`** | 0.00029 (0.00020 – 0.00040) |" in text
-    assert "![Some dots.](pictures/dots.svg)" in text
 
 
-def test_text_has_words_and_tables_but_draws_nothing() -> None:
-    def refuse() -> Any:
-        raise AssertionError("a picture was drawn")
-
-    text = to_text(*DOCUMENT.blocks, Figure("dots", refuse, "Some dots."))
-    assert "First section\n\nSee" in text and "\n- one\n- two" in text and "Some dots" not in text
+def test_text_has_words_and_tables() -> None:
+    text = to_text(*BLOCKS)
+    assert "One **line**.\n\nFirst section\n\nmethod" in text and "\n- one\n- two" in text
     assert "method                      error <\nours    0.00029 (0.00020 – 0.00040)\ntheirs\n" in text
 
 
