@@ -1,7 +1,4 @@
-"""`finlab train mdn`: train the network of method `mdn`.
-
-It goes on from the last saved state when it is called again with the same arguments.
-"""
+"""`finlab train mdn`: train the network of method `mdn`."""
 
 from pathlib import Path
 from typing import Annotated
@@ -25,25 +22,23 @@ def mdn(
     seed: Annotated[int, arg(metavar="N")] = 0,
     minutes: _Count = None,
     steps: _Count = None,
-    stop_after: _Count = None,
 ) -> None:
     """Train the network of method `mdn` on what many starts find, and write a checkpoint folder.
 
-    The answers are written first, on all cores.
+    The answers are written first, on all cores; a later run into the same folder finds them.
 
     Args:
-        output: folder for checkpoint, answers, log and resume state.
+        output: folder for checkpoint, answers and log.
         preset: recipe: default or smoke.
         seed: seed of the answers and of the first weights.
         minutes: time after which the learning ends, instead of the recipe's.
         steps: most optimizer steps instead of the recipe's.
-        stop_after: stop after so many steps; call again to go on.
     """
     from finlab.mdn.training.train import train_mdn
 
-    check_positive(minutes=minutes, steps=steps, stop_after=stop_after)
+    check_positive(minutes=minutes, steps=steps)
     seconds = None if minutes is None else 60.0 * minutes
-    made = train_mdn(preset, output, seed=seed, steps=steps, stop_after=stop_after, seconds=seconds)
+    made = train_mdn(preset, output, seed=seed, steps=steps, seconds=seconds)
     print(f"{output}: checkpoint {made.name}, preset {made.preset}, sha256 {made.sha256}")
     for group, values in made.metrics.items():
         for name, value in values.items():

@@ -1,2 +1,1 @@
-"""Training: the loop and its state. It needs PyTorch, as does `finlab.mdn.training`,
-which says what is learned."""
+"""Training: the loop, and weights to start from, with PyTorch; `finlab.mdn.training` says what is learned."""

@@ -23,11 +23,16 @@ from finlab.errors import DataError
 from finlab.mdn.network import ForceMixture, ForceNetworkConfig
 from finlab.mdn.training.answers import Answers, Batch, write_answers
 from finlab.mdn.training.recipes import RECIPES, AnswerSettings, MdnTraining
-from finlab.networks.checkpoint import read_checkpoint, read_normalization, resolve_checkpoint
+from finlab.networks.checkpoint import (
+    checkpoint_files,
+    read_checkpoint,
+    read_normalization,
+    resolve_checkpoint,
+)
 from finlab.networks.trained import State, TrainedWeights, sizes_for_file
 from finlab.training.first_weights import first_weights
-from finlab.training.loop import LOG_EVERY, Terms, train
-from finlab.training.saving import Tensors, make_folder, save_checkpoint
+from finlab.training.loop import LOG_EVERY, Tensors, Terms, train
+from finlab.whole_file import write_whole
 
 TRAIN_SEED = 140_000
 """Added to the user's seed."""
@@ -37,20 +42,18 @@ HELD_OUT = 16
 """Batches over which that is taken."""
 
 
-def train_mdn(
-    preset: str,
-    out: Path,
-    *,
-    seed: int = 0,
-    stop_after: int | None = None,
-    **training: Any,
-) -> TrainedWeights:
+def train_mdn(preset: str, out: Path, *, seed: int = 0, **training: Any) -> TrainedWeights:
     """Write the answers that are missing in `out/answers`, train a preset's network on them, and write a
-    checkpoint.
+    checkpoint, once a minute and at the end.
 
-    A run that was stopped goes on where it was when called again with the same arguments.
+    Args:
+        preset: one of `RECIPES`.
+        out: folder for checkpoint, answers and log, made if need be.
+        seed: of the answers and of the first weights.
+        training: fields of `MdnTraining`, in place of the recipe's where they are not None.
 
-    Arguments are those of `train_allocator`; `training` are fields of `MdnTraining`.
+    Raises:
+        DataError: an unknown preset, or a file that cannot be written.
     """
     if preset not in RECIPES:
         raise DataError(f"preset: expected one of {', '.join(RECIPES)}, got {preset!r}")
@@ -66,14 +69,19 @@ def train_mdn(
         "network": asdict(recipe.network),
     }
 
-    def save(network: State, run: dict[str, Any]) -> None:
+    def save(network: State, progress: dict[str, Any]) -> None:
         trained = TrainedWeights(out.name, normalization, sizes_for_file(recipe.network), network)
-        save_checkpoint(out, replace(trained, preset=preset, training={"mdn": run}))
+        made = replace(trained, preset=preset, training={"mdn": identity | progress})
+        for name, content in checkpoint_files(made).items():
+            write_whole(out / name, content, DataError)
 
-    make_folder(out / "answers")
-    terms = make_terms(recipe.network, answers_in(out / "answers", recipe.answers, seed), settings, seed)
-    weights = first_weights(recipe.network.shapes(), seed)
-    train(weights, terms, settings, out, identity, stop_after=stop_after, on_save=save)
+    answers = out / "answers"
+    try:
+        answers.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise DataError(f"{answers}: cannot be made: {error.strerror}") from None
+    terms = make_terms(recipe.network, answers_in(answers, recipe.answers, seed), settings, seed)
+    train(first_weights(recipe.network.shapes(), seed), terms, settings, out, save)
     return read_checkpoint(out)
 
 
