@@ -1,15 +1,13 @@
 """How long one call takes: near and far from the limits of robots, out of reach and from tick to tick.
 
 Methods answer the same targets in one run, the default one beside solvers in the space of forces, which are
-the best form of theirs. All times are the processor's. A fin is compiled once, whatever its law, and kept by
-content: the first call of a robot with new fins pays for that.
+the best form of theirs. All times are the processor's.
 """
 
 import math
 import re
 import time
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -19,13 +17,11 @@ from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.evaluation.experiment import Experiment
 from finlab.evaluation.method_specs import IN_FORCES, MethodSpec, can_run, load_method_spec, load_method_specs
-from finlab.evaluation.noisy_tables import noisy_table
 from finlab.evaluation.paper_figures import paper_figures
 from finlab.evaluation.progress import progress
 from finlab.evaluation.report.document import Column, Row
-from finlab.layout import Fin, Layout, load_layout, random_layout
+from finlab.layout import Layout, random_layout
 from finlab.layout.random import TRAINING_BOX
-from finlab.layout.random_fins import FAMILIES, random_fin_model
 from finlab.layout.thrust_model import PowerLaw
 from finlab.layout.thruster import Thruster
 from finlab.physics import plant_of
@@ -44,18 +40,8 @@ FAR = 1e3
 """How many times a wrench lies beyond its robot's reach for certain."""
 TICK, AT = 0.05, 0.6
 """From tick to tick a target goes by this share of the way to the next direction, at this share of reach."""
-BATCH, BATCHES = 4096, 3
-"""Targets of a batch, and how many batches are timed."""
 FORCE, POWER = (-39.91, 51.44), PowerLaw(0.997, 1.449)
 """Limits [N] and power of a thruster: Blue Robotics' T200 at 16 V."""
-NEW = "new-fins"
-"""Name of the robots whose first answers are timed."""
-NEW_FINS = 4
-"""Their fins, each with a model of its own."""
-KINDS = (*FAMILIES, "table")
-"""Models of new fins; a table is one of a random fin, with noise."""
-SMALL = np.array([0.02, 0.02, 0.02, 0.002, 0.002, 0.002])
-"""Size of their targets [N, N m], within reach of the weakest fins."""
 _ROBOT = re.compile(r"(fins|thrusters)-(\d{1,2})")
 
 
@@ -69,32 +55,28 @@ class Timed(NamedTuple):
 
 
 def run(
-    robots: tuple[str, ...] = ("fins-4", "fins-8", "thrusters-4", "thrusters-8", NEW),
+    robots: tuple[str, ...] = ("fins-4", "fins-8", "thrusters-4", "thrusters-8"),
     methods: tuple[str, ...] = (REFERENCE, IN_FORCES, "clarabel"),
     reach: tuple[float, ...] = (0.3, 0.9, 0.98, 1.5),
     calls: int = 200,
     budget: float = 2.0,
-    new: int = 3,
     checkpoint: str | None = None,
     seed: int = 0,
 ) -> list[Row]:
     """One row for each robot, call and method that takes such a robot.
 
     Args:
-        robots: fins-N or thrusters-N, random ones of so many; or new-fins, for the first answers of dual.
+        robots: fins-N or thrusters-N, random ones of so many.
         methods: names as in eval wrench, ipopt-forces, clarabel; left out where their package is missing.
         reach: targets over the most that the robot gives in their direction.
         calls: of each method.
         budget: seconds of the processor after which a slow method stops.
-        new: robots with new fins, of each kind of fin.
         checkpoint: of the learned methods, a shipped name or a folder.
         seed: of robots and targets.
     """
-    kinds = {name: _ROBOT.fullmatch(name) for name in robots if name != NEW}
+    kinds = {name: _ROBOT.fullmatch(name) for name in robots}
     if wrong := [name for name, kind in kinds.items() if kind is None or not 2 <= int(kind[2]) <= 64]:
-        raise DataError(
-            f"robots: expected fins-N, thrusters-N (N from 2 to 64) or {NEW}, got {wrong[0]!r:.60}"
-        )
+        raise DataError(f"robots: expected fins-N or thrusters-N, N from 2 to 64, got {wrong[0]!r:.60}")
     if min(reach) <= 0.0:
         raise DataError(f"reach: expected numbers above 0, got {min(reach):g}")
     specs = load_method_specs([name for name in methods if can_run(name)] or [REFERENCE], checkpoint)
@@ -106,13 +88,6 @@ def run(
         able = {each: spec for each, spec in specs.items() if spec.choice.kind.fits(timed[0].layout)}
         for share in (*reach, None):
             rows += _rows(name, timed, able, share, calls, budget)
-        rows.append({"robot": name, "call": f"batch of {BATCH}", **batch_row(ours, timed)})
-    if NEW in robots:
-        ours.on(load_layout("A")).allocate(np.zeros(6))  # what a process does once is not the fins' doing
-        for law in progress(KINDS, "kind of fin"):
-            times = first_times(ours, law, new, seed)
-            about = {"robot": NEW, "call": f"first answer: {law}", "method": REFERENCE}
-            rows.append(about | _quantiles(times))
     return rows
 
 
@@ -200,48 +175,6 @@ def _wandering(rim: Array, tick: int) -> Array:
     return np.asarray(AT * ((1.0 - rest) * first + rest * then))
 
 
-def batch_row(method: MethodSpec, timed: Sequence[Timed]) -> Row:
-    """Targets per second of the processor in a batch, over robots in turn; targets are wrenches of random
-    commands."""
-    times = []
-    for robot in timed[:BATCHES]:
-        plant, allocator = plant_of(robot.layout), method.on(robot.layout)
-        targets = plant.wrench(plant.sample(np.random.default_rng(DOMAIN), (BATCH,)))
-        allocator.allocate_batch(targets[: BATCH // 8])
-        start = time.process_time()
-        allocator.allocate_batch(targets)
-        times.append((time.process_time() - start) * 1e3 / BATCH)
-    return {
-        "method": REFERENCE,
-        **_quantiles(times),
-        "calls": BATCH * len(times),
-        "per_s": 1e3 / np.median(times),
-    }
-
-
-def first_times(method: MethodSpec, kind: str, robots: int, seed: int) -> list[float]:
-    """The processor's time [ms] of the first call of robots with fins of a kind that were not seen before."""
-    times = []
-    for k in range(robots):
-        rng = np.random.default_rng([DOMAIN, seed, KINDS.index(kind), k])
-        layout = _robot_of_new_fins(rng, kind, f"{seed}-{k}")
-        target = SMALL * rng.standard_normal(6)
-        start = time.process_time()
-        method.on(layout).allocate(target)
-        times.append(1e3 * (time.process_time() - start))
-    return times
-
-
-def _robot_of_new_fins(rng: np.random.Generator, kind: str, name: str) -> Layout:
-    layout, fins = random_layout(rng, n_fins=NEW_FINS), []
-    for i, old in enumerate(layout.fins):
-        fin = Fin("new", (0.0, 0.0, 0.0), 0.0, model=random_fin_model(rng, None if kind == "table" else kind))
-        if kind == "table":
-            fin = noisy_table(rng, fin, f"first-answer-{name}-{i}")
-        fins.append(replace(old, model=fin.model))
-    return replace(layout, actuators=tuple(fins))
-
-
 def _printed(rows: Sequence[Row]) -> list[Row]:
     cycle_ms = paper_figures()["inference"]["cycle_s"] * 1e3
     return [
@@ -262,7 +195,6 @@ experiment = Experiment(
         Column("p50_over_dual", "times that of dual", "three"),
         Column("delivered", "delivered", "share"),
         Column("power_over_dual", "power over dual's", "ratio"),
-        Column("per_s", "targets per s", "three"),
     ),
     run=run,
     note=(
@@ -271,13 +203,12 @@ experiment = Experiment(
         f"targets wander at {AT:g} of reach, and the command before is known, whose rates `dual` and `mdn` "
         "alone keep to. `ipopt-forces` and `clarabel` "
         "solve for the forces, `clarabel` with power that grows with the force to 1.5. Power: where both "
-        "deliver. First answers: a fin is compiled once, whatever its law, and kept by content."
+        "deliver."
     ),
-    quick={"robots": ("fins-4", "thrusters-8", NEW), "calls": 20, "budget": 0.5, "new": 1},
+    quick={"robots": ("fins-4", "thrusters-8"), "calls": 20, "budget": 0.5},
     full={
         "methods": (REFERENCE, "mdn", "paper", "analytic", "qp", "sqp", "px4", IN_FORCES, "clarabel"),
         "budget": 1.0,
-        "new": 2,
     },
     printed=_printed,
 )

@@ -13,7 +13,6 @@ from finlab.allocation.solution import Solution
 from finlab.errors import AllocationError, DataError
 from finlab.evaluation import method_specs
 from finlab.evaluation.experiment import Row, load_experiment
-from finlab.evaluation.experiments.latency import first_times
 from finlab.evaluation.experiments.temperature import diversity
 from finlab.evaluation.method_specs import MethodSpec, load_method_spec
 from finlab.evaluation.scoring import paper_sigma, run_method
@@ -95,15 +94,13 @@ def test_latency_compares_methods_on_the_same_targets(monkeypatch: pytest.Monkey
     pytest.importorskip("clarabel")
     monkeypatch.setattr("finlab.evaluation.experiments.latency.LAYOUTS", 2)
     monkeypatch.setattr("finlab.evaluation.experiments.latency.TARGETS", 5)
-    monkeypatch.setattr("finlab.evaluation.experiments.latency.BATCH", 512)
     names = ("dual", "analytic", "clarabel")
     sizes = {"robots": ("fins-3", "thrusters-7"), "reach": (0.9, 1.5), "calls": 6, "seed": 4711}
     rows = load_experiment("latency").rows(methods=names, **sizes)
     found = by(rows, "robot", "call", "method")
-    assert len(rows) == 3 * 3 + 1 + 3 * 2 + 1  # the pseudo-inverse knows fins alone; batches
+    assert len(rows) == 3 * 3 + 3 * 2  # the pseudo-inverse knows fins alone
     assert all(0 < row["p50_ms"] <= row["p99_ms"] for row in rows)
     for robot in sizes["robots"]:
-        assert found[robot, "batch of 512", "dual"]["per_s"] > 1e3
         for method in ("dual", "clarabel"):
             near, beyond = (found[robot, f"{share} of reach", method] for share in (0.9, 1.5))
             assert (near["delivered"], beyond["delivered"]) == (1.0, 0.0)
@@ -112,14 +109,8 @@ def test_latency_compares_methods_on_the_same_targets(monkeypatch: pytest.Monkey
     dual, inverse = (found["fins-3", "next tick", name] for name in ("dual", "analytic"))
     assert dual["p50_over_dual"] == 1.0 and dual["calls"] == 6
     assert inverse["p50_over_dual"] == pytest.approx(inverse["p50_ms"] / dual["p50_ms"])
-    with pytest.raises(DataError, match="robots: expected fins-N, thrusters-N .* got 'fins-99'"):
+    with pytest.raises(DataError, match="robots: expected fins-N or thrusters-N, .* got 'fins-99'"):
         load_experiment("latency").rows(robots=("fins-99",))
-
-
-def test_fins_are_compiled_once() -> None:
-    dual = load_method_spec("dual")
-    (first,), (again,) = (first_times(dual, "soft", 1, 4711) for _ in range(2))
-    assert again < 0.5 * first
 
 
 @pytest.mark.parametrize("name", ["clarabel", "ipopt-forces"])
