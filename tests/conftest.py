@@ -21,12 +21,13 @@ def untrained_checkpoint(tmp_path_factory: pytest.TempPathFactory) -> Path:
     # Here, so that tests of layouts do not wait for torch.
     import numpy as np
 
+    from finlab.networks.checkpoint import write_checkpoint
     from finlab.networks.normalization import Normalization
     from finlab.networks.trained import TrainedWeights, sizes_for_file
     from finlab.paper.network import NetworkConfig
     from finlab.paper.surrogate import SurrogateConfig
     from finlab.training.first_weights import first_weights
-    from finlab.training.saving import arrays_of, save_checkpoint
+    from tests.torch_weights import arrays_of
 
     surrogate = SurrogateConfig(hidden=(16, 16))
     network = NetworkConfig(
@@ -43,7 +44,7 @@ def untrained_checkpoint(tmp_path_factory: pytest.TempPathFactory) -> Path:
         network=arrays_of(first_weights(network.shapes(), 0)),
         preset="smoke",
     )
-    save_checkpoint(folder, checkpoint)
+    write_checkpoint(folder, checkpoint)
     return folder
 
 
@@ -51,17 +52,17 @@ def untrained_checkpoint(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def untrained_mdn(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Folder of a checkpoint for method `mdn`, preset `smoke`, with random weights."""
     from finlab.mdn.training.recipes import RECIPES
-    from finlab.networks.checkpoint import read_normalization, resolve_checkpoint
+    from finlab.networks.checkpoint import read_normalization, resolve_checkpoint, write_checkpoint
     from finlab.networks.trained import TrainedWeights, sizes_for_file
     from finlab.training.first_weights import first_weights
-    from finlab.training.saving import arrays_of, save_checkpoint
+    from tests.torch_weights import arrays_of
 
     network = RECIPES["smoke"].network
     folder = tmp_path_factory.mktemp("checkpoints") / "untrained-mdn"
     state = arrays_of(first_weights(network.shapes(), 0))
     normalization = read_normalization(resolve_checkpoint("paper"))
     sizes = sizes_for_file(network)
-    save_checkpoint(folder, TrainedWeights(folder.name, normalization, sizes, state, preset="smoke"))
+    write_checkpoint(folder, TrainedWeights(folder.name, normalization, sizes, state, preset="smoke"))
     return folder
 
 

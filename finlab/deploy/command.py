@@ -85,14 +85,13 @@ def serve(arguments: argparse.Namespace) -> int:
 
     stop = StopSignals()  # before the robot is loaded, so that no signal is missed
     robot = _robot(arguments)
-    from finlab.deploy.serve import Server, Timing
+    from finlab.deploy.serve import Server
     from finlab.deploy.transport import StandardStreams
 
-    deadline = None if arguments.deadline_ms is None else arguments.deadline_ms / 1e3
-    timing = Timing(deadline, None if arguments.no_watchdog else arguments.watchdog_s)
     if sys.stdin is None:
         raise FinlabError("standard input is closed; connect it")
-    Server(robot, timing).run(StandardStreams(sys.stdin.fileno(), sys.stdout.fileno(), stop))
+    watchdog = None if arguments.no_watchdog else arguments.watchdog_s
+    Server(robot, watchdog).run(StandardStreams(sys.stdin.fileno(), sys.stdout.fileno(), stop))
     return 0
 
 
@@ -161,9 +160,6 @@ def _parser() -> argparse.ArgumentParser:
         serve,
         "Read targets as JSON lines, write commands as JSON lines.",
         """echo '{"wrench": [1, 0, 0.5, 0, 0, 0.1]}' | finlab-runtime serve my_robot""",
-    )
-    loop.add_argument(
-        "--deadline-ms", type=_within(0.001, 1e6), metavar="MS", help="answer no later than this"
     )
     silence = loop.add_mutually_exclusive_group()
     silence.add_argument(

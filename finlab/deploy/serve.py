@@ -8,30 +8,23 @@ water [m/s, rad/s], if wanted. Each answer says in `status` what it is:
 status     meaning
 =========  ============================================================================================
 `ok`       commands for the newest target
-`late`     the deadline passed; the last commands that were sent, or neutral ones, are repeated
 `neutral`  no target for longer than the watchdog allows; the fins are commanded to rest
 `error`    the request was not understood; `error` holds one sentence and there are no commands
 =========  ============================================================================================
 
 From one answer to the next, commands change no faster than the servos' rates allow in a tick of 0.1 s.
 Only the newest request counts: those that waited behind it are skipped, since a robot wants the present, not
-the past. A late answer is thrown away. However the service ends, a neutral command is the last that it sends.
+the past. However the service ends, a neutral command is the last that it sends.
 """
 
 import json
 import time
 from collections.abc import Mapping
-from concurrent.futures import Future, ThreadPoolExecutor, wait
-from concurrent.futures import TimeoutError as TooLate
-from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
-from finlab.allocation.allocation import Allocation
 from finlab.arrays import Array
 from finlab.deploy.record import command_record
-from finlab.deploy.request import Request, parse_request
+from finlab.deploy.request import parse_request
 from finlab.deploy.robot import DeployedRobot
 from finlab.deploy.transport import StandardStreams, Unsent
 from finlab.errors import FinlabError
@@ -41,26 +34,15 @@ RECENT_S = 0.5
 """Age [s] up to which the last commands bind the next ones by the servos' rates."""
 
 
-@dataclass(frozen=True)
-class Timing:
-    """When to wait no longer."""
-
-    deadline: float | None = None
-    """Longest time for an answer [s]; None to wait for it however long it takes."""
-    watchdog: float | None = 1.0
-    """Longest silence before the fins rest [s]; None to keep the last commands for ever."""
-
-
 class Server:
     """Answers requests until they end."""
 
-    def __init__(self, robot: DeployedRobot, timing: Timing) -> None:
-        self._robot, self._timing = robot, timing
-        self._worker = ThreadPoolExecutor(1)
+    def __init__(self, robot: DeployedRobot, watchdog: float | None = 1.0) -> None:
+        """Takes the robot, and the longest silence before its fins rest [s]; without one they never do."""
+        self._robot, self._watchdog = robot, watchdog
         self._sent: Array | None = None  # the last commands, None while the fins rest
         self._sent_at = 0.0
         self._failed: tuple[str, ...] = ()
-        self._busy: Future[Allocation] | None = None
 
     def run(self, transport: StandardStreams) -> None:
         """Serve until the requests end or a signal asks to stop; then the fins rest.
@@ -77,13 +59,11 @@ class Server:
         except BaseException:  # an unforeseen error is raised after the fins rest
             transport.send(_line(self._rest()))
             raise
-        finally:
-            self._worker.shutdown(wait=False, cancel_futures=True)
 
     def _loop(self, transport: StandardStreams) -> None:
         fresh = time.monotonic()  # when the last good target came
         while True:
-            patience = self._timing.watchdog
+            patience = self._watchdog
             if patience is not None:
                 patience = max(patience - (time.monotonic() - fresh), 0.0)
             line = transport.newest(patience)
@@ -94,17 +74,20 @@ class Server:
 
     def answer(self, line: bytes) -> dict[str, Any]:
         """The answer to one request, as plain values."""
-        start = time.perf_counter()
         name: Any = None
+        fresh = time.monotonic() - self._sent_at < RECENT_S
         try:
             request = parse_request(line)
             name = request.id
             self._failed = tuple(request.failed)
-            answer = self._solve(request, start)
-        except TooLate:
-            neutral = self._neutral()
-            held = neutral if self._sent is None else np.where(np.isnan(neutral), np.nan, self._sent)
-            return self._reply(name, "late", held)
+            answer = self._robot.allocate(
+                request.wrench,
+                failed=self._failed,
+                previous=self._sent if fresh else None,
+                reference=request.reference,
+                policy=request.policy,
+                flow=request.flow,
+            )
         except FinlabError as error:
             return {"id": name, "status": "error", "error": str(error)}
         reply = self._reply(name, "ok", answer.command, answer.forces) | {
@@ -117,31 +100,6 @@ class Server:
         }
         self._sent, self._sent_at = answer.command, time.monotonic()
         return reply
-
-    def _solve(self, request: Request, start: float) -> Allocation:
-        """The robot's answer, or `TooLate` when the deadline passes first."""
-        fresh = time.monotonic() - self._sent_at < RECENT_S
-        previous = self._sent if fresh else None
-
-        def work() -> Allocation:
-            return self._robot.allocate(
-                request.wrench,
-                failed=self._failed,
-                previous=previous,
-                reference=request.reference,
-                policy=request.policy,
-                flow=request.flow,
-            )
-
-        if self._timing.deadline is None:
-            return work()
-        if self._busy is not None:
-            # What came too late for its own target is of no use to this one, but must end first.
-            wait([self._busy], max(self._timing.deadline - (time.perf_counter() - start), 0.0))
-            if not self._busy.done():
-                raise TooLate
-        self._busy = self._worker.submit(work)
-        return self._busy.result(max(self._timing.deadline - (time.perf_counter() - start), 0.0))
 
     def _rest(self) -> dict[str, Any]:
         command, self._sent = self._neutral(), None

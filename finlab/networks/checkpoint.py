@@ -21,6 +21,7 @@ from finlab.files.plain_values import parse_json
 from finlab.layout import FinModelSpec
 from finlab.networks.normalization import Normalization
 from finlab.networks.trained import State, TrainedWeights, check_arrays
+from finlab.whole_file import write_whole
 
 FORMAT = "finlab-checkpoint"
 VERSION = 1
@@ -103,6 +104,14 @@ def checkpoint_files(weights: TrainedWeights) -> dict[str, bytes]:
         "metrics": dict(weights.metrics),
     }
     return {CONFIG_FILE: (json.dumps(config, indent=2) + "\n").encode(), WEIGHTS_FILE: content}
+
+
+def write_checkpoint(folder: Path, weights: TrainedWeights) -> TrainedWeights:
+    """Write a checkpoint folder, and answer what is in it; a `CheckpointError` where it cannot be written."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, content in checkpoint_files(weights).items():
+        write_whole(folder / name, content, CheckpointError)
+    return read_checkpoint(folder)
 
 
 def read_normalization(folder: Path) -> Normalization:

@@ -1,11 +1,10 @@
-"""The loop on board: newest target first, deadlines kept, silence leads to rest, and so does every end."""
+"""The loop on board: newest target first, silence leads to rest, and so does every end."""
 
 import json
 import os
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import IO, Any
@@ -13,12 +12,12 @@ from typing import IO, Any
 import numpy as np
 import pytest
 
-from finlab.allocation import Allocation, Allocator
+from finlab.allocation import Allocator
 from finlab.deploy import serve as serve_module
 from finlab.deploy.bundle import Bundle
 from finlab.deploy.request import MAX_LINE
 from finlab.deploy.robot import DeployedRobot, parse_robot
-from finlab.deploy.serve import RECENT_S, Server, Timing
+from finlab.deploy.serve import RECENT_S, Server
 from finlab.deploy.stopping import SIGNALS, StopSignals
 from finlab.deploy.transport import StandardStreams, Unsent
 from finlab.errors import FinlabError
@@ -64,9 +63,9 @@ class Script:
         self.sent.append(json.loads(line, parse_constant=pytest.fail))
 
 
-def served(robot: DeployedRobot, *requests: Any, timing: Timing | None = None) -> list[dict[str, Any]]:
+def served(robot: DeployedRobot, *requests: Any, watchdog: float | None = 1.0) -> list[dict[str, Any]]:
     script = Script(*requests)
-    Server(robot, timing or Timing()).run(script)
+    Server(robot, watchdog).run(script)
     return script.sent
 
 
@@ -125,50 +124,21 @@ def test_only_good_targets_and_rest_wind_up_the_watchdog(
 ) -> None:
     script = Script(GOOD, b"nonsense", b"nonsense", GOOD, *[b"nonsense"] * 4, None)
     monkeypatch.setattr("finlab.deploy.serve.time.monotonic", lambda: script.now)
-    Server(robot, Timing(watchdog=1.0)).run(script)
+    Server(robot, 1.0).run(script)
     status = [reply["status"] for reply in script.sent]
     assert status == ["ok", *["error"] * 2, "ok", *["error"] * 4, "neutral", "neutral"]
     assert script.waits == pytest.approx([1.0, 1.0, 0.7, 0.4, 1.0, 0.7, 0.4, 0.1, 0.0, 1.0])
     np.testing.assert_array_equal(np.array(script.sent[-1]["command"]), robot.neutral())
     script = Script(GOOD, b"nonsense")
-    Server(robot, Timing(watchdog=None)).run(script)
+    Server(robot, None).run(script)
     assert script.waits == [None] * 3
 
 
 def test_the_fins_rest_before_an_error_that_nobody_foresaw_is_told(robot: DeployedRobot) -> None:
     script = Script(GOOD, ZeroDivisionError("a fault of ours"))
     with pytest.raises(ZeroDivisionError, match="a fault of ours"):
-        Server(robot, Timing()).run(script)
+        Server(robot).run(script)
     assert [reply["status"] for reply in script.sent] == ["ok", "neutral"]
-
-
-class Slow(DeployedRobot):
-    """A robot whose computer is busy."""
-
-    def __init__(self, robot: DeployedRobot, delay: float) -> None:
-        super().__init__(robot.allocator)
-        vars(self)["delay"] = delay
-
-    def allocate(self, *args: Any, **options: Any) -> Allocation:
-        time.sleep(vars(self)["delay"])
-        return super().allocate(*args, **options)
-
-
-def test_deadline_repeats_what_was_sent_last(robot: DeployedRobot, monkeypatch: pytest.MonkeyPatch) -> None:
-    slow = Slow(robot, 0.0)
-    server = Server(slow, Timing(deadline=20.0))
-    sent = server.answer(LINE)["command"]
-    vars(slow)["delay"] = 0.4
-    monkeypatch.setattr(server, "_timing", Timing(deadline=0.01))
-    late = server.answer(b'{"wrench": [0, 0, 2, 0, 0, 0], "id": 1}')
-    assert (late["id"], late["status"], late["command"]) == (1, "late", sent)
-    assert server.answer(LINE)["status"] == "late", "the computer is still busy with the other target"
-    vars(slow)["delay"] = 0.0
-    monkeypatch.setattr(server, "_timing", Timing(deadline=20.0))
-    assert server.answer(LINE)["status"] == "ok"
-    first = Server(Slow(robot, 0.3), Timing(deadline=0.01)).answer(LINE)
-    assert first["status"] == "late"
-    np.testing.assert_array_equal(np.array(first["command"]), robot.neutral())
 
 
 def test_commands_change_no_faster_than_servos_do(
@@ -176,7 +146,7 @@ def test_commands_change_no_faster_than_servos_do(
 ) -> None:
     now = [100.0]
     monkeypatch.setattr(serve_module.time, "monotonic", lambda: now[0])
-    server = Server(robot, Timing())
+    server = Server(robot)
     forwards, backwards = (json.dumps({"wrench": [x, 0, 0.5, 0, 0, 0]}).encode() for x in (1, -1))
     before = np.array(server.answer(forwards)["command"])
     truth = robot.allocate([-1, 0, 0.5, 0, 0, 0], previous=before)
@@ -188,7 +158,7 @@ def test_commands_change_no_faster_than_servos_do(
 
 def test_thrusters_and_rudders_rest_in_their_own_words() -> None:
     script = Script(None)
-    Server(DeployedRobot(Allocator(load_layout("turtle_hybrid")), ("lift_right",)), Timing()).run(script)  # type: ignore[arg-type]
+    Server(DeployedRobot(Allocator(load_layout("turtle_hybrid")), ("lift_right",))).run(script)  # type: ignore[arg-type]
     assert [reply["status"] for reply in script.sent] == ["neutral", "neutral"]
     told = {part["name"]: part for part in script.sent[0]["actuators"]}
     assert tuple(told) == load_layout("turtle_hybrid").names and "command" not in script.sent[0]
@@ -326,10 +296,7 @@ def test_without_streams_it_ends_with_a_sentence(closed: str, full: str, folder:
 
 @pytest.mark.parametrize(
     "option",
-    [
-        *(f"--watchdog-s={text}" for text in ("nan", "-1", "inf", "0", "1e-9", "1e9", "soon", "")),
-        *(f"--deadline-ms={text}" for text in ("nan", "-1", "0", "inf")),
-    ],
+    [f"--watchdog-s={text}" for text in ("nan", "-1", "inf", "0", "1e-9", "1e9", "soon", "")],
 )
 def test_times_are_finite_and_above_zero(option: str, capsys: pytest.CaptureFixture[str]) -> None:
     from finlab.deploy.command import main

@@ -24,8 +24,8 @@ from finlab.networks.checkpoint import (
     read_checkpoint,
     read_normalization,
     resolve_checkpoint,
+    write_checkpoint,
 )
-from finlab.training.saving import save_checkpoint
 from tests.any_robot import AnyRobot
 
 
@@ -75,7 +75,7 @@ def refusal(folder: Path) -> str:
 def test_round_trip(untrained_checkpoint: Path, tmp_path: Path) -> None:
     first = read_checkpoint(untrained_checkpoint)
     first = replace(first, metrics={"surrogate": {"error": 0.25}}, training={"seed": 7})
-    second = save_checkpoint(tmp_path / "again", first)
+    second = write_checkpoint(tmp_path / "again", first)
     assert second.name == "again"
     kept = ("preset", "training", "metrics", "fin_model", "sha256", "network_sizes", "surrogate_sizes")
     for name in kept:
@@ -227,7 +227,7 @@ def test_refuses_sizes_and_statistics_that_cannot_be(
 
 
 def test_a_surrogate_alone_loads_but_cannot_allocate(folder: Path) -> None:
-    save_checkpoint(folder, replace(read_checkpoint(folder), network_sizes=None, network={}))
+    write_checkpoint(folder, replace(read_checkpoint(folder), network_sizes=None, network={}))
     assert read_checkpoint(folder).network_sizes is None
     with pytest.raises(CheckpointError, match="holds no network, .* of the shipped `paper`"):
         AnyRobot("paper", checkpoint=folder).on(load_layout("A"))
@@ -236,7 +236,7 @@ def test_a_surrogate_alone_loads_but_cannot_allocate(folder: Path) -> None:
 def test_a_network_over_forces_comes_back_without_a_surrogate(untrained_mdn: Path, tmp_path: Path) -> None:
     first = read_checkpoint(untrained_mdn)
     assert first.surrogate_sizes is None and first.network_sizes is not None
-    assert save_checkpoint(tmp_path / "again", first).sha256 == first.sha256
+    assert write_checkpoint(tmp_path / "again", first).sha256 == first.sha256
     with pytest.raises(CheckpointError, match="fed 'forces', expected one that is fed 'raw'"):
         AnyRobot("paper", checkpoint=untrained_mdn).on(load_layout("A"))
 

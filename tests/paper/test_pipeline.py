@@ -20,9 +20,9 @@ from finlab.paper.surrogate import SurrogateConfig
 from finlab.physics import Plant
 from finlab.physics.effort import command_effort
 from finlab.training.first_weights import first_weights
-from finlab.training.saving import arrays_of, tensors_of
 from tests.any_robot import AnyRobot
 from tests.paper.asked_in_torch import wrench_in_torch
+from tests.torch_weights import arrays_of, tensors_of
 
 TARGET = [0.5, -0.3, 1.0, 0.05, -0.02, 0.1]
 

@@ -24,15 +24,14 @@ from finlab.mdn.network import ForceMixture, ForceNetworkConfig
 from finlab.mdn.training.answers import Answers, Batch, write_answers
 from finlab.mdn.training.recipes import RECIPES, AnswerSettings, MdnTraining
 from finlab.networks.checkpoint import (
-    checkpoint_files,
     read_checkpoint,
     read_normalization,
     resolve_checkpoint,
+    write_checkpoint,
 )
 from finlab.networks.trained import State, TrainedWeights, sizes_for_file
 from finlab.training.first_weights import first_weights
 from finlab.training.loop import LOG_EVERY, Tensors, Terms, train
-from finlab.whole_file import write_whole
 
 TRAIN_SEED = 140_000
 """Added to the user's seed."""
@@ -71,9 +70,7 @@ def train_mdn(preset: str, out: Path, *, seed: int = 0, **training: Any) -> Trai
 
     def save(network: State, progress: dict[str, Any]) -> None:
         trained = TrainedWeights(out.name, normalization, sizes_for_file(recipe.network), network)
-        made = replace(trained, preset=preset, training={"mdn": identity | progress})
-        for name, content in checkpoint_files(made).items():
-            write_whole(out / name, content, DataError)
+        write_checkpoint(out, replace(trained, preset=preset, training={"mdn": identity | progress}))
 
     answers = out / "answers"
     try:

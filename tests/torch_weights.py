@@ -1,0 +1,13 @@
+"""Weights of networks as arrays and as tensors."""
+
+import torch
+
+from finlab.networks.trained import State
+
+
+def arrays_of(weights: dict[str, torch.Tensor]) -> State:
+    return {name: value.detach().numpy() for name, value in weights.items()}
+
+
+def tensors_of(state: State) -> dict[str, torch.Tensor]:
+    return {name: torch.tensor(value) for name, value in state.items()}
