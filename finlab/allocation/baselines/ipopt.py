@@ -1,21 +1,21 @@
 """Method `ipopt`: CasADi and IPOPT from several starts; needs the extra `ipopt`.
 
-Fins whose laws are formulas become CasADi symbols, with exact first and second derivatives. A robot with a
-force table has no formula: it becomes a CasADi callback that asks the plant (`plant_in_casadi`), with the
-table's exact Jacobian and IPOPT's own approximation of the Hessian.
+Fins whose laws are formulas become CasADi symbols, with exact first and second derivatives. A force table has
+no formula: robots with one are asked for in the space of forces, where every fin is compiled.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from finlab.allocation.baselines.ipopt_forces import ForceProgram
 from finlab.allocation.baselines.model_based import ModelBased, TimeLimit, TimeLimitedSettings
-from finlab.allocation.baselines.plant_in_casadi import plant_formulas, plant_in_casadi
+from finlab.allocation.baselines.plant_in_casadi import plant_formulas
+from finlab.allocation.levenberg_marquardt import CommandProblem, refine
 from finlab.allocation.settings import Settings, choice, number
 from finlab.arrays import Array
 from finlab.distribution import install
@@ -24,6 +24,9 @@ from finlab.layout import Layout
 from finlab.networks.trained import TrainedWeights
 from finlab.physics import PlanarLaw, make_law
 
+TRADEOFF, USUAL_LOAD = 1e-4, 0.1
+"""Weight, beside the squared normalized error, of one unit of effort, and of this share of the power that
+the strongest fin takes at its upper limits: the errors given up for either are then alike, at most 4e-3."""
 SOLVER_OPTIONS = {
     "ipopt.print_level": 0,
     "ipopt.sb": "yes",
@@ -32,23 +35,6 @@ SOLVER_OPTIONS = {
     "print_time": False,
     "error_on_fail": False,
 }
-
-
-class Formulas(NamedTuple):
-    """A robot as CasADi sees it."""
-
-    command: Any
-    """Commands (3 n,)."""
-    target: Any
-    """Wrench that is wanted (6,)."""
-    residual: Any
-    """Normalized error (6,)."""
-    cost: Any
-    """What the commands cost, weighed beside the squared error."""
-    options: dict[str, Any]
-    """Options of IPOPT."""
-    called: Any
-    """A callback to be kept alive; None where there is none."""
 
 
 @dataclass(frozen=True)
@@ -60,14 +46,14 @@ class IpoptSettings(TimeLimitedSettings):
 
 
 class Ipopt(ModelBased):
-    """IPOPT on `err_norm^2 + cost` within the limits, exact derivatives by CasADi or the plant.
+    """IPOPT on `err_norm^2 + cost` within the limits, exact derivatives by CasADi.
 
     The program is built once per layout with the target as its parameter. It is run from the pseudo-inverse's
     answer, which no dead zone holds, and from random starts; of the ends, the lowest objective wins. After
     the time limit no start begins; each may take half as long.
 
     Raises:
-        AllocationError: CasADi is not installed.
+        AllocationError: CasADi is not installed, or effort is asked for where fins are tables.
     """
 
     name = "ipopt"
@@ -78,77 +64,74 @@ class Ipopt(ModelBased):
         self, layout: Layout, settings: Settings, scale: Array, weights: TrainedWeights | None = None
     ) -> None:
         super().__init__(layout, settings, scale, weights)
-        if self.settings.space == "forces" and self.aim.name != "power":
-            raise AllocationError(
-                f"method ipopt: space 'forces' keeps power least, got objective {self.aim.name!r}; "
-                "take space 'commands'"
-            )
+        self._tables = not all(isinstance(make_law(fin.model), PlanarLaw) for fin in layout.fins)
+        self._by_forces = self._tables or self.settings.space == "forces"
+        if self._by_forces and self.aim.name != "power":
+            why = "of a force table it" if self._tables else "space 'forces'"
+            raise AllocationError(f"method ipopt: {why} keeps power least, got objective {self.aim.name!r}")
         self._casadi = import_casadi()
 
     def _commands(self, targets: Array, seed: int) -> Array:
-        if self.settings.space == "forces":
-            return self._by_forces(targets, seed)
-        random = self.plant.sample(np.random.default_rng(seed), (self.settings.n_starts,))
-        first = self._inverse.command(targets)
         result = np.empty((len(targets), self.plant.n_fins, 3))
         for i, target in enumerate(targets):
-            limit = TimeLimit(self.settings.time_limit_s)
-            ends = [self._end(target, first[i])]
-            ends += [self._end(target, start) for start in random if not limit.over]
+            limit, ends = TimeLimit(self.settings.time_limit_s), list[Array]()
+            for start in self._starts(target, seed):
+                if ends and limit.over:
+                    break
+                ends.append(self._end(target, start))
             result[i] = ends[self._total(np.array(ends), target).argmin()]
         return result
 
-    def _by_forces(self, targets: Array, seed: int) -> Array:
-        """Commands (N, n, 3) for targets (N, 6), found in the space of forces."""
-        program, result = self._force_program, []
-        for target in targets:
-            limit = TimeLimit(self.settings.time_limit_s)
-            starts = program.starts(target, self.settings.n_starts, seed)
-            ends = np.array(
-                [program.command(target, each) for k, each in enumerate(starts) if not (k and limit.over)]
-            )
-            result.append(ends[self._total(ends, target).argmin()])
-        return np.array(result).reshape(len(targets), self.plant.n_fins, 3)
+    def _starts(self, target: Array, seed: int) -> Array:
+        """Where IPOPT starts from: commands (S, n, 3), or planar forces (S, n, 2)."""
+        if self._by_forces:
+            return self._force_program.starts(target, self.settings.n_starts, seed)
+        random = self.plant.sample(np.random.default_rng(seed), (self.settings.n_starts,))
+        return np.concatenate([self._inverse.command(target[None]), random])
+
+    def _end(self, target: Array, start: Array) -> Array:
+        """The command (n, 3) IPOPT ends at, or the start itself where it breaks down."""
+        if self._by_forces:
+            command = self._force_program.command(target, start)
+            # A compiled table is not quite the table.
+            return self._refined(target, command) if self._tables else command
+        limits = {"lbx": self.plant.lower.ravel(), "ubx": self.plant.upper.ravel()}
+        end = np.array(self._solver(x0=start.ravel(), p=target, **limits)["x"], np.float64).reshape(-1, 3)
+        return self.plant.feasible(end) if np.isfinite(end).all() else start
+
+    def _refined(self, target: Array, command: Array) -> Array:
+        problem = CommandProblem.of(self.plant, self.sigma)
+        return np.asarray(refine(problem, target[None] / self.sigma, command[None], 1).command[0])
+
+    @cached_property
+    def _weight(self) -> float:
+        """Of the cost beside the squared error."""
+        if self.aim.name == "effort":
+            return TRADEOFF
+        return TRADEOFF / (USUAL_LOAD * float(self.plant.power(self.plant.upper, self.aim.copper_loss).max()))
+
+    def _total(self, command: Array, target: Array) -> Array:
+        """`J = err_norm^2 + cost` (B,) of commands (B, n, 3), the error over `sigma`."""
+        missing = (self.plant.wrench(command) - target) / self.sigma
+        total: Array = (missing**2).sum(-1) + self._weight * self.aim.meter(self.plant)(command)
+        return total
 
     @cached_property
     def _force_program(self) -> ForceProgram:
-        return ForceProgram(self._casadi, self._inverse, self.sigma, self._cost.weight, self._options)
+        return ForceProgram(self._casadi, self._inverse, self.sigma, self._weight, self._options)
 
     @property
     def _options(self) -> dict[str, Any]:
         return SOLVER_OPTIONS | {"ipopt.max_cpu_time": 0.5 * self.settings.time_limit_s}
 
-    def _end(self, target: Array, start: Array) -> Array:
-        """The command (n, 3) IPOPT ends at, or the start itself where it breaks down."""
-        plant = self.plant
-        limits = {"lbx": plant.lower.ravel(), "ubx": plant.upper.ravel()}
-        answer = self._solver[0](x0=start.ravel(), p=target, **limits)
-        end = np.array(answer["x"], np.float64).reshape(-1, 3)
-        return plant.feasible(end) if np.isfinite(end).all() else start
-
     @cached_property
-    def _solver(self) -> tuple[Any, Formulas]:
-        """The solver, and the formulas, which must live as long; its variables are the commands as they are,
-        its parameter the target."""
-        formulas = self._formulas()
-        objective = self._casadi.sumsqr(formulas.residual) + formulas.cost
-        program = {"x": formulas.command, "p": formulas.target, "f": objective}
-        options = self._options | formulas.options
-        return self._casadi.nlpsol("allocation", "ipopt", program, options), formulas
-
-    def _formulas(self) -> Formulas:
-        """What the robot's commands give and cost."""
-        cs, plant, sigma = self._casadi, self.plant, self._casadi.DM(self.sigma)
-        if not all(isinstance(make_law(fin.model), PlanarLaw) for fin in plant.layout.fins):
-            answer = plant_in_casadi(cs, plant, self._cost)
-            command, target = cs.MX.sym("command", 3 * plant.n_fins), cs.MX.sym("target", 6)
-            given = answer(command)
-            options = {"ipopt.hessian_approximation": "limited-memory"}
-            return Formulas(command, target, (given[:6] - target) / sigma, given[6], options, answer)
-        command, wrench, cost = plant_formulas(cs, plant, self.aim)
-        target = cs.SX.sym("target", 6)
-        weight = self._cost.weight
-        return Formulas(command, target, (wrench - target) / sigma, weight * cost, {}, None)
+    def _solver(self) -> Any:
+        """The solver; its variables are the commands as they are, its parameter the target."""
+        command, wrench, cost = plant_formulas(self._casadi, self.plant, self.aim)
+        target = self._casadi.SX.sym("target", 6)
+        missing = (wrench - target) / self._casadi.DM(self.sigma)
+        program = {"x": command, "p": target, "f": self._casadi.sumsqr(missing) + self._weight * cost}
+        return self._casadi.nlpsol("allocation", "ipopt", program, self._options)
 
 
 def import_casadi() -> Any:

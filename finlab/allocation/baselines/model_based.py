@@ -7,7 +7,6 @@ from functools import cached_property
 from typing import ClassVar
 
 from finlab.allocation.baselines.pseudo_inverse import PseudoInverse
-from finlab.allocation.command_cost import CommandCost, command_cost
 from finlab.allocation.method import LeastErrorMethod
 from finlab.allocation.settings import AimSettings, Settings, number
 from finlab.allocation.solution import Solution
@@ -16,8 +15,6 @@ from finlab.layout import Layout
 from finlab.networks.trained import TrainedWeights
 from finlab.physics.objective import Objective
 
-ENERGY_TRADEOFF = 1e-4
-"""Weight of the cost beside the squared normalized error where a method weighs both; see `command_cost`."""
 USUAL_SHARE = 0.1
 """What a robot is mostly asked for, as a share of its yardstick."""
 
@@ -53,11 +50,6 @@ class ModelBased(LeastErrorMethod):
         """What wrenches (6,) are divided by: what a robot is mostly asked for."""
 
     @cached_property
-    def _cost(self) -> CommandCost:
-        """What the robot's commands cost, weighed beside the squared error."""
-        return command_cost(self.plant, self.aim, self.sigma, ENERGY_TRADEOFF)
-
-    @cached_property
     def _inverse(self) -> PseudoInverse:
         """What answers by the pseudo-inverse, and where others start."""
         return PseudoInverse(self.plant, self.sigma, self.aim.copper_loss)
@@ -72,12 +64,6 @@ class ModelBased(LeastErrorMethod):
 
     def _solve(self, targets: Array, *, seed: int, previous: Array | None) -> Solution:
         return Solution(self.plant.feasible(self._commands(targets, seed)))
-
-    def _total(self, command: Array, target: Array) -> Array:
-        """`J = err_norm^2 + cost` (B,) of commands (B, n, 3), the error over `sigma`."""
-        missing = (self.plant.wrench(command) - target) / self.sigma
-        total: Array = (missing**2).sum(-1) + self._cost(command)
-        return total
 
 
 @dataclass(frozen=True)
