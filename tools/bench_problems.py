@@ -20,7 +20,7 @@ from finlab.arrays import AnyArray, Array
 from finlab.assets import PAPER_LAYOUTS
 from finlab.bench.problems import FORMAT, KINDS, VERSION, BenchRobot, Problems, Sequences, Targets
 from finlab.errors import DataError
-from finlab.evaluation.cheapest_commands import CheapestCommands, has_formulas
+from finlab.evaluation.experiments.cost import EXACT, yardstick
 from finlab.evaluation.progress import progress
 from finlab.evaluation.splits import make_split, own_sigma
 from finlab.layout import Layout, layout_effectiveness, load_layout
@@ -140,10 +140,9 @@ class BestKnown:
 
     def least_cost(self, objective: Name, wrench: Array) -> float:
         """The least cost known of a wrench (6,) within reach; NaN where none is."""
-        starts = STARTS if has_formulas(self.layout) else 2 * STARTS
-        cheapest = CheapestCommands(Objective(objective), self.sigma)
-        _, cost = cheapest.ends(self.layout, wrench, starts, self.seed)
-        return float(cost[0]) if len(cost) else np.nan
+        answer = yardstick(self.layout, objective, STARTS).on(self.layout).allocate(wrench, seed=self.seed)
+        exact = np.linalg.norm(answer.unallocated / self.sigma) <= EXACT
+        return float(Objective(objective).meter(plant_of(self.layout))(answer.command)) if exact else np.nan
 
 
 def make_problems(seed: int = SEED, per_split: int = PER_SPLIT, costs: bool = True) -> Problems:

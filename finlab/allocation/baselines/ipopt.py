@@ -15,7 +15,6 @@ import numpy as np
 from finlab.allocation.baselines.ipopt_forces import ForceProgram
 from finlab.allocation.baselines.model_based import ModelBased, TimeLimit, TimeLimitedSettings
 from finlab.allocation.baselines.plant_in_casadi import plant_formulas
-from finlab.allocation.levenberg_marquardt import CommandProblem, refine
 from finlab.allocation.settings import Settings, choice, number
 from finlab.arrays import Array
 from finlab.distribution import install
@@ -27,6 +26,8 @@ from finlab.physics import PlanarLaw, make_law
 TRADEOFF, USUAL_LOAD = 1e-4, 0.1
 """Weight, beside the squared normalized error, of one unit of effort, and of this share of the power that
 the strongest fin takes at its upper limits: the errors given up for either are then alike, at most 4e-3."""
+POLISH = 3
+"""Levenberg-Marquardt steps from where IPOPT ends onto the target."""
 SOLVER_OPTIONS = {
     "ipopt.print_level": 0,
     "ipopt.sb": "yes",
@@ -49,8 +50,9 @@ class Ipopt(ModelBased):
     """IPOPT on `err_norm^2 + cost` within the limits, exact derivatives by CasADi.
 
     The program is built once per layout with the target as its parameter. It is run from the pseudo-inverse's
-    answer, which no dead zone holds, and from random starts; of the ends, the lowest objective wins. After
-    the time limit no start begins; each may take half as long.
+    answer, which no dead zone holds, and from random starts. Each end is made exact by the laws; the
+    cheapest that meets the target is the answer. After the time limit no start begins; each may take half as
+    long.
 
     Raises:
         AllocationError: CasADi is not installed, or effort is asked for where fins are tables.
@@ -64,10 +66,10 @@ class Ipopt(ModelBased):
         self, layout: Layout, settings: Settings, scale: Array, weights: TrainedWeights | None = None
     ) -> None:
         super().__init__(layout, settings, scale, weights)
-        self._tables = not all(isinstance(make_law(fin.model), PlanarLaw) for fin in layout.fins)
-        self._by_forces = self._tables or self.settings.space == "forces"
+        tables = not all(isinstance(make_law(fin.model), PlanarLaw) for fin in layout.fins)
+        self._by_forces = tables or self.settings.space == "forces"
         if self._by_forces and self.aim.name != "power":
-            why = "of a force table it" if self._tables else "space 'forces'"
+            why = "of a force table it" if tables else "space 'forces'"
             raise AllocationError(f"method ipopt: {why} keeps power least, got objective {self.aim.name!r}")
         self._casadi = import_casadi()
 
@@ -79,7 +81,7 @@ class Ipopt(ModelBased):
                 if ends and limit.over:
                     break
                 ends.append(self._end(target, start))
-            result[i] = ends[self._total(np.array(ends), target).argmin()]
+            result[i] = self._best(target, np.array(ends), POLISH)
         return result
 
     def _starts(self, target: Array, seed: int) -> Array:
@@ -92,16 +94,10 @@ class Ipopt(ModelBased):
     def _end(self, target: Array, start: Array) -> Array:
         """The command (n, 3) IPOPT ends at, or the start itself where it breaks down."""
         if self._by_forces:
-            command = self._force_program.command(target, start)
-            # A compiled table is not quite the table.
-            return self._refined(target, command) if self._tables else command
+            return self._force_program.command(target, start)
         limits = {"lbx": self.plant.lower.ravel(), "ubx": self.plant.upper.ravel()}
         end = np.array(self._solver(x0=start.ravel(), p=target, **limits)["x"], np.float64).reshape(-1, 3)
         return self.plant.feasible(end) if np.isfinite(end).all() else start
-
-    def _refined(self, target: Array, command: Array) -> Array:
-        problem = CommandProblem.of(self.plant, self.sigma)
-        return np.asarray(refine(problem, target[None] / self.sigma, command[None], 1).command[0])
 
     @cached_property
     def _weight(self) -> float:
@@ -109,12 +105,6 @@ class Ipopt(ModelBased):
         if self.aim.name == "effort":
             return TRADEOFF
         return TRADEOFF / (USUAL_LOAD * float(self.plant.power(self.plant.upper, self.aim.copper_loss).max()))
-
-    def _total(self, command: Array, target: Array) -> Array:
-        """`J = err_norm^2 + cost` (B,) of commands (B, n, 3), the error over `sigma`."""
-        missing = (self.plant.wrench(command) - target) / self.sigma
-        total: Array = (missing**2).sum(-1) + self._weight * self.aim.meter(self.plant)(command)
-        return total
 
     @cached_property
     def _force_program(self) -> ForceProgram:

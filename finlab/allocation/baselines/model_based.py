@@ -6,7 +6,10 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar
 
+import numpy as np
+
 from finlab.allocation.baselines.pseudo_inverse import PseudoInverse
+from finlab.allocation.levenberg_marquardt import CommandProblem, refine
 from finlab.allocation.method import LeastErrorMethod
 from finlab.allocation.settings import AimSettings, Settings, number
 from finlab.allocation.solution import Solution
@@ -15,6 +18,8 @@ from finlab.layout import Layout
 from finlab.networks.trained import TrainedWeights
 from finlab.physics.objective import Objective
 
+SOLVED = 1e-5
+"""Normalized error up to which an answer is exact."""
 USUAL_SHARE = 0.1
 """What a robot is mostly asked for, as a share of its yardstick."""
 
@@ -61,6 +66,15 @@ class ModelBased(LeastErrorMethod):
         Random starts are drawn once and shared by all targets, so that a target gets the same answer alone
         and among others.
         """
+
+    def _best(self, target: Array, commands: Array, steps: int) -> Array:
+        """Of commands (S, n, 3), each first brought onto a target (6,) by some Levenberg-Marquardt steps, the
+        cheapest one (n, 3) that meets it, else the one with the smallest error."""
+        problem = CommandProblem.of(self.plant, self.sigma)
+        ends = refine(problem, target[None] / self.sigma, commands, steps)
+        missed = ends.error > SOLVED
+        cost = np.where(missed, ends.error, self.aim.meter(self.plant)(ends.command))
+        return np.array(ends.command[np.lexsort((cost, missed))[0]])
 
     def _solve(self, targets: Array, *, seed: int, previous: Array | None) -> Solution:
         return Solution(self.plant.feasible(self._commands(targets, seed)))

@@ -16,8 +16,6 @@ from finlab.layout import layout_effectiveness
 from finlab.physics import Plant
 from finlab.physics.objective import CostMeter
 
-SOLVED = 1e-5
-"""Normalized error up to which an answer is exact."""
 NEAR = 1e-3
 """Normalized error from which on a start is no way to the target: its cost does not matter."""
 APPROACH, POLISH = 30, 2
@@ -53,13 +51,13 @@ class Sqp(ModelBased):
     settings: SqpSettings
 
     @cached_property
-    def _program(self) -> tuple[CommandProblem, CostMeter, Solve]:
+    def _program(self) -> tuple[CommandProblem, Solve]:
         meter = self.aim.meter(self.plant)
-        solve = cheapest_program(self.plant, meter, self.sigma, self.settings.n_steps, SETTLED)
-        return CommandProblem.of(self.plant, self.sigma), meter, solve
+        solve = cheapest_program(self.plant, meter, self.sigma, self.settings.n_steps)
+        return CommandProblem.of(self.plant, self.sigma), solve
 
     def _commands(self, targets: Array, seed: int) -> Array:
-        (problem, meter, solve), plant = self._program, self.plant
+        (problem, solve), plant = self._program, self.plant
         answer = self._inverse.command(targets)
         random = plant.sample(np.random.default_rng(seed), (self.settings.n_starts - 1,))
         for i, target in enumerate(targets / self.sigma):
@@ -70,15 +68,11 @@ class Sqp(ModelBased):
             for start in near.command[near.error <= NEAR]:
                 if not limit.over:
                     tried.append(solve(target, start))
-            ends = refine(problem, target[None], np.array(tried), POLISH)
-            missed = ends.error > SOLVED
-            answer[i] = ends.command[
-                np.lexsort((np.where(missed, ends.error, meter(ends.command)), missed))[0]
-            ]
+            answer[i] = self._best(targets[i], np.array(tried), POLISH)
         return answer
 
 
-def cheapest_program(plant: Plant, meter: CostMeter, sigma: Array, steps: int, settled: float) -> Solve:
+def cheapest_program(plant: Plant, meter: CostMeter, sigma: Array, steps: int) -> Solve:
     """Returns what finds the cheapest commands near a start that deliver a target, by SciPy's SLSQP.
 
     Args:
@@ -86,7 +80,6 @@ def cheapest_program(plant: Plant, meter: CostMeter, sigma: Array, steps: int, s
         meter: what commands cost.
         sigma: per-axis standard deviation (6,) of the error.
         steps: most quadratic programs.
-        settled: change of the cost, as a share of a usual one, at which they end.
     """
     axes, width = pushed_axes(plant, sigma), plant.width
     free = width.ravel() > 0.0
@@ -115,7 +108,7 @@ def cheapest_program(plant: Plant, meter: CostMeter, sigma: Array, steps: int, s
             return start
         first = ((start - plant.lower) / np.where(width > 0.0, width, 1.0)).ravel()[free]
         exactly: Any = {"type": "eq", "fun": missing, "jac": gradient}
-        how: dict[str, Any] = {"method": "SLSQP", "options": {"maxiter": steps, "ftol": settled}}
+        how: dict[str, Any] = {"method": "SLSQP", "options": {"maxiter": steps, "ftol": SETTLED}}
         limits = [(0.0, 1.0)] * len(first)
         end = minimize(cost, first, jac=cost_gradient, bounds=limits, constraints=exactly, **how).x
         return command_at(np.clip(end, 0.0, 1.0)) if np.isfinite(end).all() else start
