@@ -67,7 +67,7 @@ def _command_line(argv: Sequence[str]) -> SubcommandApp:
     root.command(train.verbs, name="train", help="Train the networks of methods `mdn` and `paper`.")
     root.command(evaluate.verbs(argv), name="eval", help="Measure methods by the fins' own models.")
     root.command(bench.bench)
-    root.command(fit.verbs, name="fit", help="Fit fins and robots to measurements.")
+    root.command(fit.verbs, name="fit", help="Fit actuators and robots to measurements.")
     root.command(simulate.simulate)
     root.command(export.export)
     root.command(app.app)

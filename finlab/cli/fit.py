@@ -1,4 +1,4 @@
-"""`finlab fit fin|robot`: from measurements to a fin that layouts can name, from a swim to a robot."""
+"""`finlab fit actuator|fin|robot`: from measurements to actuators that layouts name, from swims to robots."""
 
 import sys
 from collections.abc import Callable, Iterator
@@ -29,13 +29,55 @@ def fin(
         output: the fitted fin.
         seed: draws samples where there are too many.
     """
+    print("\n".join(_fin(data, output, seed)))
+
+
+@verbs.command
+def actuator(
+    data: Annotated[Positional[tuple[Path, ...]], arg(metavar="DATA.csv...")],
+    output: Annotated[Path, arg(metavar="TABLE.csv", aliases=["-o"])],
+    seed: int = 0,
+) -> None:
+    """Fit a thruster to its bench table, or a fin to a load cell's measurements; the columns tell which.
+
+    A thruster's table has a command (PWM, or input from -1 to 1, or rpm), force, and power or voltage and
+    current, and perhaps torque; units stand in the header, `force [kgf]`. Commands may be repeated. What is
+    printed goes into a layout. A fin's file is that of `finlab fit fin`.
+
+    Args:
+        data: CSV files of one actuator.
+        output: the table of thrust, or the fitted fin.
+        seed: draws samples of a fin where there are too many.
+    """
+    from finlab.fit.columns import names_in
+    from finlab.fit.conventions import NAMES, NEEDED
+
+    if set(NEEDED) <= names_in(data[0], NAMES):
+        print("\n".join(_fin(data, output, seed)))
+        return
+    from finlab.errors import DataError
+    from finlab.fit.fin_file import check_table_path
+    from finlab.fit.thruster_bench import read_bench
+    from finlab.fit.thruster_file import layout_lines, summary, thruster_csv
+    from finlab.fit.thruster_fit import fit_thruster
+    from finlab.whole_file import write_whole
+
+    check_table_path(output)
+    fit = fit_thruster(read_bench(data))
+    write_whole(output, thruster_csv(fit, output), DataError)
+    print("\n".join(summary(fit)))
+    print(f"\n{output}: in a layout's thruster\n  " + "\n  ".join(layout_lines(fit, output)))
+
+
+def _fin(data: tuple[Path, ...], output: Path, seed: int) -> list[str]:
+    """Fits a fin and writes its file; returns what to print."""
     with _progress_bar() as tell:
         from finlab.fit.advice import next_measurements
-        from finlab.fit.fin_file import check_fin_path, summary, write_fin
+        from finlab.fit.fin_file import check_table_path, summary, write_fin
         from finlab.fit.fin_fit import fit_fin
         from finlab.fit.measurements import read_measurements
 
-        check_fin_path(output)
+        check_table_path(output)
         tell("reading", 0.05)
         measurements = read_measurements(data)
         fit = fit_fin(measurements, seed, lambda words, share: tell(words, 0.1 + 0.7 * share))
@@ -43,11 +85,12 @@ def fin(
         write_fin(fit, output)
         tell("looking for what to measure next", 0.9)
         advice = next_measurements(fit)
-    print("\n".join(summary(fit)))
-    print("measure next, A [rad], f [Hz], zero direction [rad]:")
-    for command in advice:
-        print("  " + "  ".join(f"{value:7.3f}" for value in command))
-    print(f"{output}: name it in a layout, model: {{type: table, path: {output.name}}}")
+    return [
+        *summary(fit),
+        "measure next, A [rad], f [Hz], zero direction [rad]:",
+        *("  " + "  ".join(f"{value:7.3f}" for value in command) for command in advice),
+        f"{output}: name it in a layout, model: {{type: table, path: {output.name}}}",
+    ]
 
 
 @verbs.command

@@ -23,6 +23,7 @@ EXAMPLES = {
     "eval report": "finlab eval report -o runs/report --quick",
     "bench": "finlab bench dual analytic --quick --json bench.json",
     "fit": "finlab fit fin cell.csv -o fin.csv",
+    "fit actuator": "finlab fit actuator bench.csv -o thruster.csv",
     "fit fin": "finlab fit fin cell.csv -o fin.csv",
     "fit robot": "finlab fit robot my_robot.yaml swim.npz -o fitted.yaml",
     "simulate": "finlab simulate A --duration 30 -o swim",

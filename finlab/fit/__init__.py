@@ -1,4 +1,4 @@
-"""From measurements to models: a fin from a load cell, and in `robot` a layout from swims.
+"""From measurements to models: fins, thrusters, and in `robot` a layout from swims.
 
 Nothing here uses what `finlab.sim` knows to be true; fits come from data alone. Fits of fins need the extra
 `[fit]`.

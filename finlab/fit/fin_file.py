@@ -39,18 +39,18 @@ def write_fin(fit: FinFit, path: str | os.PathLike[str]) -> None:
     Raises:
         DataError: the file cannot be written, or is not called .csv.
     """
-    check_fin_path(path)
+    check_table_path(path)
     write_whole(path, fin_csv(fit), DataError)
 
 
-def check_fin_path(path: str | os.PathLike[str]) -> None:
+def check_table_path(path: str | os.PathLike[str]) -> None:
     """Refuse a name that no layout would take for a table; before a fit, which takes seconds.
 
     Raises:
         DataError: it does not end in .csv.
     """
     if Path(path).suffix.lower() != ".csv":
-        raise DataError(f"{path}: a fin is a CSV file, expected a name that ends in .csv")
+        raise DataError(f"{path}: a table is a CSV file, expected a name that ends in .csv")
 
 
 def summary(fit: FinFit) -> tuple[str, ...]:

@@ -10,13 +10,11 @@ from numpy.typing import NDArray
 
 from finlab.arrays import Array
 from finlab.errors import DataError
-from finlab.files.csv_table import read_table
-from finlab.fit.conventions import check_units, named_column
+from finlab.fit.columns import Columns, read_columns, together
+from finlab.fit.conventions import NAMES, NEEDED, check_units
 from finlab.fit.sensor_checks import check_sensors
 from finlab.layout.angles import FILE_TURN_TOLERANCE, TURN
 
-MAX_BYTES = 50_000_000
-"""Largest file that is read [bytes]."""
 MIN_SAMPLES = 20
 SAME = 1e-3
 """Amplitudes [rad] or frequencies [Hz] all closer than this are one and the same."""
@@ -100,38 +98,22 @@ def read_measurements(paths: Sequence[str | os.PathLike[str]]) -> Measurements:
     return _checked(read, ", ".join(str(path) for path in paths))
 
 
-def _read(path: Path) -> tuple[dict[str, Array], tuple[str, ...]]:
-    """The columns (n,) of a file that a fit reads in SI, by name, and the place of each sample."""
-    table = read_table(path, MAX_BYTES, "a CSV file of measurements")
-    named = [named_column(cell) for cell in table.header]
-    used = [i for i, (name, _) in enumerate(named) if name]
-    names = [named[i][0] for i in used]
-    if len(set(names)) < len(names):
-        raise DataError(f"{path}: two columns stand for {_repeated(names)}; keep one")
-    numbers, lines = table.numbers(used)
-    values = dict(zip(names, numbers.T * np.array([[named[i][1]] for i in used]), strict=True))
-    for name in ("A", "f", "Fy", "Fz"):
-        if name not in values:
-            raise DataError(f"{path}: column {name} is missing, expected A, f, phi, Fx, Fy, Fz in any order")
-    check_units(values, str(path))
-    return values, tuple(f"{path.name} line {line}" for line in lines)
+def _read(path: Path) -> Columns:
+    """The columns of a file that a fit reads."""
+    read = read_columns(path, NAMES, NEEDED, "A, f, phi, Fx, Fy, Fz in any order")
+    check_units(read.values, str(path))
+    return read
 
 
-def _repeated(names: list[str]) -> str:
-    return next(name for name in names if names.count(name) > 1)
-
-
-def _checked(read: list[tuple[dict[str, Array], tuple[str, ...]]], source: str) -> Measurements:
+def _checked(read: list[Columns], source: str) -> Measurements:
     """The samples of all files, with what is wrong with them as a whole said in a sentence."""
-    places = tuple(place for _, own in read for place in own)
+    places = tuple(place for file in read for place in file.places)
     notes: list[str] = []
     if len(places) < MIN_SAMPLES:
         raise DataError(
             f"{source}: {len(places)} samples, expected at least {MIN_SAMPLES}; 300 are a good number"
         )
-    files = [values for values, _ in read]
-    shared = [name for name in files[0] if all(name in values for values in files)]
-    columns = {name: np.concatenate([values[name] for values in files]) for name in shared}
+    columns = together(read)
     for name, unit in (("A", "rad"), ("f", "Hz")):
         if np.ptp(columns[name]) < SAME:
             raise DataError(

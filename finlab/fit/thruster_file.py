@@ -1,0 +1,54 @@
+"""The file of a fitted thruster: a table of thrust with what a layout says beside it."""
+
+from pathlib import Path
+
+from finlab.fit.thruster_fit import ThrusterFit
+from finlab.layout.thrust_model import COLUMNS
+
+
+def layout_lines(fit: ThrusterFit, path: Path) -> tuple[str, ...]:
+    """Returns the keys of a thruster in a layout beside a table at a path; its model may be the table or the
+    power law."""
+    least, most = fit.force
+    torque, known, law = fit.torque_per_newton, fit.uncertainty, fit.law
+    unit = f", unit: {fit.table.unit}" if fit.table.unit else ""
+    reverse = "" if law.reverse is None else f", reverse: {law.reverse:g}"
+    errs = f"{{share: {known.share:g}, floor_n: {known.floor:g}, common: {path.stem}}}" if known else ""
+    lines = (
+        f"force_n: [{least:g}, {most:g}]",
+        f"dead_band_n: {fit.dead_band:g}" * (fit.dead_band > 0.0),
+        f"torque_per_newton_m: {torque:.4g}" * (torque != 0.0),
+        f"uncertainty: {errs}" * bool(errs),
+        f"model: {{type: table, path: {path.name}{unit}}}",
+        f"# or model: {{type: power_law, forward: {law.forward:g}{reverse}, exponent: {law.exponent:g}}}",
+    )
+    return tuple(line for line in lines if line)
+
+
+def thruster_csv(fit: ThrusterFit, path: Path) -> str:
+    """Returns the file's text: lines that begin with # and say what the fit found, a header, the rows."""
+    notes = [f"# {line}" for line in (*summary(fit), *layout_lines(fit, path))]
+    rows = [",".join(f"{value:.12g}" for value in row) for row in fit.table.rows]
+    return "\n".join([*notes, ",".join(COLUMNS), *rows, ""])
+
+
+def summary(fit: ThrusterFit) -> tuple[str, ...]:
+    """Returns what was found, a line each."""
+    unit = f" {fit.table.unit}" if fit.table.unit else ""
+    least, most = fit.force
+    laws = [f"{name} {c:.3f} F^{p:.3f} (misses {rms:.2g} W)" for name, (c, p, rms) in fit.sides.items()]
+    moving = " and ".join(f"{command:g}" for command in fit.moving)
+    still = f"none from {fit.still[0]:g} to {fit.still[1]:g}, " if fit.still else ""
+    known, noise = fit.uncertainty, fit.scatter
+    sure = "too few rows to say how sure the table is"
+    if known and noise:
+        sure = (
+            f"a row scatters by {noise.share:.2%} of its force and {noise.floor:.3g} N, the table's force is "
+            f"known to {known.share:.2%} and {known.floor:.3g} N (standard deviations)"
+        )
+    return (
+        f"force {least:.4g} to {most:.4g} N; {still}first forces at {moving}{unit}",
+        f"power: {', '.join(laws)}; with one exponent {fit.law.exponent:g}",
+        sure,
+        *fit.notes,
+    )
