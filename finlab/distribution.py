@@ -6,7 +6,6 @@ EXTRAS = {
     "torch": "train",
     "viser": "app",
     "trimesh": "app",
-    "yourdfpy": "urdf",
     "casadi": "ipopt",
 }
 """Packages that some parts need beside the base install, and the extra that brings each."""

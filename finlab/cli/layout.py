@@ -1,4 +1,4 @@
-"""`finlab layout check|show|optimize|import|export`: look at layout files, improve and exchange them."""
+"""`finlab layout check|show|optimize|convert`: look at layout files, improve and exchange them."""
 
 from __future__ import annotations
 
@@ -71,47 +71,35 @@ def show(
     put_json(values, json, f"{text}\n\nA score card is made of robots of fins only.")
 
 
-@verbs.command(name="import")
-def import_layout(
-    file: Annotated[Positional[Path], arg(metavar="FILE.urdf")],
-    output: Annotated[Path, arg(metavar="LAYOUT.yaml", aliases=["-o"])],
+@verbs.command(name="convert")
+def convert_layout(
+    file: Annotated[Positional[str], arg(metavar="FILE")],
+    output: Annotated[Positional[Path], arg(metavar="OUT")],
+    to: Literal["layout", "urdf", "sdf", "px4", "ardusub", "matrix"] | None = None,
     fins: Annotated[tuple[str, ...], arg(metavar="LINK...")] = (),
+    thrusters: Annotated[tuple[str, ...], arg(metavar="LINK...")] = (),
     origin: Literal["gravity", "base"] = "gravity",
+    force: Annotated[tuple[float, float] | None, arg(metavar="LEAST MOST")] = None,
+    frame: Literal["FLU", "FRD"] = "FLU",
 ) -> None:
-    """Make a layout file from a robot description (URDF).
+    """Make a layout of a file of others, or the other way round: URDF, SDF, PX4, ArduSub, a matrix.
 
     Args:
-        file: a URDF file.
-        output: layout file to write.
-        fins: links that are fins; a joint's origin gives the position, its axis the shaft.
+        file: robot description (URDF, SDF), parameters of PX4 or ArduSub, factors, matrix, or layout.
+        output: file to write; its end says the form.
+        to: form of the output, where its end is not enough.
+        fins: links of a robot description that are fins.
+        thrusters: links that are thrusters although no plugin drives them.
         origin: where the layout's origin goes: the centre of gravity of all links, or the root link's frame.
+        force: least and most force [N] of every thruster, in place of the file's.
+        frame: frame of a matrix: x forward, and y left, z up (FLU) or y right, z down (FRD).
     """
-    from finlab.exchange import read_urdf
-    from finlab.layout import save_layout
+    from finlab.exchange import Exchange, convert
 
-    layout = read_urdf(file, fins, origin)
-    save_layout(layout, output)
-    print(f"{output}: layout {layout.name} with {layout.n_fins} fins; look at it with")
-    print(f"finlab layout show {output}")
-
-
-@verbs.command(name="export")
-def export_layout(
-    layout: Annotated[Positional[str], arg(metavar="LAYOUT")],
-    output: Annotated[Path, arg(metavar="FILE.urdf", aliases=["-o"])],
-) -> None:
-    """Write a layout as a robot description (URDF).
-
-    Args:
-        layout: layout file, bundle, or the name of a shipped layout.
-        output: file to write.
-    """
-    from finlab.cli.inputs import open_robot
-    from finlab.errors import CommandError
-    from finlab.exchange import write_urdf
-
-    if output.suffix.lower() != ".urdf":
-        raise CommandError(f"{output}: expected a file that ends in .urdf")
-    robot = open_robot(layout, fins_for="layout export")
-    write_urdf(robot.layout, output)
-    print(f"{output}: {robot.layout.n_fins} fins")
+    exchange = Exchange(fins, thrusters, origin, force, frame)
+    layout = convert(file, output, to, exchange)
+    print(
+        "\n".join(
+            [f"{output}: {layout.name} with {layout.counted}", *(f"- {note}" for note in exchange.notes)]
+        )
+    )

@@ -1,4 +1,5 @@
-"""Layouts in the formats of others: robot descriptions."""
+"""Layouts in the forms of others: robot descriptions, parameters of autopilots, allocation matrices."""
 
-from finlab.exchange.urdf import read_urdf as read_urdf
-from finlab.exchange.urdf import write_urdf as write_urdf
+from finlab.exchange.convert import convert as convert
+from finlab.exchange.convert import read_any as read_any
+from finlab.exchange.exchange import Exchange as Exchange

@@ -71,7 +71,6 @@ def test_check_and_show_take_any_actuator(capsys: pytest.CaptureFixture[str]) ->
     [
         ("simulate", ["simulate", "turtle_hybrid"]),
         ("layout optimize", ["layout", "optimize", "turtle_hybrid", "--fins", "front_left", "-o", "x.yaml"]),
-        ("layout export", ["layout", "export", "turtle_hybrid", "-o", "x.urdf"]),
         ("fit robot", ["fit", "robot", "turtle_hybrid", "swim.csv", "-o", "x.yaml"]),
     ],
 )

@@ -24,7 +24,7 @@ from finlab.bundle_files import CHECKSUMS, ROBOT, checksums
 from finlab.deploy.bundle import make_bundle
 from finlab.deploy.robot import load_robot
 from finlab.errors import FinlabError
-from finlab.exchange import read_urdf, write_urdf
+from finlab.exchange import Exchange, convert, read_any
 from finlab.fit.measurements import read_measurements
 from finlab.fit.robot.swim_file import read_swim
 from finlab.layout import FinModelSpec, load_layout, save_layout
@@ -155,7 +155,10 @@ def kinds(tmp_path_factory: pytest.TempPathFactory, untrained_mdn: Path) -> list
     table = FinModelSpec("table", (("path", str(place / "fin.csv")),))
     layout = load_layout("A").replace_actuator("front_right", model=table)
     save_layout(layout, place / "a.json")
-    write_urdf(layout, place / "a.urdf")
+    forms = {"robot.urdf": "urdf", "robot.sdf": "sdf", "rov.params": "px4", "rov.parm": "ardusub"}
+    forms |= {"rov.cpp": "ardusub", "factors.csv": "ardusub", "matrix.csv": "matrix", "matrix.yaml": "matrix"}
+    for name, form in forms.items():
+        convert("bluerov2_heavy", place / name, form, Exchange())
     rig = commands(60)
     write(place / "rig.csv", columns_of(rig, measured(soft(), rig)))
     rng = np.random.default_rng(1)
@@ -212,7 +215,7 @@ def kinds(tmp_path_factory: pytest.TempPathFactory, untrained_mdn: Path) -> list
         Kind("layout.json", (place / "a.json").read_bytes(), load_layout),
         Kind("bundle.zip", bundle.zip_bytes(), simple_answer, repacked),
         Kind("checkpoint.bin", checkpoint, from_parts, signed),
-        Kind("robot.urdf", (place / "a.urdf").read_bytes(), lambda p: read_urdf(p, layout.names, "base")),
+        *(Kind(name, (place / name).read_bytes(), lambda p: read_any(str(p), Exchange())) for name in forms),
         Kind("table.csv", fin_table, read_table),
         Kind("rig.csv", (place / "rig.csv").read_bytes(), lambda path: read_measurements([path])),
         Kind("swim.csv", (place / "swim.csv").read_bytes(), lambda path: read_swim(path, PAIR)),

@@ -1,0 +1,233 @@
+"""Robot descriptions, URDF of ROS or SDF of Gazebo: where links and joints are, what they weigh, and plugins.
+
+A description is taken in its zero position, in the frame of its root link or model: x forward, y left, z up
+(REP-103). Nothing but its text is read; models inside a model and <include> stay closed.
+"""
+
+import re
+from dataclasses import dataclass
+from typing import NamedTuple
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from finlab.arrays import Array
+from finlab.errors import LayoutError
+
+Named = dict[str, Element]
+"""Links, joints and frames by `link NAME`, `joint NAME` and `frame NAME`."""
+ADDED = ("xx", "yy", "zz", "pp", "qq", "rr")
+"""Diagonal of SDF's <fluid_added_mass>."""
+TURNING = ("revolute", "continuous")
+"""Kinds of joints that turn."""
+
+
+class Joint(NamedTuple):
+    """A joint, in the frame of its description."""
+
+    name: str
+    kind: str
+    parent: str
+    child: str
+    axis: Array
+    """What it turns about (3,), of length 1; of any length for a fixed joint."""
+    ends: tuple[float, float]
+    """Least and greatest angle [rad]; infinite where nothing limits it."""
+
+
+@dataclass(frozen=True)
+class Description:
+    """What a description says, in its own frame."""
+
+    name: str
+    links: dict[str, Array]
+    """Poses (4, 4) by name."""
+    joints: dict[str, Joint]
+    mass: float
+    """[kg]; 0 where no link has one."""
+    center: Array
+    """Centre of gravity (3,) [m]."""
+    inertia: Array
+    """(3, 3) about the centre of gravity [kg m^2]."""
+    added: Array
+    """Added mass (6,), diagonal [kg, kg m^2]; 0 where no link has one."""
+    plugins: list[Element]
+
+    def joint_of(self, link: str) -> Joint | None:
+        """Returns the joint that moves a link."""
+        return next((joint for joint in self.joints.values() if joint.child == link), None)
+
+
+def parse_description(text: str, name: str) -> Description:
+    """Returns what a URDF or SDF text says; `name` is what the robot is called where it has none.
+
+    Raises:
+        LayoutError: it is neither, it uses what is not allowed, or something in it is missing or no number.
+    """
+    root = _root(text)
+    models = [root] if root.tag == "robot" else list(root.iter("model"))
+    if not models:
+        raise LayoutError(f"expected a <robot> of URDF or a <model> of SDF, got <{root.tag:.40}>")
+    top = next((model for model in models if model.find(".//plugin") is not None), models[0])
+    named = {f"{tag} {_name(part)}": part for tag in ("link", "joint", "frame") for part in top.findall(tag)}
+    movers = {said(part, "child@link child"): key for key, part in named.items() if part.tag == "joint"}
+    hung = {key: _hung(key, part, named, movers) for key, part in named.items()}
+    poses = {"": np.eye(4)}
+    for key in hung:
+        _place(key, hung, poses)
+    joints = {_name(part): _joint(part, named, poses) for part in top.findall("joint")}
+    links = {key.removeprefix("link "): pose for key, pose in poses.items() if key.startswith("link ")}
+    plugins = [*top.findall("gazebo/plugin"), *top.findall("plugin"), *top.findall("link/plugin")]
+    weighed = _masses({key: named[f"link {key}"] for key in links}, links)
+    return Description(top.get("name") or name, links, joints, *weighed, plugins)
+
+
+def said(element: Element, paths: str, usual: str = "") -> str:
+    """Returns the first text among some paths below an element, an attribute behind @; else what is usual."""
+    for path in paths.split():
+        place, _, attribute = path.partition("@")
+        found = element.find(place)
+        if found is not None:
+            text = found.get(attribute) if attribute else found.text
+            if text and text.strip():
+                return text.strip()
+    return usual
+
+
+def numbers(text: str, count: int, what: str) -> Array:
+    """Returns numbers (count,) with blanks between; `what` they are goes into the error."""
+    try:
+        values = np.array(text.split(), dtype=np.float64)
+    except ValueError:
+        values = np.empty(0)
+    if values.shape != (count,) or not (np.abs(values) < 1e9).all():
+        raise LayoutError(f"{what} is not {count} numbers of ordinary size")
+    return values
+
+
+def number(element: Element, paths: str, usual: float = 0.0) -> float:
+    """Returns the number at one of some paths, as `said`; what is usual where there is none."""
+    text = said(element, paths)
+    return float(numbers(text, 1, f"<{paths}>")[0]) if text else usual
+
+
+def _root(text: str) -> Element:
+    """The outermost element. Entities could pull in other files or grow without bound, and descriptions have
+    no use for them; as the text is UTF-8 whatever its first line says, no other encoding can hide them."""
+    text = re.sub(r"^\s*<\?xml[^>]*\?>", "", text)
+    if "<!DOCTYPE" in text or "<!ENTITY" in text:
+        raise LayoutError("declares a DOCTYPE or entities, which are not allowed; remove them")
+    if re.search(r"<xacro:|\$\{|\$\((?:find|arg) ", re.sub(r"(?s)<!--.*?-->", "", text)):
+        raise LayoutError("is a xacro file, not a robot description; run `xacro FILE > robot.urdf` first")
+    try:
+        return ElementTree.fromstring(text)
+    except (ElementTree.ParseError, ValueError) as error:
+        raise LayoutError(f"is not readable XML: {str(error)[:120]}") from None
+
+
+def _name(element: Element) -> str:
+    name = element.get("name")
+    if not name:
+        raise LayoutError(f"has a <{element.tag}> without a name")
+    return name
+
+
+def _hung(key: str, part: Element, named: Named, joints: dict[str, str]) -> tuple[str, Array]:
+    """What a frame hangs on ("" for the description itself), and its pose there."""
+    if (
+        part.tag == "joint" and part.find("parent[@link]") is not None
+    ):  # of URDF; what is moved is where it is
+        return f"link {said(part, 'parent@link')}", _pose(part, key)
+    base = said(part, "pose@relative_to") or part.get("attached_to", "")
+    if part.tag == "joint":
+        return _key(base, named) or f"link {said(part, 'child')}", _pose(part, key)
+    mover = joints.get(key.removeprefix("link "), "")
+    if part.tag == "link" and mover and named[mover].find("parent[@link]") is not None:
+        return mover, np.eye(4)
+    return _key(base, named), np.eye(4) if part.find("pose") is None else _pose(part, key)
+
+
+def _key(name: str, named: Named) -> str:
+    """The key of the frame that SDF calls by a name."""
+    if name in ("", "__model__"):
+        return ""
+    return next((f"{tag} {name}" for tag in ("link", "joint", "frame") if f"{tag} {name}" in named), name)
+
+
+def _pose(part: Element, what: str) -> Array:
+    """The pose (4, 4) that a part has as <origin> in URDF, or as <pose> in SDF."""
+    pose, found = np.eye(4), part.find("pose")
+    place, turn = (
+        numbers(said(part, f"origin@{key}", "0 0 0"), 3, f"the origin of {what:.60}")
+        for key in ("xyz", "rpy")
+    )
+    if found is not None:
+        quaternion = found.get("rotation_format") == "quat_xyzw"
+        values = numbers(found.text or "0 0 0 0 0 0", 7 if quaternion else 6, f"the pose of {what:.60}")
+        place, turn = values[:3], np.radians(values[3:]) if found.get("degrees") == "true" else values[3:]
+    if len(turn) == 4 and not turn.any():
+        raise LayoutError(f"the quaternion of {what:.60} has no length")
+    rotation = Rotation.from_quat(turn) if len(turn) == 4 else Rotation.from_euler("xyz", turn)
+    pose[:3, :3], pose[:3, 3] = rotation.as_matrix(), place
+    return pose
+
+
+def _place(key: str, hung: dict[str, tuple[str, Array]], poses: dict[str, Array]) -> None:
+    """Puts the pose of a frame, and of those on the way to it, into `poses`."""
+    chain: list[str] = []
+    while key not in poses:
+        chain.append(key)
+        if key not in hung:
+            raise LayoutError(f"names {key!r:.80}, which is not in it")
+        if len(chain) > len(hung):
+            raise LayoutError(f"has joints in a circle around {key!r:.80}")
+        key = hung[key][0]
+    for step in reversed(chain):
+        base, pose = hung[step]
+        poses[step] = poses[base] @ pose
+
+
+def _joint(part: Element, named: Named, poses: dict[str, Array]) -> Joint:
+    name, what = _name(part), f"joint {_name(part)!r:.60}"
+    xyz, kind = part.find("axis/xyz"), part.get("type", "")
+    seen_from = _key(xyz.get("expressed_in", ""), named) if xyz is not None else ""
+    usual = "1 0 0" if part.find("parent[@link]") is not None else "0 0 1"
+    axis = numbers(said(part, "axis@xyz axis/xyz", usual), 3, f"the axis of {what}")
+    axis = poses[seen_from or f"joint {name}"][:3, :3] @ axis
+    length = float(np.linalg.norm(axis))
+    if length == 0.0 and kind in TURNING:
+        raise LayoutError(f"the axis of {what} has no length")
+    ends = []
+    for end, usual in (("lower", "-inf"), ("upper", "inf")):
+        text = usual if kind == "continuous" else said(part, f"limit@{end} axis/limit/{end}", usual)
+        try:
+            ends.append(float(text) if abs(float(text)) < 1e9 else float(usual))
+        except ValueError:
+            raise LayoutError(f"a limit of {what} is no number: {text!r:.40}") from None
+    names = said(part, "parent@link parent"), said(part, "child@link child")
+    return Joint(name, kind, *names, axis / (length or 1.0), (ends[0], ends[1]))
+
+
+def _masses(links: dict[str, Element], poses: dict[str, Array]) -> tuple[float, Array, Array, Array]:
+    """Mass, centre of gravity (3,), inertia (3, 3) about it and added mass (6,) of all links together."""
+    parts, added = [], np.zeros(6)
+    for name, link in links.items():
+        inertial = link.find("inertial")
+        if inertial is not None:
+            xx, xy, xz, yy, yz, zz = (
+                number(inertial, f"inertia@i{key} inertia/i{key}")
+                for key in ("xx", "xy", "xz", "yy", "yz", "zz")
+            )
+            pose = poses[name] @ _pose(inertial, f"the mass of link {name!r}")
+            own = pose[:3, :3] @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ pose[:3, :3].T
+            parts.append((number(inertial, "mass@value mass"), pose[:3, 3], own))
+            added += [number(inertial, f"fluid_added_mass/{key}") for key in ADDED]
+    mass, center, inertia = sum(part[0] for part in parts), np.zeros(3), np.zeros((3, 3))
+    if mass > 0.0:
+        center = sum((kg * at for kg, at, _ in parts), center) / mass
+        for kg, at, own in parts:
+            arm = at - center
+            inertia += own + kg * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+    return mass, center, inertia, added

@@ -1,0 +1,210 @@
+"""Layouts from and to the parameters of PX4, the factors of ArduSub, and allocation matrices."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import finlab
+from finlab.arrays import Array
+from finlab.errors import FinlabError, LayoutError
+from finlab.exchange import Exchange, convert, read_any
+from finlab.exchange.ardusub import factors_of
+from finlab.layout import Layout, Thruster, own_effectiveness, save_layout
+from tests.mixed_robots import load, random_robot
+
+D = np.sqrt(0.5)
+DIRECTIONS = [(-D, -D, 0), (-D, D, 0), (D, -D, 0), (D, D, 0), *[(0, 0, -1)] * 4]
+"""Force of each thruster of a BlueROV2 Heavy for a positive output of ArduSub, x forward, y left, z up."""
+SCRIPT = """#!/bin/sh
+# @name Some robot, with motors in x forward, y right, z down
+. ${R}etc/init.d/rc.uuv_defaults
+param set-default CA_AIRFRAME 7
+param set-default CA_ROTOR_COUNT 3
+param set-default CA_R_REV 3   # the third pushes one way only
+param set-default CA_ROTOR0_PX 0.5
+param set-default CA_ROTOR0_PY 0.3
+param set-default CA_ROTOR0_PZ 0.2
+param set-default CA_ROTOR0_AX 1.0
+param set-default CA_ROTOR0_AY -1.0
+param set-default CA_ROTOR0_AZ 0.0
+param set-default CA_ROTOR0_CT 40
+param set-default CA_ROTOR0_KM 0.0
+param set CA_ROTOR1_AZ 1.0
+param set CA_ROTOR1_PY -.5
+param set-default CA_ROTOR2_KM -0.02
+"""
+
+
+def thrusters(number: int) -> Layout:
+    return load(random_robot("thrusters", number, 7))
+
+
+def written(layout: Layout, path: Path, to: str | None = None, **unsaid: str) -> tuple[Layout, list[str]]:
+    """A layout that went into a file and came back, and the notes of both ways."""
+    save_layout(layout, path.with_name("before.json"))
+    exchange = Exchange(**unsaid)  # type: ignore[arg-type]
+    convert(str(path.with_name("before.json")), path, to, exchange)
+    return read_any(str(path), exchange), exchange.notes
+
+
+def wrenches(layout: Layout) -> Array:
+    """Wrench of 1 N of each thruster (n, 6)."""
+    return own_effectiveness(layout)[:, 0]
+
+
+def test_px4_rotors_push_and_turn_as_its_formula_says(tmp_path: Path) -> None:
+    path = tmp_path / "60999_some_robot"
+    path.write_text(SCRIPT)
+    layout = read_any(str(path), Exchange())
+    first, second, third = layout.actuators
+    assert isinstance(third, Thruster)
+    np.testing.assert_allclose((first.position, first.frame[0]), [(0.5, -0.3, -0.2), (D, D, 0)], atol=1e-15)
+    np.testing.assert_allclose([part.lower[0] for part in layout.actuators], [-40.0, -6.5, 0.0])
+    np.testing.assert_allclose([part.upper[0] for part in layout.actuators], [40.0, 6.5, 6.5])
+    # CT (p x a - KM a) in x forward, y right, z down; the usual axis is -z, the usual KM 0.05.
+    for part, place, axis, km in (
+        (first, (0.5, 0.3, 0.2), (D, -D, 0.0), 0.0),
+        (second, (0.0, -0.5, 0.0), (0.0, 0.0, 1.0), 0.05),
+        (third, (0.0, 0.0, 0.0), (0.0, 0.0, -1.0), -0.02),
+    ):
+        torque = np.cross(place, axis) - km * np.array(axis)
+        own = wrenches(replace(layout, actuators=(part,)))[0]
+        np.testing.assert_allclose(own * [1, -1, -1, 1, -1, -1], [*axis, *torque], atol=1e-15)
+
+
+@pytest.mark.parametrize("name", ["robot.params", "airframe.sh"])
+def test_px4_gives_back_what_it_has_a_place_for(name: str, tmp_path: Path) -> None:
+    for number in range(8):
+        layout = thrusters(number)
+        both = tuple(
+            replace(part, force=(-part.force[1] if part.force[0] else 0.0, part.force[1]))
+            for part in layout.actuators
+            if isinstance(part, Thruster)
+        )
+        layout = replace(layout, actuators=both[:12])
+        back, notes = written(layout, tmp_path / name, "px4")
+        np.testing.assert_allclose(wrenches(back), wrenches(layout), atol=1e-12)
+        np.testing.assert_array_equal(back.upper, layout.upper)
+        np.testing.assert_array_equal(back.lower, layout.lower)
+        assert notes[0].startswith("PX4 has no place for power")
+
+
+def test_px4_has_one_size_for_both_ways(tmp_path: Path) -> None:
+    back, notes = written(finlab.load_layout("bluerov2_heavy"), tmp_path / "rov.params")
+    assert "PX4 has one size for both ways: 51.44 N stands for -39.91 N, too." in notes
+    np.testing.assert_array_equal(back.lower[:, 0], -51.44)
+    one_way = Thruster("a", (0, 1, 0), (1, 0, 0), (-5.0, 0.0), back.actuators[0].model, torque_per_newton=0.1)  # type: ignore[union-attr,arg-type]
+    back, _ = written(Layout("one", (one_way,)), tmp_path / "one.params")
+    assert back.upper[0, 0] == 5.0 and back.lower[0, 0] == 0.0
+    np.testing.assert_allclose(-wrenches(back), wrenches(Layout("one", (one_way,))), atol=1e-15)
+
+
+def test_ardusub_frames_have_the_directions_of_the_bluerov2(tmp_path: Path) -> None:
+    path = tmp_path / "rov.parm"
+    path.write_text("# my robot\nFRAME_CONFIG,2\nMOT_1_DIRECTION 1\nMOT_6_DIRECTION\t-1.0\n")
+    layout, shipped = read_any(str(path), Exchange()), finlab.load_layout("bluerov2_heavy")
+    turned = np.array([1, 1, 1, 1, 1, -1, 1, 1])[:, None]
+    np.testing.assert_allclose(wrenches(layout)[:, :3] * turned, DIRECTIONS, atol=1e-15)
+    np.testing.assert_allclose(wrenches(shipped)[:, :3], DIRECTIONS, atol=1e-7)
+    torques, own = wrenches(layout)[:, 3:] * turned, wrenches(shipped)[:, 3:]
+    clear = np.abs(torques) > 0.01
+    np.testing.assert_array_equal(np.sign(torques)[clear], np.sign(own)[clear])
+
+
+def test_a_bluerov2_is_ardusubs_frame_2(tmp_path: Path) -> None:
+    layout = finlab.load_layout("bluerov2_heavy")
+    layout = layout.replace_actuator("rear_left", axis=(-0.70710678, -0.70710678, 0.0))
+    _, notes = written(layout, tmp_path / "rov.parm")
+    told = (tmp_path / "rov.parm").read_text().split()
+    values = dict(zip(told[-18::2], told[-17::2], strict=True))
+    assert values.pop("FRAME_CONFIG") == "2"
+    assert values == {f"MOT_{i}_DIRECTION": "-1" if i == 4 else "1" for i in range(1, 9)}
+    assert any("has no place for power" in note for note in notes)
+    with pytest.raises(LayoutError, match="no frame of ArduSub has the signs"):
+        written(finlab.load_layout("turtle_hybrid"), tmp_path / "turtle.parm")
+
+
+@pytest.mark.parametrize("frame", range(7))
+@pytest.mark.parametrize("name", ["factors.csv", "motors.cpp"])
+def test_factors_survive_the_way_there_and_back(frame: int, name: str, tmp_path: Path) -> None:
+    source = tmp_path / "frame.param"
+    source.write_text(f"FRAME_CONFIG {frame}\n")
+    layout = read_any(str(source), Exchange())
+    back, _ = written(layout, tmp_path / name, "ardusub")
+    np.testing.assert_allclose(factors_of(back, Exchange())[1], factors_of(layout, Exchange())[1], atol=1e-12)
+    back, _ = written(layout, tmp_path / "again.parm")
+    np.testing.assert_allclose(wrenches(back), wrenches(layout), atol=1e-12)
+
+
+@pytest.mark.parametrize("frame", ["FLU", "FRD"])
+@pytest.mark.parametrize("name", ["matrix.csv", "matrix.yaml"])
+def test_a_matrix_gives_back_wrenches_and_limits(name: str, frame: str, tmp_path: Path) -> None:
+    for number in range(5):
+        layout = thrusters(number)
+        back, notes = written(layout, tmp_path / name, "matrix", frame=frame)
+        assert back.names == layout.names
+        np.testing.assert_allclose(wrenches(back), wrenches(layout), atol=1e-12)
+        np.testing.assert_allclose(back.lower, layout.lower, rtol=1e-12)
+        np.testing.assert_allclose(back.upper, layout.upper, rtol=1e-12)
+        assert any("places along the lines" in note for note in notes)
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("tam.yaml", "a:\n  tam:\n  - [40, 0]\n  - [0, 40]\n  - [0, 0]\n  - [0, 0]\n  - [0, 0]\n  - [-8, 4]"),
+        ("tam.yaml", "controller: {ros__parameters: {tam: {fx: [40, 0], fy: [0, 40], fz: [0, 0], tx: [0, 0], "
+                     "ty: [0, 0], tz: [-8, 4]}}}"),
+        ("tam.yaml", "matrix: [40, 0, 0, 40, 0, 0, 0, 0, 0, 0, -8, 4]"),
+        ("tam.csv", "40, 0\n0, 40\n0, 0\n0, 0\n0, 0\n-8, 4\n"),
+        ("tam.csv", "# FRD\naxis, a, b\nFx, 40, 0\nFy, 0, -40\nFz, 0, 0\nTx, 0, 0\nTy, 0, 0\nTz, 8, -4"),
+    ],
+)  # fmt: skip
+def test_matrices_of_others(name: str, content: str, tmp_path: Path) -> None:
+    """40 N per unit of a command from -1 to 1, 0.2 m right of the centre and 0.1 m ahead of it."""
+    (tmp_path / name).write_text(content)
+    exchange = Exchange()
+    layout = read_any(str(tmp_path / name), exchange)
+    np.testing.assert_allclose(wrenches(layout), [[1, 0, 0, 0, 0, -0.2], [0, 1, 0, 0, 0, 0.1]], atol=1e-15)
+    np.testing.assert_allclose(layout.position, [[0, 0.2, 0], [0.1, 0, 0]], atol=1e-15)
+    assert (layout.lower[0, 0], layout.upper[1, 0]) == (-40.0, 40.0)
+    assert any("from -1 to 1" in note for note in exchange.notes)
+
+
+def test_what_has_no_place_is_named(tmp_path: Path) -> None:
+    _, notes = written(finlab.load_layout("turtle_hybrid"), tmp_path / "turtle.params")
+    assert notes[0].startswith("PX4 has a place for thrusters alone; left out are front_right (fin), ")
+    with pytest.raises(
+        LayoutError, match="layout A has no thruster, and A matrix has a place for these alone"
+    ):
+        written(finlab.load_layout("A"), tmp_path / "a.csv")
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("a.params", "1 1 CA_ROTOR0_PX 1 9", "CA_ROTOR_COUNT: expected 1 to 12 rotors, got 0"),
+        ("a.params", "CA_ROTOR_COUNT 1e400", "CA_ROTOR_COUNT: expected 1 to 12 rotors, got 0"),
+        ("a.params", "CA_ROTOR_COUNT 1\nCA_ROTOR0_AZ 0", "CA_ROTOR0: has no direction"),
+        ("a.parm", "FRAME_CONFIG 7", "FRAME_CONFIG: expected 0 to 6"),
+        ("a.cpp", "add_motor_raw_6dof(AP_MOTORS_MOT_1, 1, 0, 0, 0, 0, 0, 1);", "'motor1' has no force"),
+        ("a.yaml", "matrix: [[1], [2]]", "has no matrix"),
+        ("a.yaml", "limits: [[0, 1]]\nmatrix: [1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]", "limits: expected"),
+        ("a.csv", "\n".join([",".join("1" * 65)] * 6), "expected up to 64 columns, got 65"),
+        ("a.json", "[1", "is not valid JSON"),
+    ],
+)  # fmt: skip
+def test_refusals_name_the_file(name: str, content: str, message: str, tmp_path: Path) -> None:
+    (tmp_path / name).write_text(content)
+    with pytest.raises(FinlabError, match=message) as caught:
+        read_any(str(tmp_path / name), Exchange())
+    assert str(caught.value).startswith(f"{tmp_path / name}: ")
+
+
+def test_lines_that_fit_nothing_take_no_time(tmp_path: Path) -> None:
+    path = tmp_path / "a.parm"
+    numbers = ", ".join(["1" * 70] * 6)
+    path.write_text(f"FRAME_CONFIG 1\n{f'a({numbers}x' + chr(10)}{'A_B' + ' ' * 100_000}x\n" * 20)
+    assert read_any(str(path), Exchange()).n == 6
