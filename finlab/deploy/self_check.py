@@ -93,7 +93,7 @@ def self_check(robot: DeployedRobot) -> list[Finding]:
         dearer.append(float(prices[0] / max(prices[1], 1e-9)) - 1.0)
     return [
         Finding("wrench of the stored commands (err_norm)", worst(differs), SELF_TEST_TOLERANCE),
-        Finding("own answers, judged by the fins' own models (err_norm)", worst(errors), REACHED),
+        Finding("own answers, judged by the actuators' own laws (err_norm)", worst(errors), REACHED),
         Finding("own answers, more error than stored (err_norm)", worst(worse), ERROR_TOLERANCE),
         Finding("own answers, more cost than stored (share)", worst(dearer), COST_TOLERANCE),
     ]

@@ -19,8 +19,8 @@ ARM = 0.2
 """Arm of a factor of 1 [m]; the file has none."""
 ORDER = [AXES.index(axis) for axis in ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")]
 """Columns of factors in the order of a wrench."""
-NUMBERED = "BLUEROV1 VECTORED VECTORED_6DOF VECTORED_6DOF_90DEG SIMPLEROV_3 SIMPLEROV_4 SIMPLEROV_5".split()
-"""Frames by FRAME_CONFIG."""
+NUMBERED = list(FRAMES.values())
+"""Factors by FRAME_CONFIG."""
 SMALL = 0.15
 """Factors below this one are none where a layout is compared with a frame."""
 WEAK = 0.1
@@ -46,7 +46,7 @@ def read_ardusub(text: str, name: str, exchange: Exchange) -> Layout:
         if frame not in range(len(NUMBERED)):
             known = f"0 to {len(NUMBERED) - 1}, or rows of factors"
             raise LayoutError(f"expected {known}, got {frame:g}", "FRAME_CONFIG")
-        factors = FRAMES[NUMBERED[int(frame)]]
+        factors = NUMBERED[int(frame)]
         names = [f"motor{i + 1}" for i in range(len(factors))]
         directions = [values.get(f"MOT_{i + 1}_DIRECTION", 1.0) for i in range(len(factors))]
         factors = factors * np.sign(directions)[:, None]
@@ -92,7 +92,7 @@ def write_ardusub(layout: Layout, exchange: Exchange, suffix: str) -> str:
         return "\n".join(lines) + "\n"
     signs = np.sign(np.where(np.abs(factors) < SMALL, 0.0, factors))
     for frame, known in enumerate(NUMBERED):
-        own = np.sign(FRAMES[known])
+        own = np.sign(known)
         if own.shape == signs.shape:
             turned = np.where((own == signs).all(1), 1, -1)
             if (turned[:, None] * own == signs).all():

@@ -18,6 +18,10 @@ _TWO = ((1, 0, 0, -1, 0, 0), (-1, 0, 0, -1, 0, 0))
 FRAMES: dict[str, Array] = {
     name: np.array(rows, np.float64)
     for name, rows in {
+        "BLUEROV1": (
+            *((0, 0, -1, 0, 1, 0), (0, 0, 1, 0, 1, 0), (-0.5, 0.5, 0, 0.45, 0, 0)),
+            *((0.5, 0.5, 0, 0.45, 0, 0), (0, -1, 0, 1, 0, 0), (-0.25, 0, 0, 0, 0, 1)),
+        ),
         "VECTORED": (*_PLANAR, *_TWO),
         "VECTORED_6DOF": (
             *_PLANAR,
@@ -27,13 +31,9 @@ FRAMES: dict[str, Array] = {
             *((1, 1, 0, 1, 0, 0), (0, 0, 1, 0, 1, 0), (1, -1, 0, 1, 0, 0), (0, 0, 0, 0, 0, 1)),
             *((0, 0, 0, 0, 0, 1), (-1, 1, 0, 1, 0, 0), (0, 0, -1, 0, 1, 0), (-1, -1, 0, 1, 0, 0)),
         ),
-        "BLUEROV1": (
-            *((0, 0, -1, 0, 1, 0), (0, 0, 1, 0, 1, 0), (-0.5, 0.5, 0, 0.45, 0, 0)),
-            *((0.5, 0.5, 0, 0.45, 0, 0), (0, -1, 0, 1, 0, 0), (-0.25, 0, 0, 0, 0, 1)),
-        ),
         "SIMPLEROV_3": (*_SIMPLE, (0, 0, 0, -1, 0, 0)),
         "SIMPLEROV_4": (*_SIMPLE, *_TWO),
         "SIMPLEROV_5": (*_SIMPLE, *_TWO, (0, 0, 0, 0, 0, 1)),
     }.items()
 }
-"""Name of a frame -> factors (n, 6)."""
+"""Name of a frame -> factors (n, 6), in the order of the parameter FRAME_CONFIG."""

@@ -1,0 +1,68 @@
+"""`finlab layout convert`, and the way of a stranger's robot from its description to its own computer."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import finlab
+from finlab.allocation import Allocator
+from finlab.cli import main
+from finlab.deploy.command import main as runtime
+
+HEAVY = str(Path(__file__).parent / "bluerov2_heavy.urdf")
+WRENCH = [20.0, 0.0, 10.0, 0.0, 0.0, 2.0]
+
+
+def test_from_a_description_to_the_robot(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["layout", "convert", HEAVY, "rov.yaml"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == "rov.yaml: bluerov2_heavy with 8 thrusters"
+    assert lines[1] == "- It has no power: that of a T200 at 16 V is taken; write your own as `model`."
+    assert main(["layout", "show", "rov.yaml"]) == 0
+    assert "axis (-0.707, -0.707, 0)" in capsys.readouterr().out
+    asked = ["--wrench", *map(str, WRENCH), "--json"]
+    assert main(["allocate", "rov.yaml", *asked, "--failed", "thruster4"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["err_norm"] < 1e-6 and told["failed"] == ["thruster4"]
+    assert main(["export", "rov.yaml", "-o", "rov", "--failed", "thruster4"]) == 0
+    assert runtime(["check", "rov"]) == 0
+    assert "8 thrusters" in capsys.readouterr().out
+    assert runtime(["allocate", "rov", *asked]) == 0
+    there = json.loads(capsys.readouterr().out)
+    assert there["actuators"] == told["actuators"] and there["power"] == told["power"]
+
+
+def test_a_shipped_robot_of_thrusters_runs_in_the_runtime(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["export", "bluerov2_heavy", "-o", str(tmp_path / "rov.zip"), "--zip"]) == 0
+    capsys.readouterr()
+    assert runtime(["check", str(tmp_path / "rov.zip")]) == 0
+    capsys.readouterr()
+    assert runtime(["allocate", str(tmp_path / "rov.zip"), "--wrench", *map(str, WRENCH), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    desk = Allocator(finlab.load_layout("bluerov2_heavy")).allocate(WRENCH)
+    there = [part["force_n"] for part in told["actuators"]]
+    np.testing.assert_allclose(there, desk.command[:, 0], rtol=1e-12)
+    serve = [sys.executable, "-m", "finlab.deploy.command", "serve", str(tmp_path / "rov.zip")]
+    question = json.dumps({"id": 7, "wrench": WRENCH}) + "\n"
+    done = subprocess.run(serve, input=question, capture_output=True, text=True, timeout=60)
+    answer, rest = map(json.loads, done.stdout.splitlines())
+    assert (done.returncode, answer["id"], answer["actuators"]) == (0, 7, told["actuators"])
+    assert rest["status"] == "neutral" and all(part["force_n"] == 0.0 for part in rest["actuators"])
+
+
+def test_the_form_of_the_output_must_be_clear(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["layout", "convert", HEAVY, str(tmp_path / "60999_rov")]) == 2
+    assert "its end says no form; say --to layout, urdf, sdf, px4, ardusub, matrix" in capsys.readouterr().err
+    assert main(["layout", "convert", HEAVY, str(tmp_path / "60999_rov"), "--to", "px4"]) == 0
+    assert main(["layout", "convert", "nowhere.urdf", str(tmp_path / "x.yaml")]) == 2
+    assert "'nowhere.urdf' is neither a file nor a shipped layout" in capsys.readouterr().err
+    assert "param set-default CA_ROTOR_COUNT 8" in (tmp_path / "60999_rov").read_text()
