@@ -86,14 +86,14 @@ class Allocator:
         Args:
             layout: the robot.
             method: one of `finlab.allocation.METHODS`, or a class of your own.
-            checkpoint: for methods with networks: a checkpoint folder, a bundle, the name of a shipped
-                checkpoint, or what `read_checkpoint` gives; by default the shipped one.
+            checkpoint: for methods with networks: a checkpoint folder, the name of a shipped checkpoint,
+                or what `read_checkpoint` gives; by default the shipped one.
             settings: of the method, by name.
 
         Raises:
             AllocationError: unknown method or setting, or a value out of its range.
             CheckpointError: missing, corrupt or foreign checkpoint.
-            DataError: a fin's force table or a bundle cannot be read.
+            DataError: a fin's force table cannot be read.
         """
         check_layout(layout)
         if isinstance(method, str):
@@ -105,22 +105,19 @@ class Allocator:
             raise AllocationError(f"method: expected the name of a method, got {method!r:.60}")
 
     @classmethod
-    def from_bundle(
-        cls, path: str | os.PathLike[str], method: str | None = None, **settings: Any
-    ) -> Allocator:
+    def from_bundle(cls, path: str | os.PathLike[str], **settings: Any) -> Allocator:
         """The allocator of a bundle's robot, as `finlab export` wrote it.
 
         Args:
             path: of the bundle, a folder or a zip archive.
-            method: by default the bundle's own.
             settings: those that are to differ from the bundle's.
 
         Raises:
-            AllocationError: unknown method or setting.
+            AllocationError: an unknown setting, or a wrong value.
             DataError: the bundle cannot be read, or was changed.
             LayoutError: its layout cannot be read.
         """
-        choice = bundled_method(read_bundle_files(path), str(path), method, **settings)
+        choice = bundled_method(read_bundle_files(path), str(path), **settings)
         return cls.of_choice(load_layout(path), choice)
 
     @classmethod

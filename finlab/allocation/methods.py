@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
-from finlab.allocation.bundle_settings import METHODS_ON_BOARD, About, read_about
+from finlab.allocation.bundle_settings import read_about
 from finlab.allocation.method import Method
 from finlab.allocation.settings import Settings
-from finlab.bundle_files import ABOUT, CHECKPOINT, Files, checkpoint_part, is_bundle, read_bundle_files
+from finlab.bundle_files import ABOUT, CHECKPOINT, Files, checkpoint_part
 from finlab.errors import AllocationError, DataError
 from finlab.networks.checkpoint import parse_checkpoint, read_checkpoint, resolve_checkpoint
 from finlab.networks.trained import TrainedWeights
@@ -28,16 +28,10 @@ METHODS: dict[str, tuple[str, str]] = {
     "ipopt": ("finlab.allocation.baselines.ipopt", "Ipopt"),
 }
 """Name -> module and class; modules are loaded only when their method is asked for."""
-GONE = {
-    **dict.fromkeys(("search", "learned"), "is now called 'dual'"),
-    "fast": "has gone; 'dual' is exact on any fin and needs no network",
-    **dict.fromkeys(("trf", "slsqp", "multistart"), "has gone; the yardstick is 'ipopt'"),
-}
-"""Earlier names -> what to say to those who ask for them."""
 LEARNED = {"mdn": "default", "paper": "paper"}
 """Methods that need a trained network -> the shipped checkpoint that holds it."""
 Checkpoint = str | os.PathLike[str] | TrainedWeights | None
-"""A checkpoint folder, a bundle, the name of a shipped checkpoint, or the contents of one."""
+"""A checkpoint folder, the name of a shipped checkpoint, or the contents of one."""
 
 
 @dataclass(frozen=True)
@@ -58,8 +52,6 @@ def method_class(method: str) -> type[Method]:
     Raises:
         AllocationError: there is no such method.
     """
-    if method in GONE:
-        raise AllocationError(f"method: {method!r} {GONE[method]}")
     if method not in METHODS:
         raise AllocationError(f"method: expected one of {', '.join(METHODS)}, got {method!r:.60}")
     module, name = METHODS[method]
@@ -73,7 +65,6 @@ def choose_method(method: str, checkpoint: Checkpoint = None, **settings: Any) -
     Raises:
         AllocationError: unknown method or setting, or a checkpoint for a method without networks.
         CheckpointError: missing, corrupt or foreign checkpoint.
-        DataError: a bundle cannot be read, or was changed.
     """
     kind = method_class(method)
     if method not in LEARNED:
@@ -85,57 +76,36 @@ def choose_method(method: str, checkpoint: Checkpoint = None, **settings: Any) -
         return MethodChoice(kind, checked_settings(kind, settings))
     if isinstance(checkpoint, TrainedWeights):
         return MethodChoice(kind, checked_settings(kind, settings), checkpoint)
-    if checkpoint is not None and is_bundle(checkpoint):
-        return bundled_method(read_bundle_files(checkpoint), str(checkpoint), method, **settings)
     weights = read_checkpoint(resolve_checkpoint(checkpoint or LEARNED[method]))
     return MethodChoice(kind, checked_settings(kind, settings), weights)
 
 
-def bundled_method(
-    files: Files, source: str = "bundle", method: str | None = None, **settings: Any
-) -> MethodChoice:
-    """A method, by default the bundle's own, with what a bundle's files hold.
+def bundled_method(files: Files, source: str = "bundle", **changes: Any) -> MethodChoice:
+    """The method of a bundle with what its files hold; some of its settings may be changed.
 
     Raises:
-        AllocationError: unknown method or setting.
-        DataError: the bundle is of another format, or does not hold what the method needs.
+        AllocationError: a change of an unknown setting, or to a wrong value.
+        DataError: the bundle is of another format, lacks what the method needs, or has settings that no robot
+            should try.
     """
     about = read_about(files, source)
-    method = method or about.method
-    kind = method_class(method)
-    chosen = checked_settings(kind, _bundled_settings(about, f"{source}/{ABOUT}", method) | settings)
-    if method not in LEARNED:
-        return MethodChoice(kind, chosen)
-    if method not in METHODS_ON_BOARD:
-        raise DataError(
-            f"{source}: method {method!r} does not run from a bundle; name its checkpoint in place of that"
-        )
-    part = checkpoint_part(files)
-    if not part or about.checkpoint is None:
-        raise DataError(
-            f"{source}: holds no networks, which method {method!r} needs; export it again with "
-            f"`finlab export LAYOUT -o DIR --method {method}`"
-        )
-    weights = parse_checkpoint(part, f"{source}/{CHECKPOINT.rstrip('/')}", about.checkpoint)
-    return MethodChoice(kind, chosen, weights)
-
-
-def _bundled_settings(about: About, place: str, method: str) -> dict[str, Any]:
-    """The settings in a bundle, for a method: all of its own, and those that another one on board knows.
-
-    Raises:
-        DataError: settings that no robot should try.
-    """
-    values, kind = dict(about.settings), method_class(about.method)
+    kind, values = method_class(about.method), dict(about.settings)
     weights = values.get("effort_weights")
     try:
         if isinstance(weights, dict):
             values["effort_weights"] = EffortWeights(**weights)
-        values = vars(checked_settings(kind, values))
+        settings = checked_settings(kind, values)
     except (AllocationError, TypeError) as error:
-        raise DataError(f"{place}: settings: {error}") from None
-    known = method_class(method).option_names() if method in METHODS_ON_BOARD else []
-    return {name: value for name, value in values.items() if name in known}
+        raise DataError(f"{source}/{ABOUT}: settings: {error}") from None
+    if changes:
+        settings = checked_settings(kind, vars(settings) | changes)
+    if about.method not in LEARNED:
+        return MethodChoice(kind, settings)
+    part = checkpoint_part(files)
+    if not part or about.checkpoint is None:
+        raise DataError(f"{source}: holds no networks, which method {about.method!r} needs; export it again")
+    networks = parse_checkpoint(part, f"{source}/{CHECKPOINT.rstrip('/')}", about.checkpoint)
+    return MethodChoice(kind, settings, networks)
 
 
 def checked_settings(kind: type[Method], settings: dict[str, Any]) -> Settings:

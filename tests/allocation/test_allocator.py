@@ -182,12 +182,6 @@ def test_unknown_methods_are_refused_with_the_names_that_exist() -> None:
     assert str(caught.value) == f"method: expected one of {', '.join(METHODS)}, got 'magic'"
 
 
-@pytest.mark.parametrize("method", ["trf", "slsqp", "multistart", "fast"])
-def test_earlier_methods_are_refused_with_a_sentence(method: str) -> None:
-    with pytest.raises(AllocationError, match=f"method: '{method}' has gone; "):
-        AnyRobot(method)
-
-
 def test_the_command_line_names_every_method() -> None:
     words = str(allocate.__doc__)
     assert all(name in words for name in METHODS)

@@ -160,8 +160,6 @@ def test_an_answer_of_another_robot_is_not_explored() -> None:
 
 def test_what_is_no_method_is_refused() -> None:
     layout = load_layout("A")
-    with pytest.raises(AllocationError, match="method: 'search' is now called 'dual'"):
-        Allocator(layout, "search")
     with pytest.raises(AllocationError, match="method: expected the name of a method, got 3"):
         Allocator(layout, 3)  # type: ignore[call-overload]
     assert not hasattr(finlab, "load_allocator")

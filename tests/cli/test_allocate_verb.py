@@ -187,8 +187,6 @@ def test_shipped_name_works_from_any_folder(
             "has no fin left",
         ),
         (["A", *WRENCH, "--method", "magic"], "method: expected one of dual, mdn, paper"),
-        (["A", *WRENCH, "--method", "learned"], "method: 'learned' is now called 'dual'"),
-        (["A", *WRENCH, "--method", "fast"], "method: 'fast' has gone; 'dual' is exact on any fin"),
         (["A", *WRENCH, "--objective", "money"], "--objective"),
         (["A", *WRENCH, "--seed", "x"], "--seed"),
         (["missing.yaml", *WRENCH], "neither a file nor a shipped layout"),

@@ -64,15 +64,6 @@ def test_the_library_reads_it(bundle: Bundle, shipped_allocator: AnyRobot, tmp_p
     truth = shipped_allocator.allocate(finlab.load_layout("A"), WRENCH)
     for place in (tmp_path / "A", str(tmp_path / "A.zip")):
         assert Allocator.from_bundle(place).allocate(WRENCH) == truth
-    assert Allocator.from_bundle(tmp_path / "A.zip", "sqp").method == "sqp"
-    with pytest.raises(AllocationError, match="method: expected one of .* got 'nowhere'"):
-        Allocator.from_bundle(tmp_path / "A", "nowhere")
-    with pytest.raises(
-        DataError, match="holds no networks, which method 'mdn' needs; export .* --method mdn`"
-    ):
-        Allocator.from_bundle(tmp_path / "A", "mdn")
-    with pytest.raises(DataError, match="method 'paper' does not run from a bundle; name its checkpoint"):
-        Allocator.from_bundle(tmp_path / "A", "paper")
 
 
 def test_networks_travel_for_the_method_that_needs_them(
@@ -84,10 +75,9 @@ def test_networks_travel_for_the_method_that_needs_them(
         assert with_networks.files[f"checkpoint/{name}"] == (untrained_mdn / name).read_bytes()
     for allocator in (
         Allocator.from_bundle(tmp_path),
-        Allocator(finlab.load_layout("A"), "mdn", checkpoint=tmp_path),
+        Allocator(finlab.load_layout("A"), "mdn", checkpoint=tmp_path / "checkpoint"),
     ):
         assert allocator.allocate(WRENCH) == desk.allocate(WRENCH)
-    assert Allocator.from_bundle(tmp_path, "dual").method == "dual"
     assert read_checkpoint(tmp_path / "checkpoint").sha256 == desk.weights.sha256
 
 

@@ -28,7 +28,6 @@ def test_starts() -> None:
 @pytest.mark.parametrize(
     ("names", "message"),
     [
-        ("learned", "method: 'learned' is now called 'dual'"),
         ("dual,fast", "method: 'fast' has gone"),
         ("dual-32", "a number of starts, from 1, goes with ipopt only, got 'dual-32'"),
         ("paper-effort", "objective: method 'paper' has no choice"),
