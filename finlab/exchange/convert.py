@@ -5,6 +5,7 @@ import re
 from collections.abc import Callable
 from pathlib import Path
 
+from finlab.assets import shipped_layouts
 from finlab.errors import CommandError, LayoutError
 from finlab.exchange.ardusub import read_ardusub, write_ardusub
 from finlab.exchange.description_text import description_text
@@ -22,8 +23,8 @@ from finlab.whole_file import write_whole
 MAX_BYTES = 5_000_000
 """Largest file that is read; meshes are files of their own and are not touched."""
 WRITERS: dict[str, Callable[[Layout, Exchange, str], str]] = {
-    "urdf": lambda layout, exchange, _: description_text(layout, exchange, "urdf"),
-    "sdf": lambda layout, exchange, _: description_text(layout, exchange, "sdf"),
+    "urdf": lambda layout, exchange, _: description_text(layout, exchange, sdf=False),
+    "sdf": lambda layout, exchange, _: description_text(layout, exchange, sdf=True),
     "px4": write_px4,
     "ardusub": write_ardusub,
     "matrix": write_matrix,
@@ -65,7 +66,7 @@ def read_any(file: str, exchange: Exchange) -> Layout:
         FinlabError: it cannot be read, or holds no form that is known.
     """
     path = Path(file)
-    if not is_regular(path) or path.suffix.lower() == ".zip":
+    if file in shipped_layouts() or not is_regular(path) or path.suffix.lower() == ".zip":
         return load_layout(file)
     text = read_text(path, MAX_BYTES, "a robot description, parameters, a matrix or a layout", LayoutError)
     name = path.stem.strip()[:64].strip() or "robot"

@@ -4,6 +4,7 @@ A description is taken in its zero position, in the frame of its root link or mo
 (REP-103). Nothing but its text is read; models inside a model and <include> stay closed.
 """
 
+import math
 import re
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -20,6 +21,8 @@ Named = dict[str, Element]
 """Links, joints and frames by `link NAME`, `joint NAME` and `frame NAME`."""
 ADDED = ("xx", "yy", "zz", "pp", "qq", "rr")
 """Diagonal of SDF's <fluid_added_mass>."""
+MOMENTS = ("xx", "xy", "xz", "yy", "yz", "zz")
+"""Names of the entries of an inertia."""
 TURNING = ("revolute", "continuous")
 """Kinds of joints that turn."""
 
@@ -72,11 +75,14 @@ def parse_description(text: str, name: str) -> Description:
         raise LayoutError(f"expected a <robot> of URDF or a <model> of SDF, got <{root.tag:.40}>")
     top = next((model for model in models if model.find(".//plugin") is not None), models[0])
     named = {f"{tag} {_name(part)}": part for tag in ("link", "joint", "frame") for part in top.findall(tag)}
-    movers = {said(part, "child@link child"): key for key, part in named.items() if part.tag == "joint"}
-    hung = {key: _hung(key, part, named, movers) for key, part in named.items()}
+    movers = {said(part, "child@link"): key for key, part in named.items() if part.tag == "joint"}
+    hung = {key: _hung(part, named, movers) for key, part in named.items()}
     poses = {"": np.eye(4)}
-    for key in hung:
-        _place(key, hung, poses)
+    try:
+        for key in list(hung):
+            _place(key, hung, poses)
+    except RecursionError:
+        raise LayoutError("has a chain of joints too long to follow") from None
     joints = {_name(part): _joint(part, named, poses) for part in top.findall("joint")}
     links = {key.removeprefix("link "): pose for key, pose in poses.items() if key.startswith("link ")}
     plugins = [*top.findall("gazebo/plugin"), *top.findall("plugin"), *top.findall("link/plugin")]
@@ -134,19 +140,15 @@ def _name(element: Element) -> str:
     return name
 
 
-def _hung(key: str, part: Element, named: Named, joints: dict[str, str]) -> tuple[str, Array]:
-    """What a frame hangs on ("" for the description itself), and its pose there."""
-    if (
-        part.tag == "joint" and part.find("parent[@link]") is not None
-    ):  # of URDF; what is moved is where it is
-        return f"link {said(part, 'parent@link')}", _pose(part, key)
-    base = said(part, "pose@relative_to") or part.get("attached_to", "")
+def _hung(part: Element, named: Named, movers: dict[str, str]) -> tuple[str, Array]:
+    """What a frame hangs on ("" for the description itself), and its pose there: in URDF a joint on its
+    parent, and a link where its joint is; in SDF a link on the model, and a joint on its child."""
+    told = said(part, "pose@relative_to") or part.get("attached_to", "")
+    if told:
+        return _key(told, named), _pose(part)
     if part.tag == "joint":
-        return _key(base, named) or f"link {said(part, 'child')}", _pose(part, key)
-    mover = joints.get(key.removeprefix("link "), "")
-    if part.tag == "link" and mover and named[mover].find("parent[@link]") is not None:
-        return mover, np.eye(4)
-    return _key(base, named), np.eye(4) if part.find("pose") is None else _pose(part, key)
+        return f"link {said(part, 'parent@link child')}", _pose(part)
+    return movers.get(part.get("name", ""), "") if part.tag == "link" else "", _pose(part)
 
 
 def _key(name: str, named: Named) -> str:
@@ -156,37 +158,29 @@ def _key(name: str, named: Named) -> str:
     return next((f"{tag} {name}" for tag in ("link", "joint", "frame") if f"{tag} {name}" in named), name)
 
 
-def _pose(part: Element, what: str) -> Array:
+def _pose(part: Element) -> Array:
     """The pose (4, 4) that a part has as <origin> in URDF, or as <pose> in SDF."""
-    pose, found = np.eye(4), part.find("pose")
-    place, turn = (
-        numbers(said(part, f"origin@{key}", "0 0 0"), 3, f"the origin of {what:.60}")
-        for key in ("xyz", "rpy")
-    )
-    if found is not None:
-        quaternion = found.get("rotation_format") == "quat_xyzw"
-        values = numbers(found.text or "0 0 0 0 0 0", 7 if quaternion else 6, f"the pose of {what:.60}")
-        place, turn = values[:3], np.radians(values[3:]) if found.get("degrees") == "true" else values[3:]
-    if len(turn) == 4 and not turn.any():
-        raise LayoutError(f"the quaternion of {what:.60} has no length")
-    rotation = Rotation.from_quat(turn) if len(turn) == 4 else Rotation.from_euler("xyz", turn)
-    pose[:3, :3], pose[:3, 3] = rotation.as_matrix(), place
+    what, found = f"the pose of {part.tag} {part.get('name', '')!r:.60}", part.find("pose")
+    text = " ".join(said(part, f"origin@{key}", "0 0 0") for key in ("xyz", "rpy"))
+    quaternion = found is not None and found.get("rotation_format") == "quat_xyzw"
+    values = numbers(said(part, "pose", text), 7 if quaternion else 6, what)
+    if quaternion and not values[3:].any():
+        raise LayoutError(f"{what} has a quaternion without length")
+    degrees = found is not None and found.get("degrees") == "true"
+    turn = Rotation.from_quat(values[3:]) if quaternion else Rotation.from_euler("xyz", values[3:], degrees)
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = turn.as_matrix(), values[:3]
     return pose
 
 
-def _place(key: str, hung: dict[str, tuple[str, Array]], poses: dict[str, Array]) -> None:
-    """Puts the pose of a frame, and of those on the way to it, into `poses`."""
-    chain: list[str] = []
-    while key not in poses:
-        chain.append(key)
-        if key not in hung:
-            raise LayoutError(f"names {key!r:.80}, which is not in it")
-        if len(chain) > len(hung):
-            raise LayoutError(f"has joints in a circle around {key!r:.80}")
-        key = hung[key][0]
-    for step in reversed(chain):
-        base, pose = hung[step]
-        poses[step] = poses[base] @ pose
+def _place(key: str, hung: dict[str, tuple[str, Array]], poses: dict[str, Array]) -> Array:
+    """The pose of a frame, which goes from `hung` to `poses` with those on the way to it."""
+    if key not in poses:
+        if key not in hung:  # not there, or on its own way to here
+            raise LayoutError(f"has no place for {key!r:.80}: it is missing, or hangs on itself in a circle")
+        base, pose = hung.pop(key)
+        poses[key] = _place(base, hung, poses) @ pose
+    return poses[key]
 
 
 def _joint(part: Element, named: Named, poses: dict[str, Array]) -> Joint:
@@ -199,15 +193,14 @@ def _joint(part: Element, named: Named, poses: dict[str, Array]) -> Joint:
     length = float(np.linalg.norm(axis))
     if length == 0.0 and kind in TURNING:
         raise LayoutError(f"the axis of {what} has no length")
-    ends = []
-    for end, usual in (("lower", "-inf"), ("upper", "inf")):
-        text = usual if kind == "continuous" else said(part, f"limit@{end} axis/limit/{end}", usual)
-        try:
-            ends.append(float(text) if abs(float(text)) < 1e9 else float(usual))
-        except ValueError:
-            raise LayoutError(f"a limit of {what} is no number: {text!r:.40}") from None
+    texts = (said(part, f"limit@{end} axis/limit/{end}") for end in ("lower", "upper"))
+    try:
+        low, high = (float(text or math.inf) if kind != "continuous" else math.inf for text in texts)
+    except ValueError:
+        raise LayoutError(f"a limit of {what} is no number") from None
+    ends = (low, high) if max(abs(low), abs(high)) < 1e9 else (-math.inf, math.inf)
     names = said(part, "parent@link parent"), said(part, "child@link child")
-    return Joint(name, kind, *names, axis / (length or 1.0), (ends[0], ends[1]))
+    return Joint(name, kind, *names, axis / (length or 1.0), ends)
 
 
 def _masses(links: dict[str, Element], poses: dict[str, Array]) -> tuple[float, Array, Array, Array]:
@@ -216,12 +209,10 @@ def _masses(links: dict[str, Element], poses: dict[str, Array]) -> tuple[float, 
     for name, link in links.items():
         inertial = link.find("inertial")
         if inertial is not None:
-            xx, xy, xz, yy, yz, zz = (
-                number(inertial, f"inertia@i{key} inertia/i{key}")
-                for key in ("xx", "xy", "xz", "yy", "yz", "zz")
-            )
-            pose = poses[name] @ _pose(inertial, f"the mass of link {name!r}")
-            own = pose[:3, :3] @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ pose[:3, :3].T
+            told = [number(inertial, f"inertia@i{key} inertia/i{key}") for key in MOMENTS]
+            inertia = np.array(told)[[[0, 1, 2], [1, 3, 4], [2, 4, 5]]]
+            pose = poses[name] @ _pose(inertial)
+            own = pose[:3, :3] @ inertia @ pose[:3, :3].T
             parts.append((number(inertial, "mass@value mass"), pose[:3, 3], own))
             added += [number(inertial, f"fluid_added_mass/{key}") for key in ADDED]
     mass, center, inertia = sum(part[0] for part in parts), np.zeros(3), np.zeros((3, 3))

@@ -64,11 +64,9 @@ class Exchange:
         """
         size = float(np.linalg.norm(column[:3]))
         if not 1e-9 < size < 1e9:
-            raise LayoutError(
-                f"{name!r:.60} has no force, and finlab has no actuator that gives torque alone"
-            )
+            raise LayoutError(f"{name!r:.60} has no force; no actuator of finlab gives torque alone")
         self.note(
-            "It has no places: each thruster sits where the line of its force is nearest to the origin."
+            "It has no places: thrusters sit where the lines of their forces are nearest to the origin."
         )
         axis, torque = column[:3] / size, column[3:] / size
         ends = None if force is None else (force[0] * size, force[1] * size)
@@ -86,9 +84,8 @@ class Exchange:
             raise LayoutError(f"layout {layout.name} has no thruster, and {form} has a place for these alone")
         if left:
             self.note(f"{form} has a place for thrusters alone; left out are {', '.join(left)}.")
-        self.note(
-            f"{form} has no place for {', '.join(['power, dead bands, rates, time constants', *lost])}."
-        )
+        lost = ("power", "dead bands", "rates", "time constants", *lost)
+        self.note(f"{form} has no place for {', '.join(lost)}.")
         return kept
 
 

@@ -50,20 +50,18 @@ def read_description(text: str, name: str, exchange: Exchange) -> Layout:
     parts: list[Actuator] = []
     for plugin in _plugins(robot, "Thruster")[: MAX_ACTUATORS + 1]:
         joint = robot.joints.get(said(plugin, "joint_name"))
-        if joint is None:
-            raise LayoutError(
-                f"a thruster's plugin names joint {said(plugin, 'joint_name')!r:.60}, which is not in it"
-            )
+        if joint is None or joint.child not in robot.links:
+            name = said(plugin, "joint_name")
+            raise LayoutError(f"a thruster's plugin names joint {name!r:.60}, which moves no link in it")
         parts.append(_propeller(robot, joint, plugin, start, exchange))
     for link in exchange.thrusters:
         parts.append(_propeller(robot, _joint_of(robot, link), Element("plugin"), start, exchange))
     for link in exchange.fins:
         parts.append(_fin(_joint_of(robot, link), robot.links[link][:3, 3] - start, exchange))
     if not parts:
-        links = ", ".join(sorted(joint.child for joint in robot.joints.values())) or "none"
         raise LayoutError(
             "has no plugin Thruster of gz-sim; name the links that are fins (--fins LINK...) or thrusters "
-            f"(--thrusters LINK...) among those that a joint moves: {links:.300}"
+            f"(--thrusters LINK...); a joint moves {_moved(robot)}"
         )
     place = "centre of gravity" if at_gravity else "base frame"
     return Layout(robot.name, tuple(parts), f"Origin at the {place}.", _body(robot, at_gravity, exchange))
@@ -72,27 +70,26 @@ def read_description(text: str, name: str, exchange: Exchange) -> Layout:
 def _plugins(robot: Description, kind: str) -> list[Element]:
     """The plugins of gz-sim of a kind."""
     file = f"{kind.lower()}-system"
-    return [
-        each
-        for each in robot.plugins
-        if each.get("name", "").endswith(f"::{kind}") or file in each.get("filename", "")
-    ]
+    names = ((each.get("name", ""), each.get("filename", ""), each) for each in robot.plugins)
+    return [each for name, library, each in names if name.endswith(f"::{kind}") or file in library]
 
 
 def _joint_of(robot: Description, link: str) -> Joint:
     joint = robot.joint_of(link)
     if joint is None or link not in robot.links:
-        links = ", ".join(sorted(joint.child for joint in robot.joints.values())) or "none"
-        raise LayoutError(f"has no link {link!r:.60} that a joint moves; such links: {links:.300}")
+        raise LayoutError(f"has no link {link!r:.60} that a joint moves; such links: {_moved(robot)}")
     return joint
+
+
+def _moved(robot: Description) -> str:
+    links = sorted(joint.child for joint in robot.joints.values())
+    return f"{', '.join(links) or 'none'}"[:300]
 
 
 def _propeller(
     robot: Description, joint: Joint, plugin: Element, start: Array, exchange: Exchange
 ) -> Actuator:
     """The thruster that a joint spins, or the azimuth where its mount turns, too."""
-    if joint.child not in robot.links:
-        raise LayoutError(f"joint {joint.name!r:.60} moves link {joint.child!r:.60}, which is not in it")
     place = robot.links[joint.child][:3, 3] - start
     part = exchange.thruster(joint.child, place, joint.axis, _force(plugin))
     part = replace(part, dead_band=number(plugin, "deadband"))
@@ -101,9 +98,7 @@ def _propeller(
         return part
     along = float(mount.axis @ joint.axis)
     if abs(along) > MAX_LEAN:
-        raise LayoutError(
-            f"the thrust of {joint.child!r:.60} leans out of the plane in which its mount turns"
-        )
+        raise LayoutError(f"the thrust of {joint.child!r:.60} leans out of the plane in which it turns")
     zero = (joint.axis - along * mount.axis) / math.sqrt(1.0 - along * along)
     arm = place - (robot.links[joint.parent][:3, 3] - start)
     if part.force[0] < 0.0:
@@ -131,7 +126,7 @@ def _fin(joint: Joint, place: Array, exchange: Exchange) -> Fin:
     """The fin that a joint moves."""
     if joint.kind not in TURNING:
         raise LayoutError(
-            f"joint {joint.name!r:.60} is {joint.kind}; a fin's joint turns: revolute or continuous"
+            f"joint {joint.name!r:.60} is {joint.kind}; a fin's joint is {' or '.join(TURNING)}"
         )
     axis = joint.axis
     if abs(axis[2]) <= math.sin(MAX_TILT):

@@ -58,12 +58,8 @@ def csv_values(text: str) -> dict[str, Any]:
     told = {row[0].strip(): row[1:] for row in rows}
     if "Fx" not in told:
         return {**beside, "matrix": rows}
-    limits = (
-        {"limits": [*zip(told["least"], told["most"], strict=False)]}
-        if {"least", "most"} <= set(told)
-        else {}
-    )
-    return {**beside, **limits, "names": [cell.strip() for cell in rows[0][1:]], "matrix": told}
+    limits = [*zip(told.get("least", []), told.get("most", []), strict=False)] or None
+    return {**beside, "limits": limits, "names": [cell.strip() for cell in rows[0][1:]], "matrix": told}
 
 
 def _searched(data: Any) -> tuple[Array, Mapping[str, Any]] | None:
@@ -104,9 +100,8 @@ def write_matrix(layout: Layout, exchange: Exchange, suffix: str) -> str:
     names, limits = [part.name for part in parts], [list(part.force) for part in parts]
     matrix = dict(zip(AXES, rows.tolist(), strict=True))
     if suffix != ".csv":
-        return yaml_text(
-            {"frame": exchange.frame, "unit": "N", "names": names, "limits": limits, "matrix": matrix}
-        )
+        told = {"frame": exchange.frame, "unit": "N", "names": names, "limits": limits}
+        return yaml_text({**told, "matrix": matrix})
     table = {"axis": names, **matrix, **dict(zip(("least", "most"), zip(*limits, strict=True), strict=True))}
     lines = [",".join(map(str, [key, *row])) for key, row in table.items()]
     return "\n".join([f"# frame: {exchange.frame}", *lines]) + "\n"

@@ -199,13 +199,13 @@ PLUGIN = (
         ("<robot>", ("x",), "is not readable XML"),
         ("<svg/>", (), "expected a <robot> of URDF or a <model> of SDF, got <svg>"),
         (TURTLE.read_text(), ("nobody",), "has no link 'nobody' that a joint moves; such links: front"),
-        (TURTLE.read_text(), ("mount",), "joint 'mount_joint' is fixed; a fin's joint turns"),
+        (TURTLE.read_text(), ("mount",), "joint 'mount_joint' is fixed; a fin's joint is revolute or"),
         (TURTLE.read_text(), (), "has no plugin Thruster of gz-sim; name the links that are fins"),
         (TURTLE.read_text().replace('mass value="10"', 'mass value="0"'), FINS, "has no masses"),
         (TURTLE.read_text().replace('xyz="0.2 ', 'xyz="20e3 '), FINS, r"position_m\[0\]: must lie"),
-        (TURTLE.read_text().replace('xyz="0.2 ', 'xyz="west '), FINS, "the origin of .* is not 3 numbers"),
-        (TURTLE.read_text().replace("</robot>", PLUGIN), (), "plugin names joint 'x', which is not in it"),
-        (TURTLE.read_text().replace('"base_link"/><child', '"tail_fin"/><child'), FINS, "joints in a circle"),
+        (TURTLE.read_text().replace('xyz="0.2 ', 'xyz="west '), FINS, "pose of joint .* is not 6 numbers"),
+        (TURTLE.read_text().replace("</robot>", PLUGIN), (), "joint 'x', which moves no link in it"),
+        (TURTLE.read_text().replace('"base_link"/><child', '"tail_fin"/><child'), FINS, "itself in a circle"),
     ],
 )  # fmt: skip
 def test_refusals_say_what_is_wrong(
