@@ -2,14 +2,15 @@
 
 import io
 import math
-import re
 import struct
+import tokenize
 import zipfile
 import zlib
 from collections.abc import Iterable, Mapping
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
+from numpy.lib import format as npy
 
 from finlab.arrays import AnyArray
 from finlab.errors import DataError, FinlabError
@@ -30,10 +31,6 @@ _DAMAGED = (
 )
 """What reading a damaged or locked archive ends with."""
 _PACKED = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
-_ARRAY = re.compile(
-    rb"\s*\{\s*'descr': '([<>|][biufcU][0-9]{1,7})', 'fortran_order': (True|False), "
-    rb"'shape': \(([0-9, ]{0,100})\),? ?\}\s*"
-)
 
 
 def member_names(content: bytes, source: str, error: type[FinlabError] = DataError) -> list[str]:
@@ -134,18 +131,16 @@ def check_shapes(arrays: Mapping[str, AnyArray], shapes: Mapping[str, tuple[int,
 def _array(content: bytes, name: str, source: str) -> AnyArray:
     """The array of an NPY file of numbers, truth values or text."""
     try:
-        pattern, begin = {1: ("<H", 10), 2: ("<I", 12), 3: ("<I", 12)}[content[6]]
-        end = begin + int(struct.unpack_from(pattern, content, 8)[0])
-        described = _ARRAY.fullmatch(content[begin:end])
-        if content[:6] != b"\x93NUMPY" or described is None:
+        stream = io.BytesIO(content)
+        header = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}[
+            npy.read_magic(stream)
+        ]
+        shape, fortran, dtype = header(stream)
+        if dtype.kind not in "biufcU" or math.prod(shape) * dtype.itemsize != len(content) - stream.tell():
             raise ValueError
-        dtype = np.dtype(described[1].decode())
-        shape = tuple(int(part) for part in described[3].split(b",") if part.strip())
-        if math.prod(shape) * dtype.itemsize != len(content) - end:
-            raise ValueError
-        order: Literal["C", "F"] = "F" if described[2] == b"True" else "C"
-        return np.frombuffer(bytearray(content[end:]), dtype).reshape(shape, order=order)
-    except (LookupError, TypeError, ValueError, struct.error):
+        data = np.frombuffer(bytearray(content[stream.tell() :]), dtype)
+        return data.reshape(shape, order="F" if fortran else "C")
+    except (*_DAMAGED, tokenize.TokenError):
         plain = f"{name.removesuffix('.npy')!r:.60} in it is damaged, or no array of numbers or text"
         raise DataError(f"{source}: {plain}") from None
 

@@ -1,9 +1,8 @@
-"""CSV files of numbers under a header: read quickly, and with line and column where one is wrong."""
+"""CSV files of numbers under a header, with line and column where one is wrong."""
 
 import csv
 import math
-import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,10 +10,6 @@ from numpy.typing import NDArray
 from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.files.guarded import Name, decoded, read_file
-
-CHUNK = 4_000_000
-"""About so much is parsed at a time [bytes]."""
-_GAP = re.compile(r"(?<=[,;\t])[ \t]*(?=[,;\t]|$)|^[ ]*(?=[,;\t])", re.MULTILINE)
 
 
 class CsvTable:
@@ -27,19 +22,15 @@ class CsvTable:
             DataError: it is no text.
         """
         self.source, self._gaps = source, gaps
-        notes, start = [], 3 if content.startswith(b"\xef\xbb\xbf") else 0
-        while content[start : start + 1] == b"#":
-            end = content.find(b"\n", start) + 1 or len(content)
-            notes.append(decoded(content[start:end], source, "CSV text").lstrip("# ").rstrip())
-            start = end
-        self.notes = tuple(notes)
+        lines = decoded(content, source, "CSV text").splitlines()
+        above = next((i for i, line in enumerate(lines) if not line.startswith("#")), len(lines))
+        self.notes = tuple(line.lstrip("# ").rstrip() for line in lines[:above])
         """Lines above the header that begin with #, without it."""
-        end = content.find(b"\n", start) + 1 or len(content)
-        first = decoded(content[start:end], source, "CSV text").rstrip("\r\n")
+        first = lines[above] if above < len(lines) else ""
         self._delimiter = max(",;\t", key=first.count)
-        self.header = [cell.strip() for cell in self._cells(first, f"{source}: line {len(notes) + 1}")]
+        self.header = [cell.strip() for cell in self._cells(first, f"{source}: line {above + 1}")]
         """Names of the columns."""
-        self._content, self._start = content, end
+        self._rows, self._first = lines[above + 1 :], above + 2
 
     def numbers(self, places: Sequence[int]) -> tuple[Array, NDArray[np.intp]]:
         """Returns the columns at some places (rows, len(places)), and the line of each row (rows,).
@@ -49,37 +40,14 @@ class CsvTable:
         Raises:
             DataError: there is no row, or a row or a cell is wrong; the sentence names line and column.
         """
-        values, lines, line = [], [], len(self.notes) + 2
-        for text in self._chunks():
-            rows = text.splitlines()
-            kept = [i for i, row in enumerate(rows) if row.strip(" ,;\t") and not row.startswith("#")]
-            if kept:
-                lines.append(np.array(kept) + line)
-                values.append(self._parsed([rows[i] for i in kept], places, lines[-1]))
-            line += len(rows)
-        if not values:
+        rows = [
+            (line, row)
+            for line, row in enumerate(self._rows, self._first)
+            if row.strip(" ,;\t") and not row.startswith("#")
+        ]
+        if not rows:
             raise DataError(f"{self.source}: has no rows below its header")
-        return np.concatenate(values), np.concatenate(lines)
-
-    def _chunks(self) -> Iterator[str]:
-        start = self._start
-        while start < len(self._content):
-            end = self._content.find(b"\n", start + CHUNK) + 1 or len(self._content)
-            yield decoded(self._content[start:end], self.source, "CSV text")
-            start = end
-
-    def _parsed(self, rows: list[str], places: Sequence[int], lines: NDArray[np.intp]) -> Array:
-        width = len(self.header) - 1
-        if places and all(row.count(self._delimiter) == width and '"' not in row for row in rows):
-            text = [_GAP.sub("nan", row) for row in rows] if self._gaps else rows
-            try:
-                found = np.loadtxt(text, delimiter=self._delimiter, usecols=places, comments=None, ndmin=2)
-            except ValueError:
-                found = np.empty(0)
-            known = np.isfinite(found) | (np.isnan(found) & self._gaps)
-            if len(found) == len(rows) and known.all():
-                return np.asarray(found, np.float64)
-        return np.array([self._row(row, places, int(at)) for row, at in zip(rows, lines, strict=True)])
+        return np.array([self._row(row, places, line) for line, row in rows]), np.array([n for n, _ in rows])
 
     def _row(self, row: str, places: Sequence[int], line: int) -> list[float]:
         """One row, or a sentence on what is wrong in it."""
@@ -87,6 +55,12 @@ class CsvTable:
         cells = self._cells(row, where)
         if len(cells) != len(self.header):
             raise DataError(f"{where} has {len(cells)} values, the header has {len(self.header)}")
+        try:
+            found = [float(cells[i]) for i in places]
+            if "_" not in row and all(map(math.isfinite, found)):
+                return found
+        except ValueError:
+            pass
         return [self._number(cells[i].strip(), f"{where}, column {self.header[i]},") for i in places]
 
     def _cells(self, row: str, where: str) -> list[str]:
