@@ -219,6 +219,8 @@ class Allocation(Answer):
     """Settings of the method, by name."""
     previous: Array | None = None
     """Command (n, 3) of the previous tick, if it was given."""
+    prices: Array | None = field(default=None, compare=False)
+    """What one more unit of each axis of the wrench costs (6,) [W/N, W/(N m)], where the method tells."""
 
     @property
     def commands(self) -> dict[str, Command | None]:

@@ -196,7 +196,7 @@ class Allocator:
         wrench: ArrayLike,
         *,
         failed: Sequence[str] = (),
-        previous: ArrayLike | None = None,
+        previous: ArrayLike | Allocation | None = None,
         reference: ArrayLike | None = None,
         policy: Policy | str = CLOSEST,
         health: Health | None = None,
@@ -208,8 +208,8 @@ class Allocator:
         Args:
             wrench: desired wrench (6,) [N, N m] in the body frame.
             failed: names of fins that do not work; they leave the graph.
-            previous: command (n, 3) of the previous tick: fins then turn slowly, and the robot changes the
-                way it moves only when that pays.
+            previous: command (n, 3) of the previous tick: what follows stays within the rates of the
+                actuators. Or the answer that gave it: the search then begins there, which is quicker.
             reference: wrenches (K, 6) that are expected to be asked for at the next K ticks. A method that
                 knows how late its fins follow answers the one that they will be in time for, which is then
                 the result's target; others answer the present one.
@@ -232,11 +232,18 @@ class Allocator:
         ready = self._ready(failed, health)
         fins, method = ready.fins, ready.method
         method.check_policy(policy)
+        options: dict[str, Any] = {}
+        if isinstance(previous, Allocation):
+            if method.begins_at_prices and previous.prices is not None:
+                options["prices"] = previous.prices
+            previous = previous.command
         before = None if previous is None else check_previous(previous, fins.layout)[fins.alive]
         start = time.perf_counter()
         if reference is not None:
             target = method.in_time(target, check_wrenches(reference, single=False, name="reference"))
-        solution = method.solve(target[None], policy=policy, previous=before, flow=water, seed=seed)
+        solution = method.solve(
+            target[None], policy=policy, previous=before, flow=water, seed=seed, **options
+        )
         solve_ms = (time.perf_counter() - start) * 1e3
         return Allocation(
             **self._about(target, ready, solution, policy, health, water, seed),
@@ -245,6 +252,7 @@ class Allocator:
             settings=vars(self.settings).copy(),
             previous=None if before is None else fins.among_all(before),
             wrench_expected=None if solution.wrench is None else solution.wrench[0],
+            prices=None if solution.prices is None else solution.prices[0],
         )
 
     def explore(self, result: Allocation) -> tuple[Mode, ...]:

@@ -35,6 +35,8 @@ class Method(ABC):
     """Whether more than the least plain error may be asked for."""
     takes: ClassVar[Takes] = "any actuator"
     """What the robot may have."""
+    begins_at_prices: ClassVar[bool] = False
+    """Whether `solve` takes the `prices` of an earlier answer, to begin there."""
     fin_model: FinModelSpec | None = None
     """Fin model that the networks have learned; None for methods that ask every fin's own model."""
 

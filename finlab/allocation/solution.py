@@ -77,3 +77,5 @@ class Solution(NamedTuple):
     """Gives the refined candidates, for a single target."""
     samples: Callable[[], Candidates] | None = None
     """Gives the raw candidates before refinement, for a single target."""
+    prices: Array | None = None
+    """What one more unit of each axis of the wrenches costs (N, 6) [W/N, W/(N m)], where the method tells."""

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.actuators.fin.blade import COPPER_LOSS
+from finlab.allocation.allocation import Allocation
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.policy import Policy, as_policy
 from finlab.arrays import Array
@@ -138,7 +139,7 @@ class ClosedLoop:
         self._ticks: list[Tick] = []
         self._setpoints: deque[Setpoint] = deque()  # of this tick and the next ones
         self._command: Array | None = None
-        self._answered: Array | None = None  # the same, before a monitor's pushes
+        self._answered: Allocation | None = None  # what it came from, before a monitor's pushes
         self.period_s = self.controller.period_s
         """Length of a step [s]."""
         self._lag, self._gave = FinLag(layout), NO_WRENCH
@@ -257,7 +258,7 @@ class ClosedLoop:
             policy=self.policy,
             seed=self.seed,
         )
-        self._answered = command = answer.command
+        self._answered, command = answer, answer.command
         if self.monitor is not None:
             command = self.monitor.probed(command)
         tick = self._move(now, setpoint, answer.target, command, answer.solve_ms)

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from finlab.actuators.response import CELLS, Line, Plane, price_grid
 from finlab.allocation.dual.gauges import Gauges
 from finlab.arrays import Array
-from finlab.precision import FINE, NOTHING, ROUNDS
+from finlab.layout.angles import wrapped
+from finlab.precision import CLOSE, FINE, NOTHING, ROUNDS, SMALL
 
 TURNING = 1e-2
 """Price, as a share of the mean one of the least force, over which a force that cannot rest turns round."""
@@ -32,8 +33,8 @@ class Answer(NamedTuple):
     derivative: Array
     """Derivatives by the prices (l + 3 p, N) [N^2/W]: of lines, then of planes first-first, first-second and
     second-second."""
-    conjugate: Array
-    """Sum of the conjugates (N,) [W]."""
+    conjugate: Array | None
+    """Sum of the conjugates (N,) [W]; None where it was not asked for."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,6 +94,11 @@ class Sets:
         return cls(low, high, low_cost, high_cost, middle, half, whole)
 
     @cached_property
+    def least_cost(self) -> float:
+        """At most this much [W] is worth less than nothing of what the actuators cannot help to give."""
+        return float(np.maximum(self.low_cost, 0.0).sum(axis=0).max())
+
+    @cached_property
     def most_cost(self) -> Array:
         """Power (1,) or (N,) [W] of all actuators at the dearer ends of their sets."""
         found: Array = np.maximum(self.low_cost, self.high_cost).sum(axis=0)
@@ -129,13 +135,15 @@ class Answers:
 
     def sizes(self, force: Array) -> Array:
         """Sizes (p, N) [N] of the planes' forces, of forces (k, N) along all directions."""
-        _, first, second = np.split(force, [self.lines, self.lines + self.planes])
-        size: Array = np.hypot(first, second)
+        n = self.lines + self.planes
+        size: Array = np.hypot(force[self.lines : n], force[n:])
         return size
 
-    def radial(self, price: Array, row: NDArray[np.intp]) -> tuple[Array, Array, Array]:
-        """Force [N], its derivative and conjugate [W] (m, N) at prices (m, N) from 0 on in rows (m, 1) or (m,
-        N) of the tables, two for each actuator."""
+    def radial(
+        self, price: Array, row: NDArray[np.intp], worth: bool = True
+    ) -> tuple[Array, Array, Array | None]:
+        """Force [N], its derivative and, where it is asked for, conjugate [W] (m, N) at prices (m, N) from 0
+        on in rows (m, 1) or (m, N) of the tables, two for each actuator."""
         top = self._top[row]
         share = price / top
         cell = np.minimum((np.sqrt(np.sqrt(share)) * CELLS).astype(np.intp), CELLS)
@@ -146,6 +154,8 @@ class Answers:
         bend = x * x * square
         force = a0 + linear + bend
         slope = (a1 + x * (square + square + cubic)) / top
+        if not worth:
+            return force, slope, None
         # Of the mean force along the interval, the last part is exact to x^4.
         mean = a0 + 0.5 * linear + x * x * (a2 / 3.0 + 0.25 * cubic)
         return force, slope, start + top * x * mean
@@ -176,35 +186,63 @@ class Answers:
         price = top * (_EDGES[cell] + x)
         return price, price * size - conjugate
 
-    def __call__(self, price: Array, sets: Sets) -> Answer:
-        """Answers to prices (k, N)."""
-        lines, planes = self.lines, self.planes
-        sign = np.where(price[:lines] < 0.0, -1.0, 1.0) if lines else None
-        if not planes:
-            force, slope, conjugate = self._limited(price, sign, self._row, sets)
-            return Answer(force, slope, conjugate.sum(axis=0))
-        first, second = price[lines : lines + planes], price[lines + planes :]
+    def __call__(self, price: Array, sets: Sets, worth: bool = True) -> Answer:
+        """Answers to prices (k, N), with or without their conjugates."""
+        lines, n = self.lines, self.lines + self.planes
+        if not self.planes:
+            force, slope, conjugate = self._limited(price, lines, self._row, sets, worth=worth)
+            return Answer(force, slope, None if conjugate is None else conjugate.sum(axis=0))
+        first, second = price[lines:n], price[n:]
         fan = self._fan(first, second, sets)
         value = first * fan.first + second * fan.second
-        if sign is not None:
+        if lines:
             value = np.concatenate([price[:lines], value])
-            sign = np.concatenate([sign, np.ones_like(first)])
-        size, slope, conjugate = self._limited(value, sign, self._row, sets)
-        planar = _Planar.of(fan, size[lines:], slope[lines:], conjugate[lines:])
-        total = conjugate.sum(axis=0)
-        if fan.beyond is not None and len(sets.forked):
-            total += self._fork(sets.forked, planar, fan, first, second, sets)
-        if not lines:
-            return Answer(
-                np.concatenate([planar.first, planar.second]),
-                np.concatenate([planar.xx, planar.xy, planar.yy]),
-                total,
-            )
-        return Answer(
-            np.concatenate([size[:lines], planar.first, planar.second]),
-            np.concatenate([slope[:lines], planar.xx, planar.xy, planar.yy]),
-            total,
+        forked = fan.beyond is not None and len(sets.forked) > 0
+        size, slope, conjugate = self._limited(value, lines, self._row, sets, worth=worth or forked)
+        planar = _Planar.of(fan, size[lines:], slope[lines:])
+        total = None if conjugate is None else conjugate.sum(axis=0)
+        if forked:
+            assert conjugate is not None and total is not None
+            total += self._fork(sets.forked, planar, conjugate[lines:], fan, first, second, sets)
+        parts = [planar.first, planar.second], [planar.xx, planar.xy, planar.yy]
+        if lines:
+            parts = [size[:lines], *parts[0]], [slope[:lines], *parts[1]]
+        return Answer(np.concatenate(parts[0]), np.concatenate(parts[1]), total)
+
+    def change(self, derivative: Array, price: Array) -> Array:
+        """Change of the forces (k, N) [N] to first order, by the derivatives of an answer (l + 3 p, N), where
+        prices change by (k, N) [W/N]."""
+        lines, n, planes = self.lines, self.lines + self.planes, self.planes
+        first, second = price[lines:n], price[n:]
+        xx, xy, yy = derivative[lines:n], derivative[n : n + planes], derivative[n + planes :]
+        line = derivative[:lines] * price[:lines]
+        return np.concatenate([line, xx * first + xy * second, xy * first + yy * second])
+
+    def linear(self, force: Array, change: Array, sets: Sets) -> NDArray[np.bool_]:
+        """Where (N,) forces (k, N) may change by (k, N), to first order: within the sets, and so little that
+        the second order, of forces like the square of their price, costs nothing."""
+        lines, n = self.lines, self.lines + self.planes
+        old, new = self._sized(force), self._sized(force + change)
+        small = self._sized(change) ** 2 <= 4.0 * CLOSE * np.abs(old) * np.abs(old).max(axis=0)
+        inside = (new >= sets.low) & (new <= sets.high * (1.0 + CLOSE**2))
+        fits = (small & inside).all(axis=0)
+        if sets.arcs and fits.any():
+            angle = np.arctan2(force[n:] + change[n:], force[lines:n] + change[lines:n])
+            fits &= (np.abs(wrapped(angle - sets.middle)) <= sets.half + NOTHING).all(axis=0)
+        return np.asarray(fits & (not self.gauges))
+
+    def held(self, force: Array, price: Array, change: Array, sets: Sets) -> NDArray[np.bool_]:
+        """Where (N,) actuators whose forces (k, N) are at a limit stay there: prices (k, N) change
+        hardly, by (k, N)."""
+        size = self._sized(force)
+        free = (size < sets.high * (1.0 - NOTHING)) & (size > sets.low)
+        return np.asarray(
+            (free | (np.abs(self._sized(change)) <= SMALL * np.abs(self._sized(price)))).all(axis=0)
         )
+
+    def _sized(self, force: Array) -> Array:
+        """What lines give (n, N) and the sizes of what planes give, of forces or prices (k, N)."""
+        return np.concatenate([force[: self.lines], self.sizes(force)]) if self.lines else self.sizes(force)
 
     def worth(self, price: Array, sets: Sets) -> tuple[Array, Array]:
         """Prices (n, N) [W/N] along the forces that answer prices (k, N), of lines with their sign, and what
@@ -219,32 +257,40 @@ class Answers:
             if not sets.rests:  # at least force, a small price along any direction counts in full
                 size = np.hypot(first, second)
                 along[lines:] *= np.sqrt(size * size + sets.squared_gap) / np.maximum(size, 1e-300)
-        sign = np.where(along < 0.0, -1.0, 1.0)
-        sign[lines:] = 1.0
-        return along, self._limited(along, sign, self._row, sets)[2]
+        conjugate = self._limited(along, lines, self._row, sets)[2]
+        assert conjugate is not None
+        return along, conjugate
 
     def _limited(
-        self, price: Array, sign: Array | None, row: NDArray[np.intp], sets: Sets, of: Any = slice(None)
-    ) -> tuple[Array, Array, Array]:
-        """Forces, derivatives and conjugates (m, N) for prices (m, N) within the limits of some actuators;
-        prices without a sign are those of planes."""
-        if sign is None:
-            if not sets.arcs:
-                force, slope, conjugate = self.radial(price, row)
-            else:  # a price away from the arc's end moves nothing
-                force, slope, conjugate = self.radial(np.maximum(price, 0.0), row)
-                slope = np.where(price > 0.0, slope, 0.0)
-        else:
-            force, slope, conjugate = self.radial(np.maximum(price * sign, 0.0), row + (sign < 0.0))
+        self,
+        price: Array,
+        lines: int,
+        row: NDArray[np.intp],
+        sets: Sets,
+        of: Any = slice(None),
+        worth: bool = True,
+    ) -> tuple[Array, Array, Array | None]:
+        """Forces, derivatives and, where asked for, conjugates (m, N) for prices (m, N) within the limits of
+        some actuators; only the prices of the first, the lines, have a sign."""
+        along, flips = price, lines > 0
+        if flips:
+            sign = np.where(price < 0.0, -1.0, 1.0)
+            sign[lines:] = 1.0
+            along, row = price * sign, row + (sign < 0.0)
+        if sets.arcs:  # a price away from the arc's end moves nothing
+            along = np.maximum(along, 0.0)
+        force, slope, conjugate = self.radial(along, row, worth)
+        if flips:
             force = force * sign
-            if sets.arcs:
-                slope = np.where(price * sign > 0.0, slope, 0.0)
+        if sets.arcs:
+            slope = np.where(along > 0.0, slope, 0.0)
         if sets.whole:
             return force, slope, conjugate
         low, high = sets.low[of], sets.high[of]
         below, above = force <= low, force >= high
-        conjugate = np.where(below, price * low - sets.low_cost[of], conjugate)
-        conjugate = np.where(above & ~below, price * high - sets.high_cost[of], conjugate)
+        if conjugate is not None:
+            conjugate = np.where(below, price * low - sets.low_cost[of], conjugate)
+            conjugate = np.where(above & ~below, price * high - sets.high_cost[of], conjugate)
         return np.minimum(np.maximum(force, low), high), np.where(below | above, 0.0, slope), conjugate
 
     def _fan(self, first: Array, second: Array, sets: Sets) -> "_Fan":
@@ -304,6 +350,7 @@ class Answers:
         self,
         places: NDArray[np.intp],
         planar: "_Planar",
+        conjugate: Array,
         fan: "_Fan",
         first: Array,
         second: Array,
@@ -316,10 +363,11 @@ class Answers:
         x, y = (values[places] for values in self._end(fan.other + np.zeros_like(first)))
         price = first[places] * x + second[places] * y
         row = self.lines + places
-        size, slope, conjugate = self._limited(price, None, self._row[row], sets, row)
-        other = _Planar(size * x, size * y, slope * x * x, slope * x * y, slope * y * y, conjugate)
+        size, slope, worth = self._limited(price, 0, self._row[row], sets, row)
+        assert worth is not None
+        other = _Planar(size * x, size * y, slope * x * x, slope * x * y, slope * y * y)
         width = FINE * sets.high_cost[row] + 1e-12
-        ahead = planar.conjugate[places] - conjugate
+        ahead = conjugate[places] - worth
         root = np.sqrt(ahead * ahead + width * width)
         share = np.where(beyond, 0.5 * (1.0 + ahead / root), 1.0)
         turn = np.where(beyond, 0.5 * width * width / root**3, 0.0)
@@ -360,11 +408,10 @@ class _Planar(NamedTuple):
     xx: Array
     xy: Array
     yy: Array
-    conjugate: Array
 
     @classmethod
-    def of(cls, fan: _Fan, size: Array, slope: Array, conjugate: Array) -> "_Planar":
-        """The answers along a fan of directions, of sizes, their derivatives and conjugates (p, N)."""
+    def of(cls, fan: _Fan, size: Array, slope: Array) -> "_Planar":
+        """The answers along a fan of directions, of sizes and their derivatives (p, N)."""
         x, y = fan.first, fan.second
         steep_x = slope * x
         return cls(
@@ -373,5 +420,4 @@ class _Planar(NamedTuple):
             steep_x * x + size * fan.xx,
             steep_x * y + size * fan.xy,
             slope * y * y + size * fan.yy,
-            conjugate,
         )

@@ -13,18 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.dual.answers import Sets
-from finlab.allocation.dual.newton import Prices, solve
+from finlab.allocation.dual.newton import Prices, dual_value, solve
 from finlab.allocation.dual.robot import DualRobot
 from finlab.arrays import Array
 from finlab.layout.angles import wrapped
-from finlab.precision import CLOSE, NEARLY, NOTHING, ROUNDS
+from finlab.precision import CLOSE, NEARLY, NOTHING, ROUNDS, SMALL
 
 MOST_PARTS = 48
 """Open parts of one target that are followed, the cheapest first."""
 TURNS = 2.4, 1.6, 0.8, 0.4, 0.2, 0.1, 0.05
 """Angles [rad] by which fins that cannot rest are turned to find where that costs least."""
-SMALL = 1e-3
-"""Least force, as a share of the largest force of the answer, up to which it does not count."""
 NARROW = 0.2
 """Half of an arc [rad] up to which the chord stands for the arc of the least forces."""
 
@@ -83,6 +81,7 @@ def least_power(robot: DualRobot, target: Array, sets: Sets, root: Prices) -> Br
     """Forces in the sets for targets (r, N) some of whose answers `root` are in gaps."""
     count = target.shape[1]
     start = _Parts(np.arange(count), _columns(sets, count), root.prices)
+    root = root._replace(value=dual_value(robot, target, sets, root.prices))
     best = _Best(robot, target, start, root)
     parts, answer = start, root
     for _ in range(ROUNDS):
@@ -91,7 +90,7 @@ def least_power(robot: DualRobot, target: Array, sets: Sets, root: Prices) -> Br
         if not len(nearer):
             break
         parts = _dive(robot, parts, nearer, amount[:, nearer], answer)
-        answer = solve(robot, target[:, parts.row], parts.sets, parts.prices)
+        answer = solve(robot, target[:, parts.row], parts.sets, parts.prices, value=True)
     best.turn()
     parts, answer, value = start, root, np.full(count, np.inf)
     for round_ in range(ROUNDS + 1):
@@ -104,7 +103,7 @@ def least_power(robot: DualRobot, target: Array, sets: Sets, root: Prices) -> Br
         if not len(kept):
             break
         parts = _cut(robot, parts, kept, amount[:, kept], answer)
-        answer = solve(robot, target[:, parts.row], parts.sets, parts.prices)
+        answer = solve(robot, target[:, parts.row], parts.sets, parts.prices, value=True)
     best.turn()
     return Branched(best.force, best.found, value)
 
@@ -153,7 +152,7 @@ class _Best:
             columns = [values[:, row] for values in self._sets]
             columns[4][plane, np.arange(len(row))] += np.repeat([-step, step], len(row) // 2)
             sets = Sets.of(columns)
-            answer = solve(self._robot, self._target[:, row], sets, self._prices[:, row])
+            answer = solve(self._robot, self._target[:, row], sets, self._prices[:, row], value=True)
             self.keep(_Parts(row, sets, self._prices), answer, gaps(self._robot, answer.force, sets))
 
 

@@ -75,6 +75,7 @@ class Dual(Method):
     # A smaller wrench in the same direction still turns a robot to where it should go; the nearest one may
     # only push it on.
     policy_under_way = "direction"
+    begins_at_prices = True
     settings_class = DualSettings
     settings: DualSettings
 
@@ -108,15 +109,17 @@ class Dual(Method):
         previous: Array | None = None,
         flow: Array | None = None,
         seed: int = 0,
+        prices: Array | None = None,
     ) -> Solution:
-        """See `Method`."""
+        """See `Method`. For a single target, Newton's method begins at `prices` (6,) [W/N, W/(N m)], where
+        they are given."""
         if len(targets) == 0:
             return Solution(np.empty((0, self.layout.n, 3)), lambda: np.empty(0))
         if (moved := self.at(flow)) is not self:
-            return moved.solve(targets, policy=policy, previous=previous, seed=seed)
+            return moved.solve(targets, policy=policy, previous=previous, seed=seed, prices=prices)
         if self.compiled.drags:
             return self._one_by_one(targets, policy, previous)
-        return self._solve(targets, policy, previous)
+        return self._solve(targets, policy, previous, prices)
 
     def _one_by_one(self, targets: Array, policy: Policy, previous: Array | None) -> Solution:
         """Answers of a robot whose drag has another price for each target."""
@@ -137,16 +140,23 @@ class Dual(Method):
             commands.append(other._solve(target[None], policy, previous).command)
         return Solution(np.concatenate(commands), lambda: bounds)
 
-    def _solve(self, targets: Array, policy: Policy, previous: Array | None) -> Solution:
+    def _solve(
+        self, targets: Array, policy: Policy, previous: Array | None, prices: Array | None = None
+    ) -> Solution:
         robot = self.compiled.robot
-        aim, found = self._aimed(targets, policy, self._first_prices(previous))
+        begin = (
+            self._first_prices(previous)
+            if prices is None
+            else robot.basis.T @ (robot.scale * prices)[:, None]
+        )
+        aim, found = self._aimed(targets, policy, begin)
         command = self._commands(aim, found, robot.sets, previous)
         bound: Callable[[], Array] = partial(self._bound, aim, found)
         if len(targets) > 1:
             bound = partial(self._bound_again, targets, policy)
         if previous is not None and not self._rates.allow(previous, command[0]):
             command = self._in_a_tick(aim, found, previous)
-        return Solution(command, None if self._unproved else bound)
+        return Solution(command, None if self._unproved else bound, prices=found.price)
 
     def _aimed(self, targets: Array, policy: Policy, prices: Array | None = None) -> tuple[Array, Forces]:
         """What is given for targets (N, 6): themselves, or what the policy asks for; and by which forces."""

@@ -9,12 +9,12 @@ With a reward, the target is `t w` with `t` in [0, 1], paid `rho (2 t - t^2 / 2)
 """
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.dual.answers import Answer, Sets
+from finlab.allocation.dual.answers import Sets
 from finlab.allocation.dual.robot import DualRobot
 from finlab.arrays import Array
 from finlab.precision import NEARLY, NOTHING, ROUNDING
@@ -36,7 +36,8 @@ class Prices(NamedTuple):
     force: Array
     """Forces (k, N) [N] of the actuators' directions."""
     value: Array
-    """Dual value (N,) [W]: no forces within the sets that give the target cost less."""
+    """Dual value (N,) [W]: no forces within the sets that give the target cost less. NaN where it was not
+    asked for."""
     solved: NDArray[np.bool_]
     """Which targets are met (N,)."""
     beyond: NDArray[np.bool_]
@@ -69,12 +70,21 @@ class _State(NamedTuple):
 
     target: Array
     prices: Array
-    answer: Answer
+    force: Array
+    derivative: Array
+    conjugate: Array | None
     residual: Array
-    value: Array
+    paid: Array
+    """The value (N,) [W] but for what the actuators' forces are worth."""
     size: Array
     stretch: Array | None
     """Curvature (N,) [1/W] of the share of the target, where that is rewarded."""
+
+    @property
+    def value(self) -> Array:
+        """Dual value (N,) [W], where it was asked for."""
+        assert self.conjugate is not None
+        return self.paid - self.conjugate
 
 
 def start(robot: DualRobot, target: Array, sets: Sets) -> tuple[Array, NDArray[np.bool_]]:
@@ -102,6 +112,7 @@ def solve(
     sets: Sets | None = None,
     prices: Array | None = None,
     terms: Terms = MEET,
+    value: bool = False,
 ) -> Prices:
     """Prices for targets.
 
@@ -111,6 +122,7 @@ def solve(
         sets: what its actuators may give; None for all that they can.
         prices: where to begin (r, N).
         terms: penalty and reward.
+        value: whether the dual value is asked for.
     """
     sets = robot.sets if sets is None else sets
     count = target.shape[1]
@@ -119,92 +131,124 @@ def solve(
         ridge = np.where(saturated, SATURATED_RIDGE, NEARLY)
     else:
         ridge = np.full(count, NEARLY)
-    most = sets.most_cost * (1.0 + 1e-9) + 1e-9 + np.zeros(count)
-    proves = terms.penalty is None and terms.reward is None
-    state = _state(robot, target, prices, sets, terms)
+    most = np.full(count, np.inf)
+    if terms.penalty is None and terms.reward is None:
+        most = sets.most_cost * (1.0 + 1e-9) + 1e-9 + np.zeros(count)
     with np.errstate(invalid="ignore"):  # systems without an inverse are told by what is not finite
+        state = _state(robot, target, prices, sets, terms, value or count > 1)
         if count == 1:
-            return _one(robot, state, sets, terms, float(ridge[0]), float(most[0]) if proves else np.inf)
-        return _many(robot, state, sets, terms, ridge, most if proves else np.full(count, np.inf))
+            return _one(robot, state, sets, terms, float(ridge[0]), float(most[0]), value)
+        return _many(robot, state, sets, terms, ridge, most)
 
 
-def _state(robot: DualRobot, target: Array, prices: Array, sets: Sets, terms: Terms) -> _State:
-    answer = robot.answers(robot.matrix @ prices, sets)
-    value = np.einsum("rn,rn->n", prices, target)
+def dual_value(robot: DualRobot, target: Array, sets: Sets, prices: Array) -> Array:
+    """Dual values (N,) [W] of prices (r, N) for targets (r, N) that are to be met."""
+    return _state(robot, target, prices, sets, MEET).value
+
+
+def _state(
+    robot: DualRobot, target: Array, prices: Array, sets: Sets, terms: Terms, value: bool = True
+) -> _State:
+    answer = robot.answers(robot.matrix @ prices, sets, value)
+    paid = np.einsum("rn,rn->n", prices, target)
     stretch, wanted = None, target
     if terms.reward is not None:
-        left = 2.0 * terms.reward - value
+        left = 2.0 * terms.reward - paid
         share = np.minimum(np.maximum(left / terms.reward, 0.0), 1.0)
         stretch = ((left > 0.0) & (left < terms.reward)) / terms.reward
-        value = 0.5 * terms.reward * share * share - left * share
+        paid = 0.5 * terms.reward * share * share - left * share
         wanted = share * target
     residual = wanted - robot.matrix.T @ answer.force
-    value = value - answer.conjugate
     if terms.penalty is not None:
         missed = terms.penalty @ prices
         residual = residual - missed
-        value = value - 0.5 * np.einsum("rn,rn->n", prices, missed)
-    return _State(
-        target, prices, answer, residual, value, np.sqrt(np.einsum("rn,rn->n", residual, residual)), stretch
-    )
+        paid = paid - 0.5 * np.einsum("rn,rn->n", prices, missed)
+    size = np.sqrt(np.einsum("rn,rn->n", residual, residual))
+    return _State(target, prices, *answer, residual, paid, size, stretch)
 
 
-def _step(robot: DualRobot, state: _State, terms: Terms, ridge: Array) -> Array:
-    """Steps (r, N) of the prices."""
-    hessian = state.answer.derivative.T @ robot.outer.T
-    trace = np.maximum(robot.trace @ state.answer.derivative, robot.least_trace)
+def _step(robot: DualRobot, state: _State, terms: Terms, ridge: Array) -> tuple[Array, Array]:
+    """Steps (r, N) of the prices, and what the ridge leaves of the residual (N,), to first order."""
+    hessian = state.derivative.T @ robot.outer.T
+    trace = np.maximum(robot.trace @ state.derivative, robot.least_trace)
     if terms.penalty is not None:
         hessian += terms.penalty.ravel()
     if state.stretch is not None:
         weighted = state.stretch * state.target
         hessian += np.einsum("in,jn->nij", weighted, state.target).reshape(hessian.shape)
-    hessian[:, :: robot.shape[0] + 1] += (ridge * trace)[:, None]
+    added = np.where(ridge > NEARLY, ridge, ROUNDING) * trace
+    hessian[:, :: robot.shape[0] + 1] += added[:, None]
     step: Array = solve_systems(hessian.reshape(-1, *robot.shape), state.residual.T[..., None])[..., 0].T
     if not np.isfinite(step).all():  # a matrix without inverse: along the gradient
-        step = np.where(np.isfinite(step), step, state.residual / trace)
-    return step
+        step, added = np.where(np.isfinite(step), step, state.residual / trace), np.inf * trace
+    return step, added * np.sqrt(np.einsum("rn,rn->n", step, step))
+
+
+def _last(
+    robot: DualRobot, state: _State, step: Array, left: Array, sets: Sets
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Forces (k, N) after steps (r, N) of the prices, to first order, and where they will do (N,): they give
+    the target but for what is `left` (N,), within the sets, and cost hardly more than the least."""
+    price, further = robot.matrix @ state.prices, robot.matrix @ step
+    change = robot.answers.change(state.derivative, further)
+    fits = (left <= TOLERANCE) & robot.answers.linear(state.force, change, sets)
+    if fits.any():
+        fits &= robot.answers.held(state.force, price, further, sets)
+    return state.force + change, fits
 
 
 def _accepted(state: _State, trial: _State, left: Array) -> NDArray[np.bool_]:
     """Which steps are kept (N,): the slope left along the step is uphill, or the value rose, or is the same
     to rounding and the residual fell."""
-    slack = ROUNDING * np.abs(state.value)
-    return (
-        (left >= 0.0)
-        | (trial.value > state.value)
-        | ((trial.value > state.value - slack) & (trial.size < 0.9 * state.size))
-    )
+    rose, slack = trial.value - state.value, ROUNDING * np.abs(state.value)
+    return (left >= 0.0) | (rose > 0.0) | ((rose > -slack) & (trial.size < 0.9 * state.size))
 
 
-def _next_ridge(ridge: Array, left: Array, good: NDArray[np.bool_]) -> Array:
-    kept = np.where(np.abs(left) < 0.5, 0.1, np.where(left > 0.5, 0.3, 1.0))
-    grown = np.minimum(np.maximum(-left, 2.0), 10.0)
-    return np.maximum(ridge * np.where(good, kept, grown), ROUNDING)
-
-
-def _one(robot: DualRobot, state: _State, sets: Sets, terms: Terms, ridge: float, most: float) -> Prices:
-    """`solve` for one target."""
-    steps = 0
-    while steps < MOST_STEPS and state.size[0] > TOLERANCE and state.value[0] <= most:
-        step = _step(robot, state, terms, np.array([ridge]))
-        trial = _state(robot, state.target, state.prices + step, sets, terms)
-        slope = float(step[:, 0] @ state.residual[:, 0])
-        left = float(step[:, 0] @ trial.residual[:, 0]) / max(slope, 1e-300)
-        steps += 1
-        rose = trial.value[0] - state.value[0]
-        if (
-            left >= 0.0
-            or rose > 0.0
-            or (rose > -ROUNDING * abs(state.value[0]) and trial.size[0] < 0.9 * state.size[0])
-        ):
+def _one(
+    robot: DualRobot, state: _State, sets: Sets, terms: Terms, ridge: float, most: float, value: bool
+) -> Prices:
+    """`solve` for one target. The dual value takes long: it is asked for where a step was too long, or the
+    target may be out of reach."""
+    spare = most - sets.least_cost  # the value is no more than what is paid and this cost
+    force = None
+    for steps in range(MOST_STEPS + 1):
+        solved, beyond = bool(state.size[0] <= TOLERANCE), False
+        if not solved and state.paid[0] > spare:
+            state = _valued(robot, state, sets, terms)
+            beyond = bool(state.value[0] > most)
+        if solved or beyond or steps == MOST_STEPS:
+            break
+        step, left = _step(robot, state, terms, np.array([ridge]))
+        if terms.reward is None and left[0] <= TOLERANCE:
+            force, fits = _last(robot, state, step, left, sets)
+            if solved := bool(fits[0]):
+                state = state._replace(prices=state.prices + step)
+                steps += 1
+                break
+        trial = _state(robot, state.target, state.prices + step, sets, terms, value)
+        slope = max(float(step[:, 0] @ state.residual[:, 0]), 1e-300)
+        change = float(step[:, 0] @ trial.residual[:, 0]) / slope
+        good = change >= 0.0 or (change > -0.1 and bool(trial.size[0] < 0.1 * state.size[0]))
+        if not good:
+            state, trial = _valued(robot, state, sets, terms), _valued(robot, trial, sets, terms)
+            good = bool(_accepted(state, trial, np.array([change]))[0])
+        if good:
             state = trial
-            ridge *= 0.1 if abs(left) < 0.5 else 0.3 if left > 0.5 else 1.0
+            ridge *= 0.1 if abs(change) < 0.5 else 0.3 if change > 0.5 else 1.0
         else:
-            ridge *= min(max(-left, 2.0), 10.0)
-        ridge = max(ridge, ROUNDING)
-    solved = state.size <= TOLERANCE
-    beyond = ~solved & (state.value > most)
-    return Prices(state.prices, state.answer.force, state.value, solved, beyond, np.array([steps]))
+            ridge *= min(max(-change, 2.0), 10.0)
+        ridge = max(ridge, NEARLY)
+        force = None
+    worth = _valued(robot, state, sets, terms).value if value else np.array([np.nan])
+    given = state.force if force is None else force
+    return Prices(state.prices, given, worth, np.array([solved]), np.array([beyond]), np.array([steps]))
+
+
+def _valued(robot: DualRobot, state: _State, sets: Sets, terms: Terms) -> _State:
+    """The same with its dual value."""
+    if state.conjugate is not None:
+        return state
+    return _state(robot, state.target, state.prices, sets, terms)
 
 
 def _many(robot: DualRobot, state: _State, sets: Sets, terms: Terms, ridge: Array, most: Array) -> Prices:
@@ -213,63 +257,58 @@ def _many(robot: DualRobot, state: _State, sets: Sets, terms: Terms, ridge: Arra
     place = np.arange(count)
     found = Prices(
         np.empty(state.prices.shape),
-        np.empty(state.answer.force.shape),
+        np.empty(state.force.shape),
         np.empty(count),
         np.zeros(count, bool),
         np.zeros(count, bool),
         np.zeros(count, np.intp),
     )
+
+    def settle(done: NDArray[np.bool_], prices: Array, force: Array, steps: int) -> NDArray[np.intp]:
+        """Keep what was found of some columns; the others."""
+        at = place[done]
+        found.prices[:, at], found.force[:, at] = prices[:, done], force[:, done]
+        found.value[at], found.steps[at] = state.value[done], steps
+        return np.flatnonzero(~done)
+
     for steps in range(MOST_STEPS + 1):
         solved = state.size <= TOLERANCE
         beyond = ~solved & (state.value > most)
         done = solved | beyond | (steps == MOST_STEPS)
         if done.any():
-            at = place[done]
-            found.prices[:, at], found.force[:, at] = state.prices[:, done], state.answer.force[:, done]
-            found.value[at], found.solved[at], found.beyond[at] = (
-                state.value[done],
-                solved[done],
-                beyond[done],
-            )
-            found.steps[at] = steps
-            left = np.flatnonzero(~done)
+            found.solved[place[solved]], found.beyond[place[beyond]] = True, True
+            left = settle(done, state.prices, state.force, steps)
             if not len(left):
                 break
             place, ridge, most, sets = place[left], ridge[left], most[left], sets.take(left)
             state = _columns(state, left)
-        step = _step(robot, state, terms, ridge)
+        step, undone = _step(robot, state, terms, ridge)
+        if terms.reward is None and (undone <= TOLERANCE).any():
+            force, fits = _last(robot, state, step, undone, sets)
+            if fits.any():
+                found.solved[place[fits]] = True
+                left = settle(fits, state.prices + step, force, steps + 1)
+                if not len(left):
+                    break
+                place, ridge, most, sets = place[left], ridge[left], most[left], sets.take(left)
+                state, step = _columns(state, left), step[:, left]
         trial = _state(robot, state.target, state.prices + step, sets, terms)
         slope = np.maximum(np.einsum("rn,rn->n", step, state.residual), 1e-300)
         change = np.einsum("rn,rn->n", step, trial.residual) / slope
         good = _accepted(state, trial, change)
-        ridge = _next_ridge(ridge, change, good)
+        kept = np.where(np.abs(change) < 0.5, 0.1, np.where(change > 0.5, 0.3, 1.0))
+        grown = np.minimum(np.maximum(-change, 2.0), 10.0)
+        ridge = np.maximum(ridge * np.where(good, kept, grown), NEARLY)
         state = trial if good.all() else _merged(good, trial, state)
     return found
 
 
 def _columns(state: _State, columns: NDArray[np.intp]) -> _State:
-    stretch = None if state.stretch is None else state.stretch[columns]
-    return _State(
-        state.target[:, columns],
-        state.prices[:, columns],
-        Answer(*(values[..., columns] for values in state.answer)),
-        state.residual[:, columns],
-        state.value[columns],
-        state.size[columns],
-        stretch,
-    )
+    parts: list[Any] = [None if values is None else values[..., columns] for values in state]
+    return _State(*parts)
 
 
 def _merged(good: NDArray[np.bool_], trial: _State, state: _State) -> _State:
-    stretch = None
-    if trial.stretch is not None and state.stretch is not None:
-        stretch = np.where(good, trial.stretch, state.stretch)
-    return _State(
-        state.target,
-        np.where(good, trial.prices, state.prices),
-        Answer(*(np.where(good, a, b) for a, b in zip(trial.answer, state.answer, strict=True))),
-        np.where(good, trial.residual, state.residual),
-        np.where(good, trial.value, state.value),
-        np.where(good, trial.size, state.size),
-        stretch,
-    )
+    both: Any = zip(trial, state, strict=True)
+    parts: list[Any] = [None if new is None else np.where(good, new, old) for new, old in both]
+    return _State(*parts)

@@ -56,6 +56,11 @@ class DualRobot:
         return found
 
     @cached_property
+    def largest(self) -> Array:
+        """The same (k, 1) [N] for each direction."""
+        return np.concatenate([self.most, self.most[self.answers.lines :]])
+
+    @cached_property
     def gain(self) -> Array:
         """Force over price (k, 1) [N^2/W] of each direction at its limit."""
         each = self.most / self.answers.tops[:, None]
@@ -99,7 +104,7 @@ class DualRobot:
 
     def moved(self, effectiveness: Array) -> "DualRobot":
         """The same actuators elsewhere: with another effectiveness (k, 6)."""
-        scale, basis = _range(effectiveness, np.concatenate([self.most, self.most[self.answers.lines :]]))
+        scale, basis = _range(effectiveness, self.largest)
         matrix = (effectiveness / scale) @ basis
         return replace(self, effectiveness=effectiveness, scale=scale, basis=basis, matrix=matrix)
 
