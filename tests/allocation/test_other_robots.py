@@ -9,7 +9,7 @@ from finlab.errors import LayoutError
 from finlab.layout import Fin, load_layout
 
 
-@pytest.mark.parametrize("method", ["mdn", "paper", "qp", "sqp", "analytic", "ipopt"])
+@pytest.mark.parametrize("method", ["mdn", "paper", "qp", "sqp"])
 def test_a_thruster_is_named_with_its_type(method: str) -> None:
     with pytest.raises(LayoutError, match=f"method {method} works for .* 'lift_left' .* is of type thruster"):
         finlab.Allocator(load_layout("turtle_hybrid"), method)

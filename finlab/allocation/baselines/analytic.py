@@ -1,4 +1,4 @@
-"""Method `analytic`: force-space pseudo-inverse, each fin's force turned into its cheapest command."""
+"""Method `analytic`: force-space pseudo-inverse, each actuator's force turned into its cheapest command."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -17,14 +17,15 @@ class AnalyticSettings(Settings):
 
 
 class Analytic(ModelBased):
-    """Pseudo-inverse of the planar forces; failed fins have left with their two columns.
+    """Pseudo-inverse of the forces; failed actuators have left with their columns.
 
-    Rows are scaled by sigma and columns by each fin's largest force. A fin gives its force by the cheapest
-    command there is for that size and direction. What does not fit is clipped fin by fin, the rest is not
-    redistributed.
+    Rows are scaled by sigma and columns by each actuator's largest force. An actuator gives its force by the
+    cheapest command there is for that size and direction. What does not fit is clipped one by one, the rest
+    is not redistributed.
     """
 
     name = "analytic"
+    takes = "any actuator"
     settings_class = AnalyticSettings
     settings: AnalyticSettings
 

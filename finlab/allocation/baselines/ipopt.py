@@ -1,7 +1,7 @@
 """Method `ipopt`: CasADi and IPOPT from several starts; needs the extra `ipopt`.
 
-Fins whose laws are formulas become CasADi symbols, with exact first and second derivatives. A force table has
-no formula: robots with one are asked for in the space of forces, where every fin is compiled.
+Fins whose laws are formulas become CasADi symbols, with exact first and second derivatives. Force tables and
+other actuators have none: robots with one are asked for in the space of forces, where each is compiled.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from finlab.allocation.baselines.ipopt_forces import ForceProgram
-from finlab.allocation.baselines.model_based import ModelBased, TimeLimit, TimeLimitedSettings
+from finlab.allocation.baselines.model_based import SOLVED, ModelBased, TimeLimit, TimeLimitedSettings
 from finlab.allocation.baselines.plant_in_casadi import plant_formulas
 from finlab.allocation.settings import Settings, choice, number
 from finlab.arrays import Array
@@ -59,6 +59,7 @@ class Ipopt(ModelBased):
     """
 
     name = "ipopt"
+    takes = "any actuator"
     settings_class = IpoptSettings
     settings: IpoptSettings
 
@@ -67,34 +68,42 @@ class Ipopt(ModelBased):
     ) -> None:
         super().__init__(layout, settings, scale, weights)
         tables = not all(isinstance(make_law(fin.model), PlanarLaw) for fin in layout.fins)
-        self._by_forces = tables or self.settings.space == "forces"
+        self._by_forces = tables or not layout.is_of_fins or self.settings.space == "forces"
         if self._by_forces and self.aim.name != "power":
             why = "of a force table it" if tables else "space 'forces'"
             raise AllocationError(f"method ipopt: {why} keeps power least, got objective {self.aim.name!r}")
         self._casadi = import_casadi()
 
     def _commands(self, targets: Array, seed: int) -> Array:
-        result = np.empty((len(targets), self.plant.n_fins, 3))
-        for i, target in enumerate(targets):
+        answers = [self._answer(target, seed) for target in targets]
+        return np.array(answers).reshape(len(targets), self.plant.n, 3)
+
+    def _answer(self, target: Array, seed: int) -> Array:
+        """The command (n, 3) for a target (6,): in the space of forces the cheapest that delivers it, and
+        where no start leads there, as in that of commands, what is best with the error as a cost."""
+        best, unit = np.empty(0), target[None] / self.sigma
+        for exact in (True, False) if self._by_forces else (False,):
             limit, ends = TimeLimit(self.settings.time_limit_s), list[Array]()
             for start in self._starts(target, seed):
                 if ends and limit.over:
                     break
-                ends.append(self._end(target, start))
-            result[i] = self._best(target, np.array(ends), POLISH)
-        return result
+                ends.append(self._end(target, start, exact))
+            best = self._best(target, np.array(ends), POLISH)
+            if np.linalg.norm(self.plant.wrench(best) / self.sigma - unit) <= SOLVED:
+                break
+        return best
 
     def _starts(self, target: Array, seed: int) -> Array:
-        """Where IPOPT starts from: commands (S, n, 3), or planar forces (S, n, 2)."""
+        """Where IPOPT starts from: commands (S, n, 3), or forces (S, n, 2)."""
         if self._by_forces:
-            return self._force_program.starts(target, self.settings.n_starts, seed)
+            return self._exact_forces.starts(target, self.settings.n_starts, seed)
         random = self.plant.sample(np.random.default_rng(seed), (self.settings.n_starts,))
         return np.concatenate([self._inverse.command(target[None]), random])
 
-    def _end(self, target: Array, start: Array) -> Array:
+    def _end(self, target: Array, start: Array, exact: bool) -> Array:
         """The command (n, 3) IPOPT ends at, or the start itself where it breaks down."""
         if self._by_forces:
-            return self._force_program.command(target, start)
+            return (self._exact_forces if exact else self._near_forces).command(target, start)
         limits = {"lbx": self.plant.lower.ravel(), "ubx": self.plant.upper.ravel()}
         end = np.array(self._solver(x0=start.ravel(), p=target, **limits)["x"], np.float64).reshape(-1, 3)
         return self.plant.feasible(end) if np.isfinite(end).all() else start
@@ -107,7 +116,11 @@ class Ipopt(ModelBased):
         return TRADEOFF / (USUAL_LOAD * float(self.plant.power(self.plant.upper, self.aim.copper_loss).max()))
 
     @cached_property
-    def _force_program(self) -> ForceProgram:
+    def _exact_forces(self) -> ForceProgram:
+        return ForceProgram(self._casadi, self._inverse, self.sigma, None, self._options)
+
+    @cached_property
+    def _near_forces(self) -> ForceProgram:
         return ForceProgram(self._casadi, self._inverse, self.sigma, self._weight, self._options)
 
     @property

@@ -1,14 +1,15 @@
-"""IPOPT in the space of forces: the least power over the planar forces of the fins, as they are compiled.
+"""IPOPT in the space of forces: the least power over the forces of the actuators, as they are compiled.
 
-The wrench is linear in the forces, and what a force costs is known from the compiled fins: two variables for
-each fin remain, and where no arc is wider than half a turn but no full circle, one start finds the least.
+The wrench is linear in the forces, but for the drag of rudders, and what a force costs is known from the
+compiled actuators: one or two variables for each remain, and where no arc is wider than half a turn but no
+full circle, one start finds the least. Dead bands are passed over.
 """
 
 from typing import Any
 
 import numpy as np
 
-from finlab.actuators.response import Plane
+from finlab.actuators.response import Group, Line, Plane
 from finlab.allocation.baselines.pseudo_inverse import PseudoInverse
 from finlab.allocation.dual.answers import Answers
 from finlab.arrays import Array
@@ -21,75 +22,120 @@ DIRECTIONS = np.linspace(-1.0, 1.0, 97)
 SMOOTH = 1e-4
 """Share of its largest force below which the size of a force is rounded off: it has slopes at rest, too."""
 REST = 1e-3
-"""Share of its largest force up to which a fin that cannot rest is taken for one that can."""
+"""Share of its largest force up to which an actuator that cannot rest is taken for one that can."""
 NARROW = 1e-6
-"""Half of an arc [rad] below which a fin pushes along one line."""
+"""Half of an arc [rad] below which an actuator pushes along one line."""
+SAME_DIRECTION = 1e-6
+"""Singular values of the effectiveness below this share of the largest count as no authority."""
 
 
 class ForceProgram:
-    """`err_norm^2 + weight * power` over the planar forces of one robot, the target as its parameter.
+    """`err_norm^2 + weight * power` over the forces of one robot, the target as its parameter.
 
     Args:
         casadi: the module.
         inverse: the robot; where the search starts, and what turns forces into commands.
         sigma: per-axis standard deviation (6,) of the error.
-        weight: of the power.
+        weight: of the power; None where power alone is kept least, with the wrench as a constraint.
         options: of IPOPT.
     """
 
     def __init__(
-        self, casadi: Any, inverse: PseudoInverse, sigma: Array, weight: float, options: dict[str, Any]
+        self, casadi: Any, inverse: PseudoInverse, sigma: Array, weight: float | None, options: dict[str, Any]
     ) -> None:
-        self._inverse, planes = inverse, inverse.fins.planes
-        n, self._half = len(planes), np.array([plane.half for plane in planes])
-        self._middle = np.array([plane.middle for plane in planes])
-        self.convex = bool(((self._half <= 0.5 * np.pi) | (self._half >= np.pi)).all())
-        """Whether one start is enough, as far as fins can rest."""
+        self._inverse, n = inverse, inverse.plant.n
+        self._most = np.maximum(inverse.largest, 1e-9)
         share, target = casadi.MX.sym("share", 2 * n), casadi.MX.sym("target", 6)
-        self._largest = np.array([plane.table.largest for plane in planes])
-        most = np.repeat(self._largest, 2)
-        residual = casadi.DM(inverse.effectiveness * most / sigma[:, None]) @ share
-        residual -= target / casadi.DM(sigma)
-        fins = [_Fin(casadi, plane, share[2 * i : 2 * i + 2]) for i, plane in enumerate(planes)]
-        program = {
-            "x": share,
-            "p": target,
-            "f": casadi.sumsqr(residual) + weight * sum(fin.cost for fin in fins),
-            "g": casadi.vertcat(*(value for fin in fins for value, _, _ in fin.limits)),
-        }
+        per = np.repeat(self._most, 2)
+        wrench = casadi.DM(inverse.effectiveness * per) @ share + casadi.DM(inverse.beside)
+        self._parts: list[_Line | _Plane] = []
+        for response, (i, group, place) in zip(inverse.responses, inverse.places, strict=True):
+            own, most = share[2 * i : 2 * i + 2], float(self._most[i])
+            if isinstance(response, Plane):
+                self._parts.append(_Plane(casadi, response, own))
+            else:
+                line = _Line(casadi, response, own, most, inverse.groups[group][1], place)
+                self._parts.append(line)
+                wrench += line.beside
+        self.convex = all(part.convex for part in self._parts)
+        """Whether one start is enough, as far as actuators can rest."""
+        cost: Any = sum(part.cost for part in self._parts)
+        limits = [limit for part in self._parts for limit in part.limits]
+        residual = (wrench - target) / casadi.DM(sigma)
+        if weight is None:
+            # No constraint says what another one says.
+            axes, size, _ = np.linalg.svd(inverse.effectiveness * per / sigma[:, None])
+            pushed = casadi.DM(axes[:, : int((size > SAME_DIRECTION * size[0]).sum())].T) @ residual
+            limits += [(axis, 0.0, 0.0) for axis in casadi.vertsplit(pushed)]
+            objective = cost / max(sum(part.full_cost for part in self._parts), 1e-300)
+        else:
+            objective = casadi.sumsqr(residual) + weight * cost
+        conditions = casadi.vertcat(*(value for value, _, _ in limits))
+        program = {"x": share, "p": target, "f": objective, "g": conditions}
         self._solver = casadi.nlpsol("forces", "ipopt", program, options)
-        ends = np.array([(low, high) for fin in fins for _, low, high in fin.limits])
-        self._bounds = {"lbg": ends[:, 0], "ubg": ends[:, 1]}
+        between = np.array([(low, high) for _, low, high in limits]).reshape(-1, 2).T
+        ends = np.array([part.ends for part in self._parts]).reshape(-1, 2).T
+        self._bounds = dict(zip(("lbg", "ubg", "lbx", "ubx"), (*between, *ends), strict=True))
 
     def command(self, target: Array, start: Array) -> Array:
-        """The command (n, 3) for a target (6,) where IPOPT ends from planar forces (n, 2) [N]."""
-        most = np.repeat(self._largest, 2)
-        answer = self._solver(x0=start.ravel() / most, p=target, **self._bounds)
-        force = np.array(answer["x"], np.float64).ravel() * most
-        kept = force.reshape(start.shape) if np.isfinite(force).all() else start
-        command: Array = self._inverse.decoded(kept[None])[0]
+        """The command (n, 3) for a target (6,) where IPOPT ends from forces (n, 2) [N]."""
+        most = self._most[:, None]
+        answer = self._solver(x0=(start / most).ravel(), p=target, **self._bounds)
+        force = np.array(answer["x"], np.float64).reshape(start.shape) * most
+        command: Array = self._inverse.decoded((force if np.isfinite(force).all() else start)[None])[0]
         return command
 
     def starts(self, target: Array, n_random: int, seed: int) -> Array:
-        """Planar forces (S, n, 2) [N]: the pseudo-inverse's, and where arcs are wide, random ones."""
+        """Forces (S, n, 2) [N]: the pseudo-inverse's, and where arcs are wide, random ones."""
         first = self._inverse.force(target[None])
         if self.convex:
             return first
         rng = np.random.default_rng(seed)
-        angle = self._middle + rng.uniform(-1.0, 1.0, (n_random, len(self._half))) * self._half
-        size = rng.uniform(0.0, 1.0, angle.shape) * self._largest
-        drawn = np.stack([size * np.cos(angle), size * np.sin(angle)], axis=-1)
-        return np.concatenate([first, drawn])
+        drawn = np.array([[part.random(rng) for part in self._parts] for _ in range(n_random)])
+        return np.concatenate([first, drawn.reshape(-1, *first.shape[1:]) * self._most[:, None]])
 
 
-class _Fin:
-    """One compiled fin in CasADi; `share` (2,) is its planar force over the largest one of its table."""
+class _Line:
+    """One actuator of one direction in CasADi; `share` (2,) is its force over the largest one, and 0."""
+
+    convex, limits = True, ()
+
+    def __init__(self, casadi: Any, line: Line, share: Any, most: float, group: Group, place: int) -> None:
+        reverse = 0.0 if line.reverse is None else line.reverse.largest
+        low, high = max(line.low, -reverse) / most, min(line.high, line.forward.largest) / most
+        self.ends = [(low, high), (0.0, 0.0)]
+        """Least and largest value of both variables."""
+        grid = np.unique(np.concatenate([-LEVELS * reverse, LEVELS * line.forward.largest])) / most
+        if grid[0] == grid[-1]:
+            grid = np.linspace(-1.0, 1.0, 5)
+        cost = Answers([line], []).cost(most * grid[None])[0]
+        self.cost, self.full_cost = _spline(casadi, grid, cost)(share[0]), float(cost.max())
+        """Power [W] in CasADi, and at full load."""
+        force = np.zeros((len(grid), len(group.responses), 2))
+        at_rest = group.beside_of(force)
+        force[:, place, 0] = most * grid
+        beside = group.beside_of(force) - at_rest
+        self.beside: Any = _spline(casadi, grid, beside.ravel())(share[0]) if beside.any() else 0.0
+        """Wrench (6,) in CasADi that comes on top."""
+
+    def random(self, rng: np.random.Generator) -> Array:
+        """Shares (2,) within the limits."""
+        return np.array([rng.uniform(*self.ends[0]), 0.0])
+
+
+class _Plane:
+    """One actuator of two directions in CasADi; `share` (2,) is its force over the largest one."""
 
     def __init__(self, casadi: Any, plane: Plane, share: Any) -> None:
-        self._casadi = casadi
         middle, half, table = plane.middle, plane.half, plane.table
-        ahead = np.cos(middle) * share[0] + np.sin(middle) * share[1]
-        aside = np.cos(middle) * share[1] - np.sin(middle) * share[0]
+        self._middle, self._half = middle, half
+        self.ends = [(-np.inf, np.inf)] * 2
+        """See `_Line`."""
+        self.convex = half <= 0.5 * np.pi or half >= np.pi
+        """Whether the set of forces has no gap."""
+        strongest = 1.0 if plane.gauge is None else float(plane.gauge.max())
+        ahead = strongest * (np.cos(middle) * share[0] + np.sin(middle) * share[1])
+        aside = strongest * (np.cos(middle) * share[1] - np.sin(middle) * share[0])
         size = casadi.sqrt(ahead * ahead + aside * aside + SMOOTH**2)
         low, high = float(table.force[0]) / table.largest, 1.0
         if plane.gauge is not None:
@@ -99,10 +145,12 @@ class _Fin:
             count, along = len(plane.gauge), end * DIRECTIONS
             known = np.append(plane.gauge, plane.gauge[0])
             gauge = np.interp((middle + along) % TURN, TURN / count * np.arange(count + 1), known)
-            high = self._spline(along, gauge)(turn)
+            high = _spline(casadi, along, gauge)(turn)
         force = table.largest * (low + (1.0 - low) * LEVELS)
-        cost = self._spline(LEVELS, Answers([], [plane]).cost(force[None])[0])
-        self.cost = cost((size / high - low) / max(1.0 - low, 1e-9))
+        watts = Answers([], [plane]).cost(force[None])[0]
+        cost = _spline(casadi, LEVELS, watts)
+        self.cost, self.full_cost = cost((size / high - low) / max(1.0 - low, 1e-9)), float(watts[-1])
+        """See `_Line`."""
         self.limits: list[tuple[Any, float, float]] = [(size - high, -np.inf, 0.0)]
         """Values in CasADi, and between which two numbers they must lie."""
         if low > REST:
@@ -115,5 +163,12 @@ class _Fin:
         elif half < np.pi:
             self.limits.append((ahead - size * np.cos(half), 0.0, np.inf))
 
-    def _spline(self, grid: Array, values: Array) -> Any:
-        return self._casadi.interpolant("spline", "bspline", [grid.tolist()], values)
+    def random(self, rng: np.random.Generator) -> Array:
+        """Shares (2,) within the arc."""
+        angle = self._middle + rng.uniform(-1.0, 1.0) * self._half
+        return rng.uniform() * np.array([np.cos(angle), np.sin(angle)])
+
+
+def _spline(casadi: Any, grid: Array, values: Array) -> Any:
+    """A function through values (K,) or (K * m,) at K points."""
+    return casadi.interpolant("spline", "bspline", [grid.tolist()], values)

@@ -41,7 +41,7 @@ class TimeLimit:
 
 
 class ModelBased(LeastErrorMethod):
-    """A method that optimizes over the fins' own laws and tables, those that score every method."""
+    """A method that optimizes over the actuators' own laws and tables, those that score every method."""
 
     settings_class: ClassVar[type[Settings]] = Settings
 
@@ -51,6 +51,8 @@ class ModelBased(LeastErrorMethod):
         super().__init__(layout, settings, scale, weights)
         self.aim = self.settings.aim if isinstance(self.settings, AimSettings) else Objective()
         """What is kept least."""
+        if self.aim.name == "effort":
+            layout.only_fins("objective 'effort'")
         self.sigma = USUAL_SHARE * scale
         """What wrenches (6,) are divided by: what a robot is mostly asked for."""
 

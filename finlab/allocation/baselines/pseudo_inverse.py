@@ -1,50 +1,70 @@
-"""The pseudo-inverse in force space, each fin's force turned into its cheapest command."""
+"""The pseudo-inverse in force space, each actuator's force turned into its cheapest command."""
 
 import numpy as np
 
-from finlab.actuators.fin.response import FinGroup, largest_forces
+from finlab.actuators.registry import groups_of
+from finlab.actuators.response import Line, Plane, Response
 from finlab.arrays import Array
-from finlab.layout import layout_effectiveness
 from finlab.layout.angles import wrapped
 from finlab.physics import Plant
 
 RCOND = 1e-3
 """Singular values below this share of the largest count as zero."""
 
+_FULL = 0.0, np.pi
+"""Middle and half of an arc [rad] that cuts nothing off."""
+
 
 class PseudoInverse:
     """Everything about one layout that does not depend on the target.
 
+    Forces are along each actuator's own two directions; the second one of a line is 0.
+
     Args:
-        plant: the robot.
+        plant: the robot, in the flow that it has.
         sigma: scales the rows (6,).
-        copper_loss: heat of a motor that counts as power [W/(N m)^2].
+        copper_loss: heat of a fin's motor that counts as power [W/(N m)^2].
         rcond: see `RCOND`.
     """
 
     def __init__(self, plant: Plant, sigma: Array, copper_loss: float = 0.0, rcond: float = RCOND) -> None:
-        self.plant = plant
-        self.fins = FinGroup(plant.layout.fins, plant.effectiveness, copper_loss)
-        """What the fins can do, and by which commands."""
-        self.effectiveness = layout_effectiveness(plant.layout)
-        """Wrench (6, 2 n) per newton of each fin's horizontal and vertical force."""
-        planes = self.fins.planes
-        self._middle, self._half = (np.array([getattr(p, k) for p in planes]) for k in ("middle", "half"))
-        most = np.repeat(np.maximum(largest_forces(plant.layout), 1e-9), 2)
+        self.plant, inflow = plant, plant.inflow(None)
+        self.groups = [
+            (places, group.at(None if inflow is None else inflow[places]))
+            for places, group in groups_of(plant.layout, plant.effectiveness, copper_loss)
+        ]
+        """What the actuators can do, and by which commands."""
+        self.places = sorted(
+            (int(i), k, j) for k, (own, _) in enumerate(self.groups) for j, i in enumerate(own)
+        )
+        """Of each actuator, in order: itself, its group, and its place there."""
+        self.responses: list[Response] = [self.groups[k][1].responses[j] for _, k, j in self.places]
+        """What each offers."""
+        self.beside = sum((group.beside.sum(axis=0) for _, group in self.groups), np.zeros(6))
+        """Wrench (6,) [N, N m] of forces of 0, such as the drag of rudders."""
+        along = [np.reshape(each.effectiveness, (-1, 6)) for each in self.responses]
+        both = [np.concatenate([rows, np.zeros((2 - len(rows), 6))]) for rows in along]
+        self.effectiveness: Array = np.concatenate(both).T
+        """Wrench (6, 2 n) per newton along each actuator's directions."""
+        self.largest = np.array([_largest(each) for each in self.responses])
+        """The largest force (n,) of each in any direction [N]."""
+        arcs = [(each.middle, each.half) if isinstance(each, Plane) else _FULL for each in self.responses]
+        self._middle, self._half = np.array(arcs).T
+        most = np.repeat(np.maximum(self.largest, 1e-9), 2)
         scaled = self.effectiveness * most / sigma[:, None]
         self.inverse = (most[:, None] * np.linalg.pinv(scaled, rcond=rcond) / sigma).T.copy()
-        """Target (6,) times this (6, 2 n) gives each fin's horizontal and vertical force [N]."""
+        """Target (6,) times this (6, 2 n) gives each actuator's forces [N]."""
 
     def command(self, targets: Array) -> Array:
         """Commands (N, n, 3) for targets (N, 6)."""
         return self.decoded(self.force(targets))
 
     def force(self, targets: Array) -> Array:
-        """Planar forces (N, n, 2) [N] for targets (N, 6), whatever the limits."""
-        return (targets @ self.inverse).reshape(len(targets), self.plant.n_fins, 2)
+        """Forces (N, n, 2) [N] for targets (N, 6), whatever the limits."""
+        return ((targets - self.beside) @ self.inverse).reshape(len(targets), self.plant.n, 2)
 
     def decoded(self, force: Array) -> Array:
-        """The cheapest commands (N, n, 3) for planar forces (N, n, 2) [N], by the fins' own laws; what a fin
+        """The cheapest commands (N, n, 3) for forces (N, n, 2) [N], by the actuators' own laws; what one
         cannot give is cut off."""
         angle = wrapped(np.arctan2(force[..., 1], force[..., 0]) - self._middle)
         held = np.clip(angle, -self._half, self._half)
@@ -52,4 +72,14 @@ class PseudoInverse:
         size = np.hypot(force[..., 0], force[..., 1]) * np.cos(excess)
         angle = self._middle + held
         inside = size[..., None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-        return self.plant.feasible(self.fins.commands(inside))
+        command = np.empty((*size.shape, 3))
+        for places, group in self.groups:
+            command[:, places] = group.commands(inside[:, places])
+        return self.plant.feasible(command)
+
+
+def _largest(response: Response) -> float:
+    if isinstance(response, Line):
+        reverse = 0.0 if response.reverse is None else response.reverse.largest
+        return max(response.forward.largest, reverse)
+    return response.table.largest * (1.0 if response.gauge is None else float(response.gauge.max()))
