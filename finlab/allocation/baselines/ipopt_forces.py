@@ -1,8 +1,8 @@
 """IPOPT in the space of forces: the least power over the forces of the actuators, as they are compiled.
 
 The wrench is linear in the forces, but for the drag of rudders, and what a force costs is known from the
-compiled actuators: one or two variables for each remain, and where no arc is wider than half a turn but no
-full circle, one start finds the least. Dead bands are passed over.
+compiled actuators: one or two variables for each remain. One start finds the least where no arc is wider
+than half a turn but no full circle, and no fin is uneven. Dead bands are passed over.
 """
 
 from typing import Any
@@ -98,7 +98,7 @@ class ForceProgram:
 class _Line:
     """One actuator of one direction in CasADi; `share` (2,) is its force over the largest one, and 0."""
 
-    convex, limits = True, ()
+    limits = ()
 
     def __init__(self, casadi: Any, line: Line, share: Any, most: float, group: Group, place: int) -> None:
         reverse = 0.0 if line.reverse is None else line.reverse.largest
@@ -117,6 +117,8 @@ class _Line:
         beside = group.beside_of(force) - at_rest
         self.beside: Any = _spline(casadi, grid, beside.ravel())(share[0]) if beside.any() else 0.0
         """Wrench (6,) in CasADi that comes on top."""
+        self.convex = not beside.any()
+        """Whether the wrench is linear in the force."""
 
     def random(self, rng: np.random.Generator) -> Array:
         """Shares (2,) within the limits."""
@@ -131,8 +133,8 @@ class _Plane:
         self._middle, self._half = middle, half
         self.ends = [(-np.inf, np.inf)] * 2
         """See `_Line`."""
-        self.convex = half <= 0.5 * np.pi or half >= np.pi
-        """Whether the set of forces has no gap."""
+        self.convex = plane.gauge is None and (half <= 0.5 * np.pi or half >= np.pi)
+        """Whether the set of forces has no gap, and no bulge."""
         strongest = 1.0 if plane.gauge is None else float(plane.gauge.max())
         ahead = strongest * (np.cos(middle) * share[0] + np.sin(middle) * share[1])
         aside = strongest * (np.cos(middle) * share[1] - np.sin(middle) * share[0])

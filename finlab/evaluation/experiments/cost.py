@@ -21,7 +21,10 @@ EXACT, TRACKED = 1e-5, 1e-3
 """Normalized errors up to which the yardstick and a method count as delivering a target."""
 CHEAPER = 1.0 - 1e-4
 """Cost over the reference's below which a method has won."""
-KEEPS: dict[str, Name] = {"dual": "power", "mdn": "effort", "paper": "effort"}
+KEEPS: dict[str, Name] = {
+    **dict.fromkeys(("dual", "px4", "ardusub"), "power"),
+    **dict.fromkeys(("mdn", "paper"), "effort"),
+}
 """What methods without a choice keep least; they are compared in that alone."""
 UNITS: dict[Name, str] = {"power": "W", "effort": "J_en"}
 """What may be kept least, and what its cost is counted in."""
@@ -42,7 +45,8 @@ def run(
     Args:
         split: names as in eval wrench, or all.
         methods: names as in eval wrench; those that can choose are given the objective,
-            others are compared in what they keep least.
+            others are compared in what they keep least. Of several splits each method answers those whose
+            robots it takes; where actuators are no fins power alone is compared.
         objectives: power, effort or both.
         layouts: of each split.
         targets: on each layout.
@@ -54,10 +58,13 @@ def run(
     check_names("split", names, SPLITS)
     check_names("objectives", objectives, UNITS)
     rows: list[Row] = []
+    kinds = {each: load_method_spec(each, checkpoint).choice.kind for each in methods}
     for name in names:
         cases = make_split(name, layouts, targets, seed)
-        for objective in UNITS:
-            able = tuple(each for each in methods if KEEPS.get(each, objective) == objective)
+        robot = cases[0].layout
+        fit = [each for each, kind in kinds.items() if len(names) == 1 or kind.fits(robot)]
+        for objective in UNITS if robot.is_of_fins else ("power",):
+            able = tuple(each for each in fit if KEEPS.get(each, objective) == objective)
             if objective in objectives and able:
                 rows += _rows(name, cases, able, objective, starts, checkpoint, seed)
     return rows
@@ -92,8 +99,9 @@ def _rows(
 
 def yardstick(layout: Layout, objective: Name, starts: int) -> MethodSpec:
     """Who finds the least cost of a robot's answers: IPOPT, or of tables, which have no formula, SLSQP, from
-    the pseudo-inverse's answer and many random commands."""
-    tables = any(fin.model.type == "table" for fin in layout.fins)
+    the pseudo-inverse's answer and many random commands; IPOPT in the space of forces where actuators are no
+    fins."""
+    tables = layout.is_of_fins and any(fin.model.type == "table" for fin in layout.fins)
     method = load_method_spec("sqp" if tables else "ipopt", objective=objective)
     return method.with_settings(n_starts=2 * starts if tables else starts, time_limit_s=PATIENCE_S)
 

@@ -12,6 +12,7 @@ from finlab.layout import FinModelSpec, Layout, Limits, load_layout, random_layo
 from finlab.physics import plant_of
 from tests.any_robot import AnyRobot
 from tests.exhaustive import crossed, sampled
+from tests.mixed_robots import load, random_flow, random_plant, random_robot, within
 
 pytest.importorskip("casadi", reason="method ipopt is an optional extra")
 UNEVEN = FinModelSpec("soft", (("d", 0.12), ("e", 0.15), ("p", 1.5), ("phi_e", 0.4)))
@@ -65,6 +66,31 @@ def test_it_agrees_with_the_search_on_any_fin_and_arc(model: FinModelSpec, arc: 
     exact = missed < 1e-4
     assert exact.any() and error[exact].max() < 5e-3
     np.testing.assert_allclose(power[exact], least[exact], rtol=0.01)
+
+
+@pytest.mark.parametrize("kind", ["thrusters", "azimuths", "wide arcs", "rudders", "mixed"])
+def test_it_agrees_with_the_search_on_any_actuators_and_in_any_flow(kind: str) -> None:
+    for number in range(2):
+        plant, flow = random_plant(kind, number, 7), random_flow(kind, number, 7)
+        layout = load(random_robot(kind, number, 7))
+        targets = np.array([within(plant, np.random.default_rng([7, k])) for k in range(2)])
+        best = Allocator(layout).allocate_batch(targets, flow=flow)
+        found = Allocator(layout, "ipopt", space="forces").allocate_batch(targets, flow=flow)
+        assert found.err_norm.max() < 1e-4
+        np.testing.assert_allclose(found.power, best.power, rtol=2e-3)
+
+
+def test_it_delivers_exactly_what_power_would_pull_aside() -> None:
+    """On a robot that is nearly blind on an axis a small error would save many watts."""
+    layout = load_layout("bluerov2_heavy")
+    low = [(part, part.position) for part in layout.actuators[:4]]
+    flat = replace(
+        layout, actuators=tuple(replace(part, position=(x, 0.1 * y, z)) for part, (x, y, z) in low)
+    )
+    target = plant_of(flat).wrench(np.array([[20.0, 0, 0], [-5.0, 0, 0], [10.0, 0, 0], [8.0, 0, 0]]))
+    answer = Allocator(flat, "ipopt", space="forces").allocate(target)
+    assert answer.err_norm < 1e-6
+    assert answer.power == pytest.approx(Allocator(flat).allocate(target).power, rel=1e-4)
 
 
 def test_it_keeps_watts_least_and_nothing_else() -> None:

@@ -94,11 +94,11 @@ def test_latency_compares_methods_on_the_same_targets(monkeypatch: pytest.Monkey
     pytest.importorskip("clarabel")
     monkeypatch.setattr("finlab.evaluation.experiments.latency.LAYOUTS", 2)
     monkeypatch.setattr("finlab.evaluation.experiments.latency.TARGETS", 5)
-    names = ("dual", "analytic", "clarabel")
+    names = ("dual", "analytic", "clarabel", "px4")
     sizes = {"robots": ("fins-3", "thrusters-7"), "reach": (0.9, 1.5), "calls": 6, "seed": 4711}
     rows = load_experiment("latency").rows(methods=names, **sizes)
     found = by(rows, "robot", "call", "method")
-    assert len(rows) == 3 * 3 + 3 * 2  # the pseudo-inverse knows fins alone
+    assert len(rows) == 3 * 3 + 3 * 4  # px4 knows thrusters alone
     assert all(0 < row["p50_ms"] <= row["p99_ms"] for row in rows)
     for robot in sizes["robots"]:
         for method in ("dual", "clarabel"):
