@@ -58,14 +58,15 @@ def run(
     check_names("split", names, SPLITS)
     check_names("objectives", objectives, UNITS)
     rows: list[Row] = []
-    kinds = {each: load_method_spec(each, checkpoint).choice.kind for each in methods}
+    kinds = {each: spec.choice.kind for each, spec in load_method_specs(methods, checkpoint).items()}
     for name in names:
         cases = make_split(name, layouts, targets, seed)
         robot = cases[0].layout
         fit = [each for each, kind in kinds.items() if len(names) == 1 or kind.fits(robot)]
-        for objective in UNITS if robot.is_of_fins else ("power",):
+        for objective in UNITS:
             able = tuple(each for each in fit if KEEPS.get(each, objective) == objective)
-            if objective in objectives and able:
+            possible = objective == "power" or robot.is_of_fins
+            if objective in objectives and able and possible:
                 rows += _rows(name, cases, able, objective, starts, checkpoint, seed)
     return rows
 
