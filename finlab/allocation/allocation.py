@@ -17,6 +17,7 @@ from finlab.layout import Layout
 from finlab.layout.arrays import layout_effectiveness
 from finlab.layout.commands import Command, command_of
 from finlab.layout.damage import Health
+from finlab.physics.expected_miss import expected_miss, sources_of_miss
 from finlab.physics.known_plants import plant_of
 from finlab.physics.plant import Plant
 
@@ -48,7 +49,9 @@ class Answer(PlainData):
     What is dear to tell is told when it is first asked for, and kept; copies have all of it.
     """
 
-    TOLD: ClassVar[tuple[str, ...]] = ("forces", "wrench", "err_norm", "power", "effort", "bound", "notes")
+    TOLD: ClassVar[tuple[str, ...]] = (
+        *("forces", "wrench", "err_norm", "power", "effort", "bound", "expected_miss", "notes"),
+    )
     """What is told when it is asked for."""
 
     layout: Layout
@@ -110,16 +113,12 @@ class Answer(PlainData):
         """Sentences about this answer."""
         return ()
 
-    @property
+    @cached_property
     def expected_miss(self) -> Array:
-        """Standard deviation (6,) of the wrench [N, N m] by what is uncertain of the actuators; zeros where
-        nothing is known to be."""
-        return np.zeros(6)
-
-    @property
-    def expected_error(self) -> float:
-        """The same as a share of the yardstick, as `err_norm`."""
-        return float(np.linalg.norm(self.expected_miss / self.scale))
+        """Standard deviation (6,) or (N, 6) of the wrench [N, N m] by what is uncertain of the actuators:
+        what the layout says, or a table's own; zeros where nothing is known to be. See
+        `finlab.physics.expected_miss`."""
+        return self._by_parts(lambda rows: expected_miss(self._plant, rows))
 
     @property
     def _plant(self) -> Plant:
@@ -173,6 +172,11 @@ class BatchAllocation(Answer):
         for rows in chunks(len(self)):
             error[rows] = np.linalg.norm((self.target[rows] - self.wrench[rows]) / self.scale, axis=-1)
         return error
+
+    @property
+    def expected_error(self) -> Array:
+        """Sizes (N,) of `expected_miss`, each axis over its `scale`."""
+        return np.asarray(np.linalg.norm(self.expected_miss / self.scale, axis=-1))
 
     @cached_property
     def power(self) -> Array:
@@ -240,6 +244,11 @@ class Allocation(Answer):
         missing = self.unallocated / self.scale
         return float(np.sqrt(missing @ missing))
 
+    @property
+    def expected_error(self) -> float:
+        """Size of `expected_miss`, each axis over its `scale`: by how much the true wrench may be off."""
+        return float(np.linalg.norm(self.expected_miss / self.scale))
+
     @cached_property
     def power(self) -> float:
         """Mean mechanical power [W] of the command, by the fins' own models."""
@@ -261,12 +270,25 @@ class Allocation(Answer):
         return self.later.samples() if self.later is not None else None
 
     def _doubts(self) -> tuple[str, ...]:
+        doubt = () if self.expected_error <= REACHED else self._measure_next()
         if not self.bound or self.power <= (1.0 + TOLD_GAP) * self.bound:
-            return ()
+            return doubt
         gap = 100.0 * (1.0 - self.bound / self.power)
         return (
+            *doubt,
             f"of its power, {gap:.2g} % may be more than needed: where an actuator cannot rest, or has a "
             "wide arc, a dead band or drag, the least is not proved",
+        )
+
+    def _measure_next(self) -> tuple[str, ...]:
+        """The sentence about what adds most to `expected_error`."""
+        sources = sources_of_miss(self._plant, self.command[None])
+        parts = np.array([(source.variance[0] / self.scale**2).sum() for source in sources])
+        most = int(parts.argmax())
+        left = float(np.sqrt(parts.sum() - parts[most]))
+        return (
+            f"the true wrench is expected to be off by {self.expected_error:.2g}; measure "
+            f"{sources[most].words} next, without whose uncertainty {left:.2g} would be left",
         )
 
     @property

@@ -7,14 +7,17 @@ import numpy as np
 from finlab.actuators.fin.models import file_stamps
 from finlab.actuators.fin.table_file import DOUBT
 from finlab.arrays import Array
-from finlab.layout import FinModelSpec, Layout, Limits
+from finlab.layout import Actuator, Fin, FinModelSpec, Layout, Limits
+from finlab.layout.angles import wrapped
 from finlab.layout.rudder import Rudder
+from finlab.layout.thrust_model import PowerTable
 from finlab.physics import FinLaw, TableLaw, make_law, plant_of
 
 RESTLESS = 0.05
 """Share of its largest force below which a fin counts as able to rest."""
 STEPS = (5, 5, 16)
 """Amplitudes, frequencies and zero directions at which a fin is asked for its smallest and largest force."""
+AXES_OF_TABLES = ("half amplitudes", "frequencies", "zero directions")
 BEYOND = 1e-6
 """By how much [rad, Hz] limits may exceed a table unnoticed."""
 
@@ -30,7 +33,7 @@ def fin_notes(layout: Layout, flow: Array | None = None) -> tuple[str, ...]:
     if flow is None:
         return notes + _at_rest(layout)
     if plant_of(layout).feels_flow:
-        return notes
+        return notes + _not_at_speed(layout)
     return (
         *notes,
         f"the flow is without effect: layout {layout.name} does not say what speed through the water takes "
@@ -47,6 +50,23 @@ def _at_rest(layout: Layout) -> tuple[str, ...]:
         return ()
     them = f"rudder {names[0]} gives" if len(names) == 1 else f"rudders {', '.join(names)} give"
     return (f"{them} nothing at rest; tell how the robot moves through the water (flow)",)
+
+
+def _not_at_speed(layout: Layout) -> tuple[str, ...]:
+    """The sentence about tables, which tell forces at rest."""
+    told = layout.interaction.inflow if layout.interaction else (0.0, 0.0)
+    names = [
+        part.name
+        for part in layout.actuators
+        if (part.model.type == "table" and not any(told) if isinstance(part, Fin) else _has_table(part))
+    ]
+    if not names:
+        return ()
+    return (f"the tables of {', '.join(names)} hold forces at rest; what speed changes is not known",)
+
+
+def _has_table(part: Actuator) -> bool:
+    return isinstance(getattr(part, "model", None), PowerTable)
 
 
 @lru_cache(maxsize=256)
@@ -88,10 +108,22 @@ def _doubtful(law: FinLaw) -> list[str]:
 def _beyond_table(law: FinLaw, limits: Limits) -> list[str]:
     if not isinstance(law, TableLaw):
         return []
-    asked = (("half amplitudes", "rad", limits.amplitude), ("frequencies", "Hz", limits.frequency))
-    return [
+    asked = [("half amplitudes", "rad", limits.amplitude), ("frequencies", "Hz", limits.frequency)]
+    if not law.periodic:
+        middle = 0.5 * sum(law.covers[2])
+        turn = 0.5 * sum(limits.zero_direction) - middle
+        shift = float(wrapped(turn)) - turn
+        low, high = (end + shift for end in limits.zero_direction)
+        asked.append(("zero directions", "rad", (low, high)))
+    notes = [
         f"fin {{name}} may be asked for {name} of {low:.3g} to {high:.3g} {unit}, "
         f"its table holds {covered[0]:.3g} to {covered[1]:.3g}: beyond, its edge is taken"
         for (name, unit, (low, high)), covered in zip(asked, law.covers, strict=False)
         if low < covered[0] - BEYOND or high > covered[1] + BEYOND
     ]
+    if few := [AXES_OF_TABLES[k] for k in law.grid_error.few]:
+        notes.append(
+            f"the table of fin {{name}} has two {' and two '.join(few)} alone: how wrong it is between them "
+            "cannot be told"
+        )
+    return notes

@@ -65,8 +65,10 @@ def fin_rows(result: Allocation) -> list[tuple[str, ...]]:
 
 
 def wrench_rows(result: Allocation) -> list[tuple[str, ...]]:
-    """Name and cells of what was asked, what is delivered and what is missing."""
+    """Name and cells of what was asked, what is delivered, what is missing, and how uncertain that is."""
     wrenches = {"asked": result.target, "delivered": result.wrench, "missing": result.unallocated}
+    if result.expected_error:
+        wrenches["uncertain"] = result.expected_miss
     # `+ 0.0` turns a rounded -0.0 into 0.0.
     return [(name, *(f"{round(v, 3) + 0.0:.3f}" for v in row)) for name, row in wrenches.items()]
 
@@ -75,8 +77,9 @@ def summary(result: Allocation) -> str:
     """The figures of an answer in one line."""
     source = f", checkpoint {result.checkpoint}" if result.checkpoint else ""
     effort = "" if result.effort is None else f"effort {result.effort:.3f}   "
+    expected = f"expected_error {result.expected_error:.2e}   " if result.expected_error else ""
     return (
-        f"err_norm {result.err_norm:.2e}   power {result.power:.3f} W   {effort}"
+        f"err_norm {result.err_norm:.2e}   {expected}power {result.power:.3f} W   {effort}"
         f"{result.solve_ms:.1f} ms   method {result.method}{source}"
     )
 

@@ -22,6 +22,7 @@ def allocation_record(result: Allocation) -> dict[str, object]:
         "unallocated": result.unallocated.tolist(),
         "err_norm": result.err_norm,
         "expected_error": result.expected_error,
+        "expected_miss": result.expected_miss.tolist(),
         "effort": result.effort,
         "power": result.power,
         "bound": result.bound,

@@ -94,6 +94,7 @@ class Server:
             "wrench": answer.wrench.tolist(),
             "unallocated": answer.unallocated.tolist(),
             "err_norm": answer.err_norm,
+            "expected_error": answer.expected_error,
             "effort": answer.effort,
             "power": answer.power,
             "solve_ms": answer.solve_ms,

@@ -7,15 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
-from finlab.actuators.fin.table_file import COLUMNS, DOUBT, POWER_COLUMN
+from finlab.actuators.fin.table_file import COLUMNS, DEVIATIONS, DOUBT, POWER_COLUMN
 from finlab.errors import DataError
 from finlab.fit.fin_fit import FinFit
 from finlab.whole_file import write_whole
 
 GRID = (13, 13, 18)
 """Amplitudes, frequencies and zero directions of the table, from rest to the largest that was measured."""
-DEVIATIONS = ("sFx", "sFy", "sFz")
-"""Columns of the forces' standard deviations [N]; allocation reads past them."""
 
 
 def fin_csv(fit: FinFit) -> str:

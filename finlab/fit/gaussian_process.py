@@ -19,6 +19,8 @@ NOISE = (1e-8, 1.0)
 FIRST_NOISE = 1e-3
 LEAST_NOISE = 1e-10
 """Added to every variance, so that samples at the same command leave the covariance regular."""
+NOISE_ROUNDS = 2
+"""Times that the noise is found from the errors of the fit before."""
 TAILS = 5.0
 """Degrees of freedom of the noise while wild values are looked for."""
 
@@ -69,17 +71,19 @@ class Component:
         """Takes scaled inputs (n, 3) as `ThrustKernel` does, values (n,), and their noise's variance (n,).
 
         Where the variance is not known, it is found from the errors of a first fit, made as if the noise were
-        the same everywhere: it has a part that is, and a part that grows with the `size` (n,) of the whole
-        force, by default that of the value. With `wild`, a few values may be far off without making the
-        others' noise larger.
+        the same everywhere, and again from those of the second, which is nearer to small forces: it has a
+        part that is the same, and a part that grows with the `size` (n,) of the whole force, by default that
+        of the value. With `wild`, a few values may be far off without making the others' noise larger.
         """
         self._noise = 0.0, 0.0
-        if variance is None:
-            error, _ = _tuned(inputs, values, None).left_out()
-            size = np.asarray(values - error) if size is None else size
-            self._noise = _noise_of(error, size, wild)
-            variance = self._noise_at(size)
         self._process = _tuned(inputs, values, variance)
+        for _ in range(0 if variance is not None else NOISE_ROUNDS):
+            error, _ = self._process.left_out()
+            found = np.asarray(values - error) if size is None else size
+            self._noise = _noise_of(error, found, wild)
+            variance = self._noise_at(found)
+            self._process = _tuned(inputs, values, variance)
+        assert variance is not None
         self.variance = variance
         """Of the noise of each value (n,)."""
         self.left_out, self.left_out_deviation = self._process.left_out()

@@ -33,6 +33,7 @@ KEYS = [
     "unallocated",
     "err_norm",
     "expected_error",
+    "expected_miss",
     "effort",
     "power",
     "bound",

@@ -4,10 +4,14 @@ Forces, power and their derivatives are continuous between the grid's points. Wh
 the circle the table is periodic. Amplitudes and frequencies beyond the table count as its edge.
 """
 
+from functools import cached_property
+
 import numpy as np
 
+from finlab.actuators.fin.grid_error import SMALL, grid_error
 from finlab.actuators.fin.hermite_grid import Grid, HermiteGrids
 from finlab.actuators.law import FinLaw
+from finlab.actuators.table_error import TableError
 from finlab.arrays import Array, Values, library_of
 
 
@@ -56,9 +60,17 @@ class GridLaw(FinLaw):
 class TableLaw(GridLaw):
     """The law of one table."""
 
-    def __init__(self, axes: list[Array], values: Array, periodic: bool, notes: tuple[str, ...] = ()) -> None:
+    def __init__(
+        self,
+        axes: list[Array],
+        values: Array,
+        periodic: bool,
+        notes: tuple[str, ...] = (),
+        deviation: Array | None = None,
+    ) -> None:
         """Takes the grid's axes [rad, Hz, rad], rising, two points or more each, and what was measured
-        (a, f, d, 3 or 4): forces [N], and power [W] where it is known.
+        (a, f, d, 3 or 4): forces [N], and power [W] where it is known. The forces' standard deviations
+        (a, f, d, 3) [N] are None or (a, f, d, 0) where nothing is known of them.
 
         A periodic grid's zero directions cover the circle, without the first one again at the end.
         """
@@ -70,6 +82,44 @@ class TableLaw(GridLaw):
         """What to know of the table, a sentence each."""
         self.covers = tuple((float(axis[0]), float(axis[-1])) for axis in axes)
         """First and last amplitude [rad], frequency [Hz] and zero direction [rad] of the grid."""
+        self._deviation = None
+        if deviation is not None and deviation.shape[-1]:
+            self._deviation = Grid(axes, np.square(deviation), periodic)
+        self._largest = float(np.linalg.norm(values[..., :3], axis=-1).max())
+
+    @cached_property
+    def grid_error(self) -> TableError:
+        """What the grid leaves open, over the size of the force."""
+        return grid_error(self.grid)
+
+    @cached_property
+    def _variance(self) -> HermiteGrids | None:
+        return None if self._deviation is None else HermiteGrids([self._deviation])
+
+    def deviation(self, command: Array) -> Array:
+        """Returns the standard deviation (..., 2) [N] of the force across the shaft, in each of two
+        directions, and along it, at commands (..., 3): what the file says, and the error of the grid."""
+        size = np.linalg.norm(self.force(command), axis=-1)
+        error = self.grid_error
+        own = np.zeros((*size.shape, 2))
+        open_share = error.spacing
+        if self._variance is None:
+            open_share = float(np.hypot(open_share, error.noise))
+        else:
+            found = np.maximum(self._variance(command, 1)[..., 0, 0, 0, :], 0.0)
+            own[..., 0], own[..., 1] = 0.5 * (found[..., 1] + found[..., 2]), found[..., 0]
+        own[..., 0] += open_share**2 * (size**2 + (SMALL * self._largest) ** 2)
+        return np.asarray(np.sqrt(own))
+
+    @cached_property
+    def uncertain_share(self) -> float:
+        """The part of the standard deviation across the shaft that grows with the force, as a share of it,
+        over the grid."""
+        command = np.stack(np.meshgrid(*self.grid.axes, indexing="ij"), axis=-1).reshape(-1, 3)
+        size = np.linalg.norm(self.force(command), axis=-1) ** 2
+        variance = self.deviation(command)[..., 0] ** 2
+        away = size - size.mean()
+        return float(np.sqrt(max(away @ variance / max(away @ away, 1e-300), 0.0)))
 
 
 def _jacobian(found: Array) -> Array:

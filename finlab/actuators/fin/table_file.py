@@ -3,9 +3,9 @@
 Its columns are A [rad], f [Hz], phi [rad], Fx, Fy, Fz [N] under a header line, and P [W] where the power is
 known; A is the half amplitude, phi the zero direction, forces and power are cycle means, forces in the fin
 frame (x' shaft, y' horizontal thrust axis, z' up). A fin without P takes the power of a plate like U-CAT's
-fin. Rows come in any order but must fill a grid: every amplitude with every frequency with every zero
-direction. Spacing is free. Lines that begin with # say what to know of the table; other columns are passed
-over.
+fin. Standard deviations of the forces (sFx, sFy, sFz) say how far they may be from the truth. Rows come in
+any order but must fill a grid: every amplitude with every frequency with every zero direction. Spacing is
+free. Lines that begin with # say what to know of the table; other columns are passed over.
 """
 
 import csv
@@ -30,6 +30,8 @@ COLUMNS = ("A", "f", "phi", "Fx", "Fy", "Fz")
 """Columns of a force table, by name; their order in the file is free."""
 POWER_COLUMN = "P"
 """Column of the mean power [W], which may be left out."""
+DEVIATIONS = ("sFx", "sFy", "sFz")
+"""Columns of the forces' standard deviations [N], which may be left out."""
 DOUBT = "not to be trusted"
 """How a table's note begins that every answer repeats."""
 LEAST, MOST = 1e-6, 1e6
@@ -53,9 +55,9 @@ def read_table(path: str | os.PathLike[str]) -> TableLaw:
 
 def parse_table(content: bytes, source: str) -> TableLaw:
     """Returns the law in the content of a CSV file, which errors call `source`; see `read_table`."""
-    rows, lines, notes = _read_rows(content, source)
+    rows, deviation, lines, notes = _read_rows(content, source)
     _check_units(rows, source)
-    axes, values = _grid(rows, lines, source)
+    axes, values = _grid(np.hstack([rows, deviation]), lines, source)
     periodic, axes[2], values = _close_circle(axes[2], values, source)
     for name, axis in zip(COLUMNS, axes, strict=False):
         if len(axis) < 2:
@@ -65,7 +67,8 @@ def parse_table(content: bytes, source: str) -> TableLaw:
                 f"{source}: two values of column {name} are {np.diff(axis).min():.2g} apart, expected "
                 f"{LEAST_STEP:g} or more; write equal values with equal digits"
             )
-    return TableLaw(axes, values, periodic, notes)
+    known = rows.shape[1] - 3
+    return TableLaw(axes, values[..., :known], periodic, notes, values[..., known:])
 
 
 def write_table(
@@ -96,9 +99,10 @@ def table_bytes(path: str | os.PathLike[str]) -> bytes:
     return content
 
 
-def _read_rows(content: bytes, source: str) -> tuple[Array, NDArray[np.intp], tuple[str, ...]]:
-    """Returns the table (rows, 6 or 7) in the order of `COLUMNS`, with the power behind, the line (rows,) of
-    the file that each row stands in, and the notes above the header."""
+def _read_rows(content: bytes, source: str) -> tuple[Array, Array, NDArray[np.intp], tuple[str, ...]]:
+    """Returns the table (rows, 6 or 7) in the order of `COLUMNS`, with the power behind, the standard
+    deviations (rows, 3 or 0), the line (rows,) of the file that each row stands in, and the notes above the
+    header."""
     table = CsvTable(content, source)
     header = table.header
     missing = [name for name in COLUMNS if name not in header]
@@ -109,7 +113,16 @@ def _read_rows(content: bytes, source: str) -> tuple[Array, NDArray[np.intp], tu
     if len(set(header)) < len(header):
         raise DataError(f"{source}: a column name appears twice in the header")
     columns = [*COLUMNS, POWER_COLUMN] if POWER_COLUMN in header else [*COLUMNS]
-    return *table.numbers([header.index(name) for name in columns]), table.notes
+    known = len(columns)
+    if set(DEVIATIONS) <= set(header):
+        columns += DEVIATIONS
+    rows, lines = table.numbers([header.index(name) for name in columns])
+    if (rows[:, known:] < 0.0).any():
+        raise DataError(
+            f"{source}: a column of {', '.join(DEVIATIONS)} has {rows[:, known:].min():.4g}, expected "
+            "standard deviations in N from 0"
+        )
+    return rows[:, :known], rows[:, known:], lines, table.notes
 
 
 def _check_units(rows: Array, source: str) -> None:
@@ -160,7 +173,8 @@ def _check_power(power: Array, source: str) -> None:
 
 
 def _grid(rows: Array, lines: NDArray[np.intp], source: str) -> tuple[list[Array], Array]:
-    """Returns the three axes and the values (n_A, n_f, n_phi, 3 or 4) of rows that fill a grid."""
+    """Returns the three axes and the values (n_A, n_f, n_phi, columns behind them) of rows that fill a
+    grid."""
     found = [np.unique(rows[:, i], return_inverse=True) for i in range(3)]
     axes = [values for values, _ in found]
     shape = tuple(len(axis) for axis in axes)

@@ -1,0 +1,79 @@
+"""What is known of how far the forces of a robot's actuators may be from their laws and tables.
+
+A layout says it (`uncertainty` of an actuator); where it does not, a table tells by its own standard
+deviations and by the error of its grid.
+"""
+
+from collections.abc import Hashable
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from finlab.actuators.fin.models import file_stamps, make_law
+from finlab.actuators.fin.table import TableLaw
+from finlab.actuators.thrust_table_error import thrust_table_error
+from finlab.arrays import Array
+from finlab.layout.actuator import Actuator
+from finlab.layout.fin import Fin
+from finlab.layout.layout import Layout
+from finlab.layout.thrust_model import PowerTable
+
+OF_ONE_TABLE = 0.5
+"""Share of the variance that actuators with one table have together: their errors are alike where their
+commands are."""
+
+
+@dataclass(frozen=True)
+class Known:
+    """What is known of one actuator's force."""
+
+    share: float
+    """Standard deviation along each own direction, as a share of the force."""
+    floor: float = 0.0
+    """The part of it that is there at any force [N]."""
+    common: Hashable = None
+    """What the error comes from, the same for actuators that err together; None for one that errs by
+    itself."""
+    correlation: float = 1.0
+    """Share of the variance that these have together."""
+    table: TableLaw | None = None
+    """Tells the deviation at each command, in place of `share` and `floor`."""
+
+    def deviation(self, command: Array, size: Array) -> Array:
+        """Returns the standard deviation (N, 2) [N] along each own direction of the force, and along a fin's
+        shaft, at commands (N, 3) that give forces of a size (N,) [N]."""
+        if self.table is not None:
+            return self.table.deviation(command)
+        own = np.hypot(self.share * size, self.floor)
+        return np.stack([own, np.zeros_like(own)], axis=-1)
+
+
+def uncertainties(layout: Layout) -> tuple[Known | None, ...]:
+    """Returns what is known of each actuator; None where its law is taken as it is.
+
+    Raises:
+        DataError: a fin's force table cannot be read.
+    """
+    return _known(layout, file_stamps(layout))
+
+
+@lru_cache(maxsize=256)
+def _known(layout: Layout, stamps: tuple[tuple[int, int] | None, ...]) -> tuple[Known | None, ...]:
+    found = tuple(map(_of, layout.actuators))
+    return tuple(own if own and (own.table or own.share or own.floor) else None for own in found)
+
+
+def _of(part: Actuator) -> Known | None:
+    told = part.uncertainty
+    if told is not None:
+        return Known(told.share, told.floor, told.common, told.correlation)
+    if isinstance(part, Fin):
+        law = make_law(part.model)
+        if not isinstance(law, TableLaw):
+            return None
+        return Known(law.uncertain_share, 0.0, part.model, OF_ONE_TABLE, law)
+    model = getattr(part, "model", None)
+    if not isinstance(model, PowerTable):
+        return None
+    return Known(*thrust_table_error(model), model, OF_ONE_TABLE)

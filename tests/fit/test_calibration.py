@@ -1,0 +1,78 @@
+"""Whether answers of robots with fitted fins miss as much as they say: four fins, one fit, the law is known.
+
+`python -m tests.fit.test_calibration SEED...` prints the table for other seeds.
+"""
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+import pytest
+
+from finlab.allocation import Allocator
+from finlab.arrays import Array
+from finlab.fit.fin_file import write_fin
+from finlab.fit.fin_fit import fit_fin
+from finlab.layout import FinModelSpec, random_layout
+from finlab.layout.random_fins import random_fin_model
+from finlab.physics import FinLaw, TableLaw, make_law, plant_of
+from tests.fit.cell import commands, measured, samples
+
+LAWS = ("drag", "lighthill", "soft", "table")
+"""The last one is a soft fin's grid with noise of 3 %."""
+TARGETS = 40
+
+
+def random_law(kind: str, rng: np.random.Generator) -> FinLaw:
+    """A fin with random parameters."""
+    law = make_law(random_fin_model(rng, "soft" if kind == "table" else kind))
+    if kind != "table":
+        return law
+    axes = [np.linspace(0, 0.6, 8), np.linspace(0, 2.1, 9), np.linspace(-np.pi, np.pi, 12, endpoint=False)]
+    force = law.force(np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1))
+    return TableLaw(axes, np.asarray(force * (1.0 + 0.03 * rng.standard_normal(force.shape))), True)
+
+
+def miss_and_expected(kind: str, seed: int, folder: Path) -> tuple[Array, Array]:
+    """True misses and expected ones (K, 6) over the yardstick, of targets on three robots with one fit."""
+    rng = np.random.default_rng([seed, LAWS.index(kind)])
+    law, command = random_law(kind, rng), commands(300, seed)
+    path = folder / f"{kind}-{seed}.csv"
+    write_fin(fit_fin(samples(command, measured(law, command, 0.05, seed + 1))), path)
+    model = FinModelSpec("table", (("path", str(path)),))
+    misses, expected = [], []
+    for _ in range(3):
+        layout = random_layout(rng, n_fins=4)
+        layout = replace(layout, actuators=tuple(replace(fin, model=model) for fin in layout.fins))
+        plant, allocator = plant_of(layout), Allocator(layout)
+        targets = rng.uniform(0.2, 0.9, (TARGETS, 1)) * plant.wrench(plant.sample(rng, (TARGETS,)))
+        answers = allocator.allocate_batch(targets)
+        off = law.force(answers.command) - plant.force(answers.command)
+        misses.append(np.einsum("kni,niw->kw", off, plant.effectiveness) / allocator.scale)
+        expected.append(answers.expected_miss / allocator.scale)
+    return np.concatenate(misses), np.concatenate(expected)
+
+
+def ratio(miss: Array, expected: Array) -> float:
+    """Root mean square of the size of the true miss over the expected one."""
+    return float(np.sqrt(np.mean((miss**2).sum(axis=1) / (expected**2).sum(axis=1))))
+
+
+@pytest.mark.parametrize("kind", LAWS)
+def test_fitted_fins_miss_as_much_as_they_say(kind: str, tmp_path: Path) -> None:
+    rows = [miss_and_expected(kind, seed, tmp_path) for seed in (21, 22)]
+    miss, expected = (np.concatenate(part) for part in zip(*rows, strict=True))
+    assert 0.5 < ratio(miss, expected) < 2.0
+    assert (np.abs(np.log(np.sqrt(np.mean(miss**2, axis=0) / np.mean(expected**2, axis=0)))) < 1.1).all()
+
+
+if __name__ == "__main__":
+    with TemporaryDirectory() as place:
+        for law_name in LAWS:
+            own = [miss_and_expected(law_name, int(seed), Path(place)) for seed in sys.argv[1:]]
+            m, e = (np.concatenate(part) for part in zip(*own, strict=True))
+            each = " ".join(f"{ratio(*row):.2f}" for row in own)
+            axes = " ".join(f"{value:.2f}" for value in np.sqrt(np.mean(m**2 / e**2, axis=0)))
+            print(f"{law_name:10} {ratio(m, e):.2f}  by seed {each}  by axis {axes}", flush=True)
