@@ -11,9 +11,9 @@ import numpy as np
 from finlab.arrays import Array
 from finlab.errors import LayoutError
 from finlab.exchange.ardusub_frames import AXES, FRAMES, SIGNS
-from finlab.exchange.exchange import Exchange, effectiveness
+from finlab.exchange.exchange import Exchange
 from finlab.exchange.parameters import parameters_text, read_parameters
-from finlab.layout import Layout
+from finlab.layout import Layout, own_effectiveness
 
 ARM = 0.2
 """Arm of a factor of 1 [m]; the file has none."""
@@ -40,6 +40,8 @@ def read_ardusub(text: str, name: str, exchange: Exchange) -> Layout:
     rows = [found for line in text.splitlines() if (found := _MOTOR.match(line[:500]))]
     names = [f"motor{found[1]}" if found[1].isdecimal() else found[1] for found in rows]
     factors = np.array([re.findall(r"[-+.\d]+", found[2]) for found in rows], dtype=np.float64)
+    if len(set(names)) < len(names):
+        raise LayoutError("adds a motor twice; keep the lines of one frame")
     if not rows:
         values = read_parameters(text)
         frame = values.get("FRAME_CONFIG", -1.0)
@@ -63,16 +65,16 @@ def factors_of(layout: Layout, exchange: Exchange) -> tuple[list[str], Array]:
     Raises:
         LayoutError: there is no thruster.
     """
-    parts = exchange.thrusters_of(layout, "A table of factors", "limits", "lengths")
-    full = [max(part.force[1], -part.force[0]) for part in parts]
-    factors = (effectiveness(parts) * full).T[:, np.argsort(ORDER)] * SIGNS
+    kept = exchange.thrusters_of(layout, "A table of factors", "limits", "lengths")
+    full = np.maximum(kept.upper, -kept.lower)[:, :1]
+    factors = (own_effectiveness(kept)[:, 0] * full)[:, np.argsort(ORDER)] * SIGNS
     largest = np.abs(factors).max(0)
     for kinds in (slice(0, 3), slice(3, 6)):
         largest[kinds][largest[kinds] < WEAK * largest[kinds].max()] = np.inf
     for kind in np.flatnonzero(np.isinf(largest[:3])):
         exchange.note(f"Torque in {('roll', 'pitch', 'yaw')[kind]} is too weak to count.")
     factors = factors / largest
-    return [part.name for part in parts], np.where(np.abs(factors) < 1e-4, 0.0, factors)
+    return list(kept.names), np.where(np.abs(factors) < 1e-4, 0.0, factors)
 
 
 def write_ardusub(layout: Layout, exchange: Exchange, suffix: str) -> str:

@@ -38,11 +38,8 @@ FORM_OF |= {".cpp": "ardusub", ".csv": "matrix", ".yaml": "layout", ".yml": "lay
 def convert(file: str, output: str | os.PathLike[str], to: str | None, exchange: Exchange) -> Layout:
     """Makes one file into another, and returns the layout that went through.
 
-    Args:
-        file: a file of any form, a bundle, or the name of a shipped layout.
-        output: file to write.
-        to: `layout` or one of `WRITERS`; by the suffix of the output when None.
-        exchange: what to take where the file is silent; it gets notes.
+    `file` is of any form, a bundle, or the name of a shipped layout; `to` is `layout` or one of `WRITERS`, by
+    the suffix of the output when None.
 
     Raises:
         FinlabError: a file cannot be read or written, or the output's suffix says no form.

@@ -34,6 +34,8 @@ class Joint(NamedTuple):
     kind: str
     parent: str
     child: str
+    place: Array
+    """Where it is (3,) [m]."""
     axis: Array
     """What it turns about (3,), of length 1; of any length for a fixed joint."""
     ends: tuple[float, float]
@@ -45,8 +47,7 @@ class Description:
     """What a description says, in its own frame."""
 
     name: str
-    links: dict[str, Array]
-    """Poses (4, 4) by name."""
+    links: list[str]
     joints: dict[str, Joint]
     mass: float
     """[kg]; 0 where no link has one."""
@@ -87,7 +88,7 @@ def parse_description(text: str, name: str) -> Description:
     links = {key.removeprefix("link "): pose for key, pose in poses.items() if key.startswith("link ")}
     plugins = [*top.findall("gazebo/plugin"), *top.findall("plugin"), *top.findall("link/plugin")]
     weighed = _masses({key: named[f"link {key}"] for key in links}, links)
-    return Description(top.get("name") or name, links, joints, *weighed, plugins)
+    return Description(top.get("name") or name, list(links), joints, *weighed, plugins)
 
 
 def said(element: Element, paths: str, usual: str = "") -> str:
@@ -190,6 +191,7 @@ def _joint(part: Element, named: Named, poses: dict[str, Array]) -> Joint:
     usual = "1 0 0" if part.find("parent[@link]") is not None else "0 0 1"
     axis = numbers(said(part, "axis@xyz axis/xyz", usual), 3, f"the axis of {what}")
     axis = poses[seen_from or f"joint {name}"][:3, :3] @ axis
+    place = poses[f"joint {name}"][:3, 3]
     length = float(np.linalg.norm(axis))
     if length == 0.0 and kind in TURNING:
         raise LayoutError(f"the axis of {what} has no length")
@@ -200,7 +202,7 @@ def _joint(part: Element, named: Named, poses: dict[str, Array]) -> Joint:
         raise LayoutError(f"a limit of {what} is no number") from None
     ends = (low, high) if max(abs(low), abs(high)) < 1e9 else (-math.inf, math.inf)
     names = said(part, "parent@link parent"), said(part, "child@link child")
-    return Joint(name, kind, *names, axis / (length or 1.0), ends)
+    return Joint(name, kind, *names, place, axis / (length or 1.0), ends)
 
 
 def _masses(links: dict[str, Element], poses: dict[str, Array]) -> tuple[float, Array, Array, Array]:

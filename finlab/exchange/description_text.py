@@ -40,7 +40,7 @@ def description_text(layout: Layout, exchange: Exchange, sdf: bool) -> str:
             limits = {"min_thrust_cmd": part.force[0], "max_thrust_cmd": part.force[1]}
             band = {"deadband": part.dead_band} if part.dead_band else {}
             writer.plugin("Thruster", joint_name=f"{part.name}_joint", **limits, **band)
-    told = {}
+    told: dict[str, float] = {}
     for field, tags in DERIVATIVES.items():
         told |= dict(zip(tags.split(), (-value for value in getattr(body, field) or ()), strict=False))
     if told:

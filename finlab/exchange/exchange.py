@@ -72,31 +72,23 @@ class Exchange:
         ends = None if force is None else (force[0] * size, force[1] * size)
         return self.thruster(name, np.cross(axis, torque), axis, ends, float(torque @ axis))
 
-    def thrusters_of(self, layout: Layout, form: str, *lost: str) -> list[Thruster]:
-        """Returns the thrusters of a layout, for a form that has no place for others, nor for what is `lost`.
+    def thrusters_of(self, layout: Layout, form: str, *lost: str) -> Layout:
+        """Returns a layout's thrusters alone, for a form with no place for others, nor for what is `lost`.
 
         Raises:
             LayoutError: there is none.
         """
-        kept = [part for part in layout.actuators if isinstance(part, Thruster)]
-        left = [f"{part.name} ({part.type})" for part in layout.actuators if not isinstance(part, Thruster)]
-        if not kept:
+        others = {part.name: part.type for part in layout.actuators if not isinstance(part, Thruster)}
+        if len(others) == layout.n:
             raise LayoutError(f"layout {layout.name} has no thruster, and {form} has a place for these alone")
-        if left:
-            self.note(f"{form} has a place for thrusters alone; left out are {', '.join(left)}.")
-        lost = ("power", "dead bands", "rates", "time constants", *lost)
-        self.note(f"{form} has no place for {', '.join(lost)}.")
-        return kept
+        if others:
+            left = ", ".join(f"{name} ({kind})" for name, kind in others.items())
+            self.note(f"{form} has a place for thrusters alone; left out are {left}.")
+        self.note(f"{form} has no place for {', '.join(('power', 'dead bands', 'rates', *lost))}.")
+        return layout.without(others) if others else layout
 
 
 def vector(values: Array) -> Vector:
     """Returns three plain numbers; rounding errors of 0 become 0."""
     x, y, z = (0.0 if abs(value) < 1e-15 else float(value) for value in values)
     return x, y, z
-
-
-def effectiveness(parts: Sequence[Thruster]) -> Array:
-    """Returns the wrench (6, n) of 1 N of each thruster [N, N m], body frame, about the origin."""
-    axes = np.array([part.axis for part in parts])
-    reaction = np.array([part.torque_per_newton for part in parts])[:, None] * axes
-    return np.hstack([axes, np.cross([part.position for part in parts], axes) + reaction]).T

@@ -1,6 +1,6 @@
 """Layouts of robot descriptions: what plugins of gz-sim drive, and links that the user names.
 
-A plugin Thruster pushes its joint's child along the joint's axis, in newtons, or by an angular velocity w
+A plugin Thruster pushes at its joint, along the joint's axis, in newtons, or by an angular velocity w
 with CT density D^4 w |w|. On a link that turns itself it is an azimuth. Hydrodynamics has derivatives after
 Fossen, which are negative. A fin's joint sits where its force acts, and its axis is the shaft.
 """
@@ -24,6 +24,8 @@ MAX_TILT = math.radians(5.0)
 """Most that a fin's shaft may leave the horizontal plane [rad] and still be taken for horizontal."""
 MAX_LEAN = 0.02
 """Most that the thrust of an azimuth may lean out of the plane in which it turns [rad]."""
+BESIDE = 0.01
+"""Most that the line of an azimuth's thrust may pass by its turning axis and count as through it [m]."""
 MOST = 1000.0
 """What gz-sim takes for a limit of a thruster that is left out [N]."""
 DERIVATIVES = {
@@ -57,7 +59,7 @@ def read_description(text: str, name: str, exchange: Exchange) -> Layout:
     for link in exchange.thrusters:
         parts.append(_propeller(robot, _joint_of(robot, link), Element("plugin"), start, exchange))
     for link in exchange.fins:
-        parts.append(_fin(_joint_of(robot, link), robot.links[link][:3, 3] - start, exchange))
+        parts.append(_fin(_joint_of(robot, link), start, exchange))
     if not parts:
         raise LayoutError(
             "has no plugin Thruster of gz-sim; name the links that are fins (--fins LINK...) or thrusters "
@@ -90,17 +92,21 @@ def _propeller(
     robot: Description, joint: Joint, plugin: Element, start: Array, exchange: Exchange
 ) -> Actuator:
     """The thruster that a joint spins, or the azimuth where its mount turns, too."""
-    place = robot.links[joint.child][:3, 3] - start
+    place = joint.place - start
     part = exchange.thruster(joint.child, place, joint.axis, _force(plugin))
     part = replace(part, dead_band=number(plugin, "deadband"))
     mount = robot.joint_of(joint.parent)
-    if mount is None or mount.kind not in TURNING:
+    if mount is None or mount.kind not in TURNING or not mount.ends[0] < mount.ends[1]:
         return part
     along = float(mount.axis @ joint.axis)
     if abs(along) > MAX_LEAN:
         raise LayoutError(f"the thrust of {joint.child!r:.60} leans out of the plane in which it turns")
     zero = (joint.axis - along * mount.axis) / math.sqrt(1.0 - along * along)
-    arm = place - (robot.links[joint.parent][:3, 3] - start)
+    arm = joint.place - mount.place
+    if abs(arm @ np.cross(mount.axis, zero)) > BESIDE:
+        exchange.note(
+            f"{joint.child} sits beside the axis about which it turns: its place at angle 0 is taken."
+        )
     if part.force[0] < 0.0:
         exchange.note("An azimuth of finlab pushes one way only; reverse is left out.")
     arc = mount.ends if mount.ends[1] - mount.ends[0] < TURN else (-math.pi, math.pi)
@@ -115,20 +121,20 @@ def _force(plugin: Element) -> tuple[float, float] | None:
     if not said(plugin, "min_thrust_cmd max_thrust_cmd"):
         return None
     ends = [number(plugin, "min_thrust_cmd", -MOST), number(plugin, "max_thrust_cmd", MOST)]
-    if said(plugin, "use_angvel_cmd") in ("1", "true"):
+    if said(plugin, "use_angvel_cmd").lower() in ("1", "true"):
         density, size = number(plugin, "fluid_density", 1000.0), number(plugin, "propeller_diameter", 0.02)
         gain = number(plugin, "thrust_coefficient", 1.0) * density * size**4
         ends = sorted(gain * end * abs(end) for end in ends)
     return ends[0], ends[1]
 
 
-def _fin(joint: Joint, place: Array, exchange: Exchange) -> Fin:
+def _fin(joint: Joint, start: Array, exchange: Exchange) -> Fin:
     """The fin that a joint moves."""
     if joint.kind not in TURNING:
         raise LayoutError(
             f"joint {joint.name!r:.60} is {joint.kind}; a fin's joint is {' or '.join(TURNING)}"
         )
-    axis = joint.axis
+    axis, place = joint.axis, joint.place - start
     if abs(axis[2]) <= math.sin(MAX_TILT):
         # A joint may turn about the same line the other way round; finlab's shafts point out of the hull.
         outward = axis if axis[:2] @ place[:2] >= 0 else -axis

@@ -8,9 +8,9 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.errors import LayoutError
-from finlab.exchange.exchange import TO_FRD, Exchange, effectiveness
+from finlab.exchange.exchange import TO_FRD, Exchange
 from finlab.files.plain_values import yaml_text
-from finlab.layout import MAX_ACTUATORS, Layout
+from finlab.layout import MAX_ACTUATORS, Layout, own_effectiveness
 
 AXES = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
 UNIT = 0.05
@@ -95,9 +95,9 @@ def write_matrix(layout: Layout, exchange: Exchange, suffix: str) -> str:
     Raises:
         LayoutError: there is no thruster.
     """
-    parts = exchange.thrusters_of(layout, "A matrix", "places along the lines of the forces")
-    rows = effectiveness(parts) * (TO_FRD if exchange.frame == "FRD" else 1.0) + 0.0
-    names, limits = [part.name for part in parts], [list(part.force) for part in parts]
+    kept = exchange.thrusters_of(layout, "A matrix", "places along the lines of the forces")
+    rows = own_effectiveness(kept)[:, 0].T * (TO_FRD if exchange.frame == "FRD" else 1.0) + 0.0
+    names, limits = list(kept.names), np.stack([kept.lower, kept.upper], axis=1)[..., 0].tolist()
     matrix = dict(zip(AXES, rows.tolist(), strict=True))
     if suffix != ".csv":
         told = {"frame": exchange.frame, "unit": "N", "names": names, "limits": limits}

@@ -57,7 +57,7 @@ def write_px4(layout: Layout, exchange: Exchange, suffix: str) -> str:
     Raises:
         LayoutError: there is no thruster, or there are too many.
     """
-    parts = exchange.thrusters_of(layout, "PX4")
+    parts = [part for part in exchange.thrusters_of(layout, "PX4").actuators if isinstance(part, Thruster)]
     if len(parts) > MAX_ROTORS:
         raise LayoutError(f"PX4 takes up to {MAX_ROTORS} rotors, layout {layout.name} has {len(parts)}")
     reversing = sum(1 << i for i, part in enumerate(parts) if part.force[0] < 0.0 < part.force[1])

@@ -190,6 +190,7 @@ def test_what_has_no_place_is_named(tmp_path: Path) -> None:
         ("a.params", "CA_ROTOR_COUNT 1\nCA_ROTOR0_AZ 0", "CA_ROTOR0: has no direction"),
         ("a.parm", "FRAME_CONFIG 7", "FRAME_CONFIG: expected 0 to 6"),
         ("a.cpp", "add_motor_raw_6dof(AP_MOTORS_MOT_1, 1, 0, 0, 0, 0, 0, 1);", "'motor1' has no force"),
+        ("a.cpp", "add_motor(1, 0, 0, 0, 1, 0, 0, 1);\n" * 2, "adds a motor twice; keep the lines of one"),
         ("a.yaml", "matrix: [[1], [2]]", "has no matrix"),
         ("a.yaml", "limits: [[0, 1]]\nmatrix: [1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]", "limits: expected"),
         ("a.csv", "\n".join([",".join("1" * 65)] * 6), "expected up to 64 columns, got 65"),

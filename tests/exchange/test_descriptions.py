@@ -70,9 +70,9 @@ SDF = """<sdf version="1.9"><world name="sea"><model name="rov"><pose>9 9 9 0 0 
     <axis><xyz>1 0 0</xyz><limit><lower>-1e16</lower><upper>inf</upper></limit></axis></joint>
   <link name="b"><pose rotation_format="quat_xyzw">0 0 0.3 0 1 0 1</pose></link>
   <joint name="b_joint" type="continuous"><parent>hull</parent><child>b</child>
-    <axis><xyz expressed_in="__model__">0 2 0</xyz></axis></joint>
+    <pose>0 0 0.1 0 0 0</pose><axis><xyz expressed_in="__model__">0 2 0</xyz></axis></joint>
   <plugin filename="gz-sim-thruster-system" name="gz::sim::systems::Thruster"><joint_name>a_joint</joint_name>
-    <use_angvel_cmd>true</use_angvel_cmd><thrust_coefficient>-0.02</thrust_coefficient>
+    <use_angvel_cmd>True</use_angvel_cmd><thrust_coefficient>-0.02</thrust_coefficient>
     <propeller_diameter>0.1</propeller_diameter><max_thrust_cmd>100</max_thrust_cmd><min_thrust_cmd>-50</min_thrust_cmd>
     <deadband>0.5</deadband></plugin>
   <plugin filename="ignition-gazebo-thruster-system" name="ignition::gazebo::systems::Thruster">
@@ -93,7 +93,7 @@ def test_frames_of_sdf(tmp_path: Path) -> None:
     # 0.02 * 1000 * 0.1^4 w |w|; the coefficient is negative, so forward is reverse.
     np.testing.assert_allclose(a.force, [-20.0, 5.0])
     assert a.dead_band == 0.5
-    np.testing.assert_allclose((b.position, b.axis), [[-0.1, 0.0, 0.3], [0.0, 1.0, 0.0]], atol=1e-12)
+    np.testing.assert_allclose((b.position, b.axis), [[0.0, 0.0, 0.3], [0.0, 1.0, 0.0]], atol=1e-12)
     assert b.force == (-39.91, 51.44) and any("no limits of force" in note for note in exchange.notes)
     assert layout.body == Body(mass_kg=10.0, inertia_kgm2=(1.0, 2.0, 3.0), added_mass=(4, 0, 0, 0, 0, 0.5))
     assert read(path, force=(-1.0, 2.0)).actuators[1].upper[0] == 2.0
