@@ -1,12 +1,10 @@
-"""Files and folders that are either there whole or not at all."""
+"""Files that are either there whole or not at all, and folders for them."""
 
 import os
-import shutil
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from pathlib import Path
 
-from finlab.errors import FinlabError, LayoutError
+from finlab.errors import DataError, FinlabError, LayoutError
 
 
 def write_whole(
@@ -34,51 +32,15 @@ def write_whole(
         raise error(f"{path}: cannot be written: {failure.strerror}") from None
 
 
-UNFINISHED = ".unfinished"
-"""Folder inside a folder that is being filled."""
-
-
-def check_new_folder(path: str | os.PathLike[str]) -> None:
-    """Refuse what `whole_folder` would not fill: a file, or a folder that holds something.
+def make_folder(path: str | os.PathLike[str]) -> Path:
+    """Make a folder and those above it, unless they are there.
 
     Raises:
-        FinlabError: it is one.
+        DataError: that cannot be.
     """
     folder = Path(path)
-    if folder.exists() and not folder.is_dir():
-        raise FinlabError(f"{path}: expected a new or empty folder, got a file")
-    if folder.exists() and any(folder.iterdir()) and not (folder / UNFINISHED).exists():
-        raise FinlabError(f"{path}: expected a new or empty folder; name another one")
-    there = next(each for each in (folder.absolute(), *folder.absolute().parents) if each.exists())
-    if not there.is_dir() or not os.access(there, os.W_OK):
-        raise FinlabError(f"{path}: cannot be made in {there}; name another folder")
-
-
-@contextmanager
-def whole_folder(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """A folder to write files into, which are moved to a new or empty folder when all of them are there.
-
-    When writing fails nothing is left; what a kill leaves is overwritten by the next run.
-
-    Raises:
-        FinlabError: a file cannot be written.
-    """
-    folder = Path(path)
-    part, made = folder / UNFINISHED, not folder.exists()
     try:
-        shutil.rmtree(part, ignore_errors=True)
-        part.mkdir(parents=True)
-        yield part
-        for file in sorted(part.iterdir()):
-            os.replace(file, folder / file.name)
-        part.rmdir()
-    except BaseException as failure:
-        shutil.rmtree(part, ignore_errors=True)
-        if made:
-            with suppress(OSError):
-                folder.rmdir()
-        if isinstance(failure, FinlabError):
-            raise type(failure)(str(failure).replace(f"{UNFINISHED}/", "")) from None
-        if isinstance(failure, OSError):
-            raise FinlabError(f"{path}: cannot be written: {failure.strerror or failure}") from None
-        raise
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as failure:
+        raise DataError(f"{path}: cannot be made a folder: {failure.strerror}") from None
+    return folder

@@ -12,7 +12,7 @@ from tyro.conf import Positional, UseAppendAction, arg
 
 from finlab.cli.inputs import open_robot
 from finlab.errors import FinlabError
-from finlab.whole_file import check_new_folder, whole_folder
+from finlab.whole_file import make_folder
 
 if TYPE_CHECKING:
     from finlab.sim import ClosedLoop, FinFault, RunLog
@@ -62,12 +62,12 @@ def simulate(
         noise: whether the sensors are noisy.
         seed: of the noise.
         checkpoint: trained checkpoint; the shipped one of the method by default.
-        output: new or empty folder for the log (log.npz); without it only the summary is printed.
+        output: folder for the log (log.npz); without it only the summary is printed.
     """
     from tqdm import tqdm
 
     if output is not None:
-        check_new_folder(output)
+        make_folder(output)
     with tqdm(desc="swim", unit="s", disable=None, leave=False, file=sys.stderr) as bar:
         from finlab.sim import NO_NOISE, ClosedLoop, FinFault, make_trajectory
 
@@ -111,8 +111,7 @@ def simulate(
             bar.update(loop.period_s)
     written = []
     if output is not None:
-        with whole_folder(output) as folder:
-            loop.log.save(folder / "log.npz")
+        loop.log.save(output / "log.npz")
         written = [f"\n{output}: written log.npz."]
     told = excitation_summary(loop.log) if excite else summary(loop.log)
     changes = [f"{time:.1f} s: the monitor takes {what}" for time, what in found[1:]]

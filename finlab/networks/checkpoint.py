@@ -15,13 +15,13 @@ from typing import Any
 import numpy as np
 
 from finlab.assets import checkpoint_path, shipped_checkpoints
-from finlab.errors import CheckpointError, LayoutError
+from finlab.errors import CheckpointError, DataError, LayoutError
 from finlab.files.guarded import decoded, read_file
 from finlab.files.plain_values import parse_json
 from finlab.layout import FinModelSpec
 from finlab.networks.normalization import Normalization
 from finlab.networks.trained import State, TrainedWeights, check_arrays
-from finlab.whole_file import write_whole
+from finlab.whole_file import make_folder, write_whole
 
 FORMAT = "finlab-checkpoint"
 VERSION = 1
@@ -107,10 +107,10 @@ def checkpoint_files(weights: TrainedWeights) -> dict[str, bytes]:
 
 
 def write_checkpoint(folder: Path, weights: TrainedWeights) -> TrainedWeights:
-    """Write a checkpoint folder, and answer what is in it; a `CheckpointError` where it cannot be written."""
-    folder.mkdir(parents=True, exist_ok=True)
+    """Write a checkpoint folder, and answer what is in it; a `DataError` where it cannot be written."""
+    make_folder(folder)
     for name, content in checkpoint_files(weights).items():
-        write_whole(folder / name, content, CheckpointError)
+        write_whole(folder / name, content, DataError)
     return read_checkpoint(folder)
 
 

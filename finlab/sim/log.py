@@ -13,6 +13,7 @@ from finlab.arrays import AnyArray
 from finlab.errors import DataError
 from finlab.files.archive import check_shapes, json_of, read_arrays
 from finlab.files.schema import checked
+from finlab.whole_file import write_whole
 
 FORMAT = "finlab-swim"
 VERSION = 3
@@ -135,8 +136,8 @@ class RunLog:
         return file.getvalue()
 
     def save(self, path: str | Path) -> None:
-        """Writes the NPZ file."""
-        Path(path).write_bytes(self.npz())
+        """Writes the NPZ file; a `DataError` where it cannot be written."""
+        write_whole(path, self.npz(), DataError)
 
 
 def log_of_ticks(ticks: list[Tick], **about: Any) -> RunLog:

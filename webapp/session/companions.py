@@ -25,7 +25,7 @@ from finlab.files.guarded import read_file
 from finlab.layout import Fin, FinModelSpec, Layout
 from finlab.layout.body import MESH_SUFFIXES
 from finlab.layout.load import MAX_BYTES, layout_and_failed
-from finlab.whole_file import write_whole
+from finlab.whole_file import make_folder, write_whole
 from webapp.scene.meshes.mesh_file import MAX_FACES, read_mesh, simplified, stl_of
 
 LAYOUTS = (".yaml", ".yml", ".json")
@@ -158,10 +158,7 @@ def stored_mesh(name: str, content: bytes, scale: float, folder: Path) -> str:
 
 
 def _keep(path: Path, content: bytes) -> None:
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise FinlabError(f"{path.parent}: cannot be made: {error.strerror}") from None
+    make_folder(path.parent)
     if not path.exists():
         write_whole(path, content, DataError)
 

@@ -14,7 +14,7 @@ from finlab.evaluation.experiment import EXPERIMENTS, Experiment, load_experimen
 from finlab.evaluation.progress import progress
 from finlab.evaluation.report.document import Block, Row, to_markdown
 from finlab.evaluation.report.provenance import machine, source_commit, source_digest
-from finlab.whole_file import write_whole
+from finlab.whole_file import make_folder, write_whole
 
 PAGE, TABLES, RECORDS = "report.md", "tables.json", "records"
 """What a report's folder holds."""
@@ -49,10 +49,7 @@ def make_report(out: Path, *, size: Size = "full", seed: int = SEED, names: Sequ
     """
     if unknown := [name for name in names if name not in (*EXPERIMENTS, "all")]:
         raise DataError(f"sections: expected all or some of {', '.join(EXPERIMENTS)}, got {unknown[0]!r:.60}")
-    try:
-        (out / RECORDS).mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise DataError(f"{out / RECORDS}: cannot be made: {error.strerror}") from None
+    make_folder(out / RECORDS)
     digest, done = source_digest(), dict[str, dict[str, Any]]()
     for name in progress(EXPERIMENTS, "experiment", "report"):
         experiment = load_experiment(name)

@@ -32,6 +32,7 @@ from finlab.networks.checkpoint import (
 from finlab.networks.trained import State, TrainedWeights, sizes_for_file
 from finlab.training.first_weights import first_weights
 from finlab.training.loop import LOG_EVERY, Tensors, Terms, train
+from finlab.whole_file import make_folder
 
 TRAIN_SEED = 140_000
 """Added to the user's seed."""
@@ -72,12 +73,8 @@ def train_mdn(preset: str, out: Path, *, seed: int = 0, **training: Any) -> Trai
         trained = TrainedWeights(out.name, normalization, sizes_for_file(recipe.network), network)
         write_checkpoint(out, replace(trained, preset=preset, training={"mdn": identity | progress}))
 
-    answers = out / "answers"
-    try:
-        answers.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise DataError(f"{answers}: cannot be made: {error.strerror}") from None
-    terms = make_terms(recipe.network, answers_in(answers, recipe.answers, seed), settings, seed)
+    answers = answers_in(make_folder(out / "answers"), recipe.answers, seed)
+    terms = make_terms(recipe.network, answers, settings, seed)
     train(first_weights(recipe.network.shapes(), seed), terms, settings, out, save)
     return read_checkpoint(out)
 
