@@ -70,7 +70,7 @@ def factors_of(layout: Layout, exchange: Exchange) -> tuple[list[str], Array]:
     factors = (own_effectiveness(kept)[:, 0] * full)[:, np.argsort(ORDER)] * SIGNS
     largest = np.abs(factors).max(0)
     for kinds in (slice(0, 3), slice(3, 6)):
-        largest[kinds][largest[kinds] < WEAK * largest[kinds].max()] = np.inf
+        largest[kinds][largest[kinds] <= WEAK * largest[kinds].max()] = np.inf
     for kind in np.flatnonzero(np.isinf(largest[:3])):
         exchange.note(f"Torque in {('roll', 'pitch', 'yaw')[kind]} is too weak to count.")
     factors = factors / largest

@@ -12,6 +12,7 @@ from finlab.errors import FinlabError, LayoutError
 from finlab.exchange import Exchange, convert, read_any
 from finlab.exchange.ardusub import factors_of
 from finlab.layout import Layout, Thruster, own_effectiveness, save_layout
+from finlab.layout.thrust_model import PowerLaw
 from tests.mixed_robots import load, random_robot
 
 D = np.sqrt(0.5)
@@ -95,7 +96,7 @@ def test_px4_has_one_size_for_both_ways(tmp_path: Path) -> None:
     back, notes = written(finlab.load_layout("bluerov2_heavy"), tmp_path / "rov.params")
     assert "PX4 has one size for both ways: 51.44 N stands for -39.91 N, too." in notes
     np.testing.assert_array_equal(back.lower[:, 0], -51.44)
-    one_way = Thruster("a", (0, 1, 0), (1, 0, 0), (-5.0, 0.0), back.actuators[0].model, torque_per_newton=0.1)  # type: ignore[union-attr,arg-type]
+    one_way = Thruster("a", (0, 1, 0), (1, 0, 0), (-5.0, 0.0), PowerLaw(1.0), torque_per_newton=0.1)
     back, _ = written(Layout("one", (one_way,)), tmp_path / "one.params")
     assert back.upper[0, 0] == 5.0 and back.lower[0, 0] == 0.0
     np.testing.assert_allclose(-wrenches(back), wrenches(Layout("one", (one_way,))), atol=1e-15)
@@ -171,6 +172,30 @@ def test_matrices_of_others(name: str, content: str, tmp_path: Path) -> None:
     np.testing.assert_allclose(layout.position, [[0, 0.2, 0], [0.1, 0, 0]], atol=1e-15)
     assert (layout.lower[0, 0], layout.upper[1, 0]) == (-40.0, 40.0)
     assert any("from -1 to 1" in note for note in exchange.notes)
+
+
+def test_a_published_matrix_of_the_bluerov2(tmp_path: Path) -> None:
+    """Arms of the matrix that users of ROS 2 load for it: yaw 0.1888 m, roll 0.21805, pitch 0.12."""
+    arms = np.zeros((8, 3))
+    arms[:4, 2] = [-0.1888, 0.1888, 0.1888, -0.1888]
+    arms[4:, 0], arms[4:, 1] = [0.21805, -0.21805, 0.21805, -0.21805], [0.12, 0.12, -0.12, -0.12]
+    matrix = np.hstack([np.array(DIRECTIONS), arms])
+    rows = "\n".join(",".join(map(repr, row)) for row in matrix.T.tolist())
+    (tmp_path / "tam.csv").write_text(rows)
+    layout = read_any(str(tmp_path / "tam.csv"), Exchange())
+    np.testing.assert_allclose(wrenches(layout), matrix, atol=1e-15)
+    np.testing.assert_allclose(np.linalg.norm(layout.position[:4], axis=1), 0.1888)
+    places = [[x, y, 0.0] for x in (0.12, -0.12) for y in (-0.21805, 0.21805)]
+    np.testing.assert_allclose(layout.position[4:], places, atol=1e-15)
+    assert (layout.lower[0, 0], layout.upper[0, 0]) == (-39.91, 51.44)
+    convert(str(tmp_path / "tam.csv"), tmp_path / "rov.parm", None, Exchange())
+    assert "FRAME_CONFIG 2" in (tmp_path / "rov.parm").read_text()
+
+
+def test_a_thruster_through_the_centre_has_no_factor_of_torque() -> None:
+    part = Thruster("stern", (-1.0, 0.0, 0.0), (1.0, 0.0, 0.0), (-1.0, 1.0), PowerLaw(1.0))
+    _, factors = factors_of(Layout("one", (part,)), Exchange())
+    np.testing.assert_array_equal(factors, [[0, 0, 0, 0, 1, 0]])
 
 
 def test_what_has_no_place_is_named(tmp_path: Path) -> None:
