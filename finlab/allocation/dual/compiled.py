@@ -5,6 +5,7 @@ from copy import copy
 import numpy as np
 
 from finlab.actuators.registry import groups_of
+from finlab.actuators.response import with_square
 from finlab.allocation.dual.answers import Sets
 from finlab.allocation.dual.robot import DualRobot, dual_robot
 from finlab.arrays import Array
@@ -15,13 +16,23 @@ from finlab.physics.plant import Plant
 class Compiled:
     """The actuators of one robot, ready for prices."""
 
-    def __init__(self, layout: Layout, plant: Plant, copper_loss: float = 0.0) -> None:
-        """Compile the actuators of a layout; `plant` gives their effectiveness and the flow.
+    def __init__(
+        self, layout: Layout, plant: Plant, copper_loss: float = 0.0, doubt: Array | None = None
+    ) -> None:
+        """Compile the actuators of a layout.
+
+        Args:
+            layout: the robot.
+            plant: gives their effectiveness and the flow.
+            copper_loss: heat of a fin's motor that counts as power [W/(N m)^2].
+            doubt: what a squared force of each actuator costs beside its power, see `price_of_doubt`.
 
         Raises:
             DataError: a fin's force table cannot be read, or gives no thrust within its limits.
         """
         self.count = layout.n
+        self.doubt = doubt
+        """The same; None where it costs nothing."""
         self.groups = groups_of(layout, plant.effectiveness, copper_loss)
         self._prepare()
 
@@ -29,7 +40,8 @@ class Compiled:
         responses: list[object] = [None] * self.count
         for places, group in self.groups:
             for place, response in zip(places, group.responses, strict=True):
-                responses[place] = response
+                weight = 0.0 if self.doubt is None else (response.effectiveness**2 @ self.doubt[place]).sum()
+                responses[place] = with_square(response, float(weight)) if weight else response
         self.robot: DualRobot = dual_robot(responses)  # type: ignore[arg-type]
         self.beside = sum((group.beside.sum(axis=0) for _, group in self.groups), np.zeros(6))
         """Wrench (6,) [N, N m] that the actuators give beside their answers' forces, such as a rudder's

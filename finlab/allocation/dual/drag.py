@@ -43,7 +43,7 @@ def _dual_value(compiled: Compiled, wrench: Array, force: Array, price: Array) -
     worth = np.empty(compiled.count)
     worth[robot.order] = paid[: lines + planes] - robot.answers.cost(size)[:, 0]
     for places, group in compiled.groups:
-        own = group.worth(price)
+        own = None if compiled.doubt is not None else group.worth(price)
         if own is not None:
             worth[places] = own
     return float(price @ wrench - worth.sum())

@@ -19,6 +19,7 @@ from finlab.allocation.dual.answers import Sets
 from finlab.allocation.dual.bounds import proved_power
 from finlab.allocation.dual.branch import gaps, halves, least_power, may_have_gaps
 from finlab.allocation.dual.compiled import Compiled
+from finlab.allocation.dual.doubt import price_of_doubt
 from finlab.allocation.dual.drag import at_the_price_of_drag
 from finlab.allocation.dual.newton import Prices, solve
 from finlab.allocation.dual.policies import nearest
@@ -49,6 +50,9 @@ class DualSettings(Settings):
 
     copper_loss: float = number(
         0.0, 0.0, 1e6, "heat in a fin motor's windings that counts beside the mechanical power", "W/(N m)^2"
+    )
+    robust: float = number(
+        0.0, 0.0, 1e9, "what an expected miss of 1 % of the yardstick is worth, growing with its square", "W"
     )
     period_s: float = number(0.1, 0.0, 1000.0, "time between ticks", "s", above=True)
 
@@ -83,7 +87,8 @@ class Dual(Method):
         self, layout: Any, settings: Settings, scale: Array, weights: TrainedWeights | None = None
     ) -> None:
         super().__init__(layout, settings, scale, weights)
-        self.compiled = Compiled(layout, self.plant, self.settings.copper_loss)
+        doubt = price_of_doubt(layout, scale, self.settings.robust)
+        self.compiled = Compiled(layout, self.plant, self.settings.copper_loss, doubt)
 
     @cached_property
     def _problem(self) -> CommandProblem:
@@ -138,7 +143,7 @@ class Dual(Method):
                         high = share
                 target = low * target
             commands.append(other._solve(target[None], policy, previous).command)
-        return Solution(np.concatenate(commands), lambda: bounds)
+        return Solution(np.concatenate(commands), None if self._unproved else lambda: bounds)
 
     def _solve(
         self, targets: Array, policy: Policy, previous: Array | None, prices: Array | None = None
@@ -194,9 +199,11 @@ class Dual(Method):
     @property
     def _unproved(self) -> bool:
         """Whether the bound would be one of something else than the power of the answer: of fins without
-        their interaction, with a motor's heat, or of the smooth shape that stands for a measured table."""
+        their interaction, with a motor's heat or what doubt costs, or of the smooth shape that stands for a
+        measured table."""
         measured = any(fin.model.type == "table" for fin in self.layout.fins)
-        return measured or self.layout.interaction is not None or self.settings.copper_loss > 0.0
+        dearer = self.settings.copper_loss > 0.0 or self.compiled.doubt is not None
+        return measured or dearer or self.layout.interaction is not None
 
     def _forces(self, targets: Array, sets: Sets, policy: Policy, prices: Array | None = None) -> Forces:
         """Forces of least power for wrenches (N, 6), or for those that the policy gives in their place."""
