@@ -35,10 +35,10 @@ def commands(page: Page) -> list[Command]:
 
     def compare() -> None:
         session.show_drawer("Comparison")
-        page.comparison.start(session.state)
+        page.jobs.comparison.start(session.state)
 
     def swim_on() -> None:
-        page.swimming.set_running(not page.swimming.running)
+        page.jobs.swimming.set_running(not page.jobs.swimming.running)
 
     return [
         *(
@@ -78,7 +78,7 @@ def commands(page: Page) -> list[Command]:
             Command("Help", f"Lesson: {lesson.title}", partial(session.open_lesson, lesson.name))
             for lesson in LESSONS
         ),
-        Command("Files", "Export the bundle for the robot", page.exports.bundle),
+        Command("Files", "Export the bundle for the robot", page.jobs.exports.bundle),
     ]
 
 

@@ -7,8 +7,6 @@ import numpy as np
 import viser
 from markupsafe import escape
 
-PLAIN = (str, int, float)
-
 
 def add_html(gui: viser.GuiApi, content: str) -> viser.GuiHtmlHandle:
     """Markup in the page; what is not marked as such is text."""
@@ -33,32 +31,6 @@ def _same(old: Any, new: Any) -> bool:
     if isinstance(old, tuple) and len(old) and isinstance(old[0], np.ndarray):
         return len(old) == len(new) and all(_same(a, b) for a, b in zip(old, new, strict=True))
     return bool(old == new)
-
-
-class Changes:
-    """Says whether something must be made again: it keeps what it was made from last.
-
-    Objects count by identity (comparing their arrays would cost more than it saves), plain values by value.
-    """
-
-    faults = 0
-    """Grows with every fault of the app: then nothing is trusted that was made before, whole or half."""
-
-    def __init__(self) -> None:
-        """Nothing has been made yet."""
-        self._parts: tuple[Any, ...] | None = None
-
-    def __call__(self, *parts: Any) -> bool:
-        """True unless it was asked about the same parts last."""
-        old, self._parts = self._parts, (Changes.faults, *parts)
-        return (
-            old is None
-            or len(old) != len(self._parts)
-            or not all(
-                a is b or (isinstance(a, PLAIN) and isinstance(b, PLAIN) and a == b)
-                for a, b in zip(old, self._parts, strict=False)
-            )
-        )
 
 
 def on_user_change(handle: Any, act: Callable[[Any], None]) -> None:

@@ -171,7 +171,7 @@ class Layout(Checked):
         """Whether the layout says what speed through the water takes from the fins."""
         return self.interaction is not None and any(self.interaction.inflow)
 
-    @property
+    @cached_property
     def names(self) -> tuple[str, ...]:
         """Names of the actuators, in order."""
         return tuple(part.name for part in self.actuators)

@@ -76,7 +76,7 @@ class Page:
             self.session.display = self._display
             self.session.desk = Desk()
             self.session.draft, self.session.swim = SearchRequest(), SwimSettings()
-            self.view.improver.forget()
+            self.view.jobs.improver.forget()
             self.view.scenery.end_swim()
             self.view.scenery.robot.look_from("3D")
             done.set()

@@ -179,15 +179,15 @@ def test_a_search_is_watched_stopped_and_accepted(page: Any) -> None:
     page.type("Reach ± [m]", "0.03", place=0)
     page.until(lambda: session.draft.way[0] == 0.03)
     page.press("Search")
-    page.until(lambda: page.view.improver.progress is not None or page.view.improver.findings is not None)
-    if page.view.improver.findings is None:
-        page.view.improver.cancel()  # as the button does; it may be gone before it can be pressed
-    page.until(lambda: page.view.improver.findings is not None)
-    found = page.view.improver.findings
+    page.until(lambda: page.view.jobs.improver.progress is not None or page.view.jobs.improver.findings is not None)
+    if page.view.jobs.improver.findings is None:
+        page.view.jobs.improver.cancel()  # as the button does; it may be gone before it can be pressed
+    page.until(lambda: page.view.jobs.improver.findings is not None)
+    found = page.view.jobs.improver.findings
     accept = page.page.get_by_role("button", name="Accept")
     page.until(lambda: accept.count() == int(found.improved))
     if found.improved:
         page.press("Accept")
-        page.until(lambda: session.state.layout == found.layout and page.view.improver.findings is None)
+        page.until(lambda: session.state.layout == found.layout and page.view.jobs.improver.findings is None)
         page.press("Undo")
         page.until(lambda: session.state.layout == before)

@@ -46,4 +46,4 @@ def test_a_wrong_file_is_told_where_and_changes_nothing(page: Any, tmp_path: Pat
         file.truncate(160_000_000)  # sparse: it takes no room
     page.upload("Fit from measurements (CSV)", tmp_path / "huge.csv")
     page.until(lambda: any("huge.csv: has 160,000,000 bytes" in note for note in page.notes()))
-    assert page.session.state == before and not page.view.fitting.busy
+    assert page.session.state == before and not page.view.jobs.fitting.busy

@@ -153,7 +153,7 @@ def test_only_what_changes_is_drawn(page: Any) -> None:
         return int(page.page.evaluate("window.finlabFrames.count"))
 
     view = page.view
-    page.until(lambda: not (view.busy or view.analyst.busy or view.ranging.busy))  # all has come
+    page.until(lambda: not (view.busy or view.jobs.analyst.busy or view.jobs.ranging.busy))  # all has come
     page.catch_up()
     page.rest(600)
     before = drawn()

@@ -23,11 +23,11 @@ def test_the_tour_sets_each_stop_and_brings_the_work_back(page: Any) -> None:
     for stop in range(2, 6):
         page.press("Next")
         page.until(lambda stop=stop: f"{stop} of 6" in page.text(".tour"))
-    page.until(lambda: page.view.swimming.swimmer is not None and page.view.swimming.time > 0.3)
+    page.until(lambda: page.view.jobs.swimming.swimmer is not None and page.view.jobs.swimming.time > 0.3)
     page.visible("/robot", False)
     page.until(lambda: "off the path" in page.text(".fl-status"))
     page.press("Next")
-    page.until(lambda: not page.view.swimming.active)
+    page.until(lambda: not page.view.jobs.swimming.active)
     page.visible("/robot")
     page.until(lambda: "6 of 6 actuators" in page.text(".fl-status"))
     page.press("Finish")
@@ -43,7 +43,7 @@ def test_a_lesson_sees_when_its_task_is_done(page: Any) -> None:
     mine, desk = page.session.state, page.session.desk
     page.press("Lessons")
     page.until(lambda: "One wrench, several ways" in page.text(".fl-lesson"))
-    page.until(lambda: not page.view.busy and len(page.view.answering.modes.shown) > 1)
+    page.until(lambda: not page.view.busy and len(page.view.jobs.answering.modes.shown) > 1)
     assert "○" in page.text(".fl-lesson") and page.session.state.method == "mdn"
     page.page.locator("table.modes tr.pick").nth(1).click()
     page.until(lambda: "✓" in page.text(".fl-lesson"))

@@ -12,7 +12,7 @@ BOTTOMS = "all => all.map(one => one.getBoundingClientRect().bottom)"
 
 def test_a_robot_swims_and_one_fin_breaks(page: Any) -> None:
     page.tab("Simulate")
-    swimming = page.view.swimming
+    swimming = page.view.jobs.swimming
     assert "Once a swim is started" in page.text(".fl-unswum")
     for label, entry in (("Path", "circle"), ("Swim with", "analytic")):
         page.choose(label, entry)
@@ -45,7 +45,7 @@ def test_a_robot_swims_and_one_fin_breaks(page: Any) -> None:
 
 def test_a_fin_lost_in_a_current_is_found(page: Any, tmp_path: Path) -> None:
     page.tab("Simulate")
-    swimming = page.view.swimming
+    swimming = page.view.jobs.swimming
     page.choose("Scenario", "lost-in-current")
     page.until(lambda: not page.session.swim.announced)
     page.until(lambda: "In a current of 7 cm/s a fin is lost half-way" in page.page.inner_text("body"))

@@ -13,8 +13,8 @@ def test_numbers_and_arrows_follow_the_target(page: Any) -> None:
     page.until(lambda: page.vertices("/robot/wrench/delivered_force") != before)
     page.press("Turn")
     page.until(lambda: page.session.state.target[5] > 0 and page.session.state.target[0] == 1.2)
-    page.until(lambda: page.view.ranging.findings is not None and not page.view.ranging.busy)
-    high = float(page.view.ranging.findings.high[0])
+    page.until(lambda: page.view.jobs.ranging.findings is not None and not page.view.jobs.ranging.busy)
+    high = float(page.view.jobs.ranging.findings.high[0])
     marks = page.row("Fx [N]").first.locator("xpath=ancestor::div[contains(@class,'Flex-root')][1]")
     page.until(lambda: f"{high:.0f}" in marks.locator(".mantine-Slider-markLabel").last.inner_text())
     page.type("Fz [N]", "30")
@@ -54,7 +54,7 @@ def test_failed_and_damaged_fins(page: Any) -> None:
 
 
 def test_candidates_of_the_network_beside_either_answer(page: Any) -> None:
-    session, answering = page.session, page.view.answering
+    session, answering = page.session, page.view.jobs.answering
     page.tab("Candidates")
     rows = page.page.locator("table.modes tr.pick")
     page.until(lambda: rows.count() > 1 and not answering.searching)
@@ -101,8 +101,8 @@ def test_methods_side_by_side(page: Any) -> None:
     page.page.get_by_placeholder("Search commands").wait_for()
     page.page.keyboard.type("compare the meth", delay=20)
     page.page.keyboard.press("Enter")
-    page.until(lambda: page.session.drawer == "Comparison" and page.view.comparison.state is not None)
-    page.until(lambda: not page.view.comparison.running)
+    page.until(lambda: page.session.drawer == "Comparison" and page.view.jobs.comparison.state is not None)
+    page.until(lambda: not page.view.jobs.comparison.running)
     page.until(lambda: page.page.locator("table.methods tr").count() == 1 + len(COMPARED))
 
 

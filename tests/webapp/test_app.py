@@ -90,11 +90,11 @@ def test_refusals_become_notes_and_lose_nothing(server: viser.ViserServer, view:
 
 def test_solver_errors_become_notes_and_the_page_goes_on(server: viser.ViserServer, view: View) -> None:
     on_loop(server, lambda: view.do(lambda: view.session.set_setting("method", "ipopt")))
-    until(lambda: view.answering.error is not None)
+    until(lambda: view.jobs.answering.error is not None)
     assert view.client.notes == ["No answer: ipopt is out of order in this test"]
     on_loop(server, lambda: view.do(view.session.undo))
     until(lambda: not view.busy)
-    assert view.answering.error is None and view.shown is not None
+    assert view.jobs.answering.error is None and view.shown is not None
 
 
 def test_nodes_and_widgets_do_not_grow(server: viser.ViserServer, view: View) -> None:
@@ -134,10 +134,10 @@ def test_names_are_escaped(server: viser.ViserServer, view: View) -> None:
 
 def test_a_bundle_that_cannot_be_made_is_told(server: viser.ViserServer, view: View) -> None:
     until(lambda: not view.busy)
-    on_loop(server, lambda: view.do(view.exports.bundle))
+    on_loop(server, lambda: view.do(view.jobs.exports.bundle))
     until(lambda: "ucat.zip" in view.client.files)
     on_loop(server, lambda: view.do(lambda: view.session.set_setting("method", "sqp")))
-    on_loop(server, lambda: view.do(view.exports.bundle))
+    on_loop(server, lambda: view.do(view.jobs.exports.bundle))
     until(lambda: any("Not exported" in note for note in view.client.notes))
     assert "cannot be exported" in view.client.notes[-1]
     on_loop(server, lambda: view.do(view.session.undo))

@@ -2,8 +2,6 @@
 
 import threading
 from dataclasses import replace
-from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -22,7 +20,7 @@ from webapp.markup.words import source_words, three_digits
 from webapp.session.state import COMPARED, LEAST, State
 from webapp.session.targets import PRESETS
 from webapp.tasks.background import Worker
-from webapp.tasks.comparison import Comparison
+from webapp.tasks.comparison import Comparison, Run
 from webapp.tasks.solver import Solver
 
 UCAT = load_layout(shipped_layouts()["ucat"])
@@ -30,14 +28,15 @@ UCAT = load_layout(shipped_layouts()["ucat"])
 
 def test_all_methods_answer_one_after_the_other() -> None:
     worker, done = Worker(), threading.Event()
-    comparison = Comparison(page_of(worker, changed=lambda: comparison.running or done.set()))
-    assert "side by side" in comparison_table(comparison, False)
+    comparison = Comparison(page_of(worker, changed=lambda: comparison.run.running or done.set()))
+    assert "side by side" in comparison_table(comparison.run, False)
     comparison.start(State(UCAT, target=PRESETS["Turn"]))
     assert done.wait(60)
     worker.stop()
-    assert tuple(comparison.answers) == COMPARED
-    assert all(isinstance(answer, Allocation) for answer in comparison.answers.values())
-    table = comparison_table(comparison, True)
+    answers = dict(comparison.run.answers)
+    assert tuple(answers) == COMPARED
+    assert all(isinstance(answer, Allocation) for answer in answers.values())
+    table = comparison_table(comparison.run, True)
     assert table.count("<tr") == 1 + len(COMPARED) and "compare again" in table
 
 
@@ -46,20 +45,20 @@ def test_a_method_that_fails_keeps_nobody_else_waiting() -> None:
         return load_stand_in("ipopt" if method == "paper" else method)
 
     worker, done = Worker(), threading.Event()
-    context = page_of(worker, solver=Solver(load=load), changed=lambda: comparison.running or done.set())
+    context = page_of(worker, solver=Solver(load=load), changed=lambda: comparison.run.running or done.set())
     comparison = Comparison(context)
     comparison.start(State(UCAT, target=PRESETS["Turn"]))
     assert done.wait(60)
     worker.stop()
-    assert comparison.answers["paper"] == "ipopt is out of order in this test"
-    assert isinstance(comparison.answers["sqp"], Allocation)
+    answers = dict(comparison.run.answers)
+    assert answers["paper"] == "ipopt is out of order in this test"
+    assert isinstance(answers["sqp"], Allocation)
 
 
 def test_the_table_tells_what_is_kept_least() -> None:
     answers = {method: Allocator(UCAT, method).allocate(PRESETS["Turn"]) for method in ("qp", "dual")}
     answers["mdn"] = Allocator(UCAT, StandIn).allocate(PRESETS["Turn"])
-    comparison: Any = SimpleNamespace(state=State(UCAT), answers=answers)
-    table = comparison_table(comparison, False)
+    table = comparison_table(Run(State(UCAT), tuple(answers.items())), False)
     assert three_digits(answers["dual"].power) in table and three_digits(answers["qp"].effort) in table
     assert "<td>mdn</td><td>effort</td>" in table and "<td>dual</td><td>watts</td>" in table
 

@@ -36,7 +36,7 @@ def test_a_weak_and_a_stuck_fin_keep_to_what_is_left(session: Session) -> None:
     assert command[2, 2] == pytest.approx(math.radians(30))
     assert (axis_reach(state.able) < axis_reach(state.layout)).any()
     assert full_thrust(state.able)[1] < full_thrust(state.layout)[1]
-    table = fin_table(state, reply.answer, full_thrust(state.able), None)
+    table = fin_table(state.layout, state.health, reply.answer, full_thrust(state.able), None)
     assert "weak 50 %" in table and "stuck at 30°" in table
     assert damage_words(state, "front_right") == ""
     assert state.layout == UCAT, "the layout itself stays whole"

@@ -49,14 +49,14 @@ DRAWN = (
     "webapp.panels.cards.quick_check",
     "webapp.panels.cards.warnings",
     "webapp.panels.modes_tab.mode_plot",
-    "webapp.panels.modes_tab.mode_table",
+    "webapp.markup.modes.source_words",
     "webapp.panels.limits_tab.score_table",
     "webapp.panels.compare_tab.comparison_table",
     "webapp.panels.files_tab.command_line",
     "webapp.scene.stage.Stage.refresh",
-    "webapp.scene.robot_scene.fitting_newtons",
+    "webapp.scene.wrench_nodes.fitting_newtons",
     "webapp.scene.robot_scene.missing_part",
-    "webapp.scene.scenery.legend",
+    "webapp.panels.status.legend",
 )
 """Where it meets the writing of the page."""
 
@@ -71,7 +71,7 @@ class Tab:
         solver = solver or Solver(load=load_stand_in)
         loop = self.server.get_event_loop()
         self.view: View = self.on_loop(lambda: View(self.client, session, solver, workers, loop))
-        self.meet_all(session)
+        self.meet_all()
         self.settle()
 
     def on_loop(self, act: Callable[[], Any]) -> Any:
@@ -80,13 +80,18 @@ class Tab:
 
         return asyncio.run_coroutine_threadsafe(run(), self.server.get_event_loop()).result(30)
 
-    def meet_all(self, session: Session) -> None:
-        """Let the page build each panel; it shows what it has from then on."""
-        first = session.state.layout.names[0]
-        acts: list[Callable[[], object]] = [partial(session.select, name) for name in (first, None)]
+    @property
+    def ways(self) -> list[Callable[[], object]]:
+        """To all that can be seen: each task with each drawer, with a fin selected and without."""
+        session = self.view.session
+        acts: list[Callable[[], object]] = [lambda: session.select(session.state.layout.names[0])]
         acts += [partial(session.show_drawer, name) for names in DRAWERS.values() for name in names]
-        acts += [partial(session.show_task, task) for task in ("Export", "Design", "Allocate")]
-        for act in acts:
+        acts += [partial(session.show_task, task) for task in ("Export", "Design")]
+        return [*acts, partial(session.select, None), partial(session.show_task, "Allocate")]
+
+    def meet_all(self) -> None:
+        """Let the page build each panel."""
+        for act in self.ways:
             self.on_loop(partial(self.view.do, act))
 
     def open(self, layout: Any) -> None:
@@ -95,16 +100,21 @@ class Tab:
 
     def settle(self) -> None:
         view, end = self.view, time.monotonic() + 60
-        while view.busy or view.answering.searching or view.analyst.busy or view.ranging.busy:
+        while view.busy or view.jobs.answering.searching or view.jobs.analyst.busy or view.jobs.ranging.busy:
             assert time.monotonic() < end
             time.sleep(0.01)
         self.on_loop(lambda: None)
 
     def figures(self) -> list[str]:
-        """The markup that can be seen, in order, without what no two runs have in common."""
-        markup = _html(self.server.gui._container_handle_from_uuid["root"])
-        told = [text for text in markup if not text.startswith("<div class='fl dim steps'>")]  # the way here
-        return [re.sub(r"[\d.]+(e.?\d+)? ms", "ms", text) for text in told]
+        """The markup that can be seen in any task, in order, without what no two runs have in common."""
+        markup = []
+        for act in self.ways:
+            self.on_loop(partial(self.view.do, act))
+            self.settle()
+            root = self.server.gui._container_handle_from_uuid["root"]
+            hidden = [s.whole for s in self.view.frame.sections if not s.group.there and not s.refused]
+            markup += list(_html(root, hidden))
+        return [re.sub(r"[\d.]+(e.?\d+)? ms", "ms", text) for text in markup]
 
     def nodes(self) -> dict[str, str]:
         """The meshes that can be seen, and marks of their shapes."""
@@ -122,14 +132,11 @@ class Tab:
         stop_server(self.server)
 
 
-def _html(container: Any) -> Iterator[str]:
+def _html(container: Any, hidden: list[Any]) -> Iterator[str]:
     for child in container._children.values():
-        if isinstance(child, viser.GuiTabGroupHandle):
-            for tab in child._tab_handles:
-                yield from _html(tab)
-        elif getattr(child, "visible", True):
+        if getattr(child, "visible", True) and child not in hidden:
             if hasattr(child, "_children"):
-                yield from _html(child)
+                yield from _html(child, hidden)
             elif isinstance(child, viser.GuiHtmlHandle):
                 yield child.content
 
@@ -138,8 +145,8 @@ def _html(container: Any) -> Iterator[str]:
 def workers() -> Iterator[Workers]:
     workers = Workers()
     with pytest.MonkeyPatch.context() as patch:  # nobody types here, so nothing need come to rest first
-        for name in ("webapp.page.CARD_REST_S", "webapp.page.REST_S", "webapp.tasks.answering.SEARCH_REST_S"):
-            patch.setattr(name, 0.01)
+        for name in ("jobs.CARD_REST_S", "jobs.REST_S", "answering.SEARCH_REST_S"):
+            patch.setattr(f"webapp.tasks.{name}", 0.01)
         yield workers
     workers.stop()
 

@@ -106,20 +106,25 @@ def test_every_widget_survives_a_fault_in_what_it_does(
 
 
 @pytest.mark.parametrize(
-    "place",
+    ("place", "task", "selected"),
     [
-        "webapp.panels.limits_tab.ImprovePanel.refresh",
-        "webapp.panels.damage.button_colors",
-        "webapp.panels.hull_panel.hull_of",
-        "webapp.panels.files_tab.command_line",
-        "webapp.panels.swim_tab.swim_card",
-        "webapp.panels.fin_model.model_card",
+        ("webapp.panels.damage.button_colors", "Allocate", None),
+        ("webapp.panels.hull_panel.hull_of", "Design", None),
+        ("webapp.panels.files_tab.command_line", "Export", None),
+        ("webapp.panels.swim_tab.axis_reach", "Simulate", None),
+        ("webapp.panels.fin_model.model_card", "Design", "front_left"),
     ],
 )
 def test_every_widget_survives_a_fault_in_what_is_written(
-    server: viser.ViserServer, view: View, place: str, monkeypatch: pytest.MonkeyPatch
+    server: viser.ViserServer,
+    view: View,
+    place: str,
+    task: str,
+    selected: str | None,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    on_loop(server, lambda: view.do(lambda: view.session.select("front_left")))
+    on_loop(server, lambda: view.do(lambda: view.session.select(selected)))
+    on_loop(server, lambda: view.do(lambda: view.session.show_task(task)))
     with monkeypatch.context() as patch:
         patch.setattr(place, broken)
         for handle in handles(server):

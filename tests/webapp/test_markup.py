@@ -45,7 +45,7 @@ def test_no_page_shows_markup_of_ours_as_text(server: viser.ViserServer, view: V
     for task in DRAWERS:
         on_loop(server, lambda task=task: view.do(lambda: view.session.show_task(task)))
         on_loop(server, lambda: view.do(lambda: view.session.select("front_left")))
-        until(lambda: not view.busy and not view.analyst.busy)
+        until(lambda: not view.busy and not view.jobs.analyst.busy)
         found = [ESCAPED.finditer(text) for text in contents(server)]
         wrong = {text.string[max(0, text.start() - 60) : text.end() + 30] for part in found for text in part}
         assert wrong == set(), task
@@ -59,7 +59,7 @@ def test_no_page_takes_names_for_markup(server: viser.ViserServer, view: View) -
         on_loop(server, lambda task=task: view.do(lambda: view.session.show_task(task)))
         for chosen in (EVIL[:40], None):
             on_loop(server, lambda chosen=chosen: view.do(lambda: view.session.select(chosen)))
-            until(lambda: not view.busy and not view.analyst.busy)
+            until(lambda: not view.busy and not view.jobs.analyst.busy)
             texts = contents(server)
             assert any("&lt;img" in text for text in texts)
             assert not any("<img" in text or "&amp;lt;" in text for text in texts)

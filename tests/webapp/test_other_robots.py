@@ -116,9 +116,9 @@ def test_a_file_goes_out_and_comes_back(
 def test_each_actuator_has_a_row_with_its_type_and_force() -> None:
     state = State(FISH, target=(3.0, 0.0, 0.0, 0.0, 0.0, 0.0))
     answer = Solver().solve(state)
-    table = fin_table(state, answer, full_thrust(FISH), None)
+    table = fin_table(state.layout, None, answer, full_thrust(FISH), None)
     assert "azimuth, " in table and "rudder, " in table and table.count("<tr") == 5
-    assert "thruster" in fin_table(State(BLUEROV), Solver().solve(State(BLUEROV)), full_thrust(BLUEROV), None)
+    assert "thruster" in fin_table(BLUEROV, None, Solver().solve(State(BLUEROV)), full_thrust(BLUEROV), None)
     listed = fin_list(state, ("rudder",))
     assert "rudder" in listed and "azimuth" in listed
     assert isinstance(BLUEROV.actuators[0], Thruster)

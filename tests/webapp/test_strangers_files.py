@@ -211,7 +211,7 @@ def test_any_bytes_are_refused_in_a_sentence(content: bytes) -> None:
 def test_markup_in_names_and_descriptions_stays_text(server: viser.ViserServer, view: View) -> None:
     layout = files.read_layout("robot.yaml", document(name=EVIL)).layout
     on_loop(server, lambda: view.do(lambda: view.session.open_layout(layout)))
-    until(lambda: not view.busy and not view.analyst.busy)
+    until(lambda: not view.busy and not view.jobs.analyst.busy)
     containers = server.gui._container_handle_from_uuid.values()
     handles = [handle for container in containers for handle in container._children.values()]
     texts = [handle.content for handle in handles if isinstance(handle, viser.GuiHtmlHandle)]

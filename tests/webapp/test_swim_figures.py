@@ -11,7 +11,7 @@ from finlab.errors import FinlabError
 from finlab.layout import load_layout
 from finlab.sim import make_trajectory
 from tests.webapp.loops import page_of
-from tests.webapp.test_swimming import until
+from tests.webapp.test_swimming import now, until
 from webapp.markup.swim_card import swim_card
 from webapp.session.swim_plan import Plan
 from webapp.tasks.background import Worker
@@ -30,7 +30,7 @@ class Shelf:
         self.worker, self.sent, self.notes = Worker(), {}, []  # type: ignore[var-annotated]
         client = SimpleNamespace(send_file_download=lambda name, data, **_: self.sent.update({name: data}))
         context = page_of(self.worker, client=client, notify=lambda _, text: self.notes.append(text))
-        self.swimming = Swimming(context, lambda: None)
+        self.swimming = Swimming(context)
         self.files = Exports(context)
 
     def begun(self) -> Swimmer:
@@ -69,7 +69,7 @@ def test_what_a_swim_comes_to(shelf: Shelf) -> None:
     assert figures.track_m == pytest.approx(np.sqrt((off**2).mean()))
     assert figures.depth_m == pytest.approx(np.sqrt(((log.position - log.reference)[:, 2] ** 2).mean()))
     swimmer.shown = swimmer.shown._replace(figures=figures._replace(mean_w=2.0, energy_wh=0.0042))
-    card = swim_card(shelf.swimming)
+    card = swim_card(*now(shelf.swimming))
     assert "<td>2.00 W</td>" in card and "<td>4.2 mWh</td>" in card
 
 

@@ -70,7 +70,7 @@ def test_settings_of_swims_are_checked(key: str, wrong: Any) -> None:
 @pytest.fixture
 def swimming() -> Any:
     worker = Worker()
-    swim = Swimming(page_of(worker), lambda: None)
+    swim = Swimming(page_of(worker))
     yield swim
     swim.stop()
     worker.stop()

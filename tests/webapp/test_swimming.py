@@ -15,7 +15,7 @@ from finlab.sim import Trajectory, make_trajectory
 from tests.webapp.loops import page_of
 from tests.webapp.stand_in import load_stand_in
 from webapp.markup.corner import swim_corner
-from webapp.markup.swim_card import findings_words, swim_card
+from webapp.markup.swim_card import findings_words, pace_words, swim_card
 from webapp.session.state import State
 from webapp.session.swim_plan import Plan, SwimSettings
 from webapp.tasks.background import Worker
@@ -39,11 +39,18 @@ def until(condition: Callable[[], bool]) -> None:
 def swimming() -> Iterator[Swimming]:
     worker = Worker()
     notes: list[str] = []
-    swim = Swimming(page_of(worker, notify=lambda _, text: notes.append(text)), lambda: None)
+    swim = Swimming(page_of(worker, notify=lambda _, text: notes.append(text)))
     swim.notes = notes  # type: ignore[attr-defined]
     yield swim
     swim.stop()
     worker.stop()
+
+
+def now(swimming: Swimming) -> tuple[Any, ...]:
+    """What its card is made of."""
+    swimmer = swimming.swimmer
+    moment = None if swimmer is None else swimmer.shown
+    return swimming.active, swimmer, moment, pace_words(swimming)
 
 
 def begin(swimming: Swimming, **settings: Any) -> None:
@@ -52,7 +59,7 @@ def begin(swimming: Swimming, **settings: Any) -> None:
 
 
 def test_swims_to_the_end_and_tells_how(swimming: Swimming) -> None:
-    assert "Start" in swim_card(swimming)
+    assert "Start" in swim_card(*now(swimming))
     begin(swimming, method="analytic")
     while not swimming.done:
         swimming.tick(0.05)
@@ -65,8 +72,8 @@ def test_swims_to_the_end_and_tells_how(swimming: Swimming) -> None:
     assert np.all(np.diff(record[:, TIME]) > 0) and record[0, ERROR] < 0.1
     figures = first.shown.figures
     assert figures is not None and figures.track_m < 0.3
-    assert "arrived" in swim_card(swimming)
-    assert "arrived" in swim_corner(swimming, first, 2.0)
+    assert "arrived" in swim_card(*now(swimming))
+    assert "arrived" in swim_corner(first, first.shown, pace_words(swimming), 2.0)
     swimming.set_running(True)
     assert not swimming.running, "there is no way left"
 
@@ -90,7 +97,7 @@ def test_pause_step_and_speed(swimming: Swimming) -> None:
     for wrong in (float("nan"), 0.0, "2", 99.0):
         with pytest.raises(FinlabError):
             SwimSettings().with_value("speed", wrong)
-    assert "paused" in swim_card(swimming)
+    assert "paused" in swim_card(*now(swimming))
 
 
 def test_fins_break_and_are_mended_while_it_swims(swimming: Swimming) -> None:
@@ -106,7 +113,7 @@ def test_fins_break_and_are_mended_while_it_swims(swimming: Swimming) -> None:
     for name in ("front_right", "back_left"):
         swimming.toggle(name)
         until(lambda name=name: name in swimming.swimmer.shown.failed)
-    assert "drift off" in swim_card(swimming)
+    assert "drift off" in swim_card(*now(swimming))
     with pytest.raises(FinlabError, match="last fin"):
         swimming.toggle("back_right")
     swimming.toggle("front_left")
@@ -118,7 +125,7 @@ def test_a_robot_that_no_fins_can_steer_is_told_with_all_its_fins(swimming: Swim
     swimming.start(Plan(aligned, (), path=SHORT, method="analytic"))
     until(lambda: swimming.swimmer is not None)
     assert swimming.swimmer.shown.failed == ()
-    assert "With these fins surge, heave and yaw are not free" in swim_card(swimming)
+    assert "With these fins surge, heave and yaw are not free" in swim_card(*now(swimming))
 
 
 def test_bad_plans_and_methods_out_of_order(swimming: Swimming) -> None:
@@ -153,13 +160,13 @@ def test_a_fin_that_breaks_without_a_word_is_found(swimming: Swimming) -> None:
     swimming.toggle("front_left", announced=False)
     until(lambda: swimming.swimmer.shown.lost == ("front_left",))
     assert swimmer.shown.failed == () and swimmer.shown.found == ()
-    assert "does not know yet" in swim_card(swimming)
+    assert "does not know yet" in swim_card(*now(swimming))
     while not swimmer.swim.damage.failed and swimmer.swim.time < 20.0:
         swimmer.step()
     swimmer.shown = swimmer.moment()
     ((name, seconds),) = swimmer.shown.found
     assert (name, swimmer.shown.failed) == ("front_left", ("front_left",)) and 0.0 < seconds < 8.0
-    assert f"found front_left lost {seconds:.1f} s after" in swim_card(swimming)
+    assert f"found front_left lost {seconds:.1f} s after" in swim_card(*now(swimming))
     doubts = swimmer.shown.record[:, FORCES + 4 :]
     assert doubts[-1, UCAT.index("front_left")] > 0.99 and doubts[0].max() < 0.1
     assert swimmer.shown.doubted == ("front_left",)
@@ -169,7 +176,7 @@ def test_a_fin_that_breaks_without_a_word_is_found(swimming: Swimming) -> None:
     assert "The monitor takes front_left for torn or stuck" in findings_words(wrong)[0]
     swimming.toggle("front_left", announced=False)
     until(lambda: swimming.swimmer.shown.lost == ())
-    assert "front_left works, but the allocator takes it for lost" in swim_card(swimming)
+    assert "front_left works, but the allocator takes it for lost" in swim_card(*now(swimming))
 
 
 def test_whether_the_allocator_is_told_is_a_setting() -> None:

@@ -9,10 +9,11 @@ from numpy.typing import ArrayLike, NDArray
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.policy import AXES
 from finlab.arrays import Array
-from finlab.layout import Actuator, Fin, Thruster
+from finlab.layout import Actuator, Fin, Layout, Thruster
+from finlab.layout.damage import Health
 from webapp.markup.html import html
 from webapp.markup.words import damage_words, saturated
-from webapp.session.state import AXIS_WORDS, State
+from webapp.session.state import AXIS_WORDS
 from webapp.session.targets import nice_limit
 from webapp.theme import DEAD, css, fin_color, ink
 
@@ -98,22 +99,25 @@ def swatch(index: int, failed: bool = False) -> str:
     )
 
 
-def fin_table(state: State, allocation: Allocation | None, full: Array, selected: str | None) -> str:
+def fin_table(
+    layout: Layout, health: Health | None, allocation: Allocation | None, full: Array, selected: str | None
+) -> str:
     """All fins with their commands.
 
     Args:
-        state: the robot and its damage.
+        layout: the robot.
+        health: its damage.
         allocation: the answer for it, None while there is none.
         full: full thrust (n,) of each fin [N].
         selected: name of the selected fin.
     """
     limits = None if allocation is None else saturated(allocation)
     rows = []
-    for i, fin in enumerate(state.layout.actuators):
+    for i, fin in enumerate(layout.actuators):
         failed = allocation is not None and not np.isfinite(allocation.command[i, 0])
         kind = " ".join(["dead"] * failed + ["chosen"] * (fin.name == selected))
         first = html("{}<span class='name' title='{}'>{}</span>", swatch(i, failed), fin.name, fin.name)
-        if not failed and (told := damage_words(state, fin.name)):
+        if not failed and (told := damage_words(health, fin.name)):
             first += html("<div class='missing damage'>{}</div>", told)
         if allocation is None or limits is None:
             cells: str = Markup("<td>–</td>") * 5
@@ -123,7 +127,7 @@ def fin_table(state: State, allocation: Allocation | None, full: Array, selected
             force = float(np.linalg.norm(allocation.forces[i]))
             cells = _cells(fin, allocation.command[i], limits[i], force, full[i], i)
         rows.append(html("<tr class='{}'><td>{}</td>{}</tr>", kind, first, cells))
-    header = html(HEADER if state.layout.fins else PLAIN_HEADER, "fin" if state.layout.is_of_fins else "")
+    header = html(HEADER if layout.fins else PLAIN_HEADER, "fin" if layout.is_of_fins else "")
     return html("<div class='fl'><table class='fins'>{}{}</table></div>", header, rows)
 
 

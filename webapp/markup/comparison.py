@@ -8,23 +8,22 @@ from webapp.markup.html import html
 from webapp.markup.verdict import verdict_of
 from webapp.markup.words import error_digits, three_digits, unlearned_sentence
 from webapp.session.state import COMPARED, least_of
-from webapp.tasks.comparison import Comparison
+from webapp.tasks.comparison import Run
 from webapp.theme import NEARLY, css
 
 
-def comparison_table(comparison: Comparison, stale: bool) -> str:
+def comparison_table(run: Run, stale: bool) -> str:
     """Error, power, effort and time of each method."""
-    if comparison.state is None:
+    if run.state is None:
         return Markup(
             "<div class='fl dim'>Several methods on the same wrench: error, power, effort, time side by side."
             "</div>"
         )
     rows = []
-    in_reach = any(
-        isinstance(answer, Allocation) and answer.reachable for answer in comparison.answers.values()
-    )
+    answers = dict(run.answers)
+    in_reach = any(isinstance(answer, Allocation) and answer.reachable for answer in answers.values())
     for method in COMPARED:
-        answer = comparison.answers.get(method)
+        answer = answers.get(method)
         if isinstance(answer, Allocation) and answer.unknown_fins:
             words = unlearned_sentence(answer.layout, answer.unknown_fins)
             cells = html("<td colspan='4' class='words missing'>{}</td>", words)

@@ -8,15 +8,13 @@ from markupsafe import Markup
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.policy import AXES
 from webapp.markup.html import html
-from webapp.markup.swim_card import pace_words
 from webapp.markup.verdict import WORKING, verdict_of, verdict_sentence
 from webapp.markup.words import error_digits, parts_word, three_digits
 from webapp.scene.wrench_nodes import set_scale
 from webapp.session.state import AXIS_UNITS, State, least_of
 from webapp.tasks.analyst import Findings
-from webapp.tasks.moment import ERROR
+from webapp.tasks.moment import ERROR, Moment
 from webapp.tasks.swimmer import Swimmer
-from webapp.tasks.swimming import Swimming
 from webapp.theme import ASKED, DEAD, DELIVERED, HALF_TURN, WATER, css
 
 LONG = 24
@@ -140,9 +138,8 @@ def _figures(allocation: Allocation, least: bool, in_reach: bool) -> list[str]:
     ]
 
 
-def swim_corner(swimming: Swimming, first: Swimmer, newtons: float) -> str:
+def swim_corner(first: Swimmer, shown: Moment, pace: str, newtons: float) -> str:
     """The same while a robot swims."""
-    shown = first.shown
     line = "<svg width='44' height='10'><path d='M0 5H44' stroke='{}' stroke-width='3.5'/></svg>"
     named = (("the path", ASKED), (f"{first.method}, {first.about}", DELIVERED))
     trails = [_key(html(line, css(color)), word) for word, color in named]
@@ -157,7 +154,7 @@ def swim_corner(swimming: Swimming, first: Swimmer, newtons: float) -> str:
         html("<span><b>{:.1f}</b> s of {:.0f} s</span>", shown.time, first.duration_s),
         html("<span><span class='dim'>off the path</span> <b>{}</b> cm</span>", off),
         html("<span><span class='dim'>power</span> <b>{}</b> W</span>", power),
-        html("<span>{}</span>", pace_words(swimming)),
+        html("<span>{}</span>", pace),
     ]
     scale = html("<div class='dim scales'><span>{}</span></div>", _length(newtons))
     return _cards(html("<div class='fl-legend'>{}</div>{}", trails, scale), parts)

@@ -22,12 +22,7 @@ HULL = Markup(
 
 
 def fin_list(state: State, selection: tuple[str, ...]) -> str:
-    """All fins with their places.
-
-    Args:
-        state: the robot.
-        selection: names of the fins that are selected.
-    """
+    """All fins with their places; `selection` has the names of those that are selected."""
     heads = Markup().join(html("<th class='place'>{}</th>", axis) for axis in ("x", "y", "z"))
     names = state.layout.names
     robot = html(

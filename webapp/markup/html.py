@@ -2,17 +2,24 @@
 
 from collections.abc import Iterable
 
-from markupsafe import Markup
+import numpy as np
+from markupsafe import Markup, escape
+
+SAFE = (Markup, int, float, np.float64)
+"""What is put in as it is, with its format."""
 
 
 def html(template: str, *values: object) -> str:
     """Markup, a text that is marked as such, with values in the place of `{}`, which may have formats, as
     `str.format` has them. Of several things in one, all stand one after the other."""
-    return Markup(template).format(*map(_one, values))
+    # Much faster than the format of `Markup`, which looks at each value through a formatter of its own.
+    return Markup(template.format(*[v if type(v) in SAFE else _escaped(v) for v in values]))
 
 
-def _one(value: object) -> object:
-    return Markup().join(value) if isinstance(value, Iterable) and not isinstance(value, str) else value
+def _escaped(value: object) -> str:
+    if isinstance(value, Iterable) and not isinstance(value, str):
+        return "".join([v if type(v) is Markup else _escaped(v) for v in value])
+    return str(escape(value))
 
 
 def row(*cells: object) -> str:

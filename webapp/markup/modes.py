@@ -9,20 +9,20 @@ from webapp.tasks.mode_names import Modes
 from webapp.theme import css, mode_color
 
 
-def mode_table(modes: Modes, searching: bool, shown: int) -> str:
+def mode_table(modes: Modes, searching: bool, mode: int) -> str:
     """Name and origin, error, power, effort and use of the limits of each mode.
 
     Args:
         modes: an answer's modes.
         searching: whether more may be found.
-        shown: which mode moves the fins.
+        mode: which of them moves the fins.
     """
     if not modes.shown:
         return ""
     rows = []
-    for k, (mode, name) in enumerate(modes.shown):
-        kind = "chosen" if k == shown else ""
-        origin = html("<div class='dim'>{}</div>", source_words(mode.sources))
+    for k, (way, name) in enumerate(modes.shown):
+        kind = "chosen" if k == mode else ""
+        origin = html("<div class='dim'>{}</div>", source_words(way.sources))
         rows.append(
             html(
                 "<tr class='{} pick' {} tabindex='0'><td>{}</td><td class='words'>{}{}</td><td>{}"
@@ -32,10 +32,10 @@ def mode_table(modes: Modes, searching: bool, shown: int) -> str:
                 _swatch(k),
                 name,
                 origin,
-                error_digits(mode.err_norm),
-                three_digits(mode.power),
-                three_digits(mode.effort),
-                100 * mode.saturation,
+                error_digits(way.err_norm),
+                three_digits(way.power),
+                three_digits(way.effort),
+                100 * way.saturation,
             )
         )
     header = Markup(

@@ -53,21 +53,26 @@ def findings_words(shown: Moment) -> list[str]:
     return sentences
 
 
-def swim_card(swimming: Swimming) -> str:
-    """Time, pace, distance from where the robot should be, depth error, power, energy and speed."""
-    if not swimming.active:
+def swim_card(swims: bool, swimmer: Swimmer | None, moment: Moment | None, pace: str) -> str:
+    """Time, pace, distance from where the robot should be, depth error, power, energy and speed.
+
+    Args:
+        swims: whether there is a swim.
+        swimmer: the robot, None while it is being made.
+        moment: what it does.
+        pace: as `pace_words` gives it.
+    """
+    if not swims:
         return Markup("<div class='fl dim'>Start lets this robot swim, with the fins that work.</div>")
-    swimmer = swimming.swimmer
-    if swimmer is None:
+    if swimmer is None or moment is None:
         return Markup("<div class='fl dim'>making ready …</div>")
-    shown = swimmer.shown
-    head = html("<b>{:.1f} s</b> of {:.0f} s, {}", shown.time, swimmer.duration_s, pace_words(swimming))
-    rows = (row(*line) for line in zip(FIGURES, _figures(shown.figures), strict=True))
+    head = html("<b>{:.1f} s</b> of {:.0f} s, {}", moment.time, swimmer.duration_s, pace)
+    rows = (row(*line) for line in zip(FIGURES, _figures(moment.figures), strict=True))
     return html(
         "<div class='fl swim'><div class='said'>{}</div><table>{}</table>{}</div>",
         head,
         rows,
-        _warnings(swimmer, shown),
+        _warnings(swimmer, moment),
     )
 
 

@@ -10,9 +10,10 @@ from finlab.allocation.allocation import Allocation
 from finlab.arrays import Array
 from finlab.errors import LayoutError
 from finlab.layout import Azimuth, Fin, Layout
+from finlab.layout.damage import Health
 from finlab.vehicle.body import complete_body
 from finlab.vehicle.vehicle import Vehicle
-from webapp.session.state import AXIS_WORDS, State
+from webapp.session.state import AXIS_WORDS
 
 SMALL = 3e-4
 """Share of what the robot can push that is too small to draw, on one axis; an exact answer lacks no more."""
@@ -139,8 +140,10 @@ def parts_word(layout: Layout) -> str:
     return "fins" if layout.is_of_fins else "actuators"
 
 
-def damage_words(state: State, name: str) -> str:
+def damage_words(health: Health | None, name: str) -> str:
     """What is wrong with a fin that still works: `weak 50 %, stuck at 30°`; nothing for a whole one."""
-    parts = [f"weak {100 * share:.0f} %" for fin, share in state.weak if fin == name]
-    parts += [f"stuck at {math.degrees(angle):.0f}°" for fin, angle in state.stuck if fin == name]
+    if health is None:
+        return ""
+    parts = [f"weak {100 * share:.0f} %" for fin, share in health.weak if fin == name]
+    parts += [f"stuck at {math.degrees(angle):.0f}°" for fin, angle in health.stuck if fin == name]
     return ", ".join(parts).replace("-", "−")

@@ -1,13 +1,11 @@
 """What a layout says of the robot as a whole: its name, what it is, its mass, damping and buoyancy."""
 
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-import viser
-
-from finlab.layout import Body
+from finlab.layout import Body, Layout
 from finlab.vehicle.body import GRAVITY
-from webapp.handles import put
 from webapp.markup.html import html
 from webapp.markup.words import three_digits
 from webapp.page import Page
@@ -46,75 +44,70 @@ PARTS: dict[str, tuple[tuple[str, int, str], ...]] = {
 """Fields of `Body` with several numbers: their rows of three, the first number of each, what they are."""
 
 
-class BodyInspector:
+def add_body(page: Page) -> None:
     """Widgets about the robot."""
+    session, gui = page.session, page.gui
 
-    def __init__(self, gui: viser.GuiApi, page: Page) -> None:
-        self._page, session = page, page.session
-        self._head = gui.add_html("")
-        page.bind(gui.add_text("Name", ""), session.rename_robot, lambda: session.state.layout.name)
-        text = gui.add_text("About", "", multiline=True)
-        page.bind(text, session.describe_robot, lambda: session.state.layout.description)
-        acts = {"Estimate": session.estimate, "Forget": session.forget_dynamics}
-        page.add_buttons("From the hull", acts, hint=FORMULAS)
-        page.bind_number(
-            gui.add_number("Mass [kg]", 0.0, step=0.5, hint="From the hull: of the water that it displaces."),
-            partial(session.set_dynamics, "mass_kg"),
-            lambda: self._body.mass_kg or 0.0,
-        )
-        about = "As much as the robot weighs where nothing is said."
-        page.bind_number(
-            gui.add_number("Buoyancy [N]", 0.0, step=1.0, hint=about),
-            partial(session.set_dynamics, "buoyancy_n"),
-            self._lift,
-        )
-        for key, rows in PARTS.items():
-            for label, first, hint in rows:
-                page.bind_number(
-                    gui.add_vector3(label, (0.0, 0.0, 0.0), step=0.1, hint=hint),
-                    partial(self._set, key, first),
-                    partial(self._three, key, first),
-                )
-
-    @property
-    def _body(self) -> Body:
-        return self._page.session.state.layout.body or Body()
-
-    def _lift(self) -> float:
-        """The buoyant force [N]; that of a neutral robot where none is given."""
-        body = self._body
-        return (body.mass_kg or 0.0) * GRAVITY if body.buoyancy_n is None else body.buoyancy_n
-
-    def _whole(self, key: str) -> tuple[float, ...]:
-        given: tuple[float, ...] | None = getattr(self._body, key)
-        return given or (0.0,) * 3 * len(PARTS[key])
-
-    def _three(self, key: str, first: int) -> tuple[float, ...]:
-        return self._whole(key)[first : first + 3]
-
-    def _set(self, key: str, first: int, values: tuple[Any, ...]) -> None:
-        whole = list(self._whole(key))
+    def put_in(key: str, first: int, values: tuple[Any, ...]) -> None:
+        body = _body(session.state.layout)
+        whole = list(_whole(body, key))
         whole[first : first + 3] = values
-        if key == "inertia_kgm2" and self._body.inertia_kgm2 is None:
+        if key == "inertia_kgm2" and body.inertia_kgm2 is None:
             whole = [value or max(whole) for value in whole]  # typed box by box, and none may be zero
-        self._page.session.set_dynamics(key, tuple(whole))
+        session.set_dynamics(key, tuple(whole))
 
-    def refresh(self) -> None:
-        put(self._head, content=html("<div class='fl head'>{}</div>", self._facts()))
+    def three(key: str, first: int) -> Callable[[Layout], tuple[float, ...]]:
+        return lambda layout: _whole(_body(layout), key)[first : first + 3]
 
-    def _facts(self) -> str:
-        """The hull in figures, and what a swim would miss."""
-        layout, body = self._page.session.state.layout, self._body
-        volume = solid_of(hull_of(layout)).volume
-        water = three_digits(water_density(layout) * volume)
-        lines = [f"The hull encloses {three_digits(1000 * volume)} L, {water} kg of water."]
-        if body.mass_kg is not None:
-            over = self._lift() / GRAVITY - body.mass_kg
-            rises = f"{'rises' if over > 0 else 'sinks'} with {three_digits(abs(over))} kg"
-            lines.append(
-                f"By mass and buoyancy below it {'is neutral' if abs(over) < 5e-4 * body.mass_kg else rises}."
-            )
-        missing = [word for key, word in KNOWN.items() if getattr(body, key) is None]
-        if missing:
-            lines.append(f"Not said: {', '.join(missing)}.")
-        return html("<div class='dim'>{}</div>", " ".join(lines))
+    page.add_html(_facts)
+    page.bind(gui.add_text("Name", ""), session.rename_robot, lambda layout: layout.name)
+    text = gui.add_text("About", "", multiline=True)
+    page.bind(text, session.describe_robot, lambda layout: layout.description)
+    acts = {"Estimate": session.estimate, "Forget": session.forget_dynamics}
+    page.add_buttons("From the hull", acts, hint=FORMULAS)
+    page.bind_number(
+        gui.add_number("Mass [kg]", 0.0, step=0.5, hint="From the hull: of the water that it displaces."),
+        partial(session.set_dynamics, "mass_kg"),
+        lambda layout: _body(layout).mass_kg or 0.0,
+    )
+    about = "As much as the robot weighs where nothing is said."
+    page.bind_number(
+        gui.add_number("Buoyancy [N]", 0.0, step=1.0, hint=about),
+        partial(session.set_dynamics, "buoyancy_n"),
+        lambda layout: _lift(_body(layout)),
+    )
+    for key, rows in PARTS.items():
+        for label, first, hint in rows:
+            box = gui.add_vector3(label, (0.0, 0.0, 0.0), step=0.1, hint=hint)
+            page.bind_number(box, partial(put_in, key, first), three(key, first))
+
+
+def _body(layout: Layout) -> Body:
+    return layout.body or Body()
+
+
+def _lift(body: Body) -> float:
+    """The buoyant force [N]; that of a neutral robot where none is given."""
+    return (body.mass_kg or 0.0) * GRAVITY if body.buoyancy_n is None else body.buoyancy_n
+
+
+def _whole(body: Body, key: str) -> tuple[float, ...]:
+    given: tuple[float, ...] | None = getattr(body, key)
+    return given or (0.0,) * 3 * len(PARTS[key])
+
+
+def _facts(layout: Layout) -> str:
+    """The hull in figures, and what a swim would miss."""
+    body, volume = _body(layout), solid_of(hull_of(layout)).volume
+    water = three_digits(water_density(layout) * volume)
+    lines = [f"The hull encloses {three_digits(1000 * volume)} L, {water} kg of water."]
+    if body.mass_kg is not None:
+        over = _lift(body) / GRAVITY - body.mass_kg
+        rises = f"{'rises' if over > 0 else 'sinks'} with {three_digits(abs(over))} kg"
+        lines.append(
+            f"By mass and buoyancy below it {'is neutral' if abs(over) < 5e-4 * body.mass_kg else rises}."
+        )
+    missing = [word for key, word in KNOWN.items() if getattr(body, key) is None]
+    if missing:
+        lines.append(f"Not said: {', '.join(missing)}.")
+    return html("<div class='fl head'><div class='dim'>{}</div></div>", " ".join(lines))

@@ -2,9 +2,7 @@
 
 from importlib.resources import files
 
-import viser
-
-from webapp.handles import put
+from finlab.layout import Layout
 from webapp.markup.html import html
 from webapp.page import Page
 from webapp.session.files import shipped, shipped_name
@@ -14,27 +12,31 @@ SCRIPT = files("webapp").joinpath("designs.js").read_text("utf-8")
 """What runs in the page."""
 
 
-class DesignPanel:
+def add_designs(page: Page) -> None:
     """The list of shipped designs, and what is said of this one."""
 
-    def __init__(self, gui: viser.GuiApi, page: Page) -> None:
-        self._page = page
-        self._layouts = gui.add_dropdown("Layout", tuple(shipped()), hint="Shipped layouts to start from.")
-        page.on_change(self._layouts, self._open)
-        self._card = gui.add_html("")
-        run_script(gui, SCRIPT)
-
-    def _open(self, name: str) -> None:
+    def open_layout(name: str) -> None:
         if name in shipped():
-            self._page.session.open_layout(shipped()[name])
+            page.session.open_layout(shipped()[name])
 
-    def refresh(self) -> None:
-        session, layout = self._page.session, self._page.session.state.layout
-        name = shipped_name(layout)
-        own = f"{layout.name}, {'yours' if layout == session.saved else 'edited'}"
-        put(self._layouts, options=tuple(shipped()) if name else (*shipped(), own), value=name or own)
-        first = layout.description.strip().split("\n")[0]
-        known = {shipped_layout.description for shipped_layout in shipped().values()}
-        if name is None and layout.description in known:  # which is about another robot
-            first = f"Made from {layout.name}, and changed."
-        put(self._card, content=html("<div class='fl dim said'>{}</div>", first))
+    layouts = page.gui.add_dropdown("Layout", tuple(shipped()), hint="Shipped layouts to start from.")
+    page.board.show(layouts, options=_options)
+    page.bind(layouts, open_layout, lambda layout, saved: shipped_name(layout) or _own(layout, saved))
+    page.add_html(_about)
+    run_script(page.gui, SCRIPT)
+
+
+def _own(layout: Layout, saved: Layout) -> str:
+    return f"{layout.name}, {'yours' if layout == saved else 'edited'}"
+
+
+def _options(layout: Layout, saved: Layout) -> tuple[str, ...]:
+    return tuple(shipped()) if shipped_name(layout) else (*shipped(), _own(layout, saved))
+
+
+def _about(layout: Layout) -> str:
+    first = layout.description.strip().split("\n")[0]
+    known = {shipped_layout.description for shipped_layout in shipped().values()}
+    if shipped_name(layout) is None and layout.description in known:  # which is about another robot
+        first = f"Made from {layout.name}, and changed."
+    return html("<div class='fl dim said'>{}</div>", first)

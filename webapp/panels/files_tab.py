@@ -2,37 +2,29 @@
 
 import viser
 
-from webapp.handles import add_html, put
+from webapp.handles import add_html
 from webapp.markup.html import html
 from webapp.markup.picking import marker
 from webapp.markup.snippets import command_line
 from webapp.page import Page
+from webapp.session.state import State
 
 
-class FilesTab:
+def add_files(page: Page) -> None:
     """A button for the robot's bundle, and the same question as a command."""
-
-    def __init__(self, gui: viser.GuiApi, page: Page) -> None:
-        self._page = page
-        about = "The robot, its fins' physics, README and checksums: what finlab export makes."
-        add_html(gui, marker("fl-primary"))
-        icon = viser.Icon.PACKAGE_EXPORT
-        page.add_button("Export the bundle (ZIP)", page.exports.bundle, icon=icon, hint=about)
-        self._command = gui.add_html("")
-
-    def refresh(self) -> None:
-        state = self._page.session.state
-        words = "The same question on the command line"
-        put(self._command, content=html("<div class='fl'>{}</div>", _copied(words, command_line(state))))
+    about = "The robot, its fins' physics, README and checksums: what finlab export makes."
+    add_html(page.gui, marker("fl-primary"))
+    icon = viser.Icon.PACKAGE_EXPORT
+    page.add_button("Export the bundle (ZIP)", page.jobs.exports.bundle, icon=icon, hint=about)
+    page.add_html(_copied)
 
 
-def _copied(title: str, text: str) -> str:
-    """Lines that a click takes to the clipboard, where the browser lets it; else it selects them."""
+def _copied(state: State) -> str:
+    """A line that a click takes to the clipboard, where the browser lets it; else it selects it."""
     copy = "navigator.clipboard?.writeText(this.innerText); this.previousSibling.dataset.done = 1"
     return html(
-        "<div class='said copy'><span class='dim'>{}</span></div><pre class=\"command\" "
-        'title="click to copy" onclick="{}">{}</pre>',
-        title,
+        "<div class='fl'><div class='said copy'><span class='dim'>The same question on the command line"
+        '</span></div><pre class="command" title="click to copy" onclick="{}">{}</pre></div>',
         copy,
-        text,
+        command_line(state),
     )

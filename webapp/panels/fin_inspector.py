@@ -1,21 +1,21 @@
 """What a layout says of the selected fins: place, limits, model, drive. An edit counts for all of them."""
 
 import math
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-import viser
 from markupsafe import Markup
 
-from finlab.layout import Fin
+from finlab.layout import Fin, Layout
 from finlab.layout.fin import MAX_AMPLITUDE, MAX_FREQUENCY
 from finlab.layout.servo import Servo
-from webapp.handles import add_html, put
+from webapp.handles import add_html
 from webapp.markup.answer import swatch
 from webapp.markup.html import html
 from webapp.markup.words import listed
 from webapp.page import Page
-from webapp.panels.fin_model import FinModelPanel
+from webapp.panels.fin_model import add_fin_model
 from webapp.session.state import number
 
 DRIVE = {
@@ -33,115 +33,89 @@ NOMINAL = Fin("nominal", (0.0, 0.0, 0.0), 0.0)
 """What stands in the boxes while no fin is selected."""
 
 
-class FinInspector:
+def fin_of(selected: str | None, layout: Layout) -> Fin:
+    """The fin that was selected last; a nominal one where none is."""
+    return NOMINAL if selected is None else layout.fins[layout.index(selected)]
+
+
+def of_fin(value: Callable[[Fin], Any]) -> Callable[[str | None, Layout], Any]:
+    """What is shown of the fin that was selected last."""
+    return lambda selected, layout: value(fin_of(selected, layout))
+
+
+def add_fin(page: Page) -> None:
     """Widgets about the selected fins."""
+    session, gui = page.session, page.gui
 
-    def __init__(self, gui: viser.GuiApi, page: Page) -> None:
-        self._page, session = page, page.session
-        self._head = gui.add_html("")
-        with gui.add_folder(None) as self._all:
-            page.bind(gui.add_text("Name", ""), self._rename, lambda: session.selected or "")
-            with gui.add_folder("Place"):
-                about = "x forward, y left, z up, from the centre of gravity."
-                page.bind_number(
-                    gui.add_vector3("Position [m]", (0.0, 0.0, 0.0), step=0.005, hint=about),
-                    self._place,
-                    lambda: self._fin.position,
-                )
-                about = "Azimuth of the shaft, 0 is ahead, 90 to the left."
-                page.bind_number(
-                    gui.add_slider("Shaft [°]", -180.0, 180.0, 1.0, 0.0, hint=about),
-                    self._turn,
-                    lambda: math.degrees(self._fin.shaft_azimuth),
-                    digits=2,
-                )
-            with gui.add_folder("Limits"):
-                self._add_limits(gui)
-            self._model = FinModelPanel(gui, page)
-            with gui.add_folder("Drive", expand_by_default=False):
-                for key, (label, hint) in DRIVE.items():
-                    usual = f"{hint} Usual: {getattr(Servo(), key):.4g}."
-                    page.bind_number(
-                        gui.add_number(label, 1.0, step=0.5, hint=usual),
-                        partial(session.set_servo, key),
-                        partial(self._drive, key),
-                    )
+    def rename(name: str) -> None:
+        if session.selected is not None:
+            session.rename_fin(session.selected, name)
 
-    def _add_limits(self, gui: viser.GuiApi) -> None:
-        page, session = self._page, self._page.session
-        add_html(gui, LIMITS)
-        about = f"Least and most, up to {MAX_AMPLITUDE:.2f} rad."
-        page.bind_number(
-            gui.add_vector2("A [rad]", (0.0, 0.0), step=0.05, hint=about),
-            partial(session.limit_selected, "amplitude"),
-            lambda: self._fin.limits.amplitude,
-        )
-        about = f"Least and most, up to {MAX_FREQUENCY:g} Hz."
-        page.bind_number(
-            gui.add_vector2("f [Hz]", (0.0, 0.0), step=0.1, hint=about),
-            partial(session.limit_selected, "frequency"),
-            lambda: self._fin.limits.frequency,
-        )
-        about = "From and to, counter-clockwise; −180 to 180 is any direction."
-        page.bind_number(
-            gui.add_vector2("φ [°]", (0.0, 0.0), step=5.0, hint=about),
-            self._limit_direction,
-            lambda: tuple(math.degrees(end) for end in self._fin.limits.zero_direction),
-            digits=2,
-        )
+    def turn(degrees: Any) -> None:
+        session.turn_selected(math.radians(number(degrees, "shaft [°]", -3600.0, 3600.0)))
 
-    @property
-    def _fin(self) -> Fin:
-        """The fin that was selected last; a nominal one where none is."""
-        session = self._page.session
-        layout = session.state.layout
-        return NOMINAL if session.selected is None else layout.fins[layout.index(session.selected)]
+    page.add_html(_headline)
+    with gui.add_folder(None) as whole:
+        page.bind(gui.add_text("Name", ""), rename, lambda selected: selected or "")
+        with gui.add_folder("Place"):
+            about = "x forward, y left, z up, from the centre of gravity."
+            place = gui.add_vector3("Position [m]", (0.0, 0.0, 0.0), step=0.005, hint=about)
+            page.bind_number(place, session.place_selected, of_fin(lambda fin: fin.position))
+            about = "Azimuth of the shaft, 0 is ahead, 90 to the left."
+            shaft = gui.add_slider("Shaft [°]", -180.0, 180.0, 1.0, 0.0, hint=about)
+            page.bind_number(shaft, turn, of_fin(lambda fin: math.degrees(fin.shaft_azimuth)), digits=2)
+        with gui.add_folder("Limits"):
+            _add_limits(page)
+        add_fin_model(page, fin_of)
+        with gui.add_folder("Drive", expand_by_default=False):
+            for key, (label, hint) in DRIVE.items():
+                usual = f"{hint} Usual: {getattr(Servo(), key):.4g}."
+                box = gui.add_number(label, 1.0, step=0.5, hint=usual)
+                page.bind_number(box, partial(session.set_servo, key), of_fin(partial(_drive, key)))
+    page.board.show(whole, visible=lambda selected: selected is not None)
 
-    def _rename(self, name: str) -> None:
-        if self._page.session.selected is not None:
-            self._page.session.rename_fin(self._page.session.selected, name)
 
-    def _drive(self, key: str) -> float:
-        return float(getattr(self._fin.servo, key))
+def _drive(key: str, fin: Fin) -> float:
+    return float(getattr(fin.servo, key))
 
-    def _place(self, position: tuple[float, float, float]) -> None:
-        self._page.session.place_selected(position)
 
-    def _turn(self, degrees: Any) -> None:
-        checked = number(degrees, "shaft [°]", -3600.0, 3600.0)
-        self._page.session.turn_selected(math.radians(checked))
+def _add_limits(page: Page) -> None:
+    gui, limit = page.gui, page.session.limit_selected
 
-    def _limit_direction(self, degrees: tuple[Any, Any]) -> None:
+    def limit_direction(degrees: tuple[Any, Any]) -> None:
         low, high = (math.radians(number(end, "zero direction [°]", -360.0, 360.0)) for end in degrees)
-        self._page.session.limit_selected("zero_direction", (low, high))
+        limit("zero_direction", (low, high))
 
-    def refresh(self) -> None:
-        session = self._page.session
-        put(self._all, visible=session.selected is not None)
-        put(self._head, content=self._headline())
-        self._model.refresh()
+    add_html(gui, LIMITS)
+    about = f"Least and most, up to {MAX_AMPLITUDE:.2f} rad."
+    box = gui.add_vector2("A [rad]", (0.0, 0.0), step=0.05, hint=about)
+    page.bind_number(box, partial(limit, "amplitude"), of_fin(lambda fin: fin.limits.amplitude))
+    about = f"Least and most, up to {MAX_FREQUENCY:g} Hz."
+    box = gui.add_vector2("f [Hz]", (0.0, 0.0), step=0.1, hint=about)
+    page.bind_number(box, partial(limit, "frequency"), of_fin(lambda fin: fin.limits.frequency))
+    about = "From and to, counter-clockwise; −180 to 180 is any direction."
+    box = gui.add_vector2("φ [°]", (0.0, 0.0), step=5.0, hint=about)
+    ends = of_fin(lambda fin: tuple(math.degrees(end) for end in fin.limits.zero_direction))
+    page.bind_number(box, limit_direction, ends, digits=2)
 
-    def _headline(self) -> str:
-        session = self._page.session
-        layout, names = session.state.layout, session.selection
-        if not names:
-            return Markup(
-                "<div class='fl dim'>Press a fin in the list or in the view to see all about it.</div>"
-            )
-        if len(names) == 1:
-            (name,) = names
-            return html("<div class='fl head'>{}<b>{}</b></div>", swatch(layout.index(name)), name)
-        badges = Markup().join(swatch(layout.index(name)) for name in names)
-        differ = differences([layout.fins[layout.index(name)] for name in names])
-        said = f"They differ in {differ}. " if differ else "They are alike but for their place. "
-        return html(
-            "<div class='fl head'>{}<b>{} fins</b><div class='dim'>{}The boxes show {}; what "
-            "you change counts for all.</div></div>",
-            badges,
-            len(names),
-            said,
-            str(session.selected),
-        )
+
+def _headline(layout: Layout, selection: tuple[str, ...], selected: str | None) -> str:
+    if not selection:
+        return Markup("<div class='fl dim'>Press a fin in the list or in the view to see all about it.</div>")
+    if len(selection) == 1:
+        (name,) = selection
+        return html("<div class='fl head'>{}<b>{}</b></div>", swatch(layout.index(name)), name)
+    badges = Markup().join(swatch(layout.index(name)) for name in selection)
+    differ = differences([layout.fins[layout.index(name)] for name in selection])
+    said = f"They differ in {differ}. " if differ else "They are alike but for their place. "
+    return html(
+        "<div class='fl head'>{}<b>{} fins</b><div class='dim'>{}The boxes show {}; what "
+        "you change counts for all.</div></div>",
+        badges,
+        len(selection),
+        said,
+        str(selected),
+    )
 
 
 def differences(fins: list[Fin]) -> str:

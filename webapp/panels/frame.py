@@ -9,20 +9,20 @@ from collections.abc import Callable
 from functools import partial
 from importlib.resources import files
 
-import viser
 from markupsafe import Markup
 
+from finlab.layout import Layout
 from webapp.handles import add_html, put
 from webapp.markup.html import html
 from webapp.markup.picking import marker
 from webapp.markup.words import fins_only
-from webapp.page import Page, Panel
+from webapp.page import Page
 from webapp.panels.places import DRAWER, LEFT, PLACES, REGIONS, RIGHT, SIMULATE, Place
-from webapp.panels.status import Corner
+from webapp.panels.status import add_corner
 from webapp.presses import press
-from webapp.session import Session
-from webapp.session.looking import DRAWERS
+from webapp.session.looking import DRAWERS, Desk
 from webapp.session.state import can_be_edited
+from webapp.tasks.swimmer import Swimmer
 from webapp.theme import ASKED, DELIVERED, MISSING, css
 from webapp.viser_internals import run_script
 
@@ -56,92 +56,106 @@ FOLDER = ".mantine-Paper-root[data-fl~={}]"
 
 class Section:
     """A panel in its place; it gives way to a sentence when it cannot be shown: no old figure stands under a
-    new name."""
+    new name. The browser builds its widgets when it is met first, so that a first page does not wait for
+    those of other tasks; from then on they stay."""
 
-    def __init__(self, gui: viser.GuiApi, page: Page, place: Place, index: int) -> None:
-        """Build the panel, and take over the widgets that it binds to the session."""
+    def __init__(self, page: Page, place: Place, index: int) -> None:
+        """Build the panel."""
         self.place, self.name, self._page = place, f"at-{index}", page
-        with gui.add_folder(place.title, expand_by_default=not place.folded):
+        self._met, self.refused = False, False
+        gui = page.gui
+        self.group = page.board.group(self._fail)
+        with gui.add_folder(place.title, expand_by_default=not place.folded) as self.whole:
             add_html(gui, marker(f"fl-section fl-{self.name}"))
             self._sentence = gui.add_html("", visible=False)
             with gui.add_folder(None, visible=False) as self._folder:
-                self._panel = place.make(gui, page)
-        self._bound, page.bound = page.bound, []
-        self._met = False
+                place.make(page)
 
-    def is_there(self, session: Session) -> bool:
-        """Whether it belongs to what is being done."""
+    def arrange(self, desk: Desk, about: tuple[str, ...], layout: Layout) -> bool:
+        """Whether it belongs to what is being done; a robot that it does not take is told so in its place."""
         place = self.place
-        about = ("", "robot" if session.selected is None else "fins", *["guide"] * session.guided)
-        opened = place.region != DRAWER or place.title == session.drawer
-        fits = place.fins_only != "" or can_be_edited(session.state.layout)
-        return session.task in place.tasks and place.about in about and opened and fits
+        opened = place.region != DRAWER or (place.title == desk.opened[desk.task] and not desk.folded)
+        there = desk.task in place.tasks and place.about in about and opened
+        self.refused = there and place.fins_only is not None and not can_be_edited(layout)
+        self.group.there = there and not self.refused
+        if self.refused:
+            self._say(html("<div class='fl dim'>{}</div>", fins_only(layout, place.fins_only or "")))
+        elif there:
+            self._met = True
+            self._say("")
+        return there and not (self.refused and place.fins_only == "")
 
-    def refresh(self) -> None:
-        """Write the session and the answer into it. The browser builds its widgets when it is met first, so
-        that a first page does not wait for those of other tasks; from then on they stay."""
-        self._met = self._met or self.is_there(self._page.session)
-        layout = self._page.session.state.layout
-        if self.place.fins_only is not None and not can_be_edited(layout):
-            self._say(html("<div class='fl dim'>{}</div>", fins_only(layout, self.place.fins_only)))
+    def _fail(self, error: Exception | None) -> None:
+        if error is None:
+            self._say("")
             return
-        try:
-            for write in self._bound:
-                write()
-            self._panel.refresh()
-        except Exception as error:
-            text = "<div class='fl missing'>This cannot be shown of {}: {}</div>"
-            self._say(html(text, layout.name, str(error)))
-            self._page.fault(error)
-        else:
-            put(self._folder, visible=self._met)
-            put(self._sentence, visible=False)
+        name = self._page.session.state.layout.name
+        self._say(html("<div class='fl missing'>This cannot be shown of {}: {}</div>", name, str(error)))
+        self._page.fault(error)
 
     def _say(self, text: str) -> None:
-        """A sentence in place of the panel."""
-        put(self._sentence, content=text, visible=True)
-        put(self._folder, visible=False)
+        """A sentence in place of the panel, or the panel itself."""
+        put(self._sentence, content=text, visible=bool(text))
+        put(self._folder, visible=self._met and not text)
 
 
 class Frame:
     """All regions of one page with their sections."""
 
-    def __init__(self, gui: viser.GuiApi, page: Page) -> None:
+    def __init__(self, page: Page) -> None:
         """Build everything."""
-        self._page = page
+        self._page, gui = page, page.gui
         run_script(gui, NAMED)
         add_html(gui, html("{}{}", STYLE, marker("fl-chrome")))
+        page.board.group(self._fail)
         self._shown = gui.add_html("")
+        page.board.act(self._arrange)
         self._listen()
-        self._corner = Corner(gui, page)
-        self._strip: viser.GuiHtmlHandle | None = None
-        self._sections: list[Section] = []
+        self.sections: list[Section] = []
+        add_corner(page)
         for region in REGIONS:
             with gui.add_folder(region):
                 add_html(gui, marker(f"fl-region fl-{region}"))
                 if region == DRAWER:
-                    self._strip = gui.add_html("")
-                self._sections += [
-                    Section(gui, page, place, index)
+                    page.board.group(self._fail)
+                    page.add_html(_strip)
+                self.sections += [
+                    Section(page, place, index)
                     for index, place in enumerate(PLACES)
                     if place.region == region
                 ]
         run_script(gui, HABITS + FRAMES + NAMES)
 
-    @property
-    def panels(self) -> tuple[list[Panel], list[Panel]]:
-        """All panels, and of these the ones that follow a swim."""
-        follow = [section for section in self._sections if section.place.swims]
-        return [self, self._corner, *self._sections], [self._corner, *follow]
+    def _fail(self, error: Exception | None) -> None:
+        if error is not None:
+            self._page.fault(error)
 
-    def refresh(self) -> None:
-        session = self._page.session
-        plots = session.task != SIMULATE or self._page.swimming.swimmer is not None
-        put(self._shown, content=_style(self._sections, session, plots))
-        assert self._strip is not None
+    def _arrange(
+        self, desk: Desk, selected: str | None, guided: bool, layout: Layout, swimmer: Swimmer | None
+    ) -> None:
+        """Which regions are there, and which sections in them; the drawer is low until there are plots in
+        it."""
+        about = ("", "robot" if selected is None else "fins", *["guide"] * guided)
+        there = [section for section in self.sections if section.arrange(desk, about, layout)]
+        regions = {section.place.region for section in there}
+        gone = [FOLDER.format(section.name) for section in self.sections if section not in there]
+        gone += [FOLDER.format(region) for region in (LEFT, RIGHT) if region not in regions]
+        drawer = bool(DRAWERS[desk.task])
+        if not drawer:
+            gone.append(FOLDER.format(DRAWER))
+        counts = {
+            "left": LEFT in regions,
+            "right": RIGHT in regions,
+            "drawer": drawer,
+            "open": drawer and not desk.folded,
+            "guide": guided,
+        }
+        variables = Markup().join(f"--has-{name}: {int(there)};" for name, there in counts.items())
+        height = "" if desk.task != SIMULATE else LOW if swimmer is None else TALL
+        hidden = Markup(f"{', '.join(gone)} {{ display: none !important; }}")
         put(
-            self._strip,
-            content=_strip(session.task, session.desk.opened[session.task], session.desk.folded),
+            self._shown,
+            content=html("<style>:root {{ {} }} {} {}</style>", variables, Markup(height), hidden),
         )
 
     def _listen(self) -> None:
@@ -169,30 +183,9 @@ def _by_key(act: Callable[[str], object], key: str, _held: str) -> object:
     return act(key)
 
 
-def _style(sections: list[Section], session: Session, plots: bool) -> str:
-    """Which regions are there, and which sections in them; the drawer is low until there are plots in it."""
-    task, drawer = session.task, session.drawer
-    there = {section.name for section in sections if section.is_there(session)}
-    regions = {section.place.region for section in sections if section.name in there}
-    gone = [FOLDER.format(section.name) for section in sections if section.name not in there]
-    gone += [FOLDER.format(region) for region in (LEFT, RIGHT) if region not in regions]
-    if not DRAWERS[task]:
-        gone.append(FOLDER.format(DRAWER))
-    counts = {
-        "left": LEFT in regions,
-        "right": RIGHT in regions,
-        "drawer": bool(DRAWERS[task]),
-        "open": drawer is not None,
-        "guide": session.guided,
-    }
-    variables = Markup().join(f"--has-{name}: {int(there)};" for name, there in counts.items())
-    height = LOW if not plots else TALL if task == SIMULATE else ""
-    hidden = Markup(f"{', '.join(gone)} {{ display: none !important; }}")
-    return html("<style>:root {{ {} }} {} {}</style>", variables, height, hidden)
-
-
-def _strip(task: str, opened: str, folded: bool) -> str:
+def _strip(desk: Desk) -> str:
     """The upper edge of the drawer: its tabs, and the button that folds it."""
+    opened, folded = desk.opened[desk.task], desk.folded
     tabs = Markup().join(
         html(
             "<button aria-pressed='{}' {}>{}</button>",
@@ -200,7 +193,7 @@ def _strip(task: str, opened: str, folded: bool) -> str:
             press("drawer", name),
             name,
         )
-        for name in DRAWERS[task]
+        for name in DRAWERS[desk.task]
     )
     word = "Open the drawer" if folded else "Fold the drawer"
     fold = html(

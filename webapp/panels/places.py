@@ -1,28 +1,26 @@
-"""Which panel stands where: the one table of the frame. A panel is a class that takes `gui` and `page`."""
+"""Which panel stands where: the one table of the frame. A panel is built by a function of the page."""
 
 from collections.abc import Callable
 from functools import partial
 from typing import NamedTuple
 
-import viser
-
-from webapp.page import Page, Panel
-from webapp.panels.body_inspector import BodyInspector
-from webapp.panels.cards import Card, answer, camera, check, guide, robot_name, tasks
-from webapp.panels.compare_tab import ComparePanel
-from webapp.panels.damage import DamagePanel
-from webapp.panels.design_panel import DesignPanel
-from webapp.panels.files_tab import FilesTab
-from webapp.panels.fin_inspector import FinInspector
-from webapp.panels.fin_list import FinList
-from webapp.panels.hull_panel import HullPanel
-from webapp.panels.limits_tab import ImprovePanel, ReachPanel
-from webapp.panels.modes_tab import CandidatesPanel
-from webapp.panels.swim_tab import RunPanel, ScenarioPanel, SwimCardPanel
-from webapp.panels.timeline import Timeline
-from webapp.panels.top_bar import AnsweringBar, FileBar, HistoryBar
-from webapp.panels.view_tab import ViewPanel
-from webapp.panels.wrench_tab import FinsPanel, TargetPanel
+from webapp.page import Page
+from webapp.panels.body_inspector import add_body
+from webapp.panels.cards import answer, camera, card, check, guide, robot_name, tasks
+from webapp.panels.compare_tab import add_comparison
+from webapp.panels.damage import add_damage
+from webapp.panels.design_panel import add_designs
+from webapp.panels.files_tab import add_files
+from webapp.panels.fin_inspector import add_fin
+from webapp.panels.fin_list import add_fin_list
+from webapp.panels.hull_panel import add_hull
+from webapp.panels.limits_tab import add_improving, add_reach
+from webapp.panels.modes_tab import add_candidates
+from webapp.panels.swim_tab import add_figures, add_run, add_scenario
+from webapp.panels.timeline import add_timeline
+from webapp.panels.top_bar import add_answering, add_file, add_history
+from webapp.panels.view_tab import add_switches
+from webapp.panels.wrench_tab import add_commands, add_target
 from webapp.session.looking import TASKS
 
 TOP, LEFT, RIGHT, DRAWER, VIEW = REGIONS = ("top", "left", "right", "drawer", "view")
@@ -39,9 +37,7 @@ class Place(NamedTuple):
     """In which tasks it is there."""
     title: str
     """Its heading; in the drawer the name of its tab, which `DRAWERS` knows; nothing in the bar."""
-    make: Callable[[viser.GuiApi, Page], Panel]
-    swims: bool = False
-    """Whether it shows a swim, and is to follow it."""
+    make: Callable[[Page], object]
     folded: bool = False
     """Whether only its heading is seen at first."""
     about: str = ""
@@ -53,32 +49,32 @@ class Place(NamedTuple):
 
 
 PLACES = (
-    Place(TOP, TASKS, "Robot", partial(Card, robot_name)),
-    Place(TOP, TASKS, "File", FileBar),
-    Place(TOP, TASKS, "History", HistoryBar),
-    Place(TOP, TASKS, "Tasks", partial(Card, tasks)),
-    Place(TOP, TASKS, "Answers", AnsweringBar),
-    Place(LEFT, TASKS, "Guide", partial(Card, guide), about="guide"),
-    Place(LEFT, (DESIGN,), "Actuators", FinList),
-    Place(LEFT, (DESIGN,), "Designs", DesignPanel),
-    Place(RIGHT, (DESIGN,), "Fin", FinInspector, about="fins", fins_only="the inspector of a fin"),
-    Place(RIGHT, (DESIGN,), "Body", BodyInspector, about="robot"),
-    Place(RIGHT, (DESIGN,), "Hull", HullPanel, folded=True, about="robot"),
-    Place(RIGHT, (DESIGN,), "Check", partial(Card, check), fins_only=""),
-    Place(DRAWER, (DESIGN,), "Reach", ReachPanel, fins_only="reach with its score card"),
-    Place(DRAWER, (DESIGN,), "Improve", ImprovePanel, fins_only="the search for a better layout"),
-    Place(LEFT, (ALLOCATE,), "Actuators", FinsPanel),
-    Place(LEFT, (ALLOCATE,), "Damage a fin", DamagePanel, folded=True, fins_only=""),
-    Place(RIGHT, (ALLOCATE,), "Wrench", TargetPanel),
-    Place(RIGHT, (ALLOCATE,), "Asked and delivered", partial(Card, answer)),
-    Place(DRAWER, (ALLOCATE,), "Candidates", CandidatesPanel),
-    Place(DRAWER, (ALLOCATE,), "Comparison", ComparePanel, fins_only="the comparison of methods"),
-    Place(LEFT, (SIMULATE,), "Scenario", ScenarioPanel, fins_only=""),
-    Place(RIGHT, (SIMULATE,), "Run", RunPanel, swims=True, fins_only="a swim"),
-    Place(RIGHT, (SIMULATE,), "Figures", SwimCardPanel, swims=True, fins_only=""),
-    Place(DRAWER, (SIMULATE,), "Swim over time", Timeline, swims=True, fins_only=""),
-    Place(RIGHT, (EXPORT,), "Files", FilesTab),
-    Place(VIEW, TASKS, "Camera", partial(Card, camera)),
-    Place(VIEW, TASKS, "Display", ViewPanel, folded=True),
+    Place(TOP, TASKS, "Robot", partial(card, robot_name)),
+    Place(TOP, TASKS, "File", add_file),
+    Place(TOP, TASKS, "History", add_history),
+    Place(TOP, TASKS, "Tasks", partial(card, tasks)),
+    Place(TOP, TASKS, "Answers", add_answering),
+    Place(LEFT, TASKS, "Guide", partial(card, guide), about="guide"),
+    Place(LEFT, (DESIGN,), "Actuators", add_fin_list),
+    Place(LEFT, (DESIGN,), "Designs", add_designs),
+    Place(RIGHT, (DESIGN,), "Fin", add_fin, about="fins", fins_only="the inspector of a fin"),
+    Place(RIGHT, (DESIGN,), "Body", add_body, about="robot"),
+    Place(RIGHT, (DESIGN,), "Hull", add_hull, folded=True, about="robot"),
+    Place(RIGHT, (DESIGN,), "Check", partial(card, check), fins_only=""),
+    Place(DRAWER, (DESIGN,), "Reach", add_reach, fins_only="reach with its score card"),
+    Place(DRAWER, (DESIGN,), "Improve", add_improving, fins_only="the search for a better layout"),
+    Place(LEFT, (ALLOCATE,), "Actuators", add_commands),
+    Place(LEFT, (ALLOCATE,), "Damage a fin", add_damage, folded=True, fins_only=""),
+    Place(RIGHT, (ALLOCATE,), "Wrench", add_target),
+    Place(RIGHT, (ALLOCATE,), "Asked and delivered", partial(card, answer)),
+    Place(DRAWER, (ALLOCATE,), "Candidates", add_candidates),
+    Place(DRAWER, (ALLOCATE,), "Comparison", add_comparison, fins_only="the comparison of methods"),
+    Place(LEFT, (SIMULATE,), "Scenario", add_scenario, fins_only=""),
+    Place(RIGHT, (SIMULATE,), "Run", add_run, fins_only="a swim"),
+    Place(RIGHT, (SIMULATE,), "Figures", add_figures, fins_only=""),
+    Place(DRAWER, (SIMULATE,), "Swim over time", add_timeline, fins_only=""),
+    Place(RIGHT, (EXPORT,), "Files", add_files),
+    Place(VIEW, TASKS, "Camera", partial(card, camera)),
+    Place(VIEW, TASKS, "Display", add_switches, folded=True),
 )
 """All panels, in the order in which they stand in their regions."""

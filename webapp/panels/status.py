@@ -1,39 +1,45 @@
 """What lies over the 3D view: the status line and the legend."""
 
-import viser
-
+from finlab.allocation.allocation import Allocation
 from webapp.handles import put
-from webapp.markup.corner import corner, swim_corner
+from webapp.markup.corner import corner, legend, set_rows, swim_corner
 from webapp.page import Page
 from webapp.scene.swim_scene import ARROWS_N
+from webapp.scene.wrench_nodes import Scale
+from webapp.session.display import Display
+from webapp.session.state import State
+from webapp.tasks.analyst import Findings
+from webapp.tasks.moment import Moment
+from webapp.tasks.swimmer import Swimmer
 
 
-class Corner:
+def add_corner(page: Page) -> None:
     """Both, in a corner of the view."""
 
-    def __init__(self, gui: viser.GuiApi, page: Page) -> None:
-        self._page = page
-        self._content = gui.add_html("")
+    def fail(error: Exception | None) -> None:
+        if error is not None:
+            put(content, content="")
+            page.fault(error)
 
-    def refresh(self) -> None:
-        try:
-            content = self._written()
-        except Exception as error:
-            self._page.fault(error)
-            content = ""
-        put(self._content, content=content)
+    page.board.group(fail)
+    content = page.add_html(_written)
 
-    def _written(self) -> str:
-        page, answering = self._page, self._page.answering
-        if page.swimming.swimmer is not None:
-            return swim_corner(page.swimming, page.swimming.swimmer, ARROWS_N)
-        reply = answering.reply
-        return corner(
-            page.session.state,
-            page.scenery.legend,
-            page.shown,
-            page.busy,
-            answering.error,
-            page.shown is answering.best,
-            reply is not None and reply.in_reach,
-        )
+
+def _written(
+    swimmer: Swimmer | None,
+    moment: Moment | None,
+    pace: str,
+    state: State,
+    display: Display,
+    found: Findings | None,
+    scale: Scale,
+    shown: Allocation | None,
+    best: Allocation | None,
+    busy: bool,
+    error: str | None,
+    in_reach: bool,
+) -> str:
+    if swimmer is not None and moment is not None:
+        return swim_corner(swimmer, moment, pace, ARROWS_N)
+    drawn = set_rows(found if display.drawn != "none" else None)
+    return corner(state, legend(*scale, drawn), shown, busy, error, shown is best, in_reach)

@@ -3,17 +3,16 @@
 import time
 
 import numpy as np
-import viser
 
 from finlab.arrays import Array
-from webapp.handles import Changes, add_html, put
+from webapp.handles import add_html
 from webapp.markup.html import html
 from webapp.markup.picking import marker
 from webapp.page import Page
 from webapp.panels.line_plot import FIN_LINES, LinePlot, top_of
 from webapp.tasks.moment import ASKED as ASKED_COLUMN
 from webapp.tasks.moment import DELIVERED as DELIVERED_COLUMN
-from webapp.tasks.moment import DEPTH_ERROR, ERROR, FORCES, POWER, TIME
+from webapp.tasks.moment import DEPTH_ERROR, ERROR, FORCES, POWER, TIME, Moment
 from webapp.tasks.swimmer import Swimmer
 from webapp.theme import ASKED, DELIVERED, css
 
@@ -36,74 +35,52 @@ SMOOTH = 1.0
 """Time over which plotted power is averaged [s]."""
 
 
-class Timeline:
-    """What is said before a swim, and the plots."""
+def add_timeline(page: Page) -> None:
+    """What is said before a swim, and six plots over time."""
+    gui = page.gui
+    add_html(gui, marker("fl-timeline"))
+    none = add_html(gui, html("<div class='fl dim fl-unswum'>{}</div>", UNSWUM))
+    page.board.show(none, visible=lambda swimmer: swimmer is None)
+    robot, wrench = (css(DELIVERED),), (css(ASKED), css(DELIVERED))
 
-    def __init__(self, gui: viser.GuiApi, page: Page) -> None:
-        self._page = page
-        add_html(gui, marker("fl-timeline"))
-        self._none = add_html(gui, html("<div class='fl dim fl-unswum'>{}</div>", UNSWUM))
-        self._plots = SwimPlots(gui)
+    def plot(colors: tuple[str, ...], title: str, below: str = "") -> LinePlot:
+        return LinePlot(gui, colors, title, below, height=PLOT_PX + (24 if below else 0))
 
-    def refresh(self) -> None:
-        swimming = self._page.swimming
-        swimmer = swimming.swimmer
-        there = swimmer is not None
-        put(self._none, visible=not there)
-        self._plots.show(there)
-        if swimmer is not None:
-            self._plots.refresh(swimmer, swimming.running)
+    off, deep, power = plot(robot, "off [cm]"), plot(robot, "z off [cm]"), plot(robot, "power [W]")
+    surge = plot(wrench, "surge [N]", "time [s]")
+    forces = plot(FIN_LINES, "fins [N]", "time [s]")
+    broken = plot(FIN_LINES, "broken %", "time [s]")
+    drawn = 0.0
 
+    def show(swimmer: Swimmer | None) -> None:
+        for one in (off, deep, power, surge, forces, broken):
+            one.show(swimmer is not None)
 
-class SwimPlots:
-    """Six plots over time."""
-
-    def __init__(self, gui: viser.GuiApi) -> None:
-        self._drawn = 0.0
-        self._changes = Changes()
-        robot, wrench = (css(DELIVERED),), (css(ASKED), css(DELIVERED))
-
-        def plot(colors: tuple[str, ...], title: str, below: str = "") -> LinePlot:
-            height = PLOT_PX + (24 if below else 0)
-            return LinePlot(gui, colors, title, below, height=height)
-
-        self._error = plot(robot, "off [cm]")
-        self._depth = plot(robot, "z off [cm]")
-        self._power = plot(robot, "power [W]")
-        self._wrench = plot(wrench, "surge [N]", "time [s]")
-        self._force = plot(FIN_LINES, "fins [N]", "time [s]")
-        self._broken = plot(FIN_LINES, "broken %", "time [s]")
-
-    def show(self, visible: bool) -> None:
-        """Show all plots, or none."""
-        for plot in (self._error, self._depth, self._power, self._wrench, self._force, self._broken):
-            plot.show(visible)
-
-    def refresh(self, swimmer: Swimmer, running: bool) -> None:
-        """Draw errors, power, surge asked and delivered, forces and the monitor's doubts, no more often than
-        an eye can follow."""
-        record = swimmer.shown.record
-        soon = time.monotonic() - self._drawn < EVERY_S and running
-        if soon or not len(record) or not self._changes(swimmer.shown):
+    def draw(swimmer: Swimmer | None, moment: Moment | None, paused: bool) -> None:
+        """Errors, power, surge asked and delivered, forces and the monitor's doubts, no more often than an
+        eye can follow."""
+        nonlocal drawn
+        if swimmer is None or moment is None or not len(moment.record):
             return
-        self._drawn = time.monotonic()
+        now, record = time.monotonic(), moment.record
+        if now - drawn < EVERY_S and not (paused or moment.done):
+            return
+        drawn = now
         seconds = np.ascontiguousarray(record[:, TIME])
         end = shown_until(float(seconds[-1]), swimmer.duration_s)
-        for plot, column, scale in (
-            (self._error, ERROR, 100.0),
-            (self._depth, DEPTH_ERROR, 100.0),
-            (self._power, POWER, 1.0),
-        ):
+        for one, column, scale in ((off, ERROR, 100.0), (deep, DEPTH_ERROR, 100.0), (power, POWER, 1.0)):
             lines = [_line(record, column, scale)]
-            plot.draw(seconds, lines, (0.0, top_of(lines, SMALL)), end)
+            one.draw(seconds, lines, (0.0, top_of(lines, SMALL)), end)
         both = [record[:, column] for column in (ASKED_COLUMN, DELIVERED_COLUMN)]
         ends = (-top_of([-both[0], -both[1]], SMALL), top_of(both, SMALL))
-        self._wrench.draw(seconds, both, ends, end)
-        n_fins = len(swimmer.fins)
-        forces = list(record[:, FORCES : FORCES + n_fins].T)
-        self._force.draw(seconds, forces, (0.0, top_of(forces, SMALL)), end)
-        doubts = list(100.0 * record[:, FORCES + n_fins :].T)
-        self._broken.draw(seconds, doubts, (0.0, CERTAIN), end)
+        surge.draw(seconds, both, ends, end)
+        n = len(swimmer.fins)
+        sizes = list(record[:, FORCES : FORCES + n].T)
+        forces.draw(seconds, sizes, (0.0, top_of(sizes, SMALL)), end)
+        broken.draw(seconds, list(100.0 * record[:, FORCES + n :].T), (0.0, CERTAIN), end)
+
+    page.board.act(show)
+    page.board.act(draw)
 
 
 def shown_until(time: float, duration: float) -> float:

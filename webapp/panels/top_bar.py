@@ -5,7 +5,7 @@ from functools import partial
 import viser
 
 from finlab.allocation.methods import METHODS
-from webapp.handles import add_html, put
+from webapp.handles import add_html
 from webapp.markup.html import html
 from webapp.markup.picking import marker
 from webapp.page import Page
@@ -37,62 +37,43 @@ PALETTE = (
 """A line of script that opens the list of commands, as Ctrl+K does."""
 
 
-class FileBar:
+def add_file(page: Page) -> None:
     """The design as a file: a new one, one that is opened, and this one saved or shared."""
-
-    def __init__(self, gui: viser.GuiApi, page: Page) -> None:
-        self._page, designs = page, page.designs
-        add_html(gui, marker("fl-file"))
-        page.add_button("New", designs.new, icon=viser.Icon.FILE_PLUS, hint="One hull with one fin.")
-        page.opening.add(DESIGNS, designs.open)
-        hint = f"{KINDS[0].upper()}{KINDS[1:]}. Files can be dropped on the page as well."
-        self._open = page.add_upload("Open", page.opening.open, icon=viser.Icon.FOLDER_OPEN, hint=hint)
-        save = "The layout's file; with measured fins or an imported hull a ZIP with theirs."
-        page.add_button("Save", designs.save, icon=viser.Icon.DEVICE_FLOPPY, hint=save)
-        share = f"A link that carries the whole design, up to {MAX_LINK:,} characters."
-        page.add_button("Share", designs.share, icon=viser.Icon.LINK, hint=share)
-
-    def refresh(self) -> None:
-        """Tell the browser what can be opened; the panels below have said it by now."""
-        put(self._open, mime_type=self._page.opening.suffixes)
+    designs = page.designs
+    add_html(page.gui, marker("fl-file"))
+    page.add_button("New", designs.new, icon=viser.Icon.FILE_PLUS, hint="One hull with one fin.")
+    page.opening.add(DESIGNS, designs.open)
+    hint = f"{KINDS[0].upper()}{KINDS[1:]}. Files can be dropped on the page as well."
+    button = page.add_upload("Open", page.opening.open, icon=viser.Icon.FOLDER_OPEN, hint=hint)
+    # By the time that this is written, the panels below have said what can be opened.
+    page.board.show(button, mime_type=lambda: page.opening.suffixes)
+    save = "The layout's file; with measured fins or an imported hull a ZIP with theirs."
+    page.add_button("Save", designs.save, icon=viser.Icon.DEVICE_FLOPPY, hint=save)
+    share = f"A link that carries the whole design, up to {MAX_LINK:,} characters."
+    page.add_button("Share", designs.share, icon=viser.Icon.LINK, hint=share)
 
 
-class HistoryBar:
+def add_history(page: Page) -> None:
     """Undo and redo, by name."""
-
-    def __init__(self, gui: viser.GuiApi, page: Page) -> None:
-        self._page, session = page, page.session
-        back, forth = viser.Icon.ARROW_BACK_UP, viser.Icon.ARROW_FORWARD_UP
-        self._undo = page.add_button("Undo", session.undo, icon=back, hint="Ctrl+Z")
-        self._redo = page.add_button("Redo", session.redo, icon=forth, hint="Ctrl+Y or Ctrl+Shift+Z")
-
-    def refresh(self) -> None:
-        history = self._page.session.history
-        for button, word, name in (
-            (self._undo, "Undo", history.undo_name),
-            (self._redo, "Redo", history.redo_name),
-        ):
-            put(button, label=f"{word}: {name}" if name else word)
+    session, icon = page.session, viser.Icon
+    back = page.add_button("Undo", session.undo, icon=icon.ARROW_BACK_UP, hint="Ctrl+Z")
+    page.board.show(back, label=lambda undo: f"Undo: {undo}" if undo else "Undo")
+    forth = page.add_button("Redo", session.redo, icon=icon.ARROW_FORWARD_UP, hint="Ctrl+Y or Ctrl+Shift+Z")
+    page.board.show(forth, label=lambda redo: f"Redo: {redo}" if redo else "Redo")
 
 
-class AnsweringBar:
+def add_answering(page: Page) -> None:
     """Who answers, what is kept least, and where help is found."""
-
-    def __init__(self, gui: viser.GuiApi, page: Page) -> None:
-        session = page.session
-        about = "Watts, proved least by method dual; or the paper's effort, by the network of method mdn."
-        least = gui.add_dropdown("Least", tuple(LEAST), hint=about)
-        page.bind(least, session.keep_least, lambda: least_of(session.state.method))
-        about = " ".join(f"{name}: {words}." for name, words in METHOD_WORDS.items())
-        methods = gui.add_dropdown("Method", tuple(METHODS), hint=about)
-        page.bind(methods, partial(session.set_setting, "method"), lambda: session.state.method)
-        template = (
-            "<div class='fl-help'><button title='{} lessons with a task each' {}>Lessons</button>"
-            "<button title='a tour in {} stops (T)' {}>Tour</button>"
-            "<button title='all commands and their keys (Ctrl+K)' onclick='{}'>Commands</button></div>"
-        )
-        lessons, tour = press("lesson", LESSONS[0].name), press("tour", "")
-        add_html(gui, html(template, len(LESSONS), lessons, len(STEPS), tour, PALETTE))
-
-    def refresh(self) -> None:
-        """Nothing but what is bound."""
+    session, gui = page.session, page.gui
+    about = "Watts, proved least by method dual; or the paper's effort, by the network of method mdn."
+    page.bind(gui.add_dropdown("Least", tuple(LEAST), hint=about), session.keep_least, least_of)
+    about = " ".join(f"{name}: {words}." for name, words in METHOD_WORDS.items())
+    methods = gui.add_dropdown("Method", tuple(METHODS), hint=about)
+    page.bind(methods, partial(session.set_setting, "method"), lambda method: method)
+    template = (
+        "<div class='fl-help'><button title='{} lessons with a task each' {}>Lessons</button>"
+        "<button title='a tour in {} stops (T)' {}>Tour</button>"
+        "<button title='all commands and their keys (Ctrl+K)' onclick='{}'>Commands</button></div>"
+    )
+    lessons, tour = press("lesson", LESSONS[0].name), press("tour", "")
+    add_html(gui, html(template, len(LESSONS), lessons, len(STEPS), tour, PALETTE))

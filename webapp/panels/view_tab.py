@@ -1,7 +1,5 @@
 """How the robot is shown: motion or not, shadows, theme."""
 
-import viser
-
 from webapp.page import Page
 
 SWITCHES = {
@@ -12,12 +10,7 @@ SWITCHES = {
 """Field of `Display`, label and hint of each switch."""
 
 
-class ViewPanel:
-    """Switches."""
-
-    def __init__(self, gui: viser.GuiApi, page: Page) -> None:
-        for key, (label, hint) in SWITCHES.items():
-            page.bind_display(gui.add_checkbox(label, False, hint=hint), key)
-
-    def refresh(self) -> None:
-        """Nothing but what is bound."""
+def add_switches(page: Page) -> None:
+    """All of them."""
+    for key, (label, hint) in SWITCHES.items():
+        page.bind_display(page.gui.add_checkbox(label, False, hint=hint), key)

@@ -6,13 +6,15 @@ import numpy as np
 import viser
 
 from finlab.allocation.policy import AXES, KINDS
-from webapp.handles import Changes, add_html, put
+from finlab.forces.reach import Ranges
+from finlab.layout import Layout
+from webapp.handles import add_html, put
 from webapp.markup.answer import fin_table
 from webapp.markup.html import html
 from webapp.markup.picking import marker
 from webapp.markup.words import three_digits
 from webapp.page import Page
-from webapp.panels.damage import FinButtons
+from webapp.panels.damage import add_fin_buttons
 from webapp.session.state import AXIS_UNITS, AXIS_WORDS
 from webapp.session.targets import PRESETS, axis_reach, full_thrust, slider_end
 from webapp.viser_internals import put_marks
@@ -21,78 +23,72 @@ CLOSE = 0.28
 """Share of a slider below which the texts of two marks would lie on each other."""
 
 
-class FinsPanel:
-    """What each fin does, and which have failed."""
-
-    def __init__(self, gui: viser.GuiApi, page: Page) -> None:
-        self._page = page
-        self._failures = FinButtons(
-            page,
-            "Fail",
-            "Press a number to fail or repair it; X does it to the selected one.",
-            "fl-fails",
-            page.session.toggle_failure,
+def add_commands(page: Page) -> None:
+    """What each actuator does, and which have failed."""
+    about = "Press a number to fail or repair it; X does it to the selected one."
+    add_fin_buttons(
+        page,
+        "Fail",
+        about,
+        "fl-fails",
+        page.session.toggle_failure,
+        lambda layout, failed: (layout.names, failed, ()),
+    )
+    page.add_html(
+        lambda layout, health, able, shown, selected: fin_table(
+            layout, health, shown, full_thrust(able), selected
         )
-        self._table = gui.add_html("")
-
-    def refresh(self) -> None:
-        state, answer = self._page.session.state, self._page.shown
-        self._failures.refresh(state.layout.names, state.failed)
-        fitting = answer if answer is not None and answer.layout.names == state.layout.names else None
-        table = fin_table(state, fitting, full_thrust(state.able), self._page.session.selected)
-        put(self._table, content=table)
+    )
 
 
-class TargetPanel:
+def add_target(page: Page) -> None:
     """Buttons and sliders."""
+    session, gui, board = page.session, page.gui, page.board
+    presets = gui.add_button_group("Preset", tuple(PRESETS), hint="Target wrenches to start from.")
+    page.on_change(presets, session.set_preset)
+    add_html(gui, marker("fl-reach"))
+    sliders = [_add_slider(page, k) for k in range(6)]
 
-    def __init__(self, gui: viser.GuiApi, page: Page) -> None:
-        self._page = page
-        presets = gui.add_button_group("Preset", tuple(PRESETS), hint="Target wrenches to start from.")
-        page.on_change(presets, page.session.set_preset)
-        add_html(gui, marker("fl-reach"))
-        self._sliders = [self._add_slider(gui, k) for k in range(6)]
-        self._end = add_html(gui, marker("fl-reach-end"))
-        policies = "Come closest, keep the direction, or serve axes by priority, heave first."
-        page.bind(
-            gui.add_dropdown("Out of reach", KINDS, hint=policies),
-            partial(page.session.set_setting, "policy"),
-            lambda: page.session.state.policy,
-        )
-        self._changes = Changes()
+    def mark(ranges: Ranges | None, able: Layout, failed: tuple[str, ...]) -> None:
+        """Show what is within reach on the sliders."""
+        most = axis_reach(able, failed)  # with the others free
+        for k, slider in enumerate(sliders):
+            marks: tuple[tuple[float, str], ...] = ()
+            hint = AXIS_WORDS[k].capitalize()
+            if ranges is not None:
+                low, high = float(ranges.low[k]), float(ranges.high[k])
+                marks, hint = reach_marks(low, high, slider.max - slider.min), _hint(k, low, high, most[k])
+            put_marks(slider, marks)
+            put(slider, hint=hint)
 
-    def _add_slider(self, gui: viser.GuiApi, axis: int) -> viser.GuiSliderHandle[float]:
-        session, step = self._page.session, 0.01 if axis < 3 else 0.001
-        label, hint = f"{AXES[axis]} [{AXIS_UNITS[axis]}]", AXIS_WORDS[axis].capitalize()
-        return self._page.bind_number(
-            gui.add_slider(label, -10.0, 10.0, step, 0.0, hint=hint),
-            lambda value: session.set_target(axis, value),
-            lambda: session.state.target[axis],
-        )
+    board.act(mark)
+    page.add_html(_sentence)
+    policies = "Come closest, keep the direction, or serve axes by priority, heave first."
+    box = gui.add_dropdown("Out of reach", KINDS, hint=policies)
+    page.bind(box, partial(session.set_setting, "policy"), lambda policy: policy)
 
-    def refresh(self) -> None:
-        state = self._page.session.state
-        most = axis_reach(state.able, state.failed)  # with the others free
-        for slider, value, reach in zip(self._sliders, state.target, most, strict=True):
-            end = slider_end(float(reach))
-            put(slider, min=min(-end, value), max=max(end, value))
-        ranges, error = self._page.ranging.findings, self._page.ranging.error
-        if not self._changes(ranges, error):
-            return
-        sentence = (
-            ""
-            if error is None or not state.layout.is_of_fins
-            else html("<div class='fl missing'>What is in reach: {}</div>", error)
-        )
-        put(self._end, content=marker("fl-reach-end") + sentence)
-        for k, slider in enumerate(self._sliders):
-            if ranges is None:
-                put_marks(slider, ())
-                put(slider, hint=AXIS_WORDS[k].capitalize())
-                continue
-            low, high = float(ranges.low[k]), float(ranges.high[k])
-            put_marks(slider, reach_marks(low, high, slider.max - slider.min))
-            put(slider, hint=_hint(k, low, high, float(most[k])))
+
+def _add_slider(page: Page, axis: int) -> viser.GuiSliderHandle[float]:
+    session, step = page.session, 0.01 if axis < 3 else 0.001
+    label, hint = f"{AXES[axis]} [{AXIS_UNITS[axis]}]", AXIS_WORDS[axis].capitalize()
+    slider = page.gui.add_slider(label, -10.0, 10.0, step, 0.0, hint=hint)
+
+    def end(able: Layout, failed: tuple[str, ...], target: tuple[float, ...]) -> float:
+        return max(slider_end(float(axis_reach(able, failed)[axis])), abs(target[axis]))
+
+    # First the ends: a value beyond them would not be shown.
+    page.board.show(slider, max=end, min=lambda able, failed, target: -end(able, failed, target))
+    return page.bind_number(slider, partial(session.set_target, axis), lambda target: target[axis])
+
+
+def _sentence(ranges_error: str | None, layout: Layout) -> str:
+    """Why nothing is known of what is in reach."""
+    said = (
+        ""
+        if ranges_error is None or not layout.is_of_fins
+        else html("<div class='fl missing'>What is in reach: {}</div>", ranges_error)
+    )
+    return marker("fl-reach-end") + said
 
 
 def reach_marks(low: float, high: float, width: float) -> tuple[tuple[float, str], ...]:

@@ -1,22 +1,26 @@
 """The whole 3D view of one browser."""
 
 import json
+import math
 from functools import partial
 
 import numpy as np
 
 from finlab.allocation.allocation import Allocation
+from finlab.analysis import Improvement
 from finlab.arrays import Array
 from finlab.layout import Layout
+from finlab.layout.damage import Health
+from webapp.board import Board
 from webapp.handles import put
 from webapp.markup.words import damage_words, missing_part
-from webapp.scene.fin_node import FinNode, Flapping, motion
+from webapp.scene.fin_node import FinNode, motion
 from webapp.scene.meshes.hull import has_inside, hull_of
-from webapp.scene.meshes.mesh import LONGEST_TURN
 from webapp.scene.overlays import Offered
 from webapp.scene.stage import Stage, aim_camera
-from webapp.scene.wrench_nodes import LENGTH, AttainableNodes, WrenchNodes, fitting_newtons, fitting_torque
-from webapp.session.state import State, can_be_edited, chosen
+from webapp.scene.wrench_nodes import LENGTH, AttainableNodes, Scale, WrenchNodes
+from webapp.session.display import Display
+from webapp.session.state import can_be_edited, chosen
 from webapp.tasks.analyst import Findings
 from webapp.tasks.context import Context
 from webapp.theme import HALF_TURN
@@ -36,7 +40,7 @@ SPEED = 0.5
 class RobotScene:
     """Draws a session, and makes intents of clicks and drags."""
 
-    def __init__(self, context: Context) -> None:
+    def __init__(self, context: Context, board: Board) -> None:
         self._client, self._session, self._do = context.client, context.session, context.do
         scene, session = self._client.scene, self._session
         self._root = scene.add_frame("/robot", show_axes=False)
@@ -47,15 +51,17 @@ class RobotScene:
         self._fins: list[FinNode] = []
         self.dragged: int | None = None
         """Place of the fin in the user's hand."""
-        self.editing = False
-        """Whether the selected fin has its gizmos: while the layout is edited."""
-        self._flapping, self._flaps = Flapping(), ""
-        self.newtons = 1.0
-        """Force [N] that an arrow of 0.1 m stands for at the moment."""
-        self.torque = 1.0
-        """Torque [N m] that half a turn of a ring stands for at the moment."""
-        self.cut = False
-        """Whether a ring is cut off."""
+        self._moves: list[list[float] | None] = []
+        self._flaps = ""
+        for act in (
+            self._show_stage,
+            self._place,
+            self._push,
+            self._show_wrench,
+            self._show_sets,
+            self._offer,
+        ):
+            board.act(act)
         self.look_from("3D")
 
     def show(self, visible: bool) -> None:
@@ -87,68 +93,74 @@ class RobotScene:
         way = place - target
         self.aim(center + way / max(float(np.linalg.norm(way)), 1e-6) * size, center)
 
-    def refresh(
-        self,
-        allocation: Allocation | None,
-        findings: Findings | None = None,
-        offered: Layout | None = None,
-    ) -> None:
-        """Show the session's layout, and the answer to it if there is one for this very layout.
-
-        Args:
-            allocation: the answer.
-            findings: what the layout can attain, where that is to be shown.
-            offered: a better layout, whose fins are shown beside the present ones.
-        """
-        state, display = self._session.state, self._session.display
-        hull = hull_of(state.layout)
-        if self.dragged is None:  # a hull that breathes with the fin one drags is hard to aim at
+    def _show_stage(self, layout: Layout, display: Display, dragged: int | None) -> None:
+        if dragged is None:  # a hull that breathes with the fin one drags is hard to aim at
             # Glass within glass is not drawn; inside an attainable set the hull is a net.
             net = display.drawn != "none"
-            self._stage.refresh(hull, display.dark, display.shadows, net, has_inside(state.layout))
-        while len(self._fins) < state.layout.n:
-            self._fins.append(FinNode(self._client.scene, len(self._fins), self._clicked, self._drag))
-        for node in self._fins[state.layout.n :]:
-            node.hide()
-        self.newtons = fitting_newtons(_largest(state, allocation), self.newtons)
-        scale = LENGTH / self.newtons
-        fits = allocation is not None and allocation.layout.names == state.layout.names
-        moves = (
-            motion(state.layout.actuators, allocation.command) if fits and allocation is not None else None
-        )
-        for i, part in enumerate(state.layout.actuators):
-            selected = part.name == self._session.selected
-            label = _label(state, i, part.name in self._session.selection)
-            gizmos = selected and self.editing and can_be_edited(state.layout)
-            self._fins[i].place(part, hull, gizmos, label, i == self.dragged)
-            if part.name in state.failed or allocation is None:
-                self._fins[i].command(None, np.zeros(3), np.eye(3))
-            elif moves is not None and np.isfinite(moves[i, 0]):
-                force = allocation.forces[i]
-                # The force belongs to the answer's own axes, which a drag may have left behind.
-                frame = allocation.layout.frames[i]
-                self._fins[i].command(moves[i], force * scale, frame)
-        if moves is not None:
-            self._flapping.take(moves)
-        self._offered.show(offered, state.layout)
-        target = np.array(state.target)
-        self._attainable.refresh(findings if display.drawn != "none" else None, target)
-        given = None if allocation is None else allocation.wrench
-        missing = np.zeros(6) if allocation is None else missing_part(allocation)
-        top = hull.center[2] + hull.half[2]
-        torques = [target[3:], missing[3:], *([] if given is None else [given[3:]])]
-        most = float(max(np.linalg.norm(torque) for torque in torques))
-        self.torque = fitting_torque(most, self.torque)
-        self.cut = HALF_TURN * most / self.torque > LONGEST_TURN
-        self._wrench.refresh(target, given, missing, top, scale, HALF_TURN / self.torque)
+            self._stage.refresh(hull_of(layout), display.dark, display.shadows, net, has_inside(layout))
 
-    def flap(self) -> None:
-        """Let the page move the fins (`frames.js`): commands of all, and how fast."""
-        fins = [row if np.isfinite(row[0]) else None for row in self._flapping.command.tolist()]
-        told = json.dumps([fins, SPEED, self._session.display.frozen])[1:-1]
+    def _place(
+        self,
+        layout: Layout,
+        selection: tuple[str, ...],
+        selected: str | None,
+        task: str,
+        failed: tuple[str, ...],
+        health: Health | None,
+        dragged: int | None,
+    ) -> None:
+        """Actuators where they are, with their numbers and gizmos."""
+        hull = hull_of(layout)
+        while len(self._fins) < layout.n:
+            self._fins.append(FinNode(self._client.scene, len(self._fins), self._clicked, self._drag))
+        for node in self._fins[layout.n :]:
+            node.hide()
+        edited = selected if task == "Design" and can_be_edited(layout) else None
+        for i, part in enumerate(layout.actuators):
+            told = damage_words(health, part.name) if part.name not in failed else ""
+            words = (str(i + 1), part.name if part.name in selection else "", told)
+            label = " ".join([word for word in words if word])
+            self._fins[i].place(part, hull, part.name == edited, label, i == dragged)
+
+    def _push(
+        self,
+        layout: Layout,
+        failed: tuple[str, ...],
+        shown: Allocation | None,
+        scale: Scale,
+        display: Display,
+    ) -> None:
+        """What actuators do, and their forces. The page moves the fins (`frames.js`): it is told the commands
+        of all, and how fast."""
+        moves = None if shown is None else motion(layout.actuators, shown.command)
+        for i, name in enumerate(layout.names):
+            if name in failed or shown is None or moves is None:
+                self._fins[i].command(None, np.zeros(3), np.eye(3))
+            elif math.isfinite(moves[i, 0]):
+                # The force belongs to the answer's own axes, which a drag may have left behind.
+                force, frame = shown.forces[i], shown.layout.frames[i]
+                self._fins[i].command(moves[i], force * (LENGTH / scale.newtons), frame)
+        if moves is not None:
+            self._moves = [row if math.isfinite(row[0]) else None for row in moves.tolist()]
+        told = json.dumps([self._moves, SPEED, display.frozen])[1:-1]
         if told != self._flaps:
             self._flaps = told
             run_script(self._client.gui, f"finlabFrames.flap({told});")
+
+    def _show_wrench(
+        self, layout: Layout, target: tuple[float, ...], shown: Allocation | None, scale: Scale
+    ) -> None:
+        hull, asked = hull_of(layout), np.array(target)
+        missing = np.zeros(6) if shown is None else missing_part(shown)
+        given = np.zeros(6) if shown is None else shown.wrench
+        top = hull.center[2] + hull.half[2]
+        self._wrench.refresh(asked, given, missing, top, LENGTH / scale.newtons, HALF_TURN / scale.torque)
+
+    def _show_sets(self, found: Findings | None, display: Display, target: tuple[float, ...]) -> None:
+        self._attainable.refresh(found if display.drawn != "none" else None, np.array(target))
+
+    def _offer(self, better: Improvement | None, layout: Layout) -> None:
+        self._offered.show(better.layout if better is not None and better.improved else None, layout)
 
     def _clicked(self, index: int, also: bool) -> None:
         select = self._session.select_also if also else self._session.select
@@ -164,18 +176,3 @@ class RobotScene:
             return
         drag = session.end_drag if phase == "end" else session.drag_fin
         self._do(partial(drag, session.state.layout.names[index], position, angle))
-
-
-def _label(state: State, index: int, selected: bool) -> str:
-    """A fin's number; its name while it is selected; what is wrong with it."""
-    name = state.layout.names[index]
-    told = damage_words(state, name) if name not in state.failed else ""
-    return " ".join([str(index + 1), *([name] if selected else []), *([told] if told else [])])
-
-
-def _largest(state: State, allocation: Allocation | None) -> float:
-    """Largest force that an arrow has to show [N]."""
-    forces = [np.array(state.target[:3])]
-    if allocation is not None:
-        forces += [allocation.wrench[:3], *allocation.forces]
-    return float(max(np.linalg.norm(force) for force in forces))

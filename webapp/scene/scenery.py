@@ -1,20 +1,25 @@
 """What is seen beside the panel: the robot that is designed, or those that swim."""
 
+from collections.abc import Callable, Sequence
+
 import numpy as np
 
-from webapp.markup.corner import legend, set_rows
+from finlab.allocation.allocation import Allocation
+from webapp.board import Board
 from webapp.scene.robot_scene import RobotScene
 from webapp.scene.swim_scene import SwimScene
+from webapp.scene.wrench_nodes import Scale, fitting_scale
+from webapp.session.display import Display
 from webapp.session.lessons import Lesson
 from webapp.session.swim_plan import SwimSettings
 from webapp.session.tour import STEPS
-from webapp.tasks.analyst import Findings
-from webapp.tasks.answering import Answering
 from webapp.tasks.context import Context
-from webapp.tasks.improving import Improver
+from webapp.tasks.swimmer import Swimmer
 from webapp.tasks.swimming import Swimming
 from webapp.theme import BRAND
 
+FIRST = Scale(1.0, 1.0, False)
+"""What arrows and rings stand for before anything is shown."""
 NOWHERE = (None, None)
 """Neither at a stop of the tour nor in a lesson."""
 
@@ -22,42 +27,49 @@ NOWHERE = (None, None)
 class Scenery:
     """Both scenes of one page, of which one is shown, and the theme."""
 
-    def __init__(self, context: Context, swimming: Swimming) -> None:
+    def __init__(
+        self, context: Context, swimming: Swimming, board: Board, fault: Callable[[Exception], None]
+    ) -> None:
+        """`board` lets it show the facts, `fault` tells of what went wrong with that."""
         self._client, self._session, self._swimming = context.client, context.session, swimming
-        self._dark: bool | None = None
         self._guide: tuple[int | None, Lesson | None] = NOWHERE
         self._camera = (np.zeros(3), np.zeros(3))
         """Where the camera stood before the tour or lesson, and looked at."""
-        self.robot = RobotScene(context)
+        self._fault = fault
+        self._scale = FIRST
+        self._fitted: tuple[Sequence[float], Allocation | None] | None = None
+        board.group(self._fail)
+        board.act(self._show)
+        self.robot = RobotScene(context, board)
         self.swim = SwimScene(self._client, swimming)
-        self.swims = False
-        """Whether the robots that swim are on the screen."""
-        self.legend = ""
-        """What is drawn of the robot that is designed, as markup."""
+        board.act(self.swim.refresh)
 
-    def refresh(self, answering: Answering, improver: Improver, findings: Findings | None) -> None:
-        """Show what has been found for the session's state."""
-        self._follow_guide()
-        self._apply_theme()
-        found = improver.findings
-        offered = found.layout if found is not None and found.improved else None
-        display = self._session.display
-        self.robot.refresh(answering.shown, findings, offered)
-        self.robot.flap()
-        self.swims = self._swimming.swimmer is not None
-        self.robot.show(not self.swims)
-        drawn = set_rows(findings if display.drawn != "none" else None)
-        self.legend = legend(self.robot.newtons, self.robot.torque, self.robot.cut, drawn)
-        self.refresh_swim()
+    def _show(self, display: Display, swimmer: Swimmer | None) -> None:
+        """The theme, and the robot that is designed unless one swims."""
+        self.robot.show(swimmer is None)
+        if display.dark != self._dark:
+            self._dark = display.dark
+            self._client.gui.configure_theme(
+                dark_mode=self._dark, show_logo=False, show_share_button=False, brand_color=BRAND
+            )
 
-    def hide(self) -> None:
-        """Nothing is shown of the robot that is designed: what stands there may be another one's."""
-        self.robot.show(False)
-        self.legend = ""
+    _dark: bool | None = None
 
-    def refresh_swim(self) -> None:
-        """Show where the robots that swim are."""
-        self.swim.refresh(self._session.display.dark)
+    def fit(self, target: Sequence[float], shown: Allocation | None) -> Scale:
+        """What arrows and rings stand for, given a target (6,) and what is shown of it."""
+        if (target, shown) != self._fitted:
+            try:
+                self._scale, self._fitted = fitting_scale(target, shown, self._scale), (target, shown)
+            except Exception as error:
+                self._scale = FIRST
+                self._fault(error)
+        return self._scale
+
+    def _fail(self, error: Exception | None) -> None:
+        """What stands there may be another robot's."""
+        self.robot.show(error is None and self._swimming.swimmer is None)
+        if error is not None:
+            self._fault(error)
 
     def animate(self, elapsed: float) -> None:
         """Let time pass [s]: robots that swim move on."""
@@ -71,7 +83,7 @@ class Scenery:
             self._swimming.stop()
             self.robot.look_from("3D")
 
-    def _follow_guide(self) -> None:
+    def follow_guide(self) -> None:
         """The robot fills the view at each stop of the tour and in each lesson, and swims at some; to come to
         one, or to leave, ends a swim. At its end the camera stands where it stood before."""
         session, before = self._session, self._guide
@@ -88,11 +100,3 @@ class Scenery:
         self.robot.frame()
         if stop is not None and STEPS[stop].swims:
             self._swimming.start(SwimSettings().plan(session.state))
-
-    def _apply_theme(self) -> None:
-        """Light or dark."""
-        if self._session.display.dark != self._dark:
-            self._dark = self._session.display.dark
-            self._client.gui.configure_theme(
-                dark_mode=self._dark, show_logo=False, show_share_button=False, brand_color=BRAND
-            )

@@ -7,7 +7,7 @@ import numpy as np
 import viser
 
 from finlab.arrays import Array
-from webapp.handles import Changes, put
+from webapp.handles import put
 from webapp.scene.meshes.hull import AnyHull
 from webapp.scene.shape import Shape
 from webapp.theme import LIGHT, Look, look
@@ -58,8 +58,8 @@ class Stage:
     def __init__(self, scene: viser.SceneApi, hull: AnyHull) -> None:
         """Build the stage around a hull."""
         self._scene = scene
-        self._new_theme, self._new_lights = Changes(), Changes()
         self._hull = hull
+        self._look: tuple[bool, bool] | None = None
         light_up(scene)
         mesh, bow = hull.mesh(), hull.bow()
         self._body = Shape(scene, "/robot/hull", LIGHT.hull, mesh, side="double")
@@ -80,9 +80,9 @@ class Stage:
             self._body.become(hull.mesh())
             self._bow.become(hull.bow())
         put(self._grid, position=np.array([0.0, 0.0, hull.center[2] - hull.half[2] - BELOW]))
-        if self._new_lights(shadows):
+        if self._look != (dark, shadows):
+            self._look = dark, shadows
             self._scene.configure_default_lights(cast_shadow=shadows)
-        if self._new_theme(dark):
             self._paint(look(dark))
             paint_floor(self._grid, dark)
 

@@ -12,6 +12,8 @@ from webapp.scene.shape import Shape
 from webapp.scene.stage import add_floor, aim_camera, paint_floor
 from webapp.scene.swim_robot import SwimRobot, goal
 from webapp.scene.wrench_nodes import LENGTH
+from webapp.session.display import Display
+from webapp.tasks.moment import Moment
 from webapp.tasks.swimmer import Swimmer
 from webapp.tasks.swimming import Swimming
 from webapp.theme import ASKED, WATER
@@ -44,22 +46,20 @@ class SwimScene:
         self._robot = SwimRobot(scene, "/swim/robot0")
         self._shown: Swimmer | None = None
 
-    def refresh(self, dark: bool) -> None:
+    def refresh(self, swimmer: Swimmer | None, moment: Moment | None, display: Display) -> None:
         """Show the newest moment."""
-        swimmer = self._swimming.swimmer
-        visible = swimmer is not None
         for node in (self._goal.node, self._reference, self._floor, self._water.node):
-            put(node, visible=visible)
-        paint_floor(self._floor, dark)
-        if swimmer is None:
+            put(node, visible=swimmer is not None)
+        paint_floor(self._floor, display.dark)
+        if swimmer is None or moment is None:
             self._robot.hide()
             self._shown = None
             return
         if swimmer is not self._shown:
             self._begin(swimmer)
-        put(self._reference, position=swimmer.shown.reference)
+        put(self._reference, position=moment.reference)
         self._draw_water(swimmer)
-        self._robot.take(swimmer.shown, SCALE)
+        self._robot.take(moment, SCALE)
 
     def _begin(self, swimmer: Swimmer) -> None:
         """Another swim: its robot, its way, and the camera where all of it can be seen."""

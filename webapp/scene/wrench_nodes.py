@@ -1,14 +1,18 @@
 """The robot's wrench above the hull (asked, delivered, missing), and the sets that it can attain."""
 
 import math
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 import viser
 from numpy.typing import NDArray
 
+from finlab.allocation.allocation import Allocation
 from finlab.analysis import AttainableSet
 from finlab.arrays import Array
 from webapp.handles import put
+from webapp.markup.words import missing_part
 from webapp.scene.meshes.mesh import (
     LONGEST_TURN,
     NOTHING,
@@ -37,6 +41,29 @@ HEIGHT = 0.16
 """How far above the hull the arrows begin [m]; inside it they could not be seen."""
 LARGEST = 0.42
 """How far the drawn set may reach from the centre of gravity [m]."""
+
+
+class Scale(NamedTuple):
+    """What lengths in the view stand for."""
+
+    newtons: float
+    """Force of an arrow of 0.1 m [N]."""
+    torque: float
+    """Torque of half a turn of a ring [N m]."""
+    cut: bool
+    """Whether a ring would have to be longer than a turn."""
+
+
+def fitting_scale(target: Sequence[float], shown: Allocation | None, now: Scale) -> Scale:
+    """The scale for a target (6,) and what is shown of it; `now` as far as that is good enough."""
+    asked = np.array(target)
+    forces, torques = [asked[:3]], [asked[3:]]
+    if shown is not None:
+        forces += [shown.wrench[:3], *shown.forces]
+        torques += [missing_part(shown)[3:], shown.wrench[3:]]
+    force, torque = (float(np.sqrt((np.array(some) ** 2).sum(axis=1).max())) for some in (forces, torques))
+    per_turn = fitting_torque(torque, now.torque)
+    return Scale(fitting_newtons(force, now.newtons), per_turn, HALF_TURN * torque / per_turn > LONGEST_TURN)
 
 
 def fitting_newtons(largest: float, current: float) -> float:
@@ -77,13 +104,13 @@ class WrenchNodes:
         return np.array([0.0, 0.0, top + HEIGHT])
 
     def refresh(
-        self, target: Array, wrench: Array | None, missing: Array, top: float, scale: float, turn: float
+        self, target: Array, given: Array, missing: Array, top: float, scale: float, turn: float
     ) -> None:
-        """Show a target (6,) and what is delivered of it (6,), None while unknown.
+        """Show a target (6,) and what is delivered of it (6,), zero while unknown.
 
         Args:
             target: asked wrench [N, N m].
-            wrench: delivered wrench.
+            given: delivered wrench.
             missing: the part (6,) of the difference that matters enough to be drawn.
             top: height of the hull's top [m].
             scale: length of a force arrow per newton [m/N].
@@ -93,7 +120,6 @@ class WrenchNodes:
         zero = np.zeros(3)
         self._asked[0].show(force_arrow, target[:3] * scale, zero, 0.011)
         self._asked[1].show(torque_ring, target[3:] * turn, zero, 0.0085)
-        given = np.zeros(6) if wrench is None else wrench
         self._given[0].show(force_arrow, given[:3] * scale, zero, 0.0065)
         self._given[1].show(torque_ring, given[3:] * turn, zero, 0.005)
         self._missing[0].show(force_arrow, missing[:3] * scale, given[:3] * scale, 0.006)

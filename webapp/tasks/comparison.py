@@ -1,6 +1,7 @@
 """Several methods on the same question, one after the other, while the page stays alive."""
 
 from dataclasses import replace
+from typing import NamedTuple
 
 from finlab.allocation.allocation import Allocation
 from webapp.session.state import COMPARED, State
@@ -15,47 +16,55 @@ Answer = Allocation | str
 """An answer, or why there is none."""
 
 
-class Comparison:
-    """The answers of one run."""
+class Run(NamedTuple):
+    """One comparison, as far as it has come."""
 
-    def __init__(self, context: Context) -> None:
-        """The page is rendered after every answer."""
-        self._solver, self._changed = context.solver, context.changed
-        # One question per method: those of this and other pages are answered in between.
-        self._asked = Newest(context.loop, context.workers.answers, self._quickest, self._take)
-        self.state: State | None = None
-        """The question, None before the first run."""
-        self.answers: dict[str, Answer] = {}
-        """Answers so far, by method."""
+    state: State | None = None
+    """The question, None before the first run."""
+    answers: tuple[tuple[str, Answer], ...] = ()
+    """Answers so far, by method."""
 
     @property
     def running(self) -> bool:
         """True until all methods have answered."""
         return self.state is not None and len(self.answers) < len(COMPARED)
 
+
+class Comparison:
+    """The runs of one page."""
+
+    def __init__(self, context: Context) -> None:
+        """The page is rendered after every answer."""
+        self._solver, self._changed = context.solver, context.changed
+        # One question per method: those of this and other pages are answered in between.
+        self._asked = Newest(context.loop, context.workers.answers, self._quickest, self._take)
+        self.run = Run()
+        """The last one."""
+
     def start(self, state: State) -> None:
         """Ask all methods about a state; a run that is still going on is given up."""
-        self.cancel()
-        self.state = state
-        self._next(state)
+        self.forget()
+        self.run = Run(state)
+        self._next()
 
-    def cancel(self) -> None:
+    def forget(self) -> None:
         """Give up and forget."""
         self._asked.forget()
-        self.state, self.answers = None, {}
+        self.run = Run()
 
-    def _next(self, state: State) -> None:
-        waiting = [method for method in COMPARED if method not in self.answers]
-        if waiting:
-            self._asked.ask(replace(state, method=waiting[0]))
+    def _next(self) -> None:
+        if self.run.state is not None and self.run.running:
+            method = COMPARED[len(self.run.answers)]
+            self._asked.ask(replace(self.run.state, method=method))
 
     def _quickest(self, state: State) -> Allocation:
         return min((self._solver.solve(state) for _ in range(TRIES)), key=lambda answer: answer.solve_ms)
 
     def _take(self) -> None:
         asked = self._asked
-        if self.state is not None and asked.answered is not None:
+        if self.run.state is not None and asked.answered is not None:
             answer = asked.error if asked.findings is None else asked.findings
-            self.answers[asked.answered.method] = answer or "no answer"
+            answers = (*self.run.answers, (asked.answered.method, answer or "no answer"))
+            self.run = Run(self.run.state, answers)
             self._changed()
-            self._next(self.state)
+            self._next()

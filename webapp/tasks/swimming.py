@@ -32,10 +32,10 @@ class Stretch:
 class Swimming:
     """The swim of one page. All methods but `_made` and `_advance` run on the event loop."""
 
-    def __init__(self, context: Context, changed: Callable[[], None]) -> None:
-        """`changed` is called on the loop when the run has changed."""
+    def __init__(self, context: Context) -> None:
+        """Nothing swims yet."""
         # An allocator of its own, for it is used on the thread that swims.
-        self._solver, self._changed, self._notify = context.solver.aside, changed, context.notify
+        self._solver, self._changed, self._notify = context.solver.aside, context.changed, context.notify
         loop, worker = context.loop, context.workers.swims
         self._start = Newest(loop, worker, self._made, self._begin)
         self._stretch = Newest(loop, worker, self._advance, self._take)

@@ -1,0 +1,145 @@
+"""What shows the facts: properties of handles are declared as functions of facts, and made when these change.
+
+A function names the facts that it is made of as its parameters: `lambda layout, saved: ...`.
+"""
+
+import inspect
+from collections.abc import Callable
+from typing import Any
+
+from markupsafe import Markup, escape
+
+from webapp.facts import Facts
+
+PLAIN = (str, int, float, bool, tuple)
+"""Facts that are compared by value; the others, which may hold arrays, by identity."""
+UNKNOWN = object()
+"""In place of what was made last, where that is not known."""
+
+
+def _places(make: Callable[..., Any]) -> list[int]:
+    """Which facts a function is made of."""
+    names = [p.name for p in inspect.signature(make).parameters.values() if p.default is p.empty]
+    return [Facts._fields.index(name) for name in names]
+
+
+class Rule:
+    """One property of a handle, or whatever else is done when facts change."""
+
+    def __init__(self, group: "Group", make: Callable[..., Any], handle: Any = None, key: str = "") -> None:
+        """`make` gives the value of the property `key`; where there is no handle, it does all itself."""
+        self.group, self.make, self.handle, self.key = group, make, handle, key
+        self.places = _places(make)
+        self.is_due, self.last = True, UNKNOWN
+
+    def write(self, facts: Facts) -> None:
+        """Make it again, and send what has changed."""
+        made = self.make(*[facts[place] for place in self.places])
+        if self.handle is not None:
+            if self.key == "content" and type(made) is not Markup:
+                made = escape(made)  # content that is not marked as markup is text
+            # A user may have changed a value.
+            before = self.handle.value if self.key == "value" else self.last
+            if before is UNKNOWN or before != made:
+                setattr(self.handle, self.key, str(made) if self.key == "content" else made)
+            self.last = made
+        self.is_due = False
+
+
+class Group:
+    """Rules that stand or fall together, and wait while nobody can see what they show."""
+
+    def __init__(self, fail: Callable[[Exception | None], None]) -> None:
+        """`fail` hides all that the rules show, or shows it again where it gets None."""
+        self.rules: list[Rule] = []
+        self.there, self.is_due, self._failed = True, True, False
+        self._fail = fail
+
+    def write(self, facts: Facts) -> None:
+        """Make again what is due."""
+        self.is_due = False
+        try:
+            for rule in self.rules:
+                if rule.is_due:
+                    rule.write(facts)
+        except Exception as error:
+            self.fail(error)
+        else:
+            if self._failed:
+                self._failed = False
+                self._fail(None)
+
+    def fail(self, error: Exception) -> None:
+        """Hide all."""
+        self._failed = True
+        self._fail(error)
+
+
+class Board:
+    """All rules of one page."""
+
+    def __init__(self) -> None:
+        self.groups: list[Group] = []
+        self._of_fact: list[list[Rule]] = [[] for _ in Facts._fields]
+        self._of_handle: dict[int, list[Rule]] = {}
+        self.facts: Facts | None = None
+        """What is shown; None where nothing is trusted to be."""
+
+    def group(self, fail: Callable[[Exception | None], None]) -> Group:
+        """Rules that are declared from now on belong to a group; groups are written in their order."""
+        self.groups.append(Group(fail))
+        return self.groups[-1]
+
+    def show(self, handle: Any, **made: Callable[..., Any]) -> Any:
+        """Let properties of a handle be what functions make of the facts; gives the handle back."""
+        for key, make in made.items():
+            self._of_handle.setdefault(id(handle), []).append(self._declare(make, handle, key))
+        return handle
+
+    def act(self, make: Callable[..., None]) -> None:
+        """Call a function of facts whenever these change."""
+        self._declare(make)
+
+    def _declare(self, make: Callable[..., Any], handle: Any = None, key: str = "") -> Rule:
+        rule = Rule(self.groups[-1], make, handle, key)
+        rule.group.rules.append(rule)
+        for place in rule.places:
+            self._of_fact[place].append(rule)
+        return rule
+
+    @staticmethod
+    def value_of(make: Callable[..., Any], facts: Facts) -> Any:
+        """What a function makes of facts."""
+        return make(*[facts[place] for place in _places(make)])
+
+    def doubt(self, handle: Any) -> None:
+        """A user has changed a handle, and the session may have refused it."""
+        self._due(self._of_handle.get(id(handle), []))
+
+    def distrust(self) -> None:
+        """Something went wrong: all is made again next time."""
+        self.facts = None
+
+    def fail(self, error: Exception) -> None:
+        """There are no facts: nothing is shown."""
+        for group in self.groups:
+            group.fail(error)
+
+    def refresh(self, facts: Facts) -> None:
+        """Write what has changed where it can be seen; the rest waits until it can."""
+        before, self.facts = self.facts, facts
+        if before is None:
+            for group in self.groups:
+                for rule in group.rules:
+                    rule.last, rule.is_due, group.is_due = UNKNOWN, True, True
+        else:
+            for old, new, rules in zip(before, facts, self._of_fact, strict=True):
+                if old is not new and not (type(old) in PLAIN and old == new):
+                    self._due(rules)
+        for group in self.groups:
+            if group.is_due and group.there:
+                group.write(facts)
+
+    def _due(self, rules: list[Rule]) -> None:
+        for rule in rules:
+            rule.is_due = rule.group.is_due = True

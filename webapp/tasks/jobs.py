@@ -1,0 +1,56 @@
+"""All that works for one page beside the event loop."""
+
+from collections.abc import Callable
+
+from webapp.session.state import State
+from webapp.tasks.analyst import REST_S, Question, find, find_ranges
+from webapp.tasks.answering import Answering
+from webapp.tasks.background import Newest
+from webapp.tasks.comparison import Comparison
+from webapp.tasks.context import Context
+from webapp.tasks.exports import Exports
+from webapp.tasks.fitting import Fitting
+from webapp.tasks.improving import Improver
+from webapp.tasks.swimming import Swimming
+
+CARD_REST_S = 0.35
+"""How long a layout may not change before its card is worked out [s]: that takes a second."""
+
+
+class Jobs:
+    """Questions under way, and what came of them."""
+
+    def __init__(self, context: Context) -> None:
+        """Nothing has been asked yet."""
+        self._session = context.session
+        self._robot: tuple[str, tuple[str, ...]] | None = None
+        loop, workers, changed = context.loop, context.workers, context.changed
+        self.answering = Answering(context)
+        self.ranging = Newest(loop, workers.marks, find_ranges, changed, REST_S)
+        self.analyst = Newest(loop, workers.cards, find, changed, CARD_REST_S)
+        self.improver = Improver(context)
+        self.fitting = Fitting(context)
+        self.comparison = Comparison(context)
+        self.swimming = Swimming(context)
+        self.exports = Exports(context)
+
+    def ask(self) -> None:
+        """Have the workers answer the present state, unless they were asked already."""
+        session, state = self._session, self._session.state
+        robot = state.layout.name, state.layout.names
+        if self._robot != robot:
+            # What is known of another robot must not stand under this one's name.
+            self._robot = robot
+            for task in (self.answering, self.analyst, self.ranging):
+                task.forget()
+        self.analyst.ask(Question(state.able, state.failed, session.saved, session.display.drawn))
+        self.ranging.ask(State(state.able, state.failed, target=state.target))
+        self.answering.ask()
+
+    def stop(self) -> None:
+        """The page has gone."""
+        self.swimming.stop()
+        forget: list[Callable[[], None]] = [task.forget for task in (self.comparison, self.improver)]
+        forget += [task.forget for task in (self.fitting, self.answering, self.analyst, self.ranging)]
+        for each in forget:
+            each()
