@@ -177,17 +177,18 @@ def test_a_search_is_watched_stopped_and_accepted(page: Any) -> None:
     page.page.get_by_role("button", name="4", exact=True).locator("visible=true").last.click()
     page.until(lambda: session.draft.held == (before.names[3],))
     page.type("Reach ± [m]", "0.03", place=0)
+    improver = page.view.jobs.improver
     page.until(lambda: session.draft.way[0] == 0.03)
     page.press("Search")
-    page.until(lambda: page.view.jobs.improver.progress is not None or page.view.jobs.improver.findings is not None)
-    if page.view.jobs.improver.findings is None:
-        page.view.jobs.improver.cancel()  # as the button does; it may be gone before it can be pressed
-    page.until(lambda: page.view.jobs.improver.findings is not None)
-    found = page.view.jobs.improver.findings
+    page.until(lambda: improver.progress is not None or improver.findings is not None)
+    if improver.findings is None:
+        improver.cancel()  # as the button does; it may be gone before it can be pressed
+    page.until(lambda: improver.findings is not None)
+    found = improver.findings
     accept = page.page.get_by_role("button", name="Accept")
     page.until(lambda: accept.count() == int(found.improved))
     if found.improved:
         page.press("Accept")
-        page.until(lambda: session.state.layout == found.layout and page.view.jobs.improver.findings is None)
+        page.until(lambda: session.state.layout == found.layout and improver.findings is None)
         page.press("Undo")
         page.until(lambda: session.state.layout == before)

@@ -63,7 +63,6 @@ def test_every_task_shows_the_robot(tab: Tab, layout: Layout, capsys: pytest.Cap
     tab.open(layout)
     session = tab.view.session
     tab.on_loop(lambda: tab.view.do(lambda: session.set_target(0, 3.0)))
-    tab.meet_all(session)
     tab.settle()
     told = " ".join(tab.figures())
     assert tab.client.notes == [] and "Traceback" not in capsys.readouterr().err
