@@ -101,8 +101,9 @@ def test_methods_side_by_side(page: Any) -> None:
     page.page.get_by_placeholder("Search commands").wait_for()
     page.page.keyboard.type("compare the meth", delay=20)
     page.page.keyboard.press("Enter")
-    page.until(lambda: page.session.drawer == "Comparison" and page.view.jobs.comparison.run.state is not None)
-    page.until(lambda: not page.view.jobs.comparison.run.running)
+    comparison = page.view.jobs.comparison
+    page.until(lambda: page.session.drawer == "Comparison" and comparison.run.state is not None)
+    page.until(lambda: not comparison.run.running)
     page.until(lambda: page.page.locator("table.methods tr").count() == 1 + len(COMPARED))
 
 
