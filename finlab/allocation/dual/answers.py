@@ -231,14 +231,12 @@ class Answers:
             fits &= (np.abs(wrapped(angle - sets.middle)) <= sets.half + NOTHING).all(axis=0)
         return np.asarray(fits & (not self.gauges))
 
-    def held(self, force: Array, price: Array, change: Array, sets: Sets) -> NDArray[np.bool_]:
-        """Where (N,) actuators whose forces (k, N) are at a limit stay there: prices (k, N) change
-        hardly, by (k, N)."""
-        size = self._sized(force)
+    def kept(self, force: Array, price: Array, change: Array, sets: Sets) -> NDArray[np.bool_]:
+        """Where (N,) prices (k, N) change so little, by (k, N), that actuators whose forces (k, N) are at a
+        limit stay there, and the dual value is nearly the largest."""
+        size, price, change = self._sized(force), np.abs(self._sized(price)), np.abs(self._sized(change))
         free = (size < sets.high * (1.0 - NOTHING)) & (size > sets.low)
-        return np.asarray(
-            (free | (np.abs(self._sized(change)) <= SMALL * np.abs(self._sized(price)))).all(axis=0)
-        )
+        return np.asarray((change <= SMALL * np.where(free, 10.0 * price.max(axis=0), price)).all(axis=0))
 
     def _sized(self, force: Array) -> Array:
         """What lines give (n, N) and the sizes of what planes give, of forces or prices (k, N)."""

@@ -138,7 +138,7 @@ def solve(
         state = _state(robot, target, prices, sets, terms, value or count > 1)
         if count == 1:
             return _one(robot, state, sets, terms, float(ridge[0]), float(most[0]), value)
-        return _many(robot, state, sets, terms, ridge, most)
+        return _many(robot, state, sets, terms, ridge, most, value)
 
 
 def dual_value(robot: DualRobot, target: Array, sets: Sets, prices: Array) -> Array:
@@ -168,7 +168,8 @@ def _state(
 
 
 def _step(robot: DualRobot, state: _State, terms: Terms, ridge: Array) -> tuple[Array, Array]:
-    """Steps (r, N) of the prices, and what the ridge leaves of the residual (N,), to first order."""
+    """Steps (r, N) of the prices, and what the ridge leaves of the residual (N,), to first order. A small
+    ridge is taken back but for its square."""
     hessian = state.derivative.T @ robot.outer.T
     trace = np.maximum(robot.trace @ state.derivative, robot.least_trace)
     if terms.penalty is not None:
@@ -176,12 +177,17 @@ def _step(robot: DualRobot, state: _State, terms: Terms, ridge: Array) -> tuple[
     if state.stretch is not None:
         weighted = state.stretch * state.target
         hessian += np.einsum("in,jn->nij", weighted, state.target).reshape(hessian.shape)
-    added = np.where(ridge > NEARLY, ridge, ROUNDING) * trace
+    added = ridge * trace
     hessian[:, :: robot.shape[0] + 1] += added[:, None]
-    step: Array = solve_systems(hessian.reshape(-1, *robot.shape), state.residual.T[..., None])[..., 0].T
+    hessian = hessian.reshape(-1, *robot.shape)
+    step: Array = solve_systems(hessian, state.residual.T[..., None])[..., 0].T
     if not np.isfinite(step).all():  # a matrix without inverse: along the gradient
-        step, added = np.where(np.isfinite(step), step, state.residual / trace), np.inf * trace
-    return step, added * np.sqrt(np.einsum("rn,rn->n", step, step))
+        step = np.where(np.isfinite(step), step, state.residual / trace)
+        return step, np.inf * trace
+    if (ridge > NEARLY).any():
+        return step, added * np.sqrt(np.einsum("rn,rn->n", step, step))
+    more: Array = solve_systems(hessian, (added * step).T[..., None])[..., 0].T
+    return step + more, added * np.sqrt(np.einsum("rn,rn->n", more, more))
 
 
 def _last(
@@ -193,7 +199,7 @@ def _last(
     change = robot.answers.change(state.derivative, further)
     fits = (left <= TOLERANCE) & robot.answers.linear(state.force, change, sets)
     if fits.any():
-        fits &= robot.answers.held(state.force, price, further, sets)
+        fits &= robot.answers.kept(state.force, price, further, sets)
     return state.force + change, fits
 
 
@@ -237,7 +243,7 @@ def _one(
             ridge *= 0.1 if abs(change) < 0.5 else 0.3 if change > 0.5 else 1.0
         else:
             ridge *= min(max(-change, 2.0), 10.0)
-        ridge = max(ridge, NEARLY)
+        ridge = max(ridge, ROUNDING)
         force = None
     worth = _valued(robot, state, sets, terms).value if value else np.array([np.nan])
     given = state.force if force is None else force
@@ -251,7 +257,9 @@ def _valued(robot: DualRobot, state: _State, sets: Sets, terms: Terms) -> _State
     return _state(robot, state.target, state.prices, sets, terms)
 
 
-def _many(robot: DualRobot, state: _State, sets: Sets, terms: Terms, ridge: Array, most: Array) -> Prices:
+def _many(
+    robot: DualRobot, state: _State, sets: Sets, terms: Terms, ridge: Array, most: Array, value: bool
+) -> Prices:
     """`solve` for many targets, those that are done left out."""
     count = state.target.shape[1]
     place = np.arange(count)
@@ -286,8 +294,12 @@ def _many(robot: DualRobot, state: _State, sets: Sets, terms: Terms, ridge: Arra
         if terms.reward is None and (undone <= TOLERANCE).any():
             force, fits = _last(robot, state, step, undone, sets)
             if fits.any():
-                found.solved[place[fits]] = True
-                left = settle(fits, state.prices + step, force, steps + 1)
+                at, moved = place[fits], state.prices + step
+                left = settle(fits, moved, force, steps + 1)
+                found.solved[at], found.value[at] = True, np.nan
+                if value:
+                    there, part = moved[:, fits], sets.take(np.flatnonzero(fits))
+                    found.value[at] = _state(robot, state.target[:, fits], there, part, terms).value
                 if not len(left):
                     break
                 place, ridge, most, sets = place[left], ridge[left], most[left], sets.take(left)
@@ -298,7 +310,7 @@ def _many(robot: DualRobot, state: _State, sets: Sets, terms: Terms, ridge: Arra
         good = _accepted(state, trial, change)
         kept = np.where(np.abs(change) < 0.5, 0.1, np.where(change > 0.5, 0.3, 1.0))
         grown = np.minimum(np.maximum(-change, 2.0), 10.0)
-        ridge = np.maximum(ridge * np.where(good, kept, grown), NEARLY)
+        ridge = np.maximum(ridge * np.where(good, kept, grown), ROUNDING)
         state = trial if good.all() else _merged(good, trial, state)
     return found
 
