@@ -4,6 +4,8 @@ from copy import copy
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from finlab.allocation import Allocation, Allocator, BatchAllocation
 from finlab.allocation.method import Method
 from finlab.allocation.methods import LEARNED, Checkpoint, MethodChoice, checked_settings, choose_method
@@ -75,3 +77,8 @@ class AnyRobot:
     def alternatives(self, result: Allocation) -> Candidates | None:
         """Of the robot that was asked about last."""
         return self.on(self._last).alternatives(result)
+
+
+def normalized_error(normalization: Normalization, wrench: Any, target: Any) -> Any:
+    """`||(wrench - target) / std||`, over the last axis."""
+    return np.linalg.norm((np.asarray(wrench) - np.asarray(target)) / normalization.std, axis=-1)

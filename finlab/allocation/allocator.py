@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import partial
-from itertools import islice
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -367,20 +366,6 @@ class Allocator:
             "unknown_fins": ready.method.unknown_fins,
             "later": later,
         }
-
-    def allocate_stream(self, wrenches: Iterable[ArrayLike], **question: Any) -> Iterator[BatchAllocation]:
-        """Commands for any number of targets, a few thousand at a time.
-
-        Args:
-            wrenches: targets (6,), one after the other; an array (N, 6) or whatever gives them.
-            question: arguments of `allocate_batch`.
-
-        Raises:
-            FinlabError: as `allocate_batch`, at the targets that are wrong.
-        """
-        rest = iter(wrenches)
-        while some := list(islice(rest, CHUNK)):
-            yield self.allocate_batch(np.array(some), **question)
 
     def _ready(self, failed: Sequence[str], health: Health | None) -> Ready:
         """The robot in a state, prepared now or kept from an earlier question."""

@@ -6,12 +6,8 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finlab.arrays import Array, Values, library_of
-
-STD_FLOOR = 1e-6
-"""Smallest standard deviation that is divided by, as in the paper (implementation details)."""
 
 
 class Normalization(NamedTuple):
@@ -20,12 +16,6 @@ class Normalization(NamedTuple):
     mean: Array
     std: Array
     """Per-axis standard deviation; `sigma` in the error measure."""
-
-    @classmethod
-    def of(cls, wrenches: NDArray[np.floating]) -> Normalization:
-        """Statistics of wrenches of shape (N, 6)."""
-        wrenches = np.asarray(wrenches, dtype=np.float64)
-        return cls(wrenches.mean(axis=0), np.maximum(wrenches.std(axis=0), STD_FLOOR))
 
     @classmethod
     def parse(cls, values: Any) -> Normalization:
@@ -37,11 +27,6 @@ class Normalization(NamedTuple):
         if mean.shape != (6,) or std.shape != (6,) or not (np.isfinite(mean).all() and (std > 0.0).all()):
             raise ValueError("normalization must be six means and six standard deviations above 0")
         return cls(mean, std)
-
-    def error(self, wrench: NDArray[np.floating], target: NDArray[np.floating]) -> Array:
-        """`err_norm = ||(wrench - target) / std||`, over the last axis."""
-        scaled = (np.asarray(wrench, np.float64) - np.asarray(target, np.float64)) / self.std
-        return np.asarray(np.linalg.norm(scaled, axis=-1))
 
 
 def to_normalized(command: Values, lower: Values, upper: Values) -> Values:

@@ -18,7 +18,7 @@ from finlab.allocation.solution import Candidates
 from finlab.assets import shipped_layouts
 from finlab.layout import load_layout
 from finlab.physics import Plant
-from tests.any_robot import AnyRobot
+from tests.any_robot import AnyRobot, normalized_error
 
 LOWER, UPPER = np.tile([0.05, 0.1, -math.pi], (2, 1)), np.tile([0.6, 2.1, math.pi], (2, 1))
 PUSH, REST = (0.4, 1.5, 0.0), (0.05, 0.1, 0.0)
@@ -80,7 +80,7 @@ def test_modes_of_an_answer_deliver_the_wrench_in_different_ways() -> None:
     np.testing.assert_array_equal(modes[0].command, result.command)
     assert modes[0].effort == pytest.approx(result.effort) and modes[0].power == pytest.approx(result.power)
     wrench = Plant(layout).wrench(np.array([mode.command for mode in modes]))
-    assert search.normalization.error(wrench, target).max() < 1e-3
+    assert normalized_error(search.normalization, wrench, target).max() < 1e-3
     ways = [mode.signature for mode in modes]
     assert not any(same_signature(a, b) for i, a in enumerate(ways) for b in ways[:i])
     bow = layout.index("bow")

@@ -143,15 +143,6 @@ def test_robots_with_other_actuators_are_told_as_well(name: str) -> None:
         assert "effort" not in repr(answer) + str(answer) and "<table>" in answer._repr_html_()
 
 
-def test_streams_of_targets() -> None:
-    allocator, targets = Allocator(load_layout("A")), wrenches(CHUNK + 3)
-    parts = list(allocator.allocate_stream((row for row in targets), failed=["front_left"]))
-    assert [len(part) for part in parts] == [CHUNK, 3]
-    whole = allocator.allocate_batch(targets, failed=["front_left"])
-    np.testing.assert_allclose(np.concatenate([part.wrench for part in parts]), whole.wrench, atol=1e-9)
-    assert list(allocator.allocate_stream(iter(()))) == []
-
-
 def test_an_answer_of_another_robot_is_not_explored() -> None:
     answer = Allocator(load_layout("A"), "mdn").allocate(SURGE)
     with pytest.raises(AllocationError, match="this answer is of layout 'A', and this allocator is for 'B'"):

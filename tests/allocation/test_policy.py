@@ -19,7 +19,7 @@ from finlab.layout import Layout, load_layout
 from finlab.layout.arrays import layout_effectiveness
 from finlab.physics import Plant
 from tests.allocation.quick import OF_FINS
-from tests.any_robot import AnyRobot
+from tests.any_robot import AnyRobot, normalized_error
 
 FAR = (30.0, 5.0, 20.0, 1.0, 1.0, 1.0)
 """A wrench that robots of up to six such fins do not deliver."""
@@ -129,7 +129,7 @@ def test_direction_is_kept_at_the_largest_scale(
     result = search.allocate(layout, target, policy="direction")
     assert cosine(result) > 1.0 - 1e-9
     assert 0.0 < result.share < 1.0 and not result.reachable
-    delivered = search.normalization.error(result.wrench, result.share * result.target)
+    delivered = normalized_error(search.normalization, result.wrench, result.share * result.target)
     assert delivered < 1e-4
     for more in (1.001, 1.01, 1.03):
         beyond = more * result.share * result.target

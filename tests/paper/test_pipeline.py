@@ -20,7 +20,7 @@ from finlab.paper.surrogate import SurrogateConfig
 from finlab.physics import Plant
 from finlab.physics.effort import command_effort
 from finlab.training.first_weights import first_weights
-from tests.any_robot import AnyRobot
+from tests.any_robot import AnyRobot, normalized_error
 from tests.paper.asked_in_torch import wrench_in_torch
 from tests.torch_weights import arrays_of, tensors_of
 
@@ -105,7 +105,7 @@ def test_refinement_lowers_what_the_surrogate_sees(checkpoint: TrainedWeights, r
     def believed(**options: object) -> float:
         method = AnyRobot("paper", checkpoint, **options)  # type: ignore[arg-type]
         wrench = method.allocate_batch(robot, targets).wrench_expected
-        return float(method.normalization.error(wrench, targets).mean())
+        return float(normalized_error(method.normalization, wrench, targets).mean())
 
     targets = np.random.default_rng(1).normal(size=(10, 6)) * checkpoint.normalization.std
     mean, ranked, refined = believed(mean_only=True), believed(refinement="none"), believed()
@@ -120,7 +120,7 @@ def test_candidates_come_best_first(checkpoint: TrainedWeights, robot: Layout) -
     np.testing.assert_array_equal(result.candidates.command[0], result.command)
     assert result.candidates.source == ("refined",) * 3 and result.samples.source == ("sample",) * 20
     for offered in (result.candidates, result.samples):
-        j_norm = method.normalization.error(offered.wrench, np.array(TARGET)) ** 2
+        j_norm = normalized_error(method.normalization, offered.wrench, np.array(TARGET)) ** 2
         assert (np.diff(j_norm + 0.01 * offered.effort) >= -1e-5).all()
         error = np.linalg.norm((offered.wrench - TARGET) / result.scale, axis=-1)
         np.testing.assert_allclose(offered.err_norm, error, atol=1e-3)
@@ -153,7 +153,7 @@ def test_the_shipped_networks_reach_the_target() -> None:
     share = np.random.default_rng(0).uniform(size=(10, layout.n_fins, 3))
     targets = Plant(layout).wrench(lower + share * (upper - lower))
     command = method.allocate_batch(layout, targets).command
-    assert np.median(method.normalization.error(Plant(layout).wrench(command), targets)) < 0.05
+    assert np.median(normalized_error(method.normalization, Plant(layout).wrench(command), targets)) < 0.05
 
 
 def test_refuses_a_checkpoint_without_network(checkpoint: TrainedWeights) -> None:

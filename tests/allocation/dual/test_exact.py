@@ -13,7 +13,7 @@ from finlab.allocation.allocation import CHUNK
 from finlab.assets import shipped_layouts
 from finlab.layout import Fin, FinModelSpec, Layout, Limits, load_layout, random_layout
 from finlab.physics import Plant, make_law, write_table
-from tests.any_robot import AnyRobot
+from tests.any_robot import AnyRobot, normalized_error
 
 GOOD = 1e-5
 """Normalized error below which an answer counts as exact, here."""
@@ -42,7 +42,7 @@ def errors(method: Allocator, layout: Layout, targets: np.ndarray) -> np.ndarray
     """Normalized errors by the plant; commands must keep their limits to the last bit."""
     command = method.allocate_batch(layout, targets).command
     assert keeps_limits(layout, command)
-    return method.normalization.error(Plant(layout).wrench(command), targets)
+    return normalized_error(method.normalization, Plant(layout).wrench(command), targets)
 
 
 @pytest.mark.parametrize("name", list(shipped_layouts()))
@@ -125,7 +125,7 @@ def test_many_targets_are_answered_as_well_as_one(search: AnyRobot) -> None:
     layout = load_layout(shipped_layouts()["A"])
     targets = reachable(layout, CHUNK + 3)
     batch = search.allocate_batch(layout, targets)
-    error = search.normalization.error(Plant(layout).wrench(batch.command), targets)
+    error = normalized_error(search.normalization, Plant(layout).wrench(batch.command), targets)
     assert error.max() < GOOD
     for row in (0, 1, CHUNK - 1, CHUNK, CHUNK + 2):  # around the seam of two chunks
         assert search.allocate(layout, targets[row]).err_norm < GOOD
@@ -161,7 +161,7 @@ def test_turning_the_robot_does_not_make_it_worse(search: AnyRobot) -> None:
     rotated = np.concatenate([targets[:, :3] @ rotation.T, targets[:, 3:] @ rotation.T], axis=1)
     straight = search.allocate_batch(layout, targets).command
     again = search.allocate_batch(turned, rotated).command
-    assert search.normalization.error(Plant(turned).wrench(again), rotated).max() < GOOD
+    assert normalized_error(search.normalization, Plant(turned).wrench(again), rotated).max() < GOOD
     # Forces in the fins' own frames know nothing of where forward is: the old answer serves the new robot.
     np.testing.assert_allclose(Plant(turned).wrench(straight), rotated, atol=1e-5)
 

@@ -12,7 +12,7 @@ from finlab.allocation import Allocation
 from finlab.allocation.modes import force_sizes, mode_signature, same_signature
 from finlab.layout import Layout, random_layout
 from finlab.physics import Plant
-from tests.any_robot import AnyRobot
+from tests.any_robot import AnyRobot, normalized_error
 
 GOOD = 1e-5
 """Normalized error below which an answer counts as exact here."""
@@ -85,7 +85,7 @@ def test_the_order_of_the_fins_does_not_matter(search: AnyRobot, seed: int) -> N
     shuffled = replace(layout, actuators=tuple(layout.fins[i] for i in order))
     one, other = search.allocate(layout, target), search.allocate(shuffled, target)
     assert one.err_norm < GOOD and other.err_norm < GOOD
-    assert search.normalization.error(one.wrench, other.wrench) < GOOD
+    assert normalized_error(search.normalization, one.wrench, other.wrench) < GOOD
     assert same_power(one, other, 0.002)
 
 
@@ -173,7 +173,7 @@ def test_a_small_change_of_the_layout_changes_the_answer_little(search: AnyRobot
         search.allocate(replace(layout, actuators=tuple(fins)), target),
     )
     # A robot of few fins may have been moved away from the target.
-    moved = search.normalization.error(Plant(other.layout).wrench(one.command), target)
+    moved = normalized_error(search.normalization, Plant(other.layout).wrench(one.command), target)
     assert other.err_norm <= max(GOOD, moved) and same_power(one, other, 0.002)
     ways = [mode_signature(a.command, force_sizes(a.layout, a.command)) for a in (one, other)]
     if same_signature(*ways):
