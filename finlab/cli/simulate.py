@@ -72,7 +72,7 @@ def simulate(
         from finlab.sim import NO_NOISE, ClosedLoop, FinFault, make_trajectory
 
         sensors = None if noise else NO_NOISE
-        robot, water = open_robot(layout, fins_for="simulate"), _water(current, waves, seed)
+        robot, water = open_robot(layout), _water(current, waves, seed)
         faults = [*(FinFault(name, 0.0) for name in robot.failed), *map(FinFault.parse, fail)]
         if excite:
             if fail or monitor:

@@ -27,10 +27,10 @@ class Completion:
     def __init__(
         self, layout: Layout, failed: Sequence[str], axes: Sequence[str], free: Sequence[str] = ()
     ) -> None:
-        """Prepares for the fins that work, at least one, the wanted and the free axes, by their names.
+        """Prepares for the actuators that work, at least one, the wanted and the free axes, by their names.
 
         Raises:
-            LayoutError: an unknown name, or no fin is left.
+            LayoutError: an unknown name, or no actuator is left.
         """
         scale = np.array([1.0, 1.0, 1.0, 1 / LEVER_M, 1 / LEVER_M, 1 / LEVER_M])
         planar = layout_effectiveness(layout.without(failed) if failed else layout) * scale[:, None]
@@ -39,7 +39,7 @@ class Completion:
         left, values, right = np.linalg.svd(wanted)
         rank = int((values > RANK_TOLERANCE * max(float(values[0]), 1e-9)).sum())
         self.controllable = rank == len(wanted)
-        """Whether the working fins can give any small combination of the wanted axes."""
+        """Whether the working actuators can give any small combination of the wanted axes."""
         inverse = right[:rank].T @ np.diag(1.0 / values[:rank]) @ left[:, :rank].T
         spare = right[rank:].T
         give = inverse - spare @ np.linalg.pinv(held @ spare, rcond=RANK_TOLERANCE) @ held @ inverse

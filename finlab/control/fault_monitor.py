@@ -13,7 +13,7 @@ from finlab.control.motion_model import MotionModel
 from finlab.control.probe import Probe
 from finlab.layout import Body, Layout
 from finlab.layout.angles import TURN
-from finlab.layout.damage import Damage, Health
+from finlab.layout.damage import Damage
 
 LOST_BELOW = 0.2
 """A strength below which a fin is given up as lost."""
@@ -69,16 +69,17 @@ class FaultMonitor:
         self.layout, self.period_s = layout, period_s
         self.settings = MonitorSettings() if settings is None else settings
         self._model = MotionModel(layout, body, period_s)
-        self._beliefs = Hypotheses(layout.n_fins, self._model.inertia, self.settings)
+        self._beliefs = Hypotheses(layout.n, self._model.inertia, self.settings)
         self._probe = Probe(layout, self.settings, period_s)
-        n = layout.n_fins
+        n = layout.n
         self._torn = np.zeros(n, dtype=bool)
         self._lost = np.zeros(n, dtype=bool)
         self._told = np.zeros(n, dtype=bool)
         self._suspect, self._sure = 0, 0
         self._held = np.full(n, np.nan)
-        self._since = self._model.fins.direction.copy()
+        self._since = self._model.motion.direction.copy()
         self._coarse = np.ones(n)
+        self._tables = [fin for fin in layout.fins if fin.model.type == "table"]
         self._velocity: Array | None = None
 
     @property
@@ -129,7 +130,7 @@ class FaultMonitor:
         it is lost, and of one that has been repaired the robot feels it, and takes it back. Fins that all but
         rest push a little, see `MonitorSettings.least_push`.
         """
-        lost, direction = self._lost & ~self._told, self._model.fins.direction
+        lost, direction = self._lost & ~self._told, self._model.motion.direction
         return self._probe.added(command, lost, direction)
 
     def verdict(self) -> Diagnosis:
@@ -138,36 +139,35 @@ class FaultMonitor:
         strength, by_kind = beliefs.strength.copy(), beliefs.probability
         probability = beliefs.changed
         stuck = ~np.isnan(self._held)
-        failed: tuple[str, ...] = ()
-        health = None
+        damage = Damage()
         broken = self._lost | self._torn | stuck
         if True in broken.tolist():
-            names = self.layout.names
             # The last but one belief is a whole fin, the last one of a stuck fin that it turns again.
             whole = by_kind[:, -2] + np.where(stuck, by_kind[:, -1], 0.0)
             probability = np.where(broken, 1.0 - whole, probability)
-            failed = tuple(names[k] for k in np.flatnonzero(self._lost))
-            health = self._health(strength, stuck & ~self._lost)
-        return Diagnosis(Damage(failed, health), probability, strength, beliefs.strength_std)
+            damage = self._damage(strength)
+        return Diagnosis(damage, probability, strength, beliefs.strength_std)
 
-    def _health(self, strength: Array, stuck: Array) -> Health | None:
-        """What an allocator should know of fins that still push; a table's thrust cannot be scaled."""
-        fins = self.layout.fins
-        torn = [k for k in np.flatnonzero(self._torn) if fins[k].model.type != "table"]
-        if not torn and not stuck.any():
-            return None
+    def _damage(self, strength: Array) -> Damage:
+        """What an allocator should know; a table's thrust cannot be scaled."""
+        names, parts = self.layout.names, self.layout.actuators
         far = np.abs(strength - self._coarse) > 0.75 * COARSE
         steps = np.clip(np.round(strength / COARSE), 1, round(1 / COARSE)) * COARSE
         self._coarse = np.where(far, steps, self._coarse)
-        return Health(
-            thrust=tuple((fins[k].name, float(self._coarse[k])) for k in torn),
-            stuck=tuple((fins[k].name, float(self._held[k])) for k in np.flatnonzero(stuck)),
+        torn = [k for k in np.flatnonzero(self._torn) if parts[k] not in self._tables]
+        stuck = np.flatnonzero(~np.isnan(self._held) & ~self._lost)
+        return Damage.of(
+            self.layout,
+            [names[k] for k in np.flatnonzero(self._lost)],
+            {names[k]: float(self._coarse[k]) for k in torn},
+            {names[k]: float(self._held[k]) for k in stuck},
         )
 
     def _other_direction(self, fresh: Array) -> Array:
-        """Zero directions (n,) of the beliefs that fins stick: where they were when it may have begun."""
-        turn = self._model.fins.direction - self._since
-        self._since += fresh[:, -1] * (turn - TURN * np.round(turn / TURN))
+        """Where actuators (n,) are by the beliefs that they stick: where they were when it may have begun."""
+        turn = self._model.motion.direction - self._since
+        turn -= TURN * np.round(turn / TURN) * self._model.motion.angles
+        self._since += fresh[:, -1] * turn
         return np.where(np.isnan(self._held), self._since, np.nan)
 
     def _judge(self, other: Array) -> None:
@@ -176,7 +176,7 @@ class FaultMonitor:
         if True in self._torn.tolist():
             strength = beliefs.strength
             gone = self._torn & (strength < LOST_BELOW)
-            if gone.any() and (self._lost | gone).sum() < self.layout.n_fins:
+            if gone.any() and (self._lost | gone).sum() < self.layout.n:
                 self._lost |= gone
                 self._torn &= ~gone
                 for index in np.flatnonzero(gone):
@@ -194,12 +194,12 @@ class FaultMonitor:
             return
         kind = int(by_kind[fin].argmax())
         both = np.where((beliefs.pairs == fin).any(axis=1), beliefs.both, 0.0)
-        if self._lost.sum() + 2 < self.layout.n_fins and both.max() > by_kind[fin, kind]:
+        if self._lost.sum() + 2 < self.layout.n and both.max() > by_kind[fin, kind]:
             self._lose_both(int(both.argmax()))
             return
         turned = kind == len(LEVELS)
         level = float(beliefs.strength[fin]) if turned else LEVELS[kind]
-        if level == 0.0 and self._lost.sum() == self.layout.n_fins - 1:
+        if level == 0.0 and self._lost.sum() == self.layout.n - 1:
             return  # the last one that works
         beliefs.adopt(fin, kind)
         self._told[fin] = False

@@ -1,4 +1,4 @@
-"""What a robot's velocities should do next, from what its fins do: the model behind `FaultMonitor`.
+"""What a robot's velocities should do next, from what its actuators do: the model behind `FaultMonitor`.
 
 Fossen's equations with the layout's body, fins that lag as U-CAT's, and what is unknown: a current, torques
 that stay, and how much of its law's thrust each fin gives. The state z (14 + n) holds
@@ -13,11 +13,10 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.layout import Body, Layout
-from finlab.layout.angles import is_full_turn
 from finlab.physics import plant_of
+from finlab.vehicle.actuator_motion import ActuatorMotion
 from finlab.vehicle.attitude import quaternion_of, rotation_of_quaternion, tilt_of, to_body
 from finlab.vehicle.body import complete_body
-from finlab.vehicle.fin_lag import FinLag
 from finlab.vehicle.fossen import jacobian
 from finlab.vehicle.vehicle import Vehicle
 
@@ -57,9 +56,9 @@ class MotionModel:
         self.inertia = np.array(self._vehicle.inertia)
         """Mass and moments (6,), those of the water that goes along included [kg, kg m^2]."""
         self._dt = period_s
-        self.fins = FinLag(layout)
-        """What the fins do, if they follow their commands."""
-        size = FIRST_FIN + layout.n_fins
+        self.motion = ActuatorMotion(layout)
+        """What the actuators do, if they follow their commands."""
+        size = FIRST_FIN + layout.n
         self._constant = np.eye(size)
         self._constant[range(3, 6), range(11, 14)] = period_s / self.inertia[3:]
         self._gain = period_s / self.inertia
@@ -72,12 +71,12 @@ class MotionModel:
         self._constant[range(6, 8), range(3, 5)] = (sine / swing).real
         self._constant[range(6, 8), range(6, 8)] = cosine.real
         self._swing = np.array([0.0, 0.0, 0.0, *(cosine.real - 1.0), 0.0])
-        self._force = np.zeros((2, layout.n_fins, 6))
-        self._thrust = np.zeros((layout.n_fins, 3))
-        self._turns_fully = is_full_turn(layout.upper[:, 2] - layout.lower[:, 2])
-        self._unsure_s, self._any_unsure = np.zeros(layout.n_fins), False
-        self.unsure = np.zeros(layout.n_fins, dtype=bool)
-        """Which fins (n,) turn about by command just now; which way round is unknown."""
+        self._force = np.zeros((2, layout.n, 6))
+        self._thrust = np.zeros((layout.n, 3))
+        self._turned_off = np.array([part.type not in ("thruster", "rudder") for part in layout.actuators])
+        self._unsure_s, self._any_unsure = np.zeros(layout.n), False
+        self.unsure = np.zeros(layout.n, dtype=bool)
+        """Which actuators (n,) turn about by command just now; which way round is unknown."""
 
     def step(self, state: Array, yaw: float, command: Array, held: Array, other: Array) -> Step:
         """Carries a state on over a period.
@@ -86,14 +85,17 @@ class MotionModel:
             state: z (14 + n) at the beginning.
             yaw: heading at its end [rad], as measured.
             command: (n, 3) in force over the period; NaN rows rest.
-            held: zero directions (n,) that are believed [rad]; NaN where fins turn as commanded.
-            other: zero directions (n,) as they might be instead [rad]; NaN likewise.
+            held: where actuators (n,) are believed to stick, as `ActuatorMotion.direction`; NaN where they
+                turn as commanded.
+            other: where they might be instead; NaN likewise.
         """
-        wrench, turned = self._wrenches(command, held, other)
         motion, current = state[MOTION].tolist(), state[CURRENT].tolist()
         roll, pitch = state[TILT].tolist()
         quaternion = quaternion_of(roll, pitch, yaw - self._dt * motion[5])
         rotation = rotation_of_quaternion(*quaternion)
+        water = to_body(rotation, *current)
+        flow = [a - b for a, b in zip(motion, (*water, 0.0, 0.0, 0.0), strict=True)]
+        wrench, turned = self._wrenches(command, held, other, np.array(flow))
         self._vehicle.current = tuple(current)
         thrust = state[STRENGTH] @ wrench
         thrust[3:] += state[TORQUE]
@@ -102,8 +104,7 @@ class MotionModel:
         after[:8] = (*moved[7:], *tilt_of(rotation_of_quaternion(*moved[3:7])))
         gained = wrench * self._gain
         transition = self._constant.copy()
-        water = to_body(rotation, *current)
-        by_flow = self._by_flow([a - b for a, b in zip(motion, (*water, 0.0, 0.0, 0.0), strict=True)])
+        by_flow = self._by_flow(flow)
         transition[MOTION, MOTION] += by_flow
         transition[MOTION, CURRENT] = by_flow[:, :3] @ -np.array(rotation).reshape(3, 3)
         transition[MOTION, STRENGTH] = gained.T
@@ -121,22 +122,20 @@ class MotionModel:
         by_flow[range(6), range(6)] = decay
         return by_flow
 
-    def _wrenches(self, command: Array, held: Array, other: Array) -> tuple[Array, Array]:
-        """Wrench (n, 6) of each fin at full strength, mean over the period, and what it gains turned."""
-        facing = (np.cos(command[:, 2] - self.fins.direction) < ABOUT_FACE) & self._turns_fully
-        self.fins.step(command, self._dt)
-        does = self.fins.command
+    def _wrenches(self, command: Array, held: Array, other: Array, flow: Array) -> tuple[Array, Array]:
+        """Wrench (n, 6) of each actuator at full strength, mean over the period, and what it gains turned."""
+        moves = self.motion
+        facing = (np.cos(moves.held_part(command) - moves.direction) < ABOUT_FACE) & moves.turns_fully
+        moves.step(command, self._dt)
         if self._any_unsure or True in facing.tolist():
             self._unsure_s -= self._dt
             self._unsure_s[facing] = UNSURE_S
             self.unsure = self._unsure_s > 1e-9
             self._any_unsure = True in self.unsure.tolist()
-        both = np.empty((2, *does.shape))
-        both[:] = does
-        directions = np.array([held, other])
-        np.copyto(both[:, :, 2], directions, where=~np.isnan(directions))
-        force = self._plant.force(both)
-        force *= does[:, :1] * does[:, 1:2] > 0.0  # one that does not beat gives nothing, whatever its law
+        both = moves.turned_to(np.array([moves.command] * 2), np.array([held, other]))
+        force = self._plant.force(both, flow=flow)
+        # One that does not work gives nothing, but for a thruster or a rudder that is stuck.
+        force *= (moves.pushes | ~(np.isnan(held) | self._turned_off))[:, None]
         self._thrust = force[0]
         now = np.matmul(force[:, :, None, :], self._plant.effectiveness)[:, :, 0]
         mean, self._force = 0.5 * (self._force + now), now

@@ -2,9 +2,9 @@
 
 An extended Kalman filter holds surge, sway, heave and yaw rate, the accelerations along surge, heave and
 yaw that the model does not explain (a wrong damping or buoyancy, a weak fin), and the current, which shows in
-how the water carries the robot sideways. It is carried on by what the fins give, not by what was asked of
-them, so nothing winds up where a wrench is out of reach. Pose comes from these velocities, corrected slowly
-by markers, pressure and the IMU's tilt.
+how the water carries the robot sideways. It is carried on by what the actuators give, not by what was asked
+of them, so nothing winds up where a wrench is out of reach. Pose comes from these velocities, corrected
+slowly by markers, pressure and the IMU's tilt.
 """
 
 import math
@@ -15,7 +15,7 @@ import numpy as np
 from finlab.actuators.fin.response import largest_forces
 from finlab.arrays import Array
 from finlab.control.measurement import Measurement
-from finlab.layout import Body, Layout
+from finlab.layout import Body, Fin, Layout, Rudder
 from finlab.layout.angles import wrapped
 from finlab.physics import plant_of
 from finlab.vehicle.attitude import in_world, quaternion_of
@@ -39,6 +39,8 @@ VELOCITY_NOISE, RATE_NOISE = 0.02, 0.04
 ASTRAY = 1.0
 """A motion [m/s, rad/s] this far from the one that is seen tells nothing of unknown forces: the model cannot
 follow, as of a robot that water stops within a period."""
+CRUISE = 1.0
+"""Speed [m/s] at which the strength of rudders counts."""
 POSE_S, TILT_S = 1.5, 1.0
 """Time constants with which poses and tilts that are seen correct those that are counted on [s]."""
 
@@ -183,8 +185,18 @@ class MotionObserver:
 
 
 def strongest_wrench(layout: Layout) -> Array:
-    """Sizes (6,) [N, N m] of what all fins give along each axis if every one does its best for it."""
-    effectiveness = plant_of(layout).effectiveness[:, 1:]
+    """Sizes (6,) [N, N m] of what all actuators give along each axis if every one does its best for it;
+    rudders at `CRUISE`."""
+    effectiveness = plant_of(layout).effectiveness
+    reach = np.zeros(6)
     # Not that of the largest command: a soft fin may push more with a smaller one.
-    reach: Array = (largest_forces(layout)[:, None] * np.linalg.norm(effectiveness, axis=1)).sum(axis=0)
+    largest = iter(largest_forces(layout).tolist())
+    for part, own in zip(layout.actuators, effectiveness, strict=True):
+        if isinstance(part, Fin):
+            most = next(largest)
+        elif isinstance(part, Rudder):
+            most = 0.5 * part.density * part.area * CRUISE**2 * part.slope * part.stall
+        else:
+            most = max(map(abs, part.force))
+        reach += most * np.linalg.norm(own[list(part.PUSHES)], axis=0)
     return reach

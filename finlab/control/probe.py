@@ -7,12 +7,14 @@ from numpy.typing import NDArray
 
 from finlab.arrays import Array
 from finlab.control.monitor_settings import MonitorSettings
-from finlab.layout import Layout
+from finlab.layout import Azimuth, Fin, Layout, Rudder
 from finlab.layout.angles import is_full_turn
 from finlab.physics import plant_of
 
 FORCE_N = 0.6
 """Force of a whole fin that is probed [N], or what it can give if that is less."""
+SHARE = 0.1
+"""Force of a thruster that is probed, as a share of its largest."""
 LENGTH_S = 2.0
 """How long a probe lasts [s]; a fin takes half a second to swing up, and a whole one to turn."""
 BUSY = 1.5
@@ -38,7 +40,9 @@ class Probe:
         self._full = is_full_turn(self._upper - self._lower)
         self._least = settings.least_push
         self._every, self._length = round(settings.probe_every_s / period_s), round(LENGTH_S / period_s)
-        self._side = np.zeros(layout.n_fins)
+        self._side = np.zeros(layout.n)
+        self._parts = layout.actuators
+        self._of_fins = np.array([isinstance(part, Fin) for part in layout.actuators])
         self._count = 0
 
     def added(self, command: Array, lost: NDArray[np.bool_], direction: Array) -> Array:
@@ -59,10 +63,22 @@ class Probe:
             return result
         fins = np.flatnonzero(lost)
         fin = int(fins[turn % len(fins)])
-        side = 1.0 if math.sin(direction[fin]) >= 0.0 else -1.0
         result = result.copy()
-        result[fin] = self._command(fin, 0.0, side * FORCE_N)
+        result[fin] = self._trial(fin, float(direction[fin]))
         return result
+
+    def _trial(self, index: int, direction: float) -> tuple[float, float, float]:
+        """The command of one that is tried, which is or points at a direction [rad]; a rudder amidships."""
+        part = self._parts[index]
+        if isinstance(part, Fin):
+            return self._command(index, 0.0, math.copysign(FORCE_N, math.sin(direction)))
+        if isinstance(part, Rudder):
+            return 0.0, 0.0, 0.0
+        low, high = part.force
+        force = max(SHARE * max(high, -low), 2.0 * part.dead_band)
+        if isinstance(part, Azimuth):
+            return direction, min(force, high), 0.0
+        return (min(force, high) if high > 0.0 else max(-force, low)), 0.0, 0.0
 
     def _pushing(self, command: Array) -> Array:
         """Fins that are commanded to push less than is needed to be known push more, each the other way than
@@ -71,7 +87,7 @@ class Probe:
         force = self._plant.force(np.where(known[:, None], command, 0.0))
         ahead, size = force[:, 1], np.hypot(force[:, 1], force[:, 2])
         self._side[size > BUSY * self._least] = 0.0
-        idle = np.flatnonzero(known & (size < self._least))
+        idle = np.flatnonzero(known & self._of_fins & (size < self._least))
         if not len(idle) or known.sum() < FEWEST:
             return command
         result = command.copy()

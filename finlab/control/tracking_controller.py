@@ -4,7 +4,7 @@ One law for all robots and methods, by backstepping through three loops. The pat
 of the position into a velocity over ground; the heading loop points the robot so that it moves that way, with
 the sideslip that it has in a turn; the velocity loops ask for the wrench that the robot's own model needs for
 the acceleration, with the reference's, and against what the observer cannot explain. All gains follow from
-one number, how fast the fins turn (`gains_for`).
+one number, how late the actuators are (`gains_for`).
 """
 
 import math
@@ -19,6 +19,10 @@ from finlab.control.measurement import Measurement, Setpoint
 from finlab.control.observer import AXES, Estimate, MotionObserver, strongest_wrench
 from finlab.layout import Layout
 from finlab.layout.angles import wrapped
+from finlab.vehicle.actuator_motion import following_delay
+
+BEHIND_S = 0.2
+"""Delay [s] of sensors and of a control period."""
 
 
 @dataclass(frozen=True)
@@ -45,16 +49,17 @@ class TrackingGains:
 def gains_for(layout: Layout) -> TrackingGains:
     """The gains for one robot, by one rule.
 
-    The fins' slowest double pole p is a delay of 2 / p in every loop. Velocities close at 0.4 p, where the
-    fins take 44 degrees of phase; the heading 1.4 times slower than they, and the path round it 3.3 times
-    slower than the heading. At most 70 % of what all fins could do for an axis is asked for.
+    The slowest actuator and what is behind it (the sensors, the period) are a delay in every loop. Of the
+    inverse of that delay, velocities close at 1.08, the heading 1.4 times slower than they, and the path
+    round it 3.3 times slower than the heading. At most 70 % of what all actuators could do for an axis is
+    asked for.
     """
-    pole = float(layout.servo_poles.min())
+    pace = 1.0 / (following_delay(layout) + BEHIND_S)
     most = 0.7 * strongest_wrench(layout)
     return TrackingGains(
-        velocity=0.4 * pole,
-        heading=0.28 * pole,
-        path=0.085 * pole,
+        velocity=1.08 * pace,
+        heading=0.756 * pace,
+        path=0.23 * pace,
         max_wrench=(float(most[0]), 0.0, float(most[2]), 0.0, 0.0, float(most[5])),
     )
 

@@ -41,14 +41,12 @@ def own_effectiveness(layout: Layout) -> Array:
 
 
 def layout_effectiveness(layout: Layout) -> Array:
-    """What one newton along each fin's two thrust axes does to the robot.
+    """What one newton along each direction in which an actuator pushes does to the robot.
 
     Returns:
-        (6, 2 n): wrench [Fx, Fy, Fz, Tx, Ty, Tz] of 1 N along zero and along shaft x zero, which are e_h and
-        e_z of a horizontal shaft, fins side by side.
-
-    Raises:
-        LayoutError: an actuator is no fin.
+        (6, m): wrench [Fx, Fy, Fz, Tx, Ty, Tz] of 1 N, actuators side by side: of a fin along zero and along
+        shaft x zero, which are e_h and e_z of a horizontal shaft, of a thruster along its axis, of an azimuth
+        along zero and turn_axis x zero, of a rudder along shaft x zero, its lift ahead.
     """
-    layout.only_fins("what asks for two thrust axes of each actuator")
-    return own_effectiveness(layout)[:, 1:].reshape(-1, 6).T
+    pairs = zip(own_effectiveness(layout), layout.actuators, strict=True)
+    return np.concatenate([own[list(actuator.PUSHES)] for own, actuator in pairs]).T

@@ -33,6 +33,7 @@ class Azimuth(Commanded):
         "turn_rate": ("turn_rate_deg_s", TurnRateDegrees),
     }
     LIMITS, RATES, AXES = ("arc", "force"), ("turn_rate", "rate"), ("turn_axis", "zero")
+    PUSHES, LAGS = (1, 2), 1
     type: ClassVar[str] = "azimuth"
 
     name: Name

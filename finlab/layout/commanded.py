@@ -14,6 +14,12 @@ class Commanded(Checked):
     """Fields with the least and greatest of each command."""
     RATES: ClassVar[tuple[str, ...]]
     """Fields with how fast each command changes at most; None in one where nothing limits it."""
+    PUSHES: ClassVar[tuple[int, ...]]
+    """Own axes along which it pushes at will; a rudder, ahead, along shaft x zero."""
+    HELD: ClassVar[int] = 0
+    """Which command stays as it is where it sticks."""
+    LAGS: ClassVar[int] = 0
+    """Which command it follows with its time constant; another one at its rate."""
     AXES: ClassVar[tuple[str, ...]] = ()
     """Fields with two own axes that stand across each other."""
 

@@ -36,6 +36,23 @@ class Damage(NamedTuple):
     health: Health | None = None
     """What is known of fins that work in part; None where there are none."""
 
+    @classmethod
+    def of(
+        cls, layout: Layout, lost: Sequence[str], torn: Mapping[str, float], stuck: Mapping[str, float]
+    ) -> Damage:
+        """What actuators that are lost, torn (the share of their force that is left) and stuck (where) leave.
+
+        What cannot be used any more counts as lost: a stuck rudder or thruster, whose force is no choice. A
+        torn thruster is weak: it gives the force that it is allocated where it is asked for more.
+        """
+        types = {part.name: part for part in layout.actuators}
+        turning = {name: at for name, at in stuck.items() if isinstance(types[name], Fin | Azimuth)}
+        weak = {name: share for name, share in torn.items() if isinstance(types[name], Thruster | Azimuth)}
+        thrust = {name: share for name, share in torn.items() if name not in weak}
+        gone = (*lost, *(name for name in stuck if name not in turning))
+        partly = torn or turning
+        return cls(gone, Health.of(weak=weak, thrust=thrust, stuck=turning) if partly else None)
+
 
 @dataclass(frozen=True)
 class Health:
@@ -127,10 +144,12 @@ def _applied(health: Health, layout: Layout) -> Layout:
     for part in layout.actuators:
         name = part.name
         if not isinstance(part, Fin):
-            if name in running or name in thrust:
+            if isinstance(part, Rudder) and name in thrust:
+                part = replace(part, area=thrust[name] * part.area)
+            elif name in running or name in thrust:
                 raise AllocationError(
                     f"health of {name!r}: {part.type}s may be weak or failed, and azimuths stuck; only fins "
-                    "run on or lose thrust"
+                    "run on, and only fins and rudders lose thrust"
                 )
             parts.append(_damaged_other(part, weak.get(name), stuck.get(name)))
             continue

@@ -204,6 +204,8 @@ class Fin(Checked):
     }
     WRITTEN: ClassVar[Collection[str]] = ("limits", "model")
     type: ClassVar[str] = "fin"
+    PUSHES: ClassVar[tuple[int, ...]] = (1, 2)
+    HELD: ClassVar[int] = 2
 
     name: Name
     """Unique within its layout; `--failed NAME` and the app refer to it."""

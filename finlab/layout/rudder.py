@@ -46,7 +46,7 @@ class Rudder(Commanded):
         "stall": ("stall_deg", StallDegrees),
         "rate": ("rate_deg_s", TurnRateDegrees),
     }
-    LIMITS, RATES, AXES = ("deflection",), ("rate",), ("shaft", "zero")
+    LIMITS, RATES, AXES, PUSHES = ("deflection",), ("rate",), ("shaft", "zero"), (2,)
     type: ClassVar[str] = "rudder"
 
     name: Name

@@ -26,7 +26,7 @@ class Thruster(Commanded):
     """A thruster with a fixed axis; its command is the force. Checked on construction."""
 
     KEYS: ClassVar[Mapping[str, str]] = KEYS
-    LIMITS, RATES = ("force",), ("rate",)
+    LIMITS, RATES, PUSHES = ("force",), ("rate",), (0,)
     type: ClassVar[str] = "thruster"
 
     name: Name

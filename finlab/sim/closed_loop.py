@@ -1,4 +1,4 @@
-"""A robot that swims: sensors, controller, allocator, fins and body, one control period at a time."""
+"""A robot that swims: sensors, controller, allocator, actuators and body, one control period at a time."""
 
 import math
 from collections import deque
@@ -27,18 +27,17 @@ from finlab.errors import FinlabError
 from finlab.layout import Layout
 from finlab.layout.damage import Damage, Kind
 from finlab.physics import plant_of
+from finlab.sim.actuator_force import ActuatorForce
 from finlab.sim.fin_fault import FinFault, damage_of
-from finlab.sim.hanging_fin import HangingFins
 from finlab.sim.log import RunLog, Tick, log_of_ticks
 from finlab.sim.perturbed import checked_truth
-from finlab.sim.plants import make_plant
 from finlab.sim.sensors import Sensors, SensorSettings
 from finlab.sim.task import Trajectory
 from finlab.sim.water import Still, Water
+from finlab.vehicle.actuator_motion import ActuatorMotion
 from finlab.vehicle.attitude import quaternion_of_yaw
 from finlab.vehicle.body import complete_body
-from finlab.vehicle.fin_lag import FinLag
-from finlab.vehicle.fin_motion import FinMotion, fin_power
+from finlab.vehicle.fin_motion import FinMotion
 from finlab.vehicle.vehicle import STATE_SIZE, Vehicle
 
 AHEAD = 10
@@ -81,23 +80,23 @@ class ClosedLoop:
             allocator: of the layout, by any method.
             task: the path, such as `make_trajectory` gives.
             controller: by default the tracking controller of the layout.
-            plant: what the fins really do; see `PLANTS`.
+            plant: what the fins really do; see `PLANTS`. Other actuators act by their own law.
             policy: what the allocator does with a wrench that is out of reach; by default its own
                 `policy_under_way`.
             sensors: rates and noise; the defaults of `SensorSettings`.
             water: how it moves, such as `SteadyCurrent` or `Waves`; it is still by default.
-            failures: what becomes of fins, and when; (name, time [s]) is a fin that is lost.
+            failures: what becomes of actuators, and when; (name, time [s]) is one that is lost.
             announced: whether what happens is announced to the allocator; else it goes on as before, unless a
                 monitor notices.
             monitor: watches the robot, gives the allocator what it finds, and takes what is announced.
             truth: the robot that really swims, such as `perturbed(layout, damping=2.0)`, where `layout` is
-                only what allocator, controller and monitor believe of it; it has the same fins.
+                only what allocator, controller and monitor believe of it; it has the same actuators.
             copper_loss: heat in the fins' motors [W/(N m)^2] that counts as `driving_power`.
             seed: of the sensors' noise and of the allocator.
 
         Raises:
-            FinlabError: an allocator of another robot, an unknown fin, plant or kind of failure, a time that
-                is none, or a truth that has other fins.
+            FinlabError: an allocator of another robot, an unknown actuator, plant or kind of failure, a time
+                that is none, or a truth that has other actuators.
         """
         if allocator.layout != layout:
             raise FinlabError(
@@ -105,7 +104,6 @@ class ClosedLoop:
                 f"{allocator.layout.name!r:.60} or another state of it; make it with Allocator(layout)"
             )
         events = [FinFault(*failure).checked() for failure in failures]
-        layout.only_fins("a simulation")
         layout.indices([event.fin for event in events])
         self.layout = layout
         self.allocator = allocator
@@ -121,18 +119,18 @@ class ClosedLoop:
         self.water: Water = Still() if water is None else water
         self.fins = FinMotion(truth)
         """The fins' motion: amplitude, frequency, zero direction and phase of each."""
-        self._fin_force = make_plant(plant, truth)
-        self._hanging = HangingFins(truth)
+        self._forces = ActuatorForce(plant, truth, self.fins, copper_loss)
+        self.motion = self._forces.motion
+        """The motion of all actuators."""
         self._plant = plant_of(layout)
         self._flow: Array | None = None
-        self._blade, self._copper_loss = plant_of(truth).blade, copper_loss
         self._sensors = Sensors(SensorSettings() if sensors is None else sensors, np.random.default_rng(seed))
         self._pending = sorted(events, key=lambda event: event.time_s)
         self.announced, self.monitor = announced, monitor
         self.broken: dict[str, FinFault] = {}
-        """What is true: the fins that are not whole now, by name."""
+        """What is true: the actuators that are not whole now, by name."""
         self._told: dict[str, FinFault] = {}
-        self._held = np.full(layout.n_fins, np.nan)
+        self._held = np.full(layout.n, np.nan)
         self.verdict: Diagnosis | None = None
         """What the monitor believed at the last step; None without one."""
         self._completion: dict[tuple[str, ...], Completion] = {}
@@ -142,7 +140,7 @@ class ClosedLoop:
         self._answered: Allocation | None = None  # what it came from, before a monitor's pushes
         self.period_s = self.controller.period_s
         """Length of a step [s]."""
-        self._lag, self._gave = FinLag(layout), NO_WRENCH
+        self._believed, self._gave = ActuatorMotion(layout), NO_WRENCH
         start, heading = task.start()
         self.state = np.zeros(STATE_SIZE)
         """State (13,): position (world), quaternion (w, x, y, z), velocity and rates (body); SI."""
@@ -161,7 +159,7 @@ class ClosedLoop:
 
     @property
     def controllable(self) -> bool:
-        """Whether the working fins can give what the controller commands, in small."""
+        """Whether the working actuators can give what the controller commands, in small."""
         return self._complete().controllable
 
     @property
@@ -181,44 +179,45 @@ class ClosedLoop:
 
     @property
     def lost(self) -> tuple[str, ...]:
-        """Names of the fins that are lost now, whoever knows of it."""
+        """Names of the actuators that are lost now, whoever knows of it."""
         return tuple(name for name, fault in self.broken.items() if fault.kind == "lost")
 
     @property
     def told(self) -> tuple[str, ...]:
-        """Names of the fins that were announced as broken."""
+        """Names of the actuators that were announced as broken."""
         return tuple(self._told)
 
     @property
     def damage(self) -> Damage:
-        """What the allocator is given of the fins: what was announced, or what the monitor has found."""
+        """What the allocator is given: what was announced, or what the monitor has found."""
         if self.verdict is not None:
             return self.verdict.damage
-        return damage_of(self._told, dict(zip(self.layout.names, self._held.tolist(), strict=True)))
+        return damage_of(self.layout, self._told, self._held)
 
     def fail(
         self, name: str, kind: Kind = "lost", share: float = 0.5, *, announced: bool | None = None
     ) -> None:
-        """Something becomes of a fin, now.
+        """Something becomes of an actuator, now.
 
         Args:
-            name: of the fin.
-            kind: lost (hangs still and drags), torn (gives a share of its thrust), stuck (beats but no longer
-                turns) or whole.
-            share: of the thrust that a torn fin gives.
+            name: of the actuator.
+            kind: lost (a fin hangs still and drags, another gives nothing), torn (it gives a share of its
+                force), stuck (a fin beats but no longer turns, nor does an azimuth; a rudder stays as it is,
+                and so does the force of a thruster) or whole.
+            share: of the force that a torn actuator gives.
             announced: whether the allocator knows at once; by default as the swim was made.
 
         Raises:
-            LayoutError: there is no fin of that name, or it is the last that works.
+            LayoutError: there is no actuator of that name, or it is the last that works.
             FinlabError: the kind or the share is none.
         """
         fault = FinFault(name, self.time, kind, share).checked()
         index = self.layout.index(name)
         if kind == "lost":
             self.layout.without([*(other for other in self.lost if other != name), name])
-        self._held[index] = self.fins.direction[index] if kind == "stuck" else np.nan
-        if kind == "stuck":
-            self.fins.direction_rate[index] = 0.0
+        self._held[index] = self.motion.direction[index] if kind == "stuck" else np.nan
+        if kind == "stuck" and index in self.motion.of_fins:
+            self.fins.direction_rate[np.searchsorted(self.motion.of_fins, index)] = 0.0
         for known in (self.broken, self._told) if self._tells(announced) else (self.broken,):
             known.pop(name, None)
             if kind != "whole":
@@ -228,7 +227,7 @@ class ClosedLoop:
             self.verdict = self.monitor.tell(name, strength, self._held[index])
 
     def mend(self, name: str, *, announced: bool | None = None) -> None:
-        """A fin works again as it should; a `LayoutError` where there is no fin of that name."""
+        """An actuator works again as it should; a `LayoutError` where there is none of that name."""
         self.fail(name, "whole", announced=announced)
 
     def _tells(self, announced: bool | None) -> bool:
@@ -258,7 +257,7 @@ class ClosedLoop:
             policy=self.policy,
             seed=self.seed,
         )
-        self._answered, command = answer, answer.command
+        self._answered, command = answer, self._sent(answer.command)
         if self.monitor is not None:
             command = self.monitor.probed(command)
         tick = self._move(now, setpoint, answer.target, command, answer.solve_ms)
@@ -285,17 +284,17 @@ class ClosedLoop:
         return whole(expected)
 
     def _given(self) -> Array:
-        """Wrench (6,) of the fins over the last period, if they do what they were commanded [N, N m]."""
+        """Wrench (6,) over the last period, if the actuators do what they were commanded [N, N m]."""
         if self._command is None or not self.controller.needs_given:
             return NO_WRENCH
-        self._lag.step(self._command, self.period_s)
-        motion = self._lag.command
-        force = self._plant.force(motion, flow=self._flow) * (motion[:, :1] * motion[:, 1:2] > 0.0)
+        believed = self._believed
+        believed.step(self._command, self.period_s)
+        force = self._plant.force(believed.command, flow=self._flow) * believed.pushes[:, None]
         before, self._gave = self._gave, force.ravel() @ self._plant.effectiveness.reshape(-1, 6)
         return 0.5 * (before + self._gave)
 
     def _complete(self) -> Completion:
-        """What completes the controller's wrench for the fins that work now."""
+        """What completes the controller's wrench for the actuators that work now."""
         failed = self.damage.failed
         if failed not in self._completion:
             controller = self.controller
@@ -303,54 +302,51 @@ class ClosedLoop:
         return self._completion[failed]
 
     def _alive(self) -> NDArray[np.bool_]:
-        """Which fins (n,) are not lost."""
+        """Which actuators (n,) are not lost."""
         lost = self.lost
         return np.array([name not in lost for name in self.layout.names])
 
+    def _sent(self, command: Array) -> Array:
+        """A command (n, 3) for torn thrusters, which are asked for more than they are to give."""
+        health = self.damage.health
+        if health is None or not health.weak:
+            return command
+        result = command.copy()
+        for name, share in health.weak:
+            index = self.layout.index(name)
+            result[index, self.layout.actuators[index].LAGS] /= share
+        return result
+
     def _moved(self, command: Array) -> Array:
-        """What the servos make of a command (n, 3): a lost fin is not moved, a stuck one does not turn."""
+        """What drives make of a command (n, 3): a lost actuator is not moved, a stuck one does not turn."""
         result = command.copy()
         result[~self._alive()] = np.nan
-        result[:, 2] = np.where(np.isnan(self._held), result[:, 2], self._held)
-        return result
+        return result if np.isnan(self._held).all() else self.motion.turned_to(result, self._held)
 
     def _move(
         self, now: Measurement, setpoint: Setpoint, asked: Array, command: Array, solve_ms: float
     ) -> Tick:
-        """Fins and body over one period with a constant command."""
-        time, before = self.time, self.state
-        n_steps = max(1, math.ceil(self.period_s / self._fin_force.step_s - 1e-9))
+        """Actuators and body over one period with a constant command."""
+        time, before, n = self.time, self.state, self.layout.n
+        n_steps = max(1, math.ceil(self.period_s / self._forces.step_s - 1e-9))
         dt = self.period_s / n_steps
-        moved, commanded = self._moved(command), np.isfinite(command[:, :1])
-        alive = self._alive()
-        hangs = np.isnan(moved[:, 0])
-        some_hang = bool(hangs.any())
-        share = np.ones((self.layout.n_fins, 1))
-        torn = [fault for fault in self.broken.values() if fault.kind == "torn"]
-        for fault in torn:
-            share[self.layout.index(fault.fin)] = fault.share
-        mean = np.zeros((self.layout.n_fins, 6))
-        turning = np.empty((n_steps, 2, self.layout.n_fins))
+        moved, share = self._moved(command), np.ones(n)
+        for fault in self.broken.values():
+            if fault.kind == "torn":
+                share[self.layout.index(fault.fin)] = fault.share
+        mean, power = np.zeros((n, 6)), np.zeros((3, n))
         for k in range(n_steps):
-            self.fins.step(moved, dt)
             self.vehicle.current, self.vehicle.acceleration = self.water.flow(
                 self.state[:3].tolist(), time + (k + 0.5) * dt
             )
-            water = self.vehicle.velocity_in_water(self.state)
-            force = self._fin_force.step(self.fins, dt, water)
-            if torn:
-                force = force * share
-            if some_hang:
-                force[hangs] = self._hanging.force(self.fins.direction, water)[hangs]
-            wrenches = np.einsum("nk,nkw->nw", force, self._fin_force.effectiveness)
-            wrench = wrenches.sum(axis=0)
-            self.state = self.vehicle.step(self.state, wrench.tolist(), dt)
+            push = self._forces.step(moved, dt, self.vehicle.velocity_in_water(self.state), share)
+            wrenches = np.einsum("nk,nkw->nw", push.force, self._forces.effectiveness)
+            self.state = self.vehicle.step(self.state, wrenches.sum(axis=0).tolist(), dt)
             if k + 1 < n_steps:  # the sample at the end belongs to the next period
                 self._sensors.sample(time + (k + 1) * dt, self.state)
             mean += wrenches
-            turning[k] = self.fins.speed_and_acceleration()
-        mean /= n_steps
-        power = np.mean(fin_power(turning[:, 0], turning[:, 1], self._blade, self._copper_loss), axis=1)
+            power += push.power
+        mean, power = mean / n_steps, power / n_steps
         return Tick(
             time=time,
             position=before[:3].copy(),
@@ -361,16 +357,16 @@ class ClosedLoop:
             reference=setpoint.position,
             reference_surge=setpoint.surge,
             asked=asked,
-            allocated=self._plant.wrench(np.where(commanded, command, 0.0), flow=self._flow),
+            allocated=self._plant.wrench(command, flow=self._flow),
             delivered=mean.sum(axis=0),
             command=command,
-            fin_motion=self.fins.command,
-            fin_angle=self.fins.angle,
+            fin_motion=self.motion.command,
+            fin_angle=self.motion.joined(self.fins.angle, np.zeros(len(self.motion.of_others))),
             fin_force=mean[:, :3],
             inertial_power=power[0],
             torque_power=power[1],
             driving_power=power[2],
-            alive=alive,
+            alive=self._alive(),
             **self._suspicion(),
             solve_ms=solve_ms,
         )
@@ -378,7 +374,7 @@ class ClosedLoop:
     def _suspicion(self) -> dict[str, Array]:
         """The monitor's columns of a tick, NaN without one."""
         if self.verdict is None:
-            unknown = np.full(self.layout.n_fins, np.nan)
+            unknown = np.full(self.layout.n, np.nan)
             return {"fault_probability": unknown, "strength": unknown, "strength_std": unknown}
         found = self.verdict
         return {

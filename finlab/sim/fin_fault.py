@@ -4,8 +4,10 @@ import math
 from collections.abc import Mapping
 from typing import NamedTuple, cast
 
+from finlab.arrays import Array
 from finlab.errors import FinlabError
-from finlab.layout.damage import Damage, Health, Kind
+from finlab.layout import Layout
+from finlab.layout.damage import Damage, Kind
 
 KINDS: tuple[Kind, ...] = ("lost", "torn", "stuck", "whole")
 """What can become of a fin in a swim: it hangs still and drags; it gives a share of its thrust; it beats but
@@ -54,9 +56,9 @@ class FinFault(NamedTuple):
         return self
 
 
-def damage_of(faults: Mapping[str, FinFault], held: Mapping[str, float]) -> Damage:
-    """What faults, by fin, leave of a robot; `held` are the zero directions [rad] of fins that are stuck."""
+def damage_of(layout: Layout, faults: Mapping[str, FinFault], held: Array) -> Damage:
+    """What faults, by name, leave of a robot; `held` (n,) is where actuators are stuck."""
     torn = {name: fault.share for name, fault in faults.items() if fault.kind == "torn"}
-    stuck = {name: held[name] for name, fault in faults.items() if fault.kind == "stuck"}
-    lost = tuple(name for name, fault in faults.items() if fault.kind == "lost")
-    return Damage(lost, Health.of(thrust=torn, stuck=stuck) if torn or stuck else None)
+    stuck = {name: float(held[layout.index(name)]) for name, fault in faults.items() if fault.kind == "stuck"}
+    lost = [name for name, fault in faults.items() if fault.kind == "lost"]
+    return Damage.of(layout, lost, torn, stuck)

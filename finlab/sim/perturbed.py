@@ -13,7 +13,8 @@ from msgspec import Meta
 
 from finlab.errors import LayoutError
 from finlab.files.schema import checked
-from finlab.layout import Body, Layout
+from finlab.layout import Body, Fin, Layout
+from finlab.layout.actuator import Actuator
 from finlab.vehicle.body import complete_body
 from finlab.vehicle.vehicle import Vehicle
 
@@ -57,19 +58,24 @@ def perturbed(
     )
     shares = dict(thrust or {})
     layout.indices(tuple(shares))
-    fins = []
-    for fin in layout.fins:
-        if (share := shares.get(fin.name, 1.0)) != 1.0:
-            fin = replace(fin, model=fin.model.scaled(checked(share, Factor, key=fin.name)))
-        fins.append(fin)
-    return replace(layout, actuators=tuple(fins), body=changed)
+    parts: list[Actuator] = []
+    for part in layout.actuators:
+        if (share := shares.get(part.name, 1.0)) != 1.0:
+            if not isinstance(part, Fin):
+                raise LayoutError(
+                    f"thrust: only the law of a fin can be scaled, and {part.name!r} is of type "
+                    f"{part.type}; let it be torn by a FinFault"
+                )
+            part = replace(part, model=part.model.scaled(checked(share, Factor, key=part.name)))
+        parts.append(part)
+    return replace(layout, actuators=tuple(parts), body=changed)
 
 
 def checked_truth(layout: Layout, truth: Layout) -> Layout:
-    """The true robot; a `LayoutError` where it does not have the fins of the layout that is believed."""
-    if truth.names != layout.names:
+    """The true robot; a `LayoutError` where it does not have the actuators of the layout that is believed."""
+    if [(part.name, part.type) for part in truth.actuators] != [(p.name, p.type) for p in layout.actuators]:
         known, found = ", ".join(layout.names), ", ".join(truth.names)
-        raise LayoutError(f"truth: expected the fins of {layout.name}, {known}, got {found}")
+        raise LayoutError(f"truth: expected the actuators of {layout.name}, {known}, got {found}")
     return truth
 
 

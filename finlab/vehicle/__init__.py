@@ -1,8 +1,9 @@
-"""A body that moves in water, after Fossen, and fins that follow their commands.
+"""A body that moves in water, after Fossen, and actuators that follow their commands.
 
 The equations stand once, in `fossen.py`: simulation, control and fits all use them.
 """
 
+from finlab.vehicle.actuator_motion import ActuatorMotion
 from finlab.vehicle.body import GRAVITY, complete_body, ucat_body
 from finlab.vehicle.fin_lag import FinLag
 from finlab.vehicle.fin_motion import FinMotion
@@ -12,6 +13,7 @@ from finlab.vehicle.vehicle import STATE_SIZE, Vehicle
 __all__ = [
     "GRAVITY",
     "STATE_SIZE",
+    "ActuatorMotion",
     "Dynamics",
     "FinLag",
     "FinMotion",

@@ -41,14 +41,14 @@ class LagStep(NamedTuple):
 
 
 class FinLag:
-    """What the fins of one layout do if they follow as they should: enough for whoever watches ten times a
+    """What the n fins of one layout do if they follow as they should: enough for whoever watches ten times a
     second. `FinMotion` adds what happens within the beat."""
 
     def __init__(self, layout: Layout) -> None:
         """Starts at rest: no amplitude, no frequency, zero directions at the middle of their arcs."""
-        lower, upper = layout.lower[:, 2], layout.upper[:, 2]
+        lower, upper = np.array([fin.limits.zero_direction for fin in layout.fins]).reshape(-1, 2).T
         self._turns_fully = is_full_turn(upper - lower)
-        self._poles = np.ascontiguousarray(layout.servo_poles.T)
+        self._poles = np.ascontiguousarray(layout.servo_poles.reshape(-1, 3).T)
         self._fastest_swing = layout.speed_limit / TURN
         # Half amplitude [rad], frequency [Hz], zero direction [rad] counted on over the seam; rates per s.
         self._value = np.zeros((3, layout.n_fins))
@@ -58,8 +58,20 @@ class FinLag:
         self._lag: LagStep
 
     @property
+    def amplitude(self) -> Array:
+        """Half amplitude (n,) [rad]; a view, and so are the next two."""
+        amplitude: Array = self._value[0]
+        return amplitude
+
+    @property
+    def frequency(self) -> Array:
+        """(n,) [Hz]."""
+        frequency: Array = self._value[1]
+        return frequency
+
+    @property
     def direction(self) -> Array:
-        """Zero directions (n,) [rad], counted on over the seam; a view."""
+        """Zero directions (n,) [rad], counted on over the seam."""
         direction: Array = self._value[2]
         return direction
 

@@ -47,20 +47,8 @@ class FinMotion(FinLag):
         self._before = before
 
     @property
-    def amplitude(self) -> Array:
-        """Half amplitude [rad]; a view, and so are the next two."""
-        amplitude: Array = self._value[0]
-        return amplitude
-
-    @property
-    def frequency(self) -> Array:
-        """[Hz]."""
-        frequency: Array = self._value[1]
-        return frequency
-
-    @property
     def direction_rate(self) -> Array:
-        """[rad/s]."""
+        """[rad/s]; a view."""
         rate: Array = self._rate[2]
         return rate
 

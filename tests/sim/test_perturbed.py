@@ -32,5 +32,5 @@ def test_what_makes_no_sense_is_refused(layout_a: Layout, analytic: AnyRobot) ->
     table = replace(layout_a, actuators=(measured, *layout_a.fins[1:]))
     with pytest.raises(LayoutError, match="table cannot be scaled"):
         perturbed(table, thrust={"front_right": 0.5})
-    with pytest.raises(LayoutError, match="truth: expected the fins of A"):
+    with pytest.raises(LayoutError, match="truth: expected the actuators of A"):
         ClosedLoop(layout_a, analytic.on(layout_a), make_trajectory("circle"), truth=load_layout("pair"))

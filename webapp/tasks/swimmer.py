@@ -68,7 +68,7 @@ class Swimmer:
         return Moment(
             time=swim.time,
             pose=swim.state[:7].copy(),
-            motion=swim.fins.command,
+            motion=swim.motion.command,
             angle=swim.fins.angle,
             force=np.zeros((n, 3)) if last is None else last.fin_force,
             asked=np.zeros(6) if last is None else last.asked,

@@ -1,0 +1,87 @@
+"""Forces of all actuators of a robot that swims: fins by a plant of `plants.py`, others by their own law in
+the water that meets them just now."""
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from finlab.arrays import Array
+from finlab.errors import FinlabError
+from finlab.layout import Layout
+from finlab.layout.arrays import own_effectiveness
+from finlab.physics import plant_of
+from finlab.sim.hanging_fin import HangingFins
+from finlab.sim.plants import make_plant
+from finlab.vehicle.actuator_motion import ActuatorMotion
+from finlab.vehicle.fin_motion import FinMotion, FinPower, fin_power
+
+STEP_S = 0.02
+"""Longest step of a robot without fins [s]."""
+
+
+class Push(NamedTuple):
+    """What n actuators do in a step."""
+
+    force: Array
+    """Forces (n, 3) in own frames [N]."""
+    power: Array
+    """Inertial, torque and driving power (3, n) [W]; of what is no fin, none and twice that of its law."""
+
+
+class ActuatorForce:
+    """The actuators of one layout, the true one."""
+
+    def __init__(self, plant: str, layout: Layout, fins: FinMotion, copper_loss: float) -> None:
+        """Takes the fins' plant, the true robot, how its fins move and the heat in their motors [W/(N m)^2].
+
+        Raises:
+            FinlabError: there is no such plant, or one that is about fins, of which the robot has none.
+        """
+        self.motion, self._beat, self._copper_loss = ActuatorMotion(layout, fins), fins, copper_loss
+        of_fins, of_others = self.motion.of_fins, self.motion.of_others
+        self.effectiveness = own_effectiveness(layout)
+        """Wrench (n, 3, 6) of 1 N along each own axis, about the true centre of gravity."""
+        self.step_s = STEP_S
+        """Longest step that resolves the forces [s]."""
+        if len(of_fins):
+            robot = replace(layout, actuators=layout.fins)
+            self._fins, self._hanging = make_plant(plant, robot), HangingFins(robot)
+            self._blade, self.step_s = plant_of(robot).blade, self._fins.step_s
+            self.effectiveness[of_fins] = self._fins.effectiveness
+        elif plant != "mean":
+            raise FinlabError(
+                f"plant {plant!r:.60} is about fins, and layout {layout.name} has none; use 'mean'"
+            )
+        if len(of_others):
+            others = tuple(layout.actuators[i] for i in of_others)
+            self._others = plant_of(replace(layout, actuators=others, interaction=None))
+
+    def step(self, command: Array, dt: float, water: Array, share: Array) -> Push:
+        """Follows a command (n, 3) for `dt` [s].
+
+        Args:
+            command: NaN rows are lost: a fin hangs still and drags, another actuator gives nothing.
+            dt: length of the step [s].
+            water: how the robot moves through the water (6,) [m/s, rad/s], body frame.
+            share: of its force that each actuator gives (n,).
+        """
+        motion, lost = self.motion, np.isnan(command[:, 0])
+        motion.step(command, dt)
+        fins, fin_watts = np.zeros((0, 3)), np.zeros((3, 0))
+        others, watts = np.zeros((0, 3)), np.zeros((3, 0))
+        if len(motion.of_fins):
+            fins = self._fins.step(self._beat, dt, water) * share[motion.of_fins, None]
+            if (hangs := lost[motion.of_fins]).any():
+                fins[hangs] = self._hanging.force(self._beat.direction, water)[hangs]
+            fin_watts = np.array(self._fin_power())
+        if len(motion.of_others):
+            mean = 0.5 * (motion.others.before + motion.others.value)
+            works = share[motion.of_others] * motion.pushes[motion.of_others]
+            others = self._others.force(mean, flow=water) * works[:, None]
+            spent = self._others.power(mean, flow=water) * motion.pushes[motion.of_others]
+            watts = np.array([0.0 * spent, spent, spent])
+        return Push(motion.joined(fins, others), motion.joined(fin_watts.T, watts.T).T)
+
+    def _fin_power(self) -> FinPower:
+        return fin_power(*self._beat.speed_and_acceleration(), self._blade, self._copper_loss)
