@@ -15,3 +15,4 @@ from finlab.control.observer import MotionObserver as MotionObserver
 from finlab.control.tracking_controller import TrackingController as TrackingController
 from finlab.control.tracking_controller import TrackingGains as TrackingGains
 from finlab.control.tracking_controller import gains_for as gains_for
+from finlab.control.tracking_controller import steers as steers

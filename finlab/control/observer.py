@@ -64,6 +64,12 @@ class Estimate(NamedTuple):
     """The velocity (3,) in the world [m/s]."""
     current: Array
     """Horizontal velocity (2,) of the water in the world [m/s]."""
+    pitch_rate: float
+    """[rad/s]."""
+    pitch_drift: float
+    """Angular acceleration in pitch that there would be without any thrust [rad/s^2]."""
+    pitch_inertia: float
+    """Moment of inertia about y with that of the water that goes along [kg m^2]."""
     drift: Array
     """Acceleration (4,) along surge, sway, heave and yaw that there would be without any thrust [m/s^2,
     rad/s^2]."""
@@ -181,12 +187,13 @@ class MotionObserver:
         drift = np.array([jacobian[7] + by_surge, jacobian[8], jacobian[9] + by_heave, jacobian[12] + by_yaw])
         velocity, current = self._state[:3].copy(), self._state[CURRENT].copy()
         world = in_world(velocity, roll, pitch, yaw)
-        return Estimate(position, roll, pitch, yaw, velocity, r, world, current, drift)
+        pitching = float(m.rates[1]), jacobian[11], self._vehicle.inertia[4]
+        return Estimate(position, roll, pitch, yaw, velocity, r, world, current, *pitching, drift)
 
 
-def strongest_wrench(layout: Layout) -> Array:
-    """Sizes (6,) [N, N m] of what all actuators give along each axis if every one does its best for it;
-    rudders at `CRUISE`."""
+def strongest_wrench(layout: Layout, speed: float = CRUISE) -> Array:
+    """Sizes (6,) [N, N m] of what all actuators give along each axis if every one does its best for it, at
+    a speed [m/s] that counts for rudders."""
     effectiveness = plant_of(layout).effectiveness
     reach = np.zeros(6)
     # Not that of the largest command: a soft fin may push more with a smaller one.
@@ -195,7 +202,8 @@ def strongest_wrench(layout: Layout) -> Array:
         if isinstance(part, Fin):
             most = next(largest)
         elif isinstance(part, Rudder):
-            most = 0.5 * part.density * part.area * CRUISE**2 * part.slope * part.stall
+            angle = min(part.stall, max(map(abs, part.deflection)))
+            most = 0.5 * part.density * part.area * speed**2 * part.slope * angle
         else:
             most = max(map(abs, part.force))
         reach += most * np.linalg.norm(own[list(part.PUSHES)], axis=0)

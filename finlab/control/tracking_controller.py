@@ -14,13 +14,27 @@ from dataclasses import dataclass
 import numpy as np
 
 from finlab.arrays import Array
+from finlab.control.completion import Completion
 from finlab.control.feed_forward import wrenches_along
 from finlab.control.measurement import Measurement, Setpoint
-from finlab.control.observer import AXES, Estimate, MotionObserver, strongest_wrench
-from finlab.layout import Layout
+from finlab.control.observer import AXES, CRUISE, Estimate, MotionObserver, strongest_wrench
+from finlab.layout import Layout, Rudder
 from finlab.layout.angles import wrapped
 from finlab.vehicle.actuator_motion import following_delay
+from finlab.vehicle.body import complete_body, dynamics_of
 
+LARGEST = 0.7
+"""Share of what all actuators could do for an axis that is asked for at most."""
+WAY = 0.5
+"""Share of the speed that is wanted with which a robot that rudders steer goes on at least, whatever its
+heading."""
+FASTEST = 3.0
+"""Fastest that a robot is asked to go [m/s]."""
+STEEPEST, RISE_S = 0.5, 1.0
+"""Sine of the steepest climb that is asked of a robot that dives by its pitch, and the time constant with
+which its slip is known [s]."""
+MOST_BY_SPEED = 8.0
+"""Rudders are taken to give at most this much more than at `CRUISE`, as a share of that."""
 BEHIND_S = 0.2
 """Delay [s] of sensors and of a control period."""
 
@@ -36,9 +50,9 @@ class TrackingGains:
     path: float
     """Of the position."""
     max_wrench: tuple[float, ...]
-    """Largest wrench that is asked for (6,) [N, N m]; zero on axes that are not commanded."""
+    """Largest wrench that is asked for (6,) [N, N m]."""
     max_speed: float = 0.5
-    """Largest velocity over ground that is asked for [m/s]."""
+    """Largest velocity over ground that is asked for [m/s]; what the robot can hold, if that is more."""
     max_yaw_rate: float = 0.6
     """Largest yaw rate that is asked for [rad/s]."""
     slow: float = 0.08
@@ -51,26 +65,44 @@ def gains_for(layout: Layout) -> TrackingGains:
 
     The slowest actuator and what is behind it (the sensors, the period) are a delay in every loop. Of the
     inverse of that delay, velocities close at 1.08, the heading 1.4 times slower than they, and the path
-    round it 3.3 times slower than the heading. At most 70 % of what all actuators could do for an axis is
-    asked for.
-    """
+    round it 3.3 times slower than the heading."""
     pace = 1.0 / (following_delay(layout) + BEHIND_S)
-    most = 0.7 * strongest_wrench(layout)
+    most = LARGEST * strongest_wrench(layout)
+    body = dynamics_of(complete_body(layout))
+    linear, quadratic = body.linear[0], max(body.quadratic[0], 1e-9)
+    steady = (math.sqrt(linear**2 + 4.0 * quadratic * float(most[0])) - linear) / (2.0 * quadratic)
     return TrackingGains(
         velocity=1.08 * pace,
         heading=0.756 * pace,
         path=0.23 * pace,
-        max_wrench=(float(most[0]), 0.0, float(most[2]), 0.0, 0.0, float(most[5])),
+        max_wrench=tuple(most.tolist()),
+        max_speed=min(max(steady, TrackingGains.max_speed), FASTEST),
     )
 
 
+def axes_of(layout: Layout) -> tuple[str, ...]:
+    """The axes that are commanded: surge, heave and yaw, and sway where that costs nothing. Fins that push
+    sideways hardly push ahead: with them sway is headed against. A robot that lifts by rudders alone dives by
+    its pitch, and one that does not lift at all is steered in the plane."""
+    lifts = ("Fx", "Fz", "Tz")
+    rudders = [part.name for part in layout.actuators if isinstance(part, Rudder)]
+    driven = layout.without(rudders) if len(rudders) < layout.n else layout
+    candidates = [(driven, lifts), (layout, ("Fx", "Ty", "Tz"))] if rudders else [(layout, lifts)]
+    if not layout.n_fins:
+        candidates = [(driven, ("Fx", "Fy", "Fz", "Tz")), *candidates, (layout, ("Fx", "Fy", "Tz"))]
+    given = (axes for robot, axes in candidates if Completion(robot, (), axes).controllable)
+    return next(given, lifts)
+
+
+def steers(layout: Layout, failed: Sequence[str] = ()) -> bool:
+    """Whether what works of a robot can give the axes that are commanded independently, in small."""
+    return Completion(layout, failed, axes_of(layout)).controllable
+
+
 class TrackingController:
-    """Follows a trajectory in surge, heave and yaw."""
+    """Follows a trajectory in surge, heave and yaw, and in sway where no fins have to hold it."""
 
     name = "tracking"
-    axes: tuple[str, ...] = ("Fx", "Fz", "Tz")
-    # Sway that the observer knows of is headed against; roll and pitch would turn where the fins push.
-    free: tuple[str, ...] = ("Fy",)
     lead_s = 0.0
     period_s = 0.1
     needs_given = True
@@ -79,13 +111,18 @@ class TrackingController:
         """Takes the robot as its designer knows it, and gains; by default those of `gains_for`."""
         self.layout = layout
         self.gains = gains_for(layout) if gains is None else gains
+        self.axes = axes_of(layout)
+        self._sways = "Fy" in self.axes
+        self._dives = "Ty" in self.axes
+        self.free: tuple[str, ...] = () if self._sways else ("Fy", "Fz") if self._dives else ("Fy",)
+        self._of_rudders = LARGEST * (strongest_wrench(layout) - strongest_wrench(layout, 0.0))
         self._most = np.array(self.gains.max_wrench)
         self.reset()
 
     def reset(self) -> None:
         """Forget all that was seen."""
         self._observer = MotionObserver(self.layout, self.period_s)
-        self._passing = 0.0
+        self._passing, self._rising = 0.0, 0.0
         self._wrench = np.zeros(6)
         self.estimate: Estimate | None = None
 
@@ -101,11 +138,17 @@ class TrackingController:
         result = np.zeros(6)
         for axis, miss, ahead in (
             (0, u_wanted - float(now.velocity[0]), cy * ax + sy * ay),
+            (1, cy * float(wanted[1]) - sy * float(wanted[0]) - float(now.velocity[1]), cy * ay - sy * ax),
             (2, float(wanted[2] - now.world_velocity[2]), az),
             (3, yaw_rate - now.yaw_rate, 0.0),
         ):
-            result[AXES[axis]] = inertia[axis] * (ahead + g.velocity * miss - drift[axis])
-        self._wrench = result.clip(-self._most, self._most)
+            if "FxFyFzTz"[2 * axis : 2 * axis + 2] in self.axes:
+                result[AXES[axis]] = inertia[axis] * (ahead + g.velocity * miss - drift[axis])
+        if self._dives:
+            result[4] = now.pitch_inertia * (g.velocity * self._pitch_rate(now, wanted) - now.pitch_drift)
+        slow = max(1.0 - (float(now.velocity[0]) / CRUISE) ** 2, -MOST_BY_SPEED)
+        most = self._most - slow * self._of_rudders
+        self._wrench = result.clip(-most, most)
         return self._wrench
 
     def ahead(self, setpoints: Sequence[Setpoint]) -> Array:
@@ -124,11 +167,21 @@ class TrackingController:
         speed = math.sqrt(wanted @ wanted)
         return wanted * min(1.0, self.gains.max_speed / max(speed, 1e-9))
 
+    def _pitch_rate(self, now: Estimate, wanted: Array) -> float:
+        """How much faster [rad/s] to turn in pitch, nose down, for a vertical speed with the slip that there
+        is, which is taken from the last `RISE_S`."""
+        g, speed = self.gains, max(float(now.velocity[0]), self.gains.slow)
+        share = self.period_s / RISE_S
+        self._rising += share * (math.atan(float(now.velocity[2]) / speed) - self._rising)
+        climb = math.asin(min(max(float(wanted[2]) / speed, -STEEPEST), STEEPEST))
+        rate = g.heading * (self._rising - climb - now.pitch)
+        return min(max(rate, -g.max_yaw_rate), g.max_yaw_rate) - now.pitch_rate
+
     def _surge_and_turn(self, now: Estimate, wanted: Array, setpoint: Setpoint) -> tuple[float, float]:
         """Surge speed over ground [m/s] and yaw rate [rad/s] that bring the robot to a velocity (3,)."""
         g = self.gains
         cosine, sine = math.cos(now.yaw), math.sin(now.yaw)
-        c, d = now.current.tolist()
+        c, d = (0.0, 0.0) if self._sways else now.current.tolist()
         x, y = float(wanted[0]) - c, float(wanted[1]) - d  # through the water
         speed = math.hypot(x, y)
         vx, vy = float(setpoint.velocity[0]) - c, float(setpoint.velocity[1]) - d
@@ -139,8 +192,11 @@ class TrackingController:
         # Slip that comes from turning otherwise than the path does: to head against it would ring.
         self._passing = self._observer.swayed(self._passing, forward, now.yaw_rate - turning)
         slip = math.asin(min(max((sideways - self._passing) / max(speed, g.slow), -0.7), 0.7))
+        slip = 0.0 if self._sways else slip
         surge = cosine * float(wanted[0]) + sine * float(wanted[1])
-        if speed >= g.slow:
+        if self._dives:  # rudders need way
+            surge = max(surge, WAY * math.hypot(float(wanted[0]), float(wanted[1])))
+        elif speed >= g.slow:
             surge = max(surge, cosine * c + sine * d)
         # At rest it turns to where the path goes on, or stays as it is; a bit off its place it rather backs
         # than turns about.

@@ -24,7 +24,7 @@ from finlab.control import (
 )
 from finlab.control.measurement import NO_WRENCH
 from finlab.errors import FinlabError
-from finlab.layout import Layout
+from finlab.layout import Layout, Rudder
 from finlab.layout.damage import Damage, Kind
 from finlab.physics import plant_of
 from finlab.sim.actuator_force import ActuatorForce
@@ -82,7 +82,7 @@ class ClosedLoop:
             controller: by default the tracking controller of the layout.
             plant: what the fins really do; see `PLANTS`. Other actuators act by their own law.
             policy: what the allocator does with a wrench that is out of reach; by default its own
-                `policy_under_way`.
+                `policy_under_way`, of robots with rudders `closest`.
             sensors: rates and noise; the defaults of `SensorSettings`.
             water: how it moves, such as `SteadyCurrent` or `Waves`; it is still by default.
             failures: what becomes of actuators, and when; (name, time [s]) is one that is lost.
@@ -111,7 +111,10 @@ class ClosedLoop:
         self.controller = controller = TrackingController(layout) if controller is None else controller
         self._foresighted = controller if isinstance(controller, Foresighted) else None
         self.plant = plant
-        self.policy = as_policy(allocator.policy_under_way if policy is None else policy)
+        # Rudders that the flow leaves weak must not stop the propeller.
+        steered = any(isinstance(part, Rudder) for part in layout.actuators)
+        under_way = "closest" if steered else allocator.policy_under_way
+        self.policy = as_policy(under_way if policy is None else policy)
         self.seed = seed
         truth = layout if truth is None else checked_truth(layout, truth)
         self.vehicle = Vehicle(complete_body(truth))

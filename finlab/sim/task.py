@@ -23,6 +23,7 @@ RESTING = 0.005
 SHORTEST_S = 1.0
 """Least duration [s]; ten control periods."""
 MAX_BYTES = 20_000_000
+MAX_SCALE = 1000.0
 COLUMNS = ("t", "x", "y", "z")
 """Columns of a trajectory file: time [s], position in the world [m]."""
 
@@ -168,16 +169,23 @@ SHIPPED: dict[str, Callable[..., Trajectory]] = {
 """Trajectories by name; each takes its duration [s]."""
 
 
-def make_trajectory(source: str | Path, duration_s: float | None = None) -> Trajectory:
+def make_trajectory(source: str | Path, duration_s: float | None = None, scale: float = 1.0) -> Trajectory:
     """A shipped trajectory by name, or one from a file.
 
     Args:
         source: circle, lissajous, square, dive, station, or a CSV file with the columns t, x, y, z.
         duration_s: time for a shipped one [s]; a file brings its own.
+        scale: how many times larger the path is to be, about its start, in the same time.
 
     Raises:
         DataError: unknown name, unreadable file, or a duration that does not fit.
     """
+    if scale != 1.0:
+        if not 0.0 < scale <= MAX_SCALE:
+            raise DataError(f"scale: expected a number above 0 and up to {MAX_SCALE:g}, got {scale}")
+        path = make_trajectory(source, duration_s)
+        larger = path.samples[0] + scale * (path.samples - path.samples[0])
+        return Trajectory(path.name, path.time, larger)
     name = str(source)
     if name in SHIPPED:
         if duration_s is None:

@@ -1,5 +1,7 @@
 """How the actuators of a robot follow their commands: for simulation, observer and monitor."""
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -81,6 +83,7 @@ class ActuatorMotion:
         return result
 
 
+@lru_cache(maxsize=256)
 def following_delay(layout: Layout) -> float:
     """How late the slowest actuator of a robot is [s]: 2 / p of a fin's double pole p; of others the time
     constant, and the time in which it comes through a fifth of its range at its rate."""

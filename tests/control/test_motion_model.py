@@ -20,7 +20,7 @@ def test_the_model_goes_where_the_vehicle_goes_and_its_slopes_are_its_own(layout
     command = np.array([[0.5, 1.0, 0.1], [0.5, 1.0, 3.0], [0.5, 1.05, 3.1], [0.5, 1.0, 0.0]])
     free = np.full(4, np.nan)
     for _ in range(50):
-        wrench, _ = model._wrenches(command, free, free)
+        wrench, _ = model._wrenches(command, free, free, np.zeros(6))
         for _ in range(5):
             body = vehicle.step(body, wrench.sum(axis=0).tolist(), 0.02)
         w, x, y, q = body[3:7]
@@ -55,7 +55,7 @@ def test_a_fin_that_is_told_to_turn_about_may_go_either_way(layout_a: Layout) ->
     step = model.step(z, 0.0, about, free, free)
     assert model.unsure.tolist() == [False, True, False, False]
     assert step.noise is not None
-    wrench, _ = model._wrenches(about, free, free)
+    wrench, _ = model._wrenches(about, free, free, z[:6])
     np.testing.assert_array_less(
         np.abs(0.1 * wrench[1] / model.inertia), np.sqrt(np.diag(step.noise)) + 1e-12
     )

@@ -14,6 +14,7 @@ from finlab.control import (
     TrackingController,
     gains_for,
 )
+from finlab.control.tracking_controller import BEHIND_S
 from finlab.layout import Layout, Servo
 from finlab.sim import ClosedLoop, make_trajectory
 from finlab.sim.perturbed import perturbed
@@ -37,7 +38,8 @@ def test_all_gains_follow_from_the_slowest_fin(robot: Layout) -> None:
     )
     fast, halved = gains_for(robot), gains_for(slow)
     for name in ("velocity", "heading", "path"):
-        assert getattr(halved, name) == pytest.approx(0.5 * getattr(fast, name))
+        late = (2.0 / 1.75 + BEHIND_S) / (2.0 / 3.5 + BEHIND_S)
+        assert getattr(halved, name) == pytest.approx(getattr(fast, name) / late)
     assert halved.max_wrench == fast.max_wrench
 
 

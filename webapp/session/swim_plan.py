@@ -6,7 +6,6 @@ from itertools import combinations
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-from finlab.control import Completion, TrackingController
 from finlab.errors import FinlabError
 from finlab.evaluation.experiments.hard_days import HardDay
 from finlab.layout import Layout
@@ -111,7 +110,7 @@ def _affected(layout: Layout, failed: tuple[str, ...], day: HardDay) -> tuple[st
     ways = list(combinations(working, count))
 
     def steers(lost: tuple[str, ...]) -> bool:
-        return Completion(layout, (*failed, *lost), TrackingController.axes).controllable
+        return steers(layout, (*failed, *lost))
 
     return next((way for way in ways if not count or steers(way)), ways[0])
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations, product
 
-from finlab.control import Completion, TrackingController
+from finlab.control import steers
 from finlab.evaluation.experiment import Experiment
 from finlab.evaluation.experiments.closed_loop import (
     ABOUT_ERRORS,
@@ -51,9 +51,7 @@ def all_faults(layout: Layout, half_way_s: float) -> list[Fault]:
     lost = [((), 0.0), *(((name,), 0.0) for name in names)]
     lost += [(pair, 0.0) for pair in combinations(names, 2)] + [((name,), half_way_s) for name in names]
     return [
-        Fault(tuple(fins), time, Completion(layout, fins, TrackingController.axes).controllable)
-        for fins, time in lost
-        if len(fins) < len(names)
+        Fault(tuple(fins), time, steers(layout, tuple(fins))) for fins, time in lost if len(fins) < len(names)
     ]
 
 

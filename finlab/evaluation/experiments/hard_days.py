@@ -10,7 +10,7 @@ from itertools import combinations, islice
 from typing import Any, NamedTuple
 
 from finlab.assets import PAPER_LAYOUTS
-from finlab.control import Completion, FaultMonitor, TrackingController
+from finlab.control import FaultMonitor, steers
 from finlab.evaluation.method_specs import MethodSpec
 from finlab.evaluation.splits import make_split
 from finlab.layout import Layout, load_layout
@@ -91,10 +91,7 @@ class HardDay:
 
     def obstacle(self, case: "Case") -> str | None:
         """Why a swim would be hopeless; None where it is not."""
-        if (
-            not self.lost
-            or Completion(load_layout(case.layout), case.fins, TrackingController.axes).controllable
-        ):
+        if not self.lost or steers(load_layout(case.layout), case.fins):
             return None
         return (
             f"{case.layout} without {' and '.join(case.fins)}: the fins that are left cannot give surge, "

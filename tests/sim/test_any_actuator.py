@@ -1,0 +1,73 @@
+"""Robots of thrusters, azimuths, rudders and fins swim, and lose some of them."""
+
+import numpy as np
+import pytest
+
+from finlab import Allocator, load_layout
+from finlab.control import FaultMonitor
+from finlab.errors import FinlabError
+from finlab.layout import Layout
+from finlab.sim import NO_NOISE, ClosedLoop, FinFault, RunLog, make_trajectory
+
+
+@pytest.fixture(scope="module")
+def heavy() -> Layout:
+    return load_layout("bluerov2_heavy")
+
+
+def error(log: RunLog) -> float:
+    return float(np.sqrt(np.square(log.position - log.reference).sum(axis=1).mean()))
+
+
+@pytest.mark.parametrize("name", ["bluerov2", "bluerov2_heavy", "turtle_hybrid", "mixed"])
+def test_robots_of_any_actuators_follow_a_path(name: str) -> None:
+    robot = load_layout(name)
+    log = ClosedLoop(robot, Allocator(robot), make_trajectory("circle"), seed=1).run()
+    assert error(log) < 0.06
+    assert log.command.shape[1:] == log.fin_motion.shape[1:] == (robot.n, 3)
+
+
+def test_thrusters_give_what_is_allocated_a_moment_later(heavy: Layout) -> None:
+    loop = ClosedLoop(heavy, Allocator(heavy), make_trajectory("circle"), sensors=NO_NOISE)
+    log = loop.run()
+    late = log.allocated[150:-2] - log.delivered[151:-1]
+    assert np.abs(late).max() < 0.1 * np.abs(log.allocated[150:]).max()
+
+
+@pytest.mark.parametrize("kind", ["lost", "torn", "stuck"])
+@pytest.mark.parametrize("announced", [True, False])
+def test_a_thruster_breaks_and_the_robot_keeps_its_path(heavy: Layout, kind: str, announced: bool) -> None:
+    fault = FinFault(heavy.names[1], 15.0, kind)  # type: ignore[arg-type]
+    loop = ClosedLoop(
+        heavy, Allocator(heavy), make_trajectory("circle"), failures=[fault], announced=announced, seed=2
+    )
+    assert error(loop.run()) < 0.08
+
+
+def test_a_torn_thruster_that_is_known_is_asked_for_more(heavy: Layout) -> None:
+    loop = ClosedLoop(
+        heavy,
+        Allocator(heavy),
+        make_trajectory("circle"),
+        failures=[FinFault(heavy.names[0], 0.0, "torn", 0.4)],
+    )
+    log = loop.run()
+    late = log.asked[150:-2] - log.delivered[151:-1]
+    assert np.abs(late[:, [0, 2, 5]]).mean() < 0.05 * np.abs(log.asked[150:]).max()
+
+
+def test_a_rudder_that_is_torn_or_stuck_is_told_to_the_allocator() -> None:
+    torpedo = load_layout("torpedo")
+    path = make_trajectory("station")
+    loop = ClosedLoop(torpedo, Allocator(torpedo), path, monitor=FaultMonitor(torpedo), announced=True)
+    loop.fail("rudder_top", "torn", 0.5)
+    health = loop.damage.health
+    assert health is not None and dict(health.thrust) == {"rudder_top": 0.5}
+    assert health.applied_to(torpedo).actuators[1].area == pytest.approx(0.5 * torpedo.actuators[1].area)
+    loop.fail("elevator_left", "stuck")
+    assert loop.damage.failed == ("elevator_left",)
+
+
+def test_plants_of_fins_are_refused_where_there_are_none(heavy: Layout) -> None:
+    with pytest.raises(FinlabError, match="plant 'wake' is about fins"):
+        ClosedLoop(heavy, Allocator(heavy), make_trajectory("circle"), plant="wake")
