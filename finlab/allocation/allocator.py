@@ -310,8 +310,8 @@ class Allocator:
     ) -> BatchAllocation:
         """Commands for many targets (N, 6); arguments and errors as in `allocate`.
 
-        Beside the targets it keeps the commands and bounds, 32 bytes or so for each number of a command; what
-        else there is to tell is computed when it is asked for.
+        The answer keeps the targets as they are, not a copy, and the commands; what else there is to tell is
+        computed when it is asked for.
         """
         targets, policy = check_wrenches(wrenches, single=False), as_policy(policy)
         check_seed(seed)

@@ -65,10 +65,10 @@ def usable_fins(layout: Layout, failed: Sequence[str], health: Health | None = N
 
 def check_wrenches(wrench: ArrayLike, *, single: bool, name: str = "wrench") -> Array:
     """One wrench (6,) or many (N, 6) as finite float64, or a `CommandError` that says what is wrong with
-    what is called `name`."""
+    what is called `name`. Arrays of many are not copied."""
     expected = "six numbers [Fx, Fy, Fz, Tx, Ty, Tz]" if single else "an array of shape (N, 6)"
     try:
-        array = np.array(wrench)
+        array = np.array(wrench) if single else np.asarray(wrench)
         if array.dtype.kind == "c":
             raise TypeError("complex")
         array = array.astype(np.float64, copy=False)

@@ -138,7 +138,7 @@ def solve(
         state = _state(robot, target, prices, sets, terms, value or count > 1)
         if count == 1:
             return _one(robot, state, sets, terms, float(ridge[0]), float(most[0]), value)
-        return _many(robot, state, sets, terms, ridge, most, value)
+        return _many(robot, state, sets, terms, ridge, most)
 
 
 def dual_value(robot: DualRobot, target: Array, sets: Sets, prices: Array) -> Array:
@@ -168,8 +168,8 @@ def _state(
 
 
 def _step(robot: DualRobot, state: _State, terms: Terms, ridge: Array) -> tuple[Array, Array]:
-    """Steps (r, N) of the prices, and what the ridge leaves of the residual (N,), to first order. A small
-    ridge is taken back but for its square."""
+    """Steps (r, N) of the prices, and what the ridge leaves of the residual (N,), to first order. For a
+    single target, a small ridge is taken back but for its square."""
     hessian = state.derivative.T @ robot.outer.T
     trace = np.maximum(robot.trace @ state.derivative, robot.least_trace)
     if terms.penalty is not None:
@@ -184,7 +184,7 @@ def _step(robot: DualRobot, state: _State, terms: Terms, ridge: Array) -> tuple[
     if not np.isfinite(step).all():  # a matrix without inverse: along the gradient
         step = np.where(np.isfinite(step), step, state.residual / trace)
         return step, np.inf * trace
-    if (ridge > NEARLY).any():
+    if len(ridge) > 1 or ridge[0] > NEARLY:
         return step, added * np.sqrt(np.einsum("rn,rn->n", step, step))
     more: Array = solve_systems(hessian, (added * step).T[..., None])[..., 0].T
     return step + more, added * np.sqrt(np.einsum("rn,rn->n", more, more))
@@ -257,9 +257,7 @@ def _valued(robot: DualRobot, state: _State, sets: Sets, terms: Terms) -> _State
     return _state(robot, state.target, state.prices, sets, terms)
 
 
-def _many(
-    robot: DualRobot, state: _State, sets: Sets, terms: Terms, ridge: Array, most: Array, value: bool
-) -> Prices:
+def _many(robot: DualRobot, state: _State, sets: Sets, terms: Terms, ridge: Array, most: Array) -> Prices:
     """`solve` for many targets, those that are done left out."""
     count = state.target.shape[1]
     place = np.arange(count)
@@ -271,39 +269,25 @@ def _many(
         np.zeros(count, bool),
         np.zeros(count, np.intp),
     )
-
-    def settle(done: NDArray[np.bool_], prices: Array, force: Array, steps: int) -> NDArray[np.intp]:
-        """Keep what was found of some columns; the others."""
-        at = place[done]
-        found.prices[:, at], found.force[:, at] = prices[:, done], force[:, done]
-        found.value[at], found.steps[at] = state.value[done], steps
-        return np.flatnonzero(~done)
-
     for steps in range(MOST_STEPS + 1):
         solved = state.size <= TOLERANCE
         beyond = ~solved & (state.value > most)
         done = solved | beyond | (steps == MOST_STEPS)
         if done.any():
-            found.solved[place[solved]], found.beyond[place[beyond]] = True, True
-            left = settle(done, state.prices, state.force, steps)
+            at = place[done]
+            found.prices[:, at], found.force[:, at] = state.prices[:, done], state.force[:, done]
+            found.value[at], found.solved[at], found.beyond[at] = (
+                state.value[done],
+                solved[done],
+                beyond[done],
+            )
+            found.steps[at] = steps
+            left = np.flatnonzero(~done)
             if not len(left):
                 break
             place, ridge, most, sets = place[left], ridge[left], most[left], sets.take(left)
             state = _columns(state, left)
-        step, undone = _step(robot, state, terms, ridge)
-        if terms.reward is None and (undone <= TOLERANCE).any():
-            force, fits = _last(robot, state, step, undone, sets)
-            if fits.any():
-                at, moved = place[fits], state.prices + step
-                left = settle(fits, moved, force, steps + 1)
-                found.solved[at], found.value[at] = True, np.nan
-                if value:
-                    there, part = moved[:, fits], sets.take(np.flatnonzero(fits))
-                    found.value[at] = _state(robot, state.target[:, fits], there, part, terms).value
-                if not len(left):
-                    break
-                place, ridge, most, sets = place[left], ridge[left], most[left], sets.take(left)
-                state, step = _columns(state, left), step[:, left]
+        step, _ = _step(robot, state, terms, ridge)
         trial = _state(robot, state.target, state.prices + step, sets, terms)
         slope = np.maximum(np.einsum("rn,rn->n", step, state.residual), 1e-300)
         change = np.einsum("rn,rn->n", step, trial.residual) / slope
