@@ -157,6 +157,12 @@ class Line:
     high: float = np.inf
     """Largest force [N], where that is less than the tables give."""
 
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Least and largest force [N]."""
+        low = -self.reverse.largest if self.reverse else float(self.forward.force[0])
+        return max(self.low, low), min(self.high, self.forward.largest)
+
 
 @dataclass(frozen=True, eq=False)
 class Plane:

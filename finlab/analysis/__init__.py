@@ -1,6 +1,6 @@
 """What a layout can do, and how to improve it: authority, attainable sets, power, score cards, optimization.
 
-It works from the fins' own laws with numpy and scipy.
+It works from the actuators' own laws with numpy and scipy.
 """
 
 from finlab.analysis.authority import AXES as AXES

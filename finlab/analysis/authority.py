@@ -1,13 +1,14 @@
-"""Which axes the fins hold, how evenly, and what the loss of each single fin costs."""
+"""Which axes the actuators hold, how evenly, and what the loss of each single one costs."""
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from finlab.arrays import Array
 from finlab.forces.extent import RANK_TOLERANCE, singular_values, strongest, weakest
-from finlab.forces.fin_sets import SCALE, fin_sets
+from finlab.forces.force_sets import SCALE, force_sets
 from finlab.forces.reach import max_wrench_along_exactly
 from finlab.layout import Layout
 
@@ -19,13 +20,13 @@ NOTHING = 1e-4
 
 @dataclass(frozen=True)
 class HeldAxes:
-    """Axes that fins hold, before any limit. Torques are scaled by the lever 0.2 m."""
+    """Axes that actuators hold, before any limit. Torques are scaled by the lever 0.2 m."""
 
     rank: int
     condition: float | None
     """Largest over smallest singular value; None below rank 6."""
     without_authority: tuple[str, ...]
-    """Axes that no fin pushes at all."""
+    """Axes that no actuator pushes at all."""
     coupled: tuple[str, ...]
     """Axes that are pushed, but never without pushing others too."""
 
@@ -37,14 +38,16 @@ class HeldAxes:
 
 @dataclass(frozen=True)
 class Authority(HeldAxes):
-    """What a set of fins holds, within their limits too."""
+    """What a set of actuators holds, within their limits too."""
 
     singular_values: tuple[float, ...]
-    """Of the matrix whose columns are the fins' scaled wrenches at full thrust (6,) [N], falling."""
+    """Of the matrix whose columns are the actuators' scaled wrenches at full thrust (6,) [N], falling."""
     largest: tuple[float, ...]
     """Largest wrench along each axis with the other five at zero (6,) [N, N m]."""
     most_negative: tuple[float, ...]
     """The same along the negative axes, as a size (6,) [N, N m]."""
+    beside_others: tuple[float, ...]
+    """Largest wrench along each axis whatever comes beside it (6,) [N, N m], the smaller of both ways."""
     weakest: float
     """Scaled wrench [N] that is within reach in every direction; 0 below rank 6."""
     weakest_direction: tuple[float, ...]
@@ -64,9 +67,9 @@ class Authority(HeldAxes):
 
 @dataclass(frozen=True)
 class Loss:
-    """What the loss of one fin costs."""
+    """What the loss of one actuator costs."""
 
-    fin: str
+    actuator: str
     rank: int
     reachable: tuple[str, ...]
     """Axes still reachable alone."""
@@ -79,51 +82,63 @@ class Loss:
     """Scaled wrench [N] that is within reach in every direction afterwards."""
 
 
-def authority(layout: Layout, failed: Collection[str] = ()) -> Authority:
-    """Returns what the working fins hold.
-
-    Raises:
-        LayoutError: there is no fin of a name in `failed`.
-    """
-    return _authorities(layout, [failed])[0]
+def authority(layout: Layout, failed: Collection[str] = (), flow: ArrayLike | None = None) -> Authority:
+    """Returns what the working actuators hold; arguments and errors as for `losses`."""
+    return _authorities(layout, [failed], flow)[0]
 
 
-def losses(layout: Layout, failed: Collection[str] = (), before: Authority | None = None) -> tuple[Loss, ...]:
-    """Returns what the loss of each working fin, on top of `failed`, would cost; none when only one is left.
+def losses(
+    layout: Layout,
+    failed: Collection[str] = (),
+    before: Authority | None = None,
+    flow: ArrayLike | None = None,
+) -> tuple[Loss, ...]:
+    """Returns what the loss of each working actuator, on top of `failed`, would cost; none when only one is
+    left.
 
     Args:
         layout: the robot.
-        failed: fins that are lost already.
-        before: what the working fins hold, if that is known.
+        failed: actuators that are lost already.
+        before: what the working actuators hold, if that is known.
+        flow: velocity (6,) of the body relative to the water [m/s, rad/s], body frame; None at rest.
 
     Raises:
-        LayoutError: there is no fin of a name in `failed`.
+        LayoutError: there is no actuator of a name in `failed`.
     """
-    held = authority(layout, failed) if before is None else before
+    held = authority(layout, failed, flow) if before is None else before
     working = [name for name in layout.names if name not in failed]
     if len(working) < 2:
         return ()
-    left = _authorities(layout, [(*failed, name) for name in working])
+    left = _authorities(layout, [(*failed, name) for name in working], flow)
     return tuple(_loss(held, name, after) for name, after in zip(working, left, strict=True))
 
 
-def _authorities(layout: Layout, failures: Sequence[Collection[str]]) -> list[Authority]:
+def _authorities(
+    layout: Layout, failures: Sequence[Collection[str]], flow: ArrayLike | None
+) -> list[Authority]:
     """What is held after each of several failures; one call for all is quicker than many."""
-    sets = fin_sets(layout).tile(len(failures))
+    sets = force_sets(layout, flow=flow).tile(len(failures))
     for row, failed in enumerate(failures):
-        sets.radius[row, list(layout.indices(tuple(failed)))] = 0.0
+        sets.lose(row, list(layout.indices(tuple(failed))))
     values, vectors = singular_values(sets)
+    held = [held_axes(*pair) for pair in zip(values, vectors, strict=True)]
     axes = np.concatenate([np.eye(6), -np.eye(6)])
     size, gap = max_wrench_along_exactly(sets, axes)
+    if sets.corners is not None:
+        # The hull of a rudder's lift and drag has drag without lift, which pushes alone what nothing does.
+        alone = np.array([[axis in own.alone for axis in AXES] for own in held])
+        size = np.where(np.tile(alone, 2), size, 0.0)
     size = np.where(size > NOTHING, size, 0.0)
+    free = sets.repeat(12).farthest(np.tile(axes, (len(failures), 1)))[0].reshape(-1, 2, 6).min(axis=1)
     least, most = weakest(sets), strongest(sets)
     isotropy = np.divide(least.size, most.size, out=np.zeros_like(least.size), where=most.size > 0.0)
     return [
         Authority(
-            **vars(held_axes(values[k], vectors[k])),
+            **vars(held[k]),
             singular_values=_floats(values[k]),
             largest=_floats(size[k, :6] * SCALE),
             most_negative=_floats(size[k, 6:] * SCALE),
+            beside_others=_floats(np.maximum(free[k], 0.0) * SCALE),
             weakest=float(least.size[k]),
             weakest_direction=_floats(least.direction[k]),
             isotropy=float(isotropy[k]),
@@ -153,7 +168,7 @@ def _loss(before: Authority, name: str, after: Authority) -> Loss:
     left = np.array([after.largest, after.most_negative])
     share = np.where(had > 0.0, left / np.where(had > 0.0, had, 1.0), np.inf).min(axis=0)
     return Loss(
-        fin=name,
+        actuator=name,
         rank=after.rank,
         reachable=after.reachable,
         lost=tuple(axis for axis in before.reachable if axis not in after.reachable),

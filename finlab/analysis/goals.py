@@ -1,27 +1,28 @@
 """What a layout may be improved towards, measured for many variants of one layout at once.
 
-A search asks for quick measures, which are within about a percent of the fine ones on the score card. Fins
-whose arc is wider than half a turn count with the convex hull of what they can push.
+A search asks for quick measures, which are within about a percent of the fine ones on the score card.
+Actuators whose arc is wider than half a turn count with the convex hull of what they can push.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from finlab.analysis.least_power import MovedFins
+from finlab.analysis.authority import AXES, authority
+from finlab.analysis.least_power import MovedActuators, least_power
 from finlab.arrays import Array
 from finlab.errors import LayoutError
 from finlab.forces.extent import weakest
-from finlab.forces.fin_sets import SCALE, FinSets
+from finlab.forces.force_sets import SCALE, ForceSets, force_sets
 from finlab.forces.reach import COARSE, FINE, max_wrench_along
 from finlab.layout import Layout
 
 GoalName = Literal["weakest_direction", "mission_power", "worst_single_failure"]
 GOALS: tuple[GoalName, ...] = get_args(GoalName)
-Goal = Callable[[FinSets], Array]
-"""What variants (P) are worth (P,): more is better."""
+Goal = Callable[[ForceSets, Callable[[int], Layout]], Array]
+"""What variants (P) are worth (P,): more is better; of their sets and, one by one, their layouts."""
 
 MISSION = (
     (2.0, 0.0, 0.0, 0.0, 0.0, 0.0),
@@ -32,62 +33,109 @@ MISSION = (
 """Wrenches [N, N m] of a mission when none are given: cruise, turn left, turn right, dive."""
 UNREACHED = 100.0
 """What a wrench out of reach costs [W], more than allocations do."""
-LEAST_FINS = 4
-"""Fewest fins of which one may fail while six axes remain."""
 QUICK_SEARCH: dict[str, Any] = {"n_random": 8, "n_walks": 4, "fine": False}
 """How to find a weakest direction when it has to be quick."""
 
 
-def make_goal(name: str, layout: Layout, mission: ArrayLike = MISSION, *, fine: bool = True) -> Goal:
+def make_goal(
+    name: str,
+    layout: Layout,
+    mission: ArrayLike = MISSION,
+    *,
+    fine: bool = True,
+    axes: Sequence[str] = AXES,
+    flow: Array | None = None,
+) -> Goal:
     """Returns the measure called `name` for variants of a layout.
 
     Args:
         name: `weakest_direction`: the scaled wrench that is within reach in every direction [N].
-            `worst_single_failure`: the same after the loss of the fin that leaves least of it [N].
+            `worst_single_failure`: the same after the loss of the actuator that leaves least of it [N].
             `mission_power`: minus the mean least power of the mission's wrenches [W].
-        layout: its limits and fin models hold for all variants.
+        layout: its limits and models hold for all variants.
         mission: wrenches (N, 6) [N, N m].
         fine: as the score card has it; otherwise quick.
+        axes: those of `AXES` whose directions count; on the others, anything may come.
+        flow: velocity (6,) of the body relative to the water; None at rest.
 
     Raises:
-        LayoutError: unknown goal, too few fins for a failure, or a mission that is not wrenches.
+        LayoutError: unknown goal or axis, too few actuators for a failure, or a mission that is not wrenches.
     """
     search: dict[str, Any] = {} if fine else QUICK_SEARCH
+    places = _places(axes)
 
-    def of_weakest(sets: FinSets) -> Array:
+    def of_weakest(sets: ForceSets, _: object = None) -> Array:
+        if len(places) < len(AXES):
+            sets = sets._replace(effectiveness=np.ascontiguousarray(sets.effectiveness[..., places]))
         return weakest(sets, **search).size
 
     if name == "weakest_direction":
         return of_weakest
     if name == "worst_single_failure":
-        if layout.n_fins < LEAST_FINS:
+        count = np.where(force_sets(layout, flow=flow).half[0] > 0.0, 2, 1)
+        if count.sum() - count.max() < len(places):
             raise LayoutError(
-                f"the goal {name} needs {LEAST_FINS} fins or more, layout {layout.name} has {layout.n_fins}; "
-                "with fewer, none can fail without losing an axis"
+                f"the goal {name} needs {len(places)} directions after a loss, and layout {layout.name} has "
+                f"{layout.counted}, which push in {count.sum()}; none can fail without losing an axis"
             )
         return _after_worst_failure(of_weakest)
     if name == "mission_power":
-        return _mission_power(layout, _wrenches(mission), fine)
+        return _mission_power(layout, _wrenches(mission), fine, flow)
     raise LayoutError(f"goal: expected one of {', '.join(GOALS)}, got {name!r:.60}")
 
 
-def _after_worst_failure(of_rest: Goal) -> Goal:
-    def goal(sets: FinSets) -> Array:
+def axes_to_raise(layout: Layout, flow: Array | None = None) -> tuple[str, ...]:
+    """Returns the axes that count when none are named: all six, or those that the layout pushes alone now
+    where it has too few actuators to push both ways along six, wherever they go.
+
+    Raises:
+        LayoutError: there are none.
+    """
+    sets = force_sets(layout, flow=flow)
+    half, line = sets.half[0], sets.half[0] == 0.0
+    back = line & (sets.cornered[0] if sets.back is None else sets.cornered[0] | (sets.back[0] > 0.0))
+    both_ways = int(back.sum() + (half > 0.5 * np.pi - 1e-9).sum() + (half > 0.5 * np.pi + 1e-9).sum())
+    # What pushes one way only takes one more of its kind than there are axes left.
+    if both_ways >= len(AXES) or int(2 * (~line).sum() + line.sum()) > len(AXES):
+        return AXES
+    held = authority(layout, flow=flow).reachable
+    if not held:
+        raise LayoutError(
+            f"layout {layout.name} pushes along no axis alone, so there is nothing to raise; name axes, or a "
+            "flow where actuators need one"
+        )
+    return held
+
+
+def _places(axes: Sequence[str]) -> list[int]:
+    """Places of axes, each once, in order."""
+    wrong = [axis for axis in axes if axis not in AXES]
+    if wrong or not axes:
+        raise LayoutError(f"axes: expected some of {', '.join(AXES)}, got {', '.join(wrong) or 'none'}")
+    return [place for place, axis in enumerate(AXES) if axis in axes]
+
+
+def _after_worst_failure(of_rest: Callable[[ForceSets], Array]) -> Goal:
+    def goal(sets: ForceSets, _: object = None) -> Array:
         robots, n = sets.radius.shape
         rows = sets.repeat(n)
-        rows.radius[np.arange(robots * n), np.tile(np.arange(n), robots)] = 0.0
+        rows.lose(np.arange(robots * n), np.tile(np.arange(n), robots))
         least: Array = of_rest(rows).reshape(robots, n).min(axis=1)
         return least
 
     return goal
 
 
-def _mission_power(layout: Layout, mission: Array, fine: bool) -> Goal:
+def _mission_power(layout: Layout, mission: Array, fine: bool, flow: Array | None) -> Goal:
     """Mean least power; a wrench out of reach costs by what is missing."""
-    fins, tolerance = MovedFins(layout), FINE if fine else COARSE
+    actuators, tolerance = MovedActuators(layout), FINE if fine else COARSE
 
-    def goal(sets: FinSets) -> Array:
-        cost = fins.least_power(sets, mission)
+    def goal(sets: ForceSets, layout_of: Callable[[int], Layout]) -> Array:
+        if flow is None:
+            cost = actuators.least_power(sets, mission)
+        else:
+            moved = [layout_of(row) for row in range(len(sets.radius))]
+            cost = np.stack([least_power(each, mission, flow=flow) for each in moved])
         robot, wrench = np.nonzero(np.isnan(cost))
         if len(robot):
             missing = _missing(sets.take(robot), mission[wrench] / SCALE, tolerance)
@@ -97,7 +145,7 @@ def _mission_power(layout: Layout, mission: Array, fine: bool) -> Goal:
     return goal
 
 
-def _missing(sets: FinSets, target: Array, tolerance: float) -> Array:
+def _missing(sets: ForceSets, target: Array, tolerance: float) -> Array:
     """Share (R,) of scaled wrenches (R, 6) that is out of reach."""
     size = np.linalg.norm(target, axis=-1)
     asked = size > 0.0

@@ -1,26 +1,35 @@
-"""Which fins may move, how far, and which fin is the mirror image of which."""
+"""Which actuators may move, how far, and which one is the mirror image of which.
+
+An actuator goes along x, y and z, turns about the vertical, and tilts about the horizontal line across its
+main axis: shaft, axis of a thruster, or turn_axis.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from finlab.arrays import Array
 from finlab.errors import LayoutError
-from finlab.forces.fin_sets import SCALE, FinSets, fin_sets
+from finlab.forces.force_sets import ForceSets, assembled, planar_effectiveness, shapes_of
 from finlab.layout import Fin, Layout
-from finlab.layout.arrays import force_effectiveness
+from finlab.layout.actuator import Actuator
+from finlab.layout.arrays import moved_effectiveness, own_effectiveness
 
 MIRROR_TOLERANCE = 1e-3
-"""How far [m, rad] two fins may be from each other's mirror image and still count as a pair."""
+"""How far [m, rad] two actuators may be from each other's mirror image and still count as a pair."""
+MIRROR = np.array([1.0, -1.0, 1.0])
+"""The plane y = 0 as a mirror."""
 
 
 @dataclass(frozen=True)
 class Bounds:
-    """Where one fin may go. Equal ends hold a number fixed. Checked on construction."""
+    """Where one actuator may go. Equal ends hold a number fixed. Checked on construction."""
 
     x: tuple[float, float]
     """Forward [m], (minimum, maximum)."""
@@ -29,115 +38,165 @@ class Bounds:
     z: tuple[float, float]
     """Up [m]."""
     mounting_angle: tuple[float, float]
-    """Azimuth of the shaft [rad]; may reach beyond half a turn, as in 170 to 190 degrees."""
+    """Azimuth of the shaft [rad]; may reach beyond half a turn, as in 170 to 190 degrees. Of an actuator
+    without a mounting angle, how far it turns about the vertical from where it points."""
+    tilt: tuple[float, float] = (0.0, 0.0)
+    """How far its main axis rises [rad] from where it points."""
 
     def __post_init__(self) -> None:
-        for name in ("x", "y", "z", "mounting_angle"):
+        for name in ("x", "y", "z", "mounting_angle", "tilt"):
             low, high = getattr(self, name)
             if not (math.isfinite(low) and math.isfinite(high) and low <= high):
                 raise LayoutError(f"bounds of {name}: expected two numbers, smaller first, got {low} {high}")
 
     @staticmethod
-    def around(fin: Fin, reach: float | Sequence[float] = 0.05, turn: float = math.pi) -> Bounds:
-        """Returns bounds of `reach` [m], one number or three, and `turn` [rad] either way of where a fin
-        is."""
+    def around(part: Actuator, reach: float | Sequence[float] = 0.05, turn: float = math.pi) -> Bounds:
+        """Returns bounds of `reach` [m], one number or three, and `turn` [rad] either way of where an
+        actuator is; horizontal shafts stay horizontal, others also tilt, by up to a quarter turn."""
         by = np.broadcast_to(np.asarray(reach, dtype=np.float64), 3)
-        x, y, z = ((p - float(r), p + float(r)) for p, r in zip(fin.position, by, strict=True))
-        return Bounds(x, y, z, (fin.shaft_azimuth - turn, fin.shaft_azimuth + turn))
+        x, y, z = ((p - float(r), p + float(r)) for p, r in zip(part.position, by, strict=True))
+        tilt = 0.0 if is_horizontal(part) else min(turn, 0.5 * math.pi)
+        angle = azimuth(part)
+        return Bounds(x, y, z, (angle - turn, angle + turn), (-tilt, tilt))
 
     @property
     def pairs(self) -> Array:
-        """All of it as an array (4, 2) [m, m, m, rad]."""
-        return np.array([self.x, self.y, self.z, self.mounting_angle])
+        """All of it as an array (5, 2) [m, m, m, rad, rad]."""
+        return np.array([self.x, self.y, self.z, self.mounting_angle, self.tilt])
+
+
+def is_horizontal(part: Actuator) -> bool:
+    """Says whether an actuator is a fin with a mounting angle."""
+    return isinstance(part, Fin) and part.mounting_angle is not None
+
+
+def azimuth(part: Actuator) -> float:
+    """The angle [rad] that `Bounds.mounting_angle` is about, as it is now."""
+    return part.mounting_angle or 0.0 if isinstance(part, Fin) else 0.0
 
 
 def mirror_pairs(layout: Layout) -> tuple[tuple[str, str], ...]:
-    """Returns the pairs of fins that are each other's image in the plane y = 0: y and the azimuth change
+    """Returns the pairs of actuators that are each other's image in the plane y = 0: y and the azimuth change
     sign."""
     pairs: list[tuple[str, str]] = []
-    for i, fin in enumerate(layout.fins):
+    for i, part in enumerate(layout.actuators):
         taken = {name for pair in pairs for name in pair}
-        for other in layout.fins[i + 1 :]:
-            if not {fin.name, other.name} & taken and is_mirrored(fin, other):
-                pairs.append((fin.name, other.name))
+        for other in layout.actuators[i + 1 :]:
+            if not {part.name, other.name} & taken and is_mirrored(part, other):
+                pairs.append((part.name, other.name))
                 break
     return tuple(pairs)
 
 
-def is_mirrored(fin: Fin, other: Fin) -> bool:
-    """Says whether two fins are each other's mirror image."""
-    x, y, z = fin.position
-    apart = np.abs(np.subtract(other.position, (x, -y, z))).max()
-    turned = abs(math.remainder(fin.shaft_azimuth + other.shaft_azimuth, math.tau))
-    return bool(max(apart, turned) <= MIRROR_TOLERANCE)
+def is_mirrored(part: Actuator, other: Actuator) -> bool:
+    """Says whether two actuators of a type are each other's mirror image, whichever way their axes count."""
+    if part.type != other.type or is_horizontal(part) != is_horizontal(other):
+        return False
+    apart = float(np.abs(np.subtract(other.position, MIRROR * part.position)).max())
+    if is_horizontal(part):
+        turned = abs(math.remainder(azimuth(part) + azimuth(other), math.tau))
+    else:
+        count = 1 if part.type == "thruster" else 2
+        both = np.array(part.frame)[:count] * MIRROR, np.array(other.frame)[:count]
+        turned = float(np.linalg.norm(np.cross(*both), axis=-1).max())
+    return max(apart, turned) <= MIRROR_TOLERANCE
 
 
 class Moves:
-    """Turns vectors of free numbers into positions and angles of all fins."""
+    """Turns vectors of free numbers into places and directions of all actuators."""
 
     def __init__(
         self,
         layout: Layout,
-        fins: Sequence[str],
+        names: Sequence[str],
         bounds: Mapping[str, Bounds],
         pairs: Sequence[tuple[str, str]] = (),
         grid: tuple[float, float] = (0.0, 0.0),
+        flow: Array | None = None,
     ) -> None:
-        """Takes the fins to be moved, their bounds, and mirror pairs whose second follows the first.
+        """Takes the actuators to be moved, their bounds, and mirror pairs whose second follows the first.
 
-        A fin that is moved along with its twin needs no bounds of its own. Free coordinates and angles
-        are multiples of the steps [m], [rad] of `grid` where these are above zero and the bounds hold one.
+        One that is moved along with its twin needs no bounds of its own. Free coordinates and angles are
+        multiples of the steps [m], [rad] of `grid` where these are above zero and the bounds hold one. `flow`
+        as for `force_sets`.
 
         Raises:
-            LayoutError: a fin is unknown, none is named, one has no bounds, a pair is not mirrored or shares
-                a fin with another pair, or nothing is free to move.
+            LayoutError: an actuator is unknown, none is named, one has no bounds, a pair is not mirrored or
+                shares one with another pair, or nothing is free to move.
         """
-        if not fins:
-            raise LayoutError("expected at least one fin to move, got none")
-        layout.indices(tuple(fins))
+        kind = "fin" if layout.is_of_fins else "actuator"
+        if not names:
+            raise LayoutError(f"expected at least one {kind} to move, got none")
+        layout.indices(tuple(names))
         twins = _twins(layout, pairs)
         self.layout = layout
         leaders: list[str] = []
-        for name in fins:
+        for name in names:
             if name not in leaders and twins.get(name) not in leaders:
                 leaders.append(name)
         missing = [name for name in leaders if name not in bounds]
         if missing:
-            raise LayoutError(f"fin {missing[0]} is to be moved but has no bounds; give it some")
+            raise LayoutError(f"{kind} {missing[0]} is to be moved but has no bounds; give it some")
         self.leaders = tuple(leaders)
         self._lead = layout.indices(leaders)
         self._twin = [layout.index(twins[name]) if name in twins else -1 for name in leaders]
+        ahead = layout.frames[:, 0]
+        self._rise = [
+            1.0 if ahead[lead] * MIRROR @ ahead[twin] >= 0.0 else -1.0
+            for lead, twin in zip(self._lead, self._twin, strict=True)
+        ]
+        """Which way twins tilt: against their leaders where their axes count the other way."""
         self.names = tuple(name for name in layout.names if name in leaders or twins.get(name) in leaders)
-        """All fins that move, twins included, in the layout's order."""
-        self._sets = fin_sets(layout)
+        """All that move, twins included, in the layout's order."""
+        self._flow = flow
+        shapes = shapes_of(layout, flow)
+        self._directions = np.array([shape.directions for shape in shapes])
+        self._sets = assembled([shapes], own_effectiveness(layout)[None])
         self.start_position = layout.position
-        """Where all fins are now (n, 3) [m]."""
-        self._angle = layout.mounting_angle
-        box = np.concatenate([bounds[name].pairs for name in leaders])  # (4 leaders, 2)
-        held = np.concatenate([[*layout.fins[i].position, layout.fins[i].shaft_azimuth] for i in self._lead])
+        """Where all actuators are now (n, 3) [m]."""
+        self._angle = np.array([azimuth(part) for part in layout.actuators])
+        box = np.concatenate([bounds[name].pairs for name in leaders])  # (5 leaders, 2)
+        held = np.concatenate([[*self.start_position[i], self._angle[i], 0.0] for i in self._lead])
         self._whole = np.clip(held, box[:, 0], box[:, 1])
         self._free = box[:, 1] - box[:, 0] > 0.0
         if not self._free.any():
             raise LayoutError("the bounds leave nothing free to move; widen them")
         self.lower, self.upper = box[self._free].T
         """Bounds of the free numbers (D,)."""
-        self._step = np.tile([grid[0]] * 3 + [grid[1]], len(leaders))[self._free]
+        self._step = np.tile([grid[0]] * 3 + [grid[1]] * 2, len(leaders))[self._free]
         self.start = self._whole[self._free]
-        """Where the fins are now, brought within bounds (D,)."""
+        """Where the actuators are now, brought within bounds (D,)."""
 
-    def geometry(self, vectors: Array) -> tuple[Array, Array]:
-        """Returns positions (P, n, 3) [m] and mounting angles (P, n) [rad] of vectors (P, D)."""
+    def geometry(self, vectors: Array) -> tuple[Array, Array, Array]:
+        """Returns positions (P, n, 3) [m], azimuths and tilts (P, n) [rad], see `Bounds`, of vectors
+        (P, D)."""
         whole = np.tile(self._whole, (len(vectors), 1))
         whole[:, self._free] = self._on_grid(vectors)
-        moved = whole.reshape(len(vectors), len(self._lead), 4)
+        moved = whole.reshape(len(vectors), len(self._lead), 5)
         position = np.tile(self.start_position, (len(vectors), 1, 1))
         angle = np.tile(self._angle, (len(vectors), 1))
-        for k, (lead, twin) in enumerate(zip(self._lead, self._twin, strict=True)):
-            position[:, lead], angle[:, lead] = moved[:, k, :3], moved[:, k, 3]
+        tilt = np.zeros_like(angle)
+        for k, (lead, twin, rise) in enumerate(zip(self._lead, self._twin, self._rise, strict=True)):
+            position[:, lead], angle[:, lead], tilt[:, lead] = moved[:, k, :3], moved[:, k, 3], moved[:, k, 4]
             if twin >= 0:
-                position[:, twin] = moved[:, k, :3] * (1.0, -1.0, 1.0)
-                angle[:, twin] = -moved[:, k, 3]
-        return position, angle
+                position[:, twin] = moved[:, k, :3] * MIRROR
+                angle[:, twin], tilt[:, twin] = -moved[:, k, 3], rise * moved[:, k, 4]
+        return position, angle, tilt
+
+    def frames(self, angle: Array, tilt: Array) -> Array:
+        """Returns the own axes (P, n, 3, 3) of actuators under azimuths and tilts (P, n) [rad]."""
+        frames = np.tile(self.layout.frames, (len(angle), 1, 1, 1))
+        for i, part in enumerate(self.layout.actuators):
+            if part.name not in self.names:
+                continue
+            if is_horizontal(part) and not tilt[:, i].any():
+                c, s = np.cos(angle[:, i]), np.sin(angle[:, i])
+                frames[:, i, 0, :2] = np.stack([c, s], axis=-1)
+                frames[:, i, 1, :2] = np.stack([-s, c], axis=-1)
+            else:
+                turn = angle[:, i] - self._angle[i]
+                frames[:, i] = _turned(self.layout.frames[i], turn, tilt[:, i])
+        return frames
 
     def _on_grid(self, vectors: Array) -> Array:
         """Vectors (P, D) whose numbers are multiples of their steps, within bounds."""
@@ -146,29 +205,62 @@ class Moves:
         rounded = np.clip(np.round(vectors / step), low, high) * step
         return np.where((self._step > 0.0) & (low <= high), rounded, vectors)
 
-    def sets(self, vectors: Array) -> FinSets:
-        """Returns what the fins can push once moved by vectors (P, D)."""
-        effectiveness = force_effectiveness(*self.geometry(vectors))[..., 1:, :] / SCALE
-        return self._sets.tile(len(vectors))._replace(effectiveness=np.ascontiguousarray(effectiveness))
+    def sets(self, vectors: Array) -> ForceSets:
+        """Returns what the actuators can push once moved by vectors (P, D)."""
+        position, angle, tilt = self.geometry(vectors)
+        effectiveness = moved_effectiveness(self.layout, position, self.frames(angle, tilt))
+        if self._flow is None:
+            planar = planar_effectiveness(self._directions, effectiveness)
+            return self._sets.tile(len(vectors))._replace(effectiveness=planar)
+        return assembled([shapes_of(self.moved(vector), self._flow) for vector in vectors], effectiveness)
 
     def moved(self, vector: Array) -> Layout:
-        """Returns the layout with its fins moved by a vector (D,)."""
-        position, angle = self.geometry(vector[None])
+        """Returns the layout with its actuators moved by a vector (D,)."""
+        position, angle, tilt = self.geometry(vector[None])
+        frames = self.frames(angle, tilt)
         result = self.layout
         for i in self.layout.indices(self.names):
+            part = self.layout.actuators[i]
             x, y, z = (round(float(value), 12) for value in position[0, i])
-            turned = math.remainder(float(angle[0, i]), math.tau)
-            result = result.replace_actuator(self.layout.names[i], position=(x, y, z), mounting_angle=turned)
+            changes: dict[str, Any] = {"position": (x, y, z)}
+            if is_horizontal(part) and tilt[0, i] == 0.0:
+                changes["mounting_angle"] = math.remainder(float(angle[0, i]), math.tau)
+            elif angle[0, i] != self._angle[i] or tilt[0, i] != 0.0:
+                if isinstance(part, Fin):
+                    changes["mounting_angle"] = None
+                changes |= dict(zip(_axes(part), map(tuple, frames[0, i].tolist()), strict=False))
+            result = result.replace_actuator(part.name, **changes)
         return result
+
+
+def _axes(part: Actuator) -> tuple[str, ...]:
+    """Fields of the first of an actuator's own axes."""
+    if isinstance(part, Fin):
+        return "shaft", "zero"
+    return part.AXES or ("axis",)
+
+
+def _turned(frame: Array, turn: Array, tilt: Array) -> Array:
+    """Own axes (3, 3), rows, once tilted and then turned about the vertical by angles (P,) [rad]: (P, 3, 3).
+
+    A vertical main axis tilts towards x.
+    """
+    x, y, z = frame[0]
+    level = math.hypot(x, y)
+    across = np.array([y, -x, 0.0]) / level if level > MIRROR_TOLERANCE else np.array([0.0, np.sign(z), 0.0])
+    tilted = Rotation.from_rotvec(tilt[:, None] * across)
+    both = (Rotation.from_rotvec(turn[:, None] * np.eye(3)[2]) * tilted).as_matrix()
+    return np.asarray(frame @ both.swapaxes(1, 2))
 
 
 def _twins(layout: Layout, pairs: Sequence[tuple[str, str]]) -> dict[str, str]:
     """Who is whose twin, both ways."""
     twins: dict[str, str] = {}
+    kind = "a fin" if layout.is_of_fins else "an actuator"
     for pair in pairs:
-        first, second = (layout.fins[i] for i in layout.indices(pair))
+        first, second = (layout.actuators[i] for i in layout.indices(pair))
         if first.name in twins or second.name in twins:
-            raise LayoutError(f"{first.name} and {second.name}: a fin can be in one mirror pair only")
+            raise LayoutError(f"{first.name} and {second.name}: {kind} can be in one mirror pair only")
         if first is second or not is_mirrored(first, second):
             raise LayoutError(
                 f"{first.name} and {second.name} are not each other's mirror image in the plane y = 0; "

@@ -1,4 +1,4 @@
-"""Improve a layout: move chosen fins within bounds until a goal is as good as it gets."""
+"""Improve a layout: move chosen actuators within bounds until a goal is as good as it gets."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -8,21 +8,23 @@ from numpy.typing import ArrayLike
 from scipy.optimize import Bounds as Box
 from scipy.optimize import differential_evolution
 
-from finlab.analysis.goals import MISSION, Goal, make_goal
-from finlab.analysis.moves import Bounds, Moves, mirror_pairs
+from finlab.allocation.question import check_flow
+from finlab.analysis.authority import AXES
+from finlab.analysis.goals import MISSION, Goal, axes_to_raise, make_goal
+from finlab.analysis.moves import Bounds, Moves, azimuth, mirror_pairs
 from finlab.analysis.score_card import ScoreCard, score_card
 from finlab.arrays import Array
-from finlab.forces.fin_sets import fin_sets
+from finlab.forces.force_sets import force_sets
 from finlab.layout import Layout
 
 CLEARANCE = 0.10
-"""Least distance between two fins [m], or what there is now if that is less."""
+"""Least distance between two actuators [m], or what there is now if that is less."""
 PENALTY = 1e3
-"""Cost of fins that are too close or break another rule, per metre; far beyond any goal."""
+"""Cost of actuators that are too close or break another rule, per metre; far beyond any goal."""
 
 Rule = Callable[[Array, Array], Array]
-"""How far fins at positions (P, n, 3) [m] under mounting angles (P, n) [rad] break a rule (P,) [m]; 0 where
-they keep it."""
+"""How far actuators at positions (P, n, 3) [m] under azimuths (P, n) [rad], as in `Bounds`, break a rule (P,)
+[m]; 0 where they keep it."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +58,7 @@ class Improvement:
 
 def optimize_layout(
     layout: Layout,
-    fins: Sequence[str],
+    names: Sequence[str],
     bounds: Mapping[str, Bounds] | None = None,
     goal: str = "weakest_direction",
     mirror: Sequence[tuple[str, str]] | None = None,
@@ -67,48 +69,64 @@ def optimize_layout(
     clearance: float = CLEARANCE,
     rule: Rule | None = None,
     grid: tuple[float, float] = (0.0, 0.0),
+    axes: Sequence[str] | None = None,
+    flow: ArrayLike | None = None,
     progress: Callable[[Progress], None] | None = None,
     cancelled: Callable[[], bool] | None = None,
 ) -> Improvement:
-    """Moves fins to raise a goal, by SciPy's differential evolution.
+    """Moves actuators to raise a goal, by SciPy's differential evolution.
 
     The same arguments and seed give the same layout. The present layout is among the first candidates, so the
     result is never worse, unless the present one breaks the rule: then the best that keeps it is the result.
 
     Args:
-        layout: where to start; its limits and fin models stay.
-        fins: names of those that move.
+        layout: where to start; its limits and models stay.
+        names: names of those that move.
         bounds: where each may go; 5 cm and a quarter turn around where it is when left out.
         goal: `weakest_direction`, `mission_power` or `worst_single_failure`, see `make_goal`.
         mirror: pairs that stay each other's mirror image; when None, all that are so now.
         mission: wrenches (N, 6) [N, N m] for the goal `mission_power`.
         rounds: most rounds of the search.
         seed: of its random numbers.
-        clearance: least distance between fins [m]; fins that are closer already need not part.
-        rule: another one that the fins have to keep, such as to stand outside of a hull.
+        clearance: least distance between actuators [m]; those that are closer already need not part.
+        rule: another one that they have to keep, such as to stand outside of a hull.
         grid: steps [m], [rad] of the coordinates and angles that are found; 0 for any number.
+        axes: axes whose directions count for the two goals of directions, with anything on the others; all
+            six when None, or, with too few actuators for six, those that are pushed alone now.
+        flow: velocity (6,) of the body relative to the water [m/s, rad/s], body frame; None at rest.
         progress: called after each round.
         cancelled: asked after each round; the search stops when it answers True.
 
     Raises:
-        LayoutError: something about the fins, bounds, pairs, goal or mission does not fit; it says what.
+        LayoutError: something about the actuators, bounds, pairs, goal, axes or mission does not fit; it says
+            what.
+        CommandError: `flow` is not six finite numbers.
     """
-    layout.only_fins("improving a layout", horizontal=True)
-    bounds = bounds or {}
-    known = {name: bounds.get(name) or Bounds.around(layout.fins[layout.index(name)]) for name in fins}
+    bounds, water = bounds or {}, check_flow(flow)
+    known = {name: bounds.get(name) or Bounds.around(layout.actuators[layout.index(name)]) for name in names}
     pairs = mirror_pairs(layout) if mirror is None else mirror
-    moves = Moves(layout, fins, known, pairs, grid)
+    moves = Moves(layout, names, known, pairs, grid, water)
     broken = rule or (lambda position, angle: np.zeros(len(position)))
-    measure = make_goal(goal, layout, mission)
-    quick = make_goal(goal, layout, mission, fine=False)
-    before = float(measure(fin_sets(layout))[0])
+    if axes is None and goal != "mission_power":
+        axes = axes_to_raise(layout, water)
+    measure, quick = (
+        make_goal(goal, layout, mission, fine=fine, axes=axes or AXES, flow=water) for fine in (True, False)
+    )
+
+    def measured(robot: Layout) -> float:
+        return float(measure(force_sets(robot, flow=water), lambda _: robot)[0])
+
+    before = measured(layout)
     found, stopped = _search(moves, quick, before, clearance, broken, rounds, seed, progress, cancelled)
     best = moves.moved(found)
-    after = float(measure(fin_sets(best))[0])
-    wrong = [float(broken(known.position[None], known.mounting_angle[None])[0]) for known in (layout, best)]
+    after = measured(best)
+    wrong = [
+        float(broken(robot.position[None], np.array([[azimuth(part) for part in robot.actuators]]))[0])
+        for robot in (layout, best)
+    ]
     better = after > before + 1e-9 * abs(before)
     improved = wrong[1] <= 0.0 and (better or wrong[0] > 0.0)
-    card = score_card(layout)
+    card = score_card(layout, flow=water)
     return Improvement(
         layout=best if improved else layout,
         improved=improved,
@@ -118,7 +136,7 @@ def optimize_layout(
         value_after=after if improved else before,
         moved=moves.names,
         card_before=card,
-        card_after=score_card(best) if improved else card,
+        card_after=score_card(best, flow=water) if improved else card,
     )
 
 
@@ -140,8 +158,8 @@ def _search(
     def cost(vectors: Array) -> Array:
         nonlocal best
         effectiveness = vectors.reshape(len(moves.start), -1).T
-        value = measure(moves.sets(effectiveness))
-        position, angle = moves.geometry(effectiveness)
+        value = measure(moves.sets(effectiveness), lambda row: moves.moved(effectiveness[row]))
+        position, angle, _ = moves.geometry(effectiveness)
         close = np.maximum(needed - _gaps(position), 0.0).sum(-1) + rule(position, angle)
         fine = value[close <= 0.0]
         best = max(best, float(fine.max())) if len(fine) else best
@@ -172,6 +190,6 @@ def _search(
 
 
 def _gaps(position: Array) -> Array:
-    """Distances (P, pairs) [m] between the fins at positions (P, n, 3)."""
+    """Distances (P, pairs) [m] between the actuators at positions (P, n, 3)."""
     first, second = np.triu_indices(position.shape[1], k=1)
     return np.asarray(np.linalg.norm(position[:, first] - position[:, second], axis=-1))

@@ -5,7 +5,9 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from finlab.allocation.question import check_flow
 from finlab.analysis.authority import (
     AXES,
     Authority,
@@ -16,8 +18,9 @@ from finlab.analysis.authority import (
     losses,
 )
 from finlab.analysis.least_power import least_power
+from finlab.arrays import Array
 from finlab.forces.extent import singular_values
-from finlab.forces.fin_sets import MAX_CUT, fin_sets, wide_fins
+from finlab.forces.force_sets import MAX_CUT, force_sets, wide_arcs
 from finlab.layout import Layout
 
 UNIT = (1.0, 1.0, 1.0, 0.1, 0.1, 0.1)
@@ -26,15 +29,20 @@ UNIT = (1.0, 1.0, 1.0, 0.1, 0.1, 0.1)
 
 @dataclass(frozen=True)
 class ScoreCard:
-    """What a layout's working fins can do. Torques meet forces at the lever 0.2 m."""
+    """What a layout's working actuators can do. Torques meet forces at the lever 0.2 m."""
 
     layout: str
     failed: tuple[str, ...]
-    n_fins: int
+    flow: tuple[float, ...] | None
+    """Velocity of the body relative to the water (6,) [m/s, rad/s], body frame; None at rest."""
+    n_actuators: int
+    """How many work."""
+    counted: str
+    """The same by type, such as `8 thrusters`."""
     authority: Authority
     """Rank, conditioning, largest wrenches, weakest direction."""
     losses: tuple[Loss, ...]
-    """What losing one more fin costs, fin by fin; none when but one works."""
+    """What losing one more actuator costs, one by one; none when but one works."""
     unit_wrench: tuple[float, ...]
     """Size of the wrench along each axis whose least power follows (6,) [N, N m]."""
     unit_power: tuple[float | None, ...]
@@ -50,29 +58,39 @@ class ScoreCard:
 
     def to_dict(self) -> dict[str, Any]:
         """Returns the card as numbers, strings, lists and None, for JSON."""
-        worst = None if self.worst_loss is None else self.worst_loss.fin
+        worst = None if self.worst_loss is None else self.worst_loss.actuator
         reachable = list(self.authority.reachable)
         return asdict(self) | {"axes": list(AXES), "reachable": reachable, "worst_loss": worst}
 
 
-def score_card(layout: Layout, failed: Collection[str] = ()) -> ScoreCard:
-    """Returns the score card of a layout whose fins called `failed` push nothing.
+def score_card(layout: Layout, failed: Collection[str] = (), flow: ArrayLike | None = None) -> ScoreCard:
+    """Returns the score card of a layout whose actuators called `failed` push nothing.
+
+    Args:
+        layout: the robot.
+        failed: actuators that are lost.
+        flow: velocity (6,) of the body relative to the water [m/s, rad/s], body frame; None at rest.
 
     Raises:
-        LayoutError: there is no fin of a name in `failed`.
+        LayoutError: there is no actuator of a name in `failed`.
+        CommandError: `flow` is not six finite numbers.
     """
-    layout.only_fins("a score card")
-    held = authority(layout, failed)
-    power = least_power(layout, np.diag(UNIT), failed=failed)
+    water = check_flow(flow)
+    held = authority(layout, failed, water)
+    power = least_power(layout, np.diag(UNIT), failed=failed, flow=water)
+    power = np.where(held.largest, power, np.nan)
+    lost = set(failed)
     return ScoreCard(
         layout=layout.name,
         failed=tuple(name for name in layout.names if name in failed),
-        n_fins=layout.n_fins - len(set(failed)),
+        flow=None if water is None else tuple(water.tolist()),
+        n_actuators=layout.n - len(lost),
+        counted=layout.without(lost).counted if len(lost) < layout.n else "0 actuators",
         authority=held,
-        losses=losses(layout, failed, held),
+        losses=losses(layout, failed, held, water),
         unit_wrench=UNIT,
         unit_power=tuple(None if np.isnan(value) else float(value) for value in power),
-        notes=_notes(layout, failed),
+        notes=_notes(layout, failed, water),
     )
 
 
@@ -82,11 +100,11 @@ def _left(loss: Loss) -> tuple[float, ...]:
     return loss.rank, round(loss.weakest, 6), len(loss.reachable), round(sum(shares), 6)
 
 
-def _notes(layout: Layout, failed: Collection[str]) -> tuple[str, ...]:
-    """What is not exact."""
-    sets = fin_sets(layout, failed)
+def _notes(layout: Layout, failed: Collection[str], flow: Array | None) -> tuple[str, ...]:
+    """What is not exact, and what is without effect."""
+    sets = force_sets(layout, failed, flow)
     notes = []
-    n_wide = len(wide_fins(sets))
+    n_wide = len(wide_arcs(sets))
     if n_wide:
         what = "Weakest direction and isotropy are"
         if n_wide > MAX_CUT:
@@ -94,6 +112,11 @@ def _notes(layout: Layout, failed: Collection[str]) -> tuple[str, ...]:
         notes.append(
             f"{what} those of the convex hull: some arcs are wider than half a turn but not full circles."
         )
+    if sets.corners is not None:
+        notes.append("Forces of the flow count with the convex hull of their lift and drag.")
+    still = [part.name for part in layout.actuators if part.type == "rudder" and part.name not in failed]
+    if flow is None and still:
+        notes.append(f"At rest {', '.join(still)} give nothing; say how fast the robot moves (--flow).")
     if any(fin.model.type == "table" for fin in layout.fins if fin.name not in failed):
         notes.append("Fins that follow a table count with the largest thrust that was sampled from it.")
     return tuple(notes)
@@ -101,23 +124,23 @@ def _notes(layout: Layout, failed: Collection[str]) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class QuickCheck(HeldAxes):
-    """Axes that the working fins hold, and those that a loss costs."""
+    """Axes that the working actuators hold, and those that a loss costs."""
 
     lost: tuple[tuple[str, tuple[str, ...]], ...]
-    """Working fins with the axes that the loss of each costs; fins that cost none are left out."""
+    """Working actuators with the axes that the loss of each costs; those that cost none are left out."""
 
 
 def quick_check(layout: Layout, failed: Collection[str] = ()) -> QuickCheck:
-    """Returns what the working fins hold, from singular values alone.
+    """Returns what the working actuators hold at rest, from singular values alone.
 
     Raises:
-        LayoutError: there is no fin of a name in `failed`.
+        LayoutError: there is no actuator of a name in `failed`.
     """
     working = [name for name in layout.names if name not in failed]
     single = working if len(working) > 1 else []
-    sets = fin_sets(layout, failed).tile(1 + len(single))
+    sets = force_sets(layout, failed).tile(1 + len(single))
     for row, name in enumerate(single, start=1):
-        sets.radius[row, layout.index(name)] = 0.0
+        sets.lose(row, layout.index(name))
     held, *left = (held_axes(*pair) for pair in zip(*singular_values(sets), strict=True))
     lost = {
         name: tuple(axis for axis in held.alone if axis not in after.alone)

@@ -11,7 +11,7 @@ from tyro.extras import SubcommandApp
 
 from finlab.cli.json_file import JsonFile, check_json_file, put_json
 from finlab.cli.layout_table import layout_text
-from finlab.cli.optimize import optimize
+from finlab.cli.optimize import Flow, optimize
 
 verbs = SubcommandApp()
 verbs.command(optimize)
@@ -45,30 +45,25 @@ def check(layouts: Annotated[Positional[tuple[str, ...]], arg(metavar="LAYOUT...
 def show(
     layout: Annotated[Positional[str], arg(metavar="LAYOUT")],
     failed: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME")] = (),
+    flow: Annotated[Flow | None, arg(metavar="VX VY VZ WX WY WZ")] = None,
     json: JsonFile = None,
 ) -> None:
-    """Print the actuators of a layout and, of fins, the score card: what it can do, what it can lose.
+    """Print the actuators of a layout and its score card: what it can do, what it can lose.
 
     Args:
         layout: layout file, bundle, or the name of a shipped layout.
         failed: name of an actuator that does not work.
+        flow: velocity of the robot relative to the water, body frame [m/s, rad/s]; it is at rest by default.
         json: file for one JSON object; it is printed in place of the tables where no file is named.
     """
     from finlab.analysis import score_card
     from finlab.cli.inputs import open_robot
     from finlab.cli.score_card import score_card_text
-    from finlab.layout import layout_to_dict
 
     check_json_file(json)
     robot = open_robot(layout)
-    text, lost = layout_text(robot.layout), robot.with_failed(failed)
-    if robot.layout.is_of_fins:
-        card = score_card(robot.layout, lost)
-        put_json(card.to_dict(), json, f"{text}\n\n{score_card_text(card)}")
-        return
-    robot.layout.indices(lost)
-    values = {**layout_to_dict(robot.layout), "failed": lost}
-    put_json(values, json, f"{text}\n\nA score card is made of robots of fins only.")
+    card = score_card(robot.layout, robot.with_failed(failed), flow)
+    put_json(card.to_dict(), json, f"{layout_text(robot.layout)}\n\n{score_card_text(card)}")
 
 
 @verbs.command(name="convert")

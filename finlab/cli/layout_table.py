@@ -17,14 +17,14 @@ def layout_text(layout: Layout) -> str:
     from finlab.cli.score_card import table
 
     rows = [
-        (part.name, part.type, *(f"{x:6.3f}" for x in part.position), _direction(part), _limits(part))
+        (part.name, part.type, *(f"{x:6.3f}" for x in part.position), direction_text(part), _limits(part))
         for part in layout.actuators
     ]
     title = f"{layout.name}: {layout.description}" if layout.description else layout.name
     return "\n".join([title, "", *table(COLUMNS, rows)])
 
 
-def _direction(part: Actuator) -> str:
+def direction_text(part: Actuator) -> str:
     """Where an actuator points: the axes that its file gives, in the body frame."""
     from finlab.layout import Azimuth, Fin, Rudder
 

@@ -1,4 +1,4 @@
-"""`finlab layout optimize`: move chosen fins until a goal is as good as it gets. Never loads torch."""
+"""`finlab layout optimize`: move chosen actuators until a goal is as good as it gets. Never loads torch."""
 
 from __future__ import annotations
 
@@ -15,31 +15,38 @@ if TYPE_CHECKING:
     from finlab.analysis import Improvement
 
 Wrench = tuple[float, float, float, float, float, float]
+Flow = tuple[float, float, float, float, float, float]
 
 
 def optimize(
     layout: Annotated[Positional[str], arg(metavar="LAYOUT")],
-    fins: Annotated[tuple[str, ...], arg(metavar="NAME...")],
+    actuators: Annotated[tuple[str, ...], arg(metavar="NAME...", aliases=["--fins"])],
     output: Annotated[Path, arg(metavar="FILE.yaml", aliases=["-o"])],
     goal: Annotated[str, arg(metavar="NAME")] = "weakest_direction",
     reach: Annotated[float, arg(metavar="M")] = 0.05,
     turn: Annotated[float, arg(metavar="DEG")] = 90.0,
     mirror: bool = True,
+    axes: Annotated[tuple[str, ...], arg(metavar="AXIS...")] = (),
+    flow: Annotated[Flow | None, arg(metavar="VX VY VZ WX WY WZ")] = None,
     wrench: Annotated[UseAppendAction[tuple[Wrench, ...]], arg(metavar="FX FY FZ TX TY TZ")] = (),
     rounds: Annotated[int, arg(metavar="N")] = 40,
     seed: Annotated[int, arg(metavar="N")] = 0,
     json: JsonFile = None,
 ) -> None:
-    """Move fins within bounds to raise a goal, and write the layout that results.
+    """Move actuators within bounds to raise a goal, and write the layout that results.
 
     Args:
         layout: layout file, bundle, or the name of a shipped layout.
-        fins: fins that may move; mirrored twins follow.
+        actuators: those that may move; mirrored twins follow.
         output: layout file to write.
         goal: weakest_direction, mission_power or worst_single_failure.
-        reach: how far each fin may go from where it is, either way along x, y and z [m].
-        turn: how far each shaft may turn from where it points, either way [deg].
-        mirror: keep fins that are each other's mirror image so.
+        reach: how far each may go from where it is, either way along x, y and z [m].
+        turn: how far each may turn about the vertical, either way [deg]; all but fins with a mounting angle
+            also tilt.
+        mirror: keep actuators that are each other's mirror image so.
+        axes: surge, sway, heave, roll, pitch, yaw: those whose directions count; all that there are actuators
+            enough for by default.
+        flow: velocity of the robot relative to the water, body frame [m/s, rad/s]; it is at rest by default.
         wrench: a wrench of the mission for mission_power [N, N m]; may be given several times.
         rounds: most rounds of the search.
         seed: same arguments and seed, same layout.
@@ -56,12 +63,13 @@ def optimize(
     check_json_file(json)
     check_json_file(output, "output")
     check_positive(rounds=rounds)
-    robot = open_robot(layout, fins_for="layout optimize").layout
+    robot = open_robot(layout).layout
     if not (0.0 <= reach < math.inf and 0.0 <= turn <= 180.0):
         raise FinlabError(
             f"expected --reach from 0 m and --turn from 0 to 180 degrees, got {reach:g}, {turn:g}"
         )
-    space = {name: Bounds.around(robot.fins[robot.index(name)], reach, math.radians(turn)) for name in fins}
+    parts = [robot.actuators[i] for i in robot.indices(actuators)]
+    space = {part.name: Bounds.around(part, reach, math.radians(turn)) for part in parts}
     bar = tqdm(total=rounds, desc=goal, unit="round", disable=None, leave=False, file=sys.stderr)
 
     def report(progress: Progress) -> None:
@@ -71,13 +79,15 @@ def optimize(
     with bar:
         found = optimize_layout(
             robot,
-            fins,
+            actuators,
             space,
             goal,
             None if mirror else (),
             mission=wrench or MISSION,
             rounds=rounds,
             seed=seed,
+            axes=axes or None,
+            flow=flow,
             progress=report,
         )
     save_layout(found.layout, output)
@@ -101,14 +111,15 @@ def improvement_record(found: Improvement) -> dict[str, object]:
 
 
 def improvement_text(found: Improvement, output: Path) -> str:
-    """Where the fins went, the card after it, and where the layout was written."""
+    """Where the actuators went, the card after it, and where the layout was written."""
+    from finlab.cli.layout_table import direction_text
     from finlab.cli.score_card import score_card_text
 
     lines = [f"{found.goal}: {found.value_before:.4g} -> {found.value_after:.4g}", ""]
     for name in found.moved:
-        fin = found.layout.fins[found.layout.index(name)]
-        place = "  ".join(f"{value:6.3f}" for value in fin.position)
-        lines.append(f"{name:<16}  {place} m  {math.degrees(fin.shaft_azimuth):7.1f} deg")
+        part = found.layout.actuators[found.layout.index(name)]
+        place = "  ".join(f"{value:6.3f}" for value in part.position)
+        lines.append(f"{name:<16}  {place} m  {direction_text(part)}")
     lines += ["", score_card_text(found.card_after), ""]
     lines.append(
         f"{output}: written." if found.improved else f"{output}: written unchanged, nothing better was found."

@@ -16,22 +16,26 @@ def score_card_text(card: ScoreCard) -> str:
     lines = [*_span_lines(card), "", *_axis_table(card), "", *_evenness(card.authority)]
     if card.losses:
         rows = [_loss_row(loss, loss is card.worst_loss) for loss in card.losses]
-        lines += ["", "Share of the largest wrench that is left without one fin (* the worst to lose):"]
+        what = "fin" if card.counted.endswith(" fins") and " and " not in card.counted else "actuator"
+        lines += ["", f"Share of the largest wrench that is left without one {what} (* the worst to lose):"]
         lines += table(("without", "rank", "weakest [N]", *_axes(), "lost"), rows)
     lines += ["", f"Largest wrenches are exact to {max(card.authority.gap, 1e-6):.0e} N.", *card.notes]
     return "\n".join(lines)
 
 
 def _span_lines(card: ScoreCard) -> list[str]:
-    """Which axes the fins push at all, and which they push alone, before any limit."""
+    """Which axes the actuators push at all, and which they push alone, before any limit."""
     held = card.authority
-    lines = [f"{card.n_fins} fins push in {held.rank} of 6 independent directions."]
+    verb = "pushes" if card.n_actuators == 1 else "push"
+    lines = [f"{card.counted} {verb} in {held.rank} of 6 independent directions."]
     if card.failed:
         lines.append("Failed: " + ", ".join(card.failed) + ".")
     if held.without_authority:
         lines.append("Out of reach: " + ", ".join(held.without_authority) + ".")
     if held.coupled:
-        lines.append("Only together with other axes: " + ", ".join(held.coupled) + ".")
+        sizes = zip(_axes(), held.beside_others, _UNITS, strict=True)
+        coupled = [f"{axis} up to {size:.3g} {unit}" for axis, size, unit in sizes if axis in held.coupled]
+        lines.append("Only together with other axes: " + ", ".join(coupled) + ".")
     return lines
 
 
@@ -65,7 +69,7 @@ def _evenness(held: Authority) -> list[str]:
 
 def _loss_row(loss: Loss, worst: bool) -> tuple[str, ...]:
     shares = ("-" if share is None else f"{100 * share:.0f} %" for share in loss.share_left)
-    name = f"{loss.fin} *" if worst else loss.fin
+    name = f"{loss.actuator} *" if worst else loss.actuator
     return (name, f"{loss.rank}", f"{loss.weakest:.2f}", *shares, ", ".join(loss.lost) or "nothing")
 
 

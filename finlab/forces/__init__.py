@@ -1,1 +1,1 @@
-"""Planar forces of fins: what each can push, how that adds up, the least it costs. numpy and scipy."""
+"""What each actuator can push, as a convex set, and how that adds up. numpy and scipy."""

@@ -6,11 +6,11 @@ from itertools import count
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import ConvexHull
 
 from finlab.arrays import Array
-from finlab.forces.fin_sets import SCALE, FinSets, convex_parts, fin_sets, wide_fins
+from finlab.forces.force_sets import SCALE, ForceSets, convex_parts, force_sets, wide_arcs
 from finlab.forces.reach import largest
 from finlab.layout import Layout
 
@@ -99,7 +99,7 @@ TOLERANCE = 0.01
 @dataclass(frozen=True, eq=False, kw_only=True)
 class AttainableSet(Polytope):
     """A convex polytope of attainable forces or torques, body frame [N] or [N m]. Every vertex is attained,
-    by the fins or, where `hull` says so, by the convex hulls of what they can push."""
+    by the actuators or, where `hull` says so, by the convex hulls of what they can push."""
 
     kind: Kind
     alone: bool
@@ -108,8 +108,8 @@ class AttainableSet(Polytope):
     gap: float
     """Nothing attainable lies further than this outside any face [N] or [N m]."""
     hull: bool
-    """Whether it is the convex hull of a set that is not convex, because a fin's arc is wider than half a
-    turn but no full circle."""
+    """Whether it is the convex hull of a set that is not convex, because an arc is wider than half a turn
+    but no full circle, or a force is that of a flow."""
     sampled: bool
     """Whether a fin follows a table, so that its largest thrust was sampled."""
 
@@ -121,8 +121,9 @@ def attainable_set(
     failed: Collection[str] = (),
     alone: bool = True,
     tolerance: float = TOLERANCE,
+    flow: ArrayLike | None = None,
 ) -> AttainableSet:
-    """Returns what forces or torques the fins can give.
+    """Returns what forces or torques the actuators can give.
 
     Directions are sent out from the origin. In each, the farthest attainable point is a vertex; where a face
     still lies further than `tolerance` inside the plane that touches the set, its normal is sent out too.
@@ -130,15 +131,16 @@ def attainable_set(
     Args:
         layout: the robot.
         kind: `force` or `torque`.
-        failed: names of fins that push nothing.
+        failed: names of actuators that push nothing.
         alone: keep all else at zero; otherwise it may be anything.
         tolerance: when to stop, as a share of the farthest vertex.
+        flow: velocity (6,) of the body relative to the water [m/s, rad/s], body frame; None at rest.
 
     Raises:
-        LayoutError: there is no fin of a name in `failed`.
+        LayoutError: there is no actuator of a name in `failed`.
     """
     layout.indices(tuple(failed))
-    sets = fin_sets(layout, failed)
+    sets = force_sets(layout, failed, flow)
     support = _without_specks(
         _alone_support(sets, kind) if alone else _free_support(sets, kind), SPECK * float(sets.radius.sum())
     )
@@ -148,7 +150,8 @@ def attainable_set(
     scale = 1.0 / np.maximum(extent, 1e-2 * extent.max()) if extent.max() > 0.0 else np.ones(3)
     spread = _sphere(N_DIRECTIONS) * scale
     points = support(np.concatenate([axes, spread / np.linalg.norm(spread, axis=-1, keepdims=True)]))[0]
-    points = np.concatenate([points, np.zeros((1, 3))])  # every fin may rest
+    if sets.center is None:  # every actuator may rest
+        points = np.concatenate([points, np.zeros((1, 3))])
     found = hull_of(points)
     for round_ in count():
         new, reach = support(found.normals)
@@ -165,7 +168,7 @@ def attainable_set(
         alone=alone,
         failed=tuple(name for name in layout.names if name in failed),
         gap=max(float(beyond.max()), 0.0),
-        hull=len(wide_fins(sets)) > 0,
+        hull=len(wide_arcs(sets)) > 0 or sets.corners is not None,
         sampled=any(fin.model.type == "table" for fin in layout.fins),
     )
 
@@ -185,7 +188,7 @@ def _without_specks(support: Support, speck: float) -> Support:
     return clean
 
 
-def _free_support(sets: FinSets, kind: Kind) -> Support:
+def _free_support(sets: ForceSets, kind: Kind) -> Support:
     """Farthest points with all else free: in closed form."""
     own = slice(0, 3) if kind == "force" else slice(3, 6)
 
@@ -200,7 +203,7 @@ def _free_support(sets: FinSets, kind: Kind) -> Support:
     return support
 
 
-def _alone_support(sets: FinSets, kind: Kind) -> Support:
+def _alone_support(sets: ForceSets, kind: Kind) -> Support:
     """Farthest points with all else zero: by the solver, in each convex part."""
     own, other = (slice(0, 3), slice(3, 6)) if kind == "force" else (slice(3, 6), slice(0, 3))
     parts = convex_parts(sets)

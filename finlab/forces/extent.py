@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from finlab.arrays import Array
-from finlab.forces.fin_sets import FinSets
+from finlab.forces.force_sets import ForceSets
 from finlab.forces.reach import COARSE, FINE, max_wrench_along
 
 RANK_TOLERANCE = 1e-6
@@ -22,20 +22,20 @@ class Extent(NamedTuple):
     size: Array
     """(P,) [N]."""
     direction: Array
-    """Unit scaled wrench (P, 6)."""
+    """Unit scaled wrench (P, m)."""
 
 
-def singular_values(sets: FinSets) -> tuple[Array, Array]:
-    """Returns singular values (P, 6) [N], falling, and their directions (P, 6, 6), in columns.
+def singular_values(sets: ForceSets) -> tuple[Array, Array]:
+    """Returns singular values (P, m) [N], falling, and their directions (P, m, m), in columns.
 
-    Each column of the matrix is what one fin does at its largest thrust along one axis of its plane.
+    Each column of the matrix is what one actuator does at its largest force along one axis of its plane.
     """
     matrix = np.swapaxes(sets.full_effectiveness(), -1, -2)
     directions, values, _ = np.linalg.svd(matrix, full_matrices=True)
-    return np.pad(values, ((0, 0), (0, 6 - values.shape[-1]))), directions
+    return np.pad(values, ((0, 0), (0, directions.shape[-1] - values.shape[-1]))), directions
 
 
-def weakest(sets: FinSets, n_random: int = N_RANDOM, n_walks: int = N_WALKS, fine: bool = True) -> Extent:
+def weakest(sets: ForceSets, n_random: int = N_RANDOM, n_walks: int = N_WALKS, fine: bool = True) -> Extent:
     """Returns the direction in which the sets of wrenches end soonest, and where.
 
     Every wrench of that size, in any direction, is within reach. The walk starts from axes, singular vectors
@@ -44,21 +44,22 @@ def weakest(sets: FinSets, n_random: int = N_RANDOM, n_walks: int = N_WALKS, fin
     """
     values, vectors = singular_values(sets)
     size = np.zeros(len(values))
-    direction = vectors[:, :, 5].copy()
-    full = np.flatnonzero(values[:, 5] > RANK_TOLERANCE * np.maximum(values[:, 0], 1e-9))
+    direction = vectors[:, :, -1].copy()
+    full = np.flatnonzero(values[:, -1] > RANK_TOLERANCE * np.maximum(values[:, 0], 1e-9))
     if not len(full):
         return Extent(size, direction)
     rng = np.random.default_rng(0)
-    drawn = rng.standard_normal((n_random, 6))
+    axes = values.shape[1]
+    drawn = rng.standard_normal((n_random, axes))
     drawn /= np.linalg.norm(drawn, axis=-1, keepdims=True)
-    common = np.concatenate([np.eye(6), drawn])
+    common = np.concatenate([np.eye(axes), drawn])
     of_robot = np.swapaxes(vectors[full], -1, -2)
     starts = np.concatenate([np.broadcast_to(common, (len(full), *common.shape)), of_robot], axis=1)
-    if (sets.half[full] < np.pi).any():  # with full circles only, opposite directions are alike
+    if (sets.half[full] < np.pi).any() or sets.center is not None:  # else opposite directions are alike
         starts = np.concatenate([starts, -starts], axis=1)
     n_starts = starts.shape[1]
     rows = sets.take(np.repeat(full, n_starts))
-    ends = starts.reshape(-1, 6)
+    ends = starts.reshape(-1, axes)
     for walk in range(n_walks):
         last = fine and walk == n_walks - 1
         normal = max_wrench_along(rows, ends, FINE if last else COARSE).normal
@@ -66,11 +67,11 @@ def weakest(sets: FinSets, n_random: int = N_RANDOM, n_walks: int = N_WALKS, fin
     reach = rows.farthest(ends)[0].reshape(len(full), n_starts)
     best = reach.argmin(axis=1)
     size[full] = np.maximum(reach[np.arange(len(full)), best], 0.0)
-    direction[full] = ends.reshape(len(full), n_starts, 6)[np.arange(len(full)), best]
+    direction[full] = ends.reshape(len(full), n_starts, axes)[np.arange(len(full)), best]
     return Extent(size, direction)
 
 
-def strongest(sets: FinSets) -> Extent:
+def strongest(sets: ForceSets) -> Extent:
     """Returns the largest scaled wrench of each robot, other axes free: walks from axes and singular
     vectors."""
     _, vectors = singular_values(sets)

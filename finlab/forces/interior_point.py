@@ -1,9 +1,10 @@
-"""A primal-dual interior-point method for planar forces within discs and sectors: the one convex solver.
+"""A primal-dual interior-point method for planar forces within discs, sectors, lines and polygons.
 
     min 1/2 sum_j v_j^2 / c_j + 1/2 sum_i b_i |y_i|^2   s.t.   v = w - sum_i B_i y_i,   y_i within its set,
 
 for many robots at once. Newton's systems are reduced to the multipliers l = v / c of the wrench, so that an
-axis with a tiny c, which must be met, costs no accuracy, and more fins hardly cost time.
+axis with a tiny c, which must be met, costs no accuracy, and more actuators hardly cost time. Forces count
+from the centres of the sets.
 """
 
 from typing import NamedTuple
@@ -12,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.arrays import Array
-from finlab.forces.fin_sets import FinSets
+from finlab.forces.force_sets import THINNEST, ForceSets
 from finlab.small_systems import solve
 
 ITERATIONS = 40
@@ -35,8 +36,6 @@ KEPT = 0.99
 """Share of the way to the nearest limit that a step goes at most."""
 SLACK, WEIGHT = 3.0, 10.0
 """Slack and multiplier of each limit at the outset; the latter for a wanted wrench that is not far away."""
-THINNEST = 1e-3
-"""Least distance of a polygon's side from the origin, as a share of the radius: the origin stays inside."""
 NARROWEST = 1e-6
 """Half of a sector's angle [rad] below which it has no inside: such a fin only pushes ahead."""
 
@@ -78,7 +77,7 @@ class _State(NamedTuple):
 
 
 def minimize(
-    sets: FinSets,
+    sets: ForceSets,
     wanted: Array,
     c: Array,
     hessian: Array | float = 0.0,
@@ -94,7 +93,7 @@ def minimize(
         bend: cost b (R, n) of a fin's squared force [1/N^2].
         gap: when to stop, see `GAP`.
     """
-    state = _outset(sets, wanted, c, hessian)
+    state = _outset(sets, wanted - sets.offset, c, hessian)
     busy, least = np.arange(len(wanted)), np.full(len(wanted), np.inf)
     point, multiplier = state.point.copy(), state.multiplier.copy()
     for _ in range(ITERATIONS):
@@ -111,10 +110,13 @@ def minimize(
     # Should a row not be done, its forces are at least such that the fins can give.
     force = _ahead(sets, np.nan_to_num(point).swapaxes(1, 2)[..., None])[..., 0]
     force /= np.maximum(np.sqrt((force * force).sum(-1, keepdims=True)), 1.0)
-    return Optimum(force * sets.radius[..., None], multiplier * _unit(sets)[:, None])
+    force *= sets.radius[..., None]
+    if sets.center is not None:
+        force += sets.center
+    return Optimum(force, multiplier * _unit(sets)[:, None])
 
 
-def _outset(sets: FinSets, wanted: Array, c: Array, hessian: Array | float) -> _State:
+def _outset(sets: ForceSets, wanted: Array, c: Array, hessian: Array | float) -> _State:
     rows, n = sets.radius.shape
     m = sets.effectiveness.shape[-1]
     unit = _unit(sets)
@@ -138,28 +140,38 @@ def _outset(sets: FinSets, wanted: Array, c: Array, hessian: Array | float) -> _
     )
 
 
-def _unit(sets: FinSets) -> Array:
+def _unit(sets: ForceSets) -> Array:
     """Wrench (R,) of each robot's strongest fin, by which all are divided."""
     size: Array = (np.sqrt((sets.effectiveness**2).sum((-1, -2))) * sets.radius).max(-1)
     return np.where(size > 0.0, size, 1.0)
 
 
-def _ahead(sets: FinSets, vectors: Array) -> Array:
-    """Vectors (R, n, 2, k) in the fins' planes, of fins that cannot turn only their parts ahead."""
-    fixed = sets.half < NARROWEST
+def _ahead(sets: ForceSets, vectors: Array) -> Array:
+    """Vectors (R, n, 2, k) in the actuators' planes, of lines only their parts ahead."""
+    fixed = (sets.half < NARROWEST) & ~sets.cornered
     if not fixed.any():
         return vectors
     ahead = np.stack([np.cos(sets.middle), np.sin(sets.middle)], axis=-1)[..., None]
     return np.where(fixed[..., None, None], ahead * (ahead * vectors).sum(-2, keepdims=True), vectors)
 
 
-def _sides(sets: FinSets) -> tuple[Array, Array]:
+def _sides(sets: ForceSets) -> tuple[Array, Array]:
     """Normals (R, K, 2, n) that point out of each sector, and how far out its sides are (R, K, n).
 
     A sector has two sides through the origin. The hull of one wider than half a turn has one, the chord
-    between its stops. An uneven fin has those of the polygon around it. Where no fin has any, K is 0.
+    between its stops. An uneven fin has those of the polygon around it, and polygons have their own. Where
+    there are none, K is 0.
     """
     normals, beyond = _stops(sets)
+    if sets.corners is not None:
+        radius = np.where(sets.radius > 0.0, sets.radius, 1.0)[..., None, None]
+        at = (sets.corners / radius).swapaxes(1, 2)  # (R, K, n, 2)
+        edge = np.roll(at, -1, axis=1) - at
+        length = np.sqrt((edge * edge).sum(-1))
+        none = length < NARROWEST
+        out = np.stack([edge[..., 1], -edge[..., 0]], axis=-1) / np.where(none, np.inf, length)[..., None]
+        normals = np.concatenate([normals, out.swapaxes(2, 3)], axis=1)
+        beyond = np.concatenate([beyond, np.where(none, 1.0, (out * at).sum(-1))], axis=1)
     if sets.boundary is None:
         return normals, beyond
     rows, n, count = sets.boundary.shape
@@ -171,9 +183,9 @@ def _sides(sets: FinSets) -> tuple[Array, Array]:
     return np.concatenate([normals, around], axis=1), out
 
 
-def _stops(sets: FinSets) -> tuple[Array, Array]:
+def _stops(sets: ForceSets) -> tuple[Array, Array]:
     """The sides at the fins' stops, see `_sides`."""
-    circle = sets.half >= np.pi
+    circle = (sets.half >= np.pi) | sets.cornered
     rows, n = sets.half.shape
     if circle.all():
         return np.zeros((rows, 0, 2, n)), np.zeros((rows, 0, n))
@@ -184,6 +196,8 @@ def _stops(sets: FinSets) -> tuple[Array, Array]:
     none = np.stack([circle, circle | wide], axis=1)
     normals = -np.stack([np.cos(ends), np.sin(ends)], axis=2)
     beyond = np.where(wide[:, None], -np.cos(half)[:, None], 0.0)
+    if sets.back is not None:
+        beyond += sets.back[:, None]
     return np.where(none[:, :, None], 0.0, normals), np.where(none, 1.0, beyond)
 
 

@@ -7,27 +7,27 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from finlab.arrays import Array
-from finlab.forces.fin_sets import SCALE, FinSets, convex_parts, fin_sets
+from finlab.forces.force_sets import SCALE, ForceSets, convex_parts, force_sets
 from finlab.forces.interior_point import minimize
 from finlab.layout import Layout
 
 HELD = 1e-12
 """What the squared error of an entry that must be met is divided by, beside one that is free to grow."""
 BEYOND = 2.0
-"""How much more than all fins could give along a direction alone is asked for."""
+"""How much more than all actuators could give along a direction alone is asked for."""
 FINE, COARSE = 1e-9, 1e-4
 """Where the solver stops: for results to be shown, and for searches that ask thousands of times."""
 BESIDE = 1e-6
-"""Scaled wrench that may be left beside the one asked for, as a share of the strongest fin's."""
+"""Scaled wrench that may be left beside the one asked for, as a share of the strongest actuator's."""
 SPAN_TOLERANCE = 1e-9
-"""Share of the largest singular value below which the fins do not act along a direction at all."""
+"""Share of the largest singular value below which the actuators do not act along a direction at all."""
 
 
 class Largest(NamedTuple):
     """Largest scaled wrenches of R questions."""
 
     size: Array
-    """How much the fins can give (R,) [N]; proven to be no less than the truth."""
+    """How much the actuators can give (R,) [N]; proven to be no less than the truth."""
     gap: Array
     """The truth is at most this much smaller (R,) [N]."""
     force: Array
@@ -39,7 +39,7 @@ class Largest(NamedTuple):
 
 
 def largest(
-    sets: FinSets, origin: Array, basis: Array, held: Array | float = 0.0, tolerance: float = FINE
+    sets: ForceSets, origin: Array, basis: Array, held: Array | float = 0.0, tolerance: float = FINE
 ) -> Largest:
     """Returns the largest wrenches along `origin` (R, 6) whose parts along `basis` (R, 6, k) are as held.
 
@@ -59,7 +59,7 @@ def largest(
     wanted = np.empty((rows, 1 + k))
     wanted[:, 1:] = held
     full = np.sqrt((seen.full_effectiveness() ** 2).sum(-1))
-    wanted[:, 0] = np.maximum(BEYOND * full.sum(-1), 1e-9)
+    wanted[:, 0] = np.maximum(BEYOND * full.sum(-1), 1e-9) + np.abs(sets.offset).sum(-1)
     found = minimize(seen, wanted, np.array([1.0, *(HELD,) * k]), gap=tolerance)
     lead = found.multiplier[:, :1]
     across = np.tile(np.eye(1 + k)[0], (rows, 1))
@@ -78,15 +78,15 @@ def largest(
     )
 
 
-def max_wrench_along(sets: FinSets, direction: Array, tolerance: float = FINE) -> Largest:
-    """Returns the largest wrenches that point exactly along unit `direction` (R, 6), all else zero."""
+def max_wrench_along(sets: ForceSets, direction: Array, tolerance: float = FINE) -> Largest:
+    """Returns the largest wrenches that point exactly along unit `direction` (R, m), all else zero."""
     found = largest(sets, direction, orthogonal_complement(direction), tolerance=tolerance)
-    # Where fins do not act along a direction at all, no force proves that, but a plane through the origin.
+    # Where nothing acts along a direction at all, no force proves that, but a plane through the origin.
     unsure = np.flatnonzero(found.gap > 1e-6 * (1.0 + found.size))
     if len(unsure):
         matrix = sets.take(unsure).full_effectiveness()
         _, values, axes = np.linalg.svd(matrix, full_matrices=True)
-        values = np.pad(values, ((0, 0), (0, 6 - values.shape[-1])))
+        values = np.pad(values, ((0, 0), (0, direction.shape[-1] - values.shape[-1])))
         free = values <= SPAN_TOLERANCE * values[:, :1]
         off = np.where(free, _apply(axes, direction[unsure]), 0.0)
         share = (off * off).sum(-1)
@@ -98,7 +98,7 @@ def max_wrench_along(sets: FinSets, direction: Array, tolerance: float = FINE) -
     return found
 
 
-def max_wrench_along_exactly(sets: FinSets, directions: Array) -> tuple[Array, float]:
+def max_wrench_along_exactly(sets: ForceSets, directions: Array) -> tuple[Array, float]:
     """Returns the largest wrenches (P, D) of robots (P) along unit `directions` (D, 6), and the largest gap.
 
     Sectors wider than half a turn are taken in convex parts, so that the result is theirs and not their
@@ -112,8 +112,8 @@ def max_wrench_along_exactly(sets: FinSets, directions: Array) -> tuple[Array, f
 
 
 def orthogonal_complement(direction: Array) -> Array:
-    """Returns an orthonormal basis (R, 6, 5) of all that is at right angles to unit `direction` (R, 6)."""
-    # Householder's reflection takes an axis to the direction, and the other five axes along.
+    """Returns an orthonormal basis (R, m, m - 1) of what is at right angles to unit `direction` (R, m)."""
+    # Householder's reflection takes an axis to the direction, and the other axes along.
     rows, k = direction.shape
     axis = np.argmax(np.abs(direction), axis=-1)
     sign = np.sign(direction[np.arange(rows), axis])
@@ -148,19 +148,22 @@ class Ranges(NamedTuple):
     """Largest values (6,) [N, N m]."""
 
 
-def axis_ranges(layout: Layout, wrench: ArrayLike, failed: Collection[str] = ()) -> Ranges:
+def axis_ranges(
+    layout: Layout, wrench: ArrayLike, failed: Collection[str] = (), flow: ArrayLike | None = None
+) -> Ranges:
     """Returns the range of each axis with the others as in a wrench, too wide by about a millionth at most.
 
     Args:
         layout: the robot.
         wrench: components (6,) [N, N m] that the others are held at.
-        failed: fins that push nothing.
+        failed: actuators that push nothing.
+        flow: velocity (6,) of the body relative to the water [m/s, rad/s], body frame; None at rest.
 
     Raises:
-        LayoutError: there is no fin of a name in `failed`.
+        LayoutError: there is no actuator of a name in `failed`.
     """
     axes = np.concatenate([np.eye(6), -np.eye(6)])
-    parts = convex_parts(fin_sets(layout, failed))
+    parts = convex_parts(force_sets(layout, failed, flow))
     n_parts = len(parts.radius)
     basis = orthogonal_complement(axes)
     held = (np.asarray(wrench, dtype=np.float64) / SCALE) @ basis

@@ -35,9 +35,14 @@ def own_effectiveness(layout: Layout) -> Array:
         (n, 3, 6): wrench [Fx, Fy, Fz, Tx, Ty, Tz] about the origin of 1 N along each row of `layout.frames`,
         with the reaction torque of propellers about the direction of their force.
     """
+    return moved_effectiveness(layout, layout.position, layout.frames)
+
+
+def moved_effectiveness(layout: Layout, position: Array, frames: Array) -> Array:
+    """The same (..., n, 3, 6) of actuators at positions (..., n, 3) [m] with own axes (..., n, 3, 3)."""
     reaction = np.array([getattr(part, "torque_per_newton", 0.0) for part in layout.actuators])
-    torque = np.cross(layout.position[:, None], layout.frames) + reaction[:, None, None] * layout.frames
-    return np.concatenate([layout.frames, torque], axis=-1)
+    torque = np.cross(position[..., None, :], frames) + reaction[:, None, None] * frames
+    return np.concatenate([frames, torque], axis=-1)
 
 
 def layout_effectiveness(layout: Layout) -> Array:

@@ -7,7 +7,7 @@ import pytest
 
 from finlab.analysis import authority, losses
 from finlab.forces.extent import strongest, weakest
-from finlab.forces.fin_sets import fin_sets
+from finlab.forces.force_sets import force_sets
 from finlab.layout import Layout
 from tests.forces.conftest import THRUST
 
@@ -35,7 +35,7 @@ def test_no_yaw_has_no_yaw(shipped: Layouts) -> None:
 
 @pytest.mark.parametrize("name", ["A", "B", "mixed", "restricted", "hexa"])
 def test_extremes_are_those_of_all_directions(shipped: Layouts, name: str) -> None:
-    sets = fin_sets(shipped(name))
+    sets = force_sets(shipped(name))
     drawn = np.random.default_rng(5).standard_normal((20_000, 6))
     drawn /= np.linalg.norm(drawn, axis=1, keepdims=True)
     near, far = weakest(sets), strongest(sets)
@@ -54,7 +54,7 @@ def test_failures_never_help(shipped: Layouts, name: str) -> None:
     layout = shipped(name)
     before = authority(layout)
     for loss in losses(layout):
-        after = authority(layout, (loss.fin,))
+        after = authority(layout, (loss.actuator,))
         assert loss.rank == after.rank <= before.rank
         assert loss.weakest <= before.weakest + 1e-4
         assert set(loss.reachable) | set(loss.lost) == set(before.reachable)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from finlab.actuators.fin.blade import Blade
-from finlab.analysis.least_power import MovedFins, least_power
-from finlab.forces.fin_sets import FinSets, fin_sets
+from finlab.analysis.least_power import MovedActuators, least_power
+from finlab.forces.force_sets import ForceSets, force_sets
 from finlab.layout import FinModelSpec, load_layout
 
 WRENCHES = np.concatenate([np.diag([1, 1, 1, 0.1, 0.1, 0.1]), [[1.2, 0, 0.5, 0, 0, 0.15]]])
@@ -50,9 +50,9 @@ def test_moved_fins_are_the_robot_itself_placed_anew() -> None:
     moved = replace(
         layout, actuators=tuple(replace(f, mounting_angle=f.mounting_angle + 0.2) for f in layout.fins)
     )
-    pairs = zip(fin_sets(layout)[:4], fin_sets(moved)[:4], strict=True)
-    both = FinSets(*(np.concatenate(pair) for pair in pairs))
-    power = MovedFins(layout).least_power(both, WRENCHES)
+    pairs = zip(force_sets(layout)[:4], force_sets(moved)[:4], strict=True)
+    both = ForceSets(*(np.concatenate(pair) for pair in pairs))
+    power = MovedActuators(layout).least_power(both, WRENCHES)
     for row, robot in enumerate((layout, moved)):
         np.testing.assert_allclose(power[row], least_power(robot, WRENCHES), rtol=1e-5)
 

@@ -5,7 +5,15 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from finlab.analysis import GOALS, Bounds, Progress, authority, mirror_pairs, optimize_layout
+from finlab.analysis import (
+    GOALS,
+    Bounds,
+    Progress,
+    authority,
+    least_power,
+    mirror_pairs,
+    optimize_layout,
+)
 from finlab.errors import LayoutError
 from finlab.layout import Layout
 
@@ -74,7 +82,7 @@ def test_fins_keep_their_distance(shipped: Layouts) -> None:
     ("name", "goal", "mission", "message"),
     [
         ("A", "beauty", [[1, 0, 0, 0, 0, 0]], "goal: expected one of weakest_direction"),
-        ("D", "worst_single_failure", [[1, 0, 0, 0, 0, 0]], "needs 4 fins or more"),
+        ("D", "worst_single_failure", [[1, 0, 0, 0, 0, 0]], "needs 6 directions after a loss"),
         ("A", "mission_power", [[1, 2, 3]], "mission: expected wrenches"),
         ("A", "mission_power", [[1, 0, 0, 0, 0, float("nan")]], "mission: expected wrenches"),
     ],
@@ -83,3 +91,48 @@ def test_wrong_goals(shipped: Layouts, name: str, goal: str, mission: object, me
     layout = shipped(name)
     with pytest.raises(LayoutError, match=message):
         optimize_layout(layout, layout.names[:1], goal=goal, mission=mission)
+
+
+SHIPPED = {
+    "bluerov2_heavy": (["lift_rear_right"], {}),
+    "bluerov2": (["lift_left", "front_left"], {}),
+    "torpedo": (["elevator_left"], {"axes": ["surge", "roll", "pitch", "yaw"], "flow": [1.5, 0, 0, 0, 0, 0]}),
+    "catamaran": (["left", "bow"], {}),
+    "fish": (["tail"], {}),
+    "turtle_hybrid": (["lift_left", "front_left"], {}),
+}
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_any_actuator_moves_within_bounds_and_keeps_the_mirror(shipped: Layouts, name: str) -> None:
+    layout, (names, settings) = shipped(name), SHIPPED[name]
+    parts = [layout.actuators[layout.index(part)] for part in names]
+    bounds = {part.name: Bounds.around(part, 0.04, 0.3) for part in parts}
+    found = optimize_layout(layout, names, bounds, rounds=4, seed=1, **settings)
+    assert found.improved
+    assert found.value_after > found.value_before
+    assert set(mirror_pairs(layout)) <= set(mirror_pairs(found.layout))
+    for before, after in zip(layout.actuators, found.layout.actuators, strict=True):
+        if before.name not in found.moved:
+            assert after == before
+        assert np.abs(np.subtract(after.position, before.position)).max() <= 0.04 + 1e-12
+        # The main axis turns by at most both angles together.
+        assert np.dot(before.frame[0], after.frame[0]) >= np.cos(0.6) - 1e-9
+    assert found.card_after.authority.rank >= found.card_before.authority.rank
+
+
+def test_a_torpedo_at_rest_has_nothing_to_raise(shipped: Layouts) -> None:
+    with pytest.raises(LayoutError, match="pushes along no axis alone"):
+        optimize_layout(shipped("torpedo"), ["rudder_top"])
+
+
+def test_the_mission_of_a_torpedo_counts_at_its_speed(shipped: Layouts) -> None:
+    layout, flow = shipped("torpedo"), [1.5, 0, 0, 0, 0, 0]
+    rolled = [[5.0, 0.0, 0.0, 0.5, 0.0, 0.0]]
+    left = layout.actuators[layout.index("elevator_left")]
+    bounds = {left.name: Bounds.around(left, (0.0, 0.05, 0.0), 0.0)}
+    found = optimize_layout(layout, [left.name], bounds, "mission_power", mission=rolled, flow=flow, rounds=1)
+    assert found.improved
+    after = least_power(found.layout, rolled, flow=flow)
+    assert -found.value_after == pytest.approx(after[0])
+    assert after[0] < least_power(layout, rolled, flow=flow)[0]

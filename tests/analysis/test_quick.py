@@ -21,4 +21,4 @@ def test_quick_check_agrees_with_the_whole_analysis(shipped: Layouts, name: str)
         whole.coupled,
     )
     assert quick.condition == pytest.approx(whole.condition)
-    assert dict(quick.lost) == {loss.fin: loss.lost for loss in losses(layout) if loss.lost}
+    assert dict(quick.lost) == {loss.actuator: loss.lost for loss in losses(layout) if loss.lost}

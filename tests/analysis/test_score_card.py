@@ -19,7 +19,7 @@ def test_a_card_is_json(shipped: Layouts) -> None:
     assert record["authority"]["condition"] is None
     assert record["unit_power"][1] is None  # no sway
     assert record["unit_power"][0] > 0.0
-    assert [loss["fin"] for loss in record["losses"]] == list(shipped("D").names)
+    assert [loss["actuator"] for loss in record["losses"]] == list(shipped("D").names)
     assert record["worst_loss"] in shipped("D").names
     assert card.notes == ()
 
@@ -28,9 +28,9 @@ def test_failed_fins_are_left_out(shipped: Layouts) -> None:
     layout = shipped("A")
     card = score_card(layout, ("back_left",))
     assert card.failed == ("back_left",)
-    assert card.n_fins == 3
+    assert card.n_actuators == 3
     assert card.authority == authority(layout, ("back_left",))
-    assert "back_left" not in [loss.fin for loss in card.losses]
+    assert "back_left" not in [loss.actuator for loss in card.losses]
     with pytest.raises(LayoutError, match="has no fin"):
         score_card(layout, ("nobody",))
 

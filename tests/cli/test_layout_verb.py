@@ -62,15 +62,23 @@ def test_check_and_show_take_any_actuator(capsys: pytest.CaptureFixture[str]) ->
     assert "axis (0, 0, 1)                           -39.91..51.44 N, power_law" in out
     assert main(["layout", "show", "turtle_hybrid", "--failed", "lift_left", "--json"]) == 0
     values = json.loads(capsys.readouterr().out)
-    assert (values["version"], values["failed"]) == (2, ["lift_left"])
+    assert (values["counted"], values["failed"]) == ("4 fins and 1 thruster", ["lift_left"])
     assert main(["layout", "show", "turtle_hybrid", "--failed", "bow"]) == 2
+
+
+def test_show_of_a_torpedo_asks_for_its_speed(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["layout", "show", "torpedo"]) == 0
+    out = capsys.readouterr().out
+    assert "1 thruster and 4 rudders push in 1 of 6 independent directions." in out
+    assert "At rest rudder_top, rudder_bottom, elevator_left, elevator_right give nothing" in out
+    assert main(["layout", "show", "torpedo", "--flow", "1.5", "0", "0", "0", "0", "0"]) == 0
+    assert "Only together with other axes: sway up to" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
     ("verb", "argv"),
     [
         ("simulate", ["simulate", "turtle_hybrid"]),
-        ("layout optimize", ["layout", "optimize", "turtle_hybrid", "--fins", "front_left", "-o", "x.yaml"]),
         ("fit robot", ["fit", "robot", "turtle_hybrid", "swim.csv", "-o", "x.yaml"]),
     ],
 )

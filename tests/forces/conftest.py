@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.optimize import linprog
 
 from finlab.assets import shipped_layouts
-from finlab.forces.fin_sets import FinSets
+from finlab.forces.force_sets import ForceSets
 from finlab.layout import Fin, Layout, Limits, load_layout
 
 Array = NDArray[np.float64]
@@ -37,7 +37,7 @@ def wide() -> Layout:
     )
 
 
-def largest_by_polygons(sets: FinSets, direction: Array, corners: int, outer: bool) -> float:
+def largest_by_polygons(sets: ForceSets, direction: Array, corners: int, outer: bool) -> float:
     """Largest scaled wrench exactly along a unit direction (6,), each disc a polygon inside or around it.
 
     A linear programme that shares nothing with the solver under test. Sectors up to half a turn, one robot.

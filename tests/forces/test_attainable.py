@@ -10,7 +10,7 @@ from finlab.actuators.fin.response import fin_table
 from finlab.analysis import AttainableSet, attainable_set
 from finlab.errors import LayoutError
 from finlab.forces.attainable import _sphere
-from finlab.forces.fin_sets import SCALE, fin_sets
+from finlab.forces.force_sets import SCALE, force_sets
 from finlab.layout import Layout
 from finlab.physics import Plant
 from tests.forces.conftest import THRUST
@@ -49,7 +49,7 @@ def test_no_sampled_wrench_lies_outside(shipped: Layouts, name: str, kind: str) 
     fins = [fin_table(fin) for fin in layout.fins]
     shares = [1.0 if fin.gauge is None else fin.gauge.min() for fin in fins]
     off = np.array([f.table.force[0] + f.largest * (1.0 - s) for f, s in zip(fins, shares, strict=True)])
-    error = (np.linalg.norm(fin_sets(layout).effectiveness[0], axis=1) * off[:, None]).sum(axis=0) * SCALE
+    error = (np.linalg.norm(force_sets(layout).effectiveness[0], axis=1) * off[:, None]).sum(axis=0) * SCALE
     assert body.dimension == 3
     assert not body.hull
     assert body.gap <= 0.011 * np.linalg.norm(body.vertices, axis=-1).max()
@@ -62,7 +62,7 @@ def test_no_sampled_wrench_lies_outside(shipped: Layouts, name: str, kind: str) 
 def test_sets_with_all_else_zero_hold_what_was_found_otherwise(shipped: Layouts, kind: str) -> None:
     # Sums of planar forces that leave no other wrench, made by projecting random ones and shrinking them.
     layout = shipped("mixed")
-    sets = fin_sets(layout)
+    sets = force_sets(layout)
     own, other = OWN[kind], OWN["torque" if kind == "force" else "force"]
     effectiveness = sets.effectiveness[0].reshape(-1, 6)
     _, _, directions = np.linalg.svd(effectiveness[:, other].T)

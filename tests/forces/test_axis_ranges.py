@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from finlab.forces.fin_sets import SCALE, fin_sets
+from finlab.forces.force_sets import SCALE, force_sets
 from finlab.forces.reach import axis_ranges
 from finlab.layout import Layout
 
@@ -16,7 +16,7 @@ CORNERS = 96
 
 def ranges_by_polygons(layout: Layout, wrench: list[float], failed: tuple[str, ...]) -> np.ndarray:
     """Ranges (6, 2) [N, N m] with each fin's disc as a polygon within it; NaN where there are none."""
-    sets = fin_sets(layout, failed)
+    sets = force_sets(layout, failed)
     n = sets.radius.shape[1]
     turn = sets.middle[0, :, None] + sets.half[0, :, None] * np.linspace(-1, 1, CORNERS)
     force = sets.radius[0, :, None, None] * np.stack([np.cos(turn), np.sin(turn)], axis=-1)

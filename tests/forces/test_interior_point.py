@@ -5,19 +5,19 @@ import pytest
 from numpy.typing import NDArray
 from scipy.optimize import minimize as scipy_minimize
 
-from finlab.forces.fin_sets import FinSets
+from finlab.forces.force_sets import ForceSets
 from finlab.forces.interior_point import minimize
 from tests.exhaustive import crossed
-from tests.forces.test_fin_sets import HALVES, fins, sector
+from tests.forces.test_force_sets import HALVES, fins, sector
 
 Array = NDArray[np.float64]
 
 
-def robots(half: float, rows: int = 40, n: int = 5, scale: float = 1.0) -> FinSets:
+def robots(half: float, rows: int = 40, n: int = 5, scale: float = 1.0) -> ForceSets:
     rng = np.random.default_rng(5)
     effectiveness = scale * rng.standard_normal((rows, n, 2, 6))
     middle = rng.uniform(-np.pi, np.pi, (rows, n))
-    return FinSets(effectiveness, rng.uniform(0.5, 3.0, (rows, n)), middle, np.full((rows, n), half))
+    return ForceSets(effectiveness, rng.uniform(0.5, 3.0, (rows, n)), middle, np.full((rows, n), half))
 
 
 @pytest.mark.parametrize(
@@ -34,7 +34,7 @@ def test_no_force_within_the_sets_gains_more(half: float, scale: float, far: flo
     force, multiplier = minimize(sets, wanted, c, hessian)
     assert multiplier == pytest.approx((wanted - sets.wrench(force)) / c, abs=1e-5 * (scale + size))
     gain = sets.pull(multiplier) - hessian[..., None] * force
-    alone = FinSets(
+    alone = ForceSets(
         np.tile(np.eye(2), (40, 5, 1, 1)).reshape(200, 1, 2, 2),
         *(f.reshape(200, 1) for f in (sets.radius, sets.middle, sets.half)),
     )
@@ -81,7 +81,7 @@ def test_uneven_fins_within_their_polygons_against_scipy(far: float) -> None:
     boundary = 0.75 + 0.2 * np.cos(side - rng.uniform(0.0, 6.0, (6, n, 1)))
     effectiveness = rng.standard_normal((6, n, 2, 6))
     radius = rng.uniform(0.5, 2.0, (6, n))
-    sets = FinSets(effectiveness, radius, np.zeros((6, n)), np.full((6, n), np.pi), boundary)
+    sets = ForceSets(effectiveness, radius, np.zeros((6, n)), np.full((6, n), np.pi), boundary)
     wanted, hessian = far * rng.standard_normal((6, 6)), 0.1
     found = minimize(sets, wanted, np.ones(6), np.full((6, n), hessian))
     for row in range(6):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from finlab.analysis import authority
-from finlab.forces.fin_sets import SCALE, convex_parts, fin_sets
+from finlab.forces.force_sets import SCALE, convex_parts, force_sets
 from finlab.forces.reach import max_wrench_along, max_wrench_along_exactly, orthogonal_complement
 from finlab.layout import Layout
 from finlab.physics import Plant
@@ -28,7 +28,7 @@ def test_layout_b_in_closed_form(shipped: Layouts) -> None:
 
 @pytest.mark.parametrize("name", ["A", "D", "no_yaw", "restricted", "mixed", "octo"])
 def test_bracketed_by_linear_programmes(shipped: Layouts, name: str) -> None:
-    sets = fin_sets(shipped(name))
+    sets = force_sets(shipped(name))
     mixture = np.random.default_rng(0).standard_normal((3, 6))
     directions = np.concatenate([BOTH_WAYS[::3], mixture / np.linalg.norm(mixture, axis=1, keepdims=True)])
     found, gap = max_wrench_along_exactly(sets, directions)
@@ -40,7 +40,7 @@ def test_bracketed_by_linear_programmes(shipped: Layouts, name: str) -> None:
 
 
 def test_wide_arcs_count_piece_by_piece(wide: Layout) -> None:
-    sets = fin_sets(wide)
+    sets = force_sets(wide)
     size = max_wrench_along_exactly(sets, BOTH_WAYS)[0][0]
     parts = convex_parts(sets)
     assert len(parts.radius) == 4
@@ -58,7 +58,7 @@ def test_wide_arcs_count_piece_by_piece(wide: Layout) -> None:
 
 def test_the_plant_gives_the_largest_wrench(shipped: Layouts) -> None:
     layout = shipped("mixed")
-    sets = fin_sets(layout)
+    sets = force_sets(layout)
     for direction in BOTH_WAYS:
         found = max_wrench_along(sets, direction[None])
         force = found.force[0]
@@ -81,7 +81,7 @@ def test_no_sampled_command_goes_beyond(shipped: Layouts, name: str) -> None:
     lower = layout.lower
     upper = layout.upper
     wrench = Plant(layout).wrench(rng.uniform(lower, upper, (4_000, layout.n_fins, 3))) / SCALE
-    size, _ = fin_sets(layout).tile(12).farthest(BOTH_WAYS)
+    size, _ = force_sets(layout).tile(12).farthest(BOTH_WAYS)
     assert ((wrench @ BOTH_WAYS.T).max(axis=0) <= size + 1e-3).all()
 
 
@@ -98,7 +98,7 @@ def test_the_plant_reaches_as_far_as_it_is_said_to(shipped: Layouts, name: str) 
         command[:, i, :2] = fin.limits.upper[:2]
         command[:, i, 2] = np.linspace(*fin.limits.zero_direction, 2_000)
         best += np.maximum((plant.wrench(command) / SCALE @ directions.T).max(axis=0), 0.0)
-    size, _ = fin_sets(layout).tile(len(directions)).farthest(directions)
+    size, _ = force_sets(layout).tile(len(directions)).farthest(directions)
     assert size == pytest.approx(best, rel=1e-5, abs=1e-9)
 
 

@@ -120,7 +120,7 @@ def _losses(layout: Layout, card: ScoreCard) -> str:
     rows = []
     for loss in card.losses:
         cost = html("<span class='missing'>loses {}</span>", listed(loss.lost)) if loss.lost else ""
-        name = html("without {}{}", swatch(layout.index(loss.fin)), loss.fin)
+        name = html("without {}{}", swatch(layout.index(loss.actuator)), loss.actuator)
         rows.append(row(name, f"{three_digits(loss.weakest)} N", html("<div class='words'>{}</div>", cost)))
     return html("<table><tr><th>one fin lost</th><th>weakest</th><th></th></tr>{}</table>", rows)
 

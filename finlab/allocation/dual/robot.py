@@ -177,8 +177,7 @@ def dual_robot(responses: list[Response]) -> DualRobot:
     lines = [each for each in responses if isinstance(each, Line)]
     planes = [each for each in responses if isinstance(each, Plane)]
     answers = Answers(lines, planes)
-    low = [max(line.low, -line.reverse.largest if line.reverse else line.forward.force[0]) for line in lines]
-    high = [min(line.high, line.forward.largest) for line in lines]
+    low, high = [line.ends[0] for line in lines], [line.ends[1] for line in lines]
     low += [plane.table.force[0] for plane in planes]
     high += [plane.table.largest for plane in planes]
     low_, high_ = np.array(low)[:, None], np.array(high)[:, None]

@@ -4,26 +4,26 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from finlab.forces.fin_sets import MAX_CUT, FinSets, convex_parts
+from finlab.forces.force_sets import MAX_CUT, ForceSets, convex_parts
 
 Array = NDArray[np.float64]
 HALVES = [0.0, 0.4, np.pi / 2, 1.9, 2.9, np.pi]
 
 
-def fins(half: float, rows: int = 200) -> FinSets:
+def fins(half: float, rows: int = 200) -> ForceSets:
     """Robots of one fin that pushes along x and y alone."""
     rng = np.random.default_rng(0)
     effectiveness = np.zeros((rows, 1, 2, 6))
     effectiveness[:, 0, 0, 0] = effectiveness[:, 0, 1, 1] = 1.0
     middle = rng.uniform(-np.pi, np.pi, (rows, 1))
-    return FinSets(effectiveness, np.full((rows, 1), 3.0), middle, np.full((rows, 1), half))
+    return ForceSets(effectiveness, np.full((rows, 1), 3.0), middle, np.full((rows, 1), half))
 
 
 def pulls(rows: int = 200) -> Array:
     return np.random.default_rng(1).standard_normal((rows, 1, 2)) * 2.0
 
 
-def sector(sets: FinSets, row: int) -> Array:
+def sector(sets: ForceSets, row: int) -> Array:
     """Points (S, 2) all over one fin's sector, its rim and its tip included."""
     angle = sets.middle[row, 0] + np.linspace(-1.0, 1.0, 721) * sets.half[row, 0]
     boundary = sets.radius[row, 0] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
@@ -74,11 +74,11 @@ def test_an_uneven_fin_reaches_as_far_as_the_polygon_around_it(count: int) -> No
         np.testing.assert_allclose(found, known)
 
 
-def five_fins(half: float) -> FinSets:
+def five_fins(half: float) -> ForceSets:
     """Two robots of five fins with the same arcs."""
     effectiveness = np.random.default_rng(2).standard_normal((2, 5, 2, 6))
     middle = np.tile(np.linspace(-2.0, 2.0, 5), (2, 1))
-    return FinSets(effectiveness, np.ones((2, 5)), middle, np.full((2, 5), half))
+    return ForceSets(effectiveness, np.ones((2, 5)), middle, np.full((2, 5), half))
 
 
 @pytest.mark.parametrize(("half", "parts"), [(np.pi / 2, 1), (np.pi, 1), (2.0, 2**MAX_CUT)])
