@@ -1,0 +1,174 @@
+"""What the allocation of two autopilots misses and takes, within reach and beyond, on robots of thrusters."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from finlab.allocation import Allocator, Policy
+from finlab.allocation.baselines.ardusub import ORDER as ARDUSUB_ORDER
+from finlab.allocation.baselines.px4 import ORDER as PX4_ORDER
+from finlab.arrays import Array
+from finlab.evaluation.experiment import Experiment, check_names
+from finlab.evaluation.progress import progress
+from finlab.evaluation.report.document import Column, Row
+from finlab.evaluation.splits import make_split
+from finlab.layout import Layout, load_layout
+from finlab.physics import plant_of
+
+Order = tuple[tuple[str, ...], ...]
+METHODS: dict[str, tuple[str, dict[str, str], Order | None]] = {
+    "dual": ("dual", {}, None),
+    "pseudo-inverse": ("px4", {"desaturation": "none"}, PX4_ORDER),
+    "px4": ("px4", {}, PX4_ORDER),
+    "ardusub": ("ardusub", {}, ARDUSUB_ORDER),
+}
+"""Name -> method, its settings, and the order in which it means to keep axes."""
+ROBOTS = ("bluerov2_heavy", "even", "surveyed", "random")
+"""BlueROV2 Heavy, whose rear thrusters sit 1 cm further out than those in front; the same without; BlueROV2
+with thrusters a little out of place, so that the axis that nothing drives is driven badly; random ones."""
+FRONT = 0.14
+"""How far the front thrusters are ahead [m]."""
+SURVEYED = 0.005
+"""By how much places differ from the drawing [m]."""
+FAR = 1e3
+"""Times a target, surely out of reach."""
+DELIVERED = 1e-3
+"""Missing wrench over the yardstick up to which a target counts as delivered."""
+ALIKE = 1e-6
+"""Missing wrench over the yardstick up to which two are alike."""
+DOMAIN = 0x7A05
+"""Leads the seed of the draws."""
+
+
+def run(
+    robots: tuple[str, ...] = ROBOTS,
+    reach: tuple[float, ...] = (0.8, 1.2, 2.0, 3.0),
+    lost: tuple[int, ...] = (0, 1, 2),
+    layouts: int = 5,
+    targets: int = 20,
+    seed: int = 0,
+) -> list[Row]:
+    """One row for each robot, number of lost thrusters, share of reach and method.
+
+    Args:
+        robots: some of bluerov2_heavy, even, surveyed, random.
+        reach: targets over the most that the robot gives in their direction.
+        lost: numbers of lost thrusters.
+        layouts: draws of robots and of the thrusters that are lost.
+        targets: of each draw.
+        seed: of all draws.
+    """
+    check_names("robots", robots, ROBOTS)
+    rows: list[Row] = []
+    for robot in robots:
+        for count in lost:
+            drawn = list(_draws(robot, count, layouts, targets, seed))
+            for share in progress(reach, "share of reach", f"{robot}, {count} lost"):
+                found = [_scores(layout, share * edge) for layout, edge in drawn]
+                for method in METHODS:
+                    about: Row = {"robot": robot, "lost": count, "reach": share, "method": method}
+                    rows.append(about | _figures([each[method] for each in found]))
+    return rows
+
+
+def _draws(robot: str, lost: int, layouts: int, targets: int, seed: int) -> Iterator[tuple[Layout, Array]]:
+    """What is left of robots, and wrenches (N, 6) at the edge of reach, along those of uniform commands."""
+    for k in range(layouts):
+        rng = np.random.default_rng([DOMAIN, seed, ROBOTS.index(robot), lost, k])
+        layout = _robot(robot, rng, seed, k)
+        left = layout.without([layout.names[i] for i in rng.permutation(layout.n)[:lost]])
+        plant = plant_of(left)
+        wrench = plant.wrench(plant.sample(rng, (targets,)))
+        yield left, Allocator(left).allocate_batch(FAR * wrench, policy="direction").wrench
+
+
+def _robot(robot: str, rng: np.random.Generator, seed: int, k: int) -> Layout:
+    if robot == "random":
+        return make_split("thrusters", k + 1, 1, seed)[k].layout
+    layout = load_layout("bluerov2" if robot == "surveyed" else "bluerov2_heavy")
+    places = layout.position.copy()
+    if robot == "surveyed":
+        places += rng.uniform(-SURVEYED, SURVEYED, places.shape)
+    elif robot == "even":
+        places[2:4, 0] = -FRONT
+    moved = zip(layout.actuators, places.tolist(), strict=True)
+    return replace(layout, actuators=tuple(replace(part, position=tuple(place)) for part, place in moved))
+
+
+def _scores(layout: Layout, targets: Array) -> dict[str, dict[str, Array]]:
+    """By method arrays (N,): what it misses and takes, and what `dual` misses in its order."""
+    dual, found = Allocator(layout), dict[str, dict[str, Array]]()
+    bound = dual.allocate_batch(targets).bound
+    ranked = {
+        order: dual.allocate_batch(targets, policy=Policy("priority", order=order)).unallocated / dual.scale
+        for order in (PX4_ORDER, ARDUSUB_ORDER)
+    }
+    for method, (name, settings, order) in METHODS.items():
+        answer = Allocator(layout, name, **settings).allocate_batch(targets)
+        found[method] = {"missed": answer.err_norm, "power": answer.power, "bound": np.asarray(bound)}
+        if order is not None:
+            own, ours = (missing_by_group(x, order) for x in (answer.unallocated / dual.scale, ranked[order]))
+            found[method] |= {"first": own[:, 0], "dual_first": ours[:, 0]}
+            found[method]["dual_more"] = misses_more(ours, own)
+    return found
+
+
+def missing_by_group(missing: Array, order: Sequence[Sequence[str]]) -> Array:
+    """Sizes (N, G) of what is missing (N, 6), over the yardstick, in each group of axes."""
+    groups = Policy("priority", order=tuple(map(tuple, order))).groups
+    return np.stack([np.linalg.norm(missing[:, axes], axis=1) for axes in groups], axis=1)
+
+
+def misses_more(one: Array, other: Array) -> Array:
+    """Whether (N,) the first misses (N, G) more than the other in the first group in which they differ."""
+    differ = np.abs(one - other) > ALIKE
+    first = differ.argmax(axis=1)[:, None]
+    more: Array = np.take_along_axis(one - other, first, axis=1)[:, 0] > ALIKE
+    return more
+
+
+def _figures(found: Sequence[dict[str, Array]]) -> Row:
+    """Means over all targets of all draws."""
+    by = {key: np.concatenate([np.asarray(each[key], float) for each in found]) for key in found[0]}
+    fine = (by["missed"] <= DELIVERED) & (by["bound"] > 0.0)
+    row: Row = {"n": len(fine), "not_delivered": float((by["missed"] > DELIVERED).mean())}
+    if fine.any():
+        ratio = by["power"][fine] / by["bound"][fine]
+        row |= {
+            "watts": float(by["power"][fine].sum() / by["bound"][fine].sum()),
+            "watts_max": float(ratio.max()),
+        }
+    means = ("missed", "first", "dual_first", "dual_more")
+    return row | {f"{key}_mean": float(by[key].mean()) for key in means if key in by}
+
+
+experiment = Experiment(
+    name="thrusters",
+    question="What do the autopilots PX4 and ArduSub miss and take, within reach and beyond, beside `dual`?",
+    columns=(
+        Column("robot", "robot", "code"),
+        Column("lost", "lost", "count"),
+        Column("reach", "over reach", "three"),
+        Column("method", "method", "code"),
+        Column("n", "targets", "count"),
+        Column("not_delivered", "not delivered", "share"),
+        Column("watts", "power over the least", "ratio"),
+        Column("watts_max", "worst", "ratio"),
+        Column("missed_mean", "missing", "error"),
+        Column("first_mean", "missing of the first axes", "error"),
+        Column("dual_first_mean", "of `dual`", "error"),
+        Column("dual_more_mean", "`dual` misses more", "share"),
+    ),
+    run=run,
+    note=(
+        "Targets lie along the wrenches of uniform commands. Missing: over the robot's yardstick. The first "
+        "axes are those that the autopilot means to keep (PX4: roll and pitch, then heave, yaw, surge and "
+        "sway; ArduSub: roll, pitch and heave, then the others); `dual` gets the same order as a priority, "
+        "and misses more where it does so in the first group in which the two differ. Power over the least: "
+        "over the watts that no answer can undercut, where the target is delivered. Pseudo-inverse: PX4's "
+        "without desaturation. `surveyed`: a BlueROV2 with each thruster up to 5 mm out of place."
+    ),
+    quick={"robots": ("bluerov2_heavy", "random"), "lost": (0, 1), "reach": (0.8, 2.0), "layouts": 4},
+    full={"layouts": 8},
+)
