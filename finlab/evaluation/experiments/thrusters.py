@@ -35,7 +35,7 @@ FAR = 1e3
 """Times a target, surely out of reach."""
 DELIVERED = 1e-3
 """Missing wrench over the yardstick up to which a target counts as delivered."""
-ALIKE = 1e-6
+ALIKE = 1e-5
 """Missing wrench over the yardstick up to which two are alike."""
 DOMAIN = 0x7A05
 """Leads the seed of the draws."""
@@ -152,7 +152,7 @@ experiment = Experiment(
         Column("reach", "over reach", "three"),
         Column("method", "method", "code"),
         Column("n", "targets", "count"),
-        Column("not_delivered", "not delivered", "share"),
+        Column("not_delivered", "clipped", "share"),
         Column("watts", "power over the least", "ratio"),
         Column("watts_max", "worst", "ratio"),
         Column("missed_mean", "missing", "error"),
@@ -162,13 +162,14 @@ experiment = Experiment(
     ),
     run=run,
     note=(
-        "Targets lie along the wrenches of uniform commands. Missing: over the robot's yardstick. The first "
-        "axes are those that the autopilot means to keep (PX4: roll and pitch, then heave, yaw, surge and "
-        "sway; ArduSub: roll, pitch and heave, then the others); `dual` gets the same order as a priority, "
-        "and misses more where it does so in the first group in which the two differ. Power over the least: "
-        "over the watts that no answer can undercut, where the target is delivered. Pseudo-inverse: PX4's "
-        "without desaturation. `surveyed`: a BlueROV2 with each thruster up to 5 mm out of place."
+        "Targets lie along the wrenches of uniform commands. Clipped: not delivered. Missing: over the "
+        "robot's yardstick. The first axes are those that the autopilot means to keep (PX4: roll and pitch, "
+        "then heave, yaw, surge and sway; ArduSub: roll, pitch and heave, then the others); `dual` gets the "
+        "same order as a priority, and misses more where it does so in the first group in which the two "
+        "differ. Power over the least: over the watts that no answer can undercut, where the target is "
+        "delivered. Pseudo-inverse: PX4's without desaturation. `surveyed`: a BlueROV2 with each thruster up "
+        "to 5 mm out of place."
     ),
-    quick={"robots": ("bluerov2_heavy", "random"), "lost": (0, 1), "reach": (0.8, 2.0), "layouts": 4},
+    quick={"robots": ("bluerov2_heavy",), "lost": (0, 1), "reach": (0.8, 2.0)},
     full={"layouts": 8},
 )
