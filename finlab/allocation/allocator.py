@@ -181,6 +181,10 @@ class Allocator:
         """Names of the fins whose model the networks have not learned; answers for them are wrong."""
         return self._whole.method.unknown_fins
 
+    def on(self, layout: Layout) -> Allocator:
+        """Another allocator by the same method, networks and settings, for another robot."""
+        return self.of_choice(layout, self._choice)
+
     def with_settings(self, **changes: Any) -> Allocator:
         """Another allocator for the same robot, method and networks, with some settings changed.
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -15,6 +16,8 @@ from finlab.errors import FinlabError
 from finlab.whole_file import make_folder
 
 if TYPE_CHECKING:
+    from finlab.allocation import Allocator
+    from finlab.fit.robot.online import OnlineFit
     from finlab.sim import ClosedLoop, FinFault, RunLog
     from finlab.sim.water import Water
 
@@ -26,6 +29,7 @@ def simulate(
     fail: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME@SECONDS[:KIND]")] = (),
     announced: bool = True,
     monitor: bool = False,
+    learn: bool = False,
     method: Annotated[str, arg(metavar="NAME")] = "dual",
     objective: Literal["power", "effort"] = "power",
     duration: Annotated[float | None, arg(metavar="SECONDS")] = None,
@@ -51,6 +55,8 @@ def simulate(
             front_left@60:whole (it is repaired).
         announced: whether what happens to fins is announced to the allocator.
         monitor: let a FaultMonitor watch the robot and tell the allocator what it finds.
+        learn: every minute fit the fins' strengths and directions to the last two minutes of the swim, and
+            allocate with them from then on; for laws of fins, and methods that take any shaft.
         method: dual, mdn, paper, qp, sqp, px4, ardusub, analytic or ipopt.
         objective: what the method keeps least: power in watts, or effort, the paper's J_en.
         duration: time for a shipped trajectory.
@@ -75,21 +81,25 @@ def simulate(
         robot, water = open_robot(layout), _water(current, waves, seed)
         faults = [*(FinFault(name, 0.0) for name in robot.failed), *map(FinFault.parse, fail)]
         if excite:
-            if fail or monitor:
+            if fail or monitor or learn:
                 raise FinlabError(
-                    "--excite: a robot is learned with the fins that it has; leave --fail and --monitor out"
+                    "--excite: a robot is learned with the fins that it has; leave --fail, --monitor and "
+                    "--learn out"
                 )
             from finlab.sim.excite import LONGEST_S, excitation
 
+            learner = None
             whole, seconds = robot.layout.without(robot.failed), LONGEST_S if duration is None else duration
             loop = excitation(whole, seconds, plant=plant, sensors=sensors, water=water, seed=seed)
         else:
             from finlab.control import FaultMonitor
             from finlab.evaluation.method_specs import load_method_spec
 
+            allocator = load_method_spec(method, checkpoint, objective).on(robot.layout)
+            learner = _learner(allocator) if learn else None
             loop = ClosedLoop(
                 robot.layout,
-                load_method_spec(method, checkpoint, objective).on(robot.layout),
+                allocator,
                 make_trajectory(trajectory, duration),
                 plant=plant,
                 sensors=sensors,
@@ -97,6 +107,7 @@ def simulate(
                 failures=faults,
                 announced=announced,
                 monitor=FaultMonitor(robot.layout) if monitor else None,
+                learner=learner,
                 seed=seed,
             )
             for sentence in _uncontrollable(loop, faults):
@@ -114,7 +125,8 @@ def simulate(
         loop.log.save(output / "log.npz")
         written = [f"\n{output}: written log.npz."]
     told = excitation_summary(loop.log) if excite else summary(loop.log)
-    changes = [f"{time:.1f} s: the monitor takes {what}" for time, what in found[1:]]
+    changes = [] if learner is None else learner.notes
+    changes += [f"{time:.1f} s: the monitor takes {what}" for time, what in found[1:]]
     print("\n".join([told, *changes, *written]))
 
 
@@ -151,6 +163,15 @@ def excitation_summary(log: RunLog) -> str:
         f"{np.hypot(away[0], away[1]):.2f} m away, {away[2]:.2f} m up or down, {tilt:.0f} deg of roll or "
         f"pitch, {np.abs(log.motion[:, :3]).max():.2f} m/s"
     )
+
+
+def _learner(allocator: Allocator) -> OnlineFit:
+    """Who learns a robot on the way; a `FinlabError` where the method takes no fins that lean."""
+    from finlab.fit.robot.online import OnlineFit, leaned
+
+    learner, layout = OnlineFit(allocator.layout), allocator.layout
+    allocator.on(replace(layout, actuators=tuple(leaned(fin, 0.01) for fin in layout.fins)))
+    return learner
 
 
 def monitored(loop: ClosedLoop) -> str:

@@ -8,6 +8,7 @@ from finlab.control.fault_monitor import Diagnosis as Diagnosis
 from finlab.control.fault_monitor import FaultMonitor as FaultMonitor
 from finlab.control.measurement import Controller as Controller
 from finlab.control.measurement import Foresighted as Foresighted
+from finlab.control.measurement import Learner as Learner
 from finlab.control.measurement import Measurement as Measurement
 from finlab.control.measurement import Setpoint as Setpoint
 from finlab.control.monitor_settings import MonitorSettings as MonitorSettings

@@ -123,6 +123,14 @@ class FaultMonitor:
         self._told[fin] = self._lost[fin]
         return self.verdict()
 
+    def adopt(self, layout: Layout) -> None:
+        """Takes the robot for another one, with the same body: what is not lost gives what this layout says."""
+        self.layout = layout
+        self._model.adopt(layout)
+        self._torn[:] = False
+        for k in np.flatnonzero(~self._lost):
+            self._beliefs.believe(int(k), 1.0)
+
     def probed(self, command: Array) -> Array:
         """The command (n, 3) with what keeps the fins known.
 

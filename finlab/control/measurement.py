@@ -7,6 +7,7 @@ from typing import NamedTuple, Protocol, runtime_checkable
 import numpy as np
 
 from finlab.arrays import Array
+from finlab.layout import Layout
 
 NO_WRENCH = np.zeros(6)
 """Of fins that have given nothing."""
@@ -90,4 +91,17 @@ class Foresighted(Protocol):
     def ahead(self, setpoints: Sequence[Setpoint]) -> Array:
         """Wrenches (K, 6) [N, N m] that will be asked for at K setpoints after the first, a period apart; the
         first is that of the last call of `wrench`."""
+        ...
+
+
+class Learner(Protocol):
+    """Finds out on the way what a robot is; called at every tick."""
+
+    def step(self, measured: Array, command: Array) -> Layout | None:
+        """Returns the robot as it is now believed to be, where that has changed.
+
+        Args:
+            measured: position [m], roll, pitch, yaw [rad], velocity [m/s] and rates [rad/s] (12,).
+            command: of the fins until the next call (n, 3), NaN for those at rest.
+        """
         ...

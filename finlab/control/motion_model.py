@@ -78,6 +78,10 @@ class MotionModel:
         self.unsure = np.zeros(layout.n, dtype=bool)
         """Which actuators (n,) turn about by command just now; which way round is unknown."""
 
+    def adopt(self, layout: Layout) -> None:
+        """From now on forces are those of another layout with the same body."""
+        self._plant = plant_of(layout)
+
     def step(self, state: Array, yaw: float, command: Array, held: Array, other: Array) -> Step:
         """Carries a state on over a period.
 

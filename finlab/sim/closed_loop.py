@@ -18,6 +18,7 @@ from finlab.control import (
     Diagnosis,
     FaultMonitor,
     Foresighted,
+    Learner,
     Measurement,
     Setpoint,
     TrackingController,
@@ -69,6 +70,7 @@ class ClosedLoop:
         failures: Sequence[FinFault | tuple[str, float]] = (),
         announced: bool = True,
         monitor: FaultMonitor | None = None,
+        learner: Learner | None = None,
         truth: Layout | None = None,
         copper_loss: float = COPPER_LOSS,
         seed: int = 0,
@@ -89,6 +91,7 @@ class ClosedLoop:
             announced: whether what happens is announced to the allocator; else it goes on as before, unless a
                 monitor notices.
             monitor: watches the robot, gives the allocator what it finds, and takes what is announced.
+            learner: finds out what the fins really are; allocator and monitor then work with that.
             truth: the robot that really swims, such as `perturbed(layout, damping=2.0)`, where `layout` is
                 only what allocator, controller and monitor believe of it; it has the same actuators.
             copper_loss: heat in the fins' motors [W/(N m)^2] that counts as `driving_power`.
@@ -129,7 +132,7 @@ class ClosedLoop:
         self._flow: Array | None = None
         self._sensors = Sensors(SensorSettings() if sensors is None else sensors, np.random.default_rng(seed))
         self._pending = sorted(events, key=lambda event: event.time_s)
-        self.announced, self.monitor = announced, monitor
+        self.announced, self.monitor, self.learner = announced, monitor, learner
         self.broken: dict[str, FinFault] = {}
         """What is true: the actuators that are not whole now, by name."""
         self._told: dict[str, FinFault] = {}
@@ -266,7 +269,17 @@ class ClosedLoop:
         tick = self._move(now, setpoint, answer.target, command, answer.solve_ms)
         self._command = command
         self._ticks.append(tick)
+        found = None if self.learner is None else self.learner.step(tick.measured, command)
+        if found is not None:
+            self._believe(found)
         return tick
+
+    def _believe(self, layout: Layout) -> None:
+        """From now on allocator and monitor take the robot for this one."""
+        self.allocator, self._plant = self.allocator.on(layout), plant_of(layout)
+        if self.monitor is not None:
+            self.monitor.adopt(layout)
+        self._completion.clear()
 
     def run(self) -> RunLog:
         """Swims to the end of the task."""
@@ -301,7 +314,9 @@ class ClosedLoop:
         failed = self.damage.failed
         if failed not in self._completion:
             controller = self.controller
-            self._completion[failed] = Completion(self.layout, failed, controller.axes, controller.free)
+            self._completion[failed] = Completion(
+                self.allocator.layout, failed, controller.axes, controller.free
+            )
         return self._completion[failed]
 
     def _alive(self) -> NDArray[np.bool_]:

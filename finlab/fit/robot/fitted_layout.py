@@ -18,6 +18,7 @@ from finlab.fit.robot.robot_fit import RobotFit
 from finlab.layout import Body, Fin, FinModelSpec, Interaction, Jet, Layout, save_layout
 from finlab.layout.interaction import MAX_SHARE
 from finlab.layout.layout import MAX_DESCRIPTION_LENGTH
+from finlab.layout.uncertainty import Uncertainty
 from finlab.physics import make_law
 from finlab.whole_file import write_whole
 
@@ -41,7 +42,7 @@ def fitted_layout(fit: RobotFit, path: str | os.PathLike[str]) -> tuple[Layout, 
     """
     layout, place = fit.model.layout, Path(path)
     center, mounting = _found(fit, "center"), _found(fit, "mounting")
-    fins, tables = [], {}
+    fins, tables, unsure = [], {}, uncertainties(fit)
     for i, fin in enumerate(layout.fins):
         model, table = _model(fit, i)
         if table is not None:
@@ -49,11 +50,31 @@ def fitted_layout(fit: RobotFit, path: str | os.PathLike[str]) -> tuple[Layout, 
             tables[name], model = table, FinModelSpec("table", (("path", name),))
         x, y, z = (float(value) for value in np.array(fin.position) - center)
         angle = float(np.mod(fin.shaft_azimuth + mounting[i] + np.pi, 2 * np.pi) - np.pi)
-        fins.append(replace(fin, position=(x, y, z), mounting_angle=angle, model=model))
+        fins.append(
+            replace(fin, position=(x, y, z), mounting_angle=angle, model=model, uncertainty=unsure[i])
+        )
     notes = "\n".join(summary(fit))
     text = f"{notes}\n{layout.description}".strip()[:MAX_DESCRIPTION_LENGTH]
     name = layout.name if place.stem == layout.name else place.stem[:64].strip() or layout.name
     return Layout(name, tuple(fins), text, _body(fit), _interaction(fit)), tables
+
+
+def uncertainties(fit: RobotFit) -> tuple[Uncertainty, ...]:
+    """Returns how far each fin's force may be from what was found: the mean over strength and lean, with the
+    share of it that all strengths have together."""
+    place = fit.fitted.unknowns.place("strength")
+    covariance = fit.covariance[place, place]
+    own = np.sqrt(np.diag(covariance))
+    n = len(own)
+    alike = (covariance / np.outer(own, own)).sum() / n if n > 1 else 1.0
+    together = float(np.clip((alike - 1.0) / max(n - 1, 1), 0.0, 1.0))
+    strength, lean = fit.part_error("strength"), fit.part_error("lean")
+    assert strength is not None and lean is not None
+    shares = np.sqrt(0.5 * (strength**2 + lean**2)).tolist()
+    return tuple(
+        Uncertainty(share, common=f"swim of {fit.model.layout.name}"[:64].strip(), correlation=together)
+        for share in shares
+    )
 
 
 def write_robot(fit: RobotFit, path: str | os.PathLike[str]) -> Layout:

@@ -1,6 +1,7 @@
 """From unknowns to what a robot does: the wrenches of its fins over a swim, and the body that they move."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -28,8 +29,8 @@ DAMPING_DOUBT = 0.5
 class RobotModel:
     """One layout, and the swims from which it is learned, M steps in all."""
 
-    def __init__(self, layout: Layout, swims: Sequence[Swim]) -> None:
-        """Takes the robot as it is believed to be."""
+    def __init__(self, layout: Layout, swims: Sequence[Swim], doubts: Mapping[str, float]) -> None:
+        """Takes the robot as it is believed to be, and by what factors some blocks may be farther off."""
         self.layout, self.body = layout, complete_body(layout)
         self.dynamics = Dynamics(*map(np.array, dynamics_of(self.body)))
         """Of that body; arrays."""
@@ -37,7 +38,10 @@ class RobotModel:
         at_speed = known.linear + known.quadratic * TYPICAL_SPEED
         at_speed = np.maximum(at_speed, 0.1 * known.inertia * TYPICAL_SPEED)
         doubt = DAMPING_DOUBT * np.stack([at_speed, at_speed / TYPICAL_SPEED])
-        self.blocks = blocks_of(layout.names, doubt)
+        self.blocks = {
+            name: replace(block, scale=block.scale * doubts.get(name, 1.0))
+            for name, block in blocks_of(layout.names, doubt).items()
+        }
         plant = plant_of(layout)
         self.motion = np.concatenate([swim.motion for swim in swims])
         working = (self.motion[..., 0] > 0.0) & (self.motion[..., 1] > 0.0)

@@ -4,7 +4,7 @@ First all that every robot has; then, one after the other, another law of thrust
 only where it lessens the error on windows that its fit has not seen.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -30,6 +30,7 @@ WEAKLY_KNOWN = 0.1
 """Standard error of a fin's strength beside those of the others, as a share, that is worth a doubt."""
 DEVIATION_RANGE = (0.1, 30.0)
 """Deviations of sensors within these multiples of what is believed."""
+NO_DOUBTS: Mapping[str, float] = {}
 ROUNDS = 2
 """Times that deviations are estimated and the base fitted again."""
 
@@ -110,6 +111,7 @@ def fit_robot(
     swims: Sequence[Swim],
     tried: Sequence[str] = RESIDUAL,
     progress: Progress = say_nothing,
+    doubts: Mapping[str, float] = NO_DOUBTS,
 ) -> RobotFit:
     """Learns a robot. The linear algebra runs on one thread.
 
@@ -118,6 +120,7 @@ def fit_robot(
         swims: what was measured.
         tried: what is looked for besides, where it helps: some of `RESIDUAL`.
         progress: called before each step.
+        doubts: factors of how far some blocks of unknowns may be off, by name.
 
     Raises:
         DataError: there is no swim, or the fit goes astray.
@@ -132,11 +135,10 @@ def fit_robot(
         )
     stages = Stages(progress, ROUNDS + (1 + ROUNDS) * len(tried) + 1, MOST_STEPS)
     with threadpool_limits(limits=1, user_api="blas"):
-        return _fit(layout, swims, tried, stages)
+        return _fit(RobotModel(layout, swims, doubts), swims, tried, stages)
 
 
-def _fit(layout: Layout, swims: Sequence[Swim], tried: Sequence[str], stages: Stages) -> RobotFit:
-    model = RobotModel(layout, swims)
+def _fit(model: RobotModel, swims: Sequence[Swim], tried: Sequence[str], stages: Stages) -> RobotFit:
     measured = np.concatenate([swim.measured for swim in swims])
     smooth = np.concatenate([smoothed(swim.measured) for swim in swims])
     windows = cut([len(swim) for swim in swims], measured, smooth)

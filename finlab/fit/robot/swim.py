@@ -41,12 +41,16 @@ def replay(layout: Layout, command: Array) -> Array:
     """What fins with nominal servos do (N, SUBSTEPS, n, 3) under commands (N, n, 3), one per step, NaN for a
     lost fin."""
     fins = FinMotion(layout)
-    motion = np.empty((len(command), SUBSTEPS, *command.shape[1:]))
-    for k, row in enumerate(command):
-        for s in range(SUBSTEPS):
-            fins.step(row, STEP_S / SUBSTEPS / 2)
-            motion[k, s] = fins.command
-            fins.step(row, STEP_S / SUBSTEPS / 2)
+    return np.array([followed(fins, row) for row in command])
+
+
+def followed(fins: FinMotion, command: Array) -> Array:
+    """Moves fins on by one step under a command (n, 3), and returns what they do (SUBSTEPS, n, 3)."""
+    motion = np.empty((SUBSTEPS, *command.shape))
+    for s in range(SUBSTEPS):
+        fins.step(command, STEP_S / SUBSTEPS / 2)
+        motion[s] = fins.command
+        fins.step(command, STEP_S / SUBSTEPS / 2)
     return motion
 
 

@@ -1,0 +1,98 @@
+"""A robot that learns its fins while it swims: every minute the last four are fitted, and what the fins'
+strengths and directions turn out to be is what allocation works with from then on."""
+
+from collections import deque
+from dataclasses import replace
+
+import numpy as np
+
+from finlab.arrays import Array
+from finlab.errors import FinlabError
+from finlab.fit.robot.fitted_layout import uncertainties
+from finlab.fit.robot.robot_fit import RobotFit, fit_robot
+from finlab.fit.robot.swim import STEP_S, Swim, followed, only_new
+from finlab.layout import Fin, Layout
+from finlab.vehicle.fin_motion import FinMotion
+
+EVERY_S, LAST_S = 60.0, 240.0
+"""Time between fits [s], and how much of the swim each takes."""
+DOUBTS = {"inertia": 0.3, "linear": 0.3, "quadratic": 0.3, "mounting": 0.5, "center": 0.5}
+"""How doubtful body and places of the fins are, as a share of that before a swim that shakes a robot:
+a path tells less of them, and what they take up is missing in the fins' strengths."""
+
+
+class OnlineFit:
+    """What a robot's fins are, by its own swim; to be called every `STEP_S` seconds."""
+
+    def __init__(self, layout: Layout) -> None:
+        """Takes the robot as it is believed to be.
+
+        Raises:
+            LayoutError: it has other actuators than fins with horizontal shafts.
+            FinlabError: a fin is a table, whose strength is no number of the layout.
+        """
+        layout.only_fins("learning on the way", horizontal=True)
+        for fin in layout.fins:
+            if fin.model.type == "table":
+                raise FinlabError(
+                    f"fin {fin.name} is a table, expected a law: the strength of a table is fixed"
+                )
+        self.layout = layout
+        """As it was believed to be before."""
+        self.notes: list[str] = []
+        """What each fit has found, a sentence each."""
+        self._fins = FinMotion(layout)
+        self._last: deque[tuple[Array, Array, Array]] = deque(maxlen=round(LAST_S / STEP_S))
+        self._steps = 0
+
+    def step(self, measured: Array, command: Array) -> Layout | None:
+        """Returns the robot as the last minutes show it, whenever they have been fitted.
+
+        Args:
+            measured: what the sensors said last (12,), in the order of `CHANNELS`.
+            command: of the fins for this step (n, 3), NaN for those at rest.
+        """
+        self._last.append((followed(self._fins, command), measured, command))
+        self._steps += 1
+        if self._steps % round(EVERY_S / STEP_S):
+            return None
+        motion, said, commands = (np.array(part) for part in zip(*self._last, strict=True))
+        swim = Swim("the swim", motion, only_new(said), commands)
+        fit = fit_robot(self.layout, [swim], (), doubts=DOUBTS)
+        strength, error = np.exp(_part(fit, "strength")), fit.part_error("strength")
+        assert error is not None
+        told = (
+            f"{name} {own:.2f} +- {own * unsure:.2f}"
+            for name, own, unsure in zip(self.layout.names, strength, error, strict=True)
+        )
+        self.notes.append(f"{self._steps * STEP_S:.0f} s: learned strengths {', '.join(told)}")
+        return learned(fit)
+
+
+def learned(fit: RobotFit) -> Layout:
+    """Returns the layout of a fit with its fins' strengths, places and directions, but no other law or body.
+
+    A fin that leans turns its `zero` about its shaft.
+    """
+    layout, fins = fit.model.layout, []
+    strength, turned, lean = (_part(fit, name) for name in ("strength", "mounting", "lean"))
+    center, unsure = _part(fit, "center"), uncertainties(fit)
+    for i, fin in enumerate(layout.fins):
+        x, y, z = (np.array(fin.position) - center).tolist()
+        moved = replace(fin, position=(x, y, z), mounting_angle=fin.shaft_azimuth + float(turned[i]))
+        changed = leaned(moved, float(lean[i]))
+        fins.append(
+            replace(changed, model=fin.model.scaled(float(np.exp(strength[i]))), uncertainty=unsure[i])
+        )
+    return replace(layout, actuators=tuple(fins))
+
+
+def leaned(fin: Fin, angle: float) -> Fin:
+    """Returns a fin whose thrust is turned by an angle [rad] about its shaft, from `zero` to shaft x zero."""
+    shaft, zero, across = (np.array(axis) for axis in fin.frame)
+    turned = np.cos(angle) * zero + np.sin(angle) * across
+    return replace(fin, mounting_angle=None, shaft=tuple(shaft.tolist()), zero=tuple(turned.tolist()))
+
+
+def _part(fit: RobotFit, name: str) -> Array:
+    return fit.fitted.unknowns.of(name, fit.fitted.vector)
