@@ -55,7 +55,7 @@ def simulate(
             front_left@60:whole (it is repaired).
         announced: whether what happens to fins is announced to the allocator.
         monitor: let a FaultMonitor watch the robot and tell the allocator what it finds.
-        learn: every minute fit the fins' strengths and directions to the last two minutes of the swim, and
+        learn: every minute fit the fins' strengths and directions to the last four minutes of the swim, and
             allocate with them from then on; for laws of fins, and methods that take any shaft.
         method: dual, mdn, paper, qp, sqp, px4, ardusub, analytic or ipopt.
         objective: what the method keeps least: power in watts, or effort, the paper's J_en.

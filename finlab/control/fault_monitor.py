@@ -124,7 +124,7 @@ class FaultMonitor:
         return self.verdict()
 
     def adopt(self, layout: Layout) -> None:
-        """Takes the robot for another one, with the same body: what is not lost gives what this layout says."""
+        """Takes the robot for another one with the same body: what is not lost is as that layout says."""
         self.layout = layout
         self._model.adopt(layout)
         self._torn[:] = False

@@ -84,7 +84,7 @@ def test_a_monitor_says_what_it_finds(
         (["--fail", "front_left@3:torn=2"], "expected NAME@SECONDS"),
         (["--fail", "tail@3", "--method", "analytic"], "no fin 'tail'"),
         (["--trajectory", "spiral", "--method", "analytic"], "circle, lissajous, square"),
-        (["--excite", "--monitor"], "leave --fail and --monitor out"),
+        (["--excite", "--monitor"], "leave --fail, --monitor and --learn out"),
         (["-o", __file__], "cannot be made a folder: File exists"),
     ],
 )
