@@ -72,7 +72,7 @@ def make_goal(
     if name == "weakest_direction":
         return of_weakest
     if name == "worst_single_failure":
-        count = np.where(force_sets(layout, flow=flow).half[0] > 0.0, 2, 1)
+        count = _directions(force_sets(layout, flow=flow))
         if count.sum() - count.max() < len(places):
             raise LayoutError(
                 f"the goal {name} needs {len(places)} directions after a loss, and layout {layout.name} has "
@@ -84,6 +84,11 @@ def make_goal(
     raise LayoutError(f"goal: expected one of {', '.join(GOALS)}, got {name!r:.60}")
 
 
+def _directions(sets: ForceSets) -> Array:
+    """In how many directions each actuator (n,) of one robot pushes."""
+    return np.asarray(np.where(sets.half[0] > 0.0, 2, 1) * (sets.radius[0] > 0.0))
+
+
 def axes_to_raise(layout: Layout, flow: Array | None = None) -> tuple[str, ...]:
     """Returns the axes that count when none are named: all six, or those that the layout pushes alone now
     where it has too few actuators to push both ways along six, wherever they go.
@@ -92,11 +97,10 @@ def axes_to_raise(layout: Layout, flow: Array | None = None) -> tuple[str, ...]:
         LayoutError: there are none.
     """
     sets = force_sets(layout, flow=flow)
-    half, line = sets.half[0], sets.half[0] == 0.0
-    back = line & (sets.cornered[0] if sets.back is None else sets.cornered[0] | (sets.back[0] > 0.0))
-    both_ways = int(back.sum() + (half > 0.5 * np.pi - 1e-9).sum() + (half > 0.5 * np.pi + 1e-9).sum())
-    # What pushes one way only takes one more of its kind than there are axes left.
-    if both_ways >= len(AXES) or int(2 * (~line).sum() + line.sum()) > len(AXES):
+    back = 0.0 if sets.back is None else sets.back[0]
+    one_way = (sets.half[0] <= 0.5 * np.pi) & ~sets.cornered[0] & (back == 0.0)
+    # What pushes one way only has to be one more than there are axes.
+    if _directions(sets).sum() > len(AXES) - (not one_way.any()):
         return AXES
     held = authority(layout, flow=flow).reachable
     if not held:

@@ -16,10 +16,10 @@ from scipy.spatial.transform import Rotation
 
 from finlab.arrays import Array
 from finlab.errors import LayoutError
-from finlab.forces.force_sets import ForceSets, assembled, planar_effectiveness, shapes_of
+from finlab.forces.force_sets import ForceSets, assembled, shapes_of
 from finlab.layout import Fin, Layout
 from finlab.layout.actuator import Actuator
-from finlab.layout.arrays import moved_effectiveness, own_effectiveness
+from finlab.layout.arrays import moved_effectiveness
 
 MIRROR_TOLERANCE = 1e-3
 """How far [m, rad] two actuators may be from each other's mirror image and still count as a pair."""
@@ -55,7 +55,7 @@ class Bounds:
         actuator is; horizontal shafts stay horizontal, others also tilt, by up to a quarter turn."""
         by = np.broadcast_to(np.asarray(reach, dtype=np.float64), 3)
         x, y, z = ((p - float(r), p + float(r)) for p, r in zip(part.position, by, strict=True))
-        tilt = 0.0 if is_horizontal(part) else min(turn, 0.5 * math.pi)
+        tilt = min(turn, 0.5 * math.pi) if getattr(part, "mounting_angle", None) is None else 0.0
         angle = azimuth(part)
         return Bounds(x, y, z, (angle - turn, angle + turn), (-tilt, tilt))
 
@@ -65,14 +65,9 @@ class Bounds:
         return np.array([self.x, self.y, self.z, self.mounting_angle, self.tilt])
 
 
-def is_horizontal(part: Actuator) -> bool:
-    """Says whether an actuator is a fin with a mounting angle."""
-    return isinstance(part, Fin) and part.mounting_angle is not None
-
-
 def azimuth(part: Actuator) -> float:
     """The angle [rad] that `Bounds.mounting_angle` is about, as it is now."""
-    return part.mounting_angle or 0.0 if isinstance(part, Fin) else 0.0
+    return (getattr(part, "mounting_angle", None) or 0.0) + 0.0
 
 
 def mirror_pairs(layout: Layout) -> tuple[tuple[str, str], ...]:
@@ -89,17 +84,14 @@ def mirror_pairs(layout: Layout) -> tuple[tuple[str, str], ...]:
 
 
 def is_mirrored(part: Actuator, other: Actuator) -> bool:
-    """Says whether two actuators of a type are each other's mirror image, whichever way their axes count."""
-    if part.type != other.type or is_horizontal(part) != is_horizontal(other):
-        return False
-    apart = float(np.abs(np.subtract(other.position, MIRROR * part.position)).max())
-    if is_horizontal(part):
-        turned = abs(math.remainder(azimuth(part) + azimuth(other), math.tau))
-    else:
-        count = 1 if part.type == "thruster" else 2
-        both = np.array(part.frame)[:count] * MIRROR, np.array(other.frame)[:count]
-        turned = float(np.linalg.norm(np.cross(*both), axis=-1).max())
-    return max(apart, turned) <= MIRROR_TOLERANCE
+    """Says whether two actuators of a type are each other's mirror image: fins with their shafts, others
+    whichever way their axes count."""
+    count = 1 if part.type == "thruster" else 2
+    image, axes = np.array(part.frame)[:count] * MIRROR, np.array(other.frame)[:count]
+    apart = np.abs(np.subtract(other.position, MIRROR * part.position)).max()
+    turned = np.linalg.norm(np.cross(image, axes), axis=-1).max()
+    same_way = part.type != "fin" or image[0] @ axes[0] > 0.0
+    return part.type == other.type and same_way and bool(max(apart, turned) <= MIRROR_TOLERANCE)
 
 
 class Moves:
@@ -140,18 +132,9 @@ class Moves:
         self.leaders = tuple(leaders)
         self._lead = layout.indices(leaders)
         self._twin = [layout.index(twins[name]) if name in twins else -1 for name in leaders]
-        ahead = layout.frames[:, 0]
-        self._rise = [
-            1.0 if ahead[lead] * MIRROR @ ahead[twin] >= 0.0 else -1.0
-            for lead, twin in zip(self._lead, self._twin, strict=True)
-        ]
-        """Which way twins tilt: against their leaders where their axes count the other way."""
         self.names = tuple(name for name in layout.names if name in leaders or twins.get(name) in leaders)
         """All that move, twins included, in the layout's order."""
-        self._flow = flow
-        shapes = shapes_of(layout, flow)
-        self._directions = np.array([shape.directions for shape in shapes])
-        self._sets = assembled([shapes], own_effectiveness(layout)[None])
+        self._flow, self._shapes = flow, shapes_of(layout, flow)
         self.start_position = layout.position
         """Where all actuators are now (n, 3) [m]."""
         self._angle = np.array([azimuth(part) for part in layout.actuators])
@@ -168,35 +151,23 @@ class Moves:
         """Where the actuators are now, brought within bounds (D,)."""
 
     def geometry(self, vectors: Array) -> tuple[Array, Array, Array]:
-        """Returns positions (P, n, 3) [m], azimuths and tilts (P, n) [rad], see `Bounds`, of vectors
-        (P, D)."""
+        """Returns positions (P, n, 3) [m], azimuths (P, n) [rad], see `Bounds`, and own axes (P, n, 3, 3) of
+        vectors (P, D)."""
         whole = np.tile(self._whole, (len(vectors), 1))
         whole[:, self._free] = self._on_grid(vectors)
         moved = whole.reshape(len(vectors), len(self._lead), 5)
         position = np.tile(self.start_position, (len(vectors), 1, 1))
         angle = np.tile(self._angle, (len(vectors), 1))
-        tilt = np.zeros_like(angle)
-        for k, (lead, twin, rise) in enumerate(zip(self._lead, self._twin, self._rise, strict=True)):
-            position[:, lead], angle[:, lead], tilt[:, lead] = moved[:, k, :3], moved[:, k, 3], moved[:, k, 4]
+        frames = np.tile(self.layout.frames, (len(vectors), 1, 1, 1))
+        for k, (lead, twin) in enumerate(zip(self._lead, self._twin, strict=True)):
+            turn = moved[:, k, 3] - self._angle[lead]
+            turned = _turned(self.layout.frames[lead, 0], turn, moved[:, k, 4])
+            position[:, lead], angle[:, lead] = moved[:, k, :3], moved[:, k, 3]
+            frames[:, lead] = frames[:, lead] @ turned
             if twin >= 0:
-                position[:, twin] = moved[:, k, :3] * MIRROR
-                angle[:, twin], tilt[:, twin] = -moved[:, k, 3], rise * moved[:, k, 4]
-        return position, angle, tilt
-
-    def frames(self, angle: Array, tilt: Array) -> Array:
-        """Returns the own axes (P, n, 3, 3) of actuators under azimuths and tilts (P, n) [rad]."""
-        frames = np.tile(self.layout.frames, (len(angle), 1, 1, 1))
-        for i, part in enumerate(self.layout.actuators):
-            if part.name not in self.names:
-                continue
-            if is_horizontal(part) and not tilt[:, i].any():
-                c, s = np.cos(angle[:, i]), np.sin(angle[:, i])
-                frames[:, i, 0, :2] = np.stack([c, s], axis=-1)
-                frames[:, i, 1, :2] = np.stack([-s, c], axis=-1)
-            else:
-                turn = angle[:, i] - self._angle[i]
-                frames[:, i] = _turned(self.layout.frames[i], turn, tilt[:, i])
-        return frames
+                position[:, twin], angle[:, twin] = moved[:, k, :3] * MIRROR, -moved[:, k, 3]
+                frames[:, twin] = frames[:, twin] @ (turned * MIRROR * MIRROR[:, None])
+        return position, angle, frames
 
     def _on_grid(self, vectors: Array) -> Array:
         """Vectors (P, D) whose numbers are multiples of their steps, within bounds."""
@@ -207,50 +178,38 @@ class Moves:
 
     def sets(self, vectors: Array) -> ForceSets:
         """Returns what the actuators can push once moved by vectors (P, D)."""
-        position, angle, tilt = self.geometry(vectors)
-        effectiveness = moved_effectiveness(self.layout, position, self.frames(angle, tilt))
-        if self._flow is None:
-            planar = planar_effectiveness(self._directions, effectiveness)
-            return self._sets.tile(len(vectors))._replace(effectiveness=planar)
-        return assembled([shapes_of(self.moved(vector), self._flow) for vector in vectors], effectiveness)
+        position, _, frames = self.geometry(vectors)
+        shapes = [self._shapes] * len(vectors)
+        if self._flow is not None:
+            shapes = [shapes_of(self.moved(vector), self._flow) for vector in vectors]
+        return assembled(shapes, moved_effectiveness(self.layout, position, frames))
 
     def moved(self, vector: Array) -> Layout:
         """Returns the layout with its actuators moved by a vector (D,)."""
-        position, angle, tilt = self.geometry(vector[None])
-        frames = self.frames(angle, tilt)
+        position, angle, frames = self.geometry(vector[None])
         result = self.layout
         for i in self.layout.indices(self.names):
             part = self.layout.actuators[i]
-            x, y, z = (round(float(value), 12) for value in position[0, i])
-            changes: dict[str, Any] = {"position": (x, y, z)}
-            if is_horizontal(part) and tilt[0, i] == 0.0:
-                changes["mounting_angle"] = math.remainder(float(angle[0, i]), math.tau)
-            elif angle[0, i] != self._angle[i] or tilt[0, i] != 0.0:
-                if isinstance(part, Fin):
-                    changes["mounting_angle"] = None
-                changes |= dict(zip(_axes(part), map(tuple, frames[0, i].tolist()), strict=False))
+            changes: dict[str, Any] = {"position": tuple(round(x, 12) for x in position[0, i].tolist())}
+            if getattr(part, "mounting_angle", None) is not None and frames[0, i, 2, 2] > 1.0 - 1e-12:
+                changes["mounting_angle"] = math.remainder(angle[0, i], math.tau)
+            else:
+                names = ("shaft", "zero") if isinstance(part, Fin) else part.AXES or ("axis",)
+                changes |= zip(names, map(tuple, frames[0, i].tolist()), strict=False)
+                changes |= {"mounting_angle": None} if isinstance(part, Fin) else {}
             result = result.replace_actuator(part.name, **changes)
         return result
 
 
-def _axes(part: Actuator) -> tuple[str, ...]:
-    """Fields of the first of an actuator's own axes."""
-    if isinstance(part, Fin):
-        return "shaft", "zero"
-    return part.AXES or ("axis",)
-
-
-def _turned(frame: Array, turn: Array, tilt: Array) -> Array:
-    """Own axes (3, 3), rows, once tilted and then turned about the vertical by angles (P,) [rad]: (P, 3, 3).
-
-    A vertical main axis tilts towards x.
-    """
-    x, y, z = frame[0]
+def _turned(axis: Array, turn: Array, tilt: Array) -> Array:
+    """Matrices (P, 3, 3), from the right of rows, that raise a main axis (3,) and then turn it about the
+    vertical by angles (P,) [rad]; one that is vertical tilts towards x."""
+    x, y, z = axis
     level = math.hypot(x, y)
     across = np.array([y, -x, 0.0]) / level if level > MIRROR_TOLERANCE else np.array([0.0, np.sign(z), 0.0])
     tilted = Rotation.from_rotvec(tilt[:, None] * across)
-    both = (Rotation.from_rotvec(turn[:, None] * np.eye(3)[2]) * tilted).as_matrix()
-    return np.asarray(frame @ both.swapaxes(1, 2))
+    both = Rotation.from_rotvec(turn[:, None] * np.eye(3)[2]) * tilted
+    return np.asarray(both.as_matrix().swapaxes(1, 2))
 
 
 def _twins(layout: Layout, pairs: Sequence[tuple[str, str]]) -> dict[str, str]:

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Sequence
+from functools import lru_cache
 from itertools import product
 from typing import Any, NamedTuple
 
@@ -206,7 +207,7 @@ def assembled(shapes: Sequence[Sequence[Shape]], effectiveness: Array) -> ForceS
         for own in (shape.corners for shape in every)
     ]
     return ForceSets(
-        planar_effectiveness(gathered([shape.directions for shape in every]), effectiveness),
+        np.ascontiguousarray(gathered([shape.directions for shape in every]) @ effectiveness / SCALE),
         gathered([shape.radius for shape in every]),
         gathered([shape.middle for shape in every]),
         gathered([shape.half for shape in every]),
@@ -215,12 +216,6 @@ def assembled(shapes: Sequence[Sequence[Shape]], effectiveness: Array) -> ForceS
         gathered([shape.center for shape in every]) if any(np.any(shape.center) for shape in every) else None,
         gathered(list(corners)) if most else None,
     )
-
-
-def planar_effectiveness(directions: Array, effectiveness: Array) -> Array:
-    """Scaled wrenches (R, n, 2, 6) per newton along directions (..., n, 2, 3) of wrenches (R, n, 3, 6) per
-    newton along the own axes."""
-    return np.ascontiguousarray(directions @ effectiveness / SCALE)
 
 
 def shapes_of(layout: Layout, flow: ArrayLike | None = None) -> list[Shape]:
@@ -289,6 +284,7 @@ def _polygon(directions: Array, points: Array, half: float, sides: int) -> Shape
     return Shape(directions, radius, angle, half, 0.0, center, corners - center)
 
 
+@lru_cache(maxsize=256)
 def _boundary(plane: Plane | None) -> Array:
     """How far the convex hull of what a fin can push reaches along `BOUNDARY` evenly spaced directions
     (BOUNDARY,), as shares of its largest force; 1 for what is no sector."""

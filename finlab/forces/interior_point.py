@@ -1,6 +1,6 @@
 """A primal-dual interior-point method for planar forces within discs, sectors, lines and polygons.
 
-    min 1/2 sum_j v_j^2 / c_j + 1/2 sum_i b_i |y_i|^2   s.t.   v = w - sum_i B_i y_i,   y_i within its set,
+    min 1/2 sum_j v_j^2 / c_j   s.t.   v = w - sum_i B_i y_i,   y_i within its set,
 
 for many robots at once. Newton's systems are reduced to the multipliers l = v / c of the wrench, so that an
 axis with a tiny c, which must be met, costs no accuracy, and more actuators hardly cost time. Forces count
@@ -62,8 +62,6 @@ class _State(NamedTuple):
     """(R, m)."""
     c: Array
     """(R, m)."""
-    hessian: Array
-    """b (R, n) times the squared largest thrust."""
     point: Array
     """(R, 2, n)."""
     multiplier: Array
@@ -80,7 +78,6 @@ def minimize(
     sets: ForceSets,
     wanted: Array,
     c: Array,
-    hessian: Array | float = 0.0,
     gap: float = GAP,
 ) -> Optimum:
     """Solves R problems.
@@ -90,10 +87,9 @@ def minimize(
             count with their convex hulls.
         wanted: wrenches w (R, m).
         c: what each coordinate's squared error is divided by (m,) or (R, m), positive.
-        bend: cost b (R, n) of a fin's squared force [1/N^2].
         gap: when to stop, see `GAP`.
     """
-    state = _outset(sets, wanted - sets.offset, c, hessian)
+    state = _outset(sets, wanted - sets.offset, c)
     busy, least = np.arange(len(wanted)), np.full(len(wanted), np.inf)
     point, multiplier = state.point.copy(), state.multiplier.copy()
     for _ in range(ITERATIONS):
@@ -116,7 +112,7 @@ def minimize(
     return Optimum(force, multiplier * _unit(sets)[:, None])
 
 
-def _outset(sets: ForceSets, wanted: Array, c: Array, hessian: Array | float) -> _State:
+def _outset(sets: ForceSets, wanted: Array, c: Array) -> _State:
     rows, n = sets.radius.shape
     m = sets.effectiveness.shape[-1]
     unit = _unit(sets)
@@ -131,7 +127,6 @@ def _outset(sets: ForceSets, wanted: Array, c: Array, hessian: Array | float) ->
         beyond,
         wanted,
         c,
-        np.broadcast_to(hessian * (sets.radius / unit[:, None]) ** 2, (rows, n)),
         np.zeros((rows, 2, n)),
         np.zeros((rows, m)),
         np.full((rows, limits, n), SLACK),
@@ -203,13 +198,13 @@ def _stops(sets: ForceSets) -> tuple[Array, Array]:
 
 def _step(state: _State, tolerance: float) -> tuple[NDArray[np.bool_], Array, _State]:
     """Which rows are done, how far off each is (R,), and all others one Newton step on."""
-    full, sides, beyond, wanted, c, hessian, point, multiplier, slack, weight, length = state
+    full, sides, beyond, wanted, c, point, multiplier, slack, weight, length = state
     rows, _, n = point.shape
     missing = wanted - _wrench(full, point)
     disc = 0.5 * ((point * point).sum(1, keepdims=True) - 1.0)
     flat = (sides * point[:, None]).sum(2) - beyond
     astray = np.concatenate([disc, flat], axis=1) + slack
-    size = 1.0 + np.sqrt((missing * missing / c).sum(-1) + (hessian * (2.0 * disc[:, 0] + 1.0)).sum(-1))
+    size = 1.0 + np.sqrt((missing * missing / c).sum(-1))
     gap = (weight * slack).mean((1, 2))
     unmet = np.abs(missing - c * multiplier).max(-1) + np.abs(astray).max((1, 2))
     gap, unmet = gap / size, unmet / size
@@ -220,9 +215,8 @@ def _step(state: _State, tolerance: float) -> tuple[NDArray[np.bool_], Array, _S
     slope = np.concatenate([point[:, None], sides], axis=1)  # of the limits (R, 1 + K, 2, n)
     ratio = weight / slack
     aim = (np.where(length > LONG, *CENTRING) * gap * size)[:, None, None] / slack + ratio * astray
-    xx, xy, yy = _softness(slope, ratio, weight[:, 0] + hessian + STIFF)
+    xx, xy, yy = _softness(slope, ratio, weight[:, 0] + STIFF)
     pull = (full @ multiplier[..., None]).reshape(point.shape) - (aim[:, :, None] * slope).sum(1)
-    pull -= hessian[:, None] * point
     blocks = full.reshape(rows, 2, n, -1)
     x, y = blocks[:, 0], blocks[:, 1]
     spread = np.concatenate(
