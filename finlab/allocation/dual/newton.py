@@ -4,7 +4,7 @@
 
 `g` is concave. The Hessian is `G + E` with `G = sum B (dy/ds) B'`. Where actuators are at their limits, `G`
 loses rank: a ridge `mu tr(G)` keeps the step finite and is adapted to what a step brought (Levenberg,
-Marquardt).
+Marquardt; Nielsen's growth where steps are refused).
 With a reward, the target is `t w` with `t` in [0, 1], paid `rho (2 t - t^2 / 2)`.
 """
 
@@ -24,6 +24,8 @@ TOLERANCE = 1e-10
 """Scaled wrench that may be left of a target."""
 SATURATED_RIDGE = 1e-2
 """Ridge to begin with, as a share of the trace, where an actuator may be at its limit; NEARLY elsewhere."""
+MOST_RIDGE = 1.0 / ROUNDING
+"""Ridge beyond which a step is lost in rounding."""
 MOST_STEPS = 200
 """Steps after which a target is given up."""
 
@@ -60,6 +62,11 @@ class Terms:
     """Matrix E (r, r) [1/W]: the target may be missed by E l. None: it is met."""
     reward: float | None = None
     """Reward rho [W] for the share t of the target; None: all of it is asked for."""
+
+    @property
+    def tolerance(self) -> float:
+        """Scaled wrench that may be left. High prices are rounded: what may be missed is found roughly."""
+        return TOLERANCE if self.penalty is None else NEARLY
 
 
 MEET = Terms()
@@ -216,13 +223,13 @@ def _one(
     """`solve` for one target. The dual value takes long: it is asked for where a step was too long, or the
     target may be out of reach."""
     spare = most - sets.least_cost  # the value is no more than what is paid and this cost
-    force = None
+    force, growth = None, 2.0
     for steps in range(MOST_STEPS + 1):
-        solved, beyond = bool(state.size[0] <= TOLERANCE), False
+        solved, beyond = bool(state.size[0] <= terms.tolerance), False
         if not solved and state.paid[0] > spare:
             state = _valued(robot, state, sets, terms)
             beyond = bool(state.value[0] > most)
-        if solved or beyond or steps == MOST_STEPS:
+        if solved or beyond or steps == MOST_STEPS or ridge > MOST_RIDGE:
             break
         step, left = _step(robot, state, terms, np.array([ridge]))
         if terms.reward is None and left[0] <= TOLERANCE:
@@ -239,10 +246,10 @@ def _one(
             state, trial = _valued(robot, state, sets, terms), _valued(robot, trial, sets, terms)
             good = bool(_accepted(state, trial, np.array([change]))[0])
         if good:
-            state = trial
+            state, growth = trial, 2.0
             ridge *= 0.1 if abs(change) < 0.5 else 0.3 if change > 0.5 else 1.0
         else:
-            ridge *= min(max(-change, 2.0), 10.0)
+            ridge, growth = ridge * max(growth, min(-change, 10.0)), 2.0 * growth
         ridge = max(ridge, ROUNDING)
         force = None
     worth = _valued(robot, state, sets, terms).value if value else np.array([np.nan])
@@ -260,7 +267,7 @@ def _valued(robot: DualRobot, state: _State, sets: Sets, terms: Terms) -> _State
 def _many(robot: DualRobot, state: _State, sets: Sets, terms: Terms, ridge: Array, most: Array) -> Prices:
     """`solve` for many targets, those that are done left out."""
     count = state.target.shape[1]
-    place = np.arange(count)
+    place, growth = np.arange(count), np.full(count, 2.0)
     found = Prices(
         np.empty(state.prices.shape),
         np.empty(state.force.shape),
@@ -270,9 +277,9 @@ def _many(robot: DualRobot, state: _State, sets: Sets, terms: Terms, ridge: Arra
         np.zeros(count, np.intp),
     )
     for steps in range(MOST_STEPS + 1):
-        solved = state.size <= TOLERANCE
+        solved = state.size <= terms.tolerance
         beyond = ~solved & (state.value > most)
-        done = solved | beyond | (steps == MOST_STEPS)
+        done = solved | beyond | (steps == MOST_STEPS) | (ridge > MOST_RIDGE)
         if done.any():
             at = place[done]
             found.prices[:, at], found.force[:, at] = state.prices[:, done], state.force[:, done]
@@ -285,15 +292,16 @@ def _many(robot: DualRobot, state: _State, sets: Sets, terms: Terms, ridge: Arra
             left = np.flatnonzero(~done)
             if not len(left):
                 break
-            place, ridge, most, sets = place[left], ridge[left], most[left], sets.take(left)
-            state = _columns(state, left)
+            place, ridge, growth, most = place[left], ridge[left], growth[left], most[left]
+            state, sets = _columns(state, left), sets.take(left)
         step, _ = _step(robot, state, terms, ridge)
         trial = _state(robot, state.target, state.prices + step, sets, terms)
         slope = np.maximum(np.einsum("rn,rn->n", step, state.residual), 1e-300)
         change = np.einsum("rn,rn->n", step, trial.residual) / slope
         good = _accepted(state, trial, change)
         kept = np.where(np.abs(change) < 0.5, 0.1, np.where(change > 0.5, 0.3, 1.0))
-        grown = np.minimum(np.maximum(-change, 2.0), 10.0)
+        grown = np.maximum(growth, np.minimum(-change, 10.0))
+        growth = np.where(good, 2.0, 2.0 * growth)
         ridge = np.maximum(ridge * np.where(good, kept, grown), ROUNDING)
         state = trial if good.all() else _merged(good, trial, state)
     return found
