@@ -50,7 +50,7 @@ class DeployedRobot:
         wrench: ArrayLike,
         *,
         failed: Sequence[str] = (),
-        previous: ArrayLike | None = None,
+        previous: ArrayLike | Allocation | None = None,
         reference: ArrayLike | None = None,
         policy: Policy | str = CLOSEST,
         flow: ArrayLike | None = None,

@@ -22,6 +22,7 @@ import time
 from collections.abc import Mapping
 from typing import Any
 
+from finlab.allocation import Allocation
 from finlab.arrays import Array
 from finlab.deploy.record import command_record
 from finlab.deploy.request import parse_request
@@ -40,7 +41,7 @@ class Server:
     def __init__(self, robot: DeployedRobot, watchdog: float | None = 1.0) -> None:
         """Takes the robot, and the longest silence before its fins rest [s]; without one they never do."""
         self._robot, self._watchdog = robot, watchdog
-        self._sent: Array | None = None  # the last commands, None while the fins rest
+        self._sent: Allocation | None = None  # the last answer, None while the fins rest
         self._sent_at = 0.0
         self._failed: tuple[str, ...] = ()
 
@@ -99,7 +100,7 @@ class Server:
             "power": answer.power,
             "solve_ms": answer.solve_ms,
         }
-        self._sent, self._sent_at = answer.command, time.monotonic()
+        self._sent, self._sent_at = answer, time.monotonic()
         return reply
 
     def _rest(self) -> dict[str, Any]:
@@ -108,7 +109,7 @@ class Server:
 
     def _neutral(self) -> Array:
         known = [name for name in self._failed if name in self._robot.layout.names]
-        return self._robot.neutral(known, self._sent)
+        return self._robot.neutral(known, None if self._sent is None else self._sent.command)
 
     def _reply(self, name: Any, status: str, command: Array, forces: Array | None = None) -> dict[str, Any]:
         """Commands (n, 3), and the forces (n, 3) [N], body frame, that they give; at rest where not told."""
