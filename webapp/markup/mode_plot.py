@@ -10,7 +10,7 @@ from webapp.markup.html import html
 from webapp.markup.plot import EXACT, RIGHT, TOP, WIDTH, Plot, Point, cost_axis, error_axis
 from webapp.presses import press
 from webapp.tasks.mode_names import Modes
-from webapp.theme import DEAD, Rgb, css, mode_color
+from webapp.theme import DEAD, css, mode_color
 
 LEFT = 54
 """Where the axis that goes up stands [px]."""
@@ -48,9 +48,11 @@ def mode_plot(modes: Modes, shown: int, height: int) -> str:
     if not np.isfinite(points).all():
         return ""
     plot = Plot(cost_axis("effort", points[:, 0]), error_axis(points[:, 1]), height, LEFT)
-    dots = [plot.place(*point) if close else None for point, close in zip(raw, near, strict=True)]
-    parts = [_legend(), _sample_dots(dots, modes)]
-    parts += _mode_dots([plot.place(*point) for point in refined], plot.floor, shown)
+    kinds = np.full(len(raw), -1) if modes.of_samples is None else modes.of_samples
+    parts = [_legend(), _sample_dots(*plot.place(*raw[near].T), kinds[near].tolist(), len(raw))]
+    parts += _mode_dots(
+        [(float(x), float(y)) for x, y in zip(*plot.place(*refined.T), strict=True)], plot.floor, shown
+    )
     return html("<div class='fl'>{}</div>", plot.drawn(parts, upright=True))
 
 
@@ -74,30 +76,23 @@ def _mode_dots(places: list[Point], floor: float, shown: int) -> list[str]:
     return parts
 
 
-def sample_colors(modes: Modes, count: int) -> list[Rgb]:
-    """The colour of each of `count` samples: that of the mode which its component led to, grey for none."""
-    kinds = [-1] * count if modes.of_samples is None else modes.of_samples.tolist()
-    return [DEAD if kind < 0 else mode_color(kind) for kind in kinds]
-
-
 def _logarithm(error: Array) -> Array:
     return np.asarray(np.log10(np.maximum(error, EXACT)))
 
 
-def _sample_dots(places: list[Point | None], modes: Modes) -> str:
-    """Raw samples, and how many have no place in the plot."""
-    dots = [
-        html("<circle cx='{:.1f}' cy='{:.1f}' r='3' fill='{}'/>", place[0], place[1], css(color, 0.6))
-        for place, color in zip(places, sample_colors(modes, len(places)), strict=True)
-        if place is not None
+def _sample_dots(x: Array, y: Array, kinds: list[int], count: int) -> str:
+    """Raw samples in the colours of the modes which their components led to, grey for none, and how many of
+    them all have no place in the plot."""
+    fills = [
+        css(DEAD if kind < 0 else mode_color(kind), 0.6) for kind in range(-1, max(kinds, default=-1) + 1)
     ]
-    beyond = len(places) - len(dots)
-    told = (
-        html("<text x='{}' y='14' text-anchor='end'>{} dearer →</text>", WIDTH - RIGHT, beyond)
-        if beyond
-        else ""
-    )
-    return html("<g class='samples'>{}</g>{}", dots, told)
+    dots = [
+        f"<circle cx='{u:.1f}' cy='{v:.1f}' r='3' fill='{fills[kind + 1]}'/>"
+        for u, v, kind in zip(x.tolist(), y.tolist(), kinds, strict=True)
+    ]
+    beyond = count - len(dots)
+    told = f"<text x='{WIDTH - RIGHT}' y='14' text-anchor='end'>{beyond} dearer →</text>" if beyond else ""
+    return Markup(f"<g class='samples'>{''.join(dots)}</g>{told}")
 
 
 def _ring(x: float, y: float, radius: float) -> str:
@@ -107,22 +102,24 @@ def _ring(x: float, y: float, radius: float) -> str:
 def _labels(places: list[Point], floor: float) -> list[Point]:
     """Where the numbers of dots stand: beside them, clear of all dots and of each other, above `floor`."""
     labels: list[Point] = []
-    width, height = LABEL
-    for x, y in places:
-        rooms = (
-            (x + radius * math.cos(turn), y - radius * math.sin(turn))
-            for radius in range(12, WIDTH, 4)
-            for turn in np.linspace(0.5 * math.pi, 2.5 * math.pi, 12, endpoint=False)
-        )
+    (width, height), dots = LABEL, np.array(places)
+    turn = np.linspace(0.5 * math.pi, 2.5 * math.pi, 12, endpoint=False)
+    ring = (
+        np.arange(12, WIDTH, 4)[:, None, None] * np.stack([np.cos(turn), -np.sin(turn)], axis=-1)
+    ).reshape(-1, 2)
+    for place in dots:
+        rooms = place + ring
         free = (
-            (u, v)
-            for u, v in rooms
-            if LEFT + width / 2 <= u <= WIDTH - RIGHT - width / 2
-            and TOP <= v <= floor - height / 2
-            and not any(abs(u - a) < width and abs(v - b) < height for a, b in labels)
-            and not any(abs(u - a) < width / 2 + DOT and abs(v - b) < height / 2 + DOT for a, b in places)
-        )
-        labels.append(next(free, (x, y)))
+            np.abs(rooms - [(LEFT + WIDTH - RIGHT) / 2, 0]) <= [(WIDTH - RIGHT - LEFT - width) / 2, np.inf]
+        ).all(axis=1)
+        free &= (rooms[:, 1] >= TOP) & (rooms[:, 1] <= floor - height / 2)
+        for others, gap in (
+            (dots, (width / 2 + DOT, height / 2 + DOT)),
+            (np.array(labels or [(1e9, 1e9)]), LABEL),
+        ):
+            free &= ~(np.abs(rooms[:, None] - others) < gap).all(axis=2).any(axis=1)
+        u, v = rooms[free][0] if free.any() else place
+        labels.append((float(u), float(v)))
     return labels
 
 

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -34,8 +34,8 @@ class Axis(NamedTuple):
     ticks: tuple[tuple[float, str], ...]
     """Values with a line, and their labels."""
 
-    def share(self, value: float) -> float:
-        """How far along it a value lies, 0 to 1."""
+    def share(self, value: Any) -> Any:
+        """How far along it a value lies, or each of an array, 0 to 1."""
         return (value - self.low) / (self.high - self.low)
 
 
@@ -78,15 +78,15 @@ class Plot(NamedTuple):
         """Where the axis across stands [px]."""
         return self.height - BOTTOM
 
-    def place(self, x: float, y: float) -> Point:
-        """Where a pair of values stands."""
+    def place(self, x: Any, y: Any) -> tuple[Any, Any]:
+        """Where a pair of values stands, or each of two arrays [px]."""
         right = self.left + self.across.share(x) * (WIDTH - self.left - RIGHT)
         return right, self.floor - self.up.share(y) * (self.floor - TOP)
 
     def points(self, x: Array, y: Array) -> str:
         """Some places, as lines take them."""
-        places = (self.place(float(a), float(b)) for a, b in zip(x, y, strict=True))
-        return " ".join(f"{right:.1f},{down:.1f}" for right, down in places)
+        places = zip(*self.place(x, y), strict=True)
+        return " ".join([f"{right:.1f},{down:.1f}" for right, down in places])
 
     def curve(self, x: Array, y: Array, color: Rgb) -> str:
         """A line through some places."""

@@ -54,14 +54,19 @@ def tube(path: Array, radius: Array | float, sides: int = 16, across: Array | No
     tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
     if across is None:
         across = np.eye(3)[np.argmin(np.abs(tangent).max(axis=0))]
-    first = np.cross(tangent, across)
+    first = _cross(tangent, across)
     first /= np.linalg.norm(first, axis=1, keepdims=True)
-    second = np.cross(tangent, first)
+    second = _cross(tangent, first)
     turn = np.linspace(0, 2 * np.pi, sides, endpoint=False)
     ring = np.cos(turn)[None, :, None] * first[:, None] + np.sin(turn)[None, :, None] * second[:, None]
     points = path[:, None] + radius[:, None, None] * ring
     vertices = np.concatenate([points.reshape(-1, 3), path[:1], path[-1:]])
     return Mesh(vertices, _tube_faces(len(path), sides))
+
+
+def _cross(a: Array, b: Array) -> Array:
+    """Cross products of vectors (..., 3); `np.cross` takes ten times as long for few of them."""
+    return np.asarray(a[..., [1, 2, 0]] * b[..., [2, 0, 1]] - a[..., [2, 0, 1]] * b[..., [1, 2, 0]])
 
 
 @cache
