@@ -29,13 +29,12 @@ PLAIN_HEADER = Markup(
 """Of a robot without fins."""
 
 
-def wrench_bars(asked: ArrayLike, given: ArrayLike | None, sentence: str) -> str:
+def wrench_bars(asked: ArrayLike, given: ArrayLike | None) -> str:
     """The bars of all six axes.
 
     Args:
         asked: target wrench (6,) [N, N m].
         given: delivered wrench (6,), None while there is none.
-        sentence: what is left undone, in words.
     """
     asked = np.asarray(asked, dtype=float)
     given = None if given is None else np.asarray(given, dtype=float)
@@ -55,7 +54,7 @@ def wrench_bars(asked: ArrayLike, given: ArrayLike | None, sentence: str) -> str
         delivered = "–" if given is None else _value(given[k], k)
         cells = (("asked", _value(asked[k], k)), ("given", delivered), (kind, rest or "–"))
         rows += [html("<span class='right {}'>{}</span>", *cell) for cell in cells]
-    return html("<div class='fl'><div class='bars'>{}</div><div class='said'>{}</div></div>", rows, sentence)
+    return html("<div class='fl'><div class='bars'>{}</div></div>", rows)
 
 
 def _header(scales: list[float]) -> str:

@@ -112,13 +112,16 @@ def bound_sentence(allocation: Allocation) -> str:
     return f"Its watts are at most {100 * gap:.2g} % above the least."
 
 
-def answer_sentence(state: State, allocation: Allocation | None, busy: bool) -> Markup:
+def answer_sentence(
+    state: State, allocation: Allocation | None, busy: bool, searching: bool = False
+) -> Markup:
     """What is left undone, why, and what the method ignores.
 
     Args:
         state: what is asked now.
         allocation: the newest answer, None while there is none.
         busy: whether it answers an earlier question.
+        searching: whether what is proved of it, and doubtful, is not known yet.
     """
     sentences: list[str] = []
     if allocation is not None and not busy:
@@ -128,9 +131,9 @@ def answer_sentence(state: State, allocation: Allocation | None, busy: bool) -> 
         if not allocation.reachable and not allocation.unknown_fins:
             share = round(100 * allocation.share)
             told = [f"{share} % of what is asked"] if 0 <= share < 100 else []
-            told += [*allocation.binding, *allocation.notes]
+            told += [*allocation.binding, *(() if searching else allocation.notes)]
             sentences.append("; ".join(told) + "." if told else "")
-        elif allocation.reachable:
+        elif allocation.reachable and not searching:
             sentences.append(bound_sentence(allocation))
     elif busy:
         sentences.append(WORKING)

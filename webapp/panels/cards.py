@@ -57,11 +57,21 @@ def check(able: Layout, failed: tuple[str, ...], layout: Layout) -> str:
     return check_card(quick_check(able, failed), layout.n - len(failed) > 1, warnings(layout))
 
 
-def answer(shown: Allocation | None, state: State, busy: bool) -> str:
-    """What is asked, what the fins give, and what is left undone; an answer to an earlier question stands
-    beside what was asked then."""
-    asked = shown.target if shown is not None and busy else state.target
-    return wrench_bars(asked, None if shown is None else shown.wrench, answer_sentence(state, shown, busy))
+def add_answer(page: Page) -> None:
+    """What is asked, what the actuators give, and what is left undone; an answer to an earlier question
+    stands beside what was asked then."""
+    page.add_html(_bars)
+    page.add_html(_said)
+
+
+def _bars(shown: Allocation | None, target: tuple[float, ...], busy: bool) -> str:
+    asked = shown.target if shown is not None and busy else target
+    return wrench_bars(asked, None if shown is None else shown.wrench)
+
+
+def _said(shown: Allocation | None, state: State, busy: bool, searching: bool) -> str:
+    said = answer_sentence(state, shown, busy, searching)
+    return html("<div class='fl'><div class='said'>{}</div></div>", said)
 
 
 def camera() -> str:

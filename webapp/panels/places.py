@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from webapp.page import Page
 from webapp.panels.body_inspector import add_body
-from webapp.panels.cards import answer, camera, card, check, guide, robot_name, tasks
+from webapp.panels.cards import add_answer, camera, card, check, guide, robot_name, tasks
 from webapp.panels.compare_tab import add_comparison
 from webapp.panels.damage import add_damage
 from webapp.panels.design_panel import add_designs
@@ -66,7 +66,7 @@ PLACES = (
     Place(LEFT, (ALLOCATE,), "Actuators", add_commands),
     Place(LEFT, (ALLOCATE,), "Damage a fin", add_damage, folded=True, fins_only=""),
     Place(RIGHT, (ALLOCATE,), "Wrench", add_target),
-    Place(RIGHT, (ALLOCATE,), "Asked and delivered", partial(card, answer)),
+    Place(RIGHT, (ALLOCATE,), "Asked and delivered", add_answer),
     Place(DRAWER, (ALLOCATE,), "Candidates", add_candidates),
     Place(DRAWER, (ALLOCATE,), "Comparison", add_comparison, fins_only="the comparison of methods"),
     Place(LEFT, (SIMULATE,), "Scenario", add_scenario, fins_only=""),
