@@ -50,7 +50,7 @@ def actuator(
         seed: draws samples of a fin where there are too many.
     """
     from finlab.fit.columns import names_in
-    from finlab.fit.conventions import NAMES, NEEDED
+    from finlab.fit.measurements import NAMES, NEEDED
 
     if set(NEEDED) <= names_in(data[0], NAMES):
         print("\n".join(_fin(data, output, seed)))

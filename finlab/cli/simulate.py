@@ -167,7 +167,8 @@ def excitation_summary(log: RunLog) -> str:
 
 def _learner(allocator: Allocator) -> OnlineFit:
     """Who learns a robot on the way; a `FinlabError` where the method takes no fins that lean."""
-    from finlab.fit.robot.online import OnlineFit, leaned
+    from finlab.fit.robot.learned_fins import leaned
+    from finlab.fit.robot.online import OnlineFit
 
     learner, layout = OnlineFit(allocator.layout), allocator.layout
     allocator.on(replace(layout, actuators=tuple(leaned(fin, 0.01) for fin in layout.fins)))

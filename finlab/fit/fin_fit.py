@@ -180,17 +180,12 @@ def _fitted(
     turned, deflection = measurements.thrust()
     largest = float(np.linalg.norm(measurements.force, axis=-1).max())
     inputs = measurements.scaled(measurements.command)
-    variance: list[Array | None] = [None, None, None]
-    if measurements.deviation is not None:
-        # Deviations of the two axes across the shaft stay what they are in a frame that turns between them.
-        planar = np.mean(measurements.deviation[:, 1:] ** 2, axis=-1) / largest**2
-        variance = [planar, planar, measurements.deviation[:, 0] ** 2 / largest**2]
     tell("fitting the thrust")
-    along = Component(inputs, turned[:, 0] / largest, variance[0])
+    along = Component(inputs, turned[:, 0] / largest)
     tell("fitting the force across the thrust")
-    across = Component(inputs, turned[:, 1] / largest, variance[1], along.mean)
+    across = Component(inputs, turned[:, 1] / largest, along.mean)
     tell("fitting the force along the shaft")
-    sideways = Component(inputs, turned[:, 2] / largest, variance[2], along.mean)
+    sideways = Component(inputs, turned[:, 2] / largest, along.mean)
     power, largest_power = None, 1.0
     if measurements.power is not None:
         tell("fitting power")

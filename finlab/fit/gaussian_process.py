@@ -60,32 +60,23 @@ class GaussianProcess:
 class Component:
     """Force along one axis, or power, over its scale: mean, standard deviation and what it cannot explain."""
 
-    def __init__(
-        self,
-        inputs: Array,
-        values: Array,
-        variance: Array | None = None,
-        size: Array | None = None,
-        wild: bool = False,
-    ) -> None:
-        """Takes scaled inputs (n, 3) as `ThrustKernel` does, values (n,), and their noise's variance (n,).
+    def __init__(self, inputs: Array, values: Array, size: Array | None = None, wild: bool = False) -> None:
+        """Takes scaled inputs (n, 3) as `ThrustKernel` does, and values (n,).
 
-        Where the variance is not known, it is found from the errors of a first fit, made as if the noise were
-        the same everywhere, and again from those of the second, which is nearer to small forces: it has a
-        part that is the same, and a part that grows with the `size` (n,) of the whole force, by default that
-        of the value. With `wild`, a few values may be far off without making the others' noise larger.
+        The noise's variance is found from the errors of a first fit, made as if the noise were the same
+        everywhere, and again from those of the second, which is nearer to small forces: it has a part that is
+        the same, and a part that grows with the `size` (n,) of the whole force, by default that of the value.
+        With `wild`, a few values may be far off without making the others' noise larger.
         """
         self._noise = 0.0, 0.0
-        self._process = _tuned(inputs, values, variance)
-        for _ in range(0 if variance is not None else NOISE_ROUNDS):
+        self._process = _tuned(inputs, values, None)
+        for _ in range(NOISE_ROUNDS):
             error, _ = self._process.left_out()
             found = np.asarray(values - error) if size is None else size
             self._noise = _noise_of(error, found, wild)
-            variance = self._noise_at(found)
-            self._process = _tuned(inputs, values, variance)
-        assert variance is not None
-        self.variance = variance
-        """Of the noise of each value (n,)."""
+            self.variance = self._noise_at(found)
+            """Of the noise of each value (n,)."""
+            self._process = _tuned(inputs, values, self.variance)
         self.left_out, self.left_out_deviation = self._process.left_out()
         """Error of each value (n,) under the fit to all others, and what its standard deviation should be,
         noise included."""

@@ -11,10 +11,17 @@ from numpy.typing import NDArray
 from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.fit.columns import Columns, read_columns, together
-from finlab.fit.conventions import NAMES, NEEDED, check_units
 from finlab.fit.sensor_checks import check_sensors
 from finlab.layout.angles import FILE_TURN_TOLERANCE, TURN
+from finlab.layout.fin import MAX_AMPLITUDE, MAX_FREQUENCY
 
+NEEDED = ("A", "f", "Fy", "Fz")
+"""Columns without which no fin can be fitted."""
+NAMES = {
+    "a": "A", "amplitude": "A", "stroke": "A", "f": "f", "frequency": "f",
+    "phi": "phi", "zero_direction": "phi", "direction": "phi",
+    "fx": "Fx", "fy": "Fy", "fz": "Fz", "p": "P", "power": "P",
+}  # fmt: skip
 MIN_SAMPLES = 20
 SAME = 1e-3
 """Amplitudes [rad] or frequencies [Hz] all closer than this are one and the same."""
@@ -30,8 +37,6 @@ class Measurements:
     """Half amplitude [rad], frequency [Hz], zero direction [rad], (n, 3)."""
     force: Array
     """Mean force [N], (n, 3)."""
-    deviation: Array | None
-    """Standard deviation of each force [N], (n, 3), where the file tells it."""
     power: Array | None
     """Mean mechanical power [W], (n,), where the file tells it."""
     places: tuple[str, ...]
@@ -73,7 +78,6 @@ class Measurements:
         return Measurements(
             self.command[keep],
             self.force[keep],
-            None if self.deviation is None else self.deviation[keep],
             None if self.power is None else self.power[keep],
             tuple(place for place, kept in zip(self.places, keep, strict=True) if kept),
             self.notes,
@@ -85,8 +89,7 @@ def read_measurements(paths: Sequence[str | os.PathLike[str]]) -> Measurements:
     """Returns the samples of all files together.
 
     Each file has a header; columns come in any order, units may stand behind names (`A [deg]`), else
-    they are SI. They are cycle means: A (or stroke), f, Fy, Fz and perhaps phi, Fx, P,
-    sFx, sFy, sFz (standard deviations).
+    they are SI. They are cycle means: A (or stroke), f, Fy, Fz and perhaps phi, Fx, P.
 
     Raises:
         DataError: a file is missing, too large, lacks a column or holds what no fin can do; or there are too
@@ -101,8 +104,26 @@ def read_measurements(paths: Sequence[str | os.PathLike[str]]) -> Measurements:
 def _read(path: Path) -> Columns:
     """The columns of a file that a fit reads."""
     read = read_columns(path, NAMES, NEEDED, "A, f, phi, Fx, Fy, Fz in any order")
-    check_units(read.values, str(path))
+    _check_units(read.values, str(path))
     return read
+
+
+def _check_units(values: dict[str, Array], source: str) -> None:
+    """Refuses amplitudes [rad] and frequencies [Hz] that no fin has, as in a file in other units.
+
+    Raises:
+        DataError: there is such a value; the sentence says how to name the unit.
+    """
+    for name, most, unit, told in (("A", MAX_AMPLITUDE, "rad", "deg"), ("f", MAX_FREQUENCY, "Hz", "rpm")):
+        low, high = float(values[name].min()), float(values[name].max())
+        if high > most + 1e-9 or low < 0.0:
+            what = "half amplitudes" if name == "A" else "frequencies"
+            raise DataError(
+                f"{source}: {what} from {low:.4g} to {high:.4g} {unit}, expected 0 to {most:.4g}; name "
+                f"another unit in the header, `{name} [{told}]`"
+                + ", and call whole strokes `stroke`"
+                * (name == "A")
+            )
 
 
 def _checked(read: list[Columns], source: str) -> Measurements:
@@ -134,7 +155,7 @@ def _checked(read: list[Columns], source: str) -> Measurements:
         raise DataError(
             f"{source}: column P has {power.min():.4g} W, expected the mean power that drives the fin"
         )
-    return Measurements(command, force, _deviation(columns, places), power, places, tuple(notes), turned)
+    return Measurements(command, force, power, places, tuple(notes), turned)
 
 
 def _directions(columns: dict[str, Array], source: str, notes: list[str]) -> tuple[Array, bool]:
@@ -152,16 +173,3 @@ def _directions(columns: dict[str, Array], source: str, notes: list[str]) -> tup
         f"{said}: the other zero directions are filled by symmetry, as a fin that is the same all round"
     )
     return np.zeros(len(columns["A"])) if phi is None else phi, False
-
-
-def _deviation(columns: dict[str, Array], places: tuple[str, ...]) -> Array | None:
-    """Standard deviations (n, 3) of the forces [N]; an axis that is not known has the others' mean."""
-    given = [columns[name] for name in ("sFx", "sFy", "sFz") if name in columns]
-    if not given:
-        return None
-    wrong = (np.min(given, axis=0) <= 0.0) & (columns["A"] * columns["f"] > 0.0)  # at rest all is known
-    if wrong.any():
-        place = places[int(np.argmax(wrong))]
-        raise DataError(f"{place}: a standard deviation is 0 or less; leave out what is not known")
-    mean: Array = np.asarray(np.mean(given, axis=0))
-    return np.stack([columns.get(name, mean) for name in ("sFx", "sFy", "sFz")], axis=-1)

@@ -24,8 +24,6 @@ def find_outliers(measurements: Measurements, tell: Callable[[str], None]) -> ND
     sizes = np.linalg.norm(measurements.force, axis=-1)
     largest = float(np.quantile(sizes, 0.98)) or float(sizes.max())
     values = turned / largest
-    # A sample whose known deviation is large does not contradict the fit.
-    told = 0.0 if measurements.deviation is None else measurements.deviation[:, 1:].max(axis=1) / largest
     inputs = measurements.scaled(measurements.command)
     out = np.zeros(len(inputs), dtype=bool)
     for _ in range(ROUNDS):
@@ -39,7 +37,7 @@ def find_outliers(measurements: Measurements, tell: Callable[[str], None]) -> ND
         for component, value in ((along, values[:, 0]), (across, values[:, 1])):
             error, deviation = component.unseen(inputs, value, size)
             error[kept], deviation[kept] = component.left_out, component.left_out_deviation
-            out |= np.abs(error) > OUTLIER * np.maximum(deviation, told)
+            out |= np.abs(error) > OUTLIER * deviation
         if (out == before).all():
             break
     return np.asarray(out)

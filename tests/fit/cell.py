@@ -33,7 +33,7 @@ def measured(law: FinLaw, command: Array, noise: float = 0.05, seed: int = 1) ->
 def samples(command: Array, force: Array) -> Measurements:
     """As if read from a file."""
     places = tuple(f"line {k + 2}" for k in range(len(command)))
-    return Measurements(command, force, None, None, places, ())
+    return Measurements(command, force, None, places, ())
 
 
 def write(path: Path, columns: Mapping[str, Array]) -> Path:

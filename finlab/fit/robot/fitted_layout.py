@@ -10,22 +10,19 @@ from pathlib import Path
 import numpy as np
 
 from finlab.actuators.fin.table_file import COLUMNS, POWER_COLUMN
-from finlab.arrays import Array
 from finlab.errors import DataError
-from finlab.fit.robot.model import deflected, shape_factor
+from finlab.fit.robot.learned_fins import learned
+from finlab.fit.robot.model import shape_factor
 from finlab.fit.robot.report import summary
 from finlab.fit.robot.robot_fit import RobotFit
 from finlab.layout import Body, Fin, FinModelSpec, Interaction, Jet, Layout, save_layout
 from finlab.layout.interaction import MAX_SHARE
 from finlab.layout.layout import MAX_DESCRIPTION_LENGTH
-from finlab.layout.uncertainty import Uncertainty
 from finlab.physics import make_law
 from finlab.whole_file import write_whole
 
 GRID = (17, 17, 16)
 """Amplitudes, frequencies and zero directions of a fin that becomes a table."""
-STRENGTH = {"drag": "drag_coefficient", "soft": "k"}
-"""Parameter of a fin's model that its thrust is proportional to."""
 DEFLECTIONS = (3.0, 0.03)
 """Standard errors, and angle [rad], from which a fin's lean counts; an IMU that is mounted askew looks like a
 smaller one."""
@@ -41,40 +38,18 @@ def fitted_layout(fit: RobotFit, path: str | os.PathLike[str]) -> tuple[Layout, 
         path: of the layout; tables lie beside it.
     """
     layout, place = fit.model.layout, Path(path)
-    center, mounting = _found(fit, "center"), _found(fit, "mounting")
-    fins, tables, unsure = [], {}, uncertainties(fit)
-    for i, fin in enumerate(layout.fins):
-        model, table = _model(fit, i)
-        if table is not None:
+    lean = fit.found("lean")
+    certain = np.abs(lean) > np.maximum(DEFLECTIONS[0] * fit.found_error("lean"), DEFLECTIONS[1])
+    fins, tables = list(learned(fit, np.where(certain, lean, 0.0))), {}
+    for i, fin in enumerate(fins):
+        if fit.part("shape") is not None or fin.model.type == "table":
             name = str(place.resolve().with_name(f"{place.stem}-fin{i + 1}.csv"))
-            tables[name], model = table, FinModelSpec("table", (("path", name),))
-        x, y, z = (float(value) for value in np.array(fin.position) - center)
-        angle = float(np.mod(fin.shaft_azimuth + mounting[i] + np.pi, 2 * np.pi) - np.pi)
-        fins.append(
-            replace(fin, position=(x, y, z), mounting_angle=angle, model=model, uncertainty=unsure[i])
-        )
+            tables[name] = _table(fit, i)
+            fins[i] = replace(fin, model=FinModelSpec("table", (("path", name),)))
     notes = "\n".join(summary(fit))
     text = f"{notes}\n{layout.description}".strip()[:MAX_DESCRIPTION_LENGTH]
     name = layout.name if place.stem == layout.name else place.stem[:64].strip() or layout.name
     return Layout(name, tuple(fins), text, _body(fit), _interaction(fit)), tables
-
-
-def uncertainties(fit: RobotFit) -> tuple[Uncertainty, ...]:
-    """Returns how far each fin's force may be from what was found: the mean over strength and lean, with the
-    share of it that all strengths have together."""
-    place = fit.fitted.unknowns.place("strength")
-    covariance = fit.covariance[place, place]
-    own = np.sqrt(np.diag(covariance))
-    n = len(own)
-    alike = (covariance / np.outer(own, own)).sum() / n if n > 1 else 1.0
-    together = float(np.clip((alike - 1.0) / max(n - 1, 1), 0.0, 1.0))
-    strength, lean = fit.part_error("strength"), fit.part_error("lean")
-    assert strength is not None and lean is not None
-    shares = np.sqrt(0.5 * (strength**2 + lean**2)).tolist()
-    return tuple(
-        Uncertainty(share, common=f"swim of {fit.model.layout.name}"[:64].strip(), correlation=together)
-        for share in shares
-    )
 
 
 def write_robot(fit: RobotFit, path: str | os.PathLike[str]) -> Layout:
@@ -104,30 +79,7 @@ def _named(layout: Layout, names: dict[str, str]) -> Layout:
     return replace(layout, actuators=tuple(renamed(fin) for fin in layout.fins))
 
 
-def _found(fit: RobotFit, name: str) -> Array:
-    """A block that every fit has, in its own units."""
-    return fit.fitted.unknowns.of(name, fit.fitted.vector)
-
-
-def _model(fit: RobotFit, i: int) -> tuple[FinModelSpec, str | None]:
-    """The model of the i-th fin, or the text of its table where its law is another one."""
-    spec = fit.model.layout.fins[i].model
-    strength = float(np.exp(_found(fit, "strength")[i]))
-    error = fit.part_error("lean")
-    assert error is not None
-    deflection = float(_found(fit, "lean")[i])
-    deflection = deflection if abs(deflection) > max(DEFLECTIONS[0] * error[i], DEFLECTIONS[1]) else 0.0
-    values = spec.values()
-    if fit.part("shape") is None and spec.type in STRENGTH and (not deflection or spec.type == "soft"):
-        key = STRENGTH[spec.type]
-        changed = {**dict(spec.parameters), key: float(values[key]) * strength}
-        if deflection:
-            changed["d"] = float(values["d"]) + deflection
-        return FinModelSpec(spec.type, tuple(changed.items())), None
-    return spec, _table(fit, i, strength, deflection)
-
-
-def _table(fit: RobotFit, i: int, strength: float, deflection: float) -> str:
+def _table(fit: RobotFit, i: int) -> str:
     """The i-th fin's law as a table, from rest to its limits."""
     fin = fit.model.layout.fins[i]
     law = make_law(fin.model)
@@ -135,11 +87,10 @@ def _table(fit: RobotFit, i: int, strength: float, deflection: float) -> str:
     axes = [np.linspace(0.0, end, count) for end, count in zip(ends, GRID, strict=False)]
     axes.append(np.linspace(-np.pi, np.pi, GRID[2], endpoint=False))
     command = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-    force = strength * np.asarray(law.force(command))
+    force = float(np.exp(fit.found("strength")[i])) * np.asarray(law.force(command))
     shape = fit.part("shape")
     if shape is not None:
         force = force * shape_factor(fit.model.shape_terms(command), shape)[:, None]
-    force = deflected(force[:, None], np.array([deflection]))[:, 0]
     power = np.asarray(law.power(command))
     text = io.StringIO()
     text.write(f"# fin {fin.name}, fitted to a swim of the whole robot\n")
@@ -156,7 +107,7 @@ def _body(fit: RobotFit) -> Body:
     found = model.bodies(unknowns, vector[None])
     hull = None if model.layout.body is None else model.layout.body.hull
     if hull is not None:
-        hull = replace(hull, center_m=tuple(np.array(hull.center_m) - _found(fit, "center")))
+        hull = replace(hull, center_m=tuple(np.array(hull.center_m) - fit.found("center")))
     own = model.dynamics.inertia - np.array(model.body.added_mass or (0.0,) * 6)
     added = np.maximum(found.inertia[:, 0] - own, 0.0)
     return replace(

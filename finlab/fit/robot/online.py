@@ -8,10 +8,10 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.errors import FinlabError
-from finlab.fit.robot.fitted_layout import uncertainties
-from finlab.fit.robot.robot_fit import RobotFit, fit_robot
+from finlab.fit.robot.learned_fins import learned
+from finlab.fit.robot.robot_fit import fit_robot
 from finlab.fit.robot.swim import STEP_S, Swim, followed, only_new
-from finlab.layout import Fin, Layout
+from finlab.layout import Layout
 from finlab.vehicle.fin_motion import FinMotion
 
 EVERY_S, LAST_S = 60.0, 240.0
@@ -59,40 +59,10 @@ class OnlineFit:
         motion, said, commands = (np.array(part) for part in zip(*self._last, strict=True))
         swim = Swim("the swim", motion, only_new(said), commands)
         fit = fit_robot(self.layout, [swim], (), doubts=DOUBTS)
-        strength, error = np.exp(_part(fit, "strength")), fit.part_error("strength")
-        assert error is not None
+        strength, error = np.exp(fit.found("strength")), fit.found_error("strength")
         told = (
             f"{name} {own:.2f} +- {own * unsure:.2f}"
             for name, own, unsure in zip(self.layout.names, strength, error, strict=True)
         )
         self.notes.append(f"{self._steps * STEP_S:.0f} s: learned strengths {', '.join(told)}")
-        return learned(fit)
-
-
-def learned(fit: RobotFit) -> Layout:
-    """Returns the layout of a fit with its fins' strengths, places and directions, but no other law or body.
-
-    A fin that leans turns its `zero` about its shaft.
-    """
-    layout, fins = fit.model.layout, []
-    strength, turned, lean = (_part(fit, name) for name in ("strength", "mounting", "lean"))
-    center, unsure = _part(fit, "center"), uncertainties(fit)
-    for i, fin in enumerate(layout.fins):
-        x, y, z = (np.array(fin.position) - center).tolist()
-        moved = replace(fin, position=(x, y, z), mounting_angle=fin.shaft_azimuth + float(turned[i]))
-        changed = leaned(moved, float(lean[i]))
-        fins.append(
-            replace(changed, model=fin.model.scaled(float(np.exp(strength[i]))), uncertainty=unsure[i])
-        )
-    return replace(layout, actuators=tuple(fins))
-
-
-def leaned(fin: Fin, angle: float) -> Fin:
-    """Returns a fin whose thrust is turned by an angle [rad] about its shaft, from `zero` to shaft x zero."""
-    shaft, zero, across = (np.array(axis) for axis in fin.frame)
-    turned = np.cos(angle) * zero + np.sin(angle) * across
-    return replace(fin, mounting_angle=None, shaft=tuple(shaft.tolist()), zero=tuple(turned.tolist()))
-
-
-def _part(fit: RobotFit, name: str) -> Array:
-    return fit.fitted.unknowns.of(name, fit.fitted.vector)
+        return replace(self.layout, actuators=learned(fit, fit.found("lean")))

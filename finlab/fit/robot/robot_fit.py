@@ -78,9 +78,13 @@ class RobotFit:
         """What was found of one block, in its own units; None where it is not used."""
         return self.fitted.unknowns.part(name, self.fitted.vector)
 
-    def part_error(self, name: str) -> Array | None:
+    def found(self, name: str) -> Array:
+        """What was found of a block that every fit has, in its own units."""
+        return self.fitted.unknowns.of(name, self.fitted.vector)
+
+    def found_error(self, name: str) -> Array:
         """Its standard errors."""
-        return self.fitted.unknowns.part(name, self.error)
+        return self.fitted.unknowns.of(name, self.error)
 
     def untold(self) -> tuple[str, ...]:
         """What the data cannot tell of the robot: nearly as doubtful as before."""

@@ -9,7 +9,8 @@ from finlab import Allocator, load_layout
 from finlab.cli import main
 from finlab.control import FaultMonitor
 from finlab.errors import FinlabError
-from finlab.fit.robot.online import OnlineFit, leaned
+from finlab.fit.robot.learned_fins import leaned
+from finlab.fit.robot.online import OnlineFit
 from finlab.layout import Layout
 from finlab.physics import plant_of
 from finlab.sim import ClosedLoop, make_trajectory

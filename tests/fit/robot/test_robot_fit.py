@@ -25,8 +25,7 @@ TURNED = {"front_right": 0.08, "front_left": -0.05, "back_left": 0.0}
 
 def strengths(fit: RobotFit) -> dict[str, tuple[float, float]]:
     """Strength of each fin over what the layout said, and its standard error."""
-    found, error = fit.part("strength"), fit.part_error("strength")
-    assert found is not None and error is not None
+    found, error = fit.found("strength"), fit.found_error("strength")
     pairs = zip(np.exp(found).tolist(), (np.exp(found) * error).tolist(), strict=True)
     return dict(zip(fit.model.layout.names, pairs, strict=True))
 
@@ -56,11 +55,9 @@ def fit(drawn: Layout, truth: Layout) -> RobotFit:
 def test_strengths_directions_and_centre_are_found_within_their_errors(fit: RobotFit) -> None:
     for name, (found, error) in strengths(fit).items():
         assert found == pytest.approx(STRENGTH[name], abs=max(4.0 * error, 0.02)) and error < 0.05
-    turned, error = fit.part("mounting"), fit.part_error("mounting")
-    assert turned is not None and error is not None
+    turned, error = fit.found("mounting"), fit.found_error("mounting")
     np.testing.assert_array_less(np.abs(turned - list(TURNED.values())), np.maximum(4.0 * error, 0.01))
-    center, error = fit.part("center"), fit.part_error("center")
-    assert center is not None and error is not None
+    center, error = fit.found("center"), fit.found_error("center")
     np.testing.assert_allclose(center, CENTER, atol=0.004)
     assert (error < 0.004).all()
 
@@ -98,8 +95,7 @@ def test_late_sensors_are_found_out(drawn: Layout, truth: Layout) -> None:
     late[1:, [0, 1, 5]] = measured[:-1, [0, 1, 5]]
     made = Swim("late", replay(drawn, command)[2:], late[2:], command[2:])
     found = fit_robot(drawn, [made], tried=())
-    delay, error = found.part("delay"), found.part_error("delay")
-    assert delay is not None and error is not None
+    delay, error = found.found("delay"), found.found_error("delay")
     # The made-up swims themselves take forces from the ends of steps of 0.02 s.
     np.testing.assert_array_less(np.abs(delay - [0.1, 0.0, 0.0, 0.2]), np.maximum(4.0 * error, 0.02))
     for name, (strength, own) in strengths(found).items():
