@@ -73,9 +73,9 @@ def commands(page: Page) -> list[Command]:
         ),
         Command("View", "Freeze or move the fins", partial(session.toggle, "frozen"), "P"),
         Command("View", "Dark or light theme", partial(session.toggle, "dark")),
-        Command("Help", "Tour: start, or next stop", session.next_stop, "T"),
+        Command("Help", "Tour: start, or next stop", session.tour, "T"),
         *(
-            Command("Help", f"Lesson: {lesson.title}", partial(session.open_lesson, lesson.name))
+            Command("Help", f"Lesson: {lesson.title}", partial(session.open_stop, lesson.name))
             for lesson in LESSONS
         ),
         Command("Files", "Export the bundle for the robot", page.jobs.exports.bundle),

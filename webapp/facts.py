@@ -10,7 +10,7 @@ from finlab.layout.damage import Health
 from webapp.markup.swim_card import pace_words
 from webapp.scene.wrench_nodes import Scale
 from webapp.session import Display, Session
-from webapp.session.lessons import Lesson
+from webapp.session.lessons import Stop
 from webapp.session.looking import Desk
 from webapp.session.search_request import SearchRequest
 from webapp.session.state import State
@@ -48,9 +48,7 @@ class Facts(NamedTuple):
     draft: SearchRequest
     swim: SwimSettings
     mesh_unit: str
-    guided: bool
-    stop: int | None
-    lesson: Lesson | None
+    stop: Stop | None
     solved: bool
     dragged: int | None
     """Place of the fin in the user's hand."""
@@ -87,6 +85,8 @@ class Facts(NamedTuple):
     """Whether there is a swim, running or being made."""
     swimmer: Swimmer | None
     moment: Moment | None
+    drawn: Layout
+    """The robot in the view: the one that swims, or the one that is designed."""
     paused: bool
     pace: str
     """At what pace it swims, in words."""
@@ -122,9 +122,7 @@ def facts_of(session: Session, jobs: Jobs, dragged: int | None, scale: Scale, be
         draft=session.draft,
         swim=session.swim,
         mesh_unit=session.mesh_unit,
-        guided=session.guided,
         stop=session.stop,
-        lesson=session.lesson,
         solved=session.solved,
         dragged=dragged,
         best=answering.best,
@@ -151,6 +149,7 @@ def facts_of(session: Session, jobs: Jobs, dragged: int | None, scale: Scale, be
         swims=swimming.active,
         swimmer=swimmer,
         moment=None if swimmer is None else swimmer.shown,
+        drawn=layout if swimmer is None else swimmer.layout,
         paused=swimming.active and not swimming.running and not swimming.done,
         pace=pace_words(swimming) if swimming.active else "",
         scale=scale,

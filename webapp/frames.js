@@ -7,7 +7,7 @@
   const QUICK_MS = 40, SLOW_MS = 70; // between frames, just after a touch and later
   const SETTLE_MS = 230; // a little less than viser's own
   const LONGEST_STEP_S = 0.2; // a long pause must not become a leap of the fins
-  const APART = 1.9, LIMP = Math.PI / 2; // as in fin_node.py
+  const APART = 1.9, LIMP = Math.PI / 2; // between the phases of fins, which look alive so; where a lost one hangs: down
 
   let fins = [], speed = 1, frozen = true, phases = [];
   let touched = performance.now(), due = 0, drawnAt = -Infinity, drawn = [], timer = 0, stepped = 0;

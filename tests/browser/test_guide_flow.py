@@ -24,14 +24,14 @@ def test_the_tour_sets_each_stop_and_brings_the_work_back(page: Any) -> None:
         page.press("Next")
         page.until(lambda stop=stop: f"{stop} of 6" in page.text(".tour"))
     page.until(lambda: page.view.jobs.swimming.swimmer is not None and page.view.jobs.swimming.time > 0.3)
-    page.visible("/robot", False)
+    page.visible("/floor", False)
     page.until(lambda: "off the path" in page.text(".fl-status"))
     page.press("Next")
     page.until(lambda: not page.view.jobs.swimming.active)
-    page.visible("/robot")
+    page.visible("/floor")
     page.until(lambda: "6 of 6 actuators" in page.text(".fl-status"))
     page.press("Finish")
-    page.until(lambda: page.session.state == mine and not page.session.guided)
+    page.until(lambda: page.session.state == mine and page.session.stop is None)
     assert page.session.drawer == "Improve" and page.session.history.undo_name == "Set Fy"
     back = page.view.scenery.robot.camera
     page.until(lambda: np.allclose(back, camera, atol=1e-3))
@@ -48,12 +48,12 @@ def test_a_lesson_sees_when_its_task_is_done(page: Any) -> None:
     page.page.locator("table.modes tr.pick").nth(1).click()
     page.until(lambda: "✓" in page.text(".fl-lesson"))
     assert "the green arrows did not" in page.text(".fl-lesson")
-    page.press("Next lesson")
+    page.press("Next")
     page.until(lambda: "Watts are not effort" in page.text(".fl-lesson"))
     page.choose("Least", "watts")
     page.until(lambda: "✓" in page.text(".fl-lesson"))
     page.press("Close")
-    page.until(lambda: not page.session.guided and page.session.state == mine)
+    page.until(lambda: page.session.stop is None and page.session.state == mine)
     assert page.session.desk == desk and page.problems == []
 
 

@@ -19,11 +19,10 @@ def test_a_robot_swims_and_one_fin_breaks(page: Any) -> None:
         page.until(lambda entry=entry: entry in vars(page.session.swim).values())
     page.press("Start")
     page.until(lambda: swimming.swimmer is not None)
-    page.node("/swim/robot0")
-    page.visible("/swim/robot0")
-    page.visible("/robot", False)
-    start = page.pixel("/swim/robot0")
-    page.until(lambda: page.pixel("/swim/robot0") != start)  # it moves on the screen
+    page.visible("/swim/floor")
+    page.visible("/floor", False)
+    start = page.pixel("/robot")
+    page.until(lambda: page.pixel("/robot") != start)  # it moves on the screen
     page.until(lambda: page.page.locator(".uplot:visible").count() == 6)
     ends = page.page.locator(".uplot:visible").evaluate_all(BOTTOMS)
     assert max(ends) <= page.page.viewport_size["height"], f"the last plots end at {ends}"
@@ -39,7 +38,7 @@ def test_a_robot_swims_and_one_fin_breaks(page: Any) -> None:
     assert swimming.time == pytest.approx(held + 0.1)
     page.press("End")
     page.until(lambda: not swimming.active)
-    page.visible("/robot")
+    page.visible("/floor")
     assert page.problems == []
 
 

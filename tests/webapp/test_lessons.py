@@ -10,9 +10,10 @@ from finlab.allocation import Allocation, Allocator
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
 from tests.webapp.hands import turn_fin
-from webapp.markup.guide_cards import lesson_card
+from webapp.markup.guide_cards import guide_card
 from webapp.session import Session
-from webapp.session.lessons import BY_NAME, LESSONS
+from webapp.session.lessons import LESSONS, TOUR, Stop
+from webapp.session.looking import DRAWERS
 from webapp.session.state import State
 
 
@@ -37,14 +38,14 @@ SOLVED: dict[str, Callable[[Session], object]] = {
 """What a student does."""
 
 
-@pytest.mark.parametrize("name", BY_NAME)
-def test_a_lesson_is_unsolved_until_its_exercise_is_done(name: str) -> None:
+@pytest.mark.parametrize("lesson", LESSONS, ids=lambda lesson: lesson.name)
+def test_a_lesson_is_unsolved_until_its_exercise_is_done(lesson: Stop) -> None:
     session = Session(load_layout("penta"))
-    session.open_lesson(name)
-    assert session.lesson is BY_NAME[name] and session.task == BY_NAME[name].task
+    session.open_stop(lesson.name)
+    assert session.stop is lesson and lesson.drawer in DRAWERS[session.task]
     session.take(_answer(session.state))
     assert not session.solved
-    SOLVED[name](session)
+    SOLVED[lesson.name](session)
     session.take(_answer(session.state))
     assert session.solved
     session.show_mode(0)
@@ -54,12 +55,12 @@ def test_a_lesson_is_unsolved_until_its_exercise_is_done(name: str) -> None:
 
 def test_wrong_ways_do_not_count() -> None:
     session = Session(load_layout("penta"))
-    session.open_lesson("lost-fin")
+    session.open_stop("lost-fin")
     for fin in ("front_left", "back_right", "front_right"):  # one fin alone turns nothing
         session.toggle_failure(fin)
     session.take(_answer(session.state))
     assert not session.solved
-    session.open_lesson("out-of-reach")
+    session.open_stop("out-of-reach")
     session.set_setting("policy", "direction")
     session.take(_answer(replace(session.state, target=(1.0, 0.0, 0.0, 0.0, 0.0, 0.0))))
     assert not session.solved
@@ -76,35 +77,35 @@ def test_closing_gives_back_what_was_there_and_next_goes_on_to_the_end() -> None
         return session.state, session.display, session.desk, session.selected, session.history.undo_name
 
     before = all_there_is()
-    session.next_lesson()
+    session.open_stop(LESSONS[0].name)
     session.set_display("dark", False)
-    names = [session.lesson.name if session.lesson else None]
-    while session.lesson is not None:
-        session.next_lesson()
-        names.append(session.lesson.name if session.lesson else None)
-    assert names == [*BY_NAME, None] and all_there_is() == before and not session.guided
+    stops = [session.stop]
+    while session.stop is not None:
+        session.go_on()
+        stops.append(session.stop)
+    assert stops == [*LESSONS, None] and all_there_is() == before
 
 
 def test_tour_and_lesson_end_each_other() -> None:
     session = Session(load_layout("penta"))
     before = session.state
-    session.next_stop()
-    session.open_lesson("two-ways")
-    assert session.stop is None and session.lesson is not None
-    session.next_stop()
-    assert session.stop == 0 and session.lesson is None
-    session.end_tour()
+    session.tour()
+    session.open_stop("two-ways")
+    assert session.stop is LESSONS[0]
+    session.tour()
+    assert session.stop is TOUR[0]
+    session.end_guide()
     assert session.state == before
 
 
 def test_unknown_lessons_are_refused() -> None:
-    with pytest.raises(FinlabError, match="lesson: expected one of two-ways, .*got 'sailing'"):
-        Session(load_layout("A")).open_lesson("sailing")
+    with pytest.raises(FinlabError, match="lesson: expected one of wrench, .*got 'sailing'"):
+        Session(load_layout("A")).open_stop("sailing")
 
 
 def test_the_card_says_what_to_do_and_praises_what_is_done() -> None:
     for lesson in LESSONS:
-        cards = [unescape(lesson_card(lesson, solved)) for solved in (False, True)]
+        cards = [unescape(guide_card(lesson, solved)) for solved in (False, True)]
         assert all(lesson.exercise in card for card in cards)
         assert [lesson.praise in card for card in cards] == [False, True]
-    assert "Finish" in lesson_card(LESSONS[-1], True)
+    assert "Finish" in guide_card(LESSONS[-1], True)

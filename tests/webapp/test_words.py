@@ -31,9 +31,9 @@ from webapp.markup.verdict import (
 from webapp.markup.words import authority_sentence, trim_sentence
 from webapp.scene.wrench_nodes import LENGTH, LONGEST, fitting_newtons
 from webapp.session import Session, files
+from webapp.session.lessons import TOUR
 from webapp.session.state import AXIS_WORDS, State
 from webapp.session.targets import PRESETS, axis_reach, full_thrust
-from webapp.session.tour import STEPS
 from webapp.tasks.analyst import Question, find
 from webapp.tasks.solver import Solver
 from webapp.theme import DELIVERED, UNLEARNED, css
@@ -198,7 +198,7 @@ def test_cards_say_what_a_layout_can_do() -> None:
 
 
 def test_every_stop_of_the_tour_stands() -> None:
-    for step in STEPS:
+    for step in TOUR:
         state = step.state(State(load_layout(shipped_layouts()["A"])))
         assert set(step.failed) <= set(state.layout.names)
     session = Session(load_layout(shipped_layouts()["A"]))
@@ -211,22 +211,22 @@ def test_every_stop_of_the_tour_stands() -> None:
         return session.state, session.display, session.desk, session.selected, session.history.undo_name
 
     before = all_there_is()
-    for step in STEPS:
-        session.next_stop()
+    for step in TOUR:
+        session.tour()
         assert session.drawer == step.drawer and session.selected is None
-    session.previous_stop()
-    assert session.stop == len(STEPS) - 2
-    session.next_stop()
-    session.next_stop()
+    session.go_back()
+    assert session.stop is TOUR[-2]
+    session.tour()
+    session.tour()
     assert session.stop is None and all_there_is() == before
 
 
 def test_the_best_mode_is_shown_again_after_a_tour() -> None:
     session = Session(load_layout("ucat"))
-    for leave in (session.end_tour, session.start_over):
-        session.next_stop()
-        session.next_stop()
-        assert session.mode == STEPS[1].mode == 1 and session.state == STEPS[1].state(session.state)
+    for leave in (session.end_guide, session.start_over):
+        session.tour()
+        session.tour()
+        assert session.mode == TOUR[1].mode == 1 and session.state == TOUR[1].state(session.state)
         leave()
         assert session.mode == 0, "although the stop asked just what was asked before"
 

@@ -8,14 +8,12 @@ from finlab.allocation.allocation import Allocation
 from finlab.analysis.score_card import quick_check
 from finlab.layout import Layout
 from webapp.markup.answer import wrench_bars
-from webapp.markup.guide_cards import lesson_card, tour_card
 from webapp.markup.html import html
 from webapp.markup.score_card import check_card, warnings
 from webapp.markup.verdict import answer_sentence
 from webapp.page import Page
 from webapp.presses import press
 from webapp.scene.robot_scene import CAMERAS
-from webapp.session.lessons import Lesson
 from webapp.session.looking import TASKS
 from webapp.session.state import State
 
@@ -43,13 +41,6 @@ def tasks(task: str) -> str:
         for name in TASKS
     )
     return html("<nav class='fl-tasks' aria-label='Tasks'>{}</nav>", buttons)
-
-
-def guide(lesson: Lesson | None, solved: bool, stop: int | None) -> str:
-    """The card of the tour or of a lesson, whichever is under way."""
-    if lesson is not None:
-        return lesson_card(lesson, solved)
-    return "" if stop is None else tour_card(stop)
 
 
 def check(able: Layout, failed: tuple[str, ...], layout: Layout) -> str:

@@ -20,6 +20,7 @@ from webapp.page import Page
 from webapp.panels.places import DRAWER, LEFT, PLACES, REGIONS, RIGHT, SIMULATE, Place
 from webapp.panels.status import add_corner
 from webapp.presses import press
+from webapp.session.lessons import Stop
 from webapp.session.looking import DRAWERS, Desk
 from webapp.session.state import can_be_edited
 from webapp.tasks.swimmer import Swimmer
@@ -131,11 +132,11 @@ class Frame:
             self._page.fault(error)
 
     def _arrange(
-        self, desk: Desk, selected: str | None, guided: bool, layout: Layout, swimmer: Swimmer | None
+        self, desk: Desk, selected: str | None, stop: Stop | None, layout: Layout, swimmer: Swimmer | None
     ) -> None:
         """Which regions are there, and which sections in them; the drawer is low until there are plots in
         it."""
-        about = ("", "robot" if selected is None else "fins", *["guide"] * guided)
+        about = ("", "robot" if selected is None else "fins", *["guide"] * (stop is not None))
         there = [section for section in self.sections if section.arrange(desk, about, layout)]
         regions = {section.place.region for section in there}
         gone = [FOLDER.format(section.name) for section in self.sections if section not in there]
@@ -148,7 +149,7 @@ class Frame:
             "right": RIGHT in regions,
             "drawer": drawer,
             "open": drawer and not desk.folded,
-            "guide": guided,
+            "guide": stop is not None,
         }
         variables = Markup().join(f"--has-{name}: {int(there)};" for name, there in counts.items())
         height = "" if desk.task != SIMULATE else LOW if swimmer is None else TALL
@@ -165,12 +166,10 @@ class Frame:
             "task": session.show_task,
             "drawer": session.show_drawer,
             "fold": lambda _: session.fold_drawer(),
-            "tour": lambda _: session.next_stop(),
-            "back": lambda _: session.previous_stop(),
-            "end": lambda _: session.end_tour(),
-            "lesson": session.open_lesson,
-            "lesson-next": lambda _: session.next_lesson(),
-            "lesson-close": lambda _: session.close_lesson(),
+            "stop": session.open_stop,
+            "on": lambda _: session.go_on(),
+            "back": lambda _: session.go_back(),
+            "end": lambda _: session.end_guide(),
             "look": robot.look_from,
             "frame": lambda _: robot.frame(),
         }

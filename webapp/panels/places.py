@@ -4,9 +4,10 @@ from collections.abc import Callable
 from functools import partial
 from typing import NamedTuple
 
+from webapp.markup.guide_cards import guide_card
 from webapp.page import Page
 from webapp.panels.body_inspector import add_body
-from webapp.panels.cards import add_answer, camera, card, check, guide, robot_name, tasks
+from webapp.panels.cards import add_answer, camera, card, check, robot_name, tasks
 from webapp.panels.compare_tab import add_comparison
 from webapp.panels.damage import add_damage
 from webapp.panels.design_panel import add_designs
@@ -54,7 +55,7 @@ PLACES = (
     Place(TOP, TASKS, "History", add_history),
     Place(TOP, TASKS, "Tasks", partial(card, tasks)),
     Place(TOP, TASKS, "Answers", add_answering),
-    Place(LEFT, TASKS, "Guide", partial(card, guide), about="guide"),
+    Place(LEFT, TASKS, "Guide", partial(card, guide_card), about="guide"),
     Place(LEFT, (DESIGN,), "Actuators", add_fin_list),
     Place(LEFT, (DESIGN,), "Designs", add_designs),
     Place(RIGHT, (DESIGN,), "Fin", add_fin, about="fins", fins_only="the inspector of a fin"),

@@ -4,7 +4,7 @@ from finlab.allocation.allocation import Allocation
 from webapp.handles import put
 from webapp.markup.corner import corner, legend, set_rows, swim_corner
 from webapp.page import Page
-from webapp.scene.swim_scene import ARROWS_N
+from webapp.scene.robot_scene import SWIM
 from webapp.scene.wrench_nodes import Scale
 from webapp.session.display import Display
 from webapp.session.state import State
@@ -40,6 +40,6 @@ def _written(
     in_reach: bool,
 ) -> str:
     if swimmer is not None and moment is not None:
-        return swim_corner(swimmer, moment, pace, ARROWS_N)
+        return swim_corner(swimmer, moment, pace, SWIM.newtons)
     drawn = set_rows(found if display.drawn != "none" else None)
     return corner(state, legend(*scale, drawn), shown, busy, error, shown is best, in_reach)

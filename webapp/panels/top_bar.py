@@ -11,9 +11,8 @@ from webapp.markup.picking import marker
 from webapp.page import Page
 from webapp.presses import press
 from webapp.session.design_links import MAX_LINK
-from webapp.session.lessons import LESSONS
+from webapp.session.lessons import LESSONS, TOUR
 from webapp.session.state import LEAST, least_of
-from webapp.session.tour import STEPS
 from webapp.tasks.opening import KINDS
 
 DESIGNS = ".yaml,.yml,.json,.zip"
@@ -75,5 +74,5 @@ def add_answering(page: Page) -> None:
         "<button title='a tour in {} stops (T)' {}>Tour</button>"
         "<button title='all commands and their keys (Ctrl+K)' onclick='{}'>Commands</button></div>"
     )
-    lessons, tour = press("lesson", LESSONS[0].name), press("tour", "")
-    add_html(gui, html(template, len(LESSONS), lessons, len(STEPS), tour, PALETTE))
+    lessons, tour = press("stop", LESSONS[0].name), press("stop", TOUR[0].name)
+    add_html(gui, html(template, len(LESSONS), lessons, len(TOUR), tour, PALETTE))

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import viser
-from numpy.typing import NDArray
 from viser.transforms import SO3
 
 from finlab.arrays import Array
@@ -22,11 +21,6 @@ from webapp.scene.meshes.mesh import NOTHING, Mesh, force_arrow, tube
 from webapp.scene.shape import Shape
 from webapp.theme import DEAD, LIGHT, fin_color
 
-APART = 1.9
-"""Between the phases of one fin and the next [rad]: different phases look alive, and the mean force does not
-depend on them."""
-LIMP = math.pi / 2
-"""Where the blade of a failed fin hangs [rad]: down."""
 LABEL = 0.85
 """Size of a fin's number."""
 GIZMO_SIZE = 0.24
@@ -35,38 +29,12 @@ HELD: tuple[Any, ...] = (None, "cmd/ctrl", "shift")
 """Keys that may be held while a fin is clicked; viser hears each by itself."""
 
 
-class Flapping:
-    """Where each blade is at the moment."""
-
-    def __init__(self) -> None:
-        self._phase: NDArray[np.floating] = np.zeros(0)
-        self.command: Array = np.zeros((0, 3))
-        """What they do (n, 3), NaN for failed ones."""
-
-    def take(self, command: Array) -> None:
-        """Other commands (n, 3), NaN for failed fins; the fins go on from where they are."""
-        if len(command) != len(self.command):
-            self._phase = np.arange(len(command)) * APART
-        self.command = command
-
-    def angles(self, elapsed: float, frozen: bool) -> list[float]:
-        """Angle of each blade [rad] after some more time [s]; at its zero direction if `frozen`."""
-        amplitude, frequency, direction = self.command.T
-        alive = np.isfinite(amplitude)
-        if frozen:
-            return [float(a) for a in np.where(alive, direction, LIMP)]
-        turned = self._phase + 2 * np.pi * np.where(alive, frequency, 0.0) * elapsed
-        self._phase = turned % (2 * np.pi)
-        swung = direction + amplitude * np.sin(self._phase)
-        return [float(a) for a in np.where(alive, swung, LIMP)]
-
-
 class FinShapes:
     """Blade, shaft and force of one fin, in the frame of its mounting."""
 
     def __init__(self, scene: viser.SceneApi, parent: str, index: int, **arrow: Any) -> None:
         """Add the nodes under `parent`, for the fin at this place of the layout; `arrow`: options of that."""
-        self.color, self._angle = fin_color(index), math.nan
+        self.color = fin_color(index)
         self._blade = Shape(scene, f"{parent}/blade", self.color)
         self.blade = self._blade.node
         self.shaft = Shape(scene, f"{parent}/shaft", LIGHT.metal, fin_mesh.shaft()).node
@@ -87,12 +55,6 @@ class FinShapes:
     def push(self, arrow: Array, frame: Array, thickness: float) -> None:
         """Show the force as an arrow (3,) [m] of the body frame, given the actuator's own axes (3, 3)."""
         self.force.show(force_arrow, frame @ arrow, self._root, thickness)
-
-    def pose(self, angle: float) -> None:
-        """Turn the blade about its shaft to an angle [rad]; one that rests is not sent again."""
-        if angle != self._angle:
-            self._angle = angle
-            self.blade.wxyz = quaternion(angle, 0)
 
 
 def _moving_part(kind: type[Actuator]) -> Mesh:

@@ -21,8 +21,11 @@ from webapp.scene.stage import Stage, aim_camera
 from webapp.scene.wrench_nodes import LENGTH, AttainableNodes, Scale, WrenchNodes
 from webapp.session.display import Display
 from webapp.session.state import can_be_edited, chosen
+from webapp.session.swim_plan import SwimSettings
 from webapp.tasks.analyst import Findings
 from webapp.tasks.context import Context
+from webapp.tasks.moment import Moment
+from webapp.tasks.swimmer import Swimmer
 from webapp.theme import HALF_TURN
 from webapp.viser_internals import run_script
 
@@ -35,6 +38,9 @@ CAMERAS = {
 """Where the camera stands in each view [m]."""
 SPEED = 0.5
 """Time of the flapping per real time."""
+SWIM = Scale(1.0, 1.0, False)
+"""What arrows stand for while the robot swims: one scale, so that they compare."""
+FORCES_ONLY = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
 
 
 class RobotScene:
@@ -42,8 +48,9 @@ class RobotScene:
 
     def __init__(self, context: Context, board: Board) -> None:
         self._client, self._session, self._do = context.client, context.session, context.do
+        self._board = board
         scene, session = self._client.scene, self._session
-        self._root = scene.add_frame("/robot", show_axes=False)
+        self.root = scene.add_frame("/robot", show_axes=False)
         self._stage = Stage(scene, hull_of(session.state.layout))
         self._wrench = WrenchNodes(scene)
         self._offered = Offered(scene)
@@ -57,6 +64,7 @@ class RobotScene:
             self._show_stage,
             self._place,
             self._push,
+            self._flap,
             self._show_wrench,
             self._show_sets,
             self._offer,
@@ -64,10 +72,16 @@ class RobotScene:
             board.act(act)
         self.look_from("3D")
 
-    def show(self, visible: bool) -> None:
-        """Show the robot that is designed, or make room for one that swims."""
-        put(self._root, visible=visible)
-        self._stage.show_floor(visible)
+    def hide(self) -> None:
+        """What stands there may be another robot's."""
+        put(self.root, visible=False)
+
+    def show(self, swimmer: Swimmer | None) -> None:
+        """A robot that does not swim stands on a floor of its own."""
+        put(self.root, visible=True)
+        self._stage.show_floor(swimmer is None)
+        if swimmer is None:
+            put(self.root, position=np.zeros(3), wxyz=np.array([1.0, 0.0, 0.0, 0.0]))
 
     def look_from(self, view: str) -> None:
         """Move the camera to one of `CAMERAS`."""
@@ -93,78 +107,109 @@ class RobotScene:
         way = place - target
         self.aim(center + way / max(float(np.linalg.norm(way)), 1e-6) * size, center)
 
-    def _show_stage(self, layout: Layout, display: Display, dragged: int | None) -> None:
+    def _show_stage(self, drawn: Layout, display: Display, dragged: int | None) -> None:
         if dragged is None:  # a hull that breathes with the fin one drags is hard to aim at
             # Glass within glass is not drawn; inside an attainable set the hull is a net.
             net = display.drawn != "none"
-            self._stage.refresh(hull_of(layout), display.dark, display.shadows, net, has_inside(layout))
+            self._stage.refresh(hull_of(drawn), display.dark, display.shadows, net, has_inside(drawn))
 
     def _place(
         self,
-        layout: Layout,
+        drawn: Layout,
         selection: tuple[str, ...],
         selected: str | None,
         task: str,
         failed: tuple[str, ...],
         health: Health | None,
         dragged: int | None,
+        swims: bool,
     ) -> None:
         """Actuators where they are, with their numbers and gizmos."""
-        hull = hull_of(layout)
-        while len(self._fins) < layout.n:
+        hull = hull_of(drawn)
+        while len(self._fins) < drawn.n:
             self._fins.append(FinNode(self._client.scene, len(self._fins), self._clicked, self._drag))
-        for node in self._fins[layout.n :]:
+        for node in self._fins[drawn.n :]:
             node.hide()
-        edited = selected if task == "Design" and can_be_edited(layout) else None
-        for i, part in enumerate(layout.actuators):
-            told = damage_words(health, part.name) if part.name not in failed else ""
+        edited = selected if task == "Design" and not swims and can_be_edited(drawn) else None
+        for i, part in enumerate(drawn.actuators):
+            told = "" if swims or part.name in failed else damage_words(health, part.name)
             words = (str(i + 1), part.name if part.name in selection else "", told)
             label = " ".join([word for word in words if word])
             self._fins[i].place(part, hull, part.name == edited, label, i == dragged)
 
     def _push(
         self,
-        layout: Layout,
+        drawn: Layout,
         failed: tuple[str, ...],
         shown: Allocation | None,
         scale: Scale,
-        display: Display,
+        moment: Moment | None,
     ) -> None:
-        """What actuators do, and their forces. The page moves the fins (`frames.js`): it is told the commands
-        of all, and how fast."""
-        moves = None if shown is None else motion(layout.actuators, shown.command)
-        for i, name in enumerate(layout.names):
-            if name in failed or shown is None or moves is None:
+        """What actuators do, and their forces."""
+        lost, newtons = (failed, scale.newtons) if moment is None else (moment.lost, SWIM.newtons)
+        if moment is not None:
+            moves, forces, frames = moment.motion, moment.force, drawn.frames
+        elif shown is not None:
+            # The forces belong to the answer's own axes, which a drag may have left behind.
+            moves, forces = motion(drawn.actuators, shown.command), shown.forces
+            frames = shown.layout.frames
+        else:
+            moves = forces = frames = np.full((drawn.n, 3), np.nan)
+        self._moves = [None] * drawn.n
+        for i, name in enumerate(drawn.names):
+            if name in lost or not math.isfinite(moves[i, 0]):
                 self._fins[i].command(None, np.zeros(3), np.eye(3))
-            elif math.isfinite(moves[i, 0]):
-                # The force belongs to the answer's own axes, which a drag may have left behind.
-                force, frame = shown.forces[i], shown.layout.frames[i]
-                self._fins[i].command(moves[i], force * (LENGTH / scale.newtons), frame)
-        if moves is not None:
-            self._moves = [row if math.isfinite(row[0]) else None for row in moves.tolist()]
-        told = json.dumps([self._moves, SPEED, display.frozen])[1:-1]
+            else:
+                self._moves[i] = moves[i].tolist()
+                self._fins[i].command(moves[i], forces[i] * (LENGTH / newtons), frames[i])
+
+    def _flap(
+        self,
+        drawn: Layout,
+        shown: Allocation | None,
+        failed: tuple[str, ...],
+        moment: Moment | None,
+        display: Display,
+        swim: SwimSettings,
+        paused: bool,
+    ) -> None:
+        """The page moves the fins (`frames.js`): it is told the commands of all, and how fast."""
+        speed, still = (SPEED, display.frozen) if moment is None else (swim.speed, paused or moment.done)
+        told = json.dumps([self._moves, speed, still])[1:-1]
         if told != self._flaps:
             self._flaps = told
             run_script(self._client.gui, f"finlabFrames.flap({told});")
 
     def _show_wrench(
-        self, layout: Layout, target: tuple[float, ...], shown: Allocation | None, scale: Scale
+        self,
+        drawn: Layout,
+        target: tuple[float, ...],
+        shown: Allocation | None,
+        scale: Scale,
+        moment: Moment | None,
     ) -> None:
-        hull, asked = hull_of(layout), np.array(target)
-        missing = np.zeros(6) if shown is None else missing_part(shown)
-        given = np.zeros(6) if shown is None else shown.wrench
+        asked, given, missing = np.array(target), np.zeros(6), np.zeros(6)
+        if moment is not None:
+            asked, given, scale = moment.asked * FORCES_ONLY, moment.delivered * FORCES_ONLY, SWIM
+        elif shown is not None:
+            given, missing = shown.wrench, missing_part(shown)
+        hull = hull_of(drawn)
         top = hull.center[2] + hull.half[2]
         self._wrench.refresh(asked, given, missing, top, LENGTH / scale.newtons, HALF_TURN / scale.torque)
 
-    def _show_sets(self, found: Findings | None, display: Display, target: tuple[float, ...]) -> None:
-        self._attainable.refresh(found if display.drawn != "none" else None, np.array(target))
+    def _show_sets(
+        self, found: Findings | None, display: Display, target: tuple[float, ...], swims: bool
+    ) -> None:
+        self._attainable.refresh(found if display.drawn != "none" and not swims else None, np.array(target))
 
-    def _offer(self, better: Improvement | None, layout: Layout) -> None:
-        self._offered.show(better.layout if better is not None and better.improved else None, layout)
+    def _offer(self, better: Improvement | None, layout: Layout, swims: bool) -> None:
+        self._offered.show(
+            better.layout if better is not None and better.improved and not swims else None, layout
+        )
 
     def _clicked(self, index: int, also: bool) -> None:
         select = self._session.select_also if also else self._session.select
-        self._do(partial(select, self._session.state.layout.names[index]))
+        self._do(lambda: select(self._board.facts.drawn.names[index]) if self._board.facts else None)
 
     def _drag(self, index: int, phase: str, position: tuple[float, float, float], angle: float) -> None:
         session = self._session

@@ -10,9 +10,8 @@ from webapp.scene.robot_scene import RobotScene
 from webapp.scene.swim_scene import SwimScene
 from webapp.scene.wrench_nodes import Scale, fitting_scale
 from webapp.session.display import Display
-from webapp.session.lessons import Lesson
+from webapp.session.lessons import Stop
 from webapp.session.swim_plan import SwimSettings
-from webapp.session.tour import STEPS
 from webapp.tasks.context import Context
 from webapp.tasks.swimmer import Swimmer
 from webapp.tasks.swimming import Swimming
@@ -20,8 +19,6 @@ from webapp.theme import BRAND
 
 FIRST = Scale(1.0, 1.0, False)
 """What arrows and rings stand for before anything is shown."""
-NOWHERE = (None, None)
-"""Neither at a stop of the tour nor in a lesson."""
 
 
 class Scenery:
@@ -32,7 +29,7 @@ class Scenery:
     ) -> None:
         """`board` lets it show the facts, `fault` tells of what went wrong with that."""
         self._client, self._session, self._swimming = context.client, context.session, swimming
-        self._guide: tuple[int | None, Lesson | None] = NOWHERE
+        self._stop: Stop | None = None
         self._camera = (np.zeros(3), np.zeros(3))
         """Where the camera stood before the tour or lesson, and looked at."""
         self._fault = fault
@@ -41,12 +38,12 @@ class Scenery:
         board.group(self._fail)
         board.act(self._show)
         self.robot = RobotScene(context, board)
-        self.swim = SwimScene(self._client, swimming)
+        self.swim = SwimScene(self._client, swimming, self.robot.root)
         board.act(self.swim.refresh)
 
     def _show(self, display: Display, swimmer: Swimmer | None) -> None:
         """The theme, and the robot that is designed unless one swims."""
-        self.robot.show(swimmer is None)
+        self.robot.show(swimmer)
         if display.dark != self._dark:
             self._dark = display.dark
             self._client.gui.configure_theme(
@@ -66,9 +63,10 @@ class Scenery:
         return self._scale
 
     def _fail(self, error: Exception | None) -> None:
-        """What stands there may be another robot's."""
-        self.robot.show(error is None and self._swimming.swimmer is None)
-        if error is not None:
+        if error is None:
+            self.robot.show(self._swimming.swimmer)
+        else:
+            self.robot.hide()
             self._fault(error)
 
     def animate(self, elapsed: float) -> None:
@@ -86,17 +84,17 @@ class Scenery:
     def follow_guide(self) -> None:
         """The robot fills the view at each stop of the tour and in each lesson, and swims at some; to come to
         one, or to leave, ends a swim. At its end the camera stands where it stood before."""
-        session, before = self._session, self._guide
-        stop, _ = self._guide = session.stop, session.lesson
-        if self._guide == before:
+        session, before = self._session, self._stop
+        stop = self._stop = session.stop
+        if stop is before:
             return
         self.end_swim()
-        if before == NOWHERE:
+        if before is None:
             self._camera = self.robot.camera
-        if not session.guided:
+        if stop is None:
             self.robot.aim(*self._camera)
             return
         self.robot.look_from("3D")
         self.robot.frame()
-        if stop is not None and STEPS[stop].swims:
+        if stop.swims:
             self._swimming.start(SwimSettings().plan(session.state))

@@ -1,4 +1,4 @@
-"""The water while robots swim: the way to go, where the robot should be, and the robot."""
+"""The water while a robot swims: the way to go, where it should be and was; and it moves."""
 
 from typing import Any
 
@@ -7,34 +7,32 @@ import viser
 
 from finlab.arrays import Array
 from webapp.handles import put
-from webapp.scene.meshes.mesh import force_arrow
+from webapp.scene.meshes.mesh import NOTHING, Mesh, force_arrow, joined, tube
 from webapp.scene.shape import Shape
 from webapp.scene.stage import add_floor, aim_camera, paint_floor
-from webapp.scene.swim_robot import SwimRobot, goal
-from webapp.scene.wrench_nodes import LENGTH
 from webapp.session.display import Display
-from webapp.tasks.moment import Moment
+from webapp.tasks.moment import PLACE, Moment
 from webapp.tasks.swimmer import Swimmer
 from webapp.tasks.swimming import Swimming
-from webapp.theme import ASKED, WATER
+from webapp.theme import ASKED, DELIVERED, WATER
 
-ARROWS_N = 1.0
-"""Force that an arrow of 0.1 m stands for while robots swim [N]: one for all, so that they compare."""
-SCALE = LENGTH / ARROWS_N
-"""Length of arrows [m/N]."""
 FLOW_S = 6.0
 """The arrow of the water is as long as its way in this time [s]."""
 BEYOND_M = 0.3
 """How far it begins beyond the path [m]."""
 DEPTH_BELOW = 0.6
 """How far the floor is below the deepest point of the way [m]."""
+NO_LINE = np.zeros((1, 2, 3), dtype=np.float32)
+TRAIL_POINTS = 250
+"""Most pieces of a trail."""
 
 
 class SwimScene:
     """Draws a swim; nothing of it is there while no robot swims."""
 
-    def __init__(self, client: viser.ClientHandle, swimming: Swimming) -> None:
-        self._client, self._swimming = client, swimming
+    def __init__(self, client: viser.ClientHandle, swimming: Swimming, root: viser.FrameHandle) -> None:
+        """`root` carries the robot."""
+        self._client, self._swimming, self._root = client, swimming, root
         scene = client.scene
         self._goal = Shape(scene, "/swim/goal", ASKED, opacity=0.45, visible=False, cast_shadow=False)
         self._reference = scene.add_icosphere(
@@ -43,30 +41,41 @@ class SwimScene:
         fade: dict[str, Any] = {"fade_distance": 14.0, "fade_strength": 1.4, "shadow_opacity": 0.18}
         self._water = Shape(scene, "/swim/water", WATER, opacity=0.9, visible=False, cast_shadow=False)
         self._floor = add_floor(scene, "/swim/floor", 14.0, 0.25, 1.0, visible=False, **fade)
-        self._robot = SwimRobot(scene, "/swim/robot0")
+        self._trail = scene.add_line_segments(
+            "/swim/trail", NO_LINE, DELIVERED, thickness=3.5, thickness_units="screen", visible=False
+        )
         self._shown: Swimmer | None = None
+        self._behind: Moment | None = None
+        self._ahead: Moment | None = None
+        self._clock = 0.0
 
     def refresh(self, swimmer: Swimmer | None, moment: Moment | None, display: Display) -> None:
         """Show the newest moment."""
-        for node in (self._goal.node, self._reference, self._floor, self._water.node):
+        for node in (self._goal.node, self._reference, self._floor, self._water.node, self._trail):
             put(node, visible=swimmer is not None)
         paint_floor(self._floor, display.dark)
         if swimmer is None or moment is None:
-            self._robot.hide()
-            self._shown = None
+            self._shown = self._ahead = None
             return
         if swimmer is not self._shown:
             self._begin(swimmer)
+        self._behind, self._ahead = self._ahead or moment, moment
+        self._clock = self._behind.time
         put(self._reference, position=moment.reference)
         self._draw_water(swimmer)
-        self._robot.take(moment, SCALE)
+        places = moment.record[:, PLACE : PLACE + 3]
+        places = places[:: max(1, len(places) // TRAIL_POINTS)]
+        points = (
+            np.stack([places[:-1], places[1:]], axis=1).astype(np.float32) if len(places) > 1 else NO_LINE
+        )
+        put(self._trail, points=points, colors=np.array(DELIVERED, dtype=np.uint8))
 
     def _begin(self, swimmer: Swimmer) -> None:
-        """Another swim: its robot, its way, and the camera where all of it can be seen."""
-        self._shown = swimmer
-        self._robot.begin(swimmer.layout, swimmer.shown)
-        self._goal.show(goal, swimmer.path)
+        """Another swim: its way, the robot at its start, and the camera where all of it can be seen."""
+        self._shown, self._ahead = swimmer, None
+        self._goal.show(_goal, swimmer.path)
         put(self._floor, position=np.array([0.0, 0.0, swimmer.path[:, 2].min() - DEPTH_BELOW]))
+        self._pose(swimmer.shown.pose)
         self._look(swimmer.path)
 
     def _draw_water(self, swimmer: Swimmer) -> None:
@@ -84,8 +93,30 @@ class SwimScene:
         place = middle + distance * np.array([-0.35, -0.75, 0.75])
         aim_camera(self._client, place, middle - np.array([0.0, 0.0, 0.1]))
 
+    def _pose(self, pose: Array) -> None:
+        """Put the robot to a place, with a quaternion (7,)."""
+        put(self._root, position=pose[:3], wxyz=pose[3:] / np.linalg.norm(pose[3:]))
+
     def animate(self, elapsed: float) -> None:
-        """Let the robot move by some time on the wall [s]."""
-        swimming = self._swimming
-        if swimming.swimmer is not None and swimming.swimmer is self._shown:
-            self._robot.animate(elapsed * (swimming.pace.rate or swimming.pace.speed))
+        """Move on by some time on the wall [s], towards the last moment and never beyond it."""
+        swimming, behind, ahead = self._swimming, self._behind, self._ahead
+        if (
+            behind is None
+            or ahead is None
+            or swimming.swimmer is not self._shown
+            or self._clock >= ahead.time
+        ):
+            return
+        self._clock = min(self._clock + elapsed * (swimming.pace.rate or swimming.pace.speed), ahead.time)
+        share = (self._clock - behind.time) / (ahead.time - behind.time)
+        start, end = behind.pose, ahead.pose.copy()
+        if start[3:] @ end[3:] < 0:
+            end[3:] *= -1.0
+        self._pose((1 - share) * start + share * end)
+
+
+def _goal(path: Array) -> Mesh:
+    """The way to go as a thin tube."""
+    steps = np.linalg.norm(np.diff(path, axis=0), axis=1)
+    kept = path[np.concatenate([[True], steps > 1e-6])]
+    return joined(tube(kept, 0.006, 8)) if len(kept) > 1 else NOTHING

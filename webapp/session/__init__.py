@@ -5,12 +5,12 @@ with a sentence for the user and changes nothing. One file per kind of intent.
 """
 
 from webapp.session.display import Display
+from webapp.session.guide import Guiding
 from webapp.session.inspecting import Inspecting
-from webapp.session.lessons import Learning
 from webapp.session.questions import Questions
 
 
-class Session(Questions, Inspecting, Learning):
+class Session(Questions, Inspecting, Guiding):
     """What one browser has made so far."""
 
 

@@ -6,6 +6,7 @@ from itertools import combinations
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
+from finlab.control import steers
 from finlab.errors import FinlabError
 from finlab.evaluation.experiments.hard_days import HardDay
 from finlab.layout import Layout
@@ -108,11 +109,7 @@ def _affected(layout: Layout, failed: tuple[str, ...], day: HardDay) -> tuple[st
         text = f"{day.name} takes {count} of the {len(working)} working fins away"
         raise FinlabError(f"{text}; choose another scenario, or a robot with more fins")
     ways = list(combinations(working, count))
-
-    def steers(lost: tuple[str, ...]) -> bool:
-        return steers(layout, (*failed, *lost))
-
-    return next((way for way in ways if not count or steers(way)), ways[0])
+    return next((way for way in ways if not count or steers(layout, (*failed, *way))), ways[0])
 
 
 class Plan(NamedTuple):
