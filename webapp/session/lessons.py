@@ -185,8 +185,8 @@ LESSONS = (
         (30.0, 6.0, 0.0, 0.0, 0.0, 4.0),
         exercise="Choose the policy direction. What happens to the arrows?",
         praise=(
-            "Less is delivered, in the asked proportions: a robot that is asked for too much still goes where "
-            "it should."
+            "Less is delivered, in the asked proportions: a robot that is asked for too much still goes "
+            "where it should."
         ),
         done=lambda seen: seen.state.policy == "direction" and not seen.delivered and _aligned(seen),
     ),
