@@ -270,7 +270,7 @@ class Allocation(Answer):
         return self.later.samples() if self.later is not None else None
 
     def _doubts(self) -> tuple[str, ...]:
-        doubt = () if self.expected_error <= REACHED else self._measure_next()
+        doubt = (self.measure_next,) if self.measure_next else ()
         if not self.bound or self.power <= (1.0 + TOLD_GAP) * self.bound:
             return doubt
         gap = 100.0 * (1.0 - self.bound / self.power)
@@ -280,15 +280,18 @@ class Allocation(Answer):
             "wide arc, a dead band or drag, the least is not proved",
         )
 
-    def _measure_next(self) -> tuple[str, ...]:
-        """The sentence about what adds most to `expected_error`."""
+    @cached_property
+    def measure_next(self) -> str:
+        """The sentence about what adds most to `expected_error`; empty where that is at most 0.001."""
+        if self.expected_error <= REACHED:
+            return ""
         sources = sources_of_miss(self._plant, self.command[None])
         parts = np.array([(source.variance[0] / self.scale**2).sum() for source in sources])
         most = int(parts.argmax())
         left = float(np.sqrt(parts.sum() - parts[most]))
         return (
             f"the true wrench is expected to be off by {self.expected_error:.2g}; measure "
-            f"{sources[most].words} next, without whose uncertainty {left:.2g} would be left",
+            f"{sources[most].words} next, without whose uncertainty {left:.2g} would be left"
         )
 
     @property

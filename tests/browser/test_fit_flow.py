@@ -20,7 +20,7 @@ def test_a_noisy_file_becomes_a_fin(page: Any, tmp_path: Path) -> None:
     assert page.view.shown.layout.fins[0].model.type == "table" and page.view.shown.err_norm < 1e-3
     page.press("On all like it")
     page.until(lambda: [fin.model.type for fin in session.state.layout.fins] == ["table"] * 4)
-    page.page.get_by_text("Exact", exact=True).first.wait_for()
+    page.page.get_by_text("Exact by the model, expected within").first.wait_for()
 
     page.press("Share")
     page.until(lambda: any("share the ZIP" in note for note in page.notes()))

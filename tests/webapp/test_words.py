@@ -13,7 +13,7 @@ from finlab.analysis import score_card
 from finlab.analysis.score_card import quick_check
 from finlab.assets import shipped_layouts
 from finlab.errors import LayoutError
-from finlab.layout import FinModelSpec, load_layout
+from finlab.layout import FinModelSpec, Uncertainty, load_layout
 from finlab.vehicle.body import GRAVITY
 from tests.webapp.stand_in import StandIn
 from webapp.markup.comparison import comparison_table
@@ -98,6 +98,15 @@ def test_how_far_the_watts_may_be_from_the_least_is_told() -> None:
     vars(dearer)["bound"] = answer.power / 1.25
     assert "at most 25 % above the least" in answer_sentence(state, dearer, False)
     assert bound_sentence(Allocator(layout, StandIn).allocate(PRESETS["Turn"])) == ""
+
+
+def test_what_is_exact_by_an_uncertain_model_says_so() -> None:
+    layout = load_layout("ucat").replace_actuator("front_left", uncertainty=Uncertainty(0.2))
+    answer = Allocator(layout).allocate(PRESETS["Turn"])
+    error = f"{answer.expected_error:.2g}"
+    assert verdict_sentence(answer, True) == f"Exact by the model, expected within {error}"
+    said = answer_sentence(State(layout, target=PRESETS["Turn"]), answer, False)
+    assert f"The true wrench is expected to be off by {error}; measure front_left next" in said
 
 
 def test_fins_that_were_not_learned_are_told_in_words_of_their_own() -> None:

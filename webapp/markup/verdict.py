@@ -6,6 +6,7 @@ import numpy as np
 from markupsafe import Markup
 
 from finlab.allocation.allocation import Allocation
+from finlab.allocation.evaluate import REACHED
 from webapp.markup.words import (
     authority_sentence,
     fins_words,
@@ -75,7 +76,9 @@ def verdict_sentence(allocation: Allocation, in_reach: bool) -> str:
     if verdict is Verdict.UNLEARNED:
         return unlearned_sentence(allocation.layout, allocation.unknown_fins)
     if verdict is Verdict.EXACT:
-        return str(verdict.value)
+        doubtful = allocation.expected_error > REACHED
+        within = f" by the model, expected within {allocation.expected_error:.2g}" if doubtful else ""
+        return f"{verdict.value}{within}"
     axis = int(np.argmax(np.abs(allocation.unallocated / allocation.scale)))
     target, given = allocation.target[axis], allocation.wrench[axis]
     kind = "force" if axis < 3 else "torque"
@@ -135,6 +138,8 @@ def answer_sentence(
             sentences.append("; ".join(told) + "." if told else "")
         elif allocation.reachable and not searching:
             sentences.append(bound_sentence(allocation))
+            if told := allocation.measure_next:
+                sentences.append(f"{told[0].upper()}{told[1:]}.")
     elif busy:
         sentences.append(WORKING)
     blind = authority_sentence(state.layout, state.failed, axis_reach(state.able, state.failed))
