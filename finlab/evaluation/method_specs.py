@@ -11,7 +11,6 @@ from finlab.allocation.allocator import Allocator
 from finlab.allocation.baselines.ipopt import IpoptSettings
 from finlab.allocation.methods import LEARNED, MethodChoice, checked_settings, choose_method, method_class
 from finlab.errors import AllocationError
-from finlab.evaluation.cones import Cones
 from finlab.layout import Layout
 from finlab.physics.objective import Name
 
@@ -21,7 +20,7 @@ QUICK = ("dual", "mdn", "paper", "qp", "sqp", "px4", "ardusub", "analytic")
 """Methods that run on every target."""
 IN_FORCES = "ipopt-forces"
 """IPOPT in the space of forces, its best form."""
-NEEDS = {"ipopt": "casadi", IN_FORCES: "casadi", Cones.name: "clarabel"}
+NEEDS = {"ipopt": "casadi", IN_FORCES: "casadi"}
 """Packages without which a method cannot run."""
 PATIENCE_S = 60.0
 """Processor time [s] that a target may take where answers count and not times; starts and steps end every
@@ -101,16 +100,14 @@ def load_method_spec(
     """The method of a specification.
 
     Args:
-        name: a method; `ipopt-32`, say, for 32 starts; `sqp-effort`, say, for an objective of its own; or one
-            for comparison alone: `ipopt-forces` and `clarabel`, solvers in the space of forces.
+        name: a method; `ipopt-32`, say, for 32 starts; `sqp-effort`, say, for an objective of its own; or
+            `ipopt-forces`, in the space of forces.
         checkpoint: of learned methods, as for `finlab.Allocator`.
         objective: what the methods that can choose keep least; each one's default where None.
 
     Raises:
         AllocationError: unknown method, or starts or an objective for a method that has none.
     """
-    if name == Cones.name:
-        return MethodSpec(name, MethodChoice(Cones, Cones.settings_class()))
     if name == IN_FORCES:
         return MethodSpec(name, _choice("ipopt", checkpoint, space="forces"))
     if named := _WITH_OBJECTIVE.fullmatch(name):

@@ -21,8 +21,12 @@ OTHER: dict[str, dict[str, Any]] = {
     "qp": {"regularization": 10.0},
     "sqp": {"objective": "effort", "n_steps": 1},
     "analytic": {"rcond": 0.5},
+    "px4": {"desaturation": "none"},
+    "ardusub": {},
 }
-SAME_ANSWER = ("analytic", "ipopt")
+ROBOT = {"px4": "bluerov2_heavy", "ardusub": "bluerov2_heavy"}
+"""Those that do not take layout A."""
+SAME_ANSWER = ("analytic", "ipopt", "px4", "ardusub")
 """Methods that may find the same answer with those settings."""
 
 pytestmark = pytest.mark.skipif(
@@ -36,13 +40,14 @@ def test_every_method_is_here() -> None:
 
 @pytest.mark.parametrize("method", METHODS)
 def test_other_settings_answer_as_if_made_with_them(method: str) -> None:
-    layout = load_layout("A")
+    layout = load_layout(ROBOT.get(method, "A"))
     allocator = Allocator(layout, method)
     before = allocator.allocate(SURGE).command
     other = allocator.with_settings(**OTHER[method])
     command = other.allocate(SURGE).command
     made = Allocator(layout, method, **OTHER[method])
-    assert other.method == allocator.method and other.settings == made.settings != allocator.settings
+    assert other.method == allocator.method and other.settings == made.settings
+    assert (other.settings != allocator.settings) == bool(OTHER[method])
     np.testing.assert_array_equal(command, made.allocate(SURGE).command)
     assert method in SAME_ANSWER or not np.array_equal(command, before)
     np.testing.assert_array_equal(allocator.allocate(SURGE).command, before)

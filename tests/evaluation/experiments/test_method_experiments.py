@@ -10,7 +10,7 @@ from finlab.allocation.baselines.analytic import Analytic
 from finlab.allocation.method import LeastErrorMethod
 from finlab.allocation.methods import MethodChoice
 from finlab.allocation.solution import Solution
-from finlab.errors import AllocationError, DataError
+from finlab.errors import DataError
 from finlab.evaluation import method_specs
 from finlab.evaluation.experiment import Row, load_experiment
 from finlab.evaluation.experiments.temperature import diversity
@@ -91,17 +91,17 @@ def surge_robot(arc: tuple[float, float] = (-math.pi, math.pi)) -> tuple[Layout,
 
 
 def test_latency_compares_methods_on_the_same_targets(monkeypatch: pytest.MonkeyPatch) -> None:
-    pytest.importorskip("clarabel")
+    pytest.importorskip("casadi")
     monkeypatch.setattr("finlab.evaluation.experiments.latency.LAYOUTS", 2)
     monkeypatch.setattr("finlab.evaluation.experiments.latency.TARGETS", 5)
-    names = ("dual", "analytic", "clarabel", "px4")
+    names = ("dual", "analytic", "ipopt-forces", "px4")
     sizes = {"robots": ("fins-3", "thrusters-7"), "reach": (0.9, 1.5), "calls": 6, "seed": 4711}
     rows = load_experiment("latency").rows(methods=names, **sizes)
     found = by(rows, "robot", "call", "method")
     assert len(rows) == 3 * 3 + 3 * 4  # px4 knows thrusters alone
     assert all(0 < row["p50_ms"] <= row["p99_ms"] for row in rows)
     for robot in sizes["robots"]:
-        for method in ("dual", "clarabel"):
+        for method in ("dual", "ipopt-forces"):
             near, beyond = (found[robot, f"{share} of reach", method] for share in (0.9, 1.5))
             assert (near["delivered"], beyond["delivered"]) == (1.0, 0.0)
             assert near["power_over_dual"] == pytest.approx(1.0, abs=2e-3)
@@ -113,22 +113,15 @@ def test_latency_compares_methods_on_the_same_targets(monkeypatch: pytest.Monkey
         load_experiment("latency").rows(robots=("fins-99",))
 
 
-@pytest.mark.parametrize("name", ["clarabel", "ipopt-forces"])
-def test_solvers_in_the_space_of_forces_miss_no_more_and_take_no_more(name: str) -> None:
-    pytest.importorskip("clarabel" if name == "clarabel" else "casadi")
+def test_ipopt_in_the_space_of_forces_misses_no_more_and_takes_no_more() -> None:
+    pytest.importorskip("casadi")
     for case in make_split("ood-fins", 2, 3, 8):
-        ours, theirs = (load_method_spec(each).on(case.layout) for each in ("dual", name))
+        ours, theirs = (load_method_spec(each).on(case.layout) for each in ("dual", "ipopt-forces"))
         best, found = ours.allocate_batch(case.targets), theirs.allocate_batch(case.targets)
         assert found.reachable.all()
         np.testing.assert_allclose(found.power, best.power, rtol=2e-3)
         best, found = ours.allocate_batch(5.0 * case.targets), theirs.allocate_batch(5.0 * case.targets)
         np.testing.assert_allclose(found.err_norm, best.err_norm, rtol=1e-3, atol=1e-3)
-
-
-def test_clarabel_refuses_arcs() -> None:
-    pytest.importorskip("clarabel")
-    with pytest.raises(AllocationError, match="expected fins and azimuths that turn fully"):
-        load_method_spec("clarabel").on(surge_robot((-1.0, 1.0))[0])
 
 
 def test_more_temperature_more_diversity_and_none_between_equals() -> None:
