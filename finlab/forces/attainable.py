@@ -11,7 +11,7 @@ from scipy.spatial import ConvexHull
 
 from finlab.arrays import Array
 from finlab.forces.force_sets import SCALE, ForceSets, convex_parts, force_sets, wide_arcs
-from finlab.forces.reach import largest
+from finlab.forces.reach import UNPROVEN, largest
 from finlab.layout import Layout
 
 FLAT = 1e-5
@@ -218,7 +218,7 @@ def _alone_support(sets: ForceSets, kind: Kind) -> Support:
         reach = answer.size.reshape(n_parts, rows)
         best = reach.argmax(axis=0) * rows + np.arange(rows)
         # The origin stands in for a point that is not proven to be attained.
-        proven = answer.gap < 1e-3 * (1.0 + answer.size)
+        proven = answer.gap < UNPROVEN * (1.0 + answer.size)
         points = np.where(proven[:, None], answer.wrench[:, own], 0.0)
         return points[best] * SCALE[own], answer.size[best] * SCALE[own][0]
 

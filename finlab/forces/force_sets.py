@@ -39,9 +39,9 @@ HALF_TURN_TOLERANCE = 1e-9
 BOUNDARY, POINTS = 48, 193
 """Sides of the polygon around what an uneven fin can push: at most a fifth of a percent too wide; and
 directions in its arc that are looked at."""
-ALONG, SIDES = 193, 16
+ALONG, SIDES = 193, 24
 """Forces of an actuator along its limits, or its rim, of which a polygon is made; and sides of one for forces
-of the flow: they lie inside by at most 2 % of its width."""
+of the flow: they lie inside by at most 1 % of its width."""
 THINNEST = 1e-3
 """Share of a set's length below which it has no width, and least distance of a side of a polygon from its
 centre, as a share of the radius."""

@@ -19,6 +19,8 @@ FINE, COARSE = 1e-9, 1e-4
 """Where the solver stops: for results to be shown, and for searches that ask thousands of times."""
 BESIDE = 1e-6
 """Scaled wrench that may be left beside the one asked for, as a share of the strongest actuator's."""
+UNPROVEN = 1e-3
+"""Gap, as a share of the size plus one, from which no force counts as found."""
 SPAN_TOLERANCE = 1e-9
 """Share of the largest singular value below which the actuators do not act along a direction at all."""
 
@@ -95,6 +97,9 @@ def max_wrench_along(sets: ForceSets, direction: Array, tolerance: float = FINE)
         found.normal[outside] = normal / (normal * direction[outside]).sum(-1, keepdims=True)
         for field in found[:4]:
             field[outside] = 0.0
+    if sets.center is not None:  # where rest is out of reach, a direction may meet nothing at all
+        unmet = (found.size < 0.0) | (found.gap > UNPROVEN * (1.0 + found.size))
+        found.size[unmet] = found.gap[unmet] = 0.0
     return found
 
 

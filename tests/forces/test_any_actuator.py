@@ -11,6 +11,7 @@ from finlab.layout.thrust_model import PowerLaw
 from finlab.physics import Plant
 from tests.least_power import farthest
 from tests.mixed_robots import load, random_flow, random_plant, random_robot
+from tests.own_plant import OwnPlant
 
 AXES = np.concatenate([np.eye(6), -np.eye(6)])
 AT_SPEED = (1.5, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -36,6 +37,20 @@ def test_as_far_as_linear_programs_by_another_plant(kind: str) -> None:
         size = 1e-3 * sets.radius.max()
         assert (found >= best * 0.998 - size).all(), (number, found, best)
         assert (found <= best * 1.004 + size).all(), (number, found, best)
+
+
+def test_where_the_water_pushes_harder_than_all_can_hold() -> None:
+    rng, none = np.random.default_rng(0), 0
+    for number in range(6):
+        robot, flow = random_robot("rudders", number, 21), rng.normal(size=6) * [1.5, 1.5, 1.5, 0.3, 0.3, 0.3]
+        sets, plant = force_sets(load(robot), flow=flow), OwnPlant(robot, flow)
+        directions = rng.normal(size=(4, 6))
+        directions /= np.linalg.norm(directions, axis=-1, keepdims=True)
+        found = max_wrench_along_exactly(sets, directions)[0][0]
+        best = np.array([farthest(plant, direction * SCALE) for direction in directions])
+        none += int((best == 0.0).sum())
+        np.testing.assert_allclose(found, best, rtol=5e-3, atol=1e-3 * sets.radius.max())
+    assert none >= 4
 
 
 @pytest.mark.parametrize(
