@@ -95,7 +95,13 @@ def _fitted(bench: Bench) -> ThrusterFit:
     side = _sides(command, force, rising, largest, bench.unit)
     _check_rise(command, force, rising, largest, bench.unit)
     rest = side == 0
-    idle = float(power[rest].mean()) if rest.any() else 0.0
+    idle = float(power[rest].min()) if rest.any() else 0.0
+    if idle > LAW_FROM * power.max():
+        notes.append(f"at rest it takes {idle:.3g} W, which the table has and a power law leaves out")
+    idling = power <= power.min() + NO_FORCE * power.max()
+    offset = float(force[idling].mean())
+    if idling.sum() > 1 and abs(offset) > 2.0 * NO_FORCE * largest:
+        notes.append(f"the force is {offset:.3g} N where the power is least; was the load cell at 0?")
     curves = []
     for sign, name in ((-1.0, "negative"), (1.0, "positive")):
         own = side[where] == sign
@@ -111,14 +117,14 @@ def _fitted(bench: Bench) -> ThrusterFit:
     below, above = moving[moving[:, 1] < 0.0], moving[moving[:, 1] > 0.0]
     nearest = (*below[-1:], *above[:1])
     still = rows[rows[:, 1] == 0.0, 0]
-    law, sides = _laws(bench)
+    law, sides = _laws(bench, idle)
     return ThrusterFit(
         table=_table(rows, bench.unit),
         law=law,
         sides=sides,
         still=(float(still[0]), float(still[-1])) if len(still) else None,
         moving=tuple(float(row[0]) for row in nearest),
-        dead_band=max(abs(float(row[1])) for row in nearest) if len(still) > 1 else 0.0,
+        dead_band=min(abs(float(row[1])) for row in nearest) if len(still) > 1 else 0.0,
         torque_per_newton=(
             0.0 if bench.torque is None else float(bench.torque @ bench.force / (bench.force @ bench.force))
         ),
@@ -177,7 +183,7 @@ def _convex(size: Array, watts: Array, knots: Array, idle: float) -> Array:
         DataError: no convex curve is near.
     """
     bends = np.concatenate([[0.0], np.unique(knots)[:-1]])
-    weight = 1.0 / (watts + LEVEL * watts.max())
+    weight = _weight(size, watts)
     rise, _ = nnls(np.maximum(size[:, None] - bends, 0.0) * weight[:, None], (watts - idle) * weight)
     missed = np.sqrt(np.mean((idle + np.maximum(size[:, None] - bends, 0.0) @ rise - watts) ** 2))
     if missed > NOT_CONVEX * watts.max():
@@ -191,7 +197,7 @@ def _convex(size: Array, watts: Array, knots: Array, idle: float) -> Array:
 def _spline(x: Array, y: Array) -> tuple[BSpline, Array, Array]:
     """Returns the regression spline of values (n,) over places (n,), its values there, and leverages (n,)."""
     places = np.unique(x)
-    weight = 1.0 / (np.maximum(y, 0.0) + LEVEL * y.max())
+    weight = _weight(x, y)
     degree, best, least = min(3, len(places) - 2), None, np.inf
     for count in KNOTS:
         if count and count + degree + 2 > len(places):
@@ -208,6 +214,15 @@ def _spline(x: Array, y: Array) -> tuple[BSpline, Array, Array]:
             best = BSpline(knots, np.linalg.solve(r, share), degree), q @ share / weight, leverage
     assert best is not None
     return best
+
+
+def _weight(x: Array, y: Array) -> Array:
+    """Returns the inverse of what rising values (n,) over places (n,) are about, without their noise: that
+    would make low ones count for more."""
+    order = np.argsort(x, kind="stable")
+    level = np.empty_like(y)
+    level[order] = isotonic_regression(y[order]).x
+    return np.asarray(1.0 / (np.maximum(level, 0.0) + LEVEL * level.max()))
 
 
 def _deviation(parts: Sequence[Array]) -> Uncertainty | None:
@@ -264,19 +279,20 @@ def _table(rows: Array, unit: str) -> PowerTable:
         raise DataError(f"the rows make no table of thrust: {error}") from None
 
 
-def _laws(bench: Bench) -> tuple[PowerLaw, dict[str, tuple[float, float, float]]]:
-    """Returns the common power law, and each side's own."""
+def _laws(bench: Bench, idle: float) -> tuple[PowerLaw, dict[str, tuple[float, float, float]]]:
+    """Returns the common power law, and each side's own, of what is taken beyond the power at rest [W]."""
+    power = bench.power - idle
     sides, logs = {}, {}
     for name, sign in (("reverse", -1.0), ("forward", 1.0)):
         size = sign * bench.force
-        kept = (size > LAW_FROM * size.max()) & (bench.power > 0.0) & (size > 0.0)
+        kept = (size > LAW_FROM * size.max()) & (power > 0.0) & (size > 0.0)
         if len(np.unique(size[kept])) > 1:
-            x, y = logs[name] = np.log(size[kept]), np.log(bench.power[kept])
+            x, y = logs[name] = np.log(size[kept]), np.log(power[kept])
             exponent, factor = np.polyfit(x, y, 1)
-            missed = np.exp(factor + exponent * x) - bench.power[kept]
+            missed = np.exp(factor + exponent * x) - power[kept]
             sides[name] = float(np.exp(factor)), float(exponent), float(np.sqrt(np.mean(missed**2)))
     if not logs:
-        raise DataError("no side has two forces of different size that take power")
+        raise DataError("no side has two forces of different size that take more power than rest")
     within = np.concatenate([(x - x.mean()) for x, _ in logs.values()])
     common = float(within @ np.concatenate([y for _, y in logs.values()]) / (within @ within))
     common = float(np.clip(round(common, 3), 1.1, 4.0))

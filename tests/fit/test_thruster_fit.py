@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -85,6 +86,15 @@ def test_torque_and_one_side_and_rpm_without_sign(tmp_path: Path) -> None:
     ahead = {name: values[rpm >= 0.0] for name, values in columns.items()}
     fit = fit_thruster(read_bench([write(tmp_path / "one.csv", ahead)]))
     assert fit.force == pytest.approx((0.0, 45.0)) and "one way" in fit.notes[0]
+
+
+def test_power_at_rest_and_a_cell_that_was_not_at_zero_are_said() -> None:
+    plain = bench(60, 0.0)
+    idling = fit_thruster(replace(plain, power=plain.power + 12.0))
+    assert idling.law == fit_thruster(plain).law and "at rest it takes 12 W" in idling.notes[0]
+    assert idling.table.columns[2].min() == pytest.approx(12.0)
+    shifted = fit_thruster(replace(plain, force=plain.force + 0.5))
+    assert "the force is 0.51" in shifted.notes[0]
 
 
 Columns = dict[str, Array]
