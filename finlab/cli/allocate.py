@@ -18,6 +18,7 @@ def allocate(
     failed: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME")] = (),
     method: Annotated[str, arg(metavar="NAME")] = "dual",
     objective: Literal["power", "effort"] | None = None,
+    robust: Annotated[float | None, arg(metavar="W")] = None,
     checkpoint: Annotated[str | None, arg(metavar="NAME|FOLDER")] = None,
     policy: Annotated[str, arg(metavar="NAME")] = "closest",
     axis_weights: Annotated[Wrench | None, arg(metavar="W1 ... W6")] = None,
@@ -38,6 +39,7 @@ def allocate(
         failed: name of a fin that does not work.
         method: dual, mdn, paper, qp, sqp, px4, ardusub, analytic or ipopt.
         objective: what is kept least, power in watts (the default) or the paper's effort.
+        robust: for method dual: watts that an expected error of 1 % of the yardstick is worth.
         checkpoint: trained checkpoint; the shipped one of the method by default.
         policy: for a wrench out of reach: closest, direction (same direction, scaled down) or priority.
         axis_weights: for `closest`: weight of each axis of the error.
@@ -58,7 +60,8 @@ def allocate(
 
     check_json_file(json)
     robot = open_robot(layout)
-    options: dict[str, Any] = {} if objective is None else {"objective": objective}
+    told: dict[str, Any] = {"objective": objective, "robust": robust}
+    options = {name: value for name, value in told.items() if value is not None}
     allocator = Allocator(robot.layout, method, checkpoint=checkpoint, **options)
     answer = policy_from(policy, axis_weights, priority)
     damage = Health.parse(health, stuck, running)

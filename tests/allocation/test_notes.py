@@ -52,6 +52,27 @@ def test_limits_beyond_a_table_are_told_until_the_table_is_wider(tmp_path: Path)
     assert fin_notes(robot(Limits(), path)) == ()
 
 
+@pytest.mark.parametrize(
+    ("limits", "told"),
+    [((-1.0, 1.0), False), ((5.4, 6.2), False), ((-np.pi, np.pi), True), ((-1.5, 0.0), True)],
+)
+def test_zero_directions_beyond_a_table_are_told(
+    tmp_path: Path, limits: tuple[float, float], told: bool
+) -> None:
+    path = tmp_path / "arc.csv"
+    write_table(path, DRAG, np.linspace(0.0, 0.6, 5), np.linspace(0.1, 2.1, 5), np.linspace(-1.0, 1.0, 9))
+    notes = fin_notes(robot(Limits(zero_direction=limits), path))
+    assert len(notes) == told
+    assert all("zero directions of" in note and "its table holds -1 to 1" in note for note in notes)
+
+
+def test_a_table_of_two_lines_is_told(tmp_path: Path) -> None:
+    path = tmp_path / "fin.csv"
+    write_table(path, DRAG, np.array([0.0, 0.6]), np.linspace(0.1, 2.1, 5), CIRCLE)
+    (note,) = fin_notes(robot(Limits(), path))
+    assert note.startswith("the table of fin a has two half amplitudes alone")
+
+
 def test_a_table_without_thrust_within_the_limits_is_refused(tmp_path: Path) -> None:
     amplitude = np.array([0.0, 0.2, 0.3, 0.4, 0.6])
     grid = np.stack(np.meshgrid(amplitude, [0.1, 2.1], CIRCLE, indexing="ij"), axis=-1).reshape(-1, 3)

@@ -17,7 +17,7 @@ import yaml
 
 from finlab.assets import shipped_layouts
 from finlab.cli import main
-from finlab.layout import Interaction, load_layout, save_layout
+from finlab.layout import Interaction, Uncertainty, load_layout, save_layout
 from finlab.physics import plant_of
 
 WRENCH = ["--wrench", "1", "0", "-0.5", "0", "0", "1e-1"]
@@ -290,3 +290,13 @@ def test_a_bound_is_told_on_request(capsys: pytest.CaptureFixture[str]) -> None:
     assert f"no exact answer takes less than {answer['bound']:.4g} W" in capsys.readouterr().out
     assert main(["allocate", "A", *wrench, "--bound", "--method", "qp"]) == 2
     assert "bound: method 'qp' proves none" in capsys.readouterr().err
+
+
+def test_robust_is_an_option(allocate: Callable[..., tuple[int, str, str]], tmp_path: Path) -> None:
+    path = tmp_path / "unsure.yaml"
+    save_layout(load_layout("A").replace_actuator("front_left", uncertainty=Uncertainty(0.3)), path)
+    _, plain, _ = allocate(str(path), *WRENCH, "--json")
+    _, sure, _ = allocate(str(path), *WRENCH, "--robust", "3", "--json")
+    first, second = json.loads(plain), json.loads(sure)
+    assert second["expected_error"] < first["expected_error"] and second["power"] > first["power"]
+    assert "measure front_left next" in first["notes"][-1] and second["bound"] is None
