@@ -43,11 +43,11 @@ class AzimuthLaw(ActuatorLaw):
         )
         return force, jacobian
 
-    def power(self, command: Values, copper_loss: float = 0.0, inflow: Array | None = None) -> Values:
+    def power(self, command: Values, inflow: Array | None = None) -> Values:
         """See `ActuatorLaw`. Turning takes none."""
         return self.power_curve.watts(held(command[..., 1], self.dead_band))
 
-    def power_gradient(self, command: Array, copper_loss: float = 0.0, inflow: Array | None = None) -> Array:
+    def power_gradient(self, command: Array, inflow: Array | None = None) -> Array:
         """See `ActuatorLaw`."""
         gradient = np.zeros(command.shape)
         gradient[..., 1] = self.power_curve.marginal(held(command[..., 1], self.dead_band))

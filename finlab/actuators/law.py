@@ -35,12 +35,11 @@ class ActuatorLaw(ABC):
         """Returns the force and its derivative by each command in turn (..., n, 3 commands, 3 axes)."""
 
     @abstractmethod
-    def power(self, command: Values, copper_loss: float = 0.0, inflow: Array | None = None) -> Values:
-        """Returns the power (..., n) [W] of commands (..., n, 3); of fins, whose laws tell mechanical power,
-        with `copper_loss` [W/(N m)^2] times the mean squared torque on the shaft."""
+    def power(self, command: Values, inflow: Array | None = None) -> Values:
+        """Returns the power (..., n) [W] of commands (..., n, 3), of fins the mechanical one."""
 
     @abstractmethod
-    def power_gradient(self, command: Array, copper_loss: float = 0.0, inflow: Array | None = None) -> Array:
+    def power_gradient(self, command: Array, inflow: Array | None = None) -> Array:
         """Returns the power's derivatives (..., n, 3) by each command."""
 
 
@@ -53,15 +52,14 @@ class FinLaw(ActuatorLaw):
     blade: Blade = Blade()
     """The plate whose beating takes power, where nothing better is known."""
 
-    def power(self, command: Values, copper_loss: float = 0.0, inflow: Array | None = None) -> Values:
+    def power(self, command: Values, inflow: Array | None = None) -> Values:
         """See `ActuatorLaw`."""
-        return self.blade.driving_power(command[..., 0], command[..., 1], copper_loss)
+        return self.blade.power(command[..., 0], command[..., 1])
 
-    def power_gradient(self, command: Array, copper_loss: float = 0.0, inflow: Array | None = None) -> Array:
+    def power_gradient(self, command: Array, inflow: Array | None = None) -> Array:
         """See `ActuatorLaw`."""
         jacobian = np.zeros(command.shape)
-        by = self.blade.driving_jacobian(command[..., 0], command[..., 1], copper_loss)
-        jacobian[..., 0], jacobian[..., 1] = by
+        jacobian[..., 0], jacobian[..., 1] = self.blade.power_gradient(command[..., 0], command[..., 1])
         return jacobian
 
 

@@ -27,19 +27,15 @@ class Kind:
 
     laws: Callable[[Sequence[Any]], Sequence[tuple[Places, ActuatorLaw]]]
     """Laws of m actuators of the kind, few for many of them, each with its places among these m."""
-    group: Callable[[Sequence[Any], Array, float], Group]
-    """Answers to prices of m actuators with an effectiveness (m, 3, 6), and `copper_loss` [W/(N m)^2]."""
+    group: Callable[[Sequence[Any], Array], Group]
+    """Answers to prices of m actuators with an effectiveness (m, 3, 6)."""
     angle: int | None = None
     """Which of its commands is an angle that may turn freely."""
 
 
 def _kind(law: Callable[[Sequence[Any]], ActuatorLaw], group: Any, angle: int | None = None) -> Kind:
-    """A kind whose actuators have one law together, and no motors whose losses count."""
-    return Kind(
-        lambda parts: [(np.arange(len(parts)), law(parts))],
-        lambda parts, wrench, _: group(parts, wrench),
-        angle,
-    )
+    """A kind whose actuators have one law together."""
+    return Kind(lambda parts: [(np.arange(len(parts)), law(parts))], group, angle)
 
 
 _AZIMUTH = _kind(AzimuthLaw, AzimuthGroup, angle=0)
@@ -66,19 +62,18 @@ def laws_of(layout: Layout) -> list[tuple[Places, ActuatorLaw]]:
     return groups
 
 
-def groups_of(layout: Layout, effectiveness: Array, copper_loss: float = 0.0) -> list[tuple[Places, Group]]:
+def groups_of(layout: Layout, effectiveness: Array) -> list[tuple[Places, Group]]:
     """Returns the answers to prices of a robot's actuators, by kind, with their places.
 
     Args:
         layout: the robot.
         effectiveness: wrench (n, 3, 6) of 1 N along the own axes of each actuator.
-        copper_loss: heat of a fin's motor that counts as power [W/(N m)^2].
 
     Raises:
         DataError: a fin's force table cannot be read, or gives no thrust within the limits.
     """
     return [
-        (places, kind.group([layout.actuators[i] for i in places], effectiveness[places], copper_loss))
+        (places, kind.group([layout.actuators[i] for i in places], effectiveness[places]))
         for places, kind in _kinds(layout)
     ]
 

@@ -108,14 +108,14 @@ class RudderLaw(ActuatorLaw):
         jacobian[..., 0, :] = _along(met, found.lift_slope, found.drag_slope)
         return force, jacobian
 
-    def power(self, command: Values, copper_loss: float = 0.0, inflow: Array | None = None) -> Values:
+    def power(self, command: Values, inflow: Array | None = None) -> Values:
         """See `ActuatorLaw`: what the drag takes, drag times speed."""
         if inflow is None:
             return 0.0 * command[..., 0]
         met = self.met(inflow)
         return met.pressure * met.speed * self.coefficients(command[..., 0] - met.course).drag
 
-    def power_gradient(self, command: Array, copper_loss: float = 0.0, inflow: Array | None = None) -> Array:
+    def power_gradient(self, command: Array, inflow: Array | None = None) -> Array:
         """See `ActuatorLaw`."""
         gradient = np.zeros(command.shape)
         if inflow is not None:

@@ -36,11 +36,11 @@ class ThrusterLaw(ActuatorLaw):
         jacobian[..., 0, 0] = force[..., 0] == command[..., 0]
         return force, jacobian
 
-    def power(self, command: Values, copper_loss: float = 0.0, inflow: Array | None = None) -> Values:
+    def power(self, command: Values, inflow: Array | None = None) -> Values:
         """See `ActuatorLaw`. The models tell electrical power, in which the motor's loss is included."""
         return self.power_curve.watts(held(command[..., 0], self.dead_band))
 
-    def power_gradient(self, command: Array, copper_loss: float = 0.0, inflow: Array | None = None) -> Array:
+    def power_gradient(self, command: Array, inflow: Array | None = None) -> Array:
         """See `ActuatorLaw`."""
         gradient = np.zeros(command.shape)
         gradient[..., 0] = self.power_curve.marginal(held(command[..., 0], self.dead_band))

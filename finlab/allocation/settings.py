@@ -115,11 +115,8 @@ class AimSettings(Settings):
     objective: Name = choice("power", ("power", "effort"), "kept least: watts, or the paper's effort")
     effort_weights: EffortWeights = DEFAULT_WEIGHTS
     """Weights of the effort."""
-    copper_loss: float = number(
-        0.0, 0.0, 1e6, "heat in a motor's windings that counts beside the mechanical power", "W/(N m)^2"
-    )
 
     @property
     def aim(self) -> Objective:
-        """The three as one."""
-        return Objective(self.objective, self.effort_weights, self.copper_loss)
+        """Both as one."""
+        return Objective(self.objective, self.effort_weights)

@@ -6,8 +6,6 @@ Both are sums over the fins of a cost of amplitude and frequency; effort adds a 
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-import numpy as np
-
 from finlab.arrays import Array
 from finlab.errors import AllocationError
 from finlab.physics.effort import DEFAULT_WEIGHTS, EffortMeter, EffortWeights
@@ -21,7 +19,7 @@ class Objective:
     """What is kept least.
 
     Raises:
-        AllocationError: an unknown objective, or a loss that is none.
+        AllocationError: an unknown objective.
         TypeError: weights of another type.
     """
 
@@ -29,37 +27,30 @@ class Objective:
     """`power`: mean mechanical watts by each fin's own model. `effort`: the paper's energy proxy `J_en`."""
     weights: EffortWeights = DEFAULT_WEIGHTS
     """Weights of `J_en`."""
-    copper_loss: float = 0.0
-    """Heat in a motor's windings [W/(N m)^2] that counts beside the mechanical power."""
 
     def __post_init__(self) -> None:
         if self.name not in get_args(Name):
             raise AllocationError(f"objective: expected 'power' or 'effort', got {self.name!r}")
         if not isinstance(self.weights, EffortWeights):
             raise TypeError(f"effort_weights: expected EffortWeights, got {self.weights!r}")
-        if not 0.0 <= self.copper_loss < np.inf:
-            raise AllocationError(
-                f"copper_loss: expected watts per (N m)^2, from 0, got {self.copper_loss!r}"
-            )
-        object.__setattr__(self, "copper_loss", float(self.copper_loss))
 
     def meter(self, plant: Plant) -> "CostMeter":
         """Returns the meter of the cost of a robot's commands."""
         if self.name == "power":
-            return PowerMeter(plant, self.copper_loss)
+            return PowerMeter(plant)
         return EffortMeter(plant.upper, self.weights)
 
 
 class PowerMeter:
     """The power of one robot whose fins are all healthy, ready for many commands."""
 
-    def __init__(self, plant: Plant, copper_loss: float = 0.0) -> None:
+    def __init__(self, plant: Plant) -> None:
         """Make it for the fins of a plant."""
-        self._plant, self._copper_loss = plant, copper_loss
+        self._plant = plant
 
     def fins(self, command: Array) -> Array:
         """Power (R, n) [W] of each fin under commands (R, n, 3)."""
-        return self._plant.power(command, self._copper_loss)
+        return self._plant.power(command)
 
     def __call__(self, command: Array) -> Array:
         """Power (R,) [W] of commands (R, n, 3)."""
@@ -68,7 +59,7 @@ class PowerMeter:
 
     def gradient(self, command: Array) -> Array:
         """Derivatives (R, n, 3) of the power by commands (R, n, 3)."""
-        return self._plant.power_gradient(command, self._copper_loss)
+        return self._plant.power_gradient(command)
 
 
 CostMeter = PowerMeter | EffortMeter

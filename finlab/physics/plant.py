@@ -136,22 +136,21 @@ class Plant:
         and the wrench (n, axes, 6) per unit of each; here the forces."""
         return self, self.effectiveness
 
-    def power(self, command: Array, copper_loss: float = 0.0, *, flow: Array | None = None) -> Array:
-        """Returns each actuator's power (..., n) [W] of commands (..., n, 3), NaN for a failed one's; of fins
-        with a motor's loss [W/(N m)^2], see `ActuatorLaw.power`."""
+    def power(self, command: Array, *, flow: Array | None = None) -> Array:
+        """Returns each actuator's power (..., n) [W] of commands (..., n, 3), NaN for a failed one's."""
         inflow = self.inflow(flow)
         power = np.empty(_broadcast(command, inflow)[:-1])
         for places, law in self._laws:
-            power[..., places] = law.power(command[..., places, :], copper_loss, *_met(law, inflow, places))
+            power[..., places] = law.power(command[..., places, :], *_met(law, inflow, places))
         return power
 
-    def power_gradient(self, command: Array, copper_loss: float = 0.0, *, flow: Array | None = None) -> Array:
+    def power_gradient(self, command: Array, *, flow: Array | None = None) -> Array:
         """Returns the power's derivatives (..., n, 3) by each command."""
         inflow = self.inflow(flow)
         jacobian = np.empty(_broadcast(command, inflow))
         for places, law in self._laws:
             met = _met(law, inflow, places)
-            jacobian[..., places, :] = law.power_gradient(command[..., places, :], copper_loss, *met)
+            jacobian[..., places, :] = law.power_gradient(command[..., places, :], *met)
         return jacobian
 
     @cached_property

@@ -92,7 +92,7 @@ class FinPower(NamedTuple):
     """max(tau omega, 0): inertia, carried water and drag together, nothing won back by braking."""
     driving: Array
     """The same and the heat in the motor's windings, copper_loss tau^2: what a battery gives, but for the
-    electronics. Its mean over a steady beat is `Blade.driving_power`."""
+    electronics."""
 
 
 def fin_power(speed: Array, acceleration: Array, blade: Blade, copper_loss: float = COPPER_LOSS) -> FinPower:

@@ -140,7 +140,7 @@ def test_a_rudder_answers_a_price_with_the_lift_whose_drag_it_pays() -> None:
     delta = np.linspace(-0.5, 0.5, 4001)[:, None, None] * [1.0, 0.0, 0.0]
     course = law.met(inflow).course[0]
     lift = law.force(delta, inflow)[:, 0] @ [0.0, -np.sin(course), np.cos(course)]
-    worth = price * lift[:, None] - law.power(delta, 0.0, inflow)
+    worth = price * lift[:, None] - law.power(delta, inflow)
     np.testing.assert_allclose(answer.conjugate, worth.max(axis=0), rtol=0.02, atol=0.02)
 
 
@@ -156,7 +156,7 @@ def test_a_price_of_drag_counts_in_the_answer_of_a_rudder() -> None:
     tried = np.linspace(-0.5, 0.5, 4001)[:, None, None] * [1.0, 0.0, 0.0]
     found, best = (
         np.einsum("nma,maw,w->n", law.force(each, inflow), wrench, multipliers)
-        - law.power(each, 0.0, inflow)[:, 0]
+        - law.power(each, inflow)[:, 0]
         for each in (command, tried)
     )
     assert found[0] >= best.max() - 1e-3 * abs(best).max()

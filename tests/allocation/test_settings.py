@@ -14,7 +14,7 @@ from tests.any_robot import AnyRobot
 
 SURGE = [1.0, 0.0, 0.5, 0.0, 0.0, 0.1]
 OTHER: dict[str, dict[str, Any]] = {
-    "dual": {"copper_loss": 2.0},
+    "dual": {"robust": 2.0},
     "mdn": {"n_candidates": 8, "n_refined": 2},
     "paper": {"n_candidates": 4, "n_steps": 3},
     "ipopt": {"n_starts": 1},
@@ -26,7 +26,7 @@ OTHER: dict[str, dict[str, Any]] = {
 }
 ROBOT = {"px4": "bluerov2_heavy", "ardusub": "bluerov2_heavy"}
 """Those that do not take layout A."""
-SAME_ANSWER = ("analytic", "ipopt", "px4", "ardusub")
+SAME_ANSWER = ("dual", "analytic", "ipopt", "px4", "ardusub")
 """Methods that may find the same answer with those settings."""
 
 pytestmark = pytest.mark.skipif(
@@ -75,8 +75,8 @@ def test_unknown_settings_are_refused(method: str) -> None:
         ("mdn", {"n_refined": True}, "n_refined: expected a whole number .*, got True"),
         ("dual", {"period_s": 0.0}, "period_s: expected a number above 0 up to 1000 s, got 0.0"),
         ("sqp", {"objective": "speed"}, "objective: expected one of power, effort, got 'speed'"),
-        ("dual", {"copper_loss": float("nan")}, "copper_loss: expected a number .* W/.N m.\\^2, got nan"),
-        ("dual", {"copper_loss": 10**400}, "copper_loss: expected a number .*, got 1000"),
+        ("dual", {"robust": float("nan")}, "robust: expected a number .* W, got nan"),
+        ("dual", {"robust": 10**400}, "robust: expected a number .*, got 1000"),
         ("mdn", {"effort_weights": 3}, "effort_weights: expected EffortWeights, got 3"),
         ("mdn", {"effort_weights": EffortWeights(-1.0)}, "effort_weights: amplitude must be .*, got -1.0"),
         ("paper", {"refinement": "magic"}, "refinement: expected one of none, adam,"),

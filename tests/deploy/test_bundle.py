@@ -89,7 +89,7 @@ def test_the_command_line_takes_a_bundle_with_its_lost_fins(
 
 
 def test_settings_travel_and_can_be_changed(tmp_path: Path) -> None:
-    desk = Allocator(finlab.load_layout("octo"), copper_loss=0.5, period_s=0.05)
+    desk = Allocator(finlab.load_layout("octo"), robust=0.5, period_s=0.05)
     make_bundle(desk).write(tmp_path)
     assert Allocator.from_bundle(tmp_path).settings == desk.settings
     changed: Any = desk.settings
@@ -102,7 +102,7 @@ def test_settings_travel_and_can_be_changed(tmp_path: Path) -> None:
         ({"settings": []}, "settings must be keys and values"),
         ({"settings": {"n_tries": 3}}, "settings: method 'dual' knows the settings .*, got 'n_tries'"),
         ({"period_s": -1.0}, "period_s: expected a number"),
-        ({"copper_loss": float("nan")}, "holds NaN, expected a finite number"),
+        ({"robust": float("nan")}, "holds NaN, expected a finite number"),
         ({"version": 4.0}, "is a bundle of version 4.0, this finlab reads version 6; export it again"),
         ({"version": "4"}, "is a bundle of version '4', this finlab reads version 6; export it again"),
         ({"version": 3}, "is a bundle of version 3, this finlab reads version 6; export it again"),

@@ -17,23 +17,19 @@ BLADES = [
 BEATS = [(0.01, 0.1), (0.05, 2.1), (0.3, 1.0), (0.6, 2.1), (1.2, 0.5), (1.5, 3.0)]
 
 
-def integrated(blade: Blade, amplitude: float, frequency: float) -> tuple[float, float]:
-    """Mean of what driving takes [W], and mean squared torque [N^2 m^2], over a beat of A sin(2 pi f t)."""
+def integrated(blade: Blade, amplitude: float, frequency: float) -> float:
+    """Mean of what driving takes [W] over a beat of A sin(2 pi f t)."""
     turn = 2.0 * np.pi * (np.arange(400_000) + 0.5) / 400_000
     rate = 2.0 * np.pi * frequency
     speed = amplitude * rate * np.cos(turn)
     torque = -blade.inertia * amplitude * rate**2 * np.sin(turn) + blade.drag * speed * np.abs(speed)
-    return float(np.maximum(torque * speed, 0.0).mean()), float((torque**2).mean())
+    return float(np.maximum(torque * speed, 0.0).mean())
 
 
 @pytest.mark.parametrize("beat", BEATS)
 @pytest.mark.parametrize("blade", BLADES)
 def test_power_is_what_driving_takes_over_a_beat(blade: Blade, beat: tuple[float, float]) -> None:
-    power, heat = integrated(blade, *beat)
-    assert blade.power(*map(np.float64, beat)) == pytest.approx(power, rel=1e-8)
-    for loss in (0.3, 40.0):
-        driving = blade.driving_power(*map(np.float64, beat), loss)
-        assert driving == pytest.approx(power + loss * heat, rel=1e-8)
+    assert blade.power(*map(np.float64, beat)) == pytest.approx(integrated(blade, *beat), rel=1e-8)
 
 
 def test_the_plate_of_the_robot() -> None:
@@ -48,18 +44,15 @@ def test_the_plate_of_the_robot() -> None:
     assert Blade(0.4, 0.3).own_inertia == pytest.approx(24.0 * OWN_INERTIA)
 
 
-@pytest.mark.parametrize("loss", [0.0, 2.0])
 @pytest.mark.parametrize("blade", BLADES)
-def test_slopes_are_differences(blade: Blade, loss: float) -> None:
+def test_slopes_are_differences(blade: Blade) -> None:
     a, f = (np.array(values) for values in zip(*BEATS, strict=True))
-    by_a, by_f = blade.driving_jacobian(a, f, loss)
+    by_a, by_f = blade.power_gradient(a, f)
     h = 1e-6
-    ahead, behind = (blade.driving_power(a * (1.0 + s * h), f, loss) for s in (1, -1))
+    ahead, behind = (blade.power(a * (1.0 + s * h), f) for s in (1, -1))
     np.testing.assert_allclose(by_a, (ahead - behind) / (2.0 * h * a), rtol=2e-8)
-    ahead, behind = (blade.driving_power(a, f * (1.0 + s * h), loss) for s in (1, -1))
+    ahead, behind = (blade.power(a, f * (1.0 + s * h)) for s in (1, -1))
     np.testing.assert_allclose(by_f, (ahead - behind) / (2.0 * h * f), rtol=2e-8)
-    if not loss:
-        np.testing.assert_array_equal(blade.power_gradient(a, f), blade.driving_jacobian(a, f, 0.0))
 
 
 @pytest.mark.parametrize(
@@ -71,14 +64,13 @@ def test_slopes_are_differences(blade: Blade, loss: float) -> None:
         (FinModelSpec("soft"), Blade()),
     ],
 )
-@pytest.mark.parametrize("loss", [0.0, 0.7])
-def test_each_law_knows_its_plate(spec: FinModelSpec, blade: Blade, loss: float) -> None:
+def test_each_law_knows_its_plate(spec: FinModelSpec, blade: Blade) -> None:
     """A rectangle of the area whose centre lies at the lever, one edge on the shaft."""
     law = make_law(spec)
     command = np.random.default_rng(0).uniform([0.05, 0.1, -3.0], [0.6, 2.1, 3.0], (20, 3))
-    expected = blade.driving_power(command[:, 0], command[:, 1], loss)
-    np.testing.assert_allclose(law.power(command, loss), expected, rtol=1e-12)
-    jacobian = law.power_gradient(command, loss)
+    expected = blade.power(command[:, 0], command[:, 1])
+    np.testing.assert_allclose(law.power(command), expected, rtol=1e-12)
+    jacobian = law.power_gradient(command)
     np.testing.assert_array_equal(jacobian[:, 2], 0.0)
-    by = blade.driving_jacobian(command[:, 0], command[:, 1], loss)
+    by = blade.power_gradient(command[:, 0], command[:, 1])
     np.testing.assert_allclose(jacobian[:, :2].T, by, rtol=1e-12)

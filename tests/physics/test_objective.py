@@ -14,7 +14,6 @@ PRODUCT = EffortWeights(0.0, 0.0, 0.0, 1.0)
 
 OBJECTIVES = [
     Objective(),
-    Objective("power", copper_loss=1.5),
     Objective("effort"),
     Objective("effort", EffortWeights(2.0, 0.5, 0.3, 0.7)),
     Objective("effort", PRODUCT),

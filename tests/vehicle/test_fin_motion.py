@@ -110,4 +110,7 @@ def test_mean_power_is_what_a_sinusoid_has(pair: Layout) -> None:
     swing = 2 * math.pi * frequency
     assert np.mean(inertial) == pytest.approx(OWN_INERTIA * amplitude**2 * swing**3 / math.pi, rel=0.01)
     assert np.mean(torque) == pytest.approx(Blade().power(amplitude, frequency), rel=0.01)
-    assert np.mean(driving) == pytest.approx(Blade().driving_power(amplitude, frequency, 0.7), rel=0.01)
+    # The mean squared torque: parts of inertia and of drag.
+    squares = 0.5 * Blade().inertia ** 2 + 0.375 * (Blade().drag * amplitude) ** 2
+    heat = 0.7 * amplitude**2 * swing**4 * squares
+    assert np.mean(driving) == pytest.approx(Blade().power(amplitude, frequency) + heat, rel=0.01)

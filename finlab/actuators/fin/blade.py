@@ -86,33 +86,6 @@ class Blade:
         by_amplitude = scale * frequency * (3.0 * drag * amplitude + 2.0 * inertia)
         return by_amplitude, 3.0 * scale * amplitude * (drag * amplitude + inertia)
 
-    def driving_power(self, amplitude: Values, frequency: Values, copper_loss: float) -> Values:
-        """Returns the power [W] with the heat in a motor's windings: `copper_loss` [W/(N m)^2] times the mean
-        squared torque."""
-        power = self.power(amplitude, frequency)
-        if not copper_loss:
-            return power
-        scale, inertia, drag = self._heat(amplitude, frequency, copper_loss)
-        return power + scale * amplitude**2 * frequency * (inertia + drag)
-
-    def driving_jacobian(
-        self, amplitude: Values, frequency: Values, copper_loss: float
-    ) -> tuple[Values, Values]:
-        """Returns the derivatives of `driving_power` by amplitude and frequency."""
-        by_amplitude, by_frequency = self.power_gradient(amplitude, frequency)
-        if not copper_loss:
-            return by_amplitude, by_frequency
-        scale, inertia, drag = self._heat(amplitude, frequency, copper_loss)
-        by_amplitude = by_amplitude + scale * amplitude * frequency * (2.0 * inertia + 4.0 * drag)
-        return by_amplitude, by_frequency + 4.0 * scale * amplitude**2 * (inertia + drag)
-
-    def _heat(
-        self, amplitude: Values, frequency: Values, copper_loss: float
-    ) -> tuple[Values, Values, Values]:
-        """The heat over A^2 f as a scale times the sum of an inertial part and a part of drag."""
-        scale = 16.0 * math.pi**4 * copper_loss * frequency**3
-        return scale, 0.5 * self.inertia**2, 0.375 * (self.drag * amplitude) ** 2
-
     def _shares(self, amplitude: Values) -> tuple[Values, Values]:
         """The parts of drag (over A) and of inertia in the mean power over (2 pi f)^3 A^2 / pi."""
         sqrt = library_of(amplitude).sqrt

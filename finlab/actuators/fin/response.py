@@ -69,18 +69,17 @@ def largest_forces(layout: Layout) -> Array:
 class FinGroup(Group):
     """The fins of a robot."""
 
-    def __init__(self, fins: Sequence[Fin], effectiveness: Array, copper_loss: float = 0.0) -> None:
+    def __init__(self, fins: Sequence[Fin], effectiveness: Array) -> None:
         """Compile fins; those of one model and limits are compiled once in a process.
 
         Args:
             fins: the fins.
             effectiveness: wrench (m, 3, 6) per newton along each own axis: shaft, zero, across.
-            copper_loss: heat of a motor that counts as power [W/(N m)^2].
 
         Raises:
             DataError: a fin's force table cannot be read, or gives no thrust within the limits.
         """
-        tables = [fin_table(fin, copper_loss) for fin in fins]
+        tables = [fin_table(fin) for fin in fins]
         self._tables = tables
         self._laws = [make_law(fin.model) for fin in fins]
         self._stacked = stack_laws([fin.model for fin in fins])
@@ -165,9 +164,9 @@ class FinGroup(Group):
         return np.stack([size.min(axis=0), size.max(axis=0), angle, 0.5 * (upper - lower)[:, 2]], axis=-1)
 
 
-def fin_table(fin: Fin, copper_loss: float = 0.0) -> FinTable:
+def fin_table(fin: Fin) -> FinTable:
     """One fin, compiled or kept from the last time; arguments and errors as for `FinGroup`."""
-    found = _compiled(fin.model, fin.limits, copper_loss, file_stamp(fin.model))
+    found = _compiled(fin.model, fin.limits, file_stamp(fin.model))
     if found is None:
         raise DataError(
             f"{fin.name}: gives no thrust within its limits, amplitudes {fin.limits.amplitude[0]:.4g} to "
@@ -178,12 +177,10 @@ def fin_table(fin: Fin, copper_loss: float = 0.0) -> FinTable:
 
 
 @lru_cache(maxsize=512)
-def _compiled(
-    model: FinModelSpec, limits: Limits, copper_loss: float, stamp: tuple[int, int] | None
-) -> FinTable | None:
+def _compiled(model: FinModelSpec, limits: Limits, stamp: tuple[int, int] | None) -> FinTable | None:
     """The table of a fin, None where it gives no thrust; one whose file has changed is read again."""
     law = make_law(model)
-    box = _Box(law, np.array(limits.lower), np.array(limits.upper), copper_loss)
+    box = _Box(law, np.array(limits.lower), np.array(limits.upper))
     strongest = box.largest()
     if strongest <= 0.0:
         return None
@@ -200,8 +197,8 @@ def _compiled(
 class _Box:
     """One fin's law within the limits of amplitude and frequency, in its strongest direction."""
 
-    def __init__(self, law: FinLaw, lower: Array, upper: Array, copper_loss: float) -> None:
-        self.law, self.lower, self.upper, self.copper_loss = law, lower, upper, copper_loss
+    def __init__(self, law: FinLaw, lower: Array, upper: Array) -> None:
+        self.law, self.lower, self.upper = law, lower, upper
         self.turn = float(np.clip(0.0, lower[2], upper[2]))
         if not law.uniform:
             turns, across = self.all_round
@@ -240,7 +237,7 @@ class _Box:
 
     def power(self, command: Array) -> Array:
         """Powers (...) [W]."""
-        return np.asarray(self.law.power(command, self.copper_loss))
+        return np.asarray(self.law.power(command))
 
     def largest(self) -> float:
         """The largest force [N] within the limits."""
@@ -295,7 +292,7 @@ class _Box:
         force, jacobian = self.law.force_and_jacobian(command)
         size = np.maximum(np.linalg.norm(force[:, 1:], axis=-1), 1e-300)
         along = np.einsum("kci,ki->kc", jacobian[:, :2, 1:], force[:, 1:]) / size[:, None]
-        return np.asarray(price[:, None] * along - self.law.power_gradient(command, self.copper_loss)[:, :2])
+        return np.asarray(price[:, None] * along - self.law.power_gradient(command)[:, :2])
 
     def top_price(self, strongest: float) -> float:
         """The price [W/N] at which the fin gives its largest force, or nearly so where that has no end."""

@@ -42,17 +42,17 @@ class GridLaw(FinLaw):
         found = self._grids(command, 2)[..., :3]
         return found[..., 0, 0, 0, :], _jacobian(found)
 
-    def power(self, command: Values, copper_loss: float = 0.0, inflow: Array | None = None) -> Values:
-        """See `FinLaw`. Measured power stands as it is, whatever the loss."""
+    def power(self, command: Values, inflow: Array | None = None) -> Values:
+        """See `FinLaw`."""
         if not self.has_power:
-            return super().power(command, copper_loss)
+            return super().power(command)
         # A polynomial through points near zero may dip below.
         return np.maximum(self._grids(command, 1)[..., 0, 0, 0, 3], 0.0)
 
-    def power_gradient(self, command: Array, copper_loss: float = 0.0, inflow: Array | None = None) -> Array:
+    def power_gradient(self, command: Array, inflow: Array | None = None) -> Array:
         """See `FinLaw`."""
         if not self.has_power:
-            return super().power_gradient(command, copper_loss)
+            return super().power_gradient(command)
         found = self._grids(command, 2)[..., 3:]
         return _jacobian(found)[..., 0] * (found[..., 0, 0, 0, :] > 0.0)
 

@@ -113,7 +113,7 @@ class Ipopt(ModelBased):
         """Of the cost beside the squared error."""
         if self.aim.name == "effort":
             return TRADEOFF
-        return TRADEOFF / (USUAL_LOAD * float(self.plant.power(self.plant.upper, self.aim.copper_loss).max()))
+        return TRADEOFF / (USUAL_LOAD * float(self.plant.power(self.plant.upper).max()))
 
     @cached_property
     def _exact_forces(self) -> ForceProgram:

@@ -59,7 +59,7 @@ class ModelBased(LeastErrorMethod):
     @cached_property
     def _inverse(self) -> PseudoInverse:
         """What answers by the pseudo-inverse, and where others start."""
-        return PseudoInverse(self.plant, self.sigma, self.aim.copper_loss)
+        return PseudoInverse(self.plant, self.sigma)
 
     @abstractmethod
     def _commands(self, targets: Array, seed: int) -> Array:

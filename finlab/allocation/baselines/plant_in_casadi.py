@@ -25,7 +25,7 @@ def plant_formulas(casadi: Any, plant: Plant, objective: Objective) -> tuple[Any
         wrench += thrust * casadi.cos(points) * casadi.DM(plant.effectiveness[i, 1])
         wrench += thrust * casadi.sin(points) * casadi.DM(plant.effectiveness[i, 2])
         if objective.name == "power":
-            cost += law.blade.driving_power(amplitude, frequency, objective.copper_loss)
+            cost += law.blade.power(amplitude, frequency)
         else:
             shares = amplitude / scale[i, 0], frequency / scale[i, 1], direction / scale[i, 2]
             cost += effort_of_shares(*shares, objective.weights)

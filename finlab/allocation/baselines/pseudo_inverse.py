@@ -23,15 +23,14 @@ class PseudoInverse:
     Args:
         plant: the robot, in the flow that it has.
         sigma: scales the rows (6,).
-        copper_loss: heat of a fin's motor that counts as power [W/(N m)^2].
         rcond: see `RCOND`.
     """
 
-    def __init__(self, plant: Plant, sigma: Array, copper_loss: float = 0.0, rcond: float = RCOND) -> None:
+    def __init__(self, plant: Plant, sigma: Array, rcond: float = RCOND) -> None:
         self.plant, inflow = plant, plant.inflow(None)
         self.groups = [
             (places, group.at(None if inflow is None else inflow[places]))
-            for places, group in groups_of(plant.layout, plant.effectiveness, copper_loss)
+            for places, group in groups_of(plant.layout, plant.effectiveness)
         ]
         """What the actuators can do, and by which commands."""
         self.places = sorted(

@@ -16,15 +16,12 @@ from finlab.physics.plant import Plant
 class Compiled:
     """The actuators of one robot, ready for prices."""
 
-    def __init__(
-        self, layout: Layout, plant: Plant, copper_loss: float = 0.0, doubt: Array | None = None
-    ) -> None:
+    def __init__(self, layout: Layout, plant: Plant, doubt: Array | None = None) -> None:
         """Compile the actuators of a layout.
 
         Args:
             layout: the robot.
             plant: gives their effectiveness and the flow.
-            copper_loss: heat of a fin's motor that counts as power [W/(N m)^2].
             doubt: what a squared force of each actuator costs beside its power, see `price_of_doubt`.
 
         Raises:
@@ -33,7 +30,7 @@ class Compiled:
         self.count = layout.n
         self.doubt = doubt
         """The same; None where it costs nothing."""
-        self.groups = groups_of(layout, plant.effectiveness, copper_loss)
+        self.groups = groups_of(layout, plant.effectiveness)
         self._prepare()
 
     def _prepare(self) -> None:

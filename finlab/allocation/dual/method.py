@@ -48,9 +48,6 @@ NEAREST = 1e-3
 class DualSettings(Settings):
     """What can be set of the default method."""
 
-    copper_loss: float = number(
-        0.0, 0.0, 1e6, "heat in a fin motor's windings that counts beside the mechanical power", "W/(N m)^2"
-    )
     robust: float = number(
         0.0, 0.0, 1e9, "what an expected miss of 1 % of the yardstick is worth, growing with its square", "W"
     )
@@ -88,7 +85,7 @@ class Dual(Method):
     ) -> None:
         super().__init__(layout, settings, scale, weights)
         doubt = price_of_doubt(layout, scale, self.settings.robust)
-        self.compiled = Compiled(layout, self.plant, self.settings.copper_loss, doubt)
+        self.compiled = Compiled(layout, self.plant, doubt)
 
     @cached_property
     def _problem(self) -> CommandProblem:
@@ -199,10 +196,10 @@ class Dual(Method):
     @property
     def _unproved(self) -> bool:
         """Whether the bound would be one of something else than the power of the answer: of fins without
-        their interaction, with a motor's heat or what doubt costs, or of the smooth shape that stands for a
+        their interaction, with what doubt costs, or of the smooth shape that stands for a
         measured table."""
         measured = any(fin.model.type == "table" for fin in self.layout.fins)
-        dearer = self.settings.copper_loss > 0.0 or self.compiled.doubt is not None
+        dearer = self.compiled.doubt is not None
         return measured or dearer or self.layout.interaction is not None
 
     def _forces(self, targets: Array, sets: Sets, policy: Policy, prices: Array | None = None) -> Forces:

@@ -17,7 +17,7 @@ casadi = pytest.importorskip("casadi", reason="method ipopt is an optional extra
 @pytest.mark.parametrize(
     "objective",
     [
-        Objective("power", copper_loss=0.3),
+        Objective("power"),
         Objective("effort"),
         Objective("effort", EffortWeights(1.0, 0.7, 0.3, 0.4)),
     ],
