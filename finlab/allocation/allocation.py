@@ -271,7 +271,7 @@ class Allocation(Answer):
 
     def _doubts(self) -> tuple[str, ...]:
         doubt = (self.measure_next,) if self.measure_next else ()
-        if not self.bound or self.power <= (1.0 + TOLD_GAP) * self.bound:
+        if self.bound is None or self.power <= (1.0 + TOLD_GAP) * self.bound:
             return doubt
         gap = 100.0 * (1.0 - self.bound / self.power)
         return (

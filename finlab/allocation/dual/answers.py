@@ -193,10 +193,8 @@ class Answers:
             force, slope, conjugate = self._limited(price, lines, self._row, sets, worth=worth)
             return Answer(force, slope, None if conjugate is None else conjugate.sum(axis=0))
         first, second = price[lines:n], price[n:]
-        fan = self._fan(first, second, sets)
-        value = first * fan.first + second * fan.second
-        if lines:
-            value = np.concatenate([price[:lines], value])
+        fan = self._fan(first, second, sets, sets.squared_gap)
+        value = np.concatenate([price[:lines], fan.along]) if lines else fan.along
         forked = fan.beyond is not None and len(sets.forked) > 0
         size, slope, conjugate = self._limited(value, lines, self._row, sets, worth=worth or forked)
         planar = _Planar.of(fan, size[lines:], slope[lines:])
@@ -250,11 +248,7 @@ class Answers:
         along = np.empty((lines + planes, price.shape[1]))
         along[:lines] = price[:lines]
         if planes:
-            fan = self._fan(first, second, sets)
-            along[lines:] = first * fan.first + second * fan.second
-            if not sets.rests:  # at least force, a small price along any direction counts in full
-                size = np.hypot(first, second)
-                along[lines:] *= np.sqrt(size * size + sets.squared_gap) / np.maximum(size, 1e-300)
+            along[lines:] = self._fan(first, second, sets, 1e-300).along
         conjugate = self._limited(along, lines, self._row, sets)[2]
         assert conjugate is not None
         return along, conjugate
@@ -291,17 +285,17 @@ class Answers:
             conjugate = np.where(above & ~below, price * high - sets.high_cost[of], conjugate)
         return np.minimum(np.maximum(force, low), high), np.where(below | above, 0.0, slope), conjugate
 
-    def _fan(self, first: Array, second: Array, sets: Sets) -> "_Fan":
-        """Directions in which planes answer prices (p, N)."""
-        size = np.sqrt(first * first + second * second + sets.squared_gap)
+    def _fan(self, first: Array, second: Array, sets: Sets, squared_gap: Array | float) -> "_Fan":
+        """Directions in which planes answer prices (p, N), those of a smooth size of the prices."""
+        size = along = np.sqrt(first * first + second * second + squared_gap)
         x, y = first / size, second / size
         tangent = 1.0 / size
         fan_x, fan_y = x, y
         if self.gauges:
-            fan_x, fan_y, tangent = self._uneven(x, y, tangent)
+            fan_x, fan_y, tangent, along = self._uneven(x, y, tangent, size)
         xx, xy, yy = tangent * (1.0 - x * x), -tangent * x * y, tangent * (1.0 - y * y)
         if not sets.arcs:
-            return _Fan(fan_x, fan_y, xx, xy, yy, None, None)
+            return _Fan(along, fan_x, fan_y, xx, xy, yy, None, None)
         cos, sin = np.cos(sets.middle), np.sin(sets.middle)
         ahead, aside = fan_x * cos + fan_y * sin, fan_y * cos - fan_x * sin
         beyond = np.abs(aside) * np.cos(sets.half) > ahead * np.sin(sets.half)
@@ -312,6 +306,7 @@ class Answers:
         end_x, end_y = self._end(angle)
         keep = np.where(beyond, 0.0, 1.0)
         return _Fan(
+            np.where(beyond, first * end_x + second * end_y, along),
             np.where(beyond, end_x, fan_x),
             np.where(beyond, end_y, fan_y),
             xx * keep,
@@ -321,18 +316,19 @@ class Answers:
             sets.middle - nearer * sets.half,
         )
 
-    def _uneven(self, x: Array, y: Array, tangent: Array) -> tuple[Array, Array, Array]:
-        """Directions of the force with the gauges' sizes, and the weights of their change, for directions of
-        the price."""
+    def _uneven(self, x: Array, y: Array, tangent: Array, size: Array) -> tuple[Array, Array, Array, Array]:
+        """Directions of the force with the gauges' sizes, the weights of their change, and the prices along
+        them, for directions and sizes of the price."""
         places = self.gauges.places
         value, slope, bend = self.gauges.support(np.arctan2(y[places], x[places]))
-        fan_x, fan_y, tangent = x.copy(), y.copy(), tangent.copy()
+        fan_x, fan_y, tangent, along = x.copy(), y.copy(), tangent.copy(), size.copy()
         fan_x[places], fan_y[places] = (
             value * x[places] - slope * y[places],
             value * y[places] + slope * x[places],
         )
         tangent[places] *= np.maximum(value + bend, 0.0)
-        return fan_x, fan_y, tangent
+        along[places] *= value
+        return fan_x, fan_y, tangent, along
 
     def _end(self, angle: Array) -> tuple[Array, Array]:
         """The directions (p, N) of forces at angles (p, N), with the gauges' sizes."""
@@ -386,6 +382,8 @@ class Answers:
 class _Fan(NamedTuple):
     """Directions of the forces of planes, with their gauges (p, N), and what changes them."""
 
+    along: Array
+    """Prices along the directions of the force, times the gauges [W/N]."""
     first: Array
     second: Array
     xx: Array
