@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finlab.allocation import Allocator, Policy
 from finlab.allocation.baselines.ardusub import ORDER as ARDUSUB_ORDER
@@ -21,6 +22,7 @@ METHODS: dict[str, tuple[str, dict[str, str], Order | None]] = {
     "dual": ("dual", {}, None),
     "pseudo-inverse": ("px4", {"desaturation": "none"}, PX4_ORDER),
     "px4": ("px4", {}, PX4_ORDER),
+    "px4-axes": ("px4", {"desaturation": "axes"}, PX4_ORDER),
     "ardusub": ("ardusub", {}, ARDUSUB_ORDER),
 }
 """Name -> method, its settings, and the order in which it means to keep axes."""
@@ -100,7 +102,7 @@ def _scores(layout: Layout, targets: Array) -> dict[str, dict[str, Array]]:
     """By method arrays (N,): what it misses and takes, and what `dual` misses in its order."""
     dual, found = Allocator(layout), dict[str, dict[str, Array]]()
     bound = dual.allocate_batch(targets).bound
-    ranked = {
+    ranked: dict[Order, Array] = {
         order: dual.allocate_batch(targets, policy=Policy("priority", order=order)).unallocated / dual.scale
         for order in (PX4_ORDER, ARDUSUB_ORDER)
     }
@@ -110,7 +112,7 @@ def _scores(layout: Layout, targets: Array) -> dict[str, dict[str, Array]]:
         if order is not None:
             own, ours = (missing_by_group(x, order) for x in (answer.unallocated / dual.scale, ranked[order]))
             found[method] |= {"first": own[:, 0], "dual_first": ours[:, 0]}
-            found[method]["dual_more"] = misses_more(ours, own)
+            found[method]["dual_more"] = np.asarray(misses_more(ours, own), float)
     return found
 
 
@@ -120,11 +122,11 @@ def missing_by_group(missing: Array, order: Sequence[Sequence[str]]) -> Array:
     return np.stack([np.linalg.norm(missing[:, axes], axis=1) for axes in groups], axis=1)
 
 
-def misses_more(one: Array, other: Array) -> Array:
+def misses_more(one: Array, other: Array) -> NDArray[np.bool_]:
     """Whether (N,) the first misses (N, G) more than the other in the first group in which they differ."""
     differ = np.abs(one - other) > ALIKE
     first = differ.argmax(axis=1)[:, None]
-    more: Array = np.take_along_axis(one - other, first, axis=1)[:, 0] > ALIKE
+    more: NDArray[np.bool_] = np.take_along_axis(one - other, first, axis=1)[:, 0] > ALIKE
     return more
 
 

@@ -21,7 +21,7 @@ def test_beside_the_autopilots_dual_misses_no_more_and_takes_the_least() -> None
     """BlueROV2 Heavy, whole and with one thruster lost."""
     sizes = {"lost": (0, 1), "reach": (0.8, 1.2, 3.0), "layouts": 2, "targets": 6, "seed": 12}
     rows = load_experiment("thrusters").rows(robots=("bluerov2_heavy",), **sizes)
-    assert len(rows) == 2 * 3 * 4
+    assert len(rows) == 2 * 3 * 5
     for row in rows:
         assert row["n"] == 12
         assert row.get("dual_more_mean", 0.0) == 0.0
