@@ -17,7 +17,7 @@ from finlab.errors import DataError
 from finlab.evaluation.report.document import Block, Column, Row, Table
 
 EXPERIMENTS = (
-    *("wrench", "cost", "thrusters", "latency", "ablation", "temperature", "proposals"),
+    *("wrench", "cost", "thrusters", "latency", "ablation", "temperature"),
     *("trajectory", "faults", "velocity", "swims"),
 )
 """Names, which are those of their modules in `finlab.evaluation.experiments`, in the order of the report."""

@@ -69,7 +69,12 @@ def run(
             for share in progress(reach, "share of reach", f"{robot}, {count} lost"):
                 found = [_scores(layout, share * edge) for layout, edge in drawn]
                 for method in METHODS:
-                    about: Row = {"robot": robot, "lost": count, "reach": share, "method": method}
+                    about: Row = {
+                        "robot": robot,
+                        "lost": count,
+                        "of_reach": round(100 * share),
+                        "method": method,
+                    }
                     rows.append(about | _figures([each[method] for each in found]))
     return rows
 
@@ -151,10 +156,10 @@ experiment = Experiment(
     columns=(
         Column("robot", "robot", "code"),
         Column("lost", "lost", "count"),
-        Column("reach", "over reach", "three"),
+        Column("of_reach", "of reach", "count", unit="%"),
         Column("method", "method", "code"),
         Column("n", "targets", "count"),
-        Column("not_delivered", "clipped", "share"),
+        Column("not_delivered", "not delivered", "share"),
         Column("watts", "power over the least", "ratio"),
         Column("watts_max", "worst", "ratio"),
         Column("missed_mean", "missing", "error"),
@@ -164,7 +169,7 @@ experiment = Experiment(
     ),
     run=run,
     note=(
-        "Targets lie along the wrenches of uniform commands. Clipped: not delivered. Missing: over the "
+        "Targets lie along the wrenches of uniform commands. Not delivered: clipped, or coupled aside. Missing: over the "
         "robot's yardstick. The first axes are those that the autopilot means to keep (PX4: roll and pitch, "
         "then heave, yaw, surge and sway; ArduSub: roll, pitch and heave, then the others); `dual` gets the "
         "same order as a priority, and misses more where it does so in the first group in which the two "

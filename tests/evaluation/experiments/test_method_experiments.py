@@ -151,13 +151,3 @@ def test_the_ablation_scores_twice(monkeypatch: pytest.MonkeyPatch) -> None:
     assert [row["j_norm_mean"] for row in printed] == [3.64e-2, 1.01e-1, 3.03e-4]
     with pytest.raises(DataError, match="variants: expected some of mean_only"):
         experiment.rows(variants=("theirs",))
-
-
-def test_few_proposals_of_the_network_are_worth_more_than_random_ones() -> None:
-    experiment = load_experiment("proposals")
-    rows = experiment.rows(split=("ood-fins",), layouts=3, targets=8, candidates=(4,))
-    found = by(rows, "starts")
-    assert all(row["n"] == 24 and row["tracked"] == 1.0 and row["target_ms"] > 0.0 for row in rows)
-    assert 1.0 <= found["network"]["cost_ratio"] < found["random"]["cost_ratio"]
-    with pytest.raises(DataError, match="split: expected some of"):
-        experiment.rows(split=("theirs",))

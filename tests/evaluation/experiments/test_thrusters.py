@@ -26,9 +26,9 @@ def test_beside_the_autopilots_dual_misses_no_more_and_takes_the_least() -> None
         assert row["n"] == 12
         assert row.get("dual_more_mean", 0.0) == 0.0
         if row["method"] == "dual":
-            assert row["not_delivered"] == (0.0 if row["reach"] < 1.0 else 1.0)
-            assert row["reach"] > 1.0 or row["watts_max"] < 1.001
-    near = {(row["lost"], row["method"]): row for row in rows if row["reach"] == 0.8}
+            assert row["not_delivered"] == (0.0 if row["of_reach"] < 100.0 else 1.0)
+            assert row["of_reach"] > 100.0 or row["watts_max"] < 1.001
+    near = {(row["lost"], row["method"]): row for row in rows if row["of_reach"] == 80.0}
     assert near[0, "pseudo-inverse"]["not_delivered"] > 0.05 and near[0, "pseudo-inverse"]["watts"] > 1.01
     assert near[0, "ardusub"]["not_delivered"] > near[0, "pseudo-inverse"]["not_delivered"]
 

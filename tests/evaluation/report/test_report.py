@@ -23,7 +23,6 @@ TINY: dict[str, dict[str, Any]] = {
     "cost": {"split": ("id",), "methods": ("dual",), "layouts": 2, "targets": 1, "starts": 4},
     "latency": {"robots": ("fins-2",), "methods": ("dual", "qp"), "calls": 2},
     "ablation": {"variants": ("ours",), "layouts": 2, "targets": 1, "candidates": 4},
-    "proposals": {"split": ("id",), "layouts": 2, "targets": 2, "candidates": (4,)},
     "temperature": {"temperatures": (0.01, 1.0), "layouts": 2, "targets": 1, "candidates": 4},
 }
 
