@@ -138,8 +138,8 @@ def answer_sentence(
             sentences.append("; ".join(told) + "." if told else "")
         elif allocation.reachable and not searching:
             sentences.append(bound_sentence(allocation))
-            if told := allocation.measure_next:
-                sentences.append(f"{told[0].upper()}{told[1:]}.")
+            if doubt := allocation.measure_next:
+                sentences.append(f"{doubt[0].upper()}{doubt[1:]}.")
     elif busy:
         sentences.append(WORKING)
     blind = authority_sentence(state.layout, state.failed, axis_reach(state.able, state.failed))
