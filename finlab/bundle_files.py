@@ -17,7 +17,7 @@ from finlab.files.archive import member_names, unpacked
 from finlab.files.guarded import is_regular, read_file
 from finlab.files.plain_values import parse_json
 
-VERSION = 6
+VERSION = 7
 """Version of the bundle; a reader knows exactly one."""
 ROBOT, ABOUT = "robot.json", "bundle.json"
 TABLES = "tables/"

@@ -1,7 +1,6 @@
 """What travels with a bundle in its `bundle.json`: the method and what it is made with."""
 
 import json
-from dataclasses import asdict, is_dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from finlab.bundle_files import ABOUT, VERSION, Files
@@ -30,14 +29,13 @@ class About(NamedTuple):
 
 def about_bundle(allocator: "Allocator", made_by: str) -> bytes:
     """The contents of `bundle.json` for an allocator, made by a version of finlab."""
-    options = vars(allocator.settings).items()
     document = {
         "format": FORMAT,
         "version": VERSION,
         "finlab": made_by,
         "method": allocator.method,
         "checkpoint": allocator.checkpoint,
-        "settings": {key: asdict(value) if is_dataclass(value) else value for key, value in options},  # type: ignore[arg-type]
+        "settings": vars(allocator.settings),
     }
     return (json.dumps(document, indent=1, allow_nan=False) + "\n").encode()
 

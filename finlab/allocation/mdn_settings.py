@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 from finlab.allocation.settings import MOST_CANDIDATES, Settings, choice, number
-from finlab.physics.effort import DEFAULT_WEIGHTS, EffortWeights
 from finlab.physics.objective import Objective
 
 
@@ -20,10 +19,8 @@ class MdnSettings(Settings):
         "network", ("network", "random"), "where candidates come from; random is an ablation"
     )
     period_s: float = number(0.1, 0.0, 1000.0, "time between ticks", "s", above=True)
-    effort_weights: EffortWeights = DEFAULT_WEIGHTS
-    """Weights of the effort."""
 
     @property
     def aim(self) -> Objective:
         """What is kept least."""
-        return Objective("effort", self.effort_weights)
+        return Objective("effort")

@@ -14,7 +14,6 @@ from finlab.bundle_files import ABOUT, CHECKPOINT, Files, checkpoint_part
 from finlab.errors import AllocationError, DataError
 from finlab.networks.checkpoint import parse_checkpoint, read_checkpoint, resolve_checkpoint
 from finlab.networks.trained import TrainedWeights
-from finlab.physics.effort import EffortWeights
 
 METHODS: dict[str, tuple[str, str]] = {
     "dual": ("finlab.allocation.dual.method", "Dual"),
@@ -89,13 +88,10 @@ def bundled_method(files: Files, source: str = "bundle", **changes: Any) -> Meth
             should try.
     """
     about = read_about(files, source)
-    kind, values = method_class(about.method), dict(about.settings)
-    weights = values.get("effort_weights")
+    kind = method_class(about.method)
     try:
-        if isinstance(weights, dict):
-            values["effort_weights"] = EffortWeights(**weights)
-        settings = checked_settings(kind, values)
-    except (AllocationError, TypeError) as error:
+        settings = checked_settings(kind, about.settings)
+    except AllocationError as error:
         raise DataError(f"{source}/{ABOUT}: settings: {error}") from None
     if changes:
         settings = checked_settings(kind, vars(settings) | changes)

@@ -8,11 +8,8 @@ from numbers import Integral, Real
 from typing import Any, NamedTuple
 
 from finlab.errors import AllocationError
-from finlab.physics.effort import DEFAULT_WEIGHTS, EffortWeights
 from finlab.physics.objective import Name, Objective
 
-LARGEST_WEIGHT = 100.0
-"""Largest weight of a term of the effort."""
 MOST_CANDIDATES = 4096
 """Most candidates that may be drawn; more would keep a robot from answering."""
 
@@ -76,8 +73,6 @@ def _checked(setting: "Field[Any]", value: Any) -> Any:
         expected = None if value in choices else f"one of {', '.join(choices)}"
     elif limits is not None:
         return _within(setting, limits, value)
-    elif isinstance(setting.default, EffortWeights):
-        return _weights(name, value)
     elif not isinstance(value, bool):
         expected = "true or false"
     if expected is not None:
@@ -96,27 +91,13 @@ def _within(setting: "Field[Any]", limits: Range, value: Any) -> float | None:
     raise AllocationError(f"{setting.name}: expected {limits}, got {value!r:.60} ({limits.meaning})")
 
 
-def _weights(name: str, value: Any) -> EffortWeights:
-    if not isinstance(value, EffortWeights):
-        raise AllocationError(f"{name}: expected EffortWeights, got {value!r:.60}")
-    for key, weight in vars(value).items():
-        plain = isinstance(weight, int | float) and not isinstance(weight, bool)
-        if not (plain and 0.0 <= weight <= LARGEST_WEIGHT):
-            raise AllocationError(
-                f"{name}: {key} must be a number from 0 to {LARGEST_WEIGHT:g}, got {weight!r:.60}"
-            )
-    return value
-
-
 @dataclass(frozen=True)
 class AimSettings(Settings):
     """What is kept least, for methods that can choose."""
 
     objective: Name = choice("power", ("power", "effort"), "kept least: watts, or the paper's effort")
-    effort_weights: EffortWeights = DEFAULT_WEIGHTS
-    """Weights of the effort."""
 
     @property
     def aim(self) -> Objective:
-        """Both as one."""
-        return Objective(self.objective, self.effort_weights)
+        """The same as an `Objective`."""
+        return Objective(self.objective)

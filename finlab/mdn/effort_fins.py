@@ -21,7 +21,7 @@ from finlab.actuators.response import POINTS
 from finlab.arrays import AnyArray, Array
 from finlab.layout import Fin, Layout
 from finlab.layout.angles import TURN
-from finlab.physics.effort import EffortWeights, effort_of_shares, effort_scale
+from finlab.physics.effort import effort_of_shares, effort_scale
 
 LEVELS = 49
 """Sizes of force."""
@@ -89,14 +89,14 @@ class EffortFins:
     """Half of that arc (n,) [rad]; pi for a full circle."""
 
     @classmethod
-    def of(cls, layout: Layout, weights: EffortWeights) -> Self:
+    def of(cls, layout: Layout) -> Self:
         """The fins of a layout.
 
         Raises:
             DataError: a fin's force table cannot be read, or gives no thrust within the limits.
         """
         compiled = [fin_table(fin) for fin in layout.fins]
-        costs = [_costs(fin, weights, file_stamp(fin.model)) for fin in layout.fins]
+        costs = [_costs(fin, file_stamp(fin.model)) for fin in layout.fins]
         even = all(each.gauge is None for each in compiled)
         gauges = [np.ones(POINTS) if each.gauge is None else each.gauge for each in compiled]
         return cls(
@@ -180,7 +180,7 @@ class EffortFins:
 
 
 @lru_cache(maxsize=512)
-def _costs(fin: Fin, weights: EffortWeights, stamp: tuple[int, int] | None) -> tuple[Array, Array]:
+def _costs(fin: Fin, stamp: tuple[int, int] | None) -> tuple[Array, Array]:
     """Sizes of force (LEVELS,) [N] and their table (LEVELS, 5); a force table whose file has changed is read
     again."""
     box = fin_table(fin).box
@@ -196,7 +196,7 @@ def _costs(fin: Fin, weights: EffortWeights, stamp: tuple[int, int] | None) -> t
     rising = np.sqrt(np.maximum.accumulate(force, axis=1))
     rising += np.arange(FREQUENCIES) * 1e-13 * np.maximum(rising[:, -1:], 1e-12)  # where it stays, the first
     found = np.array([np.interp(np.sqrt(size), row, frequency) for row in rising])
-    effort = effort_of_shares(amplitude[:, None] / scale[0], found / scale[1], 0.0, weights)
+    effort = effort_of_shares(amplitude[:, None] / scale[0], found / scale[1], 0.0)
     effort[np.sqrt(size) > rising[:, -1:] * (1.0 + FLAT) + 1e-15] = np.inf
     best = effort.argmin(axis=0)
     level = np.arange(LEVELS)

@@ -85,7 +85,7 @@ class Mdn(Method):
         self.config = weights.network_of(ForceNetworkConfig)
         super().__init__(layout, settings, scale, weights)
         self.sigma = USUAL_SHARE * scale
-        self.robot = effort_robot(self.plant, self.sigma, self.settings.effort_weights)
+        self.robot = effort_robot(self.plant, self.sigma)
         self._network = weights.single_precision
         self._one_thread = single_threaded_products()
 

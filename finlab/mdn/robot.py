@@ -11,7 +11,7 @@ from finlab.arrays import Array
 from finlab.mdn.descent import EffortProblem, effort_problem
 from finlab.mdn.effort_fins import EffortFins
 from finlab.mdn.features import RobotView, robot_view
-from finlab.physics.effort import EffortMeter, EffortWeights, effort_scale
+from finlab.physics.effort import ZERO_DIRECTION, EffortMeter, effort_scale
 from finlab.physics.plant import Plant
 
 EXACT = 1e-5
@@ -48,16 +48,16 @@ class EffortRobot(NamedTuple):
         return self._replace(forces=forces, commands=commands)
 
 
-def effort_robot(plant: Plant, scale: Array, weights: EffortWeights) -> EffortRobot:
+def effort_robot(plant: Plant, scale: Array) -> EffortRobot:
     """Prepare a robot of fins; `scale` (6,) is what wrenches are divided by.
 
     Raises:
         DataError: a fin's force table cannot be read.
     """
     layout = plant.layout
-    turning = weights.zero_direction / effort_scale(layout.upper)[:, 2] ** 2
+    turning = ZERO_DIRECTION / effort_scale(layout.upper)[:, 2] ** 2
     idle = np.clip(0.0, layout.lower[:, 2], layout.upper[:, 2])
-    fins = EffortFins.of(layout, weights)
+    fins = EffortFins.of(layout)
     forces = effort_problem(plant.effectiveness[:, 1:] / scale, fins, turning, idle)
-    effort, commands = EffortMeter(plant.upper, weights), CommandProblem.of(plant, scale)
+    effort, commands = EffortMeter(plant.upper), CommandProblem.of(plant, scale)
     return EffortRobot(plant, forces, commands, effort, robot_view(forces))

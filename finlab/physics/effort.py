@@ -1,29 +1,13 @@
 """The paper's energy proxy `J_en`, a sum of squares and one product of normalized commands."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from finlab.arrays import AnyArray, Array, Values
 
-
-@dataclass(frozen=True)
-class EffortWeights:
-    """Weights of the terms of `J_en` (paper, inference section)."""
-
-    amplitude: float = 1.0
-    """Weight of the squared normalized amplitude."""
-    frequency: float = 1.0
-    """Weight of the squared normalized frequency."""
-    zero_direction: float = 0.1
-    """Weight of the squared normalized zero direction."""
-    product: float = 1.0
-    """Weight of normalized amplitude times normalized frequency."""
-
-
-DEFAULT_WEIGHTS = EffortWeights()
-"""The contract's `J_en`."""
+AMPLITUDE, FREQUENCY, ZERO_DIRECTION, PRODUCT = 1.0, 1.0, 0.1, 1.0
+"""Weights of the squares of normalized amplitude, frequency and zero direction, and of amplitude times
+frequency; the paper prints none."""
 
 
 def effort_scale(upper: Values) -> Values:
@@ -38,37 +22,33 @@ def effort_scale(upper: Values) -> Values:
     return abs(upper).clip(1e-3)
 
 
-def effort_of_shares(
-    amplitude: Values, frequency: Values, zero_direction: Values, weights: EffortWeights = DEFAULT_WEIGHTS
-) -> Values:
+def effort_of_shares(amplitude: Values, frequency: Values, zero_direction: Values) -> Values:
     """One fin's summand of `J_en`, from commands over their scale: arrays, tensors or symbols."""
-    a, f, d, w = amplitude, frequency, zero_direction, weights
-    return w.amplitude * a * a + w.frequency * f * f + w.zero_direction * d * d + w.product * a * f
+    a, f, d = amplitude, frequency, zero_direction
+    return AMPLITUDE * a * a + FREQUENCY * f * f + ZERO_DIRECTION * d * d + PRODUCT * a * f
 
 
-def fin_effort(command: Values, upper: Values, weights: EffortWeights = DEFAULT_WEIGHTS) -> Values:
+def fin_effort(command: Values, upper: Values) -> Values:
     """Energy (...,) of each fin: commands (..., 3) and upper limits (..., 3), arrays or tensors."""
     scaled = command / effort_scale(upper)
-    return effort_of_shares(scaled[..., 0], scaled[..., 1], scaled[..., 2], weights)
+    return effort_of_shares(scaled[..., 0], scaled[..., 1], scaled[..., 2])
 
 
-def command_effort(
-    command: NDArray[np.floating], upper: NDArray[np.floating], weights: EffortWeights = DEFAULT_WEIGHTS
-) -> AnyArray:
+def command_effort(command: NDArray[np.floating], upper: NDArray[np.floating]) -> AnyArray:
     """`J_en` of whole robots: commands (..., n, 3) to energies (...,). Failed fins (NaN) count nothing."""
-    effort = fin_effort(command, upper, weights)
+    effort = fin_effort(command, upper)
     return np.asarray(np.where(np.isnan(effort), 0.0, effort).sum(-1))
 
 
 class EffortMeter:
     """The energy proxy of one robot whose fins are all healthy, ready for many commands."""
 
-    def __init__(self, upper: Array, weights: EffortWeights = DEFAULT_WEIGHTS) -> None:
+    def __init__(self, upper: Array) -> None:
         """Make it for upper limits (n, 3)."""
-        self.upper, self.weights, self._scale = upper, weights, effort_scale(upper)
-        squares = np.array([weights.amplitude, weights.frequency, weights.zero_direction])
+        self.upper, self._scale = upper, effort_scale(upper)
+        squares = np.array([AMPLITUDE, FREQUENCY, ZERO_DIRECTION])
         self._twice = 2.0 * squares / self._scale**2
-        self._product = weights.product / (self._scale[:, 0] * self._scale[:, 1])
+        self._product = PRODUCT / (self._scale[:, 0] * self._scale[:, 1])
 
     def __call__(self, command: NDArray[np.floating]) -> AnyArray:
         """Energies (R,) of commands (R, n, 3)."""

@@ -8,7 +8,7 @@ from typing import Literal, get_args
 
 from finlab.arrays import Array
 from finlab.errors import AllocationError
-from finlab.physics.effort import DEFAULT_WEIGHTS, EffortMeter, EffortWeights
+from finlab.physics.effort import EffortMeter
 from finlab.physics.plant import Plant
 
 Name = Literal["power", "effort"]
@@ -20,25 +20,20 @@ class Objective:
 
     Raises:
         AllocationError: an unknown objective.
-        TypeError: weights of another type.
     """
 
     name: Name = "power"
     """`power`: mean mechanical watts by each fin's own model. `effort`: the paper's energy proxy `J_en`."""
-    weights: EffortWeights = DEFAULT_WEIGHTS
-    """Weights of `J_en`."""
 
     def __post_init__(self) -> None:
         if self.name not in get_args(Name):
             raise AllocationError(f"objective: expected 'power' or 'effort', got {self.name!r}")
-        if not isinstance(self.weights, EffortWeights):
-            raise TypeError(f"effort_weights: expected EffortWeights, got {self.weights!r}")
 
     def meter(self, plant: Plant) -> "CostMeter":
         """Returns the meter of the cost of a robot's commands."""
         if self.name == "power":
             return PowerMeter(plant)
-        return EffortMeter(plant.upper, self.weights)
+        return EffortMeter(plant.upper)
 
 
 class PowerMeter:

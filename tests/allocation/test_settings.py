@@ -9,7 +9,6 @@ from finlab.allocation import METHODS, Allocator
 from finlab.assets import shipped_checkpoints
 from finlab.errors import AllocationError
 from finlab.layout import load_layout
-from finlab.physics.effort import EffortWeights
 from tests.any_robot import AnyRobot
 
 SURGE = [1.0, 0.0, 0.5, 0.0, 0.0, 0.1]
@@ -77,8 +76,6 @@ def test_unknown_settings_are_refused(method: str) -> None:
         ("sqp", {"objective": "speed"}, "objective: expected one of power, effort, got 'speed'"),
         ("dual", {"robust": float("nan")}, "robust: expected a number .* W, got nan"),
         ("dual", {"robust": 10**400}, "robust: expected a number .*, got 1000"),
-        ("mdn", {"effort_weights": 3}, "effort_weights: expected EffortWeights, got 3"),
-        ("mdn", {"effort_weights": EffortWeights(-1.0)}, "effort_weights: amplitude must be .*, got -1.0"),
         ("paper", {"refinement": "magic"}, "refinement: expected one of none, adam,"),
         ("sqp", {"time_limit_s": 0.0}, "time_limit_s: expected a number above 0 up to 3600 s, got 0.0"),
         ("sqp", {"n_starts": 0}, "n_starts: expected a whole number from 1"),

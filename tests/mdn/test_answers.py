@@ -11,7 +11,6 @@ from finlab.mdn.descent import descend, wrench
 from finlab.mdn.polish import polish
 from finlab.mdn.robot import EffortRobot, effort_robot
 from finlab.physics import plant_of
-from finlab.physics.effort import DEFAULT_WEIGHTS
 
 SCALE = np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.34])
 
@@ -19,7 +18,7 @@ SCALE = np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.34])
 def robot_of(n: int, limits: str = "nominal") -> EffortRobot:
     layout = random_layout(np.random.default_rng(n), n_fins=n, limits=limits)  # type: ignore[arg-type]
     uneven = FinModelSpec("soft", (("e", 0.2), ("d", 0.1)))
-    return effort_robot(plant_of(layout.replace_actuator("fin_1", model=uneven)), SCALE, DEFAULT_WEIGHTS)
+    return effort_robot(plant_of(layout.replace_actuator("fin_1", model=uneven)), SCALE)
 
 
 def targets_of(robot: EffortRobot, count: int) -> tuple[Array, Array]:
@@ -89,6 +88,6 @@ def test_hopeless_targets_are_left_where_they_are_nearest() -> None:
 
 
 def test_robots_of_one_layout_see_the_same(layout_a: Layout) -> None:
-    one, other = (effort_robot(plant_of(layout_a), s, DEFAULT_WEIGHTS) for s in (SCALE, 3.0 * SCALE))
+    one, other = (effort_robot(plant_of(layout_a), s) for s in (SCALE, 3.0 * SCALE))
     np.testing.assert_allclose(one.view.static, other.view.static)
     np.testing.assert_allclose(one.view.solver, other.view.solver / 3.0, rtol=1e-9)

@@ -7,7 +7,7 @@ from finlab.layout import Fin, FinModelSpec, Layout, Limits
 from finlab.mdn.descent import EffortProblem, realize
 from finlab.mdn.robot import effort_robot
 from finlab.physics import plant_of
-from finlab.physics.effort import DEFAULT_WEIGHTS, effort_of_shares
+from finlab.physics.effort import effort_of_shares
 
 ARC = Limits(zero_direction=(-0.6, 1.4))
 UNEVEN = FinModelSpec("soft", (("e", 0.2), ("d", 0.15), ("phi_e", 1.0)))
@@ -21,7 +21,7 @@ KINDS = [
 
 def compiled(model: FinModelSpec, limits: Limits) -> tuple[Layout, EffortProblem]:
     layout = Layout("one", (Fin("a", (0.2, 0.1, 0.0), 0.3, limits, model=model),))
-    return layout, effort_robot(plant_of(layout), np.ones(6), DEFAULT_WEIGHTS).forces
+    return layout, effort_robot(plant_of(layout), np.ones(6)).forces
 
 
 @pytest.mark.parametrize(("model", "limits"), KINDS)

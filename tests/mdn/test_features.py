@@ -11,13 +11,12 @@ from finlab.mdn.features import SHARES, VECTORS, RobotView, features, robot_view
 from finlab.mdn.network import NODE_SIZE
 from finlab.mdn.robot import effort_robot
 from finlab.physics import plant_of
-from finlab.physics.effort import DEFAULT_WEIGHTS
 
 STD = np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.34])
 
 
 def problem_of(layout: Layout, std: np.ndarray = STD) -> EffortProblem:
-    return effort_robot(plant_of(layout), std, DEFAULT_WEIGHTS).forces
+    return effort_robot(plant_of(layout), std).forces
 
 
 @pytest.fixture(params=[2, 5, 12])

@@ -3,19 +3,9 @@
 import numpy as np
 import pytest
 
-from finlab.physics.effort import (
-    DEFAULT_WEIGHTS,
-    EffortMeter,
-    EffortWeights,
-    command_effort,
-    effort_scale,
-    fin_effort,
-)
-
-PRODUCT = EffortWeights(0.0, 0.0, 0.0, 1.0)
+from finlab.physics.effort import EffortMeter, command_effort, effort_scale, fin_effort
 
 UPPER = np.array([[0.6, 2.1, np.pi], [0.4, 3.0, -0.5], [0.5, 1.0, 0.0]])
-MIXED = EffortWeights(0.7, 1.3, 0.2, 0.4)
 
 
 def commands(rows: int) -> np.ndarray:
@@ -25,25 +15,21 @@ def commands(rows: int) -> np.ndarray:
 def test_each_term_by_hand() -> None:
     half = np.array([0.3, 0.7, np.pi / 4])  # 1/2, 1/3 and 1/4 of the first fin's limits
     assert fin_effort(half, UPPER[0]) == pytest.approx(1 / 4 + 1 / 9 + 0.1 / 16 + 1 / 6)
-    assert fin_effort(half, UPPER[0], PRODUCT) == pytest.approx(1 / 6)
-    assert fin_effort(half, UPPER[0], MIXED) == pytest.approx(0.7 / 4 + 1.3 / 9 + 0.2 / 16 + 0.4 / 6)
 
 
-@pytest.mark.parametrize("weights", [DEFAULT_WEIGHTS, PRODUCT, MIXED])
-def test_a_robots_energy_is_the_sum_over_fins(weights: EffortWeights) -> None:
+def test_a_robots_energy_is_the_sum_over_fins() -> None:
     command = commands(5)
-    fins = np.stack([fin_effort(command[:, i], UPPER[i], weights) for i in range(3)], axis=1)
-    np.testing.assert_allclose(EffortMeter(UPPER, weights)(command), fins.sum(1))
-    np.testing.assert_allclose(command_effort(command, UPPER, weights), fins.sum(1))
+    fins = np.stack([fin_effort(command[:, i], UPPER[i]) for i in range(3)], axis=1)
+    np.testing.assert_allclose(EffortMeter(UPPER)(command), fins.sum(1))
+    np.testing.assert_allclose(command_effort(command, UPPER), fins.sum(1))
     command[2, 1] = np.nan  # a failed fin costs nothing
     fins[2, 1] = 0.0
-    np.testing.assert_allclose(command_effort(command, UPPER, weights), fins.sum(1))
+    np.testing.assert_allclose(command_effort(command, UPPER), fins.sum(1))
 
 
-@pytest.mark.parametrize("weights", [DEFAULT_WEIGHTS, PRODUCT, MIXED])
-def test_slopes_are_those_of_differences(weights: EffortWeights) -> None:
+def test_slopes_are_those_of_differences() -> None:
     upper = np.where(UPPER == 0.0, 1.0, UPPER)  # differences of huge energies are not exact
-    command, meter = commands(4), EffortMeter(upper, weights)
+    command, meter = commands(4), EffortMeter(upper)
     gradient = meter.gradient(command)
     for i in range(3):
         for k in range(3):

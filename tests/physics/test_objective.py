@@ -6,17 +6,13 @@ import numpy as np
 import pytest
 
 from finlab.physics import Plant
-from finlab.physics.effort import DEFAULT_WEIGHTS, EffortWeights, command_effort
+from finlab.physics.effort import command_effort
 from finlab.physics.objective import Objective
 from tests.random_fins import KINDS, random_robot
-
-PRODUCT = EffortWeights(0.0, 0.0, 0.0, 1.0)
 
 OBJECTIVES = [
     Objective(),
     Objective("effort"),
-    Objective("effort", EffortWeights(2.0, 0.5, 0.3, 0.7)),
-    Objective("effort", PRODUCT),
 ]
 
 
@@ -40,5 +36,5 @@ def test_what_each_objective_counts() -> None:
     plant = Plant(layout)
     command = plant.sample(np.random.default_rng(0), (4,))
     np.testing.assert_allclose(Objective().meter(plant)(command), plant.power(command).sum(-1))
-    effort = command_effort(command, layout.upper, DEFAULT_WEIGHTS)
+    effort = command_effort(command, layout.upper)
     np.testing.assert_allclose(Objective("effort").meter(plant)(command), effort)

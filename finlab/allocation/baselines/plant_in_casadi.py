@@ -28,5 +28,5 @@ def plant_formulas(casadi: Any, plant: Plant, objective: Objective) -> tuple[Any
             cost += law.blade.power(amplitude, frequency)
         else:
             shares = amplitude / scale[i, 0], frequency / scale[i, 1], direction / scale[i, 2]
-            cost += effort_of_shares(*shares, objective.weights)
+            cost += effort_of_shares(*shares)
     return command, wrench, cost

@@ -16,7 +16,6 @@ from finlab.mdn.robot import EffortRobot, effort_robot
 from finlab.mdn.training.random_robots import FIN_COUNTS, random_kinds, random_robot, random_targets
 from finlab.mdn.training.recipes import AnswerSettings
 from finlab.mdn.training.teacher import root_share, shares_of_ways, ways_to_deliver
-from finlab.physics.effort import DEFAULT_WEIGHTS
 from finlab.physics.plant import Plant
 from finlab.whole_file import write_whole
 
@@ -42,7 +41,7 @@ def write_answers(folder: Path, settings: AnswerSettings, seed: int, number: int
     for _ in range(settings.robots):
         n = int(rng.choice(counts, p=often / often.sum()))
         layout = random_robot(rng, kinds, n)
-        robot = effort_robot(Plant(layout), yardstick(layout), DEFAULT_WEIGHTS)
+        robot = effort_robot(Plant(layout), yardstick(layout))
         groups.setdefault(n, []).append(_answers(rng, robot, settings))
     arrays = {
         f"{n}.{name}": np.stack([robot[name] for robot in robots])

@@ -8,7 +8,6 @@ import pytest
 from finlab.allocation.baselines.plant_in_casadi import plant_formulas
 from finlab.layout import FinModelSpec, Limits, load_layout
 from finlab.physics import Plant
-from finlab.physics.effort import EffortWeights
 from finlab.physics.objective import Objective
 
 casadi = pytest.importorskip("casadi", reason="method ipopt is an optional extra")
@@ -19,7 +18,6 @@ casadi = pytest.importorskip("casadi", reason="method ipopt is an optional extra
     [
         Objective("power"),
         Objective("effort"),
-        Objective("effort", EffortWeights(1.0, 0.7, 0.3, 0.4)),
     ],
 )
 def test_formulas_are_the_plant(objective: Objective) -> None:

@@ -9,7 +9,6 @@ from finlab.mdn.robot import effort_robot
 from finlab.mdn.training.random_robots import FIN_COUNTS, NUMBERS, random_kinds, random_robot, random_targets
 from finlab.mdn.training.teacher import ways_to_deliver
 from finlab.physics import Plant
-from finlab.physics.effort import DEFAULT_WEIGHTS
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +36,7 @@ def test_robots_are_of_all_kinds(robots: list[Layout]) -> None:
 def test_targets_are_within_reach_of_fins_that_turn_fully(robots: list[Layout]) -> None:
     rng = np.random.default_rng(2)
     for layout in robots[:12]:
-        robot = effort_robot(Plant(layout), yardstick(layout), DEFAULT_WEIGHTS)
+        robot = effort_robot(Plant(layout), yardstick(layout))
         target = random_targets(rng, robot, 24)
         assert target.shape == (24, 6) and np.isfinite(target).all()
         if not robot.forces.fins.turns_fully:

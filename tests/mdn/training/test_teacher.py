@@ -8,7 +8,6 @@ from finlab.mdn.robot import EffortRobot, effort_robot
 from finlab.mdn.training.random_robots import random_kinds, random_robot, random_targets
 from finlab.mdn.training.teacher import APART, DEAREST, Ways, root_share, shares_of_ways, ways_to_deliver
 from finlab.physics import Plant
-from finlab.physics.effort import DEFAULT_WEIGHTS
 
 STD = np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.34])
 
@@ -16,7 +15,7 @@ STD = np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.34])
 def told() -> tuple[EffortRobot, np.ndarray, Ways]:
     rng = np.random.default_rng(6)
     layout = random_robot(rng, random_kinds(rng, 2), 6)
-    robot = effort_robot(Plant(layout), STD, DEFAULT_WEIGHTS)
+    robot = effort_robot(Plant(layout), STD)
     target = random_targets(rng, robot, 12)
     return robot, target, ways_to_deliver(rng, robot.forces, target)
 
