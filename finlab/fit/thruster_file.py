@@ -1,5 +1,6 @@
 """The file of a fitted thruster: a table of thrust with what a layout says beside it."""
 
+import json
 from pathlib import Path
 
 from finlab.fit.thruster_fit import ThrusterFit
@@ -13,16 +14,25 @@ def layout_lines(fit: ThrusterFit, path: Path) -> tuple[str, ...]:
     torque, known, law = fit.torque_per_newton, fit.uncertainty, fit.law
     unit = f", unit: {fit.table.unit}" if fit.table.unit else ""
     reverse = "" if law.reverse is None else f", reverse: {law.reverse:g}"
-    errs = f"{{share: {known.share:g}, floor_n: {known.floor:g}, common: {path.stem}}}" if known else ""
+    errs = (
+        f"{{share: {known.share:g}, floor_n: {known.floor:g}, common: {_quoted(path.stem[:64].strip())}}}"
+        if known
+        else ""
+    )
     lines = (
         f"force_n: [{least:g}, {most:g}]",
         f"dead_band_n: {fit.dead_band:g}" * (fit.dead_band > 0.0),
         f"torque_per_newton_m: {torque:.4g}" * (torque != 0.0),
         f"uncertainty: {errs}" * bool(errs),
-        f"model: {{type: table, path: {path.name}{unit}}}",
+        f"model: {{type: table, path: {_quoted(path.name)}{unit}}}",
         f"# or model: {{type: power_law, forward: {law.forward:g}{reverse}, exponent: {law.exponent:g}}}",
     )
     return tuple(line for line in lines if line)
+
+
+def _quoted(text: str) -> str:
+    """Text as YAML takes it for text, whatever it is made of."""
+    return json.dumps(text, ensure_ascii=False)
 
 
 def thruster_csv(fit: ThrusterFit, path: Path) -> str:
