@@ -8,7 +8,7 @@ from pathlib import Path
 from finlab.assets import shipped_layouts
 from finlab.errors import CommandError, LayoutError
 from finlab.exchange.ardusub import read_ardusub, write_ardusub
-from finlab.exchange.description_text import description_text
+from finlab.exchange.description_text import SDF, URDF, description_text
 from finlab.exchange.exchange import Exchange
 from finlab.exchange.gazebo import read_description
 from finlab.exchange.matrix import csv_values, read_matrix, write_matrix
@@ -23,8 +23,8 @@ from finlab.whole_file import write_whole
 MAX_BYTES = 5_000_000
 """Largest file that is read; meshes are files of their own and are not touched."""
 WRITERS: dict[str, Callable[[Layout, Exchange, str], str]] = {
-    "urdf": lambda layout, exchange, _: description_text(layout, exchange, sdf=False),
-    "sdf": lambda layout, exchange, _: description_text(layout, exchange, sdf=True),
+    "urdf": lambda layout, exchange, _: description_text(layout, exchange, URDF),
+    "sdf": lambda layout, exchange, _: description_text(layout, exchange, SDF),
     "px4": write_px4,
     "ardusub": write_ardusub,
     "matrix": write_matrix,

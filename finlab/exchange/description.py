@@ -7,6 +7,7 @@ A description is taken in its zero position, in the frame of its root link or mo
 import math
 import re
 from dataclasses import dataclass
+from graphlib import CycleError, TopologicalSorter
 from typing import NamedTuple
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
@@ -49,6 +50,9 @@ class Description:
     name: str
     links: list[str]
     joints: dict[str, Joint]
+    """By their own names."""
+    movers: dict[str, Joint]
+    """By the links that they move."""
     mass: float
     """[kg]; 0 where no link has one."""
     center: Array
@@ -58,10 +62,6 @@ class Description:
     added: Array
     """Added mass (6,), diagonal [kg, kg m^2]; 0 where no link has one."""
     plugins: list[Element]
-
-    def joint_of(self, link: str) -> Joint | None:
-        """Returns the joint that moves a link."""
-        return next((joint for joint in self.joints.values() if joint.child == link), None)
 
 
 def parse_description(text: str, name: str) -> Description:
@@ -78,17 +78,13 @@ def parse_description(text: str, name: str) -> Description:
     named = {f"{tag} {_name(part)}": part for tag in ("link", "joint", "frame") for part in top.findall(tag)}
     movers = {said(part, "child@link"): key for key, part in named.items() if part.tag == "joint"}
     hung = {key: _hung(part, named, movers) for key, part in named.items()}
-    poses = {"": np.eye(4)}
-    try:
-        for key in list(hung):
-            _place(key, hung, poses)
-    except RecursionError:
-        raise LayoutError("has a chain of joints too long to follow") from None
+    poses = _placed(hung)
     joints = {_name(part): _joint(part, named, poses) for part in top.findall("joint")}
-    links = {key.removeprefix("link "): pose for key, pose in poses.items() if key.startswith("link ")}
+    links = [_name(link) for link in top.findall("link")]
     plugins = [*top.findall("gazebo/plugin"), *top.findall("plugin"), *top.findall("link/plugin")]
-    weighed = _masses({key: named[f"link {key}"] for key in links}, links)
-    return Description(top.get("name") or name, list(links), joints, *weighed, plugins)
+    weighed = _masses({link: named[f"link {link}"] for link in links}, poses)
+    by_link = {joint.child: joint for joint in joints.values()}
+    return Description(top.get("name") or name, links, joints, by_link, *weighed, plugins)
 
 
 def said(element: Element, paths: str, usual: str = "") -> str:
@@ -174,14 +170,20 @@ def _pose(part: Element) -> Array:
     return pose
 
 
-def _place(key: str, hung: dict[str, tuple[str, Array]], poses: dict[str, Array]) -> Array:
-    """The pose of a frame, which goes from `hung` to `poses` with those on the way to it."""
-    if key not in poses:
-        if key not in hung:  # not there, or on its own way to here
-            raise LayoutError(f"has no place for {key!r:.80}: it is missing, or hangs on itself in a circle")
-        base, pose = hung.pop(key)
-        poses[key] = _place(base, hung, poses) @ pose
-    return poses[key]
+def _placed(hung: dict[str, tuple[str, Array]]) -> dict[str, Array]:
+    """Poses (4, 4) of frames in the description's own, from what each hangs on and its pose there."""
+    poses = {"": np.eye(4)}
+    try:
+        for key in TopologicalSorter({key: [base] for key, (base, _) in hung.items()}).static_order():
+            if key:
+                base, pose = hung[key]
+                poses[key] = poses[base] @ pose
+    except (CycleError, KeyError) as error:
+        where = f"{error.args[-1]!r:.80}"
+        raise LayoutError(
+            f"has no place for {where}: it is missing, or hangs on itself in a circle"
+        ) from None
+    return poses
 
 
 def _joint(part: Element, named: Named, poses: dict[str, Array]) -> Joint:
@@ -213,7 +215,7 @@ def _masses(links: dict[str, Element], poses: dict[str, Array]) -> tuple[float, 
         if inertial is not None:
             told = [number(inertial, f"inertia@i{key} inertia/i{key}") for key in MOMENTS]
             inertia = np.array(told)[[[0, 1, 2], [1, 3, 4], [2, 4, 5]]]
-            pose = poses[name] @ _pose(inertial)
+            pose = poses[f"link {name}"] @ _pose(inertial)
             own = pose[:3, :3] @ inertia @ pose[:3, :3].T
             parts.append((number(inertial, "mass@value mass"), pose[:3, 3], own))
             added += [number(inertial, f"fluid_added_mass/{key}") for key in ADDED]

@@ -4,11 +4,11 @@ The base link's frame is the layout's: x forward, y left, z up, at the centre of
 link on a joint about its shaft, axis or turn axis; the propeller of an azimuth is a link on that link.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from html import escape
 from xml.etree import ElementTree
-from xml.etree.ElementTree import Element, SubElement
 
-from finlab.exchange.description import MOMENTS
+from finlab.errors import LayoutError
 from finlab.exchange.exchange import Exchange
 from finlab.exchange.gazebo import DERIVATIVES
 from finlab.layout import Actuator, Azimuth, Body, Layout, Rudder, Thruster
@@ -18,118 +18,99 @@ from finlab.layout.axes import Vector
 ROOT = "base_link"
 MASS, MOMENT = 1e-11, 1e-4
 """Shares of the body's mass and inertia that the links of all actuators get: simulators want some."""
+URDF = {
+    "robot": '<robot name="{name}">{parts}</robot>',
+    "base": '<link name="{name}">{inertial}{hull}</link>',
+    "link": '<link name="{name}">{inertial}</link>',
+    "inertial": '<inertial><mass value="{mass}"/>'
+    '<inertia ixx="{x}" iyy="{y}" izz="{z}" ixy="0" ixz="0" iyz="0"/></inertial>',
+    "hull": '<visual name="hull"><origin xyz="{place}"/><geometry><box size="{size}"/></geometry></visual>',
+    "joint": '<joint name="{name}_joint" type="{kind}"><origin xyz="{place}"/><parent link="{parent}"/>'
+    '<child link="{name}"/><axis xyz="{axis}"/>{limit}</joint>',
+    "limit": '<limit lower="{least!r}" upper="{most!r}" effort="100" velocity="10"/>',
+    "plugin": "<gazebo>{plugin}</gazebo>",
+}
+SDF = {
+    "robot": '<sdf version="1.9"><model name="{name}">{parts}</model></sdf>',
+    "base": URDF["base"],
+    "link": '<link name="{name}"><pose relative_to="{parent}">{place} 0 0 0</pose>{inertial}</link>',
+    "inertial": "<inertial><mass>{mass}</mass>"
+    "<inertia><ixx>{x}</ixx><iyy>{y}</iyy><izz>{z}</izz></inertia></inertial>",
+    "hull": '<visual name="hull"><pose>{place} 0 0 0</pose>'
+    "<geometry><box><size>{size}</size></box></geometry></visual>",
+    "joint": '<joint name="{name}_joint" type="{kind}"><parent>{parent}</parent><child>{name}</child>'
+    "<axis><xyz>{axis}</xyz>{limit}</axis></joint>",
+    "limit": "<limit><lower>{least!r}</lower><upper>{most!r}</upper><effort>100</effort>"
+    "<velocity>10</velocity></limit>",
+    "plugin": "{plugin}",
+}
+"""Parts of a file; a link and its joint are at `place` [m], seen from the link `parent`."""
 
 
-def description_text(layout: Layout, exchange: Exchange, sdf: bool) -> str:
+def description_text(layout: Layout, exchange: Exchange, form: Mapping[str, str]) -> str:
     """Returns the contents of a URDF or SDF file with a layout's places, axes, limits of force, mass and
     damping; `exchange` gets notes on what it has not."""
-    writer, body, links = _Writer(layout.name, sdf), layout.body or Body(), _links(layout.actuators)
-    moments = body.inertia_kgm2 or (1e-3,) * 3
+    body, links = layout.body or Body(), [link for part in layout.actuators for link in _links(part)]
+    hull, mass, moments = "", body.mass_kg, body.inertia_kgm2 or (1e-3,) * 3
     share = MOMENT * min(moments) / len(links)
-    base = writer.link(ROOT, (0.0, 0.0, 0.0), body.mass_kg, [m - share * len(links) for m in moments])
     if body.hull is not None and body.hull.size_m is not None:
-        visual = SubElement(base, "visual", name="hull")
-        writer.pose(visual, body.hull.center_m)
-        writer.put(SubElement(visual, "geometry"), "box", size=_text(body.hull.size_m))
+        hull = form["hull"].format(place=_text(body.hull.center_m), size=_text(body.hull.size_m))
+    inertial = _inertial(form, mass, [moment - share * len(links) for moment in moments])
+    parts = [form["base"].format(name=ROOT, inertial=inertial, hull=hull)]
+    inertial = _inertial(form, mass and mass * MASS / len(links), (share,) * 3)
     for name, parent, place, axis, ends in links:
-        here = place if parent == ROOT else (0.0, 0.0, 0.0)
-        writer.link(name, place, body.mass_kg and body.mass_kg * MASS / len(links), [share] * 3)
-        writer.joint(name, parent, here, axis, ends)
+        told = {"name": escape(name), "parent": escape(parent), "place": _text(place)}
+        limit = "" if ends is None else form["limit"].format(least=ends[0], most=ends[1])
+        kind = "continuous" if ends is None else "revolute"
+        parts.append(form["link"].format(**told, inertial=inertial))
+        parts.append(form["joint"].format(**told, kind=kind, axis=_text(axis), limit=limit))
     for part in layout.actuators:
         if isinstance(part, Thruster | Azimuth):
             limits = {"min_thrust_cmd": part.force[0], "max_thrust_cmd": part.force[1]}
             band = {"deadband": part.dead_band} if part.dead_band else {}
-            writer.plugin("Thruster", joint_name=f"{part.name}_joint", **limits, **band)
-    told: dict[str, float] = {}
+            parts.append(_plugin(form, "Thruster", {"joint_name": f"{part.name}_joint", **limits, **band}))
+    damping: dict[str, float] = {}
     for field, tags in DERIVATIVES.items():
-        told |= dict(zip(tags.split(), (-value for value in getattr(body, field) or ()), strict=False))
-    if told:
-        writer.plugin("Hydrodynamics", link_name=ROOT, **told)
-    if body.mass_kg is None:
+        damping |= dict(zip(tags.split(), (-value for value in getattr(body, field) or ()), strict=False))
+    if damping:
+        parts.append(_plugin(form, "Hydrodynamics", {"link_name": ROOT, **damping}))
+    if mass is None:
         exchange.note("The layout has no mass: no link has one, and simulators want one.")
     exchange.note("A robot description has no place for power, reaction torques, rates and buoyancy.")
     if any(not isinstance(part, Thruster | Azimuth) for part in layout.actuators):
         exchange.note(
             "Fins and rudders are joints that push nothing; --fins names the fins among them again."
         )
-    ElementTree.indent(writer.root)
-    return '<?xml version="1.0"?>\n' + ElementTree.tostring(writer.root, encoding="unicode") + "\n"
+    text = form["robot"].format(name=escape(layout.name), parts="".join(parts))
+    try:
+        root = ElementTree.fromstring(text)
+    except ElementTree.ParseError:
+        raise LayoutError("a name in the layout has a character that XML has not; give it another") from None
+    ElementTree.indent(root)
+    return '<?xml version="1.0"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
 
 
-def _links(parts: Sequence[Actuator]) -> list[tuple[str, str, Vector, Vector, tuple[float, float] | None]]:
-    """Links of actuators: name, parent, place and axis in the body frame, and limits of the angle [rad]."""
-    links: list[tuple[str, str, Vector, Vector, tuple[float, float] | None]] = []
-    for part in parts:
-        ends, mount = part.deflection if isinstance(part, Rudder) else None, f"{part.name}_mount"
-        if isinstance(part, Azimuth):
-            arc = None if is_full_turn(part.arc[1] - part.arc[0]) else part.arc
-            links.append((mount, ROOT, part.position, part.turn_axis, arc))
-            links.append((part.name, mount, part.position, part.zero, None))
-        else:
-            links.append((part.name, ROOT, part.position, part.frame[0], ends))
-    return links
+def _links(part: Actuator) -> Iterator[tuple[str, str, Vector, Vector, tuple[float, float] | None]]:
+    """Links of an actuator: name, parent, place seen from it [m], axis, and limits of the angle [rad]."""
+    if isinstance(part, Azimuth):
+        mount, arc = f"{part.name}_mount", part.arc
+        yield mount, ROOT, part.position, part.turn_axis, None if is_full_turn(arc[1] - arc[0]) else arc
+        yield part.name, mount, (0.0, 0.0, 0.0), part.zero, None
+    else:
+        ends = part.deflection if isinstance(part, Rudder) else None
+        yield part.name, ROOT, part.position, part.frame[0], ends
 
 
-class _Writer:
-    """The two dialects: what URDF has as attributes, SDF has as elements."""
+def _inertial(form: Mapping[str, str], mass: float | None, moments: Sequence[float]) -> str:
+    """What weighs a link: mass [kg], nothing where that is unknown, and moments (3,) [kg m^2]."""
+    x, y, z = map(repr, moments)
+    return "" if mass is None else form["inertial"].format(mass=repr(mass), x=x, y=y, z=z)
 
-    def __init__(self, name: str, sdf: bool) -> None:
-        self.sdf = sdf
-        self.root = Element("sdf", version="1.9") if sdf else Element("robot", name=name)
-        self.top = SubElement(self.root, "model", name=name) if sdf else self.root
 
-    def put(self, parent: Element, tag: str, **values: str) -> Element:
-        element = SubElement(parent, tag)
-        for key, value in values.items():
-            if not self.sdf:
-                element.set(key, value)
-            elif key in ("value", "link"):
-                element.text = value
-            else:
-                SubElement(element, key).text = value
-        return element
-
-    def pose(self, parent: Element, place: Sequence[float]) -> None:
-        if self.sdf:
-            SubElement(parent, "pose").text = _text((*place, 0.0, 0.0, 0.0))
-        else:
-            SubElement(parent, "origin", xyz=_text(place))
-
-    def link(
-        self, name: str, place: Sequence[float], mass: float | None, moments: Sequence[float]
-    ) -> Element:
-        link = SubElement(self.top, "link", name=name)
-        if self.sdf:
-            self.pose(link, place)
-        if mass is not None:
-            inertial, diagonal = (
-                SubElement(link, "inertial"),
-                dict(zip(("xx", "yy", "zz"), moments, strict=True)),
-            )
-            self.put(inertial, "mass", value=repr(mass))
-            self.put(inertial, "inertia", **{f"i{key}": repr(diagonal.get(key, 0.0)) for key in MOMENTS})
-        return link
-
-    def joint(
-        self, name: str, parent: str, place: Vector, axis: Vector, ends: tuple[float, float] | None
-    ) -> None:
-        kind = "continuous" if ends is None else "revolute"
-        joint = SubElement(self.top, "joint", name=f"{name}_joint", type=kind)
-        if not self.sdf:
-            self.pose(joint, place)
-        self.put(joint, "parent", link=parent)
-        self.put(joint, "child", link=name)
-        turned = self.put(joint, "axis", xyz=_text(axis))
-        if ends is not None:
-            limits = {"lower": repr(ends[0]), "upper": repr(ends[1]), "effort": "100", "velocity": "10"}
-            self.put(turned if self.sdf else joint, "limit", **limits)
-
-    def plugin(self, kind: str, **values: str | float) -> None:
-        holder = self.top if self.sdf else SubElement(self.top, "gazebo")
-        names = {"filename": f"gz-sim-{kind.lower()}-system", "name": f"gz::sim::systems::{kind}"}
-        plugin = SubElement(holder, "plugin", names)
-        for key, value in values.items():
-            SubElement(plugin, key).text = value if isinstance(value, str) else repr(value)
+def _plugin(form: Mapping[str, str], kind: str, values: Mapping[str, str | float]) -> str:
+    told = "".join(f"<{key}>{escape(str(value))}</{key}>" for key, value in values.items())
+    names = f'filename="gz-sim-{kind.lower()}-system" name="gz::sim::systems::{kind}"'
+    return form["plugin"].format(plugin=f"<plugin {names}>{told}</plugin>")
 
 
 def _text(values: Sequence[float]) -> str:

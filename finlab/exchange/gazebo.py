@@ -77,15 +77,13 @@ def _plugins(robot: Description, kind: str) -> list[Element]:
 
 
 def _joint_of(robot: Description, link: str) -> Joint:
-    joint = robot.joint_of(link)
-    if joint is None or link not in robot.links:
+    if link not in robot.movers or link not in robot.links:
         raise LayoutError(f"has no link {link!r:.60} that a joint moves; such links: {_moved(robot)}")
-    return joint
+    return robot.movers[link]
 
 
 def _moved(robot: Description) -> str:
-    links = sorted(joint.child for joint in robot.joints.values())
-    return f"{', '.join(links) or 'none'}"[:300]
+    return f"{', '.join(sorted(robot.movers)) or 'none'}"[:300]
 
 
 def _propeller(
@@ -95,7 +93,7 @@ def _propeller(
     place = joint.place - start
     part = exchange.thruster(joint.child, place, joint.axis, _force(plugin))
     part = replace(part, dead_band=number(plugin, "deadband"))
-    mount = robot.joint_of(joint.parent)
+    mount = robot.movers.get(joint.parent)
     if mount is None or mount.kind not in TURNING or not mount.ends[0] < mount.ends[1]:
         return part
     along = float(mount.axis @ joint.axis)
