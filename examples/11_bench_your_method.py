@@ -30,4 +30,4 @@ def allocate(layout: finlab.Layout, targets: np.ndarray, sigma: np.ndarray) -> n
 
 
 if __name__ == "__main__":
-    main(["bench", f"{__file__}:allocate", "--quick", "--sets", "paper"])
+    main(["bench", f"{__file__}:allocate", "--quick", "--splits", "id"])

@@ -26,7 +26,6 @@ LEVELS = (
     ("control", "paper"),
     ("mdn", "sim", "analysis", "fit"),
     ("evaluation", "deploy"),
-    ("bench",),
     ("cli",),
 )
 """A room may import rooms of earlier levels and itself, never its neighbours or later ones."""

@@ -1,68 +1,41 @@
-"""`finlab bench`: any method on the shipped problems, beside the stored results of finlab's own."""
+"""`finlab bench`: methods, yours or finlab's, on the held-out robots of `finlab eval wrench`."""
 
-import shlex
-import sys
 from typing import Annotated
 
 from tyro.conf import Positional, arg
 
 from finlab.cli.json_file import JsonFile, check_json_file, put_json
-from finlab.errors import DataError
+
+QUICK = ("id", "ood", "limits", "failure")
+"""Splits of a quick run."""
 
 
 def bench(
     methods: Annotated[Positional[tuple[str, ...]], arg(metavar="METHOD")] = ("dual",),
     quick: bool = False,
-    sets: Annotated[str, arg(metavar="A,B,...")] = "all",
-    limit: Annotated[float, arg(metavar="SECONDS")] = 1.0,
-    cpu: bool = False,
+    splits: Annotated[str | None, arg(metavar="A,B,...")] = None,
+    seed: Annotated[int, arg(metavar="N")] = 8821,
     json: JsonFile = None,
 ) -> None:
-    """Measure allocation methods, yours or finlab's, on the same problems: error, power, turn, time.
+    """Measure allocation methods, yours or finlab's, on the same robots and wrenches: error, power, time.
 
-    Example: finlab bench my_method.py:allocate --quick
+    Example: finlab bench my_method.py:allocate dual --quick
 
     Args:
         methods: a method of finlab (dual, analytic, ipopt-32, sqp-effort, ...), or a Python function as
             module:function or file.py:function.
-        quick: the first robot of each set and the first paths, within a minute.
-        sets: sets of robots with commas between, such as paper,tiny.
-        limit: longest time for one target; a later answer is a failure.
-        cpu: time calls by the processor's time, which other work on the machine does not prolong.
-        json: file for the results; they are printed in place of the table where no file is named.
+        quick: four splits of robots, five of each, in seconds.
+        splits: sets of robots, as in `finlab eval wrench`.
+        seed: of robots and wrenches.
+        json: file for the rows; they are printed in place of the table where no file is named.
     """
-    import time
-
-    from tqdm import tqdm
-
-    if not limit > 0.0:
-        raise DataError(f"limit: expected a number of seconds above 0, got {limit}")
-    if len(set(methods)) < len(methods):
-        raise DataError(f"methods: expected different names, got {', '.join(methods)}")
     check_json_file(json)
-    with tqdm(desc="bench", unit="target", disable=None, leave=False, file=sys.stderr) as bar:
-        from finlab.bench.methods import bench_method
-        from finlab.bench.metrics import figures
-        from finlab.bench.problems import open_problems
-        from finlab.bench.runner import LIMIT_S, run_method
+    from finlab.evaluation.experiments.wrench import HARD, experiment
+    from finlab.evaluation.progress import begin
+    from finlab.evaluation.report.text import to_text
 
-        tested, asked, found = [bench_method(name) for name in methods], open_problems(), []
-        part = asked if sets == "all" else asked.of_sets([name.strip() for name in sets.split(",")])
-        chosen, clock = part.quick() if quick else part, time.process_time if cpu else time.perf_counter
-        for method in tested:
-            bar.set_description(method.name, refresh=False)
-            bar.reset(len(chosen.targets.robot) + chosen.sequences.best_error.size)
-            found.append(figures(chosen, run_method(method, chosen, limit, bar.update, clock)))
-
-    from finlab.bench.results import results, stored
-    from finlab.bench.table import text
-
-    words = ["finlab", "bench", *methods, *["--sets", sets] * (part is not asked), *["--quick"] * quick]
-    words += ["--cpu"] * cpu + ["--limit", f"{limit:g}"] * (limit != LIMIT_S)
-    run = results(found, asked, quick=quick, limit_s=limit, command=shlex.join(words))
-    table = text(run, stored(asked, quick=quick) if part is asked else None)
-    try:
-        put_json(run, json, table)
-    except DataError:  # a full disk does not cost the table
-        print(table)
-        raise
+    begin("bench")
+    asked = tuple(splits.split(",")) if splits else QUICK if quick else HARD
+    size = {"layouts": 5, "targets": 4} if quick else {"layouts": 20, "targets": 10}
+    rows = experiment.rows(split=asked, methods=methods, seed=seed, **size)
+    put_json({"rows": rows}, json, to_text(*experiment.results(rows)))

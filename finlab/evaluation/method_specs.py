@@ -11,6 +11,7 @@ from finlab.allocation.allocator import Allocator
 from finlab.allocation.baselines.ipopt import IpoptSettings
 from finlab.allocation.methods import LEARNED, MethodChoice, checked_settings, choose_method, method_class
 from finlab.errors import AllocationError
+from finlab.evaluation.own_method import own_method
 from finlab.layout import Layout
 from finlab.physics.objective import Name
 
@@ -88,7 +89,7 @@ def load_method_specs(
     each = dict.fromkeys(name.strip() for name in listed if name.strip())
     if not each:
         raise AllocationError(f"methods: expected names with commas between (dual,paper), got {names!r}")
-    found = {name: load_method_spec(name, checkpoint, objective) for name in each}
+    found = {spec.name: spec for spec in (load_method_spec(name, checkpoint, objective) for name in each)}
     if not patient:
         return found
     return {name: method.with_settings(time_limit_s=PATIENCE_S) for name, method in found.items()}
@@ -100,14 +101,18 @@ def load_method_spec(
     """The method of a specification.
 
     Args:
-        name: a method; `ipopt-32`, say, for 32 starts; `sqp-effort`, say, for an objective of its own; or
-            `ipopt-forces`, in the space of forces.
+        name: a method; `ipopt-32`, say, for 32 starts; `sqp-effort`, say, for an objective of its own;
+            `ipopt-forces`, in the space of forces; or `file.py:function`, see `own_method`.
         checkpoint: of learned methods, as for `finlab.Allocator`.
         objective: what the methods that can choose keep least; each one's default where None.
 
     Raises:
         AllocationError: unknown method, or starts or an objective for a method that has none.
+        DataError: a function that is none.
     """
+    if ":" in name:
+        kind = own_method(name)
+        return MethodSpec(kind.name, MethodChoice(kind, kind.settings_class()))
     if name == IN_FORCES:
         return MethodSpec(name, _choice("ipopt", checkpoint, space="forces"))
     if named := _WITH_OBJECTIVE.fullmatch(name):

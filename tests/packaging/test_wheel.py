@@ -168,7 +168,7 @@ def test_without_extras_it_simulates_evaluates_and_exports(bare: Path, tmp_path:
     for line in (
         "simulate A --duration 12",
         "eval wrench --split id --layouts 2 --targets 3 --methods dual,paper,sqp",
-        "bench analytic --quick --sets paper",
+        "bench analytic --quick --splits id",
         "export mixed -o robot",
     ):
         done = bare_run(bare, tmp_path, "-m", "finlab", *line.split())
