@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Sequence
-from functools import lru_cache
 from itertools import product
 from typing import Any, NamedTuple
 
@@ -166,11 +165,10 @@ class Shape(NamedTuple):
     radius: float
     middle: float
     half: float
-    back: float = 0.0
-    center: Sequence[float] | Array = (0.0, 0.0)
+    boundary: Array | None = None
+    back: float | None = None
+    center: Array | None = None
     corners: Array | None = None
-    plane: Plane | None = None
-    """Where it is a sector, what it was made of."""
 
 
 def force_sets(layout: Layout, failed: Collection[str] = (), flow: ArrayLike | None = None) -> ForceSets:
@@ -194,27 +192,27 @@ def assembled(shapes: Sequence[Sequence[Shape]], effectiveness: Array) -> ForceS
     """Returns R robots of n actuators with shapes (R, n) and wrenches (R, n, 3, 6) of 1 N along their own
     axes."""
     every = [shape for robot in shapes for shape in robot]
-    count = (len(shapes), len(shapes[0]))
-
-    def gathered(values: list[ArrayLike]) -> Array:
-        found = np.array(values, np.float64)
-        return found.reshape(*count, *found.shape[1:])
-
-    uneven = any(shape.plane is not None and shape.plane.gauge is not None for shape in every)
     most = max((len(shape.corners) for shape in every if shape.corners is not None), default=0)
-    corners = [
-        np.zeros((most, 2)) if own is None else own[np.minimum(np.arange(most), len(own) - 1)]
-        for own in (shape.corners for shape in every)
-    ]
+
+    def gathered(name: str, rest: Any = None) -> Any:
+        values = [getattr(shape, name) for shape in every]
+        if all(value is None for value in values):
+            return None
+        if name == "corners":
+            last = np.arange(most)
+            values = [None if own is None else own[np.minimum(last, len(own) - 1)] for own in values]
+        found = np.array([rest if value is None else value for value in values], np.float64)
+        return found.reshape(len(shapes), -1, *found.shape[1:])
+
     return ForceSets(
-        np.ascontiguousarray(gathered([shape.directions for shape in every]) @ effectiveness / SCALE),
-        gathered([shape.radius for shape in every]),
-        gathered([shape.middle for shape in every]),
-        gathered([shape.half for shape in every]),
-        gathered([_boundary(shape.plane) for shape in every]) if uneven else None,
-        gathered([shape.back for shape in every]) if any(shape.back for shape in every) else None,
-        gathered([shape.center for shape in every]) if any(np.any(shape.center) for shape in every) else None,
-        gathered(list(corners)) if most else None,
+        np.ascontiguousarray(gathered("directions") @ effectiveness / SCALE),
+        gathered("radius"),
+        gathered("middle"),
+        gathered("half"),
+        gathered("boundary", np.ones(BOUNDARY)),
+        gathered("back", 0.0),
+        gathered("center", (0.0, 0.0)),
+        gathered("corners", np.zeros((most, 2))),
     )
 
 
@@ -247,14 +245,18 @@ def _shape(response: Response, is_fin: bool) -> Shape:
         directions = np.stack([response.effectiveness[:3], np.zeros(3)])
         low, high = response.ends
         if low > 0.0 or high < 0.0:
-            return Shape(directions, 0.5 * (high - low), 0.0, 0.0, 1.0, (0.5 * (low + high), 0.0))
+            center = np.array([0.5 * (low + high), 0.0])
+            return Shape(directions, 0.5 * (high - low), 0.0, 0.0, back=1.0, center=center)
         far, near = max(high, -low), min(high, -low)
-        return Shape(directions, far, 0.0 if high >= -low else math.pi, 0.0, near / far if far else 0.0)
+        back = near / far if near > 0.0 else None
+        return Shape(directions, far, 0.0 if high >= -low else math.pi, 0.0, back=back)
     directions, least = response.effectiveness[:, :3], response.table.force[0]
-    largest = response.table.largest * (1.0 if response.gauge is None else float(response.gauge.max()))
+    largest, boundary = response.table.largest, None
+    if response.gauge is not None:
+        largest, boundary = largest * float(response.gauge.max()), _boundary(response, response.gauge)
     middle, half = response.middle, response.half
     if is_fin or least <= THINNEST * largest or half > 0.5 * np.pi:
-        return Shape(directions, largest, middle, half, plane=response)
+        return Shape(directions, largest, middle, half, boundary)
     angle = middle + half * np.append(np.linspace(-1.0, 1.0, ALONG), (-1.0, 1.0))
     size = np.append(np.full(ALONG, largest), (least, least))
     return _polygon(
@@ -273,7 +275,9 @@ def _polygon(directions: Array, points: Array, half: float, sides: int) -> Shape
     angle = math.atan2(axes[0, 1], axes[0, 0])
     if width <= THINNEST * length or length == 0.0:
         center = middle + (0.5 * (low + high)) @ axes
-        return Shape(directions, 0.5 * length, angle, 0.0, 1.0, center)
+        if not center.any() and not length:
+            return Shape(directions, 0.0, 0.0, 0.0)
+        return Shape(directions, 0.5 * length, angle, 0.0, back=1.0, center=center)
     # Corners are the farthest points in directions around a set as wide as it is long.
     turn = TURN / sides * np.arange(sides)
     best = (along / (length, width) @ np.stack([np.cos(turn), np.sin(turn)])).argmax(axis=0)
@@ -281,23 +285,18 @@ def _polygon(directions: Array, points: Array, half: float, sides: int) -> Shape
     corners = corners if np.linalg.det(axes) > 0.0 else corners[::-1]
     center = corners.mean(axis=0)
     radius = float(np.linalg.norm(corners - center, axis=-1).max())
-    return Shape(directions, radius, angle, half, 0.0, center, corners - center)
+    return Shape(directions, radius, angle, half, center=center, corners=corners - center)
 
 
-@lru_cache(maxsize=256)
-def _boundary(plane: Plane | None) -> Array:
-    """How far the convex hull of what a fin can push reaches along `BOUNDARY` evenly spaced directions
-    (BOUNDARY,), as shares of its largest force; 1 for what is no sector."""
-    if plane is None:
-        return np.ones(BOUNDARY)
+def _boundary(plane: Plane, gauge: Array) -> Array:
+    """How far the convex hull of what an uneven fin can push reaches along evenly spaced directions
+    (BOUNDARY,), as shares of its largest force."""
     angle = plane.middle + plane.half * np.linspace(-1.0, 1.0, POINTS)
-    reach, most = np.ones(POINTS), 1.0
-    if plane.gauge is not None:
-        count, gauge = len(plane.gauge), np.append(plane.gauge, plane.gauge[0])
-        reach, most = np.interp(angle % TURN, TURN / count * np.arange(count + 1), gauge), gauge.max()
+    gauge = np.append(gauge, gauge[0])
+    reach = np.interp(angle % TURN, TURN / (len(gauge) - 1) * np.arange(len(gauge)), gauge)
     sides = TURN / BOUNDARY * np.arange(BOUNDARY)
     ahead = (reach[:, None] * np.cos(angle[:, None] - sides)).max(axis=0)
-    return np.asarray(np.maximum(ahead, 0.0) / most)
+    return np.asarray(np.maximum(ahead, 0.0) / gauge.max())
 
 
 def _along_boundary(boundary: Array, pull: Array, direction: Array) -> tuple[Array, Array]:
