@@ -7,14 +7,18 @@ tell the two apart.
 """
 
 from collections.abc import Callable
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
 from finlab.arrays import Array
+from finlab.layout.thrust_model import PowerTable
 
 FEWEST = 3, 9
 """Lines from which every second and every fourth one tell something."""
+SMALL = 0.2
+"""Share of a propeller's largest force that counts in full where a force is smaller."""
 
 
 class TableError(NamedTuple):
@@ -48,6 +52,23 @@ def line_error(
         spacing = min(max((fourth - second) / (farther - far), 0.0), spacing)
     noise = max(second - far * spacing, 0.0) / (1.0 + weights)
     return float(np.sqrt(spacing)), float(np.sqrt(noise))
+
+
+@lru_cache(maxsize=256)
+def thrust_table_error(model: PowerTable) -> tuple[float, float]:
+    """Returns the standard deviation of the force by the rows of a propeller's table, with straight lines
+    between: as a share of the force, and the part that is there at any force [N]."""
+    command, force, _ = model.columns
+    floor = SMALL * float(np.abs(force).max())
+
+    def missed(step: int) -> Array:
+        kept = np.arange(0, len(command), step)
+        left = np.arange(step // 2, kept[-1], step)
+        found = np.interp(command[left], command[kept], force[kept])
+        return np.asarray((found - force[left]) / np.hypot(force[left], floor))
+
+    share = float(np.hypot(*line_error(len(command), 2, 0.5, missed)))
+    return share, share * floor
 
 
 def _mean_square(error: Array | None) -> float:

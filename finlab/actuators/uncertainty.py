@@ -12,7 +12,7 @@ import numpy as np
 
 from finlab.actuators.fin.models import file_stamps, make_law
 from finlab.actuators.fin.table import TableLaw
-from finlab.actuators.thrust_table_error import thrust_table_error
+from finlab.actuators.table_error import thrust_table_error
 from finlab.arrays import Array
 from finlab.layout.actuator import Actuator
 from finlab.layout.fin import Fin

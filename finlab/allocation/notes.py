@@ -7,10 +7,9 @@ import numpy as np
 from finlab.actuators.fin.models import file_stamps
 from finlab.actuators.fin.table_file import DOUBT
 from finlab.arrays import Array
-from finlab.layout import Actuator, Fin, FinModelSpec, Layout, Limits
+from finlab.layout import Fin, FinModelSpec, Layout, Limits
 from finlab.layout.angles import wrapped
 from finlab.layout.rudder import Rudder
-from finlab.layout.thrust_model import PowerTable
 from finlab.physics import FinLaw, TableLaw, make_law, plant_of
 
 RESTLESS = 0.05
@@ -55,18 +54,11 @@ def _at_rest(layout: Layout) -> tuple[str, ...]:
 def _not_at_speed(layout: Layout) -> tuple[str, ...]:
     """The sentence about tables, which tell forces at rest."""
     told = layout.interaction.inflow if layout.interaction else (0.0, 0.0)
-    names = [
-        part.name
-        for part in layout.actuators
-        if (part.model.type == "table" and not any(told) if isinstance(part, Fin) else _has_table(part))
-    ]
+    parts = [part for part in layout.actuators if not (isinstance(part, Fin) and any(told))]
+    names = [part.name for part in parts if not isinstance(part, Rudder) and part.model.type == "table"]
     if not names:
         return ()
     return (f"the tables of {', '.join(names)} hold forces at rest; what speed changes is not known",)
-
-
-def _has_table(part: Actuator) -> bool:
-    return isinstance(getattr(part, "model", None), PowerTable)
 
 
 @lru_cache(maxsize=256)

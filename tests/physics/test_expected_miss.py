@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from finlab.actuators.fin.table import TableLaw
-from finlab.actuators.thrust_table_error import thrust_table_error
+from finlab.actuators.table_error import thrust_table_error
 from finlab.allocation import Allocator
 from finlab.arrays import Array
 from finlab.layout import FinModelSpec, Layout, Uncertainty, load_layout

@@ -82,10 +82,7 @@ class TableLaw(GridLaw):
         """What to know of the table, a sentence each."""
         self.covers = tuple((float(axis[0]), float(axis[-1])) for axis in axes)
         """First and last amplitude [rad], frequency [Hz] and zero direction [rad] of the grid."""
-        self._deviation = None
-        if deviation is not None and deviation.shape[-1]:
-            self._deviation = Grid(axes, np.square(deviation), periodic)
-        self._largest = float(np.linalg.norm(values[..., :3], axis=-1).max())
+        self._measured = np.square(deviation) if deviation is not None and deviation.shape[-1] else None
 
     @cached_property
     def grid_error(self) -> TableError:
@@ -93,33 +90,31 @@ class TableLaw(GridLaw):
         return grid_error(self.grid)
 
     @cached_property
-    def _variance(self) -> HermiteGrids | None:
-        return None if self._deviation is None else HermiteGrids([self._deviation])
+    def _variances(self) -> Array:
+        """Variances (a, f, d, 2) [N^2] of the forces across the shaft and along it at the grid's points: what
+        the file says, and the error of the grid."""
+        square, error = (self.grid.values[..., :3] ** 2).sum(axis=-1), self.grid_error
+        share = error.spacing**2 + (error.noise**2 if self._measured is None else 0.0)
+        known = np.zeros(3) if self._measured is None else self._measured
+        across = share * (square + SMALL**2 * square.max()) + known[..., 1:].mean(axis=-1)
+        return np.stack(np.broadcast_arrays(across, known[..., 0]), axis=-1)
+
+    @cached_property
+    def _between(self) -> HermiteGrids:
+        return HermiteGrids([self.grid._replace(values=self._variances)])
 
     def deviation(self, command: Array) -> Array:
         """Returns the standard deviation (..., 2) [N] of the force across the shaft, in each of two
-        directions, and along it, at commands (..., 3): what the file says, and the error of the grid."""
-        size = np.linalg.norm(self.force(command), axis=-1)
-        error = self.grid_error
-        own = np.zeros((*size.shape, 2))
-        open_share = error.spacing
-        if self._variance is None:
-            open_share = float(np.hypot(open_share, error.noise))
-        else:
-            found = np.maximum(self._variance(command, 1)[..., 0, 0, 0, :], 0.0)
-            own[..., 0], own[..., 1] = 0.5 * (found[..., 1] + found[..., 2]), found[..., 0]
-        own[..., 0] += open_share**2 * (size**2 + (SMALL * self._largest) ** 2)
-        return np.asarray(np.sqrt(own))
+        directions, and along it, at commands (..., 3)."""
+        return np.asarray(np.sqrt(np.maximum(self._between(command, 1)[..., 0, 0, 0, :], 0.0)))
 
     @cached_property
     def uncertain_share(self) -> float:
         """The part of the standard deviation across the shaft that grows with the force, as a share of it,
         over the grid."""
-        command = np.stack(np.meshgrid(*self.grid.axes, indexing="ij"), axis=-1).reshape(-1, 3)
-        size = np.linalg.norm(self.force(command), axis=-1) ** 2
-        variance = self.deviation(command)[..., 0] ** 2
-        away = size - size.mean()
-        return float(np.sqrt(max(away @ variance / max(away @ away, 1e-300), 0.0)))
+        square, variance = (self.grid.values[..., :3] ** 2).sum(axis=-1), self._variances[..., 0]
+        away = square - square.mean()
+        return float(np.sqrt(max((away * variance).sum() / max((away**2).sum(), 1e-300), 0.0)))
 
 
 def _jacobian(found: Array) -> Array:
