@@ -24,9 +24,8 @@ from webapp.scene.scenery import Scenery
 from webapp.session import Session
 from webapp.tasks.background import EventLoop, Workers
 from webapp.tasks.context import Context
-from webapp.tasks.designs import Designs
+from webapp.tasks.designs import Designs, Opening
 from webapp.tasks.jobs import Jobs
-from webapp.tasks.opening import Opening
 from webapp.tasks.reading import Reading
 from webapp.tasks.solver import Solver
 from webapp.theme import VERMILLION

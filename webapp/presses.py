@@ -6,17 +6,13 @@ The other half is `presses.js`. Each word is numbered, sent until it is heard, a
 import json
 from collections.abc import Callable
 from functools import partial
-from importlib.resources import files
 
 import viser
 
 from webapp.handles import add_html, on_user_change
-from webapp.markup.html import html
-from webapp.markup.picking import marker
-from webapp.viser_internals import run_script, uuid_of
+from webapp.markup.html import html, marker
+from webapp.viser_internals import run_file, run_script, uuid_of
 
-SCRIPT = files("webapp").joinpath("presses.js").read_text("utf-8")
-"""What runs in the page."""
 MAX_MESSAGE = 100_000
 """Longest message of the page that is read; a link with a design is the longest honest one."""
 KINDS = [int, str, str, str]
@@ -50,7 +46,7 @@ class Presses:
 
     def start(self) -> None:
         """Let the page's half begin."""
-        run_script(self._gui, f"{SCRIPT}\nfinlabPresses.start({json.dumps(uuid_of(self._box))});")
+        run_file(self._gui, "presses.js", f"finlabPresses.start({json.dumps(uuid_of(self._box))});")
 
     def read(self, message: str) -> None:
         """Words that were not heard yet, oldest first; the page may send anything."""

@@ -8,6 +8,7 @@ import threading
 from collections.abc import Iterator, Sequence
 from functools import cache, partial
 from http import HTTPStatus
+from importlib.resources import files
 from types import SimpleNamespace
 from typing import Any, get_type_hints
 from unittest.mock import patch
@@ -144,6 +145,11 @@ def uuid_of(handle: Any) -> str:
 def run_script(gui: viser.GuiApi, source: str) -> None:
     """Run a script in the page, as viser does to bring its plots."""
     gui._websock_interface.queue_message(_messages.RunJavascriptMessage(source=source))
+
+
+def run_file(gui: viser.GuiApi, name: str, more: str = "") -> None:
+    """Run a script that lies beside this file, and a line more."""
+    run_script(gui, files("webapp").joinpath(name).read_text("utf-8") + more)
 
 
 def stop_server(server: viser.ViserServer) -> None:

@@ -15,8 +15,8 @@ from finlab.files.plain_values import yaml_text
 from finlab.layout import FinModelSpec, Layout, layout_to_dict, load_layout
 from finlab.physics import make_law, plant_of
 from tests.fin_robots import FIN_ROBOTS
-from webapp.markup.snippets import command_line
 from webapp.markup.verdict import verdict_sentence
+from webapp.panels.files_tab import command_line
 from webapp.session import Session, files
 from webapp.session.state import LEAST, State
 from webapp.session.targets import PRESETS

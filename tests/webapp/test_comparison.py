@@ -12,11 +12,11 @@ from finlab.assets import shipped_checkpoints, shipped_layouts
 from finlab.layout import load_layout
 from tests.webapp.loops import page_of
 from tests.webapp.stand_in import StandIn, load_stand_in
-from webapp.markup.comparison import comparison_table
-from webapp.markup.corner import corner
 from webapp.markup.mode_plot import mode_plot
-from webapp.markup.snippets import command_line
 from webapp.markup.words import source_words, three_digits
+from webapp.panels.compare_tab import comparison_table
+from webapp.panels.files_tab import command_line
+from webapp.panels.status import corner
 from webapp.session.state import COMPARED, LEAST, State
 from webapp.session.targets import PRESETS
 from webapp.tasks.background import Worker

@@ -9,8 +9,8 @@ from finlab.errors import FinlabError
 from finlab.layout import load_layout
 from tests.webapp.stand_in import load_stand_in
 from webapp.markup.answer import fin_table
-from webapp.markup.snippets import command_line
 from webapp.markup.words import damage_words
+from webapp.panels.files_tab import command_line
 from webapp.session import Session
 from webapp.session.search_request import SearchRequest
 from webapp.session.swim_plan import SwimSettings

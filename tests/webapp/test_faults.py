@@ -39,7 +39,7 @@ COMPUTED = (
 )
 """Where a fault meets a worker's thread."""
 DRAWN = (
-    "webapp.markup.corner.verdict_sentence",
+    "webapp.panels.status.verdict_sentence",
     "webapp.panels.status.corner",
     "webapp.panels.wrench_tab.axis_reach",
     "webapp.panels.wrench_tab.slider_end",
@@ -49,7 +49,7 @@ DRAWN = (
     "webapp.panels.cards.quick_check",
     "webapp.panels.cards.warnings",
     "webapp.panels.modes_tab.mode_plot",
-    "webapp.markup.modes.source_words",
+    "webapp.panels.modes_tab.source_words",
     "webapp.panels.limits_tab.score_table",
     "webapp.panels.compare_tab.comparison_table",
     "webapp.panels.files_tab.command_line",

@@ -13,7 +13,7 @@ from tests.webapp.silent_client import SilentClient
 from tests.webapp.test_app import app, on_loop, server, until, view
 from webapp.app import App
 from webapp.session import Session
-from webapp.tasks.exports import Exports
+from webapp.tasks.designs import Exports
 from webapp.tasks.fitting import Fitting
 from webapp.tasks.improving import Improver
 from webapp.tasks.swimming import Swimming

@@ -18,8 +18,8 @@ from finlab.fit import outliers
 from finlab.layout import Layout, load_layout
 from tests.fit.cell import columns_of, commands, measured, soft, write
 from tests.webapp.loops import page_of
-from webapp.markup.fin_model import model_card
 from webapp.markup.fit_card import fit_card
+from webapp.panels.fin_model import model_card
 from webapp.session import Session, files
 from webapp.session.companions import archive_of, read_archive, stored_table
 from webapp.session.layout_edits import with_model

@@ -17,11 +17,10 @@ from finlab.layout import Fin, load_layout
 from tests.webapp.loops import page_of, running
 from webapp.markup.score_card import warnings
 from webapp.session import Session
-from webapp.session.room import Room
 from webapp.session.search_request import SearchRequest
 from webapp.tasks.analyst import Findings, Question, find
 from webapp.tasks.background import Newest, Worker
-from webapp.tasks.improving import Improver
+from webapp.tasks.improving import Improver, Room
 
 NO_YAW = load_layout(shipped_layouts()["no_yaw"])
 

@@ -7,7 +7,7 @@ import pytest
 from finlab.assets import shipped_layouts
 from finlab.errors import FinlabError
 from finlab.layout import FinModelSpec, load_layout
-from webapp.markup.fin_list import fin_list
+from webapp.panels.fin_list import fin_list
 from webapp.session import Session
 from webapp.session.fin_edits import modelled
 

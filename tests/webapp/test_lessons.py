@@ -10,7 +10,7 @@ from finlab.allocation import Allocation, Allocator
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
 from tests.webapp.hands import turn_fin
-from webapp.markup.guide_cards import guide_card
+from webapp.panels.cards import guide_card
 from webapp.session import Session
 from webapp.session.lessons import LESSONS, TOUR, Stop
 from webapp.session.looking import DRAWERS

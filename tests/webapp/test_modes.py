@@ -14,9 +14,9 @@ from finlab.layout import load_layout
 from tests.webapp.loops import AtOnce, page_of
 from tests.webapp.stand_in import StandIn
 from webapp.markup.mode_plot import LABEL, LEFT, mode_plot
-from webapp.markup.modes import mode_table
 from webapp.markup.plot import WIDTH
 from webapp.markup.words import error_digits, small, three_digits
+from webapp.panels.modes_tab import mode_table
 from webapp.session import Session
 from webapp.session.targets import PRESETS
 from webapp.tasks.answering import Answering

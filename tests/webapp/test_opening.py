@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from finlab.errors import FinlabError
-from webapp.tasks.opening import Opening
+from webapp.tasks.designs import Opening
 
 
 class Taken:

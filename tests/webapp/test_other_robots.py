@@ -13,7 +13,7 @@ from finlab.layout import Azimuth, Fin, Layout, Rudder, Thruster, load_layout
 from finlab.layout.thrust_model import PowerLaw
 from tests.webapp.test_faults import Tab
 from webapp.markup.answer import fin_table
-from webapp.markup.fin_list import fin_list
+from webapp.panels.fin_list import fin_list
 from webapp.session import Session, files
 from webapp.session.state import State
 from webapp.session.targets import axis_reach, full_thrust

@@ -15,7 +15,7 @@ from tests.webapp.test_swimming import now, until
 from webapp.markup.swim_card import swim_card
 from webapp.session.swim_plan import Plan
 from webapp.tasks.background import Worker
-from webapp.tasks.exports import Exports
+from webapp.tasks.designs import Exports
 from webapp.tasks.moment import POWER, Figures
 from webapp.tasks.swimmer import Swimmer
 from webapp.tasks.swimming import Swimming

@@ -10,9 +10,8 @@ from finlab.layout import Layout, load_layout
 from finlab.sim import FinFault
 from tests.webapp.loops import page_of
 from tests.webapp.test_swimming import SHORT, until
-from webapp.session.scenarios import SCENARIOS
 from webapp.session.state import State
-from webapp.session.swim_plan import SwimSettings
+from webapp.session.swim_plan import SCENARIOS, SwimSettings
 from webapp.tasks.background import Worker
 from webapp.tasks.swimming import Swimming
 

@@ -14,15 +14,14 @@ from finlab.layout import load_layout
 from finlab.sim import Trajectory, make_trajectory
 from tests.webapp.loops import page_of
 from tests.webapp.stand_in import load_stand_in
-from webapp.markup.corner import swim_corner
 from webapp.markup.swim_card import findings_words, pace_words, swim_card
+from webapp.panels.status import swim_corner
 from webapp.session.state import State
 from webapp.session.swim_plan import Plan, SwimSettings
 from webapp.tasks.background import Worker
 from webapp.tasks.moment import ERROR, FORCES, POINTS, TIME
-from webapp.tasks.pace import LAG_S
 from webapp.tasks.solver import Solver
-from webapp.tasks.swimming import Swimming
+from webapp.tasks.swimming import LAG_S, Swimming
 
 UCAT = load_layout(shipped_layouts()["ucat"])
 SHORT = Trajectory("short", np.array([0.0, 2.0]), np.array([[0.0, 0.0, -1.0], [0.2, 0.0, -1.0]]))

@@ -16,8 +16,6 @@ from finlab.errors import LayoutError
 from finlab.layout import FinModelSpec, Uncertainty, load_layout
 from finlab.vehicle.body import GRAVITY
 from tests.webapp.stand_in import StandIn
-from webapp.markup.comparison import comparison_table
-from webapp.markup.corner import corner
 from webapp.markup.score_card import check_card, score_table, warnings
 from webapp.markup.verdict import (
     WORKING,
@@ -29,6 +27,8 @@ from webapp.markup.verdict import (
     verdict_sentence,
 )
 from webapp.markup.words import authority_sentence, trim_sentence
+from webapp.panels.compare_tab import comparison_table
+from webapp.panels.status import corner
 from webapp.scene.wrench_nodes import LENGTH, LONGEST, fitting_newtons
 from webapp.session import Session, files
 from webapp.session.lessons import TOUR

@@ -1,11 +1,18 @@
 """Several methods on the same wrench."""
 
 import viser
+from markupsafe import Markup
 
+from finlab.allocation.allocation import Allocation
+from finlab.allocation.evaluate import REACHED
 from webapp.handles import add_html
-from webapp.markup.comparison import comparison_table
-from webapp.markup.picking import marker
+from webapp.markup.html import html, marker
+from webapp.markup.verdict import verdict_of
+from webapp.markup.words import error_digits, three_digits, unlearned_sentence
 from webapp.page import Page
+from webapp.session.state import COMPARED, least_of
+from webapp.tasks.comparison import Run
+from webapp.theme import NEARLY, css
 
 
 def add_comparison(page: Page) -> None:
@@ -19,3 +26,44 @@ def add_comparison(page: Page) -> None:
     )
     page.board.show(run, disabled=lambda run: run.running)
     page.add_html(lambda run, state: comparison_table(run, run.state not in (None, state)))
+
+
+def comparison_table(run: Run, stale: bool) -> str:
+    """Error, power, effort and time of each method."""
+    if run.state is None:
+        return Markup(
+            "<div class='fl dim'>Several methods on the same wrench: error, power, effort, time side by side."
+            "</div>"
+        )
+    rows = []
+    answers = dict(run.answers)
+    in_reach = any(isinstance(answer, Allocation) and answer.reachable for answer in answers.values())
+    for method in COMPARED:
+        answer = answers.get(method)
+        if isinstance(answer, Allocation) and answer.unknown_fins:
+            words = unlearned_sentence(answer.layout, answer.unknown_fins)
+            cells = html("<td colspan='4' class='words missing'>{}</td>", words)
+        elif isinstance(answer, Allocation):
+            color = css(verdict_of(answer, in_reach).color)
+            figures = (answer.power, answer.effort, answer.solve_ms)
+            error = html("<td style='color:{}'>{}</td>", color, error_digits(answer.err_norm))
+            cells = error + Markup().join(html("<td>{}</td>", three_digits(value)) for value in figures)
+        else:
+            cells = html("<td colspan='4' class='words dim'>{}</td>", "…" if answer is None else answer)
+        rows.append(html("<tr><td>{}</td><td>{}</td>{}</tr>", method, least_of(method), cells))
+    header = Markup(
+        "<tr><th>method</th><th>least</th><th>error</th><th>power [W]</th><th>effort</th><th>time [ms]</th>"
+        "</tr>"
+    )
+    said = html(
+        "<div class='said'><span class='given'>Green</span>: exact, an error of at most {}. <span "
+        "style='color:{}'>Ochre</span>: approximate, another method is exact. <span "
+        "class='missing'>Orange</span>: out of reach of all.</div>",
+        REACHED,
+        css(NEARLY),
+    )
+    note = (
+        Markup("<div class='missing'>The question has changed since; compare again.</div>") if stale else ""
+    )
+    body = Markup().join(rows)
+    return html("<div class='fl'><table class='methods'>{}{}</table>{}{}</div>", header, body, said, note)

@@ -7,7 +7,7 @@ from functools import partial, wraps
 from finlab.layout import Layout
 from finlab.layout.damage import Health
 from webapp.handles import numbered
-from webapp.markup.picking import button_colors
+from webapp.markup.html import button_colors
 from webapp.page import Page
 from webapp.session.state import STRENGTH_RANGE
 from webapp.theme import DEAD, css, fin_color, ink

@@ -1,15 +1,10 @@
 """Where designs come from: the shipped ones, and what is said of this one."""
 
-from importlib.resources import files
-
 from finlab.layout import Layout
 from webapp.markup.html import html
 from webapp.page import Page
 from webapp.session.files import shipped, shipped_name
-from webapp.viser_internals import run_script
-
-SCRIPT = files("webapp").joinpath("designs.js").read_text("utf-8")
-"""What runs in the page."""
+from webapp.viser_internals import run_file
 
 
 def add_designs(page: Page) -> None:
@@ -23,7 +18,7 @@ def add_designs(page: Page) -> None:
     page.board.show(layouts, options=_options)
     page.bind(layouts, open_layout, lambda layout, saved: shipped_name(layout) or _own(layout, saved))
     page.add_html(_about)
-    run_script(page.gui, SCRIPT)
+    run_file(page.gui, "designs.js")
 
 
 def _own(layout: Layout, saved: Layout) -> str:

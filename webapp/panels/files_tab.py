@@ -1,12 +1,14 @@
 """Export: what the robot needs, and the question as a command to copy."""
 
+import math
+import shlex
+
 import viser
 
 from webapp.handles import add_html
-from webapp.markup.html import html
-from webapp.markup.picking import marker
-from webapp.markup.snippets import command_line
+from webapp.markup.html import html, marker
 from webapp.page import Page
+from webapp.session.files import file_stem, shipped_name
 from webapp.session.state import State
 
 
@@ -28,3 +30,25 @@ def _copied(state: State) -> str:
         copy,
         command_line(state),
     )
+
+
+def command_line(state: State) -> str:
+    """The same question for `finlab allocate`."""
+    words = ["finlab", "allocate", _layout_name(state), "--wrench"]
+    words += [f"{value:g}" for value in state.target]
+    for name in state.failed:
+        words += ["--failed", name]
+    for name, share in state.weak:
+        words += ["--health", f"{name}={share:g}"]
+    for name, angle in state.stuck:
+        words += ["--stuck", f"{name}={math.degrees(angle):g}"]
+    if state.method != "dual":
+        words += ["--method", state.method]
+    if state.policy != "closest":
+        words += ["--policy", state.policy]
+    return shlex.join(words)
+
+
+def _layout_name(state: State) -> str:
+    """A shipped layout by its name, any other by the file that is saved of it."""
+    return shipped_name(state.layout) or f"{file_stem(state.layout.name)}.yaml"

@@ -13,8 +13,7 @@ from markupsafe import Markup
 
 from finlab.layout import Layout
 from webapp.handles import add_html, put
-from webapp.markup.html import html
-from webapp.markup.picking import marker
+from webapp.markup.html import html, marker
 from webapp.markup.words import fins_only
 from webapp.page import Page
 from webapp.panels.places import DRAWER, LEFT, PLACES, REGIONS, RIGHT, SIMULATE, Place
@@ -25,16 +24,8 @@ from webapp.session.looking import DRAWERS, Desk
 from webapp.session.state import can_be_edited
 from webapp.tasks.swimmer import Swimmer
 from webapp.theme import ASKED, DELIVERED, MISSING, css
-from webapp.viser_internals import run_script
+from webapp.viser_internals import run_file
 
-NAMED = files("webapp").joinpath("places.js").read_text("utf-8")
-"""Script that gives regions and sections their names, for the styles."""
-HABITS = files("webapp").joinpath("habits.js").read_text("utf-8")
-"""Script that changes what viser's page does otherwise."""
-FRAMES = files("webapp").joinpath("frames.js").read_text("utf-8")
-"""Script that lets fins flap, and draws only what has changed."""
-NAMES = files("webapp").joinpath("names.js").read_text("utf-8")
-"""Script that gives each box a name for readers of the screen."""
 _VARIABLES = (
     f":root {{ --fl-asked: {css(ASKED)}; --fl-delivered: {css(DELIVERED)}; --fl-missing: {css(MISSING)}; }}"
 )
@@ -106,7 +97,7 @@ class Frame:
     def __init__(self, page: Page) -> None:
         """Build everything."""
         self._page, gui = page, page.gui
-        run_script(gui, NAMED)
+        run_file(gui, "places.js")
         add_html(gui, html("{}{}", STYLE, marker("fl-chrome")))
         page.board.group(self._fail)
         self._shown = gui.add_html("")
@@ -125,7 +116,8 @@ class Frame:
                     for index, place in enumerate(PLACES)
                     if place.region == region
                 ]
-        run_script(gui, HABITS + FRAMES + NAMES)
+        for name in ("habits.js", "frames.js", "names.js"):
+            run_file(gui, name)
 
     def _fail(self, error: Exception | None) -> None:
         if error is not None:

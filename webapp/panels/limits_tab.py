@@ -9,8 +9,7 @@ from markupsafe import Markup
 
 from finlab.analysis import Improvement, Progress
 from webapp.handles import add_html
-from webapp.markup.html import html
-from webapp.markup.picking import marker
+from webapp.markup.html import html, marker
 from webapp.markup.score_card import score_table
 from webapp.markup.words import fins_words, three_digits
 from webapp.page import Page

@@ -4,10 +4,9 @@ from collections.abc import Callable
 from functools import partial
 from typing import NamedTuple
 
-from webapp.markup.guide_cards import guide_card
 from webapp.page import Page
 from webapp.panels.body_inspector import add_body
-from webapp.panels.cards import add_answer, camera, card, check, robot_name, tasks
+from webapp.panels.cards import add_answer, add_switches, camera, card, check, guide_card, robot_name, tasks
 from webapp.panels.compare_tab import add_comparison
 from webapp.panels.damage import add_damage
 from webapp.panels.design_panel import add_designs
@@ -20,7 +19,6 @@ from webapp.panels.modes_tab import add_candidates
 from webapp.panels.swim_tab import add_figures, add_run, add_scenario
 from webapp.panels.timeline import add_timeline
 from webapp.panels.top_bar import add_answering, add_file, add_history
-from webapp.panels.view_tab import add_switches
 from webapp.panels.wrench_tab import add_commands, add_target
 from webapp.session.looking import TASKS
 

@@ -1,16 +1,30 @@
 """What lies over the 3D view: the status line and the legend."""
 
+import math
+
+import numpy as np
+from markupsafe import Markup
+
 from finlab.allocation.allocation import Allocation
+from finlab.allocation.policy import AXES
 from webapp.handles import put
-from webapp.markup.corner import corner, legend, set_rows, swim_corner
+from webapp.markup.html import html
+from webapp.markup.verdict import WORKING, verdict_of, verdict_sentence
+from webapp.markup.words import error_digits, parts_word, three_digits
 from webapp.page import Page
 from webapp.scene.robot_scene import SWIM
-from webapp.scene.wrench_nodes import Scale
+from webapp.scene.wrench_nodes import Scale, set_scale
 from webapp.session.display import Display
-from webapp.session.state import State
+from webapp.session.state import AXIS_UNITS, State, least_of
 from webapp.tasks.analyst import Findings
-from webapp.tasks.moment import Moment
+from webapp.tasks.moment import ERROR, Moment
 from webapp.tasks.swimmer import Swimmer
+from webapp.theme import ASKED, DEAD, DELIVERED, HALF_TURN, WATER, css
+
+LONG = 24
+"""Characters of a verdict above which it takes a line of its own in a small view."""
+ARROWS = (("asked", 0.65), ("delivered", 1.0), ("missing", 1.0))
+"""Words and opacities of the three arrows."""
 
 
 def add_corner(page: Page) -> None:
@@ -43,3 +57,146 @@ def _written(
         return swim_corner(swimmer, moment, pace, SWIM.newtons)
     drawn = set_rows(found if display.drawn != "none" else None)
     return corner(state, legend(*scale, drawn), shown, busy, error, shown is best, in_reach)
+
+
+def legend(newtons: float, torque: float, cut: bool, also: str) -> str:
+    """Arrows, scales, and rows of more.
+
+    Args:
+        newtons: force [N] that an arrow of 0.1 m stands for.
+        torque: torque [N m] that half a turn of a ring stands for.
+        cut: whether a ring would have to be longer than a turn.
+        also: rows as `set_rows` makes them.
+    """
+    # By name, so that the dark theme can lighten them.
+    rows = [_key(_arrow(f"var(--fl-{word})", alpha), word) for word, alpha in ARROWS]
+    ring = f"{math.degrees(HALF_TURN):.0f}° = {torque:g} N m{', cut off' if cut else ''}"
+    scales = "<div class='dim scales'><span>{}</span><span><i>ring </i>{}</span></div>"
+    return html("<div class='fl-legend'>{}{}</div>{}", rows, also, html(scales, _length(newtons), ring))
+
+
+def _length(newtons: float) -> str:
+    """What the length of an arrow says; where there is little room, without the word in it."""
+    return html("<i>arrow </i>0.1 m = {:g} N", newtons)
+
+
+def set_rows(findings: Findings | None) -> str:
+    """The bodies of what can be attained, and their scale."""
+    if findings is None or findings.now is None:
+        return ""
+    rows = [_key(_patch(css(DELIVERED, 0.5)), "working fins")]
+    if findings.whole is not None:
+        asked = findings.question
+        word = "all fins" if asked.failed else "before"
+        rows.append(_key(_patch(css(DEAD, 0.45)), word))
+    ball = html("<svg width='44' height='12'><circle cx='22' cy='6' r='5' fill='{}'/></svg>", css(ASKED))
+    unit = "N" if findings.now.kind == "force" else "N m"
+    scale = f"body 0.1 m = {three_digits(0.1 / set_scale(findings))} {unit}"
+    rows.append(html("{}<span class='dim wide'>{}</span>", _key(ball, "asked in it"), scale))
+    return Markup().join(rows)
+
+
+def _key(sign: str, words: str) -> str:
+    """A row of the legend, which stays together where rows stand beside each other."""
+    return html("<div class='key'>{}<span>{}</span></div>", sign, words)
+
+
+def _patch(color: str) -> str:
+    box = "<svg width='44' height='12'><rect x='8' width='28' height='12' rx='3' fill='{}'/></svg>"
+    return html(box, color)
+
+
+def _arrow(color: str, opacity: float) -> str:
+    way = "<svg width='44' height='10' opacity='{}' fill='{}'><path d='M0 3H32V0L44 5L32 10V7H0Z'/></svg>"
+    return html(way, opacity, color)
+
+
+def corner(
+    state: State,
+    legend: str,
+    allocation: Allocation | None,
+    busy: bool,
+    error: str | None,
+    least: bool = True,
+    in_reach: bool = False,
+) -> str:
+    """Legend and status line in the lower left corner of the page.
+
+    Args:
+        state: what is asked.
+        legend: what the view shows, as markup.
+        allocation: what is on the robot.
+        busy: whether a newer answer is on its way.
+        error: why there is no answer.
+        least: whether it is the answer itself, not another way to do the same.
+        in_reach: whether any command of the working fins gives what is asked.
+    """
+    fins = f"{len(state.healthy)} of {state.layout.n} {parts_word(state.layout)}"
+    parts = [html("<span class='aside'>{}</span>", fins)]
+    if error is not None:
+        parts.append(html("<span class='missing'>{}</span>", error))
+    elif busy or allocation is None:  # an old verdict would be taken for that of the new question
+        parts.append(html("<span class='aside'><span class='dim'>{}</span></span>", state.method))
+        parts.append(html("<span class='pill' style='background:{}'>{}</span>", css(DEAD), WORKING))
+    else:
+        parts += _figures(allocation, least, in_reach)
+    return _cards(legend, parts)
+
+
+def _figures(allocation: Allocation, least: bool, in_reach: bool) -> list[str]:
+    """Error, costs, time and verdict of what is on the robot."""
+    color, verdict = verdict_of(allocation, in_reach).color, verdict_sentence(allocation, in_reach)
+    pill = "pill long" if len(verdict) > LONG else "pill"
+    rest = ", ".join(
+        f"{axis} {value:+.2g} {unit}"
+        for axis, value, unit in zip(AXES, allocation.unallocated, AXIS_UNITS, strict=True)
+    ).replace("-", "−")
+    costs = []
+    kinds = (("power", "watts", allocation.power, " W"), ("effort", "effort", allocation.effort, ""))
+    for word, kind, value, unit in kinds:
+        if value is None:  # effort is of fins
+            continue
+        kept = f"least {word}" if kind == least_of(allocation.method) and least else word
+        cost = html("<b class='{}'>{}</b>{}", word, three_digits(value), unit)
+        costs.append(html("<span><span class='dim'>{}</span> {}</span>", kept, cost))
+    method, ms = allocation.method, allocation.solve_ms
+    time = f"{ms:.2g}" if ms < 10.0 else f"{ms:.0f}"  # no measurement repeats to a third digit
+    error = "<span class='dim'>error</span> <b class='err'>{}</b>"
+    return [
+        html(
+            "<span title='missing, as a share of what the robot can push: {}'>{}</span>",
+            rest,
+            html(error, error_digits(allocation.err_norm)),
+        ),
+        *costs,
+        html("<span class='aside'><span class='dim'>{}</span> {} ms</span>", method, time),
+        html("<span class='{}' style='background:{}'>{}</span>", pill, css(color), verdict),
+    ]
+
+
+def swim_corner(first: Swimmer, shown: Moment, pace: str, newtons: float) -> str:
+    """The same while a robot swims."""
+    line = "<svg width='44' height='10'><path d='M0 5H44' stroke='{}' stroke-width='3.5'/></svg>"
+    named = (("the path", ASKED), (f"{first.method}, {first.about}", DELIVERED))
+    trails = [_key(html(line, css(color)), word) for word, color in named]
+    speed = 100.0 * float(np.linalg.norm(shown.flow))
+    if speed >= 0.05:
+        trails.append(_key(_arrow(css(WATER), 0.9), f"water, {speed:.1f} cm/s"))
+    alive = len(first.fins) - len(shown.lost)
+    off = f"{100 * float(shown.record[-1, ERROR]):.1f}" if len(shown.record) else "–"
+    power = "–" if shown.figures is None else f"{shown.figures.now_w:.1f}"
+    parts = [
+        html("<span>{} of {} fins</span>", alive, len(first.fins)),
+        html("<span><b>{:.1f}</b> s of {:.0f} s</span>", shown.time, first.duration_s),
+        html("<span><span class='dim'>off the path</span> <b>{}</b> cm</span>", off),
+        html("<span><span class='dim'>power</span> <b>{}</b> W</span>", power),
+        html("<span>{}</span>", pace),
+    ]
+    scale = html("<div class='dim scales'><span>{}</span></div>", _length(newtons))
+    return _cards(html("<div class='fl-legend'>{}</div>{}", trails, scale), parts)
+
+
+def _cards(legend: str, status: list[str]) -> str:
+    card = "<div class='fl fl-card {}'>{}</div>"
+    both = html(card, "fl-legend-card", legend), html(card, "fl-status", status)
+    return html("<div class='fl-corner'>{}{}</div>", *both)

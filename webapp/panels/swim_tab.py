@@ -8,15 +8,13 @@ import viser
 from finlab.layout import Layout
 from finlab.sim import PLANTS, SHIPPED
 from webapp.handles import add_html
-from webapp.markup.html import html
-from webapp.markup.picking import marker
+from webapp.markup.html import html, marker
 from webapp.markup.swim_card import swim_card
 from webapp.markup.words import trim_sentence
 from webapp.page import Page
 from webapp.panels.damage import Row, add_fin_buttons
-from webapp.session.scenarios import SCENARIOS
 from webapp.session.state import COMPARED
-from webapp.session.swim_plan import SPEEDS
+from webapp.session.swim_plan import SCENARIOS, SPEEDS
 from webapp.session.targets import axis_reach
 from webapp.tasks.moment import Moment
 from webapp.tasks.swimmer import Swimmer

@@ -6,8 +6,7 @@ import numpy as np
 
 from finlab.arrays import Array
 from webapp.handles import add_html
-from webapp.markup.html import html
-from webapp.markup.picking import marker
+from webapp.markup.html import html, marker
 from webapp.page import Page
 from webapp.panels.line_plot import FIN_LINES, LinePlot, top_of
 from webapp.tasks.moment import ASKED as ASKED_COLUMN

@@ -6,14 +6,13 @@ import viser
 
 from finlab.allocation.methods import METHODS
 from webapp.handles import add_html
-from webapp.markup.html import html
-from webapp.markup.picking import marker
+from webapp.markup.html import html, marker
 from webapp.page import Page
 from webapp.presses import press
 from webapp.session.design_links import MAX_LINK
 from webapp.session.lessons import LESSONS, TOUR
 from webapp.session.state import LEAST, least_of
-from webapp.tasks.opening import KINDS
+from webapp.tasks.designs import KINDS
 
 DESIGNS = ".yaml,.yml,.json,.zip"
 """How the names of files of designs end."""

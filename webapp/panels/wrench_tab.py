@@ -10,8 +10,7 @@ from finlab.forces.reach import Ranges
 from finlab.layout import Layout
 from webapp.handles import add_html, put
 from webapp.markup.answer import fin_table
-from webapp.markup.html import html
-from webapp.markup.picking import marker
+from webapp.markup.html import html, marker
 from webapp.markup.words import three_digits
 from webapp.page import Page
 from webapp.panels.damage import add_fin_buttons

@@ -15,7 +15,6 @@ from finlab.arrays import Array
 from finlab.layout import Actuator, Azimuth, Fin, Rudder, Thruster
 from webapp.handles import put
 from webapp.scene.meshes import fin as fin_mesh
-from webapp.scene.meshes import thruster
 from webapp.scene.meshes.hull import AnyHull
 from webapp.scene.meshes.mesh import NOTHING, Mesh, force_arrow, tube
 from webapp.scene.shape import Shape
@@ -60,7 +59,7 @@ class FinShapes:
 def _moving_part(kind: type[Actuator]) -> Mesh:
     """What of an actuator moves, in its own frame."""
     if issubclass(kind, (Thruster, Azimuth)):
-        return thruster.duct() if issubclass(kind, Thruster) else thruster.pod()
+        return fin_mesh.duct() if issubclass(kind, Thruster) else fin_mesh.pod()
     return fin_mesh.blade()
 
 

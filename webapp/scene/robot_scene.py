@@ -5,18 +5,21 @@ import math
 from functools import partial
 
 import numpy as np
+import viser
 
 from finlab.allocation.allocation import Allocation
 from finlab.analysis import Improvement
 from finlab.arrays import Array
-from finlab.layout import Layout
+from finlab.layout import Fin, Layout
 from finlab.layout.damage import Health
 from webapp.board import Board
 from webapp.handles import put
 from webapp.markup.words import damage_words, missing_part
 from webapp.scene.fin_node import FinNode, motion
+from webapp.scene.meshes import fin as fin_mesh
 from webapp.scene.meshes.hull import has_inside, hull_of
-from webapp.scene.overlays import Offered
+from webapp.scene.meshes.mesh import Mesh, joined
+from webapp.scene.shape import Shape
 from webapp.scene.stage import Stage, aim_camera
 from webapp.scene.wrench_nodes import LENGTH, AttainableNodes, Scale, WrenchNodes
 from webapp.session.display import Display
@@ -26,7 +29,7 @@ from webapp.tasks.analyst import Findings
 from webapp.tasks.context import Context
 from webapp.tasks.moment import Moment
 from webapp.tasks.swimmer import Swimmer
-from webapp.theme import HALF_TURN
+from webapp.theme import DELIVERED, HALF_TURN
 from webapp.viser_internals import run_script
 
 CAMERAS = {
@@ -221,3 +224,28 @@ class RobotScene:
             return
         drag = session.end_drag if phase == "end" else session.drag_fin
         self._do(partial(drag, session.state.layout.names[index], position, angle))
+
+
+class Offered:
+    """Blades of the fins that a search would put elsewhere, where it would put them."""
+
+    def __init__(self, scene: viser.SceneApi) -> None:
+        self._shape = Shape(scene, "/robot/proposed", DELIVERED, visible=False, cast_shadow=False)
+
+    def show(self, other: Layout | None, layout: Layout) -> None:
+        """Show the fins of a better version of a layout that stand elsewhere now; None hides the node."""
+        now = {fin.name: (fin.position, fin.frame) for fin in layout.fins}
+        fins = () if other is None or other.name != layout.name else other.fins
+        moved = tuple(fin for fin in fins if now.get(fin.name) != (fin.position, fin.frame))
+        put(self._shape.node, visible=bool(moved))
+        if moved:
+            self._shape.show(_blades, moved)
+
+
+def _blades(fins: tuple[Fin, ...]) -> Mesh:
+    parts = []
+    for fin in fins:
+        frame = np.array(fin.frame)
+        for part in (fin_mesh.blade(), fin_mesh.shaft()):
+            parts.append(Mesh(part.vertices @ frame + np.array(fin.position), part.faces))
+    return joined(*parts)

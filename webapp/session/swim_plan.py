@@ -6,23 +6,37 @@ from itertools import combinations
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
+from finlab.assets import PAPER_LAYOUTS
 from finlab.control import steers
 from finlab.errors import FinlabError
-from finlab.evaluation.experiments.hard_days import HardDay
+from finlab.evaluation.experiments.hard_days import CURRENT, HARD_DAYS, TWO, HardDay
 from finlab.layout import Layout
 from finlab.sim import (
     PLANTS,
     SHIPPED,
     FinFault,
     SensorSettings,
+    SteadyCurrent,
     Still,
     Trajectory,
     Water,
     make_trajectory,
 )
-from webapp.session.scenarios import SCENARIOS
 from webapp.session.state import COMPARED, State, chosen, number
 
+LOST_IN_CURRENT = HardDay(
+    "lost-in-current",
+    "In a current of 7 cm/s a fin is lost half-way, and a monitor has to find out.",
+    water=SteadyCurrent(CURRENT),
+    lost=1,
+    announced=False,
+)
+SCENARIOS: dict[str, HardDay] = {
+    day.name: day
+    for day in (*HARD_DAYS, LOST_IN_CURRENT)
+    if not day.mixed_fins and day.layouts in (PAPER_LAYOUTS, TWO, PAPER_LAYOUTS[:1])
+}
+"""Scenarios by name."""
 SPEEDS = (0.1, 8.0)
 """Simulated time per time on the wall that may be asked for."""
 CHOICES: dict[str, tuple[str, ...]] = {

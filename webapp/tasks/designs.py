@@ -1,18 +1,70 @@
-"""Designs as a whole: new, opened, saved, shared by a link."""
+"""Files of one page: designs opened, saved and shared, exports, and what a dropped file is for."""
 
 import json
 from collections.abc import Callable
 from functools import partial
+from pathlib import PurePath
 
+import viser
+
+from finlab.deploy.bundle import make_bundle
+from finlab.errors import FinlabError
 from finlab.layout import Layout
 from webapp.presses import Presses
 from webapp.scene.meshes.hull import hull_of
 from webapp.session import files
 from webapp.session.companions import Opened
 from webapp.session.design_links import FRAGMENT, packed, unpacked
+from webapp.session.files import file_stem
 from webapp.tasks.context import Context
-from webapp.tasks.exports import Exports
-from webapp.viser_internals import run_script
+from webapp.tasks.swimming import Swimming
+from webapp.viser_internals import run_file, run_script
+
+KINDS = "a design (YAML, JSON, ZIP), measurements of a fin (CSV), or a hull (STL, OBJ, GLB, PLY)"
+"""What is opened, in words."""
+
+Take = Callable[[str, bytes], object]
+"""Opens a file, from its name and its content."""
+
+
+class Exports:
+    """Makes files beside the event loop and sends them to one browser."""
+
+    def __init__(self, context: Context) -> None:
+        """Send what the page's session holds to its browser."""
+        self._context, self._session = context, context.session
+
+    def bundle(self) -> None:
+        """Send the bundle for the robot: the same bytes as `finlab export --zip`.
+
+        What was tried out with K and T on the page does not go to the robot.
+        """
+        state, shipped = self._session.state, self._context.solver.shipped
+        self._send(
+            f"{file_stem(state.layout.name)}.zip",
+            lambda: make_bundle(shipped(state.layout, state.method), state.failed).zip_bytes(),
+        )
+
+    def swim(self, swimming: Swimming) -> None:
+        """Send the log of the robot that swims as NPZ."""
+        log = swimming.log()
+        swimmer = swimming.swimmer
+        assert swimmer is not None
+        name = file_stem(f"{swimmer.layout.name}_{swimmer.method}_{swimmer.about}")
+        self._send(f"{name}.npz", log.npz)
+
+    def _send(self, name: str, make: Callable[[], bytes]) -> None:
+        """Have the worker make a file, and send it; of each name only the newest that is asked for."""
+        loop, notify = self._context.loop, self._context.notify
+        self._context.workers.answers.submit(
+            (id(self), name),
+            lambda: loop.post(partial(self.download, name, make())),
+            lambda text: loop.post(partial(notify, "Not exported", text)),
+        )
+
+    def download(self, name: str, content: bytes) -> None:
+        """Send a file that is there already."""
+        self._context.client.send_file_download(name, content, save_immediately=True)
 
 
 class Designs:
@@ -61,3 +113,42 @@ class Designs:
     def _show(self, layout: Layout, text: str) -> None:
         card = json.dumps([FRAGMENT + text, layout.name])
         run_script(self._context.client.gui, f"finlabDesigns.share(...{card});")
+
+
+class Opening:
+    """What files are for."""
+
+    def __init__(self, gui: viser.GuiApi, presses: Presses) -> None:
+        """Let the page take what is dropped on it."""
+        self._takers: dict[str, Take] = {}
+        presses.on("dropped", _refuse)
+        run_file(gui, "dropping.js")
+
+    @property
+    def suffixes(self) -> str:
+        """Suffixes of all files that can be opened, as a browser expects them."""
+        return ",".join(self._takers)
+
+    def add(self, suffixes: str, take: Take) -> None:
+        """Files whose names end so (`.csv,.txt`) are for `take`."""
+        self._takers |= dict.fromkeys(suffixes.split(","), take)
+
+    def open(self, name: str, content: bytes) -> None:
+        """A file that the browser has sent.
+
+        Raises:
+            FinlabError: it is of no kind that is opened, or whoever takes it refuses it.
+        """
+        take = self._takers.get(PurePath(name).suffix.lower())
+        if take is None:
+            raise FinlabError(f"{PurePath(name).name[-60:]!r} cannot be opened; expected {KINDS}")
+        take(name, content)
+
+
+def _refuse(_key: str, _text: str) -> None:
+    """What several files, or a folder, are told.
+
+    Raises:
+        FinlabError: always.
+    """
+    raise FinlabError("one file can be dropped at a time; put a design and its files into one ZIP archive")

@@ -8,7 +8,7 @@ from webapp.tasks.answering import Answering
 from webapp.tasks.background import Newest
 from webapp.tasks.comparison import Comparison
 from webapp.tasks.context import Context
-from webapp.tasks.exports import Exports
+from webapp.tasks.designs import Exports
 from webapp.tasks.fitting import Fitting
 from webapp.tasks.improving import Improver
 from webapp.tasks.swimming import Swimming

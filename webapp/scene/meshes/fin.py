@@ -6,8 +6,13 @@ A fin that points aft pushes forward, so the blade lies opposite to its thrust.
 import numpy as np
 from trimesh.convex import convex_hull
 
+from finlab.arrays import Array
 from webapp.scene.meshes.mesh import Mesh, joined, revolved, triangles, tube
 
+RADIUS, WALL = 0.038, 0.009
+"""Of the duct and of its wall [m]."""
+HUB: Array = np.array([[-0.03, 0.0, 0.0], [0.03, 0.0, 0.0]])
+"""Ends of the hub [m]."""
 CHORD = 0.18
 """Length of the blade from the shaft to its trailing edge [m]."""
 SPAN = 0.10
@@ -41,3 +46,18 @@ def sweep(amplitude: float) -> Mesh:
     rings = [arc * [1.0, radius, radius] for radius in (0.035, CHORD - 0.004)]
     k = np.arange(16)
     return Mesh(np.concatenate(rings), triangles(k, k + 1, k + 17, k + 1, k + 18, k + 17))
+
+
+def duct() -> Mesh:
+    """A ring around x' and a hub along it."""
+    turn = np.linspace(0.0, 2.0 * np.pi, 33)
+    circle = RADIUS * np.stack([np.zeros(33), np.cos(turn), np.sin(turn)], axis=-1)
+    spoke = np.array([[0.0, -RADIUS, 0.0], [0.0, RADIUS, 0.0]])
+    ring = tube(circle, WALL, 12, across=np.array([1.0, 0.0, 0.0]))
+    return joined(ring, tube(HUB, 0.011, 14), tube(spoke, 0.004, 8))
+
+
+def pod() -> Mesh:
+    """The same around y', for a thruster that turns about x'."""
+    mesh = duct()
+    return Mesh(mesh.vertices[:, [2, 0, 1]], mesh.faces)
