@@ -8,23 +8,21 @@ import time
 import viser
 
 from finlab.layout import Layout
+from webapp.panels.frame import View
 from webapp.session import Display, Session
 from webapp.session.store import SessionStore
 from webapp.tasks.background import Workers
 from webapp.tasks.solver import Solver
-from webapp.view import View
 from webapp.viser_internals import disable_sharing, enter, stored
 
 FRAME_S = 1 / 25
 """Time between two poses of robots that swim [s]."""
 STORAGE_KEY = "finlab-sessions"
-"""Where a browser keeps the keys of its sessions."""
 PATIENCE_S = (0.5, 1.0, 1.5, 2.0, 4.0, 8.0, 16.0, 30.0, 30.0)
 """How long a page may take to say which sessions it knows [s], try by try."""
 PRESENT_S = (1.0, 1.0)
 """The same for a page whose work another one asks for: it may be gone without a word."""
 MAX_KEYS = 8
-"""Sessions that one browser remembers."""
 
 
 class App:
@@ -51,7 +49,6 @@ class App:
         self._workers.readers.warm()
         self._store = SessionStore(lambda: Session(layout, display))
         self.views: dict[int, View] = {}
-        """The pages that are open, by client."""
         self._keys: dict[int, str] = {}
         self._loop = server.get_event_loop()
         server.scene.world_axes.visible = False

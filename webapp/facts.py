@@ -38,7 +38,6 @@ class Facts(NamedTuple):
     policy: str
     saved: Layout
     undo: str | None
-    """Name of the step that can be taken back."""
     redo: str | None
     selected: str | None
     selection: tuple[str, ...]
@@ -51,15 +50,12 @@ class Facts(NamedTuple):
     stop: Stop | None
     solved: bool
     dragged: int | None
-    """Place of the fin in the user's hand."""
 
     best: Allocation | None
     """The newest answer; it may be older than the state."""
     shown: Allocation | None
-    """What is on the robot: that, or another of its modes."""
     in_reach: bool
     busy: bool
-    """Whether the present state has no answer yet."""
     error: str | None
     modes: Modes
     mode: int
@@ -68,11 +64,9 @@ class Facts(NamedTuple):
     ranges: Ranges | None
     ranges_error: str | None
     found: Findings | None
-    """What the layout can do."""
     finding: bool
     found_error: str | None
     run: Run
-    """The comparison of methods."""
     better: Improvement | None
     progress: Progress | None
     improving: bool
@@ -89,9 +83,7 @@ class Facts(NamedTuple):
     """The robot in the view: the one that swims, or the one that is designed."""
     paused: bool
     pace: str
-    """At what pace it swims, in words."""
     scale: Scale
-    """What arrows and rings stand for."""
 
 
 def facts_of(session: Session, jobs: Jobs, dragged: int | None, scale: Scale, before: Facts | None) -> Facts:

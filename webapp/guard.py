@@ -50,7 +50,6 @@ class Admission:
     status: HTTPStatus
     text: str
     headers: dict[str, str] = field(default_factory=dict)
-    """Headers of the answer."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +57,6 @@ class Guard:
     """The rules of one server."""
 
     host: str
-    """Address it listens on."""
     token: str | None = None
     """Secret that every browser must know; None where only this machine can connect."""
 

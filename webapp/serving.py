@@ -15,7 +15,6 @@ from webapp.tasks.solver import Solver
 from webapp.viser_internals import start_server, stop_server
 
 FIRST_LAYOUT = "ucat"
-"""The shipped layout that a new session opens."""
 
 
 def serve(

@@ -13,7 +13,6 @@ SKY: Rgb = (86, 180, 233)
 YELLOW: Rgb = (240, 228, 66)
 
 BRAND: Rgb = (0, 92, 144)
-"""Buttons and sliders."""
 ASKED = BLUE
 """The target wrench, wherever it is drawn."""
 DELIVERED = GREEN
@@ -21,13 +20,11 @@ DELIVERED = GREEN
 MISSING = VERMILLION
 """What is left undone, and every warning."""
 WATER = SKY
-"""How the water flows."""
 NEARLY: Rgb = (150, 112, 0)
 """What could be had but is only nearly given."""
 UNLEARNED: Rgb = (112, 92, 168)
 """What a method has not learned."""
 DEAD: Rgb = (150, 154, 158)
-"""A failed fin."""
 
 FIN_COLORS: tuple[Rgb, ...] = (
     YELLOW,
@@ -52,7 +49,6 @@ MODE_COLORS: tuple[Rgb, ...] = (
     (74, 152, 206),
     (158, 92, 178),
 )
-"""One colour per mode, in order."""
 
 HALF_TURN = math.pi
 """Angle of the torque ring that the legend speaks of [rad]."""

@@ -11,7 +11,6 @@ from viser import _messages
 from webapp.viser_internals import uuid_of
 
 MOST_AT_ONCE = 4
-"""Files that one page may send at the same time."""
 MOST_IN_ALL = 200_000_000
 """Bytes that all pages together have on the way; of more, the file that has waited longest is dropped."""
 SILENCE_S = 30.0
@@ -25,21 +24,16 @@ class Upload:
     """One file on its way."""
 
     owner: "Uploads"
-    """The page that it comes from."""
     key: str
     """What the page calls it."""
     button: str
     """What the page calls the button that it was chosen with."""
     name: str
-    """The file's name."""
     size: int
     """Bytes that it has, as announced."""
     parts: int
-    """In how many parts it comes."""
     content: bytearray = field(default_factory=bytearray)
-    """What has come."""
     came: int = 0
-    """How many parts have come."""
     timer: asyncio.TimerHandle | None = None
     """Ends it when nothing comes any more."""
 

@@ -36,9 +36,8 @@ from finlab.sim.task import make_trajectory
 from tests.fit.cell import columns_of, commands, measured, soft, write
 from tests.fit.robot.swims import write_csv as write_swim
 from webapp.scene.meshes.mesh_hull import MeshHull
-from webapp.session.design_links import packed as design
-from webapp.session.design_links import unpacked
-from webapp.session.files import read_layout
+from webapp.session.files import packed as design
+from webapp.session.files import read_layout, unpacked
 
 ROOT = Path(__file__).parents[2]
 PAIR = load_layout("pair")

@@ -20,8 +20,16 @@ from finlab.physics import make_law
 from tests.webapp.loops import ReadAtOnce
 from webapp.session import Session
 from webapp.session.companions import stored_table
-from webapp.session.design_links import ARCHIVE, FRAGMENT, MAX_LINK, PLAIN, packed, unpacked
-from webapp.session.files import stored_hull, table_folder
+from webapp.session.files import (
+    ARCHIVE,
+    FRAGMENT,
+    MAX_LINK,
+    PLAIN,
+    packed,
+    stored_hull,
+    table_folder,
+    unpacked,
+)
 from webapp.tasks.designs import Designs
 
 

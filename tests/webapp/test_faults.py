@@ -19,11 +19,11 @@ from finlab.errors import FinlabError
 from finlab.layout import load_layout
 from tests.webapp.silent_client import SilentClient
 from tests.webapp.stand_in import load_stand_in
+from webapp.panels.frame import View
 from webapp.session import Display, Session
 from webapp.session.looking import DRAWERS
 from webapp.tasks.background import Workers
 from webapp.tasks.solver import Solver
-from webapp.view import View
 from webapp.viser_internals import start_server, stop_server
 
 BEFORE, OPENED, AFTER = (load_layout(shipped_layouts()[name]) for name in ("A", "B", "ucat"))

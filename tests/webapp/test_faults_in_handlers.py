@@ -12,12 +12,12 @@ from finlab.layout import load_layout
 from tests.webapp.silent_client import SilentClient
 from tests.webapp.test_app import app, on_loop, server, until, view
 from webapp.app import App
+from webapp.panels.frame import View
 from webapp.session import Session
 from webapp.tasks.designs import Exports
 from webapp.tasks.fitting import Fitting
 from webapp.tasks.improving import Improver
 from webapp.tasks.swimming import Swimming
-from webapp.view import View
 
 __all__ = ["app", "server", "view"]
 

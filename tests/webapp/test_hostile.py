@@ -9,7 +9,7 @@ import pytest
 import viser
 
 from tests.webapp.test_app import app, on_loop, server, until, view
-from webapp.view import View
+from webapp.panels.frame import View
 
 __all__ = ["app", "server", "view"]
 

@@ -10,8 +10,8 @@ from finlab.layout import load_layout
 from tests.webapp.test_app import app, on_loop, server, until, view
 from webapp.handles import put
 from webapp.markup.html import html
+from webapp.panels.frame import View
 from webapp.session.looking import DRAWERS
-from webapp.view import View
 
 __all__ = ["app", "server", "view"]
 

@@ -12,11 +12,11 @@ import viser
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
 from tests.webapp.test_app import app, on_loop, server, until, view
-from webapp.session.design_links import packed
+from webapp.panels.frame import View
+from webapp.session.files import packed
 from webapp.tasks import readers as readers_module
 from webapp.tasks import reading
 from webapp.tasks.readers import Readers
-from webapp.view import View
 
 __all__ = ["app", "server", "view"]
 

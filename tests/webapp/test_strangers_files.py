@@ -19,10 +19,10 @@ from finlab.files.plain_values import yaml_text
 from finlab.layout import FinModelSpec, layout_to_dict, load_layout
 from finlab.physics import make_law
 from tests.webapp.test_app import app, on_loop, server, until, view
+from webapp.panels.frame import View
 from webapp.scene.meshes.hull import hull_of
 from webapp.scene.meshes.mesh_hull import MeshHull
 from webapp.session import files
-from webapp.view import View
 
 __all__ = ["app", "server", "view"]
 

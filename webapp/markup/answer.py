@@ -26,7 +26,6 @@ PLAIN_HEADER = Markup(
     "<tr><th>{}</th><th colspan='3'>actuator</th><th>force [N]</th>"
     "<th title='share of the full thrust'>load</th></tr>"
 )
-"""Of a robot without fins."""
 
 
 def wrench_bars(asked: ArrayLike, given: ArrayLike | None) -> str:

@@ -11,7 +11,6 @@ from webapp.markup.words import three_digits
 from webapp.tasks.fitting import Fitted
 
 MOST_NAMED = 8
-"""Samples left out that are named one by one."""
 
 
 def fit_card(found: Fitted) -> str:

@@ -6,7 +6,6 @@ import numpy as np
 from markupsafe import Markup
 
 SAFE = (Markup, int, float, np.float64)
-"""What is put in as it is, with its format."""
 ESCAPES = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;", "'": "&#39;", '"': "&#34;"})
 
 

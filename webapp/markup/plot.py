@@ -15,7 +15,6 @@ WIDTH = 388
 RIGHT, TOP, BOTTOM = 8, 24, 34
 """Margins of a plot [px]."""
 MOST_TICKS = 6
-"""Steps between ticks at most."""
 EXACT = 1e-6
 """Error below which all answers are drawn as equally exact."""
 Point = tuple[float, float]
@@ -26,13 +25,9 @@ class Axis(NamedTuple):
     """One axis of a plot."""
 
     word: str
-    """What it measures."""
     low: float
-    """Its value at the lower end."""
     high: float
-    """At the upper end."""
     ticks: tuple[tuple[float, str], ...]
-    """Values with a line, and their labels."""
 
     def share(self, value: Any) -> Any:
         """How far along it a value lies, or each of an array, 0 to 1."""

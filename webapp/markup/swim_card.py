@@ -15,7 +15,6 @@ FIGURES = (
     "over the last second",
     "energy so far",
 )
-"""What a swim comes to, in words."""
 
 
 def pace_words(swimming: Swimming) -> str:

@@ -34,7 +34,6 @@ class Verdict(Enum):
     """One of four, each with a word and a colour."""
 
     EXACT = "Exact"
-    """The robot gives what is asked."""
     APPROXIMATE = "Approximate"
     """They could, but this answer does not."""
     UNLEARNED = "Not learned"

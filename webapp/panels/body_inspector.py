@@ -19,7 +19,6 @@ KNOWN = {
     "linear_damping": "linear damping",
     "quadratic_damping": "quadratic damping",
 }
-"""What a swim wants to know, and what it is called."""
 FORMULAS = (
     "Mass: of the water that the hull displaces. Inertia: one density. Added mass: the ellipsoid of its "
     "volume and proportions, after Lamb (1932). Damping: pressure after Hoerner (1965), about axes by "

@@ -27,10 +27,8 @@ DRIVE = {
     "frequency_rate": ("Frequency rate [Hz/s]", "How fast the asked frequency changes at most."),
     "direction_rate": ("Direction rate [rad/s]", "How fast the asked zero direction changes at most."),
 }
-"""Fields of `Servo`: labels and hints."""
 LIMITS = Markup("<div class='fl dim'>Least and most of A, f and the zero direction φ.</div>")
 NOMINAL = Fin("nominal", (0.0, 0.0, 0.0), 0.0)
-"""What stands in the boxes while no fin is selected."""
 
 
 def fin_of(selected: str | None, layout: Layout) -> Fin:

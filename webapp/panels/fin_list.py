@@ -22,9 +22,7 @@ HULL = Markup(
     "<svg class='hull' width='18' height='18' viewBox='0 0 18 18'>"
     "<ellipse cx='9' cy='9' rx='7.5' ry='4.5'/></svg>"
 )
-"""A small picture of a hull."""
 RING_SIZES = (2, 3, 4, 5, 6, 8)
-"""How many fins can stand around the vertical axis."""
 
 
 def add_fin_list(page: Page) -> None:

@@ -30,15 +30,12 @@ LAWS = {
     "lighthill": "a fin after Lighthill's elongated-body theory",
     "soft": "a soft fin that saturates, then declines",
 }
-"""Fin models with a formula, in words."""
 HEIGHT = 150
 """Height of the plot [px]."""
 SHARES, COLORS = (1.0, 2 / 3, 1 / 3), (ORANGE, GREEN, BLUE)
 """Of the largest amplitude, and the colours of their curves."""
 POINTS = 41
-"""Frequencies of a curve."""
 CSV = ".csv,.txt"
-"""How the names of files of measurements end."""
 
 
 def add_fin_model(page: Page, fin_of: Callable[[str | None, Layout], Fin]) -> None:

@@ -12,6 +12,7 @@ from importlib.resources import files
 from markupsafe import Markup
 
 from finlab.layout import Layout
+from webapp.commands import commands, register
 from webapp.handles import add_html, put
 from webapp.markup.html import html, marker
 from webapp.markup.words import fins_only
@@ -37,13 +38,9 @@ STYLE = html(
     _VARIABLES,
     (Markup(files("webapp.markup").joinpath(name).read_text("utf-8")) for name in SHEETS),
 )
-"""A style element, to be put into the page once."""
 LOW = ":root { --tall: calc(var(--z) * 92px); }"
-"""Height of a drawer in which nothing but a sentence stands."""
 TALL = ":root { --fl-usual: 344px; }"
-"""Usual height of a drawer with two rows of plots."""
 FOLDER = ".mantine-Paper-root[data-fl~={}]"
-"""Selector of the folder of a region or section."""
 
 
 class Section:
@@ -195,3 +192,13 @@ def _strip(desk: Desk) -> str:
         "▴" if folded else "▾",
     )
     return html("<nav class='fl-strip' aria-label='Drawer'>{}{}</nav>", tabs, fold)
+
+
+class View(Page):
+    """Panels and scene of one client around its session."""
+
+    def _build(self) -> None:
+        self.gui.main_panel.dock_right()
+        self.gui.set_panel_label("finlab")
+        register(self.gui, self, commands(self))
+        self.frame = Frame(self)

@@ -25,9 +25,7 @@ from webapp.session.layout_edits import center_of_gravity, with_hull
 from webapp.session.state import chosen
 
 MESH = "mesh file"
-"""Entry of the list of shapes while the hull comes from a file."""
 MESHES = ",".join(MESH_SUFFIXES)
-"""How the names of files of hulls end."""
 
 
 def add_hull(page: Page) -> None:

@@ -23,17 +23,12 @@ ORIGINS = {
     "paper": "The paper's network draws candidates; the best are refined by Adam on a learned surrogate, "
     "which leaves an error.",
 }
-"""Where the answer and its modes come from, by method."""
 ONE = "Method {} has one answer, number 1. The others are a network's, for least effort, each made exact."
-"""What is said of a method without candidates."""
 BEYOND = (
     "Method {} has one answer. Where the wrench is not delivered whole, the network is not asked beside it."
 )
-"""The same where there is nothing to compare."""
 UNKNOWN = "The network knows fins alone, so it proposes nothing for this robot."
-"""What is said of a robot with other actuators."""
 DRAWN = {"n_candidates": 64.0, "temperature": 0.02, "gamma": 0.01}
-"""What the widgets of drawing show at first."""
 DRAWS = (
     ("n_candidates", "Candidates K", (4, 256), 1.0, 0, "Draws from the mixture."),
     ("temperature", "Temperature T", (0.0, 2.0), 0.01, 4, "How far draws stray from the mixture's means."),

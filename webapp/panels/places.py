@@ -31,14 +31,11 @@ class Place(NamedTuple):
     """Where a panel stands."""
 
     region: str
-    """One of `REGIONS`."""
     tasks: tuple[str, ...]
-    """In which tasks it is there."""
     title: str
     """Its heading; in the drawer the name of its tab, which `DRAWERS` knows; nothing in the bar."""
     make: Callable[[Page], object]
     folded: bool = False
-    """Whether only its heading is seen at first."""
     about: str = ""
     """What must be selected for it to be there: `fins`, or none of them (`robot`); `guide` where a tour or a
     lesson must be under way; nothing where it is there always."""
@@ -76,4 +73,3 @@ PLACES = (
     Place(VIEW, TASKS, "Camera", partial(card, camera)),
     Place(VIEW, TASKS, "Display", add_switches, folded=True),
 )
-"""All panels, in the order in which they stand in their regions."""

@@ -24,7 +24,6 @@ from webapp.theme import ASKED, DEAD, DELIVERED, HALF_TURN, WATER, css
 LONG = 24
 """Characters of a verdict above which it takes a line of its own in a small view."""
 ARROWS = (("asked", 0.65), ("delivered", 1.0), ("missing", 1.0))
-"""Words and opacities of the three arrows."""
 
 
 def add_corner(page: Page) -> None:

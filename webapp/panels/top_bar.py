@@ -9,13 +9,12 @@ from webapp.handles import add_html
 from webapp.markup.html import html, marker
 from webapp.page import Page
 from webapp.presses import press
-from webapp.session.design_links import MAX_LINK
+from webapp.session.files import MAX_LINK
 from webapp.session.lessons import LESSONS, TOUR
 from webapp.session.state import LEAST, least_of
 from webapp.tasks.designs import KINDS
 
 DESIGNS = ".yaml,.yml,.json,.zip"
-"""How the names of files of designs end."""
 METHOD_WORDS = {
     "dual": "least watts, any actuator",
     "mdn": "least effort, a network proposes",
@@ -27,7 +26,6 @@ METHOD_WORDS = {
     "analytic": "the pseudo-inverse",
     "ipopt": "a general solver, slow",
 }
-"""Methods in a few words each."""
 PALETTE = (
     "document.documentElement.dispatchEvent(new KeyboardEvent('keydown', "
     "{ key: 'k', code: 'KeyK', ctrlKey: true, bubbles: true }))"

@@ -17,11 +17,10 @@ from webapp.handles import put
 from webapp.scene.meshes import fin as fin_mesh
 from webapp.scene.meshes.hull import AnyHull
 from webapp.scene.meshes.mesh import NOTHING, Mesh, force_arrow, tube
-from webapp.scene.shape import Shape
+from webapp.scene.stage import Shape
 from webapp.theme import DEAD, LIGHT, fin_color
 
 LABEL = 0.85
-"""Size of a fin's number."""
 GIZMO_SIZE = 0.24
 RING_SIZE = 0.20
 HELD: tuple[Any, ...] = (None, "cmd/ctrl", "shift")
@@ -129,7 +128,6 @@ class FinNode:
         self._move = add_gizmo(scene, name, GIZMO_SIZE, dragged, **arrows)
         self._turn = add_gizmo(scene, f"{name}/turn", RING_SIZE, dragged, **ring)
         self.shapes = fin = FinShapes(scene, f"{name}/turn", index, cast_shadow=False)
-        """Its blade, shaft and force."""
         fan = fin_mesh.sweep(0.1)
         self._fan = Shape(
             scene, f"{name}/turn/fan", fin.color, fan, opacity=0.3, side="double", cast_shadow=False

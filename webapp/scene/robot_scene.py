@@ -19,8 +19,7 @@ from webapp.scene.fin_node import FinNode, motion
 from webapp.scene.meshes import fin as fin_mesh
 from webapp.scene.meshes.hull import has_inside, hull_of
 from webapp.scene.meshes.mesh import Mesh, joined
-from webapp.scene.shape import Shape
-from webapp.scene.stage import Stage, aim_camera
+from webapp.scene.stage import Shape, Stage, aim_camera
 from webapp.scene.wrench_nodes import LENGTH, AttainableNodes, Scale, WrenchNodes
 from webapp.session.display import Display
 from webapp.session.state import can_be_edited, chosen
@@ -40,7 +39,6 @@ CAMERAS = {
 }
 """Where the camera stands in each view [m]."""
 SPEED = 0.5
-"""Time of the flapping per real time."""
 SWIM = Scale(1.0, 1.0, False)
 """What arrows stand for while the robot swims: one scale, so that they compare."""
 FORCES_ONLY = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
@@ -60,7 +58,6 @@ class RobotScene:
         self._attainable = AttainableNodes(scene)
         self._fins: list[FinNode] = []
         self.dragged: int | None = None
-        """Place of the fin in the user's hand."""
         self._moves: list[list[float] | None] = []
         self._flaps = ""
         for act in (

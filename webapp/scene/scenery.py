@@ -18,7 +18,6 @@ from webapp.tasks.swimming import Swimming
 from webapp.theme import BRAND
 
 FIRST = Scale(1.0, 1.0, False)
-"""What arrows and rings stand for before anything is shown."""
 
 
 class Scenery:

@@ -8,8 +8,7 @@ import viser
 from finlab.arrays import Array
 from webapp.handles import put
 from webapp.scene.meshes.mesh import NOTHING, Mesh, force_arrow, joined, tube
-from webapp.scene.shape import Shape
-from webapp.scene.stage import add_floor, aim_camera, paint_floor
+from webapp.scene.stage import Shape, add_floor, aim_camera, paint_floor
 from webapp.session.display import Display
 from webapp.tasks.moment import PLACE, Moment
 from webapp.tasks.swimmer import Swimmer
@@ -24,7 +23,6 @@ DEPTH_BELOW = 0.6
 """How far the floor is below the deepest point of the way [m]."""
 NO_LINE = np.zeros((1, 2, 3), dtype=np.float32)
 TRAIL_POINTS = 250
-"""Most pieces of a trail."""
 
 
 class SwimScene:

@@ -22,7 +22,7 @@ from webapp.scene.meshes.mesh import (
     torque_ring,
     tube,
 )
-from webapp.scene.shape import Shape
+from webapp.scene.stage import Shape
 from webapp.tasks.analyst import Findings
 from webapp.theme import ASKED, DEAD, DELIVERED, HALF_TURN, LIGHT, MISSING
 

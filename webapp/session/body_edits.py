@@ -25,9 +25,7 @@ DYNAMICS = (
     "center_of_buoyancy_m",
     "buoyancy_n",
 )
-"""Fields of `Body` that a simulation takes."""
 DIGITS = 4
-"""Significant digits of an estimate."""
 
 
 def with_dynamics(layout: Layout, **values: Any) -> Layout:

@@ -29,7 +29,6 @@ from finlab.whole_file import make_folder, write_whole
 from webapp.scene.meshes.mesh_file import MAX_FACES, read_mesh, simplified, stl_of
 
 LAYOUTS = (".yaml", ".yml", ".json")
-"""How the layout's file in an archive may end."""
 TABLE_FOLDER, HULL_FOLDER = "tables", "hulls"
 """Where files are kept, inside the app's own folder."""
 

@@ -17,7 +17,6 @@ Snapshot = TypeVar("Snapshot")
 MERGE_WINDOW_S = 1.0
 """Changes of the same kind that follow each other faster than this are one step of undo."""
 MAX_STEPS = 200
-"""Steps that are kept."""
 
 
 class History(Generic[Snapshot]):
@@ -102,14 +101,11 @@ class Core:
         self.history: History[State] = History(self._first)
         self.display = display or Display()
         self._chosen: tuple[str, ...] = ()
-        """The selected fins, in the order in which they were chosen."""
         self._names = layout.names
         self.saved = layout
         """The layout as it was opened or saved last."""
         self.draft = SearchRequest()
-        """What a search for a better layout is to do."""
         self.swim = SwimSettings()
-        """How the robot is to swim."""
         self.mesh_unit = "m"
         """What 1 means in the next mesh file of a hull: key of `UNITS`."""
         self.mode = 0

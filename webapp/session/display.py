@@ -20,7 +20,6 @@ class Display:
     shadows: bool = True
     """Cast shadows; slow without a graphics card."""
     dark: bool = False
-    """Dark theme."""
     drawn: str = "none"
     """Key of `DRAWN`: the attainable set that is shown."""
 

@@ -11,9 +11,7 @@ from finlab.layout.fin import FIN_MODELS
 from webapp.session.state import chosen
 
 QUANTITIES = ("amplitude", "frequency", "zero_direction")
-"""What of a fin is commanded, as fields of `Limits`."""
 FORMULAS = tuple(name for name, parameters in FIN_MODELS.items() if parameters)
-"""Models that need no file."""
 
 
 def words(key: str) -> str:

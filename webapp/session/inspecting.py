@@ -9,7 +9,6 @@ from webapp.session.editing import Editing, Vector
 from webapp.session.links import followed, partner
 
 UNITS = ("kg", "kgm2", "m", "n")
-"""How keys of a body end."""
 
 
 class Inspecting(Editing):

@@ -19,11 +19,9 @@ class Seen(NamedTuple):
     """What a check is given."""
 
     state: State
-    """The question."""
     answer: Allocation
     """What is on the robot."""
     mode: int
-    """Which of the answer's modes that is."""
 
     @property
     def delivered(self) -> bool:
@@ -39,21 +37,17 @@ class Stop:
     title: str
     text: str
     layout: str
-    """Shipped layout."""
     target: tuple[float, float, float, float, float, float]
     """Wrench that is asked for [N, N m]."""
     failed: tuple[str, ...] = ()
     mode: int = 0
-    """Which mode is shown."""
     method: str = "dual"
     swims: bool = False
     drawer: str = "Candidates"
     """What lies uppermost in the drawer; its task is open."""
     exercise: str = ""
     praise: str = ""
-    """What has been shown once it is done."""
     done: Callable[[Seen], bool] = lambda seen: False
-    """Whether the exercise is done."""
 
     def state(self, now: State) -> State:
         """The prepared state, with nothing left of the present one but its numbers for drawing."""
@@ -125,7 +119,6 @@ TOUR = (
         (1.2, 0.0, 4.0, 0.0, 0.0, 0.25),
     ),
 )
-"""The tour for a class."""
 
 
 LESSONS = (
@@ -205,4 +198,3 @@ LESSONS = (
         done=lambda seen: seen.state.method == "paper" and seen.answer.method == "paper",
     ),
 )
-"""Lessons, in the order of a course."""

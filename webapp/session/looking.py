@@ -8,14 +8,12 @@ from webapp.session.search_request import SearchRequest
 from webapp.session.state import chosen
 
 TASKS = ("Design", "Allocate", "Simulate", "Export")
-"""What a page can be used for."""
 DRAWERS: dict[str, tuple[str, ...]] = {
     "Design": ("Reach", "Improve"),
     "Allocate": ("Candidates", "Comparison"),
     "Simulate": ("Swim over time",),
     "Export": (),
 }
-"""What lies in the drawer of each task."""
 
 
 @dataclass(frozen=True)
@@ -23,7 +21,6 @@ class Desk:
     """Which task is open, and what lies in the drawers."""
 
     task: str = "Allocate"
-    """One of `TASKS`."""
     drawers: tuple[tuple[str, str], ...] = ()
     """Tasks, and what was chosen to lie uppermost in their drawers."""
     folded: bool = False
@@ -39,7 +36,6 @@ class Looking(Core):
     """Tasks, modes and switches."""
 
     desk = Desk()
-    """Which task is open, and what lies in the drawers."""
 
     @property
     def task(self) -> str:

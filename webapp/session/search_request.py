@@ -27,9 +27,7 @@ class SearchRequest:
     """What the user has asked for so far; it may name fins that are gone by now."""
 
     goal: str = next(iter(GOAL_WORDS))
-    """Key of `GOAL_WORDS`."""
     held: tuple[str, ...] = ()
-    """Fins that may not move."""
     way: Way = WAY
     """How far fins may go along x, y, z [m] and turn [deg]."""
 

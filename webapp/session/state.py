@@ -15,9 +15,7 @@ from finlab.paper.settings import PaperSettings
 from webapp.session.links import Links, kept, linked
 
 AXIS_WORDS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
-"""What a pilot calls them."""
 AXIS_UNITS = ("N", "N", "N", "N m", "N m", "N m")
-"""Their units."""
 
 MAX_TARGET = 1000.0
 """Largest target component that the page may ask for [N, N m]."""
@@ -28,7 +26,6 @@ COMPARED = ("dual", "mdn", "paper", "analytic", "qp", "sqp")
 LEAST = {"watts": "dual", "effort": "mdn"}
 """What answers may keep least, and the method that does it best."""
 CHOICES: dict[str, tuple[str, ...]] = {"method": tuple(METHODS), "policy": KINDS}
-"""Settings that are one of some words."""
 NUMBERS = ("n_candidates", "temperature", "gamma")
 """Settings that are numbers, which the methods check. None stands for the method's own value."""
 DRAWING: dict[str, MdnSettings | PaperSettings] = {"mdn": MdnSettings(), "paper": PaperSettings()}
@@ -43,7 +40,6 @@ class State:
 
     layout: Layout
     failed: tuple[str, ...] = ()
-    """Names of failed fins, in the order of the layout."""
     weak: tuple[tuple[str, float], ...] = ()
     """Weak fins: name, and the share that is left of the largest amplitude and frequency."""
     stuck: tuple[tuple[str, float], ...] = ()
@@ -57,11 +53,8 @@ class State:
     gamma: float | None = None
     """Weight of the effort in the ranking."""
     method: str = "dual"
-    """Name of the allocation method."""
     policy: str = "closest"
-    """What to do about a wrench that is out of reach: one of `KINDS`."""
     links: Links = ()
-    """Mirror pairs of fins that move together."""
 
     @property
     def healthy(self) -> tuple[str, ...]:

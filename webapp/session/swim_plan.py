@@ -36,7 +36,6 @@ SCENARIOS: dict[str, HardDay] = {
     for day in (*HARD_DAYS, LOST_IN_CURRENT)
     if not day.mixed_fins and day.layouts in (PAPER_LAYOUTS, TWO, PAPER_LAYOUTS[:1])
 }
-"""Scenarios by name."""
 SPEEDS = (0.1, 8.0)
 """Simulated time per time on the wall that may be asked for."""
 CHOICES: dict[str, tuple[str, ...]] = {
@@ -44,7 +43,6 @@ CHOICES: dict[str, tuple[str, ...]] = {
     "method": COMPARED,
     "plant": tuple(PLANTS),
 }
-"""Settings that are one of some words."""
 
 
 @dataclass(frozen=True)
@@ -52,13 +50,9 @@ class SwimSettings:
     """What a session remembers of its swims; not part of undo."""
 
     scenario: str = "nominal"
-    """Name of one of `SCENARIOS`; to choose it sets path and fin forces."""
     path: str = "lissajous"
-    """Name of a shipped trajectory."""
     method: str = COMPARED[0]
-    """Who allocates."""
     plant: str = next(iter(PLANTS))
-    """How the fins' forces are simulated: one of `PLANTS`."""
     speed: float = 1.0
     """Simulated time per time on the wall."""
     announced: bool = True
@@ -130,28 +124,19 @@ class Plan(NamedTuple):
     """One swim."""
 
     layout: Layout
-    """The robot as all believe it to be."""
     failed: tuple[str, ...]
     """Fins that are lost from the start, announced from the start."""
     path: Trajectory
-    """Where to swim."""
     method: str
-    """Allocation method."""
     plant: str = "mean"
-    """How the fins' forces are simulated: one of `PLANTS`."""
     scenario: str = "nominal"
-    """What it is called."""
     water: Water = Still()
-    """How it moves."""
     truth: Mapping[str, Any] = MappingProxyType({})
     """What the body really is: options of `finlab.sim.perturbed`."""
     sensors: SensorSettings = SensorSettings()
-    """Noise, bias and delay."""
     weak: tuple[str, ...] = ()
     """Fins that are weak, unannounced."""
     share: float = 1.0
     """Of their thrust that these give."""
     losses: tuple[FinFault, ...] = ()
-    """What becomes of fins on the way."""
     announced: bool = True
-    """Whether that is announced to the allocator."""

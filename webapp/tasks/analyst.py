@@ -19,9 +19,7 @@ class Question:
     layout: Layout
     failed: tuple[str, ...]
     beside: Layout
-    """The layout to compare with."""
     drawn: str
-    """Key of `DRAWN`."""
 
 
 @dataclass(frozen=True)

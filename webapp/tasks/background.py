@@ -156,13 +156,11 @@ class Newest(Generic[Question, Found]):
         self._timer: asyncio.TimerHandle | None = None
         self._round = object()
         self.question: Question | None = None
-        """What was asked last."""
         self.answered: Question | None = None
         """The question that findings and error belong to; it may be an earlier one."""
         self.findings: Found | None = None
         """What came of it; None where nothing did."""
         self.error: str | None = None
-        """Why nothing came of it."""
 
     @property
     def busy(self) -> bool:

@@ -13,7 +13,6 @@ TRIES = 3
 on a busy machine any may have to wait."""
 
 Answer = Allocation | str
-"""An answer, or why there is none."""
 
 
 class Run(NamedTuple):
@@ -22,7 +21,6 @@ class Run(NamedTuple):
     state: State | None = None
     """The question, None before the first run."""
     answers: tuple[tuple[str, Answer], ...] = ()
-    """Answers so far, by method."""
 
     @property
     def running(self) -> bool:
@@ -39,7 +37,6 @@ class Comparison:
         # One question per method: those of this and other pages are answered in between.
         self._asked = Newest(context.loop, context.workers.answers, self._quickest, self._take)
         self.run = Run()
-        """The last one."""
 
     def start(self, state: State) -> None:
         """Ask all methods about a state; a run that is still going on is given up."""

@@ -19,11 +19,9 @@ class Context:
     session: Session
     solver: Solver
     workers: Workers
-    """On whose threads all is computed."""
     loop: EventLoop
     reading: Reading
     do: Callable[[Callable[[], object]], None]
-    """Carries out an intent of the user."""
     changed: Callable[[], None]
     """Renders the page; called on the loop when there is something new to show."""
     notify: Callable[[str, str], None]

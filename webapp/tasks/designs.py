@@ -14,17 +14,14 @@ from webapp.presses import Presses
 from webapp.scene.meshes.hull import hull_of
 from webapp.session import files
 from webapp.session.companions import Opened
-from webapp.session.design_links import FRAGMENT, packed, unpacked
-from webapp.session.files import file_stem
+from webapp.session.files import FRAGMENT, file_stem, packed, unpacked
 from webapp.tasks.context import Context
 from webapp.tasks.swimming import Swimming
 from webapp.viser_internals import run_file, run_script
 
 KINDS = "a design (YAML, JSON, ZIP), measurements of a fin (CSV), or a hull (STL, OBJ, GLB, PLY)"
-"""What is opened, in words."""
 
 Take = Callable[[str, bytes], object]
-"""Opens a file, from its name and its content."""
 
 
 class Exports:

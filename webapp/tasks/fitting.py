@@ -30,7 +30,6 @@ class Upload:
 
     fin: str
     model: FinModelSpec
-    """The fin's model before."""
     name: str
     content: bytes
 
@@ -56,7 +55,6 @@ class Fitting(Newest[Upload, Fitted]):
         super().__init__(context.loop, context.workers.fits, self._fit, self._put_on)
         self._context = context
         self.progress = ""
-        """What is being done, in a few words."""
 
     def start(self, fin: str, name: str, content: bytes) -> None:
         """Begin with a file for a fin.

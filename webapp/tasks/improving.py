@@ -73,10 +73,8 @@ class Search:
     goal: str
     """What to raise, as `optimize_layout` calls it."""
     bounds: Mapping[str, Bounds]
-    """Where each fin that may move may go."""
     room: Room
     stop: threading.Event = field(default_factory=threading.Event)
-    """Ends it after the present round."""
 
 
 class Improver(Newest[Search, Improvement]):
@@ -86,7 +84,6 @@ class Improver(Newest[Search, Improvement]):
         """The page is rendered when there is progress."""
         super().__init__(context.loop, context.workers.searches, self._improve, context.changed)
         self.progress: Progress | None = None
-        """How far it is."""
 
     def start(self, layout: Layout, request: SearchRequest) -> None:
         """Search from a layout.

@@ -46,7 +46,6 @@ class Modes:
 
 
 NO_MODES = Modes((), 0)
-"""Of no answer."""
 
 
 def listed_modes(modes: tuple[Mode, ...], samples: Candidates | None) -> Modes:

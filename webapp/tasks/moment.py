@@ -64,7 +64,6 @@ class Moment(NamedTuple):
     doubted: tuple[str, ...]
     """Those that the monitor takes for broken in some way, more likely than not."""
     controllable: bool
-    """Whether the working fins hold surge, heave and yaw."""
     done: bool
     figures: Figures | None
     """What the swim has come to; None before the first step."""

@@ -28,7 +28,7 @@ def _context() -> Any:
     if "forkserver" not in multiprocessing.get_all_start_methods():
         return multiprocessing.get_context("spawn")
     context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(["webapp.session.design_links"])
+    context.set_forkserver_preload(["webapp.session.files"])
     return context
 
 
@@ -37,11 +37,9 @@ class Readers:
     """Threads that wait for the processes; all pages share them."""
 
     context: Any = field(default_factory=_context)
-    """How processes are started."""
     pool: ThreadPoolExecutor = field(
         default_factory=partial(ThreadPoolExecutor, MOST_AT_ONCE, "finlab-reader")
     )
-    """The threads."""
 
     def warm(self) -> None:
         """Let the imports be done before the first file comes."""

@@ -9,7 +9,6 @@ from webapp.tasks.background import EventLoop
 from webapp.tasks.readers import Readers
 
 MOST_WAITING = 4
-"""Files that one page may have read at the same time."""
 
 Found = TypeVar("Found")
 Read = Callable[[], Found]

@@ -32,7 +32,6 @@ class Swimmer:
         start = swim.log
         self._about = {f.name: getattr(start, f.name) for f in fields(RunLog) if f.name != "columns"}
         self.shown = self.moment()
-        """What the page shows now."""
 
     @property
     def about(self) -> str:

@@ -28,7 +28,6 @@ class Stretch:
     """Some steps of a swim."""
 
     n_steps: int
-    """How many are due."""
     swimmer: Swimmer
 
 
@@ -45,9 +44,7 @@ class Swimming:
         self.swimmer: Swimmer | None = None
         """The robot; None while it is being made."""
         self.running = False
-        """Whether the clock runs."""
         self.pace = Pace()
-        """At what speed it is to go, and goes."""
         self._acts: deque[Callable[[Swimmer], None]] = deque()
 
     @property

@@ -13,7 +13,6 @@ from finlab.layout.body import MESH_SUFFIXES
 from webapp.scene.meshes.mesh import Mesh
 
 MAX_BYTES = 20_000_000
-"""Largest mesh file that is read."""
 MAX_FACES = 60_000
 """Most triangles of a hull; more would make the page slow and show nothing new, so they are simplified."""
 SMALLEST, LARGEST = 0.02, 10.0
@@ -29,9 +28,7 @@ class MeshReport:
     triangles: int
     """How many it holds, mended."""
     is_watertight: bool
-    """Whether it is closed everywhere."""
     mended: tuple[str, ...]
-    """What was done to it, a clause each."""
 
 
 def read_mesh(name: str, content: bytes, scale: float) -> tuple[Mesh, MeshReport]:

@@ -15,7 +15,6 @@ from webapp.scene.meshes.mesh import NOTHING, Mesh
 from webapp.scene.meshes.mesh_file import MAX_BYTES, MeshReport, read_mesh, simplified
 
 COARSE_FACES = 400
-"""Triangles of a coarse hull."""
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "inch": 0.0254}
 """Metres per unit of a mesh file."""
 
@@ -65,13 +64,11 @@ class MeshHull:
     source: tuple[str, float, tuple[float, float, float]]
     """File, metres per unit, and centre."""
     surface: Triangles
-    """Its triangles in the body frame."""
     half: tuple[float, float, float]
     """Half length, width and height of the box around it [m]."""
     center: tuple[float, float, float]
     """Where the middle of that box lies in the body frame [m]."""
     report: MeshReport
-    """What was found in the file, and mended."""
     shape: str = "mesh"
     """Tells it from the parametric hulls."""
 
