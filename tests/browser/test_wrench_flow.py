@@ -72,9 +72,8 @@ def test_candidates_of_the_network_beside_either_answer(page: Any) -> None:
     page.until(lambda: page.text("table.modes tr.chosen").startswith("2"))
     page.page.locator("svg.plot:visible g.pick circle").last.click()  # the best one is drawn last
     page.until(lambda: session.mode == 0)
-    page.type("Candidates K", "24")
-    page.until(lambda: session.state.n_candidates == 24 and not page.view.busy)
-    assert len(answering.best.samples.effort) == 24
+    page.type("Temperature", "0.5")
+    page.until(lambda: session.state.temperature == 0.5 and not page.view.busy)
     page.until(lambda: page.page.locator("svg.plot:visible .samples circle").count() > 4)
     assert page.problems == []
 

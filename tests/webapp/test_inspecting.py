@@ -52,7 +52,6 @@ def test_what_changes_counts_for_all_selected_in_one_step(session: Session) -> N
     session.limit_selected("amplitude", (0.1, 0.5))
     session.choose_model("lighthill")
     session.set_parameter("width", 0.12)
-    session.set_servo("speed_limit", 9.0)
     session.turn_selected(math.radians(45))
     for name in FRONT:
         changed = fin(session, name)
@@ -88,8 +87,6 @@ def test_usual_values_are_not_written_and_shared_ones_stay(session: Session) -> 
         (lambda s: s.limit_selected("nothing", (0.0, 1.0)), "expected one of"),
         (lambda s: s.set_parameter("area", -0.1), "must lie within"),
         (lambda s: s.set_parameter("area", float("nan")), "must lie within"),
-        (lambda s: s.set_servo("amplitude_pole", 0.0), "must lie within"),
-        (lambda s: s.set_servo("__class__", 1.0), "expected one of"),
         (lambda s: s.place_selected((55.0, 0.0, 0.0)), "x of front_right"),
         (lambda s: s.rename_fin("front_right", "front_left"), "there is a fin 'front_left' already"),
         (lambda s: s.rename_fin("front_right", "  "), "name"),

@@ -9,7 +9,6 @@ from markupsafe import Markup
 
 from finlab.layout import Fin, Layout
 from finlab.layout.fin import MAX_AMPLITUDE, MAX_FREQUENCY
-from finlab.layout.servo import Servo
 from webapp.handles import add_html
 from webapp.markup.answer import swatch
 from webapp.markup.html import html
@@ -18,15 +17,6 @@ from webapp.page import Page
 from webapp.panels.fin_model import add_fin_model
 from webapp.session.state import number
 
-DRIVE = {
-    "amplitude_pole": ("Amplitude pole [rad/s]", "How the amplitude follows: half of the way after 1.7/p."),
-    "frequency_pole": ("Frequency pole [rad/s]", "The same of the frequency."),
-    "direction_pole": ("Direction pole [rad/s]", "The same of the zero direction."),
-    "speed_limit": ("Fastest turn [rad/s]", "Cuts the amplitude of fast flapping."),
-    "amplitude_rate": ("Amplitude rate [rad/s]", "How fast the asked amplitude changes at most."),
-    "frequency_rate": ("Frequency rate [Hz/s]", "How fast the asked frequency changes at most."),
-    "direction_rate": ("Direction rate [rad/s]", "How fast the asked zero direction changes at most."),
-}
 LIMITS = Markup("<div class='fl dim'>Least and most of A, f and the zero direction φ.</div>")
 NOMINAL = Fin("nominal", (0.0, 0.0, 0.0), 0.0)
 
@@ -65,16 +55,7 @@ def add_fin(page: Page) -> None:
         with gui.add_folder("Limits"):
             _add_limits(page)
         add_fin_model(page, fin_of)
-        with gui.add_folder("Drive", expand_by_default=False):
-            for key, (label, hint) in DRIVE.items():
-                usual = f"{hint} Usual: {getattr(Servo(), key):.4g}."
-                box = gui.add_number(label, 1.0, step=0.5, hint=usual)
-                page.bind_number(box, partial(session.set_servo, key), of_fin(partial(_drive, key)))
     page.board.show(whole, visible=lambda selected: selected is not None)
-
-
-def _drive(key: str, fin: Fin) -> float:
-    return float(getattr(fin.servo, key))
 
 
 def _add_limits(page: Page) -> None:

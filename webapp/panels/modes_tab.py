@@ -13,7 +13,7 @@ from webapp.markup.mode_plot import mode_plot
 from webapp.markup.words import error_digits, source_words, three_digits
 from webapp.page import Page
 from webapp.presses import press
-from webapp.session.state import State
+from webapp.session.state import DRAWING, State
 from webapp.tasks.mode_names import Modes
 from webapp.theme import css, mode_color
 
@@ -28,14 +28,6 @@ BEYOND = (
     "Method {} has one answer. Where the wrench is not delivered whole, the network is not asked beside it."
 )
 UNKNOWN = "The network knows fins alone, so it proposes nothing for this robot."
-DRAWN = {"n_candidates": 64.0, "temperature": 0.02, "gamma": 0.01}
-DRAWS = (
-    ("n_candidates", "Candidates K", (4, 256), 1.0, 0, "Draws from the mixture."),
-    ("temperature", "Temperature T", (0.0, 2.0), 0.01, 4, "How far draws stray from the mixture's means."),
-    ("gamma", "Effort weight γ", (0.0, 1.0), 0.005, 4, "How much effort counts in the ranking."),
-)
-"""Settings of drawing: key, label, ends, step, digits, hint."""
-
 PLOT_PX = 176
 """Height of the plot [px]."""
 
@@ -48,21 +40,19 @@ def add_candidates(page: Page) -> None:
         "mode",
         lambda key, _held: session.show_mode(placed(key, len(page.jobs.answering.modes.shown))),
     )
-    with gui.add_folder("Draws from the mixture") as draws:
-        for key, label, ends, step, digits, hint in DRAWS:
-            slider = gui.add_slider(label, ends[0], ends[1], step, DRAWN[key], hint=hint)
-            # What the widget shows at first, while the method has none of the kind.
-            value = partial(_setting, key)
-            page.bind_number(slider, partial(session.set_setting, key), value, digits)
-            page.board.show(slider, visible=lambda state, key=key: key in state.drawing)
-    page.board.show(draws, visible=lambda state: bool(state.drawing))
+    hint = "How far draws stray from the mixture's means."
+    slider = gui.add_slider("Temperature", 0.0, 2.0, 0.01, 0.0, hint=hint)
+    page.bind_number(slider, partial(session.set_setting, "temperature"), _temperature)
+    page.board.show(slider, visible=lambda method: method in DRAWING)
     add_html(gui, marker("fl-column"))
     page.add_html(mode_table)
     page.add_html(_origin_words)
 
 
-def _setting(key: str, state: State) -> float:
-    return float(state.drawing.get(key, DRAWN[key]))
+def _temperature(state: State) -> float:
+    """That in force."""
+    own = DRAWING.get(state.method, DRAWING["mdn"]).temperature
+    return own if state.temperature is None else state.temperature
 
 
 def _origin_words(layout: Layout, method: str, best: Allocation | None) -> str:

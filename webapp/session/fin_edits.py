@@ -78,13 +78,3 @@ def with_parameter(fin: Fin, key: str, value: Any) -> Fin:
     if math.isclose(value, rules[key].default, rel_tol=1e-12, abs_tol=0.0) or value == rules[key].default:
         del given[key]  # files say only what is not usual
     return replace(fin, model=FinModelSpec(fin.model.type, tuple(given.items())))
-
-
-def with_servo(fin: Fin, key: str, value: Any) -> Fin:
-    """The fin with another number of its drive.
-
-    Raises:
-        FinlabError: there is none of that name, or not with this value.
-    """
-    chosen(key, "drive", vars(fin.servo))
-    return replace(fin, servo=replace(fin.servo, **{key: value}))

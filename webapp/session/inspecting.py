@@ -58,14 +58,6 @@ class Inspecting(Editing):
             lambda fin: fin_edits.with_parameter(fin, key, value),
         )
 
-    def set_servo(self, key: str, value: Any) -> None:
-        """A number of the drive of all selected fins, a field of `Servo`."""
-        self._change(
-            f"{fin_edits.words(key)} of",
-            self._selected_names(),
-            lambda fin: fin_edits.with_servo(fin, key, value),
-        )
-
     def rename_robot(self, wanted: str) -> None:
         """Another name of the robot."""
         layout = self.state.layout

@@ -8,7 +8,7 @@ import numpy as np
 
 from finlab.allocation.allocation import Allocation
 from webapp.session.files import shipped
-from webapp.session.state import NUMBERS, State, least_of
+from webapp.session.state import State, least_of
 from webapp.session.targets import PRESETS
 
 ALIGNED = 0.999
@@ -50,9 +50,9 @@ class Stop:
     done: Callable[[Seen], bool] = lambda seen: False
 
     def state(self, now: State) -> State:
-        """The prepared state, with nothing left of the present one but its numbers for drawing."""
+        """The prepared state, with nothing left of the present one but its temperature."""
         plain = State(shipped()[self.layout], self.failed, target=self.target, method=self.method)
-        return replace(plain, **{key: getattr(now, key) for key in NUMBERS})
+        return replace(plain, temperature=now.temperature)
 
 
 def _aligned(seen: Seen) -> bool:

@@ -24,7 +24,7 @@ class Questions(Core):
         self._commit(f"Preset {name}", replace(self.state, target=PRESETS[name]))
 
     def set_setting(self, key: str, value: Any) -> None:
-        """K, T, gamma, the method or the policy; `key` is the field of `State`."""
+        """The temperature, the method or the policy; `key` is the field of `State`."""
         self._commit(f"Set {key.replace('_', ' ')}", self.state.with_setting(key, value), key)
 
     def keep_least(self, word: str) -> None:

@@ -26,12 +26,8 @@ COMPARED = ("dual", "mdn", "paper", "analytic", "qp", "sqp")
 LEAST = {"watts": "dual", "effort": "mdn"}
 """What answers may keep least, and the method that does it best."""
 CHOICES: dict[str, tuple[str, ...]] = {"method": tuple(METHODS), "policy": KINDS}
-NUMBERS = ("n_candidates", "temperature", "gamma")
-"""Settings that are numbers, which the methods check. None stands for the method's own value."""
 DRAWING: dict[str, MdnSettings | PaperSettings] = {"mdn": MdnSettings(), "paper": PaperSettings()}
 """Methods that draw candidates from a mixture, with their own settings."""
-SETTINGS = (*CHOICES, *NUMBERS)
-"""Fields of `State` that say how the question is answered."""
 
 
 @dataclass(frozen=True)
@@ -46,12 +42,8 @@ class State:
     """Fins that no longer turn: name, and the zero direction [rad] at which they stay."""
     target: tuple[float, float, float, float, float, float] = (0.0,) * 6
     """Desired wrench [N, N m], body frame."""
-    n_candidates: int | None = None
-    """K, how many candidates are drawn from the mixture; None for as many as the method itself draws."""
     temperature: float | None = None
-    """T, how far the draws may stray from the mixture's means; None as above, and so is gamma."""
-    gamma: float | None = None
-    """Weight of the effort in the ranking."""
+    """How far draws may stray from the mixture's means; None for the method's own."""
     method: str = "dual"
     policy: str = "closest"
     links: Links = ()
@@ -60,13 +52,6 @@ class State:
     def healthy(self) -> tuple[str, ...]:
         """Names of the fins that work."""
         return tuple(name for name in self.layout.names if name not in self.failed)
-
-    @property
-    def drawing(self) -> dict[str, Any]:
-        """K, T and gamma that are in force, those that the method has; none where it draws no candidates."""
-        shipped = vars(DRAWING[self.method]) if self.method in DRAWING else {}
-        chosen = {key: getattr(self, key) for key in NUMBERS if key in shipped}
-        return {key: shipped[key] if value is None else value for key, value in chosen.items()}
 
     @property
     def health(self) -> Health | None:
@@ -150,20 +135,12 @@ class State:
         return replace(self, links=linked(self.links, a, b))
 
     def with_setting(self, key: str, value: Any) -> "State":
-        """K, T, gamma, the method or the policy changed: `key` is one of `SETTINGS`."""
-        if key not in SETTINGS:
-            raise FinlabError(f"there is no setting {key!r:.40}")
-        checked: Any = value
+        """The temperature, the method or the policy changed."""
+        chosen(key, "setting", ("temperature", *CHOICES))
         if key in CHOICES:
-            checked = chosen(value, key, CHOICES[key])
-        elif value is not None:
-            known = [DRAWING[self.method]] if self.method in DRAWING else []
-            settings: Any = next(s for s in (*known, *DRAWING.values()) if hasattr(s, key))
-            whole = (
-                isinstance(value, float) and value.is_integer() and isinstance(getattr(settings, key), int)
-            )
-            checked = getattr(replace(settings, **{key: int(value) if whole else value}), key)
-        return replace(self, **{key: checked})
+            return replace(self, **{key: chosen(value, key, CHOICES[key])})
+        settings = DRAWING.get(self.method, DRAWING["mdn"])  # they say what is wrong with a number
+        return replace(self, temperature=replace(settings, temperature=value).temperature)
 
 
 def can_be_edited(layout: Layout) -> bool:

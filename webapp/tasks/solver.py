@@ -1,6 +1,6 @@
 """From a state to an answer with all that a page shows of it: picks the allocator and keeps it."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -43,7 +43,7 @@ class Solver:
         self._checkpoint = checkpoint
         self._load = load
         self._choices: dict[str, MethodChoice] = {}
-        self._made: dict[tuple[Layout, str, str], Allocator] = {}
+        self._made: dict[tuple[Layout, str, float | None], Allocator] = {}
 
     @cached_property
     def aside(self) -> "Solver":
@@ -56,7 +56,7 @@ class Solver:
         Raises:
             FinlabError: it cannot be made.
         """
-        return self._on(layout, method, {})
+        return self._on(layout, method, None)
 
     def allocator(self, state: State) -> Allocator:
         """The allocator for the state's robot and method with the state's settings.
@@ -64,18 +64,17 @@ class Solver:
         Raises:
             FinlabError: it cannot be made.
         """
-        drawing = {key: v for key, v in state.drawing.items() if getattr(state, key) is not None}
-        return self._on(state.layout, state.method, drawing)
+        return self._on(state.layout, state.method, state.temperature if state.method in DRAWING else None)
 
-    def _on(self, layout: Layout, method: str, drawing: Mapping[str, object]) -> Allocator:
+    def _on(self, layout: Layout, method: str, temperature: float | None) -> Allocator:
         """An allocator, one of the last few or made now."""
-        key = layout, method, repr(sorted(drawing.items()))
+        key = layout, method, temperature
         found = self._made.pop(key, None)
         if found is None:
             choice = self._choice(method)
-            known = choice.kind.option_names()
-            own = {name: value for name, value in drawing.items() if name in known}
-            settings = replace(choice.settings, **own)
+            settings = choice.settings
+            if temperature is not None and "temperature" in choice.kind.option_names():
+                settings = replace(settings, **{"temperature": temperature})
             found = Allocator.of_choice(layout, replace(choice, settings=settings))
         self._made[key] = found  # the newest is last
         while len(self._made) > KEPT:
