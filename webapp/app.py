@@ -29,11 +29,7 @@ class App:
     """Connects browsers to sessions on a running viser server."""
 
     def __init__(
-        self,
-        server: viser.ViserServer,
-        solver: Solver,
-        layout: Layout,
-        display: Display | None = None,
+        self, server: viser.ViserServer, solver: Solver, layout: Layout, display: Display | None = None
     ) -> None:
         """Take over a server.
 

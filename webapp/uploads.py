@@ -6,9 +6,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import viser
-from viser import _messages
 
-from webapp.viser_internals import uuid_of
+from webapp.viser_internals import acknowledge, hear_uploads, uuid_of
 
 MOST_AT_ONCE = 4
 MOST_IN_ALL = 200_000_000
@@ -58,9 +57,7 @@ class Uploads:
         """
         self._gui, self._most, self._refuse = gui, most, refuse
         self._takers: dict[str, Take] = {}
-        handlers = gui._websock_interface._incoming_handlers
-        handlers[_messages.FileTransferStartUpload] = [self._begin]
-        handlers[_messages.FileTransferPart] = [self._gather]
+        hear_uploads(gui, self._begin, self._gather)
 
     def on(self, button: viser.GuiUploadButtonHandle, take: Take) -> None:
         """Call `take(name, content)` for each file that is chosen with a button."""
@@ -137,5 +134,4 @@ class Uploads:
         _under_way.pop(upload, None)
 
     def _acknowledge(self, upload: Upload, so_far: int) -> None:
-        message = _messages.FileTransferPartAck(upload.button, upload.key, so_far, upload.size)
-        self._gui._websock_interface.queue_message(message)
+        acknowledge(self._gui, upload.button, upload.key, so_far, upload.size)

@@ -5,7 +5,7 @@ import contextlib
 import io
 import secrets
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import cache, partial
 from http import HTTPStatus
 from importlib.resources import files
@@ -150,6 +150,20 @@ def run_script(gui: viser.GuiApi, source: str) -> None:
 def run_file(gui: viser.GuiApi, name: str, more: str = "") -> None:
     """Run a script that lies beside this file, and a line more."""
     run_script(gui, files("webapp").joinpath(name).read_text("utf-8") + more)
+
+
+def hear_uploads(
+    gui: viser.GuiApi, begin: Callable[[Any, Any], None], gather: Callable[[Any, Any], None]
+) -> None:
+    """Hear of each file that a page sends, and of its parts, in place of viser, which trusts the page."""
+    handlers = gui._websock_interface._incoming_handlers
+    handlers[_messages.FileTransferStartUpload] = [begin]
+    handlers[_messages.FileTransferPart] = [gather]
+
+
+def acknowledge(gui: viser.GuiApi, button: str, key: str, so_far: int, size: int) -> None:
+    """Tell a page how many bytes of a file have come."""
+    gui._websock_interface.queue_message(_messages.FileTransferPartAck(button, key, so_far, size))
 
 
 def stop_server(server: viser.ViserServer) -> None:

@@ -24,11 +24,7 @@ def fit_card(found: Fitted) -> str:
         verdict = html("<b class='missing'>Not to be trusted: {}.</b>", "; ".join(fit.doubts))
     else:
         verdict = Markup("<b class='given'>May be trusted within what was measured.</b>")
-    parts = [
-        html("<div class='said'>{}</div>", verdict),
-        _figures(fit),
-        _left_out(fit),
-    ]
+    parts = [html("<div class='said'>{}</div>", verdict), _figures(fit), _left_out(fit)]
     if found.advice is not None:
         parts.append(_advice(found))
     parts += [html("<div class='said dim'>{}</div>", _sentence(note)) for note in fit.measurements.notes]

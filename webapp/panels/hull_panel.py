@@ -14,11 +14,7 @@ from finlab.layout.body import HULL_SHAPES, MESH_SUFFIXES, Hull
 from webapp.markup.html import html
 from webapp.page import Page
 from webapp.scene.meshes.hull import hull_of
-from webapp.scene.meshes.mesh_file import (
-    MAX_BYTES,
-    MAX_FACES,
-    turned,
-)
+from webapp.scene.meshes.mesh_file import MAX_BYTES, MAX_FACES, turned
 from webapp.scene.meshes.mesh_hull import UNITS, MeshHull
 from webapp.session.files import reshaped_hull, stored_hull
 from webapp.session.layout_edits import center_of_gravity, with_hull

@@ -37,8 +37,7 @@ def add_candidates(page: Page) -> None:
     session, gui = page.session, page.gui
     page.add_html(lambda modes, mode: mode_plot(modes, mode, PLOT_PX))
     page.presses.on(
-        "mode",
-        lambda key, _held: session.show_mode(placed(key, len(page.jobs.answering.modes.shown))),
+        "mode", lambda key, _held: session.show_mode(placed(key, len(page.jobs.answering.modes.shown)))
     )
     hint = "How far draws stray from the mixture's means."
     slider = gui.add_slider("Temperature", 0.0, 2.0, 0.01, 0.0, hint=hint)

@@ -107,13 +107,7 @@ class LinePlot:
     """A fixed number of lines; those that are not needed hold no numbers."""
 
     def __init__(
-        self,
-        gui: viser.GuiApi,
-        colors: Sequence[str],
-        title: str,
-        below: str = "",
-        *,
-        height: int = 100,
+        self, gui: viser.GuiApi, colors: Sequence[str], title: str, below: str = "", *, height: int = 100
     ) -> None:
         """Build it, empty.
 

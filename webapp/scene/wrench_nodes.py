@@ -13,15 +13,7 @@ from finlab.analysis import AttainableSet
 from finlab.arrays import Array
 from webapp.handles import put
 from webapp.markup.words import missing_part
-from webapp.scene.meshes.mesh import (
-    LONGEST_TURN,
-    NOTHING,
-    RING_RADIUS,
-    Mesh,
-    force_arrow,
-    torque_ring,
-    tube,
-)
+from webapp.scene.meshes.mesh import LONGEST_TURN, NOTHING, RING_RADIUS, Mesh, force_arrow, torque_ring, tube
 from webapp.scene.stage import Shape
 from webapp.tasks.analyst import Findings
 from webapp.theme import ASKED, DEAD, DELIVERED, HALF_TURN, LIGHT, MISSING

@@ -12,13 +12,7 @@ from dataclasses import replace
 from pathlib import Path, PurePosixPath
 from typing import NamedTuple
 
-from finlab.bundle_files import (
-    ABOUT,
-    LARGEST_BUNDLE,
-    LARGEST_TABLE,
-    MOST_FILES,
-    read_bundle_files,
-)
+from finlab.bundle_files import ABOUT, LARGEST_BUNDLE, LARGEST_TABLE, MOST_FILES, read_bundle_files
 from finlab.errors import DataError, FinlabError, LayoutError
 from finlab.files.archive import member_names, unpacked
 from finlab.files.guarded import read_file

@@ -38,11 +38,7 @@ SCENARIOS: dict[str, HardDay] = {
 }
 SPEEDS = (0.1, 8.0)
 """Simulated time per time on the wall that may be asked for."""
-CHOICES: dict[str, tuple[str, ...]] = {
-    "path": tuple(SHIPPED),
-    "method": COMPARED,
-    "plant": tuple(PLANTS),
-}
+CHOICES: dict[str, tuple[str, ...]] = {"path": tuple(SHIPPED), "method": COMPARED, "plant": tuple(PLANTS)}
 
 
 @dataclass(frozen=True)

@@ -7,13 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.allocation import Allocation
-from finlab.allocation.modes import (
-    Mode,
-    ModeSignature,
-    find_modes,
-    force_sizes,
-    same_signature,
-)
+from finlab.allocation.modes import Mode, ModeSignature, find_modes, force_sizes, same_signature
 from finlab.allocation.solution import Candidates
 from webapp.markup.words import OWN as OWN
 from webapp.markup.words import fins_words

@@ -23,10 +23,7 @@ class Reading:
         self._waiting = 0
 
     def read(
-        self,
-        read: Read[Found],
-        use: Callable[[Found], object],
-        prepare: Callable[[Found], object] = bool,
+        self, read: Read[Found], use: Callable[[Found], object], prepare: Callable[[Found], object] = bool
     ) -> None:
         """Read what a stranger has made, and use it on the loop.
 
