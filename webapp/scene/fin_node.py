@@ -27,34 +27,6 @@ HELD: tuple[Any, ...] = (None, "cmd/ctrl", "shift")
 """Keys that may be held while a fin is clicked; viser hears each by itself."""
 
 
-class FinShapes:
-    """Blade, shaft and force of one fin, in the frame of its mounting."""
-
-    def __init__(self, scene: viser.SceneApi, parent: str, index: int, **arrow: Any) -> None:
-        """Add the nodes under `parent`, for the fin at this place of the layout; `arrow`: options of that."""
-        self.color = fin_color(index)
-        self._blade = Shape(scene, f"{parent}/blade", self.color)
-        self.blade = self._blade.node
-        self.shaft = Shape(scene, f"{parent}/shaft", LIGHT.metal, fin_mesh.shaft()).node
-        self.force = Shape(scene, f"{parent}/force", self.color, **arrow)
-        self._root = np.zeros(3)
-
-    def become(self, part: Actuator) -> None:
-        """Look like an actuator."""
-        is_blade = isinstance(part, (Fin, Rudder))
-        put(self.shaft, visible=is_blade)
-        self._blade.show(_moving_part, type(part))
-        self._root = np.array([fin_mesh.ROOT + fin_mesh.SPAN / 2 if is_blade else 0.0, 0.0, 0.0])
-
-    def paint(self, alive: bool) -> None:
-        """In its own colour, or that of a failed fin."""
-        put(self.blade, color=self.color if alive else DEAD)
-
-    def push(self, arrow: Array, frame: Array, thickness: float) -> None:
-        """Show the force as an arrow (3,) [m] of the body frame, given the actuator's own axes (3, 3)."""
-        self.force.show(force_arrow, frame @ arrow, self._root, thickness)
-
-
 def _moving_part(kind: type[Actuator]) -> Mesh:
     """What of an actuator moves, in its own frame."""
     if issubclass(kind, (Thruster, Azimuth)):
@@ -71,18 +43,6 @@ def motion(parts: Sequence[Actuator], command: Array) -> Array:
             angle = 0.0 if isinstance(part, Thruster) else row[0]
             row[:] = 0.0 * row[0], 0.0, angle
     return moving
-
-
-def turn_of(frame: Array) -> Array:
-    """Own axes (3, 3), rows in the body frame, as a turn of a node: w, x, y, z (4,)."""
-    return np.asarray(SO3.from_matrix(frame.T).wxyz)
-
-
-def quaternion(angle: float, axis: int) -> Array:
-    """A turn [rad] about a body axis as w, x, y, z (4,)."""
-    turn = np.zeros(4)
-    turn[0], turn[1 + axis] = math.cos(angle / 2), math.sin(angle / 2)
-    return turn
 
 
 def add_gizmo(
@@ -127,17 +87,18 @@ class FinNode:
         ring = {"line_width": 4.0, "disable_axes": True, "disable_sliders": True}
         self._move = add_gizmo(scene, name, GIZMO_SIZE, dragged, **arrows)
         self._turn = add_gizmo(scene, f"{name}/turn", RING_SIZE, dragged, **ring)
-        self.shapes = fin = FinShapes(scene, f"{name}/turn", index, cast_shadow=False)
-        fan = fin_mesh.sweep(0.1)
-        self._fan = Shape(
-            scene, f"{name}/turn/fan", fin.color, fan, opacity=0.3, side="double", cast_shadow=False
-        )
+        parent, self._color = f"{name}/turn", fin_color(index)
+        self._blade = Shape(scene, f"{parent}/blade", self._color)
+        self._shaft = Shape(scene, f"{parent}/shaft", LIGHT.metal, fin_mesh.shaft()).node
+        self._force = Shape(scene, f"{parent}/force", self._color, cast_shadow=False)
+        fan: dict[str, Any] = {"opacity": 0.3, "side": "double", "cast_shadow": False}
+        self._fan = Shape(scene, f"{parent}/fan", self._color, fin_mesh.sweep(0.1), **fan)
         self._label = scene.add_label(
             f"{name}/label", str(index + 1), anchor="center-center", font_screen_scale=LABEL
         )
         self._strut = Shape(scene, f"/robot/struts/{index}", LIGHT.metal)
 
-        for node in (fin.blade, fin.shaft):
+        for node in (self._blade.node, self._shaft):
             for held in HELD:
 
                 @node.on_click(modifier=held)
@@ -166,15 +127,17 @@ class FinNode:
             label: text at its root.
             owned_by_user: True while it is dragged; the gizmo's pose is then left alone.
         """
-        frame = np.array(part.frame)
-        self.shapes.become(part)
+        frame, is_blade = np.array(part.frame), isinstance(part, (Fin, Rudder))
+        put(self._shaft, visible=is_blade)
+        self._blade.show(_moving_part, type(part))
+        self._root = np.array([fin_mesh.ROOT + fin_mesh.SPAN / 2 if is_blade else 0.0, 0.0, 0.0])
         put(self._move, visible=True, active_axes=(selected,) * 3)
         put(self._turn, active_axes=(selected, selected, False))
         if not owned_by_user:
             put(self._move, position=np.array(part.position))
-            put(self._turn, wxyz=turn_of(frame))
+            put(self._turn, wxyz=np.asarray(SO3.from_matrix(frame.T).wxyz))
         put(self._label, text=label, position=np.array([0.0, 0.0, 0.04]))
-        servo = np.array(part.position) - (0.03 if isinstance(part, (Fin, Rudder)) else 0.0) * frame[0]
+        servo = np.array(part.position) - (0.03 if is_blade else 0.0) * frame[0]
         self._strut.show(_strut, servo, hull)
         put(self._strut.node, visible=True)
 
@@ -182,15 +145,14 @@ class FinNode:
         """Show a motion (3,), None for what has failed, and its force as a body-frame arrow (3,) [m], given
         the own axes (3, 3)."""
         alive = command is not None
-        self.shapes.paint(alive)
-        put(self.shapes.force.node, visible=alive)
-        if command is None:
-            put(self._fan.node, visible=False)
-            return
-        put(self._fan.node, visible=bool(command[0] > 0.0))
-        self._fan.show(fin_mesh.sweep, float(command[0]))
-        put(self._fan.node, wxyz=quaternion(float(command[2]), 0))
-        self.shapes.push(arrow, frame, 0.007)
+        put(self._blade.node, color=self._color if alive else DEAD)
+        put(self._force.node, visible=alive)
+        put(self._fan.node, visible=command is not None and bool(command[0] > 0.0))
+        if command is not None:
+            half = float(command[2]) / 2
+            self._fan.show(fin_mesh.sweep, float(command[0]))
+            put(self._fan.node, wxyz=np.array([math.cos(half), math.sin(half), 0.0, 0.0]))
+            self._force.show(force_arrow, frame @ arrow, self._root, 0.007)
 
 
 def _strut(servo: Array, hull: AnyHull) -> Mesh:
