@@ -54,8 +54,7 @@ def test_reachable_and_not() -> None:
     assert rest_sentence(easy) == "Nothing is left undone."
     hard = allocator.allocate([0, 0, 60, 0, 0, 0])
     assert not hard.reachable
-    told = verdict_sentence(hard, False)
-    assert told.startswith("Out of reach: ") and "of the heave force" in told and "at the limit" in told
+    assert verdict_sentence(hard, False) == "Out of reach"
     state = State(layout, target=(0.0, 0.0, 60.0, 0.0, 0.0, 0.0), method="sqp")
     assert not Solver().reply(state).in_reach
     assert "N of heave" in rest_sentence(hard) and rest_sentence(hard).endswith("left undone.")
@@ -77,7 +76,7 @@ def test_all_that_is_said_of_an_answer_agrees(share: float, target: tuple[float,
     assert "100 %" not in said + verdict
     if verdict != "Exact":
         axis = int(np.argmax(np.abs((wrench - target) / answer.scale)))
-        assert AXIS_WORDS[axis] in verdict and AXIS_WORDS[axis] in said
+        assert AXIS_WORDS[axis] in said
 
 
 def test_no_verdict_stands_beside_a_new_question() -> None:
@@ -134,8 +133,7 @@ def test_what_a_method_cannot_is_not_what_the_fins_cannot() -> None:
     state = State(layout, target=PRESETS["Zero"], method="qp")
     assert Solver().reply(state).in_reach
     assert verdict_of(answer, True) is Verdict.APPROXIMATE
-    told = verdict_sentence(answer, True)
-    assert told.startswith("Approximate: ") and told.endswith("; the robot can, qp does not")
+    assert verdict_sentence(answer, True) == "Approximate: the robot can, qp does not"
     assert len({verdict.color for verdict in Verdict}) == len({verdict.value for verdict in Verdict}) == 4
 
 

@@ -9,9 +9,7 @@ from finlab.allocation.allocation import Allocation
 from finlab.allocation.evaluate import REACHED
 from webapp.markup.words import (
     authority_sentence,
-    fins_words,
     listed,
-    saturated,
     three_digits,
     unlearned_sentence,
 )
@@ -70,7 +68,7 @@ def verdict_of(allocation: Allocation, in_reach: bool) -> Verdict:
 
 
 def verdict_sentence(allocation: Allocation, in_reach: bool) -> str:
-    """The verdict with its reason: what is missing most, and the fins that are at their limits."""
+    """The verdict, and what else could be done; what is missing the answer's sentence says."""
     verdict = verdict_of(allocation, in_reach)
     if verdict is Verdict.UNLEARNED:
         return unlearned_sentence(allocation.layout, allocation.unknown_fins)
@@ -78,21 +76,8 @@ def verdict_sentence(allocation: Allocation, in_reach: bool) -> str:
         doubtful = allocation.expected_error > REACHED
         within = f" by the model, expected within {allocation.expected_error:.2g}" if doubtful else ""
         return f"{verdict.value}{within}"
-    axis = int(np.argmax(np.abs(allocation.unallocated / allocation.scale)))
-    target, given = allocation.target[axis], allocation.wrench[axis]
-    kind = "force" if axis < 3 else "torque"
-    share = 100.0 * given / target if abs(target) > 1e-3 else np.nan
-    if -0.5 < share < 99.5:
-        sentence = f"{verdict.value}: {abs(share):.0f} % of the {AXIS_WORDS[axis]} {kind}"
-    else:
-        word = "missing" if share < 100.0 else "too much"
-        sentence = f"{verdict.value}: {_amount(given - target, axis)} {word}"
-    if verdict is Verdict.APPROXIMATE:
-        return f"{sentence}; the robot can, {allocation.method} does not"
-    full = np.flatnonzero(saturated(allocation).any(axis=1))
-    return (
-        f"{sentence}; {fins_words(full.tolist(), allocation.layout)} at the limit" if len(full) else sentence
-    )
+    rest = f": the robot can, {allocation.method} does not" if verdict is Verdict.APPROXIMATE else ""
+    return f"{verdict.value}{rest}"
 
 
 def rest_sentence(allocation: Allocation) -> str:
