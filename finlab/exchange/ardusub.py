@@ -93,12 +93,10 @@ def write_ardusub(layout: Layout, exchange: Exchange, suffix: str) -> str:
             lines.append(",".join(map(str, [name, *row])) if suffix == ".csv" else call)
         return "\n".join(lines) + "\n"
     signs = np.sign(np.where(np.abs(factors) < SMALL, 0.0, factors))
-    for frame, known in enumerate(NUMBERED):
-        own = np.sign(known)
-        if own.shape == signs.shape:
-            turned = np.where((own == signs).all(1), 1, -1)
-            if (turned[:, None] * own == signs).all():
-                values = {"FRAME_CONFIG": frame}
-                values |= {f"MOT_{i}_DIRECTION": int(sign) for i, sign in enumerate(turned, 1)}
-                return parameters_text(values, names, suffix, "")
+    for frame, known in enumerate(map(np.sign, NUMBERED)):
+        if known.shape == signs.shape:
+            turned = np.where((known == signs).all(1), 1, -1)
+            if (turned[:, None] * known == signs).all():
+                directions = {f"MOT_{i}_DIRECTION": int(sign) for i, sign in enumerate(turned, 1)}
+                return parameters_text({"FRAME_CONFIG": frame, **directions}, names, suffix, "")
     raise LayoutError("no frame of ArduSub has the signs of these factors; write lines of source (.cpp)")

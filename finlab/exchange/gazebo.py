@@ -49,17 +49,10 @@ def read_description(text: str, name: str, exchange: Exchange) -> Layout:
             "has no masses, so its centre of gravity is unknown; use --origin base if that is at it"
         )
     start = robot.center if at_gravity else np.zeros(3)
-    parts: list[Actuator] = []
-    for plugin in _plugins(robot, "Thruster")[: MAX_ACTUATORS + 1]:
-        joint = robot.joints.get(said(plugin, "joint_name"))
-        if joint is None or joint.child not in robot.links:
-            name = said(plugin, "joint_name")
-            raise LayoutError(f"a thruster's plugin names joint {name!r:.60}, which moves no link in it")
-        parts.append(_propeller(robot, joint, plugin, start, exchange))
-    for link in exchange.thrusters:
-        parts.append(_propeller(robot, _joint_of(robot, link), Element("plugin"), start, exchange))
-    for link in exchange.fins:
-        parts.append(_fin(_joint_of(robot, link), start, exchange))
+    driven = [(_driven(robot, plugin), plugin) for plugin in _plugins(robot, "Thruster")[: MAX_ACTUATORS + 1]]
+    driven += [(_joint_of(robot, link), Element("plugin")) for link in exchange.thrusters]
+    parts: list[Actuator] = [_propeller(robot, joint, plugin, start, exchange) for joint, plugin in driven]
+    parts += [_fin(_joint_of(robot, link), start, exchange) for link in exchange.fins]
     if not parts:
         raise LayoutError(
             "has no plugin Thruster of gz-sim; name the links that are fins (--fins LINK...) or thrusters "
@@ -74,6 +67,14 @@ def _plugins(robot: Description, kind: str) -> list[Element]:
     file = f"{kind.lower()}-system"
     names = ((each.get("name", ""), each.get("filename", ""), each) for each in robot.plugins)
     return [each for name, library, each in names if name.endswith(f"::{kind}") or file in library]
+
+
+def _driven(robot: Description, plugin: Element) -> Joint:
+    name = said(plugin, "joint_name")
+    joint = robot.joints.get(name)
+    if joint is None or joint.child not in robot.links:
+        raise LayoutError(f"a thruster's plugin names joint {name!r:.60}, which moves no link in it")
+    return joint
 
 
 def _joint_of(robot: Description, link: str) -> Joint:
