@@ -48,11 +48,10 @@ class Description:
     """What a description says, in its own frame."""
 
     name: str
-    links: list[str]
     joints: dict[str, Joint]
-    """By their own names."""
+    """Those that move a link, by their own names."""
     movers: dict[str, Joint]
-    """By the links that they move."""
+    """The same by the names of the links."""
     mass: float
     """[kg]; 0 where no link has one."""
     center: Array
@@ -79,12 +78,11 @@ def parse_description(text: str, name: str) -> Description:
     movers = {said(part, "child@link"): key for key, part in named.items() if part.tag == "joint"}
     hung = {key: _hung(part, named, movers) for key, part in named.items()}
     poses = _placed(hung)
-    joints = {_name(part): _joint(part, named, poses) for part in top.findall("joint")}
-    links = [_name(link) for link in top.findall("link")]
+    moving = [_joint(part, named, poses) for part in top.findall("joint")]
+    joints = {joint.name: joint for joint in moving if f"link {joint.child}" in named}
+    movers_of = {joint.child: joint for joint in joints.values()}
     plugins = [*top.findall("gazebo/plugin"), *top.findall("plugin"), *top.findall("link/plugin")]
-    weighed = _masses({link: named[f"link {link}"] for link in links}, poses)
-    by_link = {joint.child: joint for joint in joints.values()}
-    return Description(top.get("name") or name, links, joints, by_link, *weighed, plugins)
+    return Description(top.get("name") or name, joints, movers_of, *_masses(named, poses), plugins)
 
 
 def said(element: Element, paths: str, usual: str = "") -> str:
@@ -189,10 +187,12 @@ def _placed(hung: dict[str, tuple[str, Array]]) -> dict[str, Array]:
 def _joint(part: Element, named: Named, poses: dict[str, Array]) -> Joint:
     name, what = _name(part), f"joint {_name(part)!r:.60}"
     xyz, kind = part.find("axis/xyz"), part.get("type", "")
-    seen_from = _key(xyz.get("expressed_in", ""), named) if xyz is not None else ""
+    seen_from = xyz.get("expressed_in") if xyz is not None else None
+    frame = _key(seen_from, named) if seen_from else f"joint {name}"
+    if frame not in poses:
+        raise LayoutError(f"has no frame {seen_from!r:.60}, in which the axis of {what} is expressed")
     usual = "1 0 0" if part.find("parent[@link]") is not None else "0 0 1"
-    axis = numbers(said(part, "axis@xyz axis/xyz", usual), 3, f"the axis of {what}")
-    axis = poses[seen_from or f"joint {name}"][:3, :3] @ axis
+    axis = poses[frame][:3, :3] @ numbers(said(part, "axis@xyz axis/xyz", usual), 3, f"the axis of {what}")
     place = poses[f"joint {name}"][:3, 3]
     length = float(np.linalg.norm(axis))
     if length == 0.0 and kind in TURNING:
@@ -207,18 +207,18 @@ def _joint(part: Element, named: Named, poses: dict[str, Array]) -> Joint:
     return Joint(name, kind, *names, place, axis / (length or 1.0), ends)
 
 
-def _masses(links: dict[str, Element], poses: dict[str, Array]) -> tuple[float, Array, Array, Array]:
+def _masses(named: Named, poses: dict[str, Array]) -> tuple[float, Array, Array, Array]:
     """Mass, centre of gravity (3,), inertia (3, 3) about it and added mass (6,) of all links together."""
     parts, added = [], np.zeros(6)
-    for name, link in links.items():
+    for key, link in named.items():
         inertial = link.find("inertial")
         if inertial is not None:
-            told = [number(inertial, f"inertia@i{key} inertia/i{key}") for key in MOMENTS]
+            told = [number(inertial, f"inertia@i{moment} inertia/i{moment}") for moment in MOMENTS]
             inertia = np.array(told)[[[0, 1, 2], [1, 3, 4], [2, 4, 5]]]
-            pose = poses[f"link {name}"] @ _pose(inertial)
+            pose = poses[key] @ _pose(inertial)
             own = pose[:3, :3] @ inertia @ pose[:3, :3].T
             parts.append((number(inertial, "mass@value mass"), pose[:3, 3], own))
-            added += [number(inertial, f"fluid_added_mass/{key}") for key in ADDED]
+            added += [number(inertial, f"fluid_added_mass/{axis}") for axis in ADDED]
     mass, center, inertia = sum(part[0] for part in parts), np.zeros(3), np.zeros((3, 3))
     if mass > 0.0:
         center = sum((kg * at for kg, at, _ in parts), center) / mass

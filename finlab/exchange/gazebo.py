@@ -72,13 +72,13 @@ def _plugins(robot: Description, kind: str) -> list[Element]:
 def _driven(robot: Description, plugin: Element) -> Joint:
     name = said(plugin, "joint_name")
     joint = robot.joints.get(name)
-    if joint is None or joint.child not in robot.links:
+    if joint is None:
         raise LayoutError(f"a thruster's plugin names joint {name!r:.60}, which moves no link in it")
     return joint
 
 
 def _joint_of(robot: Description, link: str) -> Joint:
-    if link not in robot.movers or link not in robot.links:
+    if link not in robot.movers:
         raise LayoutError(f"has no link {link!r:.60} that a joint moves; such links: {_moved(robot)}")
     return robot.movers[link]
 

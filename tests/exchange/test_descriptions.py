@@ -99,6 +99,24 @@ def test_frames_of_sdf(tmp_path: Path) -> None:
     assert read(path, force=(-1.0, 2.0)).actuators[1].upper[0] == 2.0
 
 
+def test_an_axis_may_be_expressed_in_any_frame(tmp_path: Path) -> None:
+    path = tmp_path / "model.sdf"
+    turned = SDF.replace(
+        '<pose rotation_format="quat_xyzw">0 0 0.3 0 1 0 1', '<pose degrees="true">0 0 0.3 0 0 90'
+    )
+    for frame, axis in (
+        ("__model__", (0, 1, 0)),
+        ("stern", (0, -1, 0)),
+        ("b", (-1, 0, 0)),
+        ("a_joint", (0, -1, 0)),
+    ):
+        path.write_text(turned.replace('expressed_in="__model__"', f'expressed_in="{frame}"'))
+        np.testing.assert_allclose(read(path).actuators[1].frame[0], axis, atol=1e-12)
+    path.write_text(SDF.replace("__model__", "nowhere"))
+    with pytest.raises(LayoutError, match="no frame 'nowhere', in which the axis of joint 'b_joint'"):
+        read(path)
+
+
 @pytest.mark.parametrize("suffix", ["urdf", "sdf"])
 @pytest.mark.parametrize("kind", ["thrusters", "azimuths"])
 def test_any_propellers_survive_the_way_there_and_back(kind: str, suffix: str, tmp_path: Path) -> None:
