@@ -15,7 +15,7 @@ from finlab.allocation.solution import Candidates
 from finlab.layout import Layout
 from finlab.networks.checkpoint import read_normalization, resolve_checkpoint
 from finlab.networks.normalization import Normalization
-from finlab.physics.objective import Objective
+from finlab.physics.objective import Name
 
 
 class AnyRobot:
@@ -44,9 +44,9 @@ class AnyRobot:
         return self.choice.settings
 
     @property
-    def objective(self) -> Objective:
+    def objective(self) -> Name:
         assert isinstance(self.settings, AimSettings)
-        return self.settings.aim
+        return self.settings.objective
 
     def with_settings(self, **changes: Any) -> "AnyRobot":
         other = copy(self)

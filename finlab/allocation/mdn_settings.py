@@ -1,15 +1,18 @@
 """What can be set of method `mdn`."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 from finlab.allocation.settings import MOST_CANDIDATES, Settings, choice, number
-from finlab.physics.objective import Objective
+from finlab.physics.objective import Name
 
 
 @dataclass(frozen=True)
 class MdnSettings(Settings):
     """How many ways the mixture proposes, and how many of them are refined."""
 
+    objective: ClassVar[Name] = "effort"
+    """What is kept least."""
     n_candidates: int = number(
         48, 1, MOST_CANDIDATES, "proposals K: the components' means by falling weight, then samples"
     )
@@ -19,8 +22,3 @@ class MdnSettings(Settings):
         "network", ("network", "random"), "where candidates come from; random is an ablation"
     )
     period_s: float = number(0.1, 0.0, 1000.0, "time between ticks", "s", above=True)
-
-    @property
-    def aim(self) -> Objective:
-        """What is kept least."""
-        return Objective("effort")

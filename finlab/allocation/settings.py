@@ -8,7 +8,7 @@ from numbers import Integral, Real
 from typing import Any, NamedTuple
 
 from finlab.errors import AllocationError
-from finlab.physics.objective import Name, Objective
+from finlab.physics.objective import Name
 
 MOST_CANDIDATES = 4096
 """Most candidates that may be drawn; more would keep a robot from answering."""
@@ -96,8 +96,3 @@ class AimSettings(Settings):
     """What is kept least, for methods that can choose."""
 
     objective: Name = choice("power", ("power", "effort"), "kept least: watts, or the paper's effort")
-
-    @property
-    def aim(self) -> Objective:
-        """The same as an `Objective`."""
-        return Objective(self.objective)

@@ -17,7 +17,7 @@ from finlab.errors import AllocationError, DataError
 from finlab.layout import Layout
 from finlab.layout.commands import neutral_row
 from finlab.layout.robot_file import Case, robot_of
-from finlab.physics.objective import Objective
+from finlab.physics.objective import Name
 
 
 @dataclass(frozen=True)
@@ -37,9 +37,9 @@ class DeployedRobot:
         return self.allocator.layout
 
     @property
-    def objective(self) -> Objective:
+    def objective(self) -> Name:
         """What is kept least."""
-        return getattr(self.allocator.settings, "aim", Objective())
+        return getattr(self.allocator.settings, "objective", "power")
 
     def lost(self, failed: Sequence[str] = ()) -> tuple[str, ...]:
         """Fins that the bundle names as failed stay failed, whatever `failed` adds."""

@@ -16,6 +16,7 @@ from finlab.deploy.robot import DeployedRobot
 from finlab.errors import DataError
 from finlab.layout.robot_file import Case
 from finlab.physics import plant_of
+from finlab.physics.objective import cost_meter
 
 N_SELF_TEST = 4
 """Self-test wrenches in a bundle: enough to notice a wrong file, few enough to read."""
@@ -79,7 +80,7 @@ def self_check(robot: DeployedRobot) -> list[Finding]:
     layout, failed = robot.layout, robot.failed
     alive = [i for i, name in enumerate(layout.names) if name not in failed]
     plant, scale = plant_of(layout.without(failed) if failed else layout), robot.allocator.scale
-    cost = robot.objective.meter(plant)
+    cost = cost_meter(robot.objective, plant)
 
     differs, errors, worse, dearer = [], [], [], []
     for case in robot.self_test:

@@ -3,37 +3,14 @@
 Both are sums over the fins of a cost of amplitude and frequency; effort adds a little for the zero direction.
 """
 
-from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Literal
 
 from finlab.arrays import Array
-from finlab.errors import AllocationError
 from finlab.physics.effort import EffortMeter
 from finlab.physics.plant import Plant
 
 Name = Literal["power", "effort"]
-
-
-@dataclass(frozen=True)
-class Objective:
-    """What is kept least.
-
-    Raises:
-        AllocationError: an unknown objective.
-    """
-
-    name: Name = "power"
-    """`power`: mean mechanical watts by each fin's own model. `effort`: the paper's energy proxy `J_en`."""
-
-    def __post_init__(self) -> None:
-        if self.name not in get_args(Name):
-            raise AllocationError(f"objective: expected 'power' or 'effort', got {self.name!r}")
-
-    def meter(self, plant: Plant) -> "CostMeter":
-        """Returns the meter of the cost of a robot's commands."""
-        if self.name == "power":
-            return PowerMeter(plant)
-        return EffortMeter(plant.upper)
+"""`power`: mean mechanical watts by each fin's own model. `effort`: the paper's energy proxy `J_en`."""
 
 
 class PowerMeter:
@@ -43,13 +20,9 @@ class PowerMeter:
         """Make it for the fins of a plant."""
         self._plant = plant
 
-    def fins(self, command: Array) -> Array:
-        """Power (R, n) [W] of each fin under commands (R, n, 3)."""
-        return self._plant.power(command)
-
     def __call__(self, command: Array) -> Array:
         """Power (R,) [W] of commands (R, n, 3)."""
-        total: Array = self.fins(command).sum(-1)
+        total: Array = self._plant.power(command).sum(-1)
         return total
 
     def gradient(self, command: Array) -> Array:
@@ -59,3 +32,8 @@ class PowerMeter:
 
 CostMeter = PowerMeter | EffortMeter
 """Commands (R, n, 3) of one robot to costs (R,), and their slopes."""
+
+
+def cost_meter(objective: Name, plant: Plant) -> CostMeter:
+    """Returns the meter of what the commands of a robot cost."""
+    return PowerMeter(plant) if objective == "power" else EffortMeter(plant.upper)

@@ -7,19 +7,19 @@ import pytest
 
 from finlab.physics import Plant
 from finlab.physics.effort import command_effort
-from finlab.physics.objective import Objective
+from finlab.physics.objective import Name, cost_meter
 from tests.random_fins import KINDS, random_robot
 
 OBJECTIVES = [
-    Objective(),
-    Objective("effort"),
+    "power",
+    "effort",
 ]
 
 
 @pytest.mark.parametrize("objective", OBJECTIVES)
-def test_a_meters_slopes_are_differences(objective: Objective, tmp_path: Path) -> None:
+def test_a_meters_slopes_are_differences(objective: Name, tmp_path: Path) -> None:
     plant = Plant(random_robot(np.random.default_rng(3), KINDS, tmp_path, n_fins=6))
-    meter = objective.meter(plant)
+    meter = cost_meter(objective, plant)
     command = plant.sample(np.random.default_rng(0), (7,))
     gradient = meter.gradient(command)
     assert gradient.shape == command.shape and meter(command).shape == (7,)
@@ -35,6 +35,6 @@ def test_what_each_objective_counts() -> None:
     layout = random_robot(np.random.default_rng(4), ("drag",), n_fins=3)
     plant = Plant(layout)
     command = plant.sample(np.random.default_rng(0), (4,))
-    np.testing.assert_allclose(Objective().meter(plant)(command), plant.power(command).sum(-1))
+    np.testing.assert_allclose(cost_meter("power", plant)(command), plant.power(command).sum(-1))
     effort = command_effort(command, layout.upper)
-    np.testing.assert_allclose(Objective("effort").meter(plant)(command), effort)
+    np.testing.assert_allclose(cost_meter("effort", plant)(command), effort)

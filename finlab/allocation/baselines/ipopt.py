@@ -69,9 +69,9 @@ class Ipopt(ModelBased):
         super().__init__(layout, settings, scale, weights)
         tables = not all(isinstance(make_law(fin.model), PlanarLaw) for fin in layout.fins)
         self._by_forces = tables or not layout.is_of_fins or self.settings.space == "forces"
-        if self._by_forces and self.aim.name != "power":
+        if self._by_forces and self.aim != "power":
             why = "of a force table it" if tables else "space 'forces'"
-            raise AllocationError(f"method ipopt: {why} keeps power least, got objective {self.aim.name!r}")
+            raise AllocationError(f"method ipopt: {why} keeps power least, got objective {self.aim!r}")
         self._casadi = import_casadi()
 
     def _commands(self, targets: Array, seed: int) -> Array:
@@ -111,7 +111,7 @@ class Ipopt(ModelBased):
     @cached_property
     def _weight(self) -> float:
         """Of the cost beside the squared error."""
-        if self.aim.name == "effort":
+        if self.aim == "effort":
             return TRADEOFF
         return TRADEOFF / (USUAL_LOAD * float(self.plant.power(self.plant.upper).max()))
 

@@ -16,7 +16,7 @@ from finlab.allocation.solution import Solution
 from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.networks.trained import TrainedWeights
-from finlab.physics.objective import Objective
+from finlab.physics.objective import Name, cost_meter
 
 SOLVED = 1e-5
 """Normalized error up to which an answer is exact."""
@@ -49,9 +49,9 @@ class ModelBased(LeastErrorMethod):
         self, layout: Layout, settings: Settings, scale: Array, weights: TrainedWeights | None = None
     ) -> None:
         super().__init__(layout, settings, scale, weights)
-        self.aim = self.settings.aim if isinstance(self.settings, AimSettings) else Objective()
+        self.aim: Name = getattr(self.settings, "objective", "power")
         """What is kept least."""
-        if self.aim.name == "effort":
+        if self.aim == "effort":
             layout.only_fins("objective 'effort'")
         self.sigma = USUAL_SHARE * scale
         """What wrenches (6,) are divided by: what a robot is mostly asked for."""
@@ -75,7 +75,7 @@ class ModelBased(LeastErrorMethod):
         problem = CommandProblem.of(self.plant, self.sigma)
         ends = refine(problem, target[None] / self.sigma, commands, steps)
         missed = ends.error > SOLVED
-        cost = np.where(missed, ends.error, self.aim.meter(self.plant)(ends.command))
+        cost = np.where(missed, ends.error, cost_meter(self.aim, self.plant)(ends.command))
         return np.array(ends.command[np.lexsort((cost, missed))[0]])
 
     def _solve(self, targets: Array, *, seed: int, previous: Array | None) -> Solution:

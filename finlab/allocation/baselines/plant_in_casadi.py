@@ -4,10 +4,10 @@ from typing import Any
 
 from finlab.physics import PlanarLaw, Plant, make_law
 from finlab.physics.effort import effort_of_shares, effort_scale
-from finlab.physics.objective import Objective
+from finlab.physics.objective import Name
 
 
-def plant_formulas(casadi: Any, plant: Plant, objective: Objective) -> tuple[Any, Any, Any]:
+def plant_formulas(casadi: Any, plant: Plant, objective: Name) -> tuple[Any, Any, Any]:
     """Returns symbols of the commands (3 n,), and the wrench (6,) and the cost that they give, as formulas.
 
     Args:
@@ -24,7 +24,7 @@ def plant_formulas(casadi: Any, plant: Plant, objective: Objective) -> tuple[Any
         thrust, points = law.thrust(amplitude, frequency, direction), direction + law.offset
         wrench += thrust * casadi.cos(points) * casadi.DM(plant.effectiveness[i, 1])
         wrench += thrust * casadi.sin(points) * casadi.DM(plant.effectiveness[i, 2])
-        if objective.name == "power":
+        if objective == "power":
             cost += law.blade.power(amplitude, frequency)
         else:
             shares = amplitude / scale[i, 0], frequency / scale[i, 1], direction / scale[i, 2]

@@ -14,7 +14,7 @@ from finlab.allocation.settings import number
 from finlab.arrays import Array
 from finlab.layout import layout_effectiveness
 from finlab.physics import Plant
-from finlab.physics.objective import CostMeter
+from finlab.physics.objective import CostMeter, cost_meter
 
 NEAR = 1e-3
 """Normalized error from which on a start is no way to the target: its cost does not matter."""
@@ -52,7 +52,7 @@ class Sqp(ModelBased):
 
     @cached_property
     def _program(self) -> tuple[CommandProblem, Solve]:
-        meter = self.aim.meter(self.plant)
+        meter = cost_meter(self.aim, self.plant)
         solve = cheapest_program(self.plant, meter, self.sigma, self.settings.n_steps)
         return CommandProblem.of(self.plant, self.sigma), solve
 

@@ -15,7 +15,7 @@ from finlab.evaluation.splits import SPLITS, Case, make_split
 from finlab.evaluation.statistics.bootstrap import ratio_interval
 from finlab.layout import Layout
 from finlab.physics import plant_of
-from finlab.physics.objective import Name, Objective
+from finlab.physics.objective import Name, cost_meter
 
 EXACT, TRACKED = 1e-5, 1e-3
 """Normalized errors up to which the yardstick and a method count as delivering a target."""
@@ -81,14 +81,14 @@ def _rows(
     seed: int,
 ) -> list[Row]:
     specs = load_method_specs(methods, checkpoint, objective, patient=True)
-    aim, best = Objective(objective), list[Array]()
+    best = list[Array]()
     found: dict[str, list[tuple[Array, Array]]] = {name: [] for name in specs}
     for case in progress(cases, "layout", f"{split}, {objective}"):
         sigma = sigma_of(case)
-        cost, error = _answers(yardstick(case.healthy, objective, starts), case, aim, sigma, seed)
+        cost, error = _answers(yardstick(case.healthy, objective, starts), case, objective, sigma, seed)
         best.append(np.where(error <= EXACT, cost, np.nan))
         for name, method in specs.items():
-            found[name].append(_answers(method, case, aim, sigma))
+            found[name].append(_answers(method, case, objective, sigma))
     group = np.repeat(np.arange(len(cases)), [len(case.targets) for case in cases])
     rows: list[Row] = []
     for name, parts in found.items():
@@ -108,7 +108,7 @@ def yardstick(layout: Layout, objective: Name, starts: int) -> MethodSpec:
 
 
 def _answers(
-    method: MethodSpec, case: Case, aim: Objective, sigma: Array, seed: int = 0
+    method: MethodSpec, case: Case, objective: Name, sigma: Array, seed: int = 0
 ) -> tuple[Array, Array]:
     """Costs and normalized errors, each (N,)."""
     answer = method.on(case.layout).allocate_batch(case.targets, failed=case.failed, seed=seed)
@@ -117,7 +117,7 @@ def _answers(
     error = np.linalg.norm((plant.wrench(command) - case.targets) / sigma, axis=-1)
     # An answer outside its limits is none, whatever it would cost.
     error[((command < plant.lower) | (command > plant.upper)).any((1, 2))] = np.inf
-    return np.asarray(aim.meter(plant)(command)), error
+    return np.asarray(cost_meter(objective, plant)(command)), error
 
 
 def _figures(cost: Array, error: Array, best: Array, group: NDArray[np.int64]) -> Row:

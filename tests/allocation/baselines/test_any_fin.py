@@ -15,7 +15,7 @@ from finlab.allocation.yardstick import yardstick
 from finlab.errors import AllocationError
 from finlab.layout import Fin, FinModelSpec, Layout, Limits, load_layout
 from finlab.physics import make_law, plant_of
-from finlab.physics.objective import Name
+from finlab.physics.objective import Name, cost_meter
 from tests.any_robot import AnyRobot
 from tests.exhaustive import crossed
 
@@ -181,7 +181,7 @@ def test_ipopt_minimizes_what_the_plant_says(
     method = Ipopt(layout, settings, yardstick(layout))
     plant, sigma, weight = plant_of(layout), method.sigma, method._weight
     target, at = 0.4 * plant.wrench(plant.upper), plant.sample(np.random.default_rng(4), (2,))
-    meter, asked = method.aim.meter(plant), method._solver.get_function("nlp_grad_f")
+    meter, asked = cost_meter(method.aim, plant), method._solver.get_function("nlp_grad_f")
     if objective == "power":  # ten usual loads
         assert weight * plant.power(plant.upper).max() == pytest.approx(1e-3)
     for command in at:

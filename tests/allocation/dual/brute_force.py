@@ -6,7 +6,7 @@ from scipy.optimize import minimize
 
 from finlab.layout import Layout
 from finlab.physics import Plant
-from finlab.physics.objective import Objective
+from finlab.physics.objective import Name, cost_meter
 
 Array = NDArray[np.float64]
 
@@ -15,7 +15,7 @@ def least_cost(
     layout: Layout,
     target: Array,
     sigma: Array,
-    objective: Objective,
+    objective: Name,
     *,
     n_starts: int = 24,
     seed: int = 0,
@@ -26,7 +26,7 @@ def least_cost(
     Starts are random commands, of which every other one has fins at rest, and `also`, a command (n, 3).
     """
     plant, rng = Plant(layout), np.random.default_rng(seed)
-    meter, n = objective.meter(plant), layout.n_fins
+    meter, n = cost_meter(objective, plant), layout.n_fins
     full = plant.full_turn
     low, width = plant.lower, np.maximum(plant.width, 1e-12)
 

@@ -12,7 +12,6 @@ from finlab.assets import shipped_layouts
 from finlab.evaluation.splits import make_split
 from finlab.layout import Fin, FinModelSpec, Layout, load_layout
 from finlab.physics import Plant
-from finlab.physics.objective import Objective
 from tests.allocation.dual.brute_force import least_cost
 from tests.any_robot import AnyRobot
 from tests.exhaustive import crossed, sampled
@@ -62,7 +61,7 @@ def test_no_more_than_brute_force_finds() -> None:
         for target in reachable(layout, 2, seed) * [[1.0], [0.5]]:
             answer = method.allocate(layout, target)
             if answer.err_norm < 1e-5:
-                least = least_cost(layout, target, answer.scale, Objective(), n_starts=6, also=answer.command)
+                least = least_cost(layout, target, answer.scale, "power", n_starts=6, also=answer.command)
                 ratio.append(answer.power / least)
     assert len(ratio) >= 3
     assert np.max(ratio) < 1.001
@@ -73,7 +72,7 @@ def test_robots_with_stops_are_as_cheap(target: Array) -> None:
     """Fins that start outside their arcs must come back to where they are pulled."""
     layout = load_layout(shipped_layouts()["restricted"])
     answer = Allocator(layout).allocate(target)
-    least = least_cost(layout, target, answer.scale, Objective(), n_starts=6, also=answer.command)
+    least = least_cost(layout, target, answer.scale, "power", n_starts=6, also=answer.command)
     assert answer.err_norm < 1e-5 and answer.power < 1.002 * least
 
 
@@ -82,7 +81,7 @@ def test_arcs_wider_than_half_a_turn_are_as_cheap(axis: int) -> None:
     """Which side of the gap each fin takes is no convex question."""
     layout, target = with_arcs("A", dict.fromkeys(range(4), (-2.4, 2.4))), AXES[axis]
     answer = Allocator(layout).allocate(target)
-    least = least_cost(layout, target, answer.scale, Objective(), n_starts=6, also=answer.command)
+    least = least_cost(layout, target, answer.scale, "power", n_starts=6, also=answer.command)
     assert answer.err_norm < 1e-5 and answer.power < 1.002 * least
 
 
@@ -109,7 +108,7 @@ def test_coincident_fins_share() -> None:
 def test_near_the_peak_of_soft_fins_it_is_as_cheap() -> None:
     case = make_split("fins", 10, 4, 77)[3]
     answer = Allocator(case.layout).allocate(case.targets[3])
-    goal = Objective("power")
+    goal = "power"
     least = least_cost(case.layout, answer.target, answer.scale, goal, n_starts=8, also=answer.command)
     assert answer.err_norm < 1e-5 and answer.power < 1.001 * least
 
