@@ -36,19 +36,17 @@ def read_px4(text: str, name: str, exchange: Exchange) -> Layout:
         exchange.note("Its surfaces and tilting servos (CA_SV_*) are left out: they hold no forces.")
     if exchange.force is None:
         exchange.note("CA_ROTORi_CT is taken for the newtons at full output (--force LEAST MOST).")
-    parts = [_rotor(i, values, bool(reversing >> i & 1), exchange) for i in range(count)]
+    parts = []
+    for i in range(count):
+        *vectors, size, km = (values.get(f"CA_ROTOR{i}_{key}", usual) for key, usual in USUAL.items())
+        place, axis = np.reshape(vectors, (2, 3)) * FRD
+        length = float(np.linalg.norm(axis))
+        if size == 0.0 or length == 0.0:
+            raise LayoutError("has no direction or no force", f"CA_ROTOR{i}")
+        force = (-abs(size) if reversing >> i & 1 else 0.0, abs(size))
+        axis *= math.copysign(1.0 / length, size)
+        parts.append(exchange.thruster(f"rotor{i + 1}", place, axis, force, -km))
     return Layout(name, tuple(parts))
-
-
-def _rotor(i: int, values: dict[str, float], reverses: bool, exchange: Exchange) -> Thruster:
-    rotor = {key: values.get(f"CA_ROTOR{i}_{key}", usual) for key, usual in USUAL.items()}
-    place, axis = (np.array([rotor[f"{kind}{x}"] for x in "XYZ"]) * FRD for kind in "PA")
-    size, length = abs(rotor["CT"]), float(np.linalg.norm(axis))
-    if size == 0.0 or length == 0.0:
-        raise LayoutError("has no direction or no force", f"CA_ROTOR{i}")
-    axis *= math.copysign(1.0 / length, rotor["CT"])
-    force = (-size if reverses else 0.0, size)
-    return exchange.thruster(f"rotor{i + 1}", place, axis, force, -rotor["KM"])
 
 
 def write_px4(layout: Layout, exchange: Exchange, suffix: str) -> str:
