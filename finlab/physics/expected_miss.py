@@ -49,7 +49,7 @@ def sources_of_miss(plant: Plant, command: Array) -> list[Source]:
     forces = plant.forces(command)
     groups: dict[object, list[int]] = {}
     for i, own in enumerate(known):
-        if own is not None:
+        if own is not None and not np.isnan(command[:, i, 0]).all():
             groups.setdefault(i if own.common is None else (own.common,), []).append(i)
     sources = []
     for places in groups.values():

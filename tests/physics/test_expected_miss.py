@@ -139,3 +139,11 @@ def test_a_grid_of_two_lines_says_that_it_cannot_tell() -> None:
     axes = [np.array([0.1, 0.6]), np.linspace(0.1, 2.1, 5), np.linspace(-np.pi, np.pi, 12, endpoint=False)]
     force = make_law(FinModelSpec("drag")).force(np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1))
     assert TableLaw(axes, force, True).grid_error.few == (0,)
+
+
+def test_a_lost_actuator_is_not_to_be_measured() -> None:
+    layout = load_layout("A")
+    for name in layout.names:
+        layout = layout.replace_actuator(name, uncertainty=Uncertainty(0.1, common="tank"))
+    (note,) = Allocator(layout).allocate([1.0, 0, 0.5, 0, 0, 0], failed=["front_left"]).notes[:1]
+    assert "measure front_right, back_left and back_right (which err together) next" in note
