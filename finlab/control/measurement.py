@@ -32,6 +32,8 @@ class Measurement(NamedTuple):
     """Roll [rad], from the IMU."""
     pitch: float
     """Pitch [rad], positive with the nose down, from the IMU."""
+    ages: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+    """How old the samples of markers, pressure, DVL and IMU are by their time stamps [s]."""
 
     def as_array(self) -> Array:
         """Position, roll, pitch, yaw, velocity and rates side by side (12,), as a log keeps them."""

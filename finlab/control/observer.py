@@ -8,6 +8,8 @@ slowly by markers, pressure and the IMU's tilt.
 """
 
 import math
+from collections import deque
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -41,6 +43,8 @@ ASTRAY = 1.0
 follow, as of a robot that water stops within a period."""
 CRUISE = 1.0
 """Speed [m/s] at which the strength of rudders counts."""
+OLDEST_S = 0.5
+"""Age from which on a sample counts as so old [s]."""
 POSE_S, TILT_S = 1.5, 1.0
 """Time constants with which poses and tilts that are seen correct those that are counted on [s]."""
 
@@ -97,8 +101,11 @@ class MotionObserver:
         self._sensors = np.array([VELOCITY_NOISE] * 3 + [RATE_NOISE]) ** 2
         self._transition = np.eye(9)
         self._transition[DRIVEN, range(4, 7)] = period_s
-        self._pose_share = 1.0 - math.exp(-period_s / POSE_S)
-        self._tilt_share = 1.0 - math.exp(-period_s / TILT_S)
+        times = np.array([POSE_S, POSE_S, POSE_S, TILT_S, TILT_S, POSE_S])
+        self._shares = 1.0 - np.exp(-period_s / times)
+        # Poses (position, roll, pitch and yaw) and motions of the last periods, the newest first.
+        self._poses: deque[Array] = deque(maxlen=max(1, math.ceil(OLDEST_S / period_s)))
+        self._motions: deque[Array] = deque(maxlen=self._poses.maxlen)
         self._state = np.zeros(9)
         self._first = np.diag([*self._sensors, *self._noise[UNKNOWN] * 100.0, *[CURRENT_SPEED**2] * 2])
         self._covariance = self._first
@@ -109,23 +116,40 @@ class MotionObserver:
         """Takes a measurement and the wrench (6,) that the fins have given since the last one, as far as
         known [N, N m]; returns what is believed."""
         m, before = measurement, self._estimate
-        position = np.array([m.position[0], m.position[1], -m.depth])
-        roll, pitch, yaw = m.roll, m.pitch, m.yaw
+        pose = np.array([m.position[0], m.position[1], -m.depth, m.roll, m.pitch, m.yaw])
         if before is None:
             self._state[MOTION] = self._seen(m)
         else:
             self._predict(before, wrench)
             self._correct(m)
-            dt, tilt = self._dt, self._tilt_share
+            dt, (x, y, z) = self._dt, before.position.tolist()
             roll, pitch = before.roll + dt * float(m.rates[0]), before.pitch + dt * float(m.rates[1])
-            roll, pitch = roll + tilt * (m.roll - roll), pitch + tilt * (m.pitch - pitch)
-            yaw = before.yaw + dt * float(self._state[3])
-            yaw = float(wrapped(yaw + self._pose_share * float(wrapped(m.yaw - yaw))))
-            counted = before.position + dt * in_world(self._state, roll, pitch, yaw)
-            position = counted + self._pose_share * (position - counted)
+            yaw = float(self._poses[0][5]) + dt * float(self._state[3])  # counted on over the seam
+            counted = np.array([x, y, z, roll, pitch, yaw])
+            counted[:3] += dt * in_world(self._state, roll, pitch, yaw)
+            marker, pressure, _, imu = m.ages
+            missed = pose - self._then(self._poses, counted, [marker, marker, pressure, imu, imu, marker])
+            missed[5] = float(wrapped(missed[5]))
+            pose = counted + self._shares * missed
+        self._poses.appendleft(pose)
+        self._motions.appendleft(self._state[MOTION].copy())
         self._last_velocity = m.velocity
-        self._estimate = self._believed(m, position, roll, pitch, yaw)
+        roll, pitch, yaw = pose[3:].tolist()
+        self._estimate = self._believed(m, pose[:3], roll, pitch, float(wrapped(yaw)))
         return self._estimate
+
+    def _then(self, past: deque[Array], now: Array, ages: Sequence[float]) -> Array:
+        """What each of some values was when a sample of it was taken, `ages` [s] ago, between what was
+        believed period by period; a sample is held against that, which moves it on to now."""
+        if not any(ages):
+            return now
+        known = np.array([now, *past])
+        back = np.minimum(np.array(ages) / self._dt, len(past))
+        whole = np.minimum(back.astype(int), len(past) - 1)
+        each = np.arange(len(now))
+        after, before = known[whole, each], known[whole + 1, each]
+        found: Array = after + (back - whole) * (before - after)
+        return found
 
     def swayed(self, sway: float, surge: float, yaw_rate: float) -> float:
         """Sideways speed [m/s] a period after `sway` [m/s] by the model, in a turn [rad/s] at a speed through
@@ -164,8 +188,8 @@ class MotionObserver:
 
     def _correct(self, m: Measurement) -> None:
         """What the sensors have seen; a velocity counts where it is a new one."""
-        seen = self._seen(m)
-        missed = seen - self._state[MOTION]
+        seen, (_, _, dvl, imu) = self._seen(m), m.ages
+        missed = seen - self._then(self._motions, self._state[MOTION], [dvl, dvl, dvl, imu])
         if not max(map(abs, missed.tolist())) < ASTRAY:
             self._state[:], self._covariance = 0.0, self._first
             self._state[MOTION] = seen

@@ -23,11 +23,15 @@ from finlab.layout.angles import wrapped
 from finlab.vehicle.actuator_motion import following_delay
 from finlab.vehicle.body import complete_body, dynamics_of
 
+RUDDERS_S = 1.0
+"""Delay [s] of a robot that rudders steer: it has to turn before it goes elsewhere."""
 LARGEST = 0.7
 """Share of what all actuators could do for an axis that is asked for at most."""
 WAY = 0.5
 """Share of the speed that is wanted with which a robot that rudders steer goes on at least, whatever its
 heading."""
+SMOOTH_S = 0.3
+"""Time over which the distance to the path is averaged [s]: markers jump."""
 FASTEST = 3.0
 """Fastest that a robot is asked to go [m/s]."""
 STEEPEST, RISE_S = 0.5, 1.0
@@ -65,8 +69,9 @@ def gains_for(layout: Layout) -> TrackingGains:
 
     The slowest actuator and what is behind it (the sensors, the period) are a delay in every loop. Of the
     inverse of that delay, velocities close at 1.08, the heading 1.4 times slower than they, and the path
-    round it 3.3 times slower than the heading."""
-    pace = 1.0 / (following_delay(layout) + BEHIND_S)
+    round it 1.9 times slower than the heading."""
+    behind = BEHIND_S + (RUDDERS_S if "Ty" in axes_of(layout) else 0.0)
+    pace = 1.0 / (following_delay(layout) + behind)
     most = LARGEST * strongest_wrench(layout)
     body = dynamics_of(complete_body(layout))
     linear, quadratic = body.linear[0], max(body.quadratic[0], 1e-9)
@@ -74,7 +79,7 @@ def gains_for(layout: Layout) -> TrackingGains:
     return TrackingGains(
         velocity=1.08 * pace,
         heading=0.756 * pace,
-        path=0.23 * pace,
+        path=0.39 * pace,
         max_wrench=tuple(most.tolist()),
         max_speed=min(max(steady, TrackingGains.max_speed), FASTEST),
     )
@@ -87,6 +92,7 @@ def axes_of(layout: Layout) -> tuple[str, ...]:
     lifts = ("Fx", "Fz", "Tz")
     rudders = [part.name for part in layout.actuators if isinstance(part, Rudder)]
     driven = layout.without(rudders) if len(rudders) < layout.n else layout
+    candidates: list[tuple[Layout, tuple[str, ...]]]
     candidates = [(driven, lifts), (layout, ("Fx", "Ty", "Tz"))] if rudders else [(layout, lifts)]
     if not layout.n_fins:
         candidates = [(driven, ("Fx", "Fy", "Fz", "Tz")), *candidates, (layout, ("Fx", "Fy", "Tz"))]
@@ -123,7 +129,9 @@ class TrackingController:
         """Forget all that was seen."""
         self._observer = MotionObserver(self.layout, self.period_s)
         self._passing, self._rising = 0.0, 0.0
-        self._wrench = np.zeros(6)
+        self._away: Array | None = None
+        self._smoothing = 1.0 - math.exp(-self.period_s / SMOOTH_S)
+        self._wrench, self._bound = np.zeros(6), self._most
         self.estimate: Estimate | None = None
 
     def wrench(self, measurement: Measurement, setpoint: Setpoint, given: Array) -> Array:
@@ -147,8 +155,8 @@ class TrackingController:
         if self._dives:
             result[4] = now.pitch_inertia * (g.velocity * self._pitch_rate(now, wanted) - now.pitch_drift)
         slow = max(1.0 - (float(now.velocity[0]) / CRUISE) ** 2, -MOST_BY_SPEED)
-        most = self._most - slow * self._of_rudders
-        self._wrench = result.clip(-most, most)
+        self._bound = self._most - slow * self._of_rudders
+        self._wrench = result.clip(-self._bound, self._bound)
         return self._wrench
 
     def ahead(self, setpoints: Sequence[Setpoint]) -> Array:
@@ -158,12 +166,14 @@ class TrackingController:
         # Turning is looked ahead to more cautiously: in a current it is steep where the robot hardly moves
         # through the water, and there the estimated current decides it.
         along = wrenches_along(self._observer, setpoints, current, 2.0 * self.gains.slow, self.period_s)
-        expected: Array = (self._wrench + along[1:] - along[0]).clip(-self._most, self._most)
+        expected: Array = (self._wrench + along[1:] - along[0]).clip(-self._bound, self._bound)
         return expected
 
     def _velocity(self, now: Estimate, setpoint: Setpoint) -> Array:
         """Velocity over ground (3,) to go with [m/s]."""
-        wanted: Array = setpoint.velocity + self.gains.path * (setpoint.position - now.position)
+        away = setpoint.position - now.position
+        self._away = away if self._away is None else self._away + (away - self._away) * self._smoothing
+        wanted: Array = setpoint.velocity + self.gains.path * self._away
         speed = math.sqrt(wanted @ wanted)
         return wanted * min(1.0, self.gains.max_speed / max(speed, 1e-9))
 

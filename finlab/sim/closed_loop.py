@@ -25,7 +25,7 @@ from finlab.control import (
 )
 from finlab.control.measurement import NO_WRENCH
 from finlab.errors import FinlabError
-from finlab.layout import Layout, Rudder
+from finlab.layout import Azimuth, Layout, Rudder
 from finlab.layout.damage import Damage, Kind
 from finlab.physics import plant_of
 from finlab.sim.actuator_force import ActuatorForce
@@ -332,7 +332,8 @@ class ClosedLoop:
         result = command.copy()
         for name, share in health.weak:
             index = self.layout.index(name)
-            result[index, self.layout.actuators[index].LAGS] /= share
+            part = self.layout.actuators[index]
+            result[index, 1 if isinstance(part, Azimuth) else 0] /= share
         return result
 
     def _moved(self, command: Array) -> Array:

@@ -94,8 +94,10 @@ class Channel:
         self.bias: Array = np.array(sensor.bias) * self._fate.standard_normal(len(sensor.bias))
         """What each value is off for the whole run."""
         self._due = 0.0
-        self._waiting: deque[tuple[float, Array]] = deque()
+        self._waiting: deque[tuple[float, float, Array]] = deque()  # when it arrives, when it was taken
         self._first = True
+        self.taken = 0.0
+        """When the newest sample that has arrived was taken [s]."""
 
     def is_due(self, time: float) -> bool:
         """Whether it samples now."""
@@ -108,14 +110,14 @@ class Channel:
         lost = self._sensor.dropout > 0.0 and self._fate.random() < self._sensor.dropout
         # The robot has waited at rest for its first samples.
         if self._first or not lost:
-            self._waiting.append((time if self._first else time + self._sensor.delay_s, sample))
+            self._waiting.append((time if self._first else time + self._sensor.delay_s, time, sample))
         self._first = False
 
     def arrived(self, time: float) -> Array | None:
         """The newest sample that has arrived since the last call, if there is one."""
         newest = None
         while self._waiting and self._waiting[0][0] <= time + 1e-9:
-            newest = self._waiting.popleft()[1]
+            _, self.taken, newest = self._waiting.popleft()
         return newest
 
 
@@ -133,7 +135,7 @@ class Sensors:
     def measure(self, time: float, state: Array) -> Measurement:
         """The newest samples at `time` [s] for a state (13,); to be called in order of time."""
         self.sample(time, state)
-        held = self._held._replace(time=time)
+        held = self._held
         if (pose := self._marker.arrived(time)) is not None:
             held = held._replace(position=pose[:3], yaw=float(pose[3]))
         if (depth := self._pressure.arrived(time)) is not None:
@@ -142,7 +144,10 @@ class Sensors:
             held = held._replace(velocity=velocity)
         if (turning := self._imu.arrived(time)) is not None:
             held = held._replace(rates=turning[2:], roll=float(turning[0]), pitch=float(turning[1]))
-        self._held = held
+        marker, pressure, dvl, imu = (
+            time - channel.taken for channel in (self._marker, self._pressure, self._dvl, self._imu)
+        )
+        self._held = held = held._replace(time=time, ages=(marker, pressure, dvl, imu))
         return held
 
     def sample(self, time: float, state: Array) -> None:

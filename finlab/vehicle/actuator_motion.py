@@ -60,8 +60,9 @@ class ActuatorMotion:
     def pushes(self) -> NDArray[np.bool_]:
         """Which actuators (n,) may give a force: fins that beat, whatever the law says of others, and all
         others but those that have stopped."""
-        beats = self.fins.amplitude * self.fins.frequency > 0.0
-        return self.joined(beats, self._working[self.of_others]).astype(bool)
+        result = self._working.copy()
+        result[self.of_fins] = self.fins.amplitude * self.fins.frequency > 0.0
+        return result
 
     @property
     def direction(self) -> Array:

@@ -13,7 +13,7 @@ from finlab.assets import PAPER_LAYOUTS
 from finlab.control import FaultMonitor, steers
 from finlab.evaluation.method_specs import MethodSpec
 from finlab.evaluation.splits import make_split
-from finlab.layout import Layout, load_layout
+from finlab.layout import Body, Layout, load_layout
 from finlab.sim import (
     Changing,
     ClosedLoop,
@@ -33,6 +33,18 @@ TWO = ("A", "C")
 CURRENT = (0.05, -0.05, 0.0)
 """7 cm/s across the path [m/s]."""
 
+HEAVY = ("bluerov2_heavy",)
+OTHER_HEAVY = Body(
+    mass_kg=13.0,
+    inertia_kgm2=(0.250, 0.221, 0.356),
+    added_mass=(1.272, 1.424, 3.736, 0.0378, 0.027, 0.0444),
+    linear_damping=(13.7, 1.0, 23.0, 0.5, 0.8, 0.1),
+    quadratic_damping=(14.1, 21.7, 19.0, 0.119, 0.047, 0.15),
+    center_of_buoyancy_m=(0.0, 0.0, 0.02),
+    buoyancy_n=132.4,
+)
+"""The same robot by github.com/PX4/PX4-gazebo-models, 2026 (BSD-3); it displaces 0.0135 m^3."""
+
 
 @dataclass(frozen=True)
 class HardDay:
@@ -51,6 +63,10 @@ class HardDay:
     mixed_fins: bool = False
     """Whether all methods are given fins of split `fins-mixed`, others for each seed, in place of the
     layout's."""
+    scale: float = 1.0
+    """How many times larger the path is than the shipped one."""
+    body: Body | None = None
+    """The true body where it is another one than the layout's."""
     truth: Mapping[str, Any] = field(default_factory=dict)
     """What the body really is: options of `finlab.sim.perturbed`."""
     water: Water = Still()
@@ -68,7 +84,7 @@ class HardDay:
 
     def path(self) -> Trajectory:
         """What is followed."""
-        return make_trajectory(self.trajectory, self.duration_s)
+        return make_trajectory(self.trajectory, self.duration_s, self.scale)
 
     def cases(self) -> list["Case"]:
         """Every swim of one seed: each layout, with each fin or pair that is weak or lost."""
@@ -120,7 +136,7 @@ class HardDay:
             failures=failures,
             announced=self.announced,
             monitor=None if self.announced else FaultMonitor(robot),
-            truth=perturbed(robot, thrust=weak, **self.truth),
+            truth=perturbed(replace(robot, body=self.body or robot.body), thrust=weak, **self.truth),
             seed=seed,
         )
 
@@ -175,5 +191,20 @@ HARD_DAYS = (
     HardDay("flexible", "Fins have soft tips, which no method is given.", plant="flexible"),
     HardDay("wake", "Fins weaken each other by their jets.", plant="wake"),
     HardDay("inflow", "Thrust falls with speed.", plant="inflow"),
+    HardDay("heavy", "Eight thrusters; everything is as drawn.", HEAVY),
+    HardDay("heavy-other-body", "Eight thrusters, and the body of another source.", HEAVY, body=OTHER_HEAVY),
+    HardDay(
+        "heavy-lost-one",
+        "One of eight thrusters is lost half-way, and a monitor has to find out.",
+        HEAVY,
+        lost=1,
+        announced=False,
+    ),
+    HardDay("heavy-lost-two", "Two of eight thrusters are lost half-way, announced.", HEAVY, lost=2),
+    HardDay(
+        "torpedo", "A propeller and tail fins that need speed.", ("torpedo",), "circle", 120.0, scale=25.0
+    ),
+    HardDay("hybrid", "Four fins and two thrusters.", ("turtle_hybrid",)),
+    HardDay("hybrid-lost", "One fin or thruster of six is lost half-way.", ("turtle_hybrid",), lost=1),
 )
 """The suite, in the order in which it is printed."""
