@@ -8,7 +8,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from html import escape
 from xml.etree import ElementTree
 
-from finlab.errors import LayoutError
 from finlab.exchange.exchange import Exchange
 from finlab.exchange.gazebo import DERIVATIVES
 from finlab.layout import Actuator, Azimuth, Body, Layout, Rudder, Thruster
@@ -82,10 +81,7 @@ def description_text(layout: Layout, exchange: Exchange, form: Mapping[str, str]
             "Fins and rudders are joints that push nothing; --fins names the fins among them again."
         )
     text = form["robot"].format(name=escape(layout.name), parts="".join(parts))
-    try:
-        root = ElementTree.fromstring(text)
-    except ElementTree.ParseError:
-        raise LayoutError("a name in the layout has a character that XML has not; give it another") from None
+    root = ElementTree.fromstring(text)
     ElementTree.indent(root)
     return '<?xml version="1.0"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
 

@@ -141,6 +141,28 @@ def test_any_propellers_survive_the_way_there_and_back(kind: str, suffix: str, t
             np.testing.assert_allclose(first[0], second[0], atol=1e-9)
 
 
+@pytest.mark.parametrize("suffix", ["urdf", "sdf"])
+def test_names_with_signs_of_xml(suffix: str, tmp_path: Path) -> None:
+    layout, path = finlab.load_layout("bluerov2_heavy"), tmp_path / f"robot.{suffix}"
+    odd = replace(layout.replace_actuator(layout.names[0], name="a<\"&{0}'é"), name='<{name}> & "co"')
+    back = written(odd, path)
+    assert (back.name, back.names) == (odd.name, odd.names)
+
+
+def test_chains_of_joints_may_be_long(tmp_path: Path) -> None:
+    """3000 joints of 1 mm each, the last one first."""
+    links = "".join(f'<link name="l{i}"/>' for i in range(3001))
+    joints = "".join(
+        f'<joint name="j{i}" type="continuous"><parent link="l{i}"/><child link="l{i + 1}"/>'
+        '<origin xyz="0.001 0 0"/></joint>'
+        for i in reversed(range(3000))
+    )
+    (tmp_path / "chain.urdf").write_text(f'<robot name="chain">{links}{joints}</robot>')
+    (last,) = read(tmp_path / "chain.urdf", thrusters=["l3000"], origin="base").actuators
+    assert isinstance(last, Thruster)
+    np.testing.assert_allclose(last.position, [3.0, 0.0, 0.0], atol=1e-9)
+
+
 def test_an_azimuth_that_turns_about_a_line_beside_its_thrust(tmp_path: Path) -> None:
     """A stern drive: the propeller sits 0.3 m behind the turning axis, which changes no torque."""
     tag = '<gazebo><plugin name="gz::sim::systems::Thruster"><joint_name>p</joint_name></plugin></gazebo>'
