@@ -78,7 +78,6 @@ def test_show_of_a_torpedo_asks_for_its_speed(capsys: pytest.CaptureFixture[str]
 @pytest.mark.parametrize(
     ("verb", "argv"),
     [
-        ("simulate", ["simulate", "turtle_hybrid"]),
         ("fit robot", ["fit", "robot", "turtle_hybrid", "swim.csv", "-o", "x.yaml"]),
     ],
 )
