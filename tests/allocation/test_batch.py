@@ -6,12 +6,12 @@ import pickle
 import numpy as np
 import pytest
 
-from finlab.allocation import METHODS, Health, Policy
+from finlab.allocation import Health, Policy
 from finlab.assets import shipped_checkpoints
 from finlab.errors import AllocationError
 from finlab.layout import FinModelSpec, load_layout
 from finlab.physics import Plant
-from tests.allocation.quick import quick_allocator
+from tests.allocation.quick import OF_FINS, quick_allocator
 from tests.any_robot import AnyRobot
 
 POLICIES = (
@@ -63,7 +63,7 @@ def test_the_plain_policy_shares_the_work_and_reaches_as_much() -> None:
     assert (heave <= 1e-2).all() and heave.min() < -0.01
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", OF_FINS)
 def test_batches_are_plain_data_judged_by_the_plant(method: str) -> None:
     allocator, layout, targets = quick_allocator(method), load_layout("ucat"), wrenches(4)
     batch = allocator.allocate_batch(layout, targets, failed=[layout.names[2]], seed=5)
@@ -79,7 +79,7 @@ def test_batches_are_plain_data_judged_by_the_plant(method: str) -> None:
     assert allocator.allocate_batch(layout, 0.5 * targets, failed=[layout.names[2]], seed=5) != batch
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", OF_FINS)
 def test_empty_batches_have_the_shapes_of_full_ones(method: str) -> None:
     layout = load_layout("A")
     batch = quick_allocator(method).allocate_batch(layout, np.empty((0, 6)))
@@ -87,7 +87,7 @@ def test_empty_batches_have_the_shapes_of_full_ones(method: str) -> None:
     assert batch.err_norm.shape == batch.effort.shape == batch.solve_ms.shape == batch.reachable.shape == (0,)
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", OF_FINS)
 def test_batches_carry_the_note_about_unknown_fins(method: str) -> None:
     layout = load_layout("A")
     strange = layout.replace_actuator("back_left", model=FinModelSpec("lighthill"))

@@ -4,10 +4,9 @@ from dataclasses import replace
 
 import pytest
 
-from finlab.allocation import METHODS
 from finlab.assets import shipped_checkpoints
 from finlab.layout import FinModelSpec, Layout, load_layout
-from tests.allocation.quick import quick_allocator
+from tests.allocation.quick import OF_FINS, quick_allocator
 
 SURGE = [1.0, 0.0, 0.5, 0.0, 0.0, 0.1]
 
@@ -23,7 +22,7 @@ def with_models(**models: FinModelSpec) -> Layout:
     )
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", OF_FINS)
 def test_fins_that_no_network_learned_are_named(method: str) -> None:
     allocator = quick_allocator(method)
     wide = FinModelSpec("drag", (("area", 0.03),))
@@ -33,7 +32,7 @@ def test_fins_that_no_network_learned_are_named(method: str) -> None:
     assert allocator.on(load_layout("A")).unknown_fins == ()
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", OF_FINS)
 def test_the_note_names_the_fins_that_work(method: str) -> None:
     layout = with_models(front_left=FinModelSpec("lighthill"))
     allocator = quick_allocator(method)
