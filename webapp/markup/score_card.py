@@ -152,7 +152,6 @@ def warnings(layout: Layout) -> tuple[str, ...]:
         if gap < SPAN:
             sentences.append(f"{a.name} and {b.name} are {100 * gap:.0f} cm apart and may touch.")
     for fin in layout.fins:
-        shaft = np.array([np.cos(fin.shaft_azimuth), np.sin(fin.shaft_azimuth), 0.0])
-        if hull.contains(np.array(fin.position) + 0.05 * shaft):
+        if hull.contains(np.array(fin.position) + 0.05 * np.array(fin.frame[0])):
             sentences.append(f"{fin.name} beats inside the hull.")
     return tuple(sentences)

@@ -80,11 +80,11 @@ def _add_slider(page: Page, axis: int) -> viser.GuiSliderHandle[float]:
     return page.bind_number(slider, partial(session.set_target, axis), lambda target: target[axis])
 
 
-def _sentence(ranges_error: str | None, layout: Layout) -> str:
+def _sentence(ranges_error: str | None) -> str:
     """Why nothing is known of what is in reach."""
     said = (
         ""
-        if ranges_error is None or not layout.is_of_fins
+        if ranges_error is None
         else html("<div class='fl missing'>What is in reach: {}</div>", ranges_error)
     )
     return marker("fl-reach-end") + said

@@ -56,7 +56,7 @@ def find(question: Question) -> Findings:
         elif other:
             whole = attainable_set(beside, kind, alone=True)
     card = score_card(layout, failed)
-    before = score_card(beside, lost) if other and len(lost) < beside.n_fins else None
+    before = score_card(beside, lost) if other and len(lost) < beside.n else None
     return Findings(question, card, before, now, whole)
 
 
