@@ -18,6 +18,7 @@ LEVELS = (
     ("bundle_files",),
     ("layout",),
     ("actuators",),
+    ("uncertainty",),
     ("physics", "exchange"),
     ("vehicle",),
     ("networks",),

@@ -5,12 +5,13 @@ from functools import lru_cache
 import numpy as np
 
 from finlab.actuators.fin.models import file_stamps
-from finlab.actuators.fin.table_file import DOUBT
 from finlab.arrays import Array
 from finlab.layout import Fin, FinModelSpec, Layout, Limits
 from finlab.layout.angles import wrapped
+from finlab.layout.force_table_file import DOUBT
 from finlab.layout.rudder import Rudder
 from finlab.physics import FinLaw, TableLaw, make_law, plant_of
+from finlab.uncertainty.grid_error import grid_uncertainty
 
 RESTLESS = 0.05
 """Share of its largest force below which a fin counts as able to rest."""
@@ -113,7 +114,7 @@ def _beyond_table(law: FinLaw, limits: Limits) -> list[str]:
         for (name, unit, (low, high)), covered in zip(asked, law.covers, strict=False)
         if low < covered[0] - BEYOND or high > covered[1] + BEYOND
     ]
-    if few := [AXES_OF_TABLES[k] for k in law.grid_error.few]:
+    if few := [AXES_OF_TABLES[k] for k in grid_uncertainty(law).error.few]:
         notes.append(
             f"the table of fin {{name}} has two {' and two '.join(few)} alone: how wrong it is between them "
             "cannot be told"

@@ -14,7 +14,6 @@ from pathlib import Path
 import numpy as np
 
 import finlab
-from finlab.actuators.fin.table_file import table_bytes
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.bundle_settings import METHODS_ON_BOARD, about_bundle
 from finlab.bundle_files import (
@@ -34,6 +33,7 @@ from finlab.distribution import NAME
 from finlab.errors import AllocationError, DataError
 from finlab.layout import Fin, FinModelSpec, Layout
 from finlab.layout.commands import command_of, command_values
+from finlab.layout.force_table_file import table_bytes
 from finlab.layout.robot_file import Robot, robot_bytes
 from finlab.networks.checkpoint import checkpoint_files
 from finlab.whole_file import write_whole

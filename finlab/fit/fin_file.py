@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from finlab.actuators.fin.table_file import COLUMNS, DEVIATIONS, DOUBT, POWER_COLUMN
 from finlab.errors import DataError
 from finlab.fit.fin_fit import FinFit
+from finlab.layout.force_table_file import COLUMNS, DEVIATIONS, DOUBT, POWER_COLUMN
 from finlab.whole_file import write_whole
 
 GRID = (13, 13, 18)

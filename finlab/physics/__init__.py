@@ -1,12 +1,12 @@
 """Command to force to wrench, and what it costs: the fins' laws, the plant, power and effort."""
 
 from finlab.actuators.fin.models import make_law as make_law
+from finlab.actuators.fin.models import read_table as read_table
 from finlab.actuators.fin.models import stack_laws as stack_laws
 from finlab.actuators.fin.table import TableLaw as TableLaw
-from finlab.actuators.fin.table_file import read_table as read_table
-from finlab.actuators.fin.table_file import write_table as write_table
 from finlab.actuators.law import FinLaw as FinLaw
 from finlab.actuators.law import PlanarLaw as PlanarLaw
+from finlab.layout.force_table_file import write_table as write_table
 from finlab.physics.known_plants import plant_of as plant_of
 from finlab.physics.plant import Plant as Plant
 from finlab.physics.wrench import body_force as body_force

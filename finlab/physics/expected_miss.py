@@ -10,12 +10,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from finlab.actuators.uncertainty import Known, uncertainties
 from finlab.arrays import Array
 from finlab.layout.layout import Layout
 from finlab.layout.rudder import Rudder
 from finlab.layout.thruster import Thruster
 from finlab.physics.plant import Plant
+from finlab.uncertainty.known import Known, uncertainties
 
 
 class Source(NamedTuple):

@@ -9,7 +9,7 @@ import pytest
 from threadpoolctl import threadpool_info
 
 from finlab import load_layout
-from finlab.actuators.fin.table_file import DOUBT, read_table
+from finlab.actuators.fin.models import read_table
 from finlab.allocation import Allocator
 from finlab.arrays import Array
 from finlab.errors import DataError
@@ -18,6 +18,7 @@ from finlab.fit.fin_file import summary, write_fin
 from finlab.fit.fin_fit import FinFit, fit_fin
 from finlab.layout import Fin, FinModelSpec, Layout
 from finlab.layout.angles import wrapped
+from finlab.layout.force_table_file import DOUBT
 from finlab.physics import TableLaw
 from tests.fit.cell import commands, measured, samples, soft
 

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from finlab.actuators.fin.table import TableLaw
-from finlab.actuators.table_error import thrust_table_error
 from finlab.allocation import Allocator
 from finlab.arrays import Array
 from finlab.layout import FinModelSpec, Layout, Uncertainty, load_layout
@@ -16,6 +15,8 @@ from finlab.layout.thrust_model import PowerTable
 from finlab.layout.thruster import Thruster
 from finlab.physics import make_law, plant_of, write_table
 from finlab.physics.expected_miss import expected_miss
+from finlab.uncertainty.grid_error import grid_uncertainty
+from finlab.uncertainty.table_error import thrust_table_error
 from tests.mixed_robots import load, random_flow, random_robot
 
 DRAWS = 20_000
@@ -138,7 +139,7 @@ def test_rows_of_a_thrusters_table_tell_how_far_apart_they_are() -> None:
 def test_a_grid_of_two_lines_says_that_it_cannot_tell() -> None:
     axes = [np.array([0.1, 0.6]), np.linspace(0.1, 2.1, 5), np.linspace(-np.pi, np.pi, 12, endpoint=False)]
     force = make_law(FinModelSpec("drag")).force(np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1))
-    assert TableLaw(axes, force, True).grid_error.few == (0,)
+    assert grid_uncertainty(TableLaw(axes, force, True)).error.few == (0,)
 
 
 def test_a_lost_actuator_is_not_to_be_measured() -> None:

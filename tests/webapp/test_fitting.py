@@ -11,11 +11,11 @@ from typing import Any
 
 import pytest
 
-from finlab.actuators.fin.table_file import DOUBT, table_bytes
 from finlab.allocation import Allocator
 from finlab.errors import DataError, FinlabError, LayoutError
 from finlab.fit import outliers
 from finlab.layout import Layout, load_layout
+from finlab.layout.force_table_file import DOUBT, table_bytes
 from tests.fit.cell import columns_of, commands, measured, soft, write
 from tests.webapp.loops import page_of
 from webapp.markup.fit_card import fit_card
@@ -241,8 +241,8 @@ def test_doubts_come_first(tmp_path: Path, worker: Worker) -> None:
 
 def robot(tmp_path: Path, cache: Path) -> Layout:
     """U-CAT with one measured fin."""
-    from finlab.actuators.fin.table_file import write_table
     from finlab.layout import FinModelSpec
+    from finlab.layout.force_table_file import write_table
     from finlab.physics import make_law
 
     grid = [[0.05, 0.3, 0.6], [0.1, 1.0, 2.1], [-3.0, -1.5, 0.0, 1.5]]

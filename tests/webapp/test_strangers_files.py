@@ -12,11 +12,11 @@ from typing import Any
 import pytest
 import viser
 
-from finlab.actuators.fin.table_file import write_table
 from finlab.allocation import Allocator
 from finlab.errors import DataError, FinlabError, LayoutError
 from finlab.files.plain_values import yaml_text
 from finlab.layout import FinModelSpec, layout_to_dict, load_layout
+from finlab.layout.force_table_file import write_table
 from finlab.physics import make_law
 from tests.webapp.test_app import app, on_loop, server, until, view
 from webapp.panels.frame import View

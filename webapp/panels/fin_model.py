@@ -9,11 +9,11 @@ import numpy as np
 import viser
 
 from finlab.actuators.fin.table import TableLaw
-from finlab.actuators.fin.table_file import DOUBT
 from finlab.arrays import Array
 from finlab.errors import DataError, FinlabError
 from finlab.layout import Fin, Layout
 from finlab.layout.fin import FIN_MODELS, FinModelSpec, Limits
+from finlab.layout.force_table_file import DOUBT
 from finlab.physics import make_law
 from webapp.markup.html import html
 from webapp.markup.plot import Plot, cost_axis, positive

@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from finlab.actuators.fin.table_file import read_table
+from finlab.actuators.fin.models import read_table
 from finlab.arrays import Array
 from finlab.distribution import install
 from finlab.errors import DataError, FinlabError

@@ -12,10 +12,10 @@ from finlab.actuators.fin.drag import Drag
 from finlab.actuators.fin.lighthill import Lighthill
 from finlab.actuators.fin.soft import Soft
 from finlab.actuators.fin.table import GridLaw, TableLaw
-from finlab.actuators.fin.table_file import read_table
 from finlab.actuators.law import FinLaw, PlanarLaw
 from finlab.bundle_files import archive_around
 from finlab.layout.fin import FinModelSpec
+from finlab.layout.force_table_file import read_force_table
 from finlab.layout.layout import Layout
 
 PLANAR_LAWS: dict[str, type[PlanarLaw]] = {"drag": Drag, "lighthill": Lighthill, "soft": Soft}
@@ -79,6 +79,11 @@ def file_stamp(spec: FinModelSpec) -> tuple[int, int] | None:
 def file_stamps(layout: Layout) -> tuple[tuple[int, int] | None, ...]:
     """Returns the stamps of all fins of a layout, for what is kept of it until one of its files changes."""
     return tuple([file_stamp(fin.model) for fin in layout.fins])
+
+
+def read_table(path: str | os.PathLike[str]) -> TableLaw:
+    """Returns the law in a CSV file; errors as for `read_force_table`."""
+    return TableLaw(*read_force_table(path))
 
 
 @lru_cache(maxsize=64)

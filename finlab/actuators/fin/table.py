@@ -1,17 +1,13 @@
-"""A fin model that is a table of forces, measured in a tank or computed by CFD; `table_file` reads it.
+"""A fin model that is a table of forces, measured in a tank or computed by CFD.
 
 Forces, power and their derivatives are continuous between the grid's points. When the zero directions cover
 the circle the table is periodic. Amplitudes and frequencies beyond the table count as its edge.
 """
 
-from functools import cached_property
-
 import numpy as np
 
-from finlab.actuators.fin.grid_error import SMALL, grid_error
 from finlab.actuators.fin.hermite_grid import Grid, HermiteGrids
 from finlab.actuators.law import FinLaw
-from finlab.actuators.table_error import TableError
 from finlab.arrays import Array, Values, library_of
 
 
@@ -82,39 +78,8 @@ class TableLaw(GridLaw):
         """What to know of the table, a sentence each."""
         self.covers = tuple((float(axis[0]), float(axis[-1])) for axis in axes)
         """First and last amplitude [rad], frequency [Hz] and zero direction [rad] of the grid."""
-        self._measured = np.square(deviation) if deviation is not None and deviation.shape[-1] else None
-
-    @cached_property
-    def grid_error(self) -> TableError:
-        """What the grid leaves open, over the size of the force."""
-        return grid_error(self.grid)
-
-    @cached_property
-    def _variances(self) -> Array:
-        """Variances (a, f, d, 2) [N^2] of the forces across the shaft and along it at the grid's points: what
-        the file says, and the error of the grid."""
-        square, error = (self.grid.values[..., :3] ** 2).sum(axis=-1), self.grid_error
-        share = error.spacing**2 + (error.noise**2 if self._measured is None else 0.0)
-        known = np.zeros(3) if self._measured is None else self._measured
-        across = share * (square + SMALL**2 * square.max()) + known[..., 1:].mean(axis=-1)
-        return np.stack(np.broadcast_arrays(across, known[..., 0]), axis=-1)
-
-    @cached_property
-    def _between(self) -> HermiteGrids:
-        return HermiteGrids([self.grid._replace(values=self._variances)])
-
-    def deviation(self, command: Array) -> Array:
-        """Returns the standard deviation (..., 2) [N] of the force across the shaft, in each of two
-        directions, and along it, at commands (..., 3)."""
-        return np.asarray(np.sqrt(np.maximum(self._between(command, 1)[..., 0, 0, 0, :], 0.0)))
-
-    @cached_property
-    def uncertain_share(self) -> float:
-        """The part of the standard deviation across the shaft that grows with the force, as a share of it,
-        over the grid."""
-        square, variance = (self.grid.values[..., :3] ** 2).sum(axis=-1), self._variances[..., 0]
-        away = square - square.mean()
-        return float(np.sqrt(max((away * variance).sum() / max((away**2).sum(), 1e-300), 0.0)))
+        self.deviation = deviation if deviation is not None and deviation.shape[-1] else None
+        """Standard deviations of the forces at the grid's points (a, f, d, 3) [N], where they are known."""
 
 
 def _jacobian(found: Array) -> Array:

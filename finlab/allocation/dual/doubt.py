@@ -9,9 +9,9 @@ not alike all round count by their mean.
 
 import numpy as np
 
-from finlab.actuators.uncertainty import uncertainties
 from finlab.arrays import Array
 from finlab.layout.layout import Layout
+from finlab.uncertainty.known import uncertainties
 
 PERCENT = 1e-2
 """Share of the yardstick in whose square a miss is paid."""

@@ -9,13 +9,13 @@ from pathlib import Path
 
 import numpy as np
 
-from finlab.actuators.fin.table_file import COLUMNS, POWER_COLUMN
 from finlab.errors import DataError
 from finlab.fit.robot.learned_fins import learned
 from finlab.fit.robot.model import shape_factor
 from finlab.fit.robot.report import summary
 from finlab.fit.robot.robot_fit import RobotFit
 from finlab.layout import Body, Fin, FinModelSpec, Interaction, Jet, Layout, save_layout
+from finlab.layout.force_table_file import COLUMNS, POWER_COLUMN
 from finlab.layout.interaction import MAX_SHARE
 from finlab.layout.layout import MAX_DESCRIPTION_LENGTH
 from finlab.physics import make_law

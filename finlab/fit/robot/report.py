@@ -1,7 +1,7 @@
 """What a fit to swims is worth, in sentences and as a table."""
 
-from finlab.actuators.fin.table_file import DOUBT
 from finlab.fit.robot.robot_fit import UNTOLD, RobotFit
+from finlab.layout.force_table_file import DOUBT
 
 MEANINGS = {
     "beat": "forces that swing within the beat",

@@ -12,12 +12,13 @@ import numpy as np
 
 from finlab.actuators.fin.models import file_stamps, make_law
 from finlab.actuators.fin.table import TableLaw
-from finlab.actuators.table_error import thrust_table_error
 from finlab.arrays import Array
 from finlab.layout.actuator import Actuator
 from finlab.layout.fin import Fin
 from finlab.layout.layout import Layout
 from finlab.layout.thrust_model import PowerTable
+from finlab.uncertainty.grid_error import GridUncertainty, grid_uncertainty
+from finlab.uncertainty.table_error import thrust_table_error
 
 OF_ONE_TABLE = 0.5
 """Share of the variance that actuators with one table have together: their errors are alike where their
@@ -37,7 +38,7 @@ class Known:
     itself."""
     correlation: float = 1.0
     """Share of the variance that these have together."""
-    table: TableLaw | None = None
+    table: GridUncertainty | None = None
     """Tells the deviation at each command, in place of `share` and `floor`."""
 
     def deviation(self, command: Array, size: Array) -> Array:
@@ -72,7 +73,8 @@ def _of(part: Actuator) -> Known | None:
         law = make_law(part.model)
         if not isinstance(law, TableLaw):
             return None
-        return Known(law.uncertain_share, 0.0, part.model, OF_ONE_TABLE, law)
+        known = grid_uncertainty(law)
+        return Known(known.uncertain_share, 0.0, part.model, OF_ONE_TABLE, known)
     model = getattr(part, "model", None)
     if not isinstance(model, PowerTable):
         return None

@@ -11,13 +11,11 @@ free. Lines that begin with # say what to know of the table; other columns are p
 import csv
 import math
 import os
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.actuators.fin.table import TableLaw
-from finlab.actuators.law import FinLaw
 from finlab.arrays import Array
 from finlab.bundle_files import TABLES, archive_around, read_bundle_files
 from finlab.errors import DataError
@@ -42,20 +40,31 @@ MAX_BYTES = 25_000_000
 """Largest table that is read [bytes]."""
 
 
-def read_table(path: str | os.PathLike[str]) -> TableLaw:
-    """Returns the law in a CSV file.
+class ForceTable(NamedTuple):
+    """What a file holds."""
+
+    axes: list[Array]
+    """The grid's amplitudes [rad], frequencies [Hz] and zero directions [rad], rising."""
+    values: Array
+    """Forces [N] and, where it is known, power [W] (a, f, d, 3 or 4)."""
+    periodic: bool
+    """Whether the zero directions cover the circle; the first one is not there again at the end."""
+    notes: tuple[str, ...]
+    """What to know of the table, a sentence each."""
+    deviation: Array
+    """Standard deviations of the forces (a, f, d, 3) [N]; (a, f, d, 0) where they are not known."""
+
+
+def read_force_table(path: str | os.PathLike[str]) -> ForceTable:
+    """Returns the table in a CSV file.
 
     Raises:
         DataError: the file is missing, lacks a column, holds something that is not a finite number or whose
             unit cannot be right, its rows do not fill a grid with at least two points per axis, or it has no
             thrust or no power to tell of.
     """
-    return parse_table(table_bytes(path), str(path))
-
-
-def parse_table(content: bytes, source: str) -> TableLaw:
-    """Returns the law in the content of a CSV file, which errors call `source`; see `read_table`."""
-    rows, deviation, lines, notes = _read_rows(content, source)
+    source = str(path)
+    rows, deviation, lines, notes = _read_rows(table_bytes(path), source)
     _check_units(rows, source)
     axes, values = _grid(np.hstack([rows, deviation]), lines, source)
     periodic, axes[2], values = _close_circle(axes[2], values, source)
@@ -68,16 +77,16 @@ def parse_table(content: bytes, source: str) -> TableLaw:
                 f"{LEAST_STEP:g} or more; write equal values with equal digits"
             )
     known = rows.shape[1] - 3
-    return TableLaw(axes, values[..., :known], periodic, notes, values[..., known:])
+    return ForceTable(axes, values[..., :known], periodic, notes, values[..., known:])
 
 
 def write_table(
-    path: str | os.PathLike[str], law: FinLaw, amplitude: Array, frequency: Array, zero_direction: Array
+    path: str | os.PathLike[str], law: Any, amplitude: Array, frequency: Array, zero_direction: Array
 ) -> None:
     """Writes the forces of a law on a grid of amplitude [rad], frequency [Hz] and zero direction [rad]."""
     axes = [np.asarray(axis, dtype=np.float64) for axis in (amplitude, frequency, zero_direction)]
     command = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-    force: Any = law.force(command)
+    force = law.force(command)
     with open(path, "w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(COLUMNS)
