@@ -1,4 +1,4 @@
-"""Methods as users specify them: a name, with a number of starts or an objective behind it: `ipopt-32`."""
+"""Methods as users specify them: a name, with a number of starts behind it: `ipopt-32`."""
 
 import re
 from collections.abc import Iterable
@@ -27,7 +27,6 @@ PATIENCE_S = 60.0
 """Processor time [s] that a target may take where answers count and not times; starts and steps end every
 method long before."""
 _WITH_STARTS = re.compile(r"(\w+)-(\d+)")
-_WITH_OBJECTIVE = re.compile(r"(\w+)-(power|effort)")
 
 
 def is_slow(name: str) -> bool:
@@ -101,8 +100,7 @@ def load_method_spec(
     """The method of a specification.
 
     Args:
-        name: a method; `ipopt-32`, say, for 32 starts; `sqp-effort`, say, for an objective of its own;
-            `ipopt-forces`, in the space of forces; or `file.py:function`, see `own_method`.
+        name: a method; `ipopt-32`, say, for 32 starts; `ipopt-forces`, in the space of forces; or `file.py:function`, see `own_method`.
         checkpoint: of learned methods, as for `finlab.Allocator`.
         objective: what the methods that can choose keep least; each one's default where None.
 
@@ -115,8 +113,6 @@ def load_method_spec(
         return MethodSpec(kind.name, MethodChoice(kind, kind.settings_class()))
     if name == IN_FORCES:
         return MethodSpec(name, _choice("ipopt", checkpoint, space="forces"))
-    if named := _WITH_OBJECTIVE.fullmatch(name):
-        return MethodSpec(name, _choice(named[1], checkpoint, objective=named[2]))
     method, starts = method_and_starts(name)
     options: dict[str, Any] = {}
     if starts is not None:

@@ -10,8 +10,6 @@ from finlab.evaluation.method_specs import is_slow, load_method_spec, load_metho
 def test_the_objective_is_a_part_of_the_name_or_given_to_all(name: str) -> None:
     assert load_method_spec(name).choice.settings.objective == "power"
     assert load_method_spec(name, objective="effort").choice.settings.objective == "effort"
-    assert load_method_spec(f"{name}-effort").choice.settings.objective == "effort"
-    assert load_method_spec(f"{name}-power", objective="effort").choice.settings.objective == "power"
 
 
 def test_methods_that_cannot_choose_are_left_as_they_are() -> None:
@@ -22,7 +20,7 @@ def test_methods_that_cannot_choose_are_left_as_they_are() -> None:
 
 def test_starts() -> None:
     assert load_method_spec("ipopt-32").choice.settings.n_starts == 32
-    assert is_slow("ipopt-32") and not is_slow("sqp-effort")
+    assert is_slow("ipopt-32") and not is_slow("sqp")
 
 
 @pytest.mark.parametrize(
@@ -30,7 +28,6 @@ def test_starts() -> None:
     [
         ("dual,fast", "method: expected one of dual, .* got 'fast'"),
         ("dual-32", "a number of starts, from 1, goes with ipopt only, got 'dual-32'"),
-        ("paper-effort", "objective: method 'paper' has no choice"),
         ("sqp-money", "method: expected one of dual, mdn"),
         (" , ", "expected names with commas between"),
     ],

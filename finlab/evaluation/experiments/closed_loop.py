@@ -11,10 +11,8 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.errors import DataError
-from finlab.evaluation.method_specs import MethodSpec
 from finlab.evaluation.report.document import Column, Row
-from finlab.layout import Layout
-from finlab.sim import ClosedLoop, RunLog, Trajectory
+from finlab.sim import RunLog
 
 RTE_DELTA_S = 5.0
 """Time between the two ends of a piece of path that the relative error compares [s]."""
@@ -75,25 +73,6 @@ def over_seeds(rows: Sequence[Row]) -> Row:
         values = np.array([row[key] for row in rows])
         means[key], means[f"{key}_std"] = float(values.mean()), float(values.std(ddof=min(1, len(rows) - 1)))
     return means
-
-
-def swim(
-    layout: Layout,
-    method: MethodSpec,
-    path: Trajectory,
-    seed: int,
-    faults: Sequence[tuple[str, float]] = (),
-) -> RunLog:
-    """One swim.
-
-    Args:
-        layout: the robot.
-        method: who allocates.
-        path: what is followed.
-        seed: of the sensors' noise.
-        faults: fins, each with the time [s] at which it is lost.
-    """
-    return ClosedLoop(layout, method.on(layout), path, failures=faults, seed=seed).run()
 
 
 POWER = (

@@ -13,14 +13,13 @@ from finlab.evaluation.experiments.closed_loop import (
     POWER,
     follow_row,
     over_seeds,
-    swim,
 )
 from finlab.evaluation.method_specs import load_method_specs
 from finlab.evaluation.paper_figures import paper_figures
 from finlab.evaluation.progress import progress
 from finlab.evaluation.report.document import Column, Row
 from finlab.layout import Layout, load_layout
-from finlab.sim import make_trajectory
+from finlab.sim import ClosedLoop, make_trajectory
 
 HEALTHY = "healthy"
 ALLOWED = 1.15
@@ -79,7 +78,7 @@ def run(
     done: dict[tuple[Fault, str], list[Row]] = {}
     for (fault, name), k in progress(list(product(cases, range(runs))), "swim"):
         lost = [(fin, fault.time_s) for fin in fault.fins]
-        log = swim(robot, specs[name], path, seed + k, faults=lost)
+        log = ClosedLoop(robot, specs[name].on(robot), path, failures=lost, seed=seed + k).run()
         done.setdefault((fault, name), []).append(follow_row(log))
     rows: list[Row] = []
     for (fault, name), found in done.items():

@@ -10,14 +10,13 @@ from finlab.evaluation.experiments.closed_loop import (
     POWER,
     follow_row,
     over_seeds,
-    swim,
 )
 from finlab.evaluation.method_specs import load_method_specs
 from finlab.evaluation.paper_figures import paper_figures
 from finlab.evaluation.progress import progress
 from finlab.evaluation.report.document import Column, Row
 from finlab.layout import load_layout
-from finlab.sim import make_trajectory
+from finlab.sim import ClosedLoop, make_trajectory
 
 
 def run(
@@ -42,7 +41,7 @@ def run(
     specs = load_method_specs(methods, checkpoint)
     done: dict[tuple[str, str], list[Row]] = {}
     for robot, (name, method), k in progress(list(product(robots, specs.items(), range(runs))), "swim"):
-        row = follow_row(swim(robot, method, path, seed + k))
+        row = follow_row(ClosedLoop(robot, method.on(robot), path, seed=seed + k).run())
         done.setdefault((robot.name, name), []).append(row)
         done.setdefault(("all", name), []).append(row)
     order = sorted(done, key=lambda key: key[0] == "all")

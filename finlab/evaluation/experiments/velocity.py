@@ -7,13 +7,13 @@ import numpy as np
 
 from finlab.errors import DataError
 from finlab.evaluation.experiment import Experiment
-from finlab.evaluation.experiments.closed_loop import POWER, depth_error, over_seeds, power_row, swim
+from finlab.evaluation.experiments.closed_loop import POWER, depth_error, over_seeds, power_row
 from finlab.evaluation.method_specs import load_method_specs
 from finlab.evaluation.paper_figures import paper_figures
 from finlab.evaluation.progress import progress
 from finlab.evaluation.report.document import Column, Row
 from finlab.layout import load_layout
-from finlab.sim import RunLog, straight
+from finlab.sim import ClosedLoop, RunLog, straight
 
 SPEEDS = (0.10, 0.15, 0.20)
 """The paper's speeds [m/s]."""
@@ -44,7 +44,7 @@ def run(
     robot, specs = load_layout(layout), load_method_specs(methods, checkpoint)
     done: dict[tuple[float | None, str], list[Row]] = {}
     for speed, (name, method), k in progress(list(product(SPEEDS, specs.items(), range(runs))), "swim"):
-        row = _row(swim(robot, method, straight(speed, duration), seed + k))
+        row = _row(ClosedLoop(robot, method.on(robot), straight(speed, duration), seed=seed + k).run())
         done.setdefault((speed, name), []).append(row)
         done.setdefault((None, name), []).append(row)
     order = sorted(done, key=lambda key: key[0] is None)

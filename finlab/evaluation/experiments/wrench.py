@@ -51,8 +51,8 @@ def run(
             with errors over the robot's own wrenches.
         split: names, or all: id, ood, ood-fins, limits, failure, near-singular, fins, fins-mixed, tables,
             many-fins, big, tiny, thrusters, azimuths, mixed-actuators, any-shaft.
-        methods: names; by default dual and paper, on LAYOUT all that are installed. An objective may
-            follow, as in sqp-effort, and a number of starts ipopt, as in ipopt-32. Of several splits each
+        methods: names; by default dual and paper, on LAYOUT all that are installed. A
+            number of starts may follow ipopt, as in ipopt-32. Of several splits each
             method answers those whose robots it takes.
         layouts: of each split.
         targets: on each layout.
