@@ -100,7 +100,8 @@ def load_method_spec(
     """The method of a specification.
 
     Args:
-        name: a method; `ipopt-32`, say, for 32 starts; `ipopt-forces`, in the space of forces; or `file.py:function`, see `own_method`.
+        name: a method; `ipopt-32`, say, for 32 starts; `ipopt-forces`, in the space of forces; or
+            `file.py:function`, see `own_method`.
         checkpoint: of learned methods, as for `finlab.Allocator`.
         objective: what the methods that can choose keep least; each one's default where None.
 
