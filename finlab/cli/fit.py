@@ -1,8 +1,6 @@
 """`finlab fit actuator|fin|robot`: from measurements to actuators that layouts name, from swims to robots."""
 
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
@@ -71,24 +69,18 @@ def actuator(
 
 def _fin(data: tuple[Path, ...], output: Path, seed: int) -> list[str]:
     """Fits a fin and writes its file; returns what to print."""
-    with _progress_bar() as tell:
-        from finlab.fit.advice import next_measurements
-        from finlab.fit.fin_file import check_table_path, summary, write_fin
-        from finlab.fit.fin_fit import fit_fin
-        from finlab.fit.measurements import read_measurements
+    from finlab.fit.advice import next_measurements
+    from finlab.fit.fin_file import check_table_path, summary, write_fin
+    from finlab.fit.fin_fit import fit_fin
+    from finlab.fit.measurements import read_measurements
 
-        check_table_path(output)
-        tell("reading", 0.05)
-        measurements = read_measurements(data)
-        fit = fit_fin(measurements, seed, lambda words, share: tell(words, 0.1 + 0.7 * share))
-        tell("writing the table", 0.8)
-        write_fin(fit, output)
-        tell("looking for what to measure next", 0.9)
-        advice = next_measurements(fit)
+    check_table_path(output)
+    fit = fit_fin(read_measurements(data), seed, _tell)
+    write_fin(fit, output)
     return [
         *summary(fit),
         "measure next, A [rad], f [Hz], zero direction [rad]:",
-        *("  " + "  ".join(f"{value:7.3f}" for value in command) for command in advice),
+        *("  " + "  ".join(f"{value:7.3f}" for value in command) for command in next_measurements(fit)),
         f"{output}: name it in a layout, model: {{type: table, path: {output.name}}}",
     ]
 
@@ -112,41 +104,29 @@ def robot(
         output: the layout as the swims show it; fins whose law is another one become tables beside it.
         residual: look for another law of thrust, jets and inflow, too, and use what helps on parts not seen.
     """
-    with _progress_bar() as tell:
-        from finlab.cli.inputs import open_robot
-        from finlab.errors import DataError
-        from finlab.fit.robot.fitted_layout import write_robot
-        from finlab.fit.robot.report import summary, table
-        from finlab.fit.robot.robot_fit import fit_robot
-        from finlab.fit.robot.swim_file import read_swim
-        from finlab.fit.robot.unknowns import RESIDUAL
+    from finlab.cli.inputs import open_robot
+    from finlab.errors import DataError
+    from finlab.fit.robot.fitted_layout import write_robot
+    from finlab.fit.robot.report import summary, table
+    from finlab.fit.robot.robot_fit import fit_robot
+    from finlab.fit.robot.swim_file import read_swim
+    from finlab.fit.robot.unknowns import RESIDUAL
 
-        if output.suffix.lower() not in (".yaml", ".yml", ".json"):
-            raise DataError(
-                f"{output}: a layout is a YAML or JSON file, expected a name that ends in .yaml or .json"
-            )
-        believed = open_robot(layout, fins_for="fit robot").layout
-        tell("reading", 0.0)
-        swims = [read_swim(log, believed) for log in logs]
-        fit = fit_robot(believed, swims, RESIDUAL if residual else (), tell)
-        write_robot(fit, output)
+    if output.suffix.lower() not in (".yaml", ".yml", ".json"):
+        raise DataError(
+            f"{output}: a layout is a YAML or JSON file, expected a name that ends in .yaml or .json"
+        )
+    believed = open_robot(layout, fins_for="fit robot").layout
+    swims = [read_swim(log, believed) for log in logs]
+    fit = fit_robot(believed, swims, RESIDUAL if residual else (), _tell)
+    write_robot(fit, output)
     print("\n".join(summary(fit)))
     print()
     print(table(fit))
     print(f"\n{output}: the robot as it swam")
 
 
-@contextmanager
-def _progress_bar() -> Iterator[Callable[[str, float], None]]:
-    """A bar on stderr, and who is told what comes next and the share of the work that is done; no bar where
-    stderr is no terminal."""
-    from tqdm import tqdm
-
-    form = "{desc:<55} {percentage:3.0f}%|{bar}| {elapsed}"
-    with tqdm(total=1.0, desc="loading", bar_format=form, disable=None, leave=False, file=sys.stderr) as bar:
-
-        def tell(words: str, share: float) -> None:
-            bar.n = share
-            bar.set_description_str(words)
-
-        yield tell
+def _tell(words: str) -> None:
+    """Says on stderr what comes next, where that is a terminal."""
+    if sys.stderr.isatty():
+        print(f"{words} ...", file=sys.stderr, flush=True)

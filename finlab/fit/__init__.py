@@ -1,7 +1,6 @@
 """From measurements to models: fins, thrusters, and in `robot` a layout from swims.
 
-Nothing here uses what `finlab.sim` knows to be true; fits come from data alone. Fits of fins need the extra
-`[fit]`.
+Nothing here uses what `finlab.sim` knows to be true; fits come from data alone.
 """
 
 from finlab.fit.fin_file import write_fin

@@ -11,8 +11,7 @@ from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.fit.gaussian_process import Component
 from finlab.fit.measurements import MIN_SAMPLES, Measurements
-from finlab.fit.outliers import ROUNDS, find_outliers
-from finlab.fit.progress import Progress, Stages, say_nothing
+from finlab.fit.outliers import find_outliers
 from finlab.layout.angles import TURN
 from finlab.layout.fin import MAX_AMPLITUDE, MAX_FREQUENCY
 
@@ -131,7 +130,9 @@ class FinFit:
         return np.linspace(measured.min(), measured.max(), count)
 
 
-def fit_fin(measurements: Measurements, seed: int = 0, progress: Progress = say_nothing) -> FinFit:
+def fit_fin(
+    measurements: Measurements, seed: int = 0, progress: Callable[[str], None] = lambda words: None
+) -> FinFit:
     """Returns the fin that explains samples, leaving out those that contradict all others.
 
     The linear algebra runs on one thread: on matrices of this size several wait for each other.
@@ -139,7 +140,7 @@ def fit_fin(measurements: Measurements, seed: int = 0, progress: Progress = say_
     Args:
         measurements: at least `MIN_SAMPLES` of a fin that beats.
         seed: draws the samples that are kept where there are more than `MOST_SAMPLES`.
-        progress: called before each step.
+        progress: told before each step what comes next; what it raises ends the fit.
 
     Raises:
         DataError: there are fewer.
@@ -158,12 +159,10 @@ def fit_fin(measurements: Measurements, seed: int = 0, progress: Progress = say_
         drawn = np.random.default_rng(seed).permutation(len(measurements)) >= MOST_SAMPLES
         notes.append(f"{MOST_SAMPLES} of {len(measurements)} samples, drawn at random, are used")
         measurements = measurements.without(drawn)
-    stages = Stages(progress, 2 * ROUNDS + 4)
     with threadpool_limits(limits=1, user_api="blas"):
-        bad = find_outliers(measurements, stages.begin)
+        bad = find_outliers(measurements, progress)
         if not measurements.force[~bad].any():  # a fin that hardly ever pushes: what it gives is no outlier
             bad[:] = False
-        stages.skip_to(2 * ROUNDS)
         outliers = tuple(place for place, out in zip(measurements.places, bad, strict=True) if out)
         if outliers:
             shown = ", ".join(outliers[:5]) + (" ..." if len(outliers) > 5 else "")
@@ -171,7 +170,7 @@ def fit_fin(measurements: Measurements, seed: int = 0, progress: Progress = say_
                 f"{len(outliers)} of {len(bad)} samples contradict the others and are left out: {shown}"
             )
             measurements = measurements.without(bad)
-        return _fitted(measurements, outliers, tuple(notes), stages.begin)
+        return _fitted(measurements, outliers, tuple(notes), progress)
 
 
 def _fitted(

@@ -45,11 +45,6 @@ class GaussianProcess:
         left = self._kernel.variance(inputs) - np.einsum("nm,nm->m", known, known)
         return np.asarray(self._weights @ between), np.sqrt(np.maximum(left, 0.0))
 
-    def covariance(self, inputs: Array) -> Array:
-        """Returns the covariance (m, m) at inputs (m, 3) that is left after the measurements."""
-        known = solve_triangular(self._lower, self._kernel.covariance(self._inputs, inputs), lower=True)
-        return np.asarray(self._kernel.covariance(inputs, inputs) - known.T @ known)
-
     def left_out(self) -> tuple[Array, Array]:
         """Returns the error (n,) of each value under the process of all others, and the standard deviation
         that it should have."""
@@ -84,7 +79,6 @@ class Component:
         """Each value (n,) as all others predict it."""
         self.predict = self._process.predict
         self.expect = self._process.expect
-        self.covariance = self._process.covariance
 
     def unseen(self, inputs: Array, values: Array, size: Array | None = None) -> tuple[Array, Array]:
         """Returns the errors (m,) of values that the process has not seen, and what their standard deviation

@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.fit.columns import Columns, read_columns, together
-from finlab.fit.sensor_checks import check_sensors
 from finlab.layout.angles import FILE_TURN_TOLERANCE, TURN
 from finlab.layout.fin import MAX_AMPLITUDE, MAX_FREQUENCY
 
@@ -27,6 +26,9 @@ SAME = 1e-3
 """Amplitudes [rad] or frequencies [Hz] all closer than this are one and the same."""
 SAME_DIRECTION = 0.05
 """The same of zero directions [rad]."""
+FLAT_TOP, FLAT_SHARE = 5, 0.02
+"""Rows, and share of all rows, with exactly the largest value or the least, from which a sensor counts as
+saturated, if it is three times as many as have any other value: a coarse sensor repeats all of them."""
 
 
 @dataclass(frozen=True)
@@ -75,13 +77,12 @@ class Measurements:
     def without(self, places: NDArray[np.bool_]) -> "Measurements":
         """The samples but those (n,) that are marked."""
         keep = ~places
-        return Measurements(
-            self.command[keep],
-            self.force[keep],
-            None if self.power is None else self.power[keep],
-            tuple(place for place, kept in zip(self.places, keep, strict=True) if kept),
-            self.notes,
-            self.turned,
+        return replace(
+            self,
+            command=self.command[keep],
+            force=self.force[keep],
+            power=None if self.power is None else self.power[keep],
+            places=tuple(place for place, kept in zip(self.places, keep, strict=True) if kept),
         )
 
 
@@ -95,17 +96,12 @@ def read_measurements(paths: Sequence[str | os.PathLike[str]]) -> Measurements:
         DataError: a file is missing, too large, lacks a column or holds what no fin can do; or there are too
             few samples, or only one amplitude or frequency.
     """
-    read = [_read(Path(path)) for path in paths]
+    read = [read_columns(Path(path), NAMES, NEEDED, "A, f, phi, Fx, Fy, Fz in any order") for path in paths]
     if not read:
         raise DataError("expected at least one CSV file of measurements, got none")
+    for file, path in zip(read, paths, strict=True):
+        _check_units(file.values, str(path))
     return _checked(read, ", ".join(str(path) for path in paths))
-
-
-def _read(path: Path) -> Columns:
-    """The columns of a file that a fit reads."""
-    read = read_columns(path, NAMES, NEEDED, "A, f, phi, Fx, Fy, Fz in any order")
-    _check_units(read.values, str(path))
-    return read
 
 
 def _check_units(values: dict[str, Array], source: str) -> None:
@@ -150,12 +146,30 @@ def _checked(read: list[Columns], source: str) -> Measurements:
     if not force[:, 1:].any():
         raise DataError(f"{source}: Fy and Fz are 0 throughout; such a fin drives nothing")
     power = columns.get("P")
-    check_sensors(source, command, force, power, places, turned)
+    for name in ("Fx", "Fy", "Fz", "P"):
+        if name in columns:
+            _check_sensor(name, columns[name], source, places, name == "P" or (turned and name != "Fx"))
     if power is not None and power.min() < -0.02 * np.abs(power).max():
         raise DataError(
             f"{source}: column P has {power.min():.4g} W, expected the mean power that drives the fin"
         )
     return Measurements(command, force, power, places, tuple(notes), turned)
+
+
+def _check_sensor(name: str, column: Array, source: str, places: tuple[str, ...], changes: bool) -> None:
+    """Refuses a column (n,) that is the same throughout, where that is not 0 or it should change, and one
+    that stops at one value."""
+    if np.ptp(column) == 0.0 and (changes or column[0]):
+        raise DataError(f"{source}: column {name} is {column[0]:.4g} throughout; is the sensor connected?")
+    values, counts = np.unique(column, return_counts=True)
+    flat = max(FLAT_TOP, FLAT_SHARE * len(column), 3 * counts[1:-1].max(initial=1))
+    for extreme, count in ((values[0], counts[0]), (values[-1], counts[-1])):
+        if extreme and count >= flat:
+            raise DataError(
+                f"{places[int(np.argmax(column == extreme))]}, column {name}: is exactly {extreme:.4g} as in "
+                f"{count - 1} other rows, and beyond it in none; the sensor is saturated, measure in a wider "
+                "range"
+            )
 
 
 def _directions(columns: dict[str, Array], source: str, notes: list[str]) -> tuple[Array, bool]:

@@ -1,7 +1,6 @@
-"""`finlab fit fin` at the command line: its bar on a terminal, none elsewhere, and what it refuses."""
+"""`finlab fit fin` at the command line: what it does is said on a terminal, and nowhere else."""
 
 import io
-import re
 from pathlib import Path
 
 import pytest
@@ -18,20 +17,16 @@ class Terminal(io.StringIO):
 
 
 @pytest.mark.parametrize("terminal", [True, False])
-def test_a_bar_stands_on_terminals_alone(
+def test_steps_are_told_on_terminals_alone(
     terminal: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     command = commands(40)
     data = write(tmp_path / "cell.csv", columns_of(command, measured(soft(), command)))
     stderr = Terminal() if terminal else io.StringIO()
     monkeypatch.setattr("sys.stderr", stderr)
-    monkeypatch.setenv("COLUMNS", "100")
     assert main(["fit", "fin", str(data), "-o", str(tmp_path / "fin.csv")]) == 0
     if terminal:
-        bar = stderr.getvalue()
-        assert "loading" in bar and "fitting the thrust" in bar
-        shares = [int(share) for share in re.findall(r"(\d+)%", bar)]
-        assert shares == sorted(shares) and len(set(shares)) > 3, "it says how far"
+        assert "fitting the thrust" in stderr.getvalue()
     else:
         assert stderr.getvalue() == ""
     assert "measure next" in capsys.readouterr().out

