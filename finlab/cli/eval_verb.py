@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from tyro.conf import Positional, arg
 from tyro.extras import SubcommandApp
 
-from finlab.cli.json_file import JsonFile, check_json_file, put_json
+from finlab.cli.json_file import STDOUT, JsonFile, check_json_file, put_json
 from finlab.errors import DataError
 
 if TYPE_CHECKING:
@@ -52,7 +52,11 @@ def verb_of(experiment: Experiment) -> Callable[..., None]:
         check_json_file(json)
         begin(experiment.name)
         chosen = {name: _parsed(name, options[name], value) for name, value in given.items()}
-        rows = experiment.rows(**chosen)
+        rows = []
+        for row in experiment.each_row(**chosen):
+            rows.append(row)
+            if json != STDOUT:  # so that they are there if it is stopped
+                put_json({"rows": rows}, json)
         put_json({"rows": rows}, json, to_text(*experiment.words(), *experiment.results(rows)))
 
     shown = {name: _shown(each) for name, each in options.items()}

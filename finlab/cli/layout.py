@@ -26,6 +26,7 @@ def check(layouts: Annotated[Positional[tuple[str, ...]], arg(metavar="LAYOUT...
     """
     from finlab.cli.inputs import open_robot
     from finlab.errors import FinlabError
+    from finlab.vehicle.righting import righting_words
 
     if not layouts:
         raise FinlabError("layout check: expected at least one file or name of a shipped layout, got none")
@@ -38,6 +39,8 @@ def check(layouts: Annotated[Positional[tuple[str, ...]], arg(metavar="LAYOUT...
             n_bad += 1
         else:
             print(f"{text}: ok, layout {layout.name} with {layout.counted}")
+            if (words := righting_words(layout)) is not None:
+                print(f"{text}: {words}")
     return 2 if n_bad else 0
 
 

@@ -22,9 +22,14 @@ if TYPE_CHECKING:
     from finlab.sim.water import Water
 
 
+MOTIONS = {"Fx": "surge", "Fy": "sway", "Fz": "heave", "Tx": "roll", "Ty": "pitch", "Tz": "yaw"}
+"""What the axes of a wrench move."""
+
+
 def simulate(
     layout: Annotated[Positional[str], arg(metavar="LAYOUT")],
     trajectory: Annotated[str, arg(metavar="NAME|FILE")] = "lissajous",
+    scale: Annotated[float, arg(metavar="X")] = 1.0,
     excite: bool = False,
     fail: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME@SECONDS[:KIND]")] = (),
     announced: bool = True,
@@ -48,6 +53,7 @@ def simulate(
     Args:
         layout: layout file, bundle, or the name of a shipped layout.
         trajectory: circle, lissajous, square, dive, station, or a CSV file with the columns t, x, y, z.
+        scale: how many times larger the path is to be, in the same time; a torpedo needs speed.
         excite: shake every axis and fin on the spot instead, for at most 300 s, within bounds of depth and
             attitude; `finlab fit robot` learns the robot from the log.
         fail: a fin and when it is lost, such as front_left@30; or what else becomes of it:
@@ -100,7 +106,7 @@ def simulate(
             loop = ClosedLoop(
                 robot.layout,
                 allocator,
-                make_trajectory(trajectory, duration),
+                make_trajectory(trajectory, duration, scale),
                 plant=plant,
                 sensors=sensors,
                 water=water,
@@ -145,6 +151,8 @@ def summary(log: RunLog) -> str:
         f"{row['inertial_w']:.2f} W inertial   "
         f"allocation {row['solve_ms']:.2f} ms (median)",
     ]
+    if (when := log.capsized_s) is not None:
+        lines.append(f"the robot capsized at {when:.1f} s")
     if row["max"] >= LOST_M:
         lines.append(f"the robot lost its reference: it was more than {LOST_M:g} m away")
     return "\n".join(lines)
@@ -181,8 +189,10 @@ def monitored(loop: ClosedLoop) -> str:
 
     failed, health = Damage() if loop.verdict is None else loop.verdict.damage
     words = [f"{name} lost" for name in failed]
+    if loop.monitor is not None and not loop.monitor.tells:
+        words += ["that it cannot tell: the robot moves otherwise than its model"]
     if health is not None:
-        words += [f"{name} torn" for name, _ in health.thrust]
+        words += [f"{name} torn" for name, _ in (*health.thrust, *health.weak)]
         words += [f"{name} stuck at {math.degrees(angle):.0f} deg" for name, angle in health.stuck]
     return ", ".join(words) or "all fins whole"
 
@@ -195,17 +205,21 @@ def _water(current: tuple[float, float, float], waves: tuple[float, float], seed
 
 
 def _uncontrollable(loop: ClosedLoop, faults: Sequence[FinFault]) -> list[str]:
-    """What will not be controllable, said before the run."""
+    """What will not be controllable, or not stay upright, said before the run."""
     from finlab.control import Completion
+    from finlab.vehicle.righting import righting_words
 
-    sentences, lost = [], []
+    overturns, sentences, lost = righting_words(loop.layout), [], []
+    if overturns is not None and "Ty" not in loop.controller.axes:
+        sentences.append(f"finlab: {loop.layout.name}: {overturns}")
+    words = [MOTIONS[axis] for axis in loop.controller.axes]
     events = sorted((event for event in faults if event.kind == "lost"), key=lambda event: event.time_s)
     for name, time in [("", 0.0), *((event.fin, event.time_s) for event in events)]:
         lost += [name] if name else []
         if not Completion(loop.layout, tuple(lost), loop.controller.axes).controllable:
             without = f" without {', '.join(lost)}" if lost else ""
             sentences.append(
-                f"finlab: from {time:g} s on, {loop.layout.name}{without} cannot give surge, heave and yaw "
-                "independently"
+                f"finlab: from {time:g} s on, {loop.layout.name}{without} cannot give "
+                f"{', '.join(words[:-1])} and {words[-1]} independently"
             )
     return sentences

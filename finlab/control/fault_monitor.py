@@ -21,6 +21,8 @@ WHOLE_ABOVE = 0.9
 """A strength from which a fin that was torn is whole again."""
 HOLD_S = 0.2
 """A belief is acted on once it has been certain for so long [s]: a single odd sample decides nothing."""
+ASTRAY = 1e4
+"""A misfit of the motion, a variance over that of the settings, from which on nothing can be told of it."""
 COARSE = 0.05
 """The allocator is given strengths in steps of this size, so that its problem is the same for many ticks."""
 
@@ -87,6 +89,11 @@ class FaultMonitor:
         """Names of the fins that are taken for lost, torn or stuck."""
         marked = self._lost | self._torn | ~np.isnan(self._held)
         return tuple(self.layout.names[k] for k in np.flatnonzero(marked))
+
+    @property
+    def tells(self) -> bool:
+        """Whether losses would show: not where the robot moves far otherwise than its model says."""
+        return self._beliefs.misfit < ASTRAY
 
     def step(self, measurement: Measurement, command: Array | None) -> Diagnosis:
         """Takes what has been measured and says what is believed.

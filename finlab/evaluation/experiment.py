@@ -7,7 +7,7 @@ asked for.
 
 import inspect
 import math
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import import_module
 from types import NoneType
@@ -79,9 +79,13 @@ class Experiment:
                     raise DataError(f"{name.replace('_', '-')}: expected a finite number, got {number}")
         return values
 
+    def each_row(self, **chosen: Any) -> Iterator[Row]:
+        """Run it, row by row; options as in `check`. A number that is not finite becomes None."""
+        yield from map(_finite, self.run(**self.check(chosen)))
+
     def rows(self, **chosen: Any) -> list[Row]:
-        """Run it; options as in `check`. A number that is not finite becomes None."""
-        return [_finite(row) for row in self.run(**self.check(chosen))]
+        """Run it to the end, as `each_row`."""
+        return list(self.each_row(**chosen))
 
     def table(self, rows: Sequence[Row]) -> Table:
         """The rows of the default method stand out; below them are those that the paper prints."""

@@ -18,7 +18,7 @@ from finlab.allocation.settings import Settings, number
 from finlab.allocation.solution import Solution
 from finlab.arrays import Array
 from finlab.control import Measurement, Setpoint
-from finlab.errors import DataError
+from finlab.errors import DataError, FinlabError
 from finlab.layout import Layout
 from finlab.layout.angles import wrapped
 from finlab.layout.arrays import layout_effectiveness
@@ -53,6 +53,8 @@ TURN_RAD_S = 0.8
 """Fastest that a fin is turned [rad/s]: one that turns fast paddles, which hides what its beat gives."""
 BOUNDS = (1.5, 0.5, 0.35)
 """Horizontal distance [m], change of depth [m] and roll or pitch [rad] at which the excitation has faded."""
+MOST_USED = 3.0
+"""Times these bounds at which the swim is given up."""
 DEPTH_M = 1.5
 """Where the robot is held [m]."""
 PERIOD_S = 0.1
@@ -94,6 +96,12 @@ class ExcitingController:
         speed = np.concatenate([measurement.velocity, measurement.rates])
         tilt = max(abs(measurement.roll), abs(measurement.pitch))
         used = max(math.hypot(away[0], away[1]) / BOUNDS[0], abs(away[2]) / BOUNDS[1], tilt / BOUNDS[2])
+        if used > MOST_USED:
+            raise FinlabError(
+                f"--excite: the robot left its bounds at {measurement.time:.1f} s, "
+                f"{math.hypot(*away[:2]):.1f} m off, {abs(away[2]):.1f} m up or down, tilted by {math.degrees(tilt):.0f} deg; check its "
+                "body, above all center_of_buoyancy_m and buoyancy_n"
+            )
         shaken = min(1.0, max(0.0, 2.0 - 2.0 * used)) * self.excitation(measurement.time)
         return np.asarray(self._stiff * error - self._damp * speed + shaken)
 
@@ -203,7 +211,9 @@ def excitation(
 
     Raises:
         DataError: the duration is too short to tell anything, or longer than five minutes.
+        LayoutError: an actuator is no fin.
     """
+    layout.only_fins("--excite")
     if not SHORTEST_S <= duration_s <= LONGEST_S:
         raise DataError(f"duration: expected {SHORTEST_S:g} to {LONGEST_S:g} s, got {duration_s:g}")
     return ClosedLoop(

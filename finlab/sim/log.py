@@ -127,6 +127,13 @@ class RunLog:
         """How many ticks there are."""
         return len(self.columns["time"])
 
+    @property
+    def capsized_s(self) -> float | None:
+        """When the robot first lay on its side or stood on its end [s]; None where it never did."""
+        _, qx, qy, _ = self.quaternion.T
+        over = np.flatnonzero(qx * qx + qy * qy > 0.5)
+        return float(self.time[over[0]]) if len(over) else None
+
     def npz(self) -> bytes:
         """An NPZ file: one array per column, and `meta`, a JSON object with the rest."""
         meta: dict[str, Any] = {"format": FORMAT, "version": VERSION}

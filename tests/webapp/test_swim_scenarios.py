@@ -39,7 +39,7 @@ def test_every_scenario_plans_what_its_day_says(name: str) -> None:
 
 def test_days_of_robots_of_their_own_are_left_out() -> None:
     left = {day.name for day in HARD_DAYS} - set(SCENARIOS)
-    assert left == {"hexa", "restricted", "fins-mixed"}
+    assert {"hexa", "restricted", "fins-mixed", "heavy", "torpedo", "hybrid"} <= left
 
 
 @pytest.mark.parametrize("layout", ["hexa", "pair", "penta"])
