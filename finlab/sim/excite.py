@@ -99,8 +99,9 @@ class ExcitingController:
         if used > MOST_USED:
             raise FinlabError(
                 f"--excite: the robot left its bounds at {measurement.time:.1f} s, "
-                f"{math.hypot(*away[:2]):.1f} m off, {abs(away[2]):.1f} m up or down, tilted by {math.degrees(tilt):.0f} deg; check its "
-                "body, above all center_of_buoyancy_m and buoyancy_n"
+                f"{math.hypot(*away[:2]):.1f} m off, {abs(away[2]):.1f} m up or down, "
+                f"tilted by {math.degrees(tilt):.0f} deg; check its body, "
+                "above all center_of_buoyancy_m and buoyancy_n"
             )
         shaken = min(1.0, max(0.0, 2.0 - 2.0 * used)) * self.excitation(measurement.time)
         return np.asarray(self._stiff * error - self._damp * speed + shaken)
