@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any, NamedTuple, Self
@@ -22,8 +22,8 @@ from finlab.allocation.methods import (
     choose_method,
 )
 from finlab.allocation.modes import Mode, find_modes, force_sizes
-from finlab.allocation.notes import fin_notes
-from finlab.allocation.policy import AXES, CLOSEST, Policy, as_policy
+from finlab.allocation.notes import answer_notes
+from finlab.allocation.policy import CLOSEST, Policy, as_policy
 from finlab.allocation.question import (
     Fins,
     check_flow,
@@ -34,18 +34,17 @@ from finlab.allocation.question import (
     usable_fins,
 )
 from finlab.allocation.settings import Settings
-from finlab.allocation.solution import Candidates, Solution
+from finlab.allocation.solution import Candidates, Solution, joined
 from finlab.allocation.yardstick import yardstick
 from finlab.arrays import Array
 from finlab.bundle_files import read_bundle_files
 from finlab.errors import AllocationError
-from finlab.layout import FinModelSpec, Layout
+from finlab.layout import Layout
 from finlab.layout.damage import Health
 from finlab.layout.load import load_layout
 from finlab.networks.trained import TrainedWeights
 from finlab.physics.known_plants import plant_of
 from finlab.physics.plant import Plant
-from finlab.precision import NEARLY
 
 SAME_COMMAND = 1e-6
 """Two commands [rad, Hz, rad] that differ by less are one answer, given on two machines."""
@@ -328,7 +327,9 @@ class Allocator:
             method.solve(targets[k : k + CHUNK], policy=policy, flow=water, seed=seed + k)
             for k in range(0, len(targets), CHUNK)
         )
-        solution = _joined(parts, len(targets), fins)
+        solution = joined(
+            ((part, fins.among_all(part.command)) for part in parts), len(targets), len(fins.alive)
+        )
         elapsed_ms = (time.perf_counter() - start) * 1e3
         return BatchAllocation(
             **self._about(targets, ready, solution, policy, health, water, seed),
@@ -351,7 +352,7 @@ class Allocator:
         fins = ready.fins
         later = Later(
             ready.plant.at(flow),
-            partial(self._notes, ready, flow, target),
+            partial(answer_notes, ready.fins.healthy, ready.method, self.checkpoint, flow, target),
             partial(_among_all, solution.candidates, fins),
             partial(_among_all, solution.samples, fins),
             solution.bound or _no_bound,
@@ -387,21 +388,6 @@ class Allocator:
         method = choice.kind(fins.healthy, choice.settings, self._scale, choice.weights)
         return Ready(fins, method, plant_of(fins.layout))
 
-    def _notes(self, ready: Ready, flow: Array | None, target: Array) -> tuple[str, ...]:
-        """Sentences that the user should read before trusting an answer."""
-        method, notes = ready.method, fin_notes(ready.fins.healthy, flow)
-        asked = np.asarray((np.abs(target) > NEARLY * self._scale).reshape(-1, 6).any(axis=0))
-        if left := [axis for axis in method.undriven if asked[AXES.index(axis)]]:
-            notes = (*notes, f"no actuator gives {' or '.join(left)}: what is asked of it is left out")
-        if not method.unknown_fins or method.fin_model is None:
-            return notes
-        return (
-            f"the method does not know these fins: {', '.join(method.unknown_fins)}; checkpoint "
-            f"{self.checkpoint!r} takes them for fins of model {_listed(method.fin_model)}: trust the "
-            "plant's error or train a surrogate for them",
-            *notes,
-        )
-
     def __repr__(self) -> str:
         return f"Allocator({self._layout.name!r:.60}, method={self.method!r})"
 
@@ -416,28 +402,3 @@ def _among_all(make: Callable[[], Candidates] | None, fins: Fins) -> Candidates 
         return None
     found = make()
     return found if len(fins.failed) == 0 else replace(found, command=fins.among_all(found.command))
-
-
-def _joined(parts: Iterable[Solution], n: int, fins: Fins) -> Solution:
-    """Solutions one after the other, the commands among those of all fins."""
-    command = np.full((n, len(fins.alive), 3), np.nan)
-    bounds: list[Callable[[], Array]] = []
-    wrench: Array | None = None
-    start = 0
-    for part in parts:
-        rows = slice(start, start + len(part.command))
-        start = rows.stop
-        command[rows] = fins.among_all(part.command)
-        if part.bound is not None:
-            bounds.append(part.bound)
-        if part.wrench is not None:
-            wrench = np.empty((n, 6)) if wrench is None else wrench
-            wrench[rows] = part.wrench
-    bound = (lambda: np.concatenate([part() for part in bounds])) if bounds else None
-    return Solution(command, bound, wrench)
-
-
-def _listed(model: FinModelSpec) -> str:
-    """A fin model with its parameters in words."""
-    values = [f"{k} {v:g}" if isinstance(v, float) else f"{k} {v}" for k, v in model.values().items()]
-    return f"{model.type!r} ({', '.join(values)})"

@@ -5,12 +5,15 @@ from functools import lru_cache
 import numpy as np
 
 from finlab.actuators.fin.models import file_stamps
+from finlab.allocation.method import Method
+from finlab.allocation.policy import AXES
 from finlab.arrays import Array
 from finlab.layout import Fin, FinModelSpec, Layout, Limits
 from finlab.layout.angles import wrapped
 from finlab.layout.force_table_file import DOUBT
 from finlab.layout.rudder import Rudder
 from finlab.physics import FinLaw, TableLaw, make_law, plant_of
+from finlab.precision import NEARLY
 from finlab.uncertainty.grid_error import grid_uncertainty
 
 RESTLESS = 0.05
@@ -20,6 +23,31 @@ STEPS = (5, 5, 16)
 AXES_OF_TABLES = ("half amplitudes", "frequencies", "zero directions")
 BEYOND = 1e-6
 """By how much [rad, Hz] limits may exceed a table unnoticed."""
+
+
+def answer_notes(
+    layout: Layout, method: Method, checkpoint: str | None, flow: Array | None, target: Array
+) -> tuple[str, ...]:
+    """Returns the sentences about answers of a method for targets (6,) or (N, 6): those of `fin_notes`, what
+    is asked of axes that nothing drives, and fins that the networks of a checkpoint do not know."""
+    notes = fin_notes(layout, flow)
+    asked = np.asarray((np.abs(target) > NEARLY * method.scale).reshape(-1, 6).any(axis=0))
+    if left := [axis for axis in method.undriven if asked[AXES.index(axis)]]:
+        notes = (*notes, f"no actuator gives {' or '.join(left)}: what is asked of it is left out")
+    if not method.unknown_fins or method.fin_model is None:
+        return notes
+    return (
+        f"the method does not know these fins: {', '.join(method.unknown_fins)}; checkpoint "
+        f"{checkpoint!r} takes them for fins of model {_listed(method.fin_model)}: trust the "
+        "plant's error or train a surrogate for them",
+        *notes,
+    )
+
+
+def _listed(model: FinModelSpec) -> str:
+    """A fin model with its parameters in words."""
+    values = [f"{k} {v:g}" if isinstance(v, float) else f"{k} {v}" for k, v in model.values().items()]
+    return f"{model.type!r} ({', '.join(values)})"
 
 
 def fin_notes(layout: Layout, flow: Array | None = None) -> tuple[str, ...]:

@@ -1,6 +1,6 @@
 """What a method hands over before it has been evaluated, and what makes a result plain data."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, fields
 from typing import Any, NamedTuple
 
@@ -79,3 +79,23 @@ class Solution(NamedTuple):
     """Gives the raw candidates before refinement, for a single target."""
     prices: Array | None = None
     """What one more unit of each axis of the wrenches costs (N, 6) [W/N, W/(N m)], where the method tells."""
+
+
+def joined(parts: Iterable[tuple[Solution, Array]], count: int, n: int) -> Solution:
+    """Returns solutions for `count` targets one after the other, each with its commands among those of all n
+    actuators."""
+    command = np.full((count, n, 3), np.nan)
+    bounds: list[Callable[[], Array]] = []
+    wrench: Array | None = None
+    start = 0
+    for part, among_all in parts:
+        rows = slice(start, start + len(among_all))
+        start = rows.stop
+        command[rows] = among_all
+        if part.bound is not None:
+            bounds.append(part.bound)
+        if part.wrench is not None:
+            wrench = np.empty((count, 6)) if wrench is None else wrench
+            wrench[rows] = part.wrench
+    bound = (lambda: np.concatenate([part() for part in bounds])) if bounds else None
+    return Solution(command, bound, wrench)

@@ -185,16 +185,16 @@ def _step(robot: DualRobot, state: _State, terms: Terms, ridge: Array) -> tuple[
         weighted = state.stretch * state.target
         hessian += np.einsum("in,jn->nij", weighted, state.target).reshape(hessian.shape)
     added = ridge * trace
-    hessian[:, :: robot.shape[0] + 1] += added[:, None]
+    hessian += added[:, None] * robot.metric.ravel()
     hessian = hessian.reshape(-1, *robot.shape)
     step: Array = solve_systems(hessian, state.residual.T[..., None])[..., 0].T
     if not np.isfinite(step).all():  # a matrix without inverse: along the gradient
         step = np.where(np.isfinite(step), step, state.residual / trace)
         return step, np.inf * trace
     if len(ridge) > 1 or ridge[0] > NEARLY:
-        return step, added * np.sqrt(np.einsum("rn,rn->n", step, step))
-    more: Array = solve_systems(hessian, (added * step).T[..., None])[..., 0].T
-    return step + more, added * np.sqrt(np.einsum("rn,rn->n", more, more))
+        return step, added * np.linalg.norm(robot.metric @ step, axis=0)
+    more: Array = solve_systems(hessian, (added * (robot.metric @ step)).T[..., None])[..., 0].T
+    return step + more, added * np.linalg.norm(robot.metric @ more, axis=0)
 
 
 def _last(

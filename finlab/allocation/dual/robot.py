@@ -89,6 +89,14 @@ class DualRobot:
         return NEARLY * float((self.squares @ self.gain).reshape(self.shape).trace())
 
     @cached_property
+    def metric(self) -> Array:
+        """Matrix (r, r) by which a ridge grows: the Hessian of the quadratic costs, over its mean, so that
+        directions that are driven badly are not held back more than the others."""
+        hessian = (self.squares @ self.gain).reshape(self.shape)
+        mean = float(hessian.trace()) / max(len(hessian), 1)
+        return np.asarray(hessian / mean + NEARLY * np.eye(len(hessian)))
+
+    @cached_property
     def unit(self) -> Array:
         """The unit matrix (r, r)."""
         return np.eye(self.matrix.shape[1])
