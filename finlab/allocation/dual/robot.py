@@ -96,11 +96,6 @@ class DualRobot:
         mean = float(hessian.trace()) / max(len(hessian), 1)
         return np.asarray(hessian / mean + NEARLY * np.eye(len(hessian)))
 
-    @cached_property
-    def unit(self) -> Array:
-        """The unit matrix (r, r)."""
-        return np.eye(self.matrix.shape[1])
-
     @property
     def shape(self) -> tuple[int, int]:
         """Rows and columns of the Hessian."""
@@ -109,12 +104,6 @@ class DualRobot:
     def within(self, basis: Array) -> "DualRobot":
         """The same robot with only some directions (6, q) of the scaled wrench asked for."""
         return replace(self, basis=basis, matrix=(self.effectiveness / self.scale) @ basis)
-
-    def moved(self, effectiveness: Array) -> "DualRobot":
-        """The same actuators elsewhere: with another effectiveness (k, 6)."""
-        scale, basis = _range(effectiveness, self.largest)
-        matrix = (effectiveness / scale) @ basis
-        return replace(self, effectiveness=effectiveness, scale=scale, basis=basis, matrix=matrix)
 
     def frozen(self, sets: Sets, force: Array, fixed: NDArray[np.bool_]) -> Sets:
         """Sets in which fixed actuators (n, N) give their forces (k, N) [N] and nothing else."""
