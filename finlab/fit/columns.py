@@ -13,8 +13,8 @@ from finlab.errors import DataError
 from finlab.files.csv_table import read_table
 from finlab.layout.angles import TURN
 
-MAX_BYTES = 50_000_000
-"""Largest file that is read [bytes]."""
+MAX_BYTES = 200_000_000
+"""Largest file that is read [bytes]; a swim of an hour at 50 Hz has half of it."""
 UNITS = {
     "rad": 1.0, "deg": math.pi / 180.0, "°": math.pi / 180.0,
     "hz": 1.0, "rpm": 1.0 / 60.0, "bpm": 1.0 / 60.0, "rev/min": 1.0 / 60.0, "rad/s": 1.0 / TURN,
@@ -35,24 +35,26 @@ class Columns:
     """Where each row stands, file and line."""
 
 
-def named_column(header: str, names: Mapping[str, str]) -> tuple[str, float]:
+def named_column(
+    header: str, names: Mapping[str, str], units: Mapping[str, float] = UNITS
+) -> tuple[str, float]:
     """Returns what a header cell stands for and its unit in SI: `A [deg]`, `amplitude_deg`, `Force (Kg f)`,
-    `Fx`; "" for what no fit reads. A `stroke` is the angle from end to end, twice the amplitude.
+    `Fx`; "" for what no fit reads. With units of its own a name counts as it stands, else in lower case. A
+    `stroke` is the angle from end to end, twice the amplitude.
 
     Raises:
         DataError: the unit is not known.
     """
-    units = "deg|rad|hz|rpm|us|nm|mN|kgf|lbf|N|W|mW|V|A"
-    parts = re.fullmatch(
-        rf"\s*([A-Za-z_ ]+?)\s*(?:[\[(](.*)[\])]|_({units}))?\s*", header, flags=re.IGNORECASE
-    )
-    name = names.get(parts[1].lower().replace(" ", "_"), "") if parts else ""
+    behind = "deg|rad|hz|rpm|us|nm|mN|kgf|lbf|N|W|mW|V|A"
+    parts = re.fullmatch(rf"\s*(.+?)\s*(?:[\[(](.*)[\])]|_({behind}))?\s*", header, flags=re.IGNORECASE)
+    told = parts[1] if parts else ""
+    name = names.get(told.lower().replace(" ", "_") if units is UNITS else told, "")
     if parts is None or not name:
         return "", 1.0
     unit = re.sub(r"[\s.*·]", "", (parts[2] or parts[3] or "")).lower()
-    if unit and unit not in UNITS:
-        raise DataError(f"column {header}: unit {unit!r:.20} is not known, expected {', '.join(UNITS)}")
-    return name, (0.5 if parts[1].lower() == "stroke" else 1.0) * UNITS.get(unit, 1.0)
+    if unit and unit not in units:
+        raise DataError(f"column {header}: unit {unit!r:.20} is not known, expected {', '.join(units)}")
+    return name, (0.5 if told.lower() == "stroke" else 1.0) * units.get(unit, 1.0)
 
 
 def names_in(path: Path, names: Mapping[str, str]) -> set[str]:
@@ -61,21 +63,30 @@ def names_in(path: Path, names: Mapping[str, str]) -> set[str]:
     return {named_column(cell, names)[0] for cell in header} - {""}
 
 
-def read_columns(path: Path, names: Mapping[str, str], needed: Sequence[str], expected: str) -> Columns:
+def read_columns(
+    path: Path,
+    names: Mapping[str, str],
+    needed: Sequence[str],
+    expected: str,
+    units: Mapping[str, float] = UNITS,
+    gaps: bool = False,
+) -> Columns:
     """Returns the columns of a file that have a name.
 
     Args:
         path: a CSV file with a header; lines that begin with # are passed over.
-        names: what lower-case words in the header stand for.
+        names: what words in the header stand for, as `named_column` takes them.
         needed: names of columns without which the file is refused; of `a|b` one is enough.
         expected: what the error then says of the columns.
+        units: that the header may name.
+        gaps: whether cells may be empty, which makes them NaN.
 
     Raises:
         DataError: the file cannot be read, or lacks a column.
     """
-    table = read_table(path, MAX_BYTES, "a CSV file of measurements")
+    table = read_table(path, MAX_BYTES, "a CSV file of measurements", gaps)
     try:
-        named = [named_column(cell, names) for cell in table.header]
+        named = [named_column(cell, names, units) for cell in table.header]
     except DataError as error:
         raise DataError(f"{path}: {error}") from None
     used = [i for i, (name, _) in enumerate(named) if name]
@@ -91,8 +102,8 @@ def read_columns(path: Path, names: Mapping[str, str], needed: Sequence[str], ex
                 f"expected {expected}"
             )
     numbers, lines = table.numbers(used)
-    units = np.array([named[i][1] for i in used])
-    values = dict(zip(found, (numbers * units).T, strict=True))
+    scale = np.array([named[i][1] for i in used])
+    values = dict(zip(found, (numbers * scale).T, strict=True))
     return Columns(values, tuple(f"{path.name} line {line}" for line in lines))
 
 

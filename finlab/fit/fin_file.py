@@ -1,7 +1,5 @@
 """The file of a fitted fin: a force table with the uncertainty beside it, and what to know of it."""
 
-import csv
-import io
 import os
 from pathlib import Path
 
@@ -18,17 +16,13 @@ GRID = (13, 13, 18)
 
 def fin_csv(fit: FinFit) -> str:
     """Returns the file's text: lines that begin with # and say what the fit is worth, a header, a grid."""
-    text = io.StringIO()
-    for line in summary(fit):
-        text.write(f"# {line}\n")
     command = fit.grid(GRID).reshape(-1, 3)
     force, deviation = fit.predict(command)
     power = fit.predict_power(command)
     table = np.hstack([command, force, *([power[:, None]] if power is not None else []), deviation])
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow([*COLUMNS, *([POWER_COLUMN] if power is not None else []), *DEVIATIONS])
-    writer.writerows([f"{value:.6g}" for value in row] for row in table + 0.0)
-    return text.getvalue()
+    header = [*COLUMNS, *([POWER_COLUMN] if power is not None else []), *DEVIATIONS]
+    rows = (",".join(f"{value:.6g}" for value in row) for row in table + 0.0)
+    return "\n".join([*(f"# {line}" for line in summary(fit)), ",".join(header), *rows, ""])
 
 
 def write_fin(fit: FinFit, path: str | os.PathLike[str]) -> None:

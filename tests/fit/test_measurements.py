@@ -117,7 +117,7 @@ def test_a_gap_a_short_line_and_no_file(tmp_path: Path, columns: Columns) -> Non
         read_measurements(["/dev/zero"])
     with (tmp_path / "huge.csv").open("wb") as file:
         file.truncate(10_000_000_000)  # sparse: it takes no room
-    with pytest.raises(DataError, match=r"huge\.csv: is larger than 50,000,000 bytes"):
+    with pytest.raises(DataError, match=r"huge\.csv: is larger than 200,000,000 bytes"):
         read_measurements([tmp_path / "huge.csv"])
 
 

@@ -8,7 +8,7 @@ normal equations. Each unknown is believed to lie within its scale of what the l
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -127,7 +127,8 @@ def fit_windows(
 
     def moved(at: Fitted, damping: Array, last: bool) -> Fitted:
         change, shift = at.step(float(damping[0]))
-        return problem.after(at, at.vector + change, at.start + shift)
+        with np.errstate(all="ignore"):  # a step too far may make a robot take off
+            return problem.at(at.vector + change, at.start + shift)
 
     return levenberg_marquardt(problem.at(vector, begin), moved, MOST_STEPS, DAMPING, SETTLED)
 
@@ -181,12 +182,6 @@ class _Problem:
     windows: Windows
     deviation: Array
 
-    def after(self, at: Fitted, vector: Array, start: Array) -> Fitted:
-        """The problem at other unknowns (size,) and beginnings (12, W); where those cost more, none of it but
-        that is worked out."""
-        cost = self.cost(vector, start)
-        return self.at(vector, start) if cost < at.cost[0] else replace(at, cost=np.array([np.inf]))
-
     def at(self, vector: Array, start: Array) -> Fitted:
         """The problem at unknowns (size,) and beginnings (12, W), derivatives by differences."""
         n, windows, unknowns = self.unknowns.size, self.windows, self.unknowns
@@ -200,26 +195,24 @@ class _Problem:
             begin[k, 1 + n + k] += DIFFERENCE * START_DEVIATION[k]
         state, sensed = self._simulated(vectors, wrench, begin)
         residual = self._residual(sensed[:, :, 0])
-        weighted = _clipped(residual)
-        with np.errstate(invalid="ignore"):  # an outlier pulls with constant force
-            weight = np.where(np.abs(weighted) > CLIP, CLIP / np.abs(weighted), 1.0) / self.deviation[:, None]
-        known = np.isfinite(residual)
+        left, weight = _huber(residual)
         slopes = (sensed[:, :, 1:] - sensed[:, :, :1]) / DIFFERENCE
-        slopes *= np.where(known, weight, 0.0)[:, :, None]
-        left = np.where(known, weighted, 0.0)
+        slopes *= (weight / self.deviation[:, None])[:, :, None]
         by = np.moveaxis(slopes, (2, 3), (0, 1)).reshape(n + 12, w, -1).swapaxes(0, 1)  # (W, n + 12, L 12)
         r = np.moveaxis(left, 2, 0).reshape(w, -1)
         scaled = by[:, n:]
-        pull = np.einsum("wkm,wm->wk", scaled, r) - (start - windows.start).T / START_DEVIATION
+        begun = (start - windows.start).T / START_DEVIATION
+        pull = np.einsum("wkm,wm->wk", scaled, r) - begun
         inner = np.asarray(np.linalg.inv(scaled @ scaled.swapaxes(1, 2) + np.eye(12)), np.float64)
         mixed = scaled @ by[:, :n].swapaxes(1, 2)
         own = by[:, :n] @ by[:, :n].swapaxes(1, 2)
         whole = own - mixed.swapaxes(1, 2) @ inner @ mixed
         scores = np.einsum("wkm,wm->wk", by[:, :n], r) - np.einsum("wkn,wkl,wl->wn", mixed, inner, pull)
         believed = unknowns.believed
+        cost = 0.5 * float((left**2).sum() + (begun**2).sum() + vector @ believed @ vector)
         return Fitted(
             unknowns=unknowns,
-            cost=np.array([self._half(left, vector, start)]),
+            cost=np.array([cost if np.isfinite(sensed).all() else np.inf]),
             vector=vector,
             start=start,
             gradient=scores.sum(axis=0) - believed @ vector,
@@ -232,14 +225,6 @@ class _Problem:
             mixed=mixed,
             pull=pull,
         )
-
-    def cost(self, vector: Array, start: Array) -> float:
-        """Half the sum of squares at unknowns (size,) and beginnings (12, W)."""
-        with np.errstate(all="ignore"):  # a step too far may make a robot take off
-            _, sensed = self._simulated(vector[None], self._wrenches(vector[None]), start[:, None])
-        if not np.isfinite(sensed).all():  # what is not a number would count as not measured
-            return float("inf")
-        return self._half(_clipped(self._residual(sensed[:, :, 0])), vector, start)
 
     def _simulated(self, vectors: Array, wrench: Array, start: Array) -> tuple[Array, Array]:
         """States (L, 12, B, W) of B vectors (B, size) under wrenches (L, 6, B, W) from beginnings (12, B, W),
@@ -265,17 +250,11 @@ class _Problem:
         away[:, ANGLES] = wrapped(away[:, ANGLES])
         return np.asarray(away / self.deviation[:, None])
 
-    def _half(self, weighted: Array, vector: Array, start: Array) -> float:
-        """Half the cost: residuals, beginnings, and what was believed."""
-        begun = (start - self.windows.start) / START_DEVIATION[:, None]
-        residuals = np.nansum(weighted**2) + (begun**2).sum()
-        return 0.5 * float(residuals + vector @ self.unknowns.believed @ vector)
 
-
-def _clipped(residual: Array) -> Array:
-    """Signed roots of Huber's loss: the square of what is returned grows linearly beyond `CLIP`."""
-    with np.errstate(invalid="ignore"):
-        size = np.abs(residual)
-        far = np.sqrt(np.maximum(2.0 * CLIP * size - CLIP**2, 0.0))
-        result: Array = np.sign(residual) * np.where(size > CLIP, far, size)
-    return result
+def _huber(residual: Array) -> tuple[Array, Array]:
+    """Signed roots of Huber's loss, whose squares grow linearly beyond `CLIP`, and their slopes; 0 where
+    nothing was measured."""
+    size = np.abs(np.nan_to_num(residual))
+    root = np.sqrt(np.where(size > CLIP, 2.0 * CLIP * size - CLIP**2, size**2))
+    slope = np.where(size > CLIP, CLIP / np.maximum(root, CLIP), np.isfinite(residual))
+    return np.copysign(root, residual), slope

@@ -1,8 +1,6 @@
 """A fitted robot as a layout: where its fins are and how strong, its body, the interaction, and tables of
 fins whose law is another one."""
 
-import csv
-import io
 import os
 from dataclasses import replace
 from pathlib import Path
@@ -14,7 +12,7 @@ from finlab.fit.robot.learned_fins import learned
 from finlab.fit.robot.model import shape_factor
 from finlab.fit.robot.report import summary
 from finlab.fit.robot.robot_fit import RobotFit
-from finlab.layout import Body, Fin, FinModelSpec, Interaction, Jet, Layout, save_layout
+from finlab.layout import Body, FinModelSpec, Interaction, Jet, Layout, load_layout, save_layout
 from finlab.layout.force_table_file import COLUMNS, POWER_COLUMN
 from finlab.layout.interaction import MAX_SHARE
 from finlab.layout.layout import MAX_DESCRIPTION_LENGTH
@@ -30,28 +28,6 @@ LEAST_SHARE = 0.005
 """Smallest share of a jet that is worth its line."""
 
 
-def fitted_layout(fit: RobotFit, path: str | os.PathLike[str]) -> tuple[Layout, dict[str, str]]:
-    """Returns the layout that a fit gives, and the texts of the tables that it names, by path.
-
-    Args:
-        fit: what was found.
-        path: of the layout; tables lie beside it.
-    """
-    layout, place = fit.model.layout, Path(path)
-    lean = fit.found("lean")
-    certain = np.abs(lean) > np.maximum(DEFLECTIONS[0] * fit.found_error("lean"), DEFLECTIONS[1])
-    fins, tables = list(learned(fit, np.where(certain, lean, 0.0))), {}
-    for i, fin in enumerate(fins):
-        if fit.part("shape") is not None or fin.model.type == "table":
-            name = str(place.resolve().with_name(f"{place.stem}-fin{i + 1}.csv"))
-            tables[name] = _table(fit, i)
-            fins[i] = replace(fin, model=FinModelSpec("table", (("path", name),)))
-    notes = "\n".join(summary(fit))
-    text = f"{notes}\n{layout.description}".strip()[:MAX_DESCRIPTION_LENGTH]
-    name = layout.name if place.stem == layout.name else place.stem[:64].strip() or layout.name
-    return Layout(name, tuple(fins), text, _body(fit), _interaction(fit)), tables
-
-
 def write_robot(fit: RobotFit, path: str | os.PathLike[str]) -> Layout:
     """Writes the layout that a fit gives, and tables beside it where its fins follow another law.
 
@@ -59,24 +35,20 @@ def write_robot(fit: RobotFit, path: str | os.PathLike[str]) -> Layout:
         DataError: a table cannot be written.
         LayoutError: the layout cannot be written.
     """
-    layout, tables = fitted_layout(fit, path)
-    for name, text in tables.items():
-        write_whole(name, text, DataError)
-    beside = {name: Path(name).name for name in tables}
-    save_layout(_named(layout, beside), path)
-    return layout
-
-
-def _named(layout: Layout, names: dict[str, str]) -> Layout:
-    """The layout as its file says it: tables beside it by their names alone."""
-
-    def renamed(fin: Fin) -> Fin:
-        path = str(fin.model.values().get("path", ""))
-        if path not in names:
-            return fin
-        return replace(fin, model=FinModelSpec("table", (("path", names[path]),)))
-
-    return replace(layout, actuators=tuple(renamed(fin) for fin in layout.fins))
+    layout, place = fit.model.layout, Path(path)
+    lean = fit.found("lean")
+    certain = np.abs(lean) > np.maximum(DEFLECTIONS[0] * fit.found_error("lean"), DEFLECTIONS[1])
+    fins = list(learned(fit, np.where(certain, lean, 0.0)))
+    for i, fin in enumerate(fins):
+        if fit.part("shape") is not None or fin.model.type == "table":
+            table = place.with_name(f"{place.stem}-fin{i + 1}.csv")
+            write_whole(table, _table(fit, i), DataError)
+            fins[i] = replace(fin, model=FinModelSpec("table", (("path", table.name),)))
+    notes = "\n".join(summary(fit))
+    text = f"{notes}\n{layout.description}".strip()[:MAX_DESCRIPTION_LENGTH]
+    name = layout.name if place.stem == layout.name else place.stem[:64].strip() or layout.name
+    save_layout(Layout(name, tuple(fins), text, _body(fit), _interaction(fit)), place)
+    return load_layout(place)
 
 
 def _table(fit: RobotFit, i: int) -> str:
@@ -92,13 +64,15 @@ def _table(fit: RobotFit, i: int) -> str:
     if shape is not None:
         force = force * shape_factor(fit.model.shape_terms(command), shape)[:, None]
     power = np.asarray(law.power(command))
-    text = io.StringIO()
-    text.write(f"# fin {fin.name}, fitted to a swim of the whole robot\n")
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow([*COLUMNS, POWER_COLUMN])
     rows = np.hstack([command, force, power[:, None]]) + 0.0
-    writer.writerows([f"{value:.8g}" for value in row] for row in rows)
-    return text.getvalue()
+    return "\n".join(
+        [
+            f"# fin {fin.name}, fitted to a swim of the whole robot",
+            ",".join([*COLUMNS, POWER_COLUMN]),
+            *(",".join(f"{value:.8g}" for value in row) for row in rows),
+            "",
+        ]
+    )
 
 
 def _body(fit: RobotFit) -> Body:

@@ -28,7 +28,7 @@ def summary(fit: RobotFit) -> tuple[str, ...]:
     untold = fit.untold()
     if untold:
         lines.append(f"the data cannot tell {', '.join(untold)}: there the layout's own values stand")
-    return (*head, *lines, *fit.notes)
+    return (*head, *lines)
 
 
 def table(fit: RobotFit) -> str:

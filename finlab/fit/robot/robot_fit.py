@@ -14,7 +14,7 @@ from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.fit.robot.estimate import DEVIATION, Fitted, Windows, cut, fit_windows, unseen_gains
 from finlab.fit.robot.model import RobotModel
-from finlab.fit.robot.swim import ANGLES, CHANNELS, STEP_S, Swim, smoothed
+from finlab.fit.robot.swim import ANGLES, STEP_S, Swim, smoothed
 from finlab.fit.robot.unknowns import BASE, RESIDUAL, Unknowns
 from finlab.layout import Layout
 from finlab.vehicle.many_bodies import body_velocity
@@ -55,8 +55,6 @@ class RobotFit:
     """Of each channel (12,): the sensors' noise and what the model does not explain [m, rad, m/s, rad/s]."""
     explained: float
     trials: tuple[Trial, ...]
-    notes: tuple[str, ...]
-    """What to know of the data."""
 
     @property
     def covariance(self) -> Array:
@@ -162,7 +160,7 @@ def _fit(
     fitted = fit_windows(model, fitted.unknowns, windows, deviation, fitted.vector, fitted.start)
     if not np.isfinite(fitted.vector).all():
         raise DataError(f"{swims[0].name}: the fit goes astray; is the layout that of the robot that swam?")
-    return RobotFit(model, fitted, deviation, _explained(fitted, windows), trials, _notes(windows))
+    return RobotFit(model, fitted, deviation, _explained(fitted, windows), trials)
 
 
 def _with_what_helps(
@@ -229,22 +227,12 @@ def _keep_motion(model: RobotModel, fitted: Fitted, windows: Windows) -> None:
 def _explained(fitted: Fitted, windows: Windows) -> float:
     """Share of the motion's variance within windows that the simulated swims explain, mean over channels of
     velocity and rates, or of pose where those are not measured."""
+    known = np.isfinite(windows.measured).any(axis=(0, 2))
+    channels = np.flatnonzero(known & (np.arange(12) >= 6)) if known[6:].any() else np.flatnonzero(known)
     shares = []
-    for channels in (range(6, 12), range(6)):
-        for k in channels:
-            said = windows.measured[:, k]
-            known = np.isfinite(said)
-            if not known.any():
-                continue
-            away = np.where(known, said - fitted.state[:, k], np.nan)
-            whole = float(np.nanvar(said - np.nanmean(said, axis=0)))
-            shares.append(max(0.0, 1.0 - float(np.nanmean(away**2)) / max(whole, 1e-12)))
-        if shares:
-            break
+    for k in channels:
+        said = windows.measured[:, k]
+        away = np.nanmean((said - fitted.state[:, k]) ** 2)
+        whole = np.nanvar(said - np.nanmean(said, axis=0))
+        shares.append(max(0.0, 1.0 - float(away) / max(float(whole), 1e-12)))
     return float(np.mean(shares)) if shares else 0.0
-
-
-def _notes(windows: Windows) -> tuple[str, ...]:
-    """What to know of the data."""
-    silent = [name for k, name in enumerate(CHANNELS) if not np.isfinite(windows.measured[:, k]).any()]
-    return (f"nothing was measured of {', '.join(silent)}",) if silent else ()

@@ -9,30 +9,30 @@ where it was lost. Other columns are passed over.
 
 import math
 import os
-import re
+from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from scipy.stats import binned_statistic
 
 from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.files.archive import check_shapes, json_of, read_arrays
-from finlab.files.csv_table import read_table
+from finlab.fit.columns import MAX_BYTES, read_columns
 from finlab.fit.robot.swim import ANGLES, CHANNELS, STEP_S, Swim, only_new, replay
 from finlab.layout import Layout
 from finlab.layout.fin import MAX_AMPLITUDE, MAX_FREQUENCY
 
-MAX_BYTES = 200_000_000
-"""Largest file that is read [bytes]; an hour at 50 Hz has half of it."""
 SHORTEST_S = 30.0
 """Least duration [s]."""
 LONGEST_GAP_S = 1.0
 """Longest time [s] between two rows; what the fins did meanwhile is not known."""
 COMMANDS = ("A", "f", "phi")
-DEGREES = ("deg", "deg/s", "degrees")
-"""Units in a header that are turned into radians."""
+UNITS = {
+    **dict.fromkeys(("s", "m", "m/s", "rad", "rad/s", "hz"), 1.0),
+    **dict.fromkeys(("deg", "degrees", "°", "deg/s", "°/s"), math.radians(1.0)),
+}
+"""Units that a header may name, in SI."""
 
 
 def read_swim(path: str | os.PathLike[str], layout: Layout) -> Swim:
@@ -68,7 +68,7 @@ def _log(path: Path, layout: Layout) -> Swim:
         raise DataError(f"{path}: expected a row every {STEP_S:g} s, as finlab simulate writes them")
     _check_duration(len(time) * STEP_S, path)
     command = command[:, order]
-    _check_commands(command, np.arange(1, n + 1), layout, path)
+    _check_commands(command, [f"{path}: row {k}" for k in range(1, n + 1)], layout)
     return Swim(path.name, replay(layout, command), only_new(measured), command)
 
 
@@ -82,98 +82,49 @@ def _check_duration(seconds: float, path: Path) -> None:
 
 def _csv(path: Path, layout: Layout) -> Swim:
     """A CSV file."""
-    table = read_table(path, MAX_BYTES, "a CSV file of a swim", gaps=True)
-    columns = _columns(table.header, layout, path)
-    used = [k for k, column in enumerate(columns) if column.place is not None]
-    read, lines = table.numbers([column.place for column in columns if column.place is not None])
-    values = np.full((len(lines), len(columns)), np.nan)
-    values[:, used] = read * [columns[k].factor for k in used]
-    if np.isnan(values[:, 0]).any():
-        line = lines[int(np.argmax(np.isnan(values[:, 0])))]
-        raise DataError(f"{path}: line {line}, column t, is empty")
-    time, measured = values[:, 0], values[:, 1:13]
-    command = values[:, 13:].reshape(len(lines), layout.n_fins, 3)
-    _check_time(time, lines, path)
-    _check_measured(measured, columns, path)
-    _check_commands(command, lines, layout, path)
+    commands = [f"{fin}.{part}" for fin in layout.names for part in COMMANDS]
+    names = {name: name for name in ("t", *CHANNELS, *commands)}
+    pairs = [f"{pose}|{rate}" for pose, rate in zip(CHANNELS[:6], CHANNELS[6:], strict=True)]
+    expected = "t, what was measured, and FIN.A, FIN.f, FIN.phi for each fin"
+    read = read_columns(path, names, ("t", *commands, *pairs), expected, UNITS, gaps=True)
+    n, places = len(read.places), read.places
+    time = read.values["t"]
+    _check_time(time, places)
+    _check_duration(float(time[-1] - time[0]), path)
+    for name in set(CHANNELS) & set(read.values):
+        said = read.values[name][np.isfinite(read.values[name])]
+        if len(said) < 2 or np.ptp(said) == 0.0:
+            what = f"{said[0]:g} throughout" if len(said) else "empty"
+            raise DataError(f"{path}: column {name} is {what}; is the sensor connected? leave the column out")
+    measured = np.stack([read.values.get(name, np.full(n, np.nan)) for name in CHANNELS], axis=-1)
+    command = np.stack([read.values[name] for name in commands], axis=-1).reshape(n, -1, 3)
+    _check_commands(command, places, layout)
     grid = np.arange(time[0], time[-1], STEP_S)
     held = np.searchsorted(time, grid + 1e-6, side="right") - 1
     command, measured = command[held], _on_grid(time, only_new(measured), grid)
     return Swim(path.name, replay(layout, command), measured, command)
 
 
-class _Column(NamedTuple):
-    """One column that is read."""
-
-    name: str
-    """Of `t`, `CHANNELS` or a fin's command."""
-    place: int | None
-    factor: float
-
-
-def _columns(header: list[str], layout: Layout, path: Path) -> list[_Column]:
-    """All columns that there may be, in order: time, measurements, commands."""
-    commands = [f"{fin}.{part}" for fin in layout.names for part in COMMANDS]
-    found: dict[str, _Column] = {}
-    for i, cell in enumerate(header):
-        name, _, unit = re.sub(r"[\])]", " ", cell.replace("(", "[")).partition("[")
-        name = name.strip()
-        if name in found:
-            raise DataError(f"{path}: column {name} appears twice; keep one")
-        if name in ("t", *CHANNELS, *commands):
-            degrees = unit.strip().lower() in DEGREES
-            found[name] = _Column(name, i, math.radians(1.0) if degrees else 1.0)
-    for name in ("t", *commands):
-        if name not in found:
-            raise DataError(
-                f"{path}: column {name} is missing, expected t, what was measured, and FIN.A, FIN.f, FIN.phi "
-                "for each fin"
-            )
-    for one, other in (("xyz", "uvw"), (CHANNELS[ANGLES], "pqr")):
-        if not set(one) <= set(found) and not set(other) <= set(found):
-            raise DataError(f"{path}: expected the columns {', '.join(one)} or {', '.join(other)}")
-    return [found.get(name, _Column(name, None, 1.0)) for name in ("t", *CHANNELS, *commands)]
-
-
-def _check_time(time: Array, lines: NDArray[np.intp], path: Path) -> None:
-    """Time must rise, without gaps, for long enough."""
+def _check_time(time: Array, places: Sequence[str]) -> None:
+    """Time (n,) must rise, without gaps."""
     steps = np.diff(time)
-    back = np.flatnonzero(steps <= 0.0)
-    if len(back):
-        k = int(back[0])
+    wrong = np.flatnonzero(~((steps > 0.0) & (steps <= LONGEST_GAP_S)))
+    if len(wrong):
+        k = int(wrong[0])
         raise DataError(
-            f"{path}: line {lines[k + 1]}, column t: time runs backwards or stands still, {time[k + 1]:g} s "
-            f"after {time[k]:g} s; sort the rows, or cut the file there"
+            f"{places[k + 1]}, column t: {time[k + 1]:g} s after {time[k]:g} s, expected times that rise by "
+            f"{LONGEST_GAP_S:g} s at most; sort the rows, or cut the file there and name both parts"
         )
-    gaps = np.flatnonzero(steps > LONGEST_GAP_S)
-    if len(gaps):
-        k = int(gaps[0])
-        raise DataError(
-            f"{path}: line {lines[k + 1]}, column t: {steps[k]:.1f} s without a row before it, expected at "
-            f"most {LONGEST_GAP_S:g} s; cut the file there and name both parts"
-        )
-    _check_duration(float(time[-1] - time[0]), path)
 
 
-def _check_measured(measured: Array, columns: list[_Column], path: Path) -> None:
-    """Every column that is there must say something."""
-    for k, column in enumerate(columns[1:13]):
-        said = measured[np.isfinite(measured[:, k]), k]
-        if column.place is not None and (len(said) < 2 or np.ptp(said) == 0.0):
-            what = f"{said[0]:g} throughout" if len(said) else "empty"
-            raise DataError(
-                f"{path}: column {column.name} is {what}; is the sensor connected? leave the column out"
-            )
-
-
-def _check_commands(command: Array, lines: NDArray[np.intp], layout: Layout, path: Path) -> None:
+def _check_commands(command: Array, places: Sequence[str], layout: Layout) -> None:
     """A fin is commanded by three numbers that it can do, or by none."""
     known = np.isfinite(command)
     half = np.argwhere(known.any(axis=2) & ~known.all(axis=2))
     if len(half):
         k, i = half[0]
         raise DataError(
-            f"{path}: line {lines[k]}: of {layout.names[i]}.A, .f and .phi some are empty; fill all three, "
+            f"{places[k]}: of {layout.names[i]}.A, .f and .phi some are empty; fill all three, "
             "or none for a fin that was lost"
         )
     for part, most, hint in ((0, MAX_AMPLITUDE, "half amplitudes in rad"), (1, MAX_FREQUENCY, "Hz")):
@@ -181,23 +132,19 @@ def _check_commands(command: Array, lines: NDArray[np.intp], layout: Layout, pat
         if len(wrong):
             k, i = wrong[0]
             raise DataError(
-                f"{path}: line {lines[k]}, column {layout.names[i]}.{COMMANDS[part]}, holds "
+                f"{places[k]}, column {layout.names[i]}.{COMMANDS[part]}, holds "
                 f"{command[k, i, part]:g}, expected {hint} from 0 to {most:.4g}"
             )
 
 
 def _on_grid(time: Array, measured: Array, grid: Array) -> Array:
     """New samples (N, 12) at times (N,) as means within half a step of the grid's times (M,), (M, 12)."""
-    cell = np.rint((time - grid[0]) / STEP_S).astype(int)
+    edges = np.append(grid, grid[-1] + STEP_S) - 0.5 * STEP_S
     found = np.full((len(grid), measured.shape[1]), np.nan)
     for k in range(measured.shape[1]):
-        fresh = np.isfinite(measured[:, k]) & (cell < len(grid))
-        if not fresh.any():
-            continue
-        values = measured[fresh, k]
-        if ANGLES.start <= k < ANGLES.stop:
-            values = np.unwrap(values)
-        count = np.bincount(cell[fresh], minlength=len(grid))
-        total = np.bincount(cell[fresh], weights=values, minlength=len(grid))
-        found[:, k] = np.where(count > 0, total / np.maximum(count, 1), np.nan)
+        fresh = np.isfinite(measured[:, k])
+        if fresh.any():
+            values = measured[fresh, k]
+            values = np.unwrap(values) if ANGLES.start <= k < ANGLES.stop else values
+            found[:, k] = binned_statistic(time[fresh], values, "mean", edges).statistic
     return found
