@@ -1,4 +1,4 @@
-"""Layout-independent control allocation for fin-actuated underwater robots.
+"""Control allocation for underwater robots with fins, thrusters, azimuths and rudders, in any layout.
 
 A layout says where the fins of a robot sit. A wrench says what the body should feel. An allocator turns
 both into one command per fin:

@@ -54,7 +54,7 @@ def _parsed(argv: list[str]) -> int:
     return code or 0
 
 
-_DESCRIPTION = "Control allocation for fin-actuated underwater robots: a target wrench in, commands out."
+_DESCRIPTION = "Control allocation for underwater robots: a target wrench in, commands out."
 
 
 def _command_line(argv: Sequence[str]) -> SubcommandApp:
