@@ -32,6 +32,9 @@ DRIVEN = [0, 2, 3]
 """Where what is in the state, and which of the motions the unknown accelerations (3,) change."""
 UNKNOWN_FORCE = 0.006
 """Unknown force that comes and goes, per root of a second, as a share of what all fins can give together."""
+UNKNOWN_BY_RUDDERS = 0.15
+"""The same of a robot that rudders steer: their force goes with the square of a speed, and moments of the
+water on the hull outweigh it."""
 LASTING_FORCE = 0.003
 """The same of the change of what stays."""
 CURRENT_SPEED, CURRENT_CHANGE = 0.05, 0.002
@@ -91,9 +94,11 @@ class MotionObserver:
         self.inertia = np.array(self._vehicle.inertia)[AXES]
         """Mass and moment (4,) with those of the water that goes along [kg, kg m^2]."""
         strength = strongest_wrench(layout)[AXES] / self.inertia
+        steered = any(isinstance(part, Rudder) for part in layout.actuators)
+        unknown = UNKNOWN_BY_RUDDERS if steered else UNKNOWN_FORCE
         self._noise = period_s * np.concatenate(
             [
-                (UNKNOWN_FORCE * strength) ** 2,
+                (unknown * strength) ** 2,
                 (LASTING_FORCE * strength[DRIVEN]) ** 2,
                 [CURRENT_CHANGE**2] * 2,
             ]

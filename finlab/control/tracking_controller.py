@@ -23,8 +23,9 @@ from finlab.layout.angles import wrapped
 from finlab.vehicle.actuator_motion import following_delay
 from finlab.vehicle.body import complete_body, dynamics_of
 
-RUDDERS_S = 1.0
-"""Delay [s] of a robot that rudders steer: it has to turn before it goes elsewhere."""
+BY_FORCES, BY_RUDDERS = (1.08, 0.756, 0.39), (0.75, 0.24, 0.045)
+"""Bandwidths of velocities, heading and path times the delay; a robot that rudders steer has to turn before
+it goes elsewhere."""
 LARGEST = 0.7
 """Share of what all actuators could do for an axis that is asked for at most."""
 WAY = 0.5
@@ -69,17 +70,18 @@ def gains_for(layout: Layout) -> TrackingGains:
 
     The slowest actuator and what is behind it (the sensors, the period) are a delay in every loop. Of the
     inverse of that delay, velocities close at 1.08, the heading 1.4 times slower than they, and the path
-    round it 1.9 times slower than the heading."""
-    behind = BEHIND_S + (RUDDERS_S if "Ty" in axes_of(layout) else 0.0)
-    pace = 1.0 / (following_delay(layout) + behind)
+    round it 1.9 times slower than the heading; of robots that rudders steer see `BY_RUDDERS`."""
+    pace = 1.0 / (following_delay(layout) + BEHIND_S)
+    dives = "Ty" in axes_of(layout)
+    velocity, heading, path = BY_RUDDERS if dives else BY_FORCES
     most = LARGEST * strongest_wrench(layout)
     body = dynamics_of(complete_body(layout))
     linear, quadratic = body.linear[0], max(body.quadratic[0], 1e-9)
     steady = (math.sqrt(linear**2 + 4.0 * quadratic * float(most[0])) - linear) / (2.0 * quadratic)
     return TrackingGains(
-        velocity=1.08 * pace,
-        heading=0.756 * pace,
-        path=0.39 * pace,
+        velocity=velocity * pace,
+        heading=heading * pace,
+        path=path * pace,
         max_wrench=tuple(most.tolist()),
         max_speed=min(max(steady, TrackingGains.max_speed), FASTEST),
     )

@@ -7,7 +7,7 @@ from finlab import Allocator, load_layout
 from finlab.control import FaultMonitor
 from finlab.errors import FinlabError
 from finlab.layout import Layout
-from finlab.sim import NO_NOISE, ClosedLoop, FinFault, RunLog, make_trajectory
+from finlab.sim import NO_NOISE, ClosedLoop, FinFault, RunLog, make_trajectory, straight
 
 
 @pytest.fixture(scope="module")
@@ -25,6 +25,12 @@ def test_robots_of_any_actuators_follow_a_path(name: str) -> None:
     log = ClosedLoop(robot, Allocator(robot), make_trajectory("circle"), seed=1).run()
     assert error(log) < 0.06
     assert log.command.shape[1:] == log.fin_motion.shape[1:] == (robot.n, 3)
+
+
+def test_a_torpedo_follows_a_path_at_speed() -> None:
+    torpedo = load_layout("torpedo")
+    log = ClosedLoop(torpedo, Allocator(torpedo), straight(1.5, 20.0), seed=1).run()
+    assert log.motion[-1, 0] > 1.4 and error(log) < 0.5
 
 
 def test_thrusters_give_what_is_allocated_a_moment_later(heavy: Layout) -> None:
