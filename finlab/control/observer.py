@@ -99,7 +99,7 @@ class MotionObserver:
         self._noise = period_s * np.concatenate(
             [
                 (unknown * strength) ** 2,
-                (LASTING_FORCE * strength[DRIVEN]) ** 2,
+                (unknown * LASTING_FORCE / UNKNOWN_FORCE * strength[DRIVEN]) ** 2,
                 [CURRENT_CHANGE**2] * 2,
             ]
         )
