@@ -13,9 +13,6 @@ from finlab.arrays import Array
 from finlab.layout.layout import Layout
 from finlab.uncertainty.known import uncertainties
 
-PERCENT = 1e-2
-"""Share of the yardstick in whose square a miss is paid."""
-
 
 def price_of_doubt(layout: Layout, scale: Array, robust: float) -> Array | None:
     """Returns what a squared force of each actuator costs for the squared effectiveness of each axis (n, 6)
@@ -32,4 +29,4 @@ def price_of_doubt(layout: Layout, scale: Array, robust: float) -> Array | None:
     if robust == 0.0:
         return None
     shares = np.array([0.0 if own is None else own.share for own in uncertainties(layout)])
-    return np.multiply.outer(robust * shares**2, (PERCENT * scale) ** -2.0) if shares.any() else None
+    return np.multiply.outer(robust * shares**2, (0.01 * scale) ** -2.0) if shares.any() else None
