@@ -7,7 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.actuators.fin.blade import COPPER_LOSS
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.policy import Policy, as_policy
@@ -38,7 +37,7 @@ from finlab.sim.water import Still, Water
 from finlab.vehicle.actuator_motion import ActuatorMotion
 from finlab.vehicle.attitude import quaternion_of_yaw
 from finlab.vehicle.body import complete_body
-from finlab.vehicle.fin_motion import FinMotion
+from finlab.vehicle.fin_motion import COPPER_LOSS, FinMotion
 from finlab.vehicle.vehicle import STATE_SIZE, Vehicle
 
 AHEAD = 10

@@ -15,10 +15,6 @@ from finlab.arrays import Values, library_of
 OWN_INERTIA = 0.0097
 """Moment of inertia about its shaft of a fin 0.20 m long and 0.10 m wide [kg m^2]: U-CAT's robot description
 has a plate of 0.8 kg, 0.22 x 0.10 x 0.02 m, its centre 0.09 m from the shaft."""
-COPPER_LOSS = 0.5
-"""Heat in the windings of a fin's motor [W/(N m)^2]: `copper_loss` of a robot that swims in simulation. Our
-choice, as nothing is published of U-CAT's drives: a motor of 60 W whose windings take 730 W/(N m)^2 at its
-own shaft (7 rpm per mN m) behind a gear of 50 : 1 at 80 %, with which its fin turns twice a second."""
 EIGHT_PI2 = 8.0 * math.pi**2
 
 
