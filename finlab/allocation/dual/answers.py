@@ -160,13 +160,9 @@ class Answers:
         mean = a0 + 0.5 * linear + x * x * (a2 / 3.0 + 0.25 * cubic)
         return force, slope, start + top * x * mean
 
-    def cost(self, force: Array) -> Array:
-        """Power (n, N) [W] of forces (n, N) within the tables; of planes of their sizes."""
-        return self.marginal(force)[1]
-
     def marginal(self, force: Array) -> tuple[Array, Array]:
-        """Prices (n, N) [W/N] at which forces (n, N) are given, without a sign, and their power [W]; as
-        `cost`."""
+        """Prices (n, N) [W/N] at which forces (n, N) within the tables are given, without a sign, and their
+        power [W]; of planes at their sizes."""
         row = self._row + ((np.arange(len(force)) < self.lines)[:, None] & (force < 0.0))
         size, largest = np.abs(force), np.maximum(self._ends[row, -1], 1e-300)
         place = np.searchsorted(self._shares, (size / largest + 2.0 * row).ravel()).reshape(size.shape)

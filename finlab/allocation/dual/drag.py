@@ -41,7 +41,7 @@ def _dual_value(compiled: Compiled, wrench: Array, force: Array, price: Array) -
     size = force[: lines + planes].copy()
     size[lines:] = np.hypot(force[lines : lines + planes], force[lines + planes :])
     worth = np.empty(compiled.count)
-    worth[robot.order] = paid[: lines + planes] - robot.answers.cost(size)[:, 0]
+    worth[robot.order] = paid[: lines + planes] - robot.answers.marginal(size)[1][:, 0]
     for places, group in compiled.groups:
         own = None if compiled.doubt is not None else group.worth(price)
         if own is not None:

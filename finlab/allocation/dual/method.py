@@ -222,7 +222,7 @@ class Dual(Method):
             within &= np.linalg.norm(rest, axis=1) <= NEARLY * (
                 1e-3 + np.linalg.norm(targets / robot.scale, axis=1)
             )
-        force, prices, value = root.force, root.prices, np.broadcast_to(0.0, len(targets))
+        force, prices, value = root.force, root.prices, np.zeros(len(targets))
         if may_have_gaps(robot, sets, force):
             force, value = self._in_gaps(target, sets, root, within)
         if not within.all():

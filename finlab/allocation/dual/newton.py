@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from finlab.allocation.dual.answers import Sets
 from finlab.allocation.dual.robot import DualRobot
 from finlab.arrays import Array
-from finlab.precision import NEARLY, NOTHING, ROUNDING
+from finlab.precision import NEARLY, NOTHING, ROUNDING, SMALL
 from finlab.small_systems import solve as solve_systems
 
 TOLERANCE = 1e-10
@@ -170,8 +170,12 @@ def _state(
         missed = terms.penalty @ prices
         residual = residual - missed
         paid = paid - 0.5 * np.einsum("rn,rn->n", prices, missed)
-    size = np.sqrt(np.einsum("rn,rn->n", residual, residual))
-    return _State(target, prices, *answer, residual, paid, size, stretch)
+    return _State(target, prices, *answer, residual, paid, _length(residual), stretch)
+
+
+def _length(vectors: Array) -> Array:
+    """Lengths (N,) of columns (r, N)."""
+    return np.asarray(np.sqrt(np.einsum("rn,rn->n", vectors, vectors)))
 
 
 def _step(robot: DualRobot, state: _State, terms: Terms, ridge: Array) -> tuple[Array, Array]:
@@ -192,9 +196,9 @@ def _step(robot: DualRobot, state: _State, terms: Terms, ridge: Array) -> tuple[
         step = np.where(np.isfinite(step), step, state.residual / trace)
         return step, np.inf * trace
     if len(ridge) > 1 or ridge[0] > NEARLY:
-        return step, added * np.linalg.norm(robot.metric @ step, axis=0)
+        return step, added * _length(robot.metric @ step)
     more: Array = solve_systems(hessian, (added * (robot.metric @ step)).T[..., None])[..., 0].T
-    return step + more, added * np.linalg.norm(robot.metric @ more, axis=0)
+    return step + more, added * _length(robot.metric @ more)
 
 
 def _last(
@@ -232,7 +236,7 @@ def _one(
         if solved or beyond or steps == MOST_STEPS or ridge > MOST_RIDGE:
             break
         step, left = _step(robot, state, terms, np.array([ridge]))
-        if terms.reward is None and left[0] <= TOLERANCE:
+        if terms.reward is None and left[0] <= TOLERANCE and state.size[0] < 10.0 * SMALL:
             force, fits = _last(robot, state, step, left, sets)
             if solved := bool(fits[0]):
                 state = state._replace(prices=state.prices + step)

@@ -116,7 +116,7 @@ class DualRobot:
         lines, planes = self.answers.lines, self.answers.planes
         x, y = force[lines : lines + planes], force[lines + planes :]
         size = np.concatenate([force[:lines], np.hypot(x, y)])
-        cost = self.answers.cost(np.clip(size, sets.low, sets.high))
+        cost = self.answers.marginal(np.clip(size, sets.low, sets.high))[1]
         planar = fixed[lines:]
         return Sets(
             np.where(fixed, size, sets.low),
@@ -133,7 +133,7 @@ class DualRobot:
         lines = self.answers.lines
         low = np.clip(reach[:, :1], self.sets.low, self.sets.high)
         high = np.clip(reach[:, 1:2], self.sets.low, self.sets.high)
-        cost = self.answers.cost(np.concatenate([low, high], axis=1))
+        cost = self.answers.marginal(np.concatenate([low, high], axis=1))[1]
         return Sets(low, high, cost[:, :1], cost[:, 1:], reach[lines:, 2:3], reach[lines:, 3:])
 
     def target(self, wrench: Array) -> Array:
@@ -186,7 +186,7 @@ def dual_robot(responses: list[Response]) -> DualRobot:
     low_, high_ = np.array(low)[:, None], np.array(high)[:, None]
     band = np.array([line.band for line in lines] + [plane.band for plane in planes])[:, None]
     ends = [sign * np.minimum(band, high_) for sign in (-1.0, 0.0, 1.0)]
-    cost = answers.cost(np.concatenate([low_, high_, *ends], axis=1))
+    cost = answers.marginal(np.concatenate([low_, high_, *ends], axis=1))[1]
     sets = Sets(
         low_,
         high_,
