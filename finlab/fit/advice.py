@@ -19,7 +19,8 @@ def next_measurements(fit: FinFit, count: int = 5) -> Array:
     commands = fit.grid(CANDIDATES)[1:, 1:].reshape(-1, 3)  # at rest there is nothing to measure
     if not fit.measurements.turned:
         commands[:, 2] = fit.measurements.command[0, 2]
-    inputs, doubt, chosen = fit.measurements.scaled(commands), fit.uncertainty(commands), []
+    inputs, doubt = fit.measurements.scaled(commands), fit.uncertainty(commands)
+    chosen: list[int] = []
     while len(chosen) < count and (doubt > 0.0).any():
         chosen.append(int(np.argmax(doubt)))
         away = inputs - inputs[chosen[-1]]

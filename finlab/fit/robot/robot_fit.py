@@ -227,7 +227,7 @@ def _keep_motion(model: RobotModel, fitted: Fitted, windows: Windows) -> None:
 def _explained(fitted: Fitted, windows: Windows) -> float:
     """Share of the motion's variance within windows that the simulated swims explain, mean over channels of
     velocity and rates, or of pose where those are not measured."""
-    known = np.isfinite(windows.measured).any(axis=(0, 2))
+    known = np.asarray(np.isfinite(windows.measured).any(axis=(0, 2)))
     channels = np.flatnonzero(known & (np.arange(12) >= 6)) if known[6:].any() else np.flatnonzero(known)
     shares = []
     for k in channels:
