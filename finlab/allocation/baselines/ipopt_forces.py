@@ -108,7 +108,7 @@ class _Line:
         grid = np.unique(np.concatenate([-LEVELS * reverse, LEVELS * line.forward.largest])) / most
         if grid[0] == grid[-1]:
             grid = np.linspace(-1.0, 1.0, 5)
-        cost = Answers([line], []).cost(most * grid[None])[0]
+        cost = Answers([line], []).marginal(most * grid[None])[1][0]
         self.cost, self.full_cost = _spline(casadi, grid, cost)(share[0]), float(cost.max())
         """Power [W] in CasADi, and at full load."""
         force = np.zeros((len(grid), len(group.responses), 2))
@@ -149,7 +149,7 @@ class _Plane:
             gauge = np.interp((middle + along) % TURN, TURN / count * np.arange(count + 1), known)
             high = _spline(casadi, along, gauge)(turn)
         force = table.largest * (low + (1.0 - low) * LEVELS)
-        watts = Answers([], [plane]).cost(force[None])[0]
+        watts = Answers([], [plane]).marginal(force[None])[1][0]
         cost = _spline(casadi, LEVELS, watts)
         self.cost, self.full_cost = cost((size / high - low) / max(1.0 - low, 1e-9)), float(watts[-1])
         """See `_Line`."""
