@@ -61,15 +61,15 @@ class Component:
         The noise's variance is found from the errors of a first fit, made as if the noise were the same
         everywhere, and again from those of the second, which is nearer to small forces: it has a part that is
         the same, and a part that grows with the `size` (n,) of the whole force, by default that of the value.
-        With `wild`, a few values may be far off without making the others' noise larger.
+        With `wild`, the noise follows Student's t: values that are far off count for less (O'Hagan 1979).
         """
-        self._noise = 0.0, 0.0
         self._process = _tuned(inputs, values, None)
         for _ in range(NOISE_ROUNDS):
             error, _ = self._process.left_out()
             found = np.asarray(values - error) if size is None else size
-            self._noise = _noise_of(error, found, wild)
-            self.variance = self._noise_at(found)
+            even, grown = _noise_of(error, found, wild)
+            usual = even + grown * found**2
+            self.variance = usual * (TAILS + error**2 / usual) / (TAILS + 1.0) if wild else usual
             """Of the noise of each value (n,)."""
             self._process = _tuned(inputs, values, self.variance)
         self.left_out, self.left_out_deviation = self._process.left_out()
@@ -77,19 +77,10 @@ class Component:
         noise included."""
         self.mean = np.asarray(values - self.left_out)
         """Each value (n,) as all others predict it."""
+        self.strange = np.abs(self.left_out) / np.sqrt(self.left_out_deviation**2 - self.variance + usual)
+        """Error of each value (n,) over what it should be."""
         self.predict = self._process.predict
         self.expect = self._process.expect
-
-    def unseen(self, inputs: Array, values: Array, size: Array | None = None) -> tuple[Array, Array]:
-        """Returns the errors (m,) of values that the process has not seen, and what their standard deviation
-        should be with noise of the same kind; `size` (m,) as above, by default that of the prediction."""
-        mean, deviation = self.predict(inputs)
-        noise = self._noise_at(mean if size is None else size)
-        return np.asarray(values - mean), np.sqrt(deviation**2 + noise)
-
-    def _noise_at(self, size: Array) -> Array:
-        even, grown = self._noise
-        return np.asarray(even + grown * size**2)
 
 
 def _tuned(inputs: Array, values: Array, variance: Array | None) -> GaussianProcess:
