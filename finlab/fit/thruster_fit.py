@@ -83,7 +83,7 @@ def fit_thruster(bench: Bench) -> ThrusterFit:
     """
     try:
         return _fitted(bench)
-    except DataError as error:
+    except (DataError, LayoutError) as error:
         raise DataError(f"{bench.source}: {error}") from None
 
 
@@ -92,8 +92,7 @@ def _fitted(bench: Bench) -> ThrusterFit:
     force, power = (np.bincount(where, values) / count for values in (bench.force, bench.power))
     largest, notes = float(np.abs(force).max()), list(bench.notes)
     rising = isotonic_regression(force, weights=count).x
-    side = _sides(command, force, rising, largest, bench.unit)
-    _check_rise(command, force, rising, largest, bench.unit)
+    side = _sides(command, force, rising, bench.unit)
     rest = side == 0
     idle = float(power[rest].min()) if rest.any() else 0.0
     if idle > LAW_FROM * power.max():
@@ -109,17 +108,15 @@ def _fitted(bench: Bench) -> ThrusterFit:
             curves.append(_Side(sign, bench.command[own], bench.force[own], bench.power[own], largest))
         else:
             notes.append(f"no {name} forces were measured: the thruster pushes one way")
-    parts = [np.stack([command[rest], 0.0 * command[rest], np.full(rest.sum(), idle)])]
-    rows = np.concatenate([*parts, *(curve.rows(idle) for curve in curves)], axis=1).T
+    at_rest = np.stack([command[rest], 0.0 * command[rest], np.full(rest.sum(), idle)])
+    rows = np.concatenate([at_rest, *(curve.rows(idle) for curve in curves)], axis=1).T
     rows = np.array([[float(f"{value:.{n}g}") for value, n in zip(row, DIGITS, strict=True)] for row in rows])
     rows = rows[np.argsort(rows[:, 0])]
-    moving = rows[rows[:, 1] != 0.0]
-    below, above = moving[moving[:, 1] < 0.0], moving[moving[:, 1] > 0.0]
-    nearest = (*below[-1:], *above[:1])
+    nearest = (*rows[rows[:, 1] < 0.0][-1:], *rows[rows[:, 1] > 0.0][:1])
     still = rows[rows[:, 1] == 0.0, 0]
     law, sides = _laws(bench, idle)
     return ThrusterFit(
-        table=_table(rows, bench.unit),
+        table=PowerTable(tuple(map(tuple, rows.tolist())), bench.unit),
         law=law,
         sides=sides,
         still=(float(still[0]), float(still[-1])) if len(still) else None,
@@ -238,8 +235,13 @@ def _deviation(parts: Sequence[Array]) -> Uncertainty | None:
     return Uncertainty(float(f"{share:.3g}"), float(f"{floor:.3g}"))
 
 
-def _sides(command: Array, force: Array, rising: Array, largest: float, unit: str) -> Array:
-    """Returns the side of each command, -1, 0 at rest or 1 (k,), by forces and rising means (k,) [N]."""
+def _sides(command: Array, force: Array, rising: Array, unit: str) -> Array:
+    """Returns the side of each command, -1, 0 at rest or 1 (k,), by forces and rising means (k,) [N].
+
+    Raises:
+        DataError: forces lie farther off their rising means than scatter explains, or none is near 0.
+    """
+    largest = float(np.abs(force).max())
     if force[-1] <= force[0]:
         raise DataError(
             f"the force falls with the command, from {force[0]:.4g} N at {command[0]:g} {unit} to "
@@ -254,11 +256,6 @@ def _sides(command: Array, force: Array, rising: Array, largest: float, unit: st
             f"no force is near 0, the least is {force[first]:.4g} N at {command[first]:g} {unit}; add the "
             "command that stops the thruster"
         )
-    return side
-
-
-def _check_rise(command: Array, force: Array, rising: Array, largest: float, unit: str) -> None:
-    """Refuses forces (k,) that lie farther off their rising means (k,) than scatter explains."""
     level = np.maximum(np.abs(rising), LEVEL * largest)
     away = np.abs(force - rising)
     wrong = away - FALL * largest - FAR * np.quantile(away / level, 0.7) * level
@@ -269,14 +266,7 @@ def _check_rise(command: Array, force: Array, rising: Array, largest: float, uni
             f"about {rising[k]:.4g} N by the rows beside it; leave out wrong rows, and what lies beyond the "
             "largest force"
         )
-
-
-def _table(rows: Array, unit: str) -> PowerTable:
-    """Returns rows (K, 3) as a table, or says in a sentence why they are none."""
-    try:
-        return PowerTable(tuple(map(tuple, rows.tolist())), unit)
-    except LayoutError as error:
-        raise DataError(f"the rows make no table of thrust: {error}") from None
+    return side
 
 
 def _laws(bench: Bench, idle: float) -> tuple[PowerLaw, dict[str, tuple[float, float, float]]]:

@@ -42,14 +42,4 @@ def table(fit: RobotFit) -> str:
         lines.append(
             f"{label:{width}}  {value * scale:10.4f}  {own * scale:9.4f}  {min(own, 1.0):9.0%} {unit}{said}"
         )
-    lines.append("")
-    names = ("x", "y", "z", "roll", "pitch", "yaw", "u", "v", "w", "p", "q", "r")
-    spread = "  ".join(f"{name} {value:.3g}" for name, value in zip(names, fit.deviation, strict=True))
-    lines.append(f"left over (m, rad, m/s, rad/s): {spread}")
-    for trial in fit.trials:
-        verdict = "used" if trial.used else "not used"
-        lines.append(
-            f"{MEANINGS[trial.name]}: half squared error of a window not seen falls by {trial.gain:.2f} "
-            f"+- {trial.error:.2f}, {verdict}"
-        )
     return "\n".join(lines)

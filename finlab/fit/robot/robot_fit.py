@@ -51,8 +51,6 @@ class RobotFit:
 
     model: RobotModel
     fitted: Fitted
-    deviation: Array
-    """Of each channel (12,): the sensors' noise and what the model does not explain [m, rad, m/s, rad/s]."""
     explained: float
     trials: tuple[Trial, ...]
 
@@ -160,7 +158,7 @@ def _fit(
     fitted = fit_windows(model, fitted.unknowns, windows, deviation, fitted.vector, fitted.start)
     if not np.isfinite(fitted.vector).all():
         raise DataError(f"{swims[0].name}: the fit goes astray; is the layout that of the robot that swam?")
-    return RobotFit(model, fitted, deviation, _explained(fitted, windows), trials)
+    return RobotFit(model, fitted, _explained(fitted, windows), trials)
 
 
 def _with_what_helps(

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from finlab.arrays import Array
 from finlab.fit.robot.swing import TERMS
@@ -46,22 +47,10 @@ class Block:
 def blocks_of(names: Sequence[str], damping: Array) -> dict[str, Block]:
     """All unknowns of a robot with fins of these names; linear and quadratic damping may be off by (2, 6)."""
 
-    def block(
-        name: str,
-        labels: Sequence[str],
-        scale: float | Sequence[float] | Array,
-        unit: str,
-        force: bool = True,
-    ) -> Block:
+    def block(name: str, labels: Sequence[str], scale: ArrayLike, unit: str, force: bool = True) -> Block:
         return Block(name, tuple(labels), unit, np.broadcast_to(scale, len(labels)).astype(float), force)
 
-    shape = (
-        "amplitude",
-        "frequency",
-        "amplitude^2",
-        "amplitude x frequency",
-        "frequency^2",
-    )
+    shape = ("amplitude", "frequency", "amplitude^2", "amplitude x frequency", "frequency^2")
     jets = [
         f"{kind} jet of {a} on {b}" for a in names for b in names if a != b for kind in ("wide", "narrow")
     ]
