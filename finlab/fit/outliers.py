@@ -23,5 +23,6 @@ def find_outliers(measurements: Measurements, tell: Callable[[str], None]) -> ND
     inputs = measurements.scaled(measurements.command)
     tell("looking for samples that contradict the others")
     along = Component(inputs, values[:, 0], wild=True)
+    tell("looking for such samples across the thrust")
     across = Component(inputs, values[:, 1], size=along.mean, wild=True)
     return np.asarray((along.strange > OUTLIER) | (across.strange > OUTLIER))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from finlab.fit.robot.swim import STEP_S
-from finlab.fit.robot.swing import KINDS, MOMENTS, TERMS, swing_forces
+from finlab.fit.robot.swing import MOMENTS, TERMS, swing_forces
 from finlab.layout import Layout, load_layout
 from finlab.sim.fin_force import MeanForce, RippleForce
 from finlab.vehicle.fin_motion import FinMotion
@@ -21,14 +21,8 @@ def test_fins_that_beat_steadily_have_no_mean(pair: Layout) -> None:
     assert found.shape == (80, 2, 2, TERMS)
     swings = found[40:]  # the servos have come to rest; four and eight whole beats
     largest = np.abs(swings).max(axis=(0, 2))
-    beating = largest[0, : KINDS - 3]
-    assert (beating > 0.05).all()
-    of_beats = np.arange(TERMS) % KINDS < KINDS - 3
-    assert (np.abs(swings.mean(axis=0)).max(axis=1) <= 0.01 * largest + 1e-9)[:, of_beats].all()
-    assert (largest[:, KINDS - 3 : KINDS] < 1e-3).all(), "neither fin turns any more"
-    assert (np.abs(swings[:, 0, :, KINDS : 2 * KINDS]) < 1e-9).all(), (
-        "what changes with the frequency counts from 1 Hz"
-    )
+    assert (largest[0] > 0.05).all()
+    assert (np.abs(swings.mean(axis=0)).max(axis=1) <= 0.01 * largest + 1e-9).all()
 
 
 def test_a_plates_water_and_drag_are_those_of_the_simulation(pair: Layout) -> None:
