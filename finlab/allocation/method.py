@@ -65,7 +65,7 @@ class Method(ABC):
     def check_robot(cls, layout: Layout) -> None:
         """Raise a `LayoutError` at an actuator that the method does not take."""
         if cls.takes == "thrusters":
-            layout.only_thrusters(f"method {cls.name}")
+            layout.only(f"method {cls.name}", "thruster")
         elif cls.takes != "any actuator":
             layout.only_fins(f"method {cls.name}", horizontal=cls.takes == "horizontal fins")
 

@@ -116,7 +116,8 @@ def robot(
         raise DataError(
             f"{output}: a layout is a YAML or JSON file, expected a name that ends in .yaml or .json"
         )
-    believed = open_robot(layout, fins_for="fit robot").layout
+    believed = open_robot(layout).layout
+    believed.only_fins("fit robot")
     swims = [read_swim(log, believed) for log in logs]
     fit = fit_robot(believed, swims, RESIDUAL if residual else (), _tell)
     write_robot(fit, output)

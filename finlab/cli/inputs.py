@@ -23,22 +23,15 @@ class OpenedRobot(NamedTuple):
         return tuple(dict.fromkeys([*self.failed, *names]))
 
 
-def open_robot(text: str, fins_for: str = "") -> OpenedRobot:
+def open_robot(text: str) -> OpenedRobot:
     """The layout (and failed fins) in a file, or the shipped layout of that name.
 
-    Args:
-        text: what the user gave.
-        fins_for: the verb, where it works for robots of fins only.
-
     Raises:
-        LayoutError: neither a readable file nor a shipped layout, or a robot that the verb does not take.
+        LayoutError: neither a readable file nor a shipped layout.
     """
     from finlab.layout.load import layout_and_failed
 
-    robot = OpenedRobot(*layout_and_failed(text))
-    if fins_for:
-        robot.layout.only_fins(fins_for)
-    return robot
+    return OpenedRobot(*layout_and_failed(text))
 
 
 def check_positive(**counts: int | None) -> None:

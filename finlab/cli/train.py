@@ -10,15 +10,13 @@ from finlab.cli.inputs import check_positive
 
 verbs = SubcommandApp()
 
-_Preset = Annotated[str, arg(metavar="NAME")]
-_Output = Annotated[Path, arg(metavar="FOLDER", aliases=["-o"])]
 _Count = Annotated[int | None, arg(metavar="N")]
 
 
 @verbs.command
 def mdn(
-    output: _Output,
-    preset: _Preset = "default",
+    output: Annotated[Path, arg(metavar="FOLDER", aliases=["-o"])],
+    preset: Annotated[str, arg(metavar="NAME")] = "default",
     seed: Annotated[int, arg(metavar="N")] = 0,
     minutes: _Count = None,
     steps: _Count = None,

@@ -39,15 +39,8 @@ def allocation_record(result: Allocation) -> dict[str, object]:
 
 
 def command_record(layout: Layout, command: Array, forces: Array) -> dict[str, object]:
-    """The part of an answer that tells the commands; arguments as of `actuator_values`."""
-    record: dict[str, object] = {"actuators": actuator_values(layout, command, forces)}
-    if layout.is_of_fins:
-        record |= {"fins": list(layout.names), "command": command_rows(command)}
-    return record
-
-
-def actuator_values(layout: Layout, command: Array, forces: Array) -> list[dict[str, object]]:
-    """What each actuator of a robot is told and gives, as plain values; a failed one is told nothing.
+    """The part of an answer that tells the commands: what each actuator is told and gives, as plain values; a
+    failed one, whose row is NaN, is told nothing.
 
     Args:
         layout: the robot.
@@ -60,9 +53,7 @@ def actuator_values(layout: Layout, command: Array, forces: Array) -> list[dict[
         along = float(force @ np.array(part.axis)) if isinstance(part, Thruster) else force.tolist()
         own = None if told is None else command_values(told)
         values.append({"name": part.name, "type": part.type, "force_n": along, "command": own})
-    return values
-
-
-def command_rows(command: Array) -> list[list[float] | None]:
-    """Commands (n, 3) as lists; None for a failed fin, whose row is NaN."""
-    return [None if np.isnan(row).any() else row.tolist() for row in command]
+    if not layout.is_of_fins:
+        return {"actuators": values}
+    rows = [None if np.isnan(row).any() else row.tolist() for row in command]
+    return {"actuators": values, "fins": list(layout.names), "command": rows}

@@ -3,6 +3,7 @@
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,14 +11,12 @@ from numpy.typing import ArrayLike
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.methods import bundled_method
-from finlab.allocation.policy import CLOSEST, Policy
 from finlab.arrays import Array
 from finlab.bundle_files import ROBOT, Files, check_bundle_files, is_bundle, read_bundle_files
 from finlab.errors import AllocationError, DataError
 from finlab.layout import Layout
 from finlab.layout.commands import neutral_row
 from finlab.layout.robot_file import Case, robot_of
-from finlab.physics.objective import Name
 
 
 @dataclass(frozen=True)
@@ -36,41 +35,15 @@ class DeployedRobot:
         """All fins."""
         return self.allocator.layout
 
-    @property
-    def objective(self) -> Name:
-        """What is kept least."""
-        return getattr(self.allocator.settings, "objective", "power")
-
-    def lost(self, failed: Sequence[str] = ()) -> tuple[str, ...]:
-        """Fins that the bundle names as failed stay failed, whatever `failed` adds."""
-        return tuple(dict.fromkeys([*self.failed, *failed]))
-
-    def allocate(
-        self,
-        wrench: ArrayLike,
-        *,
-        failed: Sequence[str] = (),
-        previous: ArrayLike | Allocation | None = None,
-        reference: ArrayLike | None = None,
-        policy: Policy | str = CLOSEST,
-        flow: ArrayLike | None = None,
-        seed: int = 0,
-    ) -> Allocation:
-        """Commands for one target; arguments and errors as in `finlab.Allocator.allocate`.
+    def allocate(self, wrench: ArrayLike, *, failed: Sequence[str] = (), **options: Any) -> Allocation:
+        """Commands for one target; arguments and errors as in `finlab.Allocator.allocate`. What the bundle
+        names as failed stays failed, whatever `failed` adds.
 
         Raises:
             AllocationError: also where the answer is no number, as a broken bundle gives it.
         """
-        lost = self.lost(failed)
-        answer = self.allocator.allocate(
-            wrench,
-            failed=lost,
-            previous=previous,
-            reference=reference,
-            policy=policy,
-            flow=flow,
-            seed=seed,
-        )
+        lost = (*self.failed, *(name for name in failed if name not in self.failed))
+        answer = self.allocator.allocate(wrench, failed=lost, **options)
         works = [name not in lost for name in self.layout.names]
         if not np.isfinite(answer.command[works]).all():
             raise AllocationError(
@@ -85,8 +58,7 @@ class DeployedRobot:
         command = np.array(
             [neutral_row(part, row) for part, row in zip(self.layout.actuators, rows, strict=True)]
         )
-        lost = self.lost(failed)
-        command[[name in lost for name in self.layout.names]] = np.nan
+        command[[name in (*self.failed, *failed) for name in self.layout.names]] = np.nan
         return command
 
 

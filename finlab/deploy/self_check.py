@@ -80,7 +80,7 @@ def self_check(robot: DeployedRobot) -> list[Finding]:
     layout, failed = robot.layout, robot.failed
     alive = [i for i, name in enumerate(layout.names) if name not in failed]
     plant, scale = plant_of(layout.without(failed) if failed else layout), robot.allocator.scale
-    cost = cost_meter(robot.objective, plant)
+    cost = cost_meter(getattr(robot.allocator.settings, "objective", "power"), plant)
 
     differs, errors, worse, dearer = [], [], [], []
     for case in robot.self_test:

@@ -104,12 +104,8 @@ class Server:
         return reply
 
     def _rest(self) -> dict[str, Any]:
-        command, self._sent = self._neutral(), None
-        return self._reply(None, "neutral", command)
-
-    def _neutral(self) -> Array:
-        known = [name for name in self._failed if name in self._robot.layout.names]
-        return self._robot.neutral(known, None if self._sent is None else self._sent.command)
+        now, self._sent = None if self._sent is None else self._sent.command, None
+        return self._reply(None, "neutral", self._robot.neutral(self._failed, now))
 
     def _reply(self, name: Any, status: str, command: Array, forces: Array | None = None) -> dict[str, Any]:
         """Commands (n, 3), and the forces (n, 3) [N], body frame, that they give; at rest where not told."""

@@ -102,16 +102,11 @@ class AttainableSet(Polytope):
     by the actuators or, where `hull` says so, by the convex hulls of what they can push."""
 
     kind: Kind
-    alone: bool
-    """Whether all else is zero (torque for forces, force for torques) or free."""
-    failed: tuple[str, ...]
     gap: float
     """Nothing attainable lies further than this outside any face [N] or [N m]."""
     hull: bool
     """Whether it is the convex hull of a set that is not convex, because an arc is wider than half a turn
     but no full circle, or a force is that of a flow."""
-    sampled: bool
-    """Whether a fin follows a table, so that its largest thrust was sampled."""
 
 
 def attainable_set(
@@ -139,7 +134,6 @@ def attainable_set(
     Raises:
         LayoutError: there is no actuator of a name in `failed`.
     """
-    layout.indices(tuple(failed))
     sets = force_sets(layout, failed, flow)
     support = _without_specks(
         _alone_support(sets, kind) if alone else _free_support(sets, kind), SPECK * float(sets.radius.sum())
@@ -165,11 +159,8 @@ def attainable_set(
     return AttainableSet(
         **vars(found),
         kind=kind,
-        alone=alone,
-        failed=tuple(name for name in layout.names if name in failed),
         gap=max(float(beyond.max()), 0.0),
         hull=len(wide_arcs(sets)) > 0 or sets.corners is not None,
-        sampled=any(fin.model.type == "table" for fin in layout.fins),
     )
 
 

@@ -17,9 +17,6 @@ from finlab.forces.force_sets import THINNEST, ForceSets
 from finlab.small_systems import solve
 
 ITERATIONS = 40
-GAP = 1e-11
-"""Mean product of a limit's multiplier and slack that ends the search, relative to the wrench's error plus
-one, where the strongest fin's wrench is one."""
 UNMET = 1e-8
 """Largest violation of any condition at the end, relative to the same."""
 CENTRING = (0.05, 0.3)
@@ -38,15 +35,6 @@ SLACK, WEIGHT = 3.0, 10.0
 """Slack and multiplier of each limit at the outset; the latter for a wanted wrench that is not far away."""
 NARROWEST = 1e-6
 """Half of a sector's angle [rad] below which it has no inside: such a fin only pushes ahead."""
-
-
-class Optimum(NamedTuple):
-    """Solutions of R problems."""
-
-    force: Array
-    """Planar forces (R, n, 2) [N], within the fins' sets."""
-    multiplier: Array
-    """Multiplier (R, m) of the wrench: what its error would gain from one more of it."""
 
 
 class _State(NamedTuple):
@@ -74,12 +62,7 @@ class _State(NamedTuple):
     """Of the last step (R,)."""
 
 
-def minimize(
-    sets: ForceSets,
-    wanted: Array,
-    c: Array,
-    gap: float = GAP,
-) -> Optimum:
+def minimize(sets: ForceSets, wanted: Array, c: Array, gap: float) -> tuple[Array, Array]:
     """Solves R problems.
 
     Args:
@@ -87,7 +70,12 @@ def minimize(
             count with their convex hulls.
         wanted: wrenches w (R, m).
         c: what each coordinate's squared error is divided by (m,) or (R, m), positive.
-        gap: when to stop, see `GAP`.
+        gap: mean product of a limit's multiplier and slack that ends the search, relative to the wrench's
+            error plus one, where the strongest fin's wrench is one.
+
+    Returns:
+        Planar forces (R, n, 2) [N], within the fins' sets, and the multiplier (R, m) of the wrench: what its
+        error would gain from one more of it.
     """
     state = _outset(sets, wanted - sets.offset, c)
     busy, least = np.arange(len(wanted)), np.full(len(wanted), np.inf)
@@ -109,7 +97,7 @@ def minimize(
     force *= sets.radius[..., None]
     if sets.center is not None:
         force += sets.center
-    return Optimum(force, multiplier * _unit(sets)[:, None])
+    return force, multiplier * _unit(sets)[:, None]
 
 
 def _outset(sets: ForceSets, wanted: Array, c: Array) -> _State:

@@ -62,22 +62,20 @@ def largest(
     wanted[:, 1:] = held
     full = np.sqrt((seen.full_effectiveness() ** 2).sum(-1))
     wanted[:, 0] = np.maximum(BEYOND * full.sum(-1), 1e-9) + np.abs(sets.offset).sum(-1)
-    found = minimize(seen, wanted, np.array([1.0, *(HELD,) * k]), gap=tolerance)
-    lead = found.multiplier[:, :1]
+    force, multiplier = minimize(seen, wanted, np.array([1.0, *(HELD,) * k]), tolerance)
+    lead = multiplier[:, :1]
     across = np.tile(np.eye(1 + k)[0], (rows, 1))
-    normal = np.where(lead > 0.0, found.multiplier, across) / np.where(lead > 0.0, lead, 1.0)
+    normal = np.where(lead > 0.0, multiplier, across) / np.where(lead > 0.0, lead, 1.0)
     size = seen.farthest(normal)[0] - (wanted[:, 1:] * normal[:, 1:]).sum(-1)
     # The plane across the direction itself proves something, too, should the solver's prove less.
     free = seen.farthest(across)[0]
     normal = np.where((free < size)[:, None], across, normal)
     size = np.minimum(size, free)
-    given = seen.wrench(found.force)
+    given = seen.wrench(force)
     # A wrench that is not where it was asked for proves nothing.
     beside = np.abs(given - wanted)[:, 1:].max(-1, initial=0.0)
     proven = np.where(beside <= BESIDE * full.max(-1), given[:, 0], 0.0)
-    return Largest(
-        size, np.maximum(size - proven, 0.0), found.force, sets.wrench(found.force), _apply(frame, normal)
-    )
+    return Largest(size, np.maximum(size - proven, 0.0), force, sets.wrench(force), _apply(frame, normal))
 
 
 def max_wrench_along(sets: ForceSets, direction: Array, tolerance: float = FINE) -> Largest:

@@ -116,11 +116,8 @@ def layout_to_dict(layout: Layout) -> dict[str, Any]:
         data["fins"] = [{key: value for key, value in part.items() if key != "type"} for part in parts]
     else:
         data["actuators"] = parts
-    if layout.body is not None:
-        data["body"] = plain(layout.body)
-    if layout.interaction is not None:
-        data["interaction"] = plain(layout.interaction)
-    return data
+    told = {"body": layout.body, "interaction": layout.interaction}
+    return data | {key: plain(part) for key, part in told.items() if part is not None}
 
 
 def save_layout(layout: Layout, path: str | os.PathLike[str]) -> None:

@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import Annotated, Any
+from typing import Annotated, Any, NoReturn
 
 import numpy as np
 from msgspec import Meta
@@ -17,7 +17,6 @@ from finlab.layout.body import Body
 from finlab.layout.checked import Checked, Name
 from finlab.layout.fin import Fin
 from finlab.layout.interaction import Interaction
-from finlab.layout.thruster import Thruster
 
 MAX_ACTUATORS = 64
 """Most actuators a layout may have."""
@@ -90,27 +89,19 @@ class Layout(Checked):
         Raises:
             LayoutError: the sentence names `what` and the first actuator that it does not take.
         """
+        self.only(what, "fin")
+        for fin in self.fins if horizontal else ():
+            if fin.mounting_angle is None:
+                self._refuse(what, "fins with a mounting angle", fin, "has a shaft of its own direction")
+
+    def only(self, what: str, kind: str) -> None:
+        """Refuses a robot whose actuators are not all of one type, as `only_fins` does."""
         for part in self.actuators:
-            if not isinstance(part, Fin):
-                wanted, found = "robots of fins", f"is of type {part.type}"
-            elif horizontal and part.mounting_angle is None:
-                wanted, found = "fins with a mounting angle", "has a shaft of its own direction"
-            else:
-                continue
-            raise self._refusal(what, wanted, part, found)
+            if part.type != kind:
+                self._refuse(what, f"robots of {kind}s", part, f"is of type {part.type}")
 
-    def only_thrusters(self, what: str) -> None:
-        """Refuses a robot that is not of thrusters alone, as `only_fins` does.
-
-        Raises:
-            LayoutError: an actuator is no thruster with a fixed axis.
-        """
-        for part in self.actuators:
-            if not isinstance(part, Thruster):
-                raise self._refusal(what, "robots of thrusters", part, f"is of type {part.type}")
-
-    def _refusal(self, what: str, wanted: str, part: Actuator, found: str) -> LayoutError:
-        return LayoutError(
+    def _refuse(self, what: str, wanted: str, part: Actuator, found: str) -> NoReturn:
+        raise LayoutError(
             f"{what} works for {wanted} only, and {part.name!r} of layout {self.name} {found}; "
             "method dual of `finlab allocate` takes any actuator"
         )

@@ -57,9 +57,10 @@ def random_layout(
         raise DataError(f"no fin within {box} can lie outside {outside}; make the first box larger")
     # As many fins are drawn as there could be, so that a seed's layouts stay what they are.
     count = int(rng.integers(least, most + 1, size=1)[0])
-    position = rng.uniform(-1.0, 1.0, (most, 3)) * extent
-    while outside is not None and not (np.abs(position[:count]) > np.array(outside)).any():
+    while True:
         position = rng.uniform(-1.0, 1.0, (most, 3)) * extent
+        if outside is None or (np.abs(position[:count]) > np.array(outside)).any():
+            break
     angle = rng.uniform(-math.pi, math.pi, most)
     own = _varied_limits(rng, most) if limits == "varied" else [Limits()] * most
     fins = [Fin(f"fin_{i + 1}", tuple(position[i].tolist()), float(angle[i]), own[i]) for i in range(count)]

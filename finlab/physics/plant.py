@@ -95,21 +95,15 @@ class Plant:
 
     def force(self, command: Array, *, flow: Array | None = None) -> Array:
         """Returns forces (..., n, 3) [N] in own frames of commands (..., n, 3) known to be finite."""
-        return self._force(command, self.inflow(flow))
-
-    def force_and_jacobian(self, command: Array, *, flow: Array | None = None) -> tuple[Array, Array]:
-        """Returns `force` and its derivatives (..., n, 3 commands, 3 axes)."""
-        return self._force_and_jacobian(command, self.inflow(flow))
-
-    def _force(self, command: Array, inflow: Array | None) -> Array:
-        """`force` of each actuator by itself, at velocities (..., n, 3) of their places, see `inflow`."""
+        inflow = self.inflow(flow)
         force = np.empty(_broadcast(command, inflow))
         for places, law in self._laws:
             force[..., places, :] = law.force(command[..., places, :], *_met(law, inflow, places))
         return force
 
-    def _force_and_jacobian(self, command: Array, inflow: Array | None) -> tuple[Array, Array]:
-        """`_force` and its derivatives (..., n, 3 commands, 3 axes)."""
+    def force_and_jacobian(self, command: Array, *, flow: Array | None = None) -> tuple[Array, Array]:
+        """Returns `force` and its derivatives (..., n, 3 commands, 3 axes)."""
+        inflow = self.inflow(flow)
         shape = _broadcast(command, inflow)
         force, jacobian = np.empty(shape), np.empty((*shape, 3))
         for places, law in self._laws:

@@ -118,7 +118,6 @@ def test_losing_a_fin_never_enlarges_a_set(shipped: Layouts, name: str, alone: b
     layout = shipped(name)
     whole = attainable_set(layout, kind, alone=alone, tolerance=0.05)
     left = attainable_set(layout, kind, alone=alone, failed=layout.names[:1], tolerance=0.05)
-    assert left.failed == layout.names[:1]
     assert outside(whole, left.vertices) <= whole.gap + 1e-4
 
 
