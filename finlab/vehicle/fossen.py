@@ -54,34 +54,14 @@ def accelerations(body: Dynamics[Any, Any], flow: Any, up: Any, lift_along: Any,
     net = lift - body.weight
     bx, by, bz = body.center
     ax, ay, az = lift_along
+    rx, ry, rz = lift * (by * az - bz * ay), lift * (bz * ax - bx * az), lift * (bx * ay - by * ax)
     return (
         (wrench[0] - (q * pz - r * py) - (lin[0] + quad[0] * abs(u)) * u + net * up[0]) / mx,
         (wrench[1] - (r * px - p * pz) - (lin[1] + quad[1] * abs(v)) * v + net * up[1]) / my,
         (wrench[2] - (p * py - q * px) - (lin[2] + quad[2] * abs(w)) * w + net * up[2]) / mz,
-        (
-            wrench[3]
-            - (q * hz - r * hy)
-            - (v * pz - w * py)
-            - (lin[3] + quad[3] * abs(p)) * p
-            + lift * (by * az - bz * ay)
-        )
-        / ix,
-        (
-            wrench[4]
-            - (r * hx - p * hz)
-            - (w * px - u * pz)
-            - (lin[4] + quad[4] * abs(q)) * q
-            + lift * (bz * ax - bx * az)
-        )
-        / iy,
-        (
-            wrench[5]
-            - (p * hy - q * hx)
-            - (u * py - v * px)
-            - (lin[5] + quad[5] * abs(r)) * r
-            + lift * (bx * ay - by * ax)
-        )
-        / iz,
+        (wrench[3] - (q * hz - r * hy) - (v * pz - w * py) - (lin[3] + quad[3] * abs(p)) * p + rx) / ix,
+        (wrench[4] - (r * hx - p * hz) - (w * px - u * pz) - (lin[4] + quad[4] * abs(q)) * q + ry) / iy,
+        (wrench[5] - (p * hy - q * hx) - (u * py - v * px) - (lin[5] + quad[5] * abs(r)) * r + rz) / iz,
     )
 
 
