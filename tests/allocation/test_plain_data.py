@@ -10,7 +10,7 @@ import pytest
 import finlab
 from finlab.allocation import Allocator
 
-ROOMS = ("allocation", "forces", "physics", "deploy")
+ROOMS = ("allocation", "forces", "deploy")
 
 
 def classes(room: str) -> dict[str, Any]:
