@@ -22,7 +22,7 @@ def bench(
     Example: finlab bench my_method.py:allocate dual --quick
 
     Args:
-        methods: a method of finlab (dual, analytic, ipopt-32, ...), or a Python function as
+        methods: a method of finlab (dual, analytic, ipopt, ...), or a Python function as
             module:function or file.py:function.
         quick: four splits of robots, five of each, in seconds.
         splits: sets of robots, as in `finlab eval wrench`.

@@ -1,6 +1,5 @@
-"""Methods as users specify them: a name, with a number of starts behind it: `ipopt-32`."""
+"""Methods as users specify them: a name, or a function of their own."""
 
-import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from importlib.util import find_spec
@@ -8,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 from finlab.allocation.allocator import Allocator
-from finlab.allocation.baselines.ipopt import IpoptSettings
 from finlab.allocation.methods import LEARNED, MethodChoice, checked_settings, choose_method, method_class
 from finlab.errors import AllocationError
 from finlab.evaluation.own_method import own_method
@@ -26,12 +24,6 @@ NEEDS = {"ipopt": "casadi", IN_FORCES: "casadi"}
 PATIENCE_S = 60.0
 """Processor time [s] that a target may take where answers count and not times; starts and steps end every
 method long before."""
-_WITH_STARTS = re.compile(r"(\w+)-(\d+)")
-
-
-def is_slow(name: str) -> bool:
-    """Whether a method runs on a subsample only."""
-    return method_and_starts(name)[0] in SLOW
 
 
 def installed_methods(layout: Layout) -> list[str]:
@@ -100,13 +92,12 @@ def load_method_spec(
     """The method of a specification.
 
     Args:
-        name: a method; `ipopt-32`, say, for 32 starts; `ipopt-forces`, in the space of forces; or
-            `file.py:function`, see `own_method`.
+        name: a method; `ipopt-forces`, in the space of forces; or `file.py:function`, see `own_method`.
         checkpoint: of learned methods, as for `finlab.Allocator`.
         objective: what the methods that can choose keep least; each one's default where None.
 
     Raises:
-        AllocationError: unknown method, or starts or an objective for a method that has none.
+        AllocationError: unknown method.
         DataError: a function that is none.
     """
     if ":" in name:
@@ -114,26 +105,9 @@ def load_method_spec(
         return MethodSpec(kind.name, MethodChoice(kind, kind.settings_class()))
     if name == IN_FORCES:
         return MethodSpec(name, _choice("ipopt", checkpoint, space="forces"))
-    method, starts = method_and_starts(name)
-    options: dict[str, Any] = {}
-    if starts is not None:
-        if method not in SLOW or starts < 1:
-            raise AllocationError(
-                f"methods: a number of starts, from 1, goes with {', '.join(SLOW)} only, got {name!r}"
-            )
-        # Each start has the time that it has in the method's default.
-        usual = IpoptSettings()
-        limit = usual.time_limit_s * max(1.0, starts / usual.n_starts)
-        options = {"n_starts": starts, "time_limit_s": limit}
-    spec = MethodSpec(name, _choice(method, checkpoint, **options))
+    spec = MethodSpec(name, _choice(name, checkpoint))
     return spec if objective is None else spec.with_settings(objective=objective)
 
 
 def _choice(method: str, checkpoint: str | Path | None, **options: Any) -> MethodChoice:
     return choose_method(method, checkpoint if method in LEARNED else None, **options)
-
-
-def method_and_starts(name: str) -> tuple[str, int | None]:
-    """Method and number of starts."""
-    found = _WITH_STARTS.fullmatch(name)
-    return (name, None) if found is None else (found[1], int(found[2]))

@@ -121,12 +121,6 @@ class LayoutSurrogate:
         """Forces (R, n, 3) [N] of commands (R, n, 3)."""
         return np.concatenate([self._forward(command[rows]) for rows in blocks_of(len(command))])
 
-    def force_and_jacobian(self, command: AnyArray) -> tuple[AnyArray, AnyArray]:
-        """Forces (R, n, 3) and, for each of the three commands in turn, their derivatives (R, n, 3, 3)."""
-        force, pull = self.force_and_pullback(command)
-        axes = (np.broadcast_to(axis, force.shape) for axis in np.eye(3, dtype=np.float32))
-        return force, np.stack([pull(axis) for axis in axes], axis=-1)
-
     def force_and_pullback(self, command: AnyArray) -> tuple[AnyArray, Callable[[AnyArray], AnyArray]]:
         """Forces (R, n, 3) [N], and what turns derivatives of a number by them into those by the commands,
         (R, n, 3) each."""

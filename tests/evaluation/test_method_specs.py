@@ -3,7 +3,7 @@
 import pytest
 
 from finlab.errors import AllocationError
-from finlab.evaluation.method_specs import is_slow, load_method_spec, load_method_specs
+from finlab.evaluation.method_specs import load_method_spec, load_method_specs
 
 
 @pytest.mark.parametrize("name", ["sqp", "ipopt"])
@@ -18,16 +18,11 @@ def test_methods_that_cannot_choose_are_left_as_they_are() -> None:
     assert vars(methods["sqp"].choice.settings)["objective"] == "effort"
 
 
-def test_starts() -> None:
-    assert load_method_spec("ipopt-32").choice.settings.n_starts == 32
-    assert is_slow("ipopt-32") and not is_slow("sqp")
-
-
 @pytest.mark.parametrize(
     ("names", "message"),
     [
         ("dual,fast", "method: expected one of dual, .* got 'fast'"),
-        ("dual-32", "a number of starts, from 1, goes with ipopt only, got 'dual-32'"),
+        ("dual-32", "method: expected one of dual, .* got 'dual-32'"),
         ("sqp-money", "method: expected one of dual, mdn"),
         (" , ", "expected names with commas between"),
     ],

@@ -6,7 +6,7 @@ import numpy as np
 
 from finlab.errors import DataError
 from finlab.evaluation.experiment import Experiment
-from finlab.evaluation.method_specs import installed_methods, is_slow, load_method_specs
+from finlab.evaluation.method_specs import SLOW, installed_methods, load_method_specs
 from finlab.evaluation.own_layout import own_case
 from finlab.evaluation.paper_figures import paper_wrench_rows
 from finlab.evaluation.report.document import Column, Row
@@ -51,8 +51,7 @@ def run(
             with errors over the robot's own wrenches.
         split: names, or all: id, ood, ood-fins, limits, failure, near-singular, fins, fins-mixed, tables,
             many-fins, big, tiny, thrusters, azimuths, mixed-actuators, any-shaft.
-        methods: names; by default dual and paper, on LAYOUT all that are installed. A
-            number of starts may follow ipopt, as in ipopt-32. Of several splits each
+        methods: names; by default dual and paper, on LAYOUT all that are installed. Of several splits each
             method answers those whose robots it takes.
         layouts: of each split.
         targets: on each layout.
@@ -69,7 +68,7 @@ def run(
         for name, cases in sets.items()
         for method, spec in specs.items()
         if len(sets) == 1 or spec.choice.kind.fits(cases[0].layout)
-        for found in [run_method(spec, cases, first=subsample if is_slow(method) else None)]
+        for found in [run_method(spec, cases, first=subsample if method in SLOW else None)]
     ]
 
 
