@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from finlab.arrays import Array, Values, library_of
+from finlab.arrays import Array, Values
 
 
 class Normalization(NamedTuple):
@@ -39,16 +38,3 @@ def to_command(x: Values, lower: Values, upper: Values) -> Values:
     """Inverse of `to_normalized`; not clamped."""
     half = 0.5 * (upper - lower)
     return lower + half + x * half
-
-
-def clamp_to_limits(command: Values, lower: Values, upper: Values) -> Values:
-    """Commands (..., n, 3) inside their limits (n, 3 or broadcastable).
-
-    Zero directions are angles: one outside an arc is first brought to the turn nearest the middle of
-    the arc, then to its nearer end.
-    """
-    xp = library_of(command)
-    middle = 0.5 * (lower[..., 2] + upper[..., 2])
-    direction = middle + xp.remainder(command[..., 2] - middle + math.pi, 2 * math.pi) - math.pi
-    unwrapped = xp.stack([command[..., 0], command[..., 1], direction], axis=-1)
-    return xp.minimum(xp.maximum(unwrapped, lower), upper)

@@ -13,7 +13,7 @@ from finlab.allocation.solution import Candidates, Solution
 from finlab.arrays import AnyArray, Array
 from finlab.layout import FinModelSpec, Layout
 from finlab.layout.angles import is_full_turn
-from finlab.networks.normalization import clamp_to_limits, to_command, to_normalized
+from finlab.networks.normalization import to_command, to_normalized
 from finlab.networks.threads import single_threaded_products
 from finlab.networks.trained import TrainedWeights
 from finlab.paper.features import raw_features
@@ -104,7 +104,7 @@ class Paper(LeastErrorMethod):
         std = self.normalization.std
         wanted = ((targets - robot.surrogate.bias) / std).astype(np.float32)
         mixture = self._predict(robot, (targets - self.normalization.mean) / std)
-        sampled = clamp_to_limits(to_command(self._draw(mixture, seed), *robot.limits), *robot.limits)
+        sampled = robot.problem.feasible(to_command(self._draw(mixture, seed), *robot.limits))
         if self._by_likelihood:
             score = -mixture.log_prob(to_normalized(sampled, *robot.limits)).sum(-1)
         else:

@@ -8,8 +8,8 @@ import pytest
 
 import finlab
 from finlab.cli import main
+from finlab.evaluation.experiments.wrench import own_case
 from finlab.evaluation.method_specs import installed_methods
-from finlab.evaluation.own_layout import own_case
 from finlab.layout.file import save_layout
 
 

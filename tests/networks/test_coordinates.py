@@ -6,10 +6,18 @@ import numpy as np
 import pytest
 import torch
 
-from finlab.networks.normalization import clamp_to_limits, to_command, to_normalized
+from finlab.allocation.levenberg_marquardt import CommandProblem
+from finlab.networks.normalization import to_command, to_normalized
 
 LOWER = torch.tensor([[0.05, 0.1, -math.pi], [0.1, 0.2, 0.5], [0.3, 0.7, -2.5]], dtype=torch.float64)
 UPPER = torch.tensor([[0.6, 2.1, math.pi], [0.5, 1.0, 2.0], [0.3, 0.7, -2.0]], dtype=torch.float64)
+
+
+def feasible(command: np.ndarray, lower: torch.Tensor, upper: torch.Tensor) -> np.ndarray:
+    """Commands inside limits, as the refinement of commands puts them there."""
+    low, high = lower.numpy(), upper.numpy()
+    turns = high[:, 2] - low[:, 2] >= 2.0 * math.pi - 1e-9
+    return CommandProblem(None, np.zeros((len(low), 3, 6)), low, high, turns).feasible(command)  # type: ignore[arg-type]
 
 
 def test_normalized_coordinates_go_from_minus_one_to_one_and_back() -> None:
@@ -40,24 +48,22 @@ def test_a_range_of_no_width_normalizes_to_zero() -> None:
     ],
 )
 def test_directions_are_clamped_as_angles(fin: int, direction: float, expected: float) -> None:
-    command = torch.tensor([0.3, 0.7, direction], dtype=torch.float64)
-    clamped = clamp_to_limits(command, LOWER[fin], UPPER[fin])
-    assert clamped[2].item() == pytest.approx(expected)
+    clamped = feasible(np.array([[0.3, 0.7, direction]]), LOWER[fin : fin + 1], UPPER[fin : fin + 1])
+    assert clamped[0, 2] == pytest.approx(expected)
 
 
 def test_clamped_commands_keep_their_limits_and_inner_ones_stay() -> None:
-    draw = torch.Generator().manual_seed(0)
-    command = torch.randn(500, 3, 3, generator=draw, dtype=torch.float64) * 5
-    clamped = clamp_to_limits(command, LOWER, UPPER)
-    assert (clamped >= LOWER).all() and (clamped <= UPPER).all()
-    inner = LOWER + torch.rand(500, 3, 3, generator=draw, dtype=torch.float64) * (UPPER - LOWER)
-    torch.testing.assert_close(clamp_to_limits(inner, LOWER, UPPER), inner)
+    rng, lower, upper = np.random.default_rng(0), LOWER.numpy(), UPPER.numpy()
+    clamped = feasible(5.0 * rng.standard_normal((500, 3, 3)), LOWER, UPPER)
+    assert (clamped >= lower).all() and (clamped <= upper).all()
+    inner = lower + rng.random((500, 3, 3)) * (upper - lower)
+    np.testing.assert_allclose(feasible(inner, LOWER, UPPER), inner, atol=1e-12)
 
 
 def test_arrays_are_answered_as_tensors() -> None:
     command = np.random.default_rng(0).normal(size=(50, 3, 3)) * 5
     lower, upper = LOWER.numpy(), UPPER.numpy()
-    for function in (to_normalized, to_command, clamp_to_limits):
+    for function in (to_normalized, to_command):
         expected = function(torch.from_numpy(command), LOWER, UPPER).numpy()
         np.testing.assert_allclose(function(command, lower, upper), expected, rtol=1e-12)
         single = function(*(part.astype(np.float32) for part in (command, lower, upper)))

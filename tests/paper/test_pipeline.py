@@ -12,7 +12,7 @@ from finlab.assets import shipped_layouts
 from finlab.errors import AllocationError, CheckpointError
 from finlab.layout import Fin, Layout, Limits, load_layout
 from finlab.layout.angles import is_full_turn
-from finlab.networks.normalization import Normalization, clamp_to_limits, to_command, to_normalized
+from finlab.networks.normalization import Normalization, to_command, to_normalized
 from finlab.networks.trained import TrainedWeights, sizes_for_file
 from finlab.paper.network import NetworkConfig
 from finlab.paper.pipeline import ADAM_RATE, CHUNK
@@ -247,7 +247,7 @@ def test_each_ranking_takes_what_it_ranks_first(checkpoint: TrainedWeights) -> N
         method, std = paper.method(layout), paper.normalization.std
         robot = method._robot
         mixture = method._predict(robot, (target - paper.normalization.mean) / std)
-        sampled = clamp_to_limits(to_command(method._draw(mixture, 3), *robot.limits), *robot.limits)[0]
+        sampled = robot.problem.feasible(to_command(method._draw(mixture, 3), *robot.limits))[0]
         if ranking == "nll":
             x = to_normalized(sampled[None], *robot.limits)
             best = int(np.argmax(mixture.log_prob(x).sum(-1)))

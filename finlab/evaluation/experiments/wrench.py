@@ -7,17 +7,20 @@ import numpy as np
 from finlab.errors import DataError
 from finlab.evaluation.experiment import Experiment
 from finlab.evaluation.method_specs import SLOW, installed_methods, load_method_specs
-from finlab.evaluation.own_layout import own_case
 from finlab.evaluation.paper_figures import paper_wrench_rows
 from finlab.evaluation.report.document import Column, Row
 from finlab.evaluation.scoring import Columns, run_method
-from finlab.evaluation.splits import SPLITS, Case, make_split
+from finlab.evaluation.splits import SPLITS, Case, make_split, own_sigma
 from finlab.evaluation.statistics.bootstrap import mean_interval, share_interval
+from finlab.layout import Layout
 from finlab.layout.load import layout_and_failed
+from finlab.physics import plant_of
 from finlab.physics.objective import Name as Objective
 
 SUCCESS_LEVELS = (0.01, 0.5)
 """Levels t of `success_t`, the share of targets with `err_norm <= t`."""
+OWN_DOMAIN = 0x0711
+"""Leads the seed of the draws on a user's own layout."""
 HARD = (
     "id",
     "ood",
@@ -109,6 +112,15 @@ def _cases(
         )
     own = own_case(*layout_and_failed(layout), targets, seed)
     return {f"layout {own.layout.name}": [own]}
+
+
+def own_case(layout: Layout, failed: tuple[str, ...], n_targets: int, seed: int) -> Case:
+    """A user's own layout as a case: wrenches of uniform commands of the actuators that work, and errors over
+    the robot's own wrenches. A smaller number of targets gives the first of a larger one."""
+    plant = plant_of(layout.without(failed))
+    target_seed, sigma_seed = np.random.SeedSequence((OWN_DOMAIN, seed)).spawn(2)
+    targets = plant.wrench(plant.sample(np.random.default_rng(target_seed), (n_targets,)))
+    return Case(layout, targets, failed, own_sigma(plant, np.random.default_rng(sigma_seed)))
 
 
 def _printed(rows: Sequence[Row]) -> list[Row]:

@@ -20,8 +20,6 @@ PAGE, TABLES, RECORDS = "report.md", "tables.json", "records"
 """What a report's folder holds."""
 SEED = 6143
 """Of a report, unless another one is given; kept apart from those on which methods were developed."""
-DIGITS = 6
-"""Significant digits of the numbers in `TABLES`."""
 ABOUT = (
     "Every answer is scored by the plant: the fins' own laws or tables. All methods but `paper`, which has "
     "learned one fin law from samples, were given these, so errors show how well methods solve, not how "
@@ -66,11 +64,7 @@ def make_report(out: Path, *, size: Size = "full", seed: int = SEED, names: Sequ
     left = [name for name in EXPERIMENTS if name not in done]
     how_made = _how_made(command, seconds, seed) + ([f"Not run: {', '.join(left)}"] if left else [])
     write_whole(out / PAGE, to_markdown(*_page(rows, how_made, size)), DataError)
-    lines = [
-        f"{json.dumps(name)}: [\n" + ",\n".join(json.dumps(_rounded(row)) for row in each) + "\n]"
-        for name, each in rows.items()
-    ]
-    write_whole(out / TABLES, "{\n" + ",\n".join(lines) + "\n}\n", DataError)
+    write_whole(out / TABLES, json.dumps(rows, indent=1) + "\n", DataError)
     return out / PAGE
 
 
@@ -124,12 +118,3 @@ def _how_made(command: str, seconds: float, seed: int) -> list[str]:
         "Every section is also printed by `finlab eval NAME`; printed figures are those of Y. Hamamatsu, "
         "M. Kruusmaa, A. Ristolainen, Layout-independent actuation allocator for fin-actuated marine robots",
     ]
-
-
-def _rounded(value: Any) -> Any:
-    """The same with `DIGITS` significant digits."""
-    if isinstance(value, dict):
-        return {key: _rounded(each) for key, each in value.items()}
-    if isinstance(value, list):
-        return [_rounded(each) for each in value]
-    return float(f"{value:.{DIGITS}g}") if isinstance(value, float) else value
