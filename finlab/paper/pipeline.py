@@ -1,6 +1,6 @@
 """The paper's own pipeline: sample the mixture, rank by the surrogate, refine with Adam. numpy only."""
 
-from typing import ClassVar, NamedTuple
+from typing import ClassVar
 
 import numpy as np
 
@@ -12,14 +12,13 @@ from finlab.allocation.settings import Settings
 from finlab.allocation.solution import Candidates, Solution
 from finlab.arrays import AnyArray, Array
 from finlab.layout import FinModelSpec, Layout
-from finlab.layout.angles import is_full_turn
 from finlab.networks.normalization import to_command, to_normalized
 from finlab.networks.threads import single_threaded_products
 from finlab.networks.trained import TrainedWeights
 from finlab.paper.features import raw_features
 from finlab.paper.network import Mixture, NetworkConfig
 from finlab.paper.settings import PaperSettings
-from finlab.paper.surrogate import LayoutSurrogate, SurrogateConfig, blocks_of
+from finlab.paper.surrogate import LayoutSurrogate, blocks_of
 from finlab.physics.effort import EffortMeter
 
 CHUNK = 250
@@ -28,20 +27,6 @@ ADAM_RATE = 0.03
 """Adam's first step, in units of half a limit range; it falls to a twentieth of that."""
 ADAM_DECAY = (0.9, 0.999)
 """Decays of Adam's running means of the gradient and of its square (Kingma and Ba, 2015)."""
-
-
-class _Robot(NamedTuple):
-    """One layout of n healthy fins, ready for the pipeline."""
-
-    layout: Layout
-    surrogate: LayoutSurrogate
-    problem: CommandProblem
-    """The surrogate in normalized wrenches, and the limits."""
-    limits: tuple[AnyArray, AnyArray]
-    """Lower and upper limits (n, 3), in single precision as all else here."""
-    features: AnyArray
-    """The network's node features (1, n, 10)."""
-    effort: EffortMeter
 
 
 class Paper(LeastErrorMethod):
@@ -56,20 +41,27 @@ class Paper(LeastErrorMethod):
     def __init__(self, layout: Layout, settings: Settings, scale: Array, weights: TrainedWeights) -> None:
         super().__init__(layout, settings, scale, weights)
         self.config = weights.network_of(NetworkConfig)
-        SurrogateConfig.of(weights)
+        self.surrogate = LayoutSurrogate(layout, weights)
         self.normalization = weights.normalization
         self.fin_model = FinModelSpec.from_values(weights.fin_model)
         self._network = weights.single_precision
         self._one_thread = single_threaded_products()
-        self._robot = self._prepare(layout)
+        self._effectiveness = (self.surrogate.effectiveness / weights.normalization.std).reshape(-1, 6)
+        """Normalized wrench (3n, 6) per newton of each fin's force along the axes of the body."""
+        self.limits = layout.lower.astype(np.float32), layout.upper.astype(np.float32)
+        """Lower and upper limits (n, 3), in single precision as all else here."""
+        place = layout.position, layout.mounting_angle, layout.lower, layout.upper
+        self._features = raw_features(*place).astype(np.float32)
+        self._effort = EffortMeter(layout.upper)
+        self._commands = CommandProblem.of(self.plant, weights.normalization.std)
+        """Brings directions to the nearer end of an arc, as angles."""
 
     def _solve(self, targets: AnyArray, *, seed: int, previous: AnyArray | None) -> Solution:
-        robot = self._robot
         if len(targets) == 1:
             with self._one_thread():
-                return self._solve_chunk(robot, targets, seed)
+                return self._solve_chunk(targets, seed)
         starts = range(0, len(targets), CHUNK)
-        parts = [self._solve_chunk(robot, targets[k : k + CHUNK], seed + k) for k in starts]
+        parts = [self._solve_chunk(targets[k : k + CHUNK], seed + k) for k in starts]
         wrench = [part.wrench for part in parts if part.wrench is not None]
         return Solution(np.concatenate([part.command for part in parts]), wrench=np.concatenate(wrench))
 
@@ -80,50 +72,42 @@ class Paper(LeastErrorMethod):
         solution = self.solve(target[None], policy=policy, previous=previous, flow=flow, seed=seed)
         return None if solution.candidates is None else solution.candidates()
 
-    def _solve_chunk(self, robot: _Robot, targets: AnyArray, seed: int) -> Solution:
+    def _solve_chunk(self, targets: AnyArray, seed: int) -> Solution:
         settings = self.settings
-        sampled, wanted = self._sampled(robot, targets, seed)
+        sampled, wanted = self._sampled(targets, seed)
         chosen = sampled[:, : settings.n_refined]
         if not settings.mean_only:
-            chosen = self._refine(robot, chosen, wanted)
+            chosen = self._refine(chosen, wanted)
         if not self._by_likelihood:  # without physics in the ranking the likeliest candidate stays the answer
-            chosen = _take(chosen, np.argsort(self._score(robot, chosen, wanted), axis=1, kind="stable"))
+            chosen = _take(chosen, np.argsort(self._score(chosen, wanted), axis=1, kind="stable"))
         return Solution(
-            _inside(robot, chosen[:, 0]),
-            wrench=robot.surrogate.wrench(chosen[:, 0]).astype(np.float64),
-            candidates=lambda: self._candidates(robot, chosen[0], targets[0], "refined"),
-            samples=lambda: self._candidates(robot, sampled[0], targets[0], "sample"),
+            self._inside(chosen[:, 0]),
+            wrench=self.surrogate.wrench(chosen[:, 0]).astype(np.float64),
+            candidates=lambda: self._candidates(chosen[0], targets[0], "refined"),
+            samples=lambda: self._candidates(sampled[0], targets[0], "sample"),
         )
 
     @property
     def _by_likelihood(self) -> bool:
         return self.settings.ranking == "nll" and not self.settings.mean_only
 
-    def _sampled(self, robot: _Robot, targets: AnyArray, seed: int) -> tuple[AnyArray, AnyArray]:
+    def _sampled(self, targets: AnyArray, seed: int) -> tuple[AnyArray, AnyArray]:
         """Raw candidates (N, K, n, 3) for targets (N, 6), best first, and what they are to give (N, 6)."""
         std = self.normalization.std
-        wanted = ((targets - robot.surrogate.bias) / std).astype(np.float32)
-        mixture = self._predict(robot, (targets - self.normalization.mean) / std)
-        sampled = robot.problem.feasible(to_command(self._draw(mixture, seed), *robot.limits))
+        wanted = ((targets - self.surrogate.bias) / std).astype(np.float32)
+        mixture = self._predict((targets - self.normalization.mean) / std)
+        drawn = to_command(self._draw(mixture, seed), *self.limits)
+        sampled = self._commands.feasible(drawn)
         if self._by_likelihood:
-            score = -mixture.log_prob(to_normalized(sampled, *robot.limits)).sum(-1)
+            score = -mixture.log_prob(to_normalized(sampled, *self.limits)).sum(-1)
         else:
-            score = self._score(robot, sampled, wanted)
+            score = self._score(sampled, wanted)
         return _take(sampled, np.argsort(score, axis=1, kind="stable")), wanted
 
-    def _prepare(self, layout: Layout) -> _Robot:
-        surrogate, std = LayoutSurrogate(layout, self.weights), self.normalization.std
-        lower, upper = layout.lower, layout.upper
-        turns_fully = np.asarray(is_full_turn(upper[:, 2] - lower[:, 2]))
-        problem = CommandProblem(surrogate, surrogate.effectiveness / std, lower, upper, turns_fully)
-        place = layout.position[None], layout.mounting_angle[None], lower[None], upper[None]
-        limits = lower.astype(np.float32), upper.astype(np.float32)
-        return _Robot(layout, surrogate, problem, limits, raw_features(*place), EffortMeter(upper))
-
-    def _predict(self, robot: _Robot, centred: AnyArray) -> Mixture:
+    def _predict(self, centred: AnyArray) -> Mixture:
         """The network's mixture for normalized, centred targets (N, 6)."""
-        x = np.repeat(robot.features, len(centred), axis=0)
-        return self.config(self._network, x.astype(np.float32), centred.astype(np.float32))
+        x = np.repeat(self._features[None], len(centred), axis=0)
+        return self.config(self._network, x, centred.astype(np.float32))
 
     def _draw(self, mixture: Mixture, seed: int) -> AnyArray:
         """Candidates (N, K, n, 3) in normalized coordinates."""
@@ -138,36 +122,37 @@ class Paper(LeastErrorMethod):
         normal = rng.standard_normal((rows, n, k, 3), dtype=np.float32)
         return np.asarray(mixture.sample(uniform, normal, self.settings.temperature))
 
-    def _score(self, robot: _Robot, command: AnyArray, wanted: AnyArray) -> AnyArray:
+    def _score(self, command: AnyArray, wanted: AnyArray) -> AnyArray:
         """J = J_norm + gamma J_en (N, K) of commands (N, K, n, 3), by the surrogate."""
         rows, k, n, _ = command.shape
         flat = command.reshape(-1, n, 3)
-        error = robot.problem.wrench(flat).reshape(rows, k, 6) - wanted[:, None]
-        effort = robot.effort(flat).reshape(rows, k)
+        force = self.surrogate.force(flat).reshape(rows, k, -1)
+        error = force @ self._effectiveness - wanted[:, None]
+        effort = self._effort(flat).reshape(rows, k)
         return np.asarray(np.einsum("rki,rki->rk", error, error) + self.settings.gamma * effort)
 
-    def _refine(self, robot: _Robot, command: AnyArray, wanted: AnyArray) -> AnyArray:
+    def _refine(self, command: AnyArray, wanted: AnyArray) -> AnyArray:
         """Refined commands (N, K, n, 3), inside the limits."""
         if self.settings.refinement == "none":
             return command
         shape, steps = command.shape, self.settings.n_steps
         flat, target = command.reshape(-1, *shape[2:]), np.repeat(wanted, shape[1], axis=0)
-        parts = [self._adam(robot, flat[k], target[k], steps) for k in blocks_of(len(flat))]
+        parts = [self._adam(flat[k], target[k], steps) for k in blocks_of(len(flat))]
         return np.concatenate(parts).reshape(shape)
 
-    def _adam(self, robot: _Robot, command: AnyArray, target: AnyArray, steps: int) -> AnyArray:
+    def _adam(self, command: AnyArray, target: AnyArray, steps: int) -> AnyArray:
         """Adam on J for commands (R, n, 3) and normalized targets (R, 6); the best step of each.
 
         It works in normalized coordinates, inside the limits, with a step that falls linearly. Zero
         directions that turn fully go on beyond the seam.
         """
-        lower, upper = robot.limits
+        lower, upper = self.limits
         x, half = to_normalized(command, lower, upper), np.float32(0.5) * (upper - lower)
         mean, square = np.zeros_like(x), np.zeros_like(x)
         keep_mean, keep_square = ADAM_DECAY
         best, least = x.copy(), np.full(len(x), np.inf, np.float32)
         for step in range(steps + 1):
-            score, jacobian = self._score_and_gradient(robot, to_command(x, lower, upper), target)
+            score, jacobian = self._score_and_gradient(to_command(x, lower, upper), target)
             better = score < least
             best[better], least[better] = x[better], score[better]
             if step == steps:
@@ -180,35 +165,32 @@ class Paper(LeastErrorMethod):
             x -= np.float32(rate) * mean / (size + np.float32(1e-8))
             # A full turn is two units wide.
             turned = np.remainder(x[..., 2] + np.float32(1.0), np.float32(2.0)) - np.float32(1.0)
-            x[..., 2] = np.where(robot.problem.full_turn, turned, x[..., 2])
+            x[..., 2] = np.where(self.plant.full_turn, turned, x[..., 2])
             np.clip(x, -1.0, 1.0, out=x)
         return np.asarray(to_command(best, lower, upper))
 
-    def _score_and_gradient(
-        self, robot: _Robot, command: AnyArray, target: AnyArray
-    ) -> tuple[AnyArray, AnyArray]:
+    def _score_and_gradient(self, command: AnyArray, target: AnyArray) -> tuple[AnyArray, AnyArray]:
         """J (R,) of commands (R, n, 3), and its derivatives (R, n, 3) by them."""
         rows = len(command)
-        effectiveness = robot.problem.effectiveness.reshape(-1, 6).astype(np.float32)
-        force, pull = robot.surrogate.force_and_pullback(command)
+        effectiveness = self._effectiveness.astype(np.float32)
+        force, pull = self.surrogate.force_and_pullback(command)
         error = force.reshape(rows, -1) @ effectiveness - target
         gamma = np.float32(self.settings.gamma)
-        effort, by_effort = robot.effort.with_gradient(command)
+        effort, by_effort = self._effort.with_gradient(command)
         score = np.einsum("ri,ri->r", error, error) + gamma * effort
         return score, pull(2.0 * error @ effectiveness.T) + gamma * by_effort
 
-    def _candidates(self, robot: _Robot, command: AnyArray, target: AnyArray, source: str) -> Candidates:
+    def _inside(self, command: AnyArray) -> Array:
+        """Commands in double precision, inside the limits to the last bit."""
+        return np.clip(command.astype(np.float64), self.layout.lower, self.layout.upper)
+
+    def _candidates(self, command: AnyArray, target: AnyArray, source: str) -> Candidates:
         """Candidates (K, n, 3) of a single target (6,), in their order."""
-        wrench = robot.surrogate.wrench(command).astype(np.float64)
-        error, inside = np.linalg.norm((wrench - target) / self.scale, axis=-1), _inside(robot, command)
-        return Candidates(inside, wrench, error, *costs(robot.layout, inside), (source,) * len(command))
+        wrench = self.surrogate.wrench(command).astype(np.float64)
+        error, inside = np.linalg.norm((wrench - target) / self.scale, axis=-1), self._inside(command)
+        return Candidates(inside, wrench, error, *costs(self.layout, inside), (source,) * len(command))
 
 
 def _take(command: AnyArray, index: AnyArray) -> AnyArray:
     """Of commands (N, K, n, 3) those with the numbers (N, k)."""
     return np.asarray(np.take_along_axis(command, index[..., None, None], axis=1))
-
-
-def _inside(robot: _Robot, command: AnyArray) -> AnyArray:
-    """Commands in double precision, inside the limits to the last bit."""
-    return np.clip(command.astype(np.float64), robot.problem.lower, robot.problem.upper)

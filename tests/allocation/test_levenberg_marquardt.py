@@ -134,3 +134,40 @@ def test_a_direction_may_cross_the_seam(search: AnyRobot) -> None:
     refined = refine(problem, target, start, 15)
     assert refined.error[0] < 1e-6
     assert refined.command[0, 0, 2] == pytest.approx(-math.pi + 0.1, abs=1e-3)
+
+
+ARCS = (
+    Fin("full", (0.1, 0.0, 0.0), 0.0, Limits((0.05, 0.6), (0.1, 2.1))),
+    Fin("arc", (0.0, 0.1, 0.0), 0.0, Limits((0.1, 0.5), (0.2, 1.0), (0.5, 2.0))),
+    Fin("narrow", (0.0, 0.0, 0.1), 0.0, Limits((0.3, 0.3), (0.7, 0.7), (-2.5, -2.0))),
+)
+LIMITS = CommandProblem.of(plant_of(Layout("arcs", ARCS)), np.ones(6))
+
+
+@pytest.mark.parametrize(
+    ("fin", "direction", "expected"),
+    [
+        (0, 3.5, 3.5 - 2 * math.pi),  # a full circle: only the turn changes
+        (0, -10.0, -10.0 + 4 * math.pi),
+        (1, 1.2, 1.2),
+        (1, 1.2 - 2 * math.pi, 1.2),
+        (1, 2.4, 2.0),
+        (1, 0.1, 0.5),
+        (1, -2.0, 2.0),  # 2.5 before the start of the arc, but 2.28 after its end
+        (1, -1.0, 0.5),
+        (1, -math.pi + 0.1, 2.0),
+        (2, math.pi, -2.5),  # across the seam, -2.5 is the nearer end of the arc
+        (2, 0.0, -2.0),
+    ],
+)
+def test_directions_are_clamped_as_angles(fin: int, direction: float, expected: float) -> None:
+    clamped = LIMITS.feasible(np.array([[0.3, 0.7, direction]] * 3))
+    assert clamped[fin, 2] == pytest.approx(expected)
+
+
+def test_clamped_commands_keep_their_limits_and_inner_ones_stay() -> None:
+    rng, lower, upper = np.random.default_rng(0), LIMITS.lower, LIMITS.upper
+    clamped = LIMITS.feasible(5.0 * rng.standard_normal((500, 3, 3)))
+    assert (clamped >= lower).all() and (clamped <= upper).all()
+    inner = lower + rng.random((500, 3, 3)) * (upper - lower)
+    np.testing.assert_allclose(LIMITS.feasible(inner), inner, atol=1e-12)

@@ -245,14 +245,13 @@ def test_each_ranking_takes_what_it_ranks_first(checkpoint: TrainedWeights) -> N
         options = {"ranking": ranking, "refinement": "none", "n_candidates": 12, "gamma": 0.2}
         paper = AnyRobot("paper", checkpoint, **options)
         method, std = paper.method(layout), paper.normalization.std
-        robot = method._robot
-        mixture = method._predict(robot, (target - paper.normalization.mean) / std)
-        sampled = robot.problem.feasible(to_command(method._draw(mixture, 3), *robot.limits))[0]
+        mixture = method._predict((target - paper.normalization.mean) / std)
+        sampled = method._commands.feasible(to_command(method._draw(mixture, 3), *method.limits))[0]
         if ranking == "nll":
-            x = to_normalized(sampled[None], *robot.limits)
+            x = to_normalized(sampled[None], *method.limits)
             best = int(np.argmax(mixture.log_prob(x).sum(-1)))
         else:
-            error = (robot.surrogate.wrench(sampled) - target) / std
+            error = (method.surrogate.wrench(sampled) - target) / std
             best = int(np.argmin((error**2).sum(1) + 0.2 * command_effort(sampled, layout.upper)))
         chosen[ranking] = best
         answer = paper.allocate(layout, target[0], seed=3)
