@@ -104,10 +104,6 @@ def load_method_spec(
         kind = own_method(name)
         return MethodSpec(kind.name, MethodChoice(kind, kind.settings_class()))
     if name == IN_FORCES:
-        return MethodSpec(name, _choice("ipopt", checkpoint, space="forces"))
-    spec = MethodSpec(name, _choice(name, checkpoint))
+        return MethodSpec(name, choose_method("ipopt", space="forces"))
+    spec = MethodSpec(name, choose_method(name, checkpoint if name in LEARNED else None))
     return spec if objective is None else spec.with_settings(objective=objective)
-
-
-def _choice(method: str, checkpoint: str | Path | None, **options: Any) -> MethodChoice:
-    return choose_method(method, checkpoint if method in LEARNED else None, **options)

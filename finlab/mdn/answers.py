@@ -7,8 +7,7 @@ from numpy.typing import NDArray
 
 from finlab.allocation.levenberg_marquardt import Refined, refine
 from finlab.arrays import AnyArray, Array
-from finlab.mdn.descent import EffortProblem, descend, realize, wrench
-from finlab.mdn.effort_fins import Projected
+from finlab.mdn.descent import descend, realize, wrench
 from finlab.mdn.polish import polish
 from finlab.mdn.robot import EffortRobot
 
@@ -92,10 +91,13 @@ def follow(
     rows, count, n = force.shape
     each = np.repeat(target, count, axis=0)
     found = descend(robot.forces, each, force.reshape(-1, n).astype(complex), steps.descent)
-    command, score = _promises(robot.forces, each, found)
-    score = score.reshape(rows, count)
+    command, effort = realize(robot.forces, found)
+    error = np.linalg.norm(each - wrench(robot.forces, found.force), axis=-1)
+    score = np.where(error > PROMISING, INEXACT * (1.0 + error), effort).reshape(rows, count)
     score[:, :kept] = -1.0
-    chosen = _distinct(score, _root_shares(robot.forces, found).reshape(rows, count, n), keep)
+    # Roots of shares of the largest forces: small ones count, too.
+    root = found.unit * np.sqrt(found.size / robot.forces.fins.maximum)
+    chosen = _distinct(score, root.reshape(rows, count, n), keep)
     command = command.reshape(rows, count, n, 3)[np.arange(rows)[:, None], chosen]
     return refined(robot, target, command, chosen, steps)
 
@@ -144,19 +146,6 @@ def _polished(robot: EffortRobot, target: Array, near: Refined, steps: Steps, ea
     for whole, part in zip(result, better, strict=True):
         whole[hopeful[kept]] = part[kept]
     return result
-
-
-def _promises(problem: EffortProblem, target: Array, found: Projected) -> tuple[Array, Array]:
-    """Commands (R, n, 3) at the ends of descents, and what these are sorted by (R,)."""
-    command, effort = realize(problem, found)
-    left = target - wrench(problem, found.force)
-    error = np.sqrt(np.einsum("ri,ri->r", left, left))
-    return command, np.where(error > PROMISING, INEXACT * (1.0 + error), effort)
-
-
-def _root_shares(problem: EffortProblem, found: Projected) -> AnyArray:
-    """Forces (R, n) as roots of shares of the largest ones, complex: small ones count, too."""
-    return np.asarray(found.unit * np.sqrt(found.size / problem.fins.maximum))
 
 
 def _distinct(score: Array, root: AnyArray, keep: int) -> NDArray[np.intp]:

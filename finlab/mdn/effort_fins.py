@@ -8,7 +8,7 @@ direction adds to the effort is left out here: it does not depend on the size.
 A planar force is a complex number: its horizontal part, and 1j times its vertical part, in newton.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import NamedTuple, Self
 
@@ -129,10 +129,6 @@ class EffortFins:
     def _first(self) -> NDArray[np.intp]:
         """Where each fin's rows begin (n,)."""
         return np.arange(len(self.largest)) * LEVELS
-
-    def within(self, middle: Array, half: Array) -> "EffortFins":
-        """The same fins kept within arcs (n,) of force directions [rad]."""
-        return replace(self, middle=middle, half=half)
 
     def deflection(self, direction: Array) -> Array:
         """By how much (..., n) [rad] forces in directions (..., n) [rad] lean off the zero directions."""

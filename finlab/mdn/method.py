@@ -16,6 +16,7 @@ import numpy as np
 from finlab.allocation.dual.method import Dual
 from finlab.allocation.dual.rates import Rates
 from finlab.allocation.evaluate import REACHED, costs
+from finlab.allocation.levenberg_marquardt import CommandProblem
 from finlab.allocation.mdn_settings import MdnSettings
 from finlab.allocation.method import Method, Takes
 from finlab.allocation.policy import Policy
@@ -93,7 +94,8 @@ class Mdn(Method):
         """See `Method`."""
         other = super().at(flow)
         if other is not self:
-            other.robot = self.robot.at(other.plant, self.sigma)
+            commands = CommandProblem.of(other.plant, self.sigma)
+            other.robot = self.robot._replace(plant=other.plant, commands=commands)
         return other
 
     def solve(
@@ -173,7 +175,7 @@ class Mdn(Method):
         missed = answers.error[:, 0] > robot.exact
         if missed.any():
             some, asked = answers.rows(missed), target[missed]
-            command = self._by_default(policy, asked)
+            command = self._default.solve(asked * self.sigma, policy=policy, flow=self.plant.flow).command
             delivered = robot.commands.wrench(command)
             near = np.linalg.norm(delivered - asked, axis=1)
             # A little that all miss is what the fins cannot go below; more is what the policy decides.
@@ -186,10 +188,6 @@ class Mdn(Method):
             found = found._replace(error=np.linalg.norm(found.wrench - asked[:, None], axis=-1))
             answers.replace(missed, found.columns(slice(some.error.shape[1])))
         return answers
-
-    def _by_default(self, policy: Policy, target: Array) -> Array:
-        """What the default method answers (N, n, 3) to normalized targets (N, 6)."""
-        return self._default.solve(target * self.sigma, policy=policy, flow=self.plant.flow).command
 
     @cached_property
     def _default(self) -> Method:

@@ -33,9 +33,21 @@ def propose(
     The components' means come first, by falling weight. Where K exceeds their number M, the rest are drawn by
     the components' weights, with variances times the temperature.
     """
-    component, root = _drawn(*mixture.complex_parts(), n_candidates, temperature, seed)
-    force = shares(root) * (seen.frame * view.largest)[:, None]
-    return Proposal(force, component)
+    weight, mean, std = mixture.complex_parts()
+    rows, m, n = mean.shape
+    place = np.arange(rows)[:, None]
+    component = np.argsort(-weight, axis=1)[:, :n_candidates]
+    root = mean[place, component]
+    if n_candidates > m:
+        rng, more = np.random.default_rng(seed), n_candidates - m
+        uniform = rng.random((rows, more, 1), dtype=np.float32)
+        parts = rng.standard_normal((rows, more, n, 2), dtype=np.float32)
+        cumulative = weight.cumsum(1)
+        others = (uniform * cumulative[:, None, -1:] > cumulative[:, None, :-1]).sum(-1)
+        spread = math.sqrt(temperature) * std[place, others]
+        drawn = mean[place, others] + spread * (parts[..., 0] + 1j * parts[..., 1])
+        component, root = (np.hstack(both) for both in ((component, others), (root, drawn)))
+    return Proposal(shares(root) * (seen.frame * view.largest)[:, None], component)
 
 
 def random_proposal(view: RobotView, rows: int, n_candidates: int, seed: int) -> Proposal:
@@ -50,23 +62,3 @@ def shares(root: AnyArray) -> AnyArray:
     """Shares of the largest forces, none above one, from what the mixture gives: their roots."""
     size = np.abs(root)
     return np.asarray(root * np.minimum(size, 1.0 / np.maximum(size, 1e-9)))
-
-
-def _drawn(
-    weight: AnyArray, mean: AnyArray, std: AnyArray, count: int, temperature: float, seed: int
-) -> tuple[NDArray[np.intp], AnyArray]:
-    """Components (N, K) and roots of shares (N, K, n), complex, of a mixture's complex parts."""
-    rows, m, n = mean.shape
-    place = np.arange(rows)[:, None]
-    component = np.argsort(-weight, axis=1)[:, :count]
-    first = mean[place, component]
-    if count <= m:
-        return component, first
-    rng, more = np.random.default_rng(seed), count - m
-    uniform = rng.random((rows, more, 1), dtype=np.float32)
-    parts = rng.standard_normal((rows, more, n, 2), dtype=np.float32)
-    cumulative = weight.cumsum(1)
-    others = (uniform * cumulative[:, None, -1:] > cumulative[:, None, :-1]).sum(-1)
-    spread = math.sqrt(temperature) * std[place, others]
-    drawn = mean[place, others] + spread * (parts[..., 0] + 1j * parts[..., 1])
-    return np.concatenate([component, others], axis=1), np.concatenate([first, drawn], axis=1)

@@ -35,15 +35,12 @@ class EffortRobot(NamedTuple):
     exact: float = EXACT
     """Normalized error up to which an answer is exact."""
 
-    def at(self, plant: Plant, scale: Array) -> "EffortRobot":
-        """The same robot in a flow, as a plant at that flow says; refinement knows of it."""
-        return self._replace(plant=plant, commands=CommandProblem.of(plant, scale))
-
     def within(self, box: Box) -> "EffortRobot":
         """The same robot, each fin kept within what may follow a previous command."""
         fins, free, (lower, upper) = self.forces.fins, box.free[:, 2], (box.lower[:, 2], box.upper[:, 2])
         middle, half = 0.5 * (lower + upper), np.where(free, np.pi, 0.5 * (upper - lower))
-        forces = self.forces._replace(fins=fins.within(middle + fins.deflection(middle), half))
+        arcs = replace(fins, middle=middle + fins.deflection(middle), half=half)
+        forces = self.forces._replace(fins=arcs)
         commands = replace(self.commands, lower=box.lower, upper=box.upper, full_turn=free)
         return self._replace(forces=forces, commands=commands)
 

@@ -53,7 +53,8 @@ def make_report(out: Path, *, size: Size = "full", seed: int = SEED, names: Sequ
         experiment = load_experiment(name)
         key = {"options": _options(experiment, size, seed), "source": digest}
         record = _read(out / RECORDS / f"{name}.json", key)
-        if record is None and ("all" in names or name in names) and _can_run(experiment):
+        able = all(find_spec(package) is not None for package in experiment.needs)
+        if record is None and ("all" in names or name in names) and able:
             record = _run(experiment, key, out / RECORDS / f"{name}.json")
         if record is not None:
             done[name] = record
@@ -71,11 +72,6 @@ def make_report(out: Path, *, size: Size = "full", seed: int = SEED, names: Sequ
 def _options(experiment: Experiment, size: Size, seed: int) -> dict[str, Any]:
     chosen = experiment.check(experiment.quick if size == "quick" else experiment.full)
     return chosen | ({"seed": seed} if "seed" in chosen else {})
-
-
-def _can_run(experiment: Experiment) -> bool:
-    """Whether the packages that it needs are installed."""
-    return all(find_spec(package) is not None for package in experiment.needs)
 
 
 def _read(path: Path, key: dict[str, Any]) -> dict[str, Any] | None:
