@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from finlab.arrays import Array
-from finlab.forces.extent import RANK_TOLERANCE, singular_values, strongest, weakest
+from finlab.forces.extent import RANK_TOLERANCE, singular_values, weakest
 from finlab.forces.force_sets import SCALE, force_sets
 from finlab.forces.reach import max_wrench_along_exactly
 from finlab.layout import Layout
@@ -52,9 +52,6 @@ class Authority(HeldAxes):
     """Scaled wrench [N] that is within reach in every direction; 0 below rank 6."""
     weakest_direction: tuple[float, ...]
     """Unit scaled wrench (6,) along which no more than `weakest` can be had."""
-    isotropy: float
-    """`weakest` over the largest scaled wrench in any direction: 1 is the same everywhere, 0 none
-    somewhere."""
     gap: float
     """`largest` and `most_negative` are too large by at most this [N, scaled]."""
 
@@ -130,8 +127,7 @@ def _authorities(
         size = np.where(np.tile(alone, 2), size, 0.0)
     size = np.where(size > NOTHING, size, 0.0)
     free = sets.repeat(12).farthest(np.tile(axes, (len(failures), 1)))[0].reshape(-1, 2, 6).min(axis=1)
-    least, most = weakest(sets), strongest(sets)
-    isotropy = np.divide(least.size, most.size, out=np.zeros_like(least.size), where=most.size > 0.0)
+    least = weakest(sets)
     return [
         Authority(
             **vars(held[k]),
@@ -141,7 +137,6 @@ def _authorities(
             beside_others=_floats(np.maximum(free[k], 0.0) * SCALE),
             weakest=float(least.size[k]),
             weakest_direction=_floats(least.direction[k]),
-            isotropy=float(isotropy[k]),
             gap=gap,
         )
         for k in range(len(failures))

@@ -106,12 +106,10 @@ def _notes(layout: Layout, failed: Collection[str], flow: Array | None) -> tuple
     notes = []
     n_wide = len(wide_arcs(sets))
     if n_wide:
-        what = "Weakest direction and isotropy are"
+        what = "The weakest direction is"
         if n_wide > MAX_CUT:
-            what = "Largest wrenches, weakest direction, isotropy and energies are"
-        notes.append(
-            f"{what} those of the convex hull: some arcs are wider than half a turn but not full circles."
-        )
+            what = "Largest wrenches, the weakest direction and energies are"
+        notes.append(f"{what} of the convex hull: some arcs are wider than half a turn but not full circles.")
     if sets.corners is not None:
         notes.append("Forces of the flow count with the convex hull of their lift and drag.")
     still = [part.name for part in layout.actuators if part.type == "rudder" and part.name not in failed]

@@ -57,13 +57,13 @@ def _axis_table(card: ScoreCard) -> list[str]:
 
 
 def _evenness(held: Authority) -> list[str]:
-    """Weakest direction, isotropy, conditioning."""
+    """Weakest direction and conditioning."""
     parts = sorted(zip(held.weakest_direction, _axes(), strict=True), key=lambda part: -abs(part[0]))
     direction = ", ".join(f"{axis} {value:+.2f}" for value, axis in parts if abs(value) > 0.05)
     values = " ".join(f"{value:.2f}" for value in held.singular_values)
     return [
         f"Weakest direction: {held.weakest:.2f} N along {direction} (torques over 0.2 m).",
-        f"Isotropy {held.isotropy:.3f}, condition {_condition(held.condition)}, singular values {values} N.",
+        f"Condition {_condition(held.condition)}, singular values {values} N.",
     ]
 
 

@@ -1,4 +1,4 @@
-"""How near and how far the set of all wrenches reaches: its weakest and its strongest direction."""
+"""How far the set of all wrenches reaches in its weakest direction."""
 
 from typing import NamedTuple
 
@@ -17,7 +17,7 @@ N_WALKS = 6
 
 
 class Extent(NamedTuple):
-    """One extreme of the sets of wrenches of P robots, in scaled wrenches."""
+    """The weakest direction of the sets of wrenches of P robots, in scaled wrenches."""
 
     size: Array
     """(P,) [N]."""
@@ -69,22 +69,3 @@ def weakest(sets: ForceSets, n_random: int = N_RANDOM, n_walks: int = N_WALKS, f
     size[full] = np.maximum(reach[np.arange(len(full)), best], 0.0)
     direction[full] = ends.reshape(len(full), n_starts, axes)[np.arange(len(full)), best]
     return Extent(size, direction)
-
-
-def strongest(sets: ForceSets) -> Extent:
-    """Returns the largest scaled wrench of each robot, other axes free: walks from axes and singular
-    vectors."""
-    _, vectors = singular_values(sets)
-    robots = len(vectors)
-    starts = np.concatenate(
-        [np.broadcast_to(np.eye(6), (robots, 6, 6)), np.swapaxes(vectors, -1, -2)], axis=1
-    )
-    ends = np.concatenate([starts, -starts], axis=1).reshape(-1, 6)
-    rows = sets.repeat(24)
-    for _ in range(50):
-        wrench = rows.wrench(rows.farthest(ends)[1])
-        size = np.linalg.norm(wrench, axis=-1)
-        ends = np.where(size[:, None] > 1e-12, wrench / np.maximum(size, 1e-12)[:, None], ends)
-    size = size.reshape(robots, -1)
-    best = size.argmax(axis=1)
-    return Extent(size.max(axis=1), ends.reshape(robots, -1, 6)[np.arange(robots), best])

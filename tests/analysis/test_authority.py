@@ -1,4 +1,4 @@
-"""Rank, weakest directions, isotropy, and the cost of each failure."""
+"""Rank, weakest directions, and the cost of each failure."""
 
 from collections.abc import Callable
 

@@ -18,7 +18,6 @@ from webapp.session.state import AXIS_UNITS
 
 FIGURES: dict[str, Callable[[ScoreCard], float | None]] = {
     "weakest direction [N]": lambda card: card.authority.weakest,
-    "isotropy": lambda card: card.authority.isotropy,
     "weakest after the worst loss [N]": lambda card: card.worst_loss.weakest if card.worst_loss else None,
 }
 """Words -> figure of a whole robot; None where it has none, as the worst loss of a single fin."""
