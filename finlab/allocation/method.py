@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 from copy import copy
 from dataclasses import fields
 from functools import cached_property
-from typing import ClassVar, Literal, Self
+from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 
@@ -165,18 +165,10 @@ class LeastErrorMethod(Method):
     def _solve(self, targets: Array, *, seed: int, previous: Array | None) -> Solution:
         """Solve for targets (N, 6); see `Method.solve`."""
 
-    def solve(
-        self,
-        targets: Array,
-        *,
-        policy: Policy,
-        previous: Array | None = None,
-        flow: Array | None = None,
-        seed: int = 0,
-    ) -> Solution:
+    def solve(self, targets: Array, *, flow: Array | None = None, **asked: Any) -> Solution:
         """See `Method`."""
         if len(targets) == 0:
             return Solution(np.empty((0, self.layout.n, 3)))
         if (moved := self.at(flow)) is not self:
-            return moved.solve(targets, policy=policy, previous=previous, seed=seed)
-        return self._solve(targets, seed=seed, previous=previous)
+            return moved.solve(targets, **asked)
+        return self._solve(targets, seed=asked.get("seed", 0), previous=asked.get("previous"))

@@ -17,7 +17,6 @@ from typing import Any, ClassVar
 import numpy as np
 
 from finlab.allocation.method import Method
-from finlab.allocation.policy import Policy
 from finlab.allocation.solution import Solution
 from finlab.arrays import Array
 from finlab.errors import AllocationError, DataError
@@ -52,15 +51,7 @@ class _OwnMethod(Method):
     function: ClassVar[Callable[..., Any]]
     wanted: ClassVar[tuple[str, ...]]
 
-    def solve(
-        self,
-        targets: Array,
-        *,
-        policy: Policy,
-        previous: Array | None = None,
-        flow: Array | None = None,
-        seed: int = 0,
-    ) -> Solution:
+    def solve(self, targets: Array, *, previous: Array | None = None, **asked: Any) -> Solution:
         """See `Method`.
 
         Raises:

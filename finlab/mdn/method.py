@@ -9,7 +9,7 @@ Where a target is out of reach the default method says which wrench is to be del
 """
 
 from functools import cached_property
-from typing import ClassVar, NamedTuple, Self
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
@@ -98,19 +98,11 @@ class Mdn(Method):
             other.robot = self.robot._replace(plant=other.plant, commands=commands)
         return other
 
-    def solve(
-        self,
-        targets: Array,
-        *,
-        policy: Policy,
-        previous: Array | None = None,
-        flow: Array | None = None,
-        seed: int = 0,
-    ) -> Solution:
+    def solve(self, targets: Array, *, policy: Policy, flow: Array | None = None, **asked: Any) -> Solution:
         """See `Method`."""
         if (moved := self.at(flow)) is not self:
-            return moved.solve(targets, policy=policy, previous=previous, seed=seed)
-        target = targets / self.sigma
+            return moved.solve(targets, policy=policy, **asked)
+        target, previous, seed = targets / self.sigma, asked.get("previous"), asked.get("seed", 0)
         if len(target) == 1:
             found = self._one(policy, target, previous, seed)
             return Solution(

@@ -8,12 +8,12 @@ fades until it is back.
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.method import Method
-from finlab.allocation.policy import Policy
 from finlab.allocation.settings import Settings, number
 from finlab.allocation.solution import Solution
 from finlab.arrays import Array
@@ -149,15 +149,7 @@ class Exciting(Method):
         )
         self._amplitude = upper[:, 0]
 
-    def solve(
-        self,
-        targets: Array,
-        *,
-        policy: Policy,
-        previous: Array | None = None,
-        flow: Array | None = None,
-        seed: int = 0,
-    ) -> Solution:
+    def solve(self, targets: Array, **asked: Any) -> Solution:
         """See `Method`; each target is a tick of the controller."""
         return Solution(np.stack([self._command(target) for target in targets]))
 
