@@ -51,23 +51,17 @@ class FinFit:
 
     def predict(self, command: Array) -> tuple[Array, Array]:
         """Returns forces [N] in the fin frame and their standard deviations (..., 3) at commands (..., 3)."""
-        thrust, unsure = self.thrust(command)
+        inputs = self.measurements.scaled(command)
+        found = np.array([component.predict(inputs) for component in self.components])
+        thrust, unsure = self.largest * found.transpose(1, 0, 2).reshape(2, 3, *command.shape[:-1])
         angle = command[..., 2] + self.deflection
         cos, sin = np.cos(angle), np.sin(angle)
-        along, across, sideways = np.moveaxis(thrust, -1, 0)
-        by_along, by_across, by_sideways = np.moveaxis(unsure, -1, 0)
+        along, across, sideways = thrust
+        by_along, by_across, by_sideways = unsure
         force = [sideways, along * cos - across * sin, along * sin + across * cos]
         deviation = [by_sideways, np.hypot(by_along * cos, by_across * sin)]
         deviation += [np.hypot(by_along * sin, by_across * cos)]
         return np.stack(force, axis=-1), np.stack(deviation, axis=-1)
-
-    def thrust(self, command: Array) -> tuple[Array, Array]:
-        """Returns forces [N] along the thrust's mean direction, across it and along the shaft, and their
-        standard deviations (..., 3), at commands (..., 3)."""
-        inputs = self.measurements.scaled(command)
-        found = np.array([component.predict(inputs) for component in self.components])
-        mean, deviation = self.largest * found.transpose(1, 2, 0)
-        return mean.reshape(command.shape), deviation.reshape(command.shape)
 
     def predict_power(self, command: Array) -> Array | None:
         """Returns the power [W], (...), at commands (..., 3); None where none was measured."""

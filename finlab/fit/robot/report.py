@@ -16,8 +16,7 @@ def summary(fit: RobotFit) -> tuple[str, ...]:
     doubts = fit.doubts()
     head = (f"{DOUBT}: {'; '.join(doubts)}",) if doubts else ()
     seconds = 0.1 * len(fit.model.motion)
-    used = [MEANINGS[trial.name] for trial in fit.trials if trial.used]
-    unused = [MEANINGS[trial.name] for trial in fit.trials if not trial.used]
+    used, unused = ([MEANINGS[name] for name in names] for names in (fit.helps, fit.no_help))
     lines = [
         f"fitted to {seconds:.0f} s of swimming, of whose motion simulated swims explain {fit.explained:.1%}",
         *([f"used, since it helps on parts not seen: {'; '.join(used)}"] if used else []),

@@ -5,9 +5,10 @@ only where it lessens the error on windows that its fit has not seen.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import sem
 from threadpoolctl import threadpool_limits
 
 from finlab.arrays import Array
@@ -35,24 +36,16 @@ ROUNDS = 2
 
 
 @dataclass(frozen=True)
-class Trial:
-    """Whether something more helps."""
-
-    name: str
-    gain: float
-    """By how much the half squared error of a window not seen falls, mean over windows."""
-    error: float
-    used: bool
-
-
-@dataclass(frozen=True)
 class RobotFit:
     """A robot as its swims show it."""
 
     model: RobotModel
     fitted: Fitted
     explained: float
-    trials: tuple[Trial, ...]
+    helps: tuple[str, ...]
+    """Blocks of unknowns that lessen the error on windows not seen, and are used."""
+    no_help: tuple[str, ...]
+    """Blocks that were tried besides."""
 
     @property
     def covariance(self) -> Array:
@@ -151,14 +144,16 @@ def _fit(
         vector, start = fitted.vector, fitted.start
         deviation = _deviation(fitted, deviation)
         _keep_motion(model, fitted, windows)
-    fitted, deviation, trials = _with_what_helps(model, windows, deviation, fitted, tried, tell)
+    fitted, deviation = _with_what_helps(model, windows, deviation, fitted, tried, tell)
     deviation = _deviation(fitted, deviation)
     _keep_motion(model, fitted, windows)
     tell("fitting all together")
     fitted = fit_windows(model, fitted.unknowns, windows, deviation, fitted.vector, fitted.start)
     if not np.isfinite(fitted.vector).all():
         raise DataError(f"{swims[0].name}: the fit goes astray; is the layout that of the robot that swam?")
-    return RobotFit(model, fitted, _explained(fitted, windows), trials)
+    helps = tuple(name for name in tried if name in fitted.unknowns.names)
+    no_help = tuple(name for name in tried if name not in helps)
+    return RobotFit(model, fitted, _explained(fitted, windows), helps, no_help)
 
 
 def _with_what_helps(
@@ -168,33 +163,24 @@ def _with_what_helps(
     fitted: Fitted,
     left: Sequence[str],
     tell: Callable[[str], None],
-) -> tuple[Fitted, Array, tuple[Trial, ...]]:
-    """The fit with all that helps on windows not seen, deviations (12,), and what was tried."""
-    trials: list[Trial] = []
+) -> tuple[Fitted, Array]:
+    """The fit with all of `left` that helps on windows not seen, and deviations (12,)."""
     left = list(left)
     while left:
         tell("looking for what else helps")
         gains = unseen_gains(model, fitted, windows, deviation, left)
-        tried = [Trial(name, float(gain.mean()), _error_of_mean(gain), False) for name, gain in gains.items()]
-        best = max(tried, key=lambda trial: trial.gain)
-        if not best.gain > SURE * best.error:
-            trials += tried
+        best = max(left, key=lambda name: float(gains[name].mean()))
+        if not gains[best].mean() > SURE * sem(gains[best]):
             break
-        trials.append(replace(best, used=True))
-        left.remove(best.name)
-        unknowns = Unknowns(model.blocks, (*fitted.unknowns.names, best.name))
+        left.remove(best)
+        unknowns = Unknowns(model.blocks, (*fitted.unknowns.names, best))
         vector = unknowns.taken_over(fitted.unknowns, fitted.vector)
         for _ in range(ROUNDS):
-            tell(f"fitting {best.name}")
+            tell(f"fitting {best}")
             fitted = fit_windows(model, unknowns, windows, deviation, vector, fitted.start)
             vector, deviation = fitted.vector, _deviation(fitted, deviation)
             _keep_motion(model, fitted, windows)
-    return fitted, deviation, tuple(trials)
-
-
-def _error_of_mean(gain: Array) -> float:
-    """Standard error of the mean of (W,) windows."""
-    return float(gain.std(ddof=1) / np.sqrt(len(gain))) if len(gain) > 1 else np.inf
+    return fitted, deviation
 
 
 def _deviation(fitted: Fitted, deviation: Array) -> Array:

@@ -65,7 +65,7 @@ def test_strengths_directions_and_centre_are_found_within_their_errors(fit: Robo
 def test_what_is_not_there_is_not_used_and_nothing_is_doubted(fit: RobotFit) -> None:
     assert fit.doubts() == ()
     # Forces that swing within the beat leave no trace in a layout; here they mend the servos' coarse steps.
-    assert not any(trial.used for trial in fit.trials if trial.name != "beat") and len(fit.trials) == 4
+    assert set(fit.helps) <= {"beat"} and len(fit.helps) + len(fit.no_help) == 4
     assert fit.explained > 0.8
     text = "\n".join(summary(fit))
     assert "tried, and no help" in text and "common scale" in text
