@@ -13,15 +13,3 @@ def paper_figures() -> dict[str, Any]:
     text = files("finlab.evaluation").joinpath("paper_figures.yaml").read_text("utf-8")
     tables: dict[str, Any] = yaml.safe_load(text)
     return tables
-
-
-def paper_wrench_rows(split: str) -> list[dict[str, Any]]:
-    """The paper's wrench-tracking rows of a split as rows of our table; none for splits it does not have.
-
-    `scored_by` is empty because the paper does not name the model that scored it.
-    """
-    rows = paper_figures()["wrench_tracking"].get(split, {})
-    return [
-        {"split": split, "method": f"{name} (printed in the paper)", "scored_by": "", **row}
-        for name, row in rows.items()
-    ]

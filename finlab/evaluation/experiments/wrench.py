@@ -7,7 +7,7 @@ import numpy as np
 from finlab.errors import DataError
 from finlab.evaluation.experiment import Experiment
 from finlab.evaluation.method_specs import SLOW, installed_methods, load_method_specs
-from finlab.evaluation.paper_figures import paper_wrench_rows
+from finlab.evaluation.paper_figures import paper_figures
 from finlab.evaluation.report.document import Column, Row
 from finlab.evaluation.scoring import Columns, run_method
 from finlab.evaluation.splits import SPLITS, Case, make_split, own_sigma
@@ -124,7 +124,13 @@ def own_case(layout: Layout, failed: tuple[str, ...], n_targets: int, seed: int)
 
 
 def _printed(rows: Sequence[Row]) -> list[Row]:
-    return [row for split in dict.fromkeys(row["split"] for row in rows) for row in paper_wrench_rows(split)]
+    """The paper's rows, none for splits that it does not have; it does not name the model that scored them."""
+    printed = paper_figures()["wrench_tracking"]
+    return [
+        {"split": split, "method": f"{name} (printed in the paper)", "scored_by": "", **row}
+        for split in dict.fromkeys(row["split"] for row in rows)
+        for name, row in printed.get(split, {}).items()
+    ]
 
 
 experiment = Experiment(
