@@ -124,7 +124,7 @@ def own_case(layout: Layout, failed: tuple[str, ...], n_targets: int, seed: int)
 
 
 def _printed(rows: Sequence[Row]) -> list[Row]:
-    """The paper's rows, none for splits that it does not have; it does not name the model that scored them."""
+    """The paper's rows of splits that it has; it does not name the model that scored them."""
     printed = paper_figures()["wrench_tracking"]
     return [
         {"split": split, "method": f"{name} (printed in the paper)", "scored_by": "", **row}
