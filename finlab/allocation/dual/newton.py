@@ -142,7 +142,8 @@ def solve(
     if terms.penalty is None and terms.reward is None:
         most = sets.most_cost * (1.0 + 1e-9) + 1e-9 + np.zeros(count)
     with np.errstate(invalid="ignore"):  # systems without an inverse are told by what is not finite
-        state = _state(robot, target, prices, sets, terms, value or count > 1)
+        told = value or bool((ridge > NEARLY).any())  # near the limits, values decide
+        state = _state(robot, target, prices, sets, terms, told or count > 1)
         if count == 1:
             return _one(robot, state, sets, terms, float(ridge[0]), float(most[0]), value)
         return _many(robot, state, sets, terms, ridge, most)
@@ -227,11 +228,11 @@ def _one(
     """`solve` for one target. The dual value takes long: it is asked for where a step was too long, or the
     target may be out of reach."""
     spare = most - sets.least_cost  # the value is no more than what is paid and this cost
-    force, growth = None, 2.0
+    force, growth, told = None, 2.0, state.conjugate is not None
     for steps in range(MOST_STEPS + 1):
         solved, beyond = bool(state.size[0] <= terms.tolerance), False
         if not solved and state.paid[0] > spare:
-            state = _valued(robot, state, sets, terms)
+            told, state = True, _valued(robot, state, sets, terms)
             beyond = bool(state.value[0] > most)
         if solved or beyond or steps == MOST_STEPS or ridge > MOST_RIDGE:
             break
@@ -242,12 +243,12 @@ def _one(
                 state = state._replace(prices=state.prices + step)
                 steps += 1
                 break
-        trial = _state(robot, state.target, state.prices + step, sets, terms, value)
+        trial = _state(robot, state.target, state.prices + step, sets, terms, told)
         slope = max(float(step[:, 0] @ state.residual[:, 0]), 1e-300)
         change = float(step[:, 0] @ trial.residual[:, 0]) / slope
         good = change >= 0.0 or (change > -0.1 and bool(trial.size[0] < 0.1 * state.size[0]))
         if not good:
-            state, trial = _valued(robot, state, sets, terms), _valued(robot, trial, sets, terms)
+            told, state, trial = True, _valued(robot, state, sets, terms), _valued(robot, trial, sets, terms)
             good = bool(_accepted(state, trial, np.array([change]))[0])
         if good:
             state, growth = trial, 2.0
