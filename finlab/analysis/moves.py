@@ -83,15 +83,15 @@ def mirror_pairs(layout: Layout) -> tuple[tuple[str, str], ...]:
     return tuple(pairs)
 
 
-def is_mirrored(part: Actuator, other: Actuator) -> bool:
-    """Says whether two actuators of a type are each other's mirror image: fins with their shafts, others
-    whichever way their axes count."""
+def is_mirrored(part: Actuator, other: Actuator, tolerance: float = MIRROR_TOLERANCE) -> bool:
+    """Says whether two actuators of a type are each other's mirror image, within [m, rad]: fins with their
+    shafts, others whichever way their axes count."""
     count = 1 if part.type == "thruster" else 2
     image, axes = np.array(part.frame)[:count] * MIRROR, np.array(other.frame)[:count]
     apart = np.abs(np.subtract(other.position, MIRROR * part.position)).max()
     turned = np.linalg.norm(np.cross(image, axes), axis=-1).max()
     same_way = part.type != "fin" or image[0] @ axes[0] > 0.0
-    return part.type == other.type and same_way and bool(max(apart, turned) <= MIRROR_TOLERANCE)
+    return part.type == other.type and same_way and bool(max(apart, turned) <= tolerance)
 
 
 class Moves:

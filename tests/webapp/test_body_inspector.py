@@ -68,7 +68,7 @@ def test_the_water_is_that_of_the_fins(session: Session) -> None:
     assert water_density(session.state.layout) == 1000.0
     for name in session.state.layout.names:
         session.select_also(name)
-    session.set_parameter("density", 1025.0)
+    session.set_value("density", 1025.0)
     assert water_density(session.state.layout) == 1025.0
     session.estimate()
     assert body(session).mass_kg == pytest.approx(1025 * 4 / 3 * math.pi * 0.006, rel=0.01)

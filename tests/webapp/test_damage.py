@@ -57,7 +57,7 @@ def test_damage_is_mended_undone_and_goes_with_its_fin(session: Session) -> None
     session.jam("front_left", None)
     assert session.state.stuck == ()
     session.select("front_left")
-    session.delete_fin()
+    session.delete()
     assert session.state.health is None
     session.undo()
     session.mend_all()

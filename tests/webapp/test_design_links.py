@@ -118,7 +118,7 @@ def test_a_new_design_is_whole_and_can_be_taken_back() -> None:
     session.new_layout()
     layout = session.state.layout
     assert layout.n_fins == 1 and layout.body is not None and session.selected == "left"
-    session.mirror_fin()
+    session.mirror()
     assert session.state.layout.names == ("left", "right")
     session.undo()
     session.undo()
@@ -137,7 +137,7 @@ def test_a_measured_fin_travels_with_its_table(tmp_path: Path) -> None:
     turn = np.linspace(-np.pi, np.pi, 9)
     write_table(path, make_law(FinModelSpec("drag")), np.linspace(0, 0.6, 3), np.linspace(0, 2, 3), turn)
     session = Session(load_layout("pair"))
-    session.set_model([session.state.layout.names[0]], stored_table(path.read_bytes(), table_folder()))
+    session.set_model([session.state.layout.names[0]], model=stored_table(path.read_bytes(), table_folder()))
     opened = unpacked(packed(session.state.layout, 60_000))
     assert opened.layout.fins[0].model == session.state.layout.fins[0].model
     assert FRAGMENT == "design="

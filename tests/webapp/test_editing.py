@@ -30,7 +30,7 @@ def session() -> Session:
 
 def test_linked_twins_move_together_until_unlinked(session: Session) -> None:
     session.select("front_left")
-    session.mirror_fin()
+    session.mirror()
     assert session.state.layout.n_fins == 4, "its image stands there already"
     assert session.state.links == (("front_left", "front_right"),) and session.selected == "front_right"
     move_fin(session, "front_left", (0.2, 0.18, 0.01))
@@ -40,17 +40,17 @@ def test_linked_twins_move_together_until_unlinked(session: Session) -> None:
     session.undo()
     session.undo()
     assert session.state.layout == load_layout(shipped_layouts()["ucat"])
-    session.unlink_fin()
+    session.unlink()
     move_fin(session, "front_left", (0.1, 0.2, 0.0))
     assert session.state.layout.fins[0].position[0] == pytest.approx(0.25753)
     with pytest.raises(FinlabError, match="not linked"):
-        session.unlink_fin()
+        session.unlink()
 
 
 def test_link_goes_with_its_fin(session: Session) -> None:
     session.select("front_left")
-    session.mirror_fin()
-    session.delete_fin()
+    session.mirror()
+    session.delete()
     assert session.state.links == ()
 
 
@@ -58,23 +58,23 @@ def test_ring_around_the_vertical_axis(session: Session) -> None:
     session.open_layout(load_layout(shipped_layouts()["pair"]))
     first = session.state.layout.fins[0]
     session.select(first.name)
-    session.ring_of_fins(4)
+    session.ring(4)
     assert session.state.layout.n_fins == 5
     radius = math.hypot(*first.position[:2])
     new = session.state.layout.fins[2:]
     assert all(math.hypot(*fin.position[:2]) == pytest.approx(radius) for fin in new)
     turned = new[0].mounting_angle - first.mounting_angle
     assert math.cos(turned) == pytest.approx(0.0, abs=1e-9)
-    session.ring_of_fins(8)
+    session.ring(8)
     with pytest.raises(FinlabError, match="at most 64"):
-        session.ring_of_fins(64)
+        session.ring(64)
     assert session.state.layout.n_fins == 12
 
 
 def test_stuck_fin_stands_off_the_surface_along_its_normal(session: Session) -> None:
     move_fin(session, "front_left", (0.1, 0.4, 0.0))
     session.select("front_left")
-    session.stick_fin()
+    session.stick()
     fin = session.state.layout.fins[1]
     point, normal = hull_of(session.state.layout).nearest(np.array(fin.position))
     assert np.linalg.norm(np.subtract(fin.position, point)) == pytest.approx(0.02, abs=2e-3)
@@ -188,20 +188,20 @@ def test_missing_mesh_file_is_no_disaster(session: Session) -> None:
 
 def test_new_fins_and_copies_stand_apart(session: Session) -> None:
     for _ in range(4):
-        session.add_fin()
+        session.add("fin")
     layout = session.state.layout
     new = [fin.position for fin in layout.fins[4:]]
     gaps = [math.dist(a.position, b.position) for a, b in combinations(layout.fins, 2)]
     assert len(set(new)) == 4 and min(gaps) >= 0.12 and warnings(layout) == ()
     for _ in range(3):
         session.select("front_left")
-        session.duplicate_fin()
+        session.duplicate()
     heights = [fin.position[2] for fin in session.state.layout.fins if fin.name.startswith("front_left")]
     assert heights == pytest.approx([0.0, 0.05, 0.1, 0.15])
     while session.state.layout.n_fins < MAX_ACTUATORS:
-        session.add_fin()
+        session.add("fin")
     with pytest.raises(FinlabError, match=f"at most {MAX_ACTUATORS}"):
-        session.add_fin()
+        session.add("fin")
 
 
 def test_a_hull_that_nobody_described_stays_while_fins_move() -> None:
@@ -210,11 +210,11 @@ def test_a_hull_that_nobody_described_stays_while_fins_move() -> None:
     before = hull_of(session.state.layout)
     name = session.state.layout.names[0]
     for k in range(3):
-        session.drag_fin(name, (0.3 + 0.1 * k, -0.2, 0.0), 0.0)
+        session.drag(name, (0.3 + 0.1 * k, -0.2, 0.0), 0.0)
         assert hull_of(session.state.layout) == before
     session.end_drag(name, (0.6, -0.2, 0.0), 0.0)
     session.select(name)
-    session.delete_fin()
+    session.delete()
     assert hull_of(session.state.layout) == before
     session.undo()
     session.undo()

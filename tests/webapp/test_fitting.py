@@ -22,7 +22,6 @@ from webapp.markup.fit_card import fit_card
 from webapp.panels.fin_model import model_card
 from webapp.session import Session, files
 from webapp.session.companions import archive_of, read_archive, stored_table
-from webapp.session.layout_edits import with_model
 from webapp.tasks import fitting
 from webapp.tasks.background import Worker
 from webapp.tasks.fitting import Fitting
@@ -108,7 +107,7 @@ def test_a_noisy_file_becomes_the_fins_model_and_undo_takes_it_off(tmp_path: Pat
     answer = Allocator(opened.session.state.layout).allocate([0.5, 0, 0.2, 0, 0, 0.05])
     assert answer.err_norm < 1e-6
     fitting.put_on_all()
-    assert opened.models == ["table"] * 4 and opened.session.history.undo_name == "Fit 3 fins"
+    assert opened.models == ["table"] * 4 and opened.session.history.undo_name == "Fit 3 actuators"
     with pytest.raises(FinlabError, match="no other fin"):
         fitting.put_on_all()
     opened.session.undo()
@@ -248,7 +247,7 @@ def robot(tmp_path: Path, cache: Path) -> Layout:
     grid = [[0.05, 0.3, 0.6], [0.1, 1.0, 2.1], [-3.0, -1.5, 0.0, 1.5]]
     write_table(tmp_path / "mine.csv", make_law(FinModelSpec("soft")), *grid)  # type: ignore[arg-type]
     spec = stored_table((tmp_path / "mine.csv").read_bytes(), cache)
-    return replace(with_model(load_layout("ucat"), ["back_left"], spec), name="my robot")
+    return replace(load_layout("ucat").replace_actuator("back_left", model=spec), name="my robot")
 
 
 def test_a_layout_carries_its_tables_elsewhere(tmp_path: Path, cache: Path) -> None:

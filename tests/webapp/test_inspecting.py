@@ -7,9 +7,9 @@ import pytest
 from finlab.assets import shipped_layouts
 from finlab.errors import FinlabError
 from finlab.layout import FinModelSpec, load_layout
-from webapp.panels.fin_list import fin_list
+from webapp.panels.actuator_list import actuator_list
 from webapp.session import Session
-from webapp.session.fin_edits import modelled
+from webapp.session.actuator_edits import modelled
 
 FRONT = ("front_right", "front_left")
 
@@ -38,8 +38,8 @@ def test_selection_grows_and_shrinks(session: Session) -> None:
     session.select_also("back_left")
     assert session.selection == FRONT
     choose(session, *session.state.layout.names)
-    with pytest.raises(FinlabError, match="these are all fins"):
-        session.delete_fin()
+    with pytest.raises(FinlabError, match="these are all actuators"):
+        session.delete()
     session.select(None)
     assert session.selection == () and session.selected is None
 
@@ -49,9 +49,9 @@ def test_what_changes_counts_for_all_selected_in_one_step(session: Session) -> N
     session.place_selected((0.2, *fin(session, "front_left").position[1:]))
     assert [fin(session, name).position for name in FRONT] == [(0.2, -0.1502, 0.0), (0.2, 0.1502, 0.0)]
     session.history.end_merge()
-    session.limit_selected("amplitude", (0.1, 0.5))
+    session.set_value("amplitude", (0.1, 0.5))
     session.choose_model("lighthill")
-    session.set_parameter("width", 0.12)
+    session.set_value("width", 0.12)
     session.turn_selected(math.radians(45))
     for name in FRONT:
         changed = fin(session, name)
@@ -60,7 +60,10 @@ def test_what_changes_counts_for_all_selected_in_one_step(session: Session) -> N
         assert changed.mounting_angle == pytest.approx(math.pi / 4)
     assert fin(session, "back_left") == load_layout("ucat").fins[2]
     assert len(session.history.past) == 5
-    assert session.history.past[1][0] == "Limit 2 fins" and session.history.past[3][0] == "Width of 2 fins"
+    assert (
+        session.history.past[1][0] == "Amplitude of 2 actuators"
+        and session.history.past[3][0] == "Width of 2 actuators"
+    )
     for _ in range(5):
         session.undo()
     assert session.state.layout == load_layout("ucat")
@@ -68,11 +71,11 @@ def test_what_changes_counts_for_all_selected_in_one_step(session: Session) -> N
 
 def test_usual_values_are_not_written_and_shared_ones_stay(session: Session) -> None:
     session.select("front_right")
-    session.set_parameter("density", 1025.0)
-    session.set_parameter("area", 0.03)
+    session.set_value("density", 1025.0)
+    session.set_value("area", 0.03)
     session.choose_model("lighthill")
     assert fin(session, "front_right").model == FinModelSpec("lighthill", (("density", 1025.0),))
-    session.set_parameter("density", 1000.0)
+    session.set_value("density", 1000.0)
     assert fin(session, "front_right").model == FinModelSpec("lighthill")
     with pytest.raises(FinlabError, match="comes from a file"):
         modelled(fin(session, "front_right"), "table")
@@ -81,17 +84,16 @@ def test_usual_values_are_not_written_and_shared_ones_stay(session: Session) -> 
 @pytest.mark.parametrize(
     ("act", "says"),
     [
-        (lambda s: s.limit_selected("amplitude", (0.5, 0.2)), "minimum 0.5 is above maximum 0.2"),
-        (lambda s: s.limit_selected("frequency", (0.0, 0.0)), "maximum must be at least"),
-        (lambda s: s.limit_selected("zero_direction", (-4.0, 4.0)), "one turn"),
-        (lambda s: s.limit_selected("nothing", (0.0, 1.0)), "expected one of"),
-        (lambda s: s.set_parameter("area", -0.1), "must lie within"),
-        (lambda s: s.set_parameter("area", float("nan")), "must lie within"),
+        (lambda s: s.set_value("amplitude", (0.5, 0.2)), "minimum 0.5 is above maximum 0.2"),
+        (lambda s: s.set_value("frequency", (0.0, 0.0)), "maximum must be at least"),
+        (lambda s: s.set_value("zero_direction", (-4.0, 4.0)), "one turn"),
+        (lambda s: s.set_value("area", -0.1), "must lie within"),
+        (lambda s: s.set_value("area", float("nan")), "must lie within"),
         (lambda s: s.place_selected((55.0, 0.0, 0.0)), "x of front_right"),
-        (lambda s: s.rename_fin("front_right", "front_left"), "there is a fin 'front_left' already"),
-        (lambda s: s.rename_fin("front_right", "  "), "name"),
-        (lambda s: s.rename_fin("front_right", "x" * 65), "name"),
-        (lambda s: s.rename_fin("nobody", "x"), "has no fin"),
+        (lambda s: s.rename("front_right", "front_left"), "there is an actuator 'front_left' already"),
+        (lambda s: s.rename("front_right", "  "), "name"),
+        (lambda s: s.rename("front_right", "x" * 65), "name"),
+        (lambda s: s.rename("nobody", "x"), "has no fin"),
     ],
 )
 def test_what_makes_no_sense_is_refused_and_changes_nothing(session: Session, act, says: str) -> None:  # type: ignore[no-untyped-def]
@@ -104,21 +106,21 @@ def test_what_makes_no_sense_is_refused_and_changes_nothing(session: Session, ac
 
 def test_a_renamed_fin_keeps_its_damage_link_and_selection(session: Session) -> None:
     session.select("front_left")
-    session.mirror_fin()
+    session.mirror()
     session.select("front_left")
     session.toggle_failure("front_left")
-    session.rename_fin("front_left", " bow <b> ")
+    session.rename("front_left", " bow <b> ")
     state = session.state
     assert state.failed == ("bow <b>",) and ("bow <b>", "front_right") in state.links
     assert session.selected == "bow <b>"
-    assert "<b>" not in fin_list(state, session.selection).split("<table>")[1].split("bow")[1][:12]
+    assert "<b>" not in actuator_list(state, session.selection).split("<table>")[1].split("bow")[1][:12]
     session.undo()
     assert session.selected == "front_left" and session.state.failed == ("front_left",)
 
 
 def test_linked_fins_that_are_both_selected_move_once(session: Session) -> None:
     session.select("front_left")
-    session.mirror_fin()
+    session.mirror()
     choose(session, *FRONT)
     session.place_selected((0.2, 0.2, 0.0))
     assert fin(session, "front_left").position == (0.2, 0.2, 0.0)

@@ -13,7 +13,7 @@ from finlab.layout import Azimuth, Fin, Layout, Rudder, Thruster, load_layout
 from finlab.layout.thrust_model import PowerLaw
 from tests.webapp.test_faults import Tab
 from webapp.markup.answer import fin_table
-from webapp.panels.fin_list import fin_list
+from webapp.panels.actuator_list import actuator_list
 from webapp.session import Session, files
 from webapp.session.state import State
 from webapp.session.targets import axis_reach, full_thrust
@@ -77,10 +77,10 @@ def test_every_task_shows_the_robot(tab: Tab, layout: Layout, capsys: pytest.Cap
     tab.on_loop(lambda: tab.view.do(lambda: session.toggle_failure(first)))
     tab.settle()
     assert "failed" in " ".join(tab.figures()) and tab.client.notes == []
-    for act in (session.add_fin, partial(session.drag_fin, first, (0.0, 0.0, 0.0), 0.0)):
+    for act in (partial(session.add, "tilt"), partial(session.drag, first, (0.1, 0.0, 0.0)), session.undo):
         tab.on_loop(partial(tab.view.do, act))
-    assert all("editing in the app works for" in note for note in tab.client.notes[-2:])
-    tab.on_loop(lambda: tab.view.do(lambda: session.undo()))
+    tab.settle()
+    assert "tilt" in " ".join(tab.figures()) and tab.client.notes == []
 
 
 def test_a_method_for_fins_says_so_and_watts_go_on(tab: Tab, capsys: pytest.CaptureFixture[str]) -> None:
@@ -115,7 +115,7 @@ def test_each_actuator_has_a_row_with_its_type_and_force() -> None:
     table = fin_table(state.layout, None, answer, full_thrust(FISH), None)
     assert "azimuth, " in table and "rudder, " in table and table.count("<tr") == 5
     assert "thruster" in fin_table(BLUEROV, None, Solver().solve(State(BLUEROV)), full_thrust(BLUEROV), None)
-    listed = fin_list(state, ("rudder",))
+    listed = actuator_list(state, ("rudder",))
     assert "rudder" in listed and "azimuth" in listed
     assert isinstance(BLUEROV.actuators[0], Thruster)
 

@@ -20,7 +20,7 @@ def test_a_drag_is_one_step_of_undo(session: Session) -> None:
     name = session.state.layout.names[0]
     start = session.state
     for k in range(20):
-        session.drag_fin(name, (0.2 + 0.001 * k, -0.15, 0.0), -1.0)
+        session.drag(name, (0.2 + 0.001 * k, -0.15, 0.0), -1.0)
     session.end_drag(name, (0.22, -0.15, 0.0), -1.0)
     assert session.state.layout.fins[0].position[0] == pytest.approx(0.22)
     assert session.undo() == f"Move {name}"
@@ -80,28 +80,28 @@ def test_last_fin_can_neither_fail_nor_go(session: Session) -> None:
         session.toggle_failure(session.state.layout.names[3])
     for name in session.state.layout.names[:3]:
         session.select(name)
-        session.delete_fin()
+        session.delete()
     assert session.state.failed == ()
     session.select(session.state.layout.names[0])
-    with pytest.raises(FinlabError, match="only fin"):
-        session.delete_fin()
+    with pytest.raises(FinlabError, match="only actuator"):
+        session.delete()
 
 
 def test_mirror_duplicate_add_and_selection(session: Session) -> None:
-    with pytest.raises(FinlabError, match="no fin is selected"):
-        session.mirror_fin()
-    session.add_fin()
+    with pytest.raises(FinlabError, match="no actuator is selected"):
+        session.mirror()
+    session.add("fin")
     added = session.selected
     assert added is not None
     with pytest.raises(FinlabError, match="mirror plane"):
-        session.mirror_fin()
+        session.mirror()
     move_fin(session, added, (-0.1, 0.2, 0.05))
     turn_fin(session, added, 2.0)
-    session.mirror_fin()
+    session.mirror()
     twin = session.state.layout.fins[-1]
     assert twin.position == (-0.1, -0.2, 0.05) and twin.mounting_angle == pytest.approx(-2.0)
-    session.duplicate_fin()
-    session.duplicate_fin()
+    session.duplicate()
+    session.duplicate()
     assert session.state.layout.n_fins == 8
     session.undo()
     assert session.selected is None, "a fin that is gone is not selected"

@@ -18,8 +18,8 @@ from finlab.physics import make_law
 from webapp.markup.html import html
 from webapp.markup.plot import Plot, cost_axis, positive
 from webapp.page import Page
-from webapp.session.fin_edits import FORMULAS
-from webapp.session.fin_edits import words as key_words
+from webapp.session.actuator_edits import FORMULAS
+from webapp.session.actuator_edits import words as key_words
 from webapp.tasks.fitting import MAX_BYTES, Fitted
 from webapp.theme import BLUE, GREEN, ORANGE
 
@@ -71,7 +71,7 @@ def add_fin_model(page: Page, fin_of: Callable[[str | None, Layout], Fin]) -> No
         hint = f"{rule.meaning[0].upper()}{rule.meaning[1:]}. Usual: {rule.default:g}."
         label, step = f"{key_words(key)}{unit}", (abs(rule.default) or 1.0) / 20
         handle = gui.add_number(label, rule.default, step=step, hint=hint, visible=False)
-        page.bind_number(handle, partial(session.set_parameter, key), value)
+        page.bind_number(handle, partial(session.set_value, key), value)
         board.show(handle, visible=lambda selected, layout: kind_of(selected, layout) == kind)
 
     with gui.add_folder("Fin model"):

@@ -5,14 +5,14 @@ from functools import partial
 from typing import NamedTuple
 
 from webapp.page import Page
+from webapp.panels.actuator_inspector import add_fin
+from webapp.panels.actuator_list import add_actuator_list
 from webapp.panels.body_inspector import add_body
 from webapp.panels.cards import add_answer, add_switches, camera, card, check, guide_card, robot_name, tasks
 from webapp.panels.compare_tab import add_comparison
 from webapp.panels.damage import add_damage
 from webapp.panels.design_panel import add_designs
 from webapp.panels.files_tab import add_files
-from webapp.panels.fin_inspector import add_fin
-from webapp.panels.fin_list import add_fin_list
 from webapp.panels.hull_panel import add_hull
 from webapp.panels.limits_tab import add_improving, add_reach
 from webapp.panels.modes_tab import add_candidates
@@ -51,7 +51,7 @@ PLACES = (
     Place(TOP, TASKS, "Tasks", partial(card, tasks)),
     Place(TOP, TASKS, "Answers", add_answering),
     Place(LEFT, TASKS, "Guide", partial(card, guide_card), about="guide"),
-    Place(LEFT, (DESIGN,), "Actuators", add_fin_list),
+    Place(LEFT, (DESIGN,), "Actuators", add_actuator_list),
     Place(LEFT, (DESIGN,), "Designs", add_designs),
     Place(RIGHT, (DESIGN,), "Fin", add_fin, about="fins", fins_only="the inspector of a fin"),
     Place(RIGHT, (DESIGN,), "Body", add_body, about="robot"),

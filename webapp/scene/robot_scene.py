@@ -219,8 +219,10 @@ class RobotScene:
         if phase == "start":
             session.history.end_merge()
             return
-        drag = session.end_drag if phase == "end" else session.drag_fin
-        self._do(partial(drag, session.state.layout.names[index], position, angle))
+        drag = session.end_drag if phase == "end" else session.drag
+        part = session.state.layout.actuators[index]
+        level = isinstance(part, Fin) and part.mounting_angle is not None
+        self._do(partial(drag, part.name, position, angle if level else None))
 
 
 class Offered:

@@ -120,7 +120,7 @@ class Core:
 
     @property
     def selected(self) -> str | None:
-        """The selected fin; of several the one that was chosen last."""
+        """The selected actuator; of several the one that was chosen last."""
         return self._chosen[-1] if self._chosen else None
 
     @selected.setter
@@ -129,7 +129,7 @@ class Core:
 
     @property
     def selection(self) -> tuple[str, ...]:
-        """All selected fins, in the order of the layout."""
+        """All selected actuators, in the order of the layout."""
         return tuple(name for name in self.state.layout.names if name in self._chosen)
 
     def _commit(self, name: str, state: State, merge_key: str | None = None, timed: bool = True) -> None:
@@ -138,48 +138,39 @@ class Core:
             self._settled()
 
     def _settled(self) -> None:
-        """After any change of the state: a choice of mode is void, a lost fin is not selected."""
+        """After any change of the state: a choice of mode is void, one that is gone is not selected."""
         self.revision += 1
         self.mode = 0
         names, before = self.state.layout.names, self._names
         self._names = names
-        if len(names) == len(before):  # a fin that is called otherwise now stays selected
+        if len(names) == len(before):  # one that is called otherwise now stays selected
             called = {old: new for old, new in zip(before, names, strict=True) if old not in names}
             self._chosen = tuple(called.get(name, name) for name in self._chosen)
         self._chosen = tuple(name for name in self._chosen if name in names)
 
     def select(self, name: str | None) -> None:
-        """Select a fin, or none."""
+        """Select an actuator, or none."""
         if name is not None:
             self.state.layout.index(name)
         self.selected = name
         self.history.end_merge()
 
     def select_also(self, name: str) -> None:
-        """One more fin beside those that are selected; one of them is let go."""
+        """One more actuator beside those that are selected; one of them is let go."""
         self.state.layout.index(name)
         others = tuple(other for other in self._chosen if other != name)
         self._chosen = others if name in self._chosen else (*others, name)
         self.history.end_merge()
 
     def select_next(self) -> None:
-        """Select the fin after the selected one."""
+        """Select the actuator after the selected one."""
         names = self.state.layout.names
         self.select(names[(names.index(self.selected) + 1) % len(names)] if self.selected else names[0])
 
     def _selected_name(self) -> str:
         if self.selected is None:
-            raise FinlabError("no fin is selected; click one, or choose it in the list")
-        self._check_editable()
+            raise FinlabError("no actuator is selected; click one, or choose it in the list")
         return self.selected
-
-    def _check_editable(self) -> None:
-        """Refuse a robot whose actuators the page cannot place and turn.
-
-        Raises:
-            LayoutError: an actuator is no fin, or a fin's shaft is not horizontal.
-        """
-        self.state.layout.only_fins("editing in the app", horizontal=True)
 
     def start_over(self) -> None:
         """Everything as at first sight; the way here can be undone."""

@@ -1,16 +1,15 @@
-"""Intents about the layout: place, turn, copy and remove fins, shape the hull."""
+"""Intents about the layout: place, turn, copy and remove actuators, shape the hull."""
 
 from collections.abc import Sequence
 from dataclasses import replace
 
 from finlab.errors import FinlabError
-from finlab.layout import FinModelSpec, Layout
+from finlab.layout import Layout
 from finlab.layout.body import Hull
 from webapp.session import layout_edits
 from webapp.session.core import Core
+from webapp.session.directions import Vector
 from webapp.session.links import followed, partner, unlinked
-
-Vector = tuple[float, float, float]
 
 
 class Editing(Core):
@@ -35,73 +34,80 @@ class Editing(Core):
         """A layout has been saved as it is."""
         self.saved = layout
 
-    def drag_fin(self, name: str, position: Vector, angle: float) -> None:
-        """A fin on its way in the user's hand: one step of undo for the whole drag."""
-        self._check_editable()
-        layout = layout_edits.moved(self.state.layout, name, position)
-        self._drag(name, layout_edits.turned(layout, name, angle))
+    def drag(self, name: str, position: Vector, angle: float | None = None) -> None:
+        """An actuator on its way in the user's hand: one step of undo for the whole drag.
 
-    def end_drag(self, name: str, position: Vector, angle: float) -> None:
+        Args:
+            name: which one.
+            position: where it is [m].
+            angle: mounting angle [rad] of a horizontal fin; None leaves the direction as it is.
+        """
+        layout = layout_edits.moved(self.state.layout, name, position)
+        if angle is not None:
+            layout = layout_edits.turned(layout, name, angle)
+        self._follow(f"Move {name}", name, layout, f"drag {name}", timed=False)
+
+    def end_drag(self, name: str, position: Vector, angle: float | None = None) -> None:
         """A drag is over: the next change is a step of its own."""
-        self.drag_fin(name, position, angle)
+        self.drag(name, position, angle)
         self.history.end_merge()
 
-    def _drag(self, name: str, layout: Layout) -> None:
-        whole = layout_edits.keeping_hull(self.state.layout, followed(layout, self.state.links, name))
-        state = self.state.with_layout(whole)
-        self._commit(f"Move {name}", state, f"drag {name}", timed=False)
+    def point(self, name: str, direction: Vector, held: bool = False) -> None:
+        """Another direction of an actuator: a thruster's axis, zero of an azimuth, the shaft of a fin or
+        rudder. `direction` may have any length; while it is `held` in the user's hand all is one step, until
+        `history.end_merge`."""
+        layout = layout_edits.pointed(self.state.layout, name, direction)
+        self._follow(f"Point {name}", name, layout, f"point {name}", timed=not held)
 
-    def add_fin(self) -> None:
-        """One more fin; it is selected."""
-        self._check_editable()
-        layout, name = layout_edits.added(self.state.layout)
+    def _follow(
+        self, step: str, name: str, layout: Layout, merge_key: str | None = None, timed: bool = True
+    ) -> None:
+        """A layout in which one actuator has moved; its twin moves along."""
+        layout = followed(self.state.layout, layout, self.state.links, name)
+        self._edit(step, layout, merge_key, timed)
+
+    def add(self, kind: str) -> None:
+        """One more actuator of a type; it is selected."""
+        layout, name = layout_edits.added(self.state.layout, kind)
         self._edit(f"Add {name}", layout)
         self.selected = name
 
-    def duplicate_fin(self) -> None:
-        """A copy of the selected fin; it is selected."""
+    def duplicate(self) -> None:
+        """A copy of the selected actuator; it is selected."""
         source = self._selected_name()
         layout, name = layout_edits.duplicated(self.state.layout, source)
         self._edit(f"Duplicate {source}", layout)
         self.selected = name
 
-    def mirror_fin(self) -> None:
-        """The selected fin's image on the other side, which is selected; they move together."""
+    def mirror(self) -> None:
+        """The selected actuator's image on the other side, which is selected; they move together."""
         source = self._selected_name()
         layout, name = layout_edits.mirrored(self.state.layout, source)
         state = self.state.with_layout(layout)
         self._commit(f"Mirror {source}", state.with_link(source, name))
         self.selected = name
 
-    def unlink_fin(self) -> None:
-        """The selected fin and its mirror image go their own ways."""
+    def unlink(self) -> None:
+        """The selected actuator and its mirror image go their own ways."""
         name = self._selected_name()
         if partner(self.state.links, name) is None:
-            raise FinlabError(f"{name} is not linked to another fin; Mirror links it to its image")
+            raise FinlabError(f"{name} is not linked to another one; Mirror links it to its image")
         self._commit(f"Unlink {name}", replace(self.state, links=unlinked(self.state.links, name)))
 
-    def ring_of_fins(self, count: int) -> None:
-        """Copies of the selected fin, so that `count` stand evenly around the vertical body axis."""
+    def ring(self, count: int, around: str = "z") -> None:
+        """Copies of the selected actuator, so that `count` stand evenly around a body axis."""
         name = self._selected_name()
-        self._edit(f"{count} copies of {name}", layout_edits.ring(self.state.layout, name, count))
+        self._edit(f"{count} copies of {name}", layout_edits.ring(self.state.layout, name, count, around))
 
-    def stick_fin(self) -> None:
-        """The selected fin onto the hull."""
+    def stick(self) -> None:
+        """The selected actuator onto the hull."""
         name = self._selected_name()
-        layout = layout_edits.stuck(self.state.layout, name)
-        self._edit(f"Stick {name} to the hull", followed(layout, self.state.links, name))
+        self._follow(f"Stick {name} to the hull", name, layout_edits.stuck(self.state.layout, name))
 
-    def delete_fin(self) -> None:
-        """The selected fins go."""
+    def delete(self) -> None:
+        """The selected actuators go."""
         self._selected_name()
-        names = self.selection
-        which = names[0] if len(names) == 1 else f"{len(names)} fins"
-        self._edit(f"Delete {which}", layout_edits.deleted(self.state.layout, names))
-
-    def set_model(self, names: Sequence[str], model: FinModelSpec) -> None:
-        """Another model for some fins."""
-        which = names[0] if len(names) == 1 else f"{len(names)} fins"
-        self._edit(f"Fit {which}", layout_edits.with_model(self.state.layout, names, model))
+        self._edit(f"Delete {which(self.selection)}", layout_edits.deleted(self.state.layout, self.selection))
 
     def set_hull(self, shape: str, size: Vector) -> None:
         """A parametric hull of a size [m]."""
@@ -115,6 +121,11 @@ class Editing(Core):
         """The centre of gravity at another place in the hull [m]."""
         self._edit("Move the centre of gravity", layout_edits.balanced(self.state.layout, center), "center")
 
-    def _edit(self, name: str, layout: Layout, merge_key: str | None = None) -> None:
+    def _edit(self, name: str, layout: Layout, merge_key: str | None = None, timed: bool = True) -> None:
         whole = layout_edits.keeping_hull(self.state.layout, layout)
-        self._commit(name, self.state.with_layout(whole), merge_key)
+        self._commit(name, self.state.with_layout(whole), merge_key, timed)
+
+
+def which(names: Sequence[str]) -> str:
+    """Some actuators in a few words."""
+    return names[0] if len(names) == 1 else f"{len(names)} actuators"

@@ -1,62 +1,80 @@
-"""Intents about what a layout says of its fins: for one of them, or for all that are selected at once."""
+"""Intents about what a layout says of its actuators: of one, or of all that are selected at once."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
-from finlab.layout import Fin, Layout
-from webapp.session import body_edits, fin_edits, layout_edits
-from webapp.session.editing import Editing, Vector
+from finlab.layout import Actuator, Layout
+from webapp.session import actuator_edits, body_edits, layout_edits
+from webapp.session.directions import Vector, part_of, replaced, with_zero
+from webapp.session.editing import Editing, which
 from webapp.session.links import followed, partner
 
 UNITS = ("kg", "kgm2", "m", "n")
 
 
 class Inspecting(Editing):
-    """Names, limits, models and drives of fins; several fins in one step."""
+    """Names, places, directions, limits and models of actuators; several in one step."""
 
-    def rename_fin(self, name: str, wanted: str) -> None:
-        """A fin with another name; whatever is known of it goes on under that."""
+    def rename(self, name: str, wanted: str) -> None:
+        """An actuator with another name; whatever is known of it goes on under that."""
         if wanted.strip() != name:
-            renamed = fin_edits.checked_name(self.state.layout, name, wanted)
+            renamed = actuator_edits.checked_name(self.state.layout, name, wanted)
             self._commit(f"Rename {name} to {renamed}", self.state.with_renamed(name, renamed))
 
     def place_selected(self, position: Vector) -> None:
-        """The selected fin at another place [m]; others that are selected take what of it has changed."""
+        """The selected actuator at another place [m]; others that are selected take what has changed."""
         names = self._selected_names()
-        before = self.state.layout.fins[self.state.layout.index(names[-1])].position
+        before = part_of(self.state.layout, names[-1]).position
         changed = [abs(new - old) > layout_edits.UNTOUCHED for new, old in zip(position, before, strict=True)]
 
         def placed(layout: Layout, name: str) -> Layout:
-            own = layout.fins[layout.index(name)].position
+            own = part_of(layout, name).position
             x, y, z = (new if c else old for new, old, c in zip(position, own, changed, strict=True))
             return layout_edits.moved(layout, name, (x, y, z))
 
         self._for_each("Move", names, placed, f"move {names}")
 
     def turn_selected(self, angle: float) -> None:
-        """All selected fins with one mounting angle [rad]."""
-        names = self._selected_names()
-
-        def turned(layout: Layout, name: str) -> Layout:
-            return layout_edits.turned(layout, name, angle)
-
+        """All selected fins with one mounting angle [rad]; actuators without one stay."""
+        names = tuple(
+            name
+            for name in self._selected_names()
+            if getattr(part_of(self.state.layout, name), "mounting_angle", None) is not None
+        )
+        turned = partial(layout_edits.turned, angle=angle)
         self._for_each("Turn", names, turned, f"turn {names}")
 
-    def limit_selected(self, quantity: str, ends: tuple[float, float]) -> None:
-        """Other limits of all selected fins; `quantity` is a field of `Limits`, in radians or hertz."""
-        self._change("Limit", self._selected_names(), lambda fin: fin_edits.limited(fin, quantity, ends))
+    def point_selected(self, direction: Vector) -> None:
+        """All selected actuators along one direction of any length, see `point`."""
+        names = self._selected_names()
+        pointed = partial(layout_edits.pointed, direction=direction)
+        self._for_each("Point", names, pointed, f"point {names}")
+
+    def set_zero(self, direction: Vector) -> None:
+        """Where the force of selected fins points at zero direction 0, or the leading edge of rudders."""
+
+        def zeroed(layout: Layout, name: str) -> Layout:
+            return replaced(layout, with_zero(part_of(layout, name), direction))
+
+        self._for_each("Zero of", self._selected_names(), zeroed, None)
+
+    def set_value(self, key: str, value: Any) -> None:
+        """A field of all selected actuators that have it, see `with_value`, in SI units and radians."""
+        self._change(
+            f"{actuator_edits.words(key)} of", lambda part: actuator_edits.with_value(part, key, value)
+        )
 
     def choose_model(self, kind: str) -> None:
-        """Another kind of model for all selected fins."""
-        self._change(f"Model {kind} for", self._selected_names(), lambda fin: fin_edits.modelled(fin, kind))
+        """Another kind of model for all selected actuators that may have it."""
+        self._change(f"Model {kind} for", lambda part: actuator_edits.modelled(part, kind))
 
-    def set_parameter(self, key: str, value: Any) -> None:
-        """A number of the model of all selected fins whose model has it."""
-        self._change(
-            f"{fin_edits.words(key)} of",
-            self._selected_names(),
-            lambda fin: fin_edits.with_parameter(fin, key, value),
-        )
+    def set_model(self, names: Sequence[str], **found: Any) -> None:
+        """Another model for some actuators, and what else was found with it."""
+        layout = self.state.layout
+        for name in names:
+            layout = layout.replace_actuator(name, **found)
+        self._edit(f"Fit {which(names)}", layout)
 
     def rename_robot(self, wanted: str) -> None:
         """Another name of the robot."""
@@ -72,7 +90,7 @@ class Inspecting(Editing):
     def set_dynamics(self, key: str, value: Any) -> None:
         """Another field of the body, one of `DYNAMICS`; None forgets it."""
         changed = body_edits.with_dynamics(self.state.layout, **{key: value})
-        word = fin_edits.words(key.rsplit("_", 1)[0] if key.rsplit("_", 1)[-1] in UNITS else key)
+        word = actuator_edits.words(key.rsplit("_", 1)[0] if key.rsplit("_", 1)[-1] in UNITS else key)
         self._edit(f"{word} of the robot", changed)
 
     def forget_dynamics(self) -> None:
@@ -85,15 +103,15 @@ class Inspecting(Editing):
         self._edit("Estimate mass and damping from the hull", body_edits.estimated(self.state.layout))
 
     def _selected_names(self) -> tuple[str, ...]:
-        """The selected fins, in the order in which they were chosen."""
+        """The selected actuators, in the order in which they were chosen."""
         self._selected_name()
         return self._chosen
 
-    def _change(self, what: str, names: tuple[str, ...], change: Callable[[Fin], Fin]) -> None:
+    def _change(self, what: str, change: Callable[[Actuator], Actuator]) -> None:
         def changed(layout: Layout, name: str) -> Layout:
-            return fin_edits.with_fin(layout, name, change(layout.fins[layout.index(name)]))
+            return replaced(layout, change(part_of(layout, name)))
 
-        self._for_each(what, names, changed, None)
+        self._for_each(what, self._selected_names(), changed, None)
 
     def _for_each(
         self,
@@ -102,18 +120,13 @@ class Inspecting(Editing):
         change: Callable[[Layout, str], Layout],
         merge_key: str | None,
     ) -> None:
-        """One step for several fins; twins follow unless they are among them already."""
-        layout, links = self.state.layout, self.state.links
-        done: set[str] = set()
+        """One step for several actuators; twins follow unless they are among them already."""
+        before, links = self.state.layout, self.state.links
+        layout, done = before, set[str]()
         for name in reversed(names):  # the one that was chosen last leads its twin
             twin = partner(links, name)
             if twin in done:
                 continue
-            layout = change(layout, name)
+            layout = followed(before, change(layout, name), links, name)
             done.add(name)
-            layout = followed(layout, links, name)
-        self._edit(f"{what} {_which(names)}", layout, merge_key)
-
-
-def _which(names: tuple[str, ...]) -> str:
-    return names[0] if len(names) == 1 else f"{len(names)} fins"
+        self._edit(f"{what} {which(names)}", layout, merge_key)

@@ -3,22 +3,25 @@
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from finlab.errors import FinlabError
-from finlab.layout import Body, Fin, FinModelSpec, Layout
+from finlab.layout import Actuator, Azimuth, Body, Fin, Layout, Rudder, Thruster, Tilt
 from finlab.layout.angles import wrapped
 from finlab.layout.body import HULL_SHAPES, Hull
 from finlab.layout.layout import MAX_ACTUATORS
+from finlab.layout.thrust_model import PowerLaw
 from webapp.scene.meshes.hull import hull_of
-from webapp.session.links import existing_image, image
+from webapp.session.directions import Vector, facing, image, part_of, replaced, rotated
+from webapp.session.links import existing_image
 from webapp.session.state import chosen, number
 
 UNTOUCHED = 1e-6
 """Change [m], [rad] up to which a coordinate or an angle counts as left alone: a page's own rounding."""
-MAX_COORDINATE = 2.0
-"""How far out a fin may be placed in the browser [m]."""
+MAX_COORDINATE = 10.0
+"""How far out an actuator may be placed in the browser [m]."""
 CLEAR, STEP_UP = 0.12, 0.05
 """How far a new fin, and a copy, stands from all others if there is room [m]."""
 ROUND = (180, 150, -150, 120, -120, 90, -90, 60, -60, 30, -30, 0)
@@ -26,11 +29,21 @@ ROUND = (180, 150, -150, 120, -120, 90, -90, 60, -60, 30, -30, 0)
 STAND_OFF = 0.02
 """Distance of a fin that sticks to the hull from its surface: room for the servo [m]."""
 
-Vector = tuple[float, float, float]
+AT, AHEAD, UP = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
+TURNS: dict[str, Any] = {"turn_axis": UP, "zero": AHEAD, "turn_rate": 2.0}
+NEW: dict[str, Actuator] = {
+    "fin": Fin("fin", AT, 0.0),
+    "thruster": Thruster("thruster", AT, AHEAD, (-39.91, 51.44), PowerLaw(0.997, 1.449)),
+    "azimuth": Azimuth("azimuth", AT, force=(0.0, 51.44), model=PowerLaw(0.997), **TURNS),
+    "tilt": Tilt("tilt", AT, force=(0.0, 51.44), model=PowerLaw(0.997), arc=(-1.0, 1.0), **TURNS),
+    "rudder": Rudder("rudder", AT, UP, AHEAD, area=0.00665, deflection=(-0.5, 0.5), aspect_ratio=2.21),
+}
+"""What is added, by type: U-CAT's fin; a T200 of Blue Robotics at 16 V, as shipped layouts have it, fixed or
+on a pod; a tail fin of REMUS 100."""
 
 
 def moved(layout: Layout, name: str, position: Vector) -> Layout:
-    """A fin at another place [m]."""
+    """An actuator at another place [m]."""
     checked = [
         number(value, f"{axis} of {name} [m]", -MAX_COORDINATE, MAX_COORDINATE)
         for value, axis in zip(position, "xyz", strict=True)
@@ -39,11 +52,19 @@ def moved(layout: Layout, name: str, position: Vector) -> Layout:
 
 
 def turned(layout: Layout, name: str, angle: float) -> Layout:
-    """A fin with another mounting angle [rad]."""
+    """A fin with a horizontal shaft, with another mounting angle [rad]."""
     checked = number(angle, f"mounting angle of {name} [rad]", -100.0, 100.0)
-    now = layout.fins[layout.index(name)].shaft_azimuth
-    same = abs(math.remainder(checked - now, math.tau)) <= UNTOUCHED
-    return layout.replace_actuator(name, mounting_angle=now if same else float(wrapped(checked)))
+    part = part_of(layout, name)
+    if not isinstance(part, Fin) or part.mounting_angle is None:
+        raise FinlabError(f"{name} has no mounting angle; give a direction")
+    same = abs(math.remainder(checked - part.mounting_angle, math.tau)) <= UNTOUCHED
+    return layout if same else layout.replace_actuator(name, mounting_angle=float(wrapped(checked)))
+
+
+def pointed(layout: Layout, name: str, direction: Vector) -> Layout:
+    """An actuator along a direction of any length, see `facing`."""
+    x, y, z = (number(v, f"direction of {name}", -1e6, 1e6) for v in direction)
+    return replaced(layout, facing(part_of(layout, name), (x, y, z)))
 
 
 def keeping_hull(before: Layout, after: Layout) -> Layout:
@@ -61,62 +82,63 @@ def keeping_hull(before: Layout, after: Layout) -> Layout:
 
 
 def mirrored(layout: Layout, name: str) -> tuple[Layout, str]:
-    """The layout with a fin's image on the other side of the robot, and the image's name.
+    """The layout with an actuator's image on the other side of the robot, and the image's name.
 
-    A fin that already stands there is taken for the image, and nothing is added.
+    One that already stands there is taken for the image, and nothing is added.
     """
-    fin = layout.fins[layout.index(name)]
-    if abs(fin.position[1]) < 1e-3:
+    part = part_of(layout, name)
+    if abs(part.position[1]) < 1e-3:
         raise FinlabError(f"{name} sits on the mirror plane (y = 0), so its mirror image is itself")
     there = existing_image(layout, name)
-    return (layout, there) if there is not None else _added(layout, image(fin), _mirror_name(name))
+    return (layout, there) if there is not None else _added(layout, image(part), _mirror_name(name))
 
 
-def ring(layout: Layout, name: str, count: int) -> Layout:
-    """The layout with copies of a fin, so that `count` of them stand evenly around the vertical body axis.
+def ring(layout: Layout, name: str, count: int, around: str) -> Layout:
+    """The layout with copies of an actuator, so that `count` of them stand evenly around a body axis.
 
     Raises:
-        FinlabError: the fin stands on the axis.
+        FinlabError: the actuator stands on the axis, or there is no such axis.
     """
-    fin = layout.fins[layout.index(name)]
-    x, y, z = fin.position
-    if math.hypot(x, y) < 1e-3:
-        raise FinlabError(f"{name} stands on the vertical axis, so its copies would all be in one place")
-    whole = round(number(count, "fins around the axis", 2, MAX_ACTUATORS))
+    part, axis = part_of(layout, name), np.eye(3)["xyz".index(chosen(around, "axis", tuple("xyz")))]
+    if np.linalg.norm(np.cross(axis, part.position)) < 1e-3:
+        raise FinlabError(f"{name} stands on the {around} axis, so its copies would all be in one place")
+    whole = round(number(count, "copies around the axis", 2, MAX_ACTUATORS))
     for k in range(1, whole):
-        turn = 2 * math.pi * k / whole
-        c, s = math.cos(turn), math.sin(turn)
-        place = round(c * x - s * y, 9), round(s * x + c * y, 9), z
-        azimuth = float(wrapped(fin.shaft_azimuth + turn))
-        layout, _ = _added(layout, replace(fin, position=place, mounting_angle=azimuth), name)
+        layout, _ = _added(layout, rotated(part, axis, math.tau * k / whole), name)
     return layout
 
 
 def stuck(layout: Layout, name: str) -> Layout:
-    """The layout with a fin moved onto the hull's surface, its shaft along the surface's normal.
+    """The layout with an actuator moved onto the hull's surface.
 
-    Shafts are horizontal, so of the normal only the azimuth is taken; where it points straight up or down
-    the shaft stays.
+    The shaft of a fin that has a mounting angle turns to the azimuth of the surface's normal, unless that
+    points straight up or down; all others point as they did.
     """
-    fin = layout.fins[layout.index(name)]
-    point, normal = hull_of(layout).nearest(np.array(fin.position))
-    azimuth = fin.shaft_azimuth if np.hypot(*normal[:2]) < 0.2 else math.atan2(normal[1], normal[0])
-    x, y, z = (round(float(v), 4) for v in point + STAND_OFF * normal)
-    return layout.replace_actuator(name, position=(x, y, z), mounting_angle=float(wrapped(azimuth)))
+    part = part_of(layout, name)
+    point, normal = hull_of(layout).nearest(np.array(part.position))
+    x, y, z = (round(float(v), 4) + 0.0 for v in point + STAND_OFF * normal)
+    layout = layout.replace_actuator(name, position=(x, y, z))
+    if not isinstance(part, Fin) or part.mounting_angle is None or np.hypot(*normal[:2]) < 0.2:
+        return layout
+    return layout.replace_actuator(name, mounting_angle=float(wrapped(math.atan2(normal[1], normal[0]))))
 
 
 def duplicated(layout: Layout, name: str) -> tuple[Layout, str]:
-    """The layout with a copy of a fin above it, 5 cm or the first place that is free, and the copy's name."""
-    fin = layout.fins[layout.index(name)]
-    x, y, z = fin.position
+    """The layout with a copy of an actuator above it, 5 cm or the first place that is free, and its name."""
+    part = part_of(layout, name)
+    x, y, z = part.position
     places = ((x, y, round(z + STEP_UP * k, 9)) for k in range(1, MAX_ACTUATORS + 1))
     return _added(
-        layout, replace(fin, position=next(p for p in places if _is_free(layout, p, STEP_UP))), name
+        layout, replace(part, position=next(p for p in places if _is_free(layout, p, STEP_UP))), name
     )
 
 
-def added(layout: Layout) -> tuple[Layout, str]:
-    """The layout with one more fin on the hull, and its name: at the stern, or where there is room."""
+def added(layout: Layout, kind: str) -> tuple[Layout, str]:
+    """The layout with one more actuator on the hull, and its name: at the stern, or where there is room.
+
+    A fin's shaft points away from the hull; the others push or steer ahead.
+    """
+    part = NEW[chosen(kind, "actuator", NEW)]
     hull = hull_of(layout)
     far = 4.0 * max(hull.half)
     for clear in (CLEAR, STEP_UP, 0.0):
@@ -125,12 +147,11 @@ def added(layout: Layout) -> tuple[Layout, str]:
             point, normal = hull.nearest(np.array(hull.center) + far * way)
             x, y, z = (round(float(v), 4) + 0.0 for v in point + STAND_OFF * normal)
             if _is_free(layout, (x, y, z), clear):
-                azimuth = (
-                    math.atan2(normal[1], normal[0])
-                    if math.hypot(*normal[:2]) > 0.2
-                    else math.radians(degrees)
-                )
-                return _added(layout, Fin("fin", (x, y, z), float(wrapped(azimuth))), "fin")
+                out = normal if math.hypot(*normal[:2]) > 0.2 else way
+                placed = replace(part, position=(x, y, z))
+                if isinstance(placed, Fin):
+                    placed = replace(placed, mounting_angle=math.atan2(out[1], out[0]))
+                return _added(layout, placed, kind)
     raise AssertionError("no place is free")
 
 
@@ -142,24 +163,24 @@ def blank() -> Layout:
 
 
 def _is_free(layout: Layout, position: Vector, clear: float) -> bool:
-    """Whether all fins are at least so far [m] from a place."""
-    return all(math.dist(fin.position, position) >= clear - 1e-9 for fin in layout.fins)
+    """Whether all actuators are at least so far [m] from a place."""
+    return all(math.dist(part.position, position) >= clear - 1e-9 for part in layout.actuators)
 
 
 def deleted(layout: Layout, names: Sequence[str]) -> Layout:
-    """The layout without some fins; one at least stays."""
+    """The layout without some actuators; one at least stays."""
     layout.indices(names)
-    if layout.n_fins == len(set(names)):
-        only = f"{names[0]} is the only fin" if layout.n_fins == 1 else "these are all fins"
+    if layout.n == len(set(names)):
+        only = f"{names[0]} is the only actuator" if layout.n == 1 else "these are all actuators"
         raise FinlabError(f"{only}; a layout needs at least one")
     return layout.without(names)
 
 
-def _added(layout: Layout, fin: Fin, wanted: str) -> tuple[Layout, str]:
-    if layout.n_fins >= MAX_ACTUATORS:
-        raise FinlabError(f"the layout has {layout.n_fins} fins already; expected at most {MAX_ACTUATORS}")
+def _added(layout: Layout, part: Actuator, wanted: str) -> tuple[Layout, str]:
+    if layout.n >= MAX_ACTUATORS:
+        raise FinlabError(f"the layout has {layout.n} actuators already; expected at most {MAX_ACTUATORS}")
     name = _free_name(layout, wanted)
-    return replace(layout, actuators=(*layout.fins, replace(fin, name=name))), name
+    return replace(layout, actuators=(*layout.actuators, replace(part, name=name))), name
 
 
 def _free_name(layout: Layout, wanted: str) -> str:
@@ -178,13 +199,6 @@ def _mirror_name(name: str) -> str:
         if right in name:
             return name.replace(right, left)
     return f"{name}_mirror"
-
-
-def with_model(layout: Layout, names: Sequence[str], model: FinModelSpec) -> Layout:
-    """The layout with another model on some fins."""
-    for name in names:
-        layout = layout.replace_actuator(name, model=model)
-    return layout
 
 
 def shaped(layout: Layout, shape: str, size: Vector) -> Layout:

@@ -1,29 +1,20 @@
-"""Mirror pairs that stay mirror pairs: when one fin moves, its twin does."""
+"""Mirror pairs that stay mirror pairs: when one actuator moves, its twin does."""
 
-import math
-from dataclasses import replace
+import numpy as np
 
-from finlab.layout import Fin, Layout
-from finlab.layout.angles import wrapped
+from finlab.analysis.moves import is_mirrored
+from finlab.layout import Layout
+from webapp.session.directions import axis_names, image, part_of, replaced, with_axes
 
 Links = tuple[tuple[str, str], ...]
-"""Pairs of names; a fin is in at most one of them."""
+"""Pairs of names; an actuator is in at most one of them."""
 
-CLOSE_M, CLOSE_RAD = 0.005, math.radians(1.0)
-"""How far [m], [rad] a fin may be from another one's mirror image to count as it."""
-
-
-def image(fin: Fin) -> Fin:
-    """The fin on the other side of the xz plane, under the same name.
-
-    y and the shaft's azimuth change sign.
-    """
-    x, y, z = fin.position
-    return replace(fin, position=(x, -y, z), mounting_angle=float(wrapped(-fin.shaft_azimuth)))
+CLOSE = 0.005
+"""How far [m, rad] an actuator may be from another one's mirror image to count as it."""
 
 
 def partner(links: Links, name: str) -> str | None:
-    """The fin that `name` is linked to, if any."""
+    """The actuator that `name` is linked to, if any."""
     for pair in links:
         if name in pair:
             return pair[1 - pair.index(name)]
@@ -36,29 +27,32 @@ def linked(links: Links, a: str, b: str) -> Links:
 
 
 def unlinked(links: Links, name: str) -> Links:
-    """The links without the pair of a fin."""
+    """The links without the pair of an actuator."""
     return tuple(pair for pair in links if name not in pair)
 
 
 def kept(links: Links, layout: Layout) -> Links:
-    """The links whose fins both exist."""
+    """The links whose actuators both exist."""
     return tuple(pair for pair in links if set(pair) <= set(layout.names))
 
 
-def followed(layout: Layout, links: Links, name: str) -> Layout:
-    """The layout after the twin of `name`, if it has one, has taken its mirrored place."""
+def followed(before: Layout, layout: Layout, links: Links, name: str) -> Layout:
+    """The layout after the twin of `name`, if it has one, has taken its mirrored place.
+
+    Axes that pointed the other way than the image's `before` stay so.
+    """
     twin = partner(links, name)
     if twin is None or twin not in layout.names:
         return layout
-    wanted = image(layout.fins[layout.index(name)])
-    return layout.replace_actuator(twin, position=wanted.position, mounting_angle=wanted.shaft_azimuth)
+    wanted, old = image(part_of(layout, name)), part_of(layout, twin)
+    count = len(axis_names(old))
+    past = np.sum(np.array(image(part_of(before, name)).frame) * part_of(before, twin).frame, axis=1)
+    frame = np.array(wanted.frame) * np.where(past < 0.0, -1.0, 1.0)[:, None]
+    return replaced(layout, with_axes(old, frame[:count], wanted.position))
 
 
 def existing_image(layout: Layout, name: str) -> str | None:
-    """The fin that already stands where the mirror image of `name` would."""
-    wanted = image(layout.fins[layout.index(name)])
-    for fin in layout.fins:
-        turn = abs(float(wrapped(fin.shaft_azimuth - wanted.shaft_azimuth)))
-        if fin.name != name and math.dist(fin.position, wanted.position) < CLOSE_M and turn < CLOSE_RAD:
-            return fin.name
-    return None
+    """The actuator that already stands where the mirror image of `name` would."""
+    part = part_of(layout, name)
+    others = (other for other in layout.actuators if other.name != name)
+    return next((other.name for other in others if is_mirrored(part, other, CLOSE)), None)

@@ -84,7 +84,7 @@ class Fitting(Newest[Upload, Fitted]):
             alike = [fin.name for fin in session.state.layout.fins if fin.model == found.upload.model]
             if not alike:
                 raise FinlabError("no other fin has the model that this fin had")
-            session.set_model(alike, found.model)
+            session.set_model(alike, model=found.model)
 
     def _put_on(self) -> None:
         """On the loop, when the worker is done."""
@@ -103,7 +103,7 @@ class Fitting(Newest[Upload, Fitted]):
             raise FinlabError(
                 f"{upload.fin} is no longer the fin that {upload.name} was for; upload the file again"
             )
-        session.set_model([upload.fin], found.model)
+        session.set_model([upload.fin], model=found.model)
 
     def _fit(self, upload: Upload) -> Fitted:
         """On the worker's thread."""

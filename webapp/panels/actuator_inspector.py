@@ -37,7 +37,7 @@ def add_fin(page: Page) -> None:
 
     def rename(name: str) -> None:
         if session.selected is not None:
-            session.rename_fin(session.selected, name)
+            session.rename(session.selected, name)
 
     def turn(degrees: Any) -> None:
         session.turn_selected(math.radians(number(degrees, "shaft [°]", -3600.0, 3600.0)))
@@ -59,7 +59,7 @@ def add_fin(page: Page) -> None:
 
 
 def _add_limits(page: Page) -> None:
-    gui, limit = page.gui, page.session.limit_selected
+    gui, limit = page.gui, page.session.set_value
 
     def limit_direction(degrees: tuple[Any, Any]) -> None:
         low, high = (math.radians(number(end, "zero direction [°]", -360.0, 360.0)) for end in degrees)

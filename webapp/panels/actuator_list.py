@@ -4,7 +4,6 @@ import math
 from collections.abc import Callable
 from functools import partial
 
-import viser
 from markupsafe import Markup
 
 from finlab.errors import FinlabError
@@ -15,6 +14,7 @@ from webapp.markup.answer import swatch
 from webapp.markup.html import html, marker
 from webapp.page import Page
 from webapp.presses import press
+from webapp.session.layout_edits import NEW
 from webapp.session.links import partner
 from webapp.session.state import State
 
@@ -25,7 +25,7 @@ HULL = Markup(
 RING_SIZES = (2, 3, 4, 5, 6, 8)
 
 
-def add_fin_list(page: Page) -> None:
+def add_actuator_list(page: Page) -> None:
     """A table, and below it what can be done with the fins that are selected in it."""
     session = page.session
 
@@ -35,25 +35,26 @@ def add_fin_list(page: Page) -> None:
             raise FinlabError("that fin is gone")
         (session.select_also if held else session.select)(names[int(key)])
 
-    page.add_html(fin_list)
+    page.add_html(actuator_list)
     page.presses.on("fin", select)
     page.presses.on("robot", lambda _key, _held: session.select(None))
     add_html(page.gui, marker("fl-primary"))
-    page.add_button("Add a fin", session.add_fin, icon=viser.Icon.PLUS, hint=f"Up to {MAX_ACTUATORS} fins.")
+    adds = {kind.capitalize(): partial(session.add, kind) for kind in NEW}
+    page.add_buttons("Add", adds, hint=f"On the hull; up to {MAX_ACTUATORS} actuators.")
     edits: dict[str, Callable[[], object]] = {
-        "Mirror": session.mirror_fin,
-        "Unlink": session.unlink_fin,
-        "Duplicate": session.duplicate_fin,
-        "To hull": session.stick_fin,
-        "Delete": session.delete_fin,
+        "Mirror": session.mirror,
+        "Unlink": session.unlink,
+        "Duplicate": session.duplicate,
+        "To hull": session.stick,
+        "Delete": session.delete,
     }
     page.add_buttons("Selected fin", edits, hint="What Mirror (M) makes moves along until it is unlinked.")
-    rings = {str(count): partial(session.ring_of_fins, count) for count in RING_SIZES}
+    rings = {str(count): partial(session.ring, count) for count in RING_SIZES}
     about = "Copies of the selected fin, so that so many stand evenly around the vertical axis."
     page.add_buttons("Copies around", rings, hint=about)
 
 
-def fin_list(state: State, selection: tuple[str, ...]) -> str:
+def actuator_list(state: State, selection: tuple[str, ...]) -> str:
     """All fins with their places; `selection` has the names of those that are selected."""
     heads = Markup().join(html("<th class='place'>{}</th>", axis) for axis in ("x", "y", "z"))
     names = state.layout.names

@@ -1,0 +1,126 @@
+"""Robots of any actuators are edited: places, shafts, axes and arcs turn and mirror together."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from finlab.arrays import Array
+from finlab.errors import FinlabError
+from finlab.layout import Fin, Layout, load_layout
+from finlab.physics import plant_of
+from tests.webapp.test_other_robots import FISH
+from webapp.session import Session
+from webapp.session.directions import direction, image, part_of, rotation
+from webapp.session.layout_edits import NEW
+
+ROBOTS = ("ucat", "bluerov2", "torpedo", "catamaran", "fish", "turtle_hybrid")
+FLOW = np.array([1.2, 0.1, -0.2, 0.0, 0.0, 0.0])
+POLAR, AXIAL = np.array([1.0, -1.0, 1.0]), np.array([-1.0, 1.0, -1.0])
+MIRRORED = np.concatenate([POLAR, AXIAL])
+
+
+def wrenches(layout: Layout, names: tuple[str, ...], flow: Array) -> Array:
+    """What an actuator can do at a few hundred commands, sorted so that their order does not count."""
+    plant = plant_of(Layout("part", tuple(part_of(layout, name) for name in names)))
+    share = np.stack(np.meshgrid(*[np.linspace(0, 1, 5)] * 3, indexing="ij"), -1).reshape(-1, 1, 3)
+    return np.asarray(plant.wrench(plant.lower + share * plant.width, flow=flow))
+
+
+def same(a: Array, b: Array) -> bool:
+    """Whether two sets of wrenches (K, 6) are the same, in any order."""
+    apart = np.linalg.norm(a[:, None] - b[None], axis=-1)
+    return bool(max(apart.min(0).max(), apart.min(1).max()) < 1e-6 * max(1.0, np.abs(a).max()))
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_copies_around_an_axis_do_what_the_first_does_turned(robot: str) -> None:
+    for axis, letter in zip(np.eye(3), "xyz", strict=True):
+        session = Session(load_layout(robot))
+        for name in session.state.layout.names:
+            layout = session.state.layout
+            session.select(name)
+            if np.linalg.norm(np.cross(axis, part_of(layout, name).position)) < 1e-3:
+                with pytest.raises(FinlabError, match="stands on the"):
+                    session.ring(3, letter)
+                continue
+            session.ring(3, letter)
+            new = session.state.layout.names[-2:]
+            for k, copy in enumerate(new):
+                turn = rotation(axis, 2.0 * np.pi * (k + 1) / 3.0)
+                both = np.kron(np.eye(2), turn)
+                first = wrenches(layout, (name,), both.T @ FLOW) @ both.T
+                assert same(first, wrenches(session.state.layout, (copy,), FLOW)), (name, letter)
+            session.undo()
+            assert session.state.layout == layout
+
+
+@pytest.mark.parametrize("layout", [FISH, *map(load_layout, ROBOTS)], ids=lambda layout: layout.name)
+def test_the_image_does_the_mirrored_thing(layout: Layout) -> None:
+    for part in layout.actuators:
+        other = Layout("image", (image(part),))
+        flow = FLOW * MIRRORED
+        first = wrenches(layout, (part.name,), FLOW) * MIRRORED
+        assert same(first, wrenches(other, (part.name,), flow)), part.name
+        again = image(image(part))
+        np.testing.assert_allclose(again.frame, part.frame, atol=1e-9)
+        np.testing.assert_allclose([again.lower, again.upper], [part.lower, part.upper], atol=1e-9)
+
+
+def test_a_twin_follows_in_place_and_direction() -> None:
+    session = Session(load_layout("bluerov2"))
+    session.select("front_left")
+    session.mirror()
+    assert session.selected == "front_right" and session.state.layout.n == 6
+    session.point("front_left", (0.0, 3.0, 4.0))
+    left, right = (part_of(session.state.layout, name) for name in ("front_left", "front_right"))
+    assert left.frame[0] == pytest.approx((0.0, 0.6, 0.8)) and right.frame[0] == pytest.approx(
+        (0.0, -0.6, 0.8)
+    )
+    assert session.undo() == "Point front_left"
+
+
+@pytest.mark.parametrize("kind", NEW)
+def test_what_is_added_points_where_it_is_told_with_the_rest_across(kind: str) -> None:
+    session = Session(load_layout("fish"))
+    session.add(kind)
+    name = session.selected
+    assert name == kind and session.state.layout.n == 4
+    ways = [*np.eye(3), *-np.eye(3), np.array([0.3, -0.5, 0.2])]
+    for way in ways + ways[::-1]:
+        session.point(name, tuple(way.tolist()))
+        part = part_of(session.state.layout, name)
+        assert direction(part) == pytest.approx(tuple(way / np.linalg.norm(way)))
+        np.testing.assert_allclose(np.array(part.frame) @ np.array(part.frame).T, np.eye(3), atol=1e-9)
+        if isinstance(part, Fin):
+            assert (part.mounting_angle is not None) == (way[2] == 0.0), "horizontal ones keep their angle"
+    with pytest.raises(FinlabError, match="expected a vector with a length"):
+        session.point(name, (0.0, 0.0, 0.0))
+
+
+def test_a_tail_begins_with_its_thrust_ahead_and_keeps_an_arc_it_has() -> None:
+    session = Session(load_layout("ucat"))
+    session.add("fin")
+    session.point("fin", (0.0, 0.0, 1.0))
+    tail = part_of(session.state.layout, "fin")
+    assert tail.frame[1] == pytest.approx((1.0, 0.0, 0.0))
+    session.set_value("zero_direction", (-1.0, 1.0))
+    turns = [session.state.layout]
+    for way in ((0.0, 1.0, 1.0), (0.0, 1.0, 0.0)):
+        session.point("fin", way)
+        turns.append(session.state.layout)
+    for before, after in pairwise(turns):
+        assert part_of(after, "fin").frame[1] == pytest.approx(part_of(before, "fin").frame[1])
+    session.set_zero((0.0, 0.0, 5.0))
+    assert part_of(session.state.layout, "fin").frame[1] == pytest.approx((0.0, 0.0, 1.0))
+
+
+def test_a_drag_of_the_direction_is_one_step() -> None:
+    session = Session(load_layout("torpedo"))
+    for k in range(5):
+        session.point("rudder_top", (0.1 * k, 0.1, 1.0), held=True)
+    session.history.end_merge()
+    session.point("rudder_top", (0.0, 1.0, 1.0))
+    session.undo()
+    session.undo()
+    assert session.state.layout == load_layout("torpedo")

@@ -1,0 +1,97 @@
+"""Changes of what a layout says of one actuator. Each takes an actuator and returns another one."""
+
+import math
+from dataclasses import fields, replace
+from typing import Any
+
+from finlab.errors import FinlabError
+from finlab.layout import Actuator, Azimuth, Fin, FinModelSpec, Layout, Rudder, Thruster
+from finlab.layout.fin import FIN_MODELS
+from finlab.layout.thrust_model import PowerLaw, PowerTable
+from webapp.session.state import chosen
+
+QUANTITIES = ("amplitude", "frequency", "zero_direction")
+FORMULAS = tuple(name for name, parameters in FIN_MODELS.items() if parameters)
+LAW_KEYS = tuple(field.name for field in fields(PowerLaw))
+
+
+def words(key: str) -> str:
+    """A key of a layout file as people write it: `drag_coefficient` is Drag coefficient."""
+    text = key.replace("_", " ")
+    return text if len(text) <= 2 or text == "phi e" else text[0].upper() + text[1:]
+
+
+def checked_name(layout: Layout, name: str, wanted: str) -> str:
+    """A name that the actuator called `name` may have, without outer spaces.
+
+    Raises:
+        FinlabError: another one has it. Whether it is a name at all, the layout says.
+    """
+    stripped = wanted.strip()
+    if stripped != name and stripped in layout.names:
+        raise FinlabError(f"there is an actuator {stripped!r:.70} already; give another name")
+    return stripped
+
+
+def with_value(part: Actuator, key: str, value: Any) -> Actuator:
+    """The actuator with another value of what `key` names: a field of it, of its limits or of its model; as
+    it is where it has no such field. None forgets what may be left unsaid.
+
+    Raises:
+        LayoutError: the value is none that it may have.
+    """
+    if isinstance(value, (tuple, list)):
+        value = tuple(float(end) if isinstance(end, int) else end for end in value)
+    if isinstance(part, Fin) and key in QUANTITIES:
+        return replace(part, limits=replace(part.limits, **{key: value}))
+    if isinstance(part, Fin) and key in FIN_MODELS[part.model.type]:
+        return _with_parameter(part, key, value)
+    if isinstance(part, Thruster | Azimuth) and key in LAW_KEYS:
+        known = isinstance(part.model, PowerLaw)
+        return replace(part, model=replace(part.model, **{key: value})) if known else part
+    return replace(part, **{key: value}) if key in {field.name for field in fields(part)} else part
+
+
+def modelled(part: Actuator, kind: str) -> Actuator:
+    """The actuator with another kind of model; what both models know, such as the water's density, stays.
+
+    Raises:
+        FinlabError: there is no such model, or it needs a file.
+    """
+    if isinstance(part, Rudder) or kind == part.model.type:
+        return part
+    if kind == "table":
+        raise FinlabError(f"a table for {part.name} comes from a file; drop its CSV, or fit measurements")
+    if not isinstance(part, Fin):
+        if kind in FORMULAS:
+            return part
+        chosen(kind, "model of a thruster", ("power_law",))
+        return replace(part, model=_law_of(part.model)) if isinstance(part.model, PowerTable) else part
+    if kind == "power_law":
+        return part
+    chosen(kind, "fin model", FORMULAS)
+    shared = tuple((key, value) for key, value in part.model.parameters if key in FIN_MODELS[kind])
+    return replace(part, model=FinModelSpec(kind, shared))
+
+
+def _law_of(table: PowerTable) -> PowerLaw:
+    """The power law through the ends of a table."""
+    _, force, power = table.columns
+    least, most = (
+        float(f"{max(power[k] / max(abs(force[k]), 1e-9) ** 1.5, 1e-6):.4g}") if force[k] else None
+        for k in (0, -1)
+    )
+    return PowerLaw(most or least or 1.0, least)
+
+
+def _with_parameter(fin: Fin, key: str, value: Any) -> Fin:
+    """The fin with another number in its model.
+
+    Raises:
+        LayoutError: the value is none that the parameter may have.
+    """
+    usual = FIN_MODELS[fin.model.type][key].default
+    given = {**dict(fin.model.parameters), key: value}
+    if value is None or math.isclose(value, usual, rel_tol=1e-12, abs_tol=0.0):
+        del given[key]  # files say only what is not usual
+    return replace(fin, model=FinModelSpec(fin.model.type, tuple(given.items())))
