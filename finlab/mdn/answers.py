@@ -1,14 +1,13 @@
-"""From proposed forces to exact answers: descent, Levenberg-Marquardt on commands, the least effort there."""
+"""From proposed forces to exact answers: descent in forces, then Levenberg-Marquardt on commands."""
 
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.levenberg_marquardt import Refined, refine
+from finlab.allocation.levenberg_marquardt import refine
 from finlab.arrays import AnyArray, Array
 from finlab.mdn.descent import descend, realize, wrench
-from finlab.mdn.polish import polish
 from finlab.mdn.robot import EffortRobot
 
 PROMISING = 0.02
@@ -23,7 +22,6 @@ INEXACT = 1e9
 """Rank of inexact answers, behind every exact one. Efforts reach thousands where an arc of zero directions
 ends near zero, since the effort divides by that end."""
 
-
 OTHER, NOW = -1, -2
 """Origins of answers that no network has proposed: other starts, and how the robot moves now."""
 
@@ -33,14 +31,8 @@ class Steps(NamedTuple):
 
     descent: int = 8
     """Quadratic problems in force space."""
-    first: int = 1
+    commands: int = 2
     """Levenberg-Marquardt steps from there onto the target."""
-    polish: int = 6
-    """Most quadratic problems in commands."""
-    last: int = 1
-    """Levenberg-Marquardt steps at the end."""
-    each: bool = False
-    """Whether each proposal is polished to its end, not only those that may become the cheapest."""
 
 
 class Answers(NamedTuple):
@@ -108,9 +100,7 @@ def refined(
     """Answers to normalized targets (N, 6) near commands (N, P, n, 3)."""
     rows, count, n, _ = command.shape
     each = np.repeat(target, count, axis=0)
-    near = refine(robot.commands, each, command.reshape(-1, n, 3), steps.first)
-    if steps.polish:
-        near = _polished(robot, each, near, steps, count)
+    near = refine(robot.commands, each, command.reshape(-1, n, 3), steps.commands)
     effort = robot.effort(near.command)
     parts = [values.reshape(rows, count, *values.shape[1:]) for values in (*near, effort)]
     return ranked(robot, Answers._make([*parts, origin]))
@@ -129,23 +119,6 @@ def ranked(robot: EffortRobot, answers: Answers, bonus: float = 0.0) -> Answers:
     order = score.argsort(axis=1, kind="stable")
     place = np.arange(len(order))[:, None]
     return Answers._make(values[place, order] for values in answers)
-
-
-def _polished(robot: EffortRobot, target: Array, near: Refined, steps: Steps, each: int) -> Refined:
-    """The least effort near refined commands, exact where these were."""
-    # What is far out of reach would only drive the multipliers out of bounds.
-    hopeful = np.flatnonzero(near.error <= 1.0)
-    if not len(hopeful):
-        return near
-    start, wanted = Refined(*(values[hopeful] for values in near)), target[hopeful]
-    side_by_side = each if len(hopeful) == len(target) and not steps.each else 1
-    better = polish(robot.commands, robot.effort, wanted, start, steps.polish, side_by_side)
-    better = refine(robot.commands, wanted, better.command, steps.last)
-    kept = better.error <= np.maximum(robot.exact, start.error + NEARLY)
-    result = Refined(*(values.copy() for values in near))
-    for whole, part in zip(result, better, strict=True):
-        whole[hopeful[kept]] = part[kept]
-    return result
 
 
 def _distinct(score: Array, root: AnyArray, keep: int) -> NDArray[np.intp]:

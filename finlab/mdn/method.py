@@ -39,12 +39,10 @@ CHUNK = 64
 """Targets that are solved together; keeps memory flat for any number of targets."""
 STEPS = Steps()
 """Of every answer."""
-MORE = Steps(first=8, polish=3)
+MORE = Steps(commands=8)
 """Of answers that were not exact yet."""
-WIDE = Steps(descent=16, polish=12, each=True)
+WIDE = Steps(descent=16, commands=4)
 """Of alternatives, which are told apart by where they end."""
-LEAVING = Steps(first=10, polish=0)
-"""Of the way to another allocation, from commands that are at the ends of their rates."""
 WIDER = 4
 """Times as many proposals where alternatives are asked for; each of them is refined."""
 SWITCH_GAIN = 0.01
@@ -203,7 +201,7 @@ class Mdn(Method):
             found = refined(near, target, found.command, found.origin, MORE)
         if first.effort[0, 0] < (1.0 - WORTH_LEAVING) * found.effort[0, 0]:
             towards = near.commands.feasible(first.command[:, :1])
-            other = refined(near, target, towards, first.origin[:, :1], LEAVING)
+            other = refined(near, target, towards, first.origin[:, :1], MORE)
             if other.error[0, 0] <= max(near.exact, found.error[0, 0]):
                 found = other.before(found)
         return free._replace(answers=found)

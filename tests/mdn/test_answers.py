@@ -1,14 +1,12 @@
-"""From proposals to answers: descents end at the target, and polish goes down to a minimum."""
+"""From proposals to answers: descents end at the target, and what is left is made exact."""
 
 import numpy as np
 import pytest
 
-from finlab.allocation.levenberg_marquardt import refine
 from finlab.arrays import Array
 from finlab.layout import FinModelSpec, Layout, random_layout
 from finlab.mdn.answers import Answers, Steps, follow, ranked, refined
 from finlab.mdn.descent import descend, wrench
-from finlab.mdn.polish import polish
 from finlab.mdn.robot import EffortRobot, effort_robot
 from finlab.physics import plant_of
 
@@ -42,21 +40,6 @@ def test_descents_end_near_the_target_with_less_effort_than_at_first(n: int, lim
     assert np.median(missed) < 2e-3 and (missed < 0.05).mean() > (0.9 if limits == "nominal" else 0.6)
 
 
-@pytest.mark.parametrize("n", [3, 5, 8])
-def test_polish_is_as_exact_and_never_dearer_and_ends_at_a_minimum(n: int) -> None:
-    robot = robot_of(n)
-    target, command = targets_of(robot, 12)
-    start = refine(robot.commands, target, command, 0)
-    found = polish(robot.commands, robot.effort, target, start, 60)
-    found = refine(robot.commands, target, found.command, 1)
-    assert (found.command >= robot.plant.lower).all() and (found.command <= robot.plant.upper).all()
-    assert found.error.max() < 1e-6
-    spent, before = robot.effort(found.command), robot.effort(command)
-    assert (spent <= before * (1.0 + 1e-6)).all() and spent.sum() < 0.98 * before.sum()
-    again = polish(robot.commands, robot.effort, target, found, 20)
-    assert np.median(robot.effort(again.command) / spent) > 0.999, "nothing is left to gain"
-
-
 def test_answers_are_exact_and_the_cheapest_comes_first() -> None:
     robot = robot_of(6)
     target, _ = targets_of(robot, 3)
@@ -67,7 +50,7 @@ def test_answers_are_exact_and_the_cheapest_comes_first() -> None:
     for error, effort in zip(found.error, found.effort, strict=True):
         assert (np.diff(effort[error <= robot.exact]) >= 0.0).all()
     # Each of a batch is answered as if it were alone.
-    alone = follow(robot, target[1:2], random_forces(robot, 72).reshape(3, 24, 6)[1:2], 5, Steps(each=True))
+    alone = follow(robot, target[1:2], random_forces(robot, 72).reshape(3, 24, 6)[1:2], 5, Steps())
     np.testing.assert_allclose(alone.effort[0, 0], found.effort[1, 0], rtol=5e-3)
 
 
@@ -83,7 +66,7 @@ def test_where_none_is_exact_the_cheapest_of_the_nearest_is_first() -> None:
 def test_hopeless_targets_are_left_where_they_are_nearest() -> None:
     robot = robot_of(4)
     target, command = targets_of(robot, 2)
-    far = refined(robot, 50.0 * target, command[:, None], np.zeros((2, 1), int), Steps(first=10))
+    far = refined(robot, 50.0 * target, command[:, None], np.zeros((2, 1), int), Steps(commands=10))
     assert np.isfinite(far.command).all() and (far.error > 1.0).all()
 
 
