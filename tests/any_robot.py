@@ -10,12 +10,11 @@ from finlab.allocation import Allocation, Allocator, BatchAllocation
 from finlab.allocation.method import Method
 from finlab.allocation.methods import LEARNED, Checkpoint, MethodChoice, checked_settings, choose_method
 from finlab.allocation.modes import Mode
-from finlab.allocation.settings import AimSettings, Settings
+from finlab.allocation.settings import Settings
 from finlab.allocation.solution import Candidates
 from finlab.layout import Layout
 from finlab.networks.checkpoint import read_normalization, resolve_checkpoint
 from finlab.networks.normalization import Normalization
-from finlab.physics.objective import Name
 
 
 class AnyRobot:
@@ -42,11 +41,6 @@ class AnyRobot:
     @property
     def settings(self) -> Settings:
         return self.choice.settings
-
-    @property
-    def objective(self) -> Name:
-        assert isinstance(self.settings, AimSettings)
-        return self.settings.objective
 
     def with_settings(self, **changes: Any) -> "AnyRobot":
         other = copy(self)

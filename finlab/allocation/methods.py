@@ -114,7 +114,7 @@ def checked_settings(kind: type[Method], settings: dict[str, Any]) -> Settings:
     if "objective" in settings and "objective" not in known:
         raise AllocationError(
             f"objective: method {kind.name!r} has no choice; 'dual' keeps watts least, 'mdn' and 'paper' the "
-            "paper's effort, and 'sqp' and 'ipopt' what they are told"
+            "paper's effort, and 'sqp' what it is told"
         )
     if unknown := [name for name in settings if name not in known]:
         raise AllocationError(

@@ -8,7 +8,6 @@ from numbers import Integral, Real
 from typing import Any, NamedTuple
 
 from finlab.errors import AllocationError
-from finlab.physics.objective import Name
 
 MOST_CANDIDATES = 4096
 """Most candidates that may be drawn; more would keep a robot from answering."""
@@ -89,10 +88,3 @@ def _within(setting: "Field[Any]", limits: Range, value: Any) -> float | None:
     if right and limits.low <= value <= limits.high and not (limits.above and value == limits.low):
         return int(value) if whole else float(value)
     raise AllocationError(f"{setting.name}: expected {limits}, got {value!r:.60} ({limits.meaning})")
-
-
-@dataclass(frozen=True)
-class AimSettings(Settings):
-    """What is kept least, for methods that can choose."""
-
-    objective: Name = choice("power", ("power", "effort"), "kept least: watts, or the paper's effort")

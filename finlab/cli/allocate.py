@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from tyro.conf import Positional, UseAppendAction, arg
 
@@ -17,7 +17,6 @@ def allocate(
     wrench: Annotated[Wrench, arg(metavar="FX FY FZ TX TY TZ")],
     failed: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME")] = (),
     method: Annotated[str, arg(metavar="NAME")] = "dual",
-    objective: Literal["power", "effort"] | None = None,
     robust: Annotated[float | None, arg(metavar="W")] = None,
     checkpoint: Annotated[str | None, arg(metavar="NAME|FOLDER")] = None,
     policy: Annotated[str, arg(metavar="NAME")] = "closest",
@@ -38,7 +37,6 @@ def allocate(
         wrench: target in the body frame [N, N m].
         failed: name of a fin that does not work.
         method: dual, mdn, paper, qp, sqp, px4, ardusub, analytic or ipopt.
-        objective: what is kept least, power in watts (the default) or the paper's effort.
         robust: for method dual: watts that an expected error of 1 % of the yardstick is worth.
         checkpoint: trained checkpoint; the shipped one of the method by default.
         policy: for a wrench out of reach: closest, direction (same direction, scaled down) or priority.
@@ -60,8 +58,7 @@ def allocate(
 
     check_json_file(json)
     robot = open_robot(layout)
-    told: dict[str, Any] = {"objective": objective, "robust": robust}
-    options = {name: value for name, value in told.items() if value is not None}
+    options: dict[str, Any] = {} if robust is None else {"robust": robust}
     allocator = Allocator(robot.layout, method, checkpoint=checkpoint, **options)
     answer = policy_from(policy, axis_weights, priority)
     damage = Health.parse(health, stuck, running)

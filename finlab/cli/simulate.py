@@ -7,7 +7,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional, UseAppendAction, arg
 
@@ -36,7 +36,6 @@ def simulate(
     monitor: bool = False,
     learn: bool = False,
     method: Annotated[str, arg(metavar="NAME")] = "dual",
-    objective: Literal["power", "effort"] = "power",
     duration: Annotated[float | None, arg(metavar="SECONDS")] = None,
     plant: Annotated[str, arg(metavar="NAME")] = "mean",
     current: Annotated[tuple[float, float, float], arg(metavar="VX VY VZ")] = (0.0, 0.0, 0.0),
@@ -64,7 +63,6 @@ def simulate(
         learn: every minute fit the fins' strengths and directions to the last four minutes of the swim, and
             allocate with them from then on; for laws of fins, and methods that take any shaft.
         method: dual, mdn, paper, qp, sqp, px4, ardusub, analytic or ipopt.
-        objective: what the method keeps least: power in watts, or effort, the paper's J_en.
         duration: time for a shipped trajectory.
         plant: what the fins really do: mean (the fin law), ripple (within the flapping cycle), flexible (fins
             with soft tips), wake (fins in each other's jets), inflow (thrust falls with speed) or offset
@@ -101,7 +99,7 @@ def simulate(
             from finlab.control import FaultMonitor
             from finlab.evaluation.method_specs import load_method_spec
 
-            allocator = load_method_spec(method, checkpoint, objective).on(robot.layout)
+            allocator = load_method_spec(method, checkpoint).on(robot.layout)
             learner = _learner(allocator) if learn else None
             loop = ClosedLoop(
                 robot.layout,

@@ -17,9 +17,7 @@ SLOW = ("ipopt",)
 """Methods that take a tenth of a second per target, each from several starts; they run on a subsample."""
 QUICK = ("dual", "mdn", "paper", "qp", "sqp", "px4", "ardusub", "analytic")
 """Methods that run on every target."""
-IN_FORCES = "ipopt-forces"
-"""IPOPT in the space of forces, its best form."""
-NEEDS = {"ipopt": "casadi", IN_FORCES: "casadi"}
+NEEDS = {"ipopt": "casadi"}
 """Packages without which a method cannot run."""
 PATIENCE_S = 60.0
 """Processor time [s] that a target may take where answers count and not times; starts and steps end every
@@ -92,7 +90,7 @@ def load_method_spec(
     """The method of a specification.
 
     Args:
-        name: a method; `ipopt-forces`, in the space of forces; or `file.py:function`, see `own_method`.
+        name: a method, or `file.py:function`, see `own_method`.
         checkpoint: of learned methods, as for `finlab.Allocator`.
         objective: what the methods that can choose keep least; each one's default where None.
 
@@ -103,7 +101,5 @@ def load_method_spec(
     if ":" in name:
         kind = own_method(name)
         return MethodSpec(kind.name, MethodChoice(kind, kind.settings_class()))
-    if name == IN_FORCES:
-        return MethodSpec(name, choose_method("ipopt", space="forces"))
     spec = MethodSpec(name, choose_method(name, checkpoint if name in LEARNED else None))
     return spec if objective is None else spec.with_settings(objective=objective)

@@ -107,16 +107,6 @@ def test_methods_without_a_network(allocate: Callable[..., tuple[int, str, str]]
     assert result["method"] == "analytic" and result["wrench_expected"] is None
 
 
-def test_the_objective_decides_what_is_kept_least(allocate: Callable[..., tuple[int, str, str]]) -> None:
-    usual, power, effort = (
-        answer(allocate("A", *WRENCH, "--json", *option))
-        for option in ((), ("--method", "sqp"), ("--method", "sqp", "--objective", "effort"))
-    )
-    assert usual["power"] == pytest.approx(power["power"], rel=1e-3)
-    assert power["power"] < 0.95 * effort["power"] and effort["effort"] < 0.95 * power["effort"]
-    assert max(power["err_norm"], effort["err_norm"]) < 1e-4
-
-
 def test_at_a_flow_the_plant_at_that_flow_judges(
     allocate: Callable[..., tuple[int, str, str]], tmp_path: Path
 ) -> None:
@@ -188,7 +178,6 @@ def test_shipped_name_works_from_any_folder(
             "has no fin left",
         ),
         (["A", *WRENCH, "--method", "magic"], "method: expected one of dual, mdn, paper"),
-        (["A", *WRENCH, "--objective", "money"], "--objective"),
         (["A", *WRENCH, "--seed", "x"], "--seed"),
         (["missing.yaml", *WRENCH], "neither a file nor a shipped layout"),
         ([".", *WRENCH], "is a folder"),

@@ -3,13 +3,7 @@
 import pytest
 
 from finlab.errors import AllocationError
-from finlab.evaluation.method_specs import load_method_spec, load_method_specs
-
-
-@pytest.mark.parametrize("name", ["sqp", "ipopt"])
-def test_the_objective_is_a_part_of_the_name_or_given_to_all(name: str) -> None:
-    assert load_method_spec(name).choice.settings.objective == "power"
-    assert load_method_spec(name, objective="effort").choice.settings.objective == "effort"
+from finlab.evaluation.method_specs import load_method_specs
 
 
 def test_methods_that_cannot_choose_are_left_as_they_are() -> None:

@@ -11,7 +11,7 @@ import numpy as np
 from finlab.allocation.baselines.pseudo_inverse import PseudoInverse
 from finlab.allocation.levenberg_marquardt import CommandProblem, refine
 from finlab.allocation.method import LeastErrorMethod
-from finlab.allocation.settings import AimSettings, Settings, number
+from finlab.allocation.settings import Settings, number
 from finlab.allocation.solution import Solution
 from finlab.arrays import Array
 from finlab.layout import Layout
@@ -83,7 +83,7 @@ class ModelBased(LeastErrorMethod):
 
 
 @dataclass(frozen=True)
-class TimeLimitedSettings(AimSettings):
+class TimeLimitedSettings(Settings):
     """Settings of a slow method, which ends in time."""
 
     time_limit_s: float = number(

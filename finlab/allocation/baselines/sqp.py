@@ -10,11 +10,11 @@ from scipy.optimize import minimize
 
 from finlab.allocation.baselines.model_based import ModelBased, TimeLimit, TimeLimitedSettings
 from finlab.allocation.levenberg_marquardt import CommandProblem, refine
-from finlab.allocation.settings import number
+from finlab.allocation.settings import choice, number
 from finlab.arrays import Array
 from finlab.layout import layout_effectiveness
 from finlab.physics import Plant
-from finlab.physics.objective import CostMeter, cost_meter
+from finlab.physics.objective import CostMeter, Name, cost_meter
 
 NEAR = 1e-3
 """Normalized error from which on a start is no way to the target: its cost does not matter."""
@@ -33,6 +33,7 @@ Solve = Callable[[Array, Array], Array]
 class SqpSettings(TimeLimitedSettings):
     """Settings of method `sqp`."""
 
+    objective: Name = choice("power", ("power", "effort"), "kept least: watts, or the paper's effort")
     n_steps: int = number(100, 1, 10_000, "most quadratic programs per start")
     n_starts: int = number(
         2, 1, 10_000, "starts per target beside the pseudo-inverse's: the middle of the limits, random ones"

@@ -50,7 +50,7 @@ def run(
         objectives: power, effort or both.
         layouts: of each split.
         targets: on each layout.
-        starts: random starts of method ipopt for each target; robots with tables get twice as many, of sqp.
+        starts: random starts of method ipopt for each target; twice as many of sqp.
         checkpoint: of the learned methods, a shipped name or a folder.
         seed: of the cases and of the starts.
     """
@@ -99,12 +99,12 @@ def _rows(
 
 
 def yardstick(layout: Layout, objective: Name, starts: int) -> MethodSpec:
-    """Who finds the least cost of a robot's answers: IPOPT, or of tables, which have no formula, SLSQP, from
-    the pseudo-inverse's answer and many random commands; IPOPT in the space of forces where actuators are no
-    fins."""
+    """Who finds the least cost of a robot's answers: IPOPT in the space of forces; of effort and of tables
+    SLSQP, from the pseudo-inverse's answer and twice as many random commands."""
     tables = layout.is_of_fins and any(fin.model.type == "table" for fin in layout.fins)
-    method = load_method_spec("sqp" if tables else "ipopt", objective=objective)
-    return method.with_settings(n_starts=2 * starts if tables else starts, time_limit_s=PATIENCE_S)
+    by_commands = tables or objective == "effort"
+    method = load_method_spec("sqp" if by_commands else "ipopt", objective=objective)
+    return method.with_settings(n_starts=2 * starts if by_commands else starts, time_limit_s=PATIENCE_S)
 
 
 def _answers(
@@ -154,7 +154,7 @@ experiment = Experiment(
     ),
     run=run,
     note=(
-        "The yardstick is the cheapest exact end of many starts of `ipopt`, of `sqp` where fins are tables: "
+        "The yardstick is the cheapest exact end of many starts of `ipopt`, of `sqp` for effort and tables: "
         "solvers that know nothing of how `dual` and `mdn` search. Tracked: "
         f"error up to {TRACKED:g} by the plant. Effort is the paper's J_en."
     ),

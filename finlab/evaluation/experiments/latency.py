@@ -1,7 +1,6 @@
 """How long one call takes: near and far from the limits of robots, out of reach and from tick to tick.
 
-Methods answer the same targets in one run, the default one beside IPOPT in the space of forces, which is
-its best form. All times are the processor's.
+Methods answer the same targets in one run, the default one beside IPOPT. All times are the processor's.
 """
 
 import math
@@ -16,7 +15,7 @@ from finlab.allocation.allocation import Allocation
 from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.evaluation.experiment import Experiment
-from finlab.evaluation.method_specs import IN_FORCES, MethodSpec, can_run, load_method_spec, load_method_specs
+from finlab.evaluation.method_specs import MethodSpec, can_run, load_method_spec, load_method_specs
 from finlab.evaluation.paper_figures import paper_figures
 from finlab.evaluation.progress import progress
 from finlab.evaluation.report.document import Column, Row
@@ -56,7 +55,7 @@ class Timed(NamedTuple):
 
 def run(
     robots: tuple[str, ...] = ("fins-4", "fins-8", "thrusters-4", "thrusters-8"),
-    methods: tuple[str, ...] = (REFERENCE, IN_FORCES),
+    methods: tuple[str, ...] = (REFERENCE, "ipopt"),
     reach: tuple[float, ...] = (0.3, 0.9, 0.98, 1.5),
     calls: int = 200,
     budget: float = 2.0,
@@ -67,7 +66,7 @@ def run(
 
     Args:
         robots: fins-N or thrusters-N, random ones of so many.
-        methods: names as in eval wrench, ipopt-forces; left out where their package is missing.
+        methods: names as in eval wrench; left out where their package is missing.
         reach: targets over the most that the robot gives in their direction.
         calls: of each method.
         budget: seconds of the processor after which a slow method stops.
@@ -201,12 +200,11 @@ experiment = Experiment(
         "Whole calls of allocate, one target each, one after the other. Reach: the most that a robot gives "
         "in the direction of the target; beyond it, methods answer with the nearest wrench. Next tick: "
         f"targets wander at {AT:g} of reach, and the command before is known, whose rates `dual` and `mdn` "
-        "alone keep to. `ipopt-forces` solves for the forces. Power: where both "
-        "deliver."
+        "alone keep to. Power: where both deliver."
     ),
     quick={"robots": ("fins-4", "thrusters-8"), "calls": 20, "budget": 0.5},
     full={
-        "methods": (REFERENCE, "mdn", "paper", "analytic", "qp", "sqp", "px4", IN_FORCES),
+        "methods": (REFERENCE, "mdn", "paper", "analytic", "qp", "sqp", "px4", "ipopt"),
         "budget": 1.0,
     },
     printed=_printed,

@@ -15,7 +15,6 @@ from finlab.evaluation.statistics.bootstrap import mean_interval, share_interval
 from finlab.layout import Layout
 from finlab.layout.load import layout_and_failed
 from finlab.physics import plant_of
-from finlab.physics.objective import Name as Objective
 
 SUCCESS_LEVELS = (0.01, 0.5)
 """Levels t of `success_t`, the share of targets with `err_norm <= t`."""
@@ -43,7 +42,6 @@ def run(
     layouts: int = 100,
     targets: int = 1000,
     subsample: int = 10,
-    objective: Objective = "power",
     checkpoint: str | None = None,
     seed: int = 0,
 ) -> list[Row]:
@@ -59,13 +57,12 @@ def run(
         layouts: of each split.
         targets: on each layout.
         subsample: ipopt answers only the first so many of each layout; column n says how many.
-        objective: what methods that can choose keep least.
         checkpoint: of the learned methods, a shipped name or a folder.
         seed: of all draws.
     """
     sets = _cases(layout, split, layouts, targets, seed)
     usual = ("dual", "paper") if layout is None else installed_methods(layout_and_failed(layout)[0])
-    specs = load_method_specs(methods or usual, checkpoint, objective, patient=True)
+    specs = load_method_specs(methods or usual, checkpoint, patient=True)
     return [
         {"split": name, "method": method, "n": len(found["layout"]), "scored_by": "plant", **figures(found)}
         for name, cases in sets.items()

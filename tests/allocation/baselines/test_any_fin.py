@@ -10,12 +10,10 @@ import numpy as np
 import pytest
 
 from finlab.allocation import Allocator
-from finlab.allocation.baselines.ipopt import Ipopt, IpoptSettings
-from finlab.allocation.yardstick import yardstick
 from finlab.errors import AllocationError
 from finlab.layout import Fin, FinModelSpec, Layout, Limits, load_layout
 from finlab.physics import make_law, plant_of
-from finlab.physics.objective import Name, cost_meter
+from finlab.physics.objective import Name
 from tests.any_robot import AnyRobot
 from tests.exhaustive import crossed
 
@@ -120,7 +118,7 @@ def robot(models: list[FinModelSpec]) -> Layout:
 def make(method: str, objective: Name) -> AnyRobot:
     if method == "ipopt":
         pytest.importorskip("casadi", reason="method ipopt is an optional extra")
-    aim = {"objective": objective} if method in EXACT else {}
+    aim = {"objective": objective} if method == "sqp" else {}
     return AnyRobot(method, **aim, **FEW_STARTS.get(method, {}))
 
 
@@ -132,8 +130,7 @@ def test_every_method_on_every_fin(
     method: str, name: str, objective: Name, model: Callable[[str], list[FinModelSpec]]
 ) -> None:
     layout = robot(model(name))
-    by_table = method == "ipopt" and name not in FORMULAS
-    plant, allocator = plant_of(layout), make(method, "power" if by_table else objective)
+    plant, allocator = plant_of(layout), make(method, objective)
     target = plant.wrench(plant.lower + np.array([0.7, 0.55, 0.4]) * plant.width)
     for asked in (target, 100.0 * target):
         answer = allocator.allocate(layout, asked)
@@ -150,62 +147,26 @@ def test_every_method_on_every_fin(
             assert answer.err_norm < 0.5
 
 
-@pytest.mark.parametrize(
-    ("name", "method"),
-    [*((name, "sqp") for name in ("drag", "soft", "noisy table with power", "mixed")), ("soft", "ipopt")],
-)
+@pytest.mark.parametrize("name", ["drag", "soft", "noisy table with power", "mixed"])
 def test_each_objective_is_kept_lower_by_its_own_setting(
-    method: str, name: str, model: Callable[[str], list[FinModelSpec]]
+    name: str, model: Callable[[str], list[FinModelSpec]]
 ) -> None:
     """On average over a few targets: less power with `power`, less effort with `effort`."""
     layout = robot(model(name))
     plant = plant_of(layout)
     targets = 0.5 * plant.wrench(plant.sample(np.random.default_rng(1), (3,)))
     sparing, easy = (
-        make(method, objective).allocate_batch(layout, targets) for objective in ("power", "effort")
+        make("sqp", objective).allocate_batch(layout, targets) for objective in ("power", "effort")
     )
     assert sparing.power.mean() <= 1.001 * easy.power.mean()
     assert easy.effort.mean() <= 1.001 * sparing.effort.mean()
 
 
-@pytest.mark.parametrize(
-    ("objective", "name"),
-    crossed(["power", "effort"], ["drag", "lighthill", "soft"], every=3),
-)
-def test_ipopt_minimizes_what_the_plant_says(
-    name: str, objective: Name, model: Callable[[str], list[FinModelSpec]]
-) -> None:
-    """The function that is minimized and its gradient, against the plant's."""
-    pytest.importorskip("casadi", reason="method ipopt is an optional extra")
-    layout, settings = robot(model(name)), IpoptSettings(objective=objective)
-    method = Ipopt(layout, settings, yardstick(layout))
-    plant, sigma, weight = plant_of(layout), method.sigma, method._weight
-    target, at = 0.4 * plant.wrench(plant.upper), plant.sample(np.random.default_rng(4), (2,))
-    meter, asked = cost_meter(method.aim, plant), method._solver.get_function("nlp_grad_f")
-    if objective == "power":  # ten usual loads
-        assert weight * plant.power(plant.upper).max() == pytest.approx(1e-3)
-    for command in at:
-        value, slope = asked(command.ravel(), target)
-        wrench, jacobian = plant.linearize(command)
-        residual = (wrench - target) / sigma
-        total = residual @ residual + weight * meter(command[None])[0]
-        assert float(value) == pytest.approx(float(total), rel=1e-9)
-        by = 2.0 * (residual / sigma) @ jacobian + weight * meter.gradient(command[None])[0].ravel()
-        np.testing.assert_allclose(np.array(slope).ravel(), by, rtol=1e-6, atol=1e-8)
-
-
-def test_of_tables_ipopt_keeps_power_least_alone(model: Callable[[str], list[FinModelSpec]]) -> None:
-    pytest.importorskip("casadi", reason="method ipopt is an optional extra")
-    with pytest.raises(AllocationError, match="of a force table it keeps power least"):
-        Allocator(robot(model("noisy table with power")), "ipopt", objective="effort")
-
-
-@pytest.mark.parametrize("method", EXACT)
-def test_what_is_no_objective_is_refused(method: str) -> None:
+def test_what_is_no_objective_is_refused() -> None:
     with pytest.raises(AllocationError, match="objective: expected one of power, effort, got 'thrift'"):
-        AnyRobot(method, objective="thrift")
+        AnyRobot("sqp", objective="thrift")
     with pytest.raises(AllocationError, match="knows the settings .*objective"):
-        AnyRobot(method, price=1.0)
+        AnyRobot("sqp", price=1.0)
 
 
 def test_settings_are_told_and_changed_like_any_other() -> None:

@@ -94,14 +94,14 @@ def test_latency_compares_methods_on_the_same_targets(monkeypatch: pytest.Monkey
     pytest.importorskip("casadi")
     monkeypatch.setattr("finlab.evaluation.experiments.latency.LAYOUTS", 2)
     monkeypatch.setattr("finlab.evaluation.experiments.latency.TARGETS", 5)
-    names = ("dual", "analytic", "ipopt-forces", "px4")
+    names = ("dual", "analytic", "ipopt", "px4")
     sizes = {"robots": ("fins-3", "thrusters-7"), "reach": (0.9, 1.5), "calls": 6, "seed": 4711}
     rows = load_experiment("latency").rows(methods=names, **sizes)
     found = by(rows, "robot", "call", "method")
     assert len(rows) == 3 * 3 + 3 * 4  # px4 knows thrusters alone
     assert all(0 < row["p50_ms"] <= row["p99_ms"] for row in rows)
     for robot in sizes["robots"]:
-        for method in ("dual", "ipopt-forces"):
+        for method in ("dual", "ipopt"):
             near, beyond = (found[robot, f"{share} of reach", method] for share in (0.9, 1.5))
             assert (near["delivered"], beyond["delivered"]) == (1.0, 0.0)
             assert near["power_over_dual"] == pytest.approx(1.0, abs=2e-3)
@@ -116,7 +116,7 @@ def test_latency_compares_methods_on_the_same_targets(monkeypatch: pytest.Monkey
 def test_ipopt_in_the_space_of_forces_misses_no_more_and_takes_no_more() -> None:
     pytest.importorskip("casadi")
     for case in make_split("ood-fins", 2, 3, 8):
-        ours, theirs = (load_method_spec(each).on(case.layout) for each in ("dual", "ipopt-forces"))
+        ours, theirs = (load_method_spec(each).on(case.layout) for each in ("dual", "ipopt"))
         best, found = ours.allocate_batch(case.targets), theirs.allocate_batch(case.targets)
         assert found.reachable.all()
         np.testing.assert_allclose(found.power, best.power, rtol=2e-3)
