@@ -299,12 +299,14 @@ class ClosedLoop:
         return whole(expected)
 
     def _given(self) -> Array:
-        """Wrench (6,) over the last period, if the actuators do what they were commanded [N, N m]."""
+        """Wrench (6,) over the last period, if the actuators that are not taken for lost do what they were
+        commanded [N, N m]."""
         if self._command is None or not self.controller.needs_given:
             return NO_WRENCH
         believed = self._believed
         believed.step(self._command, self.period_s)
         force = self._plant.force(believed.command, flow=self._flow) * believed.pushes[:, None]
+        force[[self.layout.index(name) for name in self.damage.failed]] = 0.0
         before, self._gave = self._gave, force.ravel() @ self._plant.effectiveness.reshape(-1, 6)
         return 0.5 * (before + self._gave)
 
