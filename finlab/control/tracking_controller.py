@@ -23,7 +23,7 @@ from finlab.layout.angles import wrapped
 from finlab.vehicle.actuator_motion import following_delay
 from finlab.vehicle.body import complete_body, dynamics_of
 
-BY_FORCES, BY_RUDDERS = (1.08, 0.756, 0.39), (0.75, 0.24, 0.045)
+BY_FORCES, BY_RUDDERS = (0.95, 0.756, 0.37), (0.75, 0.24, 0.045)
 """Bandwidths of velocities, heading and path times the delay; a robot that rudders steer has to turn before
 it goes elsewhere."""
 LARGEST = 0.7
@@ -69,8 +69,8 @@ def gains_for(layout: Layout) -> TrackingGains:
     """The gains for one robot, by one rule.
 
     The slowest actuator and what is behind it (the sensors, the period) are a delay in every loop. Of the
-    inverse of that delay, velocities close at 1.08, the heading 1.4 times slower than they, and the path
-    round it 1.9 times slower than the heading; of robots that rudders steer see `BY_RUDDERS`."""
+    inverse of that delay, velocities close at 0.95, the heading 1.3 times slower than they, and the path
+    round it twice as slow as the heading; of robots that rudders steer see `BY_RUDDERS`."""
     pace = 1.0 / (following_delay(layout) + BEHIND_S)
     dives = "Ty" in axes_of(layout)
     velocity, heading, path = BY_RUDDERS if dives else BY_FORCES
@@ -122,6 +122,7 @@ class TrackingController:
         self.axes = axes_of(layout)
         self._sways = "Fy" in self.axes
         self._dives = "Ty" in self.axes
+        self._commanded = np.array([axis in self.axes for axis in ("Fx", "Fy", "Fz", "Tz")])
         self.free: tuple[str, ...] = () if self._sways else ("Fy", "Fz") if self._dives else ("Fy",)
         self._of_rudders = LARGEST * (strongest_wrench(layout) - strongest_wrench(layout, 0.0))
         self._most = np.array(self.gains.max_wrench)
@@ -144,16 +145,20 @@ class TrackingController:
         u_wanted, yaw_rate = self._surge_and_turn(now, wanted, setpoint)
         cy, sy = math.cos(now.yaw), math.sin(now.yaw)
         ax, ay, az = setpoint.acceleration.tolist()
-        inertia, drift = self._observer.inertia, now.drift
+        miss = np.array(
+            [
+                u_wanted - now.velocity[0],
+                cy * wanted[1] - sy * wanted[0] - now.velocity[1],
+                wanted[2] - now.world_velocity[2],
+                yaw_rate - now.yaw_rate,
+            ]
+        )
+        ahead = np.array([cy * ax + sy * ay, cy * ay - sy * ax, az, 0.0])
+        # Damping counts at the motion that is wanted: one that the body does not have would speed it up.
+        slowed_by = self._observer.slowed_by
+        drift = now.drift + slowed_by(now.flow) - slowed_by(now.flow + miss)
         result = np.zeros(6)
-        for axis, miss, ahead in (
-            (0, u_wanted - float(now.velocity[0]), cy * ax + sy * ay),
-            (1, cy * float(wanted[1]) - sy * float(wanted[0]) - float(now.velocity[1]), cy * ay - sy * ax),
-            (2, float(wanted[2] - now.world_velocity[2]), az),
-            (3, yaw_rate - now.yaw_rate, 0.0),
-        ):
-            if "FxFyFzTz"[2 * axis : 2 * axis + 2] in self.axes:
-                result[AXES[axis]] = inertia[axis] * (ahead + g.velocity * miss - drift[axis])
+        result[AXES] = self._observer.inertia * (ahead + g.velocity * miss - drift) * self._commanded
         if self._dives:
             result[4] = now.pitch_inertia * (g.velocity * self._pitch_rate(now, wanted) - now.pitch_drift)
         slow = max(1.0 - (float(now.velocity[0]) / CRUISE) ** 2, -MOST_BY_SPEED)
