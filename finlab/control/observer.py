@@ -67,8 +67,6 @@ class Estimate(NamedTuple):
     """Velocity (3,) over ground in the body frame [m/s]."""
     yaw_rate: float
     """[rad/s]."""
-    flow: Array
-    """Its motion (4,) through the water: surge, sway, heave [m/s] and yaw rate [rad/s]."""
     world_velocity: Array
     """The velocity (3,) in the world [m/s]."""
     current: Array
@@ -179,7 +177,10 @@ class MotionObserver:
         """The state over one period, and how much less is known of it."""
         dt, state, transition = self._dt, self._state, self._transition
         cosine, sine = math.cos(before.yaw), math.sin(before.yaw)
-        surge, sway, heave, yaw = before.flow.tolist()
+        c, d = state[CURRENT].tolist()
+        flow = state[MOTION].copy()
+        flow[:2] -= cosine * c + sine * d, cosine * d - sine * c
+        surge, sway, heave, yaw = flow.tolist()
         jacobian = damping_jacobian(self._dynamics, (surge, sway, heave, 0.0, 0.0, yaw))
         kept = np.exp(-dt * np.array([jacobian[k] for k in AXES]))
         transition[range(4), range(4)] = kept
@@ -215,10 +216,8 @@ class MotionObserver:
         drift = np.array([jacobian[7] + by_surge, jacobian[8], jacobian[9] + by_heave, jacobian[12] + by_yaw])
         velocity, current = self._state[:3].copy(), self._state[CURRENT].copy()
         world = in_world(velocity, roll, pitch, yaw)
-        cosine, sine = math.cos(yaw), math.sin(yaw)
-        flow = self._state[MOTION] - [cosine * c + sine * d, cosine * d - sine * c, 0.0, 0.0]
         pitching = float(m.rates[1]), jacobian[11], self._vehicle.inertia[4]
-        return Estimate(position, roll, pitch, yaw, velocity, r, flow, world, current, *pitching, drift)
+        return Estimate(position, roll, pitch, yaw, velocity, r, world, current, *pitching, drift)
 
 
 def strongest_wrench(layout: Layout, speed: float = CRUISE) -> Array:

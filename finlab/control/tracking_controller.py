@@ -23,7 +23,7 @@ from finlab.layout.angles import wrapped
 from finlab.vehicle.actuator_motion import following_delay
 from finlab.vehicle.body import complete_body, dynamics_of
 
-BY_FORCES, BY_RUDDERS = (0.95, 0.756, 0.37), (0.75, 0.24, 0.045)
+BY_FORCES, BY_RUDDERS = (1.0, 0.756, 0.38), (0.75, 0.24, 0.045)
 """Bandwidths of velocities, heading and path times the delay; a robot that rudders steer has to turn before
 it goes elsewhere."""
 LARGEST = 0.7
@@ -69,7 +69,7 @@ def gains_for(layout: Layout) -> TrackingGains:
     """The gains for one robot, by one rule.
 
     The slowest actuator and what is behind it (the sensors, the period) are a delay in every loop. Of the
-    inverse of that delay, velocities close at 0.95, the heading 1.3 times slower than they, and the path
+    inverse of that delay, velocities close at 1.0, the heading 1.3 times slower than they, and the path
     round it twice as slow as the heading; of robots that rudders steer see `BY_RUDDERS`."""
     pace = 1.0 / (following_delay(layout) + BEHIND_S)
     dives = "Ty" in axes_of(layout)
@@ -154,9 +154,11 @@ class TrackingController:
             ]
         )
         ahead = np.array([cy * ax + sy * ay, cy * ay - sy * ax, az, 0.0])
-        # Damping counts at the motion that is wanted: one that the body does not have would speed it up.
-        slowed_by = self._observer.slowed_by
-        drift = now.drift + slowed_by(now.flow) - slowed_by(now.flow + miss)
+        drift = now.drift.copy()
+        # Damping in yaw counts at the rate that is wanted: one that the body does not have would spin it.
+        rates = np.zeros((2, 4))
+        rates[:, 3] = now.yaw_rate, yaw_rate
+        drift[3] -= np.diff(self._observer.slowed_by(rates)[:, 3])[0]
         result = np.zeros(6)
         result[AXES] = self._observer.inertia * (ahead + g.velocity * miss - drift) * self._commanded
         if self._dives:

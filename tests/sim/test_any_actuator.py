@@ -1,5 +1,7 @@
 """Robots of thrusters, azimuths, rudders and fins swim, and lose some of them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -48,6 +50,24 @@ def test_a_thruster_breaks_and_the_robot_keeps_its_path(heavy: Layout, kind: str
         heavy, Allocator(heavy), make_trajectory("circle"), failures=[fault], announced=announced, seed=2
     )
     assert error(loop.run()) < 0.08
+
+
+def test_a_loss_that_nobody_announced_costs_a_tenth_of_the_error_at_most(heavy: Layout) -> None:
+    path = make_trajectory("lissajous")
+    lost = FinFault(heavy.names[0], 0.5 * path.duration_s)
+    whole = ClosedLoop(heavy, Allocator(heavy), path, seed=0).run()
+    loop = ClosedLoop(heavy, Allocator(heavy), path, failures=[lost], monitor=FaultMonitor(heavy), seed=0)
+    assert error(loop.run()) < 1.1 * error(whole)
+    assert loop.damage.failed == (lost.fin,)
+
+
+def test_a_body_that_is_hardly_damped_in_yaw_is_not_spun(heavy: Layout) -> None:
+    body = replace(heavy.body, quadratic_damping=(*heavy.body.quadratic_damping[:5], 0.15))
+    loop = ClosedLoop(
+        heavy, Allocator(heavy), make_trajectory("lissajous"), truth=replace(heavy, body=body), seed=0
+    )
+    log = loop.run()
+    assert error(log) < 0.06 and np.abs(log.motion[:, 5]).max() < 2.0
 
 
 def test_a_torn_thruster_that_is_known_is_asked_for_more(heavy: Layout) -> None:
