@@ -23,6 +23,7 @@ def allocate(
     axis_weights: Annotated[Wrench | None, arg(metavar="W1 ... W6")] = None,
     priority: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="AXES")] = (),
     health: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME=SHARE")] = (),
+    torn: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME=SHARE")] = (),
     stuck: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME=DEG")] = (),
     running: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME=A,F,DEG")] = (),
     flow: Annotated[Flow | None, arg(metavar="VX VY VZ WX WY WZ")] = None,
@@ -42,8 +43,9 @@ def allocate(
         policy: for a wrench out of reach: closest, direction (same direction, scaled down) or priority.
         axis_weights: for `closest`: weight of each axis of the error.
         priority: for `priority`: a group of axes with commas between, most important first, such as Fz,Tz.
-        health: a weak fin: share that is left of its largest amplitude and frequency, such as bow=0.5.
-        stuck: a fin that no longer turns: the zero direction at which it stays [deg].
+        health: a weak actuator: share that is left of its limits, such as bow=0.5.
+        torn: a fin or rudder that gives a share of its force at every command.
+        stuck: a fin or azimuth that no longer turns: the angle at which it stays [deg].
         running: a fin that no longer listens: the command that it keeps [rad, Hz, deg].
         flow: velocity of the robot relative to the water, body frame [m/s, rad/s]; it is at rest by default.
         bound: tell as well the power [W] that no answer can undercut.
@@ -61,7 +63,7 @@ def allocate(
     options: dict[str, Any] = {} if robust is None else {"robust": robust}
     allocator = Allocator(robot.layout, method, checkpoint=checkpoint, **options)
     answer = policy_from(policy, axis_weights, priority)
-    damage = Health.parse(health, stuck, running)
+    damage = Health.parse(health, torn, stuck, running)
     lost = robot.with_failed(failed)
     result = allocator.allocate(wrench, failed=lost, policy=answer, health=damage, flow=flow, seed=seed)
     lines = [str(result)]

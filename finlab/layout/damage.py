@@ -109,18 +109,21 @@ class Health:
         return cls(tuple(shares.items()), tuple(angles.items()), tuple(kept.items()), tuple(thrusts.items()))
 
     @classmethod
-    def parse(cls, weak: Sequence[str], stuck: Sequence[str], running: Sequence[str]) -> Health | None:
+    def parse(
+        cls, weak: Sequence[str], torn: Sequence[str], stuck: Sequence[str], running: Sequence[str]
+    ) -> Health | None:
         """Health from texts, angles in degrees: `bow=0.5`, `bow=20`, `bow=0.3,1.0,20`; None where all are
         whole.
 
         Raises:
             AllocationError: a text that says something else.
         """
-        if not (weak or stuck or running):
+        if not (weak or torn or stuck or running):
             return None
         kept = _named("running", running, 3).items()
         return cls.of(
             weak={name: share for name, (share,) in _named("health", weak, 1).items()},
+            thrust={name: share for name, (share,) in _named("torn", torn, 1).items()},
             stuck={name: math.radians(angle) for name, (angle,) in _named("stuck", stuck, 1).items()},
             running={name: (a, f, math.radians(angle)) for name, (a, f, angle) in kept},
         )

@@ -210,9 +210,7 @@ class Layout(Checked):
         lost = set(self.indices(names))
         if len(lost) == self.n:
             what = "fin" if self.is_of_fins else "actuator"
-            raise LayoutError(
-                f"layout {self.name} has no {what} left once {', '.join(names)} are lost; keep one"
-            )
+            raise LayoutError(f"layout {self.name} has no {what} left once all are lost; repair one")
         left = tuple(part for i, part in enumerate(self.actuators) if i not in lost)
         jets = self.interaction and self.interaction.among([part.name for part in left])
         return replace(self, actuators=left, interaction=jets)

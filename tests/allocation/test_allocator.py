@@ -90,7 +90,7 @@ def test_refuses_unknown_fins_and_names_those_there_are(method: AnyRobot) -> Non
 
 
 def test_refuses_a_robot_without_a_working_fin(method: AnyRobot) -> None:
-    with pytest.raises(LayoutError, match="no fin left once bow, left, stern are lost"):
+    with pytest.raises(LayoutError, match="no fin left once all are lost"):
         method.allocate(ROBOT, SURGE, failed=["bow", "left", "stern"])
 
 

@@ -111,7 +111,7 @@ def test_a_tail_begins_with_its_thrust_ahead_and_keeps_an_arc_it_has() -> None:
         turns.append(session.state.layout)
     for before, after in pairwise(turns):
         assert part_of(after, "fin").frame[1] == pytest.approx(part_of(before, "fin").frame[1])
-    session.set_zero((0.0, 0.0, 5.0))
+    session.turn_about((0.0, 0.0, 5.0))
     assert part_of(session.state.layout, "fin").frame[1] == pytest.approx((0.0, 0.0, 1.0))
 
 

@@ -112,7 +112,7 @@ def test_every_widget_survives_a_fault_in_what_it_does(
         ("webapp.panels.hull_panel.hull_of", "Design", None),
         ("webapp.panels.files_tab.command_line", "Export", None),
         ("webapp.panels.swim_tab.axis_reach", "Simulate", None),
-        ("webapp.panels.fin_model.model_card", "Design", "front_left"),
+        ("webapp.panels.actuator_model.model_card", "Design", "front_left"),
     ],
 )
 def test_every_widget_survives_a_fault_in_what_is_written(

@@ -14,12 +14,14 @@ import pytest
 from finlab.allocation import Allocator
 from finlab.errors import DataError, FinlabError, LayoutError
 from finlab.fit import outliers
-from finlab.layout import Layout, load_layout
+from finlab.layout import Layout, Thruster, load_layout
 from finlab.layout.force_table_file import DOUBT, table_bytes
+from finlab.layout.thrust_model import PowerTable
 from tests.fit.cell import columns_of, commands, measured, soft, write
+from tests.fit.test_thruster_fit import T200
 from tests.webapp.loops import page_of
 from webapp.markup.fit_card import fit_card
-from webapp.panels.fin_model import model_card
+from webapp.panels.actuator_model import model_card
 from webapp.session import Session, files
 from webapp.session.companions import archive_of, read_archive, stored_table
 from webapp.tasks import fitting
@@ -108,11 +110,30 @@ def test_a_noisy_file_becomes_the_fins_model_and_undo_takes_it_off(tmp_path: Pat
     assert answer.err_norm < 1e-6
     fitting.put_on_all()
     assert opened.models == ["table"] * 4 and opened.session.history.undo_name == "Fit 3 actuators"
-    with pytest.raises(FinlabError, match="no other fin"):
+    with pytest.raises(FinlabError, match="no other actuator"):
         fitting.put_on_all()
     opened.session.undo()
     opened.session.undo()
     assert opened.session.state == before
+
+
+def test_a_bench_table_becomes_a_thruster_and_goes_on_those_like_it(worker: Worker) -> None:
+    opened = Opened(worker)
+    opened.session.open_layout(load_layout("bluerov2"))
+    before, first = opened.session.state.layout, opened.session.state.layout.actuators[0]
+    opened.fitting.start(first.name, "t200.csv", T200.read_bytes())
+    until(lambda: opened.session.state.layout != before)
+    found, part = opened.fitting.findings, opened.session.state.layout.actuators[0]
+    assert found is not None and isinstance(part, Thruster) and isinstance(part.model, PowerTable)
+    assert part.force == (part.model.rows[0][1], part.model.rows[-1][1]) and part.axis == first.axis
+    assert "Power: " in fit_card(found) and "<b>table</b> of" in model_card(part)
+    opened.fitting.put_on_all()
+    alike = [p.model for p in before.actuators].count(first.model)
+    assert [p.model for p in opened.session.state.layout.actuators].count(part.model) == alike
+    opened.session.open_layout(load_layout("torpedo"))
+    rudder = next(p.name for p in opened.session.state.layout.actuators if p.type == "rudder")
+    with pytest.raises(FinlabError, match="is a rudder"):
+        opened.fitting.start(rudder, "t200.csv", b"")
 
 
 def test_a_finished_table_is_recognized(tmp_path: Path, worker: Worker) -> None:
@@ -123,7 +144,7 @@ def test_a_finished_table_is_recognized(tmp_path: Path, worker: Worker) -> None:
     opened.fitting.start("front_left", "fin.csv", table_bytes(path))
     until(lambda: opened.models == ["drag", "table", "table", "drag"])
     found = opened.fitting.findings
-    assert found is not None and found.fit is None and "fin.csv is a finished force table" in fit_card(found)
+    assert found is not None and found.fit is None and "fin.csv is a finished table" in fit_card(found)
     assert opened.session.state.layout.fins[1].model == opened.session.state.layout.fins[2].model
     words = model_card(opened.session.state.layout.fins[1])
     assert "<b>table</b>, fitted to 69 samples" in words and "all round" in words
@@ -207,7 +228,7 @@ def test_a_fin_that_became_another_meanwhile_is_left_alone(tmp_path: Path, worke
     opened.session.open_layout(load_layout("penta"))
     gate.set()
     until(lambda: bool(opened.refused))
-    assert "back_left is no longer the fin that cell.csv was for" in opened.refused[0]
+    assert "back_left is no longer what cell.csv was for" in opened.refused[0]
     assert "table" not in opened.models and opened.fitting.findings is None
 
 

@@ -1,4 +1,4 @@
-"""What a fit of a fin is worth: the verdict first, and what to measure next."""
+"""What a fit is worth: the verdict first, and what to measure next."""
 
 import math
 
@@ -6,6 +6,8 @@ import numpy as np
 from markupsafe import Markup
 
 from finlab.fit.fin_fit import FinFit
+from finlab.fit.thruster_file import summary
+from finlab.fit.thruster_fit import ThrusterFit
 from webapp.markup.html import html, row
 from webapp.markup.words import three_digits
 from webapp.tasks.fitting import Fitted
@@ -14,12 +16,16 @@ MOST_NAMED = 8
 
 
 def fit_card(found: Fitted) -> str:
-    """What came of a file that was dropped on a fin."""
-    name, fin = found.upload.name, found.upload.fin
-    if found.fit is None:
-        said = html("<b>{} is a finished force table.</b> It is on {} as it stands.", name, fin)
+    """What came of a file that was dropped on an actuator."""
+    name, fit = found.upload.name, found.fit
+    if fit is None:
+        said = html("<b>{} is a finished table.</b> It is on {} as it stands.", name, found.upload.part.name)
         return html("<div class='fl said'>{}</div>", said)
-    fit = found.fit
+    if isinstance(fit, ThrusterFit):
+        return html(
+            "<div class='fl'>{}</div>",
+            [html("<div class='said'>{}</div>", _sentence(line)) for line in summary(fit)],
+        )
     if fit.doubts:
         verdict = html("<b class='missing'>Not to be trusted: {}.</b>", "; ".join(fit.doubts))
     else:
@@ -54,7 +60,7 @@ def _left_out(fit: FinFit) -> str:
 
 
 def _advice(found: Fitted) -> str:
-    assert found.fit is not None and found.advice is not None
+    assert isinstance(found.fit, FinFit) and found.advice is not None
     force = np.linalg.norm(found.fit.predict(found.advice)[0], axis=-1)
     rows = [
         row(

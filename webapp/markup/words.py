@@ -141,9 +141,11 @@ def parts_word(layout: Layout) -> str:
 
 
 def damage_words(health: Health | None, name: str) -> str:
-    """What is wrong with a fin that still works: `weak 50 %, stuck at 30°`; nothing for a whole one."""
+    """What is wrong with an actuator that still works: `weak 50 %, stuck at 30°`; nothing for a whole one."""
     if health is None:
         return ""
-    parts = [f"weak {100 * share:.0f} %" for fin, share in health.weak if fin == name]
-    parts += [f"stuck at {math.degrees(angle):.0f}°" for fin, angle in health.stuck if fin == name]
+    parts = [f"weak {100 * share:.0f} %" for other, share in health.weak if other == name]
+    parts += [f"torn, {100 * share:.0f} % left" for other, share in health.thrust if other == name]
+    parts += [f"stuck at {math.degrees(angle):.0f}°" for other, angle in health.stuck if other == name]
+    parts += ["runs on" for other, _ in health.running if other == name]
     return ", ".join(parts).replace("-", "−")

@@ -1,95 +1,256 @@
-"""What a layout says of the selected fins: place, limits, model, drive. An edit counts for all of them."""
+"""What a layout says of the selected actuators: place, direction, limits, model. An edit counts for all."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 from markupsafe import Markup
 
-from finlab.layout import Fin, Layout
+from finlab.errors import FinlabError
+from finlab.layout import Actuator, Azimuth, Fin, Layout
 from finlab.layout.fin import MAX_AMPLITUDE, MAX_FREQUENCY
-from webapp.handles import add_html
+from finlab.layout.thrust_model import PowerLaw
 from webapp.markup.answer import swatch
 from webapp.markup.html import html
 from webapp.markup.words import listed
 from webapp.page import Page
-from webapp.panels.fin_model import add_fin_model
+from webapp.panels.actuator_model import add_model
+from webapp.session.directions import Vector, axis_names, direction, part_of, pointed
 from webapp.session.state import number
 
-LIMITS = Markup("<div class='fl dim'>Least and most of A, f and the zero direction φ.</div>")
 NOMINAL = Fin("nominal", (0.0, 0.0, 0.0), 0.0)
+SNAPS: dict[str, Vector] = {
+    "+x": (1.0, 0.0, 0.0),
+    "−x": (-1.0, 0.0, 0.0),
+    "+y": (0.0, 1.0, 0.0),
+    "−y": (0.0, -1.0, 0.0),
+    "+z": (0.0, 0.0, 1.0),
+    "−z": (0.0, 0.0, -1.0),
+}
+FIN, FIXED, PODS, RUDDER = ("fin",), ("thruster",), ("azimuth", "tilt"), ("rudder",)
+POINTS = {"axis": "Axis", "shaft": "Shaft", "zero": "Zero"}
+OTHERS = {"fin": "Zero", "rudder": "Leading edge"}
 
 
-def fin_of(selected: str | None, layout: Layout) -> Fin:
-    """The fin that was selected last; a nominal one where none is."""
-    return NOMINAL if selected is None else layout.fins[layout.index(selected)]
+class Box(NamedTuple):
+    """A box for a number, or for two: least and greatest."""
+
+    label: str
+    key: str
+    """Field of the actuator, of its limits or of its law."""
+    types: tuple[str, ...]
+    hint: str
+    step: float = 0.1
+    degrees: bool = False
+    """Whether the field is in radians."""
+    free: bool = False
+    """Whether it may be left empty: nothing is said of it then."""
 
 
-def of_fin(value: Callable[[Fin], Any]) -> Callable[[str | None, Layout], Any]:
-    """What is shown of the fin that was selected last."""
-    return lambda selected, layout: value(fin_of(selected, layout))
+PAIRS = (
+    Box("A [rad]", "amplitude", FIN, f"Least and most, up to {MAX_AMPLITUDE:.2f} rad.", 0.05),
+    Box("f [Hz]", "frequency", FIN, f"Least and most, up to {MAX_FREQUENCY:g} Hz."),
+    Box(
+        "φ [°]",
+        "zero_direction",
+        FIN,
+        "From and to; −180 to 180 is any direction.",
+        5.0,
+        True,
+    ),
+    Box("Force [N]", "force", FIXED, "Least and most along the axis; astern it is negative.", 1.0),
+    Box("Force [N]", "force", PODS, "Least and most; above 0 for one that cannot stop.", 1.0),
+    Box("Arc [°]", "arc", PODS, "Least and greatest angle from zero; −180 to 180 is any.", 5.0, True),
+    Box("Deflection [°]", "deflection", RUDDER, "Least and greatest.", 1.0, True),
+)
+NUMBERS = (
+    Box("Dead band [N]", "dead_band", (*FIXED, *PODS), "Forces smaller than this, but 0, cannot be held."),
+    Box("Turn rate [°/s]", "turn_rate", PODS, "How fast it turns; empty: at once.", 5.0, True, True),
+    Box("Rate [N/s]", "rate", (*FIXED, *PODS), "How fast the force changes; empty: at once.", free=True),
+    Box("Rate [°/s]", "rate", RUDDER, "How fast it turns; empty: at once.", 5.0, True, True),
+    Box("Lag [s]", "time_constant", (*FIXED, *PODS, *RUDDER), "Time to 63 % of a new command.", 0.05),
+    Box("Torque/force [m]", "torque_per_newton", (*FIXED, *PODS), "Reaction torque, signed.", 0.001),
+)
+LAW = (
+    Box("Ahead [W]", "forward", (*FIXED, *PODS), "Power at 1 N; F newtons take it times F^exponent."),
+    Box("Astern [W]", "reverse", FIXED, "The same of a negative force; empty: as ahead.", free=True),
+    Box("Exponent", "exponent", (*FIXED, *PODS), "1.5 is that of an ideal propeller at rest."),
+    Box("Area [m²]", "area", RUDDER, "Of the foil.", 0.001),
+    Box("Aspect ratio", "aspect_ratio", RUDDER, "2 span²/area for a foil on a hull.", free=True),
+    Box("Lift slope [1/rad]", "lift_slope", RUDDER, "Empty: by the aspect ratio.", free=True),
+    Box("Drag", "drag", RUDDER, "Drag coefficient without lift; 0.0065 is NACA 0015.", 0.001),
+    Box("Induced drag", "induced_drag", RUDDER, "Per squared lift; empty: by the aspect ratio.", free=True),
+    Box("Stall [°]", "stall", RUDDER, "Angle to the flow at which it separates.", 1.0, True),
+)
 
 
-def add_fin(page: Page) -> None:
-    """Widgets about the selected fins."""
+def part_shown(selected: str | None, layout: Layout) -> Actuator:
+    """The actuator that was selected last; a nominal fin where none is."""
+    return NOMINAL if selected is None else part_of(layout, selected)
+
+
+def of_part(value: Callable[[Actuator], Any]) -> Callable[[str | None, Layout], Any]:
+    """What is shown of the actuator that was selected last."""
+    return lambda selected, layout: value(part_shown(selected, layout))
+
+
+def add_actuator(page: Page) -> None:
+    """Widgets about the selected actuators."""
     session, gui = page.session, page.gui
 
     def rename(name: str) -> None:
         if session.selected is not None:
             session.rename(session.selected, name)
 
-    def turn(degrees: Any) -> None:
-        session.turn_selected(math.radians(number(degrees, "shaft [°]", -3600.0, 3600.0)))
-
     page.add_html(_headline)
     with gui.add_folder(None) as whole:
         page.bind(gui.add_text("Name", ""), rename, lambda selected: selected or "")
         with gui.add_folder("Place"):
-            about = "x forward, y left, z up, from the centre of gravity."
-            place = gui.add_vector3("Position [m]", (0.0, 0.0, 0.0), step=0.005, hint=about)
-            page.bind_number(place, session.place_selected, of_fin(lambda fin: fin.position))
-            about = "Azimuth of the shaft, 0 is ahead, 90 to the left."
-            shaft = gui.add_slider("Shaft [°]", -180.0, 180.0, 1.0, 0.0, hint=about)
-            page.bind_number(shaft, turn, of_fin(lambda fin: math.degrees(fin.shaft_azimuth)), digits=2)
+            _add_place(page)
         with gui.add_folder("Limits"):
-            _add_limits(page)
-        add_fin_model(page, fin_of)
+            for box in PAIRS:
+                _add_pair(page, box)
+            _add_numbers(page, NUMBERS)
+        with gui.add_folder("Model"):
+            add_model(page, part_shown, partial(_add_numbers, page, LAW))
     page.board.show(whole, visible=lambda selected: selected is not None)
 
 
-def _add_limits(page: Page) -> None:
-    gui, limit = page.gui, page.session.set_value
+def _add_place(page: Page) -> None:
+    session, gui, board = page.session, page.gui, page.board
 
-    def limit_direction(degrees: tuple[Any, Any]) -> None:
-        low, high = (math.radians(number(end, "zero direction [°]", -360.0, 360.0)) for end in degrees)
-        limit("zero_direction", (low, high))
+    def turn(degrees: Any) -> None:
+        session.turn_selected(math.radians(number(degrees, "shaft [°]", -3600.0, 3600.0)))
 
-    add_html(gui, LIMITS)
-    about = f"Least and most, up to {MAX_AMPLITUDE:.2f} rad."
-    box = gui.add_vector2("A [rad]", (0.0, 0.0), step=0.05, hint=about)
-    page.bind_number(box, partial(limit, "amplitude"), of_fin(lambda fin: fin.limits.amplitude))
-    about = f"Least and most, up to {MAX_FREQUENCY:g} Hz."
-    box = gui.add_vector2("f [Hz]", (0.0, 0.0), step=0.1, hint=about)
-    page.bind_number(box, partial(limit, "frequency"), of_fin(lambda fin: fin.limits.frequency))
-    about = "From and to, counter-clockwise; −180 to 180 is any direction."
-    box = gui.add_vector2("φ [°]", (0.0, 0.0), step=5.0, hint=about)
-    ends = of_fin(lambda fin: tuple(math.degrees(end) for end in fin.limits.zero_direction))
-    page.bind_number(box, limit_direction, ends, digits=2)
+    def aim(degrees: tuple[Any, Any]) -> None:
+        turn, rise = (math.radians(number(end, "direction [°]", -3600.0, 3600.0)) for end in degrees)
+        level = math.cos(rise)
+        session.point_selected((level * math.cos(turn), level * math.sin(turn), math.sin(rise)))
+
+    about = "x forward, y left, z up, from the centre of gravity."
+    place = gui.add_vector3("Position [m]", (0.0, 0.0, 0.0), step=0.005, hint=about)
+    page.bind_number(place, session.place_selected, of_part(lambda part: part.position))
+    about = "Azimuth of the shaft, 0 is ahead, 90 to the left."
+    shaft = gui.add_slider("Shaft [°]", -180.0, 180.0, 1.0, 0.0, hint=about)
+    page.bind_number(shaft, turn, of_part(lambda part: math.degrees(_mounting(part) or 0.0)), digits=2)
+    board.show(shaft, visible=of_part(lambda part: _mounting(part) is not None))
+    about = "Force of a thruster, of an azimuth at angle 0, or the shaft out of the hull; any length."
+    way = gui.add_vector3("Axis", (1.0, 0.0, 0.0), step=0.05, hint=about)
+    page.bind_number(way, session.point_selected, of_part(direction))
+    board.show(way, label=of_part(lambda part: POINTS[pointed(part)]))
+    about = "The same: azimuth, 90 is to the left, and how far it rises."
+    page.bind_number(
+        gui.add_vector2("Angles [°]", (0.0, 0.0), step=5.0, hint=about), aim, of_part(_angles), 2
+    )
+    snaps = {word: partial(session.point_selected, vector) for word, vector in SNAPS.items()}
+    page.add_buttons("Snap to", snaps, hint="Ahead, astern, left, right, up, down.")
+    about = "Across that: where a fin pushes at φ = 0, the leading edge, or what a pod turns about."
+    other = gui.add_vector3("Zero", (0.0, 0.0, 0.0), step=0.05, hint=about)
+    page.bind_number(other, session.turn_about, of_part(_other))
+    board.show(
+        other,
+        label=of_part(lambda part: OTHERS.get(part.type, "Turns about")),
+        visible=of_part(lambda part: len(axis_names(part)) > 1 and _mounting(part) is None),
+    )
+
+
+def _mounting(part: Actuator) -> float | None:
+    return part.mounting_angle if isinstance(part, Fin) else None
+
+
+def _angles(part: Actuator) -> tuple[float, float]:
+    """Azimuth and rise of a direction [deg]."""
+    x, y, z = direction(part)
+    return math.degrees(math.atan2(y, x)), math.degrees(math.atan2(z, math.hypot(x, y)))
+
+
+def _other(part: Actuator) -> Vector:
+    """The own axis that is not the direction."""
+    return part.frame[0 if isinstance(part, Azimuth) else 1]
+
+
+def _value(part: Actuator, box: Box) -> Any:
+    """What an actuator has in a box, in its unit; None where nothing is said, or where it has no such box."""
+    holder: Any = part.limits if isinstance(part, Fin) else part
+    if not hasattr(holder, box.key):
+        holder = getattr(part, "model", None)
+    value = getattr(holder, box.key, None) if part.type in box.types else None
+    if value is None or not box.degrees:
+        return value
+    return tuple(map(math.degrees, value)) if isinstance(value, tuple) else math.degrees(value)
+
+
+def _is_there(box: Box) -> Callable[[str | None, Layout], bool]:
+    def there(part: Actuator) -> bool:
+        of_law = box.key in ("forward", "reverse", "exponent")
+        return part.type in box.types and (not of_law or isinstance(getattr(part, "model", None), PowerLaw))
+
+    return of_part(there)
+
+
+def _add_pair(page: Page, box: Box) -> None:
+    def put(ends: tuple[Any, Any]) -> None:
+        checked = (number(end, box.label, -1e6, 1e6) for end in ends)
+        page.session.set_value(box.key, tuple(math.radians(v) if box.degrees else v for v in checked))
+
+    handle = page.gui.add_vector2(box.label, (0.0, 0.0), step=box.step, hint=box.hint, visible=False)
+    page.bind_number(
+        handle, put, of_part(lambda part: _value(part, box) or (0.0, 0.0)), digits=2 + 2 * (not box.degrees)
+    )
+    page.board.show(handle, visible=_is_there(box))
+
+
+def _add_numbers(page: Page, boxes: Sequence[Box]) -> None:
+    for box in boxes:
+        _add_number(page, box)
+
+
+def _add_number(page: Page, box: Box) -> None:
+    """A box for a number; one that may be empty is a box for text."""
+
+    def put(value: Any) -> None:
+        checked = number(value, box.label, -1e6, 1e6)
+        page.session.set_value(box.key, math.radians(checked) if box.degrees else checked)
+
+    def read(text: str) -> None:
+        if not text.strip():
+            page.session.set_value(box.key, None)
+            return
+        try:
+            value = float(text.replace("−", "-"))
+        except ValueError:
+            raise FinlabError(f"{box.label}: expected a number, or nothing, got {text!r:.40}") from None
+        put(value)
+
+    def shown(part: Actuator) -> str:
+        value = _value(part, box)
+        return "" if value is None else f"{value:.6g}"
+
+    handle: Any
+    if box.free:
+        handle = page.gui.add_text(box.label, "", hint=box.hint, visible=False)
+        page.bind(handle, read, of_part(shown))
+    else:
+        handle = page.gui.add_number(box.label, 0.0, step=box.step, hint=box.hint, visible=False)
+        page.bind_number(handle, put, of_part(lambda part: _value(part, box) or 0.0), digits=5)
+    page.board.show(handle, visible=_is_there(box))
 
 
 def _headline(layout: Layout, selection: tuple[str, ...], selected: str | None) -> str:
     if not selection:
-        return Markup("<div class='fl dim'>Press a fin in the list or in the view to see all about it.</div>")
-    if len(selection) == 1:
-        (name,) = selection
-        return html("<div class='fl head'>{}<b>{}</b></div>", swatch(layout.index(name)), name)
+        said = "Press an actuator in the list or in the view to see all about it."
+        return html("<div class='fl dim'>{}</div>", said)
+    parts = [part_of(layout, name) for name in selection]
     badges = Markup().join(swatch(layout.index(name)) for name in selection)
-    differ = differences([layout.fins[layout.index(name)] for name in selection])
+    if len(selection) == 1:
+        head = "<div class='fl head'>{}<b>{}</b> <span class='dim'>{}</span></div>"
+        return html(head, badges, selection[0], parts[0].type)
+    differ = differences(parts)
     said = f"They differ in {differ}. " if differ else "They are alike but for their place. "
     return html(
-        "<div class='fl head'>{}<b>{} fins</b><div class='dim'>{}The boxes show {}; what "
-        "you change counts for all.</div></div>",
+        "<div class='fl head'>{}<b>{} actuators</b><div class='dim'>{}The boxes show {}; what "
+        "you change counts for all that have it.</div></div>",
         badges,
         len(selection),
         said,
@@ -97,13 +258,14 @@ def _headline(layout: Layout, selection: tuple[str, ...], selected: str | None) 
     )
 
 
-def differences(fins: list[Fin]) -> str:
-    """What of some fins is not the same, in words; nothing is said of their places."""
-    parts: dict[str, set[object]] = {
-        "shaft": {round(fin.shaft_azimuth, 6) for fin in fins},
-        "limits": {fin.limits for fin in fins},
-        "model": {fin.model for fin in fins},
-        "drive": {fin.servo for fin in fins},
+def differences(parts: list[Actuator]) -> str:
+    """What of some actuators is not the same, in words; nothing is said of their places."""
+    kinds: dict[str, set[object]] = {
+        "type": {part.type for part in parts},
+        "direction": {tuple(round(v, 6) for v in direction(part)) for part in parts},
+        "limits": {(part.lower, part.upper) for part in parts},
+        "model": {getattr(part, "model", None) for part in parts},
+        "rates": {part.rates for part in parts},
     }
-    differ = [word for word, values in parts.items() if len(values) > 1]
+    differ = [word for word, values in kinds.items() if len(values) > 1]
     return listed(differ) if differ else ""

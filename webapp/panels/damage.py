@@ -1,33 +1,39 @@
-"""Which fins have failed, and what is wrong with the others: a button for each fin, and sliders."""
+"""Which actuators have failed, and what is wrong with the others: a button for each, and sliders."""
 
 import math
 from collections.abc import Callable, Sequence
 from functools import partial, wraps
+from typing import Any
 
-from finlab.layout import Layout
+import numpy as np
+
+from finlab.arrays import Array
+from finlab.layout import Actuator, Fin, Layout
 from finlab.layout.damage import Health
 from webapp.handles import numbered
 from webapp.markup.html import button_colors
 from webapp.page import Page
-from webapp.session.state import STRENGTH_RANGE
+from webapp.session.directions import part_of
+from webapp.session.state import FAULTS, STRENGTH_RANGE
 from webapp.theme import DEAD, css, fin_color, ink
 
 Row = tuple[Sequence[str], Sequence[str], Sequence[str]]
-"""Names of fins, and of those of them that have failed, and that are held."""
+"""Names of actuators, and of those of them that have failed, and that are held."""
+DEGREE = 180.0 / math.pi
 
 
 def add_fin_buttons(
     page: Page, label: str, hint: str, marker: str, act: Callable[[str], object], row: Callable[..., Row]
 ) -> None:
-    """A row of numbers, one for each fin.
+    """A row of numbers, one for each actuator.
 
     Args:
         page: where it stands.
         label: what the numbers do.
         hint: the same at more length.
         marker: its name on the page.
-        act: an intent about the fin of a name.
-        row: which fins there are, as a function of facts.
+        act: an intent about the actuator of a name.
+        row: which there are, as a function of facts.
     """
     names: Sequence[str] = ()
 
@@ -59,50 +65,100 @@ def add_fin_buttons(
 
 
 def add_damage(page: Page) -> None:
-    """What is wrong with the selected fin, or the first."""
-    session, gui = page.session, page.gui
+    """What is wrong with the selected actuator, or the first: every fault that its type may have."""
+    session, gui, board = page.session, page.gui, page.board
 
-    def name_of(selected: str | None, layout: Layout) -> str:
-        return selected or layout.names[0]
+    def part() -> Actuator:
+        return _part(session.selected, session.state.layout)
 
-    def name() -> str:
-        return name_of(session.selected, session.state.layout)
+    def at_now() -> Array:
+        """Where that actuator is [command]: the middle of its limits where nothing is known of it."""
+        now, own = page.shown, part()
+        index = session.state.layout.index(own.name)
+        known = now is not None and now.layout.names == session.state.layout.names
+        command = now.command[index] if now is not None and known else np.full(3, np.nan)
+        return np.where(np.isfinite(command), command, 0.5 * np.add(own.lower, own.upper))
 
-    def stop(selected: str | None, layout: Layout, health: Health | None) -> float | None:
-        """The zero direction [rad] at which that fin is stuck."""
-        return None if health is None else dict(health.stuck).get(name_of(selected, layout))
+    def damage(kind: str, value: Any) -> None:
+        session.damage(part().name, kind, value)
 
-    def strength(selected: str | None, layout: Layout, health: Health | None) -> float:
-        return 100.0 if health is None else 100.0 * dict(health.weak).get(name_of(selected, layout), 1.0)
+    def jam(stuck: bool) -> None:
+        angle = at_now()[2 if isinstance(part(), Fin) else 0]
+        damage("stuck", math.remainder(float(angle), math.tau) if stuck else None)
 
-    def jam(stuck: bool, degrees: float) -> None:
-        session.jam(name(), math.radians(degrees) if stuck else None)
+    def run_on(running: bool) -> None:
+        amplitude, frequency, direction = map(float, at_now())
+        command = amplitude, frequency, math.remainder(direction, math.tau)
+        damage("running", command if running else None)
 
-    left = "What is left of its largest amplitude and frequency: a worn motor, a torn fin."
     about = "Also the one that is selected in the view."
-    fins = gui.add_dropdown("Which fin", ("1",), hint=about)
-    page.board.show(fins, options=lambda layout: layout.names)
-    page.bind(fins, session.select, name_of)
+    parts = gui.add_dropdown("Which", ("1",), hint=about)
+    board.show(parts, options=lambda layout: layout.names)
+    page.bind(parts, session.select, lambda selected, layout: _part(selected, layout).name)
+    shares = {
+        "weak": ("Strength [%]", "What is left of its limits: a worn motor gives less at most."),
+        "thrust": ("Thrust left [%]", "A torn fin or foil gives less at every command."),
+    }
+    least = 100 * STRENGTH_RANGE[0]
+    for kind, (label, hint) in shares.items():
+        slider = gui.add_slider(label, least, 100.0, 5.0, 100.0, hint=hint, visible=False)
+        page.bind_number(slider, partial(_as_share, damage, kind), _of(kind, 1.0, 100.0), digits=1)
+        board.show(slider, visible=_may(kind))
+    held = {
+        "stuck": ("Stuck", "It no longer turns from where it is.", jam),
+        "running": ("Runs on", "It no longer listens: it keeps the command that it has.", run_on),
+    }
+    for kind, (label, hint, act) in held.items():
+        box = gui.add_checkbox(label, False, hint=hint, visible=False)
+        page.bind(box, act, _is(kind))
+        board.show(box, visible=_may(kind))
+    angle = gui.add_slider("Stuck at [°]", -180.0, 180.0, 5.0, 0.0, hint="Where it stays.", visible=False)
+    page.bind_number(angle, lambda at: damage("stuck", math.radians(at)), _of("stuck", 0.0, DEGREE), digits=1)
+    board.show(angle, visible=_is("stuck"))
+    kept = gui.add_vector3(
+        "A [rad], f [Hz], φ [°]", (0.0, 0.0, 0.0), step=0.05, hint="The command that it keeps.", visible=False
+    )
     page.bind_number(
-        gui.add_slider("Strength [%]", 100 * STRENGTH_RANGE[0], 100.0, 5.0, 100.0, hint=left),
-        lambda share: session.weaken(name(), share / 100.0),
-        strength,
-        digits=1,
+        kept,
+        lambda now: damage("running", (now[0], now[1], math.radians(now[2]))),
+        _of("running", (0.0, 0.0, 0.0), (1.0, 1.0, DEGREE)),
+        digits=2,
     )
-    page.bind(
-        gui.add_checkbox("Stuck", False, hint="It no longer turns: it flaps about one direction only."),
-        lambda stuck: jam(stuck, 0.0),
-        lambda selected, layout, health: stop(selected, layout, health) is not None,
-    )
-    stays = "Zero direction at which it stays."
-    angle = page.bind_number(
-        gui.add_slider("Stuck at [°]", -180.0, 180.0, 5.0, 0.0, hint=stays, visible=False),
-        partial(jam, True),
-        lambda selected, layout, health: math.degrees(stop(selected, layout, health) or 0.0),
-        digits=1,
-    )
-    page.board.show(
-        angle, visible=lambda selected, layout, health: stop(selected, layout, health) is not None
-    )
-    mends = {"This fin": lambda: session.mend(name()), "All fins": session.mend_all}
-    page.add_buttons("Repair", mends, hint="Repairs the fin; can be undone.")
+    board.show(kept, visible=_is("running"))
+    mends = {"This one": lambda: session.mend(part().name), "All": session.mend_all}
+    page.add_buttons("Repair", mends, hint="Can be undone.")
+
+
+def _part(selected: str | None, layout: Layout) -> Actuator:
+    return part_of(layout, selected or layout.names[0])
+
+
+def _as_share(damage: Callable[[str, float], None], kind: str, percent: float) -> None:
+    damage(kind, percent / 100.0)
+
+
+def _may(kind: str) -> Callable[[str | None, Layout], bool]:
+    """Whether the actuator may have a fault of a kind; the thrust of a table cannot be scaled."""
+
+    def may(selected: str | None, layout: Layout) -> bool:
+        part = _part(selected, layout)
+        table = isinstance(part, Fin) and part.model.type == "table"
+        return kind in FAULTS[part.type] and not (table and kind == "thrust")
+
+    return may
+
+
+def _is(kind: str) -> Callable[[str | None, Layout, Health | None], bool]:
+    """Whether it has it."""
+    return lambda selected, layout, health: _part(selected, layout).name in dict(getattr(health, kind, ()))
+
+
+def _of(kind: str, whole: Any, unit: Any) -> Callable[[str | None, Layout, Health | None], Any]:
+    """What is known of it, in units for people; `whole` where it has no such fault."""
+
+    def value(selected: str | None, layout: Layout, health: Health | None) -> Any:
+        known = dict(getattr(health, kind, ())).get(_part(selected, layout).name, whole)
+        scaled = np.multiply(known, unit)
+        return tuple(scaled.tolist()) if scaled.ndim else float(scaled)
+
+    return value

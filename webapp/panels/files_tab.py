@@ -5,6 +5,7 @@ import shlex
 
 import viser
 
+from finlab.layout.damage import Health
 from webapp.handles import add_html
 from webapp.markup.html import html, marker
 from webapp.page import Page
@@ -38,10 +39,15 @@ def command_line(state: State) -> str:
     words += [f"{value:g}" for value in state.target]
     for name in state.failed:
         words += ["--failed", name]
-    for name, share in state.weak:
+    health = state.health or Health()
+    for name, share in health.weak:
         words += ["--health", f"{name}={share:g}"]
-    for name, angle in state.stuck:
+    for name, share in health.thrust:
+        words += ["--torn", f"{name}={share:g}"]
+    for name, angle in health.stuck:
         words += ["--stuck", f"{name}={math.degrees(angle):g}"]
+    for name, (amplitude, frequency, angle) in health.running:
+        words += ["--running", f"{name}={amplitude:g},{frequency:g},{math.degrees(angle):g}"]
     if state.method != "dual":
         words += ["--method", state.method]
     if state.policy != "closest":

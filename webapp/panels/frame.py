@@ -125,7 +125,7 @@ class Frame:
     ) -> None:
         """Which regions are there, and which sections in them; the drawer is low until there are plots in
         it."""
-        about = ("", "robot" if selected is None else "fins", *["guide"] * (stop is not None))
+        about = ("", "robot" if selected is None else "actuators", *["guide"] * (stop is not None))
         there = [section for section in self.sections if section.arrange(desk, about, layout)]
         regions = {section.place.region for section in there}
         gone = [FOLDER.format(section.name) for section in self.sections if section not in there]

@@ -5,7 +5,7 @@ from functools import partial
 from typing import NamedTuple
 
 from webapp.page import Page
-from webapp.panels.actuator_inspector import add_fin
+from webapp.panels.actuator_inspector import add_actuator
 from webapp.panels.actuator_list import add_actuator_list
 from webapp.panels.body_inspector import add_body
 from webapp.panels.cards import add_answer, add_switches, camera, card, check, guide_card, robot_name, tasks
@@ -37,8 +37,8 @@ class Place(NamedTuple):
     make: Callable[[Page], object]
     folded: bool = False
     about: str = ""
-    """What must be selected for it to be there: `fins`, or none of them (`robot`); `guide` where a tour or a
-    lesson must be under way; nothing where it is there always."""
+    """What must be selected for it to be there: `actuators`, or none of them (`robot`); `guide` where a tour
+    or a lesson must be under way; nothing where it is there always."""
     fins_only: str | None = None
     """What a robot with other actuators is told that it cannot have yet; where it is empty, the panel is
     not there for such a robot. None for panels that take any robot."""
@@ -53,14 +53,14 @@ PLACES = (
     Place(LEFT, TASKS, "Guide", partial(card, guide_card), about="guide"),
     Place(LEFT, (DESIGN,), "Actuators", add_actuator_list),
     Place(LEFT, (DESIGN,), "Designs", add_designs),
-    Place(RIGHT, (DESIGN,), "Fin", add_fin, about="fins", fins_only="the inspector of a fin"),
+    Place(RIGHT, (DESIGN,), "Actuator", add_actuator, about="actuators"),
     Place(RIGHT, (DESIGN,), "Body", add_body, about="robot"),
     Place(RIGHT, (DESIGN,), "Hull", add_hull, folded=True, about="robot"),
     Place(RIGHT, (DESIGN,), "Check", partial(card, check)),
     Place(DRAWER, (DESIGN,), "Reach", add_reach),
     Place(DRAWER, (DESIGN,), "Improve", add_improving, fins_only="the search for a better layout"),
     Place(LEFT, (ALLOCATE,), "Actuators", add_commands),
-    Place(LEFT, (ALLOCATE,), "Damage a fin", add_damage, folded=True, fins_only=""),
+    Place(LEFT, (ALLOCATE,), "Damage", add_damage, folded=True),
     Place(RIGHT, (ALLOCATE,), "Wrench", add_target),
     Place(RIGHT, (ALLOCATE,), "Asked and delivered", add_answer),
     Place(DRAWER, (ALLOCATE,), "Candidates", add_candidates),

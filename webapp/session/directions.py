@@ -126,20 +126,20 @@ def facing(part: Actuator, towards: Vector) -> Actuator:
     return with_axes(part, frame)
 
 
-def with_zero(part: Actuator, towards: Vector) -> Actuator:
-    """The actuator with its second axis as near to a vector of any length as stands across the first.
+def turned_about(part: Actuator, towards: Vector) -> Actuator:
+    """The actuator turned about its `direction`, with its other axis as near to a vector of any length as
+    stands across it: zero of a fin, the leading edge of a rudder, what an azimuth turns about.
 
     Raises:
-        FinlabError: the actuator has no second axis, or the vector points along the first.
+        FinlabError: the vector points along the direction.
     """
-    frame, wanted = np.array(part.frame), np.array(towards, dtype=np.float64)
     if isinstance(part, Thruster):
         return part
-    if np.linalg.norm(np.cross(frame[0], wanted)) < SHORT:
-        raise FinlabError(
-            f"zero of {part.name}: expected a direction across {axis_names(part)[0]}, got {towards}"
-        )
-    frame[1] = _across(frame[0], wanted)
+    frame, wanted = np.array(part.frame), np.array(towards, dtype=np.float64)
+    k = axis_names(part).index(pointed(part))
+    if not SHORT < np.linalg.norm(np.cross(frame[k], wanted)) < math.inf:
+        raise FinlabError(f"{part.name}: expected a direction across its {pointed(part)}, got {towards}")
+    frame[1 - k] = _across(frame[k], wanted)
     return with_axes(part, frame)
 
 

@@ -17,7 +17,7 @@ class Editing(Core):
 
     def open_layout(self, layout: Layout, step: str = "") -> None:
         """Another layout; the target stays, damage and links are forgotten. `step` is what undo calls it."""
-        whole = replace(self.state, layout=layout, failed=(), weak=(), stuck=(), links=())
+        whole = replace(self.state, layout=layout, failed=(), health=None, links=())
         self._commit(step or f"Open {layout.name}", whole)
         self.saved = layout
 

@@ -6,7 +6,7 @@ from typing import Any
 
 from finlab.layout import Actuator, Layout
 from webapp.session import actuator_edits, body_edits, layout_edits
-from webapp.session.directions import Vector, part_of, replaced, with_zero
+from webapp.session.directions import Vector, part_of, replaced, turned_about
 from webapp.session.editing import Editing, which
 from webapp.session.links import followed, partner
 
@@ -51,13 +51,9 @@ class Inspecting(Editing):
         pointed = partial(layout_edits.pointed, direction=direction)
         self._for_each("Point", names, pointed, f"point {names}")
 
-    def set_zero(self, direction: Vector) -> None:
-        """Where the force of selected fins points at zero direction 0, or the leading edge of rudders."""
-
-        def zeroed(layout: Layout, name: str) -> Layout:
-            return replaced(layout, with_zero(part_of(layout, name), direction))
-
-        self._for_each("Zero of", self._selected_names(), zeroed, None)
+    def turn_about(self, direction: Vector) -> None:
+        """Another second axis of all selected actuators that have one, see `turned_about`."""
+        self._change("Turn", lambda part: turned_about(part, direction))
 
     def set_value(self, key: str, value: Any) -> None:
         """A field of all selected actuators that have it, see `with_value`, in SI units and radians."""

@@ -6,8 +6,11 @@ from typing import Any
 from finlab.allocation.policy import AXES
 from finlab.errors import FinlabError
 from webapp.session.core import Core
-from webapp.session.state import LEAST, chosen
+from webapp.session.directions import part_of
+from webapp.session.state import FAULTS, LEAST, chosen
 from webapp.session.targets import PRESETS
+
+FAULT_VERBS = {"weak": "Weaken", "thrust": "Tear", "stuck": "Jam", "running": "Let run"}
 
 
 class Questions(Core):
@@ -32,24 +35,23 @@ class Questions(Core):
         self.set_setting("method", LEAST[chosen(word, "least", LEAST)])
 
     def toggle_failure(self, name: str) -> None:
-        """A fin fails, or is repaired."""
+        """An actuator fails, or is repaired."""
         verb = "Repair" if name in self.state.failed else "Fail"
         self._commit(f"{verb} {name}", self.state.with_failure_toggled(name))
 
-    def weaken(self, name: str, share: Any) -> None:
-        """A fin keeps only a share of its largest amplitude and frequency; 1 makes it strong again."""
-        self._commit(f"Weaken {name}", self.state.with_strength(name, share), f"weaken {name}")
-
-    def jam(self, name: str, angle: Any) -> None:
-        """A fin no longer turns from a zero direction [rad]; None frees it."""
-        verb = "Free" if angle is None else "Jam"
-        self._commit(f"{verb} {name}", self.state.with_stop(name, angle), f"jam {name}")
+    def damage(self, name: str, kind: str, value: Any) -> None:
+        """An actuator has a fault of a kind, one of `Health`: a share, an angle [rad], a command; None mends
+        that."""
+        verb = "Mend" if value is None else FAULT_VERBS.get(kind, "Damage")
+        self._commit(f"{verb} {name}", self.state.with_fault(name, kind, value), f"{kind} {name}")
 
     def mend_all(self) -> None:
-        """All fins are whole again."""
-        self._commit("Mend all fins", replace(self.state, failed=(), weak=(), stuck=()))
+        """All actuators are whole again."""
+        self._commit("Mend all", replace(self.state, failed=(), health=None))
 
     def mend(self, name: str) -> None:
-        """A fin is whole again."""
-        state = self.state.with_strength(name, 1.0).with_stop(name, None)
+        """An actuator is whole again."""
+        state = self.state
+        for kind in FAULTS[part_of(state.layout, name).type]:
+            state = state.with_fault(name, kind, None)
         self._commit(f"Mend {name}", state.with_failure_toggled(name) if name in state.failed else state)

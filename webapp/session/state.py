@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 from finlab.allocation.mdn_settings import MdnSettings
@@ -11,6 +11,7 @@ from finlab.allocation.policy import AXES, KINDS
 from finlab.errors import FinlabError
 from finlab.layout import Fin, Layout
 from finlab.layout.damage import Health
+from finlab.layout.fin import MAX_AMPLITUDE, MAX_FREQUENCY
 from finlab.paper.settings import PaperSettings
 from webapp.session.links import Links, kept, linked
 
@@ -20,7 +21,15 @@ AXIS_UNITS = ("N", "N", "N", "N m", "N m", "N m")
 MAX_TARGET = 1000.0
 """Largest target component that the page may ask for [N, N m]."""
 STRENGTH_RANGE = (0.05, 1.0)
-"""Shares that may be left of a weak fin's largest amplitude and frequency."""
+"""Shares that may be left of a weak or torn actuator."""
+FAULTS: dict[str, tuple[str, ...]] = {
+    "fin": ("weak", "thrust", "stuck", "running"),
+    "thruster": ("weak",),
+    "azimuth": ("weak", "stuck"),
+    "tilt": ("weak", "stuck"),
+    "rudder": ("thrust",),
+}
+"""Fields of `Health` that the types of actuators may have. All may fail."""
 COMPARED = ("dual", "mdn", "paper", "analytic", "qp", "sqp")
 """Methods that answer quickly enough to be compared while one waits."""
 LEAST = {"watts": "dual", "effort": "mdn"}
@@ -36,10 +45,8 @@ class State:
 
     layout: Layout
     failed: tuple[str, ...] = ()
-    weak: tuple[tuple[str, float], ...] = ()
-    """Weak fins: name, and the share that is left of the largest amplitude and frequency."""
-    stuck: tuple[tuple[str, float], ...] = ()
-    """Fins that no longer turn: name, and the zero direction [rad] at which they stay."""
+    health: Health | None = None
+    """What is known of actuators that work in part; None where all others are whole."""
     target: tuple[float, float, float, float, float, float] = (0.0,) * 6
     """Desired wrench [N, N m], body frame."""
     temperature: float | None = None
@@ -52,11 +59,6 @@ class State:
     def healthy(self) -> tuple[str, ...]:
         """Names of the fins that work."""
         return tuple(name for name in self.layout.names if name not in self.failed)
-
-    @property
-    def health(self) -> Health | None:
-        """What is known of damaged fins; None where all are whole."""
-        return Health(self.weak, self.stuck) if self.weak or self.stuck else None
 
     @property
     def able(self) -> Layout:
@@ -72,42 +74,51 @@ class State:
         return replace(self, target=(fx, fy, fz, tx, ty, tz))
 
     def with_failure_toggled(self, name: str) -> "State":
-        """One fin failed or repaired; the last working fin cannot fail."""
+        """One actuator failed or repaired."""
         self.layout.index(name)
         lost = set(self.failed) ^ {name}
-        if len(lost) == self.layout.n:
-            raise FinlabError(
-                f"{name} is the last one that works, so it cannot fail too; repair another one first"
-            )
         return replace(self, failed=tuple(n for n in self.layout.names if n in lost))
 
-    def with_strength(self, name: str, share: Any) -> "State":
-        """A fin that is weak, with a share left of its largest amplitude and frequency; 1 is a whole one."""
-        self.layout.index(name)
-        checked = number(share, f"strength left of {name}", *STRENGTH_RANGE)
-        others = tuple(pair for pair in self.weak if pair[0] != name)
-        return replace(self, weak=others if checked == 1.0 else (*others, (name, checked)))
+    def with_fault(self, name: str, kind: str, value: Any) -> "State":
+        """An actuator with a fault that its type may have, see `FAULTS`; None, and a share of 1, mend that.
 
-    def with_stop(self, name: str, angle: Any) -> "State":
-        """A fin that is stuck at a zero direction [rad]; None frees it."""
-        self.layout.index(name)
-        others = tuple(pair for pair in self.stuck if pair[0] != name)
-        if angle is None:
-            return replace(self, stuck=others)
-        checked = number(angle, f"direction of {name}, stuck, in radians", -math.pi - 1e-6, math.pi + 1e-6)
-        return replace(self, stuck=(*others, (name, checked)))
+        Raises:
+            FinlabError: it cannot have this fault, or not with this value.
+        """
+        part = self.layout.actuators[self.layout.index(name)]
+        chosen(kind, f"fault of {name}, a {part.type}", FAULTS[part.type])
+        checked = None if value is None else _checked_fault(name, kind, value)
+        held = ("stuck", "running")  # one that runs on is not stuck as well
+        out = held if kind in held and checked is not None else (kind,)
+        kinds = {
+            word: tuple(pair for pair in pairs if pair[0] != name or word not in out)
+            for word, pairs in _faults(self.health).items()
+        }
+        if checked is not None:
+            kinds[kind] += ((name, checked),)
+        return self._with_faults(kinds)
+
+    def _with_faults(self, kinds: dict[str, tuple[Any, ...]]) -> "State":
+        health = Health(**kinds) if any(kinds.values()) else None
+        if health is not None:
+            health.applied_to(self.layout)  # says what cannot be
+        return replace(self, health=health)
 
     def with_layout(self, layout: Layout) -> "State":
-        """Another layout; damage of fins that still exist stays, unless none would work."""
-        failed = tuple(name for name in layout.names if name in self.failed)
-        return replace(
+        """Another layout; damage of actuators that still exist stays.
+
+        Raises:
+            FinlabError: one of them cannot have its damage any more.
+        """
+        names = layout.names
+        changed = replace(
             self,
             layout=layout,
-            failed=() if len(failed) == layout.n else failed,
-            weak=tuple(pair for pair in self.weak if pair[0] in layout.names),
-            stuck=tuple(pair for pair in self.stuck if pair[0] in layout.names),
+            failed=tuple(name for name in names if name in self.failed),
             links=kept(self.links, layout),
         )
+        faults = _faults(self.health).items()
+        return changed._with_faults({k: tuple(p for p in pairs if p[0] in names) for k, pairs in faults})
 
     def with_renamed(self, name: str, wanted: str) -> "State":
         """A fin with another name; its damage and its link go on with it.
@@ -123,9 +134,9 @@ class State:
             self,
             layout=self.layout.replace_actuator(name, name=wanted),
             failed=tuple(new(old) for old in self.failed),
-            weak=tuple((new(old), share) for old, share in self.weak),
-            stuck=tuple((new(old), angle) for old, angle in self.stuck),
             links=tuple((new(a), new(b)) for a, b in self.links),
+        )._with_faults(
+            {kind: tuple((new(old), v) for old, v in pairs) for kind, pairs in _faults(self.health).items()}
         )
 
     def with_link(self, a: str, b: str) -> "State":
@@ -141,6 +152,25 @@ class State:
             return replace(self, **{key: chosen(value, key, CHOICES[key])})
         settings = DRAWING.get(self.method, DRAWING["mdn"])  # they say what is wrong with a number
         return replace(self, temperature=replace(settings, temperature=value).temperature)
+
+
+def _faults(health: Health | None) -> dict[str, tuple[Any, ...]]:
+    """What is damaged how: names and values by field of `Health`."""
+    return {field.name: getattr(health, field.name, ()) for field in fields(Health)}
+
+
+def _checked_fault(name: str, kind: str, value: Any) -> Any:
+    if kind in ("weak", "thrust"):
+        share = number(value, f"share left of {name}", *STRENGTH_RANGE)
+        return None if share == 1.0 else share
+    if kind == "stuck":
+        return number(value, f"angle of {name}, stuck, in radians", -math.pi - 1e-6, math.pi + 1e-6)
+    amplitude, frequency, angle = value
+    return (
+        number(amplitude, f"amplitude of {name} [rad]", 0.0, MAX_AMPLITUDE),
+        number(frequency, f"frequency of {name} [Hz]", 0.0, MAX_FREQUENCY),
+        number(angle, f"direction of {name} in radians", -math.pi - 1e-6, math.pi + 1e-6),
+    )
 
 
 def can_be_edited(layout: Layout) -> bool:

@@ -1,23 +1,27 @@
-"""A file of measurements, or a finished force table, that becomes the model of a fin."""
+"""A file of measurements, or a finished table, that becomes the model of a fin or a thruster."""
 
 import re
 import tempfile
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from finlab.actuators.fin.models import read_table
 from finlab.arrays import Array
-from finlab.errors import DataError, FinlabError
-from finlab.layout import FinModelSpec, Layout
+from finlab.errors import DataError, FinlabError, LayoutError
+from finlab.layout import Actuator, Fin, Rudder, Thruster
+from finlab.layout.thrust_model import PowerTable
 from webapp.session.companions import stored_table
+from webapp.session.directions import part_of
 from webapp.session.files import table_folder
 from webapp.tasks.background import Newest
 from webapp.tasks.context import Context
 
 if TYPE_CHECKING:  # scipy takes its time, and only who fits needs it
     from finlab.fit.fin_fit import FinFit
+    from finlab.fit.thruster_fit import ThrusterFit
 
 MAX_BYTES = 50_000_000
 """Largest file that the page takes; the command line reads ten times as much."""
@@ -25,10 +29,9 @@ MAX_BYTES = 50_000_000
 
 @dataclass(frozen=True, eq=False)
 class Upload:
-    """A file that was dropped on a fin."""
+    """A file that was dropped on an actuator."""
 
-    fin: str
-    model: FinModelSpec
+    part: Actuator
     name: str
     content: bytes
 
@@ -39,8 +42,9 @@ class Fitted:
 
     upload: Upload
     """What it was made of; without its content."""
-    model: FinModelSpec
-    fit: "FinFit | None" = None
+    found: dict[str, Any]
+    """Fields of the actuator: its model, and what else was found."""
+    fit: "FinFit | ThrusterFit | None" = None
     """The fit; None where the file was a finished table."""
     advice: Array | None = None
     """Commands (5, 3) to measure next."""
@@ -55,36 +59,38 @@ class Fitting(Newest[Upload, Fitted]):
         self._context = context
         self.progress = ""
 
-    def start(self, fin: str, name: str, content: bytes) -> None:
-        """Begin with a file for a fin.
+    def start(self, actuator: str, name: str, content: bytes) -> None:
+        """Begin with a file for an actuator.
 
         Raises:
-            FinlabError: another file is under way, the file is too large, or there is no such fin.
+            FinlabError: another file is under way, the file is too large, or it is for a rudder.
         """
         if self.busy:
             raise FinlabError("a fit is under way already; wait for it, or cancel it")
         short = re.sub(r"[^\w .()+-]", "_", Path(str(name)).name)[-60:].lstrip(". ") or "upload.csv"
         if len(content) > MAX_BYTES:
             raise DataError(too_large(short, len(content)))
-        layout = self._context.session.state.layout
-        model = layout.fins[layout.index(fin)].model
+        part = part_of(self._context.session.state.layout, actuator)
+        if isinstance(part, Rudder):
+            raise FinlabError(f"{actuator} is a rudder, without a table; type its coefficients")
         self.forget()
         self.progress = "reading the file"
-        self.ask(Upload(fin, model, short, content))
+        self.ask(Upload(part, short, content))
 
     def forget(self) -> None:
-        """Cancel what is under way, and put away what came of the last file; the fin keeps its model."""
+        """Cancel what is under way, and put away what came of the last file; all keep their models."""
         super().forget()
         self.progress = ""
 
     def put_on_all(self) -> None:
-        """The new model for all fins that still have the model that this fin had."""
+        """What was found for all that still have the model that this one had."""
         found, session = self.findings, self._context.session
         if found is not None:
-            alike = [fin.name for fin in session.state.layout.fins if fin.model == found.upload.model]
+            old = found.upload.part
+            alike = [part.name for part in session.state.layout.actuators if _model(part) == _model(old)]
             if not alike:
-                raise FinlabError("no other fin has the model that this fin had")
-            session.set_model(alike, model=found.model)
+                raise FinlabError("no other actuator has the model that this one had")
+            session.set_model(alike, **found.found)
 
     def _put_on(self) -> None:
         """On the loop, when the worker is done."""
@@ -98,22 +104,23 @@ class Fitting(Newest[Upload, Fitted]):
 
     def _take_over(self, found: Fitted) -> None:
         upload, session = found.upload, self._context.session
-        if _model_of(session.state.layout, upload.fin) != upload.model:
+        name, layout = upload.part.name, session.state.layout
+        if name not in layout.names or _model(part_of(layout, name)) != _model(upload.part):
             self.forget()
-            raise FinlabError(
-                f"{upload.fin} is no longer the fin that {upload.name} was for; upload the file again"
-            )
-        session.set_model([upload.fin], model=found.model)
+            raise FinlabError(f"{name} is no longer what {upload.name} was for; upload it again")
+        session.set_model([name], **found.found)
 
     def _fit(self, upload: Upload) -> Fitted:
         """On the worker's thread."""
-        done = Upload(upload.fin, upload.model, upload.name, b"")
+        done = Upload(upload.part, upload.name, b"")
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / upload.name
             path.write_bytes(upload.content)
             try:
+                if not isinstance(upload.part, Fin):
+                    return _bench(path, done)
                 if _is_table(path):
-                    return Fitted(done, stored_table(upload.content, table_folder()))
+                    return Fitted(done, {"model": stored_table(upload.content, table_folder())})
                 return self._fit_measurements(path, upload, done)
             except FinlabError as error:
                 raise type(error)(str(error).replace(f"{folder}/", "")) from None
@@ -128,7 +135,7 @@ class Fitting(Newest[Upload, Fitted]):
         fit = fit_fin(read_measurements([path]), progress=tell)
         tell("writing the table")
         model = stored_table(fin_csv(fit).encode(), table_folder())
-        return Fitted(done, model, fit, next_measurements(fit))
+        return Fitted(done, {"model": model}, fit, next_measurements(fit))
 
     def _tell(self, upload: Upload, words: str) -> None:
         """On the worker's thread, before each step: a fit whose result is not waited for ends here."""
@@ -150,8 +157,27 @@ def too_large(name: str, size: int) -> str:
     )
 
 
-def _model_of(layout: Layout, name: str) -> FinModelSpec | None:
-    return next((fin.model for fin in layout.fins if fin.name == name), None)
+def _model(part: Actuator) -> object:
+    return getattr(part, "model", None)
+
+
+def _bench(path: Path, done: Upload) -> Fitted:
+    """A thruster, fixed or turning, by its bench table, or by a finished one."""
+    from finlab.fit.thruster_bench import read_bench
+    from finlab.fit.thruster_fit import fit_thruster
+
+    def within(table: PowerTable) -> dict[str, Any]:
+        least, most = table.rows[0][1], table.rows[-1][1]
+        return {
+            "model": table,
+            "force": (least if isinstance(done.part, Thruster) else max(least, 0.0), most),
+        }
+
+    with suppress(LayoutError):
+        return Fitted(done, within(PowerTable.read(path)))
+    fit = fit_thruster(read_bench([path]))
+    beside = {"dead_band": fit.dead_band, "torque_per_newton": fit.torque_per_newton}
+    return Fitted(done, {**within(fit.table), **beside, "uncertainty": fit.uncertainty}, fit)
 
 
 def _is_table(path: Path) -> bool:

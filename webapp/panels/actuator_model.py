@@ -1,0 +1,251 @@
+"""What the selected actuators are known by: a formula with its numbers, or a table of measurements."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import lru_cache, partial
+from typing import Any, NamedTuple
+
+import numpy as np
+import viser
+
+from finlab.actuators.fin.table import TableLaw
+from finlab.arrays import Array
+from finlab.errors import DataError, FinlabError
+from finlab.layout import Actuator, Fin, Layout, Rudder
+from finlab.layout.fin import FIN_MODELS
+from finlab.layout.force_table_file import DOUBT
+from finlab.layout.thrust_model import PowerTable
+from finlab.physics import make_law, plant_of
+from webapp.markup.html import html
+from webapp.markup.plot import Plot, cost_axis, positive
+from webapp.page import Page
+from webapp.session.actuator_edits import FORMULAS
+from webapp.session.actuator_edits import words as key_words
+from webapp.tasks.fitting import MAX_BYTES, Fitted
+from webapp.theme import BLUE, GREEN, ORANGE
+
+BEYOND = 0.01
+"""Amplitude [rad] or frequency [Hz] by which limits may lie beyond a table without a word."""
+LAWS = {
+    "drag": "a stiff blade in quasi-steady drag (U-CAT's own law)",
+    "lighthill": "a fin after Lighthill's elongated-body theory",
+    "soft": "a soft fin that saturates, then declines",
+    "power_law": "power that grows with a power of the force",
+    "foil": "lift and drag of a foil; at rest it gives nothing",
+}
+HEIGHT = 140
+"""Height of a plot [px]."""
+SHARES, COLORS = (1.0, 2 / 3, 1 / 3), (ORANGE, GREEN, BLUE)
+"""Of the largest amplitude, and the colours of curves."""
+POINTS = 41
+CSV = ".csv,.txt"
+
+Shown = Callable[[str | None, Layout], Actuator]
+
+
+def kind_of(part: Actuator) -> str:
+    """The kind of an actuator's model."""
+    return "foil" if isinstance(part, Rudder) else part.model.type
+
+
+def add_model(page: Page, shown: Shown, add_law: Callable[[], object]) -> None:
+    """Widgets of one folder.
+
+    Args:
+        page: where they stand.
+        shown: the actuator that they are about.
+        add_law: adds the boxes for numbers of those that are no fins.
+    """
+    session, gui, board = page.session, page.gui, page.board
+
+    def kind(selected: str | None, layout: Layout) -> str:
+        return kind_of(shown(selected, layout))
+
+    def options(selected: str | None, layout: Layout) -> tuple[str, ...]:
+        part = shown(selected, layout)
+        formulas = FORMULAS if isinstance(part, Fin) else ("power_law",)
+        return formulas if kind_of(part) in formulas else (*formulas, kind_of(part))
+
+    def words(selected: str | None, layout: Layout, fitted: Fitted | None) -> str:
+        part = shown(selected, layout)
+        told = fitted is not None and fitted.found["model"] == getattr(part, "model", None)
+        return model_card(part, doubts=not told)
+
+    def add_number(law: str, key: str, rule: Any) -> None:
+        """A box for a number of a fin's model, shown while the fin has that model."""
+
+        def value(selected: str | None, layout: Layout) -> float:
+            part = shown(selected, layout)
+            known = isinstance(part, Fin) and part.model.type == law
+            return float(part.model.values()[key]) if known and isinstance(part, Fin) else rule.default
+
+        unit = f" [{rule.unit}]".replace("^2", "²").replace("^3", "³") if rule.unit else ""
+        hint = f"{rule.meaning[0].upper()}{rule.meaning[1:]}. Usual: {rule.default:g}."
+        label, step = f"{key_words(key)}{unit}", (abs(rule.default) or 1.0) / 20
+        handle = gui.add_number(label, rule.default, step=step, hint=hint, visible=False)
+        page.bind_number(handle, partial(session.set_value, key), value)
+        board.show(handle, visible=lambda selected, layout: kind(selected, layout) == law)
+
+    about = "The formula that gives force and power; a table comes from a file, below."
+    kinds = board.show(gui.add_dropdown("Model", FORMULAS, hint=about), options=options)
+    board.show(kinds, visible=lambda selected, layout: len(options(selected, layout)) > 1)
+    page.bind(kinds, session.choose_model, kind)
+    page.add_html(words)
+    for law in FORMULAS:
+        for key, rule in FIN_MODELS[law].items():
+            add_number(law, key, rule)
+    add_law()
+    page.add_html(lambda selected, layout: drawn_curves(shown(selected, layout)))
+    _add_fit(page, shown)
+
+
+def _add_fit(page: Page, shown: Shown) -> None:
+    """A file for the selected actuator, and what comes of it."""
+    session, gui, board, fitting = page.session, page.gui, page.board, page.jobs.fitting
+
+    def upload(name: str, content: bytes) -> None:
+        if session.selected is None:
+            raise FinlabError("no actuator is selected; click the one that was measured, or its row")
+        fitting.start(session.selected, name, content)
+        session.show_task("Design")
+
+    page.opening.add(CSV, upload)
+    about = "A fin: noisy rows of A, f, phi, Fx, Fy, Fz, or a force table. A thruster: PWM, force and power."
+    button = page.add_upload(
+        "Fit from measurements (CSV)",
+        upload,
+        icon=viser.Icon.UPLOAD,
+        mime_type=CSV,
+        hint=f"{about} Up to {MAX_BYTES // 1_000_000} MB.",
+    )
+    board.show(button, disabled=lambda selected, fitting: selected is None or fitting is not None)
+    board.show(button, visible=lambda selected, layout: not isinstance(shown(selected, layout), Rudder))
+    bar = gui.add_progress_bar(100.0, animated=True, visible=False)
+    hint = "The actuator stays as it is."
+    cancel = page.add_button("Cancel", fitting.forget, icon=viser.Icon.X, visible=False, hint=hint)
+    for handle in (bar, cancel):
+        board.show(handle, visible=lambda fitting: fitting is not None)
+    page.add_html(_written)
+    results = {"On all like it": fitting.put_on_all, "Close": fitting.forget}
+    hint = "All that had the same model. Undo takes a fit back."
+    buttons = page.add_buttons("Fit", results, visible=False, hint=hint)
+    board.show(buttons, visible=lambda fitted: fitted is not None)
+
+
+def _written(fitted: Fitted | None, fitting: str | None, fitted_error: str | None) -> str:
+    if fitting is not None:
+        return html("<div class='fl dim'>{} …</div>", fitting)
+    if fitted_error is not None:
+        return html("<div class='fl'><div class='said missing'>{}</div></div>", fitted_error)
+    if fitted is None:
+        return ""
+    from webapp.markup.fit_card import fit_card  # scipy comes with it
+
+    return fit_card(fitted)
+
+
+def model_card(part: Actuator, doubts: bool = True) -> str:
+    """The model of an actuator; without `doubts` where they stand elsewhere already."""
+    if isinstance(part, Fin) and part.model.type == "table":
+        return html("<div class='fl'>{}</div>", _table_words(part, doubts))
+    if not isinstance(part, Fin | Rudder) and isinstance(part.model, PowerTable):
+        (first, *_), (last, *_) = part.model.rows[0], part.model.rows[-1]
+        said = "<b>table</b> of {} rows, command {:g} to {:g} {}"
+        told = html(said, len(part.model.rows), first, last, part.model.unit)
+        return html("<div class='fl dim'>{}</div>", told)
+    said = LAWS[kind_of(part)]
+    return html("<div class='fl dim'>{}{}.</div>", said[0].upper(), said[1:])
+
+
+def _table_words(fin: Fin, doubts: bool) -> str:
+    try:
+        law = make_law(fin.model)
+    except DataError as error:
+        return html("<b>table</b>: <span class='missing'>{}</span>", str(error))
+    assert isinstance(law, TableLaw)
+    (low_a, high_a), (low_f, high_f), (low_d, high_d) = law.covers
+    turn = "all round" if law.periodic else f"from {math.degrees(low_d):.0f}° to {math.degrees(high_d):.0f}°"
+    covers = f"A {low_a:.2f} to {high_a:.2f} rad, f {low_f:.2f} to {high_f:.2f} Hz, {turn}"
+    power = "with the power that was measured" if law.has_power else "power as of U-CAT's fin"
+    doubt = next((note for note in law.notes if note.startswith(DOUBT)), None)
+    said = "" if doubt is None or not doubts else html("<div class='missing'>This fin is {}.</div>", doubt)
+    if fin.limits.amplitude[1] > high_a + BEYOND or fin.limits.frequency[1] > high_f + BEYOND:
+        most_a, most_f = fin.limits.amplitude[1], fin.limits.frequency[1]
+        said += html(
+            "<div class='missing'>The fin may be asked for {:.2f} rad and {:.2f} Hz: beyond "
+            "what was measured the force counts as at the edge.</div>",
+            most_a,
+            most_f,
+        )
+    fitted = next((note for note in law.notes if note.startswith("fitted to ")), None)
+    origin = f", {fitted.split(',')[0]}" if fitted else " of forces"
+    return html("<b>table</b>{}.{}<div class='dim'>{}; {}.</div>", origin, said, covers, power)
+
+
+class Curves(NamedTuple):
+    """A plot over a command."""
+
+    across: str
+    x: Array
+    up: str
+    lines: tuple[tuple[str, Array], ...]
+    """Names and values of curves; a single one needs no name."""
+
+
+def drawn_curves(part: Actuator) -> str:
+    """Plots of one actuator; nothing where its table cannot be read, which is reported elsewhere."""
+    try:
+        found = curves(part)
+    except DataError:
+        return ""
+    plots = []
+    for across, x, up, lines in found:
+        axis = cost_axis(across, x)._replace(low=float(x[0]), high=float(x[-1]))
+        axis = axis._replace(ticks=tuple(tick for tick in axis.ticks if axis.low <= tick[0] <= axis.high))
+        plot = Plot(axis, positive(up, np.append(1e-6, [y for _, y in lines])), HEIGHT)
+        parts = [plot.curve(x, y, color) for (_, y), color in zip(lines, COLORS, strict=False)]
+        named = zip(lines, COLORS, strict=False)
+        parts += [plot.key(104 * k, color, word) for k, ((word, _), color) in enumerate(named) if word]
+        plots.append(plot.drawn(parts))
+    return html("<div class='fl'>{}</div>", plots)
+
+
+@lru_cache(maxsize=64)
+def curves(part: Actuator) -> Sequence[Curves]:
+    """Force and power of an actuator over its command: of a fin for three amplitudes, in the middle of its
+    zero directions; of a rudder for water that comes from ahead at 1 m/s.
+
+    Raises:
+        DataError: its table cannot be read.
+    """
+    plant = plant_of(Layout("one", (part,)))
+    if isinstance(part, Fin):
+        across = np.linspace(*part.limits.frequency, POINTS)
+        amplitude = np.array(SHARES) * part.limits.amplitude[1]
+        command = np.zeros((len(SHARES), POINTS, 1, 3))
+        command[..., 0, 0], command[..., 0, 1] = amplitude[:, None], across
+        command[..., 0, 2] = np.mean(part.limits.zero_direction)
+        force = np.linalg.norm(plant.force(command)[..., 0, :], axis=-1)
+        names = [f"A {size:.2f} rad" for size in amplitude]
+        kinds = (("mean force [N]", force), ("power [W]", plant.power(command)[..., 0]))
+        return [Curves("frequency [Hz]", across, up, tuple(zip(names, y, strict=True))) for up, y in kinds]
+    if isinstance(part, Rudder):
+        across = np.linspace(*part.deflection, POINTS)
+        command = np.zeros((POINTS, 1, 3))
+        command[:, 0, 0] = across
+        flow = np.zeros(6)
+        flow[:3] = part.frame[1]  # whatever its place, the water meets it from ahead
+        at_origin = plant_of(Layout("one", (replace(part, position=(0.0, 0.0, 0.0)),)))
+        force = at_origin.force(command, flow=flow)[:, 0]
+        lines = ("lift", force[:, 2]), ("drag", -force[:, 1])
+        return [Curves("deflection [°], water at 1 m/s", np.degrees(across), "force [N]", lines)]
+    if isinstance(part.model, PowerTable):
+        across, force, power = part.model.columns
+        word = f"command [{part.model.unit}]" if part.model.unit else "command"
+        pairs = (("force [N]", force), ("power [W]", power))
+        return [Curves(word, across, up, (("", y),)) for up, y in pairs]
+    across = np.linspace(*part.force, POINTS)
+    command = np.zeros((POINTS, 1, 3))
+    command[:, 0, part.LIMITS.index("force")] = across
+    return [Curves("force [N]", across, "power [W]", (("", plant.power(command)[:, 0]),))]
