@@ -37,6 +37,7 @@
     if (own) Object.defineProperty(ended, 'value', own);
     ended.value = before;
     if (text === before || (!text.trim() && ended.matches('.mantine-NumberInput-input'))) return;
+    window.finlabPresses?.tell('typed', '', '');
     ended.select();
     ended.dispatchEvent(new KeyboardEvent('keydown', { key: 'Unidentified', bubbles: true }));
     set.call(ended, text);

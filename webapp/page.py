@@ -16,6 +16,7 @@ import viser
 from finlab.allocation.allocation import Allocation
 from finlab.bundle_files import LARGEST_BUNDLE
 from finlab.errors import FinlabError
+from webapp.asking import Asking
 from webapp.board import Board
 from webapp.facts import Facts, facts_of
 from webapp.handles import on_user_change
@@ -28,7 +29,7 @@ from webapp.tasks.designs import Designs, Opening
 from webapp.tasks.jobs import Jobs
 from webapp.tasks.reading import Reading
 from webapp.tasks.solver import Solver
-from webapp.theme import VERMILLION
+from webapp.theme import BLUE, VERMILLION
 from webapp.uploads import Uploads
 from webapp.viser_internals import run_script, uuid_of
 
@@ -66,6 +67,7 @@ class Page(ABC):
         self.board = Board()
         self.scenery = Scenery(context, self.jobs.swimming, self.board, self.fault)
         self.presses = Presses(client.gui, self.do)
+        self.ask = Asking(client.gui, self.presses).ask
         self.designs = Designs(context, self.jobs.exports, self.presses)
         self.opening = Opening(client.gui, self.presses)
         self._uploads = Uploads(client.gui, MAX_UPLOAD, partial(self.notify, "Not possible"))
@@ -193,11 +195,12 @@ class Page(ABC):
         on_user_change(group, lambda button: self.do(acts[button]) if button in acts else None)
         return group
 
-    def notify(self, title: str, body: str) -> None:
-        """Show a note to the user, in place of the last one."""
+    def notify(self, title: str, body: str, calm: bool = False) -> None:
+        """Show a note to the user, in place of the last one; a calm one is no warning."""
         if self._note is not None:
             self._note.remove()
-        self._note = self.client.add_notification(title, body, auto_close_seconds=8.0, color=VERMILLION)
+        color = BLUE if calm else VERMILLION
+        self._note = self.client.add_notification(title, body, auto_close_seconds=8.0, color=color)
 
     # From the session to the page.
 

@@ -51,7 +51,9 @@ class ReadAtOnce(Reading):
         """Read it now."""
         self._do(lambda: use(read()))
 
-    make = read
+    def make(self, work: Any, use: Callable[[Any], object], kind: str = "") -> None:
+        """Make it now."""
+        self._do(lambda: use(work()))
 
 
 def page_of(worker: Any, session: Any = None, **options: Any) -> Context:
@@ -64,7 +66,7 @@ def page_of(worker: Any, session: Any = None, **options: Any) -> Context:
         "do": lambda act: act(),
         "reading": ReadAtOnce(options.get("do", lambda act: act())),
         "changed": lambda: None,
-        "notify": lambda title, text: None,
+        "notify": lambda title, text, calm=False: None,
     }
     return Context(session=session, workers=workers, **{**silent, **options})
 

@@ -12,7 +12,15 @@ from finlab.layout.body import Hull
 from finlab.vehicle.body import GRAVITY
 from webapp.scene.meshes.hull import hull_of
 from webapp.session import Session
-from webapp.session.body_edits import DYNAMICS, estimated, solid_of, water_density, with_dynamics
+from webapp.session.body_edits import (
+    DYNAMICS,
+    contradicts,
+    displaced,
+    estimated,
+    solid_of,
+    water_density,
+    with_dynamics,
+)
 
 
 @pytest.fixture
@@ -101,3 +109,21 @@ def test_the_robot_is_renamed_and_described(session: Session) -> None:
             session.rename_robot(bad)
     with pytest.raises(FinlabError):
         session.describe_robot("x" * 4001)
+
+
+def test_a_hull_that_contradicts_the_body_can_be_estimated_anew() -> None:
+    session = Session(load_layout("ucat"))
+    session.set_hull("box", (0.5, 0.3, 0.2))
+    layout = session.state.layout
+    water = displaced(layout)
+    assert water > 25.0 and contradicts(layout)
+    session.estimate()
+    layout = session.state.layout
+    assert layout.body is not None and layout.body.mass_kg == 19.0 and not contradicts(layout)
+    session.estimate(anew=True)
+    layout = session.state.layout
+    assert layout.body is not None and layout.body.mass_kg == pytest.approx(water, rel=0.001)
+    assert layout.body.center_of_buoyancy_m is not None and not contradicts(layout)
+    session.undo()
+    session.forget_dynamics()
+    assert not contradicts(session.state.layout), "nothing is said that could"

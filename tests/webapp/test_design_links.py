@@ -1,6 +1,7 @@
 """Designs in links: whole there and back, treated like any upload, refused when they are too large."""
 
 import base64
+import re
 import zlib
 from pathlib import Path
 from types import SimpleNamespace
@@ -99,14 +100,16 @@ class Browser:
 
     def __init__(self) -> None:
         self.sent: list[str] = []
+        self.notes: list[str] = []
         self.heard: dict[str, Any] = {}
 
 
 def designs_of(session: Session, browser: Browser) -> Designs:
     context: Any = SimpleNamespace(
         session=session,
-        notify=lambda *_: None,
+        notify=lambda _, text, calm=False: browser.notes.append(text),
         reading=ReadAtOnce(lambda act: act()),
+        client=SimpleNamespace(gui=None),
     )
     exports: Any = SimpleNamespace(download=lambda name, _: browser.sent.append(name))
     presses: Any = SimpleNamespace(on=browser.heard.__setitem__)
@@ -130,6 +133,25 @@ def test_saving_sends_the_design_and_notes_it() -> None:
     session.rename_robot("My turtle")
     designs_of(session, browser).save()
     assert browser.sent == ["My_turtle.yaml"] and session.saved == session.state.layout
+
+
+def test_a_link_carries_the_wrench_and_says_that_it_is_a_copy(monkeypatch: pytest.MonkeyPatch) -> None:
+    mine, theirs, browser = Session(load_layout("octo")), Session(load_layout("ucat")), Browser()
+    mine.set_target(4, -1.0 / 3.0)
+    scripts: list[str] = []
+    monkeypatch.setattr("webapp.tasks.designs.run_script", lambda _, script: scripts.append(script))
+    designs_of(mine, browser).share()
+    fragment = re.findall(r'"(design=[^"]*)"', scripts[0])[0]
+    there = designs_of(theirs, browser)
+    there.open_link(fragment)
+    assert theirs.state.layout == mine.state.layout
+    assert theirs.state.target == pytest.approx(mine.state.target, rel=1e-5)
+    assert "is a copy" in browser.notes[0]
+    state = theirs.state
+    for wrench in ("1,2", "a,b,c,d,e,f", "nan,0,0,0,0,0", "1e9,0,0,0,0,0"):
+        with pytest.raises(FinlabError, match="expected"):
+            there.open_link(f"{fragment.partition('&')[0]}&wrench={wrench}")
+        assert theirs.state.target == state.target
 
 
 def test_a_measured_fin_travels_with_its_table(tmp_path: Path) -> None:

@@ -98,3 +98,17 @@ def test_a_page_has_few_files_read_at_once(server: viser.ViserServer, view: View
     assert sum("being read; wait" in note for note in view.client.notes) == 3
     until(lambda: view.reading._waiting == 0)
     assert found == [0] * reading.MOST_WAITING and len(view.client.notes) == 3
+
+
+def test_what_has_a_kind_waits_its_turn(server: viser.ViserServer, view: View) -> None:
+    found: list[int] = []
+
+    def ask() -> None:
+        for _ in range(reading.MOST_WAITING):
+            view.do(lambda: view.reading.make(partial(time.sleep, 0.05), lambda _: found.append(0)))
+        for count in range(1, 9):
+            view.do(lambda count=count: view.reading.make(lambda: count, found.append, "save"))
+
+    on_loop(server, ask)
+    until(lambda: sorted(found) == [0] * reading.MOST_WAITING + [8])  # of the saves the newest
+    assert view.client.notes == []

@@ -1,6 +1,7 @@
 """The session: checked intents, undo by steps that make sense, nothing lost on refusal."""
 
 import math
+from dataclasses import replace
 
 import pytest
 
@@ -29,20 +30,38 @@ def test_a_drag_is_one_step_of_undo(session: Session) -> None:
     assert session.state.layout.fins[0].position[0] == pytest.approx(0.22)
 
 
-def test_slider_steps_merge_only_in_quick_succession() -> None:
+def test_slider_steps_merge_only_in_quick_succession(session: Session) -> None:
     now = 0.0
-    session = Session(load_layout(shipped_layouts()["A"]))
     session.history._clock = lambda: now
-    session.set_target(0, 1.0)
-    session.set_target(0, 2.0)
+    session.select(session.state.layout.names[0])
+    for angle in (1.0, 1.1):
+        session.turn_selected(angle)
     now = 5.0
-    session.set_target(0, 3.0)
+    session.turn_selected(1.2)
+    session.history.end_merge()  # as before every typed value
+    session.turn_selected(1.3)
+    for angle in (1.2, 1.1):
+        session.undo()
+        assert session.state.layout.mounting_angle[0] == pytest.approx(angle)
     session.undo()
-    assert session.state.target[0] == 2.0
-    session.undo()
-    assert session.state.target[0] == 1.2
     with pytest.raises(FinlabError, match="nothing to undo"):
         session.undo()
+
+
+def test_undo_is_of_the_robot_and_not_of_the_question(session: Session) -> None:
+    session.set_target(0, 1.5)
+    session.set_setting("method", "qp")
+    assert session.history.undo_name is None
+    name = session.state.layout.names[0]
+    session.toggle_failure(name)
+    session.set_preset("Dive")
+    session.set_setting("policy", "priority")
+    asked = session.state
+    assert session.undo() == f"Fail {name}" and session.state.failed == ()
+    assert session.state == replace(asked, failed=())
+    session.keep_least("effort")
+    session.redo()
+    assert session.state == replace(asked, method="mdn")
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, 1e9, "1", None, True])

@@ -29,7 +29,9 @@ class Shelf:
     def __init__(self) -> None:
         self.worker, self.sent, self.notes = Worker(), {}, []  # type: ignore[var-annotated]
         client = SimpleNamespace(send_file_download=lambda name, data, **_: self.sent.update({name: data}))
-        context = page_of(self.worker, client=client, notify=lambda _, text: self.notes.append(text))
+        context = page_of(
+            self.worker, client=client, notify=lambda _, text, calm=False: self.notes.append(text)
+        )
         self.swimming = Swimming(context)
         self.files = Exports(context)
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from functools import partial
+from math import isfinite, nan
 from typing import Any
 
 from finlab.layout import Body, Layout
@@ -9,8 +10,7 @@ from finlab.vehicle.body import GRAVITY
 from webapp.markup.html import html
 from webapp.markup.words import three_digits
 from webapp.page import Page
-from webapp.scene.meshes.hull import hull_of
-from webapp.session.body_edits import solid_of, water_density
+from webapp.session.body_edits import contradicts, displaced, lift_of
 
 KNOWN = {
     "mass_kg": "mass",
@@ -48,12 +48,16 @@ def add_body(page: Page) -> None:
     session, gui = page.session, page.gui
 
     def put_in(key: str, first: int, values: tuple[Any, ...]) -> None:
-        body = _body(session.state.layout)
-        whole = list(_whole(body, key))
+        whole = list(_whole(_body(session.state.layout), key))
         whole[first : first + 3] = values
-        if key == "inertia_kgm2" and body.inertia_kgm2 is None:
-            whole = [value or max(whole) for value in whole]  # typed box by box, and none may be zero
-        session.set_dynamics(key, tuple(whole))
+        known = [value for value in whole if isfinite(value)]
+        # They are typed box by box; of inertias none may be zero.
+        rest = max(known, default=0.0) if key == "inertia_kgm2" else 0.0
+        session.set_dynamics(key, tuple(value if isfinite(value) else rest for value in whole))
+
+    def forget() -> None:
+        text = "Nothing is said of mass, inertia, damping and buoyancy from then on; undo brings it back."
+        page.ask("Forget the body?", text, {"Forget": session.forget_dynamics})
 
     def three(key: str, first: int) -> Callable[[Layout], tuple[float, ...]]:
         return lambda layout: _whole(_body(layout), key)[first : first + 3]
@@ -62,18 +66,18 @@ def add_body(page: Page) -> None:
     page.bind(gui.add_text("Name", ""), session.rename_robot, lambda layout: layout.name)
     text = gui.add_text("About", "", multiline=True)
     page.bind(text, session.describe_robot, lambda layout: layout.description)
-    acts = {"Estimate": session.estimate, "Forget": session.forget_dynamics}
+    acts = {"Estimate": session.estimate, "Forget": forget}
     page.add_buttons("From the hull", acts, hint=FORMULAS)
     page.bind_number(
         gui.add_number("Mass [kg]", 0.0, step=0.5, hint="From the hull: of the water that it displaces."),
         partial(session.set_dynamics, "mass_kg"),
-        lambda layout: _body(layout).mass_kg or 0.0,
+        lambda layout: _said(_body(layout).mass_kg),
     )
     about = "As much as the robot weighs where nothing is said."
     page.bind_number(
         gui.add_number("Buoyancy [N]", 0.0, step=1.0, hint=about),
         partial(session.set_dynamics, "buoyancy_n"),
-        lambda layout: _lift(_body(layout)),
+        lambda layout: _said(_body(layout).buoyancy_n),
     )
     for key, rows in PARTS.items():
         for label, first, hint in rows:
@@ -85,23 +89,27 @@ def _body(layout: Layout) -> Body:
     return layout.body or Body()
 
 
-def _lift(body: Body) -> float:
-    """The buoyant force [N]; that of a neutral robot where none is given."""
-    return (body.mass_kg or 0.0) * GRAVITY if body.buoyancy_n is None else body.buoyancy_n
+def _said(value: float | None) -> float:
+    """A number for a box; what is not said leaves it empty."""
+    return nan if value is None else value
 
 
 def _whole(body: Body, key: str) -> tuple[float, ...]:
     given: tuple[float, ...] | None = getattr(body, key)
-    return given or (0.0,) * 3 * len(PARTS[key])
+    return given or (nan,) * 3 * len(PARTS[key])
 
 
 def _facts(layout: Layout) -> str:
     """The hull in figures, and what a swim would miss."""
-    body, volume = _body(layout), solid_of(hull_of(layout)).volume
-    water = three_digits(water_density(layout) * volume)
-    lines = [f"The hull encloses {three_digits(1000 * volume)} L, {water} kg of water."]
+    body, water = _body(layout), displaced(layout)
+    lines = [f"The hull encloses {three_digits(water)} kg of water."]
     if body.mass_kg is not None:
-        over = _lift(body) / GRAVITY - body.mass_kg
+        lift = lift_of(body)
+        over = lift / GRAVITY - body.mass_kg
+        if contradicts(layout):
+            reason = "it is flooded in part" if lift < GRAVITY * water else "other parts lift, too"
+            said = f" The body's buoyancy is that of {three_digits(lift / GRAVITY)} kg"
+            lines[0] += f"{said}: {reason}, or estimate anew."
         rises = f"{'rises' if over > 0 else 'sinks'} with {three_digits(abs(over))} kg"
         lines.append(
             f"By mass and buoyancy below it {'is neutral' if abs(over) < 5e-4 * body.mass_kg else rises}."

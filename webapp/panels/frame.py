@@ -161,6 +161,7 @@ class Frame:
             "end": lambda _: session.end_guide(),
             "look": robot.look_from,
             "frame": lambda _: robot.frame(),
+            "typed": lambda _: session.history.end_merge(),
         }
         for kind, act in acts.items():
             self._page.presses.on(kind, partial(_by_key, act))

@@ -11,11 +11,14 @@ from scipy.spatial.transform import Rotation
 from finlab.errors import FinlabError
 from finlab.layout import Layout
 from finlab.layout.body import HULL_SHAPES, MESH_SUFFIXES, Hull
+from finlab.vehicle.body import GRAVITY
 from webapp.markup.html import html
+from webapp.markup.words import three_digits
 from webapp.page import Page
 from webapp.scene.meshes.hull import hull_of
-from webapp.scene.meshes.mesh_file import MAX_BYTES, MAX_FACES, turned
+from webapp.scene.meshes.mesh_file import LARGEST, MAX_BYTES, MAX_FACES, SMALLEST, turned
 from webapp.scene.meshes.mesh_hull import UNITS, MeshHull
+from webapp.session.body_edits import contradicts, displaced, lift_of
 from webapp.session.files import reshaped_hull, stored_hull
 from webapp.session.layout_edits import center_of_gravity, with_hull
 from webapp.session.state import chosen
@@ -29,12 +32,35 @@ def add_hull(page: Page) -> None:
     session, gui = page.session, page.gui
 
     def load(name: str, content: bytes) -> None:
-        page.reading.read(partial(stored_hull, name, content, session.mesh_unit), take, partial(_drawn, page))
+        unit = session.mesh_unit
+        read = partial(stored_hull, name, content, unit)
+        page.reading.read(read, partial(take, unit), partial(_drawn, page))
 
-    def take(hull: Hull) -> None:
+    def take(unit: str, hull: Hull) -> None:
+        if hull.scale == UNITS[unit]:
+            put_in(unit, hull)
+            return
+        side = 2.0 * max(hull_of(with_hull(session.state.layout, hull)).half) / hull.scale
+        lengths = {word: side * factor for word, factor in UNITS.items()}
+        answers = {
+            f"{word}: {length:.3g} m long": partial(put_in, word, replace(hull, scale=UNITS[word]))
+            for word, length in sorted(lengths.items(), key=lambda each: UNITS[each[0]] != hull.scale)
+            if SMALLEST <= length <= LARGEST
+        }
+        text = f"In {unit} it would be {lengths[unit]:.3g} m long, which no hull is."
+        page.ask("In which unit is this file?", text, answers)
+
+    def put_in(unit: str, hull: Hull) -> None:
+        session.mesh_unit = unit
         session.import_hull(hull)
         session.show_task("Design")
         session.select(None)  # so that the report is seen, wherever the file was dropped
+        layout = session.state.layout
+        if layout.body is not None and contradicts(layout):
+            said, water = (three_digits(v) for v in (lift_of(layout.body) / GRAVITY, displaced(layout)))
+            text = f"This hull encloses {water} kg of water, the body's buoyancy is that of {said} kg."
+            anew = {"All": partial(session.estimate, True), "All but the mass": partial(session.estimate)}
+            page.ask("Estimate anew from the hull?", text, anew)
 
     def choose_unit(unit: str) -> None:
         """Another unit, for the next file and for the one that is here; a reshaped one is in metres."""

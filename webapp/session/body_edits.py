@@ -26,6 +26,8 @@ DYNAMICS = (
     "buoyancy_n",
 )
 DIGITS = 4
+DOUBTFUL = 0.1
+"""Share of the water in the hull's place by which a body may be heavier or lighter."""
 
 
 def with_dynamics(layout: Layout, **values: Any) -> Layout:
@@ -63,6 +65,22 @@ def solid_of(hull: AnyHull) -> HullSolid:
     """
     mesh = hull.mesh()
     return HullSolid.of(mesh.vertices[mesh.faces])
+
+
+def displaced(layout: Layout) -> float:
+    """Water in the hull's place [kg]."""
+    return water_density(layout) * solid_of(hull_of(layout)).volume
+
+
+def lift_of(body: Body) -> float:
+    """The buoyant force [N]; that of a neutral robot where none is given."""
+    return (body.mass_kg or 0.0) * GRAVITY if body.buoyancy_n is None else body.buoyancy_n
+
+
+def contradicts(layout: Layout) -> bool:
+    """Whether the body's mass is known, and its buoyancy is not that of the hull."""
+    body, water = layout.body or Body(), displaced(layout)
+    return body.mass_kg is not None and abs(lift_of(body) / GRAVITY - water) > DOUBTFUL * water
 
 
 def estimated(layout: Layout) -> Layout:

@@ -53,6 +53,11 @@ class History(Generic[Snapshot]):
         self.merge_key, self._merge_time = merge_key, now
         self.state = state
 
+    def replace(self, state: Snapshot) -> None:
+        """Let the present state be another one, without a step."""
+        self.state = state
+        self.merge_key = None
+
     def resume(
         self, state: Snapshot, past: Sequence[tuple[str, Snapshot]], future: Sequence[tuple[str, Snapshot]]
     ) -> None:
@@ -133,9 +138,14 @@ class Core:
         return tuple(name for name in self.state.layout.names if name in self._chosen)
 
     def _commit(self, name: str, state: State, merge_key: str | None = None, timed: bool = True) -> None:
-        if state != self.state:
+        """Another state; a step of undo where the robot is another one."""
+        if state == self.state:
+            return
+        if state.asking(self.state) == self.state:  # about the same robot
+            self.history.replace(state)
+        else:
             self.history.commit(name, state, merge_key, timed)
-            self._settled()
+        self._settled()
 
     def _settled(self) -> None:
         """After any change of the state: a choice of mode is void, one that is gone is not selected."""
@@ -180,13 +190,15 @@ class Core:
 
     def undo(self) -> str:
         """Take back the last step; returns its name."""
-        return self._stepped(self.history.undo(), "undo")
+        return self._stepped(self.history.undo, "undo")
 
     def redo(self) -> str:
         """Bring back the step taken back last; returns its name."""
-        return self._stepped(self.history.redo(), "redo")
+        return self._stepped(self.history.redo, "redo")
 
-    def _stepped(self, name: str | None, verb: str) -> str:
+    def _stepped(self, step: Callable[[], str | None], verb: str) -> str:
+        asked, name = self.state, step()
+        self.history.replace(self.state.asking(asked))
         if name is None:
             raise FinlabError(f"there is nothing to {verb}")
         self._settled()

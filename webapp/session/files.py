@@ -6,6 +6,7 @@ opens it, and not to the way. What comes out of a link is treated like any file 
 
 import base64
 import binascii
+import contextlib
 import os
 import re
 import zlib
@@ -24,7 +25,7 @@ from finlab.layout.body import Hull
 from finlab.layout.load import A_LAYOUT, MAX_BYTES
 from finlab.physics import plant_of
 from webapp.scene.meshes.mesh import Mesh
-from webapp.scene.meshes.mesh_file import stl_of
+from webapp.scene.meshes.mesh_file import SizeError, stl_of
 from webapp.scene.meshes.mesh_hull import UNITS, MeshHull
 from webapp.session.companions import (
     TABLE_FOLDER,
@@ -39,6 +40,8 @@ from webapp.session.state import chosen
 
 FRAGMENT = "design="
 """What the part behind the # begins with."""
+WRENCH = "&wrench="
+"""What stands before the six components of the wrench, after the design."""
 MAX_LINK = 16_000
 """Most characters of a design in a link; chats and mail programs cut longer ones."""
 PLAIN, ARCHIVE = "y", "a"
@@ -112,14 +115,18 @@ def table_folder() -> Path:
 
 
 def stored_hull(name: str, content: bytes, unit: str) -> Hull:
-    """The hull in an uploaded mesh file, which is checked and kept under a name made from its content.
+    """The hull in an uploaded mesh file, which is checked and kept under a name made from its content; in
+    another unit where it is no hull's size in this one.
 
     Raises:
         FinlabError: it is no mesh, too large, or cannot be kept.
     """
     chosen(unit, "unit", UNITS)
     short = Path(str(name)).name[-80:] or "upload"
-    return Hull(mesh=stored_mesh(short, content, UNITS[unit], cache_folder()), scale=UNITS[unit])
+    for scale in (UNITS[unit], UNITS["mm"], UNITS["m"]):
+        with contextlib.suppress(SizeError):
+            return Hull(mesh=stored_mesh(short, content, scale, cache_folder()), scale=scale)
+    return Hull(mesh=stored_mesh(short, content, UNITS["inch"], cache_folder()), scale=UNITS["inch"])
 
 
 def reshaped_hull(hull: Hull, change: Callable[[Mesh], Mesh]) -> Hull:

@@ -94,9 +94,11 @@ class Inspecting(Editing):
         nothing: dict[str, Any] = dict.fromkeys(body_edits.DYNAMICS)
         self._edit("Forget mass and damping", body_edits.with_dynamics(self.state.layout, **nothing))
 
-    def estimate(self) -> None:
-        """What the hull says of the body; a mass that is known stays."""
-        self._edit("Estimate mass and damping from the hull", body_edits.estimated(self.state.layout))
+    def estimate(self, anew: bool = False) -> None:
+        """What the hull says of the body; a mass that is known stays, unless all is estimated `anew`."""
+        layout = self.state.layout
+        known = body_edits.with_dynamics(layout, mass_kg=None) if anew else layout
+        self._edit("Estimate mass and damping from the hull", body_edits.estimated(known))
 
     def _selected_names(self) -> tuple[str, ...]:
         """The selected actuators, in the order in which they were chosen."""

@@ -1,5 +1,9 @@
-"""Intents about the question: what wrench is asked for, of which fins, answered how."""
+"""Intents about the question: what wrench is asked for, of which actuators, answered how.
 
+Undo is of the robot and its damage; wrench, method and policy stay as they are.
+"""
+
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -18,17 +22,27 @@ class Questions(Core):
 
     def set_target(self, axis: int, value: Any) -> None:
         """One component of the target wrench [N or N m]."""
-        self._commit(f"Set {AXES[axis]}", self.state.with_target(axis, value), f"target{axis}")
+        self._commit("", self.state.with_target(axis, value))
+
+    def ask_for(self, values: Sequence[str]) -> None:
+        """All six components, as text that may be anything."""
+        state = self.state
+        try:
+            for axis, value in zip(range(len(AXES)), values, strict=True):
+                state = state.with_target(axis, float(value))
+        except ValueError:
+            raise FinlabError(f"wrench: expected six numbers, got {','.join(values)!r:.60}") from None
+        self._commit("", state)
 
     def set_preset(self, name: str) -> None:
         """The target wrench of a preset."""
         if name not in PRESETS:
             raise FinlabError(f"there is no preset {name!r:.40}")
-        self._commit(f"Preset {name}", replace(self.state, target=PRESETS[name]))
+        self._commit("", replace(self.state, target=PRESETS[name]))
 
     def set_setting(self, key: str, value: Any) -> None:
         """The temperature, the method or the policy; `key` is the field of `State`."""
-        self._commit(f"Set {key.replace('_', ' ')}", self.state.with_setting(key, value), key)
+        self._commit("", self.state.with_setting(key, value))
 
     def keep_least(self, word: str) -> None:
         """Watts or effort, by the method that keeps them least."""

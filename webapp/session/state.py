@@ -65,6 +65,16 @@ class State:
         """The layout with the limits that are left to damaged fins."""
         return self.layout if self.health is None else self.health.applied_to(self.layout)
 
+    def asking(self, other: "State") -> "State":
+        """The same robot with the question of another state: what is asked for, of whom, and how."""
+        return replace(
+            self,
+            target=other.target,
+            temperature=other.temperature,
+            method=other.method,
+            policy=other.policy,
+        )
+
     def with_target(self, axis: int, value: Any) -> "State":
         """One component of the target changed."""
         checked = number(value, f"{AXES[axis]} [{AXIS_UNITS[axis]}]", -MAX_TARGET, MAX_TARGET)

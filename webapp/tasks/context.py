@@ -24,5 +24,5 @@ class Context:
     do: Callable[[Callable[[], object]], None]
     changed: Callable[[], None]
     """Renders the page; called on the loop when there is something new to show."""
-    notify: Callable[[str, str], None]
-    """Shows a note: title and sentence; called on the loop."""
+    notify: Callable[..., None]
+    """Shows a note: title and sentence, and whether it is `calm`; called on the loop."""

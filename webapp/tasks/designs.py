@@ -14,12 +14,17 @@ from webapp.presses import Presses
 from webapp.scene.meshes.hull import hull_of
 from webapp.session import files
 from webapp.session.companions import Opened
-from webapp.session.files import FRAGMENT, file_stem, packed, unpacked
+from webapp.session.files import FRAGMENT, WRENCH, file_stem, packed, unpacked
+from webapp.session.state import State
 from webapp.tasks.context import Context
 from webapp.tasks.swimming import Swimming
 from webapp.viser_internals import run_file, run_script
 
 KINDS = "a design (YAML, JSON, ZIP), measurements of a fin (CSV), or a hull (STL, OBJ, GLB, PLY)"
+SHARED = (
+    "The link carries the whole design and the wrench that is asked for. Whoever opens it gets a copy, on a "
+    "finlab of their own."
+)
 
 Take = Callable[[str, bytes], object]
 
@@ -60,8 +65,9 @@ class Exports:
         )
 
     def download(self, name: str, content: bytes) -> None:
-        """Send a file that is there already."""
+        """Send a file that is there already, and say where it went."""
         self._context.client.send_file_download(name, content, save_immediately=True)
+        self._context.notify("Saved", f"{name}, among the downloads of this browser", calm=True)
 
 
 class Designs:
@@ -75,6 +81,7 @@ class Designs:
     def new(self) -> None:
         """A robot with one hull and one fin."""
         self._session.new_layout()
+        self._session.show_task("Design")
 
     def open(self, name: str, content: bytes) -> None:
         """A design from a file that the browser sent."""
@@ -82,13 +89,21 @@ class Designs:
 
     def open_link(self, text: str) -> None:
         """A design from the part of an address behind the #; it may be anything."""
-        self._read(partial(unpacked, text.removeprefix(FRAGMENT)))
+        design, _, wrench = text.removeprefix(FRAGMENT).partition(WRENCH)
+        self._read(partial(unpacked, design), wrench)
 
-    def _read(self, read: Callable[[], Opened]) -> None:
-        self._context.reading.read(read, self._take, lambda opened: hull_of(opened.layout))
+    def _read(self, read: Callable[[], Opened], wrench: str | None = None) -> None:
+        take = partial(self._take, wrench)
+        self._context.reading.read(read, take, lambda opened: hull_of(opened.layout))
 
-    def _take(self, opened: Opened) -> None:
+    def _take(self, wrench: str | None, opened: Opened) -> None:
+        """`wrench` is that of a link; there is none with a file."""
         self._session.open_layout(opened.layout)
+        if wrench is not None:
+            text = f"{opened.layout.name} is a copy; whoever shared it does not see what you change"
+            self._context.notify("Opened from a link", text, calm=True)
+        if wrench:
+            self._session.ask_for(wrench.split(","))
         for file in opened.missing:
             text = f"{file} did not come along, so a hull that fits is drawn; put both into one ZIP archive"
             self._context.notify("Without its hull", text)
@@ -96,7 +111,7 @@ class Designs:
     def save(self) -> None:
         """Send the design's file to the browser."""
         layout = self._session.state.layout
-        self._context.reading.make(partial(files.layout_file, layout), partial(self._send, layout))
+        self._context.reading.make(partial(files.layout_file, layout), partial(self._send, layout), "save")
 
     def _send(self, layout: Layout, file: tuple[str, bytes]) -> None:
         self._exports.download(*file)
@@ -104,12 +119,13 @@ class Designs:
 
     def share(self) -> None:
         """Show the link that carries the design, and take it to the clipboard where the browser lets us."""
-        layout = self._session.state.layout
-        self._context.reading.make(partial(packed, layout), partial(self._show, layout))
+        state = self._session.state
+        self._context.reading.make(partial(packed, state.layout), partial(self._show, state), "share")
 
-    def _show(self, layout: Layout, text: str) -> None:
-        card = json.dumps([FRAGMENT + text, layout.name])
-        run_script(self._context.client.gui, f"finlabDesigns.share(...{card});")
+    def _show(self, state: State, text: str) -> None:
+        wrench = WRENCH + ",".join(f"{value:.6g}" for value in state.target)
+        card = json.dumps([f"Share {state.layout.name}", SHARED, FRAGMENT + text + wrench])
+        run_script(self._context.client.gui, f"finlabCards.share(...{card});")
 
 
 class Opening:

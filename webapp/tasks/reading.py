@@ -21,6 +21,7 @@ class Reading:
         """`do` carries out on the loop what is meant with what was found, and says what was refused."""
         self._readers, self._loop, self._do = readers, loop, do
         self._waiting = 0
+        self._later: dict[str, Callable[[], None]] = {}
 
     def read(
         self, read: Read[Found], use: Callable[[Found], object], prepare: Callable[[Found], object] = bool
@@ -44,12 +45,16 @@ class Reading:
 
         self.make(work, use)
 
-    def make(self, work: Read[Found], use: Callable[[Found], object]) -> None:
-        """Do what takes time with what is ours, on a thread, and use what it gives on the loop.
+    def make(self, work: Read[Found], use: Callable[[Found], object], kind: str = "") -> None:
+        """Do what takes time with what is ours, on a thread, and use what it gives on the loop. What has a
+        `kind` waits its turn; of each kind the newest does.
 
         Raises:
-            FinlabError: as above.
+            FinlabError: as above, of what has none.
         """
+        if self._waiting >= MOST_WAITING and kind:
+            self._later[kind] = partial(self.make, work, use, kind)
+            return
         if self._waiting >= MOST_WAITING:
             raise FinlabError("other files are being read; wait for them")
         self._waiting += 1
@@ -65,6 +70,8 @@ class Reading:
 
     def _end(self, act: Callable[[], object]) -> None:
         self._waiting -= 1
+        if self._later:
+            self._later.pop(next(iter(self._later)))()
         self._do(act)
 
 

@@ -21,6 +21,10 @@ OPEN = 0.02
 """Share of edges with one triangle only from which a mesh is a sheet and not a body."""
 
 
+class SizeError(FinlabError):
+    """A mesh is of a size that no hull has, in the unit that was said."""
+
+
 @dataclass(frozen=True)
 class MeshReport:
     """What there is to know of a mesh file."""
@@ -55,7 +59,7 @@ def read_mesh(name: str, content: bytes, scale: float) -> tuple[Mesh, MeshReport
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     length = float((high - low).max())
     if not SMALLEST <= length <= LARGEST:
-        raise FinlabError(
+        raise SizeError(
             f"{name}: would be {length:.3g} m long, expected {SMALLEST:g} to {LARGEST:g} m; "
             "choose another unit"
         )
