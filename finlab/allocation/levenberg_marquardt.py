@@ -41,8 +41,7 @@ class CommandProblem:
     fin: FinForces
     """What commands give: the fins' own laws, or a surrogate."""
     effectiveness: AnyArray
-    """Normalized wrench (n, 3, 6) per newton of each fin's force along the axes in which `fin` gives it; six
-    axes in place of three where each fin's command changes what the others give."""
+    """Normalized wrench (n, 3, 6) per newton of each fin's force along the axes in which `fin` gives it."""
     lower: AnyArray
     """Lower limits (n, 3)."""
     upper: AnyArray
@@ -53,8 +52,7 @@ class CommandProblem:
     @classmethod
     def of(cls, plant: Plant, sigma: Array) -> Self:
         """A robot as its fins' own laws say, wrenches normalized by `sigma` (6,)."""
-        parts, effectiveness = plant.parts
-        return cls(parts, effectiveness / sigma, plant.lower, plant.upper, plant.full_turn)
+        return cls(plant, plant.effectiveness / sigma, plant.lower, plant.upper, plant.full_turn)
 
     @cached_property
     def width(self) -> AnyArray:

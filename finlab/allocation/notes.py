@@ -8,7 +8,7 @@ from finlab.actuators.fin.models import file_stamps
 from finlab.allocation.method import Method
 from finlab.allocation.policy import AXES
 from finlab.arrays import Array
-from finlab.layout import Fin, FinModelSpec, Layout, Limits
+from finlab.layout import FinModelSpec, Layout, Limits
 from finlab.layout.angles import wrapped
 from finlab.layout.force_table_file import DOUBT
 from finlab.layout.rudder import Rudder
@@ -64,8 +64,8 @@ def fin_notes(layout: Layout, flow: Array | None = None) -> tuple[str, ...]:
         return notes + _not_at_speed(layout)
     return (
         *notes,
-        f"the flow is without effect: layout {layout.name} does not say what speed through the water takes "
-        "from its fins (interaction.inflow), and it has no rudder",
+        f"the flow is without effect: layout {layout.name} has no rudder, and what speed through the water "
+        "takes from other actuators is not known",
     )
 
 
@@ -82,9 +82,8 @@ def _at_rest(layout: Layout) -> tuple[str, ...]:
 
 def _not_at_speed(layout: Layout) -> tuple[str, ...]:
     """The sentence about tables, which tell forces at rest."""
-    told = layout.interaction.inflow if layout.interaction else (0.0, 0.0)
-    parts = [part for part in layout.actuators if not (isinstance(part, Fin) and any(told))]
-    names = [part.name for part in parts if not isinstance(part, Rudder) and part.model.type == "table"]
+    others = [part for part in layout.actuators if not isinstance(part, Rudder)]
+    names = [part.name for part in others if part.model.type == "table"]
     if not names:
         return ()
     return (f"the tables of {', '.join(names)} hold forces at rest; what speed changes is not known",)

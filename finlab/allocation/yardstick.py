@@ -1,8 +1,6 @@
 """The yardstick of a robot: what an error in its wrench is compared with, forces and torques each by one
 number."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from finlab.arrays import Array
@@ -24,7 +22,7 @@ def yardstick(layout: Layout) -> Array:
     Raises:
         DataError: a fin's force table cannot be read.
     """
-    plant = Plant(replace(layout, interaction=None))
+    plant = Plant(layout)
     share = np.stack(np.meshgrid(*(np.linspace(0.0, 1.0, count) for count in STEPS), indexing="ij"), -1)
     command = plant.lower + share.reshape(-1, 1, 3) * plant.width
     wrench = np.einsum("kni,niw->knw", plant.force(command), plant.effectiveness)

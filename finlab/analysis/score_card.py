@@ -115,8 +115,6 @@ def _notes(layout: Layout, failed: Collection[str], flow: Array | None) -> tuple
     still = [part.name for part in layout.actuators if part.type == "rudder" and part.name not in failed]
     if flow is None and still:
         notes.append(f"At rest {', '.join(still)} give nothing; say how fast the robot moves (--flow).")
-    if flow is not None and layout.has_inflow:
-        notes.append("What speed takes from fins (interaction.inflow) counts in power, not in reach.")
     if any(fin.model.type == "table" for fin in layout.fins if fin.name not in failed):
         notes.append("Fins that follow a table count with the largest thrust that was sampled from it.")
     return tuple(notes)

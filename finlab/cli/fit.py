@@ -102,7 +102,8 @@ def robot(
         layout: the robot as it is believed to be: layout file or the name of a shipped layout.
         logs: swims of that robot.
         output: the layout as the swims show it; fins whose law is another one become tables beside it.
-        residual: look for another law of thrust, jets and inflow, too, and use what helps on parts not seen.
+        residual: look for forces within the beat and another law of thrust, too, and use what helps on parts
+            not seen.
     """
     from finlab.cli.inputs import open_robot
     from finlab.errors import DataError

@@ -64,8 +64,7 @@ def simulate(
             allocate with them from then on; for laws of fins, and methods that take any shaft.
         method: dual, mdn, paper, qp, sqp, px4, ardusub, analytic or ipopt.
         duration: time for a shipped trajectory.
-        plant: what the fins really do: mean (the fin law), ripple (within the flapping cycle), flexible (fins
-            with soft tips), wake (fins in each other's jets), inflow (thrust falls with speed) or offset
+        plant: what the fins really do: mean (the fin law), ripple (within the flapping cycle) or offset
             (centre of gravity and fins not where the layout says).
         current: velocity of the water in the world [m/s].
         waves: significant height [m] and peak period [s] of waves that run along the world's x.

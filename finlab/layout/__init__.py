@@ -15,8 +15,6 @@ from finlab.layout.file import save_layout as save_layout
 from finlab.layout.fin import Fin as Fin
 from finlab.layout.fin import FinModelSpec as FinModelSpec
 from finlab.layout.fin import Limits as Limits
-from finlab.layout.interaction import Interaction as Interaction
-from finlab.layout.interaction import Jet as Jet
 from finlab.layout.layout import MAX_ACTUATORS as MAX_ACTUATORS
 from finlab.layout.layout import Layout as Layout
 from finlab.layout.load import load_layout as load_layout

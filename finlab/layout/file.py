@@ -20,7 +20,7 @@ from finlab.errors import LayoutError
 from finlab.files.plain_values import yaml_text
 from finlab.files.schema import checked, shown
 from finlab.layout.checked import form
-from finlab.layout.file_form import ACTUATOR, BODY, HORIZONTAL_FIN, INTERACTION, Reader, plain, under
+from finlab.layout.file_form import ACTUATOR, BODY, HORIZONTAL_FIN, Reader, plain, under
 from finlab.layout.fin import Fin
 from finlab.layout.layout import MAX_ACTUATORS, Layout
 from finlab.whole_file import write_whole
@@ -43,7 +43,6 @@ FRAME = to_builtins(Frame())
 _OF_A_LAYOUT: dict[str, Any] = {
     "format": Literal["finlab-layout"],
     "body": BODY,
-    "interaction": INTERACTION,
     "frame": Frame,
     "optional": ["frame"],
 }
@@ -82,11 +81,11 @@ def parse_layout(
         key = VERSIONS[data["version"]]
         reader = Reader(folder, may_open)
         told = {}
-        for name in (key, "body", "interaction"):
+        for name in (key, "body"):
             with under(name):
                 told[name] = reader.value(getattr(file, name))
         try:
-            return Layout(file.name, told[key], file.description or "", told["body"], told["interaction"])
+            return Layout(file.name, told[key], file.description or "", told["body"])
         except LayoutError as error:
             raise LayoutError(error.problem, error.key.replace("actuators[", f"{key}[")) from None
 
@@ -116,8 +115,7 @@ def layout_to_dict(layout: Layout) -> dict[str, Any]:
         data["fins"] = [{key: value for key, value in part.items() if key != "type"} for part in parts]
     else:
         data["actuators"] = parts
-    told = {"body": layout.body, "interaction": layout.interaction}
-    return data | {key: plain(part) for key, part in told.items() if part is not None}
+    return data if layout.body is None else data | {"body": plain(layout.body)}
 
 
 def save_layout(layout: Layout, path: str | os.PathLike[str]) -> None:

@@ -19,7 +19,6 @@ from finlab.layout.azimuth import Azimuth, Tilt
 from finlab.layout.body import Body, Hull
 from finlab.layout.checked import Checked, form
 from finlab.layout.fin import Fin, FinModelSpec, Limits, Model
-from finlab.layout.interaction import Interaction, Jet
 from finlab.layout.rudder import Rudder
 from finlab.layout.servo import Servo
 from finlab.layout.thrust_model import MAX_ROWS, PowerLaw, PowerTable, Row
@@ -61,7 +60,6 @@ _KINDS = {
 ACTUATOR: Any = Union[tuple(_KINDS.values())]  # noqa: UP007
 """An actuator of version 2."""
 BODY = form(Body, hull=form(Hull))
-INTERACTION = form(Interaction, jets=list[form(Jet)])  # type: ignore[misc]
 
 
 @contextmanager

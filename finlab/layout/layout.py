@@ -16,7 +16,6 @@ from finlab.layout.actuator import Actuator
 from finlab.layout.body import Body
 from finlab.layout.checked import Checked, Name
 from finlab.layout.fin import Fin
-from finlab.layout.interaction import Interaction
 
 MAX_ACTUATORS = 64
 """Most actuators a layout may have."""
@@ -36,8 +35,6 @@ class Layout(Checked):
     """What there is to know about it, for people."""
     body: Body | None = None
     """Hull, mass and hydrodynamics, where known."""
-    interaction: Interaction | None = None
-    """What the fins take from each other and from speed, where a swim has shown it."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -51,15 +48,10 @@ class Layout(Checked):
                     f"{name!r} is already the name of actuator {first_use[name] + 1}", f"actuators[{i}].name"
                 )
             first_use[name] = i
-        fins = {fin.name for fin in self.fins}
-        for i, jet in enumerate(self.interaction.jets if self.interaction else ()):
-            for key, name in (("source", jet.source), ("target", jet.target)):
-                if name not in fins:
-                    raise LayoutError(f"there is no fin {name!r}", f"interaction.jets[{i}].{key}")
 
     @cached_property
     def _hash(self) -> int:
-        return hash((self.name, self.actuators, self.description, self.body, self.interaction))
+        return hash((self.name, self.actuators, self.description, self.body))
 
     def __hash__(self) -> int:
         # Kept: every call of an allocator looks its layout up, and hashing all parts takes longer.
@@ -157,11 +149,6 @@ class Layout(Checked):
         """How fast each fin can turn (n,) [rad/s]; read-only."""
         return _read_only([fin.servo.speed_limit for fin in self.fins])
 
-    @property
-    def has_inflow(self) -> bool:
-        """Whether the layout says what speed through the water takes from the fins."""
-        return self.interaction is not None and any(self.interaction.inflow)
-
     @cached_property
     def names(self) -> tuple[str, ...]:
         """Names of the actuators, in order."""
@@ -212,17 +199,13 @@ class Layout(Checked):
             what = "fin" if self.is_of_fins else "actuator"
             raise LayoutError(f"layout {self.name} has no {what} left once all are lost; repair one")
         left = tuple(part for i, part in enumerate(self.actuators) if i not in lost)
-        jets = self.interaction and self.interaction.among([part.name for part in left])
-        return replace(self, actuators=left, interaction=jets)
+        return replace(self, actuators=left)
 
     def replace_actuator(self, name: str, /, **changes: Any) -> "Layout":
         """Returns the layout with some fields of one actuator changed, such as `position=(0.1, 0, 0)`."""
         i = self.index(name)
         changed = replace(self.actuators[i], **changes)
-        parts = (*self.actuators[:i], changed, *self.actuators[i + 1 :])
-        if changed.name != name and self.interaction is not None:
-            return replace(self, actuators=parts, interaction=self.interaction.renamed(name, changed.name))
-        return replace(self, actuators=parts)
+        return replace(self, actuators=(*self.actuators[:i], changed, *self.actuators[i + 1 :]))
 
 
 def _read_only(values: ArrayLike) -> Array:

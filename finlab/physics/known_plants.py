@@ -1,10 +1,9 @@
-"""The plant of a layout, whatever its fins take from each other, made once."""
+"""The plant of a layout, made once."""
 
 from functools import lru_cache
 
 from finlab.actuators.fin.models import file_stamps
 from finlab.layout import Layout
-from finlab.physics.coupled_plant import CoupledPlant
 from finlab.physics.plant import Plant
 
 
@@ -20,4 +19,4 @@ def plant_of(layout: Layout) -> Plant:
 @lru_cache(maxsize=256)
 def _made(layout: Layout, stamps: tuple[tuple[int, int] | None, ...]) -> Plant:
     """A plant; tables whose files have changed are read again."""
-    return Plant(layout) if layout.interaction is None else CoupledPlant(layout)
+    return Plant(layout)

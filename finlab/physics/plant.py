@@ -124,12 +124,6 @@ class Plant:
         wrench: Array = wrench_of_forces(force, self.effectiveness)
         return wrench, jacobian.swapaxes(-1, -2)
 
-    @property
-    def parts(self) -> tuple[Any, Array]:
-        """What gives each actuator's part of the wrench, by `force` and `force_and_jacobian` in its own axes,
-        and the wrench (n, axes, 6) per unit of each; here the forces."""
-        return self, self.effectiveness
-
     def power(self, command: Array, *, flow: Array | None = None) -> Array:
         """Returns each actuator's power (..., n) [W] of commands (..., n, 3), NaN for a failed one's."""
         inflow = self.inflow(flow)

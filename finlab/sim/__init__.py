@@ -8,11 +8,11 @@ World: z up. Body: x forward, y left, z up. SI and radians.
 
 from finlab.sim.closed_loop import ClosedLoop as ClosedLoop
 from finlab.sim.fin_fault import FinFault as FinFault
+from finlab.sim.fin_force import PLANTS as PLANTS
 from finlab.sim.log import RunLog as RunLog
 from finlab.sim.log import Tick as Tick
 from finlab.sim.log import load_log as load_log
 from finlab.sim.perturbed import perturbed as perturbed
-from finlab.sim.plants import PLANTS as PLANTS
 from finlab.sim.sensors import NO_NOISE as NO_NOISE
 from finlab.sim.sensors import NOISE_ALONE as NOISE_ALONE
 from finlab.sim.sensors import SensorSettings as SensorSettings

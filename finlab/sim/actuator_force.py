@@ -1,5 +1,5 @@
-"""Forces of all actuators of a robot that swims: fins by a plant of `plants.py`, others by their own law in
-the water that meets them just now."""
+"""Forces of all actuators of a robot that swims: fins by a plant of `fin_force.py`, others by their own law
+in the water that meets them just now."""
 
 from dataclasses import replace
 from typing import NamedTuple
@@ -11,8 +11,8 @@ from finlab.errors import FinlabError
 from finlab.layout import Layout
 from finlab.layout.arrays import own_effectiveness
 from finlab.physics import plant_of
+from finlab.sim.fin_force import make_plant
 from finlab.sim.hanging_fin import HangingFins
-from finlab.sim.plants import make_plant
 from finlab.vehicle.actuator_motion import ActuatorMotion
 from finlab.vehicle.fin_motion import FinMotion, FinPower, fin_power
 
@@ -55,7 +55,7 @@ class ActuatorForce:
             )
         if len(of_others):
             others = tuple(layout.actuators[i] for i in of_others)
-            self._others = plant_of(replace(layout, actuators=others, interaction=None))
+            self._others = plant_of(replace(layout, actuators=others))
 
     def step(self, command: Array, dt: float, water: Array, share: Array) -> Push:
         """Follows a command (n, 3) for `dt` [s].
@@ -71,7 +71,7 @@ class ActuatorForce:
         fins, fin_watts = np.zeros((0, 3)), np.zeros((3, 0))
         others, watts = np.zeros((0, 3)), np.zeros((3, 0))
         if len(motion.of_fins):
-            fins = self._fins.step(self._beat, dt, water) * share[motion.of_fins, None]
+            fins = self._fins.step(self._beat, dt) * share[motion.of_fins, None]
             if (hangs := lost[motion.of_fins]).any():
                 fins[hangs] = self._hanging.force(self._beat.direction, water)[hangs]
             fin_watts = np.array(self._fin_power())

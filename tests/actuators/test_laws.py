@@ -14,12 +14,10 @@ from finlab.actuators.thruster import ThrusterLaw
 from finlab.arrays import Array
 from finlab.layout.azimuth import Azimuth
 from finlab.layout.fin import Fin
-from finlab.layout.interaction import Interaction, Jet
 from finlab.layout.layout import Layout
 from finlab.layout.rudder import Rudder
 from finlab.layout.thrust_model import PowerLaw, PowerTable
 from finlab.layout.thruster import Thruster
-from finlab.physics.known_plants import plant_of
 from finlab.physics.plant import Plant
 from tests.t200 import t200_rows
 
@@ -193,24 +191,6 @@ def test_a_plant_judges_any_mix() -> None:
     np.testing.assert_allclose(change, 2.0 * np.einsum("bwk,bk->bw", moved, step.reshape(6, -1)), atol=1e-8)
     assert plant.power(command, flow=flow).shape == (6, 5)
     assert plant.power(command)[:, 1] == pytest.approx(0.0)
-
-
-def test_fins_that_take_from_each_other_do_so_beside_other_actuators() -> None:
-    robot = hybrid()
-    parts = (*robot.actuators, Fin("other", (0.0, 0.2, 0.0), 2.0))
-    jets = (Jet("fin", "other", (0.2, 0.1)),)
-    coupled = plant_of(Layout("coupled", parts, interaction=Interaction(jets=jets, inflow=(0.4, -0.1))))
-    alone = Plant(Layout("alone", parts))
-    command = alone.sample(np.random.default_rng(2), (4,))
-    flow = np.array([1.2, 0.1, -0.1, 0.0, 0.2, 0.3])
-    share = np.linalg.norm(coupled.forces(command, flow=flow), axis=-1)
-    share /= np.linalg.norm(alone.forces(command, flow=flow), axis=-1)
-    np.testing.assert_allclose(share[:, [0, 1, 3, 4]], 1.0, atol=1e-12)
-    assert (abs(share[:, [2, 5]] - 1.0) > 1e-3).all()
-    moved = coupled.linearize(command, flow=flow)[1]
-    step = 1e-6 * np.random.default_rng(1).normal(size=command.shape)
-    change = coupled.wrench(command + step, flow=flow) - coupled.wrench(command - step, flow=flow)
-    np.testing.assert_allclose(change, 2.0 * np.einsum("bwk,bk->bw", moved, step.reshape(4, -1)), atol=1e-8)
 
 
 def test_a_failed_actuator_of_any_kind_gives_nothing() -> None:

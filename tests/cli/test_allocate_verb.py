@@ -7,18 +7,15 @@ import re
 import subprocess
 import sys
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 import yaml
 
 from finlab.assets import shipped_layouts
 from finlab.cli import main
-from finlab.layout import Interaction, Uncertainty, load_layout, save_layout
-from finlab.physics import plant_of
+from finlab.layout import Uncertainty, load_layout, save_layout
 
 WRENCH = ["--wrench", "1", "0", "-0.5", "0", "0", "1e-1"]
 KEYS = [
@@ -105,18 +102,6 @@ def test_same_seed_same_answer(allocate: Callable[..., tuple[int, str, str]]) ->
 def test_methods_without_a_network(allocate: Callable[..., tuple[int, str, str]]) -> None:
     result = answer(allocate("A", *WRENCH, "--method", "analytic", "--json"))
     assert result["method"] == "analytic" and result["wrench_expected"] is None
-
-
-def test_at_a_flow_the_plant_at_that_flow_judges(
-    allocate: Callable[..., tuple[int, str, str]], tmp_path: Path
-) -> None:
-    robot = replace(load_layout("A"), interaction=Interaction(inflow=(0.3, 0.2)))
-    save_layout(robot, tmp_path / "robot.yaml")
-    flow = [0.3, 0.0, -0.1, 0.0, 0.0, 0.2]
-    result = answer(allocate(str(tmp_path / "robot.yaml"), *WRENCH, "--flow", *map(str, flow), "--json"))
-    assert result["flow"] == flow and result["err_norm"] < 1e-3 and not result["notes"]
-    wrench = plant_of(robot).wrench(result["command"], flow=np.array(flow))
-    assert result["wrench_plant"] == pytest.approx(wrench.tolist())
 
 
 def test_table_for_people(allocate: Callable[..., tuple[int, str, str]]) -> None:

@@ -155,9 +155,9 @@ def test_a_single_odd_sample_decides_nothing(layout_a: Layout) -> None:
     assert monitor.broken == (layout_a.names[2],), "the second in a row decides"
 
 
-@pytest.mark.parametrize("plant", ["ripple", "flexible"])
+@pytest.mark.parametrize("plant", ["ripple", "offset"])
 def test_a_model_that_does_not_fit_raises_no_alarm(layout_a: Layout, analytic: AnyRobot, plant: str) -> None:
-    """Fins that shake the robot by several newtons, or thrust otherwise than the model says."""
+    """Fins that shake the robot by several newtons, or push elsewhere than the model says."""
     loop = swim(layout_a, analytic.on(layout_a), [], plant=plant)
     until(loop, 25.0)
     assert loop.damage.failed == () and loop.damage.health is None

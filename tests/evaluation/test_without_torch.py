@@ -41,7 +41,7 @@ def test_eval_wrench() -> None:
     assert all(name in shown for name in methods.split(","))
 
 
-@pytest.mark.parametrize("plant", ["mean", pytest.param("flexible", marks=pytest.mark.exhaustive)])
+@pytest.mark.parametrize("plant", ["mean", pytest.param("offset", marks=pytest.mark.exhaustive)])
 def test_simulate(plant: str, tmp_path: Path) -> None:
     path = tmp_path / "line.csv"
     path.write_text("t,x,y,z\n0,0,0,-1\n3,0.3,0,-1\n")

@@ -93,5 +93,5 @@ def test_a_rudder_that_is_torn_or_stuck_is_told_to_the_allocator() -> None:
 
 
 def test_plants_of_fins_are_refused_where_there_are_none(heavy: Layout) -> None:
-    with pytest.raises(FinlabError, match="plant 'wake' is about fins"):
-        ClosedLoop(heavy, Allocator(heavy), make_trajectory("circle"), plant="wake")
+    with pytest.raises(FinlabError, match="plant 'offset' is about fins"):
+        ClosedLoop(heavy, Allocator(heavy), make_trajectory("circle"), plant="offset")

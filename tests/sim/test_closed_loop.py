@@ -32,7 +32,7 @@ def swum(swim: ClosedLoop, seconds: float) -> RunLog:
     return swim.log
 
 
-@pytest.mark.parametrize("plant", ["mean", "ripple", "flexible"])
+@pytest.mark.parametrize("plant", ["mean", "ripple", "offset"])
 def test_it_follows_a_circle_on_every_plant(layout_a: Layout, analytic: AnyRobot, plant: str) -> None:
     log = swum(
         ClosedLoop(layout_a, analytic.on(layout_a), make_trajectory("circle"), plant=plant, seed=7), 20.0
@@ -86,7 +86,7 @@ def test_bad_swims_are_refused(layout_a: Layout, analytic: AnyRobot) -> None:
         ClosedLoop(layout_a, analytic.on(layout_a), task, failures=[("tail", 1.0)])
     with pytest.raises(FinlabError, match="0 s or more"):
         ClosedLoop(layout_a, analytic.on(layout_a), task, failures=[("front_left", -1.0)])
-    with pytest.raises(FinlabError, match="expected one of mean, ripple, flexible"):
+    with pytest.raises(FinlabError, match="expected one of mean, ripple, offset"):
         ClosedLoop(layout_a, analytic.on(layout_a), task, plant="water")
 
 

@@ -1,15 +1,12 @@
-"""Forces of moving fins: the mean, within the cycle, and the soft fin against theory."""
-
-import math
+"""Forces of moving fins: the mean, and within the cycle."""
 
 import numpy as np
 import pytest
 
-from finlab.actuators.fin.blade import Blade
 from finlab.assets import shipped_layouts
 from finlab.layout import Layout, load_layout
 from finlab.physics import Plant
-from finlab.sim.fin_force import FinForce, FlexibleForce, MeanForce, RippleForce, SoftFin
+from finlab.sim.fin_force import MeanForce, RippleForce
 from finlab.vehicle.fin_motion import FinMotion
 
 DT = 0.01
@@ -27,7 +24,7 @@ def flapping(layout: Layout, amplitude: float, frequency: float, direction: floa
     return motion
 
 
-def cycle_mean(force: FinForce, motion: FinMotion, cycles: int = 10, skip: int = 5) -> np.ndarray:
+def cycle_mean(force: MeanForce, motion: FinMotion, cycles: int = 10, skip: int = 5) -> np.ndarray:
     """Mean force (3,) of the first fin over whole cycles."""
     command = motion.command.copy()
     per_cycle = round(1.0 / (command[0, 1] * DT))
@@ -63,23 +60,3 @@ def test_ripple_has_the_mean_of_the_fin_law(pair: Layout, direction: float) -> N
     mean = MeanForce(pair).step(flapping(pair, 0.45, 2.0, direction), DT)[0]
     ripple = cycle_mean(RippleForce(pair), flapping(pair, 0.45, 2.0, direction))
     np.testing.assert_allclose(ripple, mean, atol=0.01 * np.linalg.norm(mean))
-
-
-def test_a_stiff_soft_fin_is_lighthills_rigid_plate(pair: Layout) -> None:
-    """Elongated-body theory of a rigid plate: T = 1/2 m L^2 (2 pi f)^2 a J1(a), along the zero direction."""
-    from scipy.special import j1
-
-    amplitude, frequency = 0.5, 1.0
-    shape = Blade()
-    theory = (
-        0.5
-        * shape.virtual_mass
-        * shape.length**2
-        * (2 * math.pi * frequency) ** 2
-        * amplitude
-        * j1(amplitude)
-    )
-    soft = FlexibleForce(pair, SoftFin(stiffness=60.0))
-    along, across = cycle_mean(soft, flapping(pair, amplitude, frequency, 0.0))[1:]
-    assert along == pytest.approx(theory, rel=0.05)
-    assert abs(across) < 0.02 * theory

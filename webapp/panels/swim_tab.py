@@ -34,7 +34,7 @@ def add_scenario(page: Page) -> None:
     _bind(page, "path", gui.add_dropdown("Path", tuple(SHIPPED), hint="Where to swim."))
     who = "Who allocates, ten times a second."
     _bind(page, "method", gui.add_dropdown("Swim with", COMPARED, hint=who))
-    forces = "The fin law, its ripple, or what no layout says: soft fins, jets, inflow, offsets."
+    forces = "The fin law, its ripple, or a robot that is not built as drawn."
     _bind(page, "plant", gui.add_dropdown("Fin forces", tuple(PLANTS), hint=forces))
 
 

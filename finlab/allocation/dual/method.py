@@ -195,12 +195,10 @@ class Dual(Method):
 
     @property
     def _unproved(self) -> bool:
-        """Whether the bound would be one of something else than the power of the answer: of fins without
-        their interaction, with what doubt costs, or of the smooth shape that stands for a
-        measured table."""
+        """Whether the bound would be one of something else than the power of the answer: with what doubt
+        costs, or of the smooth shape that stands for a measured table."""
         measured = any(fin.model.type == "table" for fin in self.layout.fins)
-        dearer = self.compiled.doubt is not None
-        return measured or dearer or self.layout.interaction is not None
+        return measured or self.compiled.doubt is not None
 
     def _forces(self, targets: Array, sets: Sets, policy: Policy, prices: Array | None = None) -> Forces:
         """Forces of least power for wrenches (N, 6), or for those that the policy gives in their place."""

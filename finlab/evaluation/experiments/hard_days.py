@@ -188,9 +188,8 @@ HARD_DAYS = (
     HardDay("lost-two", "Two fins are lost half-way, announced.", ("A",), lost=2),
     HardDay("restricted", "Stops keep the fins within arcs.", ("restricted",)),
     HardDay("saturated", "The path asks for more than the fins can give.", duration_s=36.0),
-    HardDay("flexible", "Fins have soft tips, which no method is given.", plant="flexible"),
-    HardDay("wake", "Fins weaken each other by their jets.", plant="wake"),
-    HardDay("inflow", "Thrust falls with speed.", plant="inflow"),
+    HardDay("ripple", "The fins' forces swing within the beat.", plant="ripple"),
+    HardDay("offset", "Centre of gravity and fins are not where the layout has them.", plant="offset"),
     HardDay("heavy", "Eight thrusters; everything is as drawn.", HEAVY),
     HardDay("heavy-other-body", "Eight thrusters, and the body of another source.", HEAVY, body=OTHER_HEAVY),
     HardDay(

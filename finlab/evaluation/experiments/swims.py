@@ -20,7 +20,7 @@ from finlab.sim import RunLog
 DAYS = {day.name: day for day in HARD_DAYS}
 REPORTED = (
     *("nominal", "damping-double", "parameters-high", "current-turns", "buoyant", "late", "waves", "hexa"),
-    *("fins-mixed", "weak", "lost-one-unannounced", "lost-two", "restricted", "saturated", "wake"),
+    *("fins-mixed", "weak", "lost-one-unannounced", "lost-two", "restricted", "saturated", "offset"),
 )
 """Days of the whole report, which has a quarter of an hour."""
 GAP_N = 0.1

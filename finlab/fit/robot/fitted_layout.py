@@ -1,5 +1,5 @@
-"""A fitted robot as a layout: where its fins are and how strong, its body, the interaction, and tables of
-fins whose law is another one."""
+"""A fitted robot as a layout: where its fins are and how strong, its body, and tables of fins
+whose law is another one."""
 
 import os
 from dataclasses import replace
@@ -12,9 +12,8 @@ from finlab.fit.robot.learned_fins import learned
 from finlab.fit.robot.model import shape_factor
 from finlab.fit.robot.report import summary
 from finlab.fit.robot.robot_fit import RobotFit
-from finlab.layout import Body, FinModelSpec, Interaction, Jet, Layout, load_layout, save_layout
+from finlab.layout import Body, FinModelSpec, Layout, load_layout, save_layout
 from finlab.layout.force_table_file import COLUMNS, POWER_COLUMN
-from finlab.layout.interaction import MAX_SHARE
 from finlab.layout.layout import MAX_DESCRIPTION_LENGTH
 from finlab.physics import make_law
 from finlab.whole_file import write_whole
@@ -24,8 +23,6 @@ GRID = (17, 17, 16)
 DEFLECTIONS = (3.0, 0.03)
 """Standard errors, and angle [rad], from which a fin's lean counts; an IMU that is mounted askew looks like a
 smaller one."""
-LEAST_SHARE = 0.005
-"""Smallest share of a jet that is worth its line."""
 
 
 def write_robot(fit: RobotFit, path: str | os.PathLike[str]) -> Layout:
@@ -47,7 +44,7 @@ def write_robot(fit: RobotFit, path: str | os.PathLike[str]) -> Layout:
     notes = "\n".join(summary(fit))
     text = f"{notes}\n{layout.description}".strip()[:MAX_DESCRIPTION_LENGTH]
     name = layout.name if place.stem == layout.name else place.stem[:64].strip() or layout.name
-    save_layout(Layout(name, tuple(fins), text, _body(fit), _interaction(fit)), place)
+    save_layout(Layout(name, tuple(fins), text, _body(fit)), place)
     return load_layout(place)
 
 
@@ -93,22 +90,3 @@ def _body(fit: RobotFit) -> Body:
         center_of_buoyancy_m=tuple(found.center[:, 0].tolist()),
         buoyancy_n=max(float(found.lift[0]), 0.0),
     )
-
-
-def _interaction(fit: RobotFit) -> Interaction | None:
-    """What the fins take from each other, and speed from them; None where neither is used."""
-    jets, inflow = fit.part("jets"), fit.part("inflow")
-    if jets is None and inflow is None:
-        return None
-    names, made, form = fit.model.layout.names, [], (Interaction.half_thrust_n, Interaction.narrowness)
-    if jets is not None:
-        pairs = [(a, b) for a in names for b in names if a != b]
-        shares = np.clip(jets[:-2].reshape(-1, 2), -MAX_SHARE, MAX_SHARE)
-        form = fit.model.jet_form(jets)
-        made = [
-            Jet(a, b, tuple(share.tolist()))
-            for (a, b), share in zip(pairs, shares, strict=True)
-            if np.abs(share).max() >= LEAST_SHARE
-        ]
-    taken = (0.0, 0.0) if inflow is None else tuple(np.clip(inflow, -MAX_SHARE, MAX_SHARE).tolist())
-    return Interaction(tuple(made), *form, taken)

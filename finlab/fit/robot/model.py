@@ -12,16 +12,12 @@ from finlab.fit.robot.unknowns import SENSORS, Unknowns, blocks_of
 from finlab.layout import Layout
 from finlab.layout.arrays import force_effectiveness
 from finlab.physics import plant_of
-from finlab.physics.coupling import WIDE_AND_NARROW, inflow_terms, jet_terms, jet_ways
-from finlab.physics.inflow import inflow_of
 from finlab.vehicle.body import complete_body, dynamics_of
 from finlab.vehicle.fossen import Dynamics
 from finlab.vehicle.many_bodies import Bodies
 
 TYPICAL_SPEED = np.array([0.2, 0.2, 0.2, 0.5, 0.5, 0.5])
 """At which linear and quadratic damping are compared [m/s, rad/s]."""
-NARROWNESS = 2.0
-"""Of jets, before a swim is known."""
 DAMPING_DOUBT = 0.5
 """How far damping may be off, as a share of what the layout says."""
 
@@ -47,18 +43,13 @@ class RobotModel:
         working = (self.motion[..., 0] > 0.0) & (self.motion[..., 1] > 0.0)
         self.alone = np.where(working[..., None], plant.forces(self.motion), 0.0)
         """What each fin gives by the layout's law (M, SUBSTEPS, n, 3) [N], in its own frame."""
-        self.half_thrust = 0.25 * float(np.linalg.norm(self.alone, axis=-1).mean()) + 1e-6
-        """Thrust [N] at which a jet takes half of what a very strong one takes."""
         self.middle = [float(np.median(self.motion[..., k][working])) for k in range(2)]
         """Amplitude [rad] and frequency [Hz] at which a fin has the strength that is given."""
         ends = [np.quantile(self.motion[..., k][working], (0.005, 0.995)) for k in range(2)]
         self.seen = [(max(float(low), 1e-3), max(float(high), 2e-3)) for low, high in ends]
         """Amplitudes and frequencies between which nearly all were; the law is fitted no further."""
         self._shapes = self.shape_terms(self.motion)
-        self.length = plant.blade.length
         self._beat = np.concatenate([swing_forces(layout, swim.command) for swim in swims])
-        self.velocity = np.zeros((len(self.motion), 6))
-        """How the robot moved through the water (M, 6) [m/s, rad/s], as far as is known."""
         self.late = [0] * len(SENSORS)
         """Whole steps by which each sensor is late, as far as is known."""
 
@@ -80,17 +71,7 @@ class RobotModel:
             share *= shape_factor(self._shapes, shape)
         position = layout.position - unknowns.of("center", vector)
         columns = force_effectiveness(position, layout.mounting_angle + unknowns.of("mounting", vector))
-        force = force * share[..., None]
-        jets, inflow = unknowns.part("jets", vector), unknowns.part("inflow", vector)
-        kept = np.ones(share.shape)
-        if jets is not None:
-            half_thrust, narrowness = self.jet_form(jets)
-            met = jet_terms(force, jet_ways(position, columns), half_thrust, narrowness * WIDE_AND_NARROW)
-            kept -= np.einsum("msjik,jik->msi", met, jet_shares(jets, layout.n_fins))
-        if inflow is not None:
-            foot = inflow_of(self.velocity, position, columns[..., :3])[:, None]
-            kept -= inflow_terms(force, self.motion, foot, self.length) @ inflow
-        mean = (force * kept[..., None]).mean(axis=1)
+        mean = (force * share[..., None]).mean(axis=1)
         beat = unknowns.part("beat", vector)
         if beat is not None:
             mean -= beat[-1] * np.gradient(mean, STEP_S, axis=0)
@@ -98,10 +79,6 @@ class RobotModel:
         wrench: Array = mean.reshape(len(mean), -1) @ columns.reshape(-1, 6)
         wrench[:, [0, 1, 5]] += unknowns.of("bias", vector)
         return wrench
-
-    def jet_form(self, jets: Array) -> tuple[float, float]:
-        """Thrust [N] at which a jet takes half of the most, and how narrow it is; the last two unknowns."""
-        return self.half_thrust * float(np.exp(jets[-2])), NARROWNESS * float(np.exp(jets[-1]))
 
     def bodies(self, unknowns: Unknowns, vectors: Array) -> Bodies:
         """The bodies (..., B) of B vectors (B, size)."""
@@ -139,10 +116,3 @@ def shape_factor(terms: Array, shape: Array) -> Array:
     """What thrust is multiplied by, from terms (..., 5) and their coefficients (5,)."""
     result: Array = np.exp(np.clip(terms @ shape, -2.0, 2.0))
     return result
-
-
-def jet_shares(jets: Array, n: int) -> Array:
-    """Coefficients (n, n, 2) of the jets of fin j (first) on fin i (second), from their list."""
-    shares = np.zeros((n, n, 2))
-    shares[~np.eye(n, dtype=bool)] = jets[:-2].reshape(-1, 2)
-    return shares

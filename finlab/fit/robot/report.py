@@ -6,8 +6,6 @@ from finlab.layout.force_table_file import DOUBT
 MEANINGS = {
     "beat": "forces that swing within the beat",
     "shape": "thrust that grows otherwise with amplitude and frequency",
-    "jets": "what fins take from each other by their jets",
-    "inflow": "what speed through the water takes",
 }
 
 

@@ -1,7 +1,7 @@
 """From swims to a robot: what is fitted in which order, what helps on parts not seen, what is known.
 
-First all that every robot has; then, one after the other, another law of thrust, jets and inflow, each kept
-only where it lessens the error on windows that its fit has not seen.
+First all that every robot has; then, one after the other, forces within the beat and another law of thrust,
+each kept only where it lessens the error on windows that its fit has not seen.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -15,10 +15,9 @@ from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.fit.robot.estimate import DEVIATION, Fitted, Windows, cut, fit_windows, unseen_gains
 from finlab.fit.robot.model import RobotModel
-from finlab.fit.robot.swim import ANGLES, STEP_S, Swim, smoothed
+from finlab.fit.robot.swim import STEP_S, Swim, smoothed
 from finlab.fit.robot.unknowns import BASE, RESIDUAL, Unknowns
 from finlab.layout import Layout
-from finlab.vehicle.many_bodies import body_velocity
 
 SURE = 3.0
 """Standard errors by which what is kept must lessen the error on windows not seen."""
@@ -120,11 +119,6 @@ def fit_robot(
     layout.only_fins("fitting a robot", horizontal=True)
     if not swims:
         raise DataError("expected at least one swim, got none")
-    if layout.interaction is not None:
-        raise DataError(
-            f"layout {layout.name} has an interaction already; fit the layout from which that was fitted, "
-            "with all logs together"
-        )
     with threadpool_limits(limits=1, user_api="blas"):
         return _fit(RobotModel(layout, swims, doubts), swims, tried, progress)
 
@@ -135,7 +129,6 @@ def _fit(
     measured = np.concatenate([swim.measured for swim in swims])
     smooth = np.concatenate([smoothed(swim.measured) for swim in swims])
     windows = cut([len(swim) for swim in swims], measured, smooth)
-    model.velocity[:] = smooth[:, 6:]
     unknowns, deviation = Unknowns(model.blocks, BASE), DEVIATION
     vector, start = np.zeros(unknowns.size), windows.start
     for _ in range(ROUNDS):
@@ -143,10 +136,10 @@ def _fit(
         fitted = fit_windows(model, unknowns, windows, deviation, vector, start)
         vector, start = fitted.vector, fitted.start
         deviation = _deviation(fitted, deviation)
-        _keep_motion(model, fitted, windows)
+        _keep_delays(model, fitted)
     fitted, deviation = _with_what_helps(model, windows, deviation, fitted, tried, tell)
     deviation = _deviation(fitted, deviation)
-    _keep_motion(model, fitted, windows)
+    _keep_delays(model, fitted)
     tell("fitting all together")
     fitted = fit_windows(model, fitted.unknowns, windows, deviation, fitted.vector, fitted.start)
     if not np.isfinite(fitted.vector).all():
@@ -179,7 +172,7 @@ def _with_what_helps(
             tell(f"fitting {best}")
             fitted = fit_windows(model, unknowns, windows, deviation, vector, fitted.start)
             vector, deviation = fitted.vector, _deviation(fitted, deviation)
-            _keep_motion(model, fitted, windows)
+            _keep_delays(model, fitted)
     return fitted, deviation
 
 
@@ -195,17 +188,9 @@ def _deviation(fitted: Fitted, deviation: Array) -> Array:
     return np.asarray(np.clip(found, DEVIATION_RANGE[0] * DEVIATION, DEVIATION_RANGE[1] * DEVIATION))
 
 
-def _keep_motion(model: RobotModel, fitted: Fitted, windows: Windows) -> None:
-    """Tells the model how the robot moved through the water in the simulated swim, how late sensors are."""
+def _keep_delays(model: RobotModel, fitted: Fitted) -> None:
+    """Tells the model how late sensors are."""
     model.late = [round(float(delay) / STEP_S) for delay in fitted.unknowns.of("delay", fitted.vector)]
-    # Backwards, since what fills up a window repeats its last step.
-    steps, states = windows.step.T[::-1], fitted.state[::-1].swapaxes(1, 2)
-    model.velocity[steps] = states[..., 6:]
-    current = fitted.unknowns.of("current", fitted.vector)
-    angles = np.zeros((len(model.velocity), 3))
-    angles[steps] = states[..., ANGLES]
-    world = np.broadcast_to([*current, 0.0], angles.shape)
-    model.velocity[:, :3] -= body_velocity(angles, world)
 
 
 def _explained(fitted: Fitted, windows: Windows) -> float:

@@ -15,9 +15,9 @@ BASE = (
     *("strength", "mounting", "lean", "center", "bias"),
     *("buoyancy", "lift", "current", "inertia", "linear", "quadratic", "delay"),
 )
-RESIDUAL = ("beat", "shape", "jets", "inflow")
+RESIDUAL = ("beat", "shape")
 """What is looked for besides, where it helps: forces within the beat and of fins that turn, another law of
-thrust, jets, inflow."""
+thrust."""
 
 SENSORS = {
     "position and heading": (0, 1, 5),
@@ -51,10 +51,6 @@ def blocks_of(names: Sequence[str], damping: Array) -> dict[str, Block]:
         return Block(name, tuple(labels), unit, np.broadcast_to(scale, len(labels)).astype(float), force)
 
     shape = ("amplitude", "frequency", "amplitude^2", "amplitude x frequency", "frequency^2")
-    jets = [
-        f"{kind} jet of {a} on {b}" for a in names for b in names if a != b for kind in ("wide", "narrow")
-    ]
-    form = ("thrust of half a jet, logarithm", "narrowness of jets, logarithm")
     swings = [f"force within the beat, {k}" for k in range(1, TERMS + 1)]
     blocks = (
         block("strength", [f"strength of {name}, logarithm" for name in names], 0.3, ""),
@@ -71,8 +67,6 @@ def blocks_of(names: Sequence[str], damping: Array) -> dict[str, Block]:
         block("delay", [f"delay of {sensor}" for sensor in SENSORS], 0.05, "s", False),
         block("beat", [*swings, "delay of thrust [s]"], np.array([1.0] * TERMS + [0.1]), ""),
         block("shape", [f"thrust by {name}" for name in shape], (0.5, 0.5, 0.3, 0.3, 0.3), ""),
-        block("jets", [*jets, *form], np.array([0.15] * len(jets) + [0.7, 0.4]), ""),
-        block("inflow", ["inflow", "inflow squared"], 0.4, ""),
     )
     return {one.name: one for one in blocks}
 
