@@ -11,7 +11,6 @@ from finlab.allocation.method import Method
 from finlab.allocation.methods import LEARNED, Checkpoint, MethodChoice, checked_settings, choose_method
 from finlab.allocation.modes import Mode
 from finlab.allocation.settings import Settings
-from finlab.allocation.solution import Candidates
 from finlab.layout import Layout
 from finlab.networks.checkpoint import read_normalization, resolve_checkpoint
 from finlab.networks.normalization import Normalization
@@ -67,10 +66,6 @@ class AnyRobot:
     def explore(self, result: Allocation) -> tuple[Mode, ...]:
         """Of the robot that was asked about last."""
         return self.on(self._last).explore(result)
-
-    def alternatives(self, result: Allocation) -> Candidates | None:
-        """Of the robot that was asked about last."""
-        return self.on(self._last).alternatives(result)
 
 
 def normalized_error(normalization: Normalization, wrench: Any, target: Any) -> Any:

@@ -265,41 +265,33 @@ class Allocator:
             AllocationError: the answer is of another robot, or the method, as it is set, gives another
                 answer to that question.
         """
-        found = self.alternatives(result)
-        if found is None:
-            return ()
-        layout = result.layout
-        return find_modes(found, force_sizes(layout, found.command, result.flow), layout.lower, layout.upper)
-
-    def alternatives(self, result: Allocation) -> Candidates | None:
-        """Many refined answers to the question of a result, its own first, by a wide search.
-
-        None for methods that have a single answer.
-
-        Raises:
-            AllocationError: as for `explore`.
-        """
-        ready = self._ready(result.failed, result.health)
+        ready = self._ready_for(result)
         fins = ready.fins
-        if fins.layout != result.layout:
-            raise AllocationError(
-                f"this answer is of layout {result.layout.name!r:.60}, and this allocator is for "
-                f"{self._layout.name!r:.60} as it was made; ask the allocator that answered"
-            )
         previous = None if result.previous is None else result.previous[fins.alive]
         found = ready.method.alternatives(
             result.target, policy=result.policy, previous=previous, flow=result.flow, seed=result.seed
         )
         if found is None:
-            return None
-        told = _among_all(lambda: found, fins)
-        assert told is not None
-        if not np.allclose(told.command[0], result.command, rtol=0.0, atol=SAME_COMMAND, equal_nan=True):
+            return ()
+        command, layout = fins.among_all(found.command), result.layout
+        if not np.allclose(command[0], result.command, rtol=0.0, atol=SAME_COMMAND, equal_nan=True):
             raise AllocationError(
                 f"method {self.method!r} with checkpoint {self.checkpoint!r} gives another answer than this "
                 "one; ask the allocator that answered, with its settings"
             )
-        return told
+        size = force_sizes(layout, command, result.flow)
+        return find_modes(replace(found, command=command), size, layout.lower, layout.upper)
+
+    def refinement(self, result: Allocation) -> tuple[Candidates, ...]:
+        """What a network proposes for the question of a result, whoever answered it, then the same rows after
+        each step of their refinement; nothing for methods that have no such proposals.
+
+        Raises:
+            AllocationError: the answer is of another robot.
+        """
+        ready = self._ready_for(result)
+        ways = ready.method.refinement(result.target, flow=result.flow, seed=result.seed)
+        return tuple(replace(way, command=ready.fins.among_all(way.command)) for way in ways)
 
     def allocate_batch(
         self,
@@ -371,6 +363,16 @@ class Allocator:
             "unknown_fins": ready.method.unknown_fins,
             "later": later,
         }
+
+    def _ready_for(self, result: Allocation) -> Ready:
+        """The robot as it was when it was asked."""
+        ready = self._ready(result.failed, result.health)
+        if ready.fins.layout != result.layout:
+            raise AllocationError(
+                f"this answer is of layout {result.layout.name!r:.60}, and this allocator is for "
+                f"{self._layout.name!r:.60} as it was made; ask the allocator that answered"
+            )
+        return ready
 
     def _ready(self, failed: Sequence[str], health: Health | None) -> Ready:
         """The robot in a state, prepared now or kept from an earlier question."""

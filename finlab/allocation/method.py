@@ -109,6 +109,11 @@ class Method(ABC):
         """Many answers to one target (6,), that of `solve` first; None for methods that have a single one."""
         return None
 
+    def refinement(self, target: Array, *, flow: Array | None, seed: int) -> tuple[Candidates, ...]:
+        """What a network proposes for one target (6,), then the same rows after each step of their
+        refinement; nothing for methods without proposals, or that do not tell."""
+        return ()
+
     def in_time(self, target: Array, reference: Array) -> Array:
         """Which wrench (6,) is answered: a target (6,), or, where the time between ticks is a setting, one of
         those that are expected (K, 6)."""

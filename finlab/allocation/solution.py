@@ -1,12 +1,15 @@
 """What a method hands over before it has been evaluated, and what makes a result plain data."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from finlab.arrays import Array
+
+ARRAYS = ("command", "wrench", "err_norm", "effort", "power")
+"""What candidates have a row of each."""
 
 
 class PlainData:
@@ -57,10 +60,14 @@ class Candidates(PlainData):
     def __len__(self) -> int:
         return len(self.command)
 
+    def rows(self, places: Sequence[int]) -> "Candidates":
+        """Some of them, by their places."""
+        arrays = {name: getattr(self, name)[list(places)] for name in ARRAYS}
+        return Candidates(**arrays, source=tuple(self.source[k] for k in places))
+
     def beside(self, others: "Candidates") -> "Candidates":
         """These, then others."""
-        names = ("command", "wrench", "err_norm", "effort", "power")
-        both = {name: np.concatenate([getattr(self, name), getattr(others, name)]) for name in names}
+        both = {name: np.concatenate([getattr(self, name), getattr(others, name)]) for name in ARRAYS}
         return Candidates(**both, source=self.source + others.source)
 
 

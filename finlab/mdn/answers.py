@@ -82,7 +82,7 @@ def follow(
     """
     rows, count, n = force.shape
     each = np.repeat(target, count, axis=0)
-    found = descend(robot.forces, each, force.reshape(-1, n).astype(complex), steps.descent)
+    *_, found = descend(robot.forces, each, force.reshape(-1, n).astype(complex), steps.descent)
     command, effort = realize(robot.forces, found)
     error = np.linalg.norm(each - wrench(robot.forces, found.force), axis=-1)
     score = np.where(error > PROMISING, INEXACT * (1.0 + error), effort).reshape(rows, count)
@@ -92,6 +92,16 @@ def follow(
     chosen = _distinct(score, root.reshape(rows, count, n), keep)
     command = command.reshape(rows, count, n, 3)[np.arange(rows)[:, None], chosen]
     return refined(robot, target, command, chosen, steps)
+
+
+def traced(robot: EffortRobot, target: Array, force: AnyArray, steps: Steps) -> list[Array]:
+    """Commands (K, n, 3) for one normalized target (6,): first of forces (K, n), complex, as proposed, then
+    after each step of their refinement."""
+    each = np.repeat(target[None], len(force), axis=0)
+    ways = [realize(robot.forces, at)[0] for at in descend(robot.forces, each, force, steps.descent)]
+    for _ in range(steps.commands):
+        ways.append(refine(robot.commands, each, ways[-1], 1).command)
+    return ways
 
 
 def refined(

@@ -16,6 +16,7 @@ Planar forces are complex numbers (see `effort_fins`). A symmetric 2 x 2 matrix 
 with a real.
 """
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -70,10 +71,12 @@ def effort_problem(
     )
 
 
-def descend(problem: EffortProblem, target: Array, force: AnyArray, steps: int) -> Projected:
-    """Follow R forces (R, n) to cheap ones that give normalized targets (R, 6), in `steps` problems."""
+def descend(problem: EffortProblem, target: Array, force: AnyArray, steps: int) -> Iterator[Projected]:
+    """Follow R forces (R, n) to cheap ones that give normalized targets (R, 6): what fins can give of them,
+    then what each of `steps` problems makes of it."""
     fins = problem.fins
     found = fins.project(force)
+    yield found
     cut = np.ones(force.shape)
     before = found.force
     for step in range(steps):
@@ -89,7 +92,7 @@ def descend(problem: EffortProblem, target: Array, force: AnyArray, steps: int) 
         before = answer
         found = fins.project(answer)
         cut = np.minimum(cut * fins.largest * found.gauge / np.maximum(found.wanted, LEAST), 1.0)
-    return found
+        yield found
 
 
 def wrench(problem: EffortProblem, force: AnyArray) -> Array:

@@ -24,7 +24,7 @@ from finlab.allocation.settings import Settings
 from finlab.allocation.solution import Candidates, Solution
 from finlab.arrays import Array
 from finlab.layout import Layout
-from finlab.mdn.answers import NEARLY, NOW, OTHER, Answers, Steps, follow, ranked, refined
+from finlab.mdn.answers import NEARLY, NOW, OTHER, Answers, Steps, follow, ranked, refined, traced
 from finlab.mdn.descent import realize
 from finlab.mdn.features import Seen, see
 from finlab.mdn.network import ForceMixture, ForceNetworkConfig
@@ -41,10 +41,8 @@ STEPS = Steps()
 """Of every answer."""
 MORE = Steps(commands=8)
 """Of answers that were not exact yet."""
-WIDE = Steps(descent=16, commands=4)
-"""Of alternatives, which are told apart by where they end."""
-WIDER = 4
-"""Times as many proposals where alternatives are asked for; each of them is refined."""
+WHOLE = Steps(descent=16, commands=4)
+"""Of all proposals, which are told apart by where they end."""
 SWITCH_GAIN = 0.01
 """Share of its effort that a robot in motion must save before it changes the way it moves."""
 WORTH_LEAVING = 0.03
@@ -63,11 +61,10 @@ class Found(NamedTuple):
     answers: Answers
     """What came of it."""
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """What the proposals for a single target are called."""
-        components = self.proposal.component[0].tolist()
-        return tuple("a random force" if k == RANDOM else f"component {k + 1}" for k in components)
+
+def names_of(proposal: Proposal) -> tuple[str, ...]:
+    """What the proposals for a single target are called."""
+    return tuple("a random force" if k == RANDOM else f"component {k + 1}" for k in proposal.component[0])
 
 
 class Mdn(Method):
@@ -105,7 +102,7 @@ class Mdn(Method):
             found = self._one(policy, target, previous, seed)
             return Solution(
                 self.robot.commands.feasible(found.answers.command[:, 0]),
-                candidates=lambda: self._candidates(found.answers, found.names),
+                candidates=lambda: self._candidates(found.answers, names_of(found.proposal)),
                 samples=lambda: self._samples(target, found),
             )
         command = np.empty((len(target), self.layout.n, 3))
@@ -118,17 +115,24 @@ class Mdn(Method):
     def alternatives(
         self, target: Array, *, policy: Policy, previous: Array | None, flow: Array | None, seed: int
     ) -> Candidates:
-        """The answers, then what many more proposals lead to."""
+        """The answers, then where all proposals end, the cheapest first."""
         if (moved := self.at(flow)) is not self:
             return moved.alternatives(target, policy=policy, previous=previous, flow=None, seed=seed)
+        first = self._one(policy, target[None] / self.sigma, previous, seed)
+        ends = self.refinement(target, flow=None, seed=seed)[-1]
+        exact = USUAL_SHARE * max(ALTERNATIVE_ERROR, 1.01 * float(first.answers.error[0, 0]))
+        kept = [k for k in ends.effort.argsort(kind="stable").tolist() if ends.err_norm[k] <= exact]
+        return self._candidates(first.answers, names_of(first.proposal)).beside(ends.rows(kept))
+
+    def refinement(self, target: Array, *, flow: Array | None, seed: int) -> tuple[Candidates, ...]:
+        """See `Method`."""
+        if (moved := self.at(flow)) is not self:
+            return moved.refinement(target, flow=None, seed=seed)
         wanted = target[None] / self.sigma
-        first, count = self._one(policy, wanted, previous, seed), WIDER * self.settings.n_candidates
         with self._one_thread():
-            more = self.proposals(wanted, seed, count)
-            wide = Found(more, follow(self.robot, wanted, more.force, count, WIDE))
-        exact = max(ALTERNATIVE_ERROR, 1.01 * float(first.answers.error[0, 0]))
-        kept = wide.answers.columns(np.flatnonzero(wide.answers.error[0] <= exact))
-        return self._candidates(first.answers, first.names).beside(self._candidates(kept, wide.names))
+            proposal = self.proposals(wanted, seed)
+            ways = traced(self.robot, wanted[0], proposal.force[0].astype(complex), WHOLE)
+        return tuple(self._judged(wanted, command, names_of(proposal)) for command in ways)
 
     def proposals(self, target: Array, seed: int, count: int | None = None) -> Proposal:
         """The network's proposals for normalized targets (N, 6); by default as many as the settings say."""
@@ -219,7 +223,11 @@ class Mdn(Method):
         """The proposals for a single target as the cheapest commands with their forces."""
         robot = self.robot
         command, _ = realize(robot.forces, robot.forces.fins.project(found.proposal.force[0].astype(complex)))
-        command = robot.commands.feasible(command)
-        wrench = robot.commands.wrench(command)
+        return self._judged(target, command, names_of(found.proposal))
+
+    def _judged(self, target: Array, command: Array, names: tuple[str, ...]) -> Candidates:
+        """Commands (K, n, 3) for a normalized target (1, 6), by the fins' own laws."""
+        command = self.robot.commands.feasible(command)
+        wrench = self.robot.commands.wrench(command)
         error = USUAL_SHARE * np.linalg.norm(wrench - target, axis=-1)
-        return Candidates(command, wrench * self.sigma, error, *costs(self.layout, command), found.names)
+        return Candidates(command, wrench * self.sigma, error, *costs(self.layout, command), names)

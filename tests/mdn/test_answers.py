@@ -5,7 +5,7 @@ import pytest
 
 from finlab.arrays import Array
 from finlab.layout import FinModelSpec, Layout, random_layout
-from finlab.mdn.answers import Answers, Steps, follow, ranked, refined
+from finlab.mdn.answers import Answers, Steps, follow, ranked, refined, traced
 from finlab.mdn.descent import descend, wrench
 from finlab.mdn.robot import EffortRobot, effort_robot
 from finlab.physics import plant_of
@@ -35,7 +35,7 @@ def random_forces(robot: EffortRobot, rows: int) -> Array:
 def test_descents_end_near_the_target_with_less_effort_than_at_first(n: int, limits: str) -> None:
     robot = robot_of(n, limits)
     target, _ = targets_of(robot, 40)
-    found = descend(robot.forces, target, random_forces(robot, 40), 30)
+    *_, found = descend(robot.forces, target, random_forces(robot, 40), 30)
     missed = np.linalg.norm(wrench(robot.forces, found.force) - target, axis=1)
     assert np.median(missed) < 2e-3 and (missed < 0.05).mean() > (0.9 if limits == "nominal" else 0.6)
 
@@ -74,3 +74,19 @@ def test_robots_of_one_layout_see_the_same(layout_a: Layout) -> None:
     one, other = (effort_robot(plant_of(layout_a), s) for s in (SCALE, 3.0 * SCALE))
     np.testing.assert_allclose(one.view.static, other.view.static)
     np.testing.assert_allclose(one.view.solver, other.view.solver / 3.0, rtol=1e-9)
+
+
+def test_a_trace_begins_at_the_proposals_and_ends_at_exact_answers_of_less_effort() -> None:
+    robot = robot_of(5)
+    target, _ = targets_of(robot, 1)
+    force = random_forces(robot, 30).astype(complex)
+    ways = traced(robot, target[0], force, Steps(descent=16, commands=4))
+    assert {way.shape for way in ways} == {(30, 5, 3)} and len(ways) == 21
+    given = wrench(robot.forces, robot.forces.fins.project(force).force)
+    off = np.linalg.norm(robot.commands.wrench(ways[0]) - given, axis=1)
+    assert np.median(off) < 0.02, "the first is what was proposed"
+    error = np.array([np.linalg.norm(robot.commands.wrench(way) - target, axis=1) for way in ways])
+    exact = error[-1] <= robot.exact
+    assert exact.mean() > 0.9 and np.median(error[0]) > 100.0 * np.median(error[16])
+    effort = np.array([robot.effort(way) for way in ways])[:, exact]
+    assert effort[16].sum() < effort[1].sum(), "the descent lowers the effort"

@@ -38,7 +38,7 @@ def ways_to_deliver(rng: np.random.Generator, problem: EffortProblem, target: Ar
     # A start's small forces are as good as at rest, so few or many fins work.
     size = rng.random((rows * STARTS, n)) ** rng.uniform(1.0, 8.0, (rows * STARTS, 1)) * maximum
     start = size * np.exp(1j * rng.uniform(-np.pi, np.pi, size.shape))
-    found = descend(problem, np.repeat(target, STARTS, axis=0), start, STEPS)
+    *_, found = descend(problem, np.repeat(target, STARTS, axis=0), start, STEPS)
     return _different(*_told(problem, target, found), maximum)
 
 
