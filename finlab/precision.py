@@ -11,7 +11,5 @@ FINE = 1e-5
 """Share by which a compiled table may be off between its points."""
 CLOSE = 1e-4
 """Share that is not worth another search."""
-SMALL = 1e-3
-"""Share of a force, or of what a robot can push, whose square does not count."""
 ROUNDS = 12
 """Most times that something is repeated that mostly settles after a few."""

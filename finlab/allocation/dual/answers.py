@@ -17,10 +17,13 @@ from finlab.actuators.response import CELLS, Line, Plane, price_grid
 from finlab.allocation.dual.gauges import Gauges
 from finlab.arrays import Array
 from finlab.layout.angles import wrapped
-from finlab.precision import CLOSE, FINE, NOTHING, ROUNDS, SMALL
+from finlab.precision import CLOSE, FINE, NOTHING, ROUNDS
 
 TURNING = 1e-2
 """Price, as a share of the mean one of the least force, over which a force that cannot rest turns round."""
+STEADY = 1e-3
+"""Share of its price by which that of an actuator at a limit may change in a step to first order; of the
+largest price, those of others by ten times this share."""
 _EDGES = price_grid(1.0)
 """Ends of the tables' intervals, as shares of the largest price."""
 
@@ -230,7 +233,7 @@ class Answers:
         limit stay there, and the dual value is nearly the largest."""
         size, price, change = self._sized(force), np.abs(self._sized(price)), np.abs(self._sized(change))
         free = (size < sets.high * (1.0 - NOTHING)) & (size > sets.low)
-        return np.asarray((change <= SMALL * np.where(free, 10.0 * price.max(axis=0), price)).all(axis=0))
+        return np.asarray((change <= STEADY * np.where(free, 10.0 * price.max(axis=0), price)).all(axis=0))
 
     def _sized(self, force: Array) -> Array:
         """What lines give (n, N) and the sizes of what planes give, of forces or prices (k, N)."""

@@ -17,12 +17,14 @@ from finlab.allocation.dual.newton import Prices, dual_value, solve
 from finlab.allocation.dual.robot import DualRobot
 from finlab.arrays import Array
 from finlab.layout.angles import wrapped
-from finlab.precision import CLOSE, NEARLY, NOTHING, ROUNDS, SMALL
+from finlab.precision import CLOSE, NEARLY, NOTHING, ROUNDS
 
 MOST_PARTS = 48
 """Open parts of one target that are followed, the cheapest first."""
 TURNS = 2.4, 1.6, 0.8, 0.4, 0.2, 0.1, 0.05
 """Angles [rad] by which fins that cannot rest are turned to find where that costs least."""
+HOLLOW = 1e-3
+"""Share of a robot's largest force from which on a least force leaves a gap around rest."""
 NARROW = 0.2
 """Half of an arc [rad] up to which the chord stands for the arc of the least forces."""
 
@@ -61,7 +63,7 @@ def gaps(robot: DualRobot, force: Array, sets: Sets) -> Array:
         low, radial = sets.low[lines:], size[lines:]
         off = np.abs(wrapped(np.arctan2(y, x) - sets.middle)) - sets.half
         aside = (off > CLOSE) & (radial > NEARLY * robot.most[lines:])
-        hole = (low > SMALL * size.max(axis=0)) & (radial < 0.98 * low)
+        hole = (low > HOLLOW * size.max(axis=0)) & (radial < 0.98 * low)
         wide = sets.half > NARROW
         found[lines:] = np.where(aside & wide, off, 0.0)
         found[lines:] += np.where(hole & wide, 1.0 - radial / np.maximum(low, 1e-300), 0.0)

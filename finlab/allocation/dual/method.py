@@ -23,7 +23,8 @@ from finlab.allocation.dual.doubt import price_of_doubt
 from finlab.allocation.dual.drag import at_the_price_of_drag
 from finlab.allocation.dual.newton import Prices, solve
 from finlab.allocation.dual.policies import nearest
-from finlab.allocation.dual.rates import Rates, implied_prices, within_tick
+from finlab.allocation.dual.rates import Rates, within_tick
+from finlab.allocation.evaluate import REACHED
 from finlab.allocation.levenberg_marquardt import CommandProblem, refine
 from finlab.allocation.method import Method
 from finlab.allocation.policy import AXES, CLOSEST, Policy
@@ -40,8 +41,6 @@ TICK_STEPS = 5
 """The same where a command of a tick is not exact."""
 TICK_CUTS = 3
 """Times that what may follow is cut where that has gaps."""
-NEAREST = 1e-3
-"""Error above that of forces without gaps up to which the answer of a tick counts as the nearest."""
 
 
 @dataclass(frozen=True)
@@ -146,11 +145,7 @@ class Dual(Method):
         self, targets: Array, policy: Policy, previous: Array | None, prices: Array | None = None
     ) -> Solution:
         robot = self.compiled.robot
-        begin = (
-            self._first_prices(previous)
-            if prices is None
-            else robot.basis.T @ (robot.scale * prices)[:, None]
-        )
+        begin = None if prices is None else robot.basis.T @ (robot.scale * prices)[:, None]
         aim, found = self._aimed(targets, policy, begin)
         command = self._commands(aim, found, robot.sets, previous)
         bound: Callable[[], Array] = partial(self._bound, aim, found)
@@ -169,15 +164,6 @@ class Dual(Method):
         if not found.within.all():
             aim = np.where(found.within[:, None], asked, robot.wrench(found.force)) + self.compiled.beside
         return aim, found
-
-    def _first_prices(self, previous: Array | None) -> Array | None:
-        """Prices (r, 1) to begin with: fins with arcs are many steps away from those of a cold start."""
-        robot = self.compiled.robot
-        if previous is None or robot.answers.lines or not robot.sets.arcs or not self.layout.is_of_fins:
-            return None
-        if not np.isfinite(previous).all():
-            return None
-        return implied_prices(robot, self.plant.force(previous)[robot.order, 1:])
 
     @property
     def undriven(self) -> tuple[str, ...]:
@@ -310,7 +296,7 @@ class Dual(Method):
         error, command, force, part = tried(sets)
         least = float(np.linalg.norm((robot.wrench(force) - asked) / self.scale))
         for _ in range(TICK_CUTS):
-            if error <= least + NEAREST or (cut := halves(robot, part, force[:, 0])) is None:
+            if error <= least + REACHED or (cut := halves(robot, part, force[:, 0])) is None:
                 break
             _, _, force, part = now = min(map(tried, cut), key=lambda each: each[0])
             if now[0] < error:

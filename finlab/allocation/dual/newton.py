@@ -3,8 +3,9 @@
     max over l of  g(l) = l.w - sum c*(B'l) - 1/2 l'El,   with gradient  w - sum B y(B'l) - El
 
 `g` is concave. The Hessian is `G + E` with `G = sum B (dy/ds) B'`. Where actuators are at their limits, `G`
-loses rank: a ridge `mu tr(G)` keeps the step finite and is adapted to what a step brought (Levenberg,
-Marquardt; Nielsen's growth where steps are refused).
+loses rank: a ridge `mu tr(G) M`, with M the Hessian of quadratic costs over its mean (`DualRobot.metric`),
+keeps the step finite and is adapted to what a step brought (Levenberg, Marquardt; Nielsen's growth where
+steps are refused). The last step, near the target, is taken of the forces themselves, to first order.
 With a reward, the target is `t w` with `t` in [0, 1], paid `rho (2 t - t^2 / 2)`.
 """
 
@@ -14,16 +15,18 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.dual.answers import Sets
+from finlab.allocation.dual.answers import STEADY, Sets
 from finlab.allocation.dual.robot import DualRobot
 from finlab.arrays import Array
-from finlab.precision import NEARLY, NOTHING, ROUNDING, SMALL
+from finlab.precision import NEARLY, NOTHING, ROUNDING
 from finlab.small_systems import solve as solve_systems
 
 TOLERANCE = 1e-10
 """Scaled wrench that may be left of a target."""
 SATURATED_RIDGE = 1e-2
 """Ridge to begin with, as a share of the trace, where an actuator may be at its limit; NEARLY elsewhere."""
+LINEAR = 10.0 * STEADY
+"""Scaled wrench that is left of a target from which on a step to first order may be the last one."""
 MOST_RIDGE = 1.0 / ROUNDING
 """Ridge beyond which a step is lost in rounding."""
 MOST_STEPS = 200
@@ -237,7 +240,7 @@ def _one(
         if solved or beyond or steps == MOST_STEPS or ridge > MOST_RIDGE:
             break
         step, left = _step(robot, state, terms, np.array([ridge]))
-        if terms.reward is None and left[0] <= TOLERANCE and state.size[0] < 10.0 * SMALL:
+        if terms.reward is None and left[0] <= TOLERANCE and state.size[0] < LINEAR:
             force, fits = _last(robot, state, step, left, sets)
             if solved := bool(fits[0]):
                 state = state._replace(prices=state.prices + step)

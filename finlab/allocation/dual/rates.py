@@ -12,7 +12,6 @@ from finlab.allocation.dual.robot import DualRobot
 from finlab.arrays import Array
 from finlab.layout.angles import wrapped
 from finlab.physics.plant import Plant
-from finlab.precision import NEARLY
 
 STIFFNESS = (100.0, 1e4)
 """Costs of a miss, one after the other, as multiples of the robot's largest power: what they leave undone,
@@ -99,19 +98,3 @@ def within_tick(robot: DualRobot, sets: Sets, wrench: Array, prices: Array, weig
         found = solve(robot, target, sets, prices, Terms(penalty=penalty / stiffness))
         prices = found.prices
     return found.force
-
-
-def implied_prices(robot: DualRobot, force: Array) -> Array:
-    """Prices (r, 1) of the wrench that come nearest to those at which the planes of a robot without lines
-    give forces (n, 2) [N]: inside its arc a force points where its price does."""
-    x, y = force[:, :1], force[:, 1:]
-    size = np.maximum(np.hypot(x, y), 1e-300)
-    value = robot.answers.marginal(np.clip(size, robot.sets.low, robot.sets.high))[0]
-    first, second = np.split(robot.matrix, 2)
-    along, across = (first * x + second * y) / size, (second * x - first * y) / size
-    off = np.abs(wrapped(np.arctan2(y, x) - robot.sets.middle))
-    weight = np.sqrt(size / np.maximum(value, 1e-300))
-    rows = np.concatenate([along * weight, across * weight * (off < robot.sets.half - NEARLY)])
-    wanted = np.concatenate([value * weight, 0.0 * value])
-    found: Array = np.linalg.lstsq(rows, wanted, rcond=NEARLY)[0]
-    return found

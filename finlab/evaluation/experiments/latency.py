@@ -157,7 +157,7 @@ def call_times(
             start = time.process_time()
             answer = allocator.allocate(target, previous=previous)
             took = time.process_time() - start
-            previous = answer.command if share is None else None
+            previous = answer if share is None else None
             if k >= WARM_UP:
                 times.append(1e3 * took)
                 answers.append(answer)
