@@ -21,12 +21,12 @@ def untrained_checkpoint(tmp_path_factory: pytest.TempPathFactory) -> Path:
     # Here, so that tests of layouts do not wait for torch.
     import numpy as np
 
+    from finlab.mdn.training.first_weights import first_weights
     from finlab.networks.checkpoint import write_checkpoint
     from finlab.networks.normalization import Normalization
     from finlab.networks.trained import TrainedWeights, sizes_for_file
     from finlab.paper.network import NetworkConfig
     from finlab.paper.surrogate import SurrogateConfig
-    from finlab.training.first_weights import first_weights
     from tests.torch_weights import arrays_of
 
     surrogate = SurrogateConfig(hidden=(16, 16))
@@ -51,10 +51,10 @@ def untrained_checkpoint(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="session")
 def untrained_mdn(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Folder of a checkpoint for method `mdn`, preset `smoke`, with random weights."""
+    from finlab.mdn.training.first_weights import first_weights
     from finlab.mdn.training.recipes import RECIPES
     from finlab.networks.checkpoint import read_normalization, resolve_checkpoint, write_checkpoint
     from finlab.networks.trained import TrainedWeights, sizes_for_file
-    from finlab.training.first_weights import first_weights
     from tests.torch_weights import arrays_of
 
     network = RECIPES["smoke"].network

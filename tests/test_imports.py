@@ -22,7 +22,7 @@ LEVELS = (
     ("physics", "exchange"),
     ("vehicle",),
     ("networks",),
-    ("forces", "training"),
+    ("forces",),
     ("allocation",),
     ("control", "paper"),
     ("mdn", "sim", "analysis", "fit"),

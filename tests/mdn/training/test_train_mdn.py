@@ -10,10 +10,10 @@ import torch
 
 from finlab.mdn.network import ForceNetworkConfig
 from finlab.mdn.training.answers import Answers, read_answers, write_answers
+from finlab.mdn.training.first_weights import first_weights
 from finlab.mdn.training.recipes import RECIPES
 from finlab.mdn.training.train import losses, train_mdn
 from finlab.networks.checkpoint import read_checkpoint
-from finlab.training.first_weights import first_weights
 
 SMOKE = RECIPES["smoke"]
 
@@ -63,8 +63,7 @@ def test_the_loss_is_per_fin_and_rewards_components_that_are_used(shard: Path) -
     assert 1.0 <= spread["used"] <= SMOKE.network.n_components + 1e-4
 
 
-def test_it_learns(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("finlab.training.loop.LOG_EVERY", 20)
+def test_it_learns(tmp_path: Path) -> None:
     finished = train_mdn("smoke", tmp_path)
     assert finished.training["mdn"]["steps_done"] == 30
     assert read_checkpoint(tmp_path).network_of(ForceNetworkConfig) == SMOKE.network
