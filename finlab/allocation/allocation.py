@@ -9,12 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.evaluate import REACHED, body_forces, judged_effort, judged_power
-from finlab.allocation.policy import CLOSEST, Policy, describe_binding
+from finlab.allocation.policy import CLOSEST, Policy, limits_reached
 from finlab.allocation.solution import Candidates, PlainData
 from finlab.allocation.tables import allocation_html, allocation_text
 from finlab.arrays import Array
 from finlab.layout import Layout
-from finlab.layout.arrays import layout_effectiveness
 from finlab.layout.commands import Command, command_of
 from finlab.layout.damage import Health
 from finlab.physics.expected_miss import expected_miss, sources_of_miss
@@ -314,15 +313,7 @@ class Allocation(Answer):
         """
         if self.reachable or self.unknown_fins:
             return ()
-        if not self.layout.is_of_fins:
-            lower, upper = self.layout.lower, self.layout.upper
-            slack = 1e-3 * (upper - lower)
-            ends = (self.command <= lower + slack) | (self.command >= upper - slack)
-            full = np.asarray((ends & (upper > lower)).any(axis=-1))
-            return tuple(f"{name} at a limit" for name, at_end in zip(self.fins, full, strict=True) if at_end)
-        missing = self.unallocated / self.scale**2
-        pull = (missing @ layout_effectiveness(self.layout)).reshape(-1, 2)
-        return tuple(describe_binding(self.fins, self.command, self.layout.lower, self.layout.upper, pull))
+        return limits_reached(self.layout, self.command)
 
     def with_command(self, command: Array) -> Self:
         """The same question with another command (n, 3) in place of the answer, judged by the plant."""

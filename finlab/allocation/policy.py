@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from finlab.arrays import Array
 from finlab.errors import CommandError
+from finlab.layout import Layout
 from finlab.layout.angles import is_full_turn
 
 AXES = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
@@ -16,6 +17,8 @@ AXES = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
 KINDS = ("closest", "direction", "priority")
 """`closest`: least weighted error. `direction`: the same direction, scaled down. `priority`: groups of axes,
 each served as far as those before it allow."""
+ANGLES = {"fin": 2, "thruster": -1, "azimuth": 0, "tilt": 0, "rudder": 0}
+"""Which of an actuator's commands is an angle, by its type; -1 for none."""
 
 
 @dataclass(frozen=True)
@@ -75,37 +78,29 @@ def as_policy(policy: Policy | str) -> Policy:
     return policy if isinstance(policy, Policy) else Policy(policy)
 
 
-def describe_binding(
-    names: Sequence[str], command: Array, lower: Array, upper: Array, pull: Array
-) -> list[str]:
-    """Sentences about the limits that keep a robot from delivering what is missing.
+def limits_reached(layout: Layout, command: Array) -> tuple[str, ...]:
+    """Sentences about the actuators of a robot that are at their limits, within a thousandth of each range.
 
     Args:
-        names: the fins.
-        command: (n, 3), NaN for a failed fin.
-        lower: lower limits (n, 3).
-        upper: upper limits (n, 3).
-        pull: where each fin would have to push (n, 2), in its thrust plane, to lessen what is missing.
+        layout: the robot.
+        command: (n, 3), NaN for a failed actuator.
     """
-    tolerance = 1e-3 * (upper - lower) + 1e-9
-    at_low, at_high = command <= lower + tolerance, command >= upper - tolerance
-    wanted = np.arctan2(pull[:, 1], pull[:, 0])
     sentences = []
-    for i, name in enumerate(names):
-        if np.isnan(command[i]).any():
+    for part, row in zip(layout.actuators, command, strict=True):
+        if np.isnan(row).any():
             continue
-        rests = at_low[i, 0] and at_low[i, 1]
-        if at_high[i, 0] and at_high[i, 1]:
-            sentences.append(f"{name} at full thrust")
-        if is_full_turn(upper[i, 2] - lower[i, 2]):
-            continue
-        middle, half = 0.5 * (lower[i, 2] + upper[i, 2]), 0.5 * (upper[i, 2] - lower[i, 2])
-        outside = abs((wanted[i] - middle + np.pi) % (2 * np.pi) - np.pi) > half
-        if rests and outside:
-            sentences.append(f"{name} cannot point where it is needed")
-        elif not rests and outside and (at_low[i, 2] or at_high[i, 2]):
-            sentences.append(f"{name} at the end of its arc")
-    return sentences
+        low, high = np.array(part.lower), np.array(part.upper)
+        slack = 1e-3 * (high - low) + 1e-9
+        at_low, at_high = row <= low + slack, row >= high - slack
+        angle = ANGLES[part.type]
+        sizes = np.arange(3) != angle
+        if part.type != "rudder" and (at_high | (at_low & (low < 0.0)))[sizes].all():
+            sentences.append(f"{part.name} at full thrust")
+        rests = part.type != "rudder" and at_low[sizes].all()
+        stops = angle >= 0 and not is_full_turn(high[angle] - low[angle])
+        if stops and not rests and (at_low | at_high)[angle]:
+            sentences.append(f"{part.name} at the end of its arc")
+    return tuple(sentences)
 
 
 def policy_from(kind: str, axis_weights: Any = None, priority: Sequence[str] | None = None) -> Policy:
