@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import ConvexHull
 
 from finlab.arrays import Array
-from finlab.forces.force_sets import SCALE, ForceSets, convex_parts, force_sets, wide_arcs
+from finlab.forces.force_sets import SCALE, ForceSets, convex_parts, force_sets
 from finlab.forces.reach import UNPROVEN, largest
 from finlab.layout import Layout
 
@@ -98,15 +98,13 @@ TOLERANCE = 0.01
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class AttainableSet(Polytope):
-    """A convex polytope of attainable forces or torques, body frame [N] or [N m]. Every vertex is attained,
-    by the actuators or, where `hull` says so, by the convex hulls of what they can push."""
+    """A convex polytope of forces or torques that can be had with all else at zero, body frame [N] or [N m].
+    Every vertex is attained, by the actuators or, where an arc is too wide or a force is that of a flow, by
+    the convex hulls of what they can push."""
 
     kind: Kind
     gap: float
     """Nothing attainable lies further than this outside any face [N] or [N m]."""
-    hull: bool
-    """Whether it is the convex hull of a set that is not convex, because an arc is wider than half a turn
-    but no full circle, or a force is that of a flow."""
 
 
 def attainable_set(
@@ -114,11 +112,10 @@ def attainable_set(
     kind: Kind,
     *,
     failed: Collection[str] = (),
-    alone: bool = True,
     tolerance: float = TOLERANCE,
     flow: ArrayLike | None = None,
 ) -> AttainableSet:
-    """Returns what forces or torques the actuators can give.
+    """Returns what forces or torques the actuators can give with all else at zero.
 
     Directions are sent out from the origin. In each, the farthest attainable point is a vertex; where a face
     still lies further than `tolerance` inside the plane that touches the set, its normal is sent out too.
@@ -127,7 +124,6 @@ def attainable_set(
         layout: the robot.
         kind: `force` or `torque`.
         failed: names of actuators that push nothing.
-        alone: keep all else at zero; otherwise it may be anything.
         tolerance: when to stop, as a share of the farthest vertex.
         flow: velocity (6,) of the body relative to the water [m/s, rad/s], body frame; None at rest.
 
@@ -135,9 +131,7 @@ def attainable_set(
         LayoutError: there is no actuator of a name in `failed`.
     """
     sets = force_sets(layout, failed, flow)
-    support = _without_specks(
-        _alone_support(sets, kind) if alone else _free_support(sets, kind), SPECK * float(sets.radius.sum())
-    )
+    support = _support(sets, kind)
     axes = np.concatenate([np.eye(3), -np.eye(3)])
     extent = np.maximum(support(axes)[1].reshape(2, 3).max(axis=0), 0.0)
     # Flat robots have flat sets: directions are spread over the sphere that the set would be if scaled.
@@ -156,48 +150,17 @@ def attainable_set(
             break
         points = np.concatenate([found.vertices, new[far]])
         found = hull_of(points)
-    return AttainableSet(
-        **vars(found),
-        kind=kind,
-        gap=max(float(beyond.max()), 0.0),
-        hull=len(wide_arcs(sets)) > 0 or sets.corners is not None,
-    )
+    return AttainableSet(**vars(found), kind=kind, gap=max(float(beyond.max()), 0.0))
 
 
 Support = Callable[[Array], tuple[Array, Array]]
 """Unit directions (D, 3) to the farthest points (D, 3) and how far they lie along them (D,)."""
 
 
-def _without_specks(support: Support, speck: float) -> Support:
-    """The same, but points nearer to the origin than `speck` are the origin."""
-
-    def clean(directions: Array) -> tuple[Array, Array]:
-        points, reach = support(directions)
-        near = np.linalg.norm(points, axis=-1) <= speck
-        return np.where(near[:, None], 0.0, points), np.where(near, 0.0, reach)
-
-    return clean
-
-
-def _free_support(sets: ForceSets, kind: Kind) -> Support:
-    """Farthest points with all else free: in closed form."""
-    own = slice(0, 3) if kind == "force" else slice(3, 6)
-
-    def support(directions: Array) -> tuple[Array, Array]:
-        normal = np.zeros((len(directions), 6))
-        # A scaled wrench times its scale is the wrench; so a normal is multiplied, too.
-        normal[:, own] = directions * SCALE[own]
-        rows = sets.tile(len(directions))
-        reach, force = rows.farthest(normal)
-        return rows.wrench(force)[:, own] * SCALE[own], reach
-
-    return support
-
-
-def _alone_support(sets: ForceSets, kind: Kind) -> Support:
-    """Farthest points with all else zero: by the solver, in each convex part."""
+def _support(sets: ForceSets, kind: Kind) -> Support:
+    """Farthest points: by the solver, in each convex part; those near the origin are the origin."""
     own, other = (slice(0, 3), slice(3, 6)) if kind == "force" else (slice(3, 6), slice(0, 3))
-    parts = convex_parts(sets)
+    parts, speck = convex_parts(sets), SPECK * float(sets.radius.sum())
     n_parts = len(parts.radius)
 
     def support(directions: Array) -> tuple[Array, Array]:
@@ -211,7 +174,9 @@ def _alone_support(sets: ForceSets, kind: Kind) -> Support:
         # The origin stands in for a point that is not proven to be attained.
         proven = answer.gap < UNPROVEN * (1.0 + answer.size)
         points = np.where(proven[:, None], answer.wrench[:, own], 0.0)
-        return points[best] * SCALE[own], answer.size[best] * SCALE[own][0]
+        points, size = points[best] * SCALE[own], answer.size[best] * SCALE[own][0]
+        near = np.linalg.norm(points, axis=-1) <= speck
+        return np.where(near[:, None], 0.0, points), np.where(near, 0.0, size)
 
     return support
 

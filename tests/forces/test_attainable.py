@@ -6,13 +6,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from finlab.actuators.fin.response import fin_table
 from finlab.analysis import AttainableSet, attainable_set
 from finlab.errors import LayoutError
 from finlab.forces.attainable import _sphere
 from finlab.forces.force_sets import SCALE, force_sets
 from finlab.layout import Layout
-from finlab.physics import Plant
 from tests.forces.conftest import THRUST
 
 Array = NDArray[np.float64]
@@ -27,35 +25,6 @@ def outside(body: AttainableSet, points: Array) -> float:
     size = np.linalg.norm(normals, axis=-1)
     normals, a = normals[size > 1e-12] / size[size > 1e-12, None], a[size > 1e-12]
     return float(((points @ normals.T) - (a * normals).sum(-1)).max())
-
-
-def sampled(layout: Layout, size: int = 6_000) -> Array:
-    """Wrenches (size, 6) of random commands by the plant, every other one with all fins at full thrust."""
-    rng = np.random.default_rng(0)
-    lower = layout.lower
-    upper = layout.upper
-    command = rng.uniform(lower, upper, (size, layout.n_fins, 3))
-    command[::2, :, :2] = upper[:, :2]
-    return Plant(layout).wrench(command)
-
-
-@pytest.mark.parametrize("kind", ["force", "torque"])
-@pytest.mark.parametrize("name", ["A", "restricted", "mixed"])
-def test_no_sampled_wrench_lies_outside(shipped: Layouts, name: str, kind: str) -> None:
-    layout = shipped(name)
-    body = attainable_set(layout, kind, alone=False)
-    points = sampled(layout)[:, OWN[kind]]
-    # Fins may depart from their convex sets: they cannot rest, and tables are uneven.
-    fins = [fin_table(fin) for fin in layout.fins]
-    shares = [1.0 if fin.gauge is None else fin.gauge.min() for fin in fins]
-    off = np.array([f.table.force[0] + f.largest * (1.0 - s) for f, s in zip(fins, shares, strict=True)])
-    error = (np.linalg.norm(force_sets(layout).effectiveness[0], axis=1) * off[:, None]).sum(axis=0) * SCALE
-    assert body.dimension == 3
-    assert not body.hull
-    assert body.gap <= 0.011 * np.linalg.norm(body.vertices, axis=-1).max()
-    assert outside(body, points) <= body.gap + 2 * error[OWN[kind]].max()
-    # Random commands come near the surface where few fins must agree, and always beyond half of it.
-    assert outside(body, 2.5 * points) > body.gap
 
 
 @pytest.mark.parametrize("kind", ["force", "torque"])
@@ -100,38 +69,22 @@ def test_one_fin_alone_gives_nothing_without_torque(shipped: Layouts) -> None:
     one = attainable_set(layout, "force", failed=layout.names[1:])
     assert one.dimension == 0
     assert np.abs(one.vertices).max() < 1e-4
-    assert attainable_set(layout, "force", failed=layout.names[1:], alone=False).dimension == 2
     assert attainable_set(layout, "force", failed=layout.names).dimension == 0
 
 
-@pytest.mark.parametrize("alone", [True, False])
-def test_layout_a_looks_the_same_in_the_mirror(shipped: Layouts, alone: bool) -> None:
-    body = attainable_set(shipped("A"), "force", alone=alone)
+def test_layout_a_looks_the_same_in_the_mirror(shipped: Layouts) -> None:
+    body = attainable_set(shipped("A"), "force")
     for mirror in ([-1, 1, 1], [1, -1, 1], [1, 1, -1]):
         assert outside(body, body.vertices * mirror) <= body.gap + 1e-6
 
 
 @pytest.mark.parametrize("kind", ["force", "torque"])
-@pytest.mark.parametrize("alone", [True, False])
 @pytest.mark.parametrize("name", ["A", "restricted"])
-def test_losing_a_fin_never_enlarges_a_set(shipped: Layouts, name: str, alone: bool, kind: str) -> None:
+def test_losing_a_fin_never_enlarges_a_set(shipped: Layouts, name: str, kind: str) -> None:
     layout = shipped(name)
-    whole = attainable_set(layout, kind, alone=alone, tolerance=0.05)
-    left = attainable_set(layout, kind, alone=alone, failed=layout.names[:1], tolerance=0.05)
+    whole = attainable_set(layout, kind, tolerance=0.05)
+    left = attainable_set(layout, kind, failed=layout.names[:1], tolerance=0.05)
     assert outside(whole, left.vertices) <= whole.gap + 1e-4
-
-
-def test_with_all_else_zero_a_set_is_smaller(shipped: Layouts) -> None:
-    layout = shipped("mixed")
-    free = attainable_set(layout, "force", alone=False)
-    assert outside(free, attainable_set(layout, "force").vertices) <= free.gap + 1e-6
-
-
-def test_wide_arcs_are_said_to_be_a_hull(wide: Layout) -> None:
-    body = attainable_set(wide, "force", alone=False)
-    assert body.hull
-    assert outside(body, sampled(wide)[:, :3]) <= body.gap + 1e-2
-    assert outside(body, attainable_set(wide, "force", tolerance=0.1).vertices) <= body.gap + 1e-4
 
 
 def test_faces_are_seen_from_outside(shipped: Layouts) -> None:

@@ -50,11 +50,11 @@ def find(question: Question) -> Findings:
     kind = DRAWN[question.drawn]
     now = whole = None
     if kind is not None:
-        now = attainable_set(layout, kind, failed=failed, alone=True)
+        now = attainable_set(layout, kind, failed=failed)
         if failed:
-            whole = attainable_set(layout, kind, alone=True)
+            whole = attainable_set(layout, kind)
         elif other:
-            whole = attainable_set(beside, kind, alone=True)
+            whole = attainable_set(beside, kind)
     card = score_card(layout, failed)
     before = score_card(beside, lost) if other and len(lost) < beside.n else None
     return Findings(question, card, before, now, whole)
