@@ -13,7 +13,7 @@ from webapp.session import Display, Session
 from webapp.session.lessons import Stop
 from webapp.session.looking import Desk
 from webapp.session.search_request import SearchRequest
-from webapp.session.state import State
+from webapp.session.state import Flow, State
 from webapp.session.swim_plan import SwimSettings
 from webapp.tasks.analyst import Findings
 from webapp.tasks.comparison import Run
@@ -34,6 +34,8 @@ class Facts(NamedTuple):
     failed: tuple[str, ...]
     health: Health | None
     target: tuple[float, ...]
+    flow: Flow | None
+    """Velocity relative to the water [m/s, rad/s], where one is felt."""
     method: str
     policy: str
     saved: Layout
@@ -101,6 +103,7 @@ def facts_of(session: Session, jobs: Jobs, dragged: int | None, scale: Scale, be
         failed=state.failed,
         health=health,
         target=state.target,
+        flow=state.flow,
         method=state.method,
         policy=state.policy,
         saved=session.saved,

@@ -11,7 +11,7 @@ from scipy.optimize import differential_evolution
 from finlab.allocation.question import check_flow
 from finlab.analysis.authority import AXES
 from finlab.analysis.goals import MISSION, Goal, axes_to_raise, make_goal
-from finlab.analysis.moves import Bounds, Moves, azimuth, mirror_pairs
+from finlab.analysis.moves import Bounds, Moves, mirror_pairs
 from finlab.analysis.score_card import ScoreCard, score_card
 from finlab.arrays import Array
 from finlab.forces.force_sets import force_sets
@@ -23,8 +23,8 @@ PENALTY = 1e3
 """Cost of actuators that are too close or break another rule, per metre; far beyond any goal."""
 
 Rule = Callable[[Array, Array], Array]
-"""How far actuators at positions (P, n, 3) [m] under azimuths (P, n) [rad], as in `Bounds`, break a rule (P,)
-[m]; 0 where they keep it."""
+"""How far actuators at positions (P, n, 3) [m] with own axes (P, n, 3, 3) break a rule (P,) [m]; 0 where they
+keep it."""
 
 
 @dataclass(frozen=True)
@@ -106,7 +106,7 @@ def optimize_layout(
     known = {name: bounds.get(name) or Bounds.around(layout.actuators[layout.index(name)]) for name in names}
     pairs = mirror_pairs(layout) if mirror is None else mirror
     moves = Moves(layout, names, known, pairs, grid, water)
-    broken = rule or (lambda position, angle: np.zeros(len(position)))
+    broken = rule or (lambda position, frames: np.zeros(len(position)))
     if axes is None and goal != "mission_power":
         axes = axes_to_raise(layout, water)
     measure, quick = (
@@ -120,10 +120,7 @@ def optimize_layout(
     found, stopped = _search(moves, quick, before, clearance, broken, rounds, seed, progress, cancelled)
     best = moves.moved(found)
     after = measured(best)
-    wrong = [
-        float(broken(robot.position[None], np.array([[azimuth(part) for part in robot.actuators]]))[0])
-        for robot in (layout, best)
-    ]
+    wrong = [float(broken(robot.position[None], robot.frames[None])[0]) for robot in (layout, best)]
     better = after > before + 1e-9 * abs(before)
     improved = wrong[1] <= 0.0 and (better or wrong[0] > 0.0)
     card = score_card(layout, flow=water)
@@ -159,8 +156,8 @@ def _search(
         nonlocal best
         effectiveness = vectors.reshape(len(moves.start), -1).T
         value = measure(moves.sets(effectiveness), lambda row: moves.moved(effectiveness[row]))
-        position, angle, _ = moves.geometry(effectiveness)
-        close = np.maximum(needed - _gaps(position), 0.0).sum(-1) + rule(position, angle)
+        position, frames = moves.geometry(effectiveness)[::2]
+        close = np.maximum(needed - _gaps(position), 0.0).sum(-1) + rule(position, frames)
         fine = value[close <= 0.0]
         best = max(best, float(fine.max())) if len(fine) else best
         return np.asarray(-value + PENALTY * close)

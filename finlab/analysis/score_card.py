@@ -128,15 +128,15 @@ class QuickCheck(HeldAxes):
     """Working actuators with the axes that the loss of each costs; those that cost none are left out."""
 
 
-def quick_check(layout: Layout, failed: Collection[str] = ()) -> QuickCheck:
-    """Returns what the working actuators hold at rest, from singular values alone.
+def quick_check(layout: Layout, failed: Collection[str] = (), flow: ArrayLike | None = None) -> QuickCheck:
+    """Returns what the working actuators hold in a flow as of `score_card`, from singular values alone.
 
     Raises:
         LayoutError: there is no actuator of a name in `failed`.
     """
     working = [name for name in layout.names if name not in failed]
     single = working if len(working) > 1 else []
-    sets = force_sets(layout, failed).tile(1 + len(single))
+    sets = force_sets(layout, failed, check_flow(flow)).tile(1 + len(single))
     for row, name in enumerate(single, start=1):
         sets.lose(row, layout.index(name))
     held, *left = (held_axes(*pair) for pair in zip(*singular_values(sets), strict=True))

@@ -18,6 +18,7 @@ from tests.webapp.loops import page_of, running
 from webapp.markup.score_card import warnings
 from webapp.session import Session
 from webapp.session.search_request import SearchRequest
+from webapp.session.state import State
 from webapp.tasks.analyst import Findings, Question, find
 from webapp.tasks.background import Newest, Worker
 from webapp.tasks.improving import Improver, Room
@@ -36,9 +37,9 @@ def test_search_is_cancelled_and_what_it_found_is_offered() -> None:
     worker = Worker()
     improver = Improver(page_of(worker))
     request = SearchRequest("weakest direction")
-    improver.start(NO_YAW, request)
+    improver.start(State(NO_YAW), request)
     with pytest.raises(FinlabError, match="running already"):
-        improver.start(NO_YAW, request)
+        improver.start(State(NO_YAW), request)
     until(lambda: improver.progress is not None)
     improver.cancel()
     until(lambda: improver.findings is not None)
@@ -57,7 +58,7 @@ def test_bad_searches_are_refused() -> None:
     request = SearchRequest()
     with pytest.raises(FinlabError, match="goal"):
         request.with_goal("gold")
-    with pytest.raises(FinlabError, match="no fin may move"):
+    with pytest.raises(FinlabError, match="nothing may move"):
         replace(request, held=NO_YAW.names).bounds(NO_YAW)
     for way in ((float("nan"), 0.05, 0.05, 90.0), (0.05, 0.05, 0.05, 720.0)):
         with pytest.raises(FinlabError):
@@ -74,7 +75,7 @@ def test_fins_move_within_bounds_for_the_power_of_a_mission() -> None:
     x = NO_YAW.fins[1].position[0]
     assert bounds[second].x == pytest.approx((x - 0.04, x + 0.04))
     assert bounds[first].mounting_angle[0] == bounds[first].mounting_angle[1]
-    improver.start(NO_YAW, request)
+    improver.start(State(NO_YAW), request)
     until(lambda: improver.progress is not None)
     improver.cancel()
     until(lambda: improver.findings is not None)
@@ -114,17 +115,17 @@ def test_what_is_proposed_can_be_built() -> None:
     stuck = inside.replace_actuator("tail", position=(-0.15, 0.0, 0.0))
     assert any("tail beats inside" in text for text in warnings(stuck))
     room = Room(stuck, 0.02)
-    assert room.broken(stuck.position[None], stuck.mounting_angle[None])[0] > 0.0
+    assert room.broken(stuck.position[None], stuck.frames[None])[0] > 0.0
     worker = Worker()
     improver = Improver(page_of(worker))
     request = SearchRequest().with_way((0.15, 0.05, 0.05, 60.0))
-    improver.start(stuck, request)
+    improver.start(State(stuck), request)
     until(lambda: improver.findings is not None)
     found = improver.findings
     assert found is not None and found.improved
     layout = found.layout
     assert warnings(layout) == ()
-    assert room.broken(layout.position[None], layout.mounting_angle[None])[0] == 0.0
+    assert room.broken(layout.position[None], layout.frames[None])[0] == 0.0
     assert [set(pair) for pair in mirror_pairs(layout)] == [set(pair) for pair in mirror_pairs(stuck)]
     tail = layout.fins[-1]
     assert tail.position[1] == 0.0 and tail.mounting_angle == math.pi
@@ -136,4 +137,24 @@ def test_what_is_proposed_can_be_built() -> None:
     afterwards = find(Question(layout, (), layout, "none")).card
     assert afterwards.authority.weakest == found.card_after.authority.weakest
     assert [loss.weakest for loss in afterwards.losses] == [loss.weakest for loss in found.card_after.losses]
+    worker.stop()
+
+
+@pytest.mark.parametrize("robot", ["bluerov2", "torpedo", "catamaran", "fish", "turtle_hybrid"])
+def test_any_robot_is_improved_without_what_is_lost(robot: str) -> None:
+    state = State(load_layout(robot), speed=1.0).with_failure_toggled(load_layout(robot).names[-1])
+    worker = Worker()
+    improver = Improver(page_of(worker))
+    improver.start(state, SearchRequest())
+    until(lambda: improver.progress is not None or improver.error is not None)
+    improver.cancel()
+    until(lambda: not improver.busy)
+    found = improver.findings
+    assert found is not None, improver.error
+    assert found.layout.names == state.layout.names and state.failed[0] not in found.moved
+    assert found.layout.actuators[-1] == state.layout.actuators[-1]
+    room = Room(state.layout.without(state.failed), 0.02)
+    left = found.layout.without(state.failed)
+    assert room.broken(left.position[None], left.frames[None])[0] == 0.0
+    assert mirror_pairs(left) == mirror_pairs(state.layout.without(state.failed))
     worker.stop()

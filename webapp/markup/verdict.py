@@ -126,7 +126,7 @@ def answer_sentence(
                 sentences.append(f"{doubt[0].upper()}{doubt[1:]}.")
     elif busy:
         sentences.append(WORKING)
-    blind = authority_sentence(state.layout, state.failed, axis_reach(state.able, state.failed))
+    blind = authority_sentence(state.layout, state.failed, axis_reach(state.able, state.failed, state.flow))
     if blind is not None:
         sentences.insert(0, _warning(blind))
     return Markup(" ").join(filter(None, sentences))

@@ -16,7 +16,7 @@ from webapp.presses import press
 from webapp.scene.robot_scene import CAMERAS
 from webapp.session.lessons import LESSONS, TOUR, Stop
 from webapp.session.looking import TASKS
-from webapp.session.state import State
+from webapp.session.state import Flow, State
 
 SWITCHES = {
     "frozen": ("Freeze", "Fins hold still at their zero direction (P)."),
@@ -51,9 +51,9 @@ def tasks(task: str) -> str:
     return html("<nav class='fl-tasks' aria-label='Tasks'>{}</nav>", buttons)
 
 
-def check(able: Layout, failed: tuple[str, ...], layout: Layout) -> str:
+def check(able: Layout, failed: tuple[str, ...], layout: Layout, flow: Flow | None) -> str:
     """What can be said of a layout at once: its axes, what a failure costs, what looks like a mistake."""
-    return check_card(quick_check(able, failed), layout.n - len(failed) > 1, warnings(layout))
+    return check_card(quick_check(able, failed, flow), layout.n - len(failed) > 1, warnings(layout))
 
 
 def add_answer(page: Page) -> None:

@@ -48,6 +48,8 @@ def command_line(state: State) -> str:
         words += ["--stuck", f"{name}={math.degrees(angle):g}"]
     for name, (amplitude, frequency, angle) in health.running:
         words += ["--running", f"{name}={amplitude:g},{frequency:g},{math.degrees(angle):g}"]
+    if state.flow is not None:
+        words += ["--flow", *(f"{value:g}" for value in state.flow)]
     if state.method != "dual":
         words += ["--method", state.method]
     if state.policy != "closest":

@@ -21,7 +21,7 @@ from webapp.tasks.analyst import Findings
 
 def add_reach(page: Page) -> None:
     """What is drawn, and the card."""
-    about = "Forces that the fins can give without torque, or torques without force, as a body in the view."
+    about = "Forces that it can give without torque, or torques without force, as a body in the view."
     page.bind_display(page.gui.add_dropdown("Draw the set of", tuple(DRAWN), hint=about), "drawn")
     page.add_html(_findings)
 
@@ -62,17 +62,17 @@ def add_improving(page: Page) -> None:
     add_fin_buttons(
         page,
         "May move",
-        "Press a number to hold a fin, or to let it move. Pairs stay pairs.",
+        "Press a number to hold one, or to let it move. Pairs stay pairs.",
         "fl-movers",
         partial(change, SearchRequest.with_held_toggled),
-        lambda layout, draft: (layout.names, (), draft.held),
+        lambda layout, draft, failed: (layout.names, failed, draft.held),
     )
     page.bind_number(
         gui.add_vector3("Reach ± [m]", WAY[:3], step=0.01, hint="Along x, y and z."),
         lambda reach: bound((*reach, session.draft.way[3])),
         lambda draft: draft.way[:3],
     )
-    hint = "How far its shaft may turn either way."
+    hint = "How far each may turn either way; what is not kept level rises and falls, too."
     page.bind_number(
         gui.add_slider("Turn ± [°]", 0.0, 180.0, 5.0, WAY[3], hint=hint),
         lambda turn: bound((*session.draft.way[:3], turn)),
@@ -82,7 +82,7 @@ def add_improving(page: Page) -> None:
     stops = "Takes up to a minute; it can be stopped any time."
     search = page.add_button(
         "Search",
-        lambda: improver.start(session.state.layout, session.draft),
+        lambda: improver.start(session.state, session.draft),
         icon=viser.Icon.SPARKLES,
         hint=stops,
     )
@@ -125,6 +125,6 @@ def _before_and_after(found: Improvement) -> str:
     heading = html(
         "<b>{}: {}{} before, {}{} after.</b>{}", goal.capitalize(), before, unit, after, unit, stopped
     )
-    moved = fins_words([found.layout.index(name) for name in found.moved]).capitalize()
+    moved = fins_words([found.layout.index(name) for name in found.moved], found.layout).capitalize()
     table = score_table(found.layout, found.card_after, found.card_before)
-    return html("{} {} moved; the view shows them in green, with all fins whole.{}", heading, moved, table)
+    return html("{} {} moved; the view shows them in green.{}", heading, moved, table)

@@ -58,7 +58,7 @@ PLACES = (
     Place(RIGHT, (DESIGN,), "Hull", add_hull, folded=True, about="robot"),
     Place(RIGHT, (DESIGN,), "Check", partial(card, check)),
     Place(DRAWER, (DESIGN,), "Reach", add_reach),
-    Place(DRAWER, (DESIGN,), "Improve", add_improving, fins_only="the search for a better layout"),
+    Place(DRAWER, (DESIGN,), "Improve", add_improving),
     Place(LEFT, (ALLOCATE,), "Actuators", add_commands),
     Place(LEFT, (ALLOCATE,), "Damage", add_damage, folded=True),
     Place(RIGHT, (ALLOCATE,), "Wrench", add_target),

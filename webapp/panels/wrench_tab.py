@@ -8,13 +8,14 @@ import viser
 from finlab.allocation.policy import AXES, KINDS
 from finlab.forces.reach import Ranges
 from finlab.layout import Layout
+from finlab.physics import plant_of
 from webapp.handles import add_html, put
 from webapp.markup.answer import fin_table
 from webapp.markup.html import html, marker
-from webapp.markup.words import three_digits
+from webapp.markup.words import listed, three_digits
 from webapp.page import Page
 from webapp.panels.damage import add_fin_buttons
-from webapp.session.state import AXIS_UNITS, AXIS_WORDS
+from webapp.session.state import AXIS_UNITS, AXIS_WORDS, MAX_SPEED, Flow
 from webapp.session.targets import PRESETS, axis_reach, full_thrust, slider_end
 from webapp.viser_internals import put_marks
 
@@ -34,8 +35,8 @@ def add_commands(page: Page) -> None:
         lambda layout, failed: (layout.names, failed, ()),
     )
     page.add_html(
-        lambda layout, health, able, shown, selected: fin_table(
-            layout, health, shown, full_thrust(able), selected
+        lambda layout, health, able, shown, selected, flow: fin_table(
+            layout, health, shown, full_thrust(able, flow), selected
         )
     )
 
@@ -48,9 +49,9 @@ def add_target(page: Page) -> None:
     add_html(gui, marker("fl-reach"))
     sliders = [_add_slider(page, k) for k in range(6)]
 
-    def mark(ranges: Ranges | None, able: Layout, failed: tuple[str, ...]) -> None:
+    def mark(ranges: Ranges | None, able: Layout, failed: tuple[str, ...], flow: Flow | None) -> None:
         """Show what is within reach on the sliders."""
-        most = axis_reach(able, failed)  # with the others free
+        most = axis_reach(able, failed, flow)  # with the others free
         for k, slider in enumerate(sliders):
             marks: tuple[tuple[float, str], ...] = ()
             hint = AXIS_WORDS[k].capitalize()
@@ -62,6 +63,11 @@ def add_target(page: Page) -> None:
 
     board.act(mark)
     page.add_html(_sentence)
+    about = "How fast the robot moves ahead through the water, on which rudders depend."
+    speed = gui.add_slider("Speed through the water [m/s]", 0.0, MAX_SPEED, 0.05, 0.0, hint=about)
+    page.bind_number(speed, session.set_speed, lambda state: state.speed, digits=2)
+    board.show(speed, visible=lambda layout: plant_of(layout).feels_flow)
+    page.add_html(_at_rest)
     policies = "Come closest, keep the direction, or serve axes by priority, heave first."
     box = gui.add_dropdown("Out of reach", KINDS, hint=policies)
     page.bind(box, partial(session.set_setting, "policy"), lambda policy: policy)
@@ -72,12 +78,21 @@ def _add_slider(page: Page, axis: int) -> viser.GuiSliderHandle[float]:
     label, hint = f"{AXES[axis]} [{AXIS_UNITS[axis]}]", AXIS_WORDS[axis].capitalize()
     slider = page.gui.add_slider(label, -10.0, 10.0, step, 0.0, hint=hint)
 
-    def end(able: Layout, failed: tuple[str, ...], target: tuple[float, ...]) -> float:
-        return max(slider_end(float(axis_reach(able, failed)[axis])), abs(target[axis]))
+    def end(able: Layout, failed: tuple[str, ...], flow: Flow | None, target: tuple[float, ...]) -> float:
+        return max(slider_end(float(axis_reach(able, failed, flow)[axis])), abs(target[axis]))
 
     # First the ends: a value beyond them would not be shown.
-    page.board.show(slider, max=end, min=lambda able, failed, target: -end(able, failed, target))
+    page.board.show(slider, max=end, min=lambda able, failed, flow, target: -end(able, failed, flow, target))
     return page.bind_number(slider, partial(session.set_target, axis), lambda target: target[axis])
+
+
+def _at_rest(layout: Layout, flow: Flow | None) -> str:
+    """Why rudders give nothing."""
+    rudders = [part.name for part in layout.actuators if part.type == "rudder"]
+    if flow is not None or not rudders:
+        return ""
+    said = f"{listed(rudders)} give{'s' * (len(rudders) == 1)} nothing: no water flows past at rest"
+    return html("<div class='fl missing'>{}.</div>", said)
 
 
 def _sentence(ranges_error: str | None) -> str:

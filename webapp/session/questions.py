@@ -11,7 +11,7 @@ from finlab.allocation.policy import AXES
 from finlab.errors import FinlabError
 from webapp.session.core import Core
 from webapp.session.directions import part_of
-from webapp.session.state import FAULTS, LEAST, chosen
+from webapp.session.state import FAULTS, LEAST, MAX_SPEED, chosen, number
 from webapp.session.targets import PRESETS
 
 FAULT_VERBS = {"weak": "Weaken", "thrust": "Tear", "stuck": "Jam", "running": "Let run"}
@@ -33,6 +33,11 @@ class Questions(Core):
         except ValueError:
             raise FinlabError(f"wrench: expected six numbers, got {','.join(values)!r:.60}") from None
         self._commit("", state)
+
+    def set_speed(self, value: Any) -> None:
+        """The speed ahead through the water [m/s]."""
+        checked = number(value, "speed through the water [m/s]", 0.0, MAX_SPEED)
+        self._commit("Set the speed", replace(self.state, speed=checked), "speed")
 
     def set_preset(self, name: str) -> None:
         """The target wrench of a preset."""

@@ -1,11 +1,11 @@
-"""What a search for a better layout may do: which fins move, and how far."""
+"""What a search for a better layout may do: what moves, and how far."""
 
 import math
 from dataclasses import dataclass, replace
 from typing import Any
 
 from finlab.analysis import Bounds
-from finlab.analysis.moves import is_mirrored
+from finlab.analysis.moves import azimuth, is_mirrored
 from finlab.errors import FinlabError
 from finlab.layout import Layout
 from webapp.session.state import chosen, number
@@ -17,19 +17,19 @@ GOAL_WORDS = {
 }
 """What may be improved, in words, and the name that the search knows."""
 WAY = (0.05, 0.05, 0.05, 180.0)
-"""How far a fin may go along x, y and z [m] and turn either way [deg] unless it is said otherwise."""
+"""How far an actuator may go along x, y and z [m] and turn either way [deg] unless it is said otherwise."""
 
 Way = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True)
 class SearchRequest:
-    """What the user has asked for so far; it may name fins that are gone by now."""
+    """What the user has asked for so far; it may name actuators that are gone by now."""
 
     goal: str = next(iter(GOAL_WORDS))
     held: tuple[str, ...] = ()
     way: Way = WAY
-    """How far fins may go along x, y, z [m] and turn [deg]."""
+    """How far they may go along x, y, z [m] and turn [deg]."""
 
     def with_goal(self, goal: Any) -> "SearchRequest":
         """Another goal.
@@ -40,12 +40,12 @@ class SearchRequest:
         return replace(self, goal=chosen(goal, "goal", GOAL_WORDS))
 
     def with_held_toggled(self, name: str) -> "SearchRequest":
-        """A fin held, or free to move again."""
+        """An actuator held, or free to move again."""
         held = tuple(other for other in self.held if other != name)
         return replace(self, held=held if name in self.held else (*held, name))
 
     def with_way(self, way: tuple[Any, ...]) -> "SearchRequest":
-        """Other bounds of all fins.
+        """Other bounds of all.
 
         Raises:
             FinlabError: they are too far, or no numbers.
@@ -53,23 +53,24 @@ class SearchRequest:
         x, y, z = (
             number(v, f"reach along {axis} [m]", 0.0, 0.5) for v, axis in zip(way, "xyz", strict=False)
         )
-        return replace(self, way=(x, y, z, number(way[3], "turn of the shaft [°]", 0.0, 180.0)))
+        return replace(self, way=(x, y, z, number(way[3], "turn [°]", 0.0, 180.0)))
 
     def bounds(self, layout: Layout) -> dict[str, Bounds]:
-        """Where each fin that may move may go from where it is.
+        """Where each that may move may go from where it is.
 
         Raises:
             FinlabError: none may.
         """
         bounds = {}
-        for fin in layout.fins:
-            if fin.name not in self.held:
+        for part in layout.actuators:
+            if part.name not in self.held:
                 *reach, turn = self.way
-                around = Bounds.around(fin, reach, math.radians(turn))
-                if is_mirrored(fin, fin):  # it stays in the mirror plane
-                    y, angle = fin.position[1], fin.shaft_azimuth
-                    around = replace(around, y=(y, y), mounting_angle=(angle, angle))
-                bounds[fin.name] = around
+                around = Bounds.around(part, reach, math.radians(turn))
+                if is_mirrored(part, part):  # it stays in the mirror plane
+                    y, angle = part.position[1], azimuth(part)
+                    tilt = around.tilt if abs(part.frame[0][1]) < 0.5 else (0.0, 0.0)
+                    around = replace(around, y=(y, y), mounting_angle=(angle, angle), tilt=tilt)
+                bounds[part.name] = around
         if not bounds:
-            raise FinlabError("no fin may move; press the numbers of those that may")
+            raise FinlabError("nothing may move; press the numbers of what may")
         return bounds

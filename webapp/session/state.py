@@ -13,6 +13,7 @@ from finlab.layout import Fin, Layout
 from finlab.layout.damage import Health
 from finlab.layout.fin import MAX_AMPLITUDE, MAX_FREQUENCY
 from finlab.paper.settings import PaperSettings
+from finlab.physics import plant_of
 from webapp.session.links import Links, kept, linked
 
 AXIS_WORDS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
@@ -20,6 +21,9 @@ AXIS_UNITS = ("N", "N", "N", "N m", "N m", "N m")
 
 MAX_TARGET = 1000.0
 """Largest target component that the page may ask for [N, N m]."""
+Flow = tuple[float, float, float, float, float, float]
+MAX_SPEED = 3.0
+"""Greatest speed through the water that the page may ask for [m/s]."""
 STRENGTH_RANGE = (0.05, 1.0)
 """Shares that may be left of a weak or torn actuator."""
 FAULTS: dict[str, tuple[str, ...]] = {
@@ -54,6 +58,14 @@ class State:
     method: str = "dual"
     policy: str = "closest"
     links: Links = ()
+    speed: float = 0.0
+    """Speed ahead through the water [m/s]."""
+
+    @property
+    def flow(self) -> Flow | None:
+        """Velocity (6,) relative to the water where an actuator feels it and it is not at rest; else None."""
+        felt = self.speed != 0.0 and plant_of(self.layout).feels_flow
+        return (self.speed, 0.0, 0.0, 0.0, 0.0, 0.0) if felt else None
 
     @property
     def healthy(self) -> tuple[str, ...]:
@@ -73,6 +85,7 @@ class State:
             temperature=other.temperature,
             method=other.method,
             policy=other.policy,
+            speed=other.speed,
         )
 
     def with_target(self, axis: int, value: Any) -> "State":

@@ -8,6 +8,7 @@ import numpy as np
 from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.physics import plant_of
+from webapp.session.state import Flow
 
 PRESETS: dict[str, tuple[float, float, float, float, float, float]] = {
     "Cruise": (2.0, 0.0, 0.0, 0.0, 0.0, 0.0),
@@ -26,24 +27,26 @@ STEPS = (5, 5, 73)
 """Values of each of its three numbers that an actuator is tried with: a fin's directions lie 5 deg apart."""
 
 
-def axis_reach(layout: Layout, failed: tuple[str, ...] = ()) -> Array:
+def axis_reach(layout: Layout, failed: tuple[str, ...] = (), flow: Flow | None = None) -> Array:
     """Largest size of each wrench component (6,) [N, N m] that the working actuators give with the others
-    free, at rest."""
+    free, in a flow (6,) [m/s, rad/s]."""
     works = np.array([name not in failed for name in layout.names])
-    return np.asarray(_extents(layout)[1][:, works].sum(axis=1).max(axis=0))
+    return np.asarray(_extents(layout, flow)[1][:, works].sum(axis=1).max(axis=0))
 
 
-def full_thrust(layout: Layout) -> Array:
-    """Largest force (n,) of each actuator, at rest [N]."""
-    return _extents(layout)[0]
+def full_thrust(layout: Layout, flow: Flow | None = None) -> Array:
+    """Largest force (n,) of each actuator [N]."""
+    return _extents(layout, flow)[0]
 
 
 @lru_cache(maxsize=64)
-def _extents(layout: Layout) -> tuple[Array, Array]:
+def _extents(layout: Layout, flow: Flow | None) -> tuple[Array, Array]:
     """Largest force (n,) of each actuator, and what it gives at most along each axis either way (2, n, 6)."""
     plant = plant_of(layout)
     share = np.stack(np.meshgrid(*(np.linspace(0.0, 1.0, count) for count in STEPS), indexing="ij"), -1)
-    force = plant.force(plant.lower + share.reshape(-1, 1, 3) * plant.width)
+    force = plant.force(
+        plant.lower + share.reshape(-1, 1, 3) * plant.width, flow=None if flow is None else np.array(flow)
+    )
     wrench = np.einsum("kni,niw->knw", force, plant.effectiveness)
     both = np.stack([wrench.max(axis=0), -wrench.min(axis=0)])
     return np.linalg.norm(force, axis=-1).max(axis=0), np.maximum(both, 0.0)

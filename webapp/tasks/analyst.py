@@ -6,7 +6,7 @@ from finlab.analysis import AttainableSet, ScoreCard, attainable_set, score_card
 from finlab.forces.reach import Ranges, axis_ranges
 from finlab.layout import Layout
 from webapp.session.display import DRAWN
-from webapp.session.state import State
+from webapp.session.state import Flow, State
 
 REST_S = 0.12
 """How long the target may not change before the marks are worked out again [s]."""
@@ -20,6 +20,7 @@ class Question:
     failed: tuple[str, ...]
     beside: Layout
     drawn: str
+    flow: Flow | None = None
 
 
 @dataclass(frozen=True)
@@ -43,23 +44,23 @@ def find(question: Question) -> Findings:
     Raises:
         FinlabError: the layout cannot be analysed.
     """
-    layout, failed, beside = question.layout, question.failed, question.beside
+    layout, failed, beside, flow = question.layout, question.failed, question.beside, question.flow
     other = beside != layout
     # A fin that the other layout does not have cannot have failed there.
     lost = tuple(name for name in failed if name in beside.names)
     kind = DRAWN[question.drawn]
     now = whole = None
     if kind is not None:
-        now = attainable_set(layout, kind, failed=failed)
+        now = attainable_set(layout, kind, failed=failed, flow=flow)
         if failed:
-            whole = attainable_set(layout, kind)
+            whole = attainable_set(layout, kind, flow=flow)
         elif other:
-            whole = attainable_set(beside, kind)
-    card = score_card(layout, failed)
-    before = score_card(beside, lost) if other and len(lost) < beside.n else None
+            whole = attainable_set(beside, kind, flow=flow)
+    card = score_card(layout, failed, flow)
+    before = score_card(beside, lost, flow) if other and len(lost) < beside.n else None
     return Findings(question, card, before, now, whole)
 
 
 def find_ranges(question: State) -> Ranges:
     """The range of each component of the target."""
-    return axis_ranges(question.layout, question.target, question.failed)
+    return axis_ranges(question.layout, question.target, question.failed, question.flow)

@@ -3,7 +3,7 @@
 import math
 import threading
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
@@ -11,57 +11,63 @@ import numpy as np
 from finlab.analysis import Bounds, Improvement, Progress, optimize_layout
 from finlab.arrays import Array
 from finlab.errors import FinlabError
-from finlab.layout import Layout
+from finlab.layout import Fin, Layout
 from webapp.scene.meshes.fin import CHORD, ROOT, SPAN
 from webapp.scene.meshes.hull import AnyHull, hull_of
 from webapp.scene.meshes.mesh_hull import MeshHull
+from webapp.session.directions import replaced
 from webapp.session.search_request import GOAL_WORDS, SearchRequest
+from webapp.session.state import Flow, State
 from webapp.tasks.background import Newest
 from webapp.tasks.context import Context
 
 ALONG = np.linspace(ROOT, ROOT + SPAN, 4)
-"""Places along a shaft, from where its blade begins to where it ends [m]."""
+"""Places along a fin's shaft, from where its blade begins to where it ends [m]."""
+PROPELLER = 0.05
+"""Radius of what is kept free about any other actuator [m]."""
 INSIDE = 0.02
 """How far a place inside the hull counts as wrong [m]."""
 APART_M = 0.02
-"""Least distance between what two fins sweep."""
+"""Least distance between what two actuators sweep."""
 GRID = 0.001, math.radians(1.0)
-"""What is proposed is round: steps of places [m] and shafts [rad]."""
+"""What is proposed is round: steps of places [m] and angles [rad]."""
 
 
 class Room:
-    """What a layout's fins have to keep when they are moved."""
+    """What a layout's actuators have to keep when they are moved."""
 
     def __init__(self, layout: Layout, apart: float) -> None:
-        """Blades stand outside of the layout's hull, and what two fins sweep is `apart` [m].
+        """Blades, and what stands outside of the layout's hull now, stay outside; what two actuators sweep is
+        `apart` [m].
 
-        A fin sweeps a cylinder about its shaft. Cylinders that are closer already, or overlap, need not part,
-        but come no closer.
+        A fin sweeps a cylinder about its shaft, any other one a ball. What is closer already, or overlaps,
+        need not part, but comes no closer.
         """
         hull = hull_of(layout)
         self._hull: AnyHull = hull.coarse() if isinstance(hull, MeshHull) else hull
-        now = swept_gaps(layout.position[None], layout.mounting_angle[None])[0]
-        self._needed = np.minimum(now, apart)
+        fins = np.array([isinstance(part, Fin) for part in layout.actuators])
+        self._along = np.where(fins[:, None], ALONG, 0.0)
+        self._radius = np.where(fins, CHORD, PROPELLER)
+        here = layout.position[None], layout.frames[None]
+        self._outside = (fins[:, None] | ~self._hull.contains(self._places(*here)))[0]
+        self._needed = np.minimum(self.gaps(*here)[0], apart)
 
-    def broken(self, position: Array, angle: Array) -> Array:
-        """How far fins at positions (P, n, 3) [m] under angles (P, n) [rad] break the rules (P,) [m]."""
-        inside = self._hull.contains(_places(position, angle)).sum(axis=(-1, -2))
-        close = np.maximum(self._needed - swept_gaps(position, angle) - 1e-9, 0.0).sum(axis=-1)
+    def broken(self, position: Array, frames: Array) -> Array:
+        """How far positions (P, n, 3) [m] and own axes (P, n, 3, 3) break the rules (P,) [m]."""
+        inside = (self._outside & self._hull.contains(self._places(position, frames))).sum(axis=(-1, -2))
+        close = np.maximum(self._needed - self.gaps(position, frames) - 1e-9, 0.0).sum(axis=-1)
         return np.asarray(INSIDE * inside + close)
 
+    def gaps(self, position: Array, frames: Array) -> Array:
+        """Distances (P, pairs) [m] between what actuators sweep; negative where that overlaps."""
+        places = self._places(position, frames)
+        first, second = np.triu_indices(position.shape[1], k=1)
+        between = np.linalg.norm(places[:, first, :, None] - places[:, second, None], axis=-1)
+        return np.asarray(between.min(axis=(-1, -2)) - self._radius[first] - self._radius[second])
 
-def swept_gaps(position: Array, angle: Array) -> Array:
-    """Distances (P, pairs) [m] between the cylinders that fins sweep; negative where they overlap."""
-    places = _places(position, angle)
-    first, second = np.triu_indices(position.shape[1], k=1)
-    between = places[:, first, :, None] - places[:, second, None]
-    return np.asarray(np.linalg.norm(between, axis=-1).min(axis=(-1, -2)) - 2.0 * CHORD)
-
-
-def _places(position: Array, angle: Array) -> Array:
-    """Places along the shafts (P, n, 4, 3) [m]."""
-    shaft = np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], axis=-1)
-    return np.asarray(position[..., None, :] + ALONG[:, None] * shaft[..., None, :])
+    def _places(self, position: Array, frames: Array) -> Array:
+        """Places along the shafts (P, n, 4, 3) [m]."""
+        return np.asarray(position[..., None, :] + self._along[..., None] * frames[..., None, 0, :])
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +75,10 @@ class Search:
     """One search."""
 
     layout: Layout
-    """Where it begins; mirror pairs in it stay mirror pairs."""
+    """Where it begins."""
+    failed: tuple[str, ...]
+    """Those that are lost, which stay where they are."""
+    flow: Flow | None
     goal: str
     """What to raise, as `optimize_layout` calls it."""
     bounds: Mapping[str, Bounds]
@@ -85,16 +94,17 @@ class Improver(Newest[Search, Improvement]):
         super().__init__(context.loop, context.workers.searches, self._improve, context.changed)
         self.progress: Progress | None = None
 
-    def start(self, layout: Layout, request: SearchRequest) -> None:
-        """Search from a layout.
+    def start(self, state: State, request: SearchRequest) -> None:
+        """Search from a layout for places of what works; mirror pairs stay mirror pairs.
 
         Raises:
-            FinlabError: a search is running, or no fin may move.
+            FinlabError: a search is running, nothing works, or nothing may move.
         """
         if self.busy:
             raise FinlabError("a search is running already; cancel it first")
-        room, goal = Room(layout, APART_M), GOAL_WORDS[request.goal]
-        search = Search(layout, goal, request.bounds(layout), room)
+        left = state.layout.without(state.failed)
+        room, goal = Room(left, APART_M), GOAL_WORDS[request.goal]
+        search = Search(state.layout, state.failed, state.flow, goal, request.bounds(left), room)
         self.forget()
         self.ask(search)
 
@@ -111,16 +121,21 @@ class Improver(Newest[Search, Improvement]):
 
     def _improve(self, search: Search) -> Improvement:
         """On the worker's thread."""
-        return optimize_layout(
-            search.layout,
+        found = optimize_layout(
+            search.layout.without(search.failed),
             tuple(search.bounds),
             search.bounds,
             search.goal,
             rule=search.room.broken,
             grid=GRID,
+            flow=search.flow,
             progress=lambda progress: self._loop.post(partial(self._note, search, progress)),
             cancelled=search.stop.is_set,
         )
+        layout = search.layout
+        for part in found.layout.actuators:
+            layout = replaced(layout, part)
+        return replace(found, layout=layout)
 
     def _note(self, search: Search, progress: Progress) -> None:
         if search is self.question:  # else it was forgotten

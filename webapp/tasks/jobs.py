@@ -43,8 +43,8 @@ class Jobs:
             self._robot = robot
             for task in (self.answering, self.analyst, self.ranging):
                 task.forget()
-        self.analyst.ask(Question(state.able, state.failed, session.saved, session.display.drawn))
-        self.ranging.ask(State(state.able, state.failed, target=state.target))
+        self.analyst.ask(Question(state.able, state.failed, session.saved, session.display.drawn, state.flow))
+        self.ranging.ask(State(state.able, state.failed, target=state.target, speed=state.speed))
         self.answering.ask()
 
     def stop(self) -> None:

@@ -130,7 +130,12 @@ class Solver:
             FinlabError: the method cannot be loaded or cannot answer.
         """
         return self.allocator(state).allocate(
-            state.target, failed=state.failed, policy=state.policy, health=state.health, seed=0
+            state.target,
+            failed=state.failed,
+            policy=state.policy,
+            health=state.health,
+            flow=state.flow,
+            seed=0,
         )
 
 
@@ -154,7 +159,7 @@ def _judged(answer: Allocation, found: Candidates) -> Candidates:
 
 def _verdict(answer: Allocation, command: Array) -> tuple[Array, Array]:
     """Wrenches (K, 6) of commands (K, n, 3) by the plant, and their errors (K,)."""
-    wrench = plant_of(answer.layout).wrench(command)
+    wrench = plant_of(answer.layout).wrench(command, flow=answer.flow)
     return wrench, np.linalg.norm((wrench - answer.target) / answer.scale, axis=-1)
 
 
