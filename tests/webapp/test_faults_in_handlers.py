@@ -130,6 +130,7 @@ def test_every_widget_survives_a_fault_in_what_is_written(
         for handle in handles(server):
             if not isinstance(handle, viser.GuiUploadButtonHandle):
                 use(server, view, handle, others(handle)[0])
+                on_loop(server, lambda: view.do(lambda: view.session.show_task(task)))  # New shows another
         assert any(WORDS in note for note in faults(view))
     view.client.notes.clear()
     on_loop(server, lambda: view.do(view.session.start_over))
