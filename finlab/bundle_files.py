@@ -2,7 +2,7 @@
 
 Nothing is unpacked, no link is followed, nothing is read beyond its largest size, and no content is believed
 before its checksum fits. What the files mean is known to the rooms that read them: robot and force
-tables to `finlab.layout` and `finlab.physics`, weights to `finlab.networks`, settings to `finlab.allocation`.
+tables to `finlab.layout` and `finlab.physics`, settings to `finlab.allocation`.
 """
 
 import hashlib
@@ -17,19 +17,15 @@ from finlab.files.archive import member_names, unpacked
 from finlab.files.guarded import is_regular, read_file
 from finlab.files.plain_values import parse_json
 
-VERSION = 7
+VERSION = 8
 """Version of the bundle; a reader knows exactly one."""
 ROBOT, ABOUT = "robot.json", "bundle.json"
 TABLES = "tables/"
 """Folder of the fins' force tables, each named by the SHA-256 of its content."""
-CHECKPOINT = "checkpoint/"
-"""Folder of the weights, itself a checkpoint; there for methods with networks."""
 README, CHECKSUMS = "README.md", "SHA256SUMS"
 LARGEST = {
     ROBOT: 1_000_000,
     ABOUT: 100_000,
-    f"{CHECKPOINT}config.json": 1_000_000,
-    f"{CHECKPOINT}model.safetensors": 50_000_000,
     README: 100_000,
     CHECKSUMS: 10_000,
 }
@@ -109,11 +105,6 @@ def checksums(files: Files) -> bytes:
     """The lines of `SHA256SUMS`, which `sha256sum -c` reads as well."""
     lines = (f"{hashlib.sha256(files[name]).hexdigest()}  {name}\n" for name in sorted(files))
     return "".join(lines).encode()
-
-
-def checkpoint_part(files: Files) -> dict[str, bytes]:
-    """The files of the checkpoint inside a bundle, by their names in it; empty where there is none."""
-    return {name.removeprefix(CHECKPOINT): c for name, c in files.items() if name.startswith(CHECKPOINT)}
 
 
 def _in_folder(path: Path) -> dict[str, bytes]:

@@ -22,7 +22,7 @@ class About(NamedTuple):
     method: str
     """One of `METHODS_ON_BOARD`."""
     checkpoint: str | None
-    """Name of the checkpoint that the networks come from; None for methods without."""
+    """Name of the shipped checkpoint that the networks come from; None for methods without."""
     settings: dict[str, Any]
     """Settings of the method, by name, as the file holds them: the method checks them."""
 

@@ -10,9 +10,10 @@ from typing import Any
 from finlab.allocation.bundle_settings import read_about
 from finlab.allocation.method import Method
 from finlab.allocation.settings import Settings
-from finlab.bundle_files import ABOUT, CHECKPOINT, Files, checkpoint_part
+from finlab.assets import checkpoint_path
+from finlab.bundle_files import ABOUT, Files
 from finlab.errors import AllocationError, DataError
-from finlab.networks.checkpoint import parse_checkpoint, read_checkpoint, resolve_checkpoint
+from finlab.networks.checkpoint import read_checkpoint, resolve_checkpoint
 from finlab.networks.trained import TrainedWeights
 
 METHODS: dict[str, tuple[str, str]] = {
@@ -84,8 +85,8 @@ def bundled_method(files: Files, source: str = "bundle", **changes: Any) -> Meth
 
     Raises:
         AllocationError: a change of an unknown setting, or to a wrong value.
-        DataError: the bundle is of another format, lacks what the method needs, or has settings that no robot
-            should try.
+        CheckpointError: this finlab has no such networks.
+        DataError: the bundle is of another format, or has settings that no robot should try.
     """
     about = read_about(files, source)
     kind = method_class(about.method)
@@ -97,10 +98,7 @@ def bundled_method(files: Files, source: str = "bundle", **changes: Any) -> Meth
         settings = checked_settings(kind, vars(settings) | changes)
     if about.method not in LEARNED:
         return MethodChoice(kind, settings)
-    part = checkpoint_part(files)
-    if not part or about.checkpoint is None:
-        raise DataError(f"{source}: holds no networks, which method {about.method!r} needs; export it again")
-    networks = parse_checkpoint(part, f"{source}/{CHECKPOINT.rstrip('/')}", about.checkpoint)
+    networks = read_checkpoint(checkpoint_path(about.checkpoint or LEARNED[about.method]))
     return MethodChoice(kind, settings, networks)
 
 

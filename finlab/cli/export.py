@@ -12,7 +12,6 @@ def export(
     zip: bool = False,
     failed: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME")] = (),
     method: Literal["dual", "mdn"] = "dual",
-    checkpoint: Annotated[str | None, arg(metavar="NAME|FOLDER")] = None,
 ) -> None:
     """Write the deployment bundle: the robot, its fins' physics, settings, README and checksums.
 
@@ -21,9 +20,8 @@ def export(
         output: folder to write.
         zip: write one archive, DIR.zip, instead of a folder.
         failed: name of a fin that does not work.
-        method: who answers on the robot: dual keeps watts least, mdn the paper's effort; the networks of
-            mdn travel with it.
-        checkpoint: of mdn, the shipped one by default.
+        method: who answers on the robot: dual keeps watts least, mdn the paper's effort, by the networks
+            that come with finlab.
     """
     from finlab.cli.inputs import open_robot
     from finlab.errors import FinlabError
@@ -34,7 +32,7 @@ def export(
     failed = robot.with_failed(failed)
     from finlab.allocation import Allocator
 
-    allocator = Allocator(robot.layout, method, checkpoint=checkpoint)
+    allocator = Allocator(robot.layout, method)
     from finlab.deploy.bundle import make_bundle
 
     bundle = make_bundle(allocator, failed)

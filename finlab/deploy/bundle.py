@@ -16,9 +16,9 @@ import numpy as np
 import finlab
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.bundle_settings import METHODS_ON_BOARD, about_bundle
+from finlab.assets import shipped_checkpoints
 from finlab.bundle_files import (
     ABOUT,
-    CHECKPOINT,
     CHECKSUMS,
     LARGEST_BUNDLE,
     LARGEST_TABLE,
@@ -35,7 +35,6 @@ from finlab.layout import Fin, FinModelSpec, Layout
 from finlab.layout.commands import command_of, command_values
 from finlab.layout.force_table_file import table_bytes
 from finlab.layout.robot_file import Robot, robot_bytes
-from finlab.networks.checkpoint import checkpoint_files
 from finlab.whole_file import write_whole
 
 
@@ -94,22 +93,25 @@ def make_bundle(allocator: Allocator, failed: tuple[str, ...] = ()) -> Bundle:
 
     Raises:
         LayoutError: an unknown failed fin, or none left.
-        AllocationError: the method cannot run from a bundle.
+        AllocationError: the method cannot run from a bundle, or its networks are not shipped.
         DataError: a force table cannot be read, or is too large to travel.
     """
     if allocator.method not in METHODS_ON_BOARD:
         raise AllocationError(
             f"method {allocator.method!r} cannot be exported; a bundle runs {' or '.join(METHODS_ON_BOARD)}"
         )
+    if allocator.checkpoint not in (None, *shipped_checkpoints()):
+        raise AllocationError(
+            f"checkpoint {allocator.checkpoint!r:.60} cannot be exported: a robot has those that come with "
+            "finlab; export method 'dual', or make the allocator on the robot with Allocator(layout, 'mdn')"
+        )
     layout, weights, cases = allocator.layout, allocator.weights, self_tests(allocator, failed)
     inside, tables = with_tables_inside(layout)
-    checkpoint = {} if weights is None else checkpoint_files(weights)
     sha256 = None if weights is None else weights.sha256
     files = {
         ROBOT: robot_bytes(Robot(inside, failed, sha256, cases)),
         ABOUT: about_bundle(allocator, finlab.__version__),
         **tables,
-        **{CHECKPOINT + name: content for name, content in checkpoint.items()},
         README: readme_text(allocator, failed).encode(),
     }
     if sum(map(len, files.values())) > LARGEST_BUNDLE:

@@ -12,7 +12,7 @@ from finlab.allocation.allocation import Allocation
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.methods import bundled_method
 from finlab.arrays import Array
-from finlab.bundle_files import ROBOT, Files, check_bundle_files, is_bundle, read_bundle_files
+from finlab.bundle_files import Files, check_bundle_files, is_bundle, read_bundle_files
 from finlab.errors import AllocationError, DataError
 from finlab.layout import Layout
 from finlab.layout.commands import neutral_row
@@ -85,5 +85,5 @@ def parse_robot(files: Files, source: str = "bundle") -> DeployedRobot:
     robot = robot_of(files, source)
     allocator = Allocator.of_choice(robot.layout, bundled_method(files, source))
     if (None if allocator.weights is None else allocator.weights.sha256) != robot.weights_sha256:
-        raise DataError(f"{source}: {ROBOT} and the weights are of different checkpoints; export again")
+        raise DataError(f"{source}: was made with other networks than this finlab's; export it with this one")
     return DeployedRobot(allocator, robot.failed, robot.self_test)

@@ -1,8 +1,7 @@
 """Reads checkpoints: a folder with `model.safetensors` and `config.json`. No torch, no pickle; strict.
 
 `config.json` holds everything needed to rebuild the networks and to trust them: format and version,
-sizes, normalization, fin model, training settings, metrics and the SHA-256 of the weights. The weights of a
-deployment bundle are the same files.
+sizes, normalization, fin model, training settings, metrics and the SHA-256 of the weights.
 """
 
 import hashlib
@@ -42,14 +41,10 @@ def read_checkpoint(folder: Path) -> TrainedWeights:
     Raises:
         CheckpointError: missing, corrupt, of an unknown version, or made by something else.
     """
-    return parse_checkpoint(_files(folder), str(folder), folder.name)
-
-
-def parse_checkpoint(files: Mapping[str, bytes], source: str, name: str) -> TrainedWeights:
-    """The contents of a checkpoint's files by name; errors as in `read_checkpoint`."""
     from safetensors import SafetensorError
     from safetensors.numpy import load
 
+    files, source = _files(folder), str(folder)
     config = _config(files, source, (CONFIG_FILE, WEIGHTS_FILE))
     sha256 = hashlib.sha256(files[WEIGHTS_FILE]).hexdigest()
     if sha256 != config.get("sha256"):
@@ -65,7 +60,7 @@ def parse_checkpoint(files: Mapping[str, bytes], source: str, name: str) -> Trai
         if known := {key.split(".")[0] for key in tensors} - {"surrogate", "network"}:
             raise ValueError(f"{min(known)!r:.80} is not expected")
         return TrainedWeights(
-            name=name,
+            name=folder.name,
             normalization=Normalization.parse(config["normalization"]),
             network_sizes=config["network"] and dict(config["network"]),
             network=_part("network", tensors),

@@ -28,17 +28,15 @@ from finlab.deploy.bundle import Bundle, make_bundle
 from finlab.deploy.robot import load_robot, parse_robot
 from finlab.errors import AllocationError, DataError, FinlabError
 from finlab.layout import Layout
-from finlab.networks.checkpoint import read_checkpoint
 from tests.any_robot import AnyRobot
 
-WEIGHTS = "checkpoint/model.safetensors"
 WRENCH = [1, 0, 0.5, 0, 0, 0.1]
 
 
 @pytest.fixture(scope="module")
-def with_networks(untrained_mdn: Path) -> Bundle:
-    """Layout A for method `mdn`, with a small network that has learned nothing."""
-    return make_bundle(Allocator(finlab.load_layout("A"), "mdn", checkpoint=untrained_mdn))
+def of_mdn() -> Bundle:
+    """Layout A for method `mdn`."""
+    return make_bundle(Allocator(finlab.load_layout("A"), "mdn"))
 
 
 def resealed(files: dict[str, bytes]) -> dict[str, bytes]:
@@ -66,15 +64,16 @@ def test_the_library_reads_it(bundle: Bundle, shipped_allocator: AnyRobot, tmp_p
         assert Allocator.from_bundle(place).allocate(WRENCH) == truth
 
 
-def test_networks_travel_for_the_method_that_needs_them(
-    with_networks: Bundle, untrained_mdn: Path, tmp_path: Path
-) -> None:
-    with_networks.write(tmp_path)
-    desk = Allocator(finlab.load_layout("A"), "mdn", checkpoint=untrained_mdn)
-    for name in ("config.json", "model.safetensors"):
-        assert with_networks.files[f"checkpoint/{name}"] == (untrained_mdn / name).read_bytes()
+def test_the_method_with_networks_answers_with_those_of_this_finlab(of_mdn: Bundle, tmp_path: Path) -> None:
+    of_mdn.write(tmp_path)
+    desk = Allocator(finlab.load_layout("A"), "mdn")
     assert Allocator.from_bundle(tmp_path).allocate(WRENCH) == desk.allocate(WRENCH)
-    assert read_checkpoint(tmp_path / "checkpoint").sha256 == desk.weights.sha256
+    assert load_robot(tmp_path).allocate(WRENCH) == desk.allocate(WRENCH)
+
+
+def test_networks_of_ones_own_are_not_exported(untrained_mdn: Path) -> None:
+    with pytest.raises(AllocationError, match="checkpoint 'untrained-mdn' cannot be exported"):
+        make_bundle(Allocator(finlab.load_layout("A"), "mdn", checkpoint=untrained_mdn))
 
 
 def test_the_command_line_takes_a_bundle_with_its_lost_fins(
@@ -103,13 +102,14 @@ def test_settings_travel_and_can_be_changed(tmp_path: Path) -> None:
         ({"settings": {"n_tries": 3}}, "settings: method 'dual' knows the settings .*, got 'n_tries'"),
         ({"period_s": -1.0}, "period_s: expected a number"),
         ({"robust": float("nan")}, "holds NaN, expected a finite number"),
-        ({"version": 4.0}, "is a bundle of version 4.0, this finlab reads version 7; export it again"),
-        ({"version": "4"}, "is a bundle of version '4', this finlab reads version 7; export it again"),
-        ({"version": 3}, "is a bundle of version 3, this finlab reads version 7; export it again"),
+        ({"version": 4.0}, "is a bundle of version 4.0, this finlab reads version 8; export it again"),
+        ({"version": "4"}, "is a bundle of version '4', this finlab reads version 8; export it again"),
+        ({"version": 3}, "is a bundle of version 3, this finlab reads version 8; export it again"),
         ({"version": True}, "is a bundle of version True"),
         ({"format": "other"}, "expected format finlab-bundle"),
         ({"method": "sqp"}, "method must be one of dual, mdn, got 'sqp'"),
-        ({"method": "mdn", "settings": {}}, "holds no networks, which method 'mdn' needs"),
+        ({"method": "mdn", "settings": {}}, "was made with other networks than this finlab's"),
+        ({"method": "mdn", "settings": {}, "checkpoint": "mine"}, "'mine' is not among the shipped ones"),
     ],
 )
 def test_settings_no_robot_should_try_are_refused(
@@ -128,23 +128,22 @@ def test_checksums_are_those_of_sha256sum(bundle: Bundle) -> None:
         assert hashlib.sha256(bundle.files[name]).hexdigest() == digest
 
 
-def test_a_changed_file_is_named(measured_bundle: Bundle, with_networks: Bundle) -> None:
-    for files in (measured_bundle.files, with_networks.files):
-        for name in files:
-            content = bytearray(files[name])
-            content[len(content) // 2] ^= 1
-            named = name if name != CHECKSUMS else ""
-            with pytest.raises(FinlabError, match=f"{named}.* does not fit SHA256SUMS"):
-                parse_robot({**files, name: bytes(content)})
+def test_a_changed_file_is_named(measured_bundle: Bundle) -> None:
+    files = measured_bundle.files
+    for name in files:
+        content = bytearray(files[name])
+        content[len(content) // 2] ^= 1
+        named = name if name != CHECKSUMS else ""
+        with pytest.raises(FinlabError, match=f"{named}.* does not fit SHA256SUMS"):
+            parse_robot({**files, name: bytes(content)})
 
 
-def test_parts_of_two_exports_are_refused(bundle: Bundle, with_networks: Bundle) -> None:
-    mixed = {**with_networks.files, ROBOT: bundle.files[ROBOT]}
-    with pytest.raises(DataError, match="are of different checkpoints"):
-        parse_robot(resealed(mixed))
-    mixed = {**bundle.files, ABOUT: with_networks.files[ABOUT]}
-    with pytest.raises(DataError, match="holds no networks, which method 'mdn' needs"):
-        parse_robot(resealed(mixed))
+def test_other_networks_than_those_of_the_desk_are_refused(of_mdn: Bundle) -> None:
+    document = json.loads(of_mdn.files[ROBOT])
+    document["weights_sha256"] = "0" * 64
+    other = {**of_mdn.files, ROBOT: json.dumps(document).encode()}
+    with pytest.raises(DataError, match="was made with other networks than this finlab's"):
+        parse_robot(resealed(other))
 
 
 def test_force_tables_travel_and_answer_from_folder_and_archive(
@@ -200,10 +199,10 @@ def archive_of(path: Path, **files: bytes) -> Path:
         (lambda p: p / "nowhere", "no such file"),
         (lambda p: p, "robot.json is missing; a bundle is made by `finlab export"),
         (lambda p: archive_of(p / "a.zip", **{"../evil": b"x"}), "'../evil', which is no part of a bundle"),
-        (lambda p: archive_of(p / "a.zip", **{WEIGHTS: bytes(50_000_001)}), "larger than 50,000,000 bytes"),
+        (lambda p: archive_of(p / "a.zip", **{ROBOT: bytes(1_000_001)}), "larger than 1,000,000 bytes"),
         (
             lambda p: archive_of(p / "a.zip", **{table_name(b"%d" % k): b"" for k in range(100)}),
-            "holds more than 70 files",
+            "holds more than 68 files",
         ),
         (
             lambda p: archive_of(p / "a.zip", **{TABLES + "../" + "0" * 64 + ".csv": b""}),
@@ -217,13 +216,11 @@ def test_what_is_no_bundle_is_refused(make: Callable[[Path], Path], message: str
         load_robot(make(tmp_path))
 
 
-def test_links_in_a_folder_are_refused(
-    measured_bundle: Bundle, with_networks: Bundle, tmp_path: Path
-) -> None:
-    with_networks.write(tmp_path / "x")
-    (tmp_path / "x" / WEIGHTS).unlink()
-    os.symlink("/dev/zero", tmp_path / "x" / WEIGHTS)
-    with pytest.raises(DataError, match="model.safetensors: cannot be read: it is a link"):
+def test_links_in_a_folder_are_refused(measured_bundle: Bundle, bundle: Bundle, tmp_path: Path) -> None:
+    bundle.write(tmp_path / "x")
+    (tmp_path / "x" / ROBOT).unlink()
+    os.symlink("/dev/zero", tmp_path / "x" / ROBOT)
+    with pytest.raises(DataError, match="robot.json: cannot be read: it is a link"):
         load_robot(tmp_path / "x")
     measured_bundle.write(tmp_path / "y")
     (tmp_path / "y" / TABLES).rename(tmp_path / "elsewhere")
@@ -246,13 +243,12 @@ def test_methods_that_do_not_travel_are_refused() -> None:
 
 
 def test_the_command_line_chooses_the_method(
-    tmp_path: Path, untrained_mdn: Path, with_networks: Bundle, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, of_mdn: Bundle, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["export", "mixed", "-o", str(tmp_path / "mixed")]) == 0
     assert Allocator.from_bundle(tmp_path / "mixed").method == "dual"
-    line = ["export", "A", "-o", str(tmp_path / "A"), "--method", "mdn", "--checkpoint"]
-    assert main([*line, str(untrained_mdn)]) == 0
-    assert read_bundle_files(tmp_path / "A") == dict(with_networks.files)
+    assert main(["export", "A", "-o", str(tmp_path / "A"), "--method", "mdn"]) == 0
+    assert read_bundle_files(tmp_path / "A") == dict(of_mdn.files)
     capsys.readouterr()
 
 

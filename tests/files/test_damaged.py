@@ -165,7 +165,7 @@ def kinds(tmp_path_factory: pytest.TempPathFactory, untrained_mdn: Path) -> list
     with (place / "path.csv").open("w", newline="") as file:
         rows = [[0.1 * k, 0.1 * k, np.sin(k), -1.0] for k in range(60)]
         csv.writer(file).writerows([["t", "x", "y", "z"], *rows])
-    bundle = make_bundle(Allocator(layout, "mdn", checkpoint=untrained_mdn))
+    bundle = make_bundle(Allocator(layout))
     box = trimesh.creation.icosphere(subdivisions=2, radius=0.2)
     names = [path.relative_to(untrained_mdn).as_posix() for path in untrained_mdn.iterdir()]
     checkpoint = packed({name: (untrained_mdn / name).read_bytes() for name in names})

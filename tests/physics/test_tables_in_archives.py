@@ -27,7 +27,7 @@ def spec(path: Path) -> FinModelSpec:
 
 def test_tables_are_read_out_of_an_archive(table: Path, tmp_path: Path) -> None:
     content = table.read_bytes()
-    needed = {"robot.json": b"", "bundle.json": b'{"version": 7}'}
+    needed = {"robot.json": b"", "bundle.json": b'{"version": 8}'}
     files = {**needed, table_name(content): content}
     with zipfile.ZipFile(tmp_path / "x.zip", "w") as archive:
         for name, part in {**files, CHECKSUMS: checksums(files)}.items():
