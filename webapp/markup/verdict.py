@@ -81,12 +81,17 @@ def verdict_sentence(allocation: Allocation, in_reach: bool) -> str:
 
 
 def rest_sentence(allocation: Allocation) -> str:
-    """One sentence on what is left undone, axis by axis; nothing is where the answer is exact."""
+    """One sentence on what is left undone, and on what comes along unasked, axis by axis; nothing is where the
+    answer is exact."""
     if allocation.reachable:
         return "Nothing is left undone."
     rest, size = allocation.unallocated, np.abs(allocation.unallocated / allocation.scale)
-    parts = [_amount(rest[k], k) for k in np.argsort(-size) if size[k] >= SPOKEN * size.max()]
-    return f"{listed(parts)} {'is' if len(parts) == 1 else 'are'} left undone."
+    told = [k for k in np.argsort(-size) if size[k] >= SPOKEN * size.max()]
+    less = [_amount(rest[k], k) for k in told if rest[k] * allocation.target[k] > 0.0]
+    more = [_amount(rest[k], k) for k in told if rest[k] * allocation.target[k] <= 0.0]
+    parts = [f"{listed(less)} {'is' if len(less) == 1 else 'are'} left undone"] if less else []
+    parts += [f"{listed(more)} {'comes' if len(more) == 1 else 'come'} along unasked"] if more else []
+    return f"{'; '.join(parts)}."
 
 
 def bound_sentence(allocation: Allocation) -> str:

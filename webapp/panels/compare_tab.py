@@ -10,7 +10,7 @@ from webapp.markup.html import html, marker
 from webapp.markup.verdict import verdict_of
 from webapp.markup.words import error_digits, three_digits, unlearned_sentence
 from webapp.page import Page
-from webapp.session.state import COMPARED, least_of
+from webapp.session.state import least_of
 from webapp.tasks.comparison import Run
 from webapp.theme import NEARLY, css
 
@@ -25,6 +25,10 @@ def add_comparison(page: Page) -> None:
         hint="For the present wrench and failures.",
     )
     page.board.show(run, disabled=lambda run: run.running)
+    about = "The answers so far stay."
+    cancel = page.add_button("Cancel", page.jobs.comparison.cancel, icon=viser.Icon.X, hint=about)
+    page.board.show(cancel, visible=lambda run: run.running)
+    add_html(page.gui, marker("fl-column"))
     page.add_html(lambda run, state: comparison_table(run, run.state not in (None, state)))
 
 
@@ -38,7 +42,7 @@ def comparison_table(run: Run, stale: bool) -> str:
     rows = []
     answers = dict(run.answers)
     in_reach = any(isinstance(answer, Allocation) and answer.reachable for answer in answers.values())
-    for method in COMPARED:
+    for method in run.methods:
         answer = answers.get(method)
         if isinstance(answer, Allocation) and answer.unknown_fins:
             words = unlearned_sentence(answer.layout, answer.unknown_fins)
@@ -49,7 +53,7 @@ def comparison_table(run: Run, stale: bool) -> str:
             error = html("<td style='color:{}'>{}</td>", color, error_digits(answer.err_norm))
             cells = error + Markup().join(html("<td>{}</td>", three_digits(value)) for value in figures)
         else:
-            cells = html("<td colspan='4' class='words dim'>{}</td>", "…" if answer is None else answer)
+            cells = html("<td colspan='4' class='words dim'>{}</td>", answer or ("…" if run.running else "–"))
         rows.append(html("<tr><td>{}</td><td>{}</td>{}</tr>", method, least_of(method), cells))
     header = Markup(
         "<tr><th>method</th><th>least</th><th>error</th><th>power [W]</th><th>effort</th><th>time [ms]</th>"

@@ -93,11 +93,12 @@ def add_improving(page: Page) -> None:
     cancel = page.add_button("Cancel", improver.cancel, icon=viser.Icon.X, visible=False, hint=offered)
     for handle in (bar, cancel):
         board.show(handle, visible=lambda improving: improving)
-    page.add_html(_searched)
     add_html(gui, marker("fl-verdict"))
     verdicts = {"Accept": accept, "Leave": improver.forget}
     verdict = page.add_buttons("Result", verdicts, visible=False, hint="Accepting can be undone.")
     board.show(verdict, visible=lambda better: better is not None and better.improved)
+    add_html(gui, marker("fl-column"))
+    page.add_html(_searched)
 
 
 def _searched(

@@ -13,8 +13,7 @@ from webapp.markup.swim_card import swim_card
 from webapp.markup.words import trim_sentence
 from webapp.page import Page
 from webapp.panels.damage import Row, add_fin_buttons
-from webapp.session.state import COMPARED
-from webapp.session.swim_plan import SCENARIOS, SPEEDS
+from webapp.session.swim_plan import SCENARIOS, SPEEDS, SwimSettings
 from webapp.session.targets import axis_reach
 from webapp.tasks.moment import Moment
 from webapp.tasks.swimmer import Swimmer
@@ -30,12 +29,15 @@ def add_scenario(page: Page) -> None:
     gui = page.gui
     day = "A day that is not as the designer assumed; it sets path, water, body, sensors and fins."
     _bind(page, "scenario", gui.add_dropdown("Scenario", tuple(SCENARIOS), hint=day))
-    page.add_html(lambda swim: html("<div class='fl'>{}</div>", swim.day.about))
+    page.add_html(_about)
     _bind(page, "path", gui.add_dropdown("Path", tuple(SHIPPED), hint="Where to swim."))
-    who = "Who allocates, ten times a second."
-    _bind(page, "method", gui.add_dropdown("Swim with", COMPARED, hint=who))
     forces = "The fin law, its ripple, or a robot that is not built as drawn."
     _bind(page, "plant", gui.add_dropdown("Fin forces", tuple(PLANTS), hint=forces))
+
+
+def _about(swim: SwimSettings, method: str) -> str:
+    """The day, and who allocates ten times a second."""
+    return html("<div class='fl'>{} Method {}, as in the bar, allocates.</div>", swim.day.about, method)
 
 
 def add_run(page: Page) -> None:

@@ -34,8 +34,8 @@ FAULTS: dict[str, tuple[str, ...]] = {
     "rudder": ("thrust",),
 }
 """Fields of `Health` that the types of actuators may have. All may fail."""
-COMPARED = ("dual", "mdn", "paper", "analytic", "qp", "sqp")
-"""Methods that answer quickly enough to be compared while one waits."""
+COMPARED = ("dual", "analytic", "qp", "mdn", "sqp", "paper")
+"""Methods for fins that answer quickly enough to be compared while one waits, the quick ones first."""
 LEAST = {"watts": "dual", "effort": "mdn"}
 """What answers may keep least, and the method that does it best."""
 CHOICES: dict[str, tuple[str, ...]] = {"method": tuple(METHODS), "policy": KINDS}
@@ -199,6 +199,11 @@ def _checked_fault(name: str, kind: str, value: Any) -> Any:
 def can_be_edited(layout: Layout) -> bool:
     """Whether all actuators are fins with horizontal shafts, which the page can place and turn so far."""
     return all(isinstance(part, Fin) and part.mounting_angle is not None for part in layout.actuators)
+
+
+def compared(layout: Layout) -> tuple[str, ...]:
+    """Methods that are compared on a robot, the quick ones first."""
+    return COMPARED if layout.is_of_fins else ("dual", "analytic", "px4", "ardusub", "ipopt")
 
 
 def least_of(method: str) -> str:

@@ -22,7 +22,7 @@ from finlab.sim import (
     Water,
     make_trajectory,
 )
-from webapp.session.state import COMPARED, State, chosen, number
+from webapp.session.state import State, chosen, number
 
 LOST_IN_CURRENT = HardDay(
     "lost-in-current",
@@ -38,7 +38,7 @@ SCENARIOS: dict[str, HardDay] = {
 }
 SPEEDS = (0.1, 8.0)
 """Simulated time per time on the wall that may be asked for."""
-CHOICES: dict[str, tuple[str, ...]] = {"path": tuple(SHIPPED), "method": COMPARED, "plant": tuple(PLANTS)}
+CHOICES: dict[str, tuple[str, ...]] = {"path": tuple(SHIPPED), "plant": tuple(PLANTS)}
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,6 @@ class SwimSettings:
 
     scenario: str = "nominal"
     path: str = "lissajous"
-    method: str = COMPARED[0]
     plant: str = next(iter(PLANTS))
     speed: float = 1.0
     """Simulated time per time on the wall."""
@@ -92,7 +91,7 @@ class SwimSettings:
             layout,
             state.failed,
             path,
-            self.method,
+            state.method,
             self.plant,
             self.scenario,
             day.water,

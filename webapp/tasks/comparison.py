@@ -1,10 +1,10 @@
-"""Several methods on the same question, one after the other, while the page stays alive."""
+"""Several methods on the same question, one after the other, the quick ones first, while the page stays alive."""
 
 from dataclasses import replace
 from typing import NamedTuple
 
 from finlab.allocation.allocation import Allocation
-from webapp.session.state import COMPARED, State
+from webapp.session.state import State, compared
 from webapp.tasks.background import Newest
 from webapp.tasks.context import Context
 
@@ -21,11 +21,17 @@ class Run(NamedTuple):
     state: State | None = None
     """The question, None before the first run."""
     answers: tuple[tuple[str, Answer], ...] = ()
+    cancelled: bool = False
+
+    @property
+    def methods(self) -> tuple[str, ...]:
+        """Those that are asked, in their order."""
+        return () if self.state is None else compared(self.state.layout)
 
     @property
     def running(self) -> bool:
         """True until all methods have answered."""
-        return self.state is not None and len(self.answers) < len(COMPARED)
+        return len(self.answers) < len(self.methods) and not self.cancelled
 
 
 class Comparison:
@@ -44,6 +50,11 @@ class Comparison:
         self.run = Run(state)
         self._next()
 
+    def cancel(self) -> None:
+        """Ask no more; the answers so far stay."""
+        self._asked.forget()
+        self.run = self.run._replace(cancelled=True)
+
     def forget(self) -> None:
         """Give up and forget."""
         self._asked.forget()
@@ -51,7 +62,7 @@ class Comparison:
 
     def _next(self) -> None:
         if self.run.state is not None and self.run.running:
-            method = COMPARED[len(self.run.answers)]
+            method = self.run.methods[len(self.run.answers)]
             self._asked.ask(replace(self.run.state, method=method))
 
     def _quickest(self, state: State) -> Allocation:
