@@ -66,6 +66,8 @@
     if ((event.ctrlKey || event.metaKey || event.altKey) && MOVES.test(event.code)) event.stopPropagation();
   });
 
+  window.addEventListener('beforeunload', (event) => { if (window.finlabDrops) event.preventDefault(); });
+
   // The hint of a button, after its label where that is cut.
   window.addEventListener('pointerover', (event) => {
     const button = event.target.closest?.('.mantine-Button-root');

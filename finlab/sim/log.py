@@ -21,6 +21,12 @@ MAX_BYTES = 200_000_000
 """Largest log that is read, unpacked [bytes]; an hour has a quarter of it."""
 
 
+def lies_over(quaternion: AnyArray) -> AnyArray:
+    """Whether a body of attitudes (..., 4) as w, x, y, z lies on its side or stands on its end (...)."""
+    tilt: AnyArray = (quaternion[..., 1:3] ** 2).sum(axis=-1)
+    return tilt > 0.5
+
+
 class Tick(NamedTuple):
     """What happened in one control period; N ticks of n fins make the columns of a `RunLog`."""
 
@@ -130,8 +136,7 @@ class RunLog:
     @property
     def capsized_s(self) -> float | None:
         """When the robot first lay on its side or stood on its end [s]; None where it never did."""
-        _, qx, qy, _ = self.quaternion.T
-        over = np.flatnonzero(qx * qx + qy * qy > 0.5)
+        over = np.flatnonzero(lies_over(self.quaternion))
         return float(self.time[over[0]]) if len(over) else None
 
     def npz(self) -> bytes:

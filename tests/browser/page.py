@@ -48,6 +48,7 @@ class Page:
         page.set_default_timeout(WAIT_MS * patience)
         page.on("console", lambda m: self.problems.append(m.text) if m.type == "error" else None)
         before = set(served.app.views)
+        page.on("dialog", lambda dialog: dialog.accept())
         page.goto(served.url)
         self.ready()
         self.until(lambda: bool(set(served.app.views) - before))

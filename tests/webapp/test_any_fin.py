@@ -87,7 +87,7 @@ def test_a_table_fin_goes_through_the_whole_app(
     assert session.state == state
     allocator = SOLVER.shipped(tabled, "dual")
     assert any(name.startswith("tables/") for name in make_bundle(allocator).files)
-    assert command_line(session.state).startswith("finlab allocate tabled.yaml --wrench")
+    assert command_line(session.state).startswith("finlab allocate tabled_bundle.zip --wrench")
 
 
 def test_a_table_that_did_not_come_along_is_told_when_the_layout_is_opened(tabled: Layout) -> None:

@@ -135,7 +135,7 @@ def test_names_are_escaped(server: viser.ViserServer, view: View) -> None:
 def test_a_bundle_that_cannot_be_made_is_told(server: viser.ViserServer, view: View) -> None:
     until(lambda: not view.busy)
     on_loop(server, lambda: view.do(view.jobs.exports.bundle))
-    until(lambda: "ucat.zip" in view.client.files)
+    until(lambda: "ucat_bundle.zip" in view.client.files)
     on_loop(server, lambda: view.do(lambda: view.session.set_setting("method", "sqp")))
     on_loop(server, lambda: view.do(view.jobs.exports.bundle))
     until(lambda: any("Not exported" in note for note in view.client.notes))

@@ -1,7 +1,10 @@
 """Methods side by side, what they keep least, and what a network proposes."""
 
 import threading
+from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,14 +13,14 @@ from finlab.allocation import Allocator
 from finlab.allocation.allocation import Allocation
 from finlab.assets import shipped_checkpoints, shipped_layouts
 from finlab.layout import load_layout
-from tests.webapp.loops import page_of
+from tests.webapp.loops import AtOnce, page_of
 from tests.webapp.stand_in import StandIn, load_stand_in
 from webapp.markup.mode_plot import mode_plot
 from webapp.markup.words import source_words, three_digits
 from webapp.panels.compare_tab import comparison_table
 from webapp.panels.files_tab import command_line
 from webapp.panels.status import corner
-from webapp.session.state import COMPARED, LEAST, State
+from webapp.session.state import COMPARED, LEAST, State, compared
 from webapp.session.targets import PRESETS
 from webapp.tasks.background import Worker
 from webapp.tasks.comparison import Comparison, Run
@@ -38,6 +41,22 @@ def test_all_methods_answer_one_after_the_other() -> None:
     assert all(isinstance(answer, Allocation) for answer in answers.values())
     table = comparison_table(comparison.run, True)
     assert table.count("<tr") == 1 + len(COMPARED) and "compare again" in table
+
+
+@pytest.mark.parametrize("robot", ["ucat", "bluerov2", "torpedo"])
+def test_a_comparison_that_is_cancelled_keeps_its_answers(robot: str) -> None:
+    state, loop = State(load_layout(robot)), AtOnce()
+    worker: Any = SimpleNamespace(submit=lambda _, job, __: jobs.append(job), forget=lambda _: None)
+    jobs: list[Callable[[], None]] = []
+    comparison = Comparison(page_of(worker, loop=loop, solver=Solver()))
+    comparison.start(state)
+    jobs.pop()()
+    comparison.cancel()
+    assert not comparison.run.running
+    jobs.pop()()  # it was under way
+    assert [method for method, _ in comparison.run.answers] == ["dual"] and jobs == []
+    table = comparison_table(comparison.run, False)
+    assert "…" not in table and table.count("<tr") == 1 + len(compared(state.layout))
 
 
 def test_a_method_that_fails_keeps_nobody_else_waiting() -> None:

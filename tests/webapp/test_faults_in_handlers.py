@@ -128,6 +128,7 @@ def test_every_widget_survives_a_fault_in_what_is_written(
     with monkeypatch.context() as patch:
         patch.setattr(place, broken)
         for handle in handles(server):
+            on_loop(server, lambda: view.session.show_task(task))  # New goes to another one
             if not isinstance(handle, viser.GuiUploadButtonHandle):
                 use(server, view, handle, others(handle)[0])
                 on_loop(server, lambda: view.do(lambda: view.session.show_task(task)))  # New shows another

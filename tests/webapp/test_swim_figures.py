@@ -2,6 +2,7 @@
 
 import io
 from collections.abc import Iterator
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,6 +14,7 @@ from finlab.sim import make_trajectory
 from tests.webapp.loops import page_of
 from tests.webapp.test_swimming import now, until
 from webapp.markup.swim_card import swim_card
+from webapp.markup.words import righting_sentences
 from webapp.session.swim_plan import Plan
 from webapp.tasks.background import Worker
 from webapp.tasks.designs import Exports
@@ -91,3 +93,19 @@ def test_power_is_a_column_of_the_record(shelf: Shelf) -> None:
     shelf.swim(1.0, "analytic")
     swimmer = shelf.begun()
     assert swimmer.moment().record[:, POWER] == pytest.approx(swimmer.log().driving_power.sum(axis=1))
+
+
+def test_a_swim_that_capsizes_says_so(shelf: Shelf) -> None:
+    assert UCAT.body is not None and righting_sentences(UCAT) == ()
+    heavy = replace(UCAT, body=replace(UCAT.body, center_of_buoyancy_m=(0.0, 0.0, -0.05)))
+    assert righting_sentences(heavy) == ("No righting moment: overturns in pitch at rest.",)
+    shelf.swimming.start(Plan(heavy, (), make_trajectory("circle"), "dual"))
+    until(lambda: shelf.swimming.swimmer is not None)
+    shelf.swimming.set_running(False)
+    swimmer = shelf.begun()
+    while swimmer.moment().capsized is None:
+        assert "capsized" not in swim_card(*now(shelf.swimming))
+        swimmer.step()
+        swimmer.shown = swimmer.moment()
+    assert swimmer.log().capsized_s == swimmer.shown.capsized
+    assert f"capsized at {swimmer.shown.capsized:.1f} s" in swim_card(*now(shelf.swimming))

@@ -35,6 +35,7 @@ from webapp.session.lessons import TOUR
 from webapp.session.state import AXIS_WORDS, State
 from webapp.session.targets import PRESETS, axis_reach, full_thrust
 from webapp.tasks.analyst import Question, find
+from webapp.tasks.comparison import Run
 from webapp.tasks.solver import Solver
 from webapp.theme import DELIVERED, UNLEARNED, css
 
@@ -57,7 +58,12 @@ def test_reachable_and_not() -> None:
     assert verdict_sentence(hard, False) == "Out of reach"
     state = State(layout, target=(0.0, 0.0, 60.0, 0.0, 0.0, 0.0), method="sqp")
     assert not Solver().reply(state).in_reach
-    assert "N of heave" in rest_sentence(hard) and rest_sentence(hard).endswith("left undone.")
+    assert "N of heave is left undone" in rest_sentence(hard)
+    told = {"reachable": False, "scale": np.ones(6), "target": np.array([0.0, 0.0, 5.0, 0, 0, 0])}
+    beside: Any = SimpleNamespace(unallocated=np.array([0.0, -2.0, 1.0, 0, 0, 0]), **told)
+    assert rest_sentence(beside) == "1.00 N of heave is left undone; 2.00 N of sway comes along unasked."
+    beside.unallocated = np.array([0.0, -2.0, -1.0, 0, 0, 0])  # more heave than asked
+    assert rest_sentence(beside) == "2.00 N of sway and 1.00 N of heave come along unasked."
 
 
 @pytest.mark.parametrize("share", [0.0, 0.5, 0.93, 0.985, 0.999, 1.0, 1.02, 1.5])
@@ -119,8 +125,8 @@ def test_fins_that_were_not_learned_are_told_in_words_of_their_own() -> None:
         assert verdict_sentence(answer, True) == "Not learned: fin 3. Choose another method"
         shown = corner(State(strange), "", answer, False, None)
         assert css(UNLEARNED) in shown and css(DELIVERED) not in shown and "reach" not in shown
-        comparison: Any = SimpleNamespace(state=State(strange), answers={"mdn": answer})
-        assert "Not learned: fin 3" in comparison_table(comparison, False)
+        run = Run(State(strange), (("mdn", answer),))
+        assert "Not learned: fin 3" in comparison_table(run, False)
     without = allocator.allocate(PRESETS["Turn"], failed=[other.name])
     assert verdict_of(without, True) is Verdict.EXACT
 

@@ -19,6 +19,9 @@ FIGURES = (
 
 def pace_words(swimming: Swimming) -> str:
     """At what pace it goes, in words: what is asked for, or what the machine can do."""
+    capsized = None if swimming.swimmer is None else swimming.swimmer.shown.capsized
+    if capsized is not None:
+        return html("<span class='missing'>capsized at {:.1f} s</span>", capsized)
     if swimming.done:
         return "arrived"
     if not swimming.running:

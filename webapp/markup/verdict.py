@@ -81,8 +81,7 @@ def verdict_sentence(allocation: Allocation, in_reach: bool) -> str:
 
 
 def rest_sentence(allocation: Allocation) -> str:
-    """One sentence on what is left undone, and on what comes along unasked, axis by axis; nothing is where the
-    answer is exact."""
+    """One sentence on what is left undone, and on what comes along unasked, axis by axis."""
     if allocation.reachable:
         return "Nothing is left undone."
     rest, size = allocation.unallocated, np.abs(allocation.unallocated / allocation.scale)

@@ -12,6 +12,7 @@ from finlab.errors import LayoutError
 from finlab.layout import Azimuth, Fin, Layout
 from finlab.layout.damage import Health
 from finlab.vehicle.body import complete_body
+from finlab.vehicle.righting import righting_words
 from finlab.vehicle.vehicle import Vehicle
 from webapp.session.state import AXIS_WORDS
 
@@ -95,6 +96,12 @@ def authority_sentence(layout: Layout, failed: tuple[str, ...], reach: Array) ->
         f"Without {fins_words([layout.index(name) for name in failed], layout)} this" if failed else "This"
     )
     return f"{without} robot cannot {listed(blind)}."
+
+
+def righting_sentences(layout: Layout) -> tuple[str, ...]:
+    """What there is to say of a robot that nothing rights; nothing where a moment does."""
+    said = righting_words(layout)
+    return () if said is None else (f"{said[0].upper()}{said[1:]}.",)
 
 
 def trim_sentence(layout: Layout, reach: Array) -> str | None:

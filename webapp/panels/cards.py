@@ -11,6 +11,7 @@ from webapp.markup.answer import wrench_bars
 from webapp.markup.html import html
 from webapp.markup.score_card import check_card, warnings
 from webapp.markup.verdict import answer_sentence
+from webapp.markup.words import righting_sentences
 from webapp.page import Page
 from webapp.presses import press
 from webapp.scene.robot_scene import CAMERAS
@@ -53,7 +54,8 @@ def tasks(task: str) -> str:
 
 def check(able: Layout, failed: tuple[str, ...], layout: Layout, flow: Flow | None) -> str:
     """What can be said of a layout at once: its axes, what a failure costs, what looks like a mistake."""
-    return check_card(quick_check(able, failed, flow), layout.n - len(failed) > 1, warnings(layout))
+    told = (*warnings(layout), *righting_sentences(layout))
+    return check_card(quick_check(able, failed, flow), layout.n - len(failed) > 1, told)
 
 
 def add_answer(page: Page) -> None:

@@ -1,4 +1,4 @@
-"""Export: what the robot needs, and the question as a command to copy."""
+"""Export: the bundle and the design as files, what each is for, and commands that take them."""
 
 import math
 import shlex
@@ -9,33 +9,53 @@ from finlab.layout.damage import Health
 from webapp.handles import add_html
 from webapp.markup.html import html, marker
 from webapp.page import Page
-from webapp.session.files import file_stem, shipped_name
+from webapp.session.files import bundle_name, design_name, has_files
 from webapp.session.state import State
 
 
 def add_files(page: Page) -> None:
-    """A button for the robot's bundle, and the same question as a command."""
-    about = "The robot, its fins' physics, README and checksums: what finlab export makes."
+    """A button for each file, what it is for, and commands that take it."""
     add_html(page.gui, marker("fl-primary"))
     icon = viser.Icon.PACKAGE_EXPORT
-    page.add_button("Export the bundle (ZIP)", page.jobs.exports.bundle, icon=icon, hint=about)
-    page.add_html(_copied)
+    page.add_button("Export the bundle (ZIP)", page.jobs.exports.bundle, icon=icon)
+    page.add_html(_bundle)
+    page.add_button("Save the design", page.designs.save, icon=viser.Icon.DEVICE_FLOPPY)
+    page.add_html(_design)
 
 
-def _copied(state: State) -> str:
-    """A line that a click takes to the clipboard, where the browser lets it; else it selects it."""
+def _bundle(state: State) -> str:
+    file = bundle_name(state.layout)
+    about = "for the robot: its actuators' physics, method, README and checksums. Test it there first"
+    return _about(file, about, shlex.join(["finlab-runtime", "check", file]))
+
+
+def _design(state: State) -> str:
+    about = "the design: for this app, and for commands at the desk"
+    if has_files(state.layout):
+        about += ", unpacked. The same question, of the bundle"
+    else:
+        about += ". The same question there"
+    return _about(design_name(state.layout), about, command_line(state))
+
+
+def _about(file: str, about: str, command: str) -> str:
+    """What a file is for, and a line that a click takes to the clipboard, where the browser lets it."""
     copy = "navigator.clipboard?.writeText(this.innerText); this.previousSibling.dataset.done = 1"
     return html(
-        "<div class='fl'><div class='said copy'><span class='dim'>The same question on the command line"
-        '</span></div><pre class="command" title="click to copy" onclick="{}">{}</pre></div>',
+        "<div class='fl'><div class='said copy'><b>{}</b> <span class='dim'>is {}:</span></div>"
+        '<pre class="command" title="click to copy" onclick="{}">{}</pre></div>',
+        file,
+        about,
         copy,
-        command_line(state),
+        command,
     )
 
 
 def command_line(state: State) -> str:
-    """The same question for `finlab allocate`."""
-    words = ["finlab", "allocate", _layout_name(state), "--wrench"]
+    """The same question for `finlab allocate`, of a file that this page makes."""
+    layout = state.layout
+    file = bundle_name(layout) if has_files(layout) else design_name(layout)
+    words = ["finlab", "allocate", file, "--wrench"]
     words += [f"{value:g}" for value in state.target]
     for name in state.failed:
         words += ["--failed", name]
@@ -55,8 +75,3 @@ def command_line(state: State) -> str:
     if state.policy != "closest":
         words += ["--policy", state.policy]
     return shlex.join(words)
-
-
-def _layout_name(state: State) -> str:
-    """A shipped layout by its name, any other by the file that is saved of it."""
-    return shipped_name(state.layout) or f"{file_stem(state.layout.name)}.yaml"

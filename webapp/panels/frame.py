@@ -25,7 +25,7 @@ from webapp.session.looking import DRAWERS, Desk
 from webapp.session.state import can_be_edited
 from webapp.tasks.swimmer import Swimmer
 from webapp.theme import ASKED, DELIVERED, MISSING, css
-from webapp.viser_internals import run_file
+from webapp.viser_internals import run_file, run_script
 
 _VARIABLES = (
     f":root {{ --fl-asked: {css(ASKED)}; --fl-delivered: {css(DELIVERED)}; --fl-missing: {css(MISSING)}; }}"
@@ -99,6 +99,7 @@ class Frame:
         page.board.group(self._fail)
         self._shown = gui.add_html("")
         page.board.act(self._arrange)
+        page.board.act(self._guard)
         self._listen()
         self.sections: list[Section] = []
         add_corner(page)
@@ -147,6 +148,11 @@ class Frame:
             self._shown,
             content=html("<style>:root {{ {} }} {} {}</style>", variables, Markup(height), hidden),
         )
+
+    def _guard(self, swims: bool, fitting: str | None, improving: bool) -> None:
+        """A reload asks first while there is something that it would drop."""
+        drops = str(swims or fitting is not None or improving).lower()
+        run_script(self._page.gui, f"window.finlabDrops = {drops};")
 
     def _listen(self) -> None:
         """Hear of what is pressed in the frame."""

@@ -10,7 +10,7 @@ from finlab.sim import PLANTS, SHIPPED
 from webapp.handles import add_html
 from webapp.markup.html import html, marker
 from webapp.markup.swim_card import swim_card
-from webapp.markup.words import trim_sentence
+from webapp.markup.words import righting_sentences, trim_sentence
 from webapp.page import Page
 from webapp.panels.damage import Row, add_fin_buttons
 from webapp.session.swim_plan import SCENARIOS, SPEEDS, SwimSettings
@@ -88,5 +88,6 @@ def add_figures(page: Page) -> None:
 
 
 def _trim(able: Layout, failed: tuple[str, ...], layout: Layout) -> str:
-    said = trim_sentence(layout, axis_reach(able, failed))
-    return "" if said is None else html("<div class='fl missing'>{}</div>", said)
+    trim = trim_sentence(layout, axis_reach(able, failed))
+    said = [*([] if trim is None else [trim]), *righting_sentences(layout)]
+    return html("<div class='fl missing'>{}</div>", " ".join(said)) if said else ""

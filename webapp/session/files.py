@@ -65,6 +65,23 @@ def file_stem(name: str) -> str:
     return re.sub(r"[^A-Za-z0-9_-]+", "_", name).strip("_") or "layout"
 
 
+def has_files(layout: Layout) -> bool:
+    """Whether its file names others: tables of measured fins, or a hull's mesh."""
+    hull = None if layout.body is None else layout.body.hull
+    measured = any(fin.model.type == "table" for fin in layout.fins)
+    return measured or (hull is not None and hull.mesh is not None)
+
+
+def design_name(layout: Layout) -> str:
+    """Name of the file that a layout is saved as."""
+    return f"{file_stem(layout.name)}.{'zip' if has_files(layout) else 'yaml'}"
+
+
+def bundle_name(layout: Layout) -> str:
+    """Name of the file of its bundle."""
+    return f"{file_stem(layout.name)}_bundle.zip"
+
+
 def read_layout(name: str, content: bytes) -> Opened:
     """The layout in an uploaded layout file, bundle, or archive of a layout with its files.
 
@@ -101,7 +118,7 @@ def layout_file(layout: Layout) -> tuple[str, bytes]:
     inside, tables = with_tables_inside(layout)
     inside, hull = with_hull_inside(inside)
     text, parts = yaml_text(layout_to_dict(inside)).encode(), {**tables, **hull}
-    return (f"{stem}.zip", archive_of(f"{stem}.yaml", text, parts)) if parts else (f"{stem}.yaml", text)
+    return design_name(layout), archive_of(f"{stem}.yaml", text, parts) if parts else text
 
 
 def cache_folder() -> Path:

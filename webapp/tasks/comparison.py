@@ -1,4 +1,4 @@
-"""Several methods on the same question, one after the other, the quick ones first, while the page stays alive."""
+"""Several methods on the same question, one after the other, the quick ones first; the page stays alive."""
 
 from dataclasses import replace
 from typing import NamedTuple

@@ -43,7 +43,7 @@ class Exports:
         """
         state, shipped = self._session.state, self._context.solver.shipped
         self._send(
-            f"{file_stem(state.layout.name)}.zip",
+            files.bundle_name(state.layout),
             lambda: make_bundle(shipped(state.layout, state.method), state.failed).zip_bytes(),
         )
 

@@ -64,6 +64,8 @@ class Moment(NamedTuple):
     doubted: tuple[str, ...]
     """Those that the monitor takes for broken in some way, more likely than not."""
     controllable: bool
+    capsized: float | None
+    """When it first lay on its side or stood on its end [s]; None where it never did."""
     done: bool
     figures: Figures | None
     """What the swim has come to; None before the first step."""

@@ -8,7 +8,7 @@ from finlab.allocation.allocator import Allocator
 from finlab.arrays import Array
 from finlab.control import FaultMonitor
 from finlab.sim import ClosedLoop, RunLog, Tick, perturbed
-from finlab.sim.log import log_of_ticks
+from finlab.sim.log import lies_over, log_of_ticks
 from webapp.session.swim_plan import Plan
 from webapp.tasks.moment import FORCES, POINTS, Moment, doubted, figures_of, row_of, thinned
 
@@ -29,6 +29,7 @@ class Swimmer:
         self._rows: list[Array] = []
         self._ticks: list[Tick] = []
         self._found: dict[str, float] = {}
+        self._capsized: float | None = None
         start = swim.log
         self._about = {f.name: getattr(start, f.name) for f in fields(RunLog) if f.name != "columns"}
         self.shown = self.moment()
@@ -43,6 +44,8 @@ class Swimmer:
         tick = self.swim.step()
         self._rows.append(row_of(tick))
         self._ticks.append(tick)
+        if self._capsized is None and lies_over(tick.quaternion):
+            self._capsized = tick.time
         self._note_findings()
 
     def _note_findings(self) -> None:
@@ -79,6 +82,7 @@ class Swimmer:
             found=tuple(self._found.items()),
             doubted=() if last is None else doubted(last.fault_probability, self.fins),
             controllable=swim.controllable,
+            capsized=self._capsized,
             done=swim.done,
             figures=figures_of(rows, self.period_s),
             record=thinned(rows),
