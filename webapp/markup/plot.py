@@ -42,7 +42,7 @@ def cost_axis(word: str, values: Array) -> Axis:
     decade = 10.0 ** math.floor(math.log10((high - low) / MOST_TICKS))
     step = next(s * decade for s in (1.0, 2.0, 5.0, 10.0) if (high - low) / (s * decade) <= MOST_TICKS)
     places = range(math.ceil(low / step), math.floor(high / step) + 1)
-    return Axis(word, low, high, tuple((k * step, f"{k * step:.3g}") for k in places))
+    return Axis(word, low, high, tuple((k * step, f"{k * step + 0.0:.4g}".replace("-", "−")) for k in places))
 
 
 def error_axis(logs: Array) -> Axis:

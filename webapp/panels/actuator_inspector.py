@@ -233,7 +233,9 @@ def _add_number(page: Page, box: Box) -> None:
         page.bind(handle, read, of_part(shown))
     else:
         handle = page.gui.add_number(box.label, 0.0, step=box.step, hint=box.hint, visible=False)
-        page.bind_number(handle, put, of_part(lambda part: _value(part, box) or 0.0), digits=5)
+        page.bind_number(
+            handle, put, of_part(lambda part: _value(part, box) or 0.0), digits=2 if box.degrees else 5
+        )
     page.board.show(handle, visible=_is_there(box))
 
 

@@ -1,4 +1,4 @@
-"""The list of fins: select, copy, add and remove."""
+"""The list of actuators: select, copy, add and remove."""
 
 import math
 from collections.abc import Callable
@@ -7,13 +7,14 @@ from functools import partial
 from markupsafe import Markup
 
 from finlab.errors import FinlabError
-from finlab.layout import Fin
+from finlab.layout import Actuator, Fin
 from finlab.layout.layout import MAX_ACTUATORS
 from webapp.handles import add_html
 from webapp.markup.answer import swatch
 from webapp.markup.html import html, marker
 from webapp.page import Page
 from webapp.presses import press
+from webapp.session.directions import direction
 from webapp.session.layout_edits import NEW
 from webapp.session.links import partner
 from webapp.session.state import State
@@ -23,16 +24,20 @@ HULL = Markup(
     "<ellipse cx='9' cy='9' rx='7.5' ry='4.5'/></svg>"
 )
 RING_SIZES = (2, 3, 4, 5, 6, 8)
+AXES = {"z, up": "z", "x, ahead": "x", "y, left": "y"}
+POINTS = "Azimuth of a shaft, a fixed axis, or an azimuth at angle 0, and how far it rises"
+LEVEL = 0.5
+"""Degrees up to which a direction counts as level."""
 
 
 def add_actuator_list(page: Page) -> None:
-    """A table, and below it what can be done with the fins that are selected in it."""
+    """A table, and below it what can be done with what is selected in it."""
     session = page.session
 
     def select(key: str, held: str) -> None:
         names = session.state.layout.names
         if not key.isdecimal() or int(key) >= len(names):
-            raise FinlabError("that fin is gone")
+            raise FinlabError("that actuator is gone")
         (session.select_also if held else session.select)(names[int(key)])
 
     page.add_html(actuator_list)
@@ -48,14 +53,28 @@ def add_actuator_list(page: Page) -> None:
         "To hull": session.stick,
         "Delete": session.delete,
     }
-    page.add_buttons("Selected fin", edits, hint="What Mirror (M) makes moves along until it is unlinked.")
-    rings = {str(count): partial(session.ring, count) for count in RING_SIZES}
-    about = "Copies of the selected fin, so that so many stand evenly around the vertical axis."
-    page.add_buttons("Copies around", rings, hint=about)
+    hint = "What Mirror (M) makes moves along until it is unlinked."
+    buttons = page.add_buttons("Selected", edits, hint=hint)
+
+    def there(state: State, selected: str | None) -> tuple[str, ...]:
+        """All but the one of Mirror and Unlink that does nothing."""
+        paired = selected is not None and partner(state.links, selected) is not None
+        return tuple(word for word in edits if word != ("Mirror" if paired else "Unlink"))
+
+    page.board.show(buttons, options=there)
+    axis = page.gui.add_dropdown("Around", tuple(AXES), hint="The axis for copies of the selected one.")
+
+    def ring(count: int) -> None:
+        session.ring(count, AXES[axis.value])
+
+    about = "Copies of the selected one, so that so many stand evenly around the axis, turned along."
+    rings = page.add_buttons("Copies", {str(k): partial(ring, k) for k in RING_SIZES}, hint=about)
+    for handle in (buttons, axis, rings):
+        page.board.show(handle, visible=lambda selected: selected is not None)
 
 
 def actuator_list(state: State, selection: tuple[str, ...]) -> str:
-    """All fins with their places; `selection` has the names of those that are selected."""
+    """All actuators with their places and directions; `selection` has the names of the selected ones."""
     heads = Markup().join(html("<th class='place'>{}</th>", axis) for axis in ("x", "y", "z"))
     names = state.layout.names
     robot = html(
@@ -66,39 +85,44 @@ def actuator_list(state: State, selection: tuple[str, ...]) -> str:
         state.layout.name,
     )
     return html(
-        "<div class='fl fin-list'><table><tr><th></th>{}<th class='place' title='Azimuth of the shaft'>"
-        "shaft</th></tr>{}{}</table><div class='dim units'>Press to select, with Ctrl several. "
-        "<span class='place'>x, y, z in m, shaft in °.</span></div></div>",
+        "<div class='fl fin-list'><table><tr><th></th>{}<th class='place' title='{}'>points</th>"
+        "</tr>{}{}</table><div class='dim units'>Press to select, with Ctrl several. <span class='place'>"
+        "x, y, z in m, points in °.</span></div></div>",
         heads,
+        POINTS,
         robot,
         [_row(state, index, name in selection) for index, name in enumerate(names)],
     )
 
 
 def _row(state: State, index: int, chosen: bool) -> str:
-    fin = state.layout.actuators[index]
-    horizontal = isinstance(fin, Fin) and fin.mounting_angle is not None
-    shaft = f"{math.degrees(math.atan2(*fin.frame[0][1::-1])):.0f}" if horizontal else ""
-    places = (*(f"{value:.3f}" for value in fin.position), shaft)
-    twin = partner(state.links, fin.name)
+    part = state.layout.actuators[index]
+    places = [_minus(f"{value:.3f}") for value in part.position]
+    twin = partner(state.links, part.name)
     return html(
         "<tr class='{}' data-fin='{}' {}><td>{}<span class='name' title='{}'>{}</span>{}</td>{}</tr>",
         "chosen" if chosen else "",
-        fin.name,
+        part.name,
         press("fin", str(index)),
-        swatch(index, fin.name in state.failed),
-        fin.name,
-        fin.name,
-        html("<div class='dim'>{}</div>", fin.type)
-        if not isinstance(fin, Fin)
-        else ""
-        if twin is None
-        else html("<span class='dim' title='moves with {}'>⇄</span>", twin),
-        [_cell(shown) for shown in places],
+        swatch(index, part.name in state.failed),
+        part.name,
+        part.name,
+        ["" if twin is None else html("<span class='dim' title='moves with {}'>⇄</span>", twin)]
+        + ["" if isinstance(part, Fin) else html("<div class='dim'>{}</div>", part.type)],
+        [html("<td class='place'>{}</td>", shown) for shown in (*places, points_words(part))],
     )
 
 
-def _cell(shown: str) -> str:
-    # Zero has no sign: rounded numbers may have lost all but that.
-    plain = (shown if float(shown or 0) else shown.lstrip("-")).replace("-", "−")
-    return html("<td class='place'>{}</td>", plain)
+def points_words(part: Actuator) -> str:
+    """Where an actuator points, in degrees: `60`, `60 ↑30`, `up`."""
+    x, y, z = direction(part)
+    turn, rise = math.degrees(math.atan2(y, x)), math.degrees(math.atan2(z, math.hypot(x, y)))
+    if abs(rise) > 90.0 - LEVEL:
+        return "up" if rise > 0.0 else "down"
+    sign = f" {'↑' if rise > 0.0 else '↓'}{abs(rise):.0f}" if abs(rise) > LEVEL else ""
+    return _minus(f"{turn:.0f}") + sign
+
+
+def _minus(shown: str) -> str:
+    """A rounded number with a real minus sign; zero has none."""
+    return (shown if float(shown) else shown.lstrip("-")).replace("-", "−")

@@ -64,7 +64,7 @@ def add_model(page: Page, shown: Shown, add_law: Callable[[], object]) -> None:
 
     def options(selected: str | None, layout: Layout) -> tuple[str, ...]:
         part = shown(selected, layout)
-        formulas = FORMULAS if isinstance(part, Fin) else ("power_law",)
+        formulas = FORMULAS if isinstance(part, Fin) else () if isinstance(part, Rudder) else ("power_law",)
         return formulas if kind_of(part) in formulas else (*formulas, kind_of(part))
 
     def words(selected: str | None, layout: Layout, fitted: Fitted | None) -> str:

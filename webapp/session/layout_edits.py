@@ -30,13 +30,17 @@ STAND_OFF = 0.02
 """Distance of a fin that sticks to the hull from its surface: room for the servo [m]."""
 
 AT, AHEAD, UP = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
-TURNS: dict[str, Any] = {"turn_axis": UP, "zero": AHEAD, "turn_rate": 2.0}
+TURNS: dict[str, Any] = {"turn_axis": UP, "zero": AHEAD, "turn_rate": math.radians(120)}
 NEW: dict[str, Actuator] = {
     "fin": Fin("fin", AT, 0.0),
     "thruster": Thruster("thruster", AT, AHEAD, (-39.91, 51.44), PowerLaw(0.997, 1.449)),
     "azimuth": Azimuth("azimuth", AT, force=(0.0, 51.44), model=PowerLaw(0.997), **TURNS),
-    "tilt": Tilt("tilt", AT, force=(0.0, 51.44), model=PowerLaw(0.997), arc=(-1.0, 1.0), **TURNS),
-    "rudder": Rudder("rudder", AT, UP, AHEAD, area=0.00665, deflection=(-0.5, 0.5), aspect_ratio=2.21),
+    "tilt": Tilt(
+        "tilt", AT, force=(0.0, 51.44), model=PowerLaw(0.997), arc=(-math.pi / 3, math.pi / 3), **TURNS
+    ),
+    "rudder": Rudder(
+        "rudder", AT, UP, AHEAD, area=0.00665, deflection=(-math.pi / 6, math.pi / 6), aspect_ratio=2.21
+    ),
 }
 """What is added, by type: U-CAT's fin; a T200 of Blue Robotics at 16 V, as shipped layouts have it, fixed or
 on a pod; a tail fin of REMUS 100."""
