@@ -62,6 +62,10 @@ class Facts(NamedTuple):
     modes: Modes
     mode: int
     """Which of them is on the robot."""
+    step: int | None
+    """Steps of refinement that are shown; None where all are."""
+    playing: bool
+    loops: bool
     searching: bool
     ranges: Ranges | None
     ranges_error: str | None
@@ -127,6 +131,9 @@ def facts_of(session: Session, jobs: Jobs, dragged: int | None, scale: Scale, be
         error=answering.error,
         modes=modes,
         mode=min(session.mode, max(len(modes.shown) - 1, 0)),
+        step=session.step if not answering.searching and modes.steps else None,
+        playing=jobs.refining.running,
+        loops=session.loops,
         searching=answering.searching,
         ranges=ranging.findings,
         ranges_error=ranging.error,

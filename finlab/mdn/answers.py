@@ -34,6 +34,11 @@ class Steps(NamedTuple):
     commands: int = 2
     """Levenberg-Marquardt steps from there onto the target."""
 
+    @property
+    def steps(self) -> int:
+        """All of them."""
+        return self.descent + self.commands
+
 
 class Answers(NamedTuple):
     """P refined answers to each of N targets, best first: the exact ones by effort, then the others."""

@@ -41,7 +41,7 @@ STEPS = Steps()
 """Of every answer."""
 MORE = Steps(commands=8)
 """Of answers that were not exact yet."""
-WHOLE = Steps(descent=16, commands=4)
+WHOLE = Steps(descent=32, commands=3)
 """Of all proposals, which are told apart by where they end."""
 SWITCH_GAIN = 0.01
 """Share of its effort that a robot in motion must save before it changes the way it moves."""

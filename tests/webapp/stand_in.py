@@ -48,6 +48,13 @@ class StandIn(LeastErrorMethod):
     def _solve(self, targets: Array, *, seed: int, previous: Array | None) -> Solution:
         if len(targets) > 1:  # a policy asks for many at once, and for commands alone
             return self._inner._solve(targets, seed=seed, previous=None)
+        refined, sampled, chosen = self._drawn(targets, seed)
+        samples = self._ranked(sampled, targets[0], chosen)
+        candidates = self._ranked(refined, targets[0], np.arange(N_REFINED))
+        return Solution(candidates.command[:1], candidates=lambda: candidates, samples=lambda: samples)
+
+    def _drawn(self, targets: Array, seed: int) -> tuple[Array, Array, NDArray[np.int64]]:
+        """Refined commands, samples about them, and about which each is."""
         layout, methods = self.layout, (self._inner, self._other)
         starts = [methods[k % 2]._solve(targets, seed=seed, previous=None) for k in range(N_REFINED)]
         refined = np.concatenate([start.command for start in starts])
@@ -57,21 +64,26 @@ class StandIn(LeastErrorMethod):
             0.05 + self.settings.temperature
         )
         sampled = np.clip(refined[chosen] + noise * [0.5, 1.5, 2.0], layout.lower, layout.upper)
-        samples = self._ranked(sampled, targets[0], chosen)
-        candidates = self._ranked(refined, targets[0], np.arange(N_REFINED))
-        return Solution(candidates.command[:1], candidates=lambda: candidates, samples=lambda: samples)
+        return refined, sampled, chosen
+
+    def refinement(self, target: Array, *, flow: Array | None, seed: int) -> tuple[Candidates, ...]:
+        refined, sampled, chosen = self._drawn(target[None], seed)
+        ways = sampled, 0.5 * (sampled + refined[chosen]), refined[chosen]
+        return tuple(self._judged(way, target, chosen) for way in ways)
 
     def alternatives(self, target: Array, **question: Any) -> Candidates | None:
         found = self.solve(target[None], **question).candidates
         return None if found is None else found()
 
     def _ranked(self, command: Array, target: Array, component: NDArray[np.int64]) -> Candidates:
+        found = self._judged(command, target, component)
+        return found.rows(np.argsort(100.0 * found.err_norm**2 + 1e-4 * found.effort).tolist())
+
+    def _judged(self, command: Array, target: Array, component: NDArray[np.int64]) -> Candidates:
         wrench = Plant(self.layout).wrench(command)
         error = np.linalg.norm((wrench - target) / self.scale, axis=-1)
-        effort, power = costs(self.layout, command)
-        order = np.argsort(100.0 * error**2 + 1e-4 * effort)
-        source = tuple(f"component {k + 1}" for k in component[order].tolist())
-        return Candidates(command[order], wrench[order], error[order], effort[order], power[order], source)
+        source = tuple(f"component {k + 1}" for k in component.tolist())
+        return Candidates(command, wrench, error, *costs(self.layout, command), source)
 
 
 def load_stand_in(method: str = "dual", *, checkpoint: Any = None) -> MethodChoice:

@@ -105,7 +105,7 @@ def test_one_error_everywhere() -> None:
     reply = solver.reply(state)
     answer, plant = reply.answer, plant_of(layout)
     assert answer.candidates is not None and answer.wrench_expected is not None
-    modes = [mode for mode, _ in (*reply.modes.shown, *solver.modes(reply).shown)]
+    modes = [named.mode for named in solver.modes(reply).shown]
     told = [
         (c, e)
         for found in (answer.candidates, answer.samples)
@@ -115,6 +115,6 @@ def test_one_error_everywhere() -> None:
     for command, error in [*told, *((mode.command, mode.err_norm) for mode in modes)]:
         missing = (np.array(state.target) - plant.wrench(command)) / answer.scale
         assert error == pytest.approx(float(np.linalg.norm(missing)), abs=1e-9)
-    assert reply.modes.shown[0].mode.err_norm == pytest.approx(answer.err_norm, rel=1e-9)
+    assert modes[0].err_norm == pytest.approx(answer.err_norm, rel=1e-9)
     record = allocation_record(answer)
     assert record["err_norm"] == answer.err_norm and record["unallocated"] == answer.unallocated.tolist()

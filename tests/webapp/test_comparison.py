@@ -87,26 +87,31 @@ def test_each_mode_of_mdn_tells_its_components_and_dual_has_one_answer() -> None
     solver, state = Solver(), State(UCAT, target=PRESETS["Turn"], method="mdn")
     reply = solver.reply(state)
     samples, modes = reply.answer.samples, solver.modes(reply)
-    assert samples is not None and modes.of_samples is not None
+    assert samples is not None and modes.ways[0] == samples
     assert modes.shown[0].mode.sources[0].startswith("component "), "the answer comes from the network"
-    led = {samples.source[k] for k in np.flatnonzero(modes.of_samples == 0)}
+    led = {samples.source[k] for k in range(len(samples)) if modes.ends[k] == 0}
     assert led and led <= set(modes.shown[0].mode.sources)
     dear = replace(samples, effort=np.full(len(samples), 1e4))
-    far = mode_plot(replace(modes, samples=dear), 0, 200)
+    far = mode_plot(replace(modes, ways=(dear, *modes.ways[1:])), 0, None, 200)
     assert "1e+04" not in far and "e+" not in far, "samples that are far too dear stand at the edge"
-    assert {source_words(mode.sources).split(" ")[0] for mode, _ in modes.shown} <= {"from"}
+    assert {source_words(named.mode.sources).split(" ")[0] for named in modes.shown} <= {"from"}
+    assert {named.badge for named in modes.shown} == {"network"}
 
 
 @pytest.mark.skipif("default" not in shipped_checkpoints(), reason="no trained checkpoint in the tree")
 def test_beside_the_one_answer_of_dual_stands_what_the_network_proposes() -> None:
     solver, state = Solver(), State(UCAT, target=PRESETS["Turn"])
     reply = solver.reply(state)
-    assert reply.modes.shown == () and reply.answer.samples is None
     modes = solver.modes(reply)
-    first, *others = (mode for mode, _ in modes.shown)
+    first, *others = (named.mode for named in modes.shown)
+    assert [named.badge for named in modes.shown] == ["optimum", *["network"] * len(others)]
     assert source_words(first.sources) == "the answer" and first.power == pytest.approx(reply.answer.power)
     assert others and all(mode.err_norm < 1e-3 and mode.power >= first.power for mode in others)
-    assert modes.samples is not None and mode_plot(modes, 0, 200).count("class='mode'") == len(modes.shown)
+    assert mode_plot(modes, 0, None, 200).count("class='mode'") == len(modes.shown)
+    end = modes.ways[-1]
+    for k, place in enumerate(modes.ends):
+        assert place >= 1 and end.err_norm[k] < 1e-6, "each proposal is refined to a mode, exact"
+        assert end.effort[k] == pytest.approx(modes.shown[place].mode.effort, rel=0.02)
     beyond = solver.reply(state.with_target(0, 500.0))
     assert solver.modes(beyond).shown == (), "there is nothing to compare"
 

@@ -32,7 +32,7 @@ WORDS = "out of order"
 
 COMPUTED = (
     "webapp.tasks.solver.Solver.solve",
-    "webapp.tasks.solver.known_modes",
+    "webapp.tasks.solver.modes_of",
     "webapp.tasks.analyst.score_card",
     "webapp.tasks.analyst.attainable_set",
     "webapp.tasks.analyst.axis_ranges",

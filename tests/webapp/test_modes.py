@@ -1,36 +1,29 @@
 """Candidates that do the same are one mode, and no two modes share a name."""
 
 import re
+from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
 
-from finlab.allocation import Allocator
 from finlab.allocation.modes import find_modes
 from finlab.allocation.solution import Candidates
+from finlab.errors import FinlabError
 from finlab.layout import load_layout
 from tests.webapp.loops import AtOnce, page_of
-from tests.webapp.stand_in import StandIn
+from tests.webapp.stand_in import load_stand_in
 from webapp.markup.mode_plot import LABEL, LEFT, mode_plot
 from webapp.markup.plot import WIDTH
 from webapp.markup.words import error_digits, small, three_digits
-from webapp.panels.modes_tab import mode_table
+from webapp.panels.modes_tab import mode_table, step_words
 from webapp.session import Session
+from webapp.session.state import State
 from webapp.session.targets import PRESETS
 from webapp.tasks.answering import Answering
-from webapp.tasks.mode_names import (
-    MAX_SHOWN,
-    NO_MODES,
-    Modes,
-    NamedMode,
-    known_modes,
-    led_to,
-    listed_modes,
-    named_modes,
-    same_mode,
-)
+from webapp.tasks.mode_names import MAX_SHOWN, NO_MODES, Modes, NamedMode, listed_modes
+from webapp.tasks.refining import HOLD, Refining
+from webapp.tasks.solver import Solver
 
 PUSH, REST = (0.3, 1.1, 0.0), (0.05, 0.1, 0.0)
 
@@ -49,12 +42,12 @@ def modes_of(*commands: list[tuple[float, float, float]]) -> tuple[NamedMode, ..
     lower, upper = (np.tile(end, (command.shape[1], 1)) for end in ([0.05, 0.1, -np.pi], [0.6, 2.1, np.pi]))
     with np.errstate(invalid="ignore"):
         force = np.nan_to_num(np.sin(command[..., 0]) ** 2 * command[..., 1] ** 2)
-    return named_modes(find_modes(candidates(*commands), force, lower, upper))
+    return listed_modes(find_modes(candidates(*commands), force, lower, upper), "network").shown
 
 
 def test_how_a_fin_rests_is_no_news() -> None:
     modes = modes_of([PUSH, REST], [PUSH, (0.2, 0.1, 3.0)], [REST, PUSH])
-    assert [name for _, name in modes] == ["fin 2 rests", "fin 1 rests"]
+    assert [named.name for named in modes] == ["fin 2 rests", "fin 1 rests"]
     assert len(modes) == 2
 
 
@@ -70,7 +63,7 @@ def test_names_tell_modes_apart() -> None:
         [PUSH, (0.3, 1.1, 1.0)],
         [(0.3, 1.6, 0.0), PUSH],
     )
-    names = [name for _, name in modes]
+    names = [named.name for named in modes]
     assert names == ["all fins push", *(f"all fins push ({k})" for k in (2, 3, 4, 5))]
 
 
@@ -78,35 +71,33 @@ def test_failed_fins_are_left_out() -> None:
     assert modes_of([(np.nan,) * 3, PUSH, REST])[0].name == "fin 3 rests"
 
 
-def test_a_mode_is_found_again_in_another_list() -> None:
-    modes = modes_of([PUSH, REST], [REST, PUSH], [PUSH, PUSH])
-    fewer = modes_of([PUSH, PUSH], [REST, (0.301, 1.1, 0.01)])
-    assert same_mode(fewer[1].mode, modes) == 1 and same_mode(fewer[0].mode, modes) == 2
-    assert same_mode(modes[0].mode, fewer) == 0, "the best one where it is not there"
-    assert len(modes_of(*([PUSH, (0.3, 1.1, 0.5 * k)] for k in range(12)))) == MAX_SHOWN
+def test_no_more_are_shown_than_have_colours() -> None:
+    assert len(modes_of(*([PUSH, PUSH, (0.3, 1.1, 0.5 * k)] for k in range(12)))) == MAX_SHOWN
 
 
-def test_real_candidates_are_drawn_and_listed() -> None:
-    answer = Allocator(load_layout("ucat"), StandIn).allocate(PRESETS["Turn"])
-    found = known_modes(answer)
-    modes = named_modes(found)
-    assert answer.candidates is not None and answer.samples is not None
-    listed = listed_modes(found, answer.samples)
-    led = listed.of_samples
-    assert led is not None and len(led) == len(answer.samples.effort)
-    for source, place in zip(answer.samples.source, led.tolist(), strict=True):
-        led_here = [k for k, (mode, _) in enumerate(modes) if source in mode.sources]
-        assert place == (led_here[0] if led_here else -1), "the mode that its component led to"
-    strange = replace(answer.samples, source=("sample",) * len(led))
-    assert set(led_to(strange, modes)) == {-1}, "of no component"
-    plot = mode_plot(listed, 0, 200)
-    assert plot.count("data-press='mode'") == len(modes)
-    assert plot.count("r='3'") == len(answer.samples.effort)
-    table = mode_table(listed, False, 0)
-    assert table.count("data-press=") == len(modes) and "0.0000" not in table and "more are" not in table
-    assert "2 more are" in mode_table(replace(listed, count=listed.count + 2), False, 0)
-    assert mode_table(NO_MODES, False, 0) == ""
-    assert "looking for more" in mode_table(listed, True, 0)
+def found(method: str = "mdn") -> Modes:
+    solver = Solver(load=load_stand_in)
+    return solver.modes(solver.reply(State(load_layout("ucat"), target=PRESETS["Turn"], method=method)))
+
+
+def test_samples_and_modes_are_drawn_and_listed() -> None:
+    modes = found()
+    samples, middle, end = modes.ways
+    assert len(modes.ends) == len(samples) == len(end)
+    for source, place in zip(samples.source, modes.ends, strict=True):
+        assert place < 0 or source in modes.shown[place].mode.sources, "the mode that its component led to"
+    still, moving = mode_plot(modes, 0, None, 200), mode_plot(modes, 0, 1, 200)
+    assert still.count("data-press='mode'") == len(modes.shown)
+    drawn = int((samples.effort <= 2.0 * max(named.mode.effort for named in modes.shown)).sum())
+    assert still.count("r='3'") == drawn and moving.count("r='3'") == 2 * drawn
+    assert moving.count("class='moving'") == 1 and "class='moving'" not in still
+    table = mode_table(modes, 0)
+    assert table.count("data-press=") == len(modes.shown) and "0.0000" not in table
+    assert "more are" not in table
+    assert table.count(">network</span>") == len(modes.shown)
+    assert "2 more are" in mode_table(replace(modes, count=modes.count + 2), 0)
+    assert mode_table(NO_MODES, 0) == mode_plot(NO_MODES, 0, None, 200) == ""
+    assert "samples of the network" in step_words(modes, 0) and "median error" in step_words(modes, None)
 
 
 def test_figures_keep_their_width() -> None:
@@ -118,32 +109,59 @@ def test_figures_keep_their_width() -> None:
     assert "−" in small(1e-5) and "-" not in three_digits(-2e-9)
 
 
-def test_a_mode_stays_on_the_robot_when_all_are_known() -> None:
-    session = Session(load_layout("ucat"))
-    jobs: list[Any] = []
-    submit = {"submit": lambda _, key, job, failed: jobs.append(job)}
-    worker: Any = type("Ready", (), {**submit, "forget": lambda *_: None})()
-    loop = AtOnce()
-    answering = Answering(page_of(worker, session, loop=loop))
-    session.set_target(1, 0.8)
+class Direct:
+    """Works at once."""
+
+    def submit(self, key: object, job: Callable[[], None], failed: object) -> None:
+        job()
+
+    def forget(self, key: object) -> None:
+        pass
+
+
+def test_a_refinement_is_played_step_by_step_on_the_robot() -> None:
+    session, loop, worker = Session(load_layout("ucat")), AtOnce(), Direct()
+    session.set_setting("method", "mdn")
+    context = page_of(worker, session, loop=loop)
+    answering = Answering(context)
+    refining = Refining(context, answering)
+    with pytest.raises(FinlabError, match="proposes nothing"):
+        refining.toggle()
     answering.ask()
-    jobs.pop()()
-    session.show_mode(1)
-    wanted = answering.modes.shown[1].mode
     loop.ring()
-    jobs.pop()()
-    assert answering.modes.count >= len(answering.modes.shown) > 0
-    place = same_mode(wanted, answering.modes.shown)
-    assert session.mode == place, "what is on the robot stays there when all modes are known"
+    modes, best = answering.modes, answering.shown
+    assert modes.steps == 2 and not answering.searching
+    session.show_mode(1)
+    refining.toggle()
+    seen = []
+    while session.step is not None:
+        proposal, shown = modes.ends.index(1), answering.shown
+        assert shown is not None and refining.running
+        np.testing.assert_array_equal(shown.command, modes.ways[session.step].command[proposal])
+        seen.append(session.step)
+        loop.ring()
+    assert seen == [0, 1] and not refining.running and answering.shown not in (None, best)
+    np.testing.assert_array_equal(answering.shown.command, modes.shown[1].mode.command)
+    session.set_loop(True)
+    refining.toggle()
+    for _ in range(2 + HOLD):
+        loop.ring()
+    assert session.step == 0 and refining.running, "it begins anew"
+    session.set_target(1, 0.3)
+    assert session.step is None
+    loop.ring()
+    assert not refining.running, "another question ends it"
 
 
 @pytest.mark.parametrize("spread", [0.0, 1e-6, 0.01, 1.0])
 def test_dots_stand_at_their_values_and_their_numbers_beside_them(spread: float) -> None:
-    answer = Allocator(load_layout("hexa"), StandIn).allocate(PRESETS["Turn"])
-    first = known_modes(answer)[0]
+    modes = found()
+    first = modes.shown[0].mode
     effort = np.append(0.801 + spread * np.random.default_rng(3).uniform(size=MAX_SHOWN - 1), 0.957 + spread)
-    shown = tuple(NamedMode(replace(first, effort=float(value)), f"{k}") for k, value in enumerate(effort))
-    plot = mode_plot(Modes(shown, MAX_SHOWN, answer.samples, np.zeros(64, dtype=np.intp)), 3, 200)
+    shown = tuple(
+        NamedMode(replace(first, effort=float(value)), f"{k}", "network") for k, value in enumerate(effort)
+    )
+    plot = mode_plot(replace(modes, shown=shown, ends=(0,) * len(modes.ends)), 3, None, 200)
     across = [
         float(x) for x in re.findall(r"<circle cx='([\d.]+)' cy='[\d.]+' r='[\d.]+' class='mode'", plot)
     ]

@@ -1,4 +1,4 @@
-"""The modes of an answer as numbered dots that can be picked: effort against error."""
+"""The modes of an answer as numbered rings that can be picked, and what led to them: effort against error."""
 
 import math
 
@@ -16,52 +16,60 @@ LEFT = 54
 """Where the axis that goes up stands [px]."""
 FAR = 2.0
 """Samples that cost more than so many times the dearest mode are counted, not drawn: modes keep apart."""
-LEGEND = (("refined", 5.0, 6), ("on the robot", 0.0, 72), ("sampled", 2.6, 176))
-"""Word, radius and place of what is drawn; radius 0 is the ring."""
-DOT = 4.5
-"""Radius of the dot of a mode [px]."""
+LEGEND = (("sample", 0), ("refined", 76), ("on the robot", 154))
+"""Words and places of what is drawn."""
+DOT, RING = 3.0, 5.5
+"""Radii of samples and of modes [px]."""
 LABEL = (13.0, 12.0)
 """Width and height of the number of a mode [px]."""
-FAR_PX = 14.0
-"""Distance of a number from its dot above which a line joins them [px]."""
+FAR_PX = 16.0
+"""Distance of a number from its ring above which a line joins them [px]."""
+TRAIL = (0, 1, 2, 3, 4, 6, 8, 12, 20)
+"""Steps at which the way of a sample is drawn, beside the last one."""
 
 
-def mode_plot(modes: Modes, shown: int, height: int) -> str:
+def mode_plot(modes: Modes, shown: int, step: int | None, height: int) -> str:
     """Effort, which the network's proposals keep least, against the error.
 
-    Samples are small dots, modes numbered ones, which can be clicked.
+    Samples are small dots, with thin lines to where they end; modes are numbered rings, which can be clicked.
 
     Args:
         modes: an answer's modes, which give the samples their colours.
         shown: mode on the robot.
+        step: how many steps of refinement the samples have had; None for all.
         height: of the plot [px].
     """
-    samples = modes.samples
-    if not modes.shown or samples is None:
+    if not modes.shown or not modes.ways:
         return ""
-    error = np.array([mode.err_norm for mode, _ in modes.shown])
-    effort = np.array([mode.effort for mode, _ in modes.shown])
+    error = np.array([named.mode.err_norm for named in modes.shown])
+    effort = np.array([named.mode.effort for named in modes.shown])
     refined = np.stack([effort, _logarithm(error)], axis=1)
-    raw = np.stack([samples.effort, _logarithm(samples.err_norm)], axis=1)
-    near = raw[:, 0] <= FAR * effort.max()
-    points = np.concatenate([refined, raw[near]])
+    raw = np.array([[way.effort, _logarithm(way.err_norm)] for way in modes.ways]).swapaxes(1, 2)
+    near = raw[0, :, 0] <= FAR * effort.max()
+    drawn = raw[:, near].clip(max=(FAR * effort.max(), np.inf))
+    points = np.concatenate([refined, drawn.reshape(-1, 2)])
     if not np.isfinite(points).all():
         return ""
     plot = Plot(cost_axis("effort", points[:, 0]), error_axis(points[:, 1]), height, LEFT)
-    kinds = np.full(len(raw), -1) if modes.of_samples is None else modes.of_samples
-    parts = [_legend(), _sample_dots(*plot.place(*raw[near].T), kinds[near].tolist(), len(raw))]
-    parts += _mode_dots(
-        [(float(x), float(y)) for x, y in zip(*plot.place(*refined.T), strict=True)], plot.floor, shown
-    )
+    ends = [end for end, kept in zip(modes.ends or [-1] * len(near), near.tolist(), strict=True) if kept]
+    places = np.stack(plot.place(drawn[..., 0], drawn[..., 1]), axis=-1)
+    parts = [_legend(), _trails(places, ends), _sample_dots(places[0], ends, step is not None)]
+    if step is not None:
+        parts.append(_moving_dots(places[max(step - 1, 0)], places[step], ends))
+    if beyond := int((~near).sum()):
+        parts.append(html("<text x='{}' y='14' text-anchor='end'>{} dearer →</text>", WIDTH - RIGHT, beyond))
+    rings = [(float(x), float(y)) for x, y in zip(*plot.place(*refined.T), strict=True)]
+    parts += _rings(rings, plot.floor, shown)
     return html("<div class='fl'>{}</div>", plot.drawn(parts, upright=True))
 
 
-def _mode_dots(places: list[Point], floor: float, shown: int) -> list[str]:
-    """A dot where each mode lies, with its number beside it; the best one on top."""
-    # What is between a dot and its number can be clicked, too.
-    dot = (
+def _rings(places: list[Point], floor: float, shown: int) -> list[str]:
+    """A ring where each mode lies, filled where it is on the robot, with its number beside it; the best one
+    on top."""
+    # What is between a ring and its number can be clicked, too.
+    ring = (
         "<g class='pick' {}><path {} stroke='transparent' stroke-width='12'/>{}"
-        "<circle cx='{:.1f}' cy='{:.1f}' r='{}' class='mode' fill='{}'/>"
+        "<circle cx='{:.1f}' cy='{:.1f}' r='{}' class='mode' stroke='{}' fill='{}'/>"
         "<text x='{:.1f}' y='{:.1f}' class='digit' text-anchor='middle'>{}</text></g>"
     )
     parts = []
@@ -70,9 +78,8 @@ def _mode_dots(places: list[Point], floor: float, shown: int) -> list[str]:
         color, pressed = css(mode_color(k)), press("mode", str(k))
         way = html("d='M{:.1f} {:.1f}L{:.1f} {:.1f}'", x, y, u, v)
         line = html("<path {} stroke='{}'/>", way, color) if math.dist((x, y), (u, v)) > FAR_PX else ""
-        parts.append(html(dot, pressed, way, line, x, y, DOT, color, u, v + 3.8, k + 1))
-        if k == shown:
-            parts.append(_ring(x, y, DOT + 3.0))
+        fill = color if k == shown else "transparent"
+        parts.append(html(ring, pressed, way, line, x, y, RING, color, fill, u, v + 3.8, k + 1))
     return parts
 
 
@@ -80,23 +87,40 @@ def _logarithm(error: Array) -> Array:
     return np.asarray(np.log10(np.maximum(error, EXACT)))
 
 
-def _sample_dots(x: Array, y: Array, kinds: list[int], count: int) -> str:
-    """Raw samples in the colours of the modes which their components led to, grey for none, and how many of
-    them all have no place in the plot."""
-    fills = [
-        css(DEAD if kind < 0 else mode_color(kind), 0.6) for kind in range(-1, max(kinds, default=-1) + 1)
-    ]
+def _color(end: int, alpha: float) -> str:
+    """Of a sample that ends at a mode, grey for none."""
+    return css(DEAD if end < 0 else mode_color(end), alpha)
+
+
+def _sample_dots(places: Array, ends: list[int], faint: bool) -> str:
+    """Samples (K, 2) [px] as they were proposed."""
     dots = [
-        f"<circle cx='{u:.1f}' cy='{v:.1f}' r='3' fill='{fills[kind + 1]}'/>"
-        for u, v, kind in zip(x.tolist(), y.tolist(), kinds, strict=True)
+        f"<circle cx='{x:.1f}' cy='{y:.1f}' r='{DOT:g}' fill='{_color(end, 0.25 if faint else 0.7)}'/>"
+        for (x, y), end in zip(places.tolist(), ends, strict=True)
     ]
-    beyond = count - len(dots)
-    told = f"<text x='{WIDTH - RIGHT}' y='14' text-anchor='end'>{beyond} dearer →</text>" if beyond else ""
-    return Markup(f"<g class='samples'>{''.join(dots)}</g>{told}")
+    return Markup(f"<g class='samples'>{''.join(dots)}</g>")
 
 
-def _ring(x: float, y: float, radius: float) -> str:
-    return html("<circle class='ring' cx='{:.1f}' cy='{:.1f}' r='{:g}'/>", x, y, radius)
+def _moving_dots(before: Array, now: Array, ends: list[int]) -> str:
+    """Samples (K, 2) [px] as they have been refined so far; a style lets them come from where they were."""
+    dots = [
+        f"<circle cx='{x:.1f}' cy='{y:.1f}' r='{DOT:g}' fill='{_color(end, 1.0)}' "
+        f"style='--x:{u - x:.1f}px;--y:{v - y:.1f}px'/>"
+        for (u, v), (x, y), end in zip(before.tolist(), now.tolist(), ends, strict=True)
+    ]
+    return Markup(f"<g class='moving'>{''.join(dots)}</g>")
+
+
+def _trails(places: Array, ends: list[int]) -> str:
+    """The ways of samples (steps, K, 2) [px]."""
+    if len(places) == 1:
+        return Markup()
+    kept = places[[*(k for k in TRAIL if k < len(places) - 1), -1]].swapaxes(0, 1).round(1).tolist()
+    lines = [
+        f"<path d='M{'L'.join(f'{x:g} {y:g}' for x, y in way)}' stroke='{_color(end, 0.3)}'/>"
+        for way, end in zip(kept, ends, strict=True)
+    ]
+    return Markup(f"<g class='trails'>{''.join(lines)}</g>")
 
 
 def _labels(places: list[Point], floor: float) -> list[Point]:
@@ -114,7 +138,7 @@ def _labels(places: list[Point], floor: float) -> list[Point]:
         ).all(axis=1)
         free &= (rooms[:, 1] >= TOP) & (rooms[:, 1] <= floor - height / 2)
         for others, gap in (
-            (dots, (width / 2 + DOT, height / 2 + DOT)),
+            (dots, (width / 2 + RING, height / 2 + RING)),
             (np.array(labels or [(1e9, 1e9)]), LABEL),
         ):
             free &= ~(np.abs(rooms[:, None] - others) < gap).all(axis=2).any(axis=1)
@@ -124,9 +148,10 @@ def _labels(places: list[Point], floor: float) -> list[Point]:
 
 
 def _legend() -> str:
+    sign = "<circle cx='{}' cy='10' r='{}' stroke='currentColor' stroke-width='2' fill='{}'/>"
+    looks = ((DOT - 1.0, "currentColor"), (RING - 1.0, "none"), (RING - 1.0, "currentColor"))
     parts = []
-    for word, radius, place in LEGEND:
-        dot = html("<circle cx='{}' cy='10' r='{}' fill='currentColor' opacity='.55'/>", LEFT + place, radius)
-        parts.append(dot if radius else _ring(LEFT + place, 10, 5.5))
-        parts.append(html("<text x='{}' y='14'>{}</text>", LEFT + place + 9, word))
+    for (word, place), look in zip(LEGEND, looks, strict=True):
+        parts.append(html(sign, LEFT + place + 4, *look))
+        parts.append(html("<text x='{}' y='14'>{}</text>", LEFT + place + 14, word))
     return Markup().join(parts)

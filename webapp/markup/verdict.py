@@ -93,11 +93,20 @@ def rest_sentence(allocation: Allocation) -> str:
     return f"{'; '.join(parts)}."
 
 
+def _gap(allocation: Allocation, bound: float) -> float:
+    return (allocation.power - bound) / max(bound, LEAST_WATTS)
+
+
+def is_proved(allocation: Allocation) -> bool:
+    """Whether the watts of an answer are proved to be least."""
+    return allocation.bound is not None and _gap(allocation, allocation.bound) <= PROVED
+
+
 def bound_sentence(allocation: Allocation) -> str:
     """How far an answer may be from the least watts, by the bound that its method proves; else nothing."""
     if allocation.bound is None:
         return ""
-    gap = (allocation.power - allocation.bound) / max(allocation.bound, LEAST_WATTS)
+    gap = _gap(allocation, allocation.bound)
     if gap <= PROVED:
         return "Its watts are proved least."
     return f"Its watts are at most {100 * gap:.2g} % above the least."

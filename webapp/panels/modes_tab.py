@@ -2,11 +2,13 @@
 
 from functools import partial
 
+import numpy as np
 from markupsafe import Markup
 
 from finlab.allocation.allocation import Allocation
 from finlab.errors import FinlabError
 from finlab.layout import Layout
+from finlab.mdn.method import WHOLE
 from webapp.handles import add_html
 from webapp.markup.html import html, marker
 from webapp.markup.mode_plot import mode_plot
@@ -17,33 +19,47 @@ from webapp.session.state import DRAWING, State
 from webapp.tasks.mode_names import Modes
 from webapp.theme import css, mode_color
 
-ORIGINS = {
-    "mdn": "A network proposes ways to share the wrench, drawn from its mixture; each is followed to the "
-    "least effort near it and made exact by the fins' own laws. A mode names the components that led to it.",
-    "paper": "The paper's network draws candidates; the best are refined by Adam on a learned surrogate, "
-    "which leaves an error.",
-}
-ONE = "Method {} has one answer, number 1. The others are a network's, for least effort, each made exact."
-BEYOND = (
-    "Method {} has one answer. Where the wrench is not delivered whole, the network is not asked beside it."
+UNKNOWN = "The network has learned fins alone, so it proposes nothing for this robot."
+BEYOND = "Where the wrench is not delivered whole, the network is not asked: there is the one answer."
+LEARNED = "The paper's network draws samples; the best are refined by Adam on learned physics, which errs."
+PROPOSED = (
+    "The network proposes ways to share the wrench, drawn from its mixture; each is refined to the least "
+    "effort near it and made exact by the fins' own laws."
 )
-UNKNOWN = "The network knows fins alone, so it proposes nothing for this robot."
-PLOT_PX = 176
+BESIDE = {
+    "dual": " The answer, number 1, keeps watts least, and needs no network.",
+    "mdn": " The answer, number 1, is the cheapest of them.",
+}
+PLOT_PX = 152
 """Height of the plot [px]."""
 
 
 def add_candidates(page: Page) -> None:
-    """Plot and table, and what is drawn from a mixture."""
-    session, gui = page.session, page.gui
-    page.add_html(lambda modes, mode: mode_plot(modes, mode, PLOT_PX))
-    page.presses.on(
-        "mode", lambda key, _held: session.show_mode(placed(key, len(page.jobs.answering.modes.shown)))
+    """Plot and table, the refinement as a picture, and how widely the mixture is drawn from."""
+    session, gui, jobs, board = page.session, page.gui, page.jobs, page.board
+    page.add_html(lambda searching: marker("fl-asking" if searching else "fl-asked"))
+    page.add_html(lambda modes, mode, step: mode_plot(modes, mode, step, PLOT_PX))
+
+    def choose(key: str, _held: str) -> None:
+        session.show_mode(placed(key, 0 if jobs.answering.searching else len(jobs.answering.modes.shown)))
+
+    page.presses.on("mode", choose)
+    page.presses.on("play", lambda _key, _held: jobs.refining.toggle())
+    page.presses.on("loop", lambda _key, _held: session.set_loop(not session.loops))
+    page.add_html(_player)
+    hint = "How many steps of refinement the samples have had, in the plot and on the robot."
+    slider = gui.add_slider("Step", 0, WHOLE.steps, 1, WHOLE.steps, hint=hint)
+    page.bind(
+        slider,
+        lambda value: session.show_step(int(value), jobs.answering.modes.steps),
+        lambda step, modes: modes.steps if step is None else step,
     )
-    hint = "How far draws stray from the mixture's means."
-    slider = gui.add_slider("Temperature", 0.0, 2.0, 0.01, 0.0, hint=hint)
-    page.bind_number(slider, partial(session.set_setting, "temperature"), _temperature)
-    page.board.show(slider, visible=lambda method: method in DRAWING)
+    board.show(slider, visible=lambda modes: modes.steps > 0)
     add_html(gui, marker("fl-column"))
+    hint = "How far samples stray from the means of the mixture's components: 0 is the means alone."
+    warmth = gui.add_slider("Temperature", 0.0, 2.0, 0.01, 0.0, hint=hint)
+    page.bind_number(warmth, partial(session.set_setting, "temperature"), _temperature)
+    board.show(warmth, visible=lambda layout: layout.is_of_fins)
     page.add_html(mode_table)
     page.add_html(_origin_words)
 
@@ -54,11 +70,38 @@ def _temperature(state: State) -> float:
     return own if state.temperature is None else state.temperature
 
 
+def _player(modes: Modes, step: int | None, playing: bool, loops: bool) -> str:
+    """Buttons, and what is done in the step that is shown."""
+    if not modes.steps:
+        return ""
+    play = ("❚❚", "Pause") if playing else ("▶", "Play")
+    row = (
+        "<div class='fl fl-player'><button {} title='let the samples travel to where they end'>{} {}</button>"
+        "<button {} aria-pressed='{}' title='begin anew at the end'>Loop</button><span>{}</span></div>"
+    )
+    return html(row, press("play", ""), *play, press("loop", ""), str(loops).lower(), step_words(modes, step))
+
+
+def step_words(modes: Modes, step: int | None) -> str:
+    """What is done in a step of the refinement, and the error that is left then, half of the samples having
+    less."""
+    at = modes.steps if step is None else step
+    words = "descent in forces" if at <= WHOLE.descent else "made exact"
+    words = "samples of the network" if at == 0 else words
+    left = float(np.median(modes.ways[at].err_norm))
+    return html("{} <span class='dim'>· median error</span> {}", words, error_digits(left))
+
+
 def _origin_words(layout: Layout, method: str, best: Allocation | None) -> str:
     """Where the answer and its modes come from, or why there is but one."""
-    exact = best is None or best.reachable
-    said = ORIGINS.get(method, (ONE if exact else BEYOND).format(method))
-    return html("<div class='fl dim'>{}</div>", said if layout.is_of_fins else UNKNOWN)
+    said = UNKNOWN
+    if method == "paper":
+        said = LEARNED
+    elif layout.is_of_fins:
+        exact = best is None or best.reachable
+        beside = BESIDE.get(method, f" The answer, number 1, is that of method {method}.")
+        said = PROPOSED + beside if exact else BEYOND
+    return html("<div class='fl dim'>{}</div>", said)
 
 
 def placed(key: str, count: int) -> int:
@@ -72,20 +115,20 @@ def placed(key: str, count: int) -> int:
     return int(key)
 
 
-def mode_table(modes: Modes, searching: bool, mode: int) -> str:
+def mode_table(modes: Modes, mode: int) -> str:
     """Name and origin, error, power, effort and use of the limits of each mode.
 
     Args:
         modes: an answer's modes.
-        searching: whether more may be found.
         mode: which of them moves the fins.
     """
     if not modes.shown:
         return ""
     rows = []
-    for k, (way, name) in enumerate(modes.shown):
+    for k, (way, name, badge) in enumerate(modes.shown):
         kind = "chosen" if k == mode else ""
-        origin = html("<div class='dim'>{}</div>", source_words(way.sources))
+        mark = html("<span class='badge {}'>{}</span>", badge, badge)
+        origin = html("<div>{} <span class='dim'>{}</span></div>", mark, source_words(way.sources))
         rows.append(
             html(
                 "<tr class='{} pick' {} tabindex='0'><td>{}</td><td class='words'>{}{}</td><td>{}"
@@ -106,8 +149,8 @@ def mode_table(modes: Modes, searching: bool, mode: int) -> str:
         "<th title='largest share of a range of amplitude or frequency that is used'>used</th></tr>"
     )
     left = modes.count - len(modes.shown)
-    told = "looking for more …" if searching else f"{left} more are known; they come after these."
-    more = html("<div class='said dim'>{}</div>", told) if searching or left > 0 else ""
+    told = f"{left} more are known; they come after these."
+    more = html("<div class='said dim'>{}</div>", told) if left > 0 else ""
     return html("<div class='fl'><table class='modes'>{}{}</table>{}</div>", header, rows, more)
 
 

@@ -17,6 +17,7 @@ from webapp.scene.wrench_nodes import Scale, set_scale
 from webapp.session.display import Display
 from webapp.session.state import AXIS_UNITS, State, least_of
 from webapp.tasks.analyst import Findings
+from webapp.tasks.mode_names import Modes
 from webapp.tasks.moment import ERROR, Moment
 from webapp.tasks.swimmer import Swimmer
 from webapp.theme import ASKED, DEAD, DELIVERED, HALF_TURN, WATER, css
@@ -51,11 +52,14 @@ def _written(
     busy: bool,
     error: str | None,
     in_reach: bool,
+    step: int | None,
+    modes: Modes,
 ) -> str:
     if swimmer is not None and moment is not None:
         return swim_corner(swimmer, moment, pace, SWIM.newtons)
     drawn = set_rows(found if display.drawn != "none" else None)
-    return corner(state, legend(*scale, drawn), shown, busy, error, shown is best, in_reach)
+    refined = "" if step is None or shown is best else f"Step {step} of {modes.steps}"
+    return corner(state, legend(*scale, drawn), shown, busy, error, shown is best, in_reach, refined)
 
 
 def legend(newtons: float, torque: float, cut: bool, also: str) -> str:
@@ -118,6 +122,7 @@ def corner(
     error: str | None,
     least: bool = True,
     in_reach: bool = False,
+    refined: str = "",
 ) -> str:
     """Legend and status line in the lower left corner of the page.
 
@@ -129,6 +134,7 @@ def corner(
         error: why there is no answer.
         least: whether it is the answer itself, not another way to do the same.
         in_reach: whether any command of the working fins gives what is asked.
+        refined: which step of its refinement is on the robot, in place of a verdict; nothing at its end.
     """
     fins = f"{len(state.healthy)} of {state.layout.n} {parts_word(state.layout)}"
     parts = [html("<span class='aside'>{}</span>", fins)]
@@ -138,13 +144,15 @@ def corner(
         parts.append(html("<span class='aside'><span class='dim'>{}</span></span>", state.method))
         parts.append(html("<span class='pill' style='background:{}'>{}</span>", css(DEAD), WORKING))
     else:
-        parts += _figures(allocation, least, in_reach)
+        parts += _figures(allocation, least, in_reach, refined)
     return _cards(legend, parts)
 
 
-def _figures(allocation: Allocation, least: bool, in_reach: bool) -> list[str]:
+def _figures(allocation: Allocation, least: bool, in_reach: bool, refined: str) -> list[str]:
     """Error, costs, time and verdict of what is on the robot."""
     color, verdict = verdict_of(allocation, in_reach).color, verdict_sentence(allocation, in_reach)
+    if refined:
+        color, verdict = DEAD, refined
     pill = "pill long" if len(verdict) > LONG else "pill"
     rest = ", ".join(
         f"{axis} {value:+.2g} {unit}"

@@ -115,6 +115,10 @@ class Core:
         """What 1 means in the next mesh file of a hull: key of `UNITS`."""
         self.mode = 0
         """Which of the answer's modes is shown; 0 is the best one."""
+        self.step: int | None = None
+        """How many steps of refinement the network's proposals have had that are shown; None for all."""
+        self.loops = False
+        """Whether the refinement begins anew at its end."""
         self.revision = 0
         """Grows with every change of the state; an answer carries the revision it was made for."""
 
@@ -150,7 +154,7 @@ class Core:
     def _settled(self) -> None:
         """After any change of the state: a choice of mode is void, one that is gone is not selected."""
         self.revision += 1
-        self.mode = 0
+        self.mode, self.step = 0, None
         names, before = self.state.layout.names, self._names
         self._names = names
         if len(names) == len(before):  # one that is called otherwise now stays selected

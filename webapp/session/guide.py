@@ -48,7 +48,7 @@ class Guiding(Looking):
             past, future = tuple(self.history.past), tuple(self.history.future)
             self._left = Left(self.state, past, future, self.display, self._chosen, self.mode, self.desk)
         self._commit(stop.title, stop.state(self.state))
-        self.stop, self.solved, self.mode, self.selected = stop, False, stop.mode, None
+        self.stop, self.solved, self.mode, self.step, self.selected = stop, False, stop.mode, None, None
         self.desk = Desk()
         self.show_drawer(stop.drawer)
         self.display = replace(self.display, drawn="none")
@@ -83,7 +83,7 @@ class Guiding(Looking):
             self.history.resume(left.state, left.past, left.future)
             self._settled()
             self.display, self.desk, self._chosen = left.display, left.desk, left.chosen
-            self.mode = left.mode
+            self.mode, self.step = left.mode, None
 
     def take(self, answer: Allocation) -> None:
         """See what the fins do now; an exercise that is done stays so until another stop is opened."""

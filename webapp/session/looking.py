@@ -66,6 +66,14 @@ class Looking(Core):
         """Show one of the answer's modes on the robot."""
         self.mode = max(0, int(index))
 
+    def show_step(self, step: int, steps: int) -> None:
+        """Show the network's proposals after some steps of their refinement, of as many as there are."""
+        self.step = max(step, 0) if step < steps else None
+
+    def set_loop(self, value: Any) -> None:
+        """Whether the refinement begins anew at its end."""
+        self.loops = bool(value)
+
     def set_display(self, key: str, value: Any) -> None:
         """One field of `Display`."""
         self.display = self.display.with_value(key, value)

@@ -6,7 +6,7 @@ from finlab.allocation.allocation import Allocation
 from finlab.arrays import Array
 from webapp.tasks.background import Newest
 from webapp.tasks.context import Context
-from webapp.tasks.mode_names import NO_MODES, Modes, same_mode
+from webapp.tasks.mode_names import NO_MODES, Modes
 from webapp.tasks.solver import Reply
 
 SEARCH_REST_S = 0.2
@@ -38,12 +38,9 @@ class Answering:
 
     @property
     def modes(self) -> Modes:
-        """Its modes: at once those that it knows anyway, and after a moment of rest the best of all."""
-        if self.reply is None:
-            return NO_MODES
-        searched = self._search
-        found = None if searched.busy else searched.findings
-        return self.reply.modes if found is None else found
+        """The ways to do what an answer does, known after a moment of rest; until then those of the answer
+        before, of which none can be chosen."""
+        return self._search.findings or NO_MODES
 
     @property
     def busy(self) -> bool:
@@ -53,7 +50,7 @@ class Answering:
     @property
     def searching(self) -> bool:
         """True until all modes of the newest answer are known."""
-        return self._search.busy
+        return self.busy or self._search.busy
 
     @property
     def error(self) -> str | None:
@@ -62,13 +59,14 @@ class Answering:
 
     @property
     def shown(self) -> Allocation | None:
-        """What is on the robot: the answer with the chosen mode's command."""
-        best, mode = self.best, self._session.mode
-        if best is None:
-            return None
-        if 0 < mode < len(self.modes.shown):
-            return self._variant(best, self.modes.shown[mode].mode.command)
-        return best
+        """What is on the robot: the answer with the chosen mode's command, or, while that is refined, with
+        what has become so far of the proposal that leads to it."""
+        best, mode, step, modes = self.best, self._session.mode, self._session.step, self.modes
+        if best is None or self.searching:
+            return best
+        if step is not None and step < modes.steps and (proposal := modes.proposal_of(mode)) is not None:
+            return self._variant(best, modes.ways[step].command[proposal])
+        return self._variant(best, modes.shown[mode].mode.command) if 0 < mode < len(modes.shown) else best
 
     def _variant(self, best: Allocation, command: Array) -> Allocation:
         """The answer with another command; kept, because every refresh asks for it."""
@@ -98,10 +96,6 @@ class Answering:
         self._changed()
 
     def _take_modes(self) -> None:
-        """All modes of the newest answer are known; what is on the robot stays there if it can."""
-        mode = self._session.mode
-        if self._search.error is None and not self._search.busy and self.reply is not None:
-            before = self.reply.modes.shown
-            if 0 < mode < len(before):
-                self._session.show_mode(same_mode(before[mode].mode, self.modes.shown))
+        if self._search.error is not None:
+            self._notify("No candidates", self._search.error)
         self._changed()

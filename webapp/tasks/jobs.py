@@ -11,6 +11,7 @@ from webapp.tasks.context import Context
 from webapp.tasks.designs import Exports
 from webapp.tasks.fitting import Fitting
 from webapp.tasks.improving import Improver
+from webapp.tasks.refining import Refining
 from webapp.tasks.swimming import Swimming
 
 CARD_REST_S = 0.35
@@ -26,6 +27,7 @@ class Jobs:
         self._robot: tuple[str, tuple[str, ...]] | None = None
         loop, workers, changed = context.loop, context.workers, context.changed
         self.answering = Answering(context)
+        self.refining = Refining(context, self.answering)
         self.ranging = Newest(loop, workers.marks, find_ranges, changed, REST_S)
         self.analyst = Newest(loop, workers.cards, find, changed, CARD_REST_S)
         self.improver = Improver(context)
@@ -50,6 +52,7 @@ class Jobs:
     def stop(self) -> None:
         """The page has gone."""
         self.swimming.stop()
+        self.refining.stop()
         forget: list[Callable[[], None]] = [task.forget for task in (self.comparison, self.improver)]
         forget += [task.forget for task in (self.fitting, self.answering, self.analyst, self.ranging)]
         for each in forget:

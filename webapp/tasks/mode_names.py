@@ -1,13 +1,19 @@
-"""Names that tell an answer's modes apart; what counts as one is for `finlab.allocation.modes` to say."""
+"""The ways in which a wrench can be delivered, as the page lists them: with names, and what led to each; what
+counts as one is for `finlab.allocation.modes` to say."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from finlab.allocation.allocation import Allocation
-from finlab.allocation.modes import Mode, ModeSignature, find_modes, force_sizes, same_signature
+from finlab.allocation.modes import (
+    Mode,
+    ModeSignature,
+    find_modes,
+    force_sizes,
+    mode_signature,
+    same_signature,
+)
 from finlab.allocation.solution import Candidates
 from webapp.markup.words import OWN as OWN
 from webapp.markup.words import fins_words
@@ -15,6 +21,8 @@ from webapp.theme import MODE_COLORS
 
 MAX_SHOWN = len(MODE_COLORS)
 """Modes that are shown, each in its own colour; a robot with many fins has dozens, the last ones dear."""
+EXACT = 1e-4
+"""Normalized error up to which a refined proposal is a way to deliver the wrench."""
 
 
 class NamedMode(NamedTuple):
@@ -23,6 +31,8 @@ class NamedMode(NamedTuple):
     mode: Mode
     name: str
     """What makes it different from the others that are shown."""
+    badge: str
+    """Whose it is: `network`, `optimum` where it is proved to be least, or another method's name."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,58 +40,60 @@ class Modes:
     """The modes of an answer, as the page lists them."""
 
     shown: tuple[NamedMode, ...]
-    """The first `MAX_SHOWN` of them, the best one first, no two of the same name."""
+    """The first `MAX_SHOWN` of them, the answer first, no two of the same name."""
     count: int
-    samples: Candidates | None = None
-    """What a network proposed, before it was refined."""
-    of_samples: NDArray[np.intp] | None = None
-    """For each sample (K,) the shown mode that its component led to, -1 where that is none of them; None
-    where there are no samples."""
+    ways: tuple[Candidates, ...] = ()
+    """What a network proposed, then the same K after each step of their refinement where that is told."""
+    ends: tuple[int, ...] = ()
+    """For each proposal the shown mode at which it ends, -1 where that is none of them."""
+
+    @property
+    def steps(self) -> int:
+        """Steps of the refinement."""
+        return max(len(self.ways) - 1, 0)
+
+    def proposal_of(self, mode: int) -> int | None:
+        """The first proposal that ends at a mode: the likeliest, as those come first."""
+        return self.ends.index(mode) if self.steps and mode in self.ends else None
 
 
 NO_MODES = Modes((), 0)
 
 
-def listed_modes(modes: tuple[Mode, ...], samples: Candidates | None) -> Modes:
-    """Modes with names, and which of them each raw sample's component led to."""
-    shown = named_modes(modes)
-    return Modes(shown, len(modes), samples, None if samples is None else led_to(samples, shown))
+def modes_of(answer: Allocation, own: Candidates, badge: str, ways: tuple[Candidates, ...]) -> Modes:
+    """The modes of an answer.
+
+    Args:
+        answer: the answer.
+        own: itself as a candidate.
+        badge: whose it is.
+        ways: what a network proposed for it, and its refinement; the last of them are ways of their own.
+    """
+    last = ways[-1]
+    exact = [k for k in last.effort.argsort(kind="stable").tolist() if last.err_norm[k] <= EXACT]
+    layout, found = answer.layout, own.beside(last.rows(exact))
+    modes = find_modes(found, force_sizes(layout, found.command), layout.lower, layout.upper)
+    sizes = force_sizes(layout, last.command)
+    signatures = [mode_signature(*each) for each in zip(last.command, sizes, strict=True)]
+    ends = tuple(
+        next((k for k, mode in enumerate(modes[:MAX_SHOWN]) if same_signature(mode.signature, end)), -1)
+        for end in signatures
+    )
+    return listed_modes(modes, badge, ways, ends)
 
 
-def known_modes(answer: Allocation) -> tuple[Mode, ...]:
-    """The modes among the candidates that an answer has refined anyway: a few, but they cost no time."""
-    return () if answer.candidates is None else modes_of(answer, answer.candidates)
-
-
-def modes_of(answer: Allocation, candidates: Candidates) -> tuple[Mode, ...]:
-    """The modes among candidates for the question of an answer."""
-    layout = answer.layout
-    return find_modes(candidates, force_sizes(layout, candidates.command), layout.lower, layout.upper)
-
-
-def named_modes(modes: tuple[Mode, ...]) -> tuple[NamedMode, ...]:
-    """The first `MAX_SHOWN` modes with their names, no two alike."""
+def listed_modes(
+    modes: tuple[Mode, ...], badge: str, ways: tuple[Candidates, ...] = (), ends: tuple[int, ...] = ()
+) -> Modes:
+    """Modes with their names, no two alike; all but the first are the network's."""
     shown = modes[:MAX_SHOWN]
-    names = _names([mode.signature for mode in shown])
-    return tuple(NamedMode(mode, name) for mode, name in zip(shown, names, strict=True))
+    names = _names(mode.signature for mode in shown)
+    badges = [badge, *["network"] * (len(shown) - 1)]
+    named = tuple(NamedMode(*each) for each in zip(shown, names, badges, strict=False))
+    return Modes(named, len(modes), ways, ends)
 
 
-def same_mode(wanted: Mode, modes: tuple[NamedMode, ...]) -> int:
-    """The place of a mode that is known from another list; 0, the best one, where it is not there."""
-    places = (k for k, (mode, _) in enumerate(modes) if same_signature(mode.signature, wanted.signature))
-    return next(places, 0)
-
-
-def led_to(samples: Candidates, modes: tuple[NamedMode, ...]) -> NDArray[np.intp]:
-    """For each raw sample (K,) the first mode that its component led to, -1 where it led to none."""
-    places: dict[str, int] = {}
-    for k, (mode, _) in enumerate(modes):
-        for source in mode.sources:
-            places.setdefault(source, k)
-    return np.array([places.get(source, -1) for source in samples.source], dtype=np.intp)
-
-
-def _names(signatures: list[ModeSignature]) -> list[str]:
+def _names(signatures: Iterable[ModeSignature]) -> list[str]:
     """Who rests; modes of the same name are numbered."""
     told = [_resting_words(signature) for signature in signatures]
     places = [told[:k].count(name) + 1 for k, name in enumerate(told)]

@@ -15,8 +15,9 @@ from finlab.allocation.solution import Candidates
 from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.physics import plant_of
+from webapp.markup.verdict import is_proved
 from webapp.session.state import DRAWING, State
-from webapp.tasks.mode_names import OWN, Modes, known_modes, listed_modes, modes_of
+from webapp.tasks.mode_names import NO_MODES, OWN, Modes, listed_modes, modes_of
 
 Load = Callable[..., MethodChoice]
 KEPT = 24
@@ -29,8 +30,6 @@ class Reply:
 
     state: State
     answer: Allocation
-    modes: Modes
-    """Those of its modes that are known anyway: a few."""
     in_reach: bool
     """Whether any command of the working fins gives what is asked."""
 
@@ -96,32 +95,30 @@ class Solver:
         """
         answer = judged(self.solve(state))
         _ = answer.forces, answer.power, answer.effort  # told here, not where the page is written
-        modes = listed_modes(known_modes(answer), answer.samples)
         in_reach = answer.reachable
         if not in_reach and state.method != "dual":  # which misses nothing that can be reached
             in_reach = self.solve(replace(state, method="dual")).reachable
-        return Reply(state, answer, modes, in_reach)
+        return Reply(state, answer, in_reach)
 
     def modes(self, reply: Reply) -> Modes:
-        """All distinct ways to do what an answer does, tens of milliseconds: those of its method, or beside
-        its one answer those that the network proposes."""
+        """The answer, and beside it all distinct ways to do the same that the network proposes: tens of
+        milliseconds. Method `paper` has a network of its own."""
         answer, state = reply.answer, reply.state
         _ = answer.bound, answer.notes  # to prove what is least takes longer than to find it
-        if state.method in DRAWING:
+        if state.method == "paper":
             found = judged_modes(answer, self.allocator(state).explore(answer))
-            return listed_modes(found, answer.samples)
+            return listed_modes(found, "network", (answer.samples,) if answer.samples is not None else ())
         if not (answer.reachable and answer.layout.is_of_fins and answer.effort is not None):
-            return reply.modes
-        network = self.allocator(replace(state, method="mdn"))
-        proposed = self.solve(replace(state, method="mdn"))
-        others = network.alternatives(proposed)
-        if others is None or proposed.samples is None:
-            return reply.modes
-        costs = np.array([answer.effort]), np.array([answer.power])
-        own = Candidates(
-            answer.command[None], answer.wrench[None], np.array([answer.err_norm]), *costs, (OWN,)
-        )
-        return listed_modes(modes_of(answer, own.beside(others)), proposed.samples)
+            return NO_MODES
+        if state.method == "mdn" and answer.candidates is not None:
+            own, badge = answer.candidates.rows([0]), "network"
+        else:
+            costs = np.array([answer.effort]), np.array([answer.power])
+            error = np.array([answer.err_norm])
+            own = Candidates(answer.command[None], answer.wrench[None], error, *costs, (OWN,))
+            badge = "optimum" if is_proved(answer) else state.method
+        ways = self.allocator(replace(state, method="mdn")).refinement(answer)
+        return modes_of(answer, own, badge, ways)
 
     def solve(self, state: State) -> Allocation:
         """The answer to a state.
