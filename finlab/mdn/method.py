@@ -9,14 +9,13 @@ Where a target is out of reach the default method says which wrench is to be del
 """
 
 from functools import cached_property
-from typing import Any, ClassVar, NamedTuple, Self
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from finlab.allocation.dual.method import Dual
 from finlab.allocation.dual.rates import Rates
 from finlab.allocation.evaluate import REACHED, costs
-from finlab.allocation.levenberg_marquardt import CommandProblem
 from finlab.allocation.mdn_settings import MdnSettings
 from finlab.allocation.method import Method, Takes
 from finlab.allocation.policy import Policy
@@ -85,18 +84,8 @@ class Mdn(Method):
         self._network = weights.single_precision
         self._one_thread = single_threaded_products()
 
-    def at(self, flow: Array | None) -> Self:
+    def solve(self, targets: Array, *, policy: Policy, **asked: Any) -> Solution:
         """See `Method`."""
-        other = super().at(flow)
-        if other is not self:
-            commands = CommandProblem.of(other.plant, self.sigma)
-            other.robot = self.robot._replace(plant=other.plant, commands=commands)
-        return other
-
-    def solve(self, targets: Array, *, policy: Policy, flow: Array | None = None, **asked: Any) -> Solution:
-        """See `Method`."""
-        if (moved := self.at(flow)) is not self:
-            return moved.solve(targets, policy=policy, **asked)
         target, previous, seed = targets / self.sigma, asked.get("previous"), asked.get("seed", 0)
         if len(target) == 1:
             found = self._one(policy, target, previous, seed)
@@ -116,8 +105,6 @@ class Mdn(Method):
         self, target: Array, *, policy: Policy, previous: Array | None, flow: Array | None, seed: int
     ) -> Candidates:
         """The answers, then where all proposals end, the cheapest first."""
-        if (moved := self.at(flow)) is not self:
-            return moved.alternatives(target, policy=policy, previous=previous, flow=None, seed=seed)
         first = self._one(policy, target[None] / self.sigma, previous, seed)
         ends = self.refinement(target, flow=None, seed=seed)[-1]
         exact = USUAL_SHARE * max(ALTERNATIVE_ERROR, 1.01 * float(first.answers.error[0, 0]))
@@ -126,8 +113,6 @@ class Mdn(Method):
 
     def refinement(self, target: Array, *, flow: Array | None, seed: int) -> tuple[Candidates, ...]:
         """See `Method`."""
-        if (moved := self.at(flow)) is not self:
-            return moved.refinement(target, flow=None, seed=seed)
         wanted = target[None] / self.sigma
         with self._one_thread():
             proposal = self.proposals(wanted, seed)
@@ -169,7 +154,7 @@ class Mdn(Method):
         missed = answers.error[:, 0] > robot.exact
         if missed.any():
             some, asked = answers.rows(missed), target[missed]
-            command = self._default.solve(asked * self.sigma, policy=policy, flow=self.plant.flow).command
+            command = self._default.solve(asked * self.sigma, policy=policy).command
             delivered = robot.commands.wrench(command)
             near = np.linalg.norm(delivered - asked, axis=1)
             # A little that all miss is what the fins cannot go below; more is what the policy decides.
