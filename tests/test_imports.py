@@ -14,7 +14,16 @@ ROOT = Path(__file__).resolve().parents[1]
 
 LEVELS = (
     ("errors", "arrays", "distribution"),
-    ("files", "assets", "command_end", "least_squares", "precision", "small_systems", "whole_file"),
+    (
+        "files",
+        "assets",
+        "command_end",
+        "least_squares",
+        "precision",
+        "small_systems",
+        "text_table",
+        "whole_file",
+    ),
     ("bundle_files",),
     ("layout",),
     ("actuators",),

@@ -8,32 +8,24 @@ from typing import TYPE_CHECKING
 
 from finlab.allocation.policy import AXES
 from finlab.layout.commands import AzimuthCommand, Command, FinCommand, RudderCommand
+from finlab.text_table import aligned
 
 if TYPE_CHECKING:
     from finlab.allocation.allocation import Allocation
 
-FIN_COLUMNS = ("A [rad]", "f [Hz]", "zero direction [deg]", "force [N]")
-"""Columns of the table of fins."""
-COLUMNS = ("type", "command", "force [N]")
-"""Columns of the table of actuators that are not all fins."""
-WRENCH_COLUMNS = tuple(f"{axis} [{'N' if axis.startswith('F') else 'N m'}]" for axis in AXES)
+COLUMNS = ("actuator", "type", "command", "force [N]")
+"""Columns of the table of actuators."""
+WRENCH_COLUMNS = ("", *(f"{axis} [{'N' if axis.startswith('F') else 'N m'}]" for axis in AXES))
 """Columns of the table of wrenches."""
 
 
-def columns_of(result: Allocation) -> tuple[str, ...]:
-    """Columns of the table of actuators, the names first."""
-    return ("fin", *FIN_COLUMNS) if result.layout.is_of_fins else ("actuator", *COLUMNS)
-
-
 def actuator_rows(result: Allocation) -> list[tuple[str, ...]]:
-    """Name and cells of each actuator; a failed one has no cells."""
-    if result.layout.is_of_fins:
-        return fin_rows(result)
+    """Cells of each actuator."""
     rows: list[tuple[str, ...]] = []
     for part, force in zip(result.layout.actuators, result.forces, strict=True):
         command = result.commands[part.name]
-        size = f"{math.hypot(*force):.3f}"
-        rows.append((part.name,) if command is None else (part.name, part.type, in_words(command), size))
+        told = ("failed", "") if command is None else (in_words(command), f"{math.hypot(*force):.3f}")
+        rows.append((part.name, part.type, *told))
     return rows
 
 
@@ -49,19 +41,6 @@ def in_words(command: Command) -> str:
     angle = f" at {math.degrees(command.angle):.1f} deg" if isinstance(command, AzimuthCommand) else ""
     sent = "" if command.input is None else f", input {command.input:.5g}"
     return f"{round(command.force, 3) + 0.0:.3f} N{angle}{sent}"
-
-
-def fin_rows(result: Allocation) -> list[tuple[str, ...]]:
-    """Name and cells of each fin; a failed one has no cells."""
-    rows: list[tuple[str, ...]] = []
-    for name, command, force in zip(result.fins, result.command, result.forces, strict=True):
-        if name in result.failed:
-            rows.append((name,))
-            continue
-        amplitude, frequency, direction = command
-        cells = (amplitude, frequency, math.degrees(direction), math.hypot(*force))
-        rows.append((name, *(f"{cell:.{digits}f}" for cell, digits in zip(cells, (3, 3, 1, 3), strict=True))))
-    return rows
 
 
 def wrench_rows(result: Allocation) -> list[tuple[str, ...]]:
@@ -96,26 +75,15 @@ def remarks(result: Allocation) -> list[str]:
 
 def allocation_text(result: Allocation) -> str:
     """The answer as plain text."""
-    rows = [columns_of(result), *actuator_rows(result)]
-    full = [row for row in rows if len(row) > 1]
-    width, *widths = (max(map(len, column)) for column in zip(*full, strict=True))
-    width = max(width, *(len(row[0]) for row in rows))
-    lines = []
-    for name, *cells in rows:
-        padded = [f"{cell:>{w}}" for cell, w in zip(cells, widths, strict=False)]
-        lines.append("  ".join([f"{name:<{width}}", *(padded or [" failed"])]))
-    lines += ["", "  ".join([" " * 9, *WRENCH_COLUMNS])]
-    for name, *cells in wrench_rows(result):
-        padded = [f"{cell:>{len(column)}}" for cell, column in zip(cells, WRENCH_COLUMNS, strict=True)]
-        lines.append("  ".join([f"{name:<9}", *padded]))
-    return "\n".join([*lines, "", summary(result), *remarks(result)])
+    actuators = aligned(COLUMNS, actuator_rows(result), (True, True, True, False))
+    wrenches = aligned(WRENCH_COLUMNS, wrench_rows(result), (True, *(False,) * 6))
+    return "\n".join([actuators, "", wrenches, "", summary(result), *remarks(result)])
 
 
 def allocation_html(result: Allocation) -> str:
     """The same tables for a notebook."""
-    rows = [row if len(row) > 1 else (*row, "failed") for row in actuator_rows(result)]
     words = "".join(f"<div>{escape(line)}</div>" for line in (summary(result), *remarks(result)))
-    return _html(columns_of(result), rows) + _html(("", *WRENCH_COLUMNS), wrench_rows(result)) + words
+    return _html(COLUMNS, actuator_rows(result)) + _html(WRENCH_COLUMNS, wrench_rows(result)) + words
 
 
 def _html(columns: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from finlab.text_table import aligned
+
 if TYPE_CHECKING:
     from finlab.analysis import Authority, Loss, ScoreCard
 
@@ -75,8 +77,6 @@ def _loss_row(loss: Loss, worst: bool) -> tuple[str, ...]:
 
 def table(head: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> list[str]:
     """Rows under a head; the first column and a last one of words are flush left, numbers are flush right."""
-    from finlab.evaluation.report.text import aligned
-
     words = [k == 0 or name in ("lost", "model") for k, name in enumerate(head)]
     return aligned(head, rows, words).splitlines()
 

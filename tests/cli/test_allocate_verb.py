@@ -108,19 +108,8 @@ def test_table_for_people(allocate: Callable[..., tuple[int, str, str]]) -> None
     code, out, _ = allocate("A", *WRENCH, "--failed", "front_left")
     assert code == 0
     lines = out.splitlines()
-    assert lines[0].split() == [
-        "fin",
-        "A",
-        "[rad]",
-        "f",
-        "[Hz]",
-        "zero",
-        "direction",
-        "[deg]",
-        "force",
-        "[N]",
-    ]
-    assert lines[2].split() == ["front_left", "failed"]
+    assert lines[0].split() == ["actuator", "type", "command", "force", "[N]"]
+    assert lines[2].split() == ["front_left", "fin", "failed"]
     labels = [line.split()[0] for line in lines if line]
     assert labels[5:10] == ["Fx", "asked", "delivered", "missing", "err_norm"]
     assert "1.000   0.000  -0.500     0.000     0.000     0.100" in out

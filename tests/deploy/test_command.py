@@ -58,8 +58,8 @@ def test_allocate_prints_a_table_or_one_object(folder: Path, capsys: Any) -> Non
     far = ["--wrench", "90", "0", "0", "0", "0", "0", "--policy", "direction"]
     assert main(["allocate", str(folder), *far, "--failed", "back_left"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert lines[0].split()[:5] == ["fin", "A", "[rad]", "f", "[Hz]"], "the table of the library"
-    assert lines[1 + lost].split() == ["back_left", "failed"]
+    assert lines[0].split()[:5] == ["actuator", "type", "command", "force", "[N]"], "the table of the library"
+    assert lines[1 + lost].split() == ["back_left", "fin", "failed"]
     assert any(line.startswith("err_norm ") for line in lines)
 
 
