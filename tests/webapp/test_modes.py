@@ -123,7 +123,7 @@ def test_a_refinement_is_played_step_by_step_on_the_robot() -> None:
     session, loop, worker = Session(load_layout("ucat")), AtOnce(), Direct()
     session.set_setting("method", "mdn")
     context = page_of(worker, session, loop=loop)
-    answering = Answering(context)
+    answering = Answering(context, lambda: None)
     refining = Refining(context, answering)
     with pytest.raises(FinlabError, match="proposes nothing"):
         refining.toggle()

@@ -1,5 +1,7 @@
 """Keeps one page's answer up to date: asks for the newest state, and knows what of the answer is shown."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from finlab.allocation.allocation import Allocation
@@ -16,10 +18,10 @@ SEARCH_REST_S = 0.2
 class Answering:
     """The newest answer, its modes, and the part of it that is on the robot."""
 
-    def __init__(self, context: Context) -> None:
-        """Answer what the page's session asks."""
+    def __init__(self, context: Context, found: Callable[[], None]) -> None:
+        """Answer what the page's session asks; `found` is called when its candidates are known."""
         self._session = context.session
-        self._changed, self._notify = context.changed, context.notify
+        self._changed, self._found, self._notify = context.changed, found, context.notify
         self._told: str | None = None
         self._shown: tuple[Allocation, Array, Allocation] | None = None
         loop, worker, solver = context.loop, context.workers.answers, context.solver
@@ -98,4 +100,4 @@ class Answering:
     def _take_modes(self) -> None:
         if self._search.error is not None:
             self._notify("No candidates", self._search.error)
-        self._changed()
+        self._found()

@@ -1,5 +1,6 @@
 """All that works for one page beside the event loop."""
 
+import asyncio
 from collections.abc import Callable
 
 from webapp.session.state import State
@@ -17,6 +18,9 @@ from webapp.tasks.swimming import Swimming
 CARD_REST_S = 0.35
 """How long a layout may not change before its card is worked out [s]: that takes a second."""
 
+TOGETHER_S = 0.4
+"""How long what comes beside an answer waits for the rest of it [s]."""
+
 
 class Jobs:
     """Questions under way, and what came of them."""
@@ -25,10 +29,12 @@ class Jobs:
         """Nothing has been asked yet."""
         self._session = context.session
         self._robot: tuple[str, tuple[str, ...]] | None = None
+        self._loop, self._changed = context.loop, context.changed
+        self._late: asyncio.TimerHandle | None = None
         loop, workers, changed = context.loop, context.workers, context.changed
-        self.answering = Answering(context)
+        self.answering = Answering(context, self._beside)
         self.refining = Refining(context, self.answering)
-        self.ranging = Newest(loop, workers.marks, find_ranges, changed, REST_S)
+        self.ranging = Newest(loop, workers.marks, find_ranges, self._beside, REST_S)
         self.analyst = Newest(loop, workers.cards, find, changed, CARD_REST_S)
         self.improver = Improver(context)
         self.fitting = Fitting(context)
@@ -48,6 +54,20 @@ class Jobs:
         self.analyst.ask(Question(state.able, state.failed, session.saved, session.display.drawn, state.flow))
         self.ranging.ask(State(state.able, state.failed, target=state.target, speed=state.speed))
         self.answering.ask()
+
+    def _beside(self) -> None:
+        """Marks and candidates come shortly after an answer: the page is written once for both, unless one
+        of them takes long."""
+        if self._late is None:
+            self._late = self._loop.later(TOGETHER_S, self._write)
+        if not (self.ranging.busy or self.answering.searching):
+            self._write()
+
+    def _write(self) -> None:
+        if self._late is not None:
+            self._late.cancel()
+        self._late = None
+        self._changed()
 
     def stop(self) -> None:
         """The page has gone."""
