@@ -13,7 +13,7 @@ from webapp.session import Display, Session
 from webapp.session.store import SessionStore
 from webapp.tasks.background import Workers
 from webapp.tasks.solver import Solver
-from webapp.viser_internals import disable_sharing, enter, stored
+from webapp.viser_internals import disable_sharing, stored
 
 FRAME_S = 1 / 25
 """Time between two poses of robots that swim [s]."""
@@ -78,7 +78,6 @@ class App:
             self._open(client, remembered)
 
     def _open(self, client: viser.ClientHandle, remembered: list[str]) -> None:
-        enter(client)
         key, session = self._store.enter(remembered)
         self._keys[client.client_id] = key
         if key not in remembered:

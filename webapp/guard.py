@@ -1,18 +1,20 @@
 """Who may talk to the server: pages that it served itself, and beyond this machine only with the token."""
 
 import hmac
-import re
 import secrets
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass
 from http import HTTPStatus
 from http.cookies import CookieError, SimpleCookie
 from ipaddress import ip_address
-from urllib.parse import parse_qs
+from types import MappingProxyType
+from urllib.parse import parse_qs, urlsplit
+
+from websockets.datastructures import Headers
+from websockets.http11 import Response
 
 COOKIE = "finlab-token"
 """Cookie that carries the token once the page has been opened with it."""
-LONGEST_PATH, LONGEST_QUERY = 200, 2_000
-"""Most characters of a path, and of what follows it; the page itself has one."""
 SECURE = {
     # The page is one file with its scripts inside; it evaluates those that the server sends, starts workers
     # from texts, and opens nothing elsewhere.
@@ -29,10 +31,6 @@ SECURE = {
     "Cross-Origin-Opener-Policy": "same-origin",
 }
 """Headers of every answer: no other site may frame the page, and it loads nothing from one."""
-_HOST = r"(?P<name>\[[0-9a-f:.]+\]|[a-z0-9_.-]+)(?::\d{1,5})?"
-_ORIGIN = re.compile(rf"(?P<scheme>[a-z][a-z0-9+.-]*)://(?P<host>{_HOST})")
-_HOST_ALONE = re.compile(_HOST)
-_TARGET = re.compile(r"/(?:[!-$&-~]|%(?!00)[0-9A-Fa-f]{2})*")
 
 
 def is_loopback(host: str) -> bool:
@@ -41,15 +39,6 @@ def is_loopback(host: str) -> bool:
         return host == "localhost" or ip_address(host.strip("[]")).is_loopback
     except ValueError:
         return False
-
-
-@dataclass(frozen=True)
-class Admission:
-    """What to answer a request that is not let through, or that brings the token along."""
-
-    status: HTTPStatus
-    text: str
-    headers: dict[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -65,54 +54,47 @@ class Guard:
         """A guard for an address, with a fresh token where others could connect."""
         return Guard(host, None if is_loopback(host) else secrets.token_urlsafe(18))
 
-    def check(self, path: str, headers: dict[str, str]) -> Admission | None:
-        """Look at a request; None lets it through.
+    def check(self, path: str, headers: dict[str, str]) -> Response | None:
+        """What to answer a request that is not let through, or that brings the token along; else None.
 
         Args:
             path: path and query of the request.
             headers: its headers, names in lower case.
         """
-        refused = self._malformed(path, headers) or self._foreign(headers)
-        if refused is not None or self.token is None:
-            return refused
-        given = parse_qs(path.partition("?")[2]).get("token", [""])[0]
-        if self._is_token(given):
+        host, origin = headers.get("host", "").lower(), headers.get("origin")
+        if is_loopback(self.host) and not is_loopback(_name(host)):
+            # Another site's name that was made to point at this machine.
+            return answer(HTTPStatus.FORBIDDEN, "This server answers to localhost only.\n")
+        if origin is not None and origin.lower().partition("://")[2] != host:
+            return answer(HTTPStatus.FORBIDDEN, "Pages of other sites may not use this server.\n")
+        if self.token is None:
+            return None
+        if self._is_token(parse_qs(path.partition("?")[2]).get("token", [""])[0]):
             cookie = f"{COOKIE}={self.token}; Path=/; HttpOnly; SameSite=Strict"
-            return Admission(HTTPStatus.SEE_OTHER, "", {"Location": "/", "Set-Cookie": cookie})
+            return answer(HTTPStatus.SEE_OTHER, "", {"Location": "/", "Set-Cookie": cookie})
         if self._is_token(_cookie(headers.get("cookie", ""))):
             return None
-        sentence = "Open the address with the token that finlab app printed.\n"
-        return Admission(HTTPStatus.UNAUTHORIZED, sentence)
-
-    def _malformed(self, path: str, headers: dict[str, str]) -> Admission | None:
-        """Why a request makes no sense."""
-        place, _, query = path.partition("?")
-        if len(place) > LONGEST_PATH or len(query) > LONGEST_QUERY:
-            return Admission(HTTPStatus.REQUEST_URI_TOO_LONG, "The address is too long.\n")
-        if not _TARGET.fullmatch(path):
-            return Admission(HTTPStatus.BAD_REQUEST, "The address is malformed.\n")
-        if not _HOST_ALONE.fullmatch(headers.get("host", "").lower()):
-            return Admission(HTTPStatus.BAD_REQUEST, "The header Host is missing or malformed.\n")
-        origin = headers.get("origin", "null").lower()
-        if origin != "null" and not _ORIGIN.fullmatch(origin):
-            return Admission(HTTPStatus.BAD_REQUEST, "The header Origin is malformed.\n")
-        return None
-
-    def _foreign(self, headers: dict[str, str]) -> Admission | None:
-        """Why a request may not come from where it comes from; its headers are well formed."""
-        host = headers["host"].lower()
-        match, origin = _HOST_ALONE.fullmatch(host), headers.get("origin")
-        if is_loopback(self.host) and not (match and is_loopback(match["name"])):
-            # Another site's name that was made to point at this machine.
-            return Admission(HTTPStatus.FORBIDDEN, "This server answers to localhost only.\n")
-        if origin is not None and origin.lower().partition("://")[2] != host:
-            return Admission(HTTPStatus.FORBIDDEN, "Pages of other sites may not use this server.\n")
-        return None
+        return answer(HTTPStatus.UNAUTHORIZED, "Open the address with the token that finlab app printed.\n")
 
     def _is_token(self, text: str) -> bool:
         return self.token is not None and hmac.compare_digest(
             text.encode(errors="replace"), self.token.encode()
         )
+
+
+def answer(status: HTTPStatus, text: str, headers: Mapping[str, str] = MappingProxyType({})) -> Response:
+    """A page of plain text."""
+    body = text.encode()
+    told = {"Content-Type": "text/plain; charset=utf-8", "Content-Length": str(len(body)), **headers}
+    return Response(status.value, status.phrase, Headers({**told, "Connection": "close"}), body)
+
+
+def _name(host: str) -> str:
+    """The name in a header Host, without the port; empty where there is none."""
+    try:
+        return urlsplit(f"//{host}").hostname or ""
+    except ValueError:
+        return ""
 
 
 def _cookie(text: str) -> str:

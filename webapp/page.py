@@ -30,7 +30,6 @@ from webapp.tasks.jobs import Jobs
 from webapp.tasks.reading import Reading
 from webapp.tasks.solver import Solver
 from webapp.theme import BLUE, VERMILLION
-from webapp.uploads import Uploads
 from webapp.viser_internals import run_script, uuid_of
 
 PATIENCE_S = 0.025
@@ -70,7 +69,6 @@ class Page(ABC):
         self.ask = Asking(client.gui, self.presses).ask
         self.designs = Designs(context, self.jobs.exports, self.presses)
         self.opening = Opening(client.gui, self.presses)
-        self._uploads = Uploads(client.gui, MAX_UPLOAD, partial(self.notify, "Not possible"))
         self._build()
         self.presses.start()
         self._refresh()
@@ -179,7 +177,18 @@ class Page(ABC):
         """A button that carries out `act(name, content)` when the user has chosen a file."""
         button = self.gui.add_upload_button(label, **options)
         self._hint(button)
-        self._uploads.on(button, lambda name, content: self.do(partial(act, name, content)))
+
+        def take(file: viser.UploadedFile) -> None:
+            name, size = file.name[-80:], len(file.content)
+            if size > MAX_UPLOAD:
+                raise FinlabError(f"{name}: has {size:,} bytes, expected at most {MAX_UPLOAD:,}")
+            act(name, file.content)
+
+        @button.on_upload
+        async def _uploaded(event: Any) -> None:
+            if event.client is not None:
+                self.do(partial(take, event.target.value))
+
         return button
 
     def _hint(self, button: Any) -> None:
@@ -235,5 +244,4 @@ class Page(ABC):
     def close(self) -> None:
         """The browser has gone."""
         self._loop.close()
-        self._uploads.close()
         self.jobs.stop()

@@ -3,11 +3,11 @@
 import asyncio
 import contextlib
 import io
+import logging
 import secrets
 import threading
-from collections.abc import Callable, Iterator, Sequence
-from functools import cache, partial
-from http import HTTPStatus
+from collections.abc import Iterator, Sequence
+from functools import cache
 from importlib.resources import files
 from types import SimpleNamespace
 from typing import Any, get_type_hints
@@ -20,10 +20,14 @@ from viser import _icons, _messages
 from viser._assignable_props_api import AssignablePropsBase
 from websockets.http11 import Request, Response
 
-from webapp.connections import MAX_MESSAGE, REQUEST_S, Connection, Connections, quiet, refusal
-from webapp.guard import SECURE, Admission, Guard
+from webapp.guard import SECURE, Guard
 
+MAX_MESSAGE = 16 * 1024 * 1024
+"""Longest message from a page [bytes]: the picture of a large view."""
 _STARTING = threading.Lock()
+quiet = logging.getLogger("finlab.connections")
+"""Of what strangers send wrongly, nothing is printed."""
+quiet.setLevel(logging.CRITICAL + 1)
 LOCAL = Guard("127.0.0.1")
 """Lets only pages of this machine in."""
 
@@ -37,34 +41,23 @@ def start_server(guard: Guard = LOCAL, port: int = 0) -> viser.ViserServer:
 
 @contextlib.contextmanager
 def _guarded(guard: Guard) -> Iterator[None]:
-    """Servers that start within this context ask the guard first, and keep few connections that say nothing.
-    Viser has no hook for that."""
-    serve, connections = websockets_server.serve, Connections()
+    """Servers that start within this context ask the guard first. Viser has no hook for that."""
+    serve = websockets_server.serve
 
     def guarded(*arguments: Any, process_request: Any = None, **options: Any) -> Any:
         def ask(connection: Any, request: Request) -> Response | None:
-            headers: dict[str, str] = {}
-            for name, value in request.headers.raw_items():
-                headers[name.lower()] = ", ".join(filter(None, (headers.get(name.lower()), value)))
+            headers = {name.lower(): value for name, value in request.headers.raw_items()}
             verdict = guard.check(request.path, headers)
-            if verdict is not None:
-                return refusal(verdict)
-            with contextlib.suppress(OSError, ValueError):  # what is no name of a file
-                answer: Response | None = process_request(connection, request)
-                if answer is None or answer.status_code == HTTPStatus.OK:
-                    return answer
-            return refusal(Admission(HTTPStatus.NOT_FOUND, "There is no such page.\n"))
+            answer: Response | None = process_request(connection, request) if verdict is None else verdict
+            return answer
 
         def secured(connection: Any, request: Request, response: Response) -> None:
             for name, value in SECURE.items():
-                if name not in response.headers:
-                    response.headers[name] = value
+                response.headers.setdefault(name, value)
 
         ours = {
             "process_request": ask,
             "process_response": secured,
-            "create_connection": partial(Connection, connections),
-            "open_timeout": REQUEST_S,
             "max_size": MAX_MESSAGE,
             "server_header": None,
             "logger": quiet,
@@ -73,14 +66,6 @@ def _guarded(guard: Guard) -> Iterator[None]:
 
     with patch.object(websockets_server, "serve", guarded):
         yield
-
-
-def enter(client: viser.ClientHandle) -> None:
-    """A connection is a page from now on."""
-    server = client._viser_server._websock_server
-    connection = server._live_connections.get(client.client_id)
-    if isinstance(connection, Connection):
-        connection.enter()
 
 
 async def stored(client: viser.ClientHandle, key: str, patience: Sequence[float]) -> str | None:
@@ -150,20 +135,6 @@ def run_script(gui: viser.GuiApi, source: str) -> None:
 def run_file(gui: viser.GuiApi, name: str, more: str = "") -> None:
     """Run a script that lies beside this file, and a line more."""
     run_script(gui, files("webapp").joinpath(name).read_text("utf-8") + more)
-
-
-def hear_uploads(
-    gui: viser.GuiApi, begin: Callable[[Any, Any], None], gather: Callable[[Any, Any], None]
-) -> None:
-    """Hear of each file that a page sends, and of its parts, in place of viser, which trusts the page."""
-    handlers = gui._websock_interface._incoming_handlers
-    handlers[_messages.FileTransferStartUpload] = [begin]
-    handlers[_messages.FileTransferPart] = [gather]
-
-
-def acknowledge(gui: viser.GuiApi, button: str, key: str, so_far: int, size: int) -> None:
-    """Tell a page how many bytes of a file have come."""
-    gui._websock_interface.queue_message(_messages.FileTransferPartAck(button, key, so_far, size))
 
 
 def stop_server(server: viser.ViserServer) -> None:

@@ -28,9 +28,9 @@ def test_foreign_origin_and_foreign_host_are_refused() -> None:
         "http://localhost:8080.evil.example",
     ):
         refused = guard.check("/", {**OWN, "origin": origin})
-        assert refused is not None and refused.status in (400, 403)
+        assert refused is not None and refused.status_code == 403
     rebound = guard.check("/", {"host": "evil.example:8080", "origin": "http://evil.example:8080"})
-    assert rebound is not None and rebound.status == 403
+    assert rebound is not None and rebound.status_code == 403
 
 
 def test_token_is_asked_for_beyond_this_machine() -> None:
@@ -45,9 +45,9 @@ def test_token_is_asked_for_beyond_this_machine() -> None:
         ("/", "=;="),
     ):
         refused = guard.check(path, {**headers, "cookie": cookie})
-        assert refused is not None and refused.status == 401
+        assert refused is not None and refused.status_code == 401
     opened = guard.check(f"/?token={guard.token}", headers)
-    assert opened is not None and opened.status == 303 and guard.token in opened.headers["Set-Cookie"]
+    assert opened is not None and opened.status_code == 303 and guard.token in opened.headers["Set-Cookie"]
     assert guard.check("/", {**headers, "cookie": f"{COOKIE}={guard.token}"}) is None
 
 
