@@ -91,7 +91,7 @@ def test_a_robot_with_thrusters_is_shown_and_answered(page: Any) -> None:
     page.until(lambda: session.state.failed == ("lift_right",) and "5 of 6" in page.text(".fl-status"))
     page.visible("/robot/fins/5/turn/force", False)
     page.tab("Simulate")
-    page.until(lambda: page.page.get_by_text("A swim works for robots of fins only").is_visible())
+    page.until(lambda: page.page.get_by_text("Start lets this robot swim").is_visible())
     assert page.problems == []
 
 

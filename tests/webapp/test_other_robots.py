@@ -68,7 +68,7 @@ def test_every_task_shows_the_robot(tab: Tab, layout: Layout, capsys: pytest.Cap
     assert tab.client.notes == [] and "Traceback" not in capsys.readouterr().err
     assert f"{layout.n} of {layout.n} actuators" in told and "Exact" in told and "proved least" in told
     assert all(name in told for name in layout.names) and "cannot be shown" not in told
-    assert "A swim works for " in told and "finlab allocate`" not in told
+    assert "Start lets this robot swim" in told and "finlab allocate`" not in told
     assert "weakest direction" in told and "axes independent" in told, "reach and score are of any robot"
     nodes = tab.nodes()
     assert all(f"/robot/fins/{k}/turn/blade" in nodes for k in range(layout.n))

@@ -4,6 +4,7 @@ from typing import Any
 
 import pytest
 
+from finlab.allocation import Allocator
 from finlab.errors import FinlabError
 from finlab.evaluation.experiments.hard_days import HARD_DAYS
 from finlab.layout import Layout, load_layout
@@ -11,8 +12,9 @@ from finlab.sim import FinFault
 from tests.webapp.loops import page_of
 from tests.webapp.test_swimming import SHORT, until
 from webapp.session.state import State
-from webapp.session.swim_plan import SCENARIOS, SwimSettings
+from webapp.session.swim_plan import SCENARIOS, SwimSettings, scenarios_of
 from webapp.tasks.background import Worker
+from webapp.tasks.swimmer import Swimmer, closed_loop
 from webapp.tasks.swimming import Swimming
 
 UCAT = load_layout("ucat")
@@ -76,8 +78,8 @@ def swimming() -> Any:
 
 
 def test_what_is_true_is_not_what_is_believed(swimming: Swimming) -> None:
-    settings = chosen("weak", method="analytic")
-    plan = settings.plan(State(UCAT, failed=("back_right",)))._replace(path=SHORT)
+    settings = chosen("weak")
+    plan = settings.plan(State(UCAT, failed=("back_right",), method="analytic"))._replace(path=SHORT)
     swimming.start(plan)
     until(lambda: swimming.swimmer is not None)
     assert swimming.swimmer is not None
@@ -86,3 +88,19 @@ def test_what_is_true_is_not_what_is_believed(swimming: Swimming) -> None:
     (weak,) = plan.weak
     assert swim.broken[weak] == FinFault(weak, 0.0, "torn", 0.7) and weak not in swim.told
     assert swim.controller.name == "tracking"
+
+
+@pytest.mark.parametrize("robot", ["bluerov2", "fish", "torpedo", "catamaran"])
+def test_any_robot_has_the_scenarios_that_it_can_swim(robot: str) -> None:
+    layout = load_layout(robot)
+    assert ("ripple" in scenarios_of(layout)) == bool(layout.fins)
+    settings = SwimSettings().with_value("scenario", "ripple")
+    plan = settings.plan(State(layout))
+    assert plan.scenario == ("ripple" if layout.fins else "nominal")
+    swimmer = Swimmer(plan, closed_loop(plan, Allocator(layout)))
+    for _ in range(3):
+        swimmer.step()
+    moment = swimmer.moment()
+    assert (
+        moment.figures is not None and moment.figures.mean_w >= 0.0 and moment.motion.shape == (layout.n, 3)
+    )

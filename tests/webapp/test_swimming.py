@@ -124,7 +124,7 @@ def test_a_robot_that_no_fins_can_steer_is_told_with_all_its_fins(swimming: Swim
     swimming.start(Plan(aligned, (), path=SHORT, method="analytic"))
     until(lambda: swimming.swimmer is not None)
     assert swimming.swimmer.shown.failed == ()
-    assert "With these fins surge, heave and yaw are not free" in swim_card(*now(swimming))
+    assert "With these actuators surge, heave and yaw are not free" in swim_card(*now(swimming))
 
 
 def test_bad_plans_and_methods_out_of_order(swimming: Swimming) -> None:

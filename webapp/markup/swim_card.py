@@ -11,7 +11,7 @@ from webapp.tasks.swimming import Swimming
 FIGURES = (
     "off the path, root mean square",
     "off in depth",
-    "mean power of the fins",
+    "mean power",
     "over the last second",
     "energy so far",
 )
@@ -65,7 +65,7 @@ def swim_card(swims: bool, swimmer: Swimmer | None, moment: Moment | None, pace:
         pace: as `pace_words` gives it.
     """
     if not swims:
-        return Markup("<div class='fl dim'>Start lets this robot swim, with the fins that work.</div>")
+        return Markup("<div class='fl dim'>Start lets this robot swim, with what works.</div>")
     if swimmer is None or moment is None:
         return Markup("<div class='fl dim'>making ready …</div>")
     head = html("<b>{:.1f} s</b> of {:.0f} s, {}", moment.time, swimmer.duration_s, pace)
@@ -98,7 +98,7 @@ def _warnings(swimmer: Swimmer, shown: Moment) -> str:
         warning += html("<div class='missing'>{}: {}.</div>", swimmer.method, words)
     if not shown.controllable:
         lost = [swimmer.fins.index(name) for name in shown.failed]
-        fins = f"Without {fins_words(lost)}" if lost else "With these fins"
+        fins = f"Without {fins_words(lost, swimmer.layout)}" if lost else "With these actuators"
         warning += html(
             "<div class='missing'>{} surge, heave and yaw are not free of each other: expect it "
             "to drift off.</div>",

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from finlab.allocation.allocation import Allocation
 from finlab.arrays import Array
-from finlab.errors import LayoutError
 from finlab.layout import Azimuth, Fin, Layout
 from finlab.layout.damage import Health
 from finlab.vehicle.body import complete_body
@@ -130,16 +129,6 @@ def saturated(allocation: Allocation) -> NDArray[np.bool_]:
         high = (command >= AT_LIMIT * layout.upper[:, :2]) & (layout.upper[:, :2] > 0.0)
         low = (command <= AT_LIMIT * layout.lower[:, :2]) & (layout.lower[:, :2] < 0.0)
     return np.asarray((high | (low & ~of_fins)) & ~turns)
-
-
-def fins_only(layout: Layout, what: str) -> str:
-    """Why a robot with other actuators cannot have something yet; nothing where it can."""
-    try:
-        layout.only_fins(what, horizontal=True)
-    except LayoutError as error:
-        text = str(error).partition(";")[0]
-        return f"{text[0].upper()}{text[1:]}."
-    return ""
 
 
 def parts_word(layout: Layout) -> str:

@@ -11,18 +11,15 @@ from importlib.resources import files
 
 from markupsafe import Markup
 
-from finlab.layout import Layout
 from webapp.commands import commands, register
 from webapp.handles import add_html, put
 from webapp.markup.html import html, marker
-from webapp.markup.words import fins_only
 from webapp.page import Page
 from webapp.panels.places import DRAWER, LEFT, PLACES, REGIONS, RIGHT, SIMULATE, Place
 from webapp.panels.status import add_corner
 from webapp.presses import press
 from webapp.session.lessons import Stop
 from webapp.session.looking import DRAWERS, Desk
-from webapp.session.state import can_be_edited
 from webapp.tasks.swimmer import Swimmer
 from webapp.theme import ASKED, DELIVERED, MISSING, css
 from webapp.viser_internals import run_file, run_script
@@ -51,7 +48,7 @@ class Section:
     def __init__(self, page: Page, place: Place, index: int) -> None:
         """Build the panel."""
         self.place, self.name, self._page = place, f"at-{index}", page
-        self._met, self.refused = False, False
+        self._met = False
         gui = page.gui
         self.group = page.board.group(self._fail)
         with gui.add_folder(place.title, expand_by_default=not place.folded) as self.whole:
@@ -60,19 +57,15 @@ class Section:
             with gui.add_folder(None, visible=False) as self._folder:
                 place.make(page)
 
-    def arrange(self, desk: Desk, about: tuple[str, ...], layout: Layout) -> bool:
-        """Whether it belongs to what is being done; a robot that it does not take is told so in its place."""
+    def arrange(self, desk: Desk, about: tuple[str, ...]) -> bool:
+        """Whether it belongs to what is being done."""
         place = self.place
         opened = place.region != DRAWER or (place.title == desk.opened[desk.task] and not desk.folded)
-        there = desk.task in place.tasks and place.about in about and opened
-        self.refused = there and place.fins_only is not None and not can_be_edited(layout)
-        self.group.there = there and not self.refused
-        if self.refused:
-            self._say(html("<div class='fl dim'>{}</div>", fins_only(layout, place.fins_only or "")))
-        elif there:
+        self.group.there = there = desk.task in place.tasks and place.about in about and opened
+        if there:
             self._met = True
             self._say("")
-        return there and not (self.refused and place.fins_only == "")
+        return there
 
     def _fail(self, error: Exception | None) -> None:
         if error is None:
@@ -121,13 +114,11 @@ class Frame:
         if error is not None:
             self._page.fault(error)
 
-    def _arrange(
-        self, desk: Desk, selected: str | None, stop: Stop | None, layout: Layout, swimmer: Swimmer | None
-    ) -> None:
+    def _arrange(self, desk: Desk, selected: str | None, stop: Stop | None, swimmer: Swimmer | None) -> None:
         """Which regions are there, and which sections in them; the drawer is low until there are plots in
         it."""
         about = ("", "robot" if selected is None else "actuators", *["guide"] * (stop is not None))
-        there = [section for section in self.sections if section.arrange(desk, about, layout)]
+        there = [section for section in self.sections if section.arrange(desk, about)]
         regions = {section.place.region for section in there}
         gone = [FOLDER.format(section.name) for section in self.sections if section not in there]
         gone += [FOLDER.format(region) for region in (LEFT, RIGHT) if region not in regions]

@@ -39,9 +39,6 @@ class Place(NamedTuple):
     about: str = ""
     """What must be selected for it to be there: `actuators`, or none of them (`robot`); `guide` where a tour
     or a lesson must be under way; nothing where it is there always."""
-    fins_only: str | None = None
-    """What a robot with other actuators is told that it cannot have yet; where it is empty, the panel is
-    not there for such a robot. None for panels that take any robot."""
 
 
 PLACES = (
@@ -65,10 +62,10 @@ PLACES = (
     Place(RIGHT, (ALLOCATE,), "Asked and delivered", add_answer),
     Place(DRAWER, (ALLOCATE,), "Candidates", add_candidates),
     Place(DRAWER, (ALLOCATE,), "Comparison", add_comparison),
-    Place(LEFT, (SIMULATE,), "Scenario", add_scenario, fins_only=""),
-    Place(RIGHT, (SIMULATE,), "Run", add_run, fins_only="a swim"),
-    Place(RIGHT, (SIMULATE,), "Figures", add_figures, fins_only=""),
-    Place(DRAWER, (SIMULATE,), "Swim over time", add_timeline, fins_only=""),
+    Place(LEFT, (SIMULATE,), "Scenario", add_scenario),
+    Place(RIGHT, (SIMULATE,), "Run", add_run),
+    Place(RIGHT, (SIMULATE,), "Figures", add_figures),
+    Place(DRAWER, (SIMULATE,), "Swim over time", add_timeline),
     Place(RIGHT, (EXPORT,), "Files", add_files),
     Place(VIEW, TASKS, "Camera", partial(card, camera)),
     Place(VIEW, TASKS, "Display", add_switches, folded=True),

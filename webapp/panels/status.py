@@ -193,7 +193,7 @@ def swim_corner(first: Swimmer, shown: Moment, pace: str, newtons: float) -> str
     off = f"{100 * float(shown.record[-1, ERROR]):.1f}" if len(shown.record) else "–"
     power = "–" if shown.figures is None else f"{shown.figures.now_w:.1f}"
     parts = [
-        html("<span>{} of {} fins</span>", alive, len(first.fins)),
+        html("<span>{} of {} {}</span>", alive, len(first.fins), parts_word(first.layout)),
         html("<span><b>{:.1f}</b> s of {:.0f} s</span>", shown.time, first.duration_s),
         html("<span><span class='dim'>off the path</span> <b>{}</b> cm</span>", off),
         html("<span><span class='dim'>power</span> <b>{}</b> W</span>", power),

@@ -13,7 +13,7 @@ from webapp.markup.swim_card import swim_card
 from webapp.markup.words import righting_sentences, trim_sentence
 from webapp.page import Page
 from webapp.panels.damage import Row, add_fin_buttons
-from webapp.session.swim_plan import SCENARIOS, SPEEDS, SwimSettings
+from webapp.session.swim_plan import SCENARIOS, SPEEDS, SwimSettings, scenarios_of
 from webapp.session.targets import axis_reach
 from webapp.tasks.moment import Moment
 from webapp.tasks.swimmer import Swimmer
@@ -21,23 +21,30 @@ from webapp.tasks.swimmer import Swimmer
 
 def _bind(page: Page, key: str, widget: Any) -> None:
     """A widget for a setting of swims."""
-    page.bind(widget, partial(page.session.set_swim, key), lambda swim: getattr(swim, key))
+    page.bind(
+        widget, partial(page.session.set_swim, key), lambda swim, layout: getattr(swim.fitting(layout), key)
+    )
 
 
 def add_scenario(page: Page) -> None:
     """What is swum, in which water, by which methods."""
     gui = page.gui
-    day = "A day that is not as the designer assumed; it sets path, water, body, sensors and fins."
-    _bind(page, "scenario", gui.add_dropdown("Scenario", tuple(SCENARIOS), hint=day))
+    day = "A day that is not as the designer assumed; it sets path, water, body, sensors and actuators."
+    days = gui.add_dropdown("Scenario", tuple(SCENARIOS), hint=day)
+    page.board.show(days, options=scenarios_of)
+    _bind(page, "scenario", days)
     page.add_html(_about)
     _bind(page, "path", gui.add_dropdown("Path", tuple(SHIPPED), hint="Where to swim."))
     forces = "The fin law, its ripple, or a robot that is not built as drawn."
-    _bind(page, "plant", gui.add_dropdown("Fin forces", tuple(PLANTS), hint=forces))
+    plants = gui.add_dropdown("Fin forces", tuple(PLANTS), hint=forces)
+    page.board.show(plants, visible=lambda layout: bool(layout.fins))
+    _bind(page, "plant", plants)
 
 
-def _about(swim: SwimSettings, method: str) -> str:
+def _about(swim: SwimSettings, layout: Layout, method: str) -> str:
     """The day, and who allocates ten times a second."""
-    return html("<div class='fl'>{} Method {}, as in the bar, allocates.</div>", swim.day.about, method)
+    about = swim.fitting(layout).day.about
+    return html("<div class='fl'>{} Method {}, as in the bar, allocates.</div>", about, method)
 
 
 def add_run(page: Page) -> None:
@@ -45,7 +52,6 @@ def add_run(page: Page) -> None:
     session, gui, swimming = page.session, page.gui, page.jobs.swimming
 
     def start() -> None:
-        session.state.layout.only_fins("a swim", horizontal=True)
         swimming.start(session.swim.plan(session.state))
 
     def hold() -> None:
@@ -61,8 +67,8 @@ def add_run(page: Page) -> None:
     page.board.act(lambda swim: swimming.pace.set_speed(swim.speed))
     add_fin_buttons(
         page,
-        "Break a fin",
-        "Press a fin's number: break or mend it while it swims.",
+        "Break",
+        "Press a number: break or mend that one while it swims.",
         "fl-breaks",
         lambda name: swimming.toggle(name, session.swim.announced),
         _breakable,

@@ -33,7 +33,7 @@ STEPS = (5.0, 10.0, 20.0, 30.0, 45.0, 60.0, 90.0, 120.0, 180.0, 240.0)
 CERTAIN = 114.0
 """End of the axis of probabilities [%]: some room above what is certain."""
 UNSWUM = (
-    "Once a swim is started, its distance from the path, power, wrench, fin forces and what is found broken "
+    "Once a swim is started, its distance from the path, power, wrench, forces and what is found broken "
     "are plotted here over time."
 )
 SMOOTH = 1.0
@@ -53,7 +53,7 @@ def add_timeline(page: Page) -> None:
 
     off, deep, power = plot(robot, "off [cm]"), plot(robot, "z off [cm]"), plot(robot, "power [W]")
     surge = plot(wrench, "surge [N]", "time [s]")
-    forces = plot(FIN_LINES, "fins [N]", "time [s]")
+    forces = plot(FIN_LINES, "forces [N]", "time [s]")
     broken = plot(FIN_LINES, "broken %", "time [s]")
     drawn = 0.0
 

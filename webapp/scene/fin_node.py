@@ -132,7 +132,8 @@ class FinNode:
         self._blade.show(_moving_part, type(part))
         self._root = np.array([fin_mesh.ROOT + fin_mesh.SPAN / 2 if is_blade else 0.0, 0.0, 0.0])
         put(self._move, visible=True, active_axes=(selected,) * 3)
-        put(self._turn, active_axes=(selected, selected, False))
+        level = isinstance(part, Fin) and part.mounting_angle is not None
+        put(self._turn, active_axes=(selected and level, selected and level, False))
         if not owned_by_user:
             put(self._move, position=np.array(part.position))
             put(self._turn, wxyz=np.asarray(SO3.from_matrix(frame.T).wxyz))

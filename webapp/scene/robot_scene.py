@@ -22,7 +22,7 @@ from webapp.scene.meshes.mesh import Mesh, joined
 from webapp.scene.stage import Shape, Stage, aim_camera
 from webapp.scene.wrench_nodes import LENGTH, AttainableNodes, Scale, WrenchNodes
 from webapp.session.display import Display
-from webapp.session.state import can_be_edited, chosen
+from webapp.session.state import chosen
 from webapp.session.swim_plan import SwimSettings
 from webapp.tasks.analyst import Findings
 from webapp.tasks.context import Context
@@ -130,7 +130,7 @@ class RobotScene:
             self._fins.append(FinNode(self._client.scene, len(self._fins), self._clicked, self._drag))
         for node in self._fins[drawn.n :]:
             node.hide()
-        edited = selected if task == "Design" and not swims and can_be_edited(drawn) else None
+        edited = selected if task == "Design" and not swims else None
         for i, part in enumerate(drawn.actuators):
             told = "" if swims or part.name in failed else damage_words(health, part.name)
             words = (str(i + 1), part.name if part.name in selection else "", told)

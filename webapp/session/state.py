@@ -9,7 +9,7 @@ from finlab.allocation.mdn_settings import MdnSettings
 from finlab.allocation.methods import METHODS
 from finlab.allocation.policy import AXES, KINDS
 from finlab.errors import FinlabError
-from finlab.layout import Fin, Layout
+from finlab.layout import Layout
 from finlab.layout.damage import Health
 from finlab.layout.fin import MAX_AMPLITUDE, MAX_FREQUENCY
 from finlab.paper.settings import PaperSettings
@@ -194,11 +194,6 @@ def _checked_fault(name: str, kind: str, value: Any) -> Any:
         number(frequency, f"frequency of {name} [Hz]", 0.0, MAX_FREQUENCY),
         number(angle, f"direction of {name} in radians", -math.pi - 1e-6, math.pi + 1e-6),
     )
-
-
-def can_be_edited(layout: Layout) -> bool:
-    """Whether all actuators are fins with horizontal shafts, which the page can place and turn so far."""
-    return all(isinstance(part, Fin) and part.mounting_angle is not None for part in layout.actuators)
 
 
 def compared(layout: Layout) -> tuple[str, ...]:

@@ -73,6 +73,12 @@ class SwimSettings:
             raise FinlabError(f"a swim has no setting {key!r:.40}")
         return replace(self, **{key: chosen(value, key, CHOICES[key])})
 
+    def fitting(self, layout: Layout) -> "SwimSettings":
+        """The same without what a robot has not: forces of fins that are not as their laws say."""
+        if self.scenario not in scenarios_of(layout):
+            return self.with_value("scenario", "nominal")
+        return self if layout.fins else replace(self, plant="mean")
+
     @property
     def day(self) -> HardDay:
         """The scenario."""
@@ -84,6 +90,8 @@ class SwimSettings:
         Raises:
             FinlabError: the scenario takes more fins away than the robot has.
         """
+        if self != self.fitting(state.layout):
+            return self.fitting(state.layout).plan(state)
         day, layout = self.day, state.able
         path = make_trajectory(self.path, day.duration_s if self.path == day.trajectory else None)
         affected = _affected(layout, state.failed, day)
@@ -102,6 +110,11 @@ class SwimSettings:
             tuple(FinFault(name, 0.5 * path.duration_s) for name in affected) if day.lost else (),
             self.announced,
         )
+
+
+def scenarios_of(layout: Layout) -> tuple[str, ...]:
+    """The scenarios that a robot may have."""
+    return tuple(name for name, day in SCENARIOS.items() if layout.fins or day.plant == "mean")
 
 
 def _affected(layout: Layout, failed: tuple[str, ...], day: HardDay) -> tuple[str, ...]:
