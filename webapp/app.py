@@ -42,7 +42,6 @@ class App:
         self._server = server
         self._solver = solver
         self._workers = Workers()
-        self._workers.readers.warm()
         self._store = SessionStore(lambda: Session(layout, display))
         self.views: dict[int, View] = {}
         self._keys: dict[int, str] = {}

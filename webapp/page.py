@@ -58,7 +58,7 @@ class Page(ABC):
         self._faults: set[str] = set()
         self._soon: asyncio.TimerHandle | None = None
         self._note: viser.NotificationHandle | None = None
-        reading = Reading(workers.readers, page, self.do)
+        reading = Reading(workers.readers, page, self.do, partial(self.notify, "Not possible"))
         context = Context(
             client, session, solver, workers, page, reading, self.do, self._refresh, self.notify
         )

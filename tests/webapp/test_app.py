@@ -138,7 +138,7 @@ def test_a_bundle_that_cannot_be_made_is_told(server: viser.ViserServer, view: V
     until(lambda: "ucat_bundle.zip" in view.client.files)
     on_loop(server, lambda: view.do(lambda: view.session.set_setting("method", "sqp")))
     on_loop(server, lambda: view.do(view.jobs.exports.bundle))
-    until(lambda: any("Not exported" in note for note in view.client.notes))
+    until(lambda: any("Not possible" in note for note in view.client.notes))
     assert "cannot be exported" in view.client.notes[-1]
 
 

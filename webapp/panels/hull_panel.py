@@ -33,8 +33,7 @@ def add_hull(page: Page) -> None:
 
     def load(name: str, content: bytes) -> None:
         unit = session.mesh_unit
-        read = partial(stored_hull, name, content, unit)
-        page.reading.read(read, partial(take, unit), partial(_drawn, page))
+        page.reading.make(lambda: _drawn(page, stored_hull(name, content, unit)), partial(take, unit), "hull")
 
     def take(unit: str, hull: Hull) -> None:
         if hull.scale == UNITS[unit]:
@@ -111,6 +110,7 @@ def _add_turns(page: Page) -> None:
         page.reading.make(
             lambda: _drawn(page, reshaped_hull(hull, lambda mesh: turned(mesh, matrix))),
             partial(put_on, name, hull),
+            "hull",
         )
 
     def put_on(name: str, before: Hull, hull: Hull) -> None:

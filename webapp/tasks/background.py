@@ -9,7 +9,6 @@ from functools import partial
 from typing import Generic, TypeVar
 
 from finlab.errors import FinlabError
-from webapp.tasks.readers import Readers
 
 Job = Callable[[], None]
 Failed = Callable[[str], None]
@@ -117,8 +116,8 @@ class Workers:
     """Robots that swim: all the time, in short turns."""
     searches: Worker = field(default_factory=Worker)
     """Better layouts: up to minutes."""
-    readers: Readers = field(default_factory=Readers)
-    """Files from browsers: milliseconds to seconds, in processes of their own."""
+    readers: Worker = field(default_factory=Worker)
+    """Files from browsers: milliseconds to seconds."""
     fits: Worker = field(default_factory=Worker)
     """Fins fitted to measurements, and files of swims: seconds."""
 

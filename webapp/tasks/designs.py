@@ -56,13 +56,8 @@ class Exports:
         self._send(f"{name}.npz", log.npz)
 
     def _send(self, name: str, make: Callable[[], bytes]) -> None:
-        """Have the worker make a file, and send it; of each name only the newest that is asked for."""
-        loop, notify = self._context.loop, self._context.notify
-        self._context.workers.answers.submit(
-            (id(self), name),
-            lambda: loop.post(partial(self.download, name, make())),
-            lambda text: loop.post(partial(notify, "Not exported", text)),
-        )
+        """Have a file made, and send it."""
+        self._context.reading.make(make, partial(self.download, name), name)
 
     def download(self, name: str, content: bytes) -> None:
         """Send a file that is there already, and say where it went."""
@@ -93,8 +88,13 @@ class Designs:
         self._read(partial(unpacked, design), wrench)
 
     def _read(self, read: Callable[[], Opened], wrench: str | None = None) -> None:
-        take = partial(self._take, wrench)
-        self._context.reading.read(read, take, lambda opened: hull_of(opened.layout))
+
+        def ready() -> Opened:
+            opened = read()
+            hull_of(opened.layout)  # what is drawn of it takes its time
+            return opened
+
+        self._context.reading.make(ready, partial(self._take, wrench), "open")
 
     def _take(self, wrench: str | None, opened: Opened) -> None:
         """`wrench` is that of a link; there is none with a file."""
