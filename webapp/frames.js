@@ -1,15 +1,16 @@
-// Frames of the 3D view: fins flap here, and only what has changed is drawn. viser draws for a quarter of a second after
+// Frames of the 3D view: actuators move here, and only what has changed is drawn. viser draws for a quarter of a second after
 // each message, and once a second in any case; on a machine without a graphics card one frame takes as long. A page that
-// is not used comes to rest: after REST_MS the fins stand still, until the mouse moves or something is asked.
+// is not used comes to rest: after REST_MS they stand still, until the mouse moves or something is asked.
 (() => {
   if (window.finlabFrames) return;
   const REST_MS = 30000, LOOKED_AT_MS = 4000; // after the last touch
   const QUICK_MS = 40, SLOW_MS = 70; // between frames, just after a touch and later
   const SETTLE_MS = 230; // a little less than viser's own
-  const LONGEST_STEP_S = 0.2; // a long pause must not become a leap of the fins
-  const APART = 1.9, LIMP = Math.PI / 2; // between the phases of fins, which look alive so; where a lost one hangs: down
+  const SLOW = 0.5; // propellers turn no faster than in slow motion: they would seem to turn back
+  const LONGEST_STEP_S = 0.2; // a long pause must not become a leap
+  const APART = 1.9; // between the phases of fins, which look alive so
 
-  let fins = [], speed = 1, frozen = true, phases = [];
+  let parts = [], speed = 1, frozen = true, phases = [], turns = [];
   let touched = performance.now(), due = 0, drawnAt = -Infinity, drawn = [], timer = 0, stepped = 0;
   const viewer = () => window.__viserMutable;
   const root = () => viewer()?.scene?.__r3f?.root.getState();
@@ -51,32 +52,43 @@
     beat();
   }
 
-  // How fins flap: amplitude, frequency and direction of each; null for one that hangs limp.
+  // How actuators move, each a list: half amplitude, frequency, angle, turns of its propeller per second, and the
+  // axis of that.
 
-  const flaps = () => !frozen && speed > 0 && fins.some((fin) => fin && fin[0] * fin[1] > 0) && viewer()?.nodeRefFromName['/robot']?.visible !== false;
+  const alive = () => !frozen && speed > 0 && parts.some(([amplitude, frequency, , spin]) => amplitude * frequency > 0 || spin)
+    && viewer()?.nodeRefFromName['/robot']?.visible !== false;
+
+  function turn(name, axis, angle) {
+    const node = viewer().nodePoseData[name] ??= { position: [0, 0, 0] };
+    node.wxyz = [Math.cos(angle / 2), 0, 0, 0];
+    node.wxyz[1 + axis] = Math.sin(angle / 2);
+    if (node.poseUpdateState !== 'waitForMakeObject') node.poseUpdateState = 'needsUpdate';
+  }
 
   function pose() {
-    const view = viewer();
-    fins.forEach((fin, k) => {
-      const angle = !fin ? LIMP : frozen ? fin[2] : fin[2] + fin[0] * Math.sin(phases[k]);
-      const blade = view.nodePoseData[`/robot/fins/${k}/turn/blade`] ??= { position: [0, 0, 0] };
-      blade.wxyz = [Math.cos(angle / 2), Math.sin(angle / 2), 0, 0];
-      if (blade.poseUpdateState !== 'waitForMakeObject') blade.poseUpdateState = 'needsUpdate';
+    parts.forEach(([amplitude, , angle, spin, axis], k) => {
+      const blade = `/robot/fins/${k}/turn/blade`;
+      turn(blade, 0, frozen ? angle : angle + amplitude * Math.sin(phases[k]));
+      if (spin) turn(`${blade}/propeller`, axis, turns[k]);
     });
     due = Math.max(due, performance.now() + 1);
     root()?.invalidate();
   }
 
   function beat() {
-    if (timer || document.hidden || !flaps()) return;
+    if (timer || document.hidden || !alive()) return;
     const since = performance.now() - touched;
     if (since > REST_MS) return;
     timer = setTimeout(() => requestAnimationFrame(() => {
       timer = 0;
       const now = performance.now(), elapsed = Math.min((now - stepped) / 1000, LONGEST_STEP_S);
       stepped = now;
-      fins.forEach((fin, k) => { if (fin) phases[k] = (phases[k] + 2 * Math.PI * fin[1] * elapsed * speed) % (2 * Math.PI); });
-      if (flaps()) pose();
+      const on = 2 * Math.PI * elapsed;
+      parts.forEach(([, frequency, , spin], k) => {
+        phases[k] = (phases[k] + on * frequency * speed) % (2 * Math.PI);
+        turns[k] = (turns[k] + on * spin * Math.min(speed, SLOW)) % (2 * Math.PI);
+      });
+      if (alive()) pose();
       beat();
     }), since < LOOKED_AT_MS ? QUICK_MS : SLOW_MS);
   }
@@ -86,8 +98,8 @@
     flap(commands, rate, still) {
       patch();
       listenToRequests();
-      if (commands.length !== fins.length) phases = commands.map((_, k) => APART * k);
-      [fins, speed, frozen] = [commands, rate, still];
+      if (commands.length !== parts.length) [phases, turns] = [commands.map((_, k) => APART * k), commands.map(() => 0)];
+      [parts, speed, frozen] = [commands, rate, still];
       stepped = performance.now();
       pose();
       touch();

@@ -20,6 +20,9 @@ DELIVERED = GREEN
 MISSING = VERMILLION
 """What is left undone, and every warning."""
 WATER = SKY
+REACH: Rgb = (176, 142, 84)
+"""What could be asked for: attainable sets, and the marks on the sliders of the target."""
+REACH_DARK: Rgb = (214, 180, 120)
 NEARLY: Rgb = (150, 112, 0)
 """What could be had but is only nearly given."""
 UNLEARNED: Rgb = (112, 92, 168)

@@ -7,11 +7,10 @@ Vector = tuple[float, float, float]
 
 def move_fin(session: Session, name: str, position: Vector) -> None:
     """Drag a fin to a place [m] and let it go."""
-    fin = session.state.layout.fins[session.state.layout.index(name)]
-    session.end_drag(name, position, fin.mounting_angle)
+    session.end_drag(name, position)
 
 
 def turn_fin(session: Session, name: str, angle: float) -> None:
-    """Turn a fin's ring to an angle [rad] and let it go."""
-    fin = session.state.layout.fins[session.state.layout.index(name)]
-    session.end_drag(name, fin.position, angle)
+    """Select a fin and turn it to an angle [rad]."""
+    session.select(name)
+    session.turn_selected(angle)

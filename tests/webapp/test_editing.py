@@ -210,9 +210,9 @@ def test_a_hull_that_nobody_described_stays_while_fins_move() -> None:
     before = hull_of(session.state.layout)
     name = session.state.layout.names[0]
     for k in range(3):
-        session.drag(name, (0.3 + 0.1 * k, -0.2, 0.0), 0.0)
+        session.drag(name, (0.3 + 0.1 * k, -0.2, 0.0))
         assert hull_of(session.state.layout) == before
-    session.end_drag(name, (0.6, -0.2, 0.0), 0.0)
+    session.end_drag(name, (0.6, -0.2, 0.0))
     session.select(name)
     session.delete()
     assert hull_of(session.state.layout) == before

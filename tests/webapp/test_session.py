@@ -21,8 +21,8 @@ def test_a_drag_is_one_step_of_undo(session: Session) -> None:
     name = session.state.layout.names[0]
     start = session.state
     for k in range(20):
-        session.drag(name, (0.2 + 0.001 * k, -0.15, 0.0), -1.0)
-    session.end_drag(name, (0.22, -0.15, 0.0), -1.0)
+        session.drag(name, (0.2 + 0.001 * k, -0.15, 0.0))
+    session.end_drag(name, (0.22, -0.15, 0.0))
     assert session.state.layout.fins[0].position[0] == pytest.approx(0.22)
     assert session.undo() == f"Move {name}"
     assert session.state == start

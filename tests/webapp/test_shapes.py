@@ -6,7 +6,7 @@ import trimesh
 
 from finlab.assets import shipped_layouts
 from finlab.layout import load_layout
-from webapp.scene.meshes import fin
+from webapp.scene.meshes import blades
 from webapp.scene.meshes.hull import HullShape, hull_of
 from webapp.scene.meshes.mesh import NOTHING, Mesh, force_arrow, torque_ring
 from webapp.scene.meshes.mesh_hull import Triangles
@@ -19,8 +19,8 @@ def solid(mesh: Mesh) -> trimesh.Trimesh:
 @pytest.mark.parametrize(
     "mesh",
     [
-        fin.blade(),
-        fin.shaft(),
+        blades.blade(),
+        blades.shaft(),
         force_arrow(np.array([0.1, -0.2, 0.05]), np.zeros(3), 0.01),
         torque_ring(np.array([0.0, 0.1, 0.3]), np.zeros(3), 0.01),
     ],
@@ -34,7 +34,7 @@ def test_closed_and_outward(mesh: Mesh) -> None:
 
 def test_blade_trails_behind_its_thrust() -> None:
     # Zero direction zero pushes along +y' of the fin's frame, so the blade lies along -y'.
-    blade = fin.blade()
+    blade = blades.blade()
     assert blade.vertices[:, 1].min() < -0.15 and blade.vertices[:, 1].max() < 0.02
     extent = np.ptp(blade.vertices, axis=0)
     assert extent[:2] == pytest.approx([0.10, 0.18], abs=0.02)

@@ -12,7 +12,7 @@ from finlab.layout import Layout
 from webapp.markup.answer import swatch
 from webapp.markup.html import html, row
 from webapp.markup.words import listed, three_digits
-from webapp.scene.meshes.fin import SPAN
+from webapp.scene.meshes.blades import SPAN
 from webapp.scene.meshes.hull import hull_of
 from webapp.session.state import AXIS_UNITS
 

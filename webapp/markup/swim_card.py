@@ -29,7 +29,7 @@ def pace_words(swimming: Swimming) -> str:
     rate, speed = swimming.pace.rate, swimming.pace.speed
     if rate is None or rate > 0.9 * speed:
         return f"running at {speed:.2g}×"
-    return html("<span class='missing'>running at {:.1g}×, as fast as this machine can</span>", rate)
+    return html("<span class='missing'>{:.1f}× of {:g}×, as fast as this machine can</span>", rate, speed)
 
 
 def findings_words(shown: Moment) -> list[str]:

@@ -20,7 +20,7 @@ from webapp.session.looking import TASKS
 from webapp.session.state import Flow, State
 
 SWITCHES = {
-    "frozen": ("Freeze", "Fins hold still at their zero direction (P)."),
+    "frozen": ("Freeze", "Fins hold still at their zero direction, propellers stand (P)."),
     "shadows": ("Shadows", "Slow without a graphics card."),
     "dark": ("Dark", "Dark theme."),
 }

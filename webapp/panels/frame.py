@@ -21,11 +21,12 @@ from webapp.presses import press
 from webapp.session.lessons import Stop
 from webapp.session.looking import DRAWERS, Desk
 from webapp.tasks.swimmer import Swimmer
-from webapp.theme import ASKED, DELIVERED, MISSING, css
+from webapp.theme import ASKED, DELIVERED, MISSING, REACH, REACH_DARK, css
 from webapp.viser_internals import run_file, run_script
 
 _VARIABLES = (
-    f":root {{ --fl-asked: {css(ASKED)}; --fl-delivered: {css(DELIVERED)}; --fl-missing: {css(MISSING)}; }}"
+    f":root {{ --fl-asked: {css(ASKED)}; --fl-delivered: {css(DELIVERED)}; --fl-missing: {css(MISSING)}; "
+    f"--fl-reach: {css(REACH)}; }} [data-mantine-color-scheme=dark] {{ --fl-reach: {css(REACH_DARK)}; }}"
 )
 
 

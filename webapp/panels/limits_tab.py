@@ -128,4 +128,4 @@ def _before_and_after(found: Improvement) -> str:
     )
     moved = fins_words([found.layout.index(name) for name in found.moved], found.layout).capitalize()
     table = score_table(found.layout, found.card_after, found.card_before)
-    return html("{} {} moved; the view shows them in green.{}", heading, moved, table)
+    return html("{} {} moved; the view shows them as shadows.{}", heading, moved, table)

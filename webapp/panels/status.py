@@ -12,7 +12,7 @@ from webapp.markup.html import html
 from webapp.markup.verdict import WORKING, verdict_of, verdict_sentence
 from webapp.markup.words import error_digits, parts_word, three_digits
 from webapp.page import Page
-from webapp.scene.robot_scene import SWIM
+from webapp.scene.proportions import arrow_size
 from webapp.scene.wrench_nodes import Scale, set_scale
 from webapp.session.display import Display
 from webapp.session.state import AXIS_UNITS, State, least_of
@@ -20,7 +20,7 @@ from webapp.tasks.analyst import Findings
 from webapp.tasks.mode_names import Modes
 from webapp.tasks.moment import ERROR, Moment
 from webapp.tasks.swimmer import Swimmer
-from webapp.theme import ASKED, DEAD, DELIVERED, HALF_TURN, WATER, css
+from webapp.theme import ASKED, DEAD, DELIVERED, HALF_TURN, REACH, WATER, css
 
 LONG = 24
 """Characters of a verdict above which it takes a line of its own in a small view."""
@@ -54,47 +54,50 @@ def _written(
     in_reach: bool,
     step: int | None,
     modes: Modes,
+    task: str,
 ) -> str:
     if swimmer is not None and moment is not None:
-        return swim_corner(swimmer, moment, pace, SWIM.newtons)
-    drawn = set_rows(found if display.drawn != "none" else None)
+        return swim_corner(swimmer, moment, pace, scale.newtons)
+    size = arrow_size(state.layout)
+    drawn = set_rows(found if display.drawn != "none" and task == "Design" else None, size)
     refined = "" if step is None or shown is best else f"Step {step} of {modes.steps}"
-    return corner(state, legend(*scale, drawn), shown, busy, error, shown is best, in_reach, refined)
+    return corner(state, legend(*scale, size, drawn), shown, busy, error, shown is best, in_reach, refined)
 
 
-def legend(newtons: float, torque: float, cut: bool, also: str) -> str:
+def legend(newtons: float, torque: float, cut: bool, size: float, also: str) -> str:
     """Arrows, scales, and rows of more.
 
     Args:
-        newtons: force [N] that an arrow of 0.1 m stands for.
+        newtons: force [N] that an arrow of 0.1 m stands for where `size` is 1.
         torque: torque [N m] that half a turn of a ring stands for.
         cut: whether a ring would have to be longer than a turn.
+        size: how large arrows are drawn.
         also: rows as `set_rows` makes them.
     """
     # By name, so that the dark theme can lighten them.
     rows = [_key(_arrow(f"var(--fl-{word})", alpha), word) for word, alpha in ARROWS]
     ring = f"{math.degrees(HALF_TURN):.0f}° = {torque:g} N m{', cut off' if cut else ''}"
     scales = "<div class='dim scales'><span>{}</span><span><i>ring </i>{}</span></div>"
-    return html("<div class='fl-legend'>{}{}</div>{}", rows, also, html(scales, _length(newtons), ring))
+    return html("<div class='fl-legend'>{}{}</div>{}", rows, also, html(scales, _length(newtons, size), ring))
 
 
-def _length(newtons: float) -> str:
+def _length(newtons: float, size: float) -> str:
     """What the length of an arrow says; where there is little room, without the word in it."""
-    return html("<i>arrow </i>0.1 m = {:g} N", newtons)
+    return html("<i>arrow </i>{:g} m = {:g} N", 0.1 * size, newtons)
 
 
-def set_rows(findings: Findings | None) -> str:
+def set_rows(findings: Findings | None, size: float) -> str:
     """The bodies of what can be attained, and their scale."""
     if findings is None or findings.now is None:
         return ""
-    rows = [_key(_patch(css(DELIVERED, 0.5)), "working fins")]
+    rows = [_key(_patch(css(REACH, 0.6)), "in reach")]
     if findings.whole is not None:
         asked = findings.question
-        word = "all fins" if asked.failed else "before"
+        word = "with all" if asked.failed else "before"
         rows.append(_key(_patch(css(DEAD, 0.45)), word))
     ball = html("<svg width='44' height='12'><circle cx='22' cy='6' r='5' fill='{}'/></svg>", css(ASKED))
     unit = "N" if findings.now.kind == "force" else "N m"
-    scale = f"body 0.1 m = {three_digits(0.1 / set_scale(findings))} {unit}"
+    scale = f"body {0.1 * size:g} m = {three_digits(0.1 / set_scale(findings))} {unit}"
     rows.append(html("{}<span class='dim wide'>{}</span>", _key(ball, "asked in it"), scale))
     return Markup().join(rows)
 
@@ -199,7 +202,7 @@ def swim_corner(first: Swimmer, shown: Moment, pace: str, newtons: float) -> str
         html("<span><span class='dim'>power</span> <b>{}</b> W</span>", power),
         html("<span>{}</span>", pace),
     ]
-    scale = html("<div class='dim scales'><span>{}</span></div>", _length(newtons))
+    scale = html("<div class='dim scales'><span>{}</span></div>", _length(newtons, arrow_size(first.layout)))
     return _cards(html("<div class='fl-legend'>{}</div>{}", trails, scale), parts)
 
 

@@ -3,6 +3,7 @@
 import json
 import math
 from functools import partial
+from typing import Any
 
 import numpy as np
 import viser
@@ -10,17 +11,18 @@ import viser
 from finlab.allocation.allocation import Allocation
 from finlab.analysis import Improvement
 from finlab.arrays import Array
-from finlab.layout import Fin, Layout
+from finlab.layout import Layout
 from finlab.layout.damage import Health
 from webapp.board import Board
 from webapp.handles import put
 from webapp.markup.words import damage_words, missing_part
-from webapp.scene.fin_node import FinNode, motion
-from webapp.scene.meshes import fin as fin_mesh
+from webapp.scene.actuator_node import ActuatorNode, Motion, motion, moved_parts
+from webapp.scene.direction_handle import DirectionHandle
 from webapp.scene.meshes.hull import has_inside, hull_of
-from webapp.scene.meshes.mesh import Mesh, joined
+from webapp.scene.proportions import arrow_size, part_size, view_size
 from webapp.scene.stage import Shape, Stage, aim_camera
 from webapp.scene.wrench_nodes import LENGTH, AttainableNodes, Scale, WrenchNodes
+from webapp.session.directions import direction
 from webapp.session.display import Display
 from webapp.session.state import chosen
 from webapp.session.swim_plan import SwimSettings
@@ -28,7 +30,7 @@ from webapp.tasks.analyst import Findings
 from webapp.tasks.context import Context
 from webapp.tasks.moment import Moment
 from webapp.tasks.swimmer import Swimmer
-from webapp.theme import DELIVERED, HALF_TURN
+from webapp.theme import HALF_TURN, LIGHT
 from webapp.viser_internals import run_script
 
 CAMERAS = {
@@ -39,8 +41,6 @@ CAMERAS = {
 }
 """Where the camera stands in each view [m]."""
 SPEED = 0.5
-SWIM = Scale(1.0, 1.0, False)
-"""What arrows stand for while the robot swims: one scale, so that they compare."""
 FORCES_ONLY = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
 
 
@@ -56,9 +56,11 @@ class RobotScene:
         self._wrench = WrenchNodes(scene)
         self._offered = Offered(scene)
         self._attainable = AttainableNodes(scene)
-        self._fins: list[FinNode] = []
+        self._direction = DirectionHandle(self._client, self._turn)
+        self._fins: list[ActuatorNode] = []
         self.dragged: int | None = None
-        self._moves: list[list[float] | None] = []
+        self._moves: list[Motion] = []
+        self._size = view_size(session.state.layout)
         self._flaps = ""
         for act in (
             self._show_stage,
@@ -85,7 +87,9 @@ class RobotScene:
 
     def look_from(self, view: str) -> None:
         """Move the camera to one of `CAMERAS`."""
-        self.aim(np.array(CAMERAS[chosen(view, "view", CAMERAS)]), np.array([0.0, 0.0, 0.03]))
+        self._size = view_size(self._session.state.layout)
+        place = self._size * np.array(CAMERAS[chosen(view, "view", CAMERAS)])
+        self.aim(place, np.array([0.0, 0.0, 0.03 * self._size]))
 
     def aim(self, place: Array, target: Array) -> None:
         """Let the camera see from a place (3,) to another one (3,) [m]."""
@@ -103,15 +107,21 @@ class RobotScene:
         hull = hull_of(layout)
         center, size = np.array(hull.center), 2.6 * float(np.linalg.norm(hull.half))
         if session.selected is not None:
-            center, size = layout.position[layout.index(session.selected)], 0.55
+            center, size = layout.position[layout.index(session.selected)], 0.55 * arrow_size(layout)
         way = place - target
         self.aim(center + way / max(float(np.linalg.norm(way)), 1e-6) * size, center)
 
-    def _show_stage(self, drawn: Layout, display: Display, dragged: int | None) -> None:
-        if dragged is None:  # a hull that breathes with the fin one drags is hard to aim at
-            # Glass within glass is not drawn; inside an attainable set the hull is a net.
-            net = display.drawn != "none"
-            self._stage.refresh(hull_of(drawn), display.dark, display.shadows, net, has_inside(drawn))
+    def _show_stage(
+        self, drawn: Layout, display: Display, dragged: int | None, task: str, swims: bool
+    ) -> None:
+        if dragged is not None:  # a hull that breathes with the fin one drags is hard to aim at
+            return
+        # Glass within glass is not drawn; inside an attainable set the hull is a net.
+        net = display.drawn != "none" and task == "Design"
+        size = arrow_size(drawn)
+        self._stage.refresh(hull_of(drawn), display.dark, display.shadows, net, has_inside(drawn), size)
+        if not swims and not 0.75 < view_size(drawn) / self._size < 1.34:  # another robot
+            self.look_from("3D")
 
     def _place(
         self,
@@ -125,17 +135,24 @@ class RobotScene:
         swims: bool,
     ) -> None:
         """Actuators where they are, with their numbers and gizmos."""
-        hull = hull_of(drawn)
+        hull, sizes = hull_of(drawn), (part_size(drawn), arrow_size(drawn))
         while len(self._fins) < drawn.n:
-            self._fins.append(FinNode(self._client.scene, len(self._fins), self._clicked, self._drag))
+            self._fins.append(ActuatorNode(self._client.scene, len(self._fins), self._clicked, self._drag))
         for node in self._fins[drawn.n :]:
             node.hide()
         edited = selected if task == "Design" and not swims else None
+        stuck = () if health is None or swims else dict(health.stuck)
         for i, part in enumerate(drawn.actuators):
             told = "" if swims or part.name in failed else damage_words(health, part.name)
             words = (str(i + 1), part.name if part.name in selection else "", told)
             label = " ".join([word for word in words if word])
-            self._fins[i].place(part, hull, part.name == edited, label, i == dragged)
+            moved, pinned = part.name == edited, part.name in stuck
+            self._fins[i].place(part, hull, sizes, moved, label, pinned, i == dragged)
+        if edited is None:
+            self._direction.show(None, np.zeros(3), 1.0)
+        else:
+            part = drawn.actuators[drawn.index(edited)]
+            self._direction.show(np.array(part.position), np.array(direction(part)), sizes[1])
 
     def _push(
         self,
@@ -146,22 +163,20 @@ class RobotScene:
         moment: Moment | None,
     ) -> None:
         """What actuators do, and their forces."""
-        lost, newtons = (failed, scale.newtons) if moment is None else (moment.lost, SWIM.newtons)
+        lost = failed if moment is None else moment.lost
         if moment is not None:
-            moves, forces, frames = moment.motion, moment.force, drawn.frames
+            commands, forces, frames = moment.motion, moment.force, drawn.frames
         elif shown is not None:
             # The forces belong to the answer's own axes, which a drag may have left behind.
-            moves, forces = motion(drawn.actuators, shown.command), shown.forces
-            frames = shown.layout.frames
+            commands, forces, frames = shown.command, shown.forces, shown.layout.frames
         else:
-            moves = forces = frames = np.full((drawn.n, 3), np.nan)
-        self._moves = [None] * drawn.n
-        for i, name in enumerate(drawn.names):
-            if name in lost or not math.isfinite(moves[i, 0]):
-                self._fins[i].command(None, np.zeros(3), np.eye(3))
-            else:
-                self._moves[i] = moves[i].tolist()
-                self._fins[i].command(moves[i], forces[i] * (LENGTH / newtons), frames[i])
+            commands, forces, frames = np.full((drawn.n, 3), np.nan), np.zeros((drawn.n, 3)), drawn.frames
+        self._moves = []
+        for i, part in enumerate(drawn.actuators):
+            alive = part.name not in lost and math.isfinite(commands[i, 0])
+            self._moves.append(motion(part, commands[i] if alive else None))
+            arrow = forces[i] * (LENGTH / scale.newtons) if alive else np.zeros(3)
+            self._fins[i].command(self._moves[i], alive, arrow, frames[i])
 
     def _flap(
         self,
@@ -190,17 +205,19 @@ class RobotScene:
     ) -> None:
         asked, given, missing = np.array(target), np.zeros(6), np.zeros(6)
         if moment is not None:
-            asked, given, scale = moment.asked * FORCES_ONLY, moment.delivered * FORCES_ONLY, SWIM
+            asked, given = moment.asked * FORCES_ONLY, moment.delivered * FORCES_ONLY
         elif shown is not None:
             given, missing = shown.wrench, missing_part(shown)
         hull = hull_of(drawn)
         top = hull.center[2] + hull.half[2]
-        self._wrench.refresh(asked, given, missing, top, LENGTH / scale.newtons, HALF_TURN / scale.torque)
+        lengths = LENGTH / scale.newtons, HALF_TURN / scale.torque
+        self._wrench.refresh(asked, given, missing, top, *lengths, arrow_size(drawn))
 
     def _show_sets(
-        self, found: Findings | None, display: Display, target: tuple[float, ...], swims: bool
+        self, found: Findings | None, display: Display, target: tuple[float, ...], task: str, drawn: Layout
     ) -> None:
-        self._attainable.refresh(found if display.drawn != "none" and not swims else None, np.array(target))
+        shown = found if display.drawn != "none" and task == "Design" else None
+        self._attainable.refresh(shown, np.array(target), arrow_size(drawn))
 
     def _offer(self, better: Improvement | None, layout: Layout, swims: bool) -> None:
         self._offered.show(
@@ -211,7 +228,7 @@ class RobotScene:
         select = self._session.select_also if also else self._session.select
         self._do(lambda: select(self._board.facts.drawn.names[index]) if self._board.facts else None)
 
-    def _drag(self, index: int, phase: str, position: tuple[float, float, float], angle: float) -> None:
+    def _drag(self, index: int, phase: str, position: tuple[float, float, float]) -> None:
         session = self._session
         if index >= session.state.layout.n:
             return
@@ -220,31 +237,29 @@ class RobotScene:
             session.history.end_merge()
             return
         drag = session.end_drag if phase == "end" else session.drag
-        part = session.state.layout.actuators[index]
-        level = isinstance(part, Fin) and part.mounting_angle is not None
-        self._do(partial(drag, part.name, position, angle if level else None))
+        self._do(partial(drag, session.state.layout.names[index], position))
+
+    def _turn(self, phase: str, aim: Array) -> None:
+        session = self._session
+        name, (x, y, z) = session.selected, (float(v) for v in aim)
+        if name is not None:
+            self._do(partial(session.point, name, (x, y, z), held=True))
+        if phase == "end":
+            session.history.end_merge()
 
 
 class Offered:
-    """Blades of the fins that a search would put elsewhere, where it would put them."""
+    """The actuators that a search would put elsewhere, where it would put them."""
 
     def __init__(self, scene: viser.SceneApi) -> None:
-        self._shape = Shape(scene, "/robot/proposed", DELIVERED, visible=False, cast_shadow=False)
+        ghost: dict[str, Any] = {"opacity": 0.6, "visible": False, "cast_shadow": False}
+        self._shape = Shape(scene, "/robot/proposed", LIGHT.glass, **ghost)
 
     def show(self, other: Layout | None, layout: Layout) -> None:
-        """Show the fins of a better version of a layout that stand elsewhere now; None hides the node."""
-        now = {fin.name: (fin.position, fin.frame) for fin in layout.fins}
-        fins = () if other is None or other.name != layout.name else other.fins
-        moved = tuple(fin for fin in fins if now.get(fin.name) != (fin.position, fin.frame))
+        """Show what of a better version of a layout stands elsewhere now; None hides the node."""
+        now = {part.name: (part.position, part.frame) for part in layout.actuators}
+        parts = () if other is None or other.name != layout.name else other.actuators
+        moved = tuple(part for part in parts if now.get(part.name) != (part.position, part.frame))
         put(self._shape.node, visible=bool(moved))
         if moved:
-            self._shape.show(_blades, moved)
-
-
-def _blades(fins: tuple[Fin, ...]) -> Mesh:
-    parts = []
-    for fin in fins:
-        frame = np.array(fin.frame)
-        for part in (fin_mesh.blade(), fin_mesh.shaft()):
-            parts.append(Mesh(part.vertices @ frame + np.array(fin.position), part.faces))
-    return joined(*parts)
+            self._shape.show(moved_parts, moved, part_size(layout))

@@ -8,7 +8,7 @@ from finlab.allocation.allocation import Allocation
 from webapp.board import Board
 from webapp.scene.robot_scene import RobotScene
 from webapp.scene.swim_scene import SwimScene
-from webapp.scene.wrench_nodes import Scale, fitting_scale
+from webapp.scene.wrench_nodes import Scale, fitting_scale, swim_scale
 from webapp.session.display import Display
 from webapp.session.lessons import Stop
 from webapp.session.swim_plan import SwimSettings
@@ -32,7 +32,7 @@ class Scenery:
         self._camera = (np.zeros(3), np.zeros(3))
         """Where the camera stood before the tour or lesson, and looked at."""
         self._fault = fault
-        self._scale = FIRST
+        self._scale = self._swam = FIRST
         self._fitted: tuple[Sequence[float], Allocation | None] | None = None
         board.group(self._fail)
         board.act(self._show)
@@ -52,7 +52,12 @@ class Scenery:
     _dark: bool | None = None
 
     def fit(self, target: Sequence[float], shown: Allocation | None) -> Scale:
-        """What arrows and rings stand for, given a target (6,) and what is shown of it."""
+        """What arrows and rings stand for, given a target (6,) and what is shown of it, or in a swim."""
+        swimmer = self._swimming.swimmer
+        if swimmer is not None:
+            self._swam = swim_scale(swimmer, self._swam)
+            return self._swam
+        self._swam = FIRST
         if (target, shown) != self._fitted:
             try:
                 self._scale, self._fitted = fitting_scale(target, shown, self._scale), (target, shown)

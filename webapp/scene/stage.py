@@ -65,14 +65,15 @@ class Stage:
         mesh, bow = hull.mesh(), hull.bow()
         self._body = Shape(scene, "/robot/hull", LIGHT.hull, mesh, side="double")
         self._bow = Shape(scene, "/robot/hull/bow", LIGHT.glass, bow, side="double", cast_shadow=False)
-        scene.add_frame(
+        self._axes = scene.add_frame(
             "/robot/axes", axes_length=0.09, axes_radius=0.004, origin_radius=0.009, origin_color=(40, 40, 40)
         )
         fade: dict[str, Any] = {"fade_distance": 5.0, "fade_strength": 1.6, "shadow_opacity": 0.22}
         self._grid = add_floor(scene, "/floor", 6.0, 0.1, 0.5, **fade)
 
-    def refresh(self, hull: AnyHull, dark: bool, shadows: bool, net: bool, glass: bool) -> None:
-        """Show another hull, theme or quality; a hull of glass, or a mere net, lets one look inside."""
+    def refresh(self, hull: AnyHull, dark: bool, shadows: bool, net: bool, glass: bool, size: float) -> None:
+        """Show another hull, theme or quality; a hull of glass, or a mere net, lets one look inside. Axes and
+        floor are as large as `size` says."""
         opacity = 0.35 if glass or net else None
         put(self._body.node, opacity=opacity, wireframe=net)
         put(self._bow.node, opacity=opacity, visible=not net)
@@ -80,7 +81,9 @@ class Stage:
             self._hull = hull
             self._body.become(hull.mesh())
             self._bow.become(hull.bow())
-        put(self._grid, position=np.array([0.0, 0.0, hull.center[2] - hull.half[2] - BELOW]))
+        for node in (self._axes, self._grid):
+            put(node, scale=size)
+        put(self._grid, position=np.array([0.0, 0.0, hull.center[2] - hull.half[2] - BELOW * size]))
         if self._look != (dark, shadows):
             self._look = dark, shadows
             self._scene.configure_default_lights(cast_shadow=shadows)

@@ -16,7 +16,8 @@ from webapp.markup.words import missing_part
 from webapp.scene.meshes.mesh import LONGEST_TURN, NOTHING, RING_RADIUS, Mesh, force_arrow, torque_ring, tube
 from webapp.scene.stage import Shape
 from webapp.tasks.analyst import Findings
-from webapp.theme import ASKED, DEAD, DELIVERED, HALF_TURN, LIGHT, MISSING
+from webapp.tasks.swimmer import Swimmer
+from webapp.theme import ASKED, DEAD, DELIVERED, HALF_TURN, LIGHT, MISSING, REACH
 
 NEWTONS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
 """Forces [N] that an arrow of 0.1 m may stand for."""
@@ -74,29 +75,36 @@ def fitting_torque(largest: float, current: float) -> float:
     return next((step for step in TORQUES if HALF_TURN * largest / step <= 0.95 * LONGEST_TURN), TORQUES[-1])
 
 
+def swim_scale(swimmer: Swimmer, before: Scale) -> Scale:
+    """The scale of a swim, which only grows, so that its arrows compare; `before` is the last one."""
+    moment = swimmer.shown
+    sizes = [np.linalg.norm(v, axis=-1).max() for v in (moment.force, moment.asked[:3], moment.delivered[:3])]
+    fits = (step for step in NEWTONS if LENGTH * max(sizes) / step <= LONGEST)
+    return Scale(max(next(fits, NEWTONS[-1]), before.newtons), 1.0, False)
+
+
 class WrenchNodes:
     """Arrows and rings over a stalk that stands on the centre of gravity."""
 
     def __init__(self, scene: viser.SceneApi) -> None:
         self._root = scene.add_frame("/robot/wrench", show_axes=False)
         stalk = tube(np.array([[0, 0, -HEIGHT - 0.2], [0, 0, 0.0]]), 0.0025, 10)
-        Shape(scene, "/robot/wrench/stalk", LIGHT.line, stalk, cast_shadow=False)
-        scene.add_icosphere("/robot/wrench/hub", 0.012, color=(70, 78, 86), cast_shadow=False)
+        self._nodes: list[viser.MeshHandle | viser.IcosphereHandle] = [
+            Shape(scene, "/robot/wrench/stalk", LIGHT.line, stalk, cast_shadow=False).node,
+            scene.add_icosphere("/robot/wrench/hub", 0.012, color=(70, 78, 86), cast_shadow=False),
+        ]
 
         def node(name: str, color: tuple[int, int, int], opacity: float | None) -> Shape:
-            return Shape(scene, f"/robot/wrench/{name}", color, opacity=opacity, cast_shadow=False)
+            shape = Shape(scene, f"/robot/wrench/{name}", color, opacity=opacity, cast_shadow=False)
+            self._nodes.append(shape.node)
+            return shape
 
         self._asked = node("asked_force", ASKED, 0.4), node("asked_torque", ASKED, 0.4)
         self._given = node("delivered_force", DELIVERED, None), node("delivered_torque", DELIVERED, None)
         self._missing = node("missing_force", MISSING, None), node("missing_torque", MISSING, None)
 
-    @staticmethod
-    def hub(top: float) -> Array:
-        """Where the arrows begin (3,), given the height of the hull's top [m]."""
-        return np.array([0.0, 0.0, top + HEIGHT])
-
     def refresh(
-        self, target: Array, given: Array, missing: Array, top: float, scale: float, turn: float
+        self, target: Array, given: Array, missing: Array, top: float, scale: float, turn: float, size: float
     ) -> None:
         """Show a target (6,) and what is delivered of it (6,), zero while unknown.
 
@@ -107,8 +115,11 @@ class WrenchNodes:
             top: height of the hull's top [m].
             scale: length of a force arrow per newton [m/N].
             turn: angle of a torque ring per newton metre [rad/(N m)].
+            size: how much larger all is drawn.
         """
-        put(self._root, position=self.hub(top))
+        put(self._root, position=np.array([0.0, 0.0, top + HEIGHT * size]))
+        for node in self._nodes:
+            put(node, scale=size)
         zero = np.zeros(3)
         self._asked[0].show(force_arrow, target[:3] * scale, zero, 0.011)
         self._asked[1].show(torque_ring, target[3:] * turn, zero, 0.0085)
@@ -119,32 +130,33 @@ class WrenchNodes:
 
 
 class AttainableNodes:
-    """Green for the working fins, grey for all fins where one has failed, a blue ball for what is asked."""
+    """Sand for what works, grey for all where something has failed, a blue ball for what is asked."""
 
     def __init__(self, scene: viser.SceneApi) -> None:
 
         def glass(name: str, color: tuple[int, int, int], opacity: float) -> Shape:
             return Shape(scene, name, color, opacity=opacity, side="double", visible=False, cast_shadow=False)
 
-        self._now = glass("/robot/attainable/now", DELIVERED, 0.34)
+        self._now = glass("/robot/attainable/now", REACH, 0.34)
         self._whole = glass("/robot/attainable/whole", DEAD, 0.16)
         self._asked = scene.add_icosphere(
             "/robot/attainable/asked", 0.018, color=ASKED, visible=False, cast_shadow=False
         )
 
-    def refresh(self, findings: Findings | None, target: Array) -> None:
-        """Show the sets of findings, nothing for None; the ball marks what `target` (6,) asks in them."""
+    def refresh(self, findings: Findings | None, target: Array, size: float) -> None:
+        """Show the sets of findings, nothing for None, as large as `size` says; the ball marks what `target`
+        (6,) asks in them."""
         now, whole = (None, None) if findings is None else (findings.now, findings.whole)
         scale = 1.0 if findings is None else set_scale(findings)
         for shape, body in ((self._now, now), (self._whole, whole)):
-            put(shape.node, visible=body is not None)
+            put(shape.node, visible=body is not None, scale=size)
             if body is not None:
                 shape.show(_body, body.vertices * scale, body.faces, body.outline)
-        put(self._asked, visible=now is not None)
+        put(self._asked, visible=now is not None, scale=size)
         if now is None:
             return
         part = target[:3] if now.kind == "force" else target[3:]
-        put(self._asked, position=np.asarray(part * scale))
+        put(self._asked, position=np.asarray(part * scale * size))
 
 
 def set_scale(findings: Findings) -> float:

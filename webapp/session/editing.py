@@ -34,22 +34,14 @@ class Editing(Core):
         """A layout has been saved as it is."""
         self.saved = layout
 
-    def drag(self, name: str, position: Vector, angle: float | None = None) -> None:
-        """An actuator on its way in the user's hand: one step of undo for the whole drag.
-
-        Args:
-            name: which one.
-            position: where it is [m].
-            angle: mounting angle [rad] of a horizontal fin; None leaves the direction as it is.
-        """
+    def drag(self, name: str, position: Vector) -> None:
+        """An actuator on its way in the user's hand: one step of undo for the whole drag."""
         layout = layout_edits.moved(self.state.layout, name, position)
-        if angle is not None:
-            layout = layout_edits.turned(layout, name, angle)
         self._follow(f"Move {name}", name, layout, f"drag {name}", timed=False)
 
-    def end_drag(self, name: str, position: Vector, angle: float | None = None) -> None:
+    def end_drag(self, name: str, position: Vector) -> None:
         """A drag is over: the next change is a step of its own."""
-        self.drag(name, position, angle)
+        self.drag(name, position)
         self.history.end_merge()
 
     def point(self, name: str, direction: Vector, held: bool = False) -> None:

@@ -12,7 +12,7 @@ from finlab.analysis import Bounds, Improvement, Progress, optimize_layout
 from finlab.arrays import Array
 from finlab.errors import FinlabError
 from finlab.layout import Fin, Layout
-from webapp.scene.meshes.fin import CHORD, ROOT, SPAN
+from webapp.scene.meshes.blades import CHORD, ROOT, SPAN
 from webapp.scene.meshes.hull import AnyHull, hull_of
 from webapp.scene.meshes.mesh_hull import MeshHull
 from webapp.session.directions import replaced

@@ -1,4 +1,4 @@
-"""One fin in its own frame: the shaft along x', the blade trailing along -y' at zero direction zero.
+"""Fins and rudders in their own frame: the shaft along x', the blade trailing along -y' at angle zero.
 
 A fin that points aft pushes forward, so the blade lies opposite to its thrust.
 """
@@ -6,13 +6,8 @@ A fin that points aft pushes forward, so the blade lies opposite to its thrust.
 import numpy as np
 from trimesh.convex import convex_hull
 
-from finlab.arrays import Array
 from webapp.scene.meshes.mesh import Mesh, joined, revolved, triangles, tube
 
-RADIUS, WALL = 0.038, 0.009
-"""Of the duct and of its wall [m]."""
-HUB: Array = np.array([[-0.03, 0.0, 0.0], [0.03, 0.0, 0.0]])
-"""Ends of the hub [m]."""
 CHORD = 0.18
 """Length of the blade from the shaft to its trailing edge [m]."""
 SPAN = 0.10
@@ -48,16 +43,31 @@ def sweep(amplitude: float) -> Mesh:
     return Mesh(np.concatenate(rings), triangles(k, k + 1, k + 17, k + 1, k + 18, k + 17))
 
 
-def duct() -> Mesh:
-    """A ring around x' and a hub along it."""
-    turn = np.linspace(0.0, 2.0 * np.pi, 33)
-    circle = RADIUS * np.stack([np.zeros(33), np.cos(turn), np.sin(turn)], axis=-1)
-    spoke = np.array([[0.0, -RADIUS, 0.0], [0.0, RADIUS, 0.0]])
-    ring = tube(circle, WALL, 12, across=np.array([1.0, 0.0, 0.0]))
-    return joined(ring, tube(HUB, 0.011, 14), tube(spoke, 0.004, 8))
+def foil(slenderness: float) -> Mesh:
+    """A rudder of span 1 along x', its leading edge towards y' and a quarter of its chord ahead of the shaft;
+    `slenderness` is its span over its chord."""
+    along = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, 24))
+    shape = (0.2969, -0.126, -0.3516, 0.2843, -0.1036)  # of a symmetric NACA section with a closed end
+    thick = 5.0 * 0.15 * sum(c * along**p for c, p in zip(shape, (0.5, 1, 2, 3, 4), strict=True))
+    points = []
+    for x, chord in ((-0.5, 1.0), (0.46, 0.82), (0.5, 0.74)):
+        for side in (1.0, -1.0):
+            section = [
+                np.full(24, x),
+                (0.25 - along) * chord / slenderness,
+                side * thick * chord / slenderness,
+            ]
+            points.append(np.stack(section, axis=-1))
+    whole = convex_hull(np.concatenate(points))
+    return Mesh(np.asarray(whole.vertices), np.asarray(whole.faces, dtype=np.int32))
 
 
-def pod() -> Mesh:
-    """The same around y', for a thruster that turns about x'."""
-    mesh = duct()
-    return Mesh(mesh.vertices[:, [2, 0, 1]], mesh.faces)
+def stock() -> Mesh:
+    """The shaft of a rudder of span 1."""
+    return tube(np.array([[-0.6, 0.0, 0.0], [0.54, 0.0, 0.0]]), 0.035, 12)
+
+
+def pin(size: float) -> Mesh:
+    """A nail through what is stuck."""
+    way = size * np.array([[0.0, 0.0, -0.04], [0.0, 0.0, 0.06], [0.0, 0.0, 0.06], [0.0, 0.0, 0.066]])
+    return tube(way, size * np.array([0.004, 0.004, 0.016, 0.016]), 14)

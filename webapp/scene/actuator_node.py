@@ -1,0 +1,227 @@
+"""One actuator in the scene: its gizmo, and under it what moves, what holds it, its sweep and its force.
+
+A fin beats, a rudder is deflected, a propeller spins, a pod turns as well; `frames.js` moves them.
+"""
+
+import math
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+import viser
+from viser.transforms import SO3
+
+from finlab.arrays import Array
+from finlab.layout import Actuator, Azimuth, Fin, Rudder, Thruster
+from webapp.handles import put
+from webapp.scene.meshes import blades, thrusters
+from webapp.scene.meshes.hull import AnyHull
+from webapp.scene.meshes.mesh import NOTHING, Mesh, force_arrow, joined, tube
+from webapp.scene.stage import Shape
+from webapp.theme import DEAD, LIGHT, MISSING, fin_color
+
+LABEL = 0.85
+GIZMO_SIZE = 0.24
+HELD: tuple[Any, ...] = (None, "cmd/ctrl", "shift")
+"""Keys that may be held while an actuator is clicked; viser hears each by itself."""
+TURNS_PER_S = 4.0
+"""Of a propeller at its most force; faster ones would seem to turn back."""
+
+
+class Motion(NamedTuple):
+    """How an actuator moves; `frames.js` reads it in this order."""
+
+    amplitude: float = 0.0
+    """Half amplitude of a beat [rad]."""
+    frequency: float = 0.0
+    """Of the beat [Hz]."""
+    angle: float = 0.0
+    """Angle about the own first axis [rad]; a beat is about it."""
+    turns: float = 0.0
+    """Turns of a propeller per second."""
+    along: int = 0
+    """Own axis of the propeller: 0 or 1."""
+
+
+def motion(part: Actuator, command: Array | None) -> Motion:
+    """How an actuator moves with a command (3,), and how it hangs where that is None."""
+    along = int(isinstance(part, Azimuth))
+    if command is None:
+        _, across, third = part.frame
+        limp = math.atan2(third[2], across[2]) if isinstance(part, Fin) else 0.0
+        return Motion(angle=limp, along=along)  # the blade hangs as far down as it can
+    if isinstance(part, Fin):
+        return Motion(*command.tolist())
+    if isinstance(part, Rudder):
+        return Motion(angle=float(command[0]))
+    force = float(command[along])
+    most = part.force[1] if force >= 0.0 else -part.force[0]
+    # Thrust grows with the square of the speed.
+    turns = math.copysign(TURNS_PER_S * math.sqrt(min(abs(force) / most, 1.0)), force) if force else 0.0
+    return Motion(angle=along * float(command[0]), turns=turns, along=along)
+
+
+def _moving(kind: type[Actuator], slenderness: float) -> Mesh:
+    """What of an actuator turns about its first axis, in its own frame."""
+    if issubclass(kind, Rudder):
+        return blades.foil(slenderness)
+    return blades.blade() if issubclass(kind, Fin) else thrusters.duct(int(issubclass(kind, Azimuth)))
+
+
+def _mount(kind: type[Actuator], up: bool) -> Mesh:
+    """What of an actuator stands still, in its own frame."""
+    if issubclass(kind, Thruster):
+        return NOTHING
+    if issubclass(kind, Azimuth):
+        return thrusters.column(up)
+    return blades.stock() if issubclass(kind, Rudder) else blades.shaft()
+
+
+def _propeller(along: int) -> Mesh:
+    return NOTHING if along < 0 else thrusters.propeller(along)
+
+
+def shape_of(part: Actuator, size: float) -> tuple[float, float]:
+    """Slenderness of a foil, and how large an actuator is drawn; a foil by its area."""
+    if not isinstance(part, Rudder):
+        return 1.0, size
+    ratio = min(max(part.aspect_ratio or 2.0, 0.5), 8.0) / 2.0
+    span = math.sqrt(ratio * part.area)
+    return round(ratio, 3), min(max(span, 0.05 * size), 0.3 * size)
+
+
+class ActuatorNode:
+    """The nodes of the actuator at one place of the layout. Made once; hidden while the layout has fewer."""
+
+    def __init__(
+        self,
+        scene: viser.SceneApi,
+        index: int,
+        on_click: Callable[[int, bool], None],
+        on_drag: Callable[[int, str, tuple[float, float, float]], None],
+    ) -> None:
+        """Build the nodes.
+
+        Args:
+            scene: the client's scene.
+            index: place of the actuator in the layout.
+            on_click: called with the index when it is clicked, and whether Ctrl or Shift was held.
+            on_drag: called with index, phase (`start`, `update`, `end`) and position [m].
+        """
+        name = f"/robot/fins/{index}"
+        # The arrows stay along the body's axes, like the numbers beside them.
+        idle: dict[str, Any] = {"depth_test": False, "active_axes": (False,) * 3, "line_width": 3.5}
+        self._move = scene.add_transform_controls(
+            name, GIZMO_SIZE, disable_rotations=True, disable_sliders=True, **idle
+        )
+        self._axes = scene.add_frame(f"{name}/turn", show_axes=False)
+        parent, self._color = f"{name}/turn", fin_color(index)
+        self._moving = Shape(scene, f"{parent}/blade", self._color)
+        self._spinning = Shape(scene, f"{parent}/blade/propeller", LIGHT.metal, side="double")
+        self._mount = Shape(scene, f"{parent}/shaft", LIGHT.metal)
+        self._pin = Shape(scene, f"{parent}/pin", MISSING)
+        self._force = Shape(scene, f"{parent}/force", self._color, cast_shadow=False)
+        fan: dict[str, Any] = {"opacity": 0.3, "side": "double", "cast_shadow": False}
+        self._fan = Shape(scene, f"{parent}/fan", self._color, blades.sweep(0.1), **fan)
+        self._label = scene.add_label(
+            f"{name}/label", str(index + 1), anchor="center-center", font_screen_scale=LABEL
+        )
+        self._strut = Shape(scene, f"/robot/struts/{index}", LIGHT.metal)
+
+        @self._move.on_update
+        async def _dragged(event: Any) -> None:
+            if event.client is not None:
+                x, y, z = (float(v) for v in self._move.position)
+                on_drag(index, event.phase, (x, y, z))
+
+        for node in (self._moving.node, self._spinning.node, self._mount.node):
+            for held in HELD:
+
+                @node.on_click(modifier=held)
+                async def _clicked(event: Any) -> None:
+                    on_click(index, event.modifier is not None)
+
+    def hide(self) -> None:
+        """The layout has no actuator at this place."""
+        put(self._move, visible=False, active_axes=(False,) * 3)
+        put(self._strut.node, visible=False)
+
+    def place(
+        self,
+        part: Actuator,
+        hull: AnyHull,
+        sizes: tuple[float, float],
+        moved: bool,
+        label: str,
+        stuck: bool,
+        owned_by_user: bool,
+    ) -> None:
+        """Show an actuator.
+
+        Args:
+            part: the actuator.
+            hull: what its strut ends at.
+            sizes: of actuators, and of arrows.
+            moved: whether its gizmo is shown.
+            label: text at its root.
+            stuck: whether a pin holds it.
+            owned_by_user: True while it is dragged; the gizmo's pose is then left alone.
+        """
+        frame, place, (size, arrows) = np.array(part.frame), np.array(part.position), sizes
+        slenderness, scale = shape_of(part, size)
+        is_fin, is_pod = isinstance(part, Fin), isinstance(part, Azimuth)
+        inward = hull.anchor(place) - place
+        self._moving.show(_moving, type(part), slenderness)
+        self._mount.show(_mount, type(part), bool(inward @ frame[0] >= 0.0))
+        self._spinning.show(_propeller, -1 if isinstance(part, (Fin, Rudder)) else int(is_pod))
+        for shape in (self._moving, self._spinning, self._mount):
+            put(shape.node, scale=scale)
+        put(self._fan.node, scale=size)
+        put(self._force.node, scale=arrows)
+        self._pin.show(blades.pin, size)
+        put(self._pin.node, visible=stuck)
+        self._root = np.array([size / arrows * (blades.ROOT + blades.SPAN / 2) * is_fin, 0.0, 0.0])
+        put(self._move, visible=True, active_axes=(moved,) * 3, scale=GIZMO_SIZE * arrows)
+        if not owned_by_user:
+            put(self._move, position=place)
+            put(self._axes, wxyz=np.asarray(SO3.from_matrix(frame.T).wxyz))
+        put(self._label, text=label, position=np.array([0.0, 0.0, 0.04 * size]))
+        if is_fin:
+            place = place - 0.03 * size * frame[0]
+        elif is_pod:
+            column = size * thrusters.COLUMN[-1, 0] * frame[0]
+            place = place + (column if inward @ frame[0] >= 0.0 else -column)
+        self._strut.show(_strut, place, hull, 0.008 * size)
+        put(self._strut.node, visible=True)
+
+    def command(self, moves: Motion, alive: bool, arrow: Array, frame: Array) -> None:
+        """Show how it moves, and its force as a body-frame arrow (3,) [m], given the own axes (3, 3)."""
+        put(self._moving.node, color=self._color if alive else DEAD)
+        put(self._spinning.node, color=LIGHT.metal if alive else DEAD)
+        put(self._force.node, visible=alive)
+        put(self._fan.node, visible=alive and moves.amplitude > 0.0)
+        if alive:
+            half = moves.angle / 2
+            self._fan.show(blades.sweep, moves.amplitude)
+            put(self._fan.node, wxyz=np.array([math.cos(half), math.sin(half), 0.0, 0.0]))
+            self._force.show(force_arrow, frame @ arrow, self._root, 0.007)
+
+
+def _strut(end: Array, hull: AnyHull, radius: float) -> Mesh:
+    """A rod from an end to the hull, nothing where that already lies in it."""
+    anchor = hull.anchor(end)
+    if np.linalg.norm(anchor - end) < 5e-3:
+        return NOTHING
+    return tube(np.array([end, anchor]), radius, 12)
+
+
+def moved_parts(parts: tuple[Actuator, ...], size: float) -> Mesh:
+    """Several actuators in the body frame as one mesh, at rest."""
+    meshes = []
+    for part in parts:
+        slenderness, scale = shape_of(part, size)
+        for mesh in (_moving(type(part), slenderness), _mount(type(part), True)):
+            meshes.append(
+                Mesh(scale * mesh.vertices @ np.array(part.frame) + np.array(part.position), mesh.faces)
+            )
+    return joined(*meshes)
