@@ -3,48 +3,55 @@
 import sys
 import time
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
 
+import webapp
+from finlab.assets import shipped_checkpoints
 from finlab.layout import load_layout
-from tests.webapp.stand_in import load_stand_in
 from tests.webapp.test_faults import Tab
-from webapp.page import Page
+from webapp.board import Board
+from webapp.facts import Facts
 from webapp.tasks.background import Workers
 from webapp.tasks.solver import Solver
 
+OURS = str(Path(webapp.__file__).parent)
 MOST_CALLS, MOST_WRITTEN = 1500, 2
 
 
 @pytest.fixture(scope="module")
 def tab() -> Iterator[Tab]:
     workers = Workers()
-    tab = Tab(workers, load_layout("ucat"), Solver(load=load_stand_in))
+    tab = Tab(workers, load_layout("ucat"), Solver())
     yield tab
     tab.close()
     workers.stop()
 
 
+@pytest.mark.skipif("default" not in shipped_checkpoints(), reason="no trained checkpoint in the tree")
 def test_a_change_of_a_slider_writes_the_page_twice_with_few_calls(
     tab: Tab, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    written, calls, refresh = [0], [0], Page._refresh
+    written, calls, refresh = [0], [0], Board.refresh
 
-    def counted(page: Page) -> None:
+    def counted(board: Board, facts: Facts) -> None:
         written[0] += 1
-        refresh(page)
+        refresh(board, facts)
 
     def heard(frame: Any, event: str, _argument: Any) -> None:
-        calls[0] += event == "call" and "/webapp/" in frame.f_code.co_filename
+        calls[0] += event == "call" and frame.f_code.co_filename.startswith(OURS)
 
-    monkeypatch.setattr(Page, "_refresh", counted)
-    for value in (1.3, 1.4):  # the first one may build what is met for the first time
+    tab.on_loop(lambda: tab.view.do(lambda: tab.view.session.set_display("drawn", "none")))
+    monkeypatch.setattr(Board, "refresh", counted)
+    least = []
+    for value in (1.3, 1.4, 1.5):  # where the machine is busy, an answer may come later than the page waits
         written[0] = calls[0] = 0
         tab.on_loop(lambda: sys.setprofile(heard))
         tab.on_loop(lambda value=value: tab.view.do(lambda: tab.view.session.set_target(0, value)))
-        time.sleep(0.3)
-        tab.settle()
+        time.sleep(0.7)  # marks and candidates wait until nothing changes
         tab.on_loop(lambda: sys.setprofile(None))
-    assert written[0] <= MOST_WRITTEN and calls[0] <= MOST_CALLS
+        least.append((written[0], calls[0]))
+    assert 1 < min(least)[0] <= MOST_WRITTEN and 100 < min(least)[1] <= MOST_CALLS
     assert tab.view.jobs.answering.modes.steps > 0
