@@ -58,7 +58,8 @@ def test_candidates_of_the_network_beside_either_answer(page: Any) -> None:
     page.tab("Candidates")
     rows = page.page.locator("table.modes tr.pick")
     page.until(lambda: rows.count() > 1 and not answering.searching)
-    assert "the answer" in rows.first.inner_text() and "from component" in rows.last.inner_text()
+    assert "optimum" in rows.first.inner_text() and "from component" in rows.last.inner_text()
+    assert "network" in rows.last.inner_text()
     page.until(lambda: "proved least" in page.text(".said"))
     watts = answering.best.power
     page.choose("Least", "effort")

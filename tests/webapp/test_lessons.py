@@ -29,6 +29,8 @@ def _turn_a_shaft(session: Session) -> None:
 
 SOLVED: dict[str, Callable[[Session], object]] = {
     "two-ways": lambda session: session.show_mode(1),
+    "refinement": lambda session: session.show_step(1, 9),
+    "temperature": lambda session: session.set_setting("temperature", 2.0),
     "watts-or-effort": lambda session: session.keep_least("watts"),
     "lost-fin": lambda session: session.toggle_failure("front_left"),
     "no-yaw": _turn_a_shaft,
@@ -49,6 +51,7 @@ def test_a_lesson_is_unsolved_until_its_exercise_is_done(lesson: Stop) -> None:
     session.take(_answer(session.state))
     assert session.solved
     session.show_mode(0)
+    session.step = None
     session.take(_answer(session.state))
     assert session.solved, "once done, done"
 

@@ -55,7 +55,7 @@ def test_reachable_and_not() -> None:
     assert rest_sentence(easy) == "Nothing is left undone."
     hard = allocator.allocate([0, 0, 60, 0, 0, 0])
     assert not hard.reachable
-    assert verdict_sentence(hard, False) == "Out of reach"
+    assert verdict_sentence(hard, False) == "Out of reach, closest"
     state = State(layout, target=(0.0, 0.0, 60.0, 0.0, 0.0, 0.0), method="sqp")
     assert not Solver().reply(state).in_reach
     assert "N of heave is left undone" in rest_sentence(hard)
@@ -212,8 +212,7 @@ def test_cards_say_what_a_layout_can_do() -> None:
 
 def test_every_stop_of_the_tour_stands() -> None:
     for step in TOUR:
-        state = step.state(State(load_layout(shipped_layouts()["A"])))
-        assert set(step.failed) <= set(state.layout.names)
+        assert set(step.failed) <= set(step.state.layout.names)
     session = Session(load_layout(shipped_layouts()["A"]))
     session.set_target(1, 0.5)
     session.select(session.state.layout.names[1])
@@ -239,7 +238,7 @@ def test_the_best_mode_is_shown_again_after_a_tour() -> None:
     for leave in (session.end_guide, session.start_over):
         session.tour()
         session.tour()
-        assert session.mode == TOUR[1].mode == 1 and session.state == TOUR[1].state(session.state)
+        assert session.mode == TOUR[1].mode == 1 and session.state == TOUR[1].state
         leave()
         assert session.mode == 0, "although the stop asked just what was asked before"
 

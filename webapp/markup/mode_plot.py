@@ -20,6 +20,8 @@ LEGEND = (("sample", 0), ("refined", 76), ("on the robot", 154))
 """Words and places of what is drawn."""
 DOT, RING = 3.0, 5.5
 """Radii of samples and of modes [px]."""
+APART = 3.0
+"""How much wider each further ring is that lies about another one [px]."""
 LABEL = (13.0, 12.0)
 """Width and height of the number of a mode [px]."""
 FAR_PX = 16.0
@@ -69,7 +71,7 @@ def _rings(places: list[Point], floor: float, shown: int) -> list[str]:
     # What is between a ring and its number can be clicked, too.
     ring = (
         "<g class='pick' {}><path {} stroke='transparent' stroke-width='12'/>{}"
-        "<circle cx='{:.1f}' cy='{:.1f}' r='{}' class='mode' stroke='{}' fill='{}'/>"
+        "<circle cx='{:.1f}' cy='{:.1f}' r='{:g}' class='mode' stroke='{}' fill='{}'/>"
         "<text x='{:.1f}' y='{:.1f}' class='digit' text-anchor='middle'>{}</text></g>"
     )
     parts = []
@@ -79,7 +81,8 @@ def _rings(places: list[Point], floor: float, shown: int) -> list[str]:
         way = html("d='M{:.1f} {:.1f}L{:.1f} {:.1f}'", x, y, u, v)
         line = html("<path {} stroke='{}'/>", way, color) if math.dist((x, y), (u, v)) > FAR_PX else ""
         fill = color if k == shown else "transparent"
-        parts.append(html(ring, pressed, way, line, x, y, RING, color, fill, u, v + 3.8, k + 1))
+        radius = RING + APART * sum(math.dist((x, y), place) < RING for place in places[:k])
+        parts.append(html(ring, pressed, way, line, x, y, radius, color, fill, u, v + 3.8, k + 1))
     return parts
 
 

@@ -68,7 +68,8 @@ def verdict_of(allocation: Allocation, in_reach: bool) -> Verdict:
 
 
 def verdict_sentence(allocation: Allocation, in_reach: bool) -> str:
-    """The verdict, and what else could be done; what is missing the answer's sentence says."""
+    """The verdict, and what else could be done, or which policy chose the answer; what is missing the answer's
+    sentence says."""
     verdict = verdict_of(allocation, in_reach)
     if verdict is Verdict.UNLEARNED:
         return unlearned_sentence(allocation.layout, allocation.unknown_fins)
@@ -76,8 +77,9 @@ def verdict_sentence(allocation: Allocation, in_reach: bool) -> str:
         doubtful = allocation.expected_error > REACHED
         within = f" by the model, expected within {allocation.expected_error:.2g}" if doubtful else ""
         return f"{verdict.value}{within}"
-    rest = f": the robot can, {allocation.method} does not" if verdict is Verdict.APPROXIMATE else ""
-    return f"{verdict.value}{rest}"
+    if verdict is Verdict.APPROXIMATE:
+        return f"{verdict.value}: the robot can, {allocation.method} does not"
+    return f"{verdict.value}, {allocation.policy.kind}"
 
 
 def rest_sentence(allocation: Allocation) -> str:

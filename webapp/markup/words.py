@@ -19,7 +19,7 @@ SMALL = 3e-4
 """Share of what the robot can push that is too small to draw, on one axis; an exact answer lacks no more."""
 OWN = "the answer"
 """Source of a mode that is the answer of a method without candidates."""
-MOST_LISTED = 4
+MOST_LISTED = 2
 """Components of a mixture that are named; of more their number is told."""
 ROUNDING = 1e-9
 """Normalized error below which the digits are those of the computer's rounding."""

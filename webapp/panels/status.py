@@ -171,6 +171,7 @@ def _figures(allocation: Allocation, least: bool, in_reach: bool, refined: str) 
         costs.append(html("<span><span class='dim'>{}</span> {}</span>", kept, cost))
     method, ms = allocation.method, allocation.solve_ms
     time = f"{ms:.2g}" if ms < 10.0 else f"{ms:.0f}"  # no measurement repeats to a third digit
+    who = html("<span class='dim'>{}</span> {} ms", method, time) if least else "network"
     error = "<span class='dim'>error</span> <b class='err'>{}</b>"
     return [
         html(
@@ -179,7 +180,7 @@ def _figures(allocation: Allocation, least: bool, in_reach: bool, refined: str) 
             html(error, error_digits(allocation.err_norm)),
         ),
         *costs,
-        html("<span class='aside'><span class='dim'>{}</span> {} ms</span>", method, time),
+        html("<span class='aside'>{}</span>", who),
         html("<span class='{}' style='background:{}'>{}</span>", pill, css(color), verdict),
     ]
 

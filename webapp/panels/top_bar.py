@@ -1,36 +1,36 @@
 """The bar above all: the design's file, what can be undone, who answers, and help."""
 
-from functools import partial
-
 import viser
 
-from finlab.allocation.methods import METHODS
+from finlab.allocation.methods import METHODS, method_class
+from finlab.layout import Layout
 from webapp.handles import add_html
 from webapp.markup.html import html, marker
 from webapp.page import Page
 from webapp.presses import press
 from webapp.session.files import MAX_LINK
-from webapp.session.lessons import LESSONS, TOUR
+from webapp.session.lessons import LESSONS, TOUR, Stop
 from webapp.session.state import LEAST, least_of
 from webapp.tasks.designs import KINDS
 
 DESIGNS = ".yaml,.yml,.json,.zip"
 METHOD_WORDS = {
-    "dual": "least watts, any actuator",
-    "mdn": "least effort, a network proposes",
-    "paper": "the paper's pipeline",
-    "qp": "one linear step",
+    "dual": "least watts, exact, any actuator",
+    "mdn": "least effort, a network proposes, made exact",
+    "paper": "the paper's network and learned physics",
+    "qp": "one quadratic problem",
     "sqp": "a general solver",
-    "px4": "PX4's, thrusters only",
-    "ardusub": "ArduSub's, thrusters only",
+    "px4": "as PX4 does it, thrusters alone",
+    "ardusub": "as ArduSub does it, thrusters alone",
     "analytic": "the pseudo-inverse",
     "ipopt": "a general solver, slow",
 }
-PALETTE = (
-    "document.documentElement.dispatchEvent(new KeyboardEvent('keydown', "
-    "{ key: 'k', code: 'KeyK', ctrlKey: true, bubbles: true }))"
+COMMANDS = html(
+    "<button title='all commands and their keys (Ctrl+K)' onclick='{}'>Commands</button>",
+    "document.documentElement.dispatchEvent(new KeyboardEvent("
+    '"keydown", { key: "k", code: "KeyK", ctrlKey: true, bubbles: true }))',
 )
-"""A line of script that opens the list of commands, as Ctrl+K does."""
+"""A button that opens the list of commands, as Ctrl+K does."""
 
 
 def add_file(page: Page) -> None:
@@ -62,14 +62,40 @@ def add_answering(page: Page) -> None:
     """Who answers, what is kept least, and where help is found."""
     session, gui = page.session, page.gui
     about = "Watts, proved least by method dual; or the paper's effort, by the network of method mdn."
-    page.bind(gui.add_dropdown("Least", tuple(LEAST), hint=about), session.keep_least, least_of)
-    about = " ".join(f"{name}: {words}." for name, words in METHOD_WORDS.items())
-    methods = gui.add_dropdown("Method", tuple(METHODS), hint=about)
-    page.bind(methods, partial(session.set_setting, "method"), lambda method: method)
-    template = (
-        "<div class='fl-help'><button title='{} lessons with a task each' {}>Lessons</button>"
-        "<button title='a tour in {} stops (T)' {}>Tour</button>"
-        "<button title='all commands and their keys (Ctrl+K)' onclick='{}'>Commands</button></div>"
+    least = page.bind(gui.add_dropdown("Least", tuple(LEAST), hint=about), session.keep_least, least_of)
+    page.board.show(least, visible=lambda layout: layout.is_of_fins)
+    methods = gui.add_dropdown("Method", tuple(METHODS))
+    page.board.show(methods, options=method_options)
+    named = {_option(name): name for name in METHODS}
+    page.bind(methods, lambda option: session.set_setting("method", named.get(option, option)), _option)
+    add_html(gui, html("<div class='fl-help'>{}{}{}</div>", _menu(LESSONS), _menu(TOUR), COMMANDS))
+
+
+def method_options(layout: Layout, method: str) -> tuple[str, ...]:
+    """The methods that take a robot's actuators, with a line about each; and the one that is chosen."""
+    return tuple(_option(name) for name in METHODS if name == method or method_class(name).fits(layout))
+
+
+def _option(method: str) -> str:
+    return f"{method}: {METHOD_WORDS[method]}"
+
+
+def _menu(course: tuple[Stop, ...]) -> str:
+    """A button that opens a list of the lessons, or of the tour's stops."""
+    said = {LESSONS: ("Lessons", "Each has a task"), TOUR: ("Tour", "All of the app in six stops")}
+    word, about = said[course]
+    items = (
+        html(
+            "<button {} popovertarget='fl-{}' popovertargetaction='hide'>{}. {}</button>",
+            press("stop", stop.name),
+            word,
+            place,
+            stop.title,
+        )
+        for place, stop in enumerate(course, 1)
     )
-    lessons, tour = press("stop", LESSONS[0].name), press("stop", TOUR[0].name)
-    add_html(gui, html(template, len(LESSONS), lessons, len(TOUR), tour, PALETTE))
+    menu = (
+        "<button popovertarget='fl-{}'>{}</button><div popover id='fl-{}' class='fl fl-menu'><b>{}</b>"
+        "<p>{}. Your own work comes back when you close them.</p>{}</div>"
+    )
+    return html(menu, word, word, word, word, about, items)

@@ -47,7 +47,7 @@ class Guiding(Looking):
         if self._left is None:
             past, future = tuple(self.history.past), tuple(self.history.future)
             self._left = Left(self.state, past, future, self.display, self._chosen, self.mode, self.desk)
-        self._commit(stop.title, stop.state(self.state))
+        self._commit(stop.title, stop.state)
         self.stop, self.solved, self.mode, self.step, self.selected = stop, False, stop.mode, None, None
         self.desk = Desk()
         self.show_drawer(stop.drawer)
@@ -88,7 +88,7 @@ class Guiding(Looking):
     def take(self, answer: Allocation) -> None:
         """See what the fins do now; an exercise that is done stays so until another stop is opened."""
         if self.stop is not None and answer.layout == self.state.able:
-            self.solved = self.solved or self.stop.done(Seen(self.state, answer, self.mode))
+            self.solved = self.solved or self.stop.done(Seen(self.state, answer, self.mode, self.step))
 
     def start_over(self) -> None:
         """Everything as at first sight, outside of tour and lessons; nothing comes back."""

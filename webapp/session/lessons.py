@@ -1,7 +1,7 @@
 """The tour and the lessons: each stop is a prepared state with words; a lesson has a task and its check."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -22,6 +22,8 @@ class Seen(NamedTuple):
     answer: Allocation
     """What is on the robot."""
     mode: int
+    step: int | None
+    """Steps of refinement that are shown; None where all are."""
 
     @property
     def delivered(self) -> bool:
@@ -49,10 +51,10 @@ class Stop:
     praise: str = ""
     done: Callable[[Seen], bool] = lambda seen: False
 
-    def state(self, now: State) -> State:
-        """The prepared state, with nothing left of the present one but its temperature."""
-        plain = State(shipped()[self.layout], self.failed, target=self.target, method=self.method)
-        return replace(plain, temperature=now.temperature)
+    @property
+    def state(self) -> State:
+        """The prepared state, with nothing left of the present one."""
+        return State(shipped()[self.layout], self.failed, target=self.target, method=self.method)
 
 
 def _aligned(seen: Seen) -> bool:
@@ -75,7 +77,7 @@ TOUR = (
         "many-ways",
         "One wrench has many answers",
         "Four fins have twelve numbers, the wrench only six. Here a network proposes ways, each is made "
-        "exact, and this is the second best. In the drawer below each numbered dot is one. Click some: the "
+        "exact, and this is the second best. In the plot below each numbered ring is one. Press some: the "
         "fins change, the green sum stays.",
         "ucat",
         PRESETS["Turn"],
@@ -125,14 +127,42 @@ LESSONS = (
     Stop(
         "two-ways",
         "One wrench, several ways",
-        "Four fins have twelve numbers, a wrench has six. Where the paper's effort is kept least, there are "
-        "several minima: a network proposes them, and the numbered dots below are its ways, made exact.",
+        "Four fins have twelve numbers, a wrench has six: many commands do the same. In the plot below, "
+        "small dots are what a network proposes, and thin lines lead from each to the numbered ring where it "
+        "ends. The filled ring is on the robot: the answer, number 1.",
         "ucat",
         PRESETS["Turn"],
-        exercise="Show another dot than the first. Which fins change, and what stays?",
+        exercise="Press a row with the badge network, or its ring. Which fins change, and what stays?",
         praise="The fins changed, the green arrows did not: the robot feels the same force and torque.",
         done=lambda seen: seen.mode > 0 and seen.delivered,
-        method="mdn",
+    ),
+    Stop(
+        "refinement",
+        "From a sample to an answer",
+        "A sample is nearly right: its error is some hundredths of what the robot can push. It is followed "
+        "to the least effort near it, first by descent in forces; then its commands are made exact by the "
+        "fins' own laws. The plot's error goes up in powers of ten.",
+        "ucat",
+        PRESETS["Turn"],
+        mode=1,
+        exercise="Press Play below the plot. Watch the dots, the fins, and the error over the view.",
+        praise="Now drag Step: at each place stands what the robot would do there. With Loop it begins anew.",
+        done=lambda seen: seen.step is not None and seen.step > 0,
+    ),
+    Stop(
+        "temperature",
+        "Mixture and temperature",
+        "The network gives a mixture: components, each with a mean and a spread, for different ways to share "
+        "the wrench. First come the means; the other samples are drawn about them, with variances times the "
+        "temperature.",
+        "ucat",
+        PRESETS["Turn"],
+        exercise="Set Temperature to 0, beside the plot, then to 2. What becomes of dots and rings?",
+        praise=(
+            "At 0 dots lie on the means, at 2 they stray far; the rings stay. The minima belong to the "
+            "robot: the network only says where to begin."
+        ),
+        done=lambda seen: seen.state.temperature is not None and seen.state.temperature > 1.9,
     ),
     Stop(
         "watts-or-effort",
@@ -141,8 +171,11 @@ LESSONS = (
         "fins rest. Watts grow faster than force, so they are least where all fins share the work.",
         "hexa",
         (1.5, 0.0, 0.0, 0.0, 0.0, 0.1),
-        exercise="In the bar above, keep watts least. What do the resting fins do now?",
-        praise="More fins work, each a little, and the robot needs fewer watts for the same wrench.",
+        exercise="At Least, in the bar above, choose watts. What do the resting fins do now?",
+        praise=(
+            "More fins work, each a little, and the robot needs fewer watts. The answer has the badge "
+            "optimum: its watts are proved least. What the network proposes stands beside it."
+        ),
         done=lambda seen: least_of(seen.state.method) == "watts" and seen.delivered,
         method="mdn",
     ),
@@ -153,7 +186,7 @@ LESSONS = (
         "others, as long as they can give it.",
         "ucat",
         PRESETS["Turn"],
-        exercise="Fail a fin by its number at the left, so that nothing is left undone.",
+        exercise="At Fail, on the left, press the number of a fin, so that nothing is left undone.",
         praise="Three fins are enough for this turn. Fail a second one: which axis is missing then?",
         done=lambda seen: bool(seen.state.failed) and seen.delivered,
     ),
@@ -164,7 +197,7 @@ LESSONS = (
         "or right. No method can change that: the placement of the fins decides.",
         "no_yaw",
         (1.0, 0.0, 0.0, 0.0, 0.0, 0.2),
-        exercise="Under Design, select a fin and turn its shaft until the yaw is delivered.",
+        exercise="Press a fin in the list, and move Shaft on the right until the line below says Exact.",
         praise="One turned shaft gave the robot an axis. The card of the design says what each fin is worth.",
         done=lambda seen: seen.state.layout.fins != shipped()["no_yaw"].fins and seen.delivered,
         drawer="Reach",
@@ -176,7 +209,7 @@ LESSONS = (
         "and what is delivered may point elsewhere than what was asked.",
         "ucat",
         (30.0, 6.0, 0.0, 0.0, 0.0, 4.0),
-        exercise="Choose the policy direction. What happens to the arrows?",
+        exercise="At Out of reach, on the right, choose direction. What happens to the arrows?",
         praise=(
             "Less is delivered, in the asked proportions: a robot that is asked for too much still goes "
             "where it should."
@@ -190,11 +223,12 @@ LESSONS = (
         "mixture. The status line judges every answer by the fins' own law, whatever the method believes.",
         "A",
         (1.0, 0.0, 0.5, 0.0, 0.0, 0.1),
-        exercise="In the bar above, choose the method paper, and compare the errors.",
+        exercise="At Method, in the bar above, choose paper, and see the error over the view.",
         praise=(
-            "A few hundredths: what the network has not learnt. Draw the fin a little larger under Design, "
-            "and the paper's method does not notice."
+            "What is left is what the network has not learnt. Press Compare the methods below: each of them "
+            "on this wrench, with its error, costs and time."
         ),
+        drawer="Comparison",
         done=lambda seen: seen.state.method == "paper" and seen.answer.method == "paper",
     ),
 )
