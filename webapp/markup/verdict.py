@@ -68,8 +68,8 @@ def verdict_of(allocation: Allocation, in_reach: bool) -> Verdict:
 
 
 def verdict_sentence(allocation: Allocation, in_reach: bool) -> str:
-    """The verdict, and what else could be done, or which policy chose the answer; what is missing the answer's
-    sentence says."""
+    """The verdict, and what else could be done, or which policy chose the answer; the answer's sentence says
+    what is missing."""
     verdict = verdict_of(allocation, in_reach)
     if verdict is Verdict.UNLEARNED:
         return unlearned_sentence(allocation.layout, allocation.unknown_fins)
