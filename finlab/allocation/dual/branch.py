@@ -21,8 +21,6 @@ from finlab.precision import CLOSE, NEARLY, NOTHING, ROUNDS
 
 MOST_PARTS = 48
 """Open parts of one target that are followed, the cheapest first."""
-TURNS = 2.4, 1.6, 0.8, 0.4, 0.2, 0.1, 0.05
-"""Angles [rad] by which fins that cannot rest are turned to find where that costs least."""
 HOLLOW = 1e-3
 """Share of a robot's largest force from which on a least force leaves a gap around rest."""
 NARROW = 0.2
@@ -84,7 +82,7 @@ def least_power(robot: DualRobot, target: Array, sets: Sets, root: Prices) -> Br
     count = target.shape[1]
     start = _Parts(np.arange(count), _columns(sets, count), root.prices)
     root = root._replace(value=dual_value(robot, target, sets, root.prices))
-    best = _Best(robot, target, start, root)
+    best = _Best(robot, root)
     parts, answer = start, root
     for _ in range(ROUNDS):
         amount = gaps(robot, answer.force, parts.sets)
@@ -93,7 +91,6 @@ def least_power(robot: DualRobot, target: Array, sets: Sets, root: Prices) -> Br
             break
         parts = _dive(robot, parts, nearer, amount[:, nearer], answer)
         answer = solve(robot, target[:, parts.row], parts.sets, parts.prices, value=True)
-    best.turn()
     parts, answer, value = start, root, np.full(count, np.inf)
     for round_ in range(ROUNDS + 1):
         amount = gaps(robot, answer.force, parts.sets)
@@ -106,21 +103,17 @@ def least_power(robot: DualRobot, target: Array, sets: Sets, root: Prices) -> Br
             break
         parts = _cut(robot, parts, kept, amount[:, kept], answer)
         answer = solve(robot, target[:, parts.row], parts.sets, parts.prices, value=True)
-    best.turn()
     return Branched(best.force, best.found, value)
 
 
 class _Best:
     """The cheapest answers without a gap so far, of N targets."""
 
-    def __init__(self, robot: DualRobot, target: Array, parts: _Parts, root: Prices) -> None:
-        self._robot, self._target = robot, target
-        self._value = np.full(target.shape[1], np.inf)
-        self._sets = [np.array(values) for values in parts.sets.parts]
-        self._prices = root.prices.copy()
+    def __init__(self, robot: DualRobot, root: Prices) -> None:
+        self._robot, self._value = robot, np.full(len(root.value), np.inf)
         self.force = root.force.copy()
         """Forces (k, N) [N]; those of the hulls where there is no answer yet."""
-        self.found = np.zeros(target.shape[1], bool)
+        self.found = np.zeros(len(root.value), bool)
         """Where there is one (N,)."""
 
     def keep(self, parts: _Parts, answer: Prices, amount: Array) -> NDArray[np.bool_]:
@@ -130,32 +123,13 @@ class _Best:
             row = parts.row[i]
             if answer.value[i] < self._value[row]:
                 self._value[row], self.found[row] = answer.value[i], True
-                self.force[:, row], self._prices[:, row] = answer.force[:, i], answer.prices[:, i]
-                for own, new in zip(self._sets, parts.sets.parts, strict=True):
-                    own[:, row] = new[:, i]
+                self.force[:, row] = answer.force[:, i]
         return answer.solved & ~whole & (answer.value < self._value[parts.row] * (1.0 - CLOSE))
 
     def _hollow(self, force: Array, sets: Sets) -> NDArray[np.bool_]:
         """Where the smoothed dual of a narrow arc has a force (k, N) that is smaller than any in it."""
         size, low = self._robot.answers.sizes(force), sets.low[self._robot.answers.lines :]
         return np.asarray(((size < 0.9 * low) & (sets.half <= NARROW)).any(axis=0))
-
-    def turn(self) -> None:
-        """Turn the fins that keep their least force to where that costs less, by smaller and smaller
-        angles."""
-        lines = self._robot.answers.lines
-        for step in TURNS:
-            low, high, *_, half = self._sets
-            fixed = (half == 0.0) & (low[lines:] == high[lines:]) & (low[lines:] > 0.0)
-            plane, row = np.nonzero(fixed & self.found)
-            if not len(row):
-                return
-            row, plane = np.tile(row, 2), np.tile(plane, 2)
-            columns = [values[:, row] for values in self._sets]
-            columns[4][plane, np.arange(len(row))] += np.repeat([-step, step], len(row) // 2)
-            sets = Sets.of(columns)
-            answer = solve(self._robot, self._target[:, row], sets, self._prices[:, row], value=True)
-            self.keep(_Parts(row, sets, self._prices), answer, gaps(self._robot, answer.force, sets))
 
 
 def halves(robot: DualRobot, sets: Sets, force: Array) -> list[Sets] | None:

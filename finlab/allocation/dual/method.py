@@ -27,7 +27,7 @@ from finlab.allocation.dual.rates import Rates, within_tick
 from finlab.allocation.evaluate import REACHED
 from finlab.allocation.levenberg_marquardt import CommandProblem, refine
 from finlab.allocation.method import Method
-from finlab.allocation.policy import AXES, CLOSEST, Policy
+from finlab.allocation.policy import AXES, Policy
 from finlab.allocation.settings import Settings, number
 from finlab.allocation.solution import Solution
 from finlab.arrays import Array
@@ -147,7 +147,7 @@ class Dual(Method):
         robot = self.compiled.robot
         begin = None if prices is None else robot.basis.T @ (robot.scale * prices)[:, None]
         aim, found = self._aimed(targets, policy, begin)
-        command = self._commands(aim, found, robot.sets, previous)
+        command = self._commands(aim, found, previous)
         bound: Callable[[], Array] = partial(self._bound, aim, found)
         if len(targets) > 1:
             bound = partial(self._bound_again, targets, policy)
@@ -233,29 +233,13 @@ class Dual(Method):
         value[rows] = np.where(cut.found, cut.value * (1.0 - FINE), 0.0)
         return force, value
 
-    def _commands(self, aim: Array, found: Forces, sets: Sets, previous: Array | None = None) -> Array:
+    def _commands(self, aim: Array, found: Forces, previous: Array | None = None) -> Array:
         """Commands (N, n, 3) that give wrenches (N, 6) exactly, by the plant."""
         command = self.compiled.commands(found.force, previous)
         error = self._error(command, aim)
-        if (error <= EXACT).all():
-            return command
-        shift = np.zeros_like(aim)
-        for _ in range(ROUNDS):
-            coarse = np.flatnonzero((error > FINE) & found.within)
-            if not len(coarse):
-                break
-            shift[coarse] += aim[coarse] - self.plant.wrench(command[coarse])
-            asked = (aim + shift)[coarse] - self.compiled.beside
-            again = self._forces(asked, sets.take(coarse), CLOSEST, found.prices[:, coarse])
-            trial = self.compiled.commands(again.force, previous)
-            now = self._error(trial, aim[coarse])
-            better = now < error[coarse]
-            command[coarse[better]], error[coarse[better]] = trial[better], now[better]
-            if not better.any():
-                break
         rough = np.flatnonzero(error > EXACT)
         if len(rough):
-            command[rough] = self._refined(self._problem, aim[rough], command[rough])
+            command[rough] = refine(self._problem, aim[rough] / self.scale, command[rough], ROUNDS).command
         return command
 
     def _error(self, command: Array, aim: Array) -> Array:
@@ -263,9 +247,6 @@ class Dual(Method):
         missing = (given - aim) / self.scale
         error: Array = np.sqrt(np.einsum("ni,ni->n", missing, missing))
         return error
-
-    def _refined(self, problem: CommandProblem, aim: Array, command: Array) -> Array:
-        return refine(problem, aim / self.scale, command, ROUNDS).command
 
     def _in_a_tick(self, aim: Array, found: Forces, previous: Array) -> Array:
         """The command (1, n, 3) that gives a wrench (1, 6) or comes nearest to it among those that may follow
