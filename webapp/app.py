@@ -46,6 +46,7 @@ class App:
         self.views: dict[int, View] = {}
         self._keys: dict[int, str] = {}
         self._loop = server.get_event_loop()
+        self._door = asyncio.Lock()
         server.scene.world_axes.visible = False
         # With the first words to a browser: it would else draw its own light and shadows before ours.
         server.scene.configure_environment_map(None)
@@ -73,8 +74,10 @@ class App:
         # A connection that broke may still count as open; its tab is perhaps the one that is coming back.
         rivals = [known for known, key in self._keys.items() if key in remembered]
         await asyncio.gather(*(self._drop_if_gone(rival) for rival in rivals))
-        if client.client_id in self._server.get_clients():
-            self._open(client, remembered)
+        async with self._door:  # one at a time: a page takes its time, and all others are heard in between
+            if client.client_id in self._server.get_clients():
+                self._open(client, remembered)
+            await asyncio.sleep(0.0)
 
     def _open(self, client: viser.ClientHandle, remembered: list[str]) -> None:
         key, session = self._store.enter(remembered)

@@ -1,6 +1,7 @@
 """What a layout can do, the set that is drawn of it, and how far each component of a target can go."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 from finlab.analysis import AttainableSet, ScoreCard, attainable_set, score_card
 from finlab.forces.reach import Ranges, axis_ranges
@@ -38,8 +39,9 @@ class Findings:
     """The same with all fins, where one has failed; else that of the layout to compare with."""
 
 
+@lru_cache(maxsize=32)
 def find(question: Question) -> Findings:
-    """Answer a question; takes about a second.
+    """Answer a question; takes about a second, but all first pages ask the same.
 
     Raises:
         FinlabError: the layout cannot be analysed.
@@ -61,6 +63,7 @@ def find(question: Question) -> Findings:
     return Findings(question, card, before, now, whole)
 
 
+@lru_cache(maxsize=32)
 def find_ranges(question: State) -> Ranges:
     """The range of each component of the target."""
     return axis_ranges(question.layout, question.target, question.failed, question.flow)
