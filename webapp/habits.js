@@ -10,6 +10,7 @@
 
   window.addEventListener('keydown', (event) => {
     const held = event.ctrlKey || event.metaKey;
+    if (event.key === 'Escape') document.querySelector('[popover]:popover-open')?.hidePopover(); // the page's key else
     if (typing(event.target)) return;
     if (held && !event.shiftKey && event.key.toLowerCase() === 'y') {
       event.preventDefault();

@@ -132,7 +132,7 @@ def answer_sentence(
         sentences.append(rest_sentence(allocation))
         if not allocation.reachable and not allocation.unknown_fins:
             share = round(100 * allocation.share)
-            told = [f"{share} % of what is asked"] if 0 <= share < 100 else []
+            told = [f"{share} % of what is asked is delivered"] if 0 <= share < 100 else []
             told += [*allocation.binding, *(() if searching else allocation.notes)]
             sentences.append("; ".join(told) + "." if told else "")
         elif allocation.reachable and not searching:

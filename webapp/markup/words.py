@@ -69,7 +69,7 @@ def source_words(sources: Sequence[str]) -> str:
     if len(numbers) > MOST_LISTED:
         numbers = [*numbers[:MOST_LISTED], f"{len(numbers) - MOST_LISTED} more"]
     if numbers:
-        return f"from component{'s' if len(numbers) > 1 else ''} {listed(numbers)}"
+        return f"component{'s' if len(numbers) > 1 else ''} {listed(numbers)}"
     first = sources[0]
     words = {"all fins": "found with all fins", "refined": "a refined sample"}
     return words.get(first, f"found {first}" if first.startswith("without ") else f"from {first}")

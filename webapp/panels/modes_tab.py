@@ -20,7 +20,7 @@ from webapp.tasks.mode_names import Modes
 from webapp.theme import css, mode_color
 
 UNKNOWN = "The network has learned fins alone, so it proposes nothing for this robot."
-BEYOND = "Where the wrench is not delivered whole, the network is not asked: there is the one answer."
+BEYOND = "This wrench is not delivered whole, so the network is not asked: there is one answer, by policy {}."
 LEARNED = "The paper's network draws samples; the best are refined by Adam on learned physics, which errs."
 PROPOSED = (
     "The network proposes ways to share the wrench, drawn from its mixture; each is refined to the least "
@@ -59,7 +59,7 @@ def add_candidates(page: Page) -> None:
     hint = "How far samples stray from the means of the mixture's components: 0 is the means alone."
     warmth = gui.add_slider("Temperature", 0.0, 2.0, 0.01, 0.0, hint=hint)
     page.bind_number(warmth, partial(session.set_setting, "temperature"), _temperature)
-    board.show(warmth, visible=lambda layout: layout.is_of_fins)
+    board.show(warmth, visible=lambda modes: bool(modes.ways))
     page.add_html(mode_table)
     page.add_html(_origin_words)
 
@@ -98,9 +98,9 @@ def _origin_words(layout: Layout, method: str, best: Allocation | None) -> str:
     if method == "paper":
         said = LEARNED
     elif layout.is_of_fins:
-        exact = best is None or best.reachable
         beside = BESIDE.get(method, f" The answer, number 1, is that of method {method}.")
-        said = PROPOSED + beside if exact else BEYOND
+        exact = best is None or best.reachable
+        said = PROPOSED + beside if exact else BEYOND.format(best.policy.kind)
     return html("<div class='fl dim'>{}</div>", said)
 
 

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 
 from finlab.allocation.allocation import Allocation
+from finlab.layout import Layout
 from webapp.session.display import Display
 from webapp.session.lessons import LESSONS, TOUR, Seen, Stop
 from webapp.session.looking import Desk, Looking
@@ -16,6 +17,7 @@ class Left:
     """The work as it was."""
 
     state: State
+    saved: Layout
     past: tuple[tuple[str, State], ...]
     future: tuple[tuple[str, State], ...]
     display: Display
@@ -46,8 +48,12 @@ class Guiding(Looking):
         stop = BY_NAME[chosen(name, "lesson", BY_NAME)]
         if self._left is None:
             past, future = tuple(self.history.past), tuple(self.history.future)
-            self._left = Left(self.state, past, future, self.display, self._chosen, self.mode, self.desk)
-        self._commit(stop.title, stop.state)
+            self._left = Left(
+                self.state, self.saved, past, future, self.display, self._chosen, self.mode, self.desk
+            )
+        self.history.resume(stop.state, (), ())  # what can be undone is what is done here
+        self._settled()
+        self.saved = stop.state.layout
         self.stop, self.solved, self.mode, self.step, self.selected = stop, False, stop.mode, None, None
         self.desk = Desk()
         self.show_drawer(stop.drawer)
@@ -83,7 +89,7 @@ class Guiding(Looking):
             self.history.resume(left.state, left.past, left.future)
             self._settled()
             self.display, self.desk, self._chosen = left.display, left.desk, left.chosen
-            self.mode, self.step = left.mode, None
+            self.saved, self.mode, self.step = left.saved, left.mode, None
 
     def take(self, answer: Allocation) -> None:
         """See what the fins do now; an exercise that is done stays so until another stop is opened."""

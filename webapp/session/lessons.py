@@ -145,7 +145,7 @@ LESSONS = (
         "ucat",
         PRESETS["Turn"],
         mode=1,
-        exercise="Press Play below the plot. Watch the dots, the fins, and the error over the view.",
+        exercise="Press Play below the plot. Watch the dots, the fins, and the error below the robot.",
         praise="Now drag Step: at each place stands what the robot would do there. With Loop it begins anew.",
         done=lambda seen: seen.step is not None and seen.step > 0,
     ),
@@ -193,12 +193,12 @@ LESSONS = (
     Stop(
         "no-yaw",
         "What a layout cannot do",
-        "All shafts of this robot lie along one line, so no fin can push where it would turn the robot left "
-        "or right. No method can change that: the placement of the fins decides.",
+        "Each fin of this robot pushes along a line through its middle, or up and down, so no command turns "
+        "it left or right. No method can change that: the placement of the fins decides.",
         "no_yaw",
         (1.0, 0.0, 0.0, 0.0, 0.0, 0.2),
-        exercise="Press a fin in the list, and move Shaft on the right until the line below says Exact.",
-        praise="One turned shaft gave the robot an axis. The card of the design says what each fin is worth.",
+        exercise="Press a fin in the list, and move Shaft on the right, until below the robot stands Exact.",
+        praise="One turned shaft gave the robot an axis. Reach, below, has before and now side by side.",
         done=lambda seen: seen.state.layout.fins != shipped()["no_yaw"].fins and seen.delivered,
         drawer="Reach",
     ),
@@ -220,10 +220,10 @@ LESSONS = (
         "learned-physics",
         "What a network believes",
         "The paper's method learns the physics of the fins from samples, and draws its answers from a "
-        "mixture. The status line judges every answer by the fins' own law, whatever the method believes.",
+        "mixture. Below the robot every answer is judged by the fins' own law, whatever the method believes.",
         "A",
         (1.0, 0.0, 0.5, 0.0, 0.0, 0.1),
-        exercise="At Method, in the bar above, choose paper, and see the error over the view.",
+        exercise="At Method, in the bar above, choose paper, and see the error below the robot.",
         praise=(
             "What is left is what the network has not learnt. Press Compare the methods below: each of them "
             "on this wrench, with its error, costs and time."
