@@ -19,12 +19,12 @@ def report(
 ) -> None:
     """Run every experiment and make one page of them in Markdown, and a file of their rows.
 
-    What is done is kept in DIR/records: a report that was stopped goes on where it was.
+    What is done is in DIR if it is stopped.
 
     Args:
         out: folder for the report.
         quick: a look on few cases, in minutes; the whole takes half an hour.
-        sections: run only these experiments; the page shows all that are complete.
+        sections: run only these experiments.
         seed: of all draws.
     """
     if out.exists() and not out.is_dir():

@@ -1,4 +1,4 @@
-"""A whole report at a tiny size; then again from what was kept, and on a full disk."""
+"""A whole report at a tiny size, and on a full disk."""
 
 import json
 import os
@@ -14,7 +14,7 @@ import pytest
 from finlab.cli import main
 from finlab.errors import DataError
 from finlab.evaluation.report import make
-from finlab.evaluation.report.make import PAGE, RECORDS, TABLES, make_report
+from finlab.evaluation.report.make import PAGE, TABLES, make_report
 
 pytest.importorskip("casadi")
 
@@ -65,42 +65,19 @@ def test_page_and_rows_say_the_same(folder: Path) -> None:
 
 
 def test_two_reports_of_one_seed_have_the_same_rows(folder: Path, tmp_path: Path) -> None:
-    """In another order, too."""
-    again = tmp_path / "again"
-    for names in (["temperature", "latency"], ["cost"], ["all"]):
-        make_report(again, size="quick", seed=3, names=names)
-    first, second = (json.loads((out / TABLES).read_text("utf-8")) for out in (folder, again))
-    assert without_times(first) == without_times(second)
-
-
-def test_what_was_run_is_kept_unless_code_or_seed_are_others(
-    tiny: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    only, file = ["temperature"], tmp_path / RECORDS / "temperature.json"
-    make_report(tmp_path, size="quick", seed=3, names=only)
-    before = file.stat().st_mtime_ns
-    make_report(tmp_path, size="quick", seed=3, names=only)
-    assert file.stat().st_mtime_ns == before
-    make_report(tmp_path, size="quick", seed=4, names=only)
-    after = file.stat().st_mtime_ns
-    assert after > before
-    monkeypatch.setattr(make, "source_digest", lambda: "other code")
-    page = make_report(tmp_path, size="quick", seed=4, names=["wrench"]).read_text("utf-8")
-    assert "## Wrench" in page and "## Temperature" not in page and file.stat().st_mtime_ns == after
-
-
-def test_a_damaged_record_is_named(tiny: None, tmp_path: Path) -> None:
-    (tmp_path / RECORDS).mkdir()
-    (tmp_path / RECORDS / "temperature.json").write_text('{"rows": [')
-    with pytest.raises(DataError, match=r"temperature\.json: not a file of rows .*delete it and run again"):
-        make_report(tmp_path, size="quick", names=["temperature"])
+    """Of some sections, too."""
+    page = make_report(tmp_path, size="quick", seed=3, names=["temperature", "latency"])
+    first, second = (json.loads((out / TABLES).read_text("utf-8")) for out in (folder, tmp_path))
+    assert list(second) == ["latency", "temperature"]
+    assert without_times(second) == without_times({name: first[name] for name in second})
+    assert "--sections latency,temperature --seed 3" in page.read_text("utf-8")
 
 
 def test_a_full_disk_is_a_sentence_with_the_path(tiny: None, tmp_path: Path) -> None:
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (200, hard))
     try:
-        with pytest.raises(DataError, match=r"temperature\.json: cannot be written: File too large"):
+        with pytest.raises(DataError, match=r"report\.md: cannot be written: File too large"):
             make_report(tmp_path, size="quick", names=["temperature"])
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
