@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from finlab.allocation import Allocator
     from finlab.fit.robot.online import OnlineFit
     from finlab.sim import ClosedLoop, FinFault, RunLog
-    from finlab.sim.water import Water
 
 
 MOTIONS = {"Fx": "surge", "Fy": "sway", "Fz": "heave", "Tx": "roll", "Ty": "pitch", "Tz": "yaw"}
@@ -39,7 +38,6 @@ def simulate(
     duration: Annotated[float | None, arg(metavar="SECONDS")] = None,
     plant: Annotated[str, arg(metavar="NAME")] = "mean",
     current: Annotated[tuple[float, float, float], arg(metavar="VX VY VZ")] = (0.0, 0.0, 0.0),
-    waves: Annotated[tuple[float, float], arg(metavar="HEIGHT SECONDS")] = (0.0, 3.0),
     noise: bool = True,
     seed: Annotated[int, arg(metavar="N")] = 0,
     checkpoint: Annotated[str | None, arg(metavar="NAME|FOLDER")] = None,
@@ -67,7 +65,6 @@ def simulate(
         plant: what the fins really do: mean (the fin law), ripple (within the flapping cycle) or offset
             (centre of gravity and fins not where the layout says).
         current: velocity of the water in the world [m/s].
-        waves: significant height [m] and peak period [s] of waves that run along the world's x.
         noise: whether the sensors are noisy.
         seed: of the noise.
         checkpoint: trained checkpoint; the shipped one of the method by default.
@@ -81,7 +78,7 @@ def simulate(
         from finlab.sim import NO_NOISE, ClosedLoop, FinFault, make_trajectory
 
         sensors = None if noise else NO_NOISE
-        robot, water = open_robot(layout), _water(current, waves, seed)
+        robot = open_robot(layout)
         faults = [*(FinFault(name, 0.0) for name in robot.failed), *map(FinFault.parse, fail)]
         if excite:
             if fail or monitor or learn:
@@ -93,7 +90,7 @@ def simulate(
 
             learner = None
             whole, seconds = robot.layout.without(robot.failed), LONGEST_S if duration is None else duration
-            loop = excitation(whole, seconds, plant=plant, sensors=sensors, water=water, seed=seed)
+            loop = excitation(whole, seconds, plant=plant, sensors=sensors, current=current, seed=seed)
         else:
             from finlab.control import FaultMonitor
             from finlab.evaluation.method_specs import load_method_spec
@@ -106,7 +103,7 @@ def simulate(
                 make_trajectory(trajectory, duration, scale),
                 plant=plant,
                 sensors=sensors,
-                water=water,
+                current=current,
                 failures=faults,
                 announced=announced,
                 monitor=FaultMonitor(robot.layout) if monitor else None,
@@ -192,13 +189,6 @@ def monitored(loop: ClosedLoop) -> str:
         words += [f"{name} torn" for name, _ in (*health.thrust, *health.weak)]
         words += [f"{name} stuck at {math.degrees(angle):.0f} deg" for name, angle in health.stuck]
     return ", ".join(words) or "all fins whole"
-
-
-def _water(current: tuple[float, float, float], waves: tuple[float, float], seed: int) -> Water:
-    """How the water moves."""
-    from finlab.sim.water import SteadyCurrent, Waves
-
-    return Waves(*waves, current=current, seed=seed) if waves[0] else SteadyCurrent(current)
 
 
 def _uncontrollable(loop: ClosedLoop, faults: Sequence[FinFault]) -> list[str]:

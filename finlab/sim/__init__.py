@@ -20,10 +20,4 @@ from finlab.sim.task import SHIPPED as SHIPPED
 from finlab.sim.task import Trajectory as Trajectory
 from finlab.sim.task import make_trajectory as make_trajectory
 from finlab.sim.task import straight as straight
-from finlab.sim.water import Changing as Changing
-from finlab.sim.water import Flow as Flow
-from finlab.sim.water import SteadyCurrent as SteadyCurrent
-from finlab.sim.water import Still as Still
-from finlab.sim.water import Water as Water
-from finlab.sim.water import Waves as Waves
 from finlab.vehicle.vehicle import Vehicle as Vehicle

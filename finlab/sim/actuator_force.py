@@ -12,7 +12,6 @@ from finlab.layout import Layout
 from finlab.layout.arrays import own_effectiveness
 from finlab.physics import plant_of
 from finlab.sim.fin_force import make_plant
-from finlab.sim.hanging_fin import HangingFins
 from finlab.vehicle.actuator_motion import ActuatorMotion
 from finlab.vehicle.fin_motion import FinMotion, FinPower, fin_power
 
@@ -46,7 +45,7 @@ class ActuatorForce:
         """Longest step that resolves the forces [s]."""
         if len(of_fins):
             robot = replace(layout, actuators=layout.fins)
-            self._fins, self._hanging = make_plant(plant, robot), HangingFins(robot)
+            self._fins = make_plant(plant, robot)
             self._blade, self.step_s = plant_of(robot).blade, self._fins.step_s
             self.effectiveness[of_fins] = self._fins.effectiveness
         elif plant != "mean":
@@ -61,19 +60,17 @@ class ActuatorForce:
         """Follows a command (n, 3) for `dt` [s].
 
         Args:
-            command: NaN rows are lost: a fin hangs still and drags, another actuator gives nothing.
+            command: NaN rows are lost and give nothing.
             dt: length of the step [s].
             water: how the robot moves through the water (6,) [m/s, rad/s], body frame.
             share: of its force that each actuator gives (n,).
         """
-        motion, lost = self.motion, np.isnan(command[:, 0])
+        motion = self.motion
         motion.step(command, dt)
         fins, fin_watts = np.zeros((0, 3)), np.zeros((3, 0))
         others, watts = np.zeros((0, 3)), np.zeros((3, 0))
         if len(motion.of_fins):
             fins = self._fins.step(self._beat, dt) * share[motion.of_fins, None]
-            if (hangs := lost[motion.of_fins]).any():
-                fins[hangs] = self._hanging.force(self._beat.direction, water)[hangs]
             fin_watts = np.array(self._fin_power())
         if len(motion.of_others):
             mean = 0.5 * (motion.others.before + motion.others.value)

@@ -33,7 +33,6 @@ from finlab.sim.log import RunLog, Tick, log_of_ticks
 from finlab.sim.perturbed import checked_truth
 from finlab.sim.sensors import Sensors, SensorSettings
 from finlab.sim.task import Trajectory
-from finlab.sim.water import Still, Water
 from finlab.vehicle.actuator_motion import ActuatorMotion
 from finlab.vehicle.attitude import quaternion_of_yaw
 from finlab.vehicle.body import complete_body
@@ -65,7 +64,7 @@ class ClosedLoop:
         plant: str = "mean",
         policy: Policy | str | None = None,
         sensors: SensorSettings | None = None,
-        water: Water | None = None,
+        current: Sequence[float] = (0.0, 0.0, 0.0),
         failures: Sequence[FinFault | tuple[str, float]] = (),
         announced: bool = True,
         monitor: FaultMonitor | None = None,
@@ -85,7 +84,7 @@ class ClosedLoop:
             policy: what the allocator does with a wrench that is out of reach; by default its own
                 `policy_under_way`, of robots with rudders `closest`.
             sensors: rates and noise; the defaults of `SensorSettings`.
-            water: how it moves, such as `SteadyCurrent` or `Waves`; it is still by default.
+            current: velocity (3,) of the water in the world [m/s].
             failures: what becomes of actuators, and when; (name, time [s]) is one that is lost.
             announced: whether what happens is announced to the allocator; else it goes on as before, unless a
                 monitor notices.
@@ -119,9 +118,8 @@ class ClosedLoop:
         self.policy = as_policy(under_way if policy is None else policy)
         self.seed = seed
         truth = layout if truth is None else checked_truth(layout, truth)
-        self.vehicle = Vehicle(complete_body(truth))
-        """The body that really swims; it may be replaced on the way, as may the water."""
-        self.water: Water = Still() if water is None else water
+        self.vehicle = Vehicle(complete_body(truth), current)
+        """The body that really swims, and the current; it may be replaced on the way."""
         self.fins = FinMotion(truth)
         """The fins' motion: amplitude, frequency, zero direction and phase of each."""
         self._forces = ActuatorForce(plant, truth, self.fins, copper_loss)
@@ -178,7 +176,7 @@ class ClosedLoop:
             controller=self.controller.name,
             task=self.task.name,
             plant=self.plant,
-            water=self.water.name,
+            water="current" if any(self.vehicle.current) else "still",
             seed=self.seed,
         )
 
@@ -206,7 +204,7 @@ class ClosedLoop:
 
         Args:
             name: of the actuator.
-            kind: lost (a fin hangs still and drags, another gives nothing), torn (it gives a share of its
+            kind: lost (it gives nothing; a fin hangs still), torn (it gives a share of its
                 force), stuck (a fin beats but no longer turns, nor does an azimuth; a rudder stays as it is,
                 and so does the force of a thruster) or whole.
             share: of the force that a torn actuator gives.
@@ -356,9 +354,6 @@ class ClosedLoop:
                 share[self.layout.index(fault.fin)] = fault.share
         mean, power = np.zeros((n, 6)), np.zeros((3, n))
         for k in range(n_steps):
-            self.vehicle.current, self.vehicle.acceleration = self.water.flow(
-                self.state[:3].tolist(), time + (k + 0.5) * dt
-            )
             push = self._forces.step(moved, dt, self.vehicle.velocity_in_water(self.state), share)
             wrenches = np.einsum("nk,nkw->nw", push.force, self._forces.effectiveness)
             self.state = self.vehicle.step(self.state, wrenches.sum(axis=0).tolist(), dt)
@@ -372,7 +367,7 @@ class ClosedLoop:
             position=before[:3].copy(),
             quaternion=before[3:7].copy(),
             motion=before[7:].copy(),
-            flow=np.array(self.water.flow(before[:3].tolist(), time).velocity),
+            flow=np.array(self.vehicle.current),
             measured=now.as_array(),
             reference=setpoint.position,
             reference_surge=setpoint.surge,

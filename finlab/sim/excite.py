@@ -7,6 +7,7 @@ fades until it is back.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -27,7 +28,6 @@ from finlab.physics import plant_of
 from finlab.sim.closed_loop import ClosedLoop
 from finlab.sim.sensors import SensorSettings
 from finlab.sim.task import station
-from finlab.sim.water import Water
 from finlab.vehicle.body import complete_body, dynamics_of
 
 LONGEST_S = 300.0
@@ -189,7 +189,7 @@ def excitation(
     *,
     plant: str = "mean",
     sensors: SensorSettings | None = None,
-    water: Water | None = None,
+    current: Sequence[float] = (0.0, 0.0, 0.0),
     seed: int = 0,
 ) -> ClosedLoop:
     """The swim, ready to be run.
@@ -199,7 +199,7 @@ def excitation(
         duration_s: how long [s].
         plant: what the fins really do; see `PLANTS`.
         sensors: rates and noise; the defaults of `SensorSettings`.
-        water: how it moves; it is still by default.
+        current: velocity (3,) of the water in the world [m/s].
         seed: of the excitation and of the sensors' noise.
 
     Raises:
@@ -216,6 +216,6 @@ def excitation(
         ExcitingController(layout, seed),
         plant=plant,
         sensors=sensors,
-        water=water,
+        current=current,
         seed=seed,
     )

@@ -10,7 +10,7 @@ from finlab.layout import Layout
 from finlab.layout.damage import Damage, Kind
 
 KINDS: tuple[Kind, ...] = ("lost", "torn", "stuck", "whole")
-"""What can become of a fin in a swim: it hangs still and drags; it gives a share of its thrust; it beats but
+"""What can become of a fin in a swim: it hangs still; it gives a share of its thrust; it beats but
 no longer turns; it works again as it should."""
 
 

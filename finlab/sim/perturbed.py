@@ -2,10 +2,10 @@
 
     ClosedLoop(layout, allocator, task, truth=perturbed(layout, damping=2.0))
 
-Controllers, gains and allocators go on believing the layout; only the simulated body and fins are others.
+Controllers, gains and allocators go on believing the layout; only the simulated body is another one.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Annotated
 
@@ -13,8 +13,7 @@ from msgspec import Meta
 
 from finlab.errors import LayoutError
 from finlab.files.schema import checked
-from finlab.layout import Body, Fin, Layout
-from finlab.layout.actuator import Actuator
+from finlab.layout import Body, Layout
 from finlab.vehicle.body import complete_body
 from finlab.vehicle.vehicle import Vehicle
 
@@ -28,7 +27,6 @@ def perturbed(
     added_mass: float = 1.0,
     inertia: float = 1.0,
     buoyancy: float = 1.0,
-    thrust: Mapping[str, float] | None = None,
 ) -> Layout:
     """A layout's robot with some numbers changed; what its body does not say is U-CAT's, as in any swim.
 
@@ -38,11 +36,9 @@ def perturbed(
         added_mass: factor of the added mass.
         inertia: factor of the moments of inertia; the mass stays, and with it the weight.
         buoyancy: factor of the buoyant force; 1.01 is a robot that rises.
-        thrust: share of its law's thrust that each named fin gives; fins that are tables take a
-            `FinFault(name, 0.0, "torn", share)` instead.
 
     Raises:
-        LayoutError: a factor is not above 0, a fin is unknown, or a fin that is a table is to be scaled.
+        LayoutError: a factor is not above 0.
     """
     factors = {"damping": damping, "added_mass": added_mass, "inertia": inertia, "buoyancy": buoyancy}
     for name, factor in factors.items():
@@ -56,19 +52,7 @@ def perturbed(
         inertia_kgm2=_scaled(body.inertia_kgm2, inertia),
         buoyancy_n=buoyancy * _lift(body),
     )
-    shares = dict(thrust or {})
-    layout.indices(tuple(shares))
-    parts: list[Actuator] = []
-    for part in layout.actuators:
-        if (share := shares.get(part.name, 1.0)) != 1.0:
-            if not isinstance(part, Fin):
-                raise LayoutError(
-                    f"thrust: only the law of a fin can be scaled, and {part.name!r} is of type "
-                    f"{part.type}; let it be torn by a FinFault"
-                )
-            part = replace(part, model=part.model.scaled(checked(share, Factor, key=part.name)))
-        parts.append(part)
-    return replace(layout, actuators=tuple(parts), body=changed)
+    return replace(layout, body=changed)
 
 
 def checked_truth(layout: Layout, truth: Layout) -> Layout:

@@ -36,15 +36,13 @@ class Dynamics(NamedTuple, Generic[Vector, Number]):
     """Centre of buoyancy (3) as seen from the centre of gravity [m]."""
 
 
-def accelerations(body: Dynamics[Any, Any], flow: Any, up: Any, lift_along: Any, wrench: Any) -> Any:
+def accelerations(body: Dynamics[Any, Any], flow: Any, up: Any, wrench: Any) -> Any:
     """Returns M^-1 (tau - C nu_r - D nu_r - g), six numbers [m/s^2, rad/s^2].
 
     Args:
         body: its numbers.
         flow: nu_r (6), velocity through the water and rates, body frame [m/s, rad/s].
         up: the world's z axis (3) in the body frame.
-        lift_along: direction (3) of the buoyant force in the body frame: `up` in water that does not
-            accelerate.
         wrench: tau (6), body frame [N, N m].
     """
     u, v, w, p, q, r = flow
@@ -53,7 +51,7 @@ def accelerations(body: Dynamics[Any, Any], flow: Any, up: Any, lift_along: Any,
     lin, quad, lift = body.linear, body.quadratic, body.lift
     net = lift - body.weight
     bx, by, bz = body.center
-    ax, ay, az = lift_along
+    ax, ay, az = up
     rx, ry, rz = lift * (by * az - bz * ay), lift * (bz * ax - bx * az), lift * (bx * ay - by * ax)
     return (
         (wrench[0] - (q * pz - r * py) - (lin[0] + quad[0] * abs(u)) * u + net * up[0]) / mx,

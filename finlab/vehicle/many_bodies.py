@@ -28,7 +28,7 @@ def derivative(state: Array, wrench: Array, body: Bodies, current: Array) -> Arr
     pace[3] = p - turning * up[0]  # up[0] is minus the sine of the pitch
     pace[4] = q * cr - r * sr
     pace[5] = turning
-    pace[6:] = accelerations(body, (u - cu, v - cv, w - cw, p, q, r), up, up, wrench)
+    pace[6:] = accelerations(body, (u - cu, v - cv, w - cw, p, q, r), up, wrench)
     pace[6] -= q * cw - r * cv
     pace[7] -= r * cu - p * cw
     pace[8] -= p * cv - q * cu

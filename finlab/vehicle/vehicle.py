@@ -16,7 +16,7 @@ from finlab.arrays import Array
 from finlab.errors import LayoutError
 from finlab.layout import Body
 from finlab.vehicle.attitude import rotation_of_quaternion, to_body, to_world
-from finlab.vehicle.body import GRAVITY, dynamics_of
+from finlab.vehicle.body import dynamics_of
 from finlab.vehicle.fossen import accelerations, damping_jacobian
 
 STATE_SIZE = 13
@@ -35,9 +35,9 @@ class Vehicle:
             LayoutError: the body has no mass or no inertia.
         """
         self.current = tuple(float(value) for value in current)
-        """Velocity of the water (3,) in the world, here and now [m/s]."""
-        self.acceleration = (0.0, 0.0, 0.0)
-        """Its acceleration (3,) [m/s^2]."""
+        """Velocity of the water (3,) in the world [m/s]."""
+        if len(self.current) != 3 or not all(map(math.isfinite, self.current)):
+            raise LayoutError(f"expected a velocity of three finite numbers, got {current!r:.60}", "current")
         self.dynamics = dynamics = dynamics_of(body)
         self.inertia = dynamics.inertia
         """Diagonal of M (6,) [kg, kg m^2]."""
@@ -82,21 +82,17 @@ class Vehicle:
         rotation = rotation_of_quaternion(qw, qx, qy, qz)
         up = rotation[2::3]
         cu, cv, cw = to_body(rotation, *self.current)
-        au, av, aw, lift_along = 0.0, 0.0, 0.0, up
-        if any(self.acceleration):
-            au, av, aw = to_body(rotation, *self.acceleration)
-            lift_along = (up[0] + au / GRAVITY, up[1] + av / GRAVITY, up[2] + aw / GRAVITY)
         flow = (u - cu, v - cv, w - cw, p, q, r)
-        surge, sway, heave, roll, pitch, yaw = accelerations(self.dynamics, flow, up, lift_along, wrench)
+        surge, sway, heave, roll, pitch, yaw = accelerations(self.dynamics, flow, up, wrench)
         return [
             *to_world(rotation, u, v, w),
             0.5 * (-qx * p - qy * q - qz * r),
             0.5 * (qw * p + qy * r - qz * q),
             0.5 * (qw * q + qz * p - qx * r),
             0.5 * (qw * r + qx * q - qy * p),
-            surge - (q * cw - r * cv) + au,
-            sway - (r * cu - p * cw) + av,
-            heave - (p * cv - q * cu) + aw,
+            surge - (q * cw - r * cv),
+            sway - (r * cu - p * cw),
+            heave - (p * cv - q * cu),
             roll,
             pitch,
             yaw,

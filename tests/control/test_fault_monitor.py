@@ -10,7 +10,7 @@ from finlab.allocation.allocator import Allocator
 from finlab.control import FaultMonitor, Measurement, MonitorSettings
 from finlab.errors import LayoutError
 from finlab.layout import Layout
-from finlab.sim import NOISE_ALONE, ClosedLoop, FinFault, RunLog, SteadyCurrent, make_trajectory
+from finlab.sim import NOISE_ALONE, ClosedLoop, FinFault, RunLog, make_trajectory
 from tests.any_robot import AnyRobot
 
 CURRENT = (0.03, -0.02, 0.0)
@@ -27,7 +27,7 @@ def swim(layout: Layout, allocator: Allocator, failures: list[FinFault], **optio
         announced=False,
         monitor=FaultMonitor(layout),
         sensors=NOISE_ALONE,
-        water=SteadyCurrent(CURRENT),
+        current=CURRENT,
         failures=failures,
         seed=3,
         **options,  # type: ignore[arg-type]

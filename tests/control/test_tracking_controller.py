@@ -18,7 +18,6 @@ from finlab.control.tracking_controller import BEHIND_S
 from finlab.layout import Layout, Servo
 from finlab.sim import ClosedLoop, make_trajectory
 from finlab.sim.perturbed import perturbed
-from finlab.sim.water import SteadyCurrent, Water
 from tests.any_robot import AnyRobot
 
 
@@ -68,11 +67,12 @@ def error(
     robot: Layout,
     pilot: Controller,
     truth: Layout | None = None,
-    water: Water | None = None,
+    current: float = 0.0,
     path: str = "circle",
 ) -> float:
     """Root mean square distance from a path [m]."""
-    loop = ClosedLoop(robot, AnyRobot().on(robot), make_trajectory(path), pilot, truth=truth, water=water)
+    path_, flow = make_trajectory(path), (current, 0.0, 0.0)
+    loop = ClosedLoop(robot, AnyRobot().on(robot), path_, pilot, truth=truth, current=flow)
     log = loop.run()
     return float(np.sqrt(((log.position - log.reference) ** 2).sum(1).mean()))
 
@@ -88,8 +88,8 @@ def error(
 )
 def test_it_stays_near_to_a_path(robot: Layout, damping: float, current: float, most: float) -> None:
     """The plant is not what the controller was told."""
-    truth, water = perturbed(robot, damping=damping), SteadyCurrent((current, 0.0, 0.0))
-    assert error(robot, TrackingController(robot), truth, water) < most
+    truth = perturbed(robot, damping=damping)
+    assert error(robot, TrackingController(robot), truth, current) < most
 
 
 @pytest.mark.exhaustive

@@ -127,9 +127,7 @@ def test_what_becomes_of_fins_without_a_word(layout_a: Layout, analytic: AnyRobo
     assert set(swim.broken) == {"front_left", "back_right"}
     assert np.isfinite(log.command).all(), "the allocator goes on as before"
     assert not log.alive[after, lost].any() and log.alive[~after].all()
-    foot = log.motion[:, :3] + np.cross(log.motion[:, 3:], layout_a.position[lost])
-    braked = (log.fin_force[:, lost] * foot).sum(axis=1)[after]
-    assert braked.sum() < 0.0 and braked.max() < 1e-6, "a fin that hangs still drags"
+    assert not log.fin_force[after, lost].any(), "a fin that hangs still gives nothing"
     assert np.ptp(log.fin_motion[after, stuck, 2]) < 1e-9 and np.ptp(log.command[after, stuck, 2]) > 0.02
     law = np.linalg.norm(swim._plant.fin_forces(log.fin_motion), axis=-1)
     share = np.linalg.norm(log.fin_force, axis=-1)[:, weak] / law[:, weak]

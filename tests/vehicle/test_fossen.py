@@ -121,11 +121,11 @@ def test_the_jacobian_is_that_of_the_accelerations(layout_a: Layout) -> None:
     found = np.array(jacobian(body, flow))
     for k in range(6):
         step = h * np.eye(6)[k][:, None]
-        ahead, behind = (np.array(accelerations(body, flow + s * step, up, up, wrench)) for s in (1, -1))
+        ahead, behind = (np.array(accelerations(body, flow + s * step, up, wrench)) for s in (1, -1))
         np.testing.assert_allclose(found[:, k], (ahead - behind) / (2 * h), atol=1e-6)
     np.testing.assert_allclose(jacobian(body, flow[:, 3].tolist()), found[:, :, 3], atol=1e-12)
     np.testing.assert_allclose(damping_jacobian(body, flow), -found.diagonal().T, atol=1e-12)
     still = np.zeros((6, 20))
     still[2] = flow[2]
-    slowed = -np.array(accelerations(body, still, 0.0 * up, 0.0 * up, np.zeros(6)))[2]
+    slowed = -np.array(accelerations(body, still, 0.0 * up, np.zeros(6)))[2]
     np.testing.assert_allclose(damping_rates(body, still)[2] * flow[2], slowed, atol=1e-12)

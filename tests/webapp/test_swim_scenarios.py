@@ -31,7 +31,7 @@ def chosen(name: str, **then: Any) -> SwimSettings:
 def test_every_scenario_plans_what_its_day_says(name: str) -> None:
     day, settings = SCENARIOS[name], chosen(name)
     plan = settings.plan(State(UCAT))
-    assert plan.water == day.water and plan.plant == day.plant and plan.sensors == day.sensors
+    assert plan.current == day.current and plan.plant == day.plant and plan.sensors == day.sensors
     assert plan.path.name == day.trajectory and plan.path.duration_s == day.path().duration_s
     assert plan.truth == day.truth
     assert len(plan.losses) == day.lost and len(plan.weak) == (day.weak is not None)

@@ -16,10 +16,7 @@ from finlab.sim import (
     SHIPPED,
     FinFault,
     SensorSettings,
-    SteadyCurrent,
-    Still,
     Trajectory,
-    Water,
     make_trajectory,
 )
 from webapp.session.state import State, chosen, number
@@ -27,7 +24,7 @@ from webapp.session.state import State, chosen, number
 LOST_IN_CURRENT = HardDay(
     "lost-in-current",
     "In a current of 7 cm/s a fin is lost half-way, and a monitor has to find out.",
-    water=SteadyCurrent(CURRENT),
+    current=CURRENT,
     lost=1,
     announced=False,
 )
@@ -102,7 +99,7 @@ class SwimSettings:
             state.method,
             self.plant,
             self.scenario,
-            day.water,
+            day.current,
             day.truth,
             day.sensors,
             affected if day.weak is not None else (),
@@ -138,7 +135,8 @@ class Plan(NamedTuple):
     method: str
     plant: str = "mean"
     scenario: str = "nominal"
-    water: Water = Still()
+    current: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Velocity of the water in the world [m/s]."""
     truth: Mapping[str, Any] = MappingProxyType({})
     """What the body really is: options of `finlab.sim.perturbed`."""
     sensors: SensorSettings = SensorSettings()

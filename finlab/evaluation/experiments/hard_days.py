@@ -15,15 +15,10 @@ from finlab.evaluation.method_specs import MethodSpec
 from finlab.evaluation.splits import make_split
 from finlab.layout import Body, Layout, load_layout
 from finlab.sim import (
-    Changing,
     ClosedLoop,
     FinFault,
     SensorSettings,
-    SteadyCurrent,
-    Still,
     Trajectory,
-    Water,
-    Waves,
     make_trajectory,
     perturbed,
 )
@@ -69,8 +64,8 @@ class HardDay:
     """The true body where it is another one than the layout's."""
     truth: Mapping[str, Any] = field(default_factory=dict)
     """What the body really is: options of `finlab.sim.perturbed`."""
-    water: Water = Still()
-    """How it moves; waves are others for each seed."""
+    current: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Velocity of the water in the world [m/s]."""
     plant: str = "mean"
     """What the fins really do."""
     sensors: SensorSettings = SensorSettings()
@@ -120,25 +115,27 @@ class HardDay:
         Args:
             case: of `cases()`.
             method: who allocates.
-            seed: of noise, biases, waves and mixed fins.
+            seed: of noise, biases and mixed fins.
         """
         robot, path = self.robot(case.layout, seed), self.path()
-        weak = {} if self.weak is None else dict.fromkeys(case.fins, self.weak)
         failures = [FinFault(fin, 0.5 * path.duration_s) for fin in case.fins] if self.lost else []
-        water = replace(self.water, seed=seed) if isinstance(self.water, Waves) else self.water
-        return ClosedLoop(
+        loop = ClosedLoop(
             robot,
             method.on(robot),
             path,
             plant=self.plant,
             sensors=self.sensors,
-            water=water,
+            current=self.current,
             failures=failures,
             announced=self.announced,
             monitor=None if self.announced else FaultMonitor(robot),
-            truth=perturbed(replace(robot, body=self.body or robot.body), thrust=weak, **self.truth),
+            truth=perturbed(replace(robot, body=self.body or robot.body), **self.truth),
             seed=seed,
         )
+        if self.weak is not None:
+            for fin in case.fins:
+                loop.fail(fin, "torn", self.weak, announced=False)
+        return loop
 
 
 class Case(NamedTuple):
@@ -159,16 +156,11 @@ HARD_DAYS = (
         PAPER_LAYOUTS,
         truth={"damping": 1.3, "added_mass": 1.3, "inertia": 1.3},
     ),
-    HardDay("current", "A current of 7 cm/s.", water=SteadyCurrent(CURRENT)),
-    HardDay(
-        "current-turns",
-        "A current of 7 cm/s that turns by a right angle within 5 s.",
-        water=Changing(SteadyCurrent(CURRENT), SteadyCurrent((0.05, 0.05, 0.0)), 45.0, 5.0),
-    ),
+    HardDay("current", "A current of 7 cm/s.", current=CURRENT),
     HardDay("buoyant", "The robot is 1 % too buoyant.", truth={"buoyancy": 1.01}),
     HardDay("late", "All sensors are 100 ms later.", sensors=SensorSettings().later(0.1)),
     HardDay("square", "A square with stops at its corners.", trajectory="square"),
-    HardDay("waves", "Keep a place in waves of 0.2 m.", trajectory="station", water=Waves()),
+    HardDay("station", "Keep a place in a current of 7 cm/s.", trajectory="station", current=CURRENT),
     HardDay("hexa", "Six fins.", ("hexa",)),
     HardDay(
         "fins-mixed",

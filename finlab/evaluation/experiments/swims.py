@@ -19,7 +19,7 @@ from finlab.sim import RunLog
 
 DAYS = {day.name: day for day in HARD_DAYS}
 REPORTED = (
-    *("nominal", "damping-double", "parameters-high", "current-turns", "buoyant", "late", "waves", "hexa"),
+    *("nominal", "damping-double", "parameters-high", "current", "buoyant", "late", "station", "hexa"),
     *("fins-mixed", "weak", "lost-one-unannounced", "lost-two", "restricted", "saturated", "offset"),
 )
 """Days of the whole report, which has a quarter of an hour."""
@@ -51,7 +51,7 @@ def run(
         methods: names as in eval wrench; slow ones (sqp, paper) are best tried on a few scenarios.
         seeds: how many.
         checkpoint: of the learned methods, a shipped name or a folder.
-        seed: the first seed of noise, biases, waves and mixed fins.
+        seed: the first seed of noise, biases and mixed fins.
     """
     check_names("scenarios", scenarios, DAYS)
     specs = load_method_specs(methods, checkpoint)
