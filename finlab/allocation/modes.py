@@ -16,8 +16,8 @@ from finlab.layout import Layout
 from finlab.layout.angles import wrapped
 from finlab.physics import plant_of
 
-RESTING = 0.15
-"""Share of the strongest fin's thrust below which a fin counts as resting."""
+RESTING, STILL = 0.15, 0.01
+"""Shares of the strongest fin's thrust below which a fin counts as resting, and below which it truly does."""
 SAME_DIRECTION = float(np.radians(25.0))
 """Zero directions closer than this are the same [rad]."""
 SAME_SIZE = 0.25
@@ -53,6 +53,8 @@ class Mode(PlainData):
     """Mean mechanical power [W]."""
     saturation: float
     """Largest share of any fin's range of amplitude or frequency that is used; 1 is a limit."""
+    still: tuple[int, ...]
+    """Places of the fins that do not push, by their own laws; others of `resting` hardly do."""
     signature: ModeSignature
     """What distinguishes it from other ways."""
     sources: tuple[str, ...]
@@ -88,6 +90,7 @@ def find_modes(candidates: Candidates, force: Array, lower: Array, upper: Array)
                 effort=float(candidates.effort[first]),
                 power=float(candidates.power[first]),
                 saturation=float(np.clip(np.nanmax(used), 0.0, 1.0)),
+                still=tuple(np.flatnonzero(force[first] < STILL * force[first].max()).tolist()),
                 signature=signatures[first],
                 sources=tuple(dict.fromkeys(candidates.source[k] for k in members)),
             )

@@ -54,6 +54,7 @@ def test_a_fin_rests_by_its_own_law() -> None:
     for mode in allocator.explore(allocator.allocate(layout, [1.2, 0, 0, 0, 0, 0.25])):
         force = force_sizes(layout, mode.command)
         assert mode.resting == tuple(np.flatnonzero(force < 0.15 * force.max()))
+        assert mode.still == tuple(np.flatnonzero(force < 0.01 * force.max()))
 
 
 def test_the_same_fins_at_rest_are_the_same_mode_whatever_they_do_there() -> None:

@@ -1,14 +1,13 @@
 """The ways in which a wrench can be delivered, as the page lists them: with names, and what led to each; what
 counts as one is for `finlab.allocation.modes` to say."""
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.modes import (
     Mode,
-    ModeSignature,
     find_modes,
     force_sizes,
     mode_signature,
@@ -87,20 +86,22 @@ def listed_modes(
 ) -> Modes:
     """Modes with their names, no two alike; all but the first are the network's."""
     shown = modes[:MAX_SHOWN]
-    names = _names(mode.signature for mode in shown)
+    names = _names(shown)
     badges = [badge, *["network"] * (len(shown) - 1)]
     named = tuple(NamedMode(*each) for each in zip(shown, names, badges, strict=False))
     return Modes(named, len(modes), ways, ends)
 
 
-def _names(signatures: Iterable[ModeSignature]) -> list[str]:
+def _names(modes: Sequence[Mode]) -> list[str]:
     """Who rests; modes of the same name are numbered."""
-    told = [_resting_words(signature) for signature in signatures]
+    told = [_resting_words(mode) for mode in modes]
     places = [told[:k].count(name) + 1 for k, name in enumerate(told)]
     return [f"{name} ({place})" if place > 1 else name for name, place in zip(told, places, strict=True)]
 
 
-def _resting_words(signature: ModeSignature) -> str:
-    if not signature.resting:
-        return "all fins push"
-    return f"{fins_words(signature.resting)} {'rest' if len(signature.resting) > 1 else 'rests'}"
+def _resting_words(mode: Mode) -> str:
+    still = [k for k in mode.resting if k in mode.still]
+    hardly = [k for k in mode.resting if k not in still]
+    told = ((still, "rest", "rests"), (hardly, "hardly push", "hardly pushes"))
+    parts = [f"{fins_words(fins)} {many if len(fins) > 1 else one}" for fins, many, one in told if fins]
+    return ", ".join(parts) or "all fins push"
