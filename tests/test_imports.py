@@ -30,7 +30,7 @@ LEVELS = (
     ("uncertainty",),
     ("physics", "exchange"),
     ("vehicle",),
-    ("networks",),
+    ("networks", "hull"),
     ("forces",),
     ("allocation",),
     ("control", "paper"),
@@ -180,7 +180,8 @@ def test_circles_of_imports_are_found(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("package", "banned"),
     [
-        ("finlab", ("viser", "trimesh", "webapp", "playwright")),
+        ("finlab", ("viser", "webapp", "playwright")),
+        *((f"finlab/{room}", ("trimesh",)) for rooms in LEVELS for room in rooms if room != "hull"),
         ("finlab/layout", ("torch", "scipy", "matplotlib")),
         *((f"finlab/{room}", ("torch",)) for room in ("evaluation", "sim", "control", "exchange")),
         ("webapp", ("finlab.cli",)),

@@ -27,6 +27,7 @@ from finlab.errors import FinlabError
 from finlab.exchange import Exchange, convert, read_any
 from finlab.fit.measurements import read_measurements
 from finlab.fit.robot.swim_file import read_swim
+from finlab.hull import Surface
 from finlab.layout import FinModelSpec, load_layout, save_layout
 from finlab.networks.checkpoint import read_checkpoint
 from finlab.physics import make_law, write_table
@@ -35,7 +36,6 @@ from finlab.sim.log import Tick, log_of_ticks
 from finlab.sim.task import make_trajectory
 from tests.fit.cell import columns_of, commands, measured, soft, write
 from tests.fit.robot.swims import write_csv as write_swim
-from webapp.scene.meshes.mesh_hull import MeshHull
 from webapp.session.files import packed as design
 from webapp.session.files import read_layout, unpacked
 
@@ -194,7 +194,7 @@ def kinds(tmp_path_factory: pytest.TempPathFactory, untrained_mdn: Path) -> list
         return read_layout(damaged.name, damaged.read_bytes())
 
     def mesh(damaged: Path) -> object:
-        return MeshHull.load.__wrapped__(str(damaged), 1.0, (0.0, 0.0, 0.0))
+        return Surface.of_file.__wrapped__(str(damaged), 1.0, (0.0, 0.0, 0.0))
 
     def export(kind: str) -> bytes:
         found = box.export(file_type=kind)

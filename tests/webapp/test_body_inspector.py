@@ -7,20 +7,13 @@ import pytest
 
 from finlab.assets import shipped_layouts
 from finlab.errors import FinlabError
+from finlab.hull import contradicts, displaced, estimated, hull_of
+from finlab.hull.body import solid_of, water_density
 from finlab.layout import Body, load_layout
 from finlab.layout.body import Hull
 from finlab.vehicle.body import GRAVITY
-from webapp.scene.meshes.hull import hull_of
 from webapp.session import Session
-from webapp.session.body_edits import (
-    DYNAMICS,
-    contradicts,
-    displaced,
-    estimated,
-    solid_of,
-    water_density,
-    with_dynamics,
-)
+from webapp.session.body_edits import DYNAMICS, with_dynamics
 
 
 @pytest.fixture

@@ -5,11 +5,11 @@ import pytest
 import trimesh
 
 from finlab.assets import shipped_layouts
+from finlab.hull import Surface, hull_of
+from finlab.hull.mesh import Mesh
 from finlab.layout import load_layout
 from webapp.scene.meshes import blades
-from webapp.scene.meshes.hull import HullShape, hull_of
-from webapp.scene.meshes.mesh import NOTHING, Mesh, force_arrow, torque_ring
-from webapp.scene.meshes.mesh_hull import Triangles
+from webapp.scene.meshes.mesh import NOTHING, force_arrow, torque_ring
 
 
 def solid(mesh: Mesh) -> trimesh.Trimesh:
@@ -42,8 +42,8 @@ def test_blade_trails_behind_its_thrust() -> None:
 
 @pytest.mark.parametrize("shape", ["box", "ellipsoid", "torpedo", "ucat"])
 def test_hulls(shape: str) -> None:
-    hull = HullShape(shape, (0.3, 0.12, 0.1), (0.02, 0.0, 0.01))
-    mesh = hull.mesh()
+    hull = Surface.of_shape(shape, (0.3, 0.12, 0.1), (0.02, 0.0, 0.01))
+    mesh = hull.mesh
     assert solid(mesh).volume > 0
     assert mesh.vertices.max(axis=0) == pytest.approx([0.32, 0.12, 0.11], abs=0.01)
     assert hull.contains(np.array([0.02, 0.0, 0.01])) and not hull.contains(np.array([0.5, 0.0, 0.0]))
@@ -53,7 +53,7 @@ def test_hulls(shape: str) -> None:
 
 def test_a_mesh_knows_inside_from_outside_of_a_ring() -> None:
     ring = trimesh.creation.annulus(0.1, 0.3, 0.2, sections=256)
-    surface = Triangles(Mesh(ring.vertices, ring.faces))
+    surface = Surface("mesh", (0.3, 0.3, 0.1), (0.0, 0.0, 0.0), Mesh(ring.vertices, ring.faces))
     points = np.random.default_rng(0).uniform(-0.4, 0.4, (300, 3))
     radius = np.hypot(points[:, 0], points[:, 1])
     inside = (abs(radius - 0.2) < 0.1) & (abs(points[:, 2]) < 0.1)

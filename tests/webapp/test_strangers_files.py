@@ -15,13 +15,12 @@ import viser
 from finlab.allocation import Allocator
 from finlab.errors import DataError, FinlabError, LayoutError
 from finlab.files.plain_values import yaml_text
+from finlab.hull import hull_of
 from finlab.layout import FinModelSpec, layout_to_dict, load_layout
 from finlab.layout.force_table_file import write_table
 from finlab.physics import make_law
 from tests.webapp.test_app import app, on_loop, server, until, view
 from webapp.panels.frame import View
-from webapp.scene.meshes.hull import hull_of
-from webapp.scene.meshes.mesh_hull import MeshHull
 from webapp.session import files
 
 __all__ = ["app", "server", "view"]
@@ -144,7 +143,7 @@ def test_no_mesh_of_the_server_is_opened(tmp_path: Path) -> None:
             opened.clear()
             found = files.read_layout(name, content)
             assert found.missing == (Path(path).name,) and found.layout.body is not None
-            assert found.layout.body.hull is None and not isinstance(hull_of(found.layout), MeshHull)
+            assert found.layout.body.hull is None and hull_of(found.layout).file is None
             assert seen_of(tmp_path) == []
 
 
@@ -158,7 +157,7 @@ def test_what_comes_along_is_kept_and_goes_along(tmp_path: Path, table: bytes, c
     text = document("forces/soft.csv", "shapes/hull.stl")
     parts = {"a/robot.yaml": text, "a/forces/soft.csv": table, "a/shapes/hull.stl": cube()}
     found = files.read_layout("robot.zip", packed(parts))
-    assert found.missing == () and isinstance(hull_of(found.layout), MeshHull)
+    assert found.missing == () and hull_of(found.layout).file is not None
     path = str(found.layout.fins[0].model.values()["path"])
     assert Path(path).parent == cache / "tables" and Path(path).read_bytes() == table
     name, content = files.layout_file(found.layout)
@@ -168,7 +167,7 @@ def test_what_comes_along_is_kept_and_goes_along(tmp_path: Path, table: bytes, c
     assert files.read_layout(name, content).layout == found.layout
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
         archive.extractall(tmp_path / "elsewhere")
-    assert isinstance(hull_of(load_layout(tmp_path / "elsewhere" / "robot.yaml")), MeshHull)
+    assert hull_of(load_layout(tmp_path / "elsewhere" / "robot.yaml")).file is not None
 
 
 def test_a_bundle_names_only_what_is_in_it(tmp_path: Path, table: bytes) -> None:

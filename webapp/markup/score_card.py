@@ -8,12 +8,12 @@ from markupsafe import Markup
 
 from finlab.analysis import AXES, Authority, ScoreCard
 from finlab.analysis.score_card import QuickCheck
+from finlab.hull import hull_of
 from finlab.layout import Layout
 from webapp.markup.answer import swatch
 from webapp.markup.html import html, row
 from webapp.markup.words import listed, three_digits
 from webapp.scene.meshes.blades import SPAN
-from webapp.scene.meshes.hull import hull_of
 from webapp.session.state import AXIS_UNITS
 
 FIGURES: dict[str, Callable[[ScoreCard], float | None]] = {

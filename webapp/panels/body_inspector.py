@@ -5,12 +5,12 @@ from functools import partial
 from math import isfinite, nan
 from typing import Any
 
+from finlab.hull import contradicts, displaced, lift_of
 from finlab.layout import Body, Layout
 from finlab.vehicle.body import GRAVITY
 from webapp.markup.html import html
 from webapp.markup.words import three_digits
 from webapp.page import Page
-from webapp.session.body_edits import contradicts, displaced, lift_of
 
 KNOWN = {
     "mass_kg": "mass",

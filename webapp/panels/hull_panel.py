@@ -9,16 +9,15 @@ from markupsafe import Markup
 from scipy.spatial.transform import Rotation
 
 from finlab.errors import FinlabError
+from finlab.hull import contradicts, displaced, hull_of, lift_of
+from finlab.hull.mesh_file import LARGEST, MAX_BYTES, MAX_FACES, SMALLEST, turned
+from finlab.hull.surface import UNITS
 from finlab.layout import Layout
 from finlab.layout.body import HULL_SHAPES, MESH_SUFFIXES, Hull
 from finlab.vehicle.body import GRAVITY
 from webapp.markup.html import html
 from webapp.markup.words import three_digits
 from webapp.page import Page
-from webapp.scene.meshes.hull import hull_of
-from webapp.scene.meshes.mesh_file import LARGEST, MAX_BYTES, MAX_FACES, SMALLEST, turned
-from webapp.scene.meshes.mesh_hull import UNITS, MeshHull
-from webapp.session.body_edits import contradicts, displaced, lift_of
 from webapp.session.files import reshaped_hull, stored_hull
 from webapp.session.layout_edits import center_of_gravity, with_hull
 from webapp.session.state import chosen
@@ -157,9 +156,9 @@ def _unit(layout: Layout, mesh_unit: str) -> str:
 def _report(layout: Layout) -> str:
     """What was found in the hull's file, and mended; nothing where it is a shape."""
     hull = hull_of(layout)
-    if not isinstance(hull, MeshHull):
-        return ""
     report = hull.report
+    if report is None:
+        return ""
     size = " × ".join(f"{2.0 * half:.3g}" for half in hull.half)
     closed = "watertight" if report.is_watertight else Markup("<span class='missing'>not quite closed</span>")
     mended = f" Mended: {'; '.join(report.mended)}." if report.mended else " Nothing had to be mended."

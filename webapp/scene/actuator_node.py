@@ -12,11 +12,12 @@ import viser
 from viser.transforms import SO3
 
 from finlab.arrays import Array
+from finlab.hull import Surface
+from finlab.hull.mesh import Mesh
 from finlab.layout import Actuator, Azimuth, Fin, Rudder, Thruster
 from webapp.handles import put
 from webapp.scene.meshes import blades, thrusters
-from webapp.scene.meshes.hull import AnyHull
-from webapp.scene.meshes.mesh import NOTHING, Mesh, force_arrow, joined, tube
+from webapp.scene.meshes.mesh import NOTHING, force_arrow, joined, tube
 from webapp.scene.stage import Shape
 from webapp.theme import DEAD, LIGHT, MISSING, fin_color
 
@@ -149,7 +150,7 @@ class ActuatorNode:
     def place(
         self,
         part: Actuator,
-        hull: AnyHull,
+        hull: Surface,
         sizes: tuple[float, float],
         moved: bool,
         label: str,
@@ -207,7 +208,7 @@ class ActuatorNode:
             self._force.show(force_arrow, frame @ arrow, self._root, 0.007)
 
 
-def _strut(end: Array, hull: AnyHull, radius: float) -> Mesh:
+def _strut(end: Array, hull: Surface, radius: float) -> Mesh:
     """A rod from an end to the hull, nothing where that already lies in it."""
     anchor = hull.anchor(end)
     if np.linalg.norm(anchor - end) < 5e-3:

@@ -5,8 +5,8 @@ from functools import lru_cache
 
 import numpy as np
 
+from finlab.hull import hull_of
 from finlab.layout import Layout
-from webapp.scene.meshes.hull import hull_of
 
 HALF_DIAGONAL, MEAN_SIZE = 0.3455, 0.35
 """Of the U-CAT's hull: half its diagonal, and the geometric mean of its three sizes [m]."""

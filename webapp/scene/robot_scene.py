@@ -11,6 +11,7 @@ import viser
 from finlab.allocation.allocation import Allocation
 from finlab.analysis import Improvement
 from finlab.arrays import Array
+from finlab.hull.surface import has_inside, hull_of
 from finlab.layout import Layout
 from finlab.layout.damage import Health
 from webapp.board import Board
@@ -18,7 +19,6 @@ from webapp.handles import put
 from webapp.markup.words import damage_words, missing_part
 from webapp.scene.actuator_node import ActuatorNode, Motion, motion, moved_parts
 from webapp.scene.direction_handle import DirectionHandle
-from webapp.scene.meshes.hull import has_inside, hull_of
 from webapp.scene.proportions import arrow_size, part_size, view_size
 from webapp.scene.stage import Shape, Stage, aim_camera
 from webapp.scene.wrench_nodes import LENGTH, AttainableNodes, Scale, WrenchNodes

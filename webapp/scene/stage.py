@@ -8,9 +8,11 @@ import numpy as np
 import viser
 
 from finlab.arrays import Array
+from finlab.hull import Surface
+from finlab.hull.mesh import Mesh
+from finlab.hull.shapes import STATIONS, shape_mesh
 from webapp.handles import put
-from webapp.scene.meshes.hull import AnyHull
-from webapp.scene.meshes.mesh import NOTHING, Mesh
+from webapp.scene.meshes.mesh import NOTHING
 from webapp.theme import LIGHT, Look, Rgb, look
 
 BELOW = 0.22
@@ -53,16 +55,20 @@ def paint_floor(floor: viser.GridHandle, dark: bool) -> None:
     put(floor, cell_color=look(dark).grid, section_color=look(dark).grid_section)
 
 
+BOW, PROUD = 0.72, 1.012
+"""Where along a hull its window begins, and how much larger that is."""
+
+
 class Stage:
     """Everything that stays where it is while fins are edited."""
 
-    def __init__(self, scene: viser.SceneApi, hull: AnyHull) -> None:
+    def __init__(self, scene: viser.SceneApi, hull: Surface) -> None:
         """Build the stage around a hull."""
         self._scene = scene
         self._hull = hull
         self._look: tuple[bool, bool] | None = None
         light_up(scene)
-        mesh, bow = hull.mesh(), hull.bow()
+        mesh, bow = hull.mesh, _bow(hull)
         self._body = Shape(scene, "/robot/hull", LIGHT.hull, mesh, side="double")
         self._bow = Shape(scene, "/robot/hull/bow", LIGHT.glass, bow, side="double", cast_shadow=False)
         self._axes = scene.add_frame(
@@ -71,7 +77,7 @@ class Stage:
         fade: dict[str, Any] = {"fade_distance": 5.0, "fade_strength": 1.6, "shadow_opacity": 0.22}
         self._grid = add_floor(scene, "/floor", 6.0, 0.1, 0.5, **fade)
 
-    def refresh(self, hull: AnyHull, dark: bool, shadows: bool, net: bool, glass: bool, size: float) -> None:
+    def refresh(self, hull: Surface, dark: bool, shadows: bool, net: bool, glass: bool, size: float) -> None:
         """Show another hull, theme or quality; a hull of glass, or a mere net, lets one look inside. Axes and
         floor are as large as `size` says."""
         opacity = 0.35 if glass or net else None
@@ -79,8 +85,8 @@ class Stage:
         put(self._bow.node, opacity=opacity, visible=not net)
         if hull != self._hull:
             self._hull = hull
-            self._body.become(hull.mesh())
-            self._bow.become(hull.bow())
+            self._body.become(hull.mesh)
+            self._bow.become(_bow(hull))
         for node in (self._axes, self._grid):
             put(node, scale=size)
         put(self._grid, position=np.array([0.0, 0.0, hull.center[2] - hull.half[2] - BELOW * size]))
@@ -129,3 +135,12 @@ class Shape:
         """Give the node another shape."""
         self.node.vertices = mesh.vertices.astype(np.float32)
         put(self.node, faces=mesh.faces.astype(np.uint32))
+
+
+def _bow(hull: Surface) -> Mesh:
+    """A dark window over the foremost part of a shape, a little proud of it: it shows which end is the bow. A
+    mesh from a file shows that by itself."""
+    if hull.file is not None:
+        return NOTHING
+    stations = np.concatenate([[BOW], STATIONS[STATIONS > BOW]])
+    return shape_mesh(hull.shape, hull.half, hull.center, stations, PROUD)

@@ -6,8 +6,9 @@ import numpy as np
 import viser
 
 from finlab.arrays import Array
+from finlab.hull.mesh import Mesh
 from webapp.handles import put
-from webapp.scene.meshes.mesh import NOTHING, Mesh, force_arrow, joined, tube
+from webapp.scene.meshes.mesh import NOTHING, force_arrow, joined, tube
 from webapp.scene.stage import Shape, add_floor, aim_camera, paint_floor
 from webapp.session.display import Display
 from webapp.tasks.moment import PLACE, Moment

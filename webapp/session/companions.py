@@ -16,11 +16,11 @@ from finlab.bundle_files import ABOUT, LARGEST_BUNDLE, LARGEST_TABLE, MOST_FILES
 from finlab.errors import DataError, FinlabError, LayoutError
 from finlab.files.archive import member_names, unpacked
 from finlab.files.guarded import read_file
+from finlab.hull.mesh_file import MAX_FACES, read_mesh, simplified, stl_of
 from finlab.layout import Fin, FinModelSpec, Layout
 from finlab.layout.body import MESH_SUFFIXES
 from finlab.layout.load import MAX_BYTES, layout_and_failed
 from finlab.whole_file import make_folder, write_whole
-from webapp.scene.meshes.mesh_file import MAX_FACES, read_mesh, simplified, stl_of
 
 LAYOUTS = (".yaml", ".yml", ".json")
 TABLE_FOLDER, HULL_FOLDER = "tables", "hulls"

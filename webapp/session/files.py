@@ -20,13 +20,13 @@ from finlab.deploy.bundle import with_tables_inside
 from finlab.errors import FinlabError, LayoutError
 from finlab.files.guarded import decoded
 from finlab.files.plain_values import parse_json, parse_yaml, yaml_text
+from finlab.hull.mesh import Mesh
+from finlab.hull.mesh_file import SizeError, stl_of
+from finlab.hull.surface import UNITS, Surface
 from finlab.layout import Layout, layout_to_dict, load_layout, parse_layout
 from finlab.layout.body import Hull
 from finlab.layout.load import A_LAYOUT, MAX_BYTES
 from finlab.physics import plant_of
-from webapp.scene.meshes.mesh import Mesh
-from webapp.scene.meshes.mesh_file import SizeError, stl_of
-from webapp.scene.meshes.mesh_hull import UNITS, MeshHull
 from webapp.session.companions import (
     TABLE_FOLDER,
     Opened,
@@ -154,8 +154,8 @@ def reshaped_hull(hull: Hull, change: Callable[[Mesh], Mesh]) -> Hull:
     """
     if hull.mesh is None:
         raise FinlabError("the hull is drawn from a shape; import a mesh first")
-    drawn = MeshHull.load(hull.mesh, hull.scale, (0.0, 0.0, 0.0))
-    content = stl_of(change(drawn.mesh()))
+    drawn = Surface.of_file(hull.mesh, hull.scale, (0.0, 0.0, 0.0))
+    content = stl_of(change(drawn.mesh))
     return replace(hull, mesh=stored_mesh("hull.stl", content, 1.0, cache_folder()), scale=1.0)
 
 

@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
+from finlab.hull import estimated
 from finlab.layout import Actuator, Layout
 from webapp.session import actuator_edits, body_edits, layout_edits
 from webapp.session.directions import Vector, part_of, replaced, turned_about
@@ -98,7 +99,7 @@ class Inspecting(Editing):
         """What the hull says of the body; a mass that is known stays, unless all is estimated `anew`."""
         layout = self.state.layout
         known = body_edits.with_dynamics(layout, mass_kg=None) if anew else layout
-        self._edit("Estimate mass and damping from the hull", body_edits.estimated(known))
+        self._edit("Estimate mass and damping from the hull", estimated(known))
 
     def _selected_names(self) -> tuple[str, ...]:
         """The selected actuators, in the order in which they were chosen."""

@@ -9,9 +9,9 @@ import viser
 
 from finlab.deploy.bundle import make_bundle
 from finlab.errors import FinlabError
+from finlab.hull import hull_of
 from finlab.layout import Layout
 from webapp.presses import Presses
-from webapp.scene.meshes.hull import hull_of
 from webapp.session import files
 from webapp.session.companions import Opened
 from webapp.session.files import FRAGMENT, WRENCH, file_stem, packed, unpacked

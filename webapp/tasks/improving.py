@@ -11,10 +11,9 @@ import numpy as np
 from finlab.analysis import Bounds, Improvement, Progress, optimize_layout
 from finlab.arrays import Array
 from finlab.errors import FinlabError
+from finlab.hull import hull_of
 from finlab.layout import Fin, Layout
 from webapp.scene.meshes.blades import CHORD, ROOT, SPAN
-from webapp.scene.meshes.hull import AnyHull, hull_of
-from webapp.scene.meshes.mesh_hull import MeshHull
 from webapp.session.directions import replaced
 from webapp.session.search_request import GOAL_WORDS, SearchRequest
 from webapp.session.state import Flow, State
@@ -43,8 +42,7 @@ class Room:
         A fin sweeps a cylinder about its shaft, any other one a ball. What is closer already, or overlaps,
         need not part, but comes no closer.
         """
-        hull = hull_of(layout)
-        self._hull: AnyHull = hull.coarse() if isinstance(hull, MeshHull) else hull
+        self._hull = hull_of(layout).coarse()
         fins = np.array([isinstance(part, Fin) for part in layout.actuators])
         self._along = np.where(fins[:, None], ALONG, 0.0)
         self._radius = np.where(fins, CHORD, PROPELLER)

@@ -6,7 +6,8 @@ A fin that points aft pushes forward, so the blade lies opposite to its thrust.
 import numpy as np
 from trimesh.convex import convex_hull
 
-from webapp.scene.meshes.mesh import Mesh, joined, revolved, triangles, tube
+from finlab.hull.mesh import Mesh, revolved, triangles
+from webapp.scene.meshes.mesh import joined, tube
 
 CHORD = 0.18
 """Length of the blade from the shaft to its trailing edge [m]."""

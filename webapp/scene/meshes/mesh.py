@@ -1,13 +1,13 @@
-"""A triangle mesh, the surfaces that shapes are made of, and the arrows of forces and torques."""
+"""Tubes, and the arrows of forces and torques."""
 
 import math
 from functools import cache
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from finlab.arrays import Array
+from finlab.hull.mesh import Mesh, grid_faces, triangles
 
 SHORTEST = 1e-3
 """Arrows shorter than this are not drawn [m]."""
@@ -15,15 +15,6 @@ SMALLEST_TURN, LONGEST_TURN = math.radians(3.0), math.radians(330.0)
 """Rings shorter than this are not drawn, longer ones are cut off [rad]."""
 RING_RADIUS = 0.12
 """Radius of a torque ring [m]."""
-
-
-class Mesh(NamedTuple):
-    """Triangles with outward normals."""
-
-    vertices: Array
-    """Points (V, 3) [m]."""
-    faces: NDArray[np.int32]
-    """Corners of the triangles (F, 3), counter-clockwise from outside."""
 
 
 NOTHING = Mesh(np.zeros((3, 3)), np.array([[0, 1, 2]], dtype=np.int32))
@@ -75,37 +66,7 @@ def _tube_faces(rows: int, sides: int) -> NDArray[np.int32]:
     k = np.arange(sides)
     n, last = np.roll(k, -1), (rows - 1) * sides
     start, end = np.full(sides, rows * sides), np.full(sides, rows * sides + 1)
-    return np.concatenate([_grid_faces(rows, sides), triangles(start, n, k, end, last + k, last + n)])
-
-
-def _grid_faces(rows: int, columns: int) -> NDArray[np.int32]:
-    """Triangles between neighbouring rings of points; the columns close on themselves."""
-    a = np.arange((rows - 1) * columns).reshape(-1, columns)
-    b = np.roll(a, -1, axis=1)
-    return triangles(a, b, a + columns, b, b + columns, a + columns)
-
-
-def triangles(*corners: NDArray[np.intp]) -> NDArray[np.int32]:
-    """Arrays of corners, three for each set of triangles, as triangles (F, 3)."""
-    return np.stack(corners, axis=-1).reshape(-1, 3).astype(np.int32)
-
-
-def revolved(x: Array, radius_y: Array, radius_z: Array, power: float = 2.0, sides: int = 48) -> Mesh:
-    """A closed body along the x axis whose cross-section at `x` is a superellipse.
-
-    Args:
-        x: stations (P,), rising [m].
-        radius_y: half width (P,) at each station [m].
-        radius_z: half height (P,) at each station [m].
-        power: 2 is an ellipse, larger is boxier.
-        sides: corners of the cross-section.
-    """
-    turn = np.linspace(0, 2 * np.pi, sides, endpoint=False)
-    cos, sin = np.cos(turn), np.sin(turn)
-    unit_y = np.sign(cos) * np.abs(cos) ** (2 / power)
-    unit_z = np.sign(sin) * np.abs(sin) ** (2 / power)
-    x, y, z = np.broadcast_arrays(x[:, None], radius_y[:, None] * unit_y, radius_z[:, None] * unit_z)
-    return Mesh(np.stack([x, y, z], axis=-1).reshape(-1, 3), _grid_faces(len(x), sides))
+    return np.concatenate([grid_faces(rows, sides), triangles(start, n, k, end, last + k, last + n)])
 
 
 def force_arrow(way: Array, start: Array, thickness: float) -> Mesh:

@@ -5,7 +5,8 @@ from functools import cache
 import numpy as np
 
 from finlab.arrays import Array
-from webapp.scene.meshes.mesh import Mesh, joined, revolved, triangles, tube
+from finlab.hull.mesh import Mesh, revolved, triangles
+from webapp.scene.meshes.mesh import joined, tube
 
 RADIUS = 0.046
 """Of the duct [m]."""

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from finlab.analysis.hull_hydrodynamics import (
+from finlab.hull.hydrodynamics import (
     HullSolid,
     ellipsoid_added_mass,
     friction_damping,

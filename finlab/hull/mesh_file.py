@@ -9,8 +9,8 @@ import trimesh
 
 from finlab.arrays import Array
 from finlab.errors import FinlabError
+from finlab.hull.mesh import Mesh
 from finlab.layout.body import MESH_SUFFIXES
-from webapp.scene.meshes.mesh import Mesh
 
 MAX_BYTES = 20_000_000
 MAX_FACES = 60_000

@@ -1,0 +1,136 @@
+"""The closed surface of a hull, which can be asked where it is: from a shape, a mesh file, or made up."""
+
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from functools import cached_property, lru_cache
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from trimesh.triangles import closest_point
+
+from finlab.arrays import Array
+from finlab.errors import FinlabError
+from finlab.files.guarded import read_file
+from finlab.hull.mesh import Mesh
+from finlab.hull.mesh_file import MAX_BYTES, MeshReport, read_mesh, simplified
+from finlab.hull.shapes import Three, shape_mesh
+from finlab.layout import Fin, Layout
+
+COARSE_FACES = 400
+UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "inch": 0.0254}
+"""Metres per unit of a mesh file."""
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A closed surface in the body frame. Two are equal that were made of the same."""
+
+    shape: str
+    """One of `finlab.layout.body.HULL_SHAPES`, or `mesh`."""
+    half: Three
+    """Half length, width and height of the box around it [m]."""
+    center: Three
+    """Where the middle of that box lies [m]."""
+    mesh: Mesh = field(compare=False, repr=False)
+    file: tuple[str, float] | None = None
+    """File and metres per unit, where it is a mesh."""
+    report: MeshReport | None = field(default=None, compare=False)
+    """What was found in that file."""
+
+    @staticmethod
+    @lru_cache(maxsize=8)
+    def of_shape(shape: str, half: Three, center: Three = (0.0, 0.0, 0.0)) -> "Surface":
+        """The surface of a shape of a half size [m]."""
+        return Surface(shape, half, center, shape_mesh(shape, half, center))
+
+    @staticmethod
+    @lru_cache(maxsize=8)
+    def of_file(path: str, scale: float, center: Three) -> "Surface":
+        """The surface in a mesh file, the middle of its box at `center` [m].
+
+        Raises:
+            FinlabError: the file cannot be read or is no sensible hull.
+        """
+        file = Path(path)
+        mesh, report = read_mesh(file.name, read_file(file, MAX_BYTES, "a mesh file", FinlabError), scale)
+        x, y, z = (float(v) for v in np.ptp(mesh.vertices, axis=0) / 2)
+        moved = Mesh(mesh.vertices + np.array(center), mesh.faces)
+        return Surface("mesh", (x, y, z), center, moved, (path, scale), report)
+
+    def coarse(self) -> "Surface":
+        """About the same one with few triangles, for questions that are asked thousands of times."""
+        return replace(self, mesh=simplified(self.mesh, COARSE_FACES))
+
+    @cached_property
+    def _triangles(self) -> tuple[Array, Array]:
+        """Corners (F, 3, 3) [m] and outward normals (F, 3) of the triangles that have an area."""
+        corners = np.asarray(self.mesh.vertices, dtype=float)[self.mesh.faces]
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        size = np.linalg.norm(normal, axis=1)
+        good = size > 1e-14
+        return corners[good], normal[good] / size[good, None]
+
+    def nearest(self, point: Array) -> tuple[Array, Array]:
+        """The point (3,) of the surface nearest to `point`, and the outward normal (3,) there."""
+        corners, normals = self._triangles
+        found = closest_point(corners, np.broadcast_to(np.asarray(point, dtype=float), (len(corners), 3)))
+        gap = np.linalg.norm(found - point, axis=1)
+        best = int(np.argmin(gap))
+        # On an edge several triangles are as near; their mean is what a hand would call the normal there.
+        normal = normals[gap < gap[best] + 1e-6].sum(axis=0)
+        size = float(np.linalg.norm(normal))
+        return np.asarray(found[best]), normals[best] if size < 1e-9 else normal / size
+
+    def contains(self, points: Array) -> NDArray[np.bool_]:
+        """Which of the points (..., 3) lie inside: the triangles fill the whole sphere around them, else
+        nothing. The solid angle of a triangle is that of Van Oosterom and Strackee (1983)."""
+        points = np.asarray(points, dtype=float)
+        inside = [self._solid_angle(point) > 2.0 * np.pi for point in points.reshape(-1, 3)]
+        return np.array(inside).reshape(points.shape[:-1])
+
+    def _solid_angle(self, point: Array) -> float:
+        a, b, c = np.swapaxes(self._triangles[0] - point, 0, 1)
+        u, v, w = (np.linalg.norm(side, axis=1) for side in (a, b, c))
+        volume = (a * np.cross(b, c)).sum(axis=1)
+        scale = u * v * w + (a * b).sum(axis=1) * w + (b * c).sum(axis=1) * u + (c * a).sum(axis=1) * v
+        return abs(2.0 * float(np.arctan2(volume, scale).sum()))
+
+    def anchor(self, point: Array) -> Array:
+        """Where a strut from a point (3,) meets the surface; the point itself if inside."""
+        x, y, z = np.asarray(point).tolist()
+        return np.array(_anchor(self, (x, y, z)))
+
+
+@lru_cache(maxsize=256)
+def _anchor(surface: Surface, point: Three) -> Three:
+    """Asked for again and again while nothing moves."""
+    inside = bool(surface.contains(np.array(point)))
+    x, y, z = point if inside else surface.nearest(np.array(point))[0].tolist()
+    return x, y, z
+
+
+def hull_of(layout: Layout) -> Surface:
+    """The hull that the layout describes, or one that fits between its actuators."""
+    described = layout.body.hull if layout.body is not None else None
+    if described is not None and described.mesh is not None:
+        x, y, z = described.center_m
+        with suppress(FinlabError):  # the file may be on another computer; a made-up hull is better than none
+            return Surface.of_file(described.mesh, described.scale, (x, y, z))
+    elif described is not None and described.shape is not None and described.size_m is not None:
+        length, width, height = described.size_m
+        x, y, z = described.center_m
+        return Surface.of_shape(described.shape, (length / 2, width / 2, height / 2), (x, y, z))
+    reach = np.abs(layout.position).max(axis=0)
+    half = np.maximum(reach * [1.06, 0.86, 0.86], [0.16, 0.09, 0.08])
+    slender = half[0] > 2.4 * max(half[1], half[2])
+    round_plan = half[1] > 0.8 * half[0]
+    shape = "torpedo" if slender else "ellipsoid" if round_plan else "ucat"
+    return Surface.of_shape(shape, (float(half[0]), float(half[1]), float(half[2])))
+
+
+@lru_cache(maxsize=8)
+def has_inside(layout: Layout) -> bool:
+    """Whether an actuator other than a fin sits inside the hull."""
+    places = [part.position for part in layout.actuators if not isinstance(part, Fin)]
+    return bool(places) and bool(hull_of(layout).contains(np.array(places)).any())
