@@ -52,6 +52,8 @@ class Improvement:
     value_after: float
     """The same for `layout`."""
     moved: tuple[str, ...]
+    axes: tuple[str, ...]
+    """Those whose directions count for the goals of directions; on the others, anything may come."""
     card_before: ScoreCard
     card_after: ScoreCard
 
@@ -132,6 +134,7 @@ def optimize_layout(
         value_before=before,
         value_after=after if improved else before,
         moved=moves.names,
+        axes=tuple(axes or AXES),
         card_before=card,
         card_after=score_card(best, flow=water) if improved else card,
     )

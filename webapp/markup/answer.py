@@ -142,7 +142,9 @@ def _cells(
         told = part.type if isinstance(part, Thruster) else f"{part.type}, {_degrees(command[0])}°"
         words = html("<td colspan='3' class='words'>{}</td>", told)
         given = html(
-            "<td class='{}'>{}</td>", "full" if limits.any() else "", f"{along:.2f}".replace("-", "−")
+            "<td class='{}'>{}</td>",
+            "full" if limits.any() else "",
+            f"{round(along, 2) + 0.0:.2f}".replace("-", "−"),
         )
         return html("{}{}<td>{}</td>", words, given, meter)
     bounded = "<td class='{}'>{:.1f}</td><td class='{}'>{:.2f}</td>"

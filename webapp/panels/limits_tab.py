@@ -7,11 +7,11 @@ from typing import Any
 import viser
 from markupsafe import Markup
 
-from finlab.analysis import Improvement, Progress
+from finlab.analysis import AXES, Improvement, Progress
 from webapp.handles import add_html
 from webapp.markup.html import html, marker
 from webapp.markup.score_card import score_table
-from webapp.markup.words import fins_words, three_digits
+from webapp.markup.words import fins_words, listed, three_digits
 from webapp.page import Page
 from webapp.panels.damage import add_fin_buttons
 from webapp.session.display import DRAWN
@@ -123,9 +123,15 @@ def _before_and_after(found: Improvement) -> str:
     goal = next(words for words, name in GOAL_WORDS.items() if name == found.goal)
     stopped = " The search was stopped early." if found.cancelled else ""
     unit = " W" if found.goal == "mission_power" else " N"
+    some = found.goal != "mission_power" and len(found.axes) < len(AXES)
+    of = f" of {listed(found.axes)}, with anything on the others" if some else ""
     heading = html(
-        "<b>{}: {}{} before, {}{} after.</b>{}", goal.capitalize(), before, unit, after, unit, stopped
+        "<b>{}{}: {}{} before, {}{} after.</b>{}", goal.capitalize(), of, before, unit, after, unit, stopped
     )
+    then = found.card_after.authority.alone
+    lost = [axis for axis in found.card_before.authority.alone if axis not in then]
+    if lost:
+        heading += html(" <span class='missing'>It no longer pushes {} alone.</span>", listed(lost))
     moved = fins_words([found.layout.index(name) for name in found.moved], found.layout).capitalize()
     table = score_table(found.layout, found.card_after, found.card_before)
     return html("{} {} moved; the view shows them as shadows.{}", heading, moved, table)

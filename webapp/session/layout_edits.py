@@ -162,7 +162,7 @@ def added(layout: Layout, kind: str) -> tuple[Layout, str]:
 def blank() -> Layout:
     """A robot to begin with: a round hull, and a fin on its left that pushes ahead, back, up and down."""
     hull = Hull(shape="ellipsoid", size_m=(0.5, 0.3, 0.2))
-    fin = Fin("left", (0.0, 0.15 + STAND_OFF, 0.0), math.pi / 2)
+    fin = Fin("left", (0.0, 0.17, 0.0), math.pi / 2)
     return Layout("New robot", (fin,), body=Body(hull=hull))
 
 
