@@ -10,7 +10,7 @@ import numpy as np
 from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.evaluation.noisy_tables import noisy_table
-from finlab.layout import FinModelSpec, Layout, random_layout
+from finlab.layout import Layout, random_layout
 from finlab.layout.angles import wrapped
 from finlab.layout.random import TRAINING_BOX
 from finlab.layout.random_actuators import Draw as ActuatorDraw
@@ -34,12 +34,10 @@ NEAR_ANGLE = math.radians(2.0)
 """Nearly parallel shafts of split `near-singular` differ by at most this; opposite counts as parallel."""
 NEAR_POSITION = 0.005
 """Nearly coincident fins of split `near-singular` lie within this of each other along each axis [m]."""
-BIG, TINY = 10.0, 1.0 / 6.0
-"""Length of splits `big` and `tiny` over that of the training layouts: fins out to 3 m and to 5 cm."""
 DOMAIN = 0x7E57
 """Leads the seed of every test case; training seeds begin otherwise."""
 OWN_SIGMA = (
-    *("fins", "fins-mixed", "tables", "big", "tiny"),
+    *("fins", "fins-mixed", "tables"),
     *("thrusters", "azimuths", "mixed-actuators", "any-shaft"),
 )
 """Splits whose robots are each measured by their own wrenches, which are smaller or larger than those of
@@ -117,23 +115,6 @@ def _whole(**options: Any) -> Draw:
     return lambda rng, name: (random_layout(rng, name, **options), ())
 
 
-def _scaled(size: float) -> Draw:
-    """Layouts as in training, times a size: places and blades; a bigger blade's tip moves no faster."""
-
-    def draw(rng: np.random.Generator, name: str) -> tuple[Layout, tuple[str, ...]]:
-        layout, blade = random_layout(rng, name), FinModelSpec().values()
-        bigger = ("area", float(blade["area"]) * size**2), ("lever", float(blade["lever"]) * size)
-        fins = []
-        for fin in layout.fins:
-            x, y, z = (size * np.array(fin.position)).tolist()
-            low, high = fin.limits.frequency
-            slower = replace(fin.limits, frequency=(low / max(size, 1.0), high / max(size, 1.0)))
-            fins.append(replace(fin, position=(x, y, z), model=FinModelSpec("drag", bigger), limits=slower))
-        return replace(layout, actuators=tuple(fins)), ()
-
-    return draw
-
-
 def _failure(rng: np.random.Generator, name: str) -> tuple[Layout, tuple[str, ...]]:
     """One or two fins lost, never all."""
     layout = random_layout(rng, name)
@@ -199,8 +180,6 @@ SPLITS: dict[str, tuple[int, Draw]] = {
     "fins-mixed": (7, _fins_mixed),
     "tables": (8, _tables),
     "many-fins": (9, _whole(n_fins=MANY_FINS)),
-    "big": (16, _scaled(BIG)),
-    "tiny": (17, _scaled(TINY)),
     "thrusters": (18, _robots(random_thruster, count=(4, 10))),
     "azimuths": (19, _robots(random_azimuth, count=(2, 6))),
     "mixed-actuators": (

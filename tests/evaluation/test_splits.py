@@ -87,7 +87,7 @@ def test_boxes() -> None:
 
 
 def test_limits() -> None:
-    for split in (name for name in QUICK if name not in ("limits", "big")):
+    for split in (name for name in QUICK if name != "limits"):
         assert all(fin.limits == Limits() for case in _cases(split) for fin in case.layout.fins)
     limits = [fin.limits for case in _cases("limits") for fin in case.layout.fins]
     assert all(0.3 <= each.amplitude[1] <= 0.8 and 1.0 <= each.frequency[1] <= 3.0 for each in limits)
@@ -195,19 +195,3 @@ def test_targets_are_reachable(split: str) -> None:
 def test_bad_numbers_are_refused(arguments: tuple[str, int, int, int], message: str) -> None:
     with pytest.raises(DataError, match=message):
         make_split(*arguments)
-
-
-@pytest.mark.parametrize(("split", "extent", "strength"), [("big", 3.0, 100.0), ("tiny", 0.05, 6.0**-4)])
-def test_robots_of_another_size(split: str, extent: float, strength: float) -> None:
-    """A blade ten times as long at a tenth of the frequency pushes a hundred times as much."""
-    cases = make_split(split, 24, 1, 3)
-    reach = max(np.abs(fin.position).max() for case in cases for fin in case.layout.fins)
-    assert 0.9 * extent < reach <= extent
-
-    def largest(case: Case) -> float:
-        plant = plant_of(case.layout)
-        return float(plant.thrust(plant.upper[:, 0], plant.upper[:, 1])[0])
-
-    usual = largest(make_split("id", 1, 1, 3)[0])
-    assert largest(cases[0]) == pytest.approx(strength * usual)
-    assert all(case.sigma is not None for case in cases)

@@ -20,9 +20,7 @@ from finlab.evaluation.paper_figures import paper_figures
 from finlab.evaluation.progress import progress
 from finlab.evaluation.report.document import Column, Row
 from finlab.layout import Layout, random_layout
-from finlab.layout.random import TRAINING_BOX
-from finlab.layout.thrust_model import PowerLaw
-from finlab.layout.thruster import Thruster
+from finlab.layout.random_actuators import random_robot, random_thruster
 from finlab.physics import plant_of
 
 DOMAIN = 0xF1257
@@ -39,8 +37,6 @@ FAR = 1e3
 """How many times a wrench lies beyond its robot's reach for certain."""
 TICK, AT = 0.05, 0.6
 """From tick to tick a target goes by this share of the way to the next direction, at this share of reach."""
-FORCE, POWER = (-39.91, 51.44), PowerLaw(0.997, 1.449)
-"""Limits [N] and power of a thruster: Blue Robotics' T200 at 16 V."""
 _ROBOT = re.compile(r"(fins|thrusters)-(\d{1,2})")
 
 
@@ -91,16 +87,11 @@ def run(
 
 
 def _robot(method: MethodSpec, kind: str, count: int, seed: int, k: int) -> Timed:
-    """Robot k of a kind: fins of U-CAT's law with horizontal shafts, or thrusters anyhow."""
+    """Robot k of a kind: fins of U-CAT's law with horizontal shafts, or any thrusters."""
     rng = np.random.default_rng([DOMAIN, seed, len(kind), count, k])
-    layout = random_layout(rng, f"{kind}-{count}", n_fins=count)
-    if kind == "thrusters":
-        axes = rng.standard_normal((count, 3))
-        axes /= np.linalg.norm(axes, axis=1, keepdims=True)
-        places = (rng.uniform(-1.0, 1.0, (count, 3)) * TRAINING_BOX).tolist()
-        each = zip(places, axes.tolist(), strict=True)
-        parts = (Thruster(f"t{i}", tuple(p), tuple(a), FORCE, POWER) for i, (p, a) in enumerate(each))
-        layout = Layout(layout.name, tuple(parts))
+    name, ends = f"{kind}-{count}", (count, count)
+    fins = kind == "fins"
+    layout = random_layout(rng, name, ends) if fins else random_robot(rng, name, ends, (random_thruster,))
     plant, allocator = plant_of(layout), method.on(layout)
     wrenches = plant.wrench(plant.sample(rng, (TARGETS,)))
     return Timed(layout, allocator.allocate_batch(FAR * wrenches, policy="direction").wrench)
@@ -119,7 +110,9 @@ def _rows(
     rows, answers = list[Row](), dict[str, list[Allocation]]()
     for method, spec in progress(methods.items(), "method", f"{name}, {what}"):
         times, answers[method] = call_times(spec, timed, share, calls, budget)
-        rows.append({"robot": name, "call": what, "method": method, **_quantiles(times)})
+        middle, high = (float(np.quantile(times, q)) for q in (0.5, 0.99))
+        about: Row = {"robot": name, "call": what, "method": method, "calls": len(times)}
+        rows.append(about | {"p50_ms": middle, "p99_ms": high})
     for row in rows if REFERENCE in answers else ():
         row["p50_over_dual"] = row["p50_ms"] / rows[list(answers).index(REFERENCE)]["p50_ms"]
         pairs = zip(answers[row["method"]], answers[REFERENCE], strict=False)
@@ -130,11 +123,6 @@ def _rows(
     for row in rows:
         row["delivered"] = float(np.mean([answer.reachable for answer in answers[row["method"]]]))
     return rows
-
-
-def _quantiles(times: Sequence[float]) -> Row:
-    low, middle, high = (float(np.quantile(times, q)) for q in (0.05, 0.5, 0.99))
-    return {"calls": len(times), "p5_ms": low, "p50_ms": middle, "p99_ms": high}
 
 
 def call_times(

@@ -30,7 +30,6 @@ HARD = (
     "fins-mixed",
     "tables",
     "many-fins",
-    "tiny",
 )
 """Splits of the report."""
 
@@ -51,7 +50,7 @@ def run(
         layout: a layout file, bundle or shipped name in place of a split: one case, of that many targets,
             with errors over the robot's own wrenches.
         split: names, or all: id, ood, ood-fins, limits, failure, near-singular, fins, fins-mixed, tables,
-            many-fins, big, tiny, thrusters, azimuths, mixed-actuators, any-shaft.
+            many-fins, thrusters, azimuths, mixed-actuators, any-shaft.
         methods: names; by default dual and paper, on LAYOUT all that are installed. Of several splits each
             method answers those whose robots it takes.
         layouts: of each split.
@@ -149,7 +148,7 @@ experiment = Experiment(
     run=run,
     note=(
         "Scored by the plant, the actuators' own laws or tables. Errors in standard deviations of the "
-        "wrenches of random layouts; on fins, fins-mixed, tables, big and tiny, on robots of other actuators "
+        "wrenches of random layouts; on fins, fins-mixed and tables, on robots of other actuators "
         "and on a layout of your own, of the robot's wrenches. Intervals: where another seed lands, 95 times "
         "of 100. Time: that of all targets of a layout over their number. Printed: the paper's figures, on "
         "its own layouts and targets."

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from finlab.evaluation.statistics.bootstrap import (
-    SPREAD,
     mean_interval,
     ratio_interval,
     share_interval,
 )
 
 GROUPS, EACH = 100, 20
+SPREAD = 1.96 * np.sqrt(2.0)
 
 
 def _draw(seed: int) -> tuple[np.ndarray, np.ndarray]:
