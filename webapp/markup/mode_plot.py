@@ -15,7 +15,8 @@ from webapp.theme import DEAD, css, mode_color
 LEFT = 54
 """Where the axis that goes up stands [px]."""
 FAR = 2.0
-"""Samples that cost more than so many times the dearest mode are counted, not drawn: modes keep apart."""
+"""Samples that cost more than the answer, and so many times the dearest other mode, are counted, not drawn:
+modes keep apart."""
 LEGEND = (("sample", 0), ("refined", 76), ("on the robot", 154))
 """Words and places of what is drawn."""
 DOT, RING = 3.0, 5.5
@@ -47,8 +48,9 @@ def mode_plot(modes: Modes, shown: int, step: int | None, height: int) -> str:
     effort = np.array([named.mode.effort for named in modes.shown])
     refined = np.stack([effort, _logarithm(error)], axis=1)
     raw = np.array([[way.effort, _logarithm(way.err_norm)] for way in modes.ways]).swapaxes(1, 2)
-    near = raw[0, :, 0] <= FAR * effort.max()
-    drawn = raw[:, near].clip(max=(FAR * effort.max(), np.inf))
+    far = max(float(effort.max()), FAR * float(effort[len(effort) > 1 :].max()))
+    near = raw[0, :, 0] <= far
+    drawn = raw[:, near].clip(max=(far, np.inf))
     points = np.concatenate([refined, drawn.reshape(-1, 2)])
     if not np.isfinite(points).all():
         return ""

@@ -111,7 +111,8 @@ def bound_sentence(allocation: Allocation) -> str:
     gap = _gap(allocation, allocation.bound)
     if gap <= PROVED:
         return "Its watts are proved least."
-    return f"Its watts are at most {100 * gap:.2g} % above the least."
+    share = f"{100 * gap:.2g}" if gap < 0.1 else f"{100 * gap:.0f}"
+    return f"Its watts are at most {share} % above the least."
 
 
 def answer_sentence(

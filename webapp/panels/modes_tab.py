@@ -99,8 +99,9 @@ def _origin_words(layout: Layout, method: str, best: Allocation | None) -> str:
         said = LEARNED
     elif layout.is_of_fins:
         beside = BESIDE.get(method, f" The answer, number 1, is that of method {method}.")
-        exact = best is None or best.reachable
-        said = PROPOSED + beside if exact else BEYOND.format(best.policy.kind)
+        said = PROPOSED + beside
+        if best is not None and not best.reachable:
+            said = BEYOND.format(best.policy.kind)
     return html("<div class='fl dim'>{}</div>", said)
 
 
