@@ -83,9 +83,16 @@ class Surface:
         return np.asarray(found[best]), normals[best] if size < 1e-9 else normal / size
 
     def contains(self, points: Array) -> NDArray[np.bool_]:
-        """Which of the points (..., 3) lie inside: the triangles fill the whole sphere around them, else
-        nothing. The solid angle of a triangle is that of Van Oosterom and Strackee (1983)."""
+        """Which of the points (..., 3) lie inside.
+
+        Of a shape, which is convex, those behind all triangles; of a mesh those around which the triangles
+        fill the whole sphere, by solid angles after Van Oosterom and Strackee (1983).
+        """
         points = np.asarray(points, dtype=float)
+        if self.shape != "mesh":
+            corners, normals = self._triangles
+            ahead = points @ normals.T - (corners[:, 0] * normals).sum(axis=1)
+            return np.asarray((ahead < 0.0).all(axis=-1))
         inside = [self._solid_angle(point) > 2.0 * np.pi for point in points.reshape(-1, 3)]
         return np.array(inside).reshape(points.shape[:-1])
 
