@@ -1,5 +1,6 @@
 """Design a robot with real keys: from nothing to six fins around a hull, by gizmo and numbers."""
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -120,13 +121,13 @@ def test_limits_and_model_count_for_all_selected_fins(page: Any) -> None:
     for name in ("front_left", "back_left"):
         page.page.locator(f".fin-list tr[data-fin={name}] .swatch").click(modifiers=["Control"])
     page.page.locator(".fl.head", has_text="3 fins").wait_for()
-    page.type("A [rad]", "0.52", place=1)
-    most = [0.52] * 3
+    page.type("A [°]", "30", place=1)
+    most = [math.radians(30.0)] * 3
     page.until(lambda: [fin.limits.amplitude[1] for fin in session.state.layout.fins[:3]] == most)
     page.choose("Model", "lighthill")
     page.until(lambda: [fin.model.type for fin in session.state.layout.fins] == ["lighthill"] * 3 + ["drag"])
     page.type("Width [m]", "0.12")
-    page.page.locator("svg.plot:visible", has_text="A 0.52 rad").wait_for()
+    page.page.locator("svg.plot:visible", has_text="A 30°").wait_for()
     page.until(lambda: session.history.undo_name == "Width of 3 fins")
     page.type("Width [m]", "-1")
     page.until(lambda: any("must lie within" in note for note in page.notes()))

@@ -22,6 +22,7 @@ from tests.webapp.stand_in import load_stand_in
 from webapp.panels.frame import View
 from webapp.session import Display, Session
 from webapp.session.looking import DRAWERS
+from webapp.tasks import analyst
 from webapp.tasks.background import Workers
 from webapp.tasks.solver import Solver
 from webapp.viser_internals import start_server, stop_server
@@ -175,6 +176,8 @@ def test_no_figure_of_the_robot_before_stays(
     whole = tab.figures()
     with monkeypatch.context() as patch:
         patch.setattr(place, broken)
+        for known in (analyst.find, analyst.find_ranges):
+            known.cache_clear()
         tab.open(OPENED)
         shown = tab.figures()
         told = " ".join([*shown, *tab.client.notes])

@@ -297,7 +297,7 @@ def test_limits_beyond_what_was_measured_are_told(tmp_path: Path, cache: Path) -
     fin = robot(tmp_path, cache).fins[2]
     assert "at the edge" not in model_card(fin)
     wide = replace(fin, limits=replace(fin.limits, frequency=(0.1, 3.0)))
-    assert "may be asked for 0.60 rad and 3.00 Hz" in model_card(wide)
+    assert "may be asked for 34° and 3.00 Hz" in model_card(wide)
 
 
 def test_a_bundle_opens_in_the_app(tmp_path: Path, cache: Path) -> None:

@@ -1,7 +1,5 @@
 """What a fit is worth: the verdict first, and what to measure next."""
 
-import math
-
 import numpy as np
 from markupsafe import Markup
 
@@ -9,7 +7,7 @@ from finlab.fit.fin_fit import FinFit
 from finlab.fit.thruster_file import summary
 from finlab.fit.thruster_fit import ThrusterFit
 from webapp.markup.html import html, row
-from webapp.markup.words import three_digits
+from webapp.markup.words import degrees, three_digits
 from webapp.tasks.fitting import Fitted
 
 MOST_NAMED = 8
@@ -63,13 +61,11 @@ def _advice(found: Fitted) -> str:
     assert isinstance(found.fit, FinFit) and found.advice is not None
     force = np.linalg.norm(found.fit.predict(found.advice)[0], axis=-1)
     rows = [
-        row(
-            k, f"{a:.2f}", f"{f:.2f}", f"{math.degrees(phi):.0f}".replace("-", "−"), three_digits(float(size))
-        )
+        row(k, degrees(a), f"{f:.2f}", degrees(phi), three_digits(float(size)))
         for k, ((a, f, phi), size) in enumerate(zip(found.advice, force, strict=True), start=1)
     ]
     head = Markup(
-        "<tr><th></th><th>A [rad]</th><th>f [Hz]</th><th>direction [°]</th><th>expected [N]</th></tr>"
+        "<tr><th></th><th>A [°]</th><th>f [Hz]</th><th>direction [°]</th><th>expected [N]</th></tr>"
     )
     return html(
         "<div class='said'>Measure next, the most telling first:</div><table>{}{}</table>", head, rows

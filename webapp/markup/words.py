@@ -51,6 +51,11 @@ def error_digits(value: float) -> str:
     return "≤ 1e−9" if value < ROUNDING else small(value)
 
 
+def degrees(angle: float) -> str:
+    """An angle [rad] as people read it: `−30`."""
+    return f"{math.degrees(angle):.0f}".replace("-", "−")
+
+
 def three_digits(value: float | None) -> str:
     """Three significant digits: `2.32`, `0.0410`, `12.5`; small and large ones as `small` has them."""
     if value is None or not math.isfinite(value):

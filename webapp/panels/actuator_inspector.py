@@ -9,7 +9,7 @@ from markupsafe import Markup
 
 from finlab.errors import FinlabError
 from finlab.layout import Actuator, Azimuth, Fin, Layout
-from finlab.layout.fin import MAX_AMPLITUDE, MAX_FREQUENCY
+from finlab.layout.fin import MAX_FREQUENCY
 from finlab.layout.thrust_model import PowerLaw
 from webapp.markup.answer import swatch
 from webapp.markup.html import html
@@ -49,7 +49,7 @@ class Box(NamedTuple):
 
 
 PAIRS = (
-    Box("A [rad]", "amplitude", FIN, f"Least and most, up to {MAX_AMPLITUDE:.2f} rad.", 0.05),
+    Box("A [°]", "amplitude", FIN, "Half of the beat: least and most, up to 90.", 5.0, True),
     Box("f [Hz]", "frequency", FIN, f"Least and most, up to {MAX_FREQUENCY:g} Hz."),
     Box(
         "φ [°]",

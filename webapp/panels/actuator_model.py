@@ -1,6 +1,5 @@
 """What the selected actuators are known by: a formula with its numbers, or a table of measurements."""
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import lru_cache, partial
@@ -19,6 +18,7 @@ from finlab.layout.thrust_model import PowerTable
 from finlab.physics import make_law, plant_of
 from webapp.markup.html import html
 from webapp.markup.plot import Plot, cost_axis, positive
+from webapp.markup.words import degrees
 from webapp.page import Page
 from webapp.session.actuator_edits import FORMULAS
 from webapp.session.actuator_edits import words as key_words
@@ -165,17 +165,17 @@ def _table_words(fin: Fin, doubts: bool) -> str:
         return html("<b>table</b>: <span class='missing'>{}</span>", str(error))
     assert isinstance(law, TableLaw)
     (low_a, high_a), (low_f, high_f), (low_d, high_d) = law.covers
-    turn = "all round" if law.periodic else f"from {math.degrees(low_d):.0f}° to {math.degrees(high_d):.0f}°"
-    covers = f"A {low_a:.2f} to {high_a:.2f} rad, f {low_f:.2f} to {high_f:.2f} Hz, {turn}"
+    turn = "all round" if law.periodic else f"from {degrees(low_d)}° to {degrees(high_d)}°"
+    covers = f"A {degrees(low_a)}° to {degrees(high_a)}°, f {low_f:.2f} to {high_f:.2f} Hz, {turn}"
     power = "with the power that was measured" if law.has_power else "power as of U-CAT's fin"
     doubt = next((note for note in law.notes if note.startswith(DOUBT)), None)
     said = "" if doubt is None or not doubts else html("<div class='missing'>This fin is {}.</div>", doubt)
     if fin.limits.amplitude[1] > high_a + BEYOND or fin.limits.frequency[1] > high_f + BEYOND:
         most_a, most_f = fin.limits.amplitude[1], fin.limits.frequency[1]
         said += html(
-            "<div class='missing'>The fin may be asked for {:.2f} rad and {:.2f} Hz: beyond "
+            "<div class='missing'>The fin may be asked for {}° and {:.2f} Hz: beyond "
             "what was measured the force counts as at the edge.</div>",
-            most_a,
+            degrees(most_a),
             most_f,
         )
     fitted = next((note for note in law.notes if note.startswith("fitted to ")), None)
@@ -227,7 +227,7 @@ def curves(part: Actuator) -> Sequence[Curves]:
         command[..., 0, 0], command[..., 0, 1] = amplitude[:, None], across
         command[..., 0, 2] = np.mean(part.limits.zero_direction)
         force = np.linalg.norm(plant.force(command)[..., 0, :], axis=-1)
-        names = [f"A {size:.2f} rad" for size in amplitude]
+        names = [f"A {degrees(size)}°" for size in amplitude]
         kinds = (("mean force [N]", force), ("power [W]", plant.power(command)[..., 0]))
         return [Curves("frequency [Hz]", across, up, tuple(zip(names, y, strict=True))) for up, y in kinds]
     if isinstance(part, Rudder):

@@ -116,12 +116,12 @@ def add_damage(page: Page) -> None:
     page.bind_number(angle, lambda at: damage("stuck", math.radians(at)), _of("stuck", 0.0, DEGREE), digits=1)
     board.show(angle, visible=_is("stuck"))
     kept = gui.add_vector3(
-        "A [rad], f [Hz], φ [°]", (0.0, 0.0, 0.0), step=0.05, hint="The command that it keeps.", visible=False
+        "A [°], f [Hz], φ [°]", (0.0, 0.0, 0.0), step=0.5, hint="The command that it keeps.", visible=False
     )
     page.bind_number(
         kept,
-        lambda now: damage("running", (now[0], now[1], math.radians(now[2]))),
-        _of("running", (0.0, 0.0, 0.0), (1.0, 1.0, DEGREE)),
+        lambda now: damage("running", (math.radians(now[0]), now[1], math.radians(now[2]))),
+        _of("running", (0.0, 0.0, 0.0), (DEGREE, 1.0, DEGREE)),
         digits=2,
     )
     board.show(kept, visible=_is("running"))

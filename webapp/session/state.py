@@ -187,13 +187,20 @@ def _checked_fault(name: str, kind: str, value: Any) -> Any:
         share = number(value, f"share left of {name}", *STRENGTH_RANGE)
         return None if share == 1.0 else share
     if kind == "stuck":
-        return number(value, f"angle of {name}, stuck, in radians", -math.pi - 1e-6, math.pi + 1e-6)
+        return _angle(value, f"angle of {name}, stuck [°]", -math.pi, math.pi)
     amplitude, frequency, angle = value
     return (
-        number(amplitude, f"amplitude of {name} [rad]", 0.0, MAX_AMPLITUDE),
+        _angle(amplitude, f"amplitude of {name} [°]", 0.0, MAX_AMPLITUDE),
         number(frequency, f"frequency of {name} [Hz]", 0.0, MAX_FREQUENCY),
-        number(angle, f"direction of {name} in radians", -math.pi - 1e-6, math.pi + 1e-6),
+        _angle(angle, f"direction of {name} [°]", -math.pi, math.pi),
     )
+
+
+def _angle(value: Any, name: str, low: float, high: float) -> float:
+    """An angle [rad] within bounds [rad]; people are told of it in degrees."""
+    if not isinstance(value, bool) and isinstance(value, (int, float)):
+        number(math.degrees(value), name, *(math.degrees(end) for end in (low - 1e-6, high + 1e-6)))
+    return number(value, name, -math.inf, math.inf)
 
 
 def compared(layout: Layout) -> tuple[str, ...]:
