@@ -32,10 +32,37 @@
       if (!moved && !settling && !settled) return;
       drawn = seen;
       drawnAt = now;
+      paint(scene);
       window.finlabFrames.count++;
       draw(scene, camera);
     };
     gl.domElement.addEventListener('webglcontextrestored', ask);
+  }
+
+  // Labels are black on white in viser, whatever the theme.
+  const night = { value: 0 };
+  function paint(scene) {
+    night.value = Number(document.documentElement.dataset.mantineColorScheme === 'dark');
+    scene.traverse(({ material }) => {
+      if (!material?.uniforms?.uLabelData || material.finlab) return;
+      Object.assign(material, { finlab: true, needsUpdate: true });
+      material.uniforms.night = night;
+      material.fragmentShader = `uniform float night;\n${material.fragmentShader}`
+        .replace('vec4(1.0, 1.0, 1.0,', 'vec4(vec3(1.0 - 0.86 * night),')
+        .replace('vec4(0.0, 0.0, 0.0,', 'vec4(vec3(0.9 * night),');
+    });
+  }
+
+  // The camera goes along with a robot that swims, wherever it is turned or moved to.
+  let stood = null;
+  function follow() {
+    const now = stood && viewer().nodePoseData['/robot']?.position, before = stood;
+    if (!now) return;
+    stood = [...now];
+    const [x, y, z] = now.map((value, k) => value - before[k]);
+    if (!x && !y && !z) return;
+    const controls = viewer().cameraControl, target = controls.getTarget(controls.camera.position.clone());
+    controls.moveTo(target.x - y, target.y + z, target.z - x, false); // z is up in viser, y in three.js
   }
 
   const ask = () => { due = performance.now() + SETTLE_MS; };
@@ -43,7 +70,7 @@
   function listenToRequests() {
     const view = viewer(), request = view.requestRender;
     if (request.finlab) return;
-    view.requestRender = Object.assign(() => { ask(); request(); }, { finlab: true });
+    view.requestRender = Object.assign(() => { follow(); ask(); request(); }, { finlab: true });
   }
 
   function touch() {
@@ -95,6 +122,7 @@
 
   window.finlabFrames = {
     count: 0, // frames that were drawn
+    follow(start) { stood = start; },
     flap(commands, rate, still) {
       patch();
       listenToRequests();
@@ -107,5 +135,9 @@
   };
   for (const kind of ['pointermove', 'pointerdown', 'pointerup', 'wheel', 'keydown', 'keyup'])
     window.addEventListener(kind, touch, { capture: true, passive: true });
+  // For what can be dragged, viser asks this of a listener that may not.
+  window.addEventListener('pointerdown', (event) => {
+    if (event.target.tagName === 'CANVAS') event.preventDefault = () => {};
+  }, { capture: true });
   document.addEventListener('visibilitychange', () => { ask(); touch(); });
 })();

@@ -20,6 +20,7 @@ from viser import _icons, _messages
 from viser._assignable_props_api import AssignablePropsBase
 from websockets.http11 import Request, Response
 
+from webapp.first_page import name_page
 from webapp.guard import SECURE, Guard
 
 MAX_MESSAGE = 16 * 1024 * 1024
@@ -49,7 +50,7 @@ def _guarded(guard: Guard) -> Iterator[None]:
             headers = {name.lower(): value for name, value in request.headers.raw_items()}
             verdict = guard.check(request.path, headers)
             answer: Response | None = process_request(connection, request) if verdict is None else verdict
-            return answer
+            return answer if verdict is not None or answer is None else name_page(answer)
 
         def secured(connection: Any, request: Request, response: Response) -> None:
             for name, value in SECURE.items():

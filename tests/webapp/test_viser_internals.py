@@ -1,5 +1,7 @@
 """What is put in place of viser's private parts gives what viser gives."""
 
+import gzip
+from urllib.request import Request, urlopen
 from zipfile import ZipFile
 
 import pytest
@@ -30,4 +32,16 @@ def test_icons_and_properties_are_viser_s_own_and_read_once(monkeypatch: pytest.
     box.dimensions, sphere.radius = (1.0, 2.0, 3.0), 0.5
     assert (box.dimensions, sphere.radius) == ((1.0, 2.0, 3.0), 0.5)
     assert "dimensions" not in sphere._prop_hints and "dimensions" in box._prop_hints
+    stop_server(server)
+
+
+def test_the_first_page_has_our_name_and_icon() -> None:
+    server = start_server()
+    for encoding in ("gzip", "identity"):
+        request = Request(f"http://127.0.0.1:{server.get_port()}/", headers={"Accept-Encoding": encoding})
+        with urlopen(request) as answer:
+            body = answer.read()
+            page = gzip.decompress(body) if answer.headers["Content-Encoding"] == "gzip" else body
+        assert page.count(b"<title>") == 1 and b"<title>finlab</title>" in page
+        assert page.count(b'rel="icon"') == 1
     stop_server(server)

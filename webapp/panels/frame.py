@@ -5,12 +5,14 @@ Every region is a folder of viser's that a style takes out of its panel and puts
 here. So widgets that were seen once stay mounted, and a change of task is one message.
 """
 
+import json
 from collections.abc import Callable
 from functools import partial
 from importlib.resources import files
 
 from markupsafe import Markup
 
+from finlab.layout import Layout
 from webapp.commands import commands, register
 from webapp.handles import add_html, put
 from webapp.markup.html import html, marker
@@ -94,6 +96,7 @@ class Frame:
         self._shown = gui.add_html("")
         page.board.act(self._arrange)
         page.board.act(self._guard)
+        page.board.act(self._title)
         self._listen()
         self.sections: list[Section] = []
         add_corner(page)
@@ -145,6 +148,10 @@ class Frame:
         """A reload asks first while there is something that it would drop."""
         drops = str(swims or fitting is not None or improving).lower()
         run_script(self._page.gui, f"window.finlabDrops = {drops};")
+
+    def _title(self, layout: Layout) -> None:
+        """The browser's tab has the robot's name."""
+        run_script(self._page.gui, f"document.title = {json.dumps(layout.name + ' · finlab')};")
 
     def _listen(self) -> None:
         """Hear of what is pressed in the frame."""

@@ -30,7 +30,7 @@ from webapp.tasks.analyst import Findings
 from webapp.tasks.context import Context
 from webapp.tasks.moment import Moment
 from webapp.tasks.swimmer import Swimmer
-from webapp.theme import HALF_TURN, LIGHT
+from webapp.theme import HALF_TURN, LIGHT, fin_color
 from webapp.viser_internals import run_script
 
 CAMERAS = {
@@ -149,10 +149,11 @@ class RobotScene:
             moved, pinned = part.name == edited, part.name in stuck
             self._fins[i].place(part, hull, sizes, moved, label, pinned, i == dragged)
         if edited is None:
-            self._direction.show(None, np.zeros(3), 1.0)
+            self._direction.show(None, np.zeros(3), 1.0, LIGHT.line)
         else:
-            part = drawn.actuators[drawn.index(edited)]
-            self._direction.show(np.array(part.position), np.array(direction(part)), sizes[1])
+            index = drawn.index(edited)
+            part, color = drawn.actuators[index], fin_color(index)
+            self._direction.show(np.array(part.position), np.array(direction(part)), sizes[1], color)
 
     def _push(
         self,

@@ -9,12 +9,14 @@ from finlab.arrays import Array
 from finlab.hull.mesh import Mesh
 from webapp.handles import put
 from webapp.scene.meshes.mesh import NOTHING, force_arrow, joined, tube
+from webapp.scene.proportions import view_size
 from webapp.scene.stage import Shape, add_floor, aim_camera, paint_floor
 from webapp.session.display import Display
 from webapp.tasks.moment import PLACE, Moment
 from webapp.tasks.swimmer import Swimmer
 from webapp.tasks.swimming import Swimming
 from webapp.theme import ASKED, DELIVERED, WATER
+from webapp.viser_internals import run_script
 
 FLOW_S = 6.0
 """The arrow of the water is as long as its way in this time [s]."""
@@ -54,6 +56,8 @@ class SwimScene:
             put(node, visible=swimmer is not None)
         paint_floor(self._floor, display.dark)
         if swimmer is None or moment is None:
+            if self._shown is not None:
+                run_script(self._client.gui, "finlabFrames.follow(null);")
             self._shown = self._ahead = None
             return
         if swimmer is not self._shown:
@@ -74,8 +78,10 @@ class SwimScene:
         self._shown, self._ahead = swimmer, None
         self._goal.show(_goal, swimmer.path)
         put(self._floor, position=np.array([0.0, 0.0, swimmer.path[:, 2].min() - DEPTH_BELOW]))
-        self._pose(swimmer.shown.pose)
-        self._look(swimmer.path)
+        start = swimmer.shown.pose
+        self._pose(start)
+        self._look(swimmer.path, start[:3], view_size(swimmer.layout))
+        run_script(self._client.gui, f"finlabFrames.follow({start[:3].tolist()});")
 
     def _draw_water(self, swimmer: Swimmer) -> None:
         """An arrow for the velocity of the water, beyond the path."""
@@ -83,14 +89,13 @@ class SwimScene:
         place = np.array([path[:, 0].min() - BEYOND_M, path[:, 1].max() + BEYOND_M, path[:, 2].mean()])
         self._water.show(force_arrow, np.round(FLOW_S * flow, 2), place, 0.03)
 
-    def _look(self, path: Array) -> None:
-        """Let the camera stand where the whole path (N, 3) can be seen."""
-        low, high = path.min(axis=0), path.max(axis=0)
-        distance = max(0.75 * float(np.linalg.norm((high - low)[:2])), 1.2)
-        # The lower part of the view is behind the plots, so the path belongs into the upper one.
-        middle = (low + high) / 2 + distance * np.array([-0.1, -0.22, 0.0])
-        place = middle + distance * np.array([-0.35, -0.75, 0.75])
-        aim_camera(self._client, place, middle - np.array([0.0, 0.0, 0.1]))
+    def _look(self, path: Array, start: Array, size: float) -> None:
+        """Let the camera stand where the robot, of a size, can be seen well, and much of the path (N, 3); it
+        goes along with it (`frames.js`)."""
+        extent = float(np.linalg.norm(np.ptp(path, axis=0)[:2]))
+        distance = max(0.24 * extent, 1.3 * size)
+        place = start + distance * np.array([-0.6, -0.75, 0.8])
+        aim_camera(self._client, place, start + distance * np.array([0.1, 0.0, -0.05]))
 
     def _pose(self, pose: Array) -> None:
         """Put the robot to a place, with a quaternion (7,)."""
