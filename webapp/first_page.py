@@ -10,7 +10,7 @@ from websockets.http11 import Response
 def name_page(answer: Response) -> Response:
     """Let an answer of viser's bring our first page, if it is a page at all."""
     if answer.headers.get("Content-Type", "").startswith("text/html"):
-        answer.body = _named(answer.body, answer.headers.get("Content-Encoding") == "gzip")
+        answer.body = _named(bytes(answer.body), answer.headers.get("Content-Encoding") == "gzip")
         del answer.headers["Content-Length"]
         answer.headers["Content-Length"] = str(len(answer.body))
     return answer
