@@ -23,7 +23,7 @@ from finlab.precision import CLOSE, NEARLY, NOTHING, ROUNDING, ROUNDS
 
 STIFFNESS = (10.0, 1e3, 1e5, 1e7)
 """Costs of a miss, one after the other, as multiples of the robot's largest power per actuator."""
-REWARD = 10.0
+REWARD = 1e4
 """Reward for a share of a target, as a multiple of the same."""
 
 
@@ -143,31 +143,7 @@ def direction(robot: DualRobot, sets: Sets, wrench: Array) -> Array:
     if np.linalg.norm(robot.basis @ target[:, 0] - wrench) > NEARLY * np.linalg.norm(wrench):
         return solve(robot, 0.0 * target, sets).force[:, 0]
     target = target / max(float(np.linalg.norm(target)) / 4.0, 1.0)  # farther than any robot reaches
-    unit = _unit(sets)
-    found, reward = solve(robot, target, sets, None, Terms(reward=REWARD * unit)), REWARD
-    for _ in range(4):
-        share = _share(robot, found, target)
-        if share >= (1.0 - NEARLY) * _most_share(robot, sets, found.prices, target):
-            break
-        reward *= 10.0
-        prices = found.prices + 9.0 * _unanswered(robot, found.prices, sets)
-        found = solve(robot, target, sets, prices, Terms(reward=reward * unit))
-    return found.force[:, 0]
-
-
-def _share(robot: DualRobot, found: Prices, target: Array) -> float:
-    given = robot.matrix.T @ found.force[:, 0]
-    return float(given @ target[:, 0] / (target[:, 0] @ target[:, 0]))
-
-
-def _most_share(robot: DualRobot, sets: Sets, prices: Array, target: Array) -> float:
-    """No share of a target (r, 1) larger than this one is within reach: the plane that touches the reach
-    where prices are very high."""
-    worth = float(prices[:, 0] @ target[:, 0])
-    if worth <= 0.0:
-        return np.inf
-    far = robot.answers(robot.matrix @ (prices / NOTHING / max(float(np.abs(prices).max()), 1e-300)), sets)
-    return float(prices[:, 0] @ (robot.matrix.T @ far.force[:, 0])) / worth
+    return solve(robot, target, sets, None, Terms(reward=REWARD * _unit(sets))).force[:, 0]
 
 
 def priority(
