@@ -8,10 +8,10 @@ import pytest
 from finlab.arrays import Array
 from finlab.errors import FinlabError
 from finlab.layout import Fin, Layout, load_layout
+from finlab.layout.directions import direction, image, part_of, rotation
 from finlab.physics import plant_of
 from tests.webapp.test_other_robots import FISH
 from webapp.session import Session
-from webapp.session.directions import direction, image, part_of, rotation
 from webapp.session.layout_edits import NEW
 
 ROBOTS = ("ucat", "bluerov2", "torpedo", "catamaran", "fish", "turtle_hybrid")

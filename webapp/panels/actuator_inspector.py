@@ -9,6 +9,7 @@ from markupsafe import Markup
 
 from finlab.errors import FinlabError
 from finlab.layout import Actuator, Azimuth, Fin, Layout
+from finlab.layout.directions import Vector, axis_names, direction, part_of, pointed
 from finlab.layout.fin import MAX_FREQUENCY
 from finlab.layout.thrust_model import PowerLaw
 from webapp.markup.answer import swatch
@@ -16,7 +17,6 @@ from webapp.markup.html import html
 from webapp.markup.words import listed
 from webapp.page import Page
 from webapp.panels.actuator_model import add_model
-from webapp.session.directions import Vector, axis_names, direction, part_of, pointed
 from webapp.session.state import number
 
 NOMINAL = Fin("nominal", (0.0, 0.0, 0.0), 0.0)

@@ -8,13 +8,13 @@ from markupsafe import Markup
 
 from finlab.errors import FinlabError
 from finlab.layout import Actuator, Fin
+from finlab.layout.directions import direction
 from finlab.layout.layout import MAX_ACTUATORS
 from webapp.handles import add_html
 from webapp.markup.answer import swatch
 from webapp.markup.html import html, marker
 from webapp.page import Page
 from webapp.presses import press
-from webapp.session.directions import direction
 from webapp.session.layout_edits import NEW
 from webapp.session.links import partner
 from webapp.session.state import State

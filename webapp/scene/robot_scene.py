@@ -14,6 +14,7 @@ from finlab.arrays import Array
 from finlab.hull.surface import has_inside, hull_of
 from finlab.layout import Layout
 from finlab.layout.damage import Health
+from finlab.layout.directions import direction
 from webapp.board import Board
 from webapp.handles import put
 from webapp.markup.words import damage_words, missing_part
@@ -22,7 +23,6 @@ from webapp.scene.direction_handle import DirectionHandle
 from webapp.scene.proportions import arrow_size, part_size, view_size
 from webapp.scene.stage import Shape, Stage, aim_camera
 from webapp.scene.wrench_nodes import LENGTH, AttainableNodes, Scale, WrenchNodes
-from webapp.session.directions import direction
 from webapp.session.display import Display
 from webapp.session.state import chosen
 from webapp.session.swim_plan import SwimSettings

@@ -6,9 +6,9 @@ from dataclasses import replace
 from finlab.errors import FinlabError
 from finlab.layout import Layout
 from finlab.layout.body import Hull
+from finlab.layout.directions import Vector
 from webapp.session import layout_edits
 from webapp.session.core import Core
-from webapp.session.directions import Vector
 from webapp.session.links import followed, partner, unlinked
 
 

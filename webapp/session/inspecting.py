@@ -6,8 +6,8 @@ from typing import Any
 
 from finlab.hull import estimated
 from finlab.layout import Actuator, Layout
+from finlab.layout.directions import Vector, part_of, replaced, turned_about
 from webapp.session import actuator_edits, body_edits, layout_edits
-from webapp.session.directions import Vector, part_of, replaced, turned_about
 from webapp.session.editing import Editing, which
 from webapp.session.links import followed, partner
 

@@ -12,9 +12,9 @@ from finlab.hull import hull_of
 from finlab.layout import Actuator, Azimuth, Body, Fin, Layout, Rudder, Thruster, Tilt
 from finlab.layout.angles import wrapped
 from finlab.layout.body import HULL_SHAPES, Hull
+from finlab.layout.directions import Vector, facing, image, part_of, replaced, rotated
 from finlab.layout.layout import MAX_ACTUATORS
 from finlab.layout.thrust_model import PowerLaw
-from webapp.session.directions import Vector, facing, image, part_of, replaced, rotated
 from webapp.session.links import existing_image
 from webapp.session.state import chosen, number
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from finlab.analysis.moves import is_mirrored
 from finlab.layout import Layout
-from webapp.session.directions import axis_names, image, part_of, replaced, with_axes
+from finlab.layout.directions import axis_names, image, part_of, replaced, with_axes
 
 Links = tuple[tuple[str, str], ...]
 """Pairs of names; an actuator is in at most one of them."""

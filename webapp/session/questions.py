@@ -9,8 +9,8 @@ from typing import Any
 
 from finlab.allocation.policy import AXES
 from finlab.errors import FinlabError
+from finlab.layout.directions import part_of
 from webapp.session.core import Core
-from webapp.session.directions import part_of
 from webapp.session.state import FAULTS, LEAST, MAX_SPEED, chosen, number
 from webapp.session.targets import PRESETS
 
