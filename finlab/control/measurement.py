@@ -65,12 +65,8 @@ class Controller(Protocol):
     for the free ones."""
     free: tuple[str, ...]
     """Axes that may be whatever the fins give along with the others at the least force."""
-    lead_s: float
-    """How far ahead of now [s] the waypoint should be taken from a trajectory."""
     period_s: float
     """Time between calls [s]."""
-    needs_given: bool
-    """Whether `wrench` wants to know what the fins have given; else it is given zero, which costs no time."""
 
     def reset(self) -> None:
         """Forget everything, as before the first call."""

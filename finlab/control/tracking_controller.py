@@ -111,9 +111,7 @@ class TrackingController:
     """Follows a trajectory in surge, heave and yaw, and in sway where no fins have to hold it."""
 
     name = "tracking"
-    lead_s = 0.0
     period_s = 0.1
-    needs_given = True
 
     def __init__(self, layout: Layout, gains: TrackingGains | None = None) -> None:
         """Takes the robot as its designer knows it, and gains; by default those of `gains_for`."""

@@ -13,7 +13,7 @@ from finlab.layout.arrays import own_effectiveness
 from finlab.physics import plant_of
 from finlab.sim.fin_force import make_plant
 from finlab.vehicle.actuator_motion import ActuatorMotion
-from finlab.vehicle.fin_motion import FinMotion, FinPower, fin_power
+from finlab.vehicle.fin_motion import FinMotion, fin_power
 
 STEP_S = 0.02
 """Longest step of a robot without fins [s]."""
@@ -31,13 +31,13 @@ class Push(NamedTuple):
 class ActuatorForce:
     """The actuators of one layout, the true one."""
 
-    def __init__(self, plant: str, layout: Layout, fins: FinMotion, copper_loss: float) -> None:
-        """Takes the fins' plant, the true robot, how its fins move and the heat in their motors [W/(N m)^2].
+    def __init__(self, plant: str, layout: Layout, fins: FinMotion) -> None:
+        """Takes the fins' plant, the true robot and how its fins move.
 
         Raises:
             FinlabError: there is no such plant, or one that is about fins, of which the robot has none.
         """
-        self.motion, self._beat, self._copper_loss = ActuatorMotion(layout, fins), fins, copper_loss
+        self.motion, self._beat = ActuatorMotion(layout, fins), fins
         of_fins, of_others = self.motion.of_fins, self.motion.of_others
         self.effectiveness = own_effectiveness(layout)
         """Wrench (n, 3, 6) of 1 N along each own axis, about the true centre of gravity."""
@@ -71,7 +71,7 @@ class ActuatorForce:
         others, watts = np.zeros((0, 3)), np.zeros((3, 0))
         if len(motion.of_fins):
             fins = self._fins.step(self._beat, dt) * share[motion.of_fins, None]
-            fin_watts = np.array(self._fin_power())
+            fin_watts = np.array(fin_power(*self._beat.speed_and_acceleration(), self._blade))
         if len(motion.of_others):
             mean = 0.5 * (motion.others.before + motion.others.value)
             works = share[motion.of_others] * motion.pushes[motion.of_others]
@@ -79,6 +79,3 @@ class ActuatorForce:
             spent = self._others.power(mean, flow=water) * motion.pushes[motion.of_others]
             watts = np.array([0.0 * spent, spent, spent])
         return Push(motion.joined(fins, others), motion.joined(fin_watts.T, watts.T).T)
-
-    def _fin_power(self) -> FinPower:
-        return fin_power(*self._beat.speed_and_acceleration(), self._blade, self._copper_loss)

@@ -36,7 +36,7 @@ from finlab.sim.task import Trajectory
 from finlab.vehicle.actuator_motion import ActuatorMotion
 from finlab.vehicle.attitude import quaternion_of_yaw
 from finlab.vehicle.body import complete_body
-from finlab.vehicle.fin_motion import COPPER_LOSS, FinMotion
+from finlab.vehicle.fin_motion import FinMotion
 from finlab.vehicle.vehicle import STATE_SIZE, Vehicle
 
 AHEAD = 10
@@ -70,7 +70,6 @@ class ClosedLoop:
         monitor: FaultMonitor | None = None,
         learner: Learner | None = None,
         truth: Layout | None = None,
-        copper_loss: float = COPPER_LOSS,
         seed: int = 0,
     ) -> None:
         """Puts the robot at rest at the start of its task.
@@ -92,7 +91,6 @@ class ClosedLoop:
             learner: finds out what the fins really are; allocator and monitor then work with that.
             truth: the robot that really swims, such as `perturbed(layout, damping=2.0)`, where `layout` is
                 only what allocator, controller and monitor believe of it; it has the same actuators.
-            copper_loss: heat in the fins' motors [W/(N m)^2] that counts as `driving_power`.
             seed: of the sensors' noise and of the allocator.
 
         Raises:
@@ -122,7 +120,7 @@ class ClosedLoop:
         """The body that really swims, and the current; it may be replaced on the way."""
         self.fins = FinMotion(truth)
         """The fins' motion: amplitude, frequency, zero direction and phase of each."""
-        self._forces = ActuatorForce(plant, truth, self.fins, copper_loss)
+        self._forces = ActuatorForce(plant, truth, self.fins)
         self.motion = self._forces.motion
         """The motion of all actuators."""
         self._plant = plant_of(layout)
@@ -247,10 +245,9 @@ class ClosedLoop:
             self.verdict = self.monitor.step(now, self._command)
         if self._plant.feels_flow:  # what the sensors know of it: the water itself is taken to rest
             self._flow = np.concatenate([now.velocity, now.rates])
-        setpoint, lead = self.task.setpoint(time), self.controller.lead_s
+        setpoint = self.task.setpoint(time)
         whole = self._complete()
-        followed = self.task.setpoint(time + lead) if lead else setpoint
-        asked = whole(self.controller.wrench(now, followed, self._given()))
+        asked = whole(self.controller.wrench(now, setpoint, self._given()))
         answer = self.allocator.allocate(
             asked,
             **self.damage._asdict(),
@@ -299,7 +296,7 @@ class ClosedLoop:
     def _given(self) -> Array:
         """Wrench (6,) over the last period, if the actuators that are not taken for lost do what they were
         commanded [N, N m]."""
-        if self._command is None or not self.controller.needs_given:
+        if self._command is None:
             return NO_WRENCH
         believed = self._believed
         believed.step(self._command, self.period_s)

@@ -67,8 +67,6 @@ class ExcitingController:
     name = "excitation"
     axes: tuple[str, ...] = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
     free: tuple[str, ...] = ()
-    needs_given = False
-    lead_s = 0.0
     period_s = PERIOD_S
 
     def __init__(self, layout: Layout, seed: int = 0) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from msgspec import Struct
+from msgspec import defstruct
 
 from finlab.arrays import AnyArray
 from finlab.errors import DataError
@@ -90,21 +90,6 @@ SHAPES: dict[str, tuple[int | None, ...]] = {
 """Shape of a column at each tick, None for the number of fins; the others are numbers."""
 
 
-class About(Struct):
-    """What an NPZ file says of a swim beside its columns, as in `RunLog`."""
-
-    format: Literal["finlab-swim"]
-    version: Literal[3]
-    layout: str
-    fins: tuple[str, ...]
-    method: str
-    controller: str
-    task: str
-    plant: str
-    water: str
-    seed: int
-
-
 @dataclass(frozen=True)
 class RunLog:
     """A whole swim: each column of `Tick` as an array with N rows, and what was swum."""
@@ -142,7 +127,7 @@ class RunLog:
     def npz(self) -> bytes:
         """An NPZ file: one array per column, and `meta`, a JSON object with the rest."""
         meta: dict[str, Any] = {"format": FORMAT, "version": VERSION}
-        meta |= {field.name: getattr(self, field.name) for field in fields(self) if field.name != "columns"}
+        meta |= {name: getattr(self, name) for name, _ in _ABOUT}
         file = io.BytesIO()
         np.savez_compressed(file, allow_pickle=False, meta=np.array(json.dumps(meta)), **self.columns)
         return file.getvalue()
@@ -150,6 +135,12 @@ class RunLog:
     def save(self, path: str | Path) -> None:
         """Writes the NPZ file; a `DataError` where it cannot be written."""
         write_whole(path, self.npz(), DataError)
+
+
+_ABOUT = [(field.name, field.type) for field in fields(RunLog) if field.name != "columns"]
+_FORM = [("format", Literal["finlab-swim"]), ("version", Literal[3])]
+_About: Any = defstruct("About", [*_FORM, *_ABOUT])
+"""What an NPZ file says of a swim beside its columns."""
 
 
 def log_of_ticks(ticks: list[Tick], **about: Any) -> RunLog:
@@ -162,10 +153,10 @@ def load_log(path: str | Path) -> RunLog:
     """Reads what `RunLog.save` wrote; a `DataError` where the file is missing, or no log of this version."""
     what = "a swim log written by finlab simulate"
     columns = read_arrays(path, ("meta", *Tick._fields), MAX_BYTES, what)
-    about = checked(json_of(columns.pop("meta"), f"{path}: meta"), About, DataError, f"{path}: meta")
+    about = checked(json_of(columns.pop("meta"), f"{path}: meta"), _About, DataError, f"{path}: meta")
     n, fins = columns["time"].size, len(about.fins)
     shapes = {
         name: tuple(fins if size is None else size for size in SHAPES.get(name, ())) for name in columns
     }
     check_shapes(columns, {name: (n, *shape) for name, shape in shapes.items()}, str(path))
-    return RunLog(columns=columns, **{name: getattr(about, name) for name in about.__struct_fields__[2:]})
+    return RunLog(columns=columns, **{name: getattr(about, name) for name, _ in _ABOUT})

@@ -100,14 +100,9 @@ class HardDay:
         fins = tuple(replace(fin, model=own) for fin, own in zip(robot.fins, models, strict=True))
         return replace(robot, actuators=fins)
 
-    def obstacle(self, case: "Case") -> str | None:
-        """Why a swim would be hopeless; None where it is not."""
-        if not self.lost or steers(load_layout(case.layout), case.fins):
-            return None
-        return (
-            f"{case.layout} without {' and '.join(case.fins)}: the fins that are left cannot give surge, "
-            "heave and yaw independently"
-        )
+    def is_hopeless(self, case: "Case") -> bool:
+        """Whether what is left of the robot cannot give independently what the controller commands."""
+        return self.lost > 0 and not steers(load_layout(case.layout), case.fins)
 
     def swim(self, case: "Case", method: MethodSpec, seed: int) -> ClosedLoop:
         """The swim, ready to start.

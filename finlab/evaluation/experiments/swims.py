@@ -63,7 +63,7 @@ def run(
 
 def swim_day(day: HardDay, methods: Mapping[str, MethodSpec], seeds: Sequence[int]) -> dict[str, Swims]:
     """Figures of each method's swims; hopeless cases are left out."""
-    cases = [case for case in day.cases() if day.obstacle(case) is None]
+    cases = [case for case in day.cases() if not day.is_hopeless(case)]
     swims: dict[str, dict[tuple[str, tuple[str, ...], int], Row]] = {name: {} for name in methods}
     for case, name, seed in progress(list(product(cases, methods, seeds)), "swim", day.name):
         loop = day.swim(case, methods[name], seed)

@@ -58,12 +58,12 @@ def test_fins_of_a_day_are_known_and_drawn_by_the_seed() -> None:
     assert mixed == DAYS["fins-mixed"].robot("A", 0) != DAYS["fins-mixed"].robot("A", 1)
 
 
-def test_each_fin_in_turn_and_hopeless_pairs_have_a_reason() -> None:
+def test_each_fin_in_turn_but_no_hopeless_pair() -> None:
     assert [case.fins[0] for case in DAYS["weak"].cases()] == list(DAYS["weak"].robot("A", 0).names)
     assert len(DAYS["lost-two"].cases()) == 6
-    hopeless = [why for case in DAYS["lost-two"].cases() if (why := DAYS["lost-two"].obstacle(case))]
-    assert len(hopeless) == 2 and "front_right and back_right" in hopeless[0]
-    assert not any(DAYS["lost-one"].obstacle(case) for case in DAYS["lost-one"].cases())
+    hopeless = [case.fins for case in DAYS["lost-two"].cases() if DAYS["lost-two"].is_hopeless(case)]
+    assert len(hopeless) == 2 and hopeless[0] == ("front_right", "back_right")
+    assert not any(DAYS["lost-one"].is_hopeless(case) for case in DAYS["lost-one"].cases())
 
 
 def _log(command: list[list[list[float]]], missing: list[float]) -> RunLog:
@@ -107,7 +107,7 @@ def test_figures_of_a_swim() -> None:
 def test_a_short_day(analytic: AnyRobot) -> None:
     day = replace(DAYS["lost-two"], duration_s=12.0, trajectory="station")
     (swims,) = swim_day(day, {"analytic": analytic}, [1]).values()
-    assert {fins for _, fins, _ in swims} == {case.fins for case in day.cases() if day.obstacle(case) is None}
+    assert {fins for _, fins, _ in swims} == {case.fins for case in day.cases() if not day.is_hopeless(case)}
     (row,) = day_rows(day, {"analytic": swims})
     assert row["swims"] == 4 and 0.0 < row["ate"] < 0.5
     assert row["driving_w"] < row["peak_w"] and row["cpu_s_per_min"] > 0.0
