@@ -12,6 +12,7 @@ import pytest
 import trimesh
 
 from finlab.assets import shipped_layouts
+from finlab.deploy.design_files import stored_table
 from finlab.errors import FinlabError
 from finlab.files.plain_values import yaml_text
 from finlab.layout import FinModelSpec, layout_to_dict, load_layout
@@ -20,7 +21,6 @@ from finlab.layout.load import MAX_BYTES
 from finlab.physics import make_law
 from tests.webapp.loops import ReadAtOnce
 from webapp.session import Session
-from webapp.session.companions import stored_table
 from webapp.session.files import (
     ARCHIVE,
     FRAGMENT,

@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 
 from finlab.allocation import Allocator
+from finlab.deploy.design_files import archive_of, read_archive, stored_table
 from finlab.errors import DataError, FinlabError, LayoutError
 from finlab.fit import outliers
 from finlab.layout import Layout, Thruster, load_layout
@@ -23,7 +24,6 @@ from tests.webapp.loops import page_of
 from webapp.markup.fit_card import fit_card
 from webapp.panels.actuator_model import model_card
 from webapp.session import Session, files
-from webapp.session.companions import archive_of, read_archive, stored_table
 from webapp.tasks import fitting
 from webapp.tasks.background import Worker
 from webapp.tasks.fitting import Fitting

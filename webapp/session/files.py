@@ -17,6 +17,15 @@ from pathlib import Path
 
 from finlab.assets import shipped_layouts
 from finlab.deploy.bundle import with_tables_inside
+from finlab.deploy.design_files import (
+    TABLE_FOLDER,
+    Opened,
+    adopted,
+    archive_of,
+    read_archive,
+    stored_mesh,
+    with_hull_inside,
+)
 from finlab.errors import FinlabError, LayoutError
 from finlab.files.guarded import decoded
 from finlab.files.plain_values import parse_json, parse_yaml, yaml_text
@@ -27,15 +36,6 @@ from finlab.layout import Layout, layout_to_dict, load_layout, parse_layout
 from finlab.layout.body import Hull
 from finlab.layout.load import A_LAYOUT, MAX_BYTES
 from finlab.physics import plant_of
-from webapp.session.companions import (
-    TABLE_FOLDER,
-    Opened,
-    adopted,
-    archive_of,
-    read_archive,
-    stored_mesh,
-    with_hull_inside,
-)
 from webapp.session.state import chosen
 
 FRAGMENT = "design="

@@ -8,12 +8,12 @@ from pathlib import PurePath
 import viser
 
 from finlab.deploy.bundle import make_bundle
+from finlab.deploy.design_files import Opened
 from finlab.errors import FinlabError
 from finlab.hull import hull_of
 from finlab.layout import Layout
 from webapp.presses import Presses
 from webapp.session import files
-from webapp.session.companions import Opened
 from webapp.session.files import FRAGMENT, WRENCH, file_stem, packed, unpacked
 from webapp.session.state import State
 from webapp.tasks.context import Context

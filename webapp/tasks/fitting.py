@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 from finlab.actuators.fin.models import read_table
 from finlab.arrays import Array
+from finlab.deploy.design_files import stored_table
 from finlab.errors import DataError, FinlabError, LayoutError
 from finlab.layout import Actuator, Fin, Rudder, Thruster
 from finlab.layout.directions import part_of
 from finlab.layout.thrust_model import PowerTable
-from webapp.session.companions import stored_table
 from webapp.session.files import table_folder
 from webapp.tasks.background import Newest
 from webapp.tasks.context import Context

@@ -1,6 +1,7 @@
-"""Files that belong to layouts, force tables and hulls: kept under names made from their content.
+"""A layout with the files that it names, force tables and a hull, as one archive; from strangers, too.
 
-A layout that a browser sends may name any path. None of them is ever opened: what is read came along with it.
+A layout that a stranger sends may name any path. None of them is ever opened: what is read came along with
+it, and is kept under a name made from its content.
 """
 
 import hashlib
@@ -24,7 +25,7 @@ from finlab.whole_file import make_folder, write_whole
 
 LAYOUTS = (".yaml", ".yml", ".json")
 TABLE_FOLDER, HULL_FOLDER = "tables", "hulls"
-"""Where files are kept, inside the app's own folder."""
+"""Where files are kept, inside a folder."""
 
 
 def stored_table(content: bytes, folder: Path) -> FinModelSpec:
@@ -64,10 +65,10 @@ def archive_of(name: str, document: bytes, tables: dict[str, bytes]) -> bytes:
 
 
 class Opened(NamedTuple):
-    """A layout that a browser sent."""
+    """A layout that a stranger sent."""
 
     layout: Layout
-    """Every file that it names is kept in a folder of the app, under a name made from its content."""
+    """Every file that it names is kept in that folder, under a name made from its content."""
     missing: tuple[str, ...] = ()
     """Files that it named and that did not come with it, though the layout makes sense without."""
 
