@@ -14,8 +14,10 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from finlab.analysis.authority import held_axes
 from finlab.arrays import Array
 from finlab.errors import LayoutError
+from finlab.forces.extent import singular_values
 from finlab.forces.force_sets import ForceSets, assembled, shapes_of
 from finlab.layout import Fin, Layout
 from finlab.layout.actuator import Actuator
@@ -23,6 +25,8 @@ from finlab.layout.arrays import moved_effectiveness
 
 MIRROR_TOLERANCE = 1e-3
 """How far [m, rad] two actuators may be from each other's mirror image and still count as a pair."""
+PROBE = 0.1
+"""Share of its bounds by which a number is changed to see what it costs."""
 MIRROR = np.array([1.0, -1.0, 1.0])
 """The plane y = 0 as a mirror."""
 
@@ -149,6 +153,18 @@ class Moves:
         self._step = np.tile([grid[0]] * 3 + [grid[1]] * 2, len(leaders))[self._free]
         self.start = self._whole[self._free]
         """Where the actuators are now, brought within bounds (D,)."""
+
+    def keep_alone(self, axes: Sequence[str]) -> None:
+        """Holds the free numbers that cost one of some axes, which are pushed alone now, when they change by
+        themselves; all stay free where each of them does."""
+        step = PROBE * np.diag(self.upper - self.lower)
+        tried = np.clip(np.concatenate([self.start - step, self.start + step]), self.lower, self.upper)
+        held = [held_axes(*pair) for pair in zip(*singular_values(self.sets(tried)), strict=True)]
+        kept = np.array([set(axes) <= set(each.alone) for each in held]).reshape(2, -1).all(axis=0)
+        if kept.any():
+            self._free[np.flatnonzero(self._free)[~kept]] = False
+            self.lower, self.upper, self.start = self.lower[kept], self.upper[kept], self.start[kept]
+            self._step = self._step[kept]
 
     def geometry(self, vectors: Array) -> tuple[Array, Array, Array]:
         """Returns positions (P, n, 3) [m], azimuths (P, n) [rad], see `Bounds`, and own axes (P, n, 3, 3) of

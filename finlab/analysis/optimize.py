@@ -94,7 +94,8 @@ def optimize_layout(
         rule: another one that they have to keep, such as to stand outside of a hull.
         grid: steps [m], [rad] of the coordinates and angles that are found; 0 for any number.
         axes: axes whose directions count for the two goals of directions, with anything on the others; all
-            six when None, or, with too few actuators for six, those that are pushed alone now.
+            six when None, or, with too few actuators for six, those that are pushed alone now, of which no
+            move of a single coordinate costs one.
         flow: velocity (6,) of the body relative to the water [m/s, rad/s], body frame; None at rest.
         progress: called after each round.
         cancelled: asked after each round; the search stops when it answers True.
@@ -111,6 +112,8 @@ def optimize_layout(
     broken = rule or (lambda position, frames: np.zeros(len(position)))
     if axes is None and goal != "mission_power":
         axes = axes_to_raise(layout, water)
+        if len(axes) < len(AXES):
+            moves.keep_alone(axes)
     measure, quick = (
         make_goal(goal, layout, mission, fine=fine, axes=axes or AXES, flow=water) for fine in (True, False)
     )

@@ -136,3 +136,10 @@ def test_the_mission_of_a_torpedo_counts_at_its_speed(shipped: Layouts) -> None:
     after = least_power(found.layout, rolled, flow=flow)
     assert -found.value_after == pytest.approx(after[0])
     assert after[0] < least_power(layout, rolled, flow=flow)[0]
+
+
+def test_what_a_robot_pushes_alone_is_not_given_for_the_weakest_direction(shipped: Layouts) -> None:
+    left = shipped("bluerov2").without(["front_right"])
+    found = optimize_layout(left, left.names, rounds=6)
+    assert found.improved and found.axes == ("sway", "heave", "roll", "yaw")
+    assert set(found.axes) <= set(found.card_after.authority.alone)

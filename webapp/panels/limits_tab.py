@@ -8,6 +8,7 @@ import viser
 from markupsafe import Markup
 
 from finlab.analysis import AXES, Improvement, Progress
+from finlab.analysis.goals import MISSION, UNREACHED
 from webapp.handles import add_html
 from webapp.markup.html import html, marker
 from webapp.markup.score_card import score_table
@@ -128,6 +129,8 @@ def _before_and_after(found: Improvement) -> str:
     heading = html(
         "<b>{}{}: {}{} before, {}{} after.</b>{}", goal.capitalize(), of, before, unit, after, unit, stopped
     )
+    if found.goal == "mission_power" and -found.value_before * len(MISSION) >= UNREACHED:
+        heading += f" A wrench out of reach counts with {UNREACHED:g} W or more."
     then = found.card_after.authority.alone
     lost = [axis for axis in found.card_before.authority.alone if axis not in then]
     if lost:
