@@ -46,8 +46,8 @@ from finlab.networks.trained import TrainedWeights
 from finlab.physics.known_plants import plant_of
 from finlab.physics.plant import Plant
 
-SAME_COMMAND = 1e-6
-"""Two commands [rad, Hz, rad] that differ by less are one answer, given on two machines."""
+ALTERNATIVE_ERROR = 1e-4
+"""Normalized error up to which another answer is an alternative."""
 MOST_PREPARED = 32
 """Damaged states of the robot that an allocator keeps prepared."""
 
@@ -258,29 +258,19 @@ class Allocator:
         )
 
     def explore(self, result: Allocation) -> tuple[Mode, ...]:
-        """Distinct ways to deliver the wrench of an answer, the chosen one first, by a search of tens of
-        milliseconds. Methods that have a single answer know none.
+        """Distinct ways to deliver the wrench of an answer, the chosen one first: its candidates, and where
+        all proposals end. Methods that have a single answer know none.
 
         Raises:
-            AllocationError: the answer is of another robot, or the method, as it is set, gives another
-                answer to that question.
+            AllocationError: the answer is of another robot.
         """
-        ready = self._ready_for(result)
-        fins = ready.fins
-        previous = None if result.previous is None else result.previous[fins.alive]
-        found = ready.method.alternatives(
-            result.target, policy=result.policy, previous=previous, flow=result.flow, seed=result.seed
-        )
+        ways, found, layout = self.refinement(result), result.candidates, result.layout
         if found is None:
             return ()
-        command, layout = fins.among_all(found.command), result.layout
-        if not np.allclose(command[0], result.command, rtol=0.0, atol=SAME_COMMAND, equal_nan=True):
-            raise AllocationError(
-                f"method {self.method!r} with checkpoint {self.checkpoint!r} gives another answer than this "
-                "one; ask the allocator that answered, with its settings"
-            )
-        size = force_sizes(layout, command, result.flow)
-        return find_modes(replace(found, command=command), size, layout.lower, layout.upper)
+        if ways:
+            found = found.beside(ways[-1].exact(max(ALTERNATIVE_ERROR, 1.01 * result.err_norm)))
+        size = force_sizes(layout, found.command, result.flow)
+        return find_modes(found, size, layout.lower, layout.upper)
 
     def refinement(self, result: Allocation) -> tuple[Candidates, ...]:
         """What a network proposes for the question of a result, whoever answered it, then the same rows after

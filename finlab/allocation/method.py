@@ -103,12 +103,6 @@ class Method(ABC):
             seed: makes the answer repeatable.
         """
 
-    def alternatives(
-        self, target: Array, *, policy: Policy, previous: Array | None, flow: Array | None, seed: int
-    ) -> Candidates | None:
-        """Many answers to one target (6,), that of `solve` first; None for methods that have a single one."""
-        return None
-
     def refinement(self, target: Array, *, flow: Array | None, seed: int) -> tuple[Candidates, ...]:
         """What a network proposes for one target (6,), then the same rows after each step of their
         refinement; nothing for methods without proposals, or that do not tell."""

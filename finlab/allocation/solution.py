@@ -65,6 +65,11 @@ class Candidates(PlainData):
         arrays = {name: getattr(self, name)[list(places)] for name in ARRAYS}
         return Candidates(**arrays, source=tuple(self.source[k] for k in places))
 
+    def exact(self, within: float) -> "Candidates":
+        """Those whose error is at most that, the ones of least effort first."""
+        order = self.effort.argsort(kind="stable").tolist()
+        return self.rows([k for k in order if self.err_norm[k] <= within])
+
     def beside(self, others: "Candidates") -> "Candidates":
         """These, then others."""
         both = {name: np.concatenate([getattr(self, name), getattr(others, name)]) for name in ARRAYS}

@@ -46,8 +46,6 @@ SWITCH_GAIN = 0.01
 """Share of its effort that a robot in motion must save before it changes the way it moves."""
 WORTH_LEAVING = 0.03
 """The same in the end, before its fins go towards a way that takes several ticks."""
-ALTERNATIVE_ERROR = 1e-3
-"""Normalized error up to which another answer is an alternative."""
 STARTS = {OTHER: "another start", NOW: "the way it moves now"}
 """What answers are called that no component has proposed."""
 
@@ -100,16 +98,6 @@ class Mdn(Method):
                 some = slice(k, k + CHUNK)
                 command[some] = self._found(policy, target[some], seed + k).answers.command[:, 0]
         return Solution(command)
-
-    def alternatives(
-        self, target: Array, *, policy: Policy, previous: Array | None, flow: Array | None, seed: int
-    ) -> Candidates:
-        """The answers, then where all proposals end, the cheapest first."""
-        first = self._one(policy, target[None] / self.sigma, previous, seed)
-        ends = self.refinement(target, flow=None, seed=seed)[-1]
-        exact = USUAL_SHARE * max(ALTERNATIVE_ERROR, 1.01 * float(first.answers.error[0, 0]))
-        kept = [k for k in ends.effort.argsort(kind="stable").tolist() if ends.err_norm[k] <= exact]
-        return self._candidates(first.answers, names_of(first.proposal)).beside(ends.rows(kept))
 
     def refinement(self, target: Array, *, flow: Array | None, seed: int) -> tuple[Candidates, ...]:
         """See `Method`."""

@@ -7,7 +7,6 @@ import numpy as np
 from finlab.allocation.evaluate import costs
 from finlab.allocation.levenberg_marquardt import CommandProblem
 from finlab.allocation.method import LeastErrorMethod, Takes
-from finlab.allocation.policy import Policy
 from finlab.allocation.settings import Settings
 from finlab.allocation.solution import Candidates, Solution
 from finlab.arrays import AnyArray, Array
@@ -64,13 +63,6 @@ class Paper(LeastErrorMethod):
         parts = [self._solve_chunk(targets[k : k + CHUNK], seed + k) for k in starts]
         wrench = [part.wrench for part in parts if part.wrench is not None]
         return Solution(np.concatenate([part.command for part in parts]), wrench=np.concatenate(wrench))
-
-    def alternatives(
-        self, target: AnyArray, *, policy: Policy, previous: Array | None, flow: Array | None, seed: int
-    ) -> Candidates | None:
-        """See `Method`: the refined samples."""
-        solution = self.solve(target[None], policy=policy, previous=previous, flow=flow, seed=seed)
-        return None if solution.candidates is None else solution.candidates()
 
     def _solve_chunk(self, targets: AnyArray, seed: int) -> Solution:
         settings = self.settings

@@ -1,9 +1,8 @@
 """What every method has in common: problems are checked, failed fins left out, answers judge themselves."""
 
 import math
-from dataclasses import replace
 from types import SimpleNamespace
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -40,10 +39,6 @@ class Drawn(LeastErrorMethod):
         command = np.array([0.05, 0.1, -3.0]) + share * [0.5, 1.9, 6.0]
         few = Candidates(command, targets * 0, np.zeros(1), np.zeros(1), np.zeros(1), ("drawn",))
         return Solution(command, wrench=0.5 * targets, candidates=lambda: few)
-
-    def alternatives(self, target: np.ndarray, **question: Any) -> Candidates | None:
-        found = self.solve(target[None], **question).candidates
-        return None if found is None else found()
 
 
 @pytest.fixture
@@ -211,16 +206,3 @@ def test_the_time_is_that_of_the_solver_shared_by_its_targets(
     assert method.allocate_batch(ROBOT, [SURGE] * 3).solve_ms.tolist() == [10_000.0] * 3
     monkeypatch.setattr(allocator, "time", clock())
     assert method.allocate_batch(ROBOT, np.empty((0, 6))).solve_ms.tolist() == []
-
-
-def test_a_changed_answer_is_noticed(method: AnyRobot) -> None:
-    """Alternatives belong to an answer: up to a millionth it may differ, as between machines."""
-    answer = method.allocate(ROBOT, SURGE, failed=["left"])
-    for off, same in ((0.9e-6, True), (1.2e-6, False)):
-        other = replace(answer, command=answer.command + off)
-        if same:
-            (mode,) = method.explore(other)
-            np.testing.assert_array_equal(mode.command, answer.command)
-        else:
-            with pytest.raises(AllocationError, match="method 'drawn' with checkpoint None gives another"):
-                method.explore(other)

@@ -71,10 +71,6 @@ class StandIn(LeastErrorMethod):
         ways = sampled, 0.5 * (sampled + refined[chosen]), refined[chosen]
         return tuple(self._judged(way, target, chosen) for way in ways)
 
-    def alternatives(self, target: Array, **question: Any) -> Candidates | None:
-        found = self.solve(target[None], **question).candidates
-        return None if found is None else found()
-
     def _ranked(self, command: Array, target: Array, component: NDArray[np.int64]) -> Candidates:
         found = self._judged(command, target, component)
         return found.rows(np.argsort(100.0 * found.err_norm**2 + 1e-4 * found.effort).tolist())

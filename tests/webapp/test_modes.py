@@ -21,7 +21,7 @@ from webapp.session import Session
 from webapp.session.state import State
 from webapp.session.targets import PRESETS
 from webapp.tasks.answering import Answering
-from webapp.tasks.mode_names import MAX_SHOWN, NO_MODES, Modes, NamedMode, listed_modes
+from webapp.tasks.mode_names import MAX_SHOWN, NO_MODES, Modes, NamedMode, named_modes
 from webapp.tasks.refining import HOLD, Refining
 from webapp.tasks.solver import Solver
 
@@ -42,7 +42,7 @@ def modes_of(*commands: list[tuple[float, float, float]]) -> tuple[NamedMode, ..
     lower, upper = (np.tile(end, (command.shape[1], 1)) for end in ([0.05, 0.1, -np.pi], [0.6, 2.1, np.pi]))
     with np.errstate(invalid="ignore"):
         force = np.nan_to_num(np.sin(command[..., 0]) ** 2 * command[..., 1] ** 2)
-    return listed_modes(find_modes(candidates(*commands), force, lower, upper), "network").shown
+    return named_modes(find_modes(candidates(*commands), force, lower, upper), "network")
 
 
 def test_how_a_fin_rests_is_no_news() -> None:

@@ -20,8 +20,6 @@ from webapp.theme import MODE_COLORS
 
 MAX_SHOWN = len(MODE_COLORS)
 """Modes that are shown, each in its own colour; a robot with many fins has dozens, the last ones dear."""
-EXACT = 1e-4
-"""Normalized error up to which a refined proposal is a way to deliver the wrench."""
 
 
 class NamedMode(NamedTuple):
@@ -59,37 +57,31 @@ class Modes:
 NO_MODES = Modes((), 0)
 
 
-def modes_of(answer: Allocation, own: Candidates, badge: str, ways: tuple[Candidates, ...]) -> Modes:
+def modes_of(answer: Allocation, found: Candidates, badge: str, ways: tuple[Candidates, ...]) -> Modes:
     """The modes of an answer.
 
     Args:
         answer: the answer.
-        own: itself as a candidate.
+        found: itself as a candidate, then others.
         badge: whose it is.
-        ways: what a network proposed for it, and its refinement; the last of them are ways of their own.
+        ways: what a network proposed for it, and its refinement.
     """
-    last = ways[-1]
-    exact = [k for k in last.effort.argsort(kind="stable").tolist() if last.err_norm[k] <= EXACT]
-    layout, found = answer.layout, own.beside(last.rows(exact))
+    layout = answer.layout
     modes = find_modes(found, force_sizes(layout, found.command), layout.lower, layout.upper)
-    sizes = force_sizes(layout, last.command)
-    signatures = [mode_signature(*each) for each in zip(last.command, sizes, strict=True)]
+    shown, last = named_modes(modes, badge), ways[-1]
+    signatures = map(mode_signature, last.command, force_sizes(layout, last.command))
     ends = tuple(
-        next((k for k, mode in enumerate(modes[:MAX_SHOWN]) if same_signature(mode.signature, end)), -1)
+        next((k for k, named in enumerate(shown) if same_signature(named.mode.signature, end)), -1)
         for end in signatures
     )
-    return listed_modes(modes, badge, ways, ends)
+    return Modes(shown, len(modes), ways, ends)
 
 
-def listed_modes(
-    modes: tuple[Mode, ...], badge: str, ways: tuple[Candidates, ...] = (), ends: tuple[int, ...] = ()
-) -> Modes:
-    """Modes with their names, no two alike; all but the first are the network's."""
+def named_modes(modes: Sequence[Mode], badge: str) -> tuple[NamedMode, ...]:
+    """The first modes with their names, no two alike; all but the first one are the network's."""
     shown = modes[:MAX_SHOWN]
-    names = _names(shown)
     badges = [badge, *["network"] * (len(shown) - 1)]
-    named = tuple(NamedMode(*each) for each in zip(shown, names, badges, strict=False))
-    return Modes(named, len(modes), ways, ends)
+    return tuple(NamedMode(*each) for each in zip(shown, _names(shown), badges, strict=False))
 
 
 def _names(modes: Sequence[Mode]) -> list[str]:

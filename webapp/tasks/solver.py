@@ -8,16 +8,14 @@ from pathlib import Path
 import numpy as np
 
 from finlab.allocation.allocation import Allocation
-from finlab.allocation.allocator import Allocator
+from finlab.allocation.allocator import ALTERNATIVE_ERROR, Allocator
 from finlab.allocation.methods import MethodChoice, choose_method
-from finlab.allocation.modes import Mode
 from finlab.allocation.solution import Candidates
-from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.physics import plant_of
 from webapp.markup.verdict import is_proved
 from webapp.session.state import DRAWING, State
-from webapp.tasks.mode_names import NO_MODES, OWN, Modes, listed_modes, modes_of
+from webapp.tasks.mode_names import NO_MODES, OWN, Modes, modes_of
 
 Load = Callable[..., MethodChoice]
 KEPT = 24
@@ -105,9 +103,8 @@ class Solver:
         milliseconds. Method `paper` has a network of its own."""
         answer, state = reply.answer, reply.state
         _ = answer.bound, answer.notes  # to prove what is least takes longer than to find it
-        if state.method == "paper":
-            found = judged_modes(answer, self.allocator(state).explore(answer))
-            return listed_modes(found, "network", (answer.samples,) if answer.samples is not None else ())
+        if answer.samples is not None and answer.candidates is not None and state.method == "paper":
+            return modes_of(answer, answer.candidates, "network", (answer.samples,))
         if not (answer.reachable and answer.layout.is_of_fins and answer.effort is not None):
             return NO_MODES
         if state.method == "mdn" and answer.candidates is not None:
@@ -118,7 +115,7 @@ class Solver:
             own = Candidates(answer.command[None], answer.wrench[None], error, *costs, (OWN,))
             badge = "optimum" if is_proved(answer) else state.method
         ways = self.allocator(replace(state, method="mdn")).refinement(answer)
-        return modes_of(answer, own, badge, ways)
+        return modes_of(answer, own.beside(ways[-1].exact(ALTERNATIVE_ERROR)), badge, ways)
 
     def solve(self, state: State) -> Allocation:
         """The answer to a state.
@@ -150,23 +147,6 @@ def judged(answer: Allocation) -> Allocation:
 
 
 def _judged(answer: Allocation, found: Candidates) -> Candidates:
-    wrench, error = _verdict(answer, found.command)
+    wrench = plant_of(answer.layout).wrench(found.command)
+    error = np.linalg.norm((wrench - answer.target) / answer.scale, axis=-1)
     return replace(found, wrench=wrench, err_norm=error)
-
-
-def _verdict(answer: Allocation, command: Array) -> tuple[Array, Array]:
-    """Wrenches (K, 6) of commands (K, n, 3) by the plant, and their errors (K,)."""
-    wrench = plant_of(answer.layout).wrench(command, flow=answer.flow)
-    return wrench, np.linalg.norm((wrench - answer.target) / answer.scale, axis=-1)
-
-
-def judged_modes(answer: Allocation, modes: tuple[Mode, ...]) -> tuple[Mode, ...]:
-    """The same for modes."""
-    if answer.wrench_expected is None or not modes:
-        return modes
-    command = np.stack([mode.command for mode in modes])
-    wrenches, errors = _verdict(answer, command)
-    return tuple(
-        replace(mode, wrench=wrench, err_norm=float(error))
-        for mode, wrench, error in zip(modes, wrenches, errors, strict=True)
-    )
