@@ -23,11 +23,11 @@ def test_the_tour_sets_each_stop_and_brings_the_work_back(page: Any) -> None:
     page.press("Tour")
     page.page.get_by_text("Your own work comes back").locator("visible=true").wait_for()
     page.press(f"1. {TOUR[0].title}")
-    page.until(lambda: "1 of 6" in page.text(".tour"))
+    page.until(lambda: "1 of 4" in page.text(".tour"))
     page.until(lambda: apart(page, ".fl-tour", "canvas[data-engine]"))
-    for stop in range(2, 6):
+    for stop in range(2, 4):
         page.press("Next")
-        page.until(lambda stop=stop: f"{stop} of 6" in page.text(".tour"))
+        page.until(lambda stop=stop: f"{stop} of 4" in page.text(".tour"))
     page.until(lambda: page.view.jobs.swimming.swimmer is not None and page.view.jobs.swimming.time > 0.3)
     page.visible("/floor", False)
     page.until(lambda: "off the path" in page.text(".fl-status"))

@@ -7,7 +7,7 @@ from markupsafe import Markup
 
 from finlab.arrays import Array
 from webapp.markup.html import html
-from webapp.markup.plot import EXACT, RIGHT, TOP, WIDTH, Plot, Point, cost_axis, error_axis
+from webapp.markup.plot import EXACT, RIGHT, WIDTH, Plot, Point, cost_axis, error_axis
 from webapp.presses import press
 from webapp.tasks.mode_names import Modes
 from webapp.theme import DEAD, css, mode_color
@@ -25,8 +25,8 @@ APART = 3.0
 """How much wider each further ring is that lies about another one [px]."""
 LABEL = (13.0, 12.0)
 """Width and height of the number of a mode [px]."""
-FAR_PX = 16.0
-"""Distance of a number from its ring above which a line joins them [px]."""
+LIFT = 15.0
+"""Of a number above the middle of its ring [px]."""
 TRAIL = (0, 1, 2, 3, 4, 6, 8, 12, 20)
 """Steps at which the way of a sample is drawn, beside the last one."""
 
@@ -63,28 +63,23 @@ def mode_plot(modes: Modes, shown: int, step: int | None, height: int) -> str:
     if beyond := int((~near).sum()):
         parts.append(html("<text x='{}' y='14' text-anchor='end'>{} dearer →</text>", WIDTH - RIGHT, beyond))
     rings = [(float(x), float(y)) for x, y in zip(*plot.place(*refined.T), strict=True)]
-    parts += _rings(rings, plot.floor, shown)
+    parts += _rings(rings, shown)
     return html("<div class='fl'>{}</div>", plot.drawn(parts, upright=True))
 
 
-def _rings(places: list[Point], floor: float, shown: int) -> list[str]:
-    """A ring where each mode lies, filled where it is on the robot, with its number beside it; the best one
-    on top."""
-    # What is between a ring and its number can be clicked, too.
+def _rings(places: list[Point], shown: int) -> list[str]:
+    """A ring where each mode lies, filled where it is on the robot, with its number above it."""
     ring = (
-        "<g class='pick' {}><path {} stroke='transparent' stroke-width='12'/>{}"
-        "<circle cx='{:.1f}' cy='{:.1f}' r='{:g}' class='mode' stroke='{}' fill='{}'/>"
+        "<g class='pick' {}><circle cx='{:.1f}' cy='{:.1f}' r='{:g}' class='mode' stroke='{}' fill='{}'/>"
         "<text x='{:.1f}' y='{:.1f}' class='digit' text-anchor='middle'>{}</text></g>"
     )
     parts = []
-    labels = _labels(places, floor)
+    labels = _labels(places)
     for k, ((x, y), (u, v)) in reversed(list(enumerate(zip(places, labels, strict=True)))):
-        color, pressed = css(mode_color(k)), press("mode", str(k))
-        way = html("d='M{:.1f} {:.1f}L{:.1f} {:.1f}'", x, y, u, v)
-        line = html("<path {} stroke='{}'/>", way, color) if math.dist((x, y), (u, v)) > FAR_PX else ""
+        color = css(mode_color(k))
         fill = color if k == shown else "transparent"
         radius = RING + APART * sum(math.dist((x, y), place) < RING for place in places[:k])
-        parts.append(html(ring, pressed, way, line, x, y, radius, color, fill, u, v + 3.8, k + 1))
+        parts.append(html(ring, press("mode", str(k)), x, y, radius, color, fill, u, v + 3.8, k + 1))
     return parts
 
 
@@ -128,27 +123,15 @@ def _trails(places: Array, ends: list[int]) -> str:
     return Markup(f"<g class='trails'>{''.join(lines)}</g>")
 
 
-def _labels(places: list[Point], floor: float) -> list[Point]:
-    """Where the numbers of dots stand: beside them, clear of all dots and of each other, above `floor`."""
+def _labels(places: list[Point]) -> list[Point]:
+    """Where the numbers of rings stand: above them, and above each other's."""
     labels: list[Point] = []
-    (width, height), dots = LABEL, np.array(places)
-    turn = np.linspace(0.5 * math.pi, 2.5 * math.pi, 12, endpoint=False)
-    ring = (
-        np.arange(12, WIDTH, 4)[:, None, None] * np.stack([np.cos(turn), -np.sin(turn)], axis=-1)
-    ).reshape(-1, 2)
-    for place in dots:
-        rooms = place + ring
-        free = (
-            np.abs(rooms - [(LEFT + WIDTH - RIGHT) / 2, 0]) <= [(WIDTH - RIGHT - LEFT - width) / 2, np.inf]
-        ).all(axis=1)
-        free &= (rooms[:, 1] >= TOP) & (rooms[:, 1] <= floor - height / 2)
-        for others, gap in (
-            (dots, (width / 2 + RING, height / 2 + RING)),
-            (np.array(labels or [(1e9, 1e9)]), LABEL),
-        ):
-            free &= ~(np.abs(rooms[:, None] - others) < gap).all(axis=2).any(axis=1)
-        u, v = rooms[free][0] if free.any() else place
-        labels.append((float(u), float(v)))
+    (width, height) = LABEL
+    for x, y in places:
+        level = y - LIFT
+        while any(abs(x - u) < width and abs(level - v) < height for u, v in labels):
+            level -= 0.5 * height
+        labels.append((x, level))
     return labels
 
 

@@ -82,7 +82,7 @@ def _option(method: str) -> str:
 
 def _menu(course: tuple[Stop, ...]) -> str:
     """A button that opens a list of the lessons, or of the tour's stops."""
-    said = {LESSONS: ("Lessons", "Each has a task"), TOUR: ("Tour", "All of the app in six stops")}
+    said = {LESSONS: ("Lessons", "Each has a task"), TOUR: ("Tour", f"The app in {len(TOUR)} stops")}
     word, about = said[course]
     items = (
         html(

@@ -41,7 +41,6 @@ class Stop:
     layout: str
     target: tuple[float, float, float, float, float, float]
     """Wrench that is asked for [N, N m]."""
-    failed: tuple[str, ...] = ()
     mode: int = 0
     method: str = "dual"
     swims: bool = False
@@ -54,7 +53,7 @@ class Stop:
     @property
     def state(self) -> State:
         """The prepared state, with nothing left of the present one."""
-        return State(shipped()[self.layout], self.failed, target=self.target, method=self.method)
+        return State(shipped()[self.layout], target=self.target, method=self.method)
 
 
 def _aligned(seen: Seen) -> bool:
@@ -83,24 +82,6 @@ TOUR = (
         PRESETS["Turn"],
         mode=1,
         method="mdn",
-    ),
-    Stop(
-        "a-failure",
-        "A fin fails",
-        "Fin 2 hangs down. It is left out, and the other three answer at once. Fail another "
-        "one in the list, and read below the bars what is left undone.",
-        "ucat",
-        PRESETS["Turn"],
-        failed=("front_left",),
-    ),
-    Stop(
-        "no-way",
-        "What a layout cannot do",
-        "This robot has no way to turn left or right, however its fins flap: the yaw that is asked stays "
-        "missing. Select a fin, turn its shaft by the ring, and yaw becomes possible.",
-        "no_yaw",
-        (1.0, 0.0, 0.0, 0.0, 0.0, 0.2),
-        drawer="Reach",
     ),
     Stop(
         "swim",
