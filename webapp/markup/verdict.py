@@ -28,6 +28,10 @@ LEAST_WATTS = 1e-3
 """Bound [W] that shares are taken of where it is smaller, or nothing."""
 
 
+AT_REST = "(flow)"
+"""How a note ends that the panel beside the speed tells in its own words."""
+
+
 class Verdict(Enum):
     """One of four, each with a word and a colour."""
 
@@ -135,7 +139,8 @@ def answer_sentence(
             share = round(100 * allocation.share)
             told = [f"{share} % of what is asked is delivered"] if 0 <= share < 100 else []
             told += [*allocation.binding, *(() if searching else allocation.notes)]
-            sentences.append("; ".join(told) + "." if told else "")
+            said = "; ".join(note for note in told if not note.endswith(AT_REST))
+            sentences.append(f"{said[0].upper()}{said[1:]}." if said else "")
         elif allocation.reachable and not searching:
             sentences.append(bound_sentence(allocation))
             if doubt := allocation.measure_next:

@@ -112,15 +112,16 @@ def _add_fit(page: Page, shown: Shown) -> None:
 
     page.opening.add(CSV, upload)
     about = "A fin: noisy rows of A, f, phi, Fx, Fy, Fz, or a force table. A thruster: PWM, force and power."
-    button = page.add_upload(
-        "Fit from measurements (CSV)",
-        upload,
-        icon=viser.Icon.UPLOAD,
-        mime_type=CSV,
-        hint=f"{about} Up to {MAX_BYTES // 1_000_000} MB.",
-    )
+    with gui.add_folder(None) as whole:  # viser cannot hide a button for files
+        button = page.add_upload(
+            "Fit from measurements (CSV)",
+            upload,
+            icon=viser.Icon.UPLOAD,
+            mime_type=CSV,
+            hint=f"{about} Up to {MAX_BYTES // 1_000_000} MB.",
+        )
     board.show(button, disabled=lambda selected, fitting: selected is None or fitting is not None)
-    board.show(button, visible=lambda selected, layout: not isinstance(shown(selected, layout), Rudder))
+    board.show(whole, visible=lambda selected, layout: not isinstance(shown(selected, layout), Rudder))
     bar = gui.add_progress_bar(100.0, animated=True, visible=False)
     hint = "The actuator stays as it is."
     cancel = page.add_button("Cancel", fitting.forget, icon=viser.Icon.X, visible=False, hint=hint)

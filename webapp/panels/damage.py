@@ -97,7 +97,7 @@ def add_damage(page: Page) -> None:
     page.bind(parts, session.select, lambda selected, layout: _part(selected, layout).name)
     shares = {
         "weak": ("Strength [%]", "What is left of its limits: a worn motor gives less at most."),
-        "thrust": ("Thrust left [%]", "A torn fin or foil gives less at every command."),
+        "thrust": ("Force left [%]", "A torn fin or foil gives less at every command."),
     }
     least = 100 * STRENGTH_RANGE[0]
     for kind, (label, hint) in shares.items():
