@@ -63,7 +63,7 @@ def test_a_robot_from_nothing_to_another_browser(
             page.page.locator(".fin-list tr[data-fin=left] .name").click()
             page.until(lambda: session.selected == "left")
         else:
-            page.press("Add a fin")
+            page.press("Fin")
             page.until(lambda pair=pair: session.state.layout.n_fins == 2 * pair + 1)
         describe(page, texts)
         page.press("Mirror")
@@ -120,7 +120,7 @@ def test_limits_and_model_count_for_all_selected_fins(page: Any) -> None:
     page.page.locator(".fin-list tr[data-fin=front_right] .swatch").click()
     for name in ("front_left", "back_left"):
         page.page.locator(f".fin-list tr[data-fin={name}] .swatch").click(modifiers=["Control"])
-    page.page.locator(".fl.head", has_text="3 fins").wait_for()
+    page.page.locator(".fl.head", has_text="3 actuators").wait_for()
     page.type("A [°]", "30", place=1)
     most = [math.radians(30.0)] * 3
     page.until(lambda: [fin.limits.amplitude[1] for fin in session.state.layout.fins[:3]] == most)
@@ -128,7 +128,7 @@ def test_limits_and_model_count_for_all_selected_fins(page: Any) -> None:
     page.until(lambda: [fin.model.type for fin in session.state.layout.fins] == ["lighthill"] * 3 + ["drag"])
     page.type("Width [m]", "0.12")
     page.page.locator("svg.plot:visible", has_text="A 30°").wait_for()
-    page.until(lambda: session.history.undo_name == "Width of 3 fins")
+    page.until(lambda: session.history.undo_name == "Width of 3 actuators")
     page.type("Width [m]", "-1")
     page.until(lambda: any("must lie within" in note for note in page.notes()))
 
