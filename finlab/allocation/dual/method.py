@@ -17,14 +17,13 @@ from numpy.typing import NDArray
 
 from finlab.allocation.dual.answers import Sets
 from finlab.allocation.dual.bounds import proved_power
-from finlab.allocation.dual.branch import gaps, halves, least_power, may_have_gaps
+from finlab.allocation.dual.branch import gaps, least_power, may_have_gaps
 from finlab.allocation.dual.compiled import Compiled
 from finlab.allocation.dual.doubt import price_of_doubt
 from finlab.allocation.dual.drag import at_the_price_of_drag
 from finlab.allocation.dual.newton import Prices, solve
 from finlab.allocation.dual.policies import nearest
 from finlab.allocation.dual.rates import Rates, within_tick
-from finlab.allocation.evaluate import REACHED
 from finlab.allocation.levenberg_marquardt import CommandProblem, refine
 from finlab.allocation.method import Method
 from finlab.allocation.policy import AXES, Policy
@@ -39,8 +38,6 @@ EXACT = 1e-8
 """Error, on the robot's yardstick, up to which commands need no further step."""
 TICK_STEPS = 5
 """The same where a command of a tick is not exact."""
-TICK_CUTS = 3
-"""Times that what may follow is cut where that has gaps."""
 
 
 @dataclass(frozen=True)
@@ -257,29 +254,9 @@ class Dual(Method):
             self._problem, lower=box.lower, upper=box.upper, full_turn=box.free[:, 2] & self.plant.full_turn
         )
 
-        def realized(force: Array) -> tuple[Array, float]:
-            """A command in the box for forces (k, 1), and its error."""
-            command = self.plant.feasible(box.clipped(self.compiled.commands(force, previous)))
-            error = self._error(command, aim)
-            if error[0] > EXACT:
-                command = refine(problem, aim / self.scale, box.clipped(command), TICK_STEPS).command
-                command = self.plant.feasible(box.clipped(command))
-                error = self._error(command, aim)
-            return command, float(error[0])
-
-        def tried(part: Sets) -> tuple[float, Array, Array, Sets]:
-            """Error and command of a part of the sets, the dual's forces there, and the part."""
-            force = within_tick(robot, part, asked, found.prices, 1.0 / self.scale)
-            command, error = realized(force)
-            return error, command, force, part
-
-        robot = self.compiled.robot
-        error, command, force, part = tried(sets)
-        least = float(np.linalg.norm((robot.wrench(force) - asked) / self.scale))
-        for _ in range(TICK_CUTS):
-            if error <= least + REACHED or (cut := halves(robot, part, force[:, 0])) is None:
-                break
-            _, _, force, part = now = min(map(tried, cut), key=lambda each: each[0])
-            if now[0] < error:
-                error, command = now[:2]
+        force = within_tick(self.compiled.robot, sets, asked, found.prices, 1.0 / self.scale)
+        command = self.plant.feasible(box.clipped(self.compiled.commands(force, previous)))
+        if self._error(command, aim)[0] > EXACT:
+            command = refine(problem, aim / self.scale, box.clipped(command), TICK_STEPS).command
+            command = self.plant.feasible(box.clipped(command))
         return command
