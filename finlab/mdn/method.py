@@ -15,7 +15,7 @@ import numpy as np
 
 from finlab.allocation.dual.method import Dual
 from finlab.allocation.dual.rates import Rates
-from finlab.allocation.evaluate import REACHED, costs
+from finlab.allocation.evaluate import costs
 from finlab.allocation.mdn_settings import MdnSettings
 from finlab.allocation.method import Method, Takes
 from finlab.allocation.policy import Policy
@@ -23,7 +23,7 @@ from finlab.allocation.settings import Settings
 from finlab.allocation.solution import Candidates, Solution
 from finlab.arrays import Array
 from finlab.layout import Layout
-from finlab.mdn.answers import NEARLY, NOW, OTHER, Answers, Steps, follow, ranked, refined, traced
+from finlab.mdn.answers import NOW, OTHER, Answers, Steps, follow, ranked, refined, traced
 from finlab.mdn.descent import realize
 from finlab.mdn.features import Seen, see
 from finlab.mdn.network import ForceMixture, ForceNetworkConfig
@@ -135,25 +135,19 @@ class Mdn(Method):
         return Found(proposal, answers)
 
     def _at_last(self, policy: Policy, target: Array, answers: Answers) -> Answers:
-        """Answers to normalized targets (M, 6) that were missed at first: after more steps, and beside the
-        default method's answer, which tells what is to be delivered where that is out of reach."""
+        """Answers to normalized targets (M, 6) that were missed at first: after more steps, or that of the
+        default method, which tells what is to be delivered out of reach."""
         robot = self.robot
         answers = refined(robot, target, answers.command, answers.origin, MORE)
         missed = answers.error[:, 0] > robot.exact
         if missed.any():
-            some, asked = answers.rows(missed), target[missed]
+            asked = target[missed]
             command = self._default.solve(asked * self.sigma, policy=policy).command
-            delivered = robot.commands.wrench(command)
-            near = np.linalg.norm(delivered - asked, axis=1)
-            # A little that all miss is what the fins cannot go below; more is what the policy decides.
-            little = some.error[:, 0] <= np.minimum(near + NEARLY, REACHED / USUAL_SHARE)
-            as_asked = little | (near <= robot.exact)
-            delivered[as_asked] = asked[as_asked]
-            start = np.concatenate([command[:, None], some.command], axis=1)
-            origin = np.insert(some.origin, 0, OTHER, axis=1)
-            found = refined(robot, delivered, start, origin, MORE)
-            found = found._replace(error=np.linalg.norm(found.wrench - asked[:, None], axis=-1))
-            answers.replace(missed, found.columns(slice(some.error.shape[1])))
+            wrench = robot.commands.wrench(command)
+            error = np.linalg.norm(wrench - asked, axis=1)
+            told = (command, wrench, error, robot.effort(command), np.full(len(asked), OTHER))
+            for kept, new in zip(answers, told, strict=True):
+                kept[missed, 0] = new
         return answers
 
     @cached_property
