@@ -15,7 +15,7 @@ from finlab.arrays import AnyArray, Array
 from finlab.least_squares import Damping, levenberg_marquardt
 from finlab.physics.plant import Plant
 from finlab.precision import NOTHING
-from finlab.small_systems import solve, step_within
+from finlab.small_systems import solve
 
 RIDGE = (1e-9, 1e-14)
 """Regularization of the 6 x 6 systems: absolute, and relative to their trace. Without the latter those of
@@ -160,15 +160,19 @@ def _step(problem: CommandProblem, at: _Evaluated, jacobian: AnyArray, damping: 
     rows, n, _ = at.command.shape
     free = jacobian.reshape(rows, 3 * n, 6)
     right = at.residual[..., None]
-
-    def free_step(_: AnyArray, held: AnyArray) -> AnyArray:
-        moving = free * ~held.reshape(rows, 3 * n, 1) if held.any() else free
-        return _smallest_change(moving, right, damping).reshape(rows, n, 3)
-
-    # What is at a limit may not leave it; the rest is cut off afterwards.
     low, high = problem.edges
-    least = np.where(at.command <= low, 0.0, -np.inf)
-    return step_within(free_step, least, np.where(at.command >= high, 0.0, np.inf), 2)
+    at_low, at_high = at.command <= low, at.command >= high
+
+    def leaving(step: AnyArray) -> AnyArray:
+        """Which commands (R, n, 3) at a limit a step takes out."""
+        return np.asarray((at_low & (step < 0.0)) | (at_high & (step > 0.0)))
+
+    step = _smallest_change(free, right, damping).reshape(rows, n, 3)
+    held = leaving(step)
+    if not held.any():
+        return step
+    step = _smallest_change(free * ~held.reshape(rows, 3 * n, 1), right, damping).reshape(rows, n, 3)
+    return np.where(leaving(step), 0.0, step)
 
 
 def _smallest_change(free: AnyArray, right: AnyArray, damping: AnyArray) -> AnyArray:
