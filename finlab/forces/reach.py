@@ -21,8 +21,6 @@ BESIDE = 1e-6
 """Scaled wrench that may be left beside the one asked for, as a share of the strongest actuator's."""
 UNPROVEN = 1e-3
 """Gap, as a share of the size plus one, from which no force counts as found."""
-SPAN_TOLERANCE = 1e-9
-"""Share of the largest singular value below which the actuators do not act along a direction at all."""
 
 
 class Largest(NamedTuple):
@@ -75,26 +73,14 @@ def largest(
     # A wrench that is not where it was asked for proves nothing.
     beside = np.abs(given - wanted)[:, 1:].max(-1, initial=0.0)
     proven = np.where(beside <= BESIDE * full.max(-1), given[:, 0], 0.0)
-    return Largest(size, np.maximum(size - proven, 0.0), force, sets.wrench(force), _apply(frame, normal))
+    return Largest(
+        size, np.maximum(size - proven, 0.0), force, sets.wrench(force), (frame @ normal[..., None])[..., 0]
+    )
 
 
 def max_wrench_along(sets: ForceSets, direction: Array, tolerance: float = FINE) -> Largest:
     """Returns the largest wrenches that point exactly along unit `direction` (R, m), all else zero."""
     found = largest(sets, direction, orthogonal_complement(direction), tolerance=tolerance)
-    # Where nothing acts along a direction at all, no force proves that, but a plane through the origin.
-    unsure = np.flatnonzero(found.gap > 1e-6 * (1.0 + found.size))
-    if len(unsure):
-        matrix = sets.take(unsure).full_effectiveness()
-        _, values, axes = np.linalg.svd(matrix, full_matrices=True)
-        values = np.pad(values, ((0, 0), (0, direction.shape[-1] - values.shape[-1])))
-        free = values <= SPAN_TOLERANCE * values[:, :1]
-        off = np.where(free, _apply(axes, direction[unsure]), 0.0)
-        share = (off * off).sum(-1)
-        outside = unsure[share > SPAN_TOLERANCE]
-        normal = _apply(axes.swapaxes(1, 2), off)[share > SPAN_TOLERANCE]
-        found.normal[outside] = normal / (normal * direction[outside]).sum(-1, keepdims=True)
-        for field in found[:4]:
-            field[outside] = 0.0
     if sets.center is not None:  # where rest is out of reach, a direction may meet nothing at all
         unmet = (found.size < 0.0) | (found.gap > UNPROVEN * (1.0 + found.size))
         found.size[unmet] = found.gap[unmet] = 0.0
@@ -126,12 +112,6 @@ def orthogonal_complement(direction: Array) -> Array:
     reflection = np.eye(k) - 2.0 * mirror[..., :, None] * mirror[..., None, :]
     keep = np.arange(k) != axis[:, None]
     return np.swapaxes(np.swapaxes(reflection, -1, -2)[keep].reshape(rows, k - 1, k), -1, -2)
-
-
-def _apply(matrix: Array, vector: Array) -> Array:
-    """Matrices (R, a, b) times vectors (R, b)."""
-    product: Array = (matrix @ vector[..., None])[..., 0]
-    return product
 
 
 TOLERANCE = 1e-6
