@@ -69,7 +69,6 @@ def actuator(
 
 def _fin(data: tuple[Path, ...], output: Path, seed: int) -> list[str]:
     """Fits a fin and writes its file; returns what to print."""
-    from finlab.fit.advice import next_measurements
     from finlab.fit.fin_file import check_table_path, summary, write_fin
     from finlab.fit.fin_fit import fit_fin
     from finlab.fit.measurements import read_measurements
@@ -79,8 +78,6 @@ def _fin(data: tuple[Path, ...], output: Path, seed: int) -> list[str]:
     write_fin(fit, output)
     return [
         *summary(fit),
-        "measure next, A [rad], f [Hz], zero direction [rad]:",
-        *("  " + "  ".join(f"{value:7.3f}" for value in command) for command in next_measurements(fit)),
         f"{output}: name it in a layout, model: {{type: table, path: {output.name}}}",
     ]
 

@@ -81,17 +81,16 @@ def allocate(arguments: argparse.Namespace) -> int:
 
 def serve(arguments: argparse.Namespace) -> int:
     """Answer requests until they end or a signal asks to stop."""
-    from finlab.deploy.stopping import StopSignals
+    from finlab.deploy.transport import StandardStreams
 
-    stop = StopSignals()  # before the robot is loaded, so that no signal is missed
+    streams = StandardStreams()  # before the robot is loaded, so that no signal is missed
     robot = _robot(arguments)
     from finlab.deploy.serve import Server
-    from finlab.deploy.transport import StandardStreams
 
     if sys.stdin is None:
         raise FinlabError("standard input is closed; connect it")
-    watchdog = None if arguments.no_watchdog else arguments.watchdog_s
-    Server(robot, watchdog).run(StandardStreams(sys.stdin.fileno(), sys.stdout.fileno(), stop))
+    streams.open(sys.stdin.fileno(), sys.stdout.fileno())
+    Server(robot, None if arguments.no_watchdog else arguments.watchdog_s).run(streams)
     return 0
 
 

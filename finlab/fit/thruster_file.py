@@ -8,12 +8,10 @@ from finlab.layout.thrust_model import COLUMNS
 
 
 def layout_lines(fit: ThrusterFit, path: Path) -> tuple[str, ...]:
-    """Returns the keys of a thruster in a layout beside a table at a path; its model may be the table or the
-    power law."""
+    """Returns the keys of a thruster in a layout beside a table at a path."""
     least, most = fit.force
-    torque, known, law = fit.torque_per_newton, fit.uncertainty, fit.law
+    torque, known = fit.torque_per_newton, fit.uncertainty
     unit = f", unit: {fit.table.unit}" if fit.table.unit else ""
-    reverse = "" if law.reverse is None else f", reverse: {law.reverse:g}"
     errs = (
         f"{{share: {known.share:g}, floor_n: {known.floor:g}, common: {_quoted(path.stem[:64].strip())}}}"
         if known
@@ -25,7 +23,6 @@ def layout_lines(fit: ThrusterFit, path: Path) -> tuple[str, ...]:
         f"torque_per_newton_m: {torque:.4g}" * (torque != 0.0),
         f"uncertainty: {errs}" * bool(errs),
         f"model: {{type: table, path: {_quoted(path.name)}{unit}}}",
-        f"# or model: {{type: power_law, forward: {law.forward:g}{reverse}, exponent: {law.exponent:g}}}",
     )
     return tuple(line for line in lines if line)
 
@@ -46,19 +43,8 @@ def summary(fit: ThrusterFit) -> tuple[str, ...]:
     """Returns what was found, a line each."""
     unit = f" {fit.table.unit}" if fit.table.unit else ""
     least, most = fit.force
-    laws = [f"{name} {c:.3f} F^{p:.3f} (misses {rms:.2g} W)" for name, (c, p, rms) in fit.sides.items()]
-    moving = " and ".join(f"{command:g}" for command in fit.moving)
-    still = f"none from {fit.still[0]:g} to {fit.still[1]:g}, " if fit.still else ""
-    known, noise = fit.uncertainty, fit.scatter
-    sure = "too few rows to say how sure the table is"
-    if known and noise:
-        sure = (
-            f"a row scatters by {noise.share:.2%} of its force and {noise.floor:.3g} N, the table's force is "
-            f"known to {known.share:.2%} and {known.floor:.3g} N (standard deviations)"
-        )
-    return (
-        f"force {least:.4g} to {most:.4g} N; {still}first forces at {moving}{unit}",
-        f"power: {', '.join(laws)}; with one exponent {fit.law.exponent:g}",
-        sure,
-        *fit.notes,
-    )
+    still = f"; none from {fit.still[0]:g} to {fit.still[1]:g}{unit}" if fit.still else ""
+    known, sure = fit.uncertainty, "too few rows to say how sure the table is"
+    if known:
+        sure = f"force known to {known.share:.2%} and {known.floor:.3g} N (standard deviations)"
+    return (f"force {least:.4g} to {most:.4g} N{still}", sure, *fit.notes)

@@ -1,4 +1,4 @@
-"""A thruster from its bench table: force and power over the command, a power law, and how sure they are.
+"""A thruster from its bench table: force and power over the command, and how sure the force is.
 
 Each side is a cubic regression spline over the command; leave-one-out errors choose the number of its knots
 (PRESS, Allen 1974). Where rows hardly scatter about it they are kept as measured, else the spline stands for
@@ -15,7 +15,7 @@ from scipy.optimize import isotonic_regression, nnls
 from finlab.arrays import Array
 from finlab.errors import DataError, LayoutError
 from finlab.fit.thruster_bench import Bench
-from finlab.layout.thrust_model import PowerLaw, PowerTable
+from finlab.layout.thrust_model import PowerTable
 from finlab.layout.uncertainty import Uncertainty
 
 NO_FORCE = 0.002
@@ -38,9 +38,6 @@ DIGITS = (12, 6, 6)
 FALL, FAR = 0.04, 6.0
 """Share of the largest force by which the force may lie off its rising mean, and how many times what
 seven in ten rows keep to more."""
-LAW_FROM = 0.02
-"""Share of a side's largest force from which on rows count for the power law: below it the resolution of the
-ammeter rules."""
 
 
 @dataclass(frozen=True)
@@ -49,23 +46,14 @@ class ThrusterFit:
 
     table: PowerTable
     """Command, force [N] and power [W]."""
-    law: PowerLaw
-    """The nearest power law whose exponent both sides share, by logarithms."""
-    sides: dict[str, tuple[float, float, float]]
-    """`reverse` and `forward` where measured: factor c and exponent p of c F^p for itself, and the root mean
-    square of what that misses [W]."""
     still: tuple[float, float] | None
     """Commands between which there is no force, as far as there are such rows."""
-    moving: tuple[float, ...]
-    """The nearest command with a force on each side that was measured."""
     dead_band: float
     """Least force beside a dead band [N]; 0 where none was seen."""
     torque_per_newton: float
     """Slope of torque over force [m]; 0 where no torque was measured."""
-    scatter: Uncertainty | None
-    """Standard deviation of one row about the curve; None where rows are too few to tell."""
     uncertainty: Uncertainty | None
-    """Standard deviation of the table's force."""
+    """Standard deviation of the table's force; None where rows are too few to tell."""
     notes: tuple[str, ...]
     """What was filled in or left aside, a sentence each."""
 
@@ -95,12 +83,6 @@ def _fitted(bench: Bench) -> ThrusterFit:
     side = _sides(command, force, rising, bench.unit)
     rest = side == 0
     idle = float(power[rest].min()) if rest.any() else 0.0
-    if idle > LAW_FROM * power.max():
-        notes.append(f"at rest it takes {idle:.3g} W, which the table has and a power law leaves out")
-    idling = power <= power.min() + NO_FORCE * power.max()
-    offset = float(force[idling].mean())
-    if idling.sum() > 1 and abs(offset) > 2.0 * NO_FORCE * largest:
-        notes.append(f"the force is {offset:.3g} N where the power is least; was the load cell at 0?")
     curves = []
     for sign, name in ((-1.0, "negative"), (1.0, "positive")):
         own = side[where] == sign
@@ -114,18 +96,13 @@ def _fitted(bench: Bench) -> ThrusterFit:
     rows = rows[np.argsort(rows[:, 0])]
     nearest = (*rows[rows[:, 1] < 0.0][-1:], *rows[rows[:, 1] > 0.0][:1])
     still = rows[rows[:, 1] == 0.0, 0]
-    law, sides = _laws(bench, idle)
     return ThrusterFit(
         table=PowerTable(tuple(map(tuple, rows.tolist())), bench.unit),
-        law=law,
-        sides=sides,
         still=(float(still[0]), float(still[-1])) if len(still) else None,
-        moving=tuple(float(row[0]) for row in nearest),
         dead_band=min(abs(float(row[1])) for row in nearest) if len(still) > 1 else 0.0,
         torque_per_newton=(
             0.0 if bench.torque is None else float(bench.torque @ bench.force / (bench.force @ bench.force))
         ),
-        scatter=_deviation([curve.scatter for curve in curves]),
         uncertainty=_deviation([curve.error for curve in curves]),
         notes=tuple(notes),
     )
@@ -140,13 +117,12 @@ class _Side:
         command, force = sign * command, sign * force
         places, where, count = np.unique(command, return_inverse=True, return_counts=True)
         size = np.bincount(where, force) / count
-        self.scatter, self.error = np.empty((0, 2)), np.empty((0, 2))
-        """Force [N] and squared residual, and force and squared error of the curve (n, 2)."""
+        self.error = np.empty((0, 2))
+        """Force [N] and squared error of the curve (n, 2)."""
         if len(places) > 2:
             spline, fitted, leverage = _spline(command, force)
             fitted = np.maximum(fitted, 0.0)
-            self.scatter = np.stack([fitted, (force - fitted) ** 2 / (1.0 - leverage)], axis=1)
-            found = _deviation([self.scatter])
+            found = _deviation([np.stack([fitted, (force - fitted) ** 2 / (1.0 - leverage)], axis=1)])
             assert found is not None
             variance = (found.share * fitted) ** 2 + found.floor**2
             noisy = variance.max() > (SCATTER * largest) ** 2 and leverage.mean() < LEVERAGE
@@ -267,25 +243,3 @@ def _sides(command: Array, force: Array, rising: Array, unit: str) -> Array:
             "largest force"
         )
     return side
-
-
-def _laws(bench: Bench, idle: float) -> tuple[PowerLaw, dict[str, tuple[float, float, float]]]:
-    """Returns the common power law, and each side's own, of what is taken beyond the power at rest [W]."""
-    power = bench.power - idle
-    sides, logs = {}, {}
-    for name, sign in (("reverse", -1.0), ("forward", 1.0)):
-        size = sign * bench.force
-        kept = (size > LAW_FROM * size.max()) & (power > 0.0) & (size > 0.0)
-        if len(np.unique(size[kept])) > 1:
-            x, y = logs[name] = np.log(size[kept]), np.log(power[kept])
-            exponent, factor = np.polyfit(x, y, 1)
-            missed = np.exp(factor + exponent * x) - power[kept]
-            sides[name] = float(np.exp(factor)), float(exponent), float(np.sqrt(np.mean(missed**2)))
-    if not logs:
-        raise DataError("no side has two forces of different size that take more power than rest")
-    within = np.concatenate([(x - x.mean()) for x, _ in logs.values()])
-    common = float(within @ np.concatenate([y for _, y in logs.values()]) / (within @ within))
-    common = float(np.clip(round(common, 3), 1.1, 4.0))
-    factor = {name: float(f"{np.exp(np.mean(y - common * x)):.4g}") for name, (x, y) in logs.items()}
-    first = factor.get("forward", factor.get("reverse", 1.0))
-    return PowerLaw(first, factor.get("reverse"), common), sides

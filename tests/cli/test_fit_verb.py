@@ -29,4 +29,4 @@ def test_steps_are_told_on_terminals_alone(
         assert "fitting the thrust" in stderr.getvalue()
     else:
         assert stderr.getvalue() == ""
-    assert "measure next" in capsys.readouterr().out
+    assert "cross-validated error" in capsys.readouterr().out

@@ -18,8 +18,7 @@ from finlab.deploy.bundle import Bundle
 from finlab.deploy.request import MAX_LINE
 from finlab.deploy.robot import DeployedRobot, parse_robot
 from finlab.deploy.serve import RECENT_S, Server
-from finlab.deploy.stopping import SIGNALS, StopSignals
-from finlab.deploy.transport import StandardStreams, Unsent
+from finlab.deploy.transport import SIGNALS, StandardStreams, Unsent
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
 
@@ -187,17 +186,16 @@ def test_an_answer_that_is_no_number_is_an_error(
 
 
 @pytest.fixture
-def stop() -> Iterator[StopSignals]:
-    before = {number: signal.getsignal(number) for number in SIGNALS}
-    yield StopSignals()
-    signal.set_wakeup_fd(-1)
+def streams() -> Iterator[StandardStreams]:
+    before = {number: signal.getsignal(number) for number in (*SIGNALS, signal.SIGALRM)}
+    yield StandardStreams()
     for number, handler in before.items():
         signal.signal(number, handler)
 
 
-def test_streams_keep_only_the_newest_request(stop: StopSignals) -> None:
+def test_streams_keep_only_the_newest_request(streams: StandardStreams) -> None:
     (source, requests), (answers, sink) = os.pipe(), os.pipe()
-    streams = StandardStreams(source, sink, stop)
+    streams.open(source, sink)
     assert streams.newest(0.0) is None and streams.newest(0.02) is None
     os.write(requests, b"one\n\ntwo\nthree\n   \n")
     assert streams.newest(1.0) == b"three"
@@ -212,22 +210,26 @@ def test_streams_keep_only_the_newest_request(stop: StopSignals) -> None:
     with pytest.raises(EOFError):
         streams.newest(None)
     os.close(answers)
-    with pytest.raises(Unsent, match="nobody reads it any more; the neutral command was not sent"):
+    with pytest.raises(Unsent, match="Broken pipe; the neutral command was not sent"):
         streams.send(b"to nobody\n")
 
 
-def test_a_line_without_end_takes_no_memory_and_no_time(stop: StopSignals) -> None:
-    source = os.open("/dev/zero", os.O_RDONLY)
-    streams = StandardStreams(source, os.open("/dev/null", os.O_WRONLY), stop)
+def test_a_line_without_end_takes_no_memory_and_no_time(streams: StandardStreams) -> None:
+    (source, requests), sink = os.pipe(), os.open("/dev/null", os.O_WRONLY)
+    streams.open(source, sink)
+    for _ in range(100):
+        os.write(requests, bytes(MAX_LINE))
     assert streams.newest(0.1) is None
-    assert len(streams._part) <= MAX_LINE + 1
+    os.write(requests, b"\n")
+    assert len(streams.newest(10.0) or b"") == MAX_LINE + 1, "enough to refuse it"
+    os.close(requests)
 
 
-def test_a_signal_ends_waiting_and_sending(stop: StopSignals, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_signal_ends_waiting_and_sending(streams: StandardStreams, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("finlab.deploy.transport.PATIENCE", 0.05)
     (source, requests), (_, sink) = os.pipe(), os.pipe()
     os.write(requests, LINE)
-    streams = StandardStreams(source, sink, stop)
+    streams.open(source, sink)
     signal.raise_signal(signal.SIGTERM)
     with pytest.raises(EOFError):
         streams.newest(None)
@@ -273,15 +275,15 @@ def test_the_fins_rest_once_when_the_requests_end(part: bytes, status: list[str]
     assert ended(service) == (status, "") and service.returncode == 0
 
 
-def test_a_reader_that_ends_is_noticed_at_once(folder: Path) -> None:
-    service = started(folder, "--no-watchdog", stdout=subprocess.PIPE)
+def test_a_reader_that_ends_is_noticed_at_the_next_answer(folder: Path) -> None:
+    service = started(folder, "--watchdog-s=0.2", stdout=subprocess.PIPE)
     pipe(service.stdin).write(LINE)
     pipe(service.stdin).flush()
     pipe(service.stdout).readline()
     pipe(service.stdout).close()
     assert service.wait(60) == 2
     told = pipe(service.stderr).read().decode()
-    assert told.startswith("finlab-runtime: error: standard output: nobody reads it any more;")
+    assert told.startswith("finlab-runtime: error: standard output: Broken pipe;")
     assert told.count("\n") == 1
 
 

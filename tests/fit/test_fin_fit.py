@@ -1,4 +1,4 @@
-"""Fitted fins beside the laws that were measured: error, band, outliers, doubt, advice, and their file."""
+"""Fitted fins beside the laws that were measured: error, band, outliers, doubt, and their file."""
 
 import time
 import warnings
@@ -13,11 +13,9 @@ from finlab.actuators.fin.models import read_table
 from finlab.allocation import Allocator
 from finlab.arrays import Array
 from finlab.errors import DataError
-from finlab.fit.advice import APART, next_measurements
 from finlab.fit.fin_file import summary, write_fin
 from finlab.fit.fin_fit import FinFit, fit_fin
 from finlab.layout import Fin, FinModelSpec, Layout
-from finlab.layout.angles import wrapped
 from finlab.layout.force_table_file import DOUBT
 from finlab.physics import TableLaw
 from tests.fit.cell import commands, measured, samples, soft
@@ -122,24 +120,6 @@ def test_one_zero_direction_speaks_for_all() -> None:
     assert np.sqrt(np.mean(error**2)) < 0.02
 
 
-def test_advice_leads_to_where_nothing_was_measured() -> None:
-    command = commands(160)
-    command = command[(command[:, 0] < 0.35) | (command[:, 1] < 1.1) | (np.arange(160) == 0)]
-    command[0] = [0.6, 2.1, 0.0]
-    thin = fit_fin(samples(command, measured(LAW, command, 0.03)))
-    advised = next_measurements(thin)
-    assert advised.shape == (5, 3)
-    assert ((advised[:, 0] > 0.35) & (advised[:, 1] > 1.1)).sum() >= 4
-    assert len(np.unique(advised.round(3), axis=0)) == 5
-
-    def uncertain_with(more: Array) -> float:
-        both = np.concatenate([command, more])
-        return float(fit_fin(samples(both, measured(LAW, both, 0.03))).uncertainty(thin.grid()).mean())
-
-    elsewhere = np.array([[0.2, 0.5, phi] for phi in (-2.0, -1.0, 0.0, 1.0, 2.0)])
-    assert uncertain_with(advised) < 0.9 * uncertain_with(elsewhere)
-
-
 def test_many_samples_are_thinned_and_it_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("finlab.fit.fin_fit.MOST_SAMPLES", 100)
     command = commands(130)
@@ -180,26 +160,8 @@ def test_axes_without_force_or_noise_raise_no_warning(along_shaft: float, noise:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         found = fit_fin(samples(command, force))
-        assert np.isfinite(found.predict(TEST)).all() and len(next_measurements(found)) == 5
+        assert np.isfinite(found.predict(TEST)).all()
     assert np.sqrt(np.mean(error_of(found)[TEST[:, 0] > 0.1] ** 2)) < 0.2
-
-
-@pytest.mark.parametrize("turned", [True, False])
-@pytest.mark.parametrize("noise", [0.02, 0.5])
-def test_no_measurement_is_proposed_twice(turned: bool, noise: float) -> None:
-    command, force = eight_directions(40, noise=noise)
-    if not turned:
-        command[:, 2] = 0.3
-        force = LAW.force(command) + noise * np.random.default_rng(0).standard_normal(force.shape)
-    told = samples(command, force)
-    found = fit_fin(type(told)(command, force, None, told.places, (), turned))
-    advised = next_measurements(found, 8)
-    assert 5 <= len(advised) <= 8 and (turned or (advised[:, 2] == 0.3).all())
-    inputs = found.measurements.scaled(advised)
-    away = inputs[:, None] - inputs[None]
-    away[..., 2] = wrapped(away[..., 2])
-    near = (np.abs(away) < APART).all(axis=-1)
-    assert near.sum() == len(advised), "each is near itself alone"
 
 
 def test_few_forces_among_many_zeros_are_no_outliers() -> None:

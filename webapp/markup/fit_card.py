@@ -1,13 +1,12 @@
-"""What a fit is worth: the verdict first, and what to measure next."""
+"""What a fit is worth: the verdict first."""
 
-import numpy as np
 from markupsafe import Markup
 
 from finlab.fit.fin_fit import FinFit
 from finlab.fit.thruster_file import summary
 from finlab.fit.thruster_fit import ThrusterFit
 from webapp.markup.html import html, row
-from webapp.markup.words import degrees, three_digits
+from webapp.markup.words import three_digits
 from webapp.tasks.fitting import Fitted
 
 MOST_NAMED = 8
@@ -29,8 +28,6 @@ def fit_card(found: Fitted) -> str:
     else:
         verdict = Markup("<b class='given'>May be trusted within what was measured.</b>")
     parts = [html("<div class='said'>{}</div>", verdict), _figures(fit), _left_out(fit)]
-    if found.advice is not None:
-        parts.append(_advice(found))
     parts += [html("<div class='said dim'>{}</div>", _sentence(note)) for note in fit.measurements.notes]
     return html("<div class='fl'>{}</div>", parts)
 
@@ -55,18 +52,3 @@ def _left_out(fit: FinFit) -> str:
     named = ", ".join(fit.outliers[:MOST_NAMED]) + (" …" if len(fit.outliers) > MOST_NAMED else "")
     many = "sample contradicts" if len(fit.outliers) == 1 else "samples contradict"
     return html("<div class='said'>{} {} the others: {}.</div>", len(fit.outliers), many, named)
-
-
-def _advice(found: Fitted) -> str:
-    assert isinstance(found.fit, FinFit) and found.advice is not None
-    force = np.linalg.norm(found.fit.predict(found.advice)[0], axis=-1)
-    rows = [
-        row(k, degrees(a), f"{f:.2f}", degrees(phi), three_digits(float(size)))
-        for k, ((a, f, phi), size) in enumerate(zip(found.advice, force, strict=True), start=1)
-    ]
-    head = Markup(
-        "<tr><th></th><th>A [°]</th><th>f [Hz]</th><th>direction [°]</th><th>expected [N]</th></tr>"
-    )
-    return html(
-        "<div class='said'>Measure next, the most telling first:</div><table>{}{}</table>", head, rows
-    )

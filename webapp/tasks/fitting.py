@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from finlab.actuators.fin.models import read_table
-from finlab.arrays import Array
 from finlab.deploy.design_files import stored_table
 from finlab.errors import DataError, FinlabError, LayoutError
 from finlab.layout import Actuator, Fin, Rudder, Thruster
@@ -46,8 +45,6 @@ class Fitted:
     """Fields of the actuator: its model, and what else was found."""
     fit: "FinFit | ThrusterFit | None" = None
     """The fit; None where the file was a finished table."""
-    advice: Array | None = None
-    """Commands (5, 3) to measure next."""
 
 
 class Fitting(Newest[Upload, Fitted]):
@@ -126,7 +123,6 @@ class Fitting(Newest[Upload, Fitted]):
                 raise type(error)(str(error).replace(f"{folder}/", "")) from None
 
     def _fit_measurements(self, path: Path, upload: Upload, done: Upload) -> Fitted:
-        from finlab.fit.advice import next_measurements
         from finlab.fit.fin_file import fin_csv
         from finlab.fit.fin_fit import fit_fin
         from finlab.fit.measurements import read_measurements
@@ -135,7 +131,7 @@ class Fitting(Newest[Upload, Fitted]):
         fit = fit_fin(read_measurements([path]), progress=tell)
         tell("writing the table")
         model = stored_table(fin_csv(fit).encode(), table_folder())
-        return Fitted(done, {"model": model}, fit, next_measurements(fit))
+        return Fitted(done, {"model": model}, fit)
 
     def _tell(self, upload: Upload, words: str) -> None:
         """On the worker's thread, before each step: a fit whose result is not waited for ends here."""
