@@ -127,7 +127,7 @@ def test_limits_and_model_count_for_all_selected_fins(page: Any) -> None:
     page.choose("Model", "lighthill")
     page.until(lambda: [fin.model.type for fin in session.state.layout.fins] == ["lighthill"] * 3 + ["drag"])
     page.type("Width [m]", "0.12")
-    page.page.locator("svg.plot:visible", has_text="A 30°").wait_for()
+    page.page.locator("svg.plot:visible", has_text="A 30°").first.wait_for()
     page.until(lambda: session.history.undo_name == "Width of 3 actuators")
     page.type("Width [m]", "-1")
     page.until(lambda: any("must lie within" in note for note in page.notes()))
@@ -191,3 +191,32 @@ def test_a_search_is_watched_stopped_and_accepted(page: Any) -> None:
         page.until(lambda: session.state.layout == found.layout and improver.findings is None)
         page.press("Undo")
         page.until(lambda: session.state.layout == before)
+
+
+def test_what_would_be_lost_is_asked_about_and_typed_values_are_steps(page: Any) -> None:
+    page.tab("Design")
+    session, card = page.session, page.page.locator(".fl-ask")
+    for key, mass in (("Escape", 19.0), ("Enter", None)):
+        page.press("Forget")
+        card.wait_for()
+        page.page.keyboard.press(key)
+        page.until(lambda mass=mass: card.count() == 0 and session.state.layout.body.mass_kg == mass)
+    page.shows("Mass [kg]", "")
+    page.key("Control+z")
+    page.shows("Mass [kg]", "19")
+    page.key("n")
+    place = session.state.layout.position[0].tolist()
+    for axis, value in enumerate(("0.3", "0.2")):
+        page.type("Position [m]", value, axis)
+    page.until(lambda: session.state.layout.position[0].tolist() == [0.3, 0.2, place[2]])
+    page.key("Control+z")
+    page.until(lambda: session.state.layout.position[0].tolist() == [0.3, *place[1:]])
+    page.tab("Simulate")
+    drops = "window.finlabDrops === {}"
+    page.press("Start")
+    page.page.wait_for_function(drops.format("true"))
+    page.press("End")
+    page.page.wait_for_function(drops.format("false"))
+    page.press("New")
+    page.until(lambda: session.task == "Design")
+    assert page.problems == []

@@ -49,7 +49,7 @@ def test_what_is_dropped_is_opened(page: Any, tmp_path: Path) -> None:
     page.until(lambda: any("'notes.docx' cannot be opened" in text for text in page.notes()))
     values, table = measured(tmp_path)
     drop(page, "canvas[data-engine]", {"cell.csv": table})
-    page.until(lambda: any("no fin is selected" in text for text in page.notes()))
+    page.until(lambda: any("no actuator is selected" in text for text in page.notes()))
     assert session.state == state
     drop(page, "canvas[data-engine]", {"robot.yaml": yaml_text(values).encode(), "soft.csv": table})
     page.until(lambda: any("into one ZIP archive" in text for text in page.notes()))
@@ -106,8 +106,12 @@ def test_a_strangers_layout_opens_no_file_and_runs_nothing(page: Any, tmp_path: 
 
 def test_what_is_exported(page: Any, tmp_path: Path) -> None:
     page.tab("Export")
-    page.until(lambda: "finlab allocate ucat --wrench 1.2 0 0 0 0 0.25" in page.text("pre.command"))
+    lines = page.page.locator("pre.command:visible")
+    page.until(lambda: "finlab allocate ucat.yaml --wrench 1.2 0 0 0 0 0.25" in lines.all_inner_texts())
+    assert "finlab-runtime check ucat_bundle.zip" in lines.all_inner_texts()
+    assert load_layout(page.download("Save the design", tmp_path / "ucat.yaml")).name == "ucat"
     bundle = page.download("Export the bundle (ZIP)", tmp_path / "page.zip")
+    page.until(lambda: any("ucat_bundle.zip, among the downloads" in note for note in page.notes()))
     assert main(["export", "ucat", "-o", str(tmp_path / "ucat"), "--zip"]) == 0
     assert bundle.read_bytes() == (tmp_path / "ucat.zip").read_bytes()
     state = page.session.state
