@@ -54,6 +54,7 @@ def add_actuator_list(page: Page) -> None:
         "Delete": session.delete,
     }
     hint = "What Mirror (M) makes moves along until it is unlinked."
+    add_html(page.gui, marker("fl-deletes"))
     buttons = page.add_buttons("Selected", edits, hint=hint)
 
     def there(state: State, selected: str | None) -> tuple[str, ...]:

@@ -34,7 +34,7 @@ from webapp.theme import HALF_TURN, LIGHT, fin_color
 from webapp.viser_internals import run_script
 
 CAMERAS = {
-    "3D": (0.42, 0.40, 0.51),
+    "3D": (0.44, 0.42, 0.52),
     "Top": (-0.001, 0.0, 1.35),
     "Side": (0.0, -1.3, 0.1),
     "Front": (1.3, 0.0, 0.1),
@@ -89,7 +89,8 @@ class RobotScene:
         """Move the camera to one of `CAMERAS`."""
         self._size = view_size(self._session.state.layout)
         place = self._size * np.array(CAMERAS[chosen(view, "view", CAMERAS)])
-        self.aim(place, np.array([0.0, 0.0, 0.03 * self._size]))
+        # Lower than the robot's middle: below it stands the legend.
+        self.aim(place, np.array([0.0, 0.0, -0.02 * self._size]))
 
     def aim(self, place: Array, target: Array) -> None:
         """Let the camera see from a place (3,) to another one (3,) [m]."""
