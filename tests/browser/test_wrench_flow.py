@@ -2,6 +2,8 @@
 
 from typing import Any
 
+import pytest
+
 from webapp.session.state import COMPARED
 
 
@@ -45,9 +47,11 @@ def test_failed_and_damaged_fins(page: Any) -> None:
     page.choose("Which", "back_left")
     page.until(lambda: session.selected == "back_left")
     page.type("Strength [%]", "50")
+    page.until(lambda: "weak 50 %" in page.text(".damage") and not page.view.busy)
+    now = page.view.shown.command[2, 2]
     page.row("Stuck").first.click()
-    page.until(lambda: "weak 50 %, stuck at 0°" in page.text(".damage"))
-    page.until(lambda: not page.view.busy and page.view.shown.command[2, 2] == 0.0)
+    page.until(lambda: "weak 50 %, stuck at" in page.text(".damage") and not page.view.busy)
+    assert page.view.shown.command[2, 2] == pytest.approx(now), "it is stuck where it was"
     page.press("All")
     page.until(lambda: session.state.health is None)
     page.page.locator(".damage").wait_for(state="detached")
