@@ -137,3 +137,18 @@ def test_a_table_of_thrust_on_the_server_is_not_opened(tmp_path: Path) -> None:
     content = json.dumps(robot).encode()
     with pytest.raises(LayoutError, match="model.path: names a file, which is not opened here"):
         files.read_layout("x.json", content)
+
+
+def test_a_method_that_does_not_take_a_robot_gives_way_when_that_is_opened() -> None:
+    session = Session(load_layout("ucat"))
+    session.open_layout(load_layout("bluerov2_heavy"))
+    session.undo()
+    session.set_setting("method", "mdn")
+    session.redo()
+    assert session.state.layout.name == "bluerov2_heavy" and session.state.method == "dual"
+    session.open_layout(load_layout("ucat"))
+    session.set_setting("method", "qp")
+    session.open_layout(load_layout("hexa"))
+    assert session.state.method == "qp", "it stays where it takes the robot"
+    session.add("thruster")
+    assert session.state.method == "dual"

@@ -23,7 +23,7 @@ DOT, RING = 3.0, 5.5
 """Radii of samples and of modes [px]."""
 APART = 3.0
 """How much wider each further ring is that lies about another one [px]."""
-LABEL = (13.0, 12.0)
+LABEL = (13.0, 14.0)
 """Width and height of the number of a mode [px]."""
 LIFT = 15.0
 """Of a number above the middle of its ring [px]."""

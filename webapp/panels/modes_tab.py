@@ -20,7 +20,7 @@ from webapp.tasks.mode_names import Modes
 from webapp.theme import css, mode_color
 
 UNKNOWN = "The network has learned fins alone, so it proposes nothing for this robot."
-BEYOND = "This wrench is not delivered whole, so the network is not asked: there is one answer, by policy {}."
+BEYOND = "This wrench is out of reach, so the network is not asked: there is one answer, by policy {}."
 LEARNED = "The paper's network draws samples; the best are refined by Adam on learned physics, which errs."
 PROPOSED = (
     "The network proposes ways to share the wrench, drawn from its mixture; each is refined to the least "
@@ -92,7 +92,7 @@ def step_words(modes: Modes, step: int | None) -> str:
     return html("{} <span class='dim'>· median error</span> {}", words, error_digits(left))
 
 
-def _origin_words(layout: Layout, method: str, best: Allocation | None) -> str:
+def _origin_words(layout: Layout, method: str, best: Allocation | None, in_reach: bool) -> str:
     """Where the answer and its modes come from, or why there is but one."""
     said = UNKNOWN
     if method == "paper":
@@ -100,7 +100,7 @@ def _origin_words(layout: Layout, method: str, best: Allocation | None) -> str:
     elif layout.is_of_fins:
         beside = BESIDE.get(method, f" The answer, number 1, is that of method {method}.")
         said = PROPOSED + beside
-        if best is not None and not best.reachable:
+        if best is not None and not in_reach:
             said = BEYOND.format(best.policy.kind)
     return html("<div class='fl dim'>{}</div>", said)
 

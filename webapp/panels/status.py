@@ -15,7 +15,7 @@ from webapp.page import Page
 from webapp.scene.proportions import arrow_size
 from webapp.scene.wrench_nodes import Scale, set_scale
 from webapp.session.display import Display
-from webapp.session.state import AXIS_UNITS, State, least_of
+from webapp.session.state import AXIS_UNITS, LEAST, State
 from webapp.tasks.analyst import Findings
 from webapp.tasks.mode_names import Modes
 from webapp.tasks.moment import ERROR, Moment
@@ -166,7 +166,8 @@ def _figures(allocation: Allocation, least: bool, in_reach: bool, refined: str) 
     for word, kind, value, unit in kinds:
         if value is None:  # effort is of fins
             continue
-        kept = f"least {word}" if kind == least_of(allocation.method) and least else word
+        is_least = least and LEAST.get(kind) == allocation.method
+        kept = f"least {word}" if is_least else word
         cost = html("<b class='{}'>{}</b>{}", word, three_digits(value), unit)
         costs.append(html("<span><span class='dim'>{}</span> {}</span>", kept, cost))
     method, ms = allocation.method, allocation.solve_ms

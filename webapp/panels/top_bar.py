@@ -65,15 +65,15 @@ def add_answering(page: Page) -> None:
     least = page.bind(gui.add_dropdown("Least", tuple(LEAST), hint=about), session.keep_least, least_of)
     page.board.show(least, visible=lambda layout: layout.is_of_fins)
     methods = gui.add_dropdown("Method", tuple(METHODS))
-    page.board.show(methods, options=method_options)
+    page.board.show(methods, options=_options)
     named = {_option(name): name for name in METHODS}
     page.bind(methods, lambda option: session.set_setting("method", named.get(option, option)), _option)
     add_html(gui, html("<div class='fl-help'>{}{}{}</div>", _menu(LESSONS), _menu(TOUR), COMMANDS))
 
 
-def method_options(layout: Layout, method: str) -> tuple[str, ...]:
-    """The methods that take a robot's actuators, with a line about each; and the one that is chosen."""
-    return tuple(_option(name) for name in METHODS if name == method or method_class(name).fits(layout))
+def _options(layout: Layout) -> tuple[str, ...]:
+    """The methods that take a robot's actuators, with a line about each."""
+    return tuple(_option(name) for name in METHODS if method_class(name).fits(layout))
 
 
 def _option(method: str) -> str:

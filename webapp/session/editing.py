@@ -10,6 +10,7 @@ from finlab.layout.directions import Vector
 from webapp.session import layout_edits
 from webapp.session.core import Core
 from webapp.session.links import followed, partner, unlinked
+from webapp.session.state import method_for
 
 
 class Editing(Core):
@@ -17,7 +18,8 @@ class Editing(Core):
 
     def open_layout(self, layout: Layout, step: str = "") -> None:
         """Another layout; the target stays, damage and links are forgotten. `step` is what undo calls it."""
-        whole = replace(self.state, layout=layout, failed=(), health=None, links=())
+        method = method_for(layout, self.state.method)
+        whole = replace(self.state, layout=layout, failed=(), health=None, links=(), method=method)
         self._commit(step or f"Open {layout.name}", whole)
         self.saved = layout
 

@@ -50,6 +50,7 @@ class Looking(Core):
     def show_task(self, name: str) -> None:
         """Open a task."""
         self.desk = replace(self.desk, task=chosen(name, "task", TASKS))
+        self.step = None
 
     def show_drawer(self, name: str) -> None:
         """Open the drawer at one of its tabs, and the task to which it belongs."""
@@ -57,6 +58,7 @@ class Looking(Core):
         chosen(name, "drawer", DRAWERS[task])
         others = tuple(pair for pair in self.desk.drawers if pair[0] != task)
         self.desk = Desk(task, (*others, (task, name)))
+        self.step = None
 
     def fold_drawer(self) -> None:
         """Leave only the tabs of the drawer, or open it again."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields, replace
 from typing import Any
 
 from finlab.allocation.mdn_settings import MdnSettings
-from finlab.allocation.methods import METHODS
+from finlab.allocation.methods import METHODS, method_class
 from finlab.allocation.policy import AXES, KINDS
 from finlab.errors import FinlabError
 from finlab.layout import Layout
@@ -83,7 +83,7 @@ class State:
             self,
             target=other.target,
             temperature=other.temperature,
-            method=other.method,
+            method=method_for(self.layout, other.method),
             policy=other.policy,
             speed=other.speed,
         )
@@ -139,6 +139,7 @@ class State:
             layout=layout,
             failed=tuple(name for name in names if name in self.failed),
             links=kept(self.links, layout),
+            method=method_for(layout, self.method),
         )
         faults = _faults(self.health).items()
         return changed._with_faults({k: tuple(p for p in pairs if p[0] in names) for k, pairs in faults})
@@ -206,6 +207,11 @@ def _angle(value: Any, name: str, low: float, high: float) -> float:
 def compared(layout: Layout) -> tuple[str, ...]:
     """Methods that are compared on a robot, the quick ones first."""
     return COMPARED if layout.is_of_fins else ("dual", "analytic", "px4", "ardusub", "ipopt")
+
+
+def method_for(layout: Layout, method: str) -> str:
+    """A method where it takes all actuators of a robot, else the one that takes any."""
+    return method if method_class(method).fits(layout) else "dual"
 
 
 def least_of(method: str) -> str:

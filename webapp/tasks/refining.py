@@ -56,7 +56,8 @@ class Refining:
 
     def _go_on(self) -> None:
         session, steps, self._timer = self._session, self._answering.modes.steps, None
-        if self._answering.searching or not steps:  # something else is asked
+        looked_at = session.desk.opened[session.task] == "Candidates"
+        if self._answering.searching or not steps or not looked_at:
             session.step = None
         else:
             if session.step is not None:
