@@ -1,6 +1,5 @@
 """How a command ends: with its exit code, and with one sentence on stderr where something is wrong."""
 
-import io
 import os
 import sys
 from collections.abc import Callable
@@ -19,13 +18,12 @@ BROKEN_PIPE = 141
 def exit_code(program: str, work: Callable[[], int]) -> int:
     """The exit code of a command: that of its work, or one of the above after one sentence on stderr.
 
-    Standard output that is closed or full, or that is no longer read, is an error like any other.
+    Standard output that is full, or that is no longer read, is an error like any other.
     """
     try:
-        if sys.stdout is None:  # the command was started without it; only those that print are refused
-            sys.stdout = _Closed()
         code = work()
-        sys.stdout.flush()
+        if sys.stdout is not None:  # else the command was started without it, and prints nothing
+            sys.stdout.flush()
         return code
     except FinlabError as error:
         return _fail(program, str(error))
@@ -52,13 +50,3 @@ def _drop_output() -> None:
     """Give standard output somewhere to write: Python flushes it once more at exit."""
     with suppress(OSError, ValueError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-
-
-class _Closed(io.TextIOBase):
-    """Standard output that was closed before the command began."""
-
-    def write(self, text: str, /) -> int:
-        return self.fileno()
-
-    def fileno(self) -> int:
-        raise FinlabError("cannot print: standard output is closed; write the output to another place")

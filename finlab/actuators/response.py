@@ -15,7 +15,6 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.layout.thrust_model import lower_hull
-from finlab.precision import ROUNDS
 
 CELLS = 1024
 """Intervals of price of a table; their ends are `top (j / CELLS)^4`."""
@@ -96,22 +95,9 @@ class RadialTable:
     def with_square(self, weight: float) -> "RadialTable":
         """The table where a force T [N] costs `weight` T^2 [W] more: what answered a price v now answers
         v + 2 weight T."""
-        factor = 2.0 * weight
-        own, coefficients = price_grid(self.top), self.polynomials()[:-1, :4]
-        ends, top = own + factor * self.force, self.top + factor * float(self.force[-1])
-        price = price_grid(top)
-        cell = np.clip(np.searchsorted(ends, price, "right") - 1, 0, CELLS - 1)
-        a0, a1, a2, a3 = coefficients[cell].T
-        start, width = own[cell], np.diff(price_grid(1.0))[cell]
-        step = np.maximum(ends[cell + 1] - ends[cell], 1e-300)
-        x = width * np.clip((price - ends[cell]) / step, 0.0, 1.0)
-        for _ in range(ROUNDS):  # Newton's method; the left side rises with x
-            excess = start + self.top * x + factor * (a0 + x * (a1 + x * (a2 + x * a3))) - price
-            x = np.clip(x - excess / (self.top + factor * (a1 + x * (2.0 * a2 + 3.0 * x * a3))), 0.0, width)
-        slope = (a1 + x * (2.0 * a2 + 3.0 * x * a3)) / self.top
-        slope = np.where(price < ends[0], 0.0, slope / (1.0 + factor * slope))
-        rest = self.rest + weight * float(self.force[0]) ** 2
-        return self.of_forces(top, a0 + x * (a1 + x * (a2 + x * a3)), rest, slope)
+        price = price_grid(self.top) + 2.0 * weight * self.force
+        top, rest = float(price[-1]), self.rest + weight * float(self.force[0]) ** 2
+        return self.of_forces(top, np.interp(price_grid(top), price, self.force), rest)
 
     def polynomials(self) -> Array:
         """Coefficients (CELLS + 1, 5): of the force in rising powers of the price, as a share of the largest,

@@ -59,12 +59,11 @@ def allocate(
     from finlab.errors import FinlabError
 
     check_json_file(json)
-    robot = open_robot(layout)
+    robot, lost = open_robot(layout, failed)
     options: dict[str, Any] = {} if robust is None else {"robust": robust}
-    allocator = Allocator(robot.layout, method, checkpoint=checkpoint, **options)
+    allocator = Allocator(robot, method, checkpoint=checkpoint, **options)
     answer = policy_from(policy, axis_weights, priority)
     damage = Health.parse(health, torn, stuck, running)
-    lost = robot.with_failed(failed)
     result = allocator.allocate(wrench, failed=lost, policy=answer, health=damage, flow=flow, seed=seed)
     lines = [str(result)]
     if bound and result.bound is None:

@@ -28,11 +28,10 @@ def export(
 
     if output.suffix == ".json":
         raise FinlabError(f"{output}: expected a folder, got the name of a file")
-    robot = open_robot(layout)  # before a network is loaded
-    failed = robot.with_failed(failed)
+    robot, failed = open_robot(layout, failed)  # before a network is loaded
     from finlab.allocation import Allocator
 
-    allocator = Allocator(robot.layout, method)
+    allocator = Allocator(robot, method)
     from finlab.deploy.bundle import make_bundle
 
     bundle = make_bundle(allocator, failed)
@@ -42,5 +41,5 @@ def export(
     else:
         bundle.write(output)
     size = sum(map(len, bundle.files.values())) / 1e6
-    print(f"{output}: {robot.layout.counted}, {len(bundle.files)} files, {size:.2f} MB")
+    print(f"{output}: {robot.counted}, {len(bundle.files)} files, {size:.2f} MB")
     print(f"check it on the robot: finlab-runtime check {output.name}")

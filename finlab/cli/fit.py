@@ -114,7 +114,7 @@ def robot(
         raise DataError(
             f"{output}: a layout is a YAML or JSON file, expected a name that ends in .yaml or .json"
         )
-    believed = open_robot(layout).layout
+    believed = open_robot(layout)[0]
     believed.only_fins("fit robot")
     swims = [read_swim(log, believed) for log in logs]
     fit = fit_robot(believed, swims, RESIDUAL if residual else (), _tell)

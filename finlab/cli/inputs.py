@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from finlab.errors import CommandError
 
@@ -10,28 +10,17 @@ if TYPE_CHECKING:
     from finlab.layout import Layout
 
 
-class OpenedRobot(NamedTuple):
-    """A layout, and the fins of it that do not work."""
-
-    layout: Layout
-    """All fins."""
-    failed: tuple[str, ...] = ()
-    """Names of fins that a bundle marks as failed."""
-
-    def with_failed(self, names: tuple[str, ...]) -> tuple[str, ...]:
-        """Names of all failed fins: those of the file and those named now, each once."""
-        return tuple(dict.fromkeys([*self.failed, *names]))
-
-
-def open_robot(text: str) -> OpenedRobot:
-    """The layout (and failed fins) in a file, or the shipped layout of that name.
+def open_robot(text: str, failed: tuple[str, ...] = ()) -> tuple[Layout, tuple[str, ...]]:
+    """The layout in a file, or the shipped one of that name, and the names of all actuators that do not work:
+    those that a bundle marks as failed and those named now, each once.
 
     Raises:
         LayoutError: neither a readable file nor a shipped layout.
     """
     from finlab.layout.load import layout_and_failed
 
-    return OpenedRobot(*layout_and_failed(text))
+    layout, lost = layout_and_failed(text)
+    return layout, tuple(dict.fromkeys([*lost, *failed]))
 
 
 def check_positive(**counts: int | None) -> None:

@@ -33,7 +33,7 @@ def check(layouts: Annotated[Positional[tuple[str, ...]], arg(metavar="LAYOUT...
     n_bad = 0
     for text in layouts:
         try:
-            layout = open_robot(text).layout
+            layout, _ = open_robot(text)
         except FinlabError as error:
             print(f"finlab: error: {error}", file=sys.stderr)
             n_bad += 1
@@ -64,9 +64,9 @@ def show(
     from finlab.cli.score_card import score_card_text
 
     check_json_file(json)
-    robot = open_robot(layout)
-    card = score_card(robot.layout, robot.with_failed(failed), flow)
-    put_json(card.to_dict(), json, f"{layout_text(robot.layout)}\n\n{score_card_text(card)}")
+    robot, lost = open_robot(layout, failed)
+    card = score_card(robot, lost, flow)
+    put_json(card.to_dict(), json, f"{layout_text(robot)}\n\n{score_card_text(card)}")
 
 
 @verbs.command(name="convert")

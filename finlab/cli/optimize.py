@@ -63,7 +63,7 @@ def optimize(
     check_json_file(json)
     check_json_file(output, "output")
     check_positive(rounds=rounds)
-    robot = open_robot(layout).layout
+    robot = open_robot(layout)[0]
     if not (0.0 <= reach < math.inf and 0.0 <= turn <= 180.0):
         raise FinlabError(
             f"expected --reach from 0 m and --turn from 0 to 180 degrees, got {reach:g}, {turn:g}"

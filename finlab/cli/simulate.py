@@ -78,8 +78,8 @@ def simulate(
         from finlab.sim import NO_NOISE, ClosedLoop, FinFault, make_trajectory
 
         sensors = None if noise else NO_NOISE
-        robot = open_robot(layout)
-        faults = [*(FinFault(name, 0.0) for name in robot.failed), *map(FinFault.parse, fail)]
+        robot, lost = open_robot(layout)
+        faults = [*(FinFault(name, 0.0) for name in lost), *map(FinFault.parse, fail)]
         if excite:
             if fail or monitor or learn:
                 raise FinlabError(
@@ -89,16 +89,16 @@ def simulate(
             from finlab.sim.excite import LONGEST_S, excitation
 
             learner = None
-            whole, seconds = robot.layout.without(robot.failed), LONGEST_S if duration is None else duration
+            whole, seconds = robot.without(lost), LONGEST_S if duration is None else duration
             loop = excitation(whole, seconds, plant=plant, sensors=sensors, current=current, seed=seed)
         else:
             from finlab.control import FaultMonitor
             from finlab.evaluation.method_specs import load_method_spec
 
-            allocator = load_method_spec(method, checkpoint).on(robot.layout)
+            allocator = load_method_spec(method, checkpoint).on(robot)
             learner = _learner(allocator) if learn else None
             loop = ClosedLoop(
-                robot.layout,
+                robot,
                 allocator,
                 make_trajectory(trajectory, duration, scale),
                 plant=plant,
@@ -106,7 +106,7 @@ def simulate(
                 current=current,
                 failures=faults,
                 announced=announced,
-                monitor=FaultMonitor(robot.layout) if monitor else None,
+                monitor=FaultMonitor(robot) if monitor else None,
                 learner=learner,
                 seed=seed,
             )

@@ -87,8 +87,8 @@ def serve(arguments: argparse.Namespace) -> int:
     robot = _robot(arguments)
     from finlab.deploy.serve import Server
 
-    if sys.stdin is None:
-        raise FinlabError("standard input is closed; connect it")
+    if sys.stdin is None or sys.stdout is None:
+        raise FinlabError("standard input or output is closed; connect both")
     streams.open(sys.stdin.fileno(), sys.stdout.fileno())
     Server(robot, None if arguments.no_watchdog else arguments.watchdog_s).run(streams)
     return 0

@@ -93,7 +93,6 @@ RUNTIME = [sys.executable, "-m", "finlab.deploy.command"]
 @pytest.mark.parametrize(
     ("output", "code", "reason"),
     [
-        (">&-", 2, "standard output is closed; write the output to another place"),
         (">/dev/full", 2, "No space left on device; write the output to another place"),
         ("| true", 141, "whoever read the output has ended"),
     ],
