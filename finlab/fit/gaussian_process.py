@@ -30,7 +30,7 @@ class GaussianProcess:
 
     def __init__(self, kernel: ThrustKernel, inputs: Array, values: Array, variance: Array) -> None:
         """Takes inputs (n, 3) as `ThrustKernel` does, values (n,) and the variance (n,) of their noise."""
-        self._kernel, self._inputs, self._values = kernel, inputs, values
+        self._kernel, self._inputs = kernel, inputs
         self._lower = _factor(kernel.covariance(inputs, inputs), variance)
         self._weights = cho_solve((self._lower, True), values)
 
