@@ -1,7 +1,7 @@
 """The files of a deployment bundle, from a folder or a zip archive that may come from a stranger.
 
-Nothing is unpacked, no link is followed, nothing is read beyond its largest size, and no content is believed
-before its checksum fits. What the files mean is known to the rooms that read them: robot and force
+Nothing is unpacked, nothing is read beyond its largest size, and no content is believed before its checksum
+fits. What the files mean is known to the rooms that read them: robot and force
 tables to `finlab.layout` and `finlab.physics`, settings to `finlab.allocation`.
 """
 
@@ -9,11 +9,11 @@ import hashlib
 import os
 import re
 from collections.abc import Mapping
-from contextlib import suppress
+from functools import partial
 from pathlib import Path
 
 from finlab.errors import DataError
-from finlab.files.archive import member_names, unpacked
+from finlab.files.archive import unpacked
 from finlab.files.guarded import is_regular, read_file
 from finlab.files.plain_values import parse_json
 
@@ -34,8 +34,6 @@ LARGEST_TABLE = 20_000_000
 """Largest size of a force table in a bundle [bytes]."""
 LARGEST_BUNDLE = 100_000_000
 """Largest size of all files together [bytes]."""
-MOST_FILES = len(LARGEST) + 64
-"""Most files; a robot has up to 64 actuators, each with a table at most."""
 REQUIRED = (ROBOT, ABOUT, CHECKSUMS)
 
 Files = Mapping[str, bytes]
@@ -80,7 +78,14 @@ def read_bundle_files(path: str | os.PathLike[str]) -> dict[str, bytes]:
         DataError: it cannot be read, is of another version, was changed, or holds what no bundle holds.
     """
     source = str(path)
-    files = _in_folder(Path(path)) if os.path.isdir(source) else _in_archive(source)
+    if os.path.isdir(path):
+        folder = Path(path)
+        names = [*LARGEST, *(f"{TABLES}{file.name}" for file in sorted((folder / TABLES).glob("*.csv")))]
+        there = [name for name in names if largest(name) > 0 and (folder / name).exists()]
+        files = {name: read_file(folder / name, largest(name), "a bundle's file") for name in there}
+    else:
+        content = read_file(source, LARGEST_BUNDLE + 100_000, "a bundle's folder or its zip archive")
+        files = unpacked(content, source, partial(_largest, source), LARGEST_BUNDLE)
     check_bundle_files(files, source)
     return files
 
@@ -107,40 +112,12 @@ def checksums(files: Files) -> bytes:
     return "".join(lines).encode()
 
 
-def _in_folder(path: Path) -> dict[str, bytes]:
-    """The files in a bundle's folder; no link is followed."""
-    names = [*LARGEST]
-    with suppress(FileNotFoundError, NotADirectoryError, PermissionError):
-        names += sorted(f"{TABLES}{name}" for name in os.listdir(path / TABLES))
-    files: dict[str, bytes] = {}
-    left = LARGEST_BUNDLE
-    for name in names:
-        file = path / name
-        if largest(name) < 0 or not os.path.lexists(file):
-            continue
-        if file.parent != path and file.parent.is_symlink():
-            raise DataError(f"{path}: {name} is no regular file, but behind a link")
-        files[name] = read_file(file, min(largest(name), left), "a bundle's file", follow=False)
-        left -= len(files[name])
-        if len(files) > MOST_FILES:
-            raise DataError(f"{path}: holds more than {MOST_FILES} files")
-    return files
-
-
-def _in_archive(source: str) -> dict[str, bytes]:
-    """The files in a bundle's zip archive; nothing is unpacked to the disk."""
-    content = read_file(source, LARGEST_BUNDLE + 100_000, "a bundle's folder or its zip archive")
-    names = member_names(content, source)
-    about = unpacked(content, source, {ABOUT: LARGEST[ABOUT]}, LARGEST_BUNDLE)
-    # The version comes first: files of another one are not the news.
-    _check_version(about.get(ABOUT), source)
-    if strangers := [name for name in names if largest(name) < 0]:
-        layout = strangers[0].endswith((".yaml", ".yml"))
-        hint = "; unpack it, and name the layout file in it" if layout else ""
-        raise DataError(f"{source}: holds {strangers[0]!r:.60}, which is no part of a bundle{hint}")
-    if len(names) > MOST_FILES:
-        raise DataError(f"{source}: holds more than {MOST_FILES} files")
-    return unpacked(content, source, {name: largest(name) for name in names}, LARGEST_BUNDLE)
+def _largest(source: str, name: str) -> int:
+    """Largest size [bytes] of a file in an archive; a `DataError` for one that no bundle holds."""
+    if (most := largest(name)) < 0:
+        hint = "; unpack it, and name the layout file in it" * name.endswith((".yaml", ".yml"))
+        raise DataError(f"{source}: holds {name!r:.60}, which is no part of a bundle{hint}")
+    return most
 
 
 def _check_version(about: bytes | None, source: str) -> None:

@@ -1,13 +1,9 @@
-"""`--help` of every verb: at most 100 columns wide, in plain characters, with an example at its end."""
+"""`--help` of every verb: plain characters, with an example at its end."""
 
 import io
-import os
-import shutil
 from collections.abc import Callable, Sequence
 from contextlib import redirect_stdout
 
-WIDTH = 100
-"""Most columns of a page."""
 EXAMPLES = {
     "": "finlab allocate A --wrench 1 0 0.5 0 0 0.1",
     "allocate": "finlab allocate A --wrench 1 0 0.5 0 0 0.1 --failed front_right --json",
@@ -38,22 +34,11 @@ def asks_for_help(argv: Sequence[str]) -> bool:
 
 
 def help_page(argv: Sequence[str], write: Callable[[], int]) -> tuple[int, str]:
-    """The page that `write` prints for arguments, in at most `WIDTH` columns and with its example; before it
-    the exit code."""
-    caught, before = io.StringIO(), os.environ.get("COLUMNS")
-    os.environ["COLUMNS"] = str(min(shutil.get_terminal_size().columns, WIDTH))
-    try:
-        with redirect_stdout(caught):  # what is no terminal gets no boxes
-            code = write()
-    finally:
-        if before is None:
-            del os.environ["COLUMNS"]
-        else:
-            os.environ["COLUMNS"] = before
-    lines = [
-        part for line in caught.getvalue().splitlines() for part in _folded(line.rstrip().replace("•", "-"))
-    ]
-    return code, "\n".join([*lines, f"example: {example(argv)}"])
+    """The page that `write` prints for arguments, with its example; before it the exit code."""
+    caught = io.StringIO()
+    with redirect_stdout(caught):  # what is no terminal gets no boxes
+        code = write()
+    return code, f"{caught.getvalue().rstrip().replace('•', '-')}\n\nexample: {example(argv)}"
 
 
 def example(argv: Sequence[str]) -> str:
@@ -63,13 +48,3 @@ def example(argv: Sequence[str]) -> str:
         return f"finlab eval {words[1]} --json rows.json"
     names = (" ".join(words[:count]) for count in range(len(words), -1, -1))
     return next(EXAMPLES[name] for name in names if name in EXAMPLES)
-
-
-def _folded(line: str) -> list[str]:
-    """A line in parts that are narrow enough, cut behind commas or blanks."""
-    parts = []
-    while len(line) > WIDTH:
-        cut = max(line.rfind(",", 0, WIDTH), line.rfind(" ", 9, WIDTH)) + 1 or WIDTH
-        parts.append(line[:cut].rstrip())
-        line = " " * 8 + line[cut:].lstrip()
-    return [*parts, line]

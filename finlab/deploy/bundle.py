@@ -4,9 +4,7 @@
 same layout and settings give the same bytes, as a folder and as a zip archive.
 """
 
-import io
 import os
-import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -31,6 +29,7 @@ from finlab.bundle_files import (
 from finlab.deploy.self_check import self_tests
 from finlab.distribution import NAME
 from finlab.errors import AllocationError, DataError
+from finlab.files.archive import packed
 from finlab.layout import Fin, FinModelSpec, Layout
 from finlab.layout.commands import command_of, command_values
 from finlab.layout.force_table_file import table_bytes
@@ -74,14 +73,7 @@ class Bundle:
 
     def zip_bytes(self) -> bytes:
         """The bundle as one zip archive."""
-        buffer = io.BytesIO()
-        # Arrays hardly shrink, and a compressor's bytes would differ from version to version.
-        with zipfile.ZipFile(buffer, "w", zipfile.ZIP_STORED) as archive:
-            for name, content in self.files.items():
-                entry = zipfile.ZipInfo(name, (1980, 1, 1, 0, 0, 0))
-                entry.create_system, entry.external_attr = 3, 0o100644 << 16
-                archive.writestr(entry, content)
-        return buffer.getvalue()
+        return packed(self.files)
 
 
 def make_bundle(allocator: Allocator, failed: tuple[str, ...] = ()) -> Bundle:

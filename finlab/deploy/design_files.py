@@ -5,17 +5,16 @@ it, and is kept under a name made from its content.
 """
 
 import hashlib
-import io
 import tempfile
-import zipfile
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import NamedTuple
 
-from finlab.bundle_files import ABOUT, LARGEST_BUNDLE, LARGEST_TABLE, MOST_FILES, read_bundle_files
+from finlab.bundle_files import ABOUT, LARGEST, LARGEST_BUNDLE, LARGEST_TABLE, read_bundle_files
 from finlab.errors import DataError, FinlabError, LayoutError
-from finlab.files.archive import member_names, unpacked
+from finlab.files.archive import unpacked
 from finlab.files.guarded import read_file
 from finlab.hull.mesh_file import MAX_FACES, read_mesh, simplified, stl_of
 from finlab.layout import Fin, FinModelSpec, Layout
@@ -53,15 +52,6 @@ def with_hull_inside(layout: Layout) -> tuple[Layout, dict[str, bytes]]:
     content = read_file(path, LARGEST_TABLE, "the hull's mesh; import it again")
     name = f"hull{path.suffix.lower()}"
     return replace(layout, body=replace(layout.body, hull=replace(hull, mesh=name))), {name: content}
-
-
-def archive_of(name: str, document: bytes, tables: dict[str, bytes]) -> bytes:
-    """A document and the force tables that it names, as one zip archive; the same bytes each time."""
-    buffer = io.BytesIO()
-    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
-        for part, content in {name: document, **tables}.items():
-            archive.writestr(zipfile.ZipInfo(part, (1980, 1, 1, 0, 0, 0)), content, zipfile.ZIP_DEFLATED)
-    return buffer.getvalue()
 
 
 class Opened(NamedTuple):
@@ -160,21 +150,17 @@ def _keep(path: Path, content: bytes) -> None:
 def _unpacked(packed: Path, content: bytes, source: str, folder: Path) -> tuple[Path, dict[str, bytes]]:
     """What to load of an archive: its layout's file, or itself where it is a bundle; and its other files, by
     the paths by which that can name them."""
-    names = member_names(content, source, LayoutError)
-    if ABOUT in names:
+    if unpacked(content, source, {ABOUT: LARGEST[ABOUT]}.get, LARGEST_BUNDLE, LayoutError):
         packed.write_bytes(content)
         return packed, {f"{packed}/{name}": c for name, c in read_bundle_files(packed).items()}
-    layouts = [name for name in names if name.endswith(LAYOUTS)]
-    if len(layouts) != 1 or len(names) > MOST_FILES:
+    parts = unpacked(content, source, partial(_largest, source), LARGEST_BUNDLE, LayoutError)
+    layouts = [name for name in parts if name.endswith(LAYOUTS)]
+    if len(layouts) != 1:
         raise LayoutError(
-            f"holds {len(names)} files, {len(layouts)} of them layouts; expected a bundle, or one "
+            f"holds {len(parts)} files, {len(layouts)} of them layouts; expected a bundle, or one "
             "layout file with its force tables",
             source=source,
         )
-    for name in names:
-        _check_name(name, source)
-    largest = {name: MAX_BYTES if name in layouts else LARGEST_TABLE for name in names}
-    parts = unpacked(content, source, largest, LARGEST_BUNDLE, LayoutError)
     path = folder / layouts[0]
     try:
         path.parent.mkdir(parents=True)
@@ -184,9 +170,10 @@ def _unpacked(packed: Path, content: bytes, source: str, folder: Path) -> tuple[
     return path, {str(folder / name): part for name, part in parts.items()}
 
 
-def _check_name(name: str, source: str) -> None:
-    """Refuse names that lead out of the folder, or that no layout needs."""
+def _largest(source: str, name: str) -> int:
+    """Largest size [bytes] of a file; refuses names that lead out of the folder, or that no layout needs."""
     path = PurePosixPath(name)
     known = path.suffix.lower() in (".csv", *MESH_SUFFIXES, *LAYOUTS)
     if path.is_absolute() or ".." in path.parts or "\\" in name or ":" in name or not known:
         raise LayoutError(f"holds {name!r:.60}, expected a layout file, CSV tables and a mesh", source=source)
+    return MAX_BYTES if name.endswith(LAYOUTS) else LARGEST_TABLE

@@ -1,15 +1,13 @@
 """Zip archives and NPZ files, unpacked in memory: what is declared is checked, what is read is counted."""
 
 import io
-import math
 import struct
 import tokenize
 import zipfile
 import zlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
-import numpy as np
 from numpy.lib import format as npy
 
 from finlab.arrays import AnyArray
@@ -24,69 +22,70 @@ _DAMAGED = (
     ArithmeticError,
     EOFError,
     LookupError,
+    MemoryError,
     OSError,
     RuntimeError,
     TypeError,
     ValueError,
+    tokenize.TokenError,
 )
 """What reading a damaged or locked archive ends with."""
 _PACKED = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
-
-
-def member_names(content: bytes, source: str, error: type[FinlabError] = DataError) -> list[str]:
-    """Returns the names of the files in a zip archive, folders left out.
-
-    Raises:
-        FinlabError: of the kind `error`; it is no zip archive, or holds a name twice.
-    """
-    try:
-        with zipfile.ZipFile(io.BytesIO(content)) as archive:
-            names = [entry.filename for entry in archive.infolist() if not entry.is_dir()]
-    except _DAMAGED as problem:
-        raise error.at(source, f"cannot be read as a zip archive ({_reason(problem)})") from None
-    if len(set(names)) < len(names):
-        raise error.at(source, "holds a file twice; pack it again")
-    return names
+MOST_FILES = 500
+"""Most files in an archive."""
 
 
 def unpacked(
-    content: bytes, source: str, largest: Mapping[str, int], most: int, error: type[FinlabError] = DataError
+    content: bytes,
+    source: str,
+    largest: Callable[[str], int | None],
+    most: int,
+    error: type[FinlabError] = DataError,
 ) -> dict[str, bytes]:
-    """Returns members of a zip archive by name.
+    """Returns files in a zip archive by name.
 
     Args:
         content: the archive.
         source: what to call it in the sentence.
-        largest: the members that are wanted, each with its largest size [bytes]; one that is not there is
-            left out.
+        largest: the largest size [bytes] of the file of a name; None for one that is passed over. May raise.
         most: largest size of all of them together [bytes].
         error: the kind of error.
 
     Raises:
-        FinlabError: of the kind `error`; the archive is damaged, or a member is too large.
+        FinlabError: of the kind `error`; the archive is damaged, holds a name twice, or a file is too large.
     """
     found: dict[str, bytes] = {}
-    too_large = ""
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
-            for entry in archive.infolist():
-                if entry.filename not in largest or entry.filename in found:
+            entries = {entry.filename: entry for entry in archive.infolist() if not entry.is_dir()}
+            if len(archive.namelist()) > MOST_FILES or len(set(archive.namelist())) < len(archive.namelist()):
+                raise error.at(source, f"holds a file twice, or more than {MOST_FILES} files; pack it again")
+            for name, entry in entries.items():
+                if (own := largest(name)) is None:
                     continue
+                room = min(own, most)
                 if entry.compress_type not in _PACKED:
-                    raise ValueError(f"{entry.filename!r:.60} is compressed in another way than deflate")
-                room = min(largest[entry.filename], most)
+                    raise ValueError(f"{name!r:.60} is compressed in another way than deflate")
                 if entry.file_size <= room:
                     with archive.open(entry) as stream:
-                        found[entry.filename] = stream.read(room + 1)
-                if entry.file_size > room or len(found[entry.filename]) > room:
-                    too_large = f"{entry.filename[-60:]} in it is larger than {room:,} bytes"
-                    break
-                most -= len(found[entry.filename])
+                        found[name] = stream.read(room + 1)
+                if entry.file_size > room or len(found[name]) > room:
+                    raise error.at(source, f"{name[-60:]} in it is larger than {room:,} bytes")
+                most -= len(found[name])
     except _DAMAGED as problem:
-        raise error.at(source, f"is damaged, and cannot be unpacked ({_reason(problem)})") from None
-    if too_large:
-        raise error.at(source, too_large)
+        raise error.at(source, f"cannot be read as a zip archive ({_reason(problem)})") from None
     return found
+
+
+def packed(files: Mapping[str, bytes]) -> bytes:
+    """Returns files by name as one zip archive; the same bytes each time."""
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w") as archive:
+        for name, content in files.items():
+            entry = zipfile.ZipInfo(name, (1980, 1, 1, 0, 0, 0))
+            entry.create_system, entry.external_attr = 3, 0o100644 << 16
+            archive.writestr(entry, content, zipfile.ZIP_DEFLATED)
+    return buffer.getvalue()
 
 
 def read_arrays(path: Name, names: Iterable[str] | None, most: int, what: str) -> dict[str, AnyArray]:
@@ -101,15 +100,17 @@ def read_arrays(path: Name, names: Iterable[str] | None, most: int, what: str) -
     Raises:
         DataError: the file cannot be read, is damaged or too large, or lacks an array.
     """
-    content, source = read_file(path, most, what), str(path)
-    there = member_names(content, f"{path}: expected {what}")
-    members = [name for name in there if name.endswith(".npy")]
-    if names is not None:
-        members = [f"{name}.npy" for name in names]
-    if missing := sorted(set(members) - set(there)):
-        raise DataError(f"{path}: expected {what}, but it holds no {missing[0].removesuffix('.npy')}")
-    parts = unpacked(content, source, dict.fromkeys(members, most), most)
-    return {name.removesuffix(".npy"): _array(part, name, source) for name, part in parts.items()}
+
+    def largest(member: str) -> int | None:
+        name = member.removesuffix(".npy")
+        return most if name != member and (names is None or name in wanted) else None
+
+    wanted = set(names or ())
+    parts = unpacked(read_file(path, most, what), f"{path}: expected {what}", largest, most)
+    found = {name.removesuffix(".npy"): content for name, content in parts.items()}
+    if missing := sorted(wanted - set(found)):
+        raise DataError(f"{path}: expected {what}, but it holds no {missing[0]}")
+    return {name: _array(content, name, str(path)) for name, content in found.items()}
 
 
 def json_of(array: AnyArray, source: str) -> Any:
@@ -131,17 +132,12 @@ def check_shapes(arrays: Mapping[str, AnyArray], shapes: Mapping[str, tuple[int,
 def _array(content: bytes, name: str, source: str) -> AnyArray:
     """The array of an NPY file of numbers, truth values or text."""
     try:
-        stream = io.BytesIO(content)
-        header = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}[
-            npy.read_magic(stream)
-        ]
-        shape, fortran, dtype = header(stream)
-        if dtype.kind not in "biufcU" or math.prod(shape) * dtype.itemsize != len(content) - stream.tell():
+        array: AnyArray = npy.read_array(io.BytesIO(content), allow_pickle=False)
+        if array.dtype.kind not in "biufcU":
             raise ValueError
-        data = np.frombuffer(bytearray(content[stream.tell() :]), dtype)
-        return data.reshape(shape, order="F" if fortran else "C")
-    except (*_DAMAGED, tokenize.TokenError):
-        plain = f"{name.removesuffix('.npy')!r:.60} in it is damaged, or no array of numbers or text"
+        return array
+    except _DAMAGED:
+        plain = f"{name!r:.60} in it is damaged, or no array of numbers or text"
         raise DataError(f"{source}: {plain}") from None
 
 

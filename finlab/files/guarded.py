@@ -1,6 +1,5 @@
 """The one way to open a file: a regular file, within a size, and one sentence where it is not."""
 
-import errno
 import os
 import stat
 from pathlib import Path
@@ -10,9 +9,7 @@ from finlab.errors import DataError, FinlabError
 Name = str | os.PathLike[str]
 
 
-def read_file(
-    path: Name, most: int, what: str, error: type[FinlabError] = DataError, follow: bool = True
-) -> bytes:
+def read_file(path: Name, most: int, what: str, error: type[FinlabError] = DataError) -> bytes:
     """Returns the content of a regular file.
 
     A pipe, a socket and a device are refused without waiting for them.
@@ -22,14 +19,12 @@ def read_file(
         most: largest size that is read [bytes].
         what: what is expected, for the sentence, such as "a layout file".
         error: the kind of error.
-        follow: whether `path` itself may be a symbolic link.
 
     Raises:
         FinlabError: of the kind `error`; the file is missing, not regular, too large or not readable.
     """
-    flags = os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC | (0 if follow else os.O_NOFOLLOW)
     try:
-        with open(os.open(path, flags), "rb") as file:
+        with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC), "rb") as file:
             about = os.fstat(file.fileno())
             if stat.S_ISDIR(about.st_mode):
                 raise error.at(str(path), f"is a folder, expected {what}")
@@ -42,8 +37,7 @@ def read_file(
     except IsADirectoryError:
         raise error.at(str(path), f"is a folder, expected {what}") from None
     except (OSError, ValueError) as problem:  # ValueError: a NUL byte in the name
-        is_link = getattr(problem, "errno", None) == errno.ELOOP and not follow
-        reason = "it is a link" if is_link else getattr(problem, "strerror", None) or problem
+        reason = getattr(problem, "strerror", None) or problem
         raise error.at(str(path)[:300], f"cannot be read: {reason}") from None
     if content is None or len(content) > most:
         raise error.at(str(path), f"is larger than {most:,} bytes, too large for {what}")

@@ -26,9 +26,6 @@ SAME = 1e-3
 """Amplitudes [rad] or frequencies [Hz] all closer than this are one and the same."""
 SAME_DIRECTION = 0.05
 """The same of zero directions [rad]."""
-FLAT_TOP, FLAT_SHARE = 5, 0.02
-"""Rows, and share of all rows, with exactly the largest value or the least, from which a sensor counts as
-saturated, if it is three times as many as have any other value: a coarse sensor repeats all of them."""
 
 
 @dataclass(frozen=True)
@@ -147,29 +144,14 @@ def _checked(read: list[Columns], source: str) -> Measurements:
         raise DataError(f"{source}: Fy and Fz are 0 throughout; such a fin drives nothing")
     power = columns.get("P")
     for name in ("Fx", "Fy", "Fz", "P"):
-        if name in columns:
-            _check_sensor(name, columns[name], source, places, name == "P" or (turned and name != "Fx"))
+        if name in columns and columns[name][0] and np.ptp(columns[name]) == 0.0:
+            told = f"column {name} is {columns[name][0]:.4g} throughout"
+            raise DataError(f"{source}: {told}; is the sensor connected?")
     if power is not None and power.min() < -0.02 * np.abs(power).max():
         raise DataError(
             f"{source}: column P has {power.min():.4g} W, expected the mean power that drives the fin"
         )
     return Measurements(command, force, power, places, tuple(notes), turned)
-
-
-def _check_sensor(name: str, column: Array, source: str, places: tuple[str, ...], changes: bool) -> None:
-    """Refuses a column (n,) that is the same throughout, where that is not 0 or it should change, and one
-    that stops at one value."""
-    if np.ptp(column) == 0.0 and (changes or column[0]):
-        raise DataError(f"{source}: column {name} is {column[0]:.4g} throughout; is the sensor connected?")
-    values, counts = np.unique(column, return_counts=True)
-    flat = max(FLAT_TOP, FLAT_SHARE * len(column), 3 * counts[1:-1].max(initial=1))
-    for extreme, count in ((values[0], counts[0]), (values[-1], counts[-1])):
-        if extreme and count >= flat:
-            raise DataError(
-                f"{places[int(np.argmax(column == extreme))]}, column {name}: is exactly {extreme:.4g} as in "
-                f"{count - 1} other rows, and beyond it in none; the sensor is saturated, measure in a wider "
-                "range"
-            )
 
 
 def _directions(columns: dict[str, Array], source: str, notes: list[str]) -> tuple[Array, bool]:

@@ -13,7 +13,7 @@ from tyro.extras import SubcommandApp
 
 import finlab
 from finlab.cli import _command_line, main
-from finlab.cli.help_page import EXAMPLES, WIDTH
+from finlab.cli.help_page import EXAMPLES
 from finlab.cli.json_file import with_json_file
 from tests.fit.cell import columns_of, commands, measured, soft, write
 
@@ -32,17 +32,14 @@ def verbs(app: SubcommandApp, *words: str) -> Iterator[str]:
 
 
 @pytest.mark.parametrize("verb", list(verbs(_command_line([]))))
-def test_every_verb_has_a_page_of_help_with_an_example(
-    verb: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("COLUMNS", "400")
+def test_every_verb_has_a_page_of_help_with_an_example(verb: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main([*verb.split(), "--help"]) == 0
     page = capsys.readouterr().out
-    assert page.startswith(f"usage: finlab {verb}".strip()) and max(map(len, page.splitlines())) <= WIDTH
+    assert page.startswith(f"usage: finlab {verb}".strip())
     assert page.isascii(), "a page of help goes through any pipe"
     last = page.splitlines()[-1]
     assert verb in EXAMPLES or verb.startswith("eval "), "give a new verb its example"
-    assert last.startswith(f"example: finlab {verb}") and os.environ["COLUMNS"] == "400"
+    assert last.startswith(f"example: finlab {verb}")
 
 
 def test_versions_are_told(capsys: pytest.CaptureFixture[str]) -> None:

@@ -21,12 +21,12 @@ from finlab.deploy.design_files import (
     TABLE_FOLDER,
     Opened,
     adopted,
-    archive_of,
     read_archive,
     stored_mesh,
     with_hull_inside,
 )
 from finlab.errors import FinlabError, LayoutError
+from finlab.files.archive import packed as pack
 from finlab.files.guarded import decoded
 from finlab.files.plain_values import parse_json, parse_yaml, yaml_text
 from finlab.hull.mesh import Mesh
@@ -118,7 +118,7 @@ def layout_file(layout: Layout) -> tuple[str, bytes]:
     inside, tables = with_tables_inside(layout)
     inside, hull = with_hull_inside(inside)
     text, parts = yaml_text(layout_to_dict(inside)).encode(), {**tables, **hull}
-    return design_name(layout), archive_of(f"{stem}.yaml", text, parts) if parts else text
+    return design_name(layout), pack({f"{stem}.yaml": text, **parts}) if parts else text
 
 
 def cache_folder() -> Path:
