@@ -48,7 +48,6 @@ class Facts(NamedTuple):
     display: Display
     draft: SearchRequest
     swim: SwimSettings
-    mesh_unit: str
     stop: Stop | None
     solved: bool
     dragged: int | None
@@ -120,7 +119,6 @@ def facts_of(session: Session, jobs: Jobs, dragged: int | None, scale: Scale, be
         display=session.display,
         draft=session.draft,
         swim=session.swim,
-        mesh_unit=session.mesh_unit,
         stop=session.stop,
         solved=session.solved,
         dragged=dragged,

@@ -18,7 +18,7 @@ from finlab.hull.shapes import Three, shape_mesh
 from finlab.layout import Fin, Layout
 
 COARSE_FACES = 400
-UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "inch": 0.0254}
+UNITS = {"m": 1.0, "mm": 0.001, "cm": 0.01, "inch": 0.0254}
 """Metres per unit of a mesh file."""
 
 

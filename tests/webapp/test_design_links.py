@@ -55,7 +55,7 @@ def test_a_design_comes_back_whole(name: str) -> None:
 def test_a_small_hull_and_table_travel_and_large_ones_are_refused(tmp_path: Path) -> None:
     session = Session(load_layout("pair"))
     session.import_hull(
-        stored_hull("hull.stl", trimesh.creation.box((0.4, 0.3, 0.2)).export(file_type="stl"), "m")
+        stored_hull("hull.stl", trimesh.creation.box((0.4, 0.3, 0.2)).export(file_type="stl"))
     )
     opened = unpacked(packed(session.state.layout))
     assert opened.layout.body is not None and opened.layout.body.hull is not None
@@ -63,7 +63,7 @@ def test_a_small_hull_and_table_travel_and_large_ones_are_refused(tmp_path: Path
 
     rough = trimesh.creation.icosphere(subdivisions=4, radius=0.2)
     rough.vertices *= 1 + 0.05 * np.random.default_rng(0).random((len(rough.vertices), 1))
-    session.import_hull(stored_hull("hull.stl", rough.export(file_type="stl"), "m"))
+    session.import_hull(stored_hull("hull.stl", rough.export(file_type="stl")))
     with pytest.raises(FinlabError, match=r"with its files needs [\d,]+ characters, .* share the ZIP"):
         packed(session.state.layout)
 

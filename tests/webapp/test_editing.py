@@ -105,7 +105,7 @@ def test_mesh_hull_in_millimetres(
     box.update_faces(np.arange(12) != 3)  # a hole, to be mended
     content = box.export(file_type=kind)
     content = content.encode() if isinstance(content, str) else content
-    session.import_hull(stored_hull(f"my hull.{kind}", content, "mm"))
+    session.import_hull(stored_hull(f"my hull.{kind}", content))
     hull = hull_of(session.state.layout)
     assert hull.shape == "mesh" and hull.half == pytest.approx((0.3, 0.1, 0.05))
     inside = hull.contains(np.array([[0.0, 0.0, 0.0], [0.29, 0.09, 0.04], [0.31, 0.0, 0.0]]))
@@ -160,7 +160,7 @@ def test_a_hull_from_a_file_is_turned_scaled_and_simplified(
     ball = trimesh.creation.icosphere(subdivisions=6)
     ball.apply_scale((300.0, 100.0, 50.0))
     assert len(ball.faces) > MAX_FACES
-    hull = stored_hull("ball.stl", ball.export(file_type="stl"), "mm")
+    hull = stored_hull("ball.stl", ball.export(file_type="stl"))
     session.import_hull(hull)
     drawn = hull_of(session.state.layout)
     assert drawn.report is not None and drawn.report.is_watertight and drawn.report.triangles <= MAX_FACES

@@ -193,7 +193,7 @@ def test_a_mesh_that_names_other_files_reads_none(tmp_path: Path) -> None:
     lines = "mtllib /etc/passwd,usemtl a,v 0 0 0,v 1 0 0,v 0 1 0,v 0 0 1,f 1 3 2,f 1 2 4,f 2 3 4,f 1 4 3,"
     wavefront = lines.replace(",", "\n").encode()
     opened.clear()
-    files.stored_hull("hull.obj", wavefront, "m")
+    files.stored_hull("hull.obj", wavefront)
     assert seen_of(tmp_path) == []
 
 

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from finlab.errors import FinlabError
 from finlab.hull import contradicts, displaced, hull_of, lift_of
-from finlab.hull.mesh_file import LARGEST, MAX_BYTES, MAX_FACES, SMALLEST, turned
+from finlab.hull.mesh_file import LARGEST, MAX_BYTES, MAX_FACES, turned
 from finlab.hull.surface import UNITS
 from finlab.layout import Layout
 from finlab.layout.body import HULL_SHAPES, MESH_SUFFIXES, Hull
@@ -20,10 +20,11 @@ from webapp.markup.words import three_digits
 from webapp.page import Page
 from webapp.session.files import reshaped_hull, stored_hull
 from webapp.session.layout_edits import center_of_gravity, with_hull
-from webapp.session.state import chosen
 
 MESH = "mesh file"
 MESHES = ",".join(MESH_SUFFIXES)
+LEAST = 0.1
+"""Length of a hull [m] below which another unit is meant."""
 
 
 def add_hull(page: Page) -> None:
@@ -31,25 +32,23 @@ def add_hull(page: Page) -> None:
     session, gui = page.session, page.gui
 
     def load(name: str, content: bytes) -> None:
-        unit = session.mesh_unit
-        page.reading.make(lambda: _drawn(page, stored_hull(name, content, unit)), partial(take, unit), "hull")
+        page.reading.make(lambda: _drawn(page, stored_hull(name, content)), take, "hull")
 
-    def take(unit: str, hull: Hull) -> None:
-        if hull.scale == UNITS[unit]:
-            put_in(unit, hull)
-            return
+    def take(hull: Hull) -> None:
+        """Mesh files do not say in which unit they are: where it need not be metres, the user says it."""
         side = 2.0 * max(hull_of(with_hull(session.state.layout, hull)).half) / hull.scale
-        lengths = {word: side * factor for word, factor in UNITS.items()}
+        lengths = {word: side * scale for word, scale in UNITS.items() if LEAST <= side * scale <= LARGEST}
+        if list(lengths) in (["m"], []):
+            put_in(hull)
+            return
         answers = {
-            f"{word}: {length:.3g} m long": partial(put_in, word, replace(hull, scale=UNITS[word]))
-            for word, length in sorted(lengths.items(), key=lambda each: UNITS[each[0]] != hull.scale)
-            if SMALLEST <= length <= LARGEST
+            f"{word}: {length:.3g} m long": partial(put_in, replace(hull, scale=UNITS[word]))
+            for word, length in lengths.items()
         }
-        text = f"In {unit} it would be {lengths[unit]:.3g} m long, which no hull is."
+        text = f"Its longest side is {side:.4g} of them."
         page.ask("In which unit is this file?", text, answers)
 
-    def put_in(unit: str, hull: Hull) -> None:
-        session.mesh_unit = unit
+    def put_in(hull: Hull) -> None:
         session.import_hull(hull)
         session.show_task("Design")
         session.select(None)  # so that the report is seen, wherever the file was dropped
@@ -59,13 +58,6 @@ def add_hull(page: Page) -> None:
             text = f"This hull encloses {water} kg of water, the body's buoyancy is that of {said} kg."
             anew = {"All": partial(session.estimate, True), "All but the mass": partial(session.estimate)}
             page.ask("Estimate anew from the hull?", text, anew)
-
-    def choose_unit(unit: str) -> None:
-        """Another unit, for the next file and for the one that is here; a reshaped one is in metres."""
-        session.mesh_unit = chosen(unit, "unit", UNITS)
-        hull = _described(session.state.layout)
-        if hull is not None and hull.mesh is not None:
-            session.import_hull(replace(hull, scale=UNITS[unit]), "Unit of the hull")
 
     def choose_shape(shape: str) -> None:
         if shape != MESH:
@@ -84,8 +76,6 @@ def add_hull(page: Page) -> None:
     about = "Centre of gravity as seen from the hull's middle. Torques are about it."
     center = gui.add_vector3("Centre of gravity [m]", (0.0, 0.0, 0.0), step=0.005, hint=about)
     page.bind_number(center, session.set_center_of_gravity, center_of_gravity)
-    hint = "What 1 means in the mesh file; of one that is here, too."
-    page.bind(gui.add_dropdown("Unit of file", tuple(UNITS), hint=hint), choose_unit, _unit)
     page.opening.add(MESHES, load)
     page.add_upload(
         "Import a hull (STL, OBJ, GLB)",
@@ -116,7 +106,6 @@ def _add_turns(page: Page) -> None:
         if _described(session.state.layout) != before:
             raise FinlabError("the hull has been changed in the meantime; do it again")
         session.import_hull(hull, name)
-        session.mesh_unit = "m"
 
     turns = {axis: partial(turn, axis) for axis in ("x", "y", "z")}
     hint = "A quarter turn about the body's axis, by the right-hand rule."
@@ -144,13 +133,6 @@ def _shape(layout: Layout) -> str:
 def _size(layout: Layout) -> tuple[float, float, float]:
     x, y, z = hull_of(layout).half
     return 2 * x, 2 * y, 2 * z
-
-
-def _unit(layout: Layout, mesh_unit: str) -> str:
-    """The unit of the mesh that is here, else the one for the next."""
-    hull = _described(layout)
-    scale = None if hull is None or hull.mesh is None else hull.scale
-    return next((unit for unit, factor in UNITS.items() if factor == scale), mesh_unit)
 
 
 def _report(layout: Layout) -> str:

@@ -12,7 +12,7 @@ from finlab.allocation.allocation import Allocation
 from finlab.analysis import Improvement
 from finlab.arrays import Array
 from finlab.hull.surface import has_inside, hull_of
-from finlab.layout import Layout
+from finlab.layout import Actuator, Layout
 from finlab.layout.damage import Health
 from finlab.layout.directions import direction
 from webapp.board import Board
@@ -145,7 +145,7 @@ class RobotScene:
         stuck = () if health is None or swims else dict(health.stuck)
         for i, part in enumerate(drawn.actuators):
             told = "" if swims or part.name in failed else damage_words(health, part.name)
-            words = (str(i + 1), part.name if part.name in selection else "", told)
+            words = (str(i + 1), _named(part) if part.name in selection else "", told)
             label = " ".join([word for word in words if word])
             moved, pinned = part.name == edited, part.name in stuck
             self._fins[i].place(part, hull, sizes, moved, label, pinned, i == dragged)
@@ -265,3 +265,8 @@ class Offered:
         put(self._shape.node, visible=bool(moved))
         if moved:
             self._shape.show(moved_parts, moved, part_size(layout))
+
+
+def _named(part: Actuator) -> str:
+    """Name and place of an actuator."""
+    return f"{part.name}, {', '.join(f'{value:.3f}' for value in part.position)} m".replace("-", "−")

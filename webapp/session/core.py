@@ -111,8 +111,6 @@ class Core:
         """The layout as it was opened or saved last."""
         self.draft = SearchRequest()
         self.swim = SwimSettings()
-        self.mesh_unit = "m"
-        """What 1 means in the next mesh file of a hull: key of `UNITS`."""
         self.mode = 0
         """Which of the answer's modes is shown; 0 is the best one."""
         self.step: int | None = None
@@ -189,7 +187,7 @@ class Core:
     def start_over(self) -> None:
         """Everything as at first sight; the way here can be undone."""
         self._commit("Start over", self._first)
-        self.saved, self.mesh_unit = self._first.layout, "m"
+        self.saved = self._first.layout
         self.selected, self.mode = None, 0
 
     def undo(self) -> str:

@@ -36,7 +36,6 @@ from finlab.layout import Layout, layout_to_dict, load_layout, parse_layout
 from finlab.layout.body import Hull
 from finlab.layout.load import A_LAYOUT, MAX_BYTES
 from finlab.physics import plant_of
-from webapp.session.state import chosen
 
 FRAGMENT = "design="
 """What the part behind the # begins with."""
@@ -131,19 +130,18 @@ def table_folder() -> Path:
     return cache_folder() / TABLE_FOLDER
 
 
-def stored_hull(name: str, content: bytes, unit: str) -> Hull:
-    """The hull in an uploaded mesh file, which is checked and kept under a name made from its content; in
-    another unit where it is no hull's size in this one.
+def stored_hull(name: str, content: bytes) -> Hull:
+    """The hull in an uploaded mesh file, which is checked and kept under a name made from its content; in the
+    first unit in which it has the size of one.
 
     Raises:
         FinlabError: it is no mesh, too large, or cannot be kept.
     """
-    chosen(unit, "unit", UNITS)
     short = Path(str(name)).name[-80:] or "upload"
-    for scale in (UNITS[unit], UNITS["mm"], UNITS["m"]):
+    for scale in UNITS.values():
         with contextlib.suppress(SizeError):
             return Hull(mesh=stored_mesh(short, content, scale, cache_folder()), scale=scale)
-    return Hull(mesh=stored_mesh(short, content, UNITS["inch"], cache_folder()), scale=UNITS["inch"])
+    return Hull(mesh=stored_mesh(short, content, 1.0, cache_folder()))  # which says what is wrong
 
 
 def reshaped_hull(hull: Hull, change: Callable[[Mesh], Mesh]) -> Hull:
