@@ -17,7 +17,7 @@ from finlab.errors import DataError
 from finlab.evaluation.report.document import Block, Column, Row, Table
 
 EXPERIMENTS = (
-    *("wrench", "cost", "thrusters", "latency", "ablation", "temperature"),
+    *("wrench", "thrusters", "latency", "ablation", "temperature"),
     *("trajectory", "faults", "velocity", "swims"),
 )
 """Names, which are those of their modules in `finlab.evaluation.experiments`, in the order of the report."""
@@ -48,8 +48,6 @@ class Experiment:
     """Options of the quick report where they differ from the defaults."""
     full: Mapping[str, Any] = field(default_factory=dict)
     """Options of the whole report where they differ from the defaults."""
-    needs: tuple[str, ...] = ()
-    """Packages without which the report leaves it out."""
     printed: Callable[[Sequence[Row]], list[Row]] | None = None
     """Figures that the paper prints beside our rows, as rows that stand below them."""
 

@@ -4,7 +4,6 @@ import json
 import platform
 import time
 from collections.abc import Sequence
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Literal
 
@@ -53,21 +52,17 @@ def make_report(out: Path, *, size: Size = "full", seed: int = SEED, names: Sequ
         raise DataError(f"sections: expected all or some of {', '.join(EXPERIMENTS)}, got {unknown[0]!r:.60}")
     make_folder(out)
     chosen = [name for name in EXPERIMENTS if "all" in names or name in names]
-    start, rows, left = time.process_time(), dict[str, list[Row]](), list[str]()
+    start, rows = time.process_time(), dict[str, list[Row]]()
     command = f"finlab eval report -o {out}" + (" --quick" if size == "quick" else "")
     command += "" if "all" in names else f" --sections {','.join(chosen)}"
     command += f" --seed {seed}" if seed != SEED else ""
     for name in progress(chosen, "experiment", "report"):
         experiment = load_experiment(name)
-        if all(find_spec(package) is not None for package in experiment.needs):
-            options = experiment.check(experiment.quick if size == "quick" else experiment.full)
-            with threadpool_limits(1):
-                rows[name] = experiment.rows(**options | ({"seed": seed} if "seed" in options else {}))
-        else:
-            left.append(name)
+        options = experiment.check(experiment.quick if size == "quick" else experiment.full)
+        with threadpool_limits(1):
+            rows[name] = experiment.rows(**options | ({"seed": seed} if "seed" in options else {}))
         minutes = (time.process_time() - start) / 60.0
         made = [f"Command `{command}`, seed {seed}, {minutes:.0f} minutes of one core"]
-        made += [f"Not run, a package is missing: {', '.join(left)}"] if left else []
         write_whole(out / PAGE, to_markdown(*_page(rows, made, size)), DataError)
         write_whole(out / TABLES, json.dumps(rows, indent=1) + "\n", DataError)
     return out / PAGE

@@ -19,6 +19,7 @@ from finlab.evaluation.scoring import paper_sigma, run_method
 from finlab.evaluation.splits import make_split
 from finlab.layout import Fin, Layout, Limits
 from finlab.physics import Plant
+from tools import cost
 
 
 def by(rows: list[Row], *keys: str) -> dict[Any, Row]:
@@ -59,14 +60,14 @@ def test_the_plant_scores(first: int | None) -> None:
 def test_dual_costs_no_more_than_the_best_start() -> None:
     pytest.importorskip("casadi")
     sizes = {"layouts": 3, "targets": 1, "seed": 6, "starts": 8, "methods": ("dual",)}
-    rows = load_experiment("cost").rows(split=("id", "failure"), objectives=("power",), **sizes)
+    rows = cost.experiment.rows(split=("id", "failure"), objectives=("power",), **sizes)
     assert [row["split"] for row in rows] == ["id", "failure"]
     for row in rows:
         assert row["tracked"] == 1.0 and row["cost_ratio"] < 1.002 and row["ratio_max"] < 1.005
         low, high = row["cost_ratio_interval"]
         assert low <= row["cost_ratio"] <= high
     sizes["methods"] = ("dual", "sqp", "mdn")
-    effort = load_experiment("cost").rows(split=("id",), objectives=("effort",), **sizes)
+    effort = cost.experiment.rows(split=("id",), objectives=("effort",), **sizes)
     assert [row["method"] for row in effort] == ["sqp", "mdn"]
     assert effort[1]["cost"] != rows[0]["cost"] and effort[1]["cost_ratio"] < 1.05
 
@@ -75,9 +76,7 @@ def test_an_answer_outside_its_limits_is_none(monkeypatch: pytest.MonkeyPatch) -
     pytest.importorskip("casadi")
     cheat = MethodSpec("cheat", MethodChoice(Cheat, Cheat.settings_class()))
     monkeypatch.setattr(method_specs, "load_method_spec", lambda *_: cheat)
-    (row,) = load_experiment("cost").rows(
-        methods=("cheat",), objectives=("power",), layouts=2, targets=1, starts=2
-    )
+    (row,) = cost.experiment.rows(methods=("cheat",), objectives=("power",), layouts=2, targets=1, starts=2)
     assert row["tracked"] == 0.0 and "cost_ratio" not in row
 
 

@@ -20,7 +20,6 @@ pytest.importorskip("casadi")
 
 TINY: dict[str, dict[str, Any]] = {
     "wrench": {"split": ("id", "tables"), "methods": ("dual", "qp"), "layouts": 2, "targets": 2},
-    "cost": {"split": ("id",), "methods": ("dual",), "layouts": 2, "targets": 1, "starts": 4},
     "latency": {"robots": ("fins-2",), "methods": ("dual", "qp"), "calls": 2},
     "ablation": {"variants": ("ours",), "layouts": 2, "targets": 1, "candidates": 4},
     "temperature": {"temperatures": (0.01, 1.0), "layouts": 2, "targets": 1, "candidates": 4},
@@ -88,7 +87,7 @@ def test_a_full_disk_is_a_sentence_with_the_path(tiny: None, tmp_path: Path) -> 
     ("arguments", "message"),
     [
         ("-o README.md", "out: expected a folder, got the file README.md"),
-        ("-o somewhere --sections nothing", "sections: expected all or some of wrench, cost"),
+        ("-o somewhere --sections nothing", "sections: expected all or some of wrench, thrusters"),
     ],
 )
 def test_bad_input_is_one_sentence(

@@ -1,11 +1,19 @@
-"""What methods cost under exact tracking, over the best of many random starts: power in watts, or effort."""
+#!/usr/bin/env python3
+"""What methods cost under exact tracking, over the best of many random starts: power in watts, or effort.
+
+    python tools/cost.py --split id,limits --methods dual,mdn,sqp --layouts 3 --targets 1 --starts 8
+
+Options are those of `finlab eval`; `--json FILE` has the rows.
+"""
 
 from collections.abc import Sequence
 
 import numpy as np
+import tyro
 from numpy.typing import NDArray
 
 from finlab.arrays import Array
+from finlab.cli.eval_verb import verb_of
 from finlab.evaluation.experiment import Experiment, check_names
 from finlab.evaluation.method_specs import PATIENCE_S, MethodSpec, load_method_spec, load_method_specs
 from finlab.evaluation.progress import progress
@@ -158,19 +166,7 @@ experiment = Experiment(
         "solvers that know nothing of how `dual` and `mdn` search. Tracked: "
         f"error up to {TRACKED:g} by the plant. Effort is the paper's J_en."
     ),
-    quick={
-        "split": ("id", "limits"),
-        "methods": ("dual", "mdn", "sqp"),
-        "layouts": 3,
-        "targets": 1,
-        "starts": 8,
-    },
-    full={
-        "split": ("id", "ood-fins", "limits", "failure", "fins-mixed"),
-        "methods": ("dual", "mdn", "sqp", "analytic"),
-        "layouts": 12,
-        "targets": 2,
-        "starts": 16,
-    },
-    needs=("casadi",),
 )
+
+if __name__ == "__main__":
+    tyro.cli(verb_of(experiment))
