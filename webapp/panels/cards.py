@@ -70,8 +70,8 @@ def _bars(shown: Allocation | None, target: tuple[float, ...], busy: bool) -> st
     return wrench_bars(asked, None if shown is None else shown.wrench)
 
 
-def _said(shown: Allocation | None, state: State, busy: bool, searching: bool) -> str:
-    said = answer_sentence(state, shown, busy, searching)
+def _said(shown: Allocation | None, state: State, busy: bool, searching: bool, step: int | None) -> str:
+    said = answer_sentence(state, shown, busy, searching or step is not None)
     return html("<div class='fl'><div class='said'>{}</div></div>", said)
 
 
