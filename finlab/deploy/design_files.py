@@ -61,6 +61,8 @@ class Opened(NamedTuple):
     """Every file that it names is kept in that folder, under a name made from its content."""
     missing: tuple[str, ...] = ()
     """Files that it named and that did not come with it, though the layout makes sense without."""
+    failed: tuple[str, ...] = ()
+    """Actuators that a bundle says are lost."""
 
 
 def read_archive(source: str, content: bytes, folder: Path) -> Opened:
@@ -76,7 +78,8 @@ def read_archive(source: str, content: bytes, folder: Path) -> Opened:
         packed = Path(place) / "upload.zip"
         try:
             file, parts = _unpacked(packed, content, source, Path(place) / "files")
-            return adopted(layout_and_failed(file, may_open=False)[0], parts, folder, source)
+            layout, failed = layout_and_failed(file, may_open=False)
+            return adopted(layout, parts, folder, source)._replace(failed=failed)
         except FinlabError as error:
             text = str(error).replace(str(packed), source).replace(f"{place}/files/", f"{source}/")
             raise type(error)(text) from None

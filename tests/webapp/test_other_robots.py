@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from finlab.allocation import Allocator
+from finlab.deploy.bundle import make_bundle
 from finlab.errors import LayoutError
 from finlab.layout import Azimuth, Fin, Layout, Rudder, Thruster, load_layout
 from finlab.layout.thrust_model import PowerLaw
@@ -92,6 +94,12 @@ def test_a_method_for_fins_says_so_and_watts_go_on(tab: Tab, capsys: pytest.Capt
     tab.on_loop(lambda: tab.view.do(lambda: session.keep_least("watts")))
     tab.settle()
     assert "Exact" in " ".join(tab.figures()) and "Traceback" not in capsys.readouterr().err
+
+
+def test_a_bundle_opens_with_what_was_lost() -> None:
+    content = make_bundle(Allocator(BLUEROV), BLUEROV.names[:1]).zip_bytes()
+    opened = files.read_layout("bundle.zip", content)
+    assert opened.layout == BLUEROV and opened.failed == BLUEROV.names[:1]
 
 
 @pytest.mark.parametrize("layout", [HYBRID, BLUEROV, FISH], ids=lambda layout: layout.name)

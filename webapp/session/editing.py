@@ -16,10 +16,11 @@ from webapp.session.state import method_for
 class Editing(Core):
     """Changes of the layout."""
 
-    def open_layout(self, layout: Layout, step: str = "") -> None:
-        """Another layout; the target stays, damage and links are forgotten. `step` is what undo calls it."""
+    def open_layout(self, layout: Layout, step: str = "", failed: tuple[str, ...] = ()) -> None:
+        """Another layout, of which some may have failed; the target stays, damage and links are forgotten.
+        `step` is what undo calls it."""
         method = method_for(layout, self.state.method)
-        whole = replace(self.state, layout=layout, failed=(), health=None, links=(), method=method)
+        whole = replace(self.state, layout=layout, failed=failed, health=None, links=(), method=method)
         self._commit(step or f"Open {layout.name}", whole)
         self.saved = layout
 

@@ -98,7 +98,7 @@ class Designs:
 
     def _take(self, wrench: str | None, opened: Opened) -> None:
         """`wrench` is that of a link; there is none with a file."""
-        self._session.open_layout(opened.layout)
+        self._session.open_layout(opened.layout, failed=opened.failed)
         if wrench is not None:
             text = f"{opened.layout.name} is a copy; whoever shared it does not see what you change"
             self._context.notify("Opened from a link", text, calm=True)
