@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, ClassVar, NamedTuple, Self
+from typing import Any, ClassVar, Generic, NamedTuple, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,8 @@ from finlab.physics.expected_miss import expected_miss, sources_of_miss
 from finlab.physics.known_plants import plant_of
 from finlab.physics.plant import Plant
 
+Number = TypeVar("Number", float, Array)
+"""What is told of one answer, or of each of many (N,)."""
 TOLD_GAP = 0.01
 """Share by which the power may exceed its bound untold."""
 CHUNK = 1024
@@ -42,7 +44,7 @@ class Later(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Answer(PlainData):
+class Answer(PlainData, Generic[Number]):
     """What answers to one target and to many share, as plain data; many have N rows of each array.
 
     What is dear to tell is told when it is first asked for, and kept; copies have all of it.
@@ -106,7 +108,9 @@ class Answer(PlainData):
     @cached_property
     def notes(self) -> tuple[str, ...]:
         """Sentences that the user should read, such as a fin model that the checkpoint never saw."""
-        return (*self.later.notes(), *self._doubts()) if self.later is not None else ()
+        if self.later is None:
+            return ()
+        return (*self.later.notes(), *self._doubts())
 
     def _doubts(self) -> tuple[str, ...]:
         """Sentences about this answer."""
@@ -118,6 +122,38 @@ class Answer(PlainData):
         what the layout says, or a table's own; zeros where nothing is known to be. See
         `finlab.physics.expected_miss`."""
         return self._by_parts(lambda rows: expected_miss(self._plant, rows))
+
+    @cached_property
+    def err_norm(self) -> Number:
+        """Size of what is missing from a target, each axis over its `scale`."""
+        return self._number(np.linalg.norm(self.unallocated / self.scale, axis=-1))
+
+    @property
+    def expected_error(self) -> Number:
+        """Size of `expected_miss`, each axis over its `scale`: by how much the true wrench may be off."""
+        return self._number(np.linalg.norm(self.expected_miss / self.scale, axis=-1))
+
+    @cached_property
+    def power(self) -> Number:
+        """Mean power [W] of a command, by the actuators' own models: of fins mechanical."""
+        return self._number(self._by_parts(lambda rows: judged_power(self._plant, rows)))
+
+    @cached_property
+    def effort(self) -> Number | None:
+        """Effort `J_en` of a command, the paper's energy proxy; None where not all actuators are fins."""
+        if not self.layout.is_of_fins:
+            return None
+        return self._number(self._by_parts(lambda rows: judged_effort(self.layout, rows)))
+
+    @cached_property
+    def bound(self) -> Number | None:
+        """Power [W] that no answer for the same wrench can undercut; None for methods that prove none."""
+        found = None if self.later is None else self.later.bound()
+        return None if found is None else self._number(found)
+
+    def _number(self, values: Array) -> Number:
+        """Values of each row: an array, or of one answer a number."""
+        raise NotImplementedError
 
     @property
     def _plant(self) -> Plant:
@@ -132,7 +168,7 @@ class Answer(PlainData):
             return judge(self.command)
         result: Array | None = None
         for rows in chunks(len(self.command)):
-            part = judge(self.command[rows])
+            part: Array = judge(self.command[rows])
             if result is None:
                 result = np.empty((len(self.command), *part.shape[1:]))
             result[rows] = part
@@ -152,43 +188,14 @@ class Answer(PlainData):
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class BatchAllocation(Answer):
+class BatchAllocation(Answer[Array]):
     """Answers to N targets on one layout: plain data, as an `Allocation` is."""
 
     solve_ms: Array = field(compare=False)
     """Time per target (N,) [ms]: the whole time divided by N."""
 
-    @cached_property
-    def bound(self) -> Array | None:
-        """Power (N,) [W] that no answer for the wrenches delivered can undercut; None for methods that prove
-        none."""
-        return None if self.later is None else self.later.bound()
-
-    @cached_property
-    def err_norm(self) -> Array:
-        """Sizes (N,) of what is missing from the targets, each axis over its `scale`."""
-        error = np.empty(len(self))
-        for rows in chunks(len(self)):
-            error[rows] = np.linalg.norm((self.target[rows] - self.wrench[rows]) / self.scale, axis=-1)
-        return error
-
-    @property
-    def expected_error(self) -> Array:
-        """Sizes (N,) of `expected_miss`, each axis over its `scale`."""
-        return np.asarray(np.linalg.norm(self.expected_miss / self.scale, axis=-1))
-
-    @cached_property
-    def power(self) -> Array:
-        """Mean mechanical power (N,) [W] of the commands, by the fins' own models."""
-        return self._by_parts(lambda rows: judged_power(self._plant, rows))
-
-    @cached_property
-    def effort(self) -> Array | None:
-        """Effort `J_en` (N,) of the commands, the paper's energy proxy; None where not all actuators are
-        fins."""
-        if not self.layout.is_of_fins:
-            return None
-        return self._by_parts(lambda rows: judged_effort(self.layout, rows))
+    def _number(self, values: Array) -> Array:
+        return np.asarray(values)
 
     @property
     def reachable(self) -> NDArray[np.bool_]:
@@ -208,7 +215,7 @@ class BatchAllocation(Answer):
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Allocation(Answer):
+class Allocation(Answer[float]):
     """The answer to one allocation problem, as plain data: it can be compared, copied, pickled and printed.
 
     `print(result)` shows it as a table.
@@ -231,32 +238,8 @@ class Allocation(Answer):
         parts = zip(self.layout.actuators, self.command, strict=True)
         return {part.name: command_of(part, row) for part, row in parts}
 
-    @cached_property
-    def bound(self) -> float | None:
-        """Power [W] that no answer for the same wrench can undercut; None for methods that prove none."""
-        found = None if self.later is None else self.later.bound()
-        return None if found is None else float(found[0])
-
-    @cached_property
-    def err_norm(self) -> float:
-        """Size of what is missing from the target, each axis over its `scale`."""
-        missing = self.unallocated / self.scale
-        return float(np.sqrt(missing @ missing))
-
-    @property
-    def expected_error(self) -> float:
-        """Size of `expected_miss`, each axis over its `scale`: by how much the true wrench may be off."""
-        return float(np.linalg.norm(self.expected_miss / self.scale))
-
-    @cached_property
-    def power(self) -> float:
-        """Mean mechanical power [W] of the command, by the fins' own models."""
-        return float(judged_power(self._plant, self.command[None])[0])
-
-    @cached_property
-    def effort(self) -> float | None:
-        """Effort `J_en` of the command, the paper's energy proxy; None where not all actuators are fins."""
-        return float(judged_effort(self.layout, self.command[None])[0]) if self.layout.is_of_fins else None
+    def _number(self, values: Array) -> float:
+        return float(np.ravel(values)[0])
 
     @cached_property
     def candidates(self) -> Candidates | None:
