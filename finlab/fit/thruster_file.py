@@ -10,18 +10,12 @@ from finlab.layout.thrust_model import COLUMNS
 def layout_lines(fit: ThrusterFit, path: Path) -> tuple[str, ...]:
     """Returns the keys of a thruster in a layout beside a table at a path."""
     least, most = fit.force
-    torque, known = fit.torque_per_newton, fit.uncertainty
+    torque = fit.torque_per_newton
     unit = f", unit: {fit.table.unit}" if fit.table.unit else ""
-    errs = (
-        f"{{share: {known.share:g}, floor_n: {known.floor:g}, common: {_quoted(path.stem[:64].strip())}}}"
-        if known
-        else ""
-    )
     lines = (
         f"force_n: [{least:g}, {most:g}]",
         f"dead_band_n: {fit.dead_band:g}" * (fit.dead_band > 0.0),
         f"torque_per_newton_m: {torque:.4g}" * (torque != 0.0),
-        f"uncertainty: {errs}" * bool(errs),
         f"model: {{type: table, path: {_quoted(path.name)}{unit}}}",
     )
     return tuple(line for line in lines if line)
@@ -44,7 +38,4 @@ def summary(fit: ThrusterFit) -> tuple[str, ...]:
     unit = f" {fit.table.unit}" if fit.table.unit else ""
     least, most = fit.force
     still = f"; none from {fit.still[0]:g} to {fit.still[1]:g}{unit}" if fit.still else ""
-    known, sure = fit.uncertainty, "too few rows to say how sure the table is"
-    if known:
-        sure = f"force known to {known.share:.2%} and {known.floor:.3g} N (standard deviations)"
-    return (f"force {least:.4g} to {most:.4g} N{still}", sure, *fit.notes)
+    return (f"force {least:.4g} to {most:.4g} N{still}", *fit.notes)

@@ -16,6 +16,7 @@ from finlab.errors import DataError
 from finlab.fit.thruster_bench import Bench, read_bench
 from finlab.fit.thruster_file import layout_lines
 from finlab.fit.thruster_fit import ThrusterFit, fit_thruster
+from finlab.uncertainty.table_error import thrust_table_error
 from tests.fit.cell import columns_of, commands, measured, soft, write
 
 T200 = Path(__file__).parent / "data" / "t200_16v.csv"
@@ -44,7 +45,7 @@ def test_the_t200_is_as_published() -> None:
     assert fit.still == (1472.0, 1528.0)
     assert 0.3 < fit.dead_band < 0.41
     assert len(fit.table.rows) == 201 and fit.table.unit == "us"
-    assert fit.uncertainty is not None and 0.002 < fit.uncertainty.share < 0.01
+    assert 0.002 < thrust_table_error(fit.table)[0] < 0.02
     assert "rpm is left aside" in fit.notes[0]
 
 
@@ -59,8 +60,8 @@ def test_noise_is_averaged_and_the_uncertainty_is_that_of_the_table(
         at = np.linspace(-1.0, 1.0, 500)
         missed = np.interp(at, command, force) - true_force(at)
         assert np.sqrt(np.mean(missed**2)) < 0.5 * noise * 50.0
-        assert fit.uncertainty is not None
-        expected = np.hypot(fit.uncertainty.share * true_force(at), fit.uncertainty.floor)
+        share, floor = thrust_table_error(fit.table)
+        expected = np.hypot(share * true_force(at), floor)
         ratios.append(np.sqrt(np.mean(missed**2) / np.mean(expected**2)))
     assert 0.5 < np.median(ratios) < 2.0
 

@@ -127,7 +127,7 @@ def test_a_bench_table_becomes_a_thruster_and_goes_on_those_like_it(worker: Work
     found, part = opened.fitting.findings, opened.session.state.layout.actuators[0]
     assert found is not None and isinstance(part, Thruster) and isinstance(part.model, PowerTable)
     assert part.force == (part.model.rows[0][1], part.model.rows[-1][1]) and part.axis == first.axis
-    assert "Force known to " in fit_card(found) and "<b>table</b> of" in model_card(part)
+    assert "Force -39.91 to 51.44 N" in fit_card(found) and "<b>table</b> of" in model_card(part)
     opened.fitting.put_on_all()
     alike = [p.model for p in before.actuators].count(first.model)
     assert [p.model for p in opened.session.state.layout.actuators].count(part.model) == alike

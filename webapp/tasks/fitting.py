@@ -173,7 +173,7 @@ def _bench(path: Path, done: Upload) -> Fitted:
         return Fitted(done, within(PowerTable.read(path)))
     fit = fit_thruster(read_bench([path]))
     beside = {"dead_band": fit.dead_band, "torque_per_newton": fit.torque_per_newton}
-    return Fitted(done, {**within(fit.table), **beside, "uncertainty": fit.uncertainty}, fit)
+    return Fitted(done, {**within(fit.table), **beside, "uncertainty": None}, fit)
 
 
 def _is_table(path: Path) -> bool:
