@@ -108,9 +108,7 @@ class Answer(PlainData, Generic[Number]):
     @cached_property
     def notes(self) -> tuple[str, ...]:
         """Sentences that the user should read, such as a fin model that the checkpoint never saw."""
-        if self.later is None:
-            return ()
-        return (*self.later.notes(), *self._doubts())
+        return () if self.later is None else self.later.notes() + self._doubts()
 
     def _doubts(self) -> tuple[str, ...]:
         """Sentences about this answer."""
