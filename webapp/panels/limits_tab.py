@@ -80,7 +80,7 @@ def add_improving(page: Page) -> None:
         lambda draft: draft.way[3],
         digits=2,
     )
-    stops = "Takes up to a minute; it can be stopped any time."
+    stops = "About a minute for eight actuators, longer for more; it stops after a round."
     search = page.add_button(
         "Search",
         lambda: improver.start(session.state, session.draft),
