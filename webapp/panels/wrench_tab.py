@@ -119,7 +119,7 @@ def reach_marks(low: float, high: float, width: float) -> tuple[tuple[float, str
 
 
 def _short(value: float) -> str:
-    digits = 0 if abs(value) >= 9.95 else 1
+    digits = next((k for k, size in enumerate((9.95, 0.095, 0.0095)) if abs(value) >= size), 3)
     rounded = round(value, digits)
     return f"{rounded:.{digits}f}".replace("-", "−") if rounded else "0"
 
