@@ -21,7 +21,7 @@ LEGEND = (("sample", 0), ("refined", 76), ("on the robot", 154))
 """Words and places of what is drawn."""
 DOT, RING = 3.0, 5.5
 """Radii of samples and of modes [px]."""
-APART = 3.0
+APART = 2.0
 """How much wider each further ring is that lies about another one [px]."""
 LABEL = (13.0, 14.0)
 """Width and height of the number of a mode [px]."""

@@ -21,6 +21,7 @@ from webapp.theme import css, mode_color
 
 UNKNOWN = "The network has learned fins alone, so it proposes nothing for this robot."
 BEYOND = "This wrench is out of reach, so the network is not asked: there is one answer, by policy {}."
+NOTHING = "No wrench is asked for, so there is nothing to share among the fins."
 LEARNED = "The paper's network draws samples; the best are refined by Adam on learned physics, which errs."
 PROPOSED = (
     "The network proposes ways to share the wrench, drawn from its mixture; each is refined to the least "
@@ -49,11 +50,7 @@ def add_candidates(page: Page) -> None:
     page.add_html(_player)
     hint = "How many steps of refinement the samples have had, in the plot and on the robot."
     slider = gui.add_slider("Step", 0, WHOLE.steps, 1, WHOLE.steps, hint=hint)
-    page.bind(
-        slider,
-        lambda value: session.show_step(int(value), jobs.answering.modes.steps),
-        lambda step, modes: modes.steps if step is None else step,
-    )
+    page.bind(slider, jobs.refining.hold, lambda step, modes: modes.steps if step is None else step)
     board.show(slider, visible=lambda modes: modes.steps > 0)
     add_html(gui, marker("fl-column"))
     hint = "How far samples stray from the means of the mixture's components: 0 is the means alone."
@@ -102,6 +99,8 @@ def _origin_words(layout: Layout, method: str, best: Allocation | None, in_reach
         said = PROPOSED + beside
         if best is not None and not in_reach:
             said = BEYOND.format(best.policy.kind)
+        elif best is not None and not best.target.any():
+            said = NOTHING
     return html("<div class='fl dim'>{}</div>", said)
 
 

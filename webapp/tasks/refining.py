@@ -1,6 +1,7 @@
 """Plays the refinement of what the network proposes: in the plot, on the robot, and in what is said of it."""
 
 import asyncio
+from typing import Any
 
 from finlab.errors import FinlabError
 from webapp.tasks.answering import Answering
@@ -50,6 +51,11 @@ class Refining:
         if self._timer is not None:
             self._timer.cancel()
         self._timer = None
+
+    def hold(self, step: Any) -> None:
+        """Stay at a step."""
+        self.stop()
+        self._session.show_step(int(step), self._answering.modes.steps)
 
     def _wait(self) -> None:
         self._timer = self._loop.later(STEP_S, self._go_on)

@@ -105,7 +105,7 @@ class Solver:
         _ = answer.bound, answer.notes  # to prove what is least takes longer than to find it
         if answer.samples is not None and answer.candidates is not None and state.method == "paper":
             return modes_of(answer, answer.candidates, "network", (answer.samples,))
-        if not (reply.in_reach and answer.layout.is_of_fins and answer.effort is not None):
+        if not (reply.in_reach and answer.effort is not None and answer.target.any()):  # effort is of fins
             return NO_MODES
         if state.method == "mdn" and answer.candidates is not None:
             own, badge = answer.candidates.rows([0]), "network"
