@@ -22,3 +22,7 @@ def test_marks_of_a_slider_that_is_forty_long(
     low: float, high: float, marks: tuple[tuple[float, str], ...]
 ) -> None:
     assert reach_marks(low, high, 40.0) == marks
+
+
+def test_marks_of_a_short_slider_have_more_digits() -> None:
+    assert reach_marks(-0.04, 0.06, 0.15) == ((-0.04, "−0.040"), (0.06, "0.060"))

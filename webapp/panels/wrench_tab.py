@@ -110,7 +110,7 @@ def reach_marks(low: float, high: float, width: float) -> tuple[tuple[float, str
     none where there is no range, and one text for both where two would lie on each other."""
     if not np.isfinite(low):
         return ()
-    first, last = _short(low), _short(high)
+    first, last = _short(low, width), _short(high, width)
     if high - low <= 1e-3:
         return ((round(low, 3), first),)
     if high - low < CLOSE * width:
@@ -118,8 +118,9 @@ def reach_marks(low: float, high: float, width: float) -> tuple[tuple[float, str
     return (round(low, 3), first), (round(high, 3), last)
 
 
-def _short(value: float) -> str:
-    digits = next((k for k, size in enumerate((9.95, 0.095, 0.0095)) if abs(value) >= size), 3)
+def _short(value: float, width: float) -> str:
+    fine = next((k for k, size in ((1, 2.0), (2, 0.2)) if width >= size), 3)
+    digits = 0 if abs(value) >= 9.95 else fine
     rounded = round(value, digits)
     return f"{rounded:.{digits}f}".replace("-", "−") if rounded else "0"
 
