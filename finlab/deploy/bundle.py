@@ -9,8 +9,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
-
 import finlab
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.bundle_settings import METHODS_ON_BOARD, about_bundle
@@ -31,7 +29,6 @@ from finlab.distribution import NAME
 from finlab.errors import AllocationError, DataError
 from finlab.files.archive import packed
 from finlab.layout import Fin, FinModelSpec, Layout
-from finlab.layout.commands import command_of, command_values
 from finlab.layout.force_table_file import table_bytes
 from finlab.layout.robot_file import Robot, robot_bytes
 from finlab.whole_file import write_whole
@@ -58,11 +55,10 @@ class Bundle:
                 raise DataError(
                     f"{path}: holds {strangers[0]!r:.60}, which is no part of a bundle; name an empty folder"
                 )
-            # The checksums go first and come last: a half-written bundle is refused.
-            for name in (CHECKSUMS, *(present - set(self.files))):
-                (path / name).unlink(missing_ok=True)
+            for name in present:  # the checksums come last: a half-written bundle is refused
+                (path / name).unlink()
             for name, content in self.files.items():
-                (path / name).parent.mkdir(parents=True, exist_ok=True)
+                (path / name).parent.mkdir(exist_ok=True)
                 (path / name).write_bytes(content)
         except OSError as error:
             raise DataError(f"{error.filename or path}: cannot be written: {error.strerror}") from None
@@ -133,14 +129,6 @@ def with_tables_inside(layout: Layout) -> tuple[Layout, dict[str, bytes]]:
 
 def readme_text(allocator: Allocator, failed: tuple[str, ...]) -> str:
     """The README of a bundle: `bundle_readme.md`, beside this module, filled in."""
-    rows = []
-    for part in allocator.layout.actuators:
-        x, y, z = part.position
-        low, high = (command_values(command_of(part, np.array(end))) for end in (part.lower, part.upper))
-        ranges = "; ".join(f"{key} {low[key]:.4g}..{high[key]:.4g}" for key in low)
-        works = "no" if part.name in failed else "yes"
-        name = part.name.replace("|", "\\|")
-        rows.append(f"| {name} | {part.type} | {x:g}, {y:g}, {z:g} | {ranges} | {works} |")
     template = Path(__file__).with_name("bundle_readme.md").read_text("utf-8")
     return template.format(
         name=allocator.layout.name,
@@ -148,6 +136,6 @@ def readme_text(allocator: Allocator, failed: tuple[str, ...]) -> str:
         wheel=NAME.replace("-", "_"),
         method=allocator.method,
         networks="" if allocator.checkpoint is None else f" with checkpoint `{allocator.checkpoint}`",
-        actuators="\n".join(rows),
+        actuators=", ".join(allocator.layout.names),
         failed=list(failed),
     )

@@ -4,7 +4,6 @@ import argparse
 import json
 import math
 import os
-import shutil
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -110,15 +109,7 @@ def _within(low: float, high: float) -> Callable[[str], float]:
 
 
 class _Parser(argparse.ArgumentParser):
-    """Pages of help are at most 100 columns wide and end with an example."""
-
-    def __init__(self, *, example: str, **others: Any) -> None:
-        width = min(shutil.get_terminal_size().columns, 100) - 2
-        super().__init__(
-            epilog=f"example:\n  {example}",
-            formatter_class=lambda prog: argparse.RawDescriptionHelpFormatter(prog, width=width),
-            **others,
-        )
+    """One that does not pass over an output that is full."""
 
     def _print_message(self, message: str, file: Any = None) -> None:
         print(message, end="", file=file or sys.stderr)
@@ -126,16 +117,16 @@ class _Parser(argparse.ArgumentParser):
 
 def _parser() -> argparse.ArgumentParser:
     parser = _Parser(
-        prog="finlab-runtime",
+        "finlab-runtime",
         description="Control allocation on board.",
-        example="finlab-runtime check my_robot",
+        epilog="example: finlab-runtime check my_robot",
     )
     parser.add_argument("--version", action="version", version=f"finlab-runtime {__version__}")
     verbs = parser.add_subparsers(required=True, metavar="check|allocate|serve")
 
     def verb(run: Callable[[argparse.Namespace], int], text: str, example: str) -> argparse.ArgumentParser:
         made: argparse.ArgumentParser = verbs.add_parser(
-            run.__name__, help=text, description=text, example=example
+            run.__name__, help=text, description=text, epilog=f"example: {example}"
         )
         made.set_defaults(run=run)
         about = "folder or zip archive made by `finlab export`"

@@ -1,4 +1,4 @@
-"""Motor factors of ArduSub: lines of its source, tables, and the frames that its parameters choose.
+"""Motor factors of ArduSub: lines of its source, and tables.
 
 Factors hold directions of forces and signs of torques, no lengths and no newtons; `ardusub_frames` has their
 columns and signs.
@@ -10,19 +10,14 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.errors import LayoutError
-from finlab.exchange.ardusub_frames import AXES, FRAMES, SIGNS
+from finlab.exchange.ardusub_frames import AXES, SIGNS
 from finlab.exchange.exchange import Exchange
-from finlab.exchange.parameters import parameters_text, read_parameters
 from finlab.layout import Layout, own_effectiveness
 
 ARM = 0.2
 """Arm of a factor of 1 [m]; the file has none."""
 ORDER = [AXES.index(axis) for axis in ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")]
 """Columns of factors in the order of a wrench."""
-NUMBERED = list(FRAMES.values())
-"""Factors by FRAME_CONFIG."""
-SMALL = 0.15
-"""Factors below this one are none where a layout is compared with a frame."""
 WEAK = 0.1
 """Torques about an axis are none where they stay below this share of those about another one."""
 _MOTOR = re.compile(
@@ -32,7 +27,7 @@ _MOTOR = re.compile(
 
 def read_ardusub(text: str, name: str, exchange: Exchange) -> Layout:
     """Returns the layout, called `name`, of motors: in lines `add_motor_raw_6dof(...)`, in a table with a
-    motor and its factors in each row, or those of the frame in a parameter file, with MOT_i_DIRECTION.
+    motor and its factors in each row.
 
     Raises:
         LayoutError: it has no motors, one of them twice, or one that gives no force.
@@ -40,18 +35,10 @@ def read_ardusub(text: str, name: str, exchange: Exchange) -> Layout:
     rows = [found for line in text.splitlines() if (found := _MOTOR.match(line[:500]))]
     names = [f"motor{found[1]}" if found[1].isdecimal() else found[1] for found in rows]
     factors = np.array([re.findall(r"[-+.\d]+", found[2]) for found in rows], dtype=np.float64)
+    if not rows:
+        raise LayoutError("has no rows of factors, a motor and its six factors in each")
     if len(set(names)) < len(names):
         raise LayoutError("adds a motor twice; keep the lines of one frame")
-    if not rows:
-        values = read_parameters(text)
-        frame = values.get("FRAME_CONFIG", -1.0)
-        if frame not in range(len(NUMBERED)):
-            known = f"0 to {len(NUMBERED) - 1}, or rows of factors"
-            raise LayoutError(f"expected {known}, got {frame:g}", "FRAME_CONFIG")
-        factors = NUMBERED[int(frame)]
-        names = [f"motor{i + 1}" for i in range(len(factors))]
-        directions = [values.get(f"MOT_{i + 1}_DIRECTION", 1.0) for i in range(len(factors))]
-        factors = factors * np.sign(directions)[:, None]
     exchange.note(f"Factors hold no lengths: one of 1 is taken for an arm of {ARM} m; correct `position_m`.")
     columns = (factors * SIGNS)[:, ORDER]
     columns[:, 3:] *= ARM * np.linalg.norm(columns[:, :3], axis=1, keepdims=True)
@@ -78,25 +65,15 @@ def factors_of(layout: Layout, exchange: Exchange) -> tuple[list[str], Array]:
 
 
 def write_ardusub(layout: Layout, exchange: Exchange, suffix: str) -> str:
-    """Returns the factors of a layout's thrusters: for `.parm`, `.param` and `.params` the parameters that
-    choose their frame, for `.csv` a table, else lines of source.
+    """Returns the factors of a layout's thrusters: for `.csv` a table, else lines of source.
 
     Raises:
-        LayoutError: there is no thruster, or no frame has the signs of the factors.
+        LayoutError: there is no thruster.
     """
     names, factors = factors_of(layout, exchange)
-    if suffix not in (".parm", ".param", ".params"):
-        lines = ["motor,roll,pitch,yaw,throttle,forward,lateral"] if suffix == ".csv" else []
-        for i, (name, row) in enumerate(zip(names, factors.tolist(), strict=True), 1):
-            numbers = ", ".join(f"{factor}f" for factor in row)
-            call = f"add_motor_raw_6dof(AP_MOTORS_MOT_{i}, {numbers}, {i});  // {name}"
-            lines.append(",".join(map(str, [name, *row])) if suffix == ".csv" else call)
-        return "\n".join(lines) + "\n"
-    signs = np.sign(np.where(np.abs(factors) < SMALL, 0.0, factors))
-    for frame, known in enumerate(map(np.sign, NUMBERED)):
-        if known.shape == signs.shape:
-            turned = np.where((known == signs).all(1), 1, -1)
-            if (turned[:, None] * known == signs).all():
-                directions = {f"MOT_{i}_DIRECTION": int(sign) for i, sign in enumerate(turned, 1)}
-                return parameters_text({"FRAME_CONFIG": frame, **directions}, names, suffix, "")
-    raise LayoutError("no frame of ArduSub has the signs of these factors; write lines of source (.cpp)")
+    lines = ["motor,roll,pitch,yaw,throttle,forward,lateral"] if suffix == ".csv" else []
+    for i, (name, row) in enumerate(zip(names, factors.tolist(), strict=True), 1):
+        numbers = ", ".join(f"{factor}f" for factor in row)
+        call = f"add_motor_raw_6dof(AP_MOTORS_MOT_{i}, {numbers}, {i});  // {name}"
+        lines.append(",".join(map(str, [name, *row])) if suffix == ".csv" else call)
+    return "\n".join(lines) + "\n"

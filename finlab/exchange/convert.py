@@ -30,7 +30,7 @@ WRITERS: dict[str, Callable[[Layout, Exchange, str], str]] = {
     "matrix": write_matrix,
 }
 """Forms beside layout files that are written: the text for a layout and the suffix of the file."""
-FORM_OF = {".urdf": "urdf", ".sdf": "sdf", ".params": "px4", ".parm": "ardusub", ".param": "ardusub"}
+FORM_OF = {".urdf": "urdf", ".sdf": "sdf", ".params": "px4"}
 FORM_OF |= {".cpp": "ardusub", ".csv": "matrix", ".yaml": "layout", ".yml": "layout", ".json": "layout"}
 """What a suffix stands for where the user does not say."""
 
@@ -74,7 +74,7 @@ def read_any(file: str, exchange: Exchange) -> Layout:
         if FORM_OF.get(suffix) != "layout":
             if "CA_ROTOR" in text:
                 return read_px4(text, name, exchange)
-            if re.search(r"\bFRAME_CONFIG\b|add_motor|(?i:throttle\W+forward)", text):
+            if re.search(r"add_motor|(?i:throttle\W+forward)", text):
                 return read_ardusub(text, name, exchange)
             if suffix == ".csv":
                 return read_matrix(csv_values(text), name, exchange)

@@ -11,6 +11,7 @@ from finlab.arrays import Array
 from finlab.errors import FinlabError, LayoutError
 from finlab.exchange import Exchange, convert, read_any
 from finlab.exchange.ardusub import factors_of
+from finlab.exchange.ardusub_frames import FRAMES
 from finlab.layout import Layout, Thruster, own_effectiveness, save_layout
 from finlab.layout.thrust_model import PowerLaw
 from tests.mixed_robots import load, random_robot
@@ -103,40 +104,30 @@ def test_px4_has_one_size_for_both_ways(tmp_path: Path) -> None:
 
 
 def test_ardusub_frames_have_the_directions_of_the_bluerov2(tmp_path: Path) -> None:
-    path = tmp_path / "rov.parm"
-    path.write_text("# my robot\nFRAME_CONFIG,2\nMOT_1_DIRECTION 1\nMOT_6_DIRECTION\t-1.0\n")
+    path = tmp_path / "rov.csv"
+    path.write_text(factor_rows("VECTORED_6DOF"))
     layout, shipped = read_any(str(path), Exchange()), finlab.load_layout("bluerov2_heavy")
-    turned = np.array([1, 1, 1, 1, 1, -1, 1, 1])[:, None]
-    np.testing.assert_allclose(wrenches(layout)[:, :3] * turned, DIRECTIONS, atol=1e-15)
+    np.testing.assert_allclose(wrenches(layout)[:, :3], DIRECTIONS, atol=1e-15)
     np.testing.assert_allclose(wrenches(shipped)[:, :3], DIRECTIONS, atol=1e-7)
-    torques, own = wrenches(layout)[:, 3:] * turned, wrenches(shipped)[:, 3:]
+    torques, own = wrenches(layout)[:, 3:], wrenches(shipped)[:, 3:]
     clear = np.abs(torques) > 0.01
     np.testing.assert_array_equal(np.sign(torques)[clear], np.sign(own)[clear])
 
 
-def test_a_bluerov2_is_ardusubs_frame_2(tmp_path: Path) -> None:
-    layout = finlab.load_layout("bluerov2_heavy")
-    layout = layout.replace_actuator("rear_left", axis=(-0.70710678, -0.70710678, 0.0))
-    _, notes = written(layout, tmp_path / "rov.parm")
-    told = (tmp_path / "rov.parm").read_text().split()
-    values = dict(zip(told[-18::2], told[-17::2], strict=True))
-    assert values.pop("FRAME_CONFIG") == "2"
-    assert values == {f"MOT_{i}_DIRECTION": "-1" if i == 4 else "1" for i in range(1, 9)}
-    assert any("has no place for power" in note for note in notes)
-    with pytest.raises(LayoutError, match="no frame of ArduSub has the signs"):
-        written(finlab.load_layout("turtle_hybrid"), tmp_path / "turtle.parm")
+def factor_rows(frame: str) -> str:
+    """A table of a frame's factors."""
+    rows = [",".join(map(str, [f"motor{i}", *row])) for i, row in enumerate(FRAMES[frame].tolist(), 1)]
+    return "\n".join(["motor,roll,pitch,yaw,throttle,forward,lateral", *rows])
 
 
-@pytest.mark.parametrize("frame", range(7))
+@pytest.mark.parametrize("frame", FRAMES)
 @pytest.mark.parametrize("name", ["factors.csv", "motors.cpp"])
-def test_factors_survive_the_way_there_and_back(frame: int, name: str, tmp_path: Path) -> None:
-    source = tmp_path / "frame.param"
-    source.write_text(f"FRAME_CONFIG {frame}\n")
+def test_factors_survive_the_way_there_and_back(frame: str, name: str, tmp_path: Path) -> None:
+    source = tmp_path / "frame.csv"
+    source.write_text(factor_rows(frame))
     layout = read_any(str(source), Exchange())
     back, _ = written(layout, tmp_path / name, "ardusub")
     np.testing.assert_allclose(factors_of(back, Exchange())[1], factors_of(layout, Exchange())[1], atol=1e-12)
-    back, _ = written(layout, tmp_path / "again.parm")
-    np.testing.assert_allclose(wrenches(back), wrenches(layout), atol=1e-12)
 
 
 @pytest.mark.parametrize("frame", ["FLU", "FRD"])
@@ -188,8 +179,8 @@ def test_a_published_matrix_of_the_bluerov2(tmp_path: Path) -> None:
     places = [[x, y, 0.0] for x in (0.12, -0.12) for y in (-0.21805, 0.21805)]
     np.testing.assert_allclose(layout.position[4:], places, atol=1e-15)
     assert (layout.lower[0, 0], layout.upper[0, 0]) == (-39.91, 51.44)
-    convert(str(tmp_path / "tam.csv"), tmp_path / "rov.parm", None, Exchange())
-    assert "FRAME_CONFIG 2" in (tmp_path / "rov.parm").read_text()
+    convert(str(tmp_path / "tam.csv"), tmp_path / "rov.cpp", None, Exchange())
+    assert (tmp_path / "rov.cpp").read_text().count("add_motor_raw_6dof") == 8
 
 
 def test_a_thruster_through_the_centre_has_no_factor_of_torque() -> None:
@@ -213,7 +204,7 @@ def test_what_has_no_place_is_named(tmp_path: Path) -> None:
         ("a.params", "1 1 CA_ROTOR0_PX 1 9", "CA_ROTOR_COUNT: expected 1 to 12 rotors, got 0"),
         ("a.params", "CA_ROTOR_COUNT 1e400", "CA_ROTOR_COUNT: expected 1 to 12 rotors, got 0"),
         ("a.params", "CA_ROTOR_COUNT 1\nCA_ROTOR0_AZ 0", "CA_ROTOR0: has no direction"),
-        ("a.parm", "FRAME_CONFIG 7", "FRAME_CONFIG: expected 0 to 6"),
+        ("a.cpp", "add_motor", "has no rows of factors"),
         ("a.cpp", "add_motor_raw_6dof(AP_MOTORS_MOT_1, 1, 0, 0, 0, 0, 0, 1);", "'motor1' has no force"),
         ("a.cpp", "add_motor(1, 0, 0, 0, 1, 0, 0, 1);\n" * 2, "adds a motor twice; keep the lines of one"),
         ("a.yaml", "matrix: [[1], [2]]", "has no matrix"),
@@ -230,7 +221,8 @@ def test_refusals_name_the_file(name: str, content: str, message: str, tmp_path:
 
 
 def test_lines_that_fit_nothing_take_no_time(tmp_path: Path) -> None:
-    path = tmp_path / "a.parm"
+    path = tmp_path / "a.cpp"
     numbers = ", ".join(["1" * 70] * 6)
-    path.write_text(f"FRAME_CONFIG 1\n{f'a({numbers}x' + chr(10)}{'A_B' + ' ' * 100_000}x\n" * 20)
-    assert read_any(str(path), Exchange()).n == 6
+    long = f"a({numbers}x\nA_B{' ' * 100_000}x\n"
+    path.write_text("add_motor(1, 0, 0, 0, 0, 1, 0)\n" + 20 * long)
+    assert read_any(str(path), Exchange()).n == 1

@@ -154,7 +154,7 @@ def kinds(tmp_path_factory: pytest.TempPathFactory, untrained_mdn: Path) -> list
     table = FinModelSpec("table", (("path", str(place / "fin.csv")),))
     layout = load_layout("A").replace_actuator("front_right", model=table)
     save_layout(layout, place / "a.json")
-    forms = {"robot.urdf": "urdf", "robot.sdf": "sdf", "rov.params": "px4", "rov.parm": "ardusub"}
+    forms = {"robot.urdf": "urdf", "robot.sdf": "sdf", "rov.params": "px4", "rov.cpp": "ardusub"}
     forms |= {"rov.cpp": "ardusub", "factors.csv": "ardusub", "matrix.csv": "matrix", "matrix.yaml": "matrix"}
     for name, form in forms.items():
         convert("bluerov2_heavy", place / name, form, Exchange())
