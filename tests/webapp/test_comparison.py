@@ -114,6 +114,12 @@ def test_beside_the_one_answer_of_dual_stands_what_the_network_proposes() -> Non
         assert end.effort[k] == pytest.approx(modes.shown[place].mode.effort, rel=0.02)
     beyond = solver.reply(state.with_target(0, 500.0))
     assert solver.modes(beyond).shown == (), "there is nothing to compare"
+    for target in ((0.0,) * 6, (0.0, 0.0, 1.0, 0.0, 0.0, 0.0)):
+        found = solver.modes(solver.reply(State(UCAT, target=target, method="qp")))
+        badges = ["qp", "network"] if any(target) else []
+        assert [named.badge for named in found.shown][:2] == badges, (
+            "whoever answers, where there is a wrench"
+        )
 
 
 def test_what_a_page_tries_out_stays_with_its_own_answers() -> None:
