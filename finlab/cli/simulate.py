@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -18,11 +17,7 @@ from finlab.whole_file import make_folder
 if TYPE_CHECKING:
     from finlab.allocation import Allocator
     from finlab.fit.robot.online import OnlineFit
-    from finlab.sim import ClosedLoop, FinFault, RunLog
-
-
-MOTIONS = {"Fx": "surge", "Fy": "sway", "Fz": "heave", "Tx": "roll", "Ty": "pitch", "Tz": "yaw"}
-"""What the axes of a wrench move."""
+    from finlab.sim import ClosedLoop, RunLog
 
 
 def simulate(
@@ -94,6 +89,7 @@ def simulate(
         else:
             from finlab.control import FaultMonitor
             from finlab.evaluation.method_specs import load_method_spec
+            from finlab.vehicle.righting import righting_words
 
             allocator = load_method_spec(method, checkpoint).on(robot)
             learner = _learner(allocator) if learn else None
@@ -110,8 +106,9 @@ def simulate(
                 learner=learner,
                 seed=seed,
             )
-            for sentence in _uncontrollable(loop, faults):
-                bar.write(sentence, file=sys.stderr)
+            overturns = righting_words(robot)
+            if overturns is not None and "Ty" not in loop.controller.axes:
+                bar.write(f"finlab: {robot.name}: {overturns}", file=sys.stderr)
         found = [(0.0, monitored(loop))]
         bar.reset(round(loop.task.duration_s, 1))
         bar.bar_format = "{l_bar}{bar}| {n:.0f}/{total:.0f} s [{elapsed}<{remaining}]"
@@ -189,24 +186,3 @@ def monitored(loop: ClosedLoop) -> str:
         words += [f"{name} torn" for name, _ in (*health.thrust, *health.weak)]
         words += [f"{name} stuck at {math.degrees(angle):.0f} deg" for name, angle in health.stuck]
     return ", ".join(words) or "all fins whole"
-
-
-def _uncontrollable(loop: ClosedLoop, faults: Sequence[FinFault]) -> list[str]:
-    """What will not be controllable, or not stay upright, said before the run."""
-    from finlab.control import Completion
-    from finlab.vehicle.righting import righting_words
-
-    overturns, sentences, lost = righting_words(loop.layout), [], []
-    if overturns is not None and "Ty" not in loop.controller.axes:
-        sentences.append(f"finlab: {loop.layout.name}: {overturns}")
-    words = [MOTIONS[axis] for axis in loop.controller.axes]
-    events = sorted((event for event in faults if event.kind == "lost"), key=lambda event: event.time_s)
-    for name, time in [("", 0.0), *((event.fin, event.time_s) for event in events)]:
-        lost += [name] if name else []
-        if not Completion(loop.layout, tuple(lost), loop.controller.axes).controllable:
-            without = f" without {', '.join(lost)}" if lost else ""
-            sentences.append(
-                f"finlab: from {time:g} s on, {loop.layout.name}{without} cannot give "
-                f"{', '.join(words[:-1])} and {words[-1]} independently"
-            )
-    return sentences

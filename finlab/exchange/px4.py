@@ -5,18 +5,30 @@ CA_R_REV says that it reverses (PX4, ActuatorEffectivenessRotors).
 """
 
 import math
+import re
 
 import numpy as np
 
 from finlab.errors import LayoutError
 from finlab.exchange.exchange import TO_FRD, Exchange
-from finlab.exchange.parameters import parameters_text, read_parameters
 from finlab.layout import Layout, Thruster
 
 MAX_ROTORS = 12
 FRD = TO_FRD[:3, 0]
+LONGEST = 500
+"""Most characters of a line that are looked at."""
+_LINE = re.compile(
+    r"(?:^|[\s,])([A-Z][A-Z0-9]*_\w+)[\s,=]+([-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?)(?=[\s,]|$)"
+)
 USUAL = {"PX": 0.0, "PY": 0.0, "PZ": 0.0, "AX": 0.0, "AY": 0.0, "AZ": -1.0, "CT": 6.5, "KM": 0.05}
 """Keys of a rotor, and their defaults."""
+
+
+def read_parameters(text: str) -> dict[str, float]:
+    """Returns parameters by name: of lines `param set-default NAME VALUE`, `NAME VALUE`, `NAME,VALUE`, and
+    those of QGroundControl, `1 1 NAME VALUE TYPE`. What follows # is a comment; the last value counts."""
+    lines = (_LINE.search(line[:LONGEST].partition("#")[0]) for line in text.splitlines())
+    return {found[1]: float(found[2]) for found in lines if found and abs(float(found[2])) < 1e9}
 
 
 def read_px4(text: str, name: str, exchange: Exchange) -> Layout:
@@ -69,4 +81,9 @@ def write_px4(layout: Layout, exchange: Exchange, suffix: str) -> str:
         axis = np.array(part.axis) * FRD * (1.0 if most > 0.0 else -1.0) + 0.0
         own = [*(np.array(part.position) * FRD + 0.0), *axis, most or -least, -part.torque_per_newton + 0.0]
         values |= {f"CA_ROTOR{i}_{key}": float(value) for key, value in zip(USUAL, own, strict=True)}
-    return parameters_text(values, [part.name for part in parts], suffix, "param set-default ")
+    lines = [f"# motor {i}: {part.name}" for i, part in enumerate(parts, 1)]
+    for key, value in values.items():
+        kind = 6 if isinstance(value, int) else 9  # of MAVLink: 32 bits, whole or not
+        listed = f"1\t1\t{key}\t{value!r}\t{kind}"
+        lines.append(listed if suffix == ".params" else f"param set-default {key} {value!r}")
+    return "\n".join(lines) + "\n"

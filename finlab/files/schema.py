@@ -91,16 +91,10 @@ def _sentence(said: str, place: str, values: Any, kind: Any) -> tuple[str, str]:
         return f"expected a number of {_BOUNDS[found[1]]} {float(found[2]):g}, got {shown(value)}", ""
     if found := re.fullmatch(r"Expected `([\w| ]+)`(, got .*)?", said):
         wanted = " or ".join(_TYPES.get(name, name) for name in found[1].split(" | ") if name != "null")
-        hint = "; a number is written as in JSON, 0.5 or 1e-3" if wanted == "a number" == _a(value) else ""
-        return f"expected {wanted}, got {shown(value)}{hint}", ""
+        return f"expected {wanted}, got {shown(value)}", ""
     if choices := _choices(known):
         return f"expected {'one of ' * (len(choices) > 1)}{', '.join(choices)}, got {shown(value)}", ""
     return f"{said[:1].lower()}{said[1:]}, got {shown(value)}", ""
-
-
-def _a(value: Any) -> str:
-    """Whether text looks like a number."""
-    return "a number" if isinstance(value, str) and re.match(r"[-+.]*\d", value) else ""
 
 
 def _at(place: str, value: Any, known: Any) -> tuple[Any, Any]:

@@ -56,12 +56,6 @@ def test_progress_is_shown_at_once(line: list[str]) -> None:
     assert spent < 1.5, "the processor's time until a bar is there [s]"
 
 
-def test_uncontrollable_is_said_before_the_run(line: list[str], capsys: pytest.CaptureFixture[str]) -> None:
-    assert main([*line, "--fail", "front_left@0", "--fail", "back_left@0.5"]) == 0
-    err = capsys.readouterr().err
-    assert "from 0.5 s on, A without front_left, back_left cannot give surge, heave and yaw" in err
-
-
 def test_a_monitor_says_what_it_finds(
     line: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
