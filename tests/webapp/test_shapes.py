@@ -1,5 +1,7 @@
 """Meshes are closed and face outwards; the blade trails behind its thrust."""
 
+import math
+
 import numpy as np
 import pytest
 import trimesh
@@ -7,7 +9,9 @@ import trimesh
 from finlab.assets import shipped_layouts
 from finlab.hull import Surface, hull_of
 from finlab.hull.mesh import Mesh
-from finlab.layout import load_layout
+from finlab.layout import Azimuth, Fin, Rudder, Thruster, load_layout
+from webapp.scene.actuator_node import TURNS_PER_S, motion
+from webapp.scene.direction_handle import on_sphere, snapped
 from webapp.scene.meshes import blades
 from webapp.scene.meshes.mesh import NOTHING, force_arrow, torque_ring
 
@@ -76,3 +80,34 @@ def test_arrows_scale_and_vanish() -> None:
     assert force_arrow(way, np.zeros(3), 0.01).vertices[:, 0].max() == pytest.approx(0.3)
     assert force_arrow(0 * way, np.zeros(3), 0.01) is NOTHING
     assert torque_ring(np.zeros(3), np.zeros(3), 0.01) is NOTHING
+
+
+def test_a_direction_follows_the_hand_on_a_sphere_and_jumps_to_axes() -> None:
+    rng = np.random.default_rng(3)
+    for _ in range(200):
+        eye, before, goal = rng.normal(size=(3, 3))
+        eye *= 3.0 / np.linalg.norm(eye)
+        goal *= 0.3 / np.linalg.norm(goal)
+        found = on_sphere(eye, goal - eye, 0.3, goal)
+        assert found == pytest.approx(goal / 0.3, abs=1e-9), "the point of the sphere on the ray"
+        passing = on_sphere(eye, before, 0.3, before)
+        assert np.linalg.norm(passing) == pytest.approx(1.0)
+    assert snapped(np.array([0.05, -0.997, 0.05])) == pytest.approx([0.0, -1.0, 0.0])
+    free = np.array([0.6, 0.8, 0.0])
+    assert snapped(free) is free
+
+
+@pytest.mark.parametrize("name", ["bluerov2_heavy", "catamaran", "torpedo", "turtle_hybrid", "fish"])
+def test_actuators_move_as_commanded_or_hang(name: str) -> None:
+    for part in load_layout(shipped_layouts()[name]).actuators:
+        full, back = motion(part, np.array(part.upper)), motion(part, np.array(part.lower))
+        hung = motion(part, None)
+        assert hung.turns == hung.amplitude == 0.0
+        if isinstance(part, (Thruster, Azimuth)):
+            assert full.turns == pytest.approx(TURNS_PER_S) and full.turns * back.turns <= 0.0
+        if isinstance(part, Fin):
+            assert (full.amplitude, full.frequency, full.angle) == pytest.approx(part.upper)
+            limp = part.frame[2][2] * math.sin(hung.angle) + part.frame[1][2] * math.cos(hung.angle)
+            assert limp == pytest.approx(math.hypot(part.frame[1][2], part.frame[2][2])), "its blade is low"
+        if isinstance(part, Rudder):
+            assert full.angle == part.upper[0]

@@ -43,7 +43,6 @@ def add_actuator_list(page: Page) -> None:
     page.add_html(actuator_list)
     page.presses.on("fin", select)
     page.presses.on("robot", lambda _key, _held: session.select(None))
-    add_html(page.gui, marker("fl-primary"))
     adds = {kind.capitalize(): partial(session.add, kind) for kind in NEW}
     page.add_buttons("Add", adds, hint=f"On the hull; up to {MAX_ACTUATORS} actuators.")
     edits: dict[str, Callable[[], object]] = {

@@ -17,7 +17,7 @@ from webapp.commands import commands, register
 from webapp.handles import add_html, put
 from webapp.markup.html import html, marker
 from webapp.page import Page
-from webapp.panels.places import DRAWER, LEFT, PLACES, REGIONS, RIGHT, SIMULATE, Place
+from webapp.panels.places import ALLOCATE, CANDIDATES, DRAWER, LEFT, PLACES, REGIONS, RIGHT, SIMULATE, Place
 from webapp.panels.status import add_corner
 from webapp.presses import press
 from webapp.session.lessons import Stop
@@ -118,7 +118,9 @@ class Frame:
         if error is not None:
             self._page.fault(error)
 
-    def _arrange(self, desk: Desk, selected: str | None, stop: Stop | None, swimmer: Swimmer | None) -> None:
+    def _arrange(
+        self, desk: Desk, selected: str | None, stop: Stop | None, swimmer: Swimmer | None, layout: Layout
+    ) -> None:
         """Which regions are there, and which sections in them; the drawer is low until there are plots in
         it."""
         about = ("", "robot" if selected is None else "actuators", *["guide"] * (stop is not None))
@@ -137,7 +139,10 @@ class Frame:
             "guide": stop is not None,
         }
         variables = Markup().join(f"--has-{name}: {int(there)};" for name, there in counts.items())
-        height = "" if desk.task != SIMULATE else LOW if swimmer is None else TALL
+        proposes = layout.is_of_fins or desk.opened.get(ALLOCATE) != CANDIDATES
+        height = "" if proposes or desk.task != ALLOCATE else LOW
+        if desk.task == SIMULATE:
+            height = LOW if swimmer is None else TALL
         hidden = Markup(f"{', '.join(gone)} {{ display: none !important; }}")
         put(
             self._shown,

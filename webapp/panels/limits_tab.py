@@ -81,6 +81,7 @@ def add_improving(page: Page) -> None:
         digits=2,
     )
     stops = "About a minute for eight actuators, longer for more; it stops after a round."
+    add_html(gui, marker("fl-primary"))
     search = page.add_button(
         "Search",
         lambda: improver.start(session.state, session.draft),

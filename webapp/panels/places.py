@@ -25,6 +25,7 @@ from webapp.session.looking import TASKS
 TOP, LEFT, RIGHT, DRAWER, VIEW = REGIONS = ("top", "left", "right", "drawer", "view")
 """The bar above all; the list at the left; the inspector at the right; the drawer below; over the view."""
 DESIGN, ALLOCATE, SIMULATE, EXPORT = TASKS
+CANDIDATES = "Candidates"
 
 
 class Place(NamedTuple):
@@ -60,7 +61,7 @@ PLACES = (
     Place(LEFT, (ALLOCATE,), "Damage", add_damage, folded=True),
     Place(RIGHT, (ALLOCATE,), "Wrench", add_target),
     Place(RIGHT, (ALLOCATE,), "Asked and delivered", add_answer),
-    Place(DRAWER, (ALLOCATE,), "Candidates", add_candidates),
+    Place(DRAWER, (ALLOCATE,), CANDIDATES, add_candidates),
     Place(DRAWER, (ALLOCATE,), "Comparison", add_comparison),
     Place(LEFT, (SIMULATE,), "Scenario", add_scenario),
     Place(RIGHT, (SIMULATE,), "Run", add_run),

@@ -93,7 +93,7 @@ class SwimScene:
         """Let the camera stand where the robot, of a size, can be seen well, and much of the path (N, 3); it
         goes along with it (`frames.js`)."""
         extent = float(np.linalg.norm(np.ptp(path, axis=0)[:2]))
-        distance = max(0.24 * extent, 1.3 * size)
+        distance = max(0.18 * extent, 0.9 * size)
         place = start + distance * np.array([-0.6, -0.75, 0.8])
         aim_camera(self._client, place, start + distance * np.array([0.1, 0.0, -0.05]))
 
