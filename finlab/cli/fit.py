@@ -89,18 +89,19 @@ def robot(
     output: Annotated[Path, arg(metavar="LAYOUT2", aliases=["-o"])],
     residual: bool = True,
 ) -> None:
-    """Learn a robot from swims: its fins' strengths and directions, its body, what fins take from each other.
+    """Learn a robot from swims: its actuators' strengths and directions, and its body.
 
     A log is log.npz of `finlab simulate`, or a CSV file: t, what was measured (x, y, z, roll, pitch, yaw, u,
-    v, w, p, q, r), and FIN.A, FIN.f, FIN.phi for each fin as it was commanded. `finlab simulate --excite`
-    makes a swim that determines much.
+    v, w, p, q, r), and what was commanded: NAME.A, NAME.f, NAME.phi of a fin, NAME.force of a thruster,
+    NAME.angle and NAME.force of an azimuth, NAME.deflection of a rudder. `finlab simulate --excite` makes a
+    swim that determines much.
 
     Args:
         layout: the robot as it is believed to be: layout file or the name of a shipped layout.
         logs: swims of that robot.
         output: the layout as the swims show it; fins whose law is another one become tables beside it.
-        residual: look for forces within the beat and another law of thrust, too, and use what helps on parts
-            not seen.
+        residual: of robots of fins look for forces within the beat and another law of thrust, too, and use
+            what helps on parts not seen.
     """
     from finlab.cli.inputs import open_robot
     from finlab.errors import DataError
@@ -115,7 +116,6 @@ def robot(
             f"{output}: a layout is a YAML or JSON file, expected a name that ends in .yaml or .json"
         )
     believed = open_robot(layout)[0]
-    believed.only_fins("fit robot")
     swims = [read_swim(log, believed) for log in logs]
     fit = fit_robot(believed, swims, RESIDUAL if residual else (), _tell)
     write_robot(fit, output)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import sys
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -53,8 +52,8 @@ def simulate(
             front_left@60:whole (it is repaired).
         announced: whether what happens to fins is announced to the allocator.
         monitor: let a FaultMonitor watch the robot and tell the allocator what it finds.
-        learn: every minute fit the fins' strengths and directions to the last four minutes of the swim, and
-            allocate with them from then on; for laws of fins, and methods that take any shaft.
+        learn: every minute fit the actuators' strengths and directions to the last four minutes of the swim,
+            and allocate with them from then on; for methods that take any shaft, and fins of a law.
         method: dual, mdn, paper, qp, sqp, px4, ardusub, analytic or ipopt.
         duration: time for a shipped trajectory.
         plant: what the fins really do: mean (the fin law), ripple (within the flapping cycle) or offset
@@ -165,12 +164,14 @@ def excitation_summary(log: RunLog) -> str:
 
 
 def _learner(allocator: Allocator) -> OnlineFit:
-    """Who learns a robot on the way; a `FinlabError` where the method takes no fins that lean."""
-    from finlab.fit.robot.learned_fins import leaned
+    """Who learns a robot on the way; a `FinlabError` where the method takes no actuators that lean."""
+    import numpy as np
+
+    from finlab.fit.robot.learned_actuators import leaned
     from finlab.fit.robot.online import OnlineFit
 
     learner, layout = OnlineFit(allocator.layout), allocator.layout
-    allocator.on(replace(layout, actuators=tuple(leaned(fin, 0.01) for fin in layout.fins)))
+    allocator.on(leaned(layout, np.full(layout.n, 0.01)))
     return learner
 
 

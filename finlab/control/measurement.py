@@ -95,11 +95,15 @@ class Foresighted(Protocol):
 class Learner(Protocol):
     """Finds out on the way what a robot is; called at every tick."""
 
+    factor: Array
+    """By what commands to the robot as it was learned are multiplied for its drives (n, 3): a thruster's
+    command is the force that it gives, and a weak one is asked for more."""
+
     def step(self, measured: Array, command: Array) -> Layout | None:
         """Returns the robot as it is now believed to be, where that has changed.
 
         Args:
             measured: position [m], roll, pitch, yaw [rad], velocity [m/s] and rates [rad/s] (12,).
-            command: of the fins until the next call (n, 3), NaN for those at rest.
+            command: of the drives until the next call (n, 3), NaN for those at rest.
         """
         ...

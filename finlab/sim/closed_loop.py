@@ -88,7 +88,7 @@ class ClosedLoop:
             announced: whether what happens is announced to the allocator; else it goes on as before, unless a
                 monitor notices.
             monitor: watches the robot, gives the allocator what it finds, and takes what is announced.
-            learner: finds out what the fins really are; allocator and monitor then work with that.
+            learner: finds out what the actuators really are; allocator and monitor then work with that.
             truth: the robot that really swims, such as `perturbed(layout, damping=2.0)`, where `layout` is
                 only what allocator, controller and monitor believe of it; it has the same actuators.
             seed: of the sensors' noise and of the allocator.
@@ -263,7 +263,7 @@ class ClosedLoop:
         tick = self._move(now, setpoint, answer.target, command, answer.solve_ms)
         self._command = command
         self._ticks.append(tick)
-        found = None if self.learner is None else self.learner.step(tick.measured, command)
+        found = None if self.learner is None else self.learner.step(tick.measured, tick.command)
         if found is not None:
             self._believe(found)
         return tick
@@ -271,6 +271,7 @@ class ClosedLoop:
     def _believe(self, layout: Layout) -> None:
         """From now on allocator and monitor take the robot for this one."""
         self.allocator, self._plant = self.allocator.on(layout), plant_of(layout)
+        self._told = {name: fault for name, fault in self._told.items() if fault.kind != "torn"}
         if self.monitor is not None:
             self.monitor.adopt(layout)
         self._completion.clear()
@@ -345,7 +346,8 @@ class ClosedLoop:
         time, before, n = self.time, self.state, self.layout.n
         n_steps = max(1, math.ceil(self.period_s / self._forces.step_s - 1e-9))
         dt = self.period_s / n_steps
-        moved, share = self._moved(command), np.ones(n)
+        sent = command if self.learner is None else command * self.learner.factor
+        moved, share = self._moved(sent), np.ones(n)
         for fault in self.broken.values():
             if fault.kind == "torn":
                 share[self.layout.index(fault.fin)] = fault.share
@@ -371,7 +373,7 @@ class ClosedLoop:
             asked=asked,
             allocated=self._plant.wrench(command, flow=self._flow),
             delivered=mean.sum(axis=0),
-            command=command,
+            command=sent,
             fin_motion=self.motion.command,
             fin_angle=self.motion.joined(self.fins.angle, np.zeros(len(self.motion.of_others))),
             fin_force=mean[:, :3],

@@ -1,17 +1,18 @@
-"""A swim from which a robot can be learned: every axis and every fin is varied, depth and attitude are kept.
+"""A swim from which a robot can be learned: every axis and actuator is varied, depth and attitude are kept.
 
 The controller holds the place softly and adds a sum of sines on each axis, each axis with periods of its own.
 The allocator gives that wrench with forces that also push against each other, and draws each fin's amplitude
-anew every few seconds, so that the law of each fin shows. Where the robot leaves its bounds, the excitation
-fades until it is back.
+anew every few seconds, so that the law of each fin shows. No axis is shaken farther than it may go. Where the
+robot leaves its bounds, the excitation fades until it is back.
 """
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.method import Method
@@ -20,7 +21,7 @@ from finlab.allocation.solution import Solution
 from finlab.arrays import Array
 from finlab.control import Measurement, Setpoint
 from finlab.errors import DataError, FinlabError
-from finlab.layout import Layout
+from finlab.layout import Azimuth, Fin, Layout, Rudder, Thruster
 from finlab.layout.angles import wrapped
 from finlab.layout.arrays import layout_effectiveness
 from finlab.networks.trained import TrainedWeights
@@ -35,7 +36,7 @@ LONGEST_S = 300.0
 SHORTEST_S = 30.0
 """Shortest one [s]: once through the slowest sine."""
 SHARE = (0.40, 0.35, 0.30, 0.15, 0.15, 0.15)
-"""Amplitude of the excitation on each axis, as a share of what all fins together could give at most."""
+"""Amplitude of the excitation on each axis, as a share of what all actuators together could give at most."""
 PERIODS_S = (
     (31.0, 13.0, 7.0),
     (23.0, 11.0, 6.1),
@@ -46,7 +47,7 @@ PERIODS_S = (
 )
 """Periods of the sines of each axis [s]; no two axes share one."""
 INNER_SHARE = 0.3
-"""Amplitude of the forces that cancel, as a share of the largest force of a fin."""
+"""Amplitude of the forces that cancel, as a share of the largest force of an actuator."""
 REDRAW_S = 3.1
 """Time after which each fin has another amplitude [s]."""
 TURN_RAD_S = 0.8
@@ -55,6 +56,14 @@ BOUNDS = (1.5, 0.5, 0.35)
 """Horizontal distance [m], change of depth [m] and roll or pitch [rad] at which the excitation has faded."""
 MOST_USED = 3.0
 """Times these bounds at which the swim is given up."""
+REACHED = np.array([BOUNDS[0], BOUNDS[0], BOUNDS[1], BOUNDS[2], BOUNDS[2], 1.0])
+"""Bounds of each axis [m, rad]; that of yaw is no more than a wish."""
+SHAKEN_TO = 0.5
+"""Share of them to which the sines of an axis take the robot at most."""
+HOLDS = 0.3
+"""Share of what all actuators could give that holds the robot at a bound, where a loop may be so fast."""
+SLOWEST, FASTEST = np.array([0.25, 0.25, 0.4, 0.0, 0.0, 0.4]), np.array([1.0, 1.0, 1.0, 2.5, 2.5, 1.0])
+"""Of the loops that hold place and attitude [rad/s]."""
 DEPTH_M = 1.5
 """Where the robot is held [m]."""
 PERIOD_S = 0.1
@@ -70,17 +79,22 @@ class ExcitingController:
     period_s = PERIOD_S
 
     def __init__(self, layout: Layout, seed: int = 0) -> None:
-        plant = plant_of(layout)
-        largest = np.linalg.norm(plant.forces(plant.upper), axis=-1)
-        # Each axis as far as all fins could push it, were they all aimed at it.
-        reach = np.linalg.norm(plant.effectiveness[:, 1:], axis=1)
-        self._size = np.array(SHARE) * (reach * largest[:, None]).sum(axis=0)
+        # Each axis as far as all actuators could push it, were they all aimed at it.
+        most = np.abs(layout_effectiveness(layout) * largest_forces(layout))
+        most = np.add.reduceat(most**2, np.unique(_owners(layout), return_index=True)[1], axis=1) ** 0.5
+        most = most.sum(axis=1)
         rng = np.random.default_rng(seed)
         self._phase = rng.uniform(0.0, 2 * math.pi, (6, len(PERIODS_S[0])))
-        inertia = np.array(dynamics_of(complete_body(layout)).inertia)
-        # A position loop of 0.25 rad/s, one of 0.4 rad/s for depth and heading; damping of about 0.8.
-        pace = np.array([0.25, 0.25, 0.4, 0.0, 0.0, 0.4])
-        self._stiff, self._damp = inertia * pace**2, inertia * np.array([0.2, 0.2, 0.6, 0.5, 0.5, 0.6])
+        dynamics = dynamics_of(complete_body(layout))
+        inertia = np.array(dynamics.inertia)
+        pace = np.clip(np.sqrt(HOLDS * most / (inertia * REACHED)), SLOWEST, FASTEST)
+        # Damping of about 0.8.
+        least = np.array([0.2, 0.2, 0.6, 0.5, 0.5, 0.6])
+        self._stiff, self._damp = inertia * pace**2, inertia * np.maximum(1.6 * pace, least)
+        swing = 2.0 * math.pi / np.array(PERIODS_S).T
+        damp = 1j * swing * (self._damp + np.array(dynamics.linear))
+        moved = 1.0 / np.abs(self._stiff - inertia * swing**2 + damp)
+        self._size = np.minimum(np.array(SHARE) * most, SHAKEN_TO * REACHED / moved.mean(axis=0))
 
     def reset(self) -> None:
         """Nothing is remembered."""
@@ -90,7 +104,7 @@ class ExcitingController:
         away = setpoint.position - np.array([*measurement.position[:2], -measurement.depth])
         c, s = math.cos(measurement.yaw), math.sin(measurement.yaw)
         error = np.array([c * away[0] + s * away[1], c * away[1] - s * away[0], away[2], 0.0, 0.0, 0.0])
-        error[5] = float(wrapped(-measurement.yaw))
+        error[3:] = wrapped(-np.array([measurement.roll, measurement.pitch, measurement.yaw]))
         speed = np.concatenate([measurement.velocity, measurement.rates])
         tilt = max(abs(measurement.roll), abs(measurement.pitch))
         used = max(math.hypot(away[0], away[1]) / BOUNDS[0], abs(away[2]) / BOUNDS[1], tilt / BOUNDS[2])
@@ -128,24 +142,28 @@ class Exciting(Method):
         self, layout: Layout, settings: Settings, scale: Array, weights: TrainedWeights | None = None
     ) -> None:
         super().__init__(layout, settings, scale, weights)
-        seed = self.settings.seed
-        self._rng = np.random.default_rng(seed)
-        self._plant = self.plant
-        self._to_force = np.linalg.pinv(layout_effectiveness(layout), rcond=1e-6)
-        _, values, right = np.linalg.svd(layout_effectiveness(layout))
+        self._rng = np.random.default_rng(self.settings.seed)
+        self._owner, self._most = _owners(layout), largest_forces(layout)
+        # Each gives its share of what it can.
+        share = self._most / self._most.max()
+        columns = layout_effectiveness(layout) * share
+        self._to_force = share[:, None] * np.linalg.pinv(columns, rcond=1e-6)
+        _, values, right = np.linalg.svd(columns)
         rank = int((values > 1e-6 * values[0]).sum())
-        self._inner = right[rank:]
-        self._largest = np.linalg.norm(self._plant.forces(self._plant.upper), axis=-1)
+        self._inner = right[rank:] * self._most
         self._phase = self._rng.uniform(0.0, 2 * math.pi, (len(self._inner), 2))
         self._calls = 0
+        self._is_fin = np.array([isinstance(part, Fin) for part in layout.actuators])
         self._direction: Array | None = None
-        shares = np.linspace(0.0, 1.0, 13), np.linspace(0.0, 1.0, 41)
-        grid = np.stack(np.meshgrid(*shares, indexing="ij"), axis=-1).reshape(-1, 1, 2)
-        lower, upper = self._plant.lower[:, :2], self._plant.upper[:, :2]
-        self._grid = np.concatenate(
-            [lower + grid * (upper - lower), np.zeros((len(grid), len(lower), 1))], axis=-1
-        )
-        self._amplitude = upper[:, 0]
+        if layout.fins:
+            self._plant = plant_of(replace(layout, actuators=layout.fins))
+            self._largest = self._most[np.isin(self._owner, np.flatnonzero(self._is_fin))][::2]
+            shares = np.linspace(0.0, 1.0, 13), np.linspace(0.0, 1.0, 41)
+            grid = np.stack(np.meshgrid(*shares, indexing="ij"), axis=-1).reshape(-1, 1, 2)
+            lower, upper = self._plant.lower[:, :2], self._plant.upper[:, :2]
+            directions = np.zeros((len(grid), len(lower), 1))
+            self._grid = np.concatenate([lower + grid * (upper - lower), directions], axis=-1)
+            self._amplitude = upper[:, 0]
 
     def solve(self, targets: Array, **asked: Any) -> Solution:
         """See `Method`; each target is a tick of the controller."""
@@ -153,17 +171,30 @@ class Exciting(Method):
 
     def _command(self, target: Array) -> Array:
         """The next command (n, 3); each call is a tick of the controller."""
-        time = self._calls * PERIOD_S
+        time, k = self._calls * PERIOD_S, np.arange(len(self._inner))
+        swing = np.sin(2 * math.pi * time / (14.3 + 3.7 * k) + self._phase[:, 0])
+        swing += np.sin(2 * math.pi * time / (5.9 + 1.3 * k) + self._phase[:, 1])
+        force = self._to_force @ target + (INNER_SHARE * swing @ self._inner if len(k) else 0.0)
+        command = np.zeros((self.layout.n, 3))
+        for i, part in enumerate(self.layout.actuators):
+            own = force[self._owner == i]
+            if isinstance(part, Thruster):
+                command[i, 0] = own[0]
+            elif isinstance(part, Azimuth):
+                command[i, :2] = math.atan2(own[1], own[0]), math.hypot(*own)
+        command = self.plant.feasible(command)
+        if self._is_fin.any():
+            own = force[np.isin(self._owner, np.flatnonzero(self._is_fin))].reshape(-1, 2)
+            command[self._is_fin] = self._beat(own)
+        self._calls += 1
+        return command
+
+    def _beat(self, force: Array) -> Array:
+        """Commands (n, 3) of the fins for forces (n, 2) [N] along zero and shaft x zero."""
         if self._calls % round(REDRAW_S / PERIOD_S) == 0:
             share = self._rng.uniform(0.2, 1.0, self._plant.n_fins)
             lower, upper = self._plant.lower[:, 0], self._plant.upper[:, 0]
             self._amplitude = lower + share * (upper - lower)
-        self._calls += 1
-        k = np.arange(len(self._inner))
-        swing = np.sin(2 * math.pi * time / (14.3 + 3.7 * k) + self._phase[:, 0])
-        swing += np.sin(2 * math.pi * time / (5.9 + 1.3 * k) + self._phase[:, 1])
-        inner = INNER_SHARE * float(self._largest.mean()) * swing @ self._inner if len(k) else 0.0
-        force = (self._to_force @ target + inner).reshape(-1, 2)
         size, direction = np.hypot(*force.T), np.arctan2(force[:, 1], force[:, 0])
         if self._direction is not None:
             most = TURN_RAD_S * PERIOD_S
@@ -179,6 +210,18 @@ class Exciting(Method):
         other = np.abs(tried[..., 0] - self._amplitude) / self._plant.upper[:, 0]
         best = np.argmin(miss + 0.05 * other, axis=0)
         return np.asarray(tried[best, np.arange(self._plant.n_fins)])
+
+
+def _owners(layout: Layout) -> NDArray[np.intp]:
+    """Which actuator each column of `layout_effectiveness` is of (m,)."""
+    return np.repeat(np.arange(layout.n), [len(part.PUSHES) for part in layout.actuators])
+
+
+def largest_forces(layout: Layout) -> Array:
+    """Returns the largest force [N] along each direction in which an actuator pushes (m,), at rest."""
+    plant = plant_of(layout)
+    size = np.linalg.norm(plant.forces(np.stack([plant.lower, plant.upper])), axis=-1).max(axis=0)
+    return np.asarray(size[_owners(layout)])
 
 
 def excitation(
@@ -202,9 +245,13 @@ def excitation(
 
     Raises:
         DataError: the duration is too short to tell anything, or longer than five minutes.
-        LayoutError: an actuator is no fin.
+        FinlabError: it has rudders, which give nothing on the spot.
     """
-    layout.only_fins("--excite")
+    if any(isinstance(part, Rudder) for part in layout.actuators):
+        raise FinlabError(
+            f"--excite: rudders of layout {layout.name} give nothing on the spot; let it swim a wide path, "
+            "such as --trajectory circle --scale 25, and fit that log"
+        )
     if not SHORTEST_S <= duration_s <= LONGEST_S:
         raise DataError(f"duration: expected {SHORTEST_S:g} to {LONGEST_S:g} s, got {duration_s:g}")
     return ClosedLoop(

@@ -5,7 +5,7 @@ import pytest
 
 from finlab.allocation import Allocator
 from finlab.cli import main
-from finlab.errors import DataError
+from finlab.errors import DataError, FinlabError
 from finlab.layout import Layout, load_layout
 from finlab.sim import RunLog
 from finlab.sim.excite import BOUNDS, Exciting, excitation
@@ -52,6 +52,8 @@ def test_commands_give_the_wrench_where_the_fins_can() -> None:
 
 def test_what_cannot_be_shaken_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     layout: Layout = load_layout("A")
+    with pytest.raises(FinlabError, match="rudders of layout torpedo give nothing on the spot"):
+        excitation(load_layout("torpedo"), 60.0)
     with pytest.raises(DataError, match="30 to 300 s, got 301"):
         excitation(layout, 301.0)
     assert main(["simulate", "A", "--excite", "--fail", "front_left@3"]) == 2

@@ -1,4 +1,4 @@
-"""A fitted robot as a layout: where its fins are and how strong, its body, and tables of fins
+"""A fitted robot as a layout: where its actuators are and how strong, its body, and tables of fins
 whose law is another one."""
 
 import os
@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from finlab.errors import DataError
-from finlab.fit.robot.learned_fins import learned
+from finlab.fit.robot.learned_actuators import learned
 from finlab.fit.robot.model import shape_factor
 from finlab.fit.robot.report import summary
 from finlab.fit.robot.robot_fit import RobotFit
-from finlab.layout import Body, FinModelSpec, Layout, load_layout, save_layout
+from finlab.layout import Body, Fin, FinModelSpec, Layout, load_layout, save_layout
 from finlab.layout.force_table_file import COLUMNS, POWER_COLUMN
 from finlab.layout.layout import MAX_DESCRIPTION_LENGTH
 from finlab.physics import make_law
@@ -35,22 +35,22 @@ def write_robot(fit: RobotFit, path: str | os.PathLike[str]) -> Layout:
     layout, place = fit.model.layout, Path(path)
     lean = fit.found("lean")
     certain = np.abs(lean) > np.maximum(DEFLECTIONS[0] * fit.found_error("lean"), DEFLECTIONS[1])
-    fins = list(learned(fit, np.where(certain, lean, 0.0)))
-    for i, fin in enumerate(fins):
-        if fit.part("shape") is not None or fin.model.type == "table":
+    parts = list(learned(fit, np.where(certain, lean, 0.0)))
+    other_law = fit.part("shape") is not None
+    for i, (drawn, part) in enumerate(zip(layout.actuators, parts, strict=True)):
+        if isinstance(drawn, Fin) and isinstance(part, Fin) and (other_law or part.model.type == "table"):
             table = place.with_name(f"{place.stem}-fin{i + 1}.csv")
-            write_whole(table, _table(fit, i), DataError)
-            fins[i] = replace(fin, model=FinModelSpec("table", (("path", table.name),)))
+            write_whole(table, _table(fit, i, drawn), DataError)
+            parts[i] = replace(part, model=FinModelSpec("table", (("path", table.name),)))
     notes = "\n".join(summary(fit))
     text = f"{notes}\n{layout.description}".strip()[:MAX_DESCRIPTION_LENGTH]
     name = layout.name if place.stem == layout.name else place.stem[:64].strip() or layout.name
-    save_layout(Layout(name, tuple(fins), text, _body(fit)), place)
+    save_layout(Layout(name, tuple(parts), text, _body(fit)), place)
     return load_layout(place)
 
 
-def _table(fit: RobotFit, i: int) -> str:
-    """The i-th fin's law as a table, from rest to its limits."""
-    fin = fit.model.layout.fins[i]
+def _table(fit: RobotFit, i: int, fin: Fin) -> str:
+    """The law of the i-th actuator, a fin, as a table, from rest to its limits."""
     law = make_law(fin.model)
     ends = fin.limits.amplitude[1], fin.limits.frequency[1]
     axes = [np.linspace(0.0, end, count) for end, count in zip(ends, GRID, strict=False)]

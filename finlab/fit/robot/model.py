@@ -1,7 +1,8 @@
-"""From unknowns to what a robot does: the wrenches of its fins over a swim, and the body that they move."""
+"""From unknowns to what a robot does: wrenches of its actuators over a swim, and the body that they move."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 
@@ -9,8 +10,8 @@ from finlab.arrays import Array
 from finlab.fit.robot.swim import STEP_S, Swim
 from finlab.fit.robot.swing import swing_forces
 from finlab.fit.robot.unknowns import SENSORS, Unknowns, blocks_of
-from finlab.layout import Layout
-from finlab.layout.arrays import force_effectiveness
+from finlab.layout import Layout, Thruster
+from finlab.layout.arrays import moved_effectiveness
 from finlab.physics import plant_of
 from finlab.vehicle.body import complete_body, dynamics_of
 from finlab.vehicle.fossen import Dynamics
@@ -38,20 +39,36 @@ class RobotModel:
             name: replace(block, scale=block.scale * doubts.get(name, 1.0))
             for name, block in blocks_of(layout.names, doubt).items()
         }
-        plant = plant_of(layout)
+        self._plant, self._swims = plant_of(layout), swims
         self.motion = np.concatenate([swim.motion for swim in swims])
-        working = (self.motion[..., 0] > 0.0) & (self.motion[..., 1] > 0.0)
-        self.alone = np.where(working[..., None], plant.forces(self.motion), 0.0)
-        """What each fin gives by the layout's law (M, SUBSTEPS, n, 3) [N], in its own frame."""
-        self.middle = [float(np.median(self.motion[..., k][working])) for k in range(2)]
-        """Amplitude [rad] and frequency [Hz] at which a fin has the strength that is given."""
-        ends = [np.quantile(self.motion[..., k][working], (0.005, 0.995)) for k in range(2)]
-        self.seen = [(max(float(low), 1e-3), max(float(high), 2e-3)) for low, high in ends]
-        """Amplitudes and frequencies between which nearly all were; the law is fitted no further."""
-        self._shapes = self.shape_terms(self.motion)
-        self._beat = np.concatenate([swing_forces(layout, swim.command) for swim in swims])
+        self.alone = self._plant.forces(self.motion)
+        """What each actuator gives by the layout's law (M, SUBSTEPS, n, 3) [N], in its own frame."""
         self.late = [0] * len(SENSORS)
         """Whole steps by which each sensor is late, as far as is known."""
+
+    def meet(self, flow: Array) -> None:
+        """Takes the robot to move through the water with (M, 6) [m/s, rad/s], which rudders feel."""
+        if self._plant.feels_flow:
+            self.alone = self._plant.forces(self.motion, flow=flow[:, None])
+
+    @cached_property
+    def middle(self) -> list[float]:
+        """Amplitude [rad] and frequency [Hz] at which a fin has the strength that is given."""
+        return [float(np.nanmedian(self.motion[..., k])) for k in range(2)]
+
+    @cached_property
+    def seen(self) -> list[tuple[float, float]]:
+        """Amplitudes and frequencies between which nearly all were; the law is fitted no further."""
+        ends = [np.nanquantile(self.motion[..., k], (0.005, 0.995)) for k in range(2)]
+        return [(max(float(low), 1e-3), max(float(high), 2e-3)) for low, high in ends]
+
+    @cached_property
+    def _shapes(self) -> Array:
+        return self.shape_terms(np.nan_to_num(self.motion))
+
+    @cached_property
+    def _beat(self) -> Array:
+        return np.concatenate([swing_forces(self.layout, swim.command) for swim in self._swims])
 
     def shape_terms(self, command: Array) -> Array:
         """Terms (..., 5) of the logarithm of a fin's true law over the layout's, for commands (..., 3): a
@@ -64,13 +81,14 @@ class RobotModel:
 
     def wrench(self, unknowns: Unknowns, vector: Array) -> Array:
         """Mean wrench (M, 6) of each step for one vector (size,) of unknowns."""
-        layout, force = self.layout, deflected(self.alone, unknowns.of("lean", vector))
+        layout, force = self.layout, self.alone
         share = np.exp(unknowns.of("strength", vector)) * np.ones(force.shape[:-1])
         shape = unknowns.part("shape", vector)
         if shape is not None:
             share *= shape_factor(self._shapes, shape)
         position = layout.position - unknowns.of("center", vector)
-        columns = force_effectiveness(position, layout.mounting_angle + unknowns.of("mounting", vector))
+        frames = turned_frames(layout, unknowns.of("mounting", vector), unknowns.of("lean", vector))
+        columns = moved_effectiveness(layout, position, frames)
         mean = (force * share[..., None]).mean(axis=1)
         beat = unknowns.part("beat", vector)
         if beat is not None:
@@ -105,11 +123,23 @@ class RobotModel:
         return said
 
 
-def deflected(force: Array, deflection: Array) -> Array:
-    """Forces (..., n, 3) in fin frames, turned about the shafts by (n,) [rad]."""
-    cos, sin = np.cos(deflection), np.sin(deflection)
-    y, z = force[..., 1], force[..., 2]
-    return np.stack([force[..., 0], cos * y - sin * z, sin * y + cos * z], axis=-1)
+def turned_frames(layout: Layout, mounting: Array, lean: Array) -> Array:
+    """Returns own axes (n, 3, 3), rows in the body frame, of actuators that are not as drawn.
+
+    Args:
+        layout: as it was drawn.
+        mounting: angles (n,) about the third of the axes [rad], of a fin's horizontal shaft about z.
+        lean: then angles (n,) about the first [rad], a shaft; of thrusters, which push along it, about the
+            second.
+    """
+    first, second, third = np.moveaxis(layout.frames, 1, 0)
+    cos, sin = np.cos(mounting)[:, None], np.sin(mounting)[:, None]
+    first, second = cos * first + sin * second, cos * second - sin * first
+    cos, sin = np.cos(lean)[:, None], np.sin(lean)[:, None]
+    about_shaft = np.stack([first, cos * second + sin * third, cos * third - sin * second], axis=1)
+    across = np.stack([cos * first - sin * third, second, cos * third + sin * first], axis=1)
+    thrusts = np.array([isinstance(part, Thruster) for part in layout.actuators])
+    return np.where(thrusts[:, None, None], across, about_shaft)
 
 
 def shape_factor(terms: Array, shape: Array) -> Array:

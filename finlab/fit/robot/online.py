@@ -1,4 +1,4 @@
-"""A robot that learns its fins while it swims: every minute the last four are fitted, and what the fins'
+"""A robot that learns its actuators while it swims: every minute the last four are fitted, and what their
 strengths and directions turn out to be is what allocation works with from then on."""
 
 from collections import deque
@@ -8,30 +8,27 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.errors import FinlabError
-from finlab.fit.robot.learned_fins import learned
+from finlab.fit.robot.learned_actuators import asked_more, learned
 from finlab.fit.robot.robot_fit import fit_robot
-from finlab.fit.robot.swim import STEP_S, Swim, followed, only_new
+from finlab.fit.robot.swim import STEP_S, Swim, followed, motion_of, only_new
 from finlab.layout import Layout
-from finlab.vehicle.fin_motion import FinMotion
 
 EVERY_S, LAST_S = 60.0, 240.0
 """Time between fits [s], and how much of the swim each takes."""
 DOUBTS = {"inertia": 0.3, "linear": 0.3, "quadratic": 0.3, "mounting": 0.5, "center": 0.5}
-"""How doubtful body and places of the fins are, as a share of that before a swim that shakes a robot:
-a path tells less of them, and what they take up is missing in the fins' strengths."""
+"""How doubtful body and places of the actuators are, as a share of that before a swim that shakes a robot:
+a path tells less of them, and what they take up is missing in the strengths."""
 
 
 class OnlineFit:
-    """What a robot's fins are, by its own swim; to be called every `STEP_S` seconds."""
+    """What a robot's actuators are, by its own swim; to be called every `STEP_S` seconds."""
 
     def __init__(self, layout: Layout) -> None:
         """Takes the robot as it is believed to be.
 
         Raises:
-            LayoutError: it has other actuators than fins with horizontal shafts.
             FinlabError: a fin is a table, whose strength is no number of the layout.
         """
-        layout.only_fins("learning on the way", horizontal=True)
         for fin in layout.fins:
             if fin.model.type == "table":
                 raise FinlabError(
@@ -41,7 +38,9 @@ class OnlineFit:
         """As it was believed to be before."""
         self.notes: list[str] = []
         """What each fit has found, a sentence each."""
-        self._fins = FinMotion(layout)
+        self.factor = np.ones((layout.n, 3))
+        """By what commands to the robot as it was learned are multiplied for its drives (n, 3)."""
+        self._moving = motion_of(layout)
         self._last: deque[tuple[Array, Array, Array]] = deque(maxlen=round(LAST_S / STEP_S))
         self._steps = 0
 
@@ -50,9 +49,9 @@ class OnlineFit:
 
         Args:
             measured: what the sensors said last (12,), in the order of `CHANNELS`.
-            command: of the fins for this step (n, 3), NaN for those at rest.
+            command: of the drives for this step (n, 3), NaN for those at rest.
         """
-        self._last.append((followed(self._fins, command), measured, command))
+        self._last.append((followed(self._moving, command), measured, command))
         self._steps += 1
         if self._steps % round(EVERY_S / STEP_S):
             return None
@@ -65,4 +64,5 @@ class OnlineFit:
             for name, own, unsure in zip(self.layout.names, strength, error, strict=True)
         )
         self.notes.append(f"{self._steps * STEP_S:.0f} s: learned strengths {', '.join(told)}")
+        self.factor = asked_more(self.layout, strength)
         return replace(self.layout, actuators=learned(fit, fit.found("lean")))

@@ -1,6 +1,7 @@
 """What a fit to swims is worth, in sentences and as a table."""
 
 from finlab.fit.robot.robot_fit import UNTOLD, RobotFit
+from finlab.layout import Azimuth, Thruster
 from finlab.layout.force_table_file import DOUBT
 
 MEANINGS = {
@@ -22,6 +23,11 @@ def summary(fit: RobotFit) -> tuple[str, ...]:
         "a common scale of all forces, damping and inertia does not follow from motion; it rests on the mass "
         "and added mass that the layout gave",
     ]
+    if any(isinstance(part, Thruster | Azimuth) for part in fit.model.layout.actuators):
+        lines.append(
+            "a force in the layout is what a thruster gives: divide it by the strength that was found for "
+            "what the thruster is to be sent"
+        )
     untold = fit.untold()
     if untold:
         lines.append(f"the data cannot tell {', '.join(untold)}: there the layout's own values stand")

@@ -25,8 +25,10 @@ UNTOLD = 0.7
 """Share of what was doubtful before that must be left for the data to have determined nothing."""
 SOUND = 0.5
 """Least share of the motion that simulated swims should explain."""
+MOVES = 1.5
+"""Times the believed noise of a sensor by which its channel varies where the robot moves at all."""
 WEAKLY_KNOWN = 0.1
-"""Standard error of a fin's strength beside those of the others, as a share, that is worth a doubt."""
+"""Standard error of an actuator's strength beside those of the others, as a share, that is worth a doubt."""
 DEVIATION_RANGE = (0.1, 30.0)
 """Deviations of sensors within these multiples of what is believed."""
 NO_DOUBTS: Mapping[str, float] = {}
@@ -109,18 +111,17 @@ def fit_robot(
     Args:
         layout: the robot as it is believed to be; what its body does not say is U-CAT's.
         swims: what was measured.
-        tried: what is looked for besides, where it helps: some of `RESIDUAL`.
+        tried: what is looked for besides, where it helps: some of `RESIDUAL`, which are about fins alone.
         progress: told before each step what comes next.
         doubts: factors of how far some blocks of unknowns may be off, by name.
 
     Raises:
         DataError: there is no swim, or the fit goes astray.
     """
-    layout.only_fins("fitting a robot", horizontal=True)
     if not swims:
         raise DataError("expected at least one swim, got none")
     with threadpool_limits(limits=1, user_api="blas"):
-        return _fit(RobotModel(layout, swims, doubts), swims, tried, progress)
+        return _fit(RobotModel(layout, swims, doubts), swims, tried if layout.is_of_fins else (), progress)
 
 
 def _fit(
@@ -129,10 +130,11 @@ def _fit(
     measured = np.concatenate([swim.measured for swim in swims])
     smooth = np.concatenate([smoothed(swim.measured) for swim in swims])
     windows = cut([len(swim) for swim in swims], measured, smooth)
+    model.meet(smooth[:, 6:])
     unknowns, deviation = Unknowns(model.blocks, BASE), DEVIATION
     vector, start = np.zeros(unknowns.size), windows.start
     for _ in range(ROUNDS):
-        tell("fitting fins and body")
+        tell("fitting actuators and body")
         fitted = fit_windows(model, unknowns, windows, deviation, vector, start)
         vector, start = fitted.vector, fitted.start
         deviation = _deviation(fitted, deviation)
@@ -195,7 +197,7 @@ def _keep_delays(model: RobotModel, fitted: Fitted) -> None:
 
 def _explained(fitted: Fitted, windows: Windows) -> float:
     """Share of the motion's variance within windows that the simulated swims explain, mean over channels of
-    velocity and rates, or of pose where those are not measured."""
+    velocity and rates, or of pose where those are not measured, that change by more than noise."""
     known = np.asarray(np.isfinite(windows.measured).any(axis=(0, 2)))
     channels = np.flatnonzero(known & (np.arange(12) >= 6)) if known[6:].any() else np.flatnonzero(known)
     shares = []
@@ -203,5 +205,6 @@ def _explained(fitted: Fitted, windows: Windows) -> float:
         said = windows.measured[:, k]
         away = np.nanmean((said - fitted.state[:, k]) ** 2)
         whole = np.nanvar(said - np.nanmean(said, axis=0))
-        shares.append(max(0.0, 1.0 - float(away) / max(float(whole), 1e-12)))
+        if whole > (MOVES * DEVIATION[k]) ** 2:
+            shares.append(max(0.0, 1.0 - float(away) / float(whole)))
     return float(np.mean(shares)) if shares else 0.0

@@ -1,4 +1,4 @@
-"""One swim as a fit sees it: what the fins did and what the sensors said, on an even grid of time."""
+"""One swim as a fit sees it: what the actuators did and what the sensors said, on an even grid of time."""
 
 from dataclasses import dataclass
 
@@ -6,13 +6,14 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.layout import Layout
+from finlab.vehicle.actuator_motion import ActuatorMotion
 from finlab.vehicle.fin_motion import FinMotion
 from finlab.vehicle.many_bodies import body_rates, body_velocity
 
 STEP_S = 0.1
 """Spacing of the grid [s]."""
 SUBSTEPS = 2
-"""Moments within a step at which the fins' forces are taken."""
+"""Moments within a step at which the actuators' forces are taken."""
 CHANNELS = ("x", "y", "z", "roll", "pitch", "yaw", "u", "v", "w", "p", "q", "r")
 """What sensors may say: position in the world [m], attitude [rad], velocity [m/s] and angular rates [rad/s]
 in the body frame."""
@@ -21,36 +22,41 @@ ANGLES = slice(3, 6)
 
 @dataclass(frozen=True)
 class Swim:
-    """N steps of one robot with n fins."""
+    """N steps of one robot with n actuators."""
 
     name: str
     motion: Array
-    """What the fins did, (N, SUBSTEPS, n, 3): amplitude [rad], frequency [Hz], direction [rad]; zero
-    amplitude and frequency for a fin that was lost."""
+    """What the actuators did, (N, SUBSTEPS, n, 3), as their commands, of fins amplitude [rad], frequency
+    [Hz], direction [rad]; NaN for one that gave nothing."""
     measured: Array
     """What the sensors said at the beginning of each step (N, 12), in the order of `CHANNELS`; NaN where
     there is nothing new."""
     command: Array
-    """What was commanded of the fins for each step (N, n, 3), NaN for a fin that was lost."""
+    """What was commanded for each step (N, n, 3), NaN for an actuator that was lost."""
 
     def __len__(self) -> int:
         return len(self.motion)
 
 
 def replay(layout: Layout, command: Array) -> Array:
-    """What fins with nominal servos do (N, SUBSTEPS, n, 3) under commands (N, n, 3), one per step, NaN for a
-    lost fin."""
-    fins = FinMotion(layout)
-    return np.array([followed(fins, row) for row in command])
+    """What actuators that follow as they should do (N, SUBSTEPS, n, 3) under commands (N, n, 3), one per
+    step, NaN for a lost one."""
+    moving = motion_of(layout)
+    return np.array([followed(moving, row) for row in command])
 
 
-def followed(fins: FinMotion, command: Array) -> Array:
-    """Moves fins on by one step under a command (n, 3), and returns what they do (SUBSTEPS, n, 3)."""
+def motion_of(layout: Layout) -> ActuatorMotion:
+    """Actuators at rest, fins with what happens within the beat."""
+    return ActuatorMotion(layout, FinMotion(layout))
+
+
+def followed(moving: ActuatorMotion, command: Array) -> Array:
+    """Moves actuators on by one step under a command (n, 3), and returns what they do (SUBSTEPS, n, 3)."""
     motion = np.empty((SUBSTEPS, *command.shape))
     for s in range(SUBSTEPS):
-        fins.step(command, STEP_S / SUBSTEPS / 2)
-        motion[s] = fins.command
-        fins.step(command, STEP_S / SUBSTEPS / 2)
+        moving.step(command, STEP_S / SUBSTEPS / 2)
+        motion[s] = np.where(moving.pushes[:, None], moving.command, np.nan)
+        moving.step(command, STEP_S / SUBSTEPS / 2)
     return motion
 
 

@@ -1,10 +1,10 @@
 """Swims from files: a log of `finlab simulate`, or a CSV file of time, measurements and commands.
 
 A CSV file has a header and columns in any order: t [s]; of x, y, z [m], roll, pitch, yaw [rad], u, v, w
-[m/s], p, q, r [rad/s] what was measured; and FIN.A, FIN.f, FIN.phi for each fin, as commanded. World: z up;
-body: x forward, y left, z up; pitch is positive nose down. Degrees stand in the header, `yaw [deg]`. A
-sensor's cell may be empty or repeat the last one where there is nothing new; a fin's three cells are empty
-where it was lost. Other columns are passed over.
+[m/s], p, q, r [rad/s] what was measured; and NAME.PART for each actuator, as commanded, with the parts of
+`PARTS`. World: z up; body: x forward, y left, z up; pitch is positive nose down. Degrees stand in the header,
+`yaw [deg]`. A sensor's cell may be empty or repeat the last one where there is nothing new; an actuator's
+cells are empty where it was lost. Other columns are passed over.
 """
 
 import math
@@ -20,19 +20,29 @@ from finlab.errors import DataError
 from finlab.files.archive import check_shapes, json_of, read_arrays
 from finlab.fit.columns import MAX_BYTES, read_columns
 from finlab.fit.robot.swim import ANGLES, CHANNELS, STEP_S, Swim, only_new, replay
-from finlab.layout import Layout
+from finlab.layout import Fin, Layout
 from finlab.layout.fin import MAX_AMPLITUDE, MAX_FREQUENCY
 
 SHORTEST_S = 30.0
 """Least duration [s]."""
 LONGEST_GAP_S = 1.0
-"""Longest time [s] between two rows; what the fins did meanwhile is not known."""
-COMMANDS = ("A", "f", "phi")
+"""Longest time [s] between two rows; what the actuators did meanwhile is not known."""
+PARTS = {
+    "fin": ("A", "f", "phi"),
+    "thruster": ("force",),
+    "azimuth": ("angle", "force"),
+    "tilt": ("angle", "force"),
+    "rudder": ("deflection",),
+}
+"""What is commanded of each type of actuator: half amplitude [rad], frequency [Hz] and zero direction [rad];
+force [N]; angle [rad]."""
 UNITS = {
-    **dict.fromkeys(("s", "m", "m/s", "rad", "rad/s", "hz"), 1.0),
+    **dict.fromkeys(("s", "m", "m/s", "rad", "rad/s", "hz", "n"), 1.0),
     **dict.fromkeys(("deg", "degrees", "°", "deg/s", "°/s"), math.radians(1.0)),
 }
 """Units that a header may name, in SI."""
+UNIT_OF = {"A": "half amplitudes in rad", "f": "Hz", "force": "N", "deflection": "rad"}
+"""What is expected of commands that have an end."""
 
 
 def read_swim(path: str | os.PathLike[str], layout: Layout) -> Swim:
@@ -55,7 +65,7 @@ def _log(path: Path, layout: Layout) -> Swim:
     fins = [str(name) for name in said] if isinstance(said, list) else []
     if sorted(fins) != sorted(layout.names):
         raise DataError(
-            f"{path}: is of a robot with the fins {', '.join(fins)}, layout {layout.name} has "
+            f"{path}: is of a robot with the actuators {', '.join(fins)}, layout {layout.name} has "
             f"{', '.join(layout.names)}"
         )
     n = arrays["time"].size
@@ -82,10 +92,10 @@ def _check_duration(seconds: float, path: Path) -> None:
 
 def _csv(path: Path, layout: Layout) -> Swim:
     """A CSV file."""
-    commands = [f"{fin}.{part}" for fin in layout.names for part in COMMANDS]
+    commands = [f"{one.name}.{part}" for one in layout.actuators for part in PARTS[one.type]]
     names = {name: name for name in ("t", *CHANNELS, *commands)}
     pairs = [f"{pose}|{rate}" for pose, rate in zip(CHANNELS[:6], CHANNELS[6:], strict=True)]
-    expected = "t, what was measured, and FIN.A, FIN.f, FIN.phi for each fin"
+    expected = f"t, what was measured, and what was commanded, {', '.join(commands)}"
     read = read_columns(path, names, ("t", *commands, *pairs), expected, UNITS, gaps=True)
     n, places = len(read.places), read.places
     time = read.values["t"]
@@ -97,7 +107,7 @@ def _csv(path: Path, layout: Layout) -> Swim:
             what = f"{said[0]:g} throughout" if len(said) else "empty"
             raise DataError(f"{path}: column {name} is {what}; is the sensor connected? leave the column out")
     measured = np.stack([read.values.get(name, np.full(n, np.nan)) for name in CHANNELS], axis=-1)
-    command = np.stack([read.values[name] for name in commands], axis=-1).reshape(n, -1, 3)
+    command = _rows(np.stack([read.values[name] for name in commands], axis=-1), layout)
     _check_commands(command, places, layout)
     grid = np.arange(time[0], time[-1], STEP_S)
     held = np.searchsorted(time, grid + 1e-6, side="right") - 1
@@ -117,24 +127,42 @@ def _check_time(time: Array, places: Sequence[str]) -> None:
         )
 
 
+def _rows(values: Array, layout: Layout) -> Array:
+    """Commands (n, actuators, 3) of values (n, columns); what an actuator does not have is 0."""
+    command, begin = np.zeros((len(values), layout.n, 3)), 0
+    for i, part in enumerate(layout.actuators):
+        own = values[:, begin : begin + len(PARTS[part.type])]
+        command[:, i, : own.shape[1]] = own
+        command[np.isnan(own).all(axis=1), i] = np.nan
+        begin += own.shape[1]
+    return command
+
+
 def _check_commands(command: Array, places: Sequence[str], layout: Layout) -> None:
-    """A fin is commanded by three numbers that it can do, or by none."""
+    """An actuator is commanded by numbers that it can do, or by none."""
     known = np.isfinite(command)
     half = np.argwhere(known.any(axis=2) & ~known.all(axis=2))
     if len(half):
         k, i = half[0]
+        name, parts = layout.names[i], PARTS[layout.actuators[i].type]
         raise DataError(
-            f"{places[k]}: of {layout.names[i]}.A, .f and .phi some are empty; fill all three, "
-            "or none for a fin that was lost"
+            f"{places[k]}: of {', '.join(f'{name}.{part}' for part in parts)} some are empty; fill all, "
+            "or none for an actuator that was lost"
         )
-    for part, most, hint in ((0, MAX_AMPLITUDE, "half amplitudes in rad"), (1, MAX_FREQUENCY, "Hz")):
-        wrong = np.argwhere((command[..., part] < 0.0) | (command[..., part] > most + 1e-9))
-        if len(wrong):
-            k, i = wrong[0]
-            raise DataError(
-                f"{places[k]}, column {layout.names[i]}.{COMMANDS[part]}, holds "
-                f"{command[k, i, part]:g}, expected {hint} from 0 to {most:.4g}"
-            )
+    for i, one in enumerate(layout.actuators):
+        for part, name in enumerate(PARTS[one.type]):
+            if name not in UNIT_OF:
+                continue
+            low, high = one.lower[part], one.upper[part]
+            if isinstance(one, Fin):
+                low, high = 0.0, (MAX_AMPLITUDE, MAX_FREQUENCY)[part]
+            wrong = (command[:, i, part] < low - 1e-6) | (command[:, i, part] > high + 1e-6)
+            if wrong.any():
+                k = int(np.argmax(wrong))
+                raise DataError(
+                    f"{places[k]}, column {one.name}.{name}, holds {command[k, i, part]:g}, expected "
+                    f"{UNIT_OF[name]} from {low:.4g} to {high:.4g}"
+                )
 
 
 def _on_grid(time: Array, measured: Array, grid: Array) -> Array:

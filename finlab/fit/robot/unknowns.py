@@ -41,11 +41,11 @@ class Block:
     scale: Array
     """How far each may be off: one standard deviation of what is believed before a swim."""
     force: bool
-    """Whether the wrench of the fins depends on them."""
+    """Whether the wrench of the actuators depends on them."""
 
 
 def blocks_of(names: Sequence[str], damping: Array) -> dict[str, Block]:
-    """All unknowns of a robot with fins of these names; linear and quadratic damping may be off by (2, 6)."""
+    """All unknowns of actuators of these names and their robot, whose damping may be off by (2, 6)."""
 
     def block(name: str, labels: Sequence[str], scale: ArrayLike, unit: str, force: bool = True) -> Block:
         return Block(name, tuple(labels), unit, np.broadcast_to(scale, len(labels)).astype(float), force)
@@ -88,7 +88,7 @@ class Unknowns:
         self.labels = tuple(label for block in self.blocks for label in block.labels)
         self.units = tuple(block.unit for block in self.blocks for _ in block.labels)
         self.force = np.array([block.force for block in self.blocks for _ in block.labels])
-        """Whether the wrench of the fins depends on each (size,)."""
+        """Whether the wrench of the actuators depends on each (size,)."""
 
     @cached_property
     def believed(self) -> Array:

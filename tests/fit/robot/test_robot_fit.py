@@ -12,9 +12,10 @@ from finlab.fit.robot.report import summary, table
 from finlab.fit.robot.robot_fit import RobotFit, fit_robot
 from finlab.fit.robot.swim import Swim, only_new, replay
 from finlab.fit.robot.swim_file import read_swim
-from finlab.layout import Fin, FinModelSpec, Layout, load_layout, save_layout
+from finlab.layout import Fin, FinModelSpec, Layout, Thruster, load_layout, save_layout
 from finlab.layout.angles import wrapped
 from finlab.physics import plant_of
+from finlab.sim.excite import excitation
 from tests.any_robot import AnyRobot
 from tests.fit.robot.swims import swim, write_csv
 
@@ -139,3 +140,20 @@ def test_the_command_reads_a_csv_file(
     assert load_layout(tmp_path / "found.json").names == drawn.names
     assert main([*arguments[:-1], f"{tmp_path}/found.txt"]) == 2
     assert not (tmp_path / "found.txt").exists()
+
+
+@pytest.mark.parametrize("name", ["turtle_hybrid", "bluerov2_heavy", "catamaran"])
+def test_strengths_of_any_actuators_are_found_in_a_minute_on_the_spot(name: str, tmp_path: Path) -> None:
+    layout = load_layout(name)
+    loop, shares = excitation(layout, 60.0, seed=3), [(0.9, 0.7)[i % 2] for i in range(layout.n)]
+    for each, share in zip(layout.names, shares, strict=True):
+        loop.fail(each, "torn", share, announced=False)
+    loop.run().save(tmp_path / "log.npz")
+    fit = fit_robot(layout, [read_swim(tmp_path / "log.npz", layout)])
+    for (found, error), share in zip(strengths(fit).values(), shares, strict=True):
+        assert found == pytest.approx(share, abs=max(4.0 * error, 0.02)) and error < 0.05
+    assert fit.doubts() == ()
+    written = write_robot(fit, tmp_path / "fitted.yaml")
+    for part, drawn, share in zip(written.actuators, layout.actuators, shares, strict=True):
+        if isinstance(part, Thruster) and isinstance(drawn, Thruster):
+            assert part.force[1] == pytest.approx(share * drawn.force[1], rel=0.05)

@@ -76,7 +76,7 @@ def test_a_fin_without_commands_was_lost(rows: Rows, pair: Layout, tmp_path: Pat
     for row in rows[200:]:
         row[-3:] = ["", "", ""]
     swim = read(rows, pair, tmp_path)
-    assert (swim.motion[200:, :, 1, 0] == 0.0).all() and (swim.motion[150:199, :, 1, 0] > 0.2).all()
+    assert np.isnan(swim.motion[200:, :, 1]).all() and (swim.motion[150:199, :, 1, 0] > 0.2).all()
 
 
 def _set(rows: Rows, line: int, name: str, value: str) -> None:
@@ -126,7 +126,7 @@ def test_missing_columns_are_named(
         ("t", "", "line 70, column t: nan s after"),
         ("FIN.A", "45", "line 70, column FIN.A, holds 45, expected half amplitudes in rad"),
         ("FIN.f", "-1", "line 70, column FIN.f, holds -1, expected Hz"),
-        ("FIN.phi", "", "line 70: of FIN.A, .f and .phi some are empty"),
+        ("FIN.phi", "", "line 70: of FIN.A, FIN.f, FIN.phi some are empty"),
     ],
 )
 def test_cells_that_cannot_be_are_told_with_line_and_column(
@@ -157,6 +157,6 @@ def test_logs_of_another_robot_are_refused(pair: Layout, tmp_path: Path) -> None
     from finlab.sim.excite import excitation
 
     excitation(pair, 30.0).run().save(tmp_path / "log.npz")
-    with pytest.raises(DataError, match="is of a robot with the fins"):
+    with pytest.raises(DataError, match="is of a robot with the actuators"):
         read_swim(tmp_path / "log.npz", load_layout("A"))
     assert len(read_swim(tmp_path / "log.npz", pair)) == 300
