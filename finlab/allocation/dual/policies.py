@@ -168,9 +168,9 @@ def priority(
         held = basis
         if missed > NEARLY * np.linalg.norm(basis.T @ aim):
             normal = _unanswered(part, found.prices, sets)[:, 0]
-            sets = _kept_at_limits(
-                robot, sets, force, np.abs(part.matrix @ normal) > NEARLY * np.abs(part.matrix @ normal).max()
-            )
+            driven = np.abs(part.matrix @ normal)
+            least = max(float(driven.max()), float(np.abs(part.matrix).max() * np.linalg.norm(normal)))
+            sets = _kept_at_limits(robot, sets, force, driven > NEARLY * least)  # none at an axis without any
             held = _beside(basis, normal)
         aim = np.where(_spanned(held), got, aim)
     return force
