@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional, UseAppendAction, arg
 
-from finlab.cli.json_file import JsonFile, check_json_file, put_json
+from finlab.cli.json_file import check_json_file
 
 if TYPE_CHECKING:
     from finlab.analysis import Improvement
@@ -31,7 +31,6 @@ def optimize(
     wrench: Annotated[UseAppendAction[tuple[Wrench, ...]], arg(metavar="FX FY FZ TX TY TZ")] = (),
     rounds: Annotated[int, arg(metavar="N")] = 40,
     seed: Annotated[int, arg(metavar="N")] = 0,
-    json: JsonFile = None,
 ) -> None:
     """Move actuators within bounds to raise a goal, and write the layout that results.
 
@@ -50,7 +49,6 @@ def optimize(
         wrench: a wrench of the mission for mission_power [N, N m]; may be given several times.
         rounds: most rounds of the search.
         seed: same arguments and seed, same layout.
-        json: file for one JSON object; it is printed in place of the table where no file is named.
     """
     from tqdm import tqdm
 
@@ -60,7 +58,6 @@ def optimize(
     from finlab.errors import FinlabError
     from finlab.layout import save_layout
 
-    check_json_file(json)
     check_json_file(output, "output")
     check_positive(rounds=rounds)
     robot = open_robot(layout)[0]
@@ -91,23 +88,7 @@ def optimize(
             progress=report,
         )
     save_layout(found.layout, output)
-    put_json(improvement_record(found), json, improvement_text(found, output))
-
-
-def improvement_record(found: Improvement) -> dict[str, object]:
-    """The JSON object of `finlab layout optimize --json`."""
-    from finlab.layout import layout_to_dict
-
-    return {
-        "goal": found.goal,
-        "improved": found.improved,
-        "value_before": found.value_before,
-        "value_after": found.value_after,
-        "moved": list(found.moved),
-        "before": found.card_before.to_dict(),
-        "after": found.card_after.to_dict(),
-        "layout": layout_to_dict(found.layout),
-    }
+    print(improvement_text(found, output))
 
 
 def improvement_text(found: Improvement, output: Path) -> str:

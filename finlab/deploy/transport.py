@@ -6,11 +6,12 @@ from queue import Empty, SimpleQueue
 from threading import Thread
 from types import FrameType
 
-from finlab.deploy.request import MAX_LINE
 from finlab.errors import FinlabError
 
 SIGNALS = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
 """What ends the service; SIGHUP does not where it was ignored before, as `nohup` has it."""
+MAX_LINE = 65_536
+"""Longest request that is read [bytes]."""
 PATIENCE = 1.0
 """How long [s] a reader that takes nothing is waited for once the service has to stop."""
 CHUNK = 65_536

@@ -22,18 +22,15 @@ def test_optimize_writes_a_better_layout(tmp_path: Path, capsys: pytest.CaptureF
     assert main(["layout", "check", str(output)]) == 0
 
 
-def test_optimize_as_json_within_reach(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_optimize_within_reach(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     output = tmp_path / "better.json"
     box = ["--reach", "0.03"]
     mission = ["--goal", "mission_power", "--wrench", "1", "0", "0", "0", "0", "0"]
     mission += ["--wrench", "0", "0", "1", "0", "0", "0"]
-    arguments = ["--fins", "front_right", "--rounds", "1", "--seed", "2", "--no-mirror", "--json"]
+    arguments = ["--fins", "front_right", "--rounds", "1", "--seed", "2", "--no-mirror"]
     assert main(["layout", "optimize", "A", *arguments, *box, *mission, "-o", str(output)]) == 0
-    record = json.loads(capsys.readouterr().out)
-    assert record["goal"] == "mission_power"
-    assert record["moved"] == ["front_right"]
-    assert record["value_after"] >= record["value_before"]
-    assert record["before"]["layout"] == "A"
+    told = capsys.readouterr().out
+    assert told.startswith("mission_power: ") and "\nfront_right " in told
     moved = np.subtract(load_layout(output).fins[0].position, load_layout("A").fins[0].position)
     assert np.abs(moved).max() <= 0.03 + 1e-9
 

@@ -15,10 +15,9 @@ import pytest
 from finlab.allocation import Allocator
 from finlab.deploy import serve as serve_module
 from finlab.deploy.bundle import Bundle
-from finlab.deploy.request import MAX_LINE
 from finlab.deploy.robot import DeployedRobot, parse_robot
 from finlab.deploy.serve import RECENT_S, Server
-from finlab.deploy.transport import SIGNALS, StandardStreams, Unsent
+from finlab.deploy.transport import MAX_LINE, SIGNALS, StandardStreams, Unsent
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
 
