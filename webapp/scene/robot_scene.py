@@ -108,7 +108,8 @@ class RobotScene:
         hull = hull_of(layout)
         center, size = np.array(hull.center), 2.6 * float(np.linalg.norm(hull.half))
         if session.selected is not None:
-            center, size = layout.position[layout.index(session.selected)], 0.55 * arrow_size(layout)
+            place_of = layout.position[layout.index(session.selected)]
+            center, size = place_of, 0.55 * min(arrow_size(layout), 2.0 * part_size(layout))
         way = place - target
         self.aim(center + way / max(float(np.linalg.norm(way)), 1e-6) * size, center)
 
@@ -145,7 +146,8 @@ class RobotScene:
         stuck = () if health is None or swims else dict(health.stuck)
         for i, part in enumerate(drawn.actuators):
             told = "" if swims or part.name in failed else damage_words(health, part.name)
-            words = (str(i + 1), _named(part) if part.name in selection else "", told)
+            named = part.name if swims else _named(part)  # one that swims is elsewhere
+            words = (str(i + 1), named if part.name in selection else "", told)
             label = " ".join([word for word in words if word])
             moved, pinned = part.name == edited, part.name in stuck
             self._fins[i].place(part, hull, sizes, moved, label, pinned, i == dragged)
