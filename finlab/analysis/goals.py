@@ -10,13 +10,13 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
+from finlab.allocation import Allocator
+from finlab.allocation.evaluate import REACHED
 from finlab.analysis.authority import AXES, authority
-from finlab.analysis.least_power import MovedActuators, least_power
 from finlab.arrays import Array
 from finlab.errors import LayoutError
 from finlab.forces.extent import weakest
-from finlab.forces.force_sets import SCALE, ForceSets, force_sets
-from finlab.forces.reach import COARSE, FINE, max_wrench_along
+from finlab.forces.force_sets import ForceSets, force_sets
 from finlab.layout import Layout
 
 GoalName = Literal["weakest_direction", "mission_power", "worst_single_failure"]
@@ -80,7 +80,7 @@ def make_goal(
             )
         return _after_worst_failure(of_weakest)
     if name == "mission_power":
-        return _mission_power(layout, _wrenches(mission), fine, flow)
+        return _mission_power(_wrenches(mission), flow)
     raise LayoutError(f"goal: expected one of {', '.join(GOALS)}, got {name!r:.60}")
 
 
@@ -130,32 +130,17 @@ def _after_worst_failure(of_rest: Callable[[ForceSets], Array]) -> Goal:
     return goal
 
 
-def _mission_power(layout: Layout, mission: Array, fine: bool, flow: Array | None) -> Goal:
+def _mission_power(mission: Array, flow: Array | None) -> Goal:
     """Mean least power; a wrench out of reach costs by what is missing."""
-    actuators, tolerance = MovedActuators(layout), FINE if fine else COARSE
 
     def goal(sets: ForceSets, layout_of: Callable[[int], Layout]) -> Array:
-        if flow is None:
-            cost = actuators.least_power(sets, mission)
-        else:
-            moved = [layout_of(row) for row in range(len(sets.radius))]
-            cost = np.stack([least_power(each, mission, flow=flow) for each in moved])
-        robot, wrench = np.nonzero(np.isnan(cost))
-        if len(robot):
-            missing = _missing(sets.take(robot), mission[wrench] / SCALE, tolerance)
-            cost[robot, wrench] = UNREACHED * (1.0 + missing)
+        robots = (Allocator(layout_of(row)) for row in range(len(sets.radius)))
+        answers = [robot.allocate_batch(mission, flow=flow) for robot in robots]
+        power, missing = (np.stack([getattr(a, name) for a in answers]) for name in ("power", "err_norm"))
+        cost = np.where(missing <= REACHED, power, UNREACHED * (1.0 + missing))
         return np.asarray(-cost.mean(axis=1))
 
     return goal
-
-
-def _missing(sets: ForceSets, target: Array, tolerance: float) -> Array:
-    """Share (R,) of scaled wrenches (R, 6) that is out of reach."""
-    size = np.linalg.norm(target, axis=-1)
-    asked = size > 0.0
-    unit = np.where(asked[:, None], target / np.where(asked, size, 1.0)[:, None], np.eye(6)[0])
-    given = (max_wrench_along(sets, unit, tolerance).wrench * unit).sum(-1)
-    return np.where(asked, 1.0 - np.clip(given / np.where(asked, size, 1.0), 0.0, 1.0), 0.0)
 
 
 def _wrenches(mission: ArrayLike) -> Array:

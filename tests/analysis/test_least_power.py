@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from finlab.actuators.fin.blade import Blade
-from finlab.analysis.least_power import MovedActuators, least_power
-from finlab.forces.force_sets import ForceSets, force_sets
+from finlab.analysis.least_power import least_power
 from finlab.layout import FinModelSpec, load_layout
 
 WRENCHES = np.concatenate([np.diag([1, 1, 1, 0.1, 0.1, 0.1]), [[1.2, 0, 0.5, 0, 0, 0.15]]])
@@ -43,18 +42,6 @@ def test_nothing_costs_nothing_even_without_fins() -> None:
 def test_it_grows_faster_than_the_wrench() -> None:
     power = least_power(load_layout("A"), np.outer([0.25, 0.5, 1.0, 2.0], WRENCHES[-1]))
     assert (power[1:] > 2.0 * power[:-1]).all() and (power[1:] < 4.0 * power[:-1]).all()
-
-
-def test_moved_fins_are_the_robot_itself_placed_anew() -> None:
-    layout = load_layout("A")
-    moved = replace(
-        layout, actuators=tuple(replace(f, mounting_angle=f.mounting_angle + 0.2) for f in layout.fins)
-    )
-    pairs = zip(force_sets(layout)[:4], force_sets(moved)[:4], strict=True)
-    both = ForceSets(*(np.concatenate(pair) for pair in pairs))
-    power = MovedActuators(layout).least_power(both, WRENCHES)
-    for row, robot in enumerate((layout, moved)):
-        np.testing.assert_allclose(power[row], least_power(robot, WRENCHES), rtol=1e-5)
 
 
 def test_larger_blades_of_the_same_thrust_take_more_power() -> None:

@@ -105,12 +105,6 @@ class DualRobot:
         """The same robot with only some directions (6, q) of the scaled wrench asked for."""
         return replace(self, basis=basis, matrix=(self.effectiveness / self.scale) @ basis)
 
-    def moved(self, effectiveness: Array) -> "DualRobot":
-        """The same actuators elsewhere: with another effectiveness (k, 6)."""
-        scale, basis = _range(effectiveness, self.largest)
-        matrix = (effectiveness / scale) @ basis
-        return replace(self, effectiveness=effectiveness, scale=scale, basis=basis, matrix=matrix)
-
     def frozen(self, sets: Sets, force: Array, fixed: NDArray[np.bool_]) -> Sets:
         """Sets in which fixed actuators (n, N) give their forces (k, N) [N] and nothing else."""
         lines, planes = self.answers.lines, self.answers.planes
