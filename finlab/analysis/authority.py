@@ -46,14 +46,10 @@ class Authority(HeldAxes):
     """Largest wrench along each axis with the other five at zero (6,) [N, N m]."""
     most_negative: tuple[float, ...]
     """The same along the negative axes, as a size (6,) [N, N m]."""
-    beside_others: tuple[float, ...]
-    """Largest wrench along each axis whatever comes beside it (6,) [N, N m], the smaller of both ways."""
     weakest: float
     """Scaled wrench [N] that is within reach in every direction; 0 below rank 6."""
     weakest_direction: tuple[float, ...]
     """Unit scaled wrench (6,) along which no more than `weakest` can be had."""
-    gap: float
-    """`largest` and `most_negative` are too large by at most this [N, scaled]."""
 
     @property
     def reachable(self) -> tuple[str, ...]:
@@ -120,13 +116,12 @@ def _authorities(
     values, vectors = singular_values(sets)
     held = [held_axes(*pair) for pair in zip(values, vectors, strict=True)]
     axes = np.concatenate([np.eye(6), -np.eye(6)])
-    size, gap = max_wrench_along_exactly(sets, axes)
+    size, _ = max_wrench_along_exactly(sets, axes)
     if sets.corners is not None:
         # The hull of a rudder's lift and drag has drag without lift, which pushes alone what nothing does.
         alone = np.array([[axis in own.alone for axis in AXES] for own in held])
         size = np.where(np.tile(alone, 2), size, 0.0)
     size = np.where(size > NOTHING, size, 0.0)
-    free = sets.repeat(12).farthest(np.tile(axes, (len(failures), 1)))[0].reshape(-1, 2, 6).min(axis=1)
     least = weakest(sets)
     return [
         Authority(
@@ -134,10 +129,8 @@ def _authorities(
             singular_values=_floats(values[k]),
             largest=_floats(size[k, :6] * SCALE),
             most_negative=_floats(size[k, 6:] * SCALE),
-            beside_others=_floats(np.maximum(free[k], 0.0) * SCALE),
             weakest=float(least.size[k]),
             weakest_direction=_floats(least.direction[k]),
-            gap=gap,
         )
         for k in range(len(failures))
     ]

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -19,16 +18,15 @@ from finlab.arrays import Array
 from finlab.errors import LayoutError
 from finlab.forces.extent import singular_values
 from finlab.forces.force_sets import ForceSets, assembled, shapes_of
-from finlab.layout import Fin, Layout
+from finlab.layout import Layout
 from finlab.layout.actuator import Actuator
 from finlab.layout.arrays import moved_effectiveness
+from finlab.layout.directions import MIRROR, replaced, with_axes
 
 MIRROR_TOLERANCE = 1e-3
 """How far [m, rad] two actuators may be from each other's mirror image and still count as a pair."""
 PROBE = 0.1
 """Share of its bounds by which a number is changed to see what it costs."""
-MIRROR = np.array([1.0, -1.0, 1.0])
-"""The plane y = 0 as a mirror."""
 
 
 @dataclass(frozen=True)
@@ -166,24 +164,22 @@ class Moves:
             self.lower, self.upper, self.start = self.lower[kept], self.upper[kept], self.start[kept]
             self._step = self._step[kept]
 
-    def geometry(self, vectors: Array) -> tuple[Array, Array, Array]:
-        """Returns positions (P, n, 3) [m], azimuths (P, n) [rad], see `Bounds`, and own axes (P, n, 3, 3) of
-        vectors (P, D)."""
+    def geometry(self, vectors: Array) -> tuple[Array, Array]:
+        """Returns positions (P, n, 3) [m] and own axes (P, n, 3, 3) of vectors (P, D)."""
         whole = np.tile(self._whole, (len(vectors), 1))
         whole[:, self._free] = self._on_grid(vectors)
         moved = whole.reshape(len(vectors), len(self._lead), 5)
         position = np.tile(self.start_position, (len(vectors), 1, 1))
-        angle = np.tile(self._angle, (len(vectors), 1))
         frames = np.tile(self.layout.frames, (len(vectors), 1, 1, 1))
         for k, (lead, twin) in enumerate(zip(self._lead, self._twin, strict=True)):
             turn = moved[:, k, 3] - self._angle[lead]
             turned = _turned(self.layout.frames[lead, 0], turn, moved[:, k, 4])
-            position[:, lead], angle[:, lead] = moved[:, k, :3], moved[:, k, 3]
+            position[:, lead] = moved[:, k, :3]
             frames[:, lead] = frames[:, lead] @ turned
             if twin >= 0:
-                position[:, twin], angle[:, twin] = moved[:, k, :3] * MIRROR, -moved[:, k, 3]
+                position[:, twin] = moved[:, k, :3] * MIRROR
                 frames[:, twin] = frames[:, twin] @ (turned * MIRROR * MIRROR[:, None])
-        return position, angle, frames
+        return position, frames
 
     def _on_grid(self, vectors: Array) -> Array:
         """Vectors (P, D) whose numbers are multiples of their steps, within bounds."""
@@ -194,7 +190,7 @@ class Moves:
 
     def sets(self, vectors: Array) -> ForceSets:
         """Returns what the actuators can push once moved by vectors (P, D)."""
-        position, _, frames = self.geometry(vectors)
+        position, frames = self.geometry(vectors)
         shapes = [self._shapes] * len(vectors)
         if self._flow is not None:
             shapes = [shapes_of(self.moved(vector), self._flow) for vector in vectors]
@@ -202,18 +198,10 @@ class Moves:
 
     def moved(self, vector: Array) -> Layout:
         """Returns the layout with its actuators moved by a vector (D,)."""
-        position, angle, frames = self.geometry(vector[None])
+        position, frames = self.geometry(vector[None])
         result = self.layout
         for i in self.layout.indices(self.names):
-            part = self.layout.actuators[i]
-            changes: dict[str, Any] = {"position": tuple(round(x, 12) for x in position[0, i].tolist())}
-            if getattr(part, "mounting_angle", None) is not None and frames[0, i, 2, 2] > 1.0 - 1e-12:
-                changes["mounting_angle"] = math.remainder(angle[0, i], math.tau)
-            else:
-                names = ("shaft", "zero") if isinstance(part, Fin) else part.AXES or ("axis",)
-                changes |= zip(names, map(tuple, frames[0, i].tolist()), strict=False)
-                changes |= {"mounting_angle": None} if isinstance(part, Fin) else {}
-            result = result.replace_actuator(part.name, **changes)
+            result = replaced(result, with_axes(self.layout.actuators[i], frames[0, i], position[0, i]))
         return result
 
 

@@ -162,7 +162,7 @@ def _search(
         nonlocal best
         effectiveness = vectors.reshape(len(moves.start), -1).T
         value = measure(moves.sets(effectiveness), lambda row: moves.moved(effectiveness[row]))
-        position, frames = moves.geometry(effectiveness)[::2]
+        position, frames = moves.geometry(effectiveness)
         close = np.maximum(needed - _gaps(position), 0.0).sum(-1) + rule(position, frames)
         fine = value[close <= 0.0]
         best = max(best, float(fine.max())) if len(fine) else best

@@ -21,7 +21,7 @@ def score_card_text(card: ScoreCard) -> str:
         what = "fin" if card.counted.endswith(" fins") and " and " not in card.counted else "actuator"
         lines += ["", f"Share of the largest wrench that is left without one {what} (* the worst to lose):"]
         lines += table(("without", "rank", "weakest [N]", *_axes(), "lost"), rows)
-    lines += ["", f"Largest wrenches are exact to {max(card.authority.gap, 1e-6):.0e} N.", *card.notes]
+    lines += ["", *card.notes] if card.notes else []
     return "\n".join(lines)
 
 
@@ -35,9 +35,7 @@ def _span_lines(card: ScoreCard) -> list[str]:
     if held.without_authority:
         lines.append("Out of reach: " + ", ".join(held.without_authority) + ".")
     if held.coupled:
-        sizes = zip(_axes(), held.beside_others, _UNITS, strict=True)
-        coupled = [f"{axis} up to {size:.3g} {unit}" for axis, size, unit in sizes if axis in held.coupled]
-        lines.append("Only together with other axes: " + ", ".join(coupled) + ".")
+        lines.append("Only together with other axes: " + ", ".join(held.coupled) + ".")
     return lines
 
 

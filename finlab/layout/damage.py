@@ -11,14 +11,16 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Literal, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
-import numpy as np
+from msgspec import Meta
 
 from finlab.errors import AllocationError
+from finlab.files.schema import checked
 from finlab.layout.actuator import Actuator
+from finlab.layout.angles import TURN
 from finlab.layout.azimuth import Azimuth
-from finlab.layout.fin import Fin, Limits
+from finlab.layout.fin import Amplitude, Frequency, Limits
 from finlab.layout.layout import Layout
 from finlab.layout.rudder import Rudder
 from finlab.layout.thruster import Thruster
@@ -26,6 +28,17 @@ from finlab.layout.thruster import Thruster
 Kind = Literal["lost", "weak", "torn", "stuck", "running", "whole"]
 """What may be true of a fin."""
 Command = tuple[float, float, float]
+Share = Annotated[float, Meta(gt=0.0, le=1.0)]
+Angle = Annotated[float, Meta(ge=-1e6, le=1e6)]
+
+FAULTS: Mapping[str, tuple[str, ...]] = {
+    "fin": ("weak", "thrust", "stuck", "running"),
+    "thruster": ("weak",),
+    "azimuth": ("weak", "stuck"),
+    "tilt": ("weak", "stuck"),
+    "rudder": ("thrust",),
+}
+"""Fields of `Health` that the types of actuators may have. All may fail."""
 
 
 class Damage(NamedTuple):
@@ -45,13 +58,21 @@ class Damage(NamedTuple):
         What cannot be used any more counts as lost: a stuck rudder or thruster, whose force is no choice. A
         torn thruster is weak: it gives the force that it is allocated where it is asked for more.
         """
-        types = {part.name: part for part in layout.actuators}
-        turning = {name: at for name, at in stuck.items() if isinstance(types[name], Fin | Azimuth)}
-        weak = {name: share for name, share in torn.items() if isinstance(types[name], Thruster | Azimuth)}
-        thrust = {name: share for name, share in torn.items() if name not in weak}
+        may = {part.name: FAULTS[part.type] for part in layout.actuators}
+        turning = {name: at for name, at in stuck.items() if "stuck" in may[name]}
+        thrust = {name: share for name, share in torn.items() if "thrust" in may[name]}
+        weak = {name: share for name, share in torn.items() if name not in thrust}
         gone = (*lost, *(name for name in stuck if name not in turning))
         partly = torn or turning
         return cls(gone, Health.of(weak=weak, thrust=thrust, stuck=turning) if partly else None)
+
+
+_VALUES: Mapping[str, Any] = {
+    "weak": Share,
+    "stuck": Angle,
+    "running": tuple[Amplitude, Frequency, Angle],
+    "thrust": Share,
+}
 
 
 @dataclass(frozen=True)
@@ -69,15 +90,12 @@ class Health:
     blade does."""
 
     def __post_init__(self) -> None:
-        for name, share in (*self.weak, *self.thrust):
-            if not 0.0 < share <= 1.0:
-                raise AllocationError(
-                    f"health of {name}: expected a share above 0 and up to 1, got {share}; "
-                    "a fin that gives nothing is failed"
-                )
-        for name, angle in self.stuck:
-            if not np.isfinite(angle):
-                raise AllocationError(f"stuck {name}: expected a finite angle in radians, got {angle}")
+        for kind, value in _VALUES.items():
+            known = getattr(self, kind)
+            told = (
+                (name, checked(own, value, AllocationError, f"health: {kind} {name}")) for name, own in known
+            )
+            object.__setattr__(self, kind, tuple(told))
         named = [name for name, _ in (*self.stuck, *self.running)]
         if len(set(named)) < len(named):
             raise AllocationError(f"health: a fin is stuck or running once, got {', '.join(named)}")
@@ -95,18 +113,11 @@ class Health:
         Raises:
             AllocationError: a share out of range, an angle that is no number.
         """
-        try:
-            shares, angles, thrusts = (
-                {k: float(v) for k, v in (d or {}).items()} for d in (weak, stuck, thrust)
-            )
-            kept = {name: (float(a), float(f), float(d)) for name, (a, f, d) in (running or {}).items()}
-        except (TypeError, ValueError, AttributeError) as error:
-            raise AllocationError(
-                "health: expected dictionaries by fin name, of shares, of angles and of commands "
-                f"(amplitude, frequency, zero direction), got weak={weak}, stuck={stuck}, running={running}, "
-                f"thrust={thrust}"
-            ) from error
-        return cls(tuple(shares.items()), tuple(angles.items()), tuple(kept.items()), tuple(thrusts.items()))
+        kinds = (
+            checked(kind or {}, dict[str, Any], AllocationError, "health")
+            for kind in (weak, stuck, running, thrust)
+        )
+        return cls(*(tuple(kind.items()) for kind in kinds))
 
     @classmethod
     def parse(
@@ -140,66 +151,54 @@ class Health:
 
 @lru_cache(maxsize=64)
 def _applied(health: Health, layout: Layout) -> Layout:
-    weak, stuck, running = dict(health.weak), dict(health.stuck), dict(health.running)
-    thrust = dict(health.thrust)
-    layout.indices((*weak, *stuck, *running, *thrust))
-    parts: list[Actuator] = []
-    for part in layout.actuators:
-        name = part.name
-        if not isinstance(part, Fin):
-            if isinstance(part, Rudder) and name in thrust:
-                part = replace(part, area=thrust[name] * part.area)
-            elif name in running or name in thrust:
-                raise AllocationError(
-                    f"health of {name!r}: {part.type}s may be weak or failed, and azimuths stuck; only fins "
-                    "run on, and only fins and rudders lose thrust"
-                )
-            parts.append(_damaged_other(part, weak.get(name), stuck.get(name)))
-            continue
-        fin = part if name not in thrust else replace(part, model=part.model.scaled(thrust[name]))
-        parts.append(_damaged(fin, weak.get(name), stuck.get(name), running.get(name)))
-    return replace(layout, actuators=tuple(parts))
+    faults: dict[str, dict[str, Any]] = {part.name: {} for part in layout.actuators}
+    for kind, known in vars(health).items():
+        for name, value in known:
+            part = layout.actuators[layout.index(name)]
+            if kind not in FAULTS[part.type]:
+                may = ", ".join(FAULTS[part.type])
+                raise AllocationError(f"health of {name!r}: {part.type}s may be {may} or failed, got {kind}")
+            faults[name][kind] = value
+    return replace(layout, actuators=tuple(_damaged(part, **faults[part.name]) for part in layout.actuators))
 
 
-def _damaged_other(
-    part: Thruster | Azimuth | Rudder, share: float | None, angle: float | None
-) -> Thruster | Azimuth | Rudder:
-    """The actuator, no fin, with the limits that are left of it."""
-    if share is not None:
-        if isinstance(part, Rudder):
-            raise AllocationError(f"health of {part.name!r}: a rudder is failed or whole, not weak")
+def _damaged(
+    part: Actuator,
+    weak: float | None = None,
+    stuck: float | None = None,
+    running: Command | None = None,
+    thrust: float | None = None,
+) -> Actuator:
+    """The actuator with the law and the limits that are left of it."""
+    if isinstance(part, Rudder):
+        return part if thrust is None else replace(part, area=thrust * part.area)
+    if isinstance(part, Thruster):
         low, high = part.force
-        least = min(low, share * high) if isinstance(part, Azimuth) else share * low
-        part = replace(part, force=(least, share * high))
-    if angle is not None:
-        if not isinstance(part, Azimuth):
-            raise AllocationError(f"stuck {part.name!r}: only fins and azimuths turn")
-        held = _held(angle, part.arc)
-        part = replace(part, arc=(held, held))
-    return part
-
-
-def _damaged(fin: Fin, share: float | None, angle: float | None, command: Command | None) -> Fin:
-    """The fin with the limits that are left of it."""
-    limits = fin.limits
-    if command is not None:
-        amplitude, frequency, direction = command
-        return replace(fin, limits=Limits(*((value, value) for value in (amplitude, frequency, direction))))
-    if share is not None:
+        return part if weak is None else replace(part, force=(weak * low, weak * high))
+    if isinstance(part, Azimuth):
+        force = part.force if weak is None else _weakened(part.force, weak)
+        return replace(part, force=force, arc=_held(stuck, part.arc))
+    model = part.model if thrust is None else part.model.scaled(thrust)
+    if running is not None:
+        amplitude, frequency, direction = ((value, value) for value in running)
+        return replace(part, model=model, limits=Limits(amplitude, frequency, direction))
+    limits = replace(part.limits, zero_direction=_held(stuck, part.limits.zero_direction))
+    if weak is not None:
         limits = replace(
             limits,
-            amplitude=_weakened(limits.amplitude, share),
-            frequency=_weakened(limits.frequency, share),
+            amplitude=_weakened(limits.amplitude, weak),
+            frequency=_weakened(limits.frequency, weak),
         )
-    if angle is not None:
-        held = _held(angle, limits.zero_direction)
-        limits = replace(limits, zero_direction=(held, held))
-    return fin if limits is fin.limits else replace(fin, limits=limits)
+    return replace(part, model=model, limits=limits)
 
 
-def _held(angle: float, limits: tuple[float, float]) -> float:
-    """The same angle [rad], whole turns off, within limits where there is such a one."""
-    return angle + round((0.5 * sum(limits) - angle) / (2 * np.pi)) * 2 * np.pi
+def _held(angle: float | None, limits: tuple[float, float]) -> tuple[float, float]:
+    """An angle [rad] as both limits, whole turns off, within the limits where there is such a one; the limits
+    themselves where it is None."""
+    if angle is None:
+        return limits
+    held = angle + round((0.5 * sum(limits) - angle) / TURN) * TURN
+    return held, held
 
 
 def _weakened(interval: tuple[float, float], share: float) -> tuple[float, float]:

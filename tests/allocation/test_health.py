@@ -49,7 +49,7 @@ def test_a_torn_fin_gives_its_share_at_every_command(search: AnyRobot, penta: La
 def test_the_thrust_of_a_table_cannot_be_scaled() -> None:
     with pytest.raises(LayoutError, match="cannot be scaled"):
         FinModelSpec("table", (("path", "fin.csv"),)).scaled(0.5)
-    with pytest.raises(AllocationError, match="share above 0"):
+    with pytest.raises(AllocationError, match="health: thrust bow: expected a number of at most 1, got 1.5"):
         Health.of(thrust={"bow": 1.5})
 
 
@@ -112,7 +112,7 @@ def test_the_command_line_tells_what_is_left(capsys: pytest.CaptureFixture[str])
     "wrong", [{"weak": {"bow": "x"}}, {"stuck": {"bow": None}}, {"running": {"bow": (1.0, 2.0)}}, {"weak": 3}]
 )
 def test_health_of_the_wrong_type_is_refused_in_a_sentence(wrong: dict[str, object]) -> None:
-    with pytest.raises(AllocationError, match="health: expected dictionaries by fin name"):
+    with pytest.raises(AllocationError, match="health: .*expected .*, got "):
         Health.of(**wrong)  # type: ignore[arg-type]
 
 

@@ -7,14 +7,13 @@ import pytest
 from finlab.assets import shipped_layouts
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
-from finlab.layout.damage import Health
+from finlab.layout.damage import FAULTS, Health
 from tests.webapp.stand_in import load_stand_in
 from webapp.markup.answer import fin_table
 from webapp.markup.words import damage_words
 from webapp.panels.files_tab import command_line
 from webapp.session import Session
 from webapp.session.search_request import SearchRequest
-from webapp.session.state import FAULTS
 from webapp.session.swim_plan import SwimSettings
 from webapp.session.targets import axis_reach, full_thrust
 from webapp.tasks.solver import Solver

@@ -9,12 +9,12 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.layout import Actuator, Fin, Layout
-from finlab.layout.damage import Health
+from finlab.layout.damage import FAULTS, Health
 from finlab.layout.directions import part_of
 from webapp.handles import numbered
 from webapp.markup.html import button_colors
 from webapp.page import Page
-from webapp.session.state import FAULTS, STRENGTH_RANGE
+from webapp.session.state import STRENGTH_RANGE
 from webapp.theme import DEAD, css, fin_color, ink
 
 Row = tuple[Sequence[str], Sequence[str], Sequence[str]]

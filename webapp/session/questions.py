@@ -9,9 +9,10 @@ from typing import Any
 
 from finlab.allocation.policy import AXES
 from finlab.errors import FinlabError
+from finlab.layout.damage import FAULTS
 from finlab.layout.directions import part_of
 from webapp.session.core import Core
-from webapp.session.state import FAULTS, LEAST, MAX_SPEED, chosen, number
+from webapp.session.state import LEAST, MAX_SPEED, chosen, number
 from webapp.session.targets import PRESETS
 
 FAULT_VERBS = {"weak": "Weaken", "thrust": "Tear", "stuck": "Jam", "running": "Let run"}

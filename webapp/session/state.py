@@ -10,7 +10,7 @@ from finlab.allocation.methods import METHODS, method_class
 from finlab.allocation.policy import AXES, KINDS
 from finlab.errors import FinlabError
 from finlab.layout import Layout
-from finlab.layout.damage import Health
+from finlab.layout.damage import FAULTS, Health
 from finlab.layout.fin import MAX_AMPLITUDE, MAX_FREQUENCY
 from finlab.paper.settings import PaperSettings
 from finlab.physics import plant_of
@@ -26,14 +26,6 @@ MAX_SPEED = 3.0
 """Greatest speed through the water that the page may ask for [m/s]."""
 STRENGTH_RANGE = (0.05, 1.0)
 """Shares that may be left of a weak or torn actuator."""
-FAULTS: dict[str, tuple[str, ...]] = {
-    "fin": ("weak", "thrust", "stuck", "running"),
-    "thruster": ("weak",),
-    "azimuth": ("weak", "stuck"),
-    "tilt": ("weak", "stuck"),
-    "rudder": ("thrust",),
-}
-"""Fields of `Health` that the types of actuators may have. All may fail."""
 COMPARED = ("dual", "analytic", "qp", "mdn", "sqp", "paper")
 """Methods for fins that answer quickly enough to be compared while one waits, the quick ones first."""
 LEAST = {"watts": "dual", "effort": "mdn"}
