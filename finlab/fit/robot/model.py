@@ -10,7 +10,7 @@ from finlab.arrays import Array
 from finlab.fit.robot.swim import STEP_S, Swim
 from finlab.fit.robot.swing import swing_forces
 from finlab.fit.robot.unknowns import SENSORS, Unknowns, blocks_of
-from finlab.layout import Layout, Thruster
+from finlab.layout import Layout, Rudder, Thruster
 from finlab.layout.arrays import moved_effectiveness
 from finlab.physics import plant_of
 from finlab.vehicle.body import complete_body, dynamics_of
@@ -43,6 +43,9 @@ class RobotModel:
         self.motion = np.concatenate([swim.motion for swim in swims])
         self.alone = self._plant.forces(self.motion)
         """What each actuator gives by the layout's law (M, SUBSTEPS, n, 3) [N], in its own frame."""
+        self.steers = np.array([isinstance(part, Rudder) for part in layout.actuators])
+        """Which actuators (n,) are rudders: one that leans meets the water at another angle."""
+        self._by_lean = np.zeros_like(self.alone)
         self.late = [0] * len(SENSORS)
         """Whole steps by which each sensor is late, as far as is known."""
 
@@ -50,6 +53,9 @@ class RobotModel:
         """Takes the robot to move through the water with (M, 6) [m/s, rad/s], which rudders feel."""
         if self._plant.feels_flow:
             self.alone = self._plant.forces(self.motion, flow=flow[:, None])
+            _, slopes = self._plant.force_and_jacobian(np.nan_to_num(self.motion), flow=flow[:, None])
+            works = self.steers[:, None] & np.isfinite(self.motion[..., :1])
+            self._by_lean = np.where(works, slopes[..., 0, :], 0.0)
 
     @cached_property
     def middle(self) -> list[float]:
@@ -81,13 +87,15 @@ class RobotModel:
 
     def wrench(self, unknowns: Unknowns, vector: Array) -> Array:
         """Mean wrench (M, 6) of each step for one vector (size,) of unknowns."""
-        layout, force = self.layout, self.alone
+        layout, lean = self.layout, unknowns.of("lean", vector)
+        force = self.alone + lean[:, None] * self._by_lean if self.steers.any() else self.alone
         share = np.exp(unknowns.of("strength", vector)) * np.ones(force.shape[:-1])
         shape = unknowns.part("shape", vector)
         if shape is not None:
             share *= shape_factor(self._shapes, shape)
         position = layout.position - unknowns.of("center", vector)
-        frames = turned_frames(layout, unknowns.of("mounting", vector), unknowns.of("lean", vector))
+        turned = np.where(self.steers, 0.0, lean)
+        frames = turned_frames(layout, unknowns.of("mounting", vector), turned)
         columns = moved_effectiveness(layout, position, frames)
         mean = (force * share[..., None]).mean(axis=1)
         beat = unknowns.part("beat", vector)

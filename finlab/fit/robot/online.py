@@ -9,7 +9,7 @@ import numpy as np
 from finlab.arrays import Array
 from finlab.errors import FinlabError
 from finlab.fit.robot.learned_actuators import asked_more, learned
-from finlab.fit.robot.robot_fit import fit_robot
+from finlab.fit.robot.robot_fit import SOUND, fit_robot
 from finlab.fit.robot.swim import STEP_S, Swim, followed, motion_of, only_new
 from finlab.layout import Layout
 
@@ -58,6 +58,12 @@ class OnlineFit:
         motion, said, commands = (np.array(part) for part in zip(*self._last, strict=True))
         swim = Swim("the swim", motion, only_new(said), commands)
         fit = fit_robot(self.layout, [swim], (), doubts=DOUBTS)
+        if fit.explained < SOUND:
+            self.notes.append(
+                f"{self._steps * STEP_S:.0f} s: nothing is learned, since simulated swims explain "
+                f"{fit.explained:.0%} of the motion, expected at least {SOUND:.0%}"
+            )
+            return None
         strength, error = np.exp(fit.found("strength")), fit.found_error("strength")
         told = (
             f"{name} {own:.2f} +- {own * unsure:.2f}"

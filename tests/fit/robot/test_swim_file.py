@@ -160,3 +160,18 @@ def test_logs_of_another_robot_are_refused(pair: Layout, tmp_path: Path) -> None
     with pytest.raises(DataError, match="is of a robot with the actuators"):
         read_swim(tmp_path / "log.npz", load_layout("A"))
     assert len(read_swim(tmp_path / "log.npz", pair)) == 300
+
+
+def test_thrusters_and_azimuths_are_commanded_by_force_and_angle(rows: Rows, tmp_path: Path) -> None:
+    layout = load_layout("catamaran")
+    left, right, bow = layout.names
+    parts = [f"{left}.angle [deg]", f"{left}.force [N]", f"{right}.angle", f"{right}.force", f"{bow}.force"]
+    made = [rows[0][:13] + parts] + [row[:13] + ["90", "20", "0", "5", "-3"] for row in rows[1:]]
+    for row in made[200:]:
+        row[-1] = ""
+    swim = read(made, layout, tmp_path)
+    np.testing.assert_allclose(swim.command[100], [[np.pi / 2, 20, 0], [0, 5, 0], [-3, 0, 0]], atol=1e-9)
+    assert np.isnan(swim.motion[200:, :, 2]).all() and np.isfinite(swim.motion[:, :, :2]).all()
+    made[50][-2] = "500"
+    with pytest.raises(DataError, match=f"line 51, column {right}.force, holds 500, expected N from"):
+        read(made, layout, tmp_path)
