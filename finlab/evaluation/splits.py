@@ -126,17 +126,17 @@ def _failure(rng: np.random.Generator, name: str) -> tuple[Layout, tuple[str, ..
 def _near_singular(rng: np.random.Generator, name: str) -> tuple[Layout, tuple[str, ...]]:
     """Half of the layouts have nearly parallel shafts, half have a nearly coincident pair of fins."""
     layout = random_layout(rng, name)
-    first, *others = layout.fins
+    (first, *others), angle = layout.fins, layout.mounting_angle[0]
     if rng.uniform() < 0.5:
         turns = rng.uniform(-NEAR_ANGLE, NEAR_ANGLE, len(others)) / 2
         turns += math.pi * rng.integers(0, 2, len(others))
         fins = [
-            replace(fin, mounting_angle=float(wrapped(first.shaft_azimuth + turn)))
+            replace(fin, mounting_angle=float(wrapped(angle + turn)))
             for fin, turn in zip(others, turns, strict=True)
         ]
     else:
         x, y, z = (np.array(first.position) + rng.uniform(-NEAR_POSITION, NEAR_POSITION, 3)).tolist()
-        turned = float(wrapped(first.shaft_azimuth + rng.uniform(-NEAR_ANGLE, NEAR_ANGLE)))
+        turned = float(wrapped(angle + rng.uniform(-NEAR_ANGLE, NEAR_ANGLE)))
         fins = [replace(others[0], position=(x, y, z), mounting_angle=turned), *others[1:]]
     return replace(layout, actuators=(first, *fins)), ()
 

@@ -7,7 +7,8 @@ time. Whatever YAML calls a number beyond JSON's (0o17, 1_000, 1:30, .inf), a da
 import json
 import math
 import re
-from typing import Any
+from functools import cache
+from typing import Any, ClassVar
 
 from finlab.errors import DataError, FinlabError
 
@@ -18,8 +19,9 @@ MAX_DEPTH = 20
 MAX_DIGITS = 100
 """Most characters of a number."""
 
-_NUMBER = re.compile(r"-?(?:0|[1-9][0-9]*)(\.[0-9]+)?([eE][-+]?[0-9]+)?")
+_NUMBER = re.compile(r"-?(?:0|[1-9][0-9]*)(\.[0-9]+)?([eE][-+]?[0-9]+)?\Z")
 _WORDS = {"": None, "null": None, "true": True, "false": False}
+_WORD = re.compile(r"(?:null|true|false)?\Z")
 _ESCAPED_SURROGATE = re.compile(r"\\u[dD][89a-fA-F]")
 
 
@@ -94,13 +96,11 @@ def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def _document(content: str) -> Any:
-    """The value of the document, built from its events while they are read."""
+    """The value of the document; what it is made of is looked through before anything is built."""
     import yaml
 
-    document: list[Any] = []
-    inside: list[_Collection] = [_Collection(document)]
-    # libyaml's parser is ten times as fast, but PyYAML may have been built without it.
-    for count, event in enumerate(yaml.parse(content, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader))):
+    loader, depth, n_documents = _loader(), 0, 0
+    for count, event in enumerate(yaml.parse(content, Loader=loader)):
         line = event.start_mark.line + 1 if event.start_mark else 0
         if count > MAX_EVENTS:
             raise ValueError(f"line {line}: has more than {MAX_EVENTS} entries, too many to be read")
@@ -110,56 +110,43 @@ def _document(content: str) -> Any:
             )
         if getattr(event, "tag", None):
             raise ValueError(f"line {line}: tags (!) are not allowed; write plain keys and values")
-        if isinstance(event, yaml.ScalarEvent):
-            inside[-1].add(event.value, event.implicit[0], line)
-        elif isinstance(event, yaml.CollectionStartEvent):
-            if len(inside) > MAX_DEPTH:
-                raise ValueError(
-                    f"line {line}: is nested deeper than {MAX_DEPTH} levels, too deep to be read"
-                )
-            values: Any = {} if isinstance(event, yaml.MappingStartEvent) else []
-            inside[-1].put(values, line)
-            inside.append(_Collection(values))
-        elif isinstance(event, yaml.CollectionEndEvent):
-            inside.pop()
-        elif isinstance(event, yaml.DocumentStartEvent) and document:
+        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+        if depth > MAX_DEPTH:
+            raise ValueError(f"line {line}: is nested deeper than {MAX_DEPTH} levels, too deep to be read")
+        n_documents += isinstance(event, yaml.DocumentStartEvent)
+        if n_documents > 1:
             raise ValueError(f"is not valid YAML: line {line}: a second document begins, expected one")
-    return document[0] if document else None
+    return yaml.load(content, Loader=loader)  # noqa: S506  # a safe loader
 
 
-class _Collection:
-    """A list or a mapping whose end has not been read."""
+@cache
+def _loader() -> Any:
+    """PyYAML's safe loader with the numbers and words of JSON alone, each key of a mapping once."""
+    import yaml
 
-    def __init__(self, values: Any) -> None:
-        self.values = values
-        self.key: str | None = None
+    # libyaml's parser is ten times as fast, but PyYAML may have been built without it.
+    class Loader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[misc]
+        yaml_implicit_resolvers: ClassVar[dict[str, Any]] = {}
 
-    def add(self, text: str, plain: bool, line: int) -> None:
-        """Take a key, or a value."""
-        if isinstance(self.values, list) or self.key is not None:
-            self.put(_scalar(text, line) if plain else text, line)
-        elif text in self.values:
-            raise ValueError(f"line {line}: key {text!r:.60} is given twice")
-        else:
-            self.key = text
+        def construct_mapping(self, node: Any, deep: bool = False) -> dict[str, Any]:
+            values: dict[str, Any] = {}
+            for key, value in node.value:
+                line = key.start_mark.line + 1
+                if not isinstance(key, yaml.ScalarNode):
+                    raise ValueError(f"line {line}: a key must be plain text")
+                if key.value in values:
+                    raise ValueError(f"line {line}: key {key.value!r:.60} is given twice")
+                values[key.value] = self.construct_object(value, deep=True)
+            return values
 
-    def put(self, value: Any, line: int) -> None:
-        """Take a value."""
-        if isinstance(self.values, list):
-            self.values.append(value)
-        elif self.key is None:
-            raise ValueError(f"line {line}: a key must be plain text")
-        else:
-            self.values[self.key], self.key = value, None
+        def construct_number(self, node: Any) -> int | float:
+            try:
+                return _number(node.value)
+            except ValueError as problem:
+                raise ValueError(f"line {node.start_mark.line + 1}: {problem}") from None
 
-
-def _scalar(text: str, line: int) -> Any:
-    """The value of text without quotes."""
-    if text in _WORDS:
-        return _WORDS[text]
-    if text[0] in "-0123456789" and _NUMBER.fullmatch(text):
-        try:
-            return _number(text)
-        except ValueError as problem:
-            raise ValueError(f"line {line}: {problem}") from None
-    return text
+    Loader.add_implicit_resolver("!number", _NUMBER, None)
+    Loader.add_constructor("!number", Loader.construct_number)
+    Loader.add_implicit_resolver("!word", _WORD, None)
+    Loader.add_constructor("!word", lambda _, node: _WORDS[node.value])
+    return Loader

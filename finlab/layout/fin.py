@@ -265,20 +265,7 @@ class Fin(Checked):
     def frame(self) -> tuple[Vector, Vector, Vector]:
         """The fin's own axes in the body frame: shaft, zero, shaft x zero."""
         if self.shaft is None or self.zero is None:
-            c, s = math.cos(self.shaft_azimuth), math.sin(self.shaft_azimuth)
+            angle = self.mounting_angle or 0.0
+            c, s = math.cos(angle), math.sin(angle)
             return (c, s, 0.0), (-s, c, 0.0), (0.0, 0.0, 1.0)
         return self.shaft, self.zero, cross(self.shaft, self.zero)
-
-    @property
-    def shaft_azimuth(self) -> float:
-        """The mounting angle [rad], for what works with horizontal shafts only.
-
-        Raises:
-            LayoutError: the shaft is not horizontal, or thrust at zero direction 0 is not.
-        """
-        if self.mounting_angle is None:
-            raise LayoutError(
-                f"fin {self.name!r} has a shaft of its own direction, and what was asked works for fins with "
-                "mounting_angle_deg only; use `finlab allocate` with method dual, which takes any shaft"
-            )
-        return self.mounting_angle

@@ -135,50 +135,31 @@ def _read_rows(content: bytes, source: str) -> tuple[Array, Array, NDArray[np.in
 
 
 def _check_units(rows: Array, source: str) -> None:
-    """Refuse what no fin can do, with a guess at what was meant."""
-    amplitude, frequency, direction = rows[:, 0], rows[:, 1], rows[:, 2]
-    for name, values, unit in ((COLUMNS[0], amplitude, "rad"), (COLUMNS[1], frequency, "Hz")):
-        if values.min() < 0.0:
-            raise DataError(f"{source}: column {name} has {values.min():.4g}, expected {unit} from 0")
-    most = amplitude.max()
-    if most > MAX_AMPLITUDE + 1e-9:
-        doubled = most <= 2 * MAX_AMPLITUDE + 1e-9
-        hint = "peak-to-peak angles; halve them" if doubled else "degrees; write radians"
-        raise DataError(
-            f"{source}: column A goes up to {most:.4g}, expected half amplitudes in rad up to "
-            f"{MAX_AMPLITUDE:.4g}; these look like {hint}"
-        )
-    if frequency.max() > MAX_FREQUENCY:
-        raise DataError(
-            f"{source}: column f goes up to {frequency.max():.4g}, expected Hz up to {MAX_FREQUENCY:g}; "
-            "these look like beats per minute (rev/min); divide them by 60"
-        )
-    span = np.ptp(direction)
-    if span > TURN + FILE_TURN_TOLERANCE:
-        hint = "; these look like degrees; write radians" if span > 2 * TURN else ""
-        raise DataError(
-            f"{source}: the zero directions phi span {span:.4g} rad, expected at most one turn (6.283){hint}"
-        )
-    largest, thrust = np.abs(rows[:, 3:]).max(), np.abs(rows[:, 4:6]).max()
-    if largest > MOST or 0.0 < thrust < LEAST:
-        raise DataError(
-            f"{source}: thrust goes up to {thrust:.3g}, the largest value is {largest:.3g}, expected "
-            f"{LEAST:g} to {MOST:g} N and W"
-        )
-    if not rows[:, 4:6].any():
-        raise DataError(f"{source}: the thrust is 0 everywhere, Fy as well as Fz; such a fin drives nothing")
+    """Refuse what no fin can do."""
+    limits = {
+        "A": (MAX_AMPLITUDE + 1e-9, "half amplitudes in rad (not peak to peak)"),
+        "f": (MAX_FREQUENCY, "frequencies in Hz (not beats per minute)"),
+    }
     if rows.shape[1] > len(COLUMNS):
-        _check_power(rows[:, len(COLUMNS)], source)
-
-
-def _check_power(power: Array, source: str) -> None:
-    """Refuse powers (rows,) [W] that no fin takes."""
-    if power.min() < 0.0:
-        raise DataError(
-            f"{source}: column P has {power.min():.4g}, expected the mean power in W that drives it, from 0"
-        )
-    if not power.any():
+        limits[POWER_COLUMN] = (MOST, "the mean power in W that drives it")
+    for name, (most, unit) in limits.items():
+        values = rows[:, (*COLUMNS, POWER_COLUMN).index(name)]
+        for end in (values.max(), values.min()):
+            if not 0.0 <= end <= most:
+                raise DataError(f"{source}: column {name} has {end:.4g}, expected {unit}, 0 to {most:.4g}")
+    if rows.shape[1] > len(COLUMNS) and not rows[:, len(COLUMNS)].any():
         raise DataError(f"{source}: column P is 0 everywhere; leave it out where the power is not known")
+    span = np.ptp(rows[:, 2])
+    if span > TURN + FILE_TURN_TOLERANCE:
+        raise DataError(
+            f"{source}: the zero directions phi span {span:.4g} rad, expected at most one turn (6.283)"
+        )
+    largest, thrust = np.abs(rows[:, 3:6]).max(), np.abs(rows[:, 4:6]).max()
+    if largest > MOST or thrust < LEAST:
+        raise DataError(
+            f"{source}: thrust goes up to {thrust:.3g}, the largest force is {largest:.3g}, expected "
+            f"{LEAST:g} to {MOST:g} N"
+        )
 
 
 def _grid(rows: Array, lines: NDArray[np.intp], source: str) -> tuple[list[Array], Array]:

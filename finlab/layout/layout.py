@@ -119,7 +119,7 @@ class Layout(Checked):
             LayoutError: an actuator is no fin, or its shaft is not horizontal.
         """
         self.only_fins("what asks for mounting angles", horizontal=True)
-        return _read_only([fin.shaft_azimuth for fin in self.fins])
+        return _read_only([fin.mounting_angle or 0.0 for fin in self.fins])
 
     @cached_property
     def lower(self) -> Array:

@@ -93,7 +93,7 @@ def test_turning_the_robot_changes_nothing(layout: Layout) -> None:
         replace(
             fin,
             position=tuple((rotation @ fin.position).tolist()),
-            mounting_angle=float(np.angle(np.exp(1j * (fin.shaft_azimuth + yaw)))),
+            mounting_angle=float(np.angle(np.exp(1j * ((fin.mounting_angle or 0.0) + yaw)))),
         )
         for fin in layout.fins
     )
