@@ -3,6 +3,7 @@
 You will see what the fit is worth, and what an allocation for the drawn robot and for the fitted one gives.
 """
 
+import math
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -11,6 +12,7 @@ from finlab.fit.robot.fitted_layout import write_robot
 from finlab.fit.robot.report import summary
 from finlab.fit.robot.robot_fit import fit_robot
 from finlab.fit.robot.swim_file import read_swim
+from finlab.sim import perturbed
 from finlab.sim.excite import excitation
 
 TARGET = [1.0, 0.0, 0.5, 0.0, 0.0, 0.1]
@@ -18,10 +20,11 @@ TARGET = [1.0, 0.0, 0.5, 0.0, 0.0, 0.1]
 
 def main() -> None:
     drawn = finlab.load_layout("A")
+    built = perturbed(drawn, askew=math.radians(5.0), center=(-0.016, 0.012, 0.0))
     with TemporaryDirectory() as folder:
         log, path = Path(folder) / "log.npz", Path(folder) / "mine.yaml"
         # A real robot writes a CSV file instead; 10_swim_from_rosbag.py makes one of a rosbag.
-        excitation(drawn, 60.0, plant="offset").run().save(log)
+        excitation(drawn, 60.0, truth=built).run().save(log)
         fit = fit_robot(drawn, [read_swim(log, drawn)], tried=())
         print("\n".join(summary(fit)))
         fitted = write_robot(fit, path)

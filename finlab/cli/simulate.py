@@ -30,7 +30,7 @@ def simulate(
     learn: bool = False,
     method: Annotated[str, arg(metavar="NAME")] = "dual",
     duration: Annotated[float | None, arg(metavar="SECONDS")] = None,
-    plant: Annotated[str, arg(metavar="NAME")] = "mean",
+    truth: Annotated[str | None, arg(metavar="LAYOUT")] = None,
     current: Annotated[tuple[float, float, float], arg(metavar="VX VY VZ")] = (0.0, 0.0, 0.0),
     noise: bool = True,
     seed: Annotated[int, arg(metavar="N")] = 0,
@@ -56,8 +56,8 @@ def simulate(
             and allocate with them from then on; for methods that take any shaft, and fins of a law.
         method: dual, mdn, paper, qp, sqp, px4, ardusub, analytic or ipopt.
         duration: time for a shipped trajectory.
-        plant: what the fins really do: mean (the fin law), ripple (within the flapping cycle) or offset
-            (centre of gravity and fins not where the layout says).
+        truth: the robot that really swims, a layout with the same actuators; the one that is believed by
+            default.
         current: velocity of the water in the world [m/s].
         noise: whether the sensors are noisy.
         seed: of the noise.
@@ -73,6 +73,7 @@ def simulate(
 
         sensors = None if noise else NO_NOISE
         robot, lost = open_robot(layout)
+        true = None if truth is None else open_robot(truth)[0]
         faults = [*(FinFault(name, 0.0) for name in lost), *map(FinFault.parse, fail)]
         if excite:
             if fail or monitor or learn:
@@ -84,7 +85,7 @@ def simulate(
 
             learner = None
             whole, seconds = robot.without(lost), LONGEST_S if duration is None else duration
-            loop = excitation(whole, seconds, plant=plant, sensors=sensors, current=current, seed=seed)
+            loop = excitation(whole, seconds, truth=true, sensors=sensors, current=current, seed=seed)
         else:
             from finlab.control import FaultMonitor
             from finlab.evaluation.method_specs import load_method_spec
@@ -96,7 +97,7 @@ def simulate(
                 robot,
                 allocator,
                 make_trajectory(trajectory, duration, scale),
-                plant=plant,
+                truth=true,
                 sensors=sensors,
                 current=current,
                 failures=faults,
@@ -133,7 +134,7 @@ def summary(log: RunLog) -> str:
     row = follow_row(log)
     lost = [name for name, works in zip(log.fins, log.alive[-1], strict=True) if not works]
     lines = [
-        f"{log.layout} along {log.task} by {log.method}, plant {log.plant}, {log.time[-1]:.0f} s"
+        f"{log.layout} along {log.task} by {log.method}, {log.time[-1]:.0f} s"
         + (f", lost: {', '.join(lost)}" if lost else ""),
         f"ATE {row['ate']:.4f} m   RTE over {RTE_DELTA_S:g} s {row['rte']:.4f} m   "
         f"depth RMSE {row['depth_rmse']:.4f} m   farthest {row['max']:.3f} m",
@@ -157,7 +158,7 @@ def excitation_summary(log: RunLog) -> str:
     away = np.abs(log.position - log.position[0]).max(axis=0)
     tilt = np.degrees(np.abs(euler(log.quaternion)[:, :2]).max())
     return (
-        f"{log.layout} shaken on the spot, plant {log.plant}, {log.time[-1]:.0f} s: at most "
+        f"{log.layout} shaken on the spot, {log.time[-1]:.0f} s: at most "
         f"{np.hypot(away[0], away[1]):.2f} m away, {away[2]:.2f} m up or down, {tilt:.0f} deg of roll or "
         f"pitch, {np.abs(log.motion[:, :3]).max():.2f} m/s"
     )

@@ -8,7 +8,6 @@ World: z up. Body: x forward, y left, z up. SI and radians.
 
 from finlab.sim.closed_loop import ClosedLoop as ClosedLoop
 from finlab.sim.fin_fault import FinFault as FinFault
-from finlab.sim.fin_force import PLANTS as PLANTS
 from finlab.sim.log import RunLog as RunLog
 from finlab.sim.log import Tick as Tick
 from finlab.sim.log import load_log as load_log

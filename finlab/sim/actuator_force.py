@@ -1,5 +1,4 @@
-"""Forces of all actuators of a robot that swims: fins by a plant of `fin_force.py`, others by their own law
-in the water that meets them just now."""
+"""Forces of all actuators of a robot that swims, by their own laws, in the water that meets them just now."""
 
 from dataclasses import replace
 from typing import NamedTuple
@@ -7,16 +6,15 @@ from typing import NamedTuple
 import numpy as np
 
 from finlab.arrays import Array
-from finlab.errors import FinlabError
 from finlab.layout import Layout
+from finlab.layout.angles import wrapped
 from finlab.layout.arrays import own_effectiveness
 from finlab.physics import plant_of
-from finlab.sim.fin_force import make_plant
 from finlab.vehicle.actuator_motion import ActuatorMotion
 from finlab.vehicle.fin_motion import FinMotion, fin_power
 
 STEP_S = 0.02
-"""Longest step of a robot without fins [s]."""
+"""Longest step that resolves the forces [s]."""
 
 
 class Push(NamedTuple):
@@ -31,27 +29,16 @@ class Push(NamedTuple):
 class ActuatorForce:
     """The actuators of one layout, the true one."""
 
-    def __init__(self, plant: str, layout: Layout, fins: FinMotion) -> None:
-        """Takes the fins' plant, the true robot and how its fins move.
+    step_s = STEP_S
 
-        Raises:
-            FinlabError: there is no such plant, or one that is about fins, of which the robot has none.
-        """
+    def __init__(self, layout: Layout, fins: FinMotion) -> None:
+        """Takes the true robot and how its fins move."""
         self.motion, self._beat = ActuatorMotion(layout, fins), fins
         of_fins, of_others = self.motion.of_fins, self.motion.of_others
         self.effectiveness = own_effectiveness(layout)
         """Wrench (n, 3, 6) of 1 N along each own axis, about the true centre of gravity."""
-        self.step_s = STEP_S
-        """Longest step that resolves the forces [s]."""
         if len(of_fins):
-            robot = replace(layout, actuators=layout.fins)
-            self._fins = make_plant(plant, robot)
-            self._blade, self.step_s = plant_of(robot).blade, self._fins.step_s
-            self.effectiveness[of_fins] = self._fins.effectiveness
-        elif plant != "mean":
-            raise FinlabError(
-                f"plant {plant!r:.60} is about fins, and layout {layout.name} has none; use 'mean'"
-            )
+            self._fins = plant_of(replace(layout, actuators=layout.fins))
         if len(of_others):
             others = tuple(layout.actuators[i] for i in of_others)
             self._others = plant_of(replace(layout, actuators=others))
@@ -70,8 +57,8 @@ class ActuatorForce:
         fins, fin_watts = np.zeros((0, 3)), np.zeros((3, 0))
         others, watts = np.zeros((0, 3)), np.zeros((3, 0))
         if len(motion.of_fins):
-            fins = self._fins.step(self._beat, dt) * share[motion.of_fins, None]
-            fin_watts = np.array(fin_power(*self._beat.speed_and_acceleration(), self._blade))
+            fins = self.of_fins(dt) * share[motion.of_fins, None]
+            fin_watts = np.array(fin_power(*self._beat.speed_and_acceleration(), self._fins.blade))
         if len(motion.of_others):
             mean = 0.5 * (motion.others.before + motion.others.value)
             works = share[motion.of_others] * motion.pushes[motion.of_others]
@@ -79,3 +66,12 @@ class ActuatorForce:
             spent = self._others.power(mean, flow=water) * motion.pushes[motion.of_others]
             watts = np.array([0.0 * spent, spent, spent])
         return Push(motion.joined(fins, others), motion.joined(fin_watts.T, watts.T).T)
+
+    def of_fins(self, dt: float) -> Array:
+        """Force (n, 3) of each fin in its own frame [N], the mean over the step `dt` [s] that has just been
+        taken."""
+        command = self._beat.mean_command
+        command[:, 2] = wrapped(command[:, 2])
+        # One that does not beat gives nothing, whatever its law.
+        beats = (command[:, 0] > 0.0) & (command[:, 1] > 0.0)
+        return self._fins.force(command) * beats[:, None]

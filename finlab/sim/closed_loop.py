@@ -61,7 +61,6 @@ class ClosedLoop:
         task: Trajectory,
         controller: Controller | None = None,
         *,
-        plant: str = "mean",
         policy: Policy | str | None = None,
         sensors: SensorSettings | None = None,
         current: Sequence[float] = (0.0, 0.0, 0.0),
@@ -79,7 +78,6 @@ class ClosedLoop:
             allocator: of the layout, by any method.
             task: the path, such as `make_trajectory` gives.
             controller: by default the tracking controller of the layout.
-            plant: what the fins really do; see `PLANTS`. Other actuators act by their own law.
             policy: what the allocator does with a wrench that is out of reach; by default its own
                 `policy_under_way`, of robots with rudders `closest`.
             sensors: rates and noise; the defaults of `SensorSettings`.
@@ -94,7 +92,7 @@ class ClosedLoop:
             seed: of the sensors' noise and of the allocator.
 
         Raises:
-            FinlabError: an allocator of another robot, an unknown actuator, plant or kind of failure, a time
+            FinlabError: an allocator of another robot, an unknown actuator or kind of failure, a time
                 that is none, or a truth that has other actuators.
         """
         if allocator.layout != layout:
@@ -109,7 +107,6 @@ class ClosedLoop:
         self.task = task
         self.controller = controller = TrackingController(layout) if controller is None else controller
         self._foresighted = controller if isinstance(controller, Foresighted) else None
-        self.plant = plant
         # Rudders that the flow leaves weak must not stop the propeller.
         steered = any(isinstance(part, Rudder) for part in layout.actuators)
         under_way = "closest" if steered else allocator.policy_under_way
@@ -120,7 +117,7 @@ class ClosedLoop:
         """The body that really swims, and the current; it may be replaced on the way."""
         self.fins = FinMotion(truth)
         """The fins' motion: amplitude, frequency, zero direction and phase of each."""
-        self._forces = ActuatorForce(plant, truth, self.fins)
+        self._forces = ActuatorForce(truth, self.fins)
         self.motion = self._forces.motion
         """The motion of all actuators."""
         self._plant = plant_of(layout)
@@ -173,7 +170,6 @@ class ClosedLoop:
             method=self.allocator.method,
             controller=self.controller.name,
             task=self.task.name,
-            plant=self.plant,
             water="current" if any(self.vehicle.current) else "still",
             seed=self.seed,
         )

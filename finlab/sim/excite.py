@@ -228,7 +228,7 @@ def excitation(
     layout: Layout,
     duration_s: float = LONGEST_S,
     *,
-    plant: str = "mean",
+    truth: Layout | None = None,
     sensors: SensorSettings | None = None,
     current: Sequence[float] = (0.0, 0.0, 0.0),
     seed: int = 0,
@@ -238,7 +238,7 @@ def excitation(
     Args:
         layout: the robot.
         duration_s: how long [s].
-        plant: what the fins really do; see `PLANTS`.
+        truth: the robot that really swims, where it is not as drawn.
         sensors: rates and noise; the defaults of `SensorSettings`.
         current: velocity (3,) of the water in the world [m/s].
         seed: of the excitation and of the sensors' noise.
@@ -259,7 +259,7 @@ def excitation(
         Allocator(layout, Exciting, seed=seed),
         station(duration_s, DEPTH_M, "excitation"),
         ExcitingController(layout, seed),
-        plant=plant,
+        truth=truth,
         sensors=sensors,
         current=current,
         seed=seed,

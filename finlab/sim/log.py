@@ -99,7 +99,6 @@ class RunLog:
     method: str
     controller: str
     task: str
-    plant: str
     water: str
     seed: int
     """Seed of the sensors' noise."""

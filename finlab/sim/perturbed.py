@@ -9,11 +9,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Annotated
 
+import numpy as np
 from msgspec import Meta
 
 from finlab.errors import LayoutError
 from finlab.files.schema import checked
 from finlab.layout import Body, Layout
+from finlab.layout.directions import rotation, with_axes
 from finlab.vehicle.body import complete_body
 from finlab.vehicle.vehicle import Vehicle
 
@@ -27,6 +29,8 @@ def perturbed(
     added_mass: float = 1.0,
     inertia: float = 1.0,
     buoyancy: float = 1.0,
+    askew: float = 0.0,
+    center: Sequence[float] = (0.0, 0.0, 0.0),
 ) -> Layout:
     """A layout's robot with some numbers changed; what its body does not say is U-CAT's, as in any swim.
 
@@ -36,6 +40,9 @@ def perturbed(
         added_mass: factor of the added mass.
         inertia: factor of the moments of inertia; the mass stays, and with it the weight.
         buoyancy: factor of the buoyant force; 1.01 is a robot that rises.
+        askew: how far actuators are turned about the vertical [rad], one this way and the next that way.
+        center: the true centre of gravity as the layout's frame sees it (3,) [m]; the robot is ballasted to
+            lie level all the same, so its centre of buoyancy is where the layout says, seen from there.
 
     Raises:
         LayoutError: a factor is not above 0.
@@ -52,7 +59,12 @@ def perturbed(
         inertia_kgm2=_scaled(body.inertia_kgm2, inertia),
         buoyancy_n=buoyancy * _lift(body),
     )
-    return replace(layout, body=changed)
+    parts = []
+    for k, part in enumerate(layout.actuators):
+        turn = rotation((0.0, 0.0, 1.0), askew * (-1.0) ** k)
+        parts.append(with_axes(part, np.array(part.frame) @ turn.T, np.subtract(part.position, center)))
+    moved = askew != 0.0 or any(center)
+    return replace(layout, body=changed, actuators=tuple(parts) if moved else layout.actuators)
 
 
 def checked_truth(layout: Layout, truth: Layout) -> Layout:

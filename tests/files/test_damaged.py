@@ -136,7 +136,7 @@ def swim_log(path: Path) -> Path:
         return rng.random((2, 3)) if name in triples else rng.random(2)
 
     ticks = [Tick(**{name: value(name, k) for name in Tick._fields}) for k in range(320)]  # type: ignore[arg-type]
-    about = dict.fromkeys(("method", "controller", "task", "plant", "water"), "x")
+    about = dict.fromkeys(("method", "controller", "task", "water"), "x")
     log_of_ticks(ticks, layout="pair", fins=PAIR.names, seed=0, **about).save(path)
     return path
 

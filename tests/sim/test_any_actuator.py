@@ -7,7 +7,6 @@ import pytest
 
 from finlab import Allocator, load_layout
 from finlab.control import FaultMonitor
-from finlab.errors import FinlabError
 from finlab.evaluation.experiments.hard_days import OTHER_HEAVY
 from finlab.layout import Layout
 from finlab.sim import NO_NOISE, ClosedLoop, FinFault, RunLog, make_trajectory, straight
@@ -90,8 +89,3 @@ def test_a_rudder_that_is_torn_or_stuck_is_told_to_the_allocator() -> None:
     assert health.applied_to(torpedo).actuators[1].area == pytest.approx(0.5 * torpedo.actuators[1].area)
     loop.fail("elevator_left", "stuck")
     assert loop.damage.failed == ("elevator_left",)
-
-
-def test_plants_of_fins_are_refused_where_there_are_none(heavy: Layout) -> None:
-    with pytest.raises(FinlabError, match="plant 'offset' is about fins"):
-        ClosedLoop(heavy, Allocator(heavy), make_trajectory("circle"), plant="offset")

@@ -9,6 +9,7 @@ import pytest
 
 from finlab.control import FaultMonitor, TrackingController
 from finlab.errors import DataError, FinlabError, LayoutError
+from finlab.evaluation.experiments.hard_days import BUILT_OFF
 from finlab.layout import Layout
 from finlab.sim import (
     NO_NOISE,
@@ -18,11 +19,13 @@ from finlab.sim import (
     Tick,
     load_log,
     make_trajectory,
+    perturbed,
     straight,
 )
 from finlab.sim.log import log_of_ticks
 from finlab.vehicle.body import ucat_body
 from tests.any_robot import AnyRobot
+from tests.ripple import rippled
 
 
 def swum(swim: ClosedLoop, seconds: float) -> RunLog:
@@ -32,11 +35,11 @@ def swum(swim: ClosedLoop, seconds: float) -> RunLog:
     return swim.log
 
 
-@pytest.mark.parametrize("plant", ["mean", "ripple", "offset"])
-def test_it_follows_a_circle_on_every_plant(layout_a: Layout, analytic: AnyRobot, plant: str) -> None:
-    log = swum(
-        ClosedLoop(layout_a, analytic.on(layout_a), make_trajectory("circle"), plant=plant, seed=7), 20.0
-    )
+@pytest.mark.parametrize("truth", ["drawn", "ripple", "askew"])
+def test_it_follows_a_circle_whatever_its_fins_do(layout_a: Layout, analytic: AnyRobot, truth: str) -> None:
+    built = perturbed(layout_a, **BUILT_OFF) if truth == "askew" else None
+    loop = ClosedLoop(layout_a, analytic.on(layout_a), make_trajectory("circle"), truth=built, seed=7)
+    log = swum(rippled(loop) if truth == "ripple" else loop, 20.0)
     error = np.linalg.norm(log.position - log.reference, axis=1)
     assert error.max() < 0.25
     assert np.sqrt((error**2).mean()) < 0.1
@@ -86,8 +89,6 @@ def test_bad_swims_are_refused(layout_a: Layout, analytic: AnyRobot) -> None:
         ClosedLoop(layout_a, analytic.on(layout_a), task, failures=[("tail", 1.0)])
     with pytest.raises(FinlabError, match="0 s or more"):
         ClosedLoop(layout_a, analytic.on(layout_a), task, failures=[("front_left", -1.0)])
-    with pytest.raises(FinlabError, match="expected one of mean, ripple, offset"):
-        ClosedLoop(layout_a, analytic.on(layout_a), task, plant="water")
 
 
 def test_logs_survive_the_disk(layout_a: Layout, analytic: AnyRobot, tmp_path: Path) -> None:
@@ -109,7 +110,7 @@ def log_of_ticks_like(log: object, ticks: list[Tick]) -> object:
     """The same log made anew from its ticks."""
     about = {
         name: getattr(log, name)
-        for name in ("layout", "fins", "method", "controller", "task", "plant", "water")
+        for name in ("layout", "fins", "method", "controller", "task", "water")
     }
     return log_of_ticks(ticks, seed=log.seed, **about)  # type: ignore[attr-defined]
 

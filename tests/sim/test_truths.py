@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from finlab.evaluation.experiments.hard_days import BUILT_OFF
 from finlab.layout import Layout, load_layout
-from finlab.sim import ClosedLoop, make_trajectory
-from finlab.sim.fin_force import MeanForce, OffsetForce
+from finlab.layout.arrays import own_effectiveness
+from finlab.sim import ClosedLoop, make_trajectory, perturbed
 from finlab.vehicle.attitude import euler
-from finlab.vehicle.fin_motion import FinMotion
 from tests.any_robot import AnyRobot
 
 
@@ -16,28 +16,21 @@ def robot() -> Layout:
     return load_layout("A")
 
 
-def beating(layout: Layout, direction: float, amplitude: float = 0.5, frequency: float = 1.0) -> FinMotion:
-    motion = FinMotion(layout)
-    motion.amplitude[:], motion.frequency[:], motion.direction[:] = amplitude, frequency, direction
-    return motion
-
-
 def test_a_robot_built_askew_feels_its_fins_elsewhere(robot: Layout) -> None:
-    true, drawn = OffsetForce(robot), MeanForce(robot)
-    motion = beating(robot, 0.7)
-    np.testing.assert_array_equal(true.step(motion, 0.02), drawn.step(motion, 0.02))
-    turn = np.einsum("nw,nw->n", true.effectiveness[:, 1, :3], drawn.effectiveness[:, 1, :3])
+    true = perturbed(robot, **BUILT_OFF)
+    drawn, built = own_effectiveness(robot), own_effectiveness(true)
+    turn = np.einsum("nw,nw->n", built[:, 1, :3], drawn[:, 1, :3])
     np.testing.assert_allclose(np.degrees(np.arccos(turn)), 5.0, rtol=1e-6)
     # One newton upwards pitches about the true centre: 1.6 cm further behind, 1.2 cm to the left of it.
     np.testing.assert_allclose(
-        true.effectiveness[:, 2, 3:5] - drawn.effectiveness[:, 2, 3:5],
-        np.tile([-0.012, -0.016], (4, 1)),
-        atol=1e-12,
+        built[:, 2, 3:5] - drawn[:, 2, 3:5], np.tile([-0.012, -0.016], (4, 1)), atol=1e-12
     )
 
 
 def test_a_robot_built_askew_stays_afoot(robot: Layout) -> None:
-    loop = ClosedLoop(robot, AnyRobot().on(robot), make_trajectory("circle"), plant="offset")
+    loop = ClosedLoop(
+        robot, AnyRobot().on(robot), make_trajectory("circle"), truth=perturbed(robot, **BUILT_OFF)
+    )
     for _ in range(120):
         loop.step()
     assert np.abs(euler(loop.state[3:7])[:2]).max() < 0.3

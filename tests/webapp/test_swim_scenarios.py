@@ -12,7 +12,7 @@ from finlab.sim import FinFault
 from tests.webapp.loops import page_of
 from tests.webapp.test_swimming import SHORT, until
 from webapp.session.state import State
-from webapp.session.swim_plan import SCENARIOS, SwimSettings, scenarios_of
+from webapp.session.swim_plan import SCENARIOS, SwimSettings
 from webapp.tasks.background import Worker
 from webapp.tasks.swimmer import Swimmer, closed_loop
 from webapp.tasks.swimming import Swimming
@@ -31,7 +31,7 @@ def chosen(name: str, **then: Any) -> SwimSettings:
 def test_every_scenario_plans_what_its_day_says(name: str) -> None:
     day, settings = SCENARIOS[name], chosen(name)
     plan = settings.plan(State(UCAT))
-    assert plan.current == day.current and plan.plant == day.plant and plan.sensors == day.sensors
+    assert plan.current == day.current and plan.sensors == day.sensors
     assert plan.path.name == day.trajectory and plan.path.duration_s == day.path().duration_s
     assert plan.truth == day.truth
     assert len(plan.losses) == day.lost and len(plan.weak) == (day.weak is not None)
@@ -60,7 +60,6 @@ def test_a_fin_is_lost_without_which_an_own_robot_can_be_steered(layout: str) ->
     ("key", "wrong"),
     [
         ("scenario", "hexa"),
-        ("plant", "autopilot"),
     ],
 )
 def test_settings_of_swims_are_checked(key: str, wrong: Any) -> None:
@@ -93,10 +92,7 @@ def test_what_is_true_is_not_what_is_believed(swimming: Swimming) -> None:
 @pytest.mark.parametrize("robot", ["bluerov2", "fish", "torpedo", "catamaran"])
 def test_any_robot_has_the_scenarios_that_it_can_swim(robot: str) -> None:
     layout = load_layout(robot)
-    assert ("ripple" in scenarios_of(layout)) == bool(layout.fins)
-    settings = SwimSettings().with_value("scenario", "ripple")
-    plan = settings.plan(State(layout))
-    assert plan.scenario == ("ripple" if layout.fins else "nominal")
+    plan = SwimSettings().with_value("scenario", "offset").plan(State(layout))
     swimmer = Swimmer(plan, closed_loop(plan, Allocator(layout)))
     for _ in range(3):
         swimmer.step()

@@ -6,14 +6,14 @@ from typing import Any
 import viser
 
 from finlab.layout import Layout
-from finlab.sim import PLANTS, SHIPPED
+from finlab.sim import SHIPPED
 from webapp.handles import add_html
 from webapp.markup.html import html, marker
 from webapp.markup.swim_card import swim_card
 from webapp.markup.words import righting_sentences, trim_sentence
 from webapp.page import Page
 from webapp.panels.damage import Row, add_fin_buttons
-from webapp.session.swim_plan import SCENARIOS, SPEEDS, SwimSettings, scenarios_of
+from webapp.session.swim_plan import SCENARIOS, SPEEDS, SwimSettings
 from webapp.session.targets import axis_reach
 from webapp.tasks.moment import Moment
 from webapp.tasks.swimmer import Swimmer
@@ -21,9 +21,7 @@ from webapp.tasks.swimmer import Swimmer
 
 def _bind(page: Page, key: str, widget: Any) -> None:
     """A widget for a setting of swims."""
-    page.bind(
-        widget, partial(page.session.set_swim, key), lambda swim, layout: getattr(swim.fitting(layout), key)
-    )
+    page.bind(widget, partial(page.session.set_swim, key), lambda swim: getattr(swim, key))
 
 
 def add_scenario(page: Page) -> None:
@@ -31,19 +29,14 @@ def add_scenario(page: Page) -> None:
     gui = page.gui
     day = "A day that is not as the designer assumed; it sets path, water, body, sensors and actuators."
     days = gui.add_dropdown("Scenario", tuple(SCENARIOS), hint=day)
-    page.board.show(days, options=scenarios_of)
     _bind(page, "scenario", days)
     page.add_html(_about)
     _bind(page, "path", gui.add_dropdown("Path", tuple(SHIPPED), hint="Where to swim."))
-    forces = "The fin law, its ripple, or a robot that is not built as drawn."
-    plants = gui.add_dropdown("Fin forces", tuple(PLANTS), hint=forces)
-    page.board.show(plants, visible=lambda layout: bool(layout.fins))
-    _bind(page, "plant", plants)
 
 
-def _about(swim: SwimSettings, layout: Layout, method: str) -> str:
+def _about(swim: SwimSettings, method: str) -> str:
     """The day, and who allocates ten times a second."""
-    about = swim.fitting(layout).day.about
+    about = swim.day.about
     return html("<div class='fl'>{} Method {}, as in the bar, allocates.</div>", about, method)
 
 

@@ -12,7 +12,6 @@ from finlab.errors import FinlabError
 from finlab.evaluation.experiments.hard_days import CURRENT, HARD_DAYS, TWO, HardDay
 from finlab.layout import Layout
 from finlab.sim import (
-    PLANTS,
     SHIPPED,
     FinFault,
     SensorSettings,
@@ -35,7 +34,7 @@ SCENARIOS: dict[str, HardDay] = {
 }
 SPEEDS = (0.1, 8.0)
 """Simulated time per time on the wall that may be asked for."""
-CHOICES: dict[str, tuple[str, ...]] = {"path": tuple(SHIPPED), "plant": tuple(PLANTS)}
+CHOICES: dict[str, tuple[str, ...]] = {"path": tuple(SHIPPED)}
 
 
 @dataclass(frozen=True)
@@ -44,7 +43,6 @@ class SwimSettings:
 
     scenario: str = "nominal"
     path: str = "lissajous"
-    plant: str = next(iter(PLANTS))
     speed: float = 1.0
     """Simulated time per time on the wall."""
     announced: bool = True
@@ -58,7 +56,7 @@ class SwimSettings:
         """
         if key == "scenario":
             day = SCENARIOS[chosen(value, key, tuple(SCENARIOS))]
-            said = replace(self, announced=day.announced, path=day.trajectory, plant=day.plant)
+            said = replace(self, announced=day.announced, path=day.trajectory)
             return replace(said, scenario=day.name)
         if key == "announced":
             if not isinstance(value, bool):
@@ -69,12 +67,6 @@ class SwimSettings:
         if key not in CHOICES:
             raise FinlabError(f"a swim has no setting {key!r:.40}")
         return replace(self, **{key: chosen(value, key, CHOICES[key])})
-
-    def fitting(self, layout: Layout) -> "SwimSettings":
-        """The same without what a robot has not: forces of fins that are not as their laws say."""
-        if self.scenario not in scenarios_of(layout):
-            return self.with_value("scenario", "nominal")
-        return self if layout.fins else replace(self, plant="mean")
 
     @property
     def day(self) -> HardDay:
@@ -87,8 +79,6 @@ class SwimSettings:
         Raises:
             FinlabError: the scenario takes more fins away than the robot has.
         """
-        if self != self.fitting(state.layout):
-            return self.fitting(state.layout).plan(state)
         day, layout = self.day, state.able
         path = make_trajectory(self.path, day.duration_s if self.path == day.trajectory else None)
         affected = _affected(layout, state.failed, day)
@@ -97,7 +87,6 @@ class SwimSettings:
             state.failed,
             path,
             state.method,
-            self.plant,
             self.scenario,
             day.current,
             day.truth,
@@ -107,11 +96,6 @@ class SwimSettings:
             tuple(FinFault(name, 0.5 * path.duration_s) for name in affected) if day.lost else (),
             self.announced,
         )
-
-
-def scenarios_of(layout: Layout) -> tuple[str, ...]:
-    """The scenarios that a robot may have."""
-    return tuple(name for name, day in SCENARIOS.items() if layout.fins or day.plant == "mean")
 
 
 def _affected(layout: Layout, failed: tuple[str, ...], day: HardDay) -> tuple[str, ...]:
@@ -133,7 +117,6 @@ class Plan(NamedTuple):
     """Fins that are lost from the start, announced from the start."""
     path: Trajectory
     method: str
-    plant: str = "mean"
     scenario: str = "nominal"
     current: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Velocity of the water in the world [m/s]."""

@@ -96,7 +96,6 @@ def closed_loop(plan: Plan, allocator: Allocator) -> ClosedLoop:
         layout,
         allocator,
         plan.path,
-        plant=plan.plant,
         sensors=plan.sensors,
         current=plan.current,
         failures=plan.losses,

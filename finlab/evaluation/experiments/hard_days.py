@@ -4,6 +4,7 @@ What a day says is true of the robot and its surroundings; allocator, controller
 the laws of its fins, and what is announced.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from itertools import combinations, islice
@@ -40,6 +41,9 @@ OTHER_HEAVY = Body(
 )
 """The same robot by github.com/PX4/PX4-gazebo-models, 2026 (BSD-3); it displaces 0.0135 m^3."""
 
+BUILT_OFF = {"askew": math.radians(5.0), "center": (-0.016, 0.012, 0.0)}
+"""A robot that is not built as drawn: actuators turned by 5 degrees, the centre of gravity 2 cm off."""
+
 
 @dataclass(frozen=True)
 class HardDay:
@@ -66,8 +70,6 @@ class HardDay:
     """What the body really is: options of `finlab.sim.perturbed`."""
     current: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Velocity of the water in the world [m/s]."""
-    plant: str = "mean"
-    """What the fins really do."""
     sensors: SensorSettings = SensorSettings()
     """Noise, bias, delay and losses."""
     weak: float | None = None
@@ -118,7 +120,6 @@ class HardDay:
             robot,
             method.on(robot),
             path,
-            plant=self.plant,
             sensors=self.sensors,
             current=self.current,
             failures=failures,
@@ -175,8 +176,7 @@ HARD_DAYS = (
     HardDay("lost-two", "Two fins are lost half-way, announced.", ("A",), lost=2),
     HardDay("restricted", "Stops keep the fins within arcs.", ("restricted",)),
     HardDay("saturated", "The path asks for more than the fins can give.", duration_s=36.0),
-    HardDay("ripple", "The fins' forces swing within the beat.", plant="ripple"),
-    HardDay("offset", "Centre of gravity and fins are not where the layout has them.", plant="offset"),
+    HardDay("offset", "Centre of gravity and fins are not where the layout has them.", truth=BUILT_OFF),
     HardDay("heavy", "Eight thrusters; everything is as drawn.", HEAVY),
     HardDay("heavy-other-body", "Eight thrusters, and the body of another source.", HEAVY, body=OTHER_HEAVY),
     HardDay(

@@ -6,8 +6,9 @@ import pytest
 from finlab.fit.robot.swim import STEP_S
 from finlab.fit.robot.swing import MOMENTS, TERMS, swing_forces
 from finlab.layout import Layout, load_layout
-from finlab.sim.fin_force import MeanForce, RippleForce
+from finlab.sim.actuator_force import ActuatorForce
 from finlab.vehicle.fin_motion import FinMotion
+from tests.ripple import RippleForce
 
 
 @pytest.fixture(scope="module")
@@ -29,12 +30,13 @@ def test_a_plates_water_and_drag_are_those_of_the_simulation(pair: Layout) -> No
     rng = np.random.default_rng(0)
     command = np.repeat(pair.lower + rng.random((12, 2, 3)) * (pair.upper - pair.lower), 5, axis=0)
     found = swing_forces(pair, command)
-    ripple, mean, fins = RippleForce(pair), MeanForce(pair), FinMotion(pair)
+    fins = FinMotion(pair)
+    ripple, mean = RippleForce(pair, fins), ActuatorForce(pair, fins)
     dt = STEP_S / MOMENTS
     for k, row in enumerate(command):
         true = np.zeros((2, 3))
         for _ in range(MOMENTS):
             fins.step(row, dt)
-            pulses = mean.step(fins, dt) * (1.0 - np.cos(2.0 * fins.phase))[:, None]
-            true += (ripple.step(fins, dt) - pulses) / MOMENTS
+            pulses = mean.of_fins(dt) * (1.0 - np.cos(2.0 * fins.phase))[:, None]
+            true += (ripple.of_fins(dt) - pulses) / MOMENTS
         np.testing.assert_allclose(found[k, :, :, 0] + found[k, :, :, 2], true[:, 1:], atol=1e-9)

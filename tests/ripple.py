@@ -1,0 +1,47 @@
+"""What real fins do within a beat, which no method here is given: a swim whose fins' forces swing."""
+
+import math
+
+import numpy as np
+
+from finlab.actuators.fin.blade import Blade
+from finlab.arrays import Array
+from finlab.layout import Layout
+from finlab.sim import ClosedLoop
+from finlab.sim.actuator_force import ActuatorForce
+from finlab.vehicle.fin_motion import FinMotion
+
+
+class RippleForce(ActuatorForce):
+    """The mean force in two pulses per cycle, and a ripple of mean zero on top.
+
+    The ripple is what a rigid plate of `Blade` feels normal to itself: the momentum of the water that it
+    carries, m L^2/2 theta', and the drag of its strips, 1/6 rho Cd W L^3 theta' |theta'|. Over a cycle both
+    have mean zero, so the mean force stays the fin law's. The fin points away from its thrust.
+    """
+
+    step_s = 0.01
+    blade = Blade()
+
+    def __init__(self, layout: Layout, fins: FinMotion) -> None:
+        super().__init__(layout, fins)
+        self._momentum = np.zeros((layout.n_fins, 2))
+
+    def of_fins(self, dt: float) -> Array:
+        """See `ActuatorForce`."""
+        motion, length = self._beat, self.blade.length
+        force = super().of_fins(dt) * (1.0 - np.cos(2 * motion.phase))[:, None]
+        angle, speed = motion.angle + math.pi, motion.speed
+        normal = np.stack([-np.sin(angle), np.cos(angle)], axis=-1)
+        momentum = 0.5 * self.blade.virtual_mass * length**2 * speed[:, None] * normal
+        drag = self.blade.force_drag * speed * np.abs(speed)
+        force[:, 1:] -= (momentum - self._momentum) / dt + drag[:, None] * normal
+        self._momentum = momentum
+        return force
+
+
+def rippled(loop: ClosedLoop) -> ClosedLoop:
+    """The swim, at its start, with fins whose forces swing."""
+    loop._forces = RippleForce(loop.layout, loop.fins)
+    loop.motion = loop._forces.motion
+    return loop
