@@ -108,10 +108,7 @@ def test_logs_survive_the_disk(layout_a: Layout, analytic: AnyRobot, tmp_path: P
 
 def log_of_ticks_like(log: object, ticks: list[Tick]) -> object:
     """The same log made anew from its ticks."""
-    about = {
-        name: getattr(log, name)
-        for name in ("layout", "fins", "method", "controller", "task", "water")
-    }
+    about = {name: getattr(log, name) for name in ("layout", "fins", "method", "controller", "task", "water")}
     return log_of_ticks(ticks, seed=log.seed, **about)  # type: ignore[attr-defined]
 
 
