@@ -62,14 +62,12 @@ class Rudder(Commanded):
     """Area of the foil [m^2]."""
     deflection: tuple[Deflection, Deflection]
     """Least and greatest deflection [rad]."""
-    aspect_ratio: Annotated[float, Meta(ge=0.05, le=100.0)] | None = None
-    """Effective aspect ratio, 2 span^2 / area for a foil on a hull; None where `lift_slope` is given."""
+    aspect_ratio: Annotated[float, Meta(ge=0.05, le=100.0)]
+    """Effective aspect ratio, 2 span^2 / area for a foil on a hull."""
     lift_slope: Slope | None = None
     """Lift coefficient per angle [1/rad]; from the aspect ratio after Whicker and Fehlner when None."""
     drag: Coefficient = 0.0065
     """Drag coefficient without lift; the default is that of a NACA 0015 section."""
-    induced_drag: Coefficient | None = None
-    """Drag coefficient per squared lift coefficient; 1 / (pi 0.9 aspect ratio) when None."""
     stall: Annotated[float, Meta(ge=0.08, le=1.23)] = 0.47
     """Angle between chord and flow at which the flow separates [rad]; lift then falls to that of a plate."""
     density: Annotated[float, Meta(ge=500.0, le=2000.0)] = 1000.0
@@ -88,29 +86,15 @@ class Rudder(Commanded):
             raise LayoutError(
                 f"expected a least below the greatest angle, got {low:g} and {high:g}", "deflection_deg"
             )
-        if self.aspect_ratio is None and self.lift_slope is None:
-            raise LayoutError("required key is missing; give it, or lift_slope_per_rad", "aspect_ratio")
 
     @property
     def slope(self) -> float:
         """Lift coefficient per angle [1/rad], given or from the aspect ratio."""
         if self.lift_slope is not None:
             return self.lift_slope
-        ratio = self.aspect_ratio or 0.0
-        return 1.8 * math.pi * ratio / (math.hypot(ratio, 2.0) + 1.8)
+        return 1.8 * math.pi * self.aspect_ratio / (math.hypot(self.aspect_ratio, 2.0) + 1.8)
 
     @property
     def induced(self) -> float:
-        """Drag coefficient per squared lift coefficient, given or from the aspect ratio."""
-        if self.induced_drag is not None:
-            return self.induced_drag
-        ratio = self.aspect_ratio or _aspect_ratio(self.slope)
-        return 1.0 / (math.pi * EFFICIENCY * ratio)
-
-
-def _aspect_ratio(slope: float) -> float:
-    """The aspect ratio that has a lift slope [1/rad] after Whicker and Fehlner; infinite where none has."""
-    k = 1.8 * math.pi / slope
-    if k <= 1.0:
-        return math.inf
-    return (1.8 * k + math.sqrt((1.8 * k) ** 2 + 0.76 * (k * k - 1.0))) / (k * k - 1.0)
+        """Drag coefficient per squared lift coefficient."""
+        return 1.0 / (math.pi * EFFICIENCY * self.aspect_ratio)

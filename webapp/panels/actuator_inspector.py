@@ -77,10 +77,9 @@ LAW = (
     Box("Astern [W]", "reverse", FIXED, "The same of a negative force; empty: as ahead.", free=True),
     Box("Exponent", "exponent", (*FIXED, *PODS), "1.5 is that of an ideal propeller at rest."),
     Box("Area [m²]", "area", RUDDER, "Of the foil.", 0.001),
-    Box("Aspect ratio", "aspect_ratio", RUDDER, "2 span²/area for a foil on a hull.", free=True),
+    Box("Aspect ratio", "aspect_ratio", RUDDER, "2 span²/area for a foil on a hull."),
     Box("Lift slope [1/rad]", "lift_slope", RUDDER, "Empty: by the aspect ratio.", free=True),
     Box("Drag", "drag", RUDDER, "Drag coefficient without lift; 0.0065 is NACA 0015.", 0.001),
-    Box("Induced drag", "induced_drag", RUDDER, "Per squared lift; empty: by the aspect ratio.", free=True),
     Box("Stall [°]", "stall", RUDDER, "Angle to the flow at which it separates.", 1.0, True),
 )
 

@@ -86,7 +86,7 @@ def shape_of(part: Actuator, size: float) -> tuple[float, float]:
     """Slenderness of a foil, and how large an actuator is drawn; a foil by its area."""
     if not isinstance(part, Rudder):
         return 1.0, size
-    ratio = min(max(part.aspect_ratio or 2.0, 0.5), 8.0) / 2.0
+    ratio = min(max(part.aspect_ratio, 0.5), 8.0) / 2.0
     span = math.sqrt(ratio * part.area)
     return round(ratio, 3), min(max(span, 0.05 * size), 0.3 * size)
 

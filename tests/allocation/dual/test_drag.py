@@ -28,7 +28,7 @@ def test_answers_of_robots_with_rudders_are_exact_and_above_a_bound_that_is_met(
 
 
 def test_rudders_alone_give_nothing_at_rest_and_something_in_a_flow() -> None:
-    rudder = Rudder("r", (-0.5, 0, 0), (0, 0, 1), (1, 0, 0), 0.01, (-0.3, 0.3), lift_slope=3.0)
+    rudder = Rudder("r", (-0.5, 0, 0), (0, 0, 1), (1, 0, 0), 0.01, (-0.3, 0.3), 2.0, lift_slope=3.0)
     allocator = finlab.Allocator(Layout("rudder", (rudder,)))
     rest = allocator.allocate([0, 1, 0, 0, 0, -0.5])
     assert not rest.wrench.any() and rest.power == 0.0
@@ -37,7 +37,7 @@ def test_rudders_alone_give_nothing_at_rest_and_something_in_a_flow() -> None:
 
 
 def test_rudders_at_rest_turn_back_no_faster_than_their_drives() -> None:
-    rudder = Rudder("r", (-0.5, 0, 0), (0, 0, 1), (1, 0, 0), 0.01, (-0.3, 0.3), lift_slope=3.0, rate=0.5)
+    rudder = Rudder("r", (-0.5, 0, 0), (0, 0, 1), (1, 0, 0), 0.01, (-0.3, 0.3), 2.0, lift_slope=3.0, rate=0.5)
     result = finlab.Allocator(Layout("rudder", (rudder,))).allocate(
         [0, 1, 0, 0, 0, -0.5], previous=[[0.3, 0.0, 0.0]]
     )
