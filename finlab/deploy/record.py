@@ -1,11 +1,12 @@
 """An answer as plain values: the JSON object of `finlab allocate` and of `finlab-runtime allocate`."""
 
 import numpy as np
+from msgspec import to_builtins
 
 from finlab.allocation.allocation import Allocation
 from finlab.arrays import Array
 from finlab.layout import Layout
-from finlab.layout.commands import command_of, command_values
+from finlab.layout.commands import command_of
 from finlab.layout.thruster import Thruster
 
 
@@ -51,7 +52,7 @@ def command_record(layout: Layout, command: Array, forces: Array) -> dict[str, o
     for part, row, force in zip(layout.actuators, command, forces, strict=True):
         told = command_of(part, row)
         along = float(force @ np.array(part.axis)) if isinstance(part, Thruster) else force.tolist()
-        own = None if told is None else command_values(told)
+        own = None if told is None else to_builtins(told)
         values.append({"name": part.name, "type": part.type, "force_n": along, "command": own})
     if not layout.is_of_fins:
         return {"actuators": values}

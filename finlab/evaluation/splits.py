@@ -16,12 +16,12 @@ from finlab.layout.random import TRAINING_BOX
 from finlab.layout.random_actuators import Draw as ActuatorDraw
 from finlab.layout.random_actuators import (
     random_azimuth,
+    random_fin_model,
     random_robot,
     random_shaft_fin,
     random_thruster,
     random_tilt,
 )
-from finlab.layout.random_fins import random_fin_model
 from finlab.physics import Plant
 
 OOD_BOX = (0.45, 0.45, 0.20)

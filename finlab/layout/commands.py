@@ -1,10 +1,9 @@
 """Commands of actuators as users see them: one small value per type; inside, a command is a row of three."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
+from msgspec import Struct
 
 from finlab.arrays import Array
 from finlab.layout.actuator import Actuator
@@ -13,16 +12,20 @@ from finlab.layout.fin import Fin
 from finlab.layout.thrust_model import PowerTable, ThrustModel
 from finlab.layout.thruster import Thruster
 
+KEYS: Mapping[str, str] = {
+    "amplitude": "amplitude_rad",
+    "frequency": "frequency_hz",
+    "zero_direction": "zero_direction_rad",
+    "force": "force_n",
+    "angle": "angle_rad",
+    "deflection": "deflection_rad",
+}
+"""Fields of commands -> their keys in a JSON file, which carry the units."""
 
-@dataclass(frozen=True)
-class FinCommand:
+
+class FinCommand(Struct, frozen=True, omit_defaults=True, rename=KEYS):
     """What a fin is told."""
 
-    KEYS: ClassVar[Mapping[str, str]] = {
-        "amplitude": "amplitude_rad",
-        "frequency": "frequency_hz",
-        "zero_direction": "zero_direction_rad",
-    }
     amplitude: float
     """Half amplitude [rad]."""
     frequency: float
@@ -31,22 +34,18 @@ class FinCommand:
     """Direction about which it beats [rad]."""
 
 
-@dataclass(frozen=True)
-class ThrusterCommand:
+class ThrusterCommand(Struct, frozen=True, omit_defaults=True, rename=KEYS):
     """What a thruster with a fixed axis is told."""
 
-    KEYS: ClassVar[Mapping[str, str]] = {"force": "force_n", "input": "input"}
     force: float
     """Force along its axis [N], signed."""
     input: float | None = None
     """What its table says to send for it, in the table's unit; None for a power law."""
 
 
-@dataclass(frozen=True)
-class AzimuthCommand:
+class AzimuthCommand(Struct, frozen=True, omit_defaults=True, rename=KEYS):
     """What a thruster that turns is told."""
 
-    KEYS: ClassVar[Mapping[str, str]] = {"angle": "angle_rad", "force": "force_n", "input": "input"}
     angle: float
     """Angle of its force from `zero` towards turn_axis x zero [rad]."""
     force: float
@@ -55,11 +54,9 @@ class AzimuthCommand:
     """As for a `ThrusterCommand`."""
 
 
-@dataclass(frozen=True)
-class RudderCommand:
+class RudderCommand(Struct, frozen=True, omit_defaults=True, rename=KEYS):
     """What a rudder is told."""
 
-    KEYS: ClassVar[Mapping[str, str]] = {"deflection": "deflection_rad"}
     deflection: float
     """Angle of its chord from `zero` towards shaft x zero [rad]."""
 
@@ -79,14 +76,6 @@ def command_of(actuator: Actuator, row: Array) -> Command | None:
     if isinstance(actuator, Azimuth):
         return AzimuthCommand(first, second, input_of(actuator.model, second))
     return RudderCommand(first)
-
-
-def command_values(command: Command | None) -> dict[str, float]:
-    """Returns a command as the mapping in a JSON file; its keys carry the units. Empty for a failed one."""
-    if command is None:
-        return {}
-    told = ((key, getattr(command, name)) for name, key in command.KEYS.items())
-    return {key: value for key, value in told if value is not None}
 
 
 def input_of(model: ThrustModel, force: float) -> float | None:

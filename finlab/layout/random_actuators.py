@@ -1,4 +1,4 @@
-"""Random actuators of each kind, of about one size per robot, for held-out splits."""
+"""Random actuators of each kind, of about one size per robot, for held-out splits; fins of U-CAT's size."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -8,9 +8,8 @@ import numpy as np
 from finlab.arrays import Array
 from finlab.layout.actuator import Actuator
 from finlab.layout.azimuth import Azimuth, Tilt
-from finlab.layout.fin import Fin
+from finlab.layout.fin import Fin, FinModelSpec
 from finlab.layout.layout import Layout
-from finlab.layout.random_fins import log_uniform, random_fin_model
 from finlab.layout.thrust_model import PowerLaw
 from finlab.layout.thruster import Thruster
 
@@ -27,6 +26,25 @@ ARC = (math.radians(20.0), math.radians(300.0))
 """Width of the arc of an azimuth [rad], where it has one, as half of them do."""
 TILT = (math.radians(20.0), math.radians(120.0))
 """Width of the arc of a tilt [rad]."""
+
+Numbers = dict[str, tuple[float, float]]
+"""Names of a fin model's numbers, and from where each is drawn."""
+LOGARITHMIC = ("area", "lever", "length", "width", "k")
+"""Numbers whose logarithm is uniform; the others are uniform themselves."""
+FAMILIES: dict[str, Numbers] = {
+    "drag": {"area": (0.005, 0.04), "lever": (0.05, 0.15)},
+    "lighthill": {"length": (0.1, 0.3), "width": (0.05, 0.15)},
+    "soft": {
+        "k": (1.0, 8.0),
+        "p": (1.0, 2.0),
+        "x0": (0.6, 1.5),
+        "q": (3.0, 6.0),
+        "e": (0.0, 0.2),
+        "phi_e": (-math.pi, math.pi),
+        "d": (-0.15, 0.15),
+    },
+}
+"""Fin model -> its numbers; what is not named stays as it is by default."""
 
 Draw = Callable[[np.random.Generator, str, float], Actuator]
 """From a generator, a name and the robot's size to an actuator."""
@@ -84,6 +102,23 @@ def random_shaft_fin(rng: np.random.Generator, name: str, size: float) -> Fin:
     """Returns a fin of a random model with a shaft in any direction; its size is its own."""
     shaft, zero = _across(rng)
     return Fin(name, _position(rng), model=random_fin_model(rng), shaft=shaft, zero=zero)
+
+
+def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
+    """A number whose logarithm is uniform."""
+    return math.exp(rng.uniform(math.log(low), math.log(high)))
+
+
+def random_fin_model(
+    rng: np.random.Generator, kind: str | None = None, families: dict[str, Numbers] = FAMILIES
+) -> FinModelSpec:
+    """A fin with random numbers, of one kind or of each equally often."""
+    kind = kind or str(rng.choice(list(families)))
+    drawn = {
+        name: log_uniform(rng, *ends) if name in LOGARITHMIC else float(rng.uniform(*ends))
+        for name, ends in families[kind].items()
+    }
+    return FinModelSpec(kind, tuple(drawn.items()))
 
 
 def _position(rng: np.random.Generator) -> tuple[float, float, float]:

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from msgspec import to_builtins
 
 from finlab.layout import Fin
 from finlab.layout.azimuth import Azimuth, Tilt
@@ -13,7 +14,6 @@ from finlab.layout.commands import (
     RudderCommand,
     ThrusterCommand,
     command_of,
-    command_values,
     input_of,
     neutral_row,
 )
@@ -41,15 +41,14 @@ def test_each_type_has_a_command_of_its_own() -> None:
 
 
 def test_keys_of_files_carry_the_units() -> None:
-    assert command_values(FinCommand(1.0, 2.0, 3.0)) == {
+    assert to_builtins(FinCommand(1.0, 2.0, 3.0)) == {
         "amplitude_rad": 1.0,
         "frequency_hz": 2.0,
         "zero_direction_rad": 3.0,
     }
-    assert command_values(ThrusterCommand(1.0, 1500.0)) == {"force_n": 1.0, "input": 1500.0}
-    assert command_values(AzimuthCommand(0.5, 2.0)) == {"angle_rad": 0.5, "force_n": 2.0}
-    assert command_values(RudderCommand(0.5)) == {"deflection_rad": 0.5}
-    assert command_values(None) == {}
+    assert to_builtins(ThrusterCommand(1.0, 1500.0)) == {"force_n": 1.0, "input": 1500.0}
+    assert to_builtins(AzimuthCommand(0.5, 2.0)) == {"angle_rad": 0.5, "force_n": 2.0}
+    assert to_builtins(RudderCommand(0.5)) == {"deflection_rad": 0.5}
 
 
 @pytest.mark.parametrize(
