@@ -214,7 +214,7 @@ class ClosedLoop:
             self.layout.without([*(other for other in self.lost if other != name), name])
         self._held[index] = self.motion.direction[index] if kind == "stuck" else np.nan
         if kind == "stuck" and index in self.motion.of_fins:
-            self.fins.direction_rate[np.searchsorted(self.motion.of_fins, index)] = 0.0
+            self.fins.rate[2, np.searchsorted(self.motion.of_fins, index)] = 0.0
         for known in (self.broken, self._told) if self._tells(announced) else (self.broken,):
             known.pop(name, None)
             if kind != "whole":

@@ -61,7 +61,7 @@ class ActuatorMotion:
         """Which actuators (n,) may give a force: fins that beat, whatever the law says of others, and all
         others but those that have stopped."""
         result = self._working.copy()
-        result[self.of_fins] = self.fins.amplitude * self.fins.frequency > 0.0
+        result[self.of_fins] = self.fins.value[0] * self.fins.value[1] > 0.0
         return result
 
     @property
@@ -69,7 +69,7 @@ class ActuatorMotion:
         """Where each actuator (n,) would stay if it stuck: a fin's zero direction, the angle of an azimuth or
         of a rudder [rad], a thruster's force [N]."""
         others = self.others.value[np.arange(len(self.of_others)), self._held[self.of_others]]
-        return self.joined(self.fins.direction, others)
+        return self.joined(self.fins.value[2], others)
 
     def held_part(self, command: Array) -> Array:
         """The parts (..., n) of commands (..., n, 3) that stay where an actuator sticks."""

@@ -50,35 +50,18 @@ class FinLag:
         self._turns_fully = is_full_turn(upper - lower)
         self._poles = np.ascontiguousarray(layout.servo_poles.reshape(-1, 3).T)
         self._fastest_swing = layout.speed_limit / TURN
-        # Half amplitude [rad], frequency [Hz], zero direction [rad] counted on over the seam; rates per s.
-        self._value = np.zeros((3, layout.n_fins))
-        self._value[2] = 0.5 * (lower + upper)
-        self._rate = np.zeros((3, layout.n_fins))
+        self.value = np.zeros((3, layout.n_fins))
+        """Half amplitude [rad], frequency [Hz] and zero direction [rad], counted on over the seam (3, n)."""
+        self.value[2] = 0.5 * (lower + upper)
+        self.rate = np.zeros((3, layout.n_fins))
+        """The same per second (3, n)."""
         self._dt = math.nan
         self._lag: LagStep
 
     @property
-    def amplitude(self) -> Array:
-        """Half amplitude (n,) [rad]; a view, and so are the next two."""
-        amplitude: Array = self._value[0]
-        return amplitude
-
-    @property
-    def frequency(self) -> Array:
-        """(n,) [Hz]."""
-        frequency: Array = self._value[1]
-        return frequency
-
-    @property
-    def direction(self) -> Array:
-        """Zero directions (n,) [rad], counted on over the seam."""
-        direction: Array = self._value[2]
-        return direction
-
-    @property
     def command(self) -> Array:
         """What the fins do now, as a command (n, 3) [rad, Hz, rad]; a copy."""
-        return self._value.T.copy()
+        return self.value.T.copy()
 
     def step(self, command: Array, dt: float) -> None:
         """Follows a command (n, 3) for `dt` [s]; a fin whose row is NaN stops at once and hangs still."""
@@ -88,7 +71,7 @@ class FinLag:
         """Takes the step; returns which fins (n,) hang still, or None where all follow."""
         if dt != self._dt:
             self._dt, self._lag = dt, LagStep.of(self._poles, dt)
-        before, aim = self._value, command.T.copy()
+        before, aim = self.value, command.T.copy()
         lost = np.isnan(aim[0])
         some_lost = bool(lost.any())
         if some_lost:
@@ -96,9 +79,9 @@ class FinLag:
         np.minimum(aim[0], self._fastest_swing / np.maximum(aim[1], 1e-9), out=aim[0])
         turn = aim[2] - before[2]
         aim[2] = before[2] + np.where(self._turns_fully, turn - TURN * np.rint(turn / TURN), turn)
-        value, rate = self._lag.follow(before, self._rate, aim)
+        value, rate = self._lag.follow(before, self.rate, aim)
         np.minimum(value[0], self._fastest_swing / np.maximum(value[1], 1e-9), out=value[0])
         if some_lost:
             value[:2, lost], value[2, lost], rate[:, lost] = 0.0, before[2, lost], 0.0
-        self._value, self._rate = value, rate
+        self.value, self.rate = value, rate
         return lost if some_lost else None

@@ -30,16 +30,16 @@ class FinMotion(FinLag):
         super().__init__(layout)
         self._speed_limit = layout.speed_limit
         self._creep = CREEP * self._speed_limit
-        self._before = self._value
+        self._before = self.value
         self._change = np.zeros((3, layout.n_fins))
         self.phase = np.zeros(layout.n_fins)
         """Phase of the flapping [rad]."""
 
     def step(self, command: Array, dt: float) -> None:
         """Follows a command (n, 3) for `dt` [s]; a fin whose row is NaN stops at once and hangs still."""
-        before, rate_before = self._value, self._rate
+        before, rate_before = self.value, self.rate
         lost = self._follow(command, dt)
-        value, rate = self._value, self._rate
+        value, rate = self.value, self.rate
         # What flapping leaves of the servo's speed is there to turn the fin.
         spare = np.maximum(self._speed_limit - value[0] * (TURN * value[1]), self._creep)
         turned = np.minimum(np.maximum(value[2] - before[2], -spare * dt), spare * dt)
@@ -52,21 +52,15 @@ class FinMotion(FinLag):
         self._before = before
 
     @property
-    def direction_rate(self) -> Array:
-        """[rad/s]; a view."""
-        rate: Array = self._rate[2]
-        return rate
-
-    @property
     def mean_command(self) -> Array:
         """`command` as a mean over the last step (n, 3)."""
-        command: Array = 0.5 * (self._before + self._value).T
+        command: Array = 0.5 * (self._before + self.value).T
         return command
 
     @property
     def angle(self) -> Array:
         """The fins' angles [rad]: theta = A sin(phase) + zero direction."""
-        return self.amplitude * np.sin(self.phase) + self.direction
+        return np.asarray(self.value[0] * np.sin(self.phase) + self.value[2])
 
     @property
     def speed(self) -> Array:
@@ -77,13 +71,13 @@ class FinMotion(FinLag):
         """The fins' angular speeds [rad/s] and accelerations [rad/s^2], those of servos that change their aim
         as means over the last step."""
         sine, cosine = np.sin(self.phase), np.cos(self.phase)
-        swing = TURN * self._value[1]
-        fast, growth = self._value[0] * swing, self._rate[0]
-        speed = self._rate[2] + growth * sine + fast * cosine
+        swing = TURN * self.value[1]
+        fast, growth = self.value[0] * swing, self.rate[0]
+        speed = self.rate[2] + growth * sine + fast * cosine
         acceleration = (
             self._change[2]
             + (self._change[0] - fast * swing) * sine
-            + (2.0 * growth * swing + (TURN * self._value[0]) * self._rate[1]) * cosine
+            + (2.0 * growth * swing + (TURN * self.value[0]) * self.rate[1]) * cosine
         )
         return speed, acceleration
 

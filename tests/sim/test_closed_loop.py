@@ -142,7 +142,7 @@ def test_what_is_announced_reaches_the_allocator(layout_a: Layout, analytic: Any
     assert swim.damage.health is not None
     assert swim.damage.health.thrust == (("front_left", 0.4),)
     (name, angle), fin = swim.damage.health.stuck[0], layout_a.index("back_left")
-    assert name == "back_left" and angle == swim.fins.direction[fin]
+    assert name == "back_left" and angle == swim.fins.value[2][fin]
     assert swim.step().command[fin, 2] == pytest.approx(angle, abs=1e-9)
     swim.mend("front_left", announced=False)
     assert dict(swim.damage.health.thrust) == {"front_left": 0.4}, "nobody said that it is whole"

@@ -21,7 +21,7 @@ def pair() -> Layout:
 def flapping(layout: Layout, amplitude: float, frequency: float, direction: float) -> FinMotion:
     """Fins that have followed a command for long."""
     motion = FinMotion(layout)
-    motion.amplitude[:], motion.frequency[:], motion.direction[:] = amplitude, frequency, direction
+    motion.value[0], motion.value[1], motion.value[2] = amplitude, frequency, direction
     return motion
 
 

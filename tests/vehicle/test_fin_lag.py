@@ -24,4 +24,4 @@ def test_it_follows_as_the_simulated_servo_does(layout_a: Layout) -> None:
     lag.step(command, 0.1)
     still = lag.command
     np.testing.assert_allclose(still[1], motion.command[1], atol=0.02)
-    assert still[1, 0] == still[1, 1] == 0.0 and lag.direction[1] == still[1, 2]
+    assert still[1, 0] == still[1, 1] == 0.0 and lag.value[2][1] == still[1, 2]

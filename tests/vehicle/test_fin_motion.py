@@ -28,7 +28,7 @@ def driven(layout: Layout, servo: Servo) -> Layout:
 def flapping(layout: Layout, amplitude: float, frequency: float, direction: float) -> FinMotion:
     """Fins that have followed a command for long."""
     motion = FinMotion(layout)
-    motion.amplitude[:], motion.frequency[:], motion.direction[:] = amplitude, frequency, direction
+    motion.value[0], motion.value[1], motion.value[2] = amplitude, frequency, direction
     return motion
 
 
@@ -40,9 +40,9 @@ def test_the_filters_are_critically_damped_and_exact(pair: Layout) -> None:
     for _ in range(37):
         motion.step(command, DT)
     for value, aim, gains in (
-        (motion.amplitude, command[:, 0], (15.0, 6.0)),
-        (motion.frequency, command[:, 1], (15.0, 10.0)),
-        (motion.direction, command[:, 2], (7.0, 4.0)),
+        (motion.value[0], command[:, 0], (15.0, 6.0)),
+        (motion.value[1], command[:, 1], (15.0, 10.0)),
+        (motion.value[2], command[:, 2], (7.0, 4.0)),
     ):
         for i, k in enumerate(gains):
             exact = solve_ivp(
@@ -57,10 +57,10 @@ def test_the_filters_are_critically_damped_and_exact(pair: Layout) -> None:
 
 def test_fins_turn_the_short_way_over_the_seam(pair: Layout) -> None:
     motion = FinMotion(pair)
-    motion.direction[:] = 3.0
+    motion.value[2][:] = 3.0
     for _ in range(300):
         motion.step(np.tile([0.2, 1.0, -3.0], (2, 1)), DT)
-    np.testing.assert_allclose(motion.direction, 2 * math.pi - 3.0, atol=1e-3)
+    np.testing.assert_allclose(motion.value[2], 2 * math.pi - 3.0, atol=1e-3)
 
 
 def test_speed_limit_cuts_fast_flapping_and_turning(pair: Layout) -> None:
@@ -68,16 +68,16 @@ def test_speed_limit_cuts_fast_flapping_and_turning(pair: Layout) -> None:
     speeds = []
     for _ in range(300):
         motion.step(np.tile([0.6, 2.0, 3.1], (2, 1)), DT)
-        speeds.append(np.abs(motion.amplitude * 2 * math.pi * motion.frequency).max())
+        speeds.append(np.abs(motion.value[0] * 2 * math.pi * motion.value[1]).max())
     assert speeds[-1] == pytest.approx(4.0) and max(speeds) <= 4.0 + 1e-9
     for _ in range(30):  # the frequency falls, the amplitude may grow again
         motion.step(np.tile([0.6, 1.0, 3.1], (2, 1)), DT)
-        assert np.abs(motion.amplitude * 2 * math.pi * motion.frequency).max() <= 4.0 + 1e-9
+        assert np.abs(motion.value[0] * 2 * math.pi * motion.value[1]).max() <= 4.0 + 1e-9
     free, slow = FinMotion(pair), FinMotion(driven(pair, Servo(speed_limit=0.5)))
     for _ in range(50):
         for each in (free, slow):
             each.step(np.tile([0.05, 0.1, 3.0], (2, 1)), DT)
-    assert slow.direction[0] < free.direction[0] - 0.5
+    assert slow.value[2][0] < free.value[2][0] - 0.5
 
 
 def test_accelerations_are_those_of_the_speed(pair: Layout) -> None:
