@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
-from finlab.allocation.settings import MOST_CANDIDATES, Settings, choice, number
+from finlab.allocation.settings import MOST_CANDIDATES, Settings, number
 from finlab.physics.objective import Name
 
 
@@ -18,7 +18,4 @@ class MdnSettings(Settings):
     )
     n_refined: int = number(6, 1, 256, "proposals that are refined and offered as candidates")
     temperature: float = number(1.0, 0.0, 100.0, "what the variances of the samples are multiplied by")
-    starts: str = choice(
-        "network", ("network", "random"), "where candidates come from; random is an ablation"
-    )
     period_s: float = number(0.1, 0.0, 1000.0, "time between ticks", "s", above=True)

@@ -27,32 +27,32 @@ def fin(
         output: the fitted fin.
         seed: draws samples where there are too many.
     """
-    print("\n".join(_fin(data, output, seed)))
+    from finlab.fit.fin_file import check_table_path, summary, write_fin
+    from finlab.fit.fin_fit import fit_fin
+    from finlab.fit.measurements import read_measurements
+
+    check_table_path(output)
+    fit = fit_fin(read_measurements(data), seed, _tell)
+    write_fin(fit, output)
+    print("\n".join(summary(fit)))
+    print(f"{output}: name it in a layout, model: {{type: table, path: {output.name}}}")
 
 
 @verbs.command
 def actuator(
     data: Annotated[Positional[tuple[Path, ...]], arg(metavar="DATA.csv...")],
     output: Annotated[Path, arg(metavar="TABLE.csv", aliases=["-o"])],
-    seed: int = 0,
 ) -> None:
-    """Fit a thruster to its bench table, or a fin to a load cell's measurements; the columns tell which.
+    """Fit a thruster to its bench table.
 
-    A thruster's table has a command (PWM, or input from -1 to 1, or rpm), force, and power or voltage and
+    The table has a command (PWM, or input from -1 to 1, or rpm), force, and power or voltage and
     current, and perhaps torque; units stand in the header, `force [kgf]`. Commands may be repeated. What is
-    printed goes into a layout. A fin's file is that of `finlab fit fin`.
+    printed goes into a layout. `finlab fit fin` is for fins.
 
     Args:
-        data: CSV files of one actuator.
-        output: the table of thrust, or the fitted fin.
-        seed: draws samples of a fin where there are too many.
+        data: CSV files of one thruster.
+        output: the table of thrust.
     """
-    from finlab.fit.columns import names_in
-    from finlab.fit.measurements import NAMES, NEEDED
-
-    if set(NEEDED) <= names_in(data[0], NAMES):
-        print("\n".join(_fin(data, output, seed)))
-        return
     from finlab.errors import DataError
     from finlab.fit.fin_file import check_table_path
     from finlab.fit.thruster_bench import read_bench
@@ -65,21 +65,6 @@ def actuator(
     write_whole(output, thruster_csv(fit, output), DataError)
     print("\n".join(summary(fit)))
     print(f"\n{output}: in a layout's thruster\n  " + "\n  ".join(layout_lines(fit, output)))
-
-
-def _fin(data: tuple[Path, ...], output: Path, seed: int) -> list[str]:
-    """Fits a fin and writes its file; returns what to print."""
-    from finlab.fit.fin_file import check_table_path, summary, write_fin
-    from finlab.fit.fin_fit import fit_fin
-    from finlab.fit.measurements import read_measurements
-
-    check_table_path(output)
-    fit = fit_fin(read_measurements(data), seed, _tell)
-    write_fin(fit, output)
-    return [
-        *summary(fit),
-        f"{output}: name it in a layout, model: {{type: table, path: {output.name}}}",
-    ]
 
 
 @verbs.command

@@ -1,4 +1,4 @@
-"""An answer as plain values: the JSON object of `finlab allocate` and of `finlab-runtime allocate`."""
+"""An answer as plain values: the JSON object of `finlab allocate`."""
 
 import numpy as np
 from msgspec import to_builtins

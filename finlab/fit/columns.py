@@ -57,12 +57,6 @@ def named_column(
     return name, (0.5 if told.lower() == "stroke" else 1.0) * units.get(unit, 1.0)
 
 
-def names_in(path: Path, names: Mapping[str, str]) -> set[str]:
-    """Returns what the header of a file names."""
-    header = read_table(path, MAX_BYTES, "a CSV file of measurements").header
-    return {named_column(cell, names)[0] for cell in header} - {""}
-
-
 def read_columns(
     path: Path,
     names: Mapping[str, str],

@@ -19,8 +19,8 @@ NAMES = {
 COMMANDS = {"PWM": "us", "input": "", "rpm": "rpm"}
 """Columns of commands with their units; the first that a file has is taken."""
 EXPECTED = (
-    "a command (PWM, input or rpm), force, and power or voltage and current, or of a fin A, f, Fy, Fz; units "
-    "in brackets, `force [kgf]`"
+    "a command (PWM, input or rpm), force, and power or voltage and current; units in brackets, "
+    "`force [kgf]`; `finlab fit fin` takes A, f, Fy, Fz of fins"
 )
 MIN_COMMANDS = 5
 """Fewest different commands."""

@@ -27,7 +27,7 @@ from finlab.mdn.answers import NOW, OTHER, Answers, Steps, follow, ranked, refin
 from finlab.mdn.descent import realize
 from finlab.mdn.features import Seen, see
 from finlab.mdn.network import ForceMixture, ForceNetworkConfig
-from finlab.mdn.proposal import RANDOM, Proposal, propose, random_proposal
+from finlab.mdn.proposal import Proposal, propose
 from finlab.mdn.robot import effort_robot
 from finlab.networks.threads import single_threaded_products
 from finlab.networks.trained import TrainedWeights
@@ -61,7 +61,7 @@ class Found(NamedTuple):
 
 def names_of(proposal: Proposal) -> tuple[str, ...]:
     """What the proposals for a single target are called."""
-    return tuple("a random force" if k == RANDOM else f"component {k + 1}" for k in proposal.component[0])
+    return tuple(f"component {k + 1}" for k in proposal.component[0])
 
 
 class Mdn(Method):
@@ -110,8 +110,6 @@ class Mdn(Method):
     def proposals(self, target: Array, seed: int, count: int | None = None) -> Proposal:
         """The network's proposals for normalized targets (N, 6); by default as many as the settings say."""
         count = count or self.settings.n_candidates
-        if self.settings.starts == "random":
-            return random_proposal(self.robot.view, len(target), count, seed)
         seen = see(self.robot.view, target)
         return propose(self.mixture(seen), self.robot.view, seen, count, self.settings.temperature, seed)
 

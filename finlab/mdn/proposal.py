@@ -10,11 +10,6 @@ from finlab.arrays import AnyArray
 from finlab.mdn.features import RobotView, Seen
 from finlab.mdn.network import ForceMixture
 
-RANDOM = -1
-"""In place of a component, for proposals that no network has made."""
-POWERS = (1.0, 8.0)
-"""Of uniform random numbers, for random shares of the largest forces."""
-
 
 class Proposal(NamedTuple):
     """K proposals for each of N targets, none of them exact yet."""
@@ -22,7 +17,7 @@ class Proposal(NamedTuple):
     force: AnyArray
     """Planar forces (N, K, n) [N], complex: horizontal, and 1j times vertical."""
     component: NDArray[np.intp]
-    """Mixture component of each (N, K), or `RANDOM`."""
+    """Mixture component of each (N, K)."""
 
 
 def propose(
@@ -48,14 +43,6 @@ def propose(
         drawn = mean[place, others] + spread * (parts[..., 0] + 1j * parts[..., 1])
         component, root = (np.hstack(both) for both in ((component, others), (root, drawn)))
     return Proposal(shares(root) * (seen.frame * view.largest)[:, None], component)
-
-
-def random_proposal(view: RobotView, rows: int, n_candidates: int, seed: int) -> Proposal:
-    """K random proposals for each of N targets on one robot: mostly few fins work hard."""
-    rng, shape = np.random.default_rng(seed), (rows, n_candidates, len(view.largest))
-    share = rng.random(shape) ** rng.uniform(*POWERS, (*shape[:2], 1))
-    force = share * view.largest * np.exp(1j * rng.uniform(-np.pi, np.pi, shape))
-    return Proposal(force, np.full(shape[:2], RANDOM))
 
 
 def shares(root: AnyArray) -> AnyArray:

@@ -11,13 +11,12 @@ import yaml
 
 from finlab.arrays import Array
 from finlab.cli import main
-from finlab.deploy.command import main as runtime
 from finlab.errors import DataError
 from finlab.fit.thruster_bench import Bench, read_bench
 from finlab.fit.thruster_file import layout_lines
 from finlab.fit.thruster_fit import ThrusterFit, fit_thruster
 from finlab.uncertainty.table_error import thrust_table_error
-from tests.fit.cell import columns_of, commands, measured, soft, write
+from tests.fit.cell import write
 
 T200 = Path(__file__).parent / "data" / "t200_16v.csv"
 """Force in kgf, voltage and current in place of power, rpm beside PWM."""
@@ -143,15 +142,3 @@ def test_the_verb_makes_a_table_that_answers_with_inputs(
         assert actuator["command"]["force_n"] == pytest.approx(newtons, abs=1e-6)
         there = np.interp(actuator["command"]["input"], command, 9.80665 * force)
         assert there == pytest.approx(newtons, abs=0.01)
-    assert main(["export", str(robot), "-o", str(tmp_path / "bundle")]) == 0
-    capsys.readouterr()
-    assert runtime(["allocate", str(tmp_path / "bundle"), "--wrench", *target, "--json"]) == 0
-    on_board = json.loads(capsys.readouterr().out)
-    assert [one["command"] for one in on_board["actuators"]] == [one["command"] for one in told["actuators"]]
-
-
-def test_the_same_verb_takes_a_fin(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    command = commands(40)
-    data = write(tmp_path / "cell.csv", columns_of(command, measured(soft(), command)))
-    assert main(["fit", "actuator", str(data), "-o", str(tmp_path / "fin.csv")]) == 0
-    assert "fitted to 40 samples" in capsys.readouterr().out and (tmp_path / "fin.csv").exists()

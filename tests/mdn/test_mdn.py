@@ -185,14 +185,6 @@ def test_samples_are_the_proposed_forces(shipped: AnyRobot, layout_a: Layout) ->
     )
 
 
-def test_random_proposals_are_an_ablation(layout_a: Layout) -> None:
-    method = AnyRobot("mdn", starts="random")
-    answer = method.allocate(layout_a, TARGET)
-    assert answer.err_norm < 1e-6 and answer.candidates is not None
-    assert set(answer.candidates.source) == {"a random force"}
-    assert answer == method.allocate(layout_a, TARGET)
-
-
 @pytest.mark.parametrize("policy", ["closest", "direction", "priority"])
 def test_out_of_reach_it_delivers_what_the_default_method_does(
     policy: str, shipped: AnyRobot, layout_a: Layout
