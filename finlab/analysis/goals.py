@@ -59,7 +59,7 @@ def make_goal(
         flow: velocity (6,) of the body relative to the water; None at rest.
 
     Raises:
-        LayoutError: unknown goal or axis, too few actuators for a failure, or a mission that is not wrenches.
+        LayoutError: unknown goal or axis, or too few actuators for a failure.
     """
     search: dict[str, Any] = {} if fine else QUICK_SEARCH
     places = _places(axes)
@@ -80,7 +80,7 @@ def make_goal(
             )
         return _after_worst_failure(of_weakest)
     if name == "mission_power":
-        return _mission_power(_wrenches(mission), flow)
+        return _mission_power(mission, flow)
     raise LayoutError(f"goal: expected one of {', '.join(GOALS)}, got {name!r:.60}")
 
 
@@ -130,7 +130,7 @@ def _after_worst_failure(of_rest: Callable[[ForceSets], Array]) -> Goal:
     return goal
 
 
-def _mission_power(mission: Array, flow: Array | None) -> Goal:
+def _mission_power(mission: ArrayLike, flow: Array | None) -> Goal:
     """Mean least power; a wrench out of reach costs by what is missing."""
 
     def goal(sets: ForceSets, layout_of: Callable[[int], Layout]) -> Array:
@@ -141,13 +141,3 @@ def _mission_power(mission: Array, flow: Array | None) -> Goal:
         return np.asarray(-cost.mean(axis=1))
 
     return goal
-
-
-def _wrenches(mission: ArrayLike) -> Array:
-    try:
-        values = np.atleast_2d(np.asarray(mission, dtype=np.float64))
-    except (TypeError, ValueError):
-        values = np.zeros((0, 0))
-    if values.ndim != 2 or values.shape[1] != 6 or not len(values) or not np.isfinite(values).all():
-        raise LayoutError("mission: expected wrenches of six finite numbers [N, N m], got something else")
-    return values

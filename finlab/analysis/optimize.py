@@ -101,9 +101,8 @@ def optimize_layout(
         cancelled: asked after each round; the search stops when it answers True.
 
     Raises:
-        LayoutError: something about the actuators, bounds, pairs, goal, axes or mission does not fit; it says
-            what.
-        CommandError: `flow` is not six finite numbers.
+        LayoutError: something about the actuators, bounds, pairs, goal or axes does not fit; it says what.
+        CommandError: `flow` is not six finite numbers, or `mission` not such wrenches.
     """
     bounds, water = bounds or {}, check_flow(flow)
     known = {name: bounds.get(name) or Bounds.around(layout.actuators[layout.index(name)]) for name in names}

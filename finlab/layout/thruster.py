@@ -1,5 +1,6 @@
 """A thruster whose axis is fixed in the robot."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, ClassVar
@@ -68,15 +69,9 @@ class Thruster(Commanded):
     @property
     def frame(self) -> tuple[Vector, Vector, Vector]:
         """Own axes in the body frame: the axis, and two across it."""
-        least = min(range(3), key=lambda i: abs(self.axis[i]))
-        beside = unit_vector("axis", _scaled(cross(self.axis, _AXES[least])))
-        return self.axis, beside, cross(self.axis, beside)
-
-
-_AXES: tuple[Vector, Vector, Vector] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-
-
-def _scaled(vector: Vector) -> Vector:
-    """A vector of any length with length 1."""
-    length = sum(value * value for value in vector) ** 0.5
-    return vector[0] / length, vector[1] / length, vector[2] / length
+        first, across = self.axis, [0.0, 0.0, 0.0]
+        across[min(range(3), key=lambda i: abs(first[i]))] = 1.0
+        x, y, z = cross(first, (across[0], across[1], across[2]))
+        size = math.hypot(x, y, z)
+        beside = x / size, y / size, z / size
+        return first, beside, cross(first, beside)

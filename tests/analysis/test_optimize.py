@@ -14,7 +14,7 @@ from finlab.analysis import (
     mirror_pairs,
     optimize_layout,
 )
-from finlab.errors import LayoutError
+from finlab.errors import FinlabError, LayoutError
 from finlab.layout import Layout
 
 Layouts = Callable[[str], Layout]
@@ -83,13 +83,13 @@ def test_fins_keep_their_distance(shipped: Layouts) -> None:
     [
         ("A", "beauty", [[1, 0, 0, 0, 0, 0]], "goal: expected one of weakest_direction"),
         ("D", "worst_single_failure", [[1, 0, 0, 0, 0, 0]], "needs 6 directions after a loss"),
-        ("A", "mission_power", [[1, 2, 3]], "mission: expected wrenches"),
-        ("A", "mission_power", [[1, 0, 0, 0, 0, float("nan")]], "mission: expected wrenches"),
+        ("A", "mission_power", [[1, 2, 3]], "wrench: expected an array of shape"),
+        ("A", "mission_power", [[1, 0, 0, 0, 0, float("nan")]], "wrench: Tz must be finite"),
     ],
 )
 def test_wrong_goals(shipped: Layouts, name: str, goal: str, mission: object, message: str) -> None:
     layout = shipped(name)
-    with pytest.raises(LayoutError, match=message):
+    with pytest.raises(FinlabError, match=message):
         optimize_layout(layout, layout.names[:1], goal=goal, mission=mission)
 
 
