@@ -17,6 +17,7 @@ from finlab.files.archive import unpacked
 from finlab.files.guarded import is_regular, read_file
 from finlab.files.plain_values import parse_json
 
+FORMAT = "finlab-bundle"
 VERSION = 8
 """Version of the bundle; a reader knows exactly one."""
 ROBOT, ABOUT = "robot.json", "bundle.json"

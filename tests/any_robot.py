@@ -9,7 +9,6 @@ import numpy as np
 from finlab.allocation import Allocation, Allocator, BatchAllocation
 from finlab.allocation.method import Method
 from finlab.allocation.methods import LEARNED, Checkpoint, MethodChoice, checked_settings, choose_method
-from finlab.allocation.modes import Mode
 from finlab.allocation.settings import Settings
 from finlab.layout import Layout
 from finlab.networks.checkpoint import read_normalization, resolve_checkpoint
@@ -48,7 +47,6 @@ class AnyRobot:
         return other
 
     def on(self, layout: Layout) -> Allocator:
-        self._last = layout
         if layout not in self._made:
             self._made[layout] = Allocator.of_choice(layout, self.choice)
         return self._made[layout]
@@ -62,10 +60,6 @@ class AnyRobot:
 
     def allocate_batch(self, layout: Layout, wrenches: Any, **question: Any) -> BatchAllocation:
         return self.on(layout).allocate_batch(wrenches, **question)
-
-    def explore(self, result: Allocation) -> tuple[Mode, ...]:
-        """Of the robot that was asked about last."""
-        return self.on(self._last).explore(result)
 
 
 def normalized_error(normalization: Normalization, wrench: Any, target: Any) -> Any:

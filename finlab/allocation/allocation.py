@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from html import escape
 from typing import Any, ClassVar, Generic, NamedTuple, Self, TypeVar
 
 import numpy as np
@@ -11,14 +12,13 @@ from numpy.typing import NDArray
 from finlab.allocation.evaluate import REACHED, body_forces, judged_effort, judged_power
 from finlab.allocation.policy import CLOSEST, Policy, limits_reached
 from finlab.allocation.solution import Candidates, PlainData
-from finlab.allocation.tables import allocation_html, allocation_text
+from finlab.allocation.tables import allocation_text
 from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.layout.commands import Command, command_of
 from finlab.layout.damage import Health
 from finlab.physics.expected_miss import expected_miss, sources_of_miss
-from finlab.physics.known_plants import plant_of
-from finlab.physics.plant import Plant
+from finlab.physics.plant import Plant, plant_of
 
 Number = TypeVar("Number", float, Array)
 """What is told of one answer, or of each of many (N,)."""
@@ -335,7 +335,7 @@ class Allocation(Answer[float]):
 
     def _repr_html_(self) -> str:
         """The table of the command line, for notebooks."""
-        return allocation_html(self)
+        return f"<pre>{escape(str(self))}</pre>"
 
 
 def chunks(n: int) -> Iterator[slice]:

@@ -21,7 +21,6 @@ from finlab.allocation.methods import (
     checked_settings,
     choose_method,
 )
-from finlab.allocation.modes import Mode, find_modes, force_sizes
 from finlab.allocation.notes import answer_notes
 from finlab.allocation.policy import CLOSEST, Policy, as_policy
 from finlab.allocation.question import (
@@ -43,11 +42,8 @@ from finlab.layout import Layout
 from finlab.layout.damage import Health
 from finlab.layout.load import load_layout
 from finlab.networks.trained import TrainedWeights
-from finlab.physics.known_plants import plant_of
-from finlab.physics.plant import Plant
+from finlab.physics.plant import Plant, plant_of
 
-ALTERNATIVE_ERROR = 1e-4
-"""Normalized error up to which another answer is an alternative."""
 MOST_PREPARED = 32
 """Damaged states of the robot that an allocator keeps prepared."""
 
@@ -256,21 +252,6 @@ class Allocator:
             wrench_expected=None if solution.wrench is None else solution.wrench[0],
             prices=None if solution.prices is None else solution.prices[0],
         )
-
-    def explore(self, result: Allocation) -> tuple[Mode, ...]:
-        """Distinct ways to deliver the wrench of an answer, the chosen one first: its candidates, and where
-        all proposals end. Methods that have a single answer know none.
-
-        Raises:
-            AllocationError: the answer is of another robot.
-        """
-        ways, found, layout = self.refinement(result), result.candidates, result.layout
-        if found is None:
-            return ()
-        if ways:
-            found = found.beside(ways[-1].exact(max(ALTERNATIVE_ERROR, 1.01 * result.err_norm)))
-        size = force_sizes(layout, found.command, result.flow)
-        return find_modes(found, size, layout.lower, layout.upper)
 
     def refinement(self, result: Allocation) -> tuple[Candidates, ...]:
         """What a network proposes for the question of a result, whoever answered it, then the same rows after

@@ -7,8 +7,7 @@ import numpy as np
 from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.physics.effort import EffortMeter
-from finlab.physics.known_plants import plant_of
-from finlab.physics.plant import Plant
+from finlab.physics.plant import Plant, plant_of
 
 REACHED = 1e-3
 """Share of the yardstick up to which an error is none: the wrench counts as delivered."""

@@ -7,12 +7,13 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
-from finlab.allocation.bundle_settings import read_about
 from finlab.allocation.method import Method
 from finlab.allocation.settings import Settings
 from finlab.assets import checkpoint_path
-from finlab.bundle_files import ABOUT, Files
+from finlab.bundle_files import ABOUT, FORMAT, Files
 from finlab.errors import AllocationError, DataError
+from finlab.files.guarded import decoded
+from finlab.files.plain_values import parse_json
 from finlab.networks.checkpoint import read_checkpoint, resolve_checkpoint
 from finlab.networks.trained import TrainedWeights
 
@@ -30,6 +31,8 @@ METHODS: dict[str, tuple[str, str]] = {
 """Name -> module and class; modules are loaded only when their method is asked for."""
 LEARNED = {"mdn": "default", "paper": "paper"}
 """Methods that need a trained network -> the shipped checkpoint that holds it."""
+METHODS_ON_BOARD = ("dual", "mdn")
+"""Methods that a bundle can answer with."""
 Checkpoint = str | os.PathLike[str] | TrainedWeights | None
 """A checkpoint folder, the name of a shipped checkpoint, or the contents of one."""
 
@@ -86,19 +89,29 @@ def bundled_method(files: Files, source: str = "bundle", **changes: Any) -> Meth
     Raises:
         AllocationError: a change of an unknown setting, or to a wrong value.
         CheckpointError: this finlab has no such networks.
-        DataError: the bundle is of another format, or has settings that no robot should try.
+        DataError: the bundle is of another format, has a method that runs on no robot, or settings that no
+            robot should try.
     """
-    about = read_about(files, source)
-    kind = method_class(about.method)
+    place = f"{source}/{ABOUT}"
+    document = parse_json(decoded(files[ABOUT], place, "JSON"), place)
+    if not isinstance(document, dict) or document.get("format") != FORMAT:
+        raise DataError(f"{place}: expected format {FORMAT}; a bundle is made by `finlab export`")
+    method, checkpoint, values = (document.get(key) for key in ("method", "checkpoint", "settings"))
+    if not isinstance(method, str) or method not in METHODS_ON_BOARD:
+        known = ", ".join(METHODS_ON_BOARD)
+        raise DataError(f"{place}: method must be one of {known}, got {method!r:.40}")
+    if not isinstance(checkpoint, str | None) or not isinstance(values, dict):
+        raise DataError(f"{place}: checkpoint must be a name and settings must be keys and values")
+    kind = method_class(method)
     try:
-        settings = checked_settings(kind, about.settings)
+        settings = checked_settings(kind, values)
     except AllocationError as error:
-        raise DataError(f"{source}/{ABOUT}: settings: {error}") from None
+        raise DataError(f"{place}: settings: {error}") from None
     if changes:
         settings = checked_settings(kind, vars(settings) | changes)
-    if about.method not in LEARNED:
+    if method not in LEARNED:
         return MethodChoice(kind, settings)
-    networks = read_checkpoint(checkpoint_path(about.checkpoint or LEARNED[about.method]))
+    networks = read_checkpoint(checkpoint_path(checkpoint or LEARNED[method]))
     return MethodChoice(kind, settings, networks)
 
 

@@ -110,10 +110,9 @@ def cluster(signatures: list[ModeSignature]) -> list[list[int]]:
     return groups
 
 
-def force_sizes(layout: Layout, command: Array, flow: Array | None = None) -> Array:
-    """Size of each fin's force (..., n) [N] by its own law for commands (..., n, 3), zero for failed fins; at
-    a velocity (6,) relative to the water, None at rest."""
-    return np.asarray(np.linalg.norm(plant_of(layout).forces(command, flow=flow), axis=-1))
+def force_sizes(layout: Layout, command: Array) -> Array:
+    """Size of each fin's force (..., n) [N] by its own law for commands (..., n, 3), zero for failed fins."""
+    return np.asarray(np.linalg.norm(plant_of(layout).forces(command), axis=-1))
 
 
 def mode_signature(command: Array, force: Array) -> ModeSignature:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from html import escape
 from typing import TYPE_CHECKING
 
 from finlab.allocation.policy import AXES
@@ -78,15 +77,3 @@ def allocation_text(result: Allocation) -> str:
     actuators = aligned(COLUMNS, actuator_rows(result), (True, True, True, False))
     wrenches = aligned(WRENCH_COLUMNS, wrench_rows(result), (True, *(False,) * 6))
     return "\n".join([actuators, "", wrenches, "", summary(result), *remarks(result)])
-
-
-def allocation_html(result: Allocation) -> str:
-    """The same tables for a notebook."""
-    words = "".join(f"<div>{escape(line)}</div>" for line in (summary(result), *remarks(result)))
-    return _html(COLUMNS, actuator_rows(result)) + _html(WRENCH_COLUMNS, wrench_rows(result)) + words
-
-
-def _html(columns: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
-    head = "".join(f"<th>{escape(column)}</th>" for column in columns)
-    body = "".join(f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in row)}</tr>" for row in rows)
-    return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"

@@ -4,6 +4,7 @@
 same layout and settings give the same bytes, as a folder and as a zip archive.
 """
 
+import json
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -11,15 +12,17 @@ from pathlib import Path
 
 import finlab
 from finlab.allocation.allocator import Allocator
-from finlab.allocation.bundle_settings import METHODS_ON_BOARD, about_bundle
+from finlab.allocation.methods import METHODS_ON_BOARD
 from finlab.assets import shipped_checkpoints
 from finlab.bundle_files import (
     ABOUT,
     CHECKSUMS,
+    FORMAT,
     LARGEST_BUNDLE,
     LARGEST_TABLE,
     README,
     ROBOT,
+    VERSION,
     checksums,
     largest,
     table_name,
@@ -98,13 +101,26 @@ def make_bundle(allocator: Allocator, failed: tuple[str, ...] = ()) -> Bundle:
     sha256 = None if weights is None else weights.sha256
     files = {
         ROBOT: robot_bytes(Robot(inside, failed, sha256, cases)),
-        ABOUT: about_bundle(allocator, finlab.__version__),
+        ABOUT: about_bundle(allocator),
         **tables,
         README: readme_text(allocator, failed).encode(),
     }
     if sum(map(len, files.values())) > LARGEST_BUNDLE:
         raise DataError(f"layout {layout.name!r}: its bundle would be larger than {LARGEST_BUNDLE:,} bytes")
     return Bundle({**files, CHECKSUMS: checksums(files)})
+
+
+def about_bundle(allocator: Allocator) -> bytes:
+    """The contents of `bundle.json`: the method and what it is made with."""
+    document = {
+        "format": FORMAT,
+        "version": VERSION,
+        "finlab": finlab.__version__,
+        "method": allocator.method,
+        "checkpoint": allocator.checkpoint,
+        "settings": vars(allocator.settings),
+    }
+    return (json.dumps(document, indent=1, allow_nan=False) + "\n").encode()
 
 
 def with_tables_inside(layout: Layout) -> tuple[Layout, dict[str, bytes]]:

@@ -6,14 +6,14 @@ velocity of the body relative to the water [m/s, rad/s], body frame; None is a r
 
 from copy import copy
 from dataclasses import astuple
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from finlab.actuators.fin.blade import Blade
-from finlab.actuators.fin.models import make_law
+from finlab.actuators.fin.models import file_stamps, make_law
 from finlab.actuators.law import ActuatorLaw
 from finlab.actuators.registry import free_angles, laws_of
 from finlab.arrays import Array
@@ -195,3 +195,18 @@ def _broadcast(command: Array, inflow: Array | None) -> tuple[int, ...]:
 def _met(law: ActuatorLaw, inflow: Array | None, places: Any) -> tuple[Array, ...]:
     """What a law is told beside the commands: the velocities of its actuators' places, where they count."""
     return () if inflow is None or not law.feels_flow else (inflow[..., places, :],)
+
+
+def plant_of(layout: Layout) -> Plant:
+    """Returns the plant of a layout, kept from the last time it was asked for.
+
+    Raises:
+        DataError: a fin's force table cannot be read.
+    """
+    return _made(layout, file_stamps(layout))
+
+
+@lru_cache(maxsize=256)
+def _made(layout: Layout, stamps: tuple[tuple[int, int] | None, ...]) -> Plant:
+    """A plant; tables whose files have changed are read again."""
+    return Plant(layout)

@@ -3,14 +3,12 @@
 import copy
 import pickle
 from dataclasses import fields, replace
-from html.parser import HTMLParser
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from finlab.allocation import Allocation, Allocator, Health
-from finlab.allocation.modes import same_signature
 from finlab.allocation.solution import equal
 from finlab.assets import shipped_checkpoints
 from finlab.errors import DataError
@@ -117,55 +115,11 @@ def test_the_short_form_is_short(n_fins: int, search: AnyRobot) -> None:
     assert "0 targets" in repr(search.allocate_batch(layout, np.empty((0, 6))))
 
 
-class Cells(HTMLParser):
-    """The texts of a page's cells."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.texts: list[str] = []
-        self.open: list[str] = []
-
-    def handle_starttag(self, tag: str, attrs: object) -> None:
-        self.open.append(tag)
-
-    def handle_endtag(self, tag: str) -> None:
-        assert self.open.pop() == tag
-
-    def handle_data(self, data: str) -> None:
-        self.texts.append(data)
-
-
 def test_notebooks_show_the_table_of_the_command_line(search: AnyRobot) -> None:
     layout = load_layout("A")
     layout = replace(layout, actuators=(replace(layout.fins[0], name="<b>bow</b> & co"), *layout.fins[1:]))
-    for wrench in (SURGE, FAR):
-        result = search.allocate(layout, wrench, failed=["front_left"])
-        page = Cells()
-        page.feed(result._repr_html_())
-        assert page.open == []
-        shown, printed = " ".join(page.texts).split(), str(result).split()
-        assert [word for word in shown if word != "fin"] == [word for word in printed if word != "fin"]
-        assert "<b>bow</b> & co" in page.texts
-
-
-def test_an_allocator_explores_any_copy_of_its_answer() -> None:
-    layout, search = load_layout("A"), AnyRobot("mdn")
-    few = search.with_settings(n_refined=8)
-    before = search.allocate(layout, SURGE, failed=["back_left"]).command
-    for allocator, policy, wrench in (
-        (search, "closest", SURGE),
-        (few, "closest", SURGE),
-        (search, "direction", FAR),
-    ):
-        result = allocator.allocate(
-            layout, wrench, failed=["back_left"], policy=policy, seed=3, previous=before
-        )
-        modes = allocator.explore(result)
-        assert len(modes) > 0
-        np.testing.assert_allclose(modes[0].command, result.command, atol=1e-12)
-        signatures = [mode.signature for mode in modes]
-        assert not any(same_signature(a, b) for i, a in enumerate(signatures) for b in signatures[:i])
-        assert all(allocator.explore(twin) == modes for twin in round_trips(result))
+    shown = search.allocate(layout, SURGE)._repr_html_()
+    assert shown.startswith("<pre>actuator") and "&lt;b&gt;bow&lt;/b&gt; &amp; co" in shown
 
 
 def test_another_command_is_judged_anew(search: AnyRobot) -> None:

@@ -88,7 +88,6 @@ def ask(seed: int) -> None:
         except LayoutError as error:  # what damage leaves of a fin may be below all bounds
             assert "must be at least" in str(error) and "health" in asked
             return
-        modes = allocator.explore(result) if name == "dual" and seed % 5 == 0 else ()
         if result.bound is not None and result.reachable:
             assert 0.0 <= result.bound <= result.power * (1 + 1e-6) + 1e-12
         batch = allocator.allocate_batch(
@@ -96,7 +95,6 @@ def ask(seed: int) -> None:
         )
     for found, limited in (
         (result.command, result.layout),
-        *((each.command, result.layout) for each in modes),
         *((each, robot) for each in batch.command),
     ):
         works = [fin not in result.failed for fin in robot.names]

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from finlab.allocation.allocation import Allocation
-from finlab.allocation.allocator import ALTERNATIVE_ERROR, Allocator
+from finlab.allocation.allocator import Allocator
 from finlab.allocation.methods import MethodChoice, choose_method
 from finlab.allocation.solution import Candidates
 from finlab.layout import Layout
@@ -20,6 +20,8 @@ from webapp.tasks.mode_names import NO_MODES, OWN, Modes, modes_of
 Load = Callable[..., MethodChoice]
 KEPT = 24
 """Allocators that are kept: to make one takes as long as a hundred answers."""
+ALTERNATIVE_ERROR = 1e-4
+"""Normalized error up to which another answer is an alternative."""
 
 
 @dataclass(frozen=True, eq=False)

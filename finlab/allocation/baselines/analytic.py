@@ -1,19 +1,7 @@
 """Method `analytic`: force-space pseudo-inverse, each actuator's force turned into its cheapest command."""
 
-from dataclasses import dataclass
-from functools import cached_property
-
 from finlab.allocation.baselines.model_based import ModelBased
-from finlab.allocation.baselines.pseudo_inverse import RCOND, PseudoInverse
-from finlab.allocation.settings import Settings, number
 from finlab.arrays import Array
-
-
-@dataclass(frozen=True)
-class AnalyticSettings(Settings):
-    """Settings of method `analytic`."""
-
-    rcond: float = number(RCOND, 0.0, 1.0, "singular values below this share of the largest count as zero")
 
 
 class Analytic(ModelBased):
@@ -26,12 +14,6 @@ class Analytic(ModelBased):
 
     name = "analytic"
     takes = "any actuator"
-    settings_class = AnalyticSettings
-    settings: AnalyticSettings
-
-    @cached_property
-    def _inverse(self) -> PseudoInverse:
-        return PseudoInverse(self.plant, self.sigma, rcond=self.settings.rcond)
 
     def _commands(self, targets: Array, seed: int) -> Array:
         return self._inverse.command(targets)

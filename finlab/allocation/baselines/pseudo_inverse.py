@@ -23,10 +23,9 @@ class PseudoInverse:
     Args:
         plant: the robot, in the flow that it has.
         sigma: scales the rows (6,).
-        rcond: see `RCOND`.
     """
 
-    def __init__(self, plant: Plant, sigma: Array, rcond: float = RCOND) -> None:
+    def __init__(self, plant: Plant, sigma: Array) -> None:
         self.plant, inflow = plant, plant.inflow(None)
         self.groups = [
             (places, group.at(None if inflow is None else inflow[places]))
@@ -51,7 +50,7 @@ class PseudoInverse:
         self._middle, self._half = np.array(arcs).T
         most = np.repeat(np.maximum(self.largest, 1e-9), 2)
         scaled = self.effectiveness * most / sigma[:, None]
-        self.inverse = (most[:, None] * np.linalg.pinv(scaled, rcond=rcond) / sigma).T.copy()
+        self.inverse = (most[:, None] * np.linalg.pinv(scaled, rcond=RCOND) / sigma).T.copy()
         """Target (6,) times this (6, 2 n) gives each actuator's forces [N]."""
 
     def command(self, targets: Array) -> Array:

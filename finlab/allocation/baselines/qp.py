@@ -1,13 +1,11 @@
 """Method `qp`: one linear map per layout, one box-constrained least squares per target, as in the paper."""
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from scipy.optimize import lsq_linear
 
 from finlab.allocation.baselines.model_based import ModelBased
-from finlab.allocation.settings import Settings, number
 from finlab.arrays import Array
 from finlab.physics import Plant
 
@@ -32,24 +30,15 @@ class LinearMap:
         self.wrench = plant.wrench(self.reference)
 
 
-@dataclass(frozen=True)
-class QpSettings(Settings):
-    """Settings of method `qp`."""
-
-    regularization: float = number(1.0, 0.0, 1e6, "weight of the distance from the middle of the limits")
-
-
 class Qp(ModelBased):
     """Linearized once per layout, solved per target by SciPy's active-set `lsq_linear(method="bvls")`.
 
-    Minimizes `||(w_ref + J du - target) / sigma||^2 + regularization ||du||^2` over commands as positions
+    Minimizes `||(w_ref + J du - target) / sigma||^2 + ||du||^2` over commands as positions
     between their limits, where `w_ref` and `J` belong to the middle of the limits. What commands cost plays
     no part. (What the paper's QP regularizes it does not say.)
     """
 
     name = "qp"
-    settings_class = QpSettings
-    settings: QpSettings
 
     @cached_property
     def _map(self) -> LinearMap:
@@ -60,7 +49,7 @@ class Qp(ModelBased):
         n_free = int(linear.free.sum())
         step = np.zeros((len(targets), linear.free.size))
         if n_free:
-            matrix = np.vstack([linear.matrix, np.sqrt(self.settings.regularization) * np.eye(n_free)])
+            matrix = np.vstack([linear.matrix, np.eye(n_free)])
             wanted = np.zeros((len(targets), 6 + n_free))
             wanted[:, :6] = (targets - linear.wrench) / self.sigma
             for i, right in enumerate(wanted):
