@@ -58,7 +58,6 @@ def commands(page: Page) -> list[Command]:
         Command("Design", "Save the design", page.designs.save, "S", CTRL),
         Command("Design", "Share the design by a link", page.designs.share),
         Command("Design", "Unlink the selected fin from its mirror image", session.unlink),
-        Command("Design", "Stick the selected fin to the hull", session.stick),
         Command("Design", "Start over", session.start_over),
         Command("Wrench", "Fail or repair the selected fin", fail_selected, "X"),
         *(Command("Wrench", f"Ask for: {name}", partial(session.set_preset, name)) for name in PRESETS),

@@ -28,8 +28,6 @@ def put(handle: Any, **values: Any) -> None:
 def _same(old: Any, new: Any) -> bool:
     if isinstance(old, np.ndarray) or isinstance(new, np.ndarray):
         return np.array_equal(np.asarray(old), np.asarray(new))
-    if isinstance(old, tuple) and len(old) and isinstance(old[0], np.ndarray):
-        return len(old) == len(new) and all(_same(a, b) for a, b in zip(old, new, strict=True))
     return bool(old == new)
 
 

@@ -1,4 +1,4 @@
-"""Links, rings, sticking to the hull, hulls from numbers and from files."""
+"""Links, rings, hulls from numbers and from files."""
 
 import math
 from itertools import combinations
@@ -68,16 +68,6 @@ def test_ring_around_the_vertical_axis(session: Session) -> None:
     with pytest.raises(FinlabError, match="at most 64"):
         session.ring(64)
     assert session.state.layout.n_fins == 12
-
-
-def test_stuck_fin_stands_off_the_surface_along_its_normal(session: Session) -> None:
-    move_fin(session, "front_left", (0.1, 0.4, 0.0))
-    session.select("front_left")
-    session.stick()
-    fin = session.state.layout.fins[1]
-    point, normal = hull_of(session.state.layout).nearest(np.array(fin.position))
-    assert np.linalg.norm(np.subtract(fin.position, point)) == pytest.approx(0.02, abs=2e-3)
-    assert normal[1] > 0.9 and fin.mounting_angle == pytest.approx(math.pi / 2, abs=0.2)
 
 
 def test_hull_by_numbers_and_centre_of_gravity(session: Session) -> None:

@@ -55,7 +55,7 @@ DRAWN = (
     "webapp.panels.compare_tab.comparison_table",
     "webapp.panels.files_tab.command_line",
     "webapp.scene.stage.Stage.refresh",
-    "webapp.scene.wrench_nodes.fitting_newtons",
+    "webapp.scene.wrench_nodes.fitting",
     "webapp.scene.robot_scene.missing_part",
     "webapp.panels.status.legend",
 )

@@ -13,7 +13,7 @@ from finlab.layout import load_layout
 from finlab.sim import make_trajectory
 from tests.webapp.loops import page_of
 from tests.webapp.test_swimming import now, until
-from webapp.markup.swim_card import swim_card
+from webapp.markup.swim_card import pace_words, swim_card
 from webapp.markup.words import righting_sentences
 from webapp.session.swim_plan import Plan
 from webapp.tasks.background import Worker
@@ -104,8 +104,8 @@ def test_a_swim_that_capsizes_says_so(shelf: Shelf) -> None:
     shelf.swimming.set_running(False)
     swimmer = shelf.begun()
     while swimmer.moment().capsized is None:
-        assert "capsized" not in swim_card(*now(shelf.swimming))
+        assert "capsized" not in pace_words(shelf.swimming)
         swimmer.step()
         swimmer.shown = swimmer.moment()
     assert swimmer.log().capsized_s == swimmer.shown.capsized
-    assert f"capsized at {swimmer.shown.capsized:.1f} s" in swim_card(*now(shelf.swimming))
+    assert f"capsized at {swimmer.shown.capsized:.1f} s" in pace_words(shelf.swimming)

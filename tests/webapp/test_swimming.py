@@ -49,7 +49,7 @@ def now(swimming: Swimming) -> tuple[Any, ...]:
     """What its card is made of."""
     swimmer = swimming.swimmer
     moment = None if swimmer is None else swimmer.shown
-    return swimming.active, swimmer, moment, pace_words(swimming)
+    return swimming.active, swimmer, moment
 
 
 def begin(swimming: Swimming, **settings: Any) -> None:
@@ -71,7 +71,7 @@ def test_swims_to_the_end_and_tells_how(swimming: Swimming) -> None:
     assert np.all(np.diff(record[:, TIME]) > 0) and record[0, ERROR] < 0.1
     figures = first.shown.figures
     assert figures is not None and figures.track_m < 0.3
-    assert "arrived" in swim_card(*now(swimming))
+    assert "arrived" in pace_words(swimming)
     assert "arrived" in swim_corner(first, first.shown, pace_words(swimming), 2.0)
     swimming.set_running(True)
     assert not swimming.running, "there is no way left"
@@ -96,7 +96,7 @@ def test_pause_step_and_speed(swimming: Swimming) -> None:
     for wrong in (float("nan"), 0.0, "2", 99.0):
         with pytest.raises(FinlabError):
             SwimSettings().with_value("speed", wrong)
-    assert "paused" in swim_card(*now(swimming))
+    assert "paused" in pace_words(swimming)
 
 
 def test_fins_break_and_are_mended_while_it_swims(swimming: Swimming) -> None:

@@ -29,7 +29,7 @@ from webapp.markup.verdict import (
 from webapp.markup.words import authority_sentence, trim_sentence
 from webapp.panels.compare_tab import comparison_table
 from webapp.panels.status import corner
-from webapp.scene.wrench_nodes import LENGTH, LONGEST, fitting_newtons
+from webapp.scene.wrench_nodes import LENGTH, LONGEST, NEWTONS, SHORTEST, fitting
 from webapp.session import Session, files
 from webapp.session.lessons import TOUR
 from webapp.session.state import AXIS_WORDS, State
@@ -158,10 +158,13 @@ def test_reach_is_a_bound_that_is_met_on_heave() -> None:
 
 
 def test_arrow_scale_fits_and_rests() -> None:
+    def newtons_for(largest: float, current: float) -> float:
+        return fitting(NEWTONS, largest, current, LENGTH, (SHORTEST, LONGEST))
+
     for largest in (0.01, 0.3, 1.2, 9.0, 60.0):
-        newtons = fitting_newtons(largest, 1.0)
+        newtons = newtons_for(largest, 1.0)
         assert LENGTH * largest / newtons <= LONGEST
-    assert fitting_newtons(1.3, fitting_newtons(1.2, 1.0)) == fitting_newtons(1.2, 1.0)
+    assert newtons_for(1.3, newtons_for(1.2, 1.0)) == newtons_for(1.2, 1.0)
 
 
 def test_layout_files_go_out_and_come_back() -> None:

@@ -34,13 +34,13 @@ class Axis(NamedTuple):
         return (value - self.low) / (self.high - self.low)
 
 
-def cost_axis(word: str, values: Array) -> Axis:
-    """An axis that shows all of some values, with round ticks."""
+def cost_axis(word: str, values: Array, most: int = MOST_TICKS) -> Axis:
+    """An axis that shows all of some values, with round ticks, `most` at most."""
     low, high = float(values.min()), float(values.max())
     margin = max(0.08 * (high - low), 0.02 * high, 1e-6)
     low, high = low - margin, high + margin
-    decade = 10.0 ** math.floor(math.log10((high - low) / MOST_TICKS))
-    step = next(s * decade for s in (1.0, 2.0, 5.0, 10.0) if (high - low) / (s * decade) <= MOST_TICKS)
+    decade = 10.0 ** math.floor(math.log10((high - low) / most))
+    step = next(s * decade for s in (1.0, 2.0, 5.0, 10.0) if (high - low) / (s * decade) <= most)
     places = range(math.ceil(low / step), math.floor(high / step) + 1)
     return Axis(word, low, high, tuple((k * step, f"{k * step + 0.0:.4g}".replace("-", "−")) for k in places))
 
@@ -67,6 +67,8 @@ class Plot(NamedTuple):
     """[px]."""
     left: int = 44
     """Where the axis that goes up stands [px]."""
+    width: int = WIDTH
+    """[px]."""
 
     @property
     def floor(self) -> float:
@@ -75,7 +77,7 @@ class Plot(NamedTuple):
 
     def place(self, x: Any, y: Any) -> tuple[Any, Any]:
         """Where a pair of values stands, or each of two arrays [px]."""
-        right = self.left + self.across.share(x) * (WIDTH - self.left - RIGHT)
+        right = self.left + self.across.share(x) * (self.width - self.left - RIGHT)
         return right, self.floor - self.up.share(y) * (self.floor - TOP)
 
     def points(self, x: Array, y: Array) -> str:
@@ -98,7 +100,7 @@ class Plot(NamedTuple):
         parts, floor, left = [], self.floor, self.left
         for value, label in self.up.ticks:
             at = self.place(0.0, value)[1]
-            parts.append(html("<path d='M{} {:.1f}H{}' class='grid'/>", left, at, WIDTH - RIGHT))
+            parts.append(html("<path d='M{} {:.1f}H{}' class='grid'/>", left, at, self.width - RIGHT))
             parts.append(html("<text x='{}' y='{:.1f}' text-anchor='end'>{}</text>", left - 5, at + 4, label))
         middle = "<text x='{:.1f}' y='{}' text-anchor='middle'>{}</text>"
         for value, label in self.across.ticks:
@@ -106,7 +108,7 @@ class Plot(NamedTuple):
             if upright:
                 parts.append(html("<path d='M{:.1f} {}V{}' class='grid'/>", at, TOP, floor))
             parts.append(html(middle, at, floor + 14, label))
-        parts.append(html(middle, (left + WIDTH) / 2, self.height - 5, self.across.word))
+        parts.append(html(middle, (left + self.width) / 2, self.height - 5, self.across.word))
         turned = f"translate(10 {(TOP + floor) / 2}) rotate(-90)"
         parts.append(html("<text transform='{}' text-anchor='middle'>{}</text>", turned, self.up.word))
         return html("{}", parts)
@@ -114,10 +116,16 @@ class Plot(NamedTuple):
     def drawn(self, parts: Iterable[str], upright: bool = False) -> str:
         """The whole plot, `parts` over its grid."""
         whole = "<svg class='plot' viewBox='0 0 {} {}'>{}{}</svg>"
-        return html(whole, WIDTH, self.height, self.grid(upright), parts)
+        return html(whole, self.width, self.height, self.grid(upright), parts)
 
 
-def positive(word: str, values: Array) -> Axis:
+def positive(word: str, values: Array, most: int = MOST_TICKS) -> Axis:
     """An axis from 0, or the least of some values, that shows all of them."""
     least = min(0.0, float(values.min()))
-    return cost_axis(word, np.append(values, least))._replace(low=least)
+    return cost_axis(word, np.append(values, least), most)._replace(low=least)
+
+
+def exact_axis(word: str, values: Array) -> Axis:
+    """An axis from the first of some values to the last."""
+    axis = cost_axis(word, values)._replace(low=float(values[0]), high=float(values[-1]))
+    return axis._replace(ticks=tuple(tick for tick in axis.ticks if axis.low <= tick[0] <= axis.high))

@@ -8,14 +8,6 @@ from webapp.tasks.moment import Figures, Moment
 from webapp.tasks.swimmer import Swimmer
 from webapp.tasks.swimming import Swimming
 
-FIGURES = (
-    "off the path, root mean square",
-    "off in depth",
-    "mean power",
-    "over the last second",
-    "energy so far",
-)
-
 
 def pace_words(swimming: Swimming) -> str:
     """At what pace it goes, in words: what is asked for, or what the machine can do."""
@@ -55,38 +47,30 @@ def findings_words(shown: Moment) -> list[str]:
     return sentences
 
 
-def swim_card(swims: bool, swimmer: Swimmer | None, moment: Moment | None, pace: str) -> str:
-    """Time, pace, distance from where the robot should be, depth error, power, energy and speed.
+def swim_card(swims: bool, swimmer: Swimmer | None, moment: Moment | None) -> str:
+    """Distance from where the robot should be, depth error, power and energy so far, and what was found.
 
     Args:
         swims: whether there is a swim.
         swimmer: the robot, None while it is being made.
         moment: what it does.
-        pace: as `pace_words` gives it.
     """
     if not swims:
         return Markup("<div class='fl dim'>Start lets this robot swim, with what works.</div>")
     if swimmer is None or moment is None:
         return Markup("<div class='fl dim'>making ready …</div>")
-    head = html("<b>{:.1f} s</b> of {:.0f} s, {}", moment.time, swimmer.duration_s, pace)
-    rows = (row(*line) for line in zip(FIGURES, _figures(moment.figures), strict=True))
-    return html(
-        "<div class='fl swim'><div class='said'>{}</div><table>{}</table>{}</div>",
-        head,
-        rows,
-        _warnings(swimmer, moment),
-    )
+    rows = (row(*line) for line in _figures(moment.figures))
+    return html("<div class='fl swim'><table>{}</table>{}</div>", rows, _warnings(swimmer, moment))
 
 
-def _figures(figures: Figures | None) -> tuple[str, ...]:
+def _figures(figures: Figures | None) -> tuple[tuple[str, str], ...]:
     if figures is None:
-        return ("–",) * len(FIGURES)
+        return ()
     return (
-        f"{100 * figures.track_m:.1f} cm",
-        f"{100 * figures.depth_m:.1f} cm",
-        f"{figures.mean_w:.2f} W",
-        f"{figures.now_w:.2f} W",
-        f"{figures.energy_wh * 1000:.1f} mWh",
+        ("off the path, root mean square", f"{100 * figures.track_m:.1f} cm"),
+        ("off in depth", f"{100 * figures.depth_m:.1f} cm"),
+        ("mean power", f"{figures.mean_w:.2f} W"),
+        ("energy so far", f"{figures.energy_wh * 1000:.1f} mWh"),
     )
 
 

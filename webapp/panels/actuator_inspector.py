@@ -1,20 +1,18 @@
 """What a layout says of the selected actuators: place, direction, limits, model. An edit counts for all."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
 from typing import Any, NamedTuple
 
 from markupsafe import Markup
 
-from finlab.errors import FinlabError
 from finlab.layout import Actuator, Azimuth, Fin, Layout
 from finlab.layout.directions import Vector, axis_names, direction, part_of, pointed
 from finlab.layout.fin import MAX_FREQUENCY
 from finlab.layout.thrust_model import PowerLaw
 from webapp.markup.answer import swatch
 from webapp.markup.html import html
-from webapp.markup.words import listed
 from webapp.page import Page
 from webapp.panels.actuator_model import add_model
 from webapp.session.state import number
@@ -45,20 +43,13 @@ class Box(NamedTuple):
     degrees: bool = False
     """Whether the field is in radians."""
     free: bool = False
-    """Whether it may be left empty: nothing is said of it then."""
+    """Whether it may be empty: nothing is said of it then; 0 empties it."""
 
 
 PAIRS = (
     Box("A [°]", "amplitude", FIN, "Half of the beat: least and most, up to 90.", 5.0, True),
     Box("f [Hz]", "frequency", FIN, f"Least and most, up to {MAX_FREQUENCY:g} Hz."),
-    Box(
-        "φ [°]",
-        "zero_direction",
-        FIN,
-        "From and to; −180 to 180 is any direction.",
-        5.0,
-        True,
-    ),
+    Box("φ [°]", "zero_direction", FIN, "From and to; −180 to 180 is any direction.", 5.0, True),
     Box("Force [N]", "force", FIXED, "Least and most along the axis; astern it is negative.", 1.0),
     Box("Force [N]", "force", PODS, "Least and most; above 0 for one that cannot stop.", 1.0),
     Box("Arc [°]", "arc", PODS, "Least and greatest angle from zero; −180 to 180 is any.", 5.0, True),
@@ -66,19 +57,19 @@ PAIRS = (
 )
 NUMBERS = (
     Box("Dead band [N]", "dead_band", (*FIXED, *PODS), "Forces smaller than this, but 0, cannot be held."),
-    Box("Turn rate [°/s]", "turn_rate", PODS, "How fast it turns; empty: at once.", 5.0, True, True),
-    Box("Rate [N/s]", "rate", (*FIXED, *PODS), "How fast the force changes; empty: at once.", free=True),
-    Box("Rate [°/s]", "rate", RUDDER, "How fast it turns; empty: at once.", 5.0, True, True),
+    Box("Turn rate [°/s]", "turn_rate", PODS, "How fast it turns; 0: at once.", 5.0, True, True),
+    Box("Rate [N/s]", "rate", (*FIXED, *PODS), "How fast the force changes; 0: at once.", free=True),
+    Box("Rate [°/s]", "rate", RUDDER, "How fast it turns; 0: at once.", 5.0, True, True),
     Box("Lag [s]", "time_constant", (*FIXED, *PODS, *RUDDER), "Time to 63 % of a new command.", 0.05),
     Box("Torque/force [m]", "torque_per_newton", (*FIXED, *PODS), "Reaction torque, signed.", 0.001),
 )
 LAW = (
     Box("Ahead [W]", "forward", (*FIXED, *PODS), "Power at 1 N; F newtons take it times F^exponent."),
-    Box("Astern [W]", "reverse", FIXED, "The same of a negative force; empty: as ahead.", free=True),
+    Box("Astern [W]", "reverse", FIXED, "The same of a negative force; 0: as ahead.", free=True),
     Box("Exponent", "exponent", (*FIXED, *PODS), "1.5 is that of an ideal propeller at rest."),
     Box("Area [m²]", "area", RUDDER, "Of the foil.", 0.001),
     Box("Aspect ratio", "aspect_ratio", RUDDER, "2 span²/area for a foil on a hull."),
-    Box("Lift slope [1/rad]", "lift_slope", RUDDER, "Empty: by the aspect ratio.", free=True),
+    Box("Lift slope [1/rad]", "lift_slope", RUDDER, "0: by the aspect ratio.", free=True),
     Box("Drag", "drag", RUDDER, "Drag coefficient without lift; 0.0065 is NACA 0015.", 0.001),
     Box("Stall [°]", "stall", RUDDER, "Angle to the flow at which it separates.", 1.0, True),
 )
@@ -102,6 +93,10 @@ def add_actuator(page: Page) -> None:
         if session.selected is not None:
             session.rename(session.selected, name)
 
+    def add_law() -> None:
+        for box in LAW:
+            _add_number(page, box)
+
     page.add_html(_headline)
     with gui.add_folder(None) as whole:
         page.bind(gui.add_text("Name", ""), rename, lambda selected: selected or "")
@@ -110,9 +105,10 @@ def add_actuator(page: Page) -> None:
         with gui.add_folder("Limits"):
             for box in PAIRS:
                 _add_pair(page, box)
-            _add_numbers(page, NUMBERS)
+            for box in NUMBERS:
+                _add_number(page, box)
         with gui.add_folder("Model"):
-            add_model(page, part_shown, partial(_add_numbers, page, LAW))
+            add_model(page, part_shown, add_law)
     page.board.show(whole, visible=lambda selected: selected is not None)
 
 
@@ -200,41 +196,20 @@ def _add_pair(page: Page, box: Box) -> None:
     page.board.show(handle, visible=_is_there(box))
 
 
-def _add_numbers(page: Page, boxes: Sequence[Box]) -> None:
-    for box in boxes:
-        _add_number(page, box)
-
-
 def _add_number(page: Page, box: Box) -> None:
-    """A box for a number; one that may be empty is a box for text."""
+    """A box for a number; one that may be empty is so where nothing is said, and 0 brings that back."""
 
     def put(value: Any) -> None:
         checked = number(value, box.label, -1e6, 1e6)
-        page.session.set_value(box.key, math.radians(checked) if box.degrees else checked)
+        said = math.radians(checked) if box.degrees else checked
+        page.session.set_value(box.key, None if box.free and said == 0.0 else said)
 
-    def read(text: str) -> None:
-        if not text.strip():
-            page.session.set_value(box.key, None)
-            return
-        try:
-            value = float(text.replace("−", "-"))
-        except ValueError:
-            raise FinlabError(f"{box.label}: expected a number, or nothing, got {text!r:.40}") from None
-        put(value)
-
-    def shown(part: Actuator) -> str:
+    def shown(part: Actuator) -> float:
         value = _value(part, box)
-        return "" if value is None else f"{value:.6g}"
+        return value if value is not None else math.nan if box.free else 0.0
 
-    handle: Any
-    if box.free:
-        handle = page.gui.add_text(box.label, "", hint=box.hint, visible=False)
-        page.bind(handle, read, of_part(shown))
-    else:
-        handle = page.gui.add_number(box.label, 0.0, step=box.step, hint=box.hint, visible=False)
-        page.bind_number(
-            handle, put, of_part(lambda part: _value(part, box) or 0.0), digits=2 if box.degrees else 5
-        )
+    handle = page.gui.add_number(box.label, 0.0, step=box.step, hint=box.hint, visible=False)
+    page.bind_number(handle, put, of_part(shown), digits=2 if box.degrees else 5)
     page.board.show(handle, visible=_is_there(box))
 
 
@@ -242,31 +217,14 @@ def _headline(layout: Layout, selection: tuple[str, ...], selected: str | None) 
     if not selection:
         said = "Press an actuator in the list or in the view to see all about it."
         return html("<div class='fl dim'>{}</div>", said)
-    parts = [part_of(layout, name) for name in selection]
     badges = Markup().join(swatch(layout.index(name)) for name in selection)
     if len(selection) == 1:
         head = "<div class='fl head'>{}<b>{}</b> <span class='dim'>{}</span></div>"
-        return html(head, badges, selection[0], parts[0].type)
-    differ = differences(parts)
-    said = f"They differ in {differ}. " if differ else "They are alike but for their place. "
+        return html(head, badges, selection[0], part_of(layout, selection[0]).type)
     return html(
-        "<div class='fl head'>{}<b>{} actuators</b><div class='dim'>{}The boxes show {}; what "
+        "<div class='fl head'>{}<b>{} actuators</b><div class='dim'>The boxes show {}; what "
         "you change counts for all that have it.</div></div>",
         badges,
         len(selection),
-        said,
         str(selected),
     )
-
-
-def differences(parts: list[Actuator]) -> str:
-    """What of some actuators is not the same, in words; nothing is said of their places."""
-    kinds: dict[str, set[object]] = {
-        "type": {part.type for part in parts},
-        "direction": {tuple(round(v, 6) for v in direction(part)) for part in parts},
-        "limits": {(part.lower, part.upper) for part in parts},
-        "model": {getattr(part, "model", None) for part in parts},
-        "rates": {part.rates for part in parts},
-    }
-    differ = [word for word, values in kinds.items() if len(values) > 1]
-    return listed(differ) if differ else ""

@@ -49,7 +49,6 @@ def add_actuator_list(page: Page) -> None:
         "Mirror": session.mirror,
         "Unlink": session.unlink,
         "Duplicate": session.duplicate,
-        "To hull": session.stick,
         "Delete": session.delete,
     }
     hint = "What Mirror (M) makes moves along until it is unlinked."

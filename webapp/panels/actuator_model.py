@@ -17,7 +17,7 @@ from finlab.layout.force_table_file import DOUBT
 from finlab.layout.thrust_model import PowerTable
 from finlab.physics import make_law, plant_of
 from webapp.markup.html import html
-from webapp.markup.plot import Plot, cost_axis, positive
+from webapp.markup.plot import Plot, exact_axis, positive
 from webapp.markup.words import degrees
 from webapp.page import Page
 from webapp.session.actuator_edits import FORMULAS
@@ -202,9 +202,7 @@ def drawn_curves(part: Actuator) -> str:
         return ""
     plots = []
     for across, x, up, lines in found:
-        axis = cost_axis(across, x)._replace(low=float(x[0]), high=float(x[-1]))
-        axis = axis._replace(ticks=tuple(tick for tick in axis.ticks if axis.low <= tick[0] <= axis.high))
-        plot = Plot(axis, positive(up, np.append(1e-6, [y for _, y in lines])), HEIGHT)
+        plot = Plot(exact_axis(across, x), positive(up, np.append(1e-6, [y for _, y in lines])), HEIGHT)
         parts = [plot.curve(x, y, color) for (_, y), color in zip(lines, COLORS, strict=False)]
         named = zip(lines, COLORS, strict=False)
         parts += [plot.key(104 * k, color, word) for k, ((word, _), color) in enumerate(named) if word]

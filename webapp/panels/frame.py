@@ -38,7 +38,7 @@ STYLE = html(
     _VARIABLES,
     (Markup(files("webapp.markup").joinpath(name).read_text("utf-8")) for name in SHEETS),
 )
-LOW = ":root { --tall: calc(var(--z) * 92px); }"
+LOW = ":root { --tall: 92px; }"
 TALL = ":root { --fl-usual: 344px; }"
 FOLDER = ".mantine-Paper-root[data-fl~={}]"
 

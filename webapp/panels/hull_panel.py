@@ -68,7 +68,7 @@ def add_hull(page: Page) -> None:
         if shape != MESH:
             session.set_hull(shape, size)
 
-    shapes = gui.add_dropdown("Shape", (*HULL_SHAPES, MESH), hint="For the picture, and for To hull.")
+    shapes = gui.add_dropdown("Shape", (*HULL_SHAPES, MESH), hint="For the picture, and for estimates.")
     page.bind(shapes, choose_shape, _shape)
     ends: dict[str, Any] = {"min": (0.02,) * 3, "max": (5.0,) * 3, "step": 0.01}
     sides = gui.add_vector3("Size [m]", (0.5, 0.3, 0.2), **ends, hint="Length, width and height of a shape.")

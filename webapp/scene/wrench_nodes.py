@@ -56,24 +56,20 @@ def fitting_scale(target: Sequence[float], shown: Allocation | None, now: Scale)
         forces += [shown.wrench[:3], *shown.forces]
         torques += [missing_part(shown)[3:], shown.wrench[3:]]
     force, torque = (float(np.sqrt((np.array(some) ** 2).sum(axis=1).max())) for some in (forces, torques))
-    per_turn = fitting_torque(torque, now.torque)
-    return Scale(fitting_newtons(force, now.newtons), per_turn, HALF_TURN * torque / per_turn > LONGEST_TURN)
+    newtons = fitting(NEWTONS, force, now.newtons, LENGTH, (SHORTEST, LONGEST))
+    turns = SHORTEST_TURN, 0.95 * LONGEST_TURN
+    per_turn = fitting(TORQUES, torque, now.torque, HALF_TURN, turns)
+    return Scale(newtons, per_turn, HALF_TURN * torque / per_turn > LONGEST_TURN)
 
 
-def fitting_newtons(largest: float, current: float) -> float:
-    """Force per 0.1 m [N] for arrows up to `largest` [N]; `current` while that is good enough."""
-    length = LENGTH * largest / current
-    if largest < 1e-6 or SHORTEST <= length <= LONGEST:
+def fitting(
+    steps: Sequence[float], largest: float, current: float, unit: float, ends: tuple[float, float]
+) -> float:
+    """What `unit` [m or rad] in the view stands for, one of `steps`, so that `largest` ends within two ends;
+    `current` while that is good enough, or next to nothing is shown."""
+    if largest < steps[0] / 100.0 or ends[0] <= unit * largest / current <= ends[1]:
         return current
-    return next((step for step in NEWTONS if LENGTH * largest / step <= LONGEST), NEWTONS[-1])
-
-
-def fitting_torque(largest: float, current: float) -> float:
-    """Torque per half a turn [N m] for rings up to `largest` [N m]; `current` while that is good enough."""
-    turn = HALF_TURN * largest / current
-    if largest < TORQUES[0] / 100.0 or SHORTEST_TURN <= turn <= 0.95 * LONGEST_TURN:
-        return current
-    return next((step for step in TORQUES if HALF_TURN * largest / step <= 0.95 * LONGEST_TURN), TORQUES[-1])
+    return next((step for step in steps if unit * largest / step <= ends[1]), steps[-1])
 
 
 def swim_scale(swimmer: Swimmer, before: Scale) -> Scale:

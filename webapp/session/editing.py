@@ -94,11 +94,6 @@ class Editing(Core):
         name = self._selected_name()
         self._edit(f"{count} copies of {name}", layout_edits.ring(self.state.layout, name, count, around))
 
-    def stick(self) -> None:
-        """The selected actuator onto the hull."""
-        name = self._selected_name()
-        self._follow(f"Stick {name} to the hull", name, layout_edits.stuck(self.state.layout, name))
-
     def delete(self) -> None:
         """The selected actuators go."""
         self._selected_name()

@@ -27,7 +27,7 @@ CLEAR, STEP_UP = 0.12, 0.05
 ROUND = (180, 150, -150, 120, -120, 90, -90, 60, -60, 30, -30, 0)
 """Directions [deg] in which a new fin is put, the stern first."""
 STAND_OFF = 0.02
-"""Distance of a fin that sticks to the hull from its surface: room for the servo [m]."""
+"""Distance of a new actuator from the hull: room for the servo [m]."""
 
 AT, AHEAD, UP = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 TURNS: dict[str, Any] = {"turn_axis": UP, "zero": AHEAD, "turn_rate": math.radians(120)}
@@ -110,21 +110,6 @@ def ring(layout: Layout, name: str, count: int, around: str) -> Layout:
     for k in range(1, whole):
         layout, _ = _added(layout, rotated(part, axis, math.tau * k / whole), name)
     return layout
-
-
-def stuck(layout: Layout, name: str) -> Layout:
-    """The layout with an actuator moved onto the hull's surface.
-
-    The shaft of a fin that has a mounting angle turns to the azimuth of the surface's normal, unless that
-    points straight up or down; all others point as they did.
-    """
-    part = part_of(layout, name)
-    point, normal = hull_of(layout).nearest(np.array(part.position))
-    x, y, z = (round(float(v), 4) + 0.0 for v in point + STAND_OFF * normal)
-    layout = layout.replace_actuator(name, position=(x, y, z))
-    if not isinstance(part, Fin) or part.mounting_angle is None or np.hypot(*normal[:2]) < 0.2:
-        return layout
-    return layout.replace_actuator(name, mounting_angle=float(wrapped(math.atan2(normal[1], normal[0]))))
 
 
 def duplicated(layout: Layout, name: str) -> tuple[Layout, str]:

@@ -11,13 +11,7 @@ from finlab.control import steers
 from finlab.errors import FinlabError
 from finlab.evaluation.experiments.hard_days import CURRENT, HARD_DAYS, TWO, HardDay
 from finlab.layout import Layout
-from finlab.sim import (
-    SHIPPED,
-    FinFault,
-    SensorSettings,
-    Trajectory,
-    make_trajectory,
-)
+from finlab.sim import SHIPPED, FinFault, SensorSettings, Trajectory, make_trajectory
 from webapp.session.state import State, chosen, number
 
 LOST_IN_CURRENT = HardDay(
@@ -34,7 +28,6 @@ SCENARIOS: dict[str, HardDay] = {
 }
 SPEEDS = (0.1, 8.0)
 """Simulated time per time on the wall that may be asked for."""
-CHOICES: dict[str, tuple[str, ...]] = {"path": tuple(SHIPPED)}
 
 
 @dataclass(frozen=True)
@@ -58,15 +51,15 @@ class SwimSettings:
             day = SCENARIOS[chosen(value, key, tuple(SCENARIOS))]
             said = replace(self, announced=day.announced, path=day.trajectory)
             return replace(said, scenario=day.name)
-        if key == "announced":
-            if not isinstance(value, bool):
-                raise FinlabError(f"announced: expected true or false, got {value!r:.60}")
-            return replace(self, announced=value)
+        if key == "announced" and not isinstance(value, bool):
+            raise FinlabError(f"announced: expected true or false, got {value!r:.60}")
         if key == "speed":
-            return replace(self, speed=number(value, "speed", *SPEEDS))
-        if key not in CHOICES:
+            value = number(value, key, *SPEEDS)
+        elif key == "path":
+            chosen(value, key, SHIPPED)
+        elif key != "announced":
             raise FinlabError(f"a swim has no setting {key!r:.40}")
-        return replace(self, **{key: chosen(value, key, CHOICES[key])})
+        return replace(self, **{key: value})
 
     @property
     def day(self) -> HardDay:

@@ -1,6 +1,5 @@
 """One moment of a robot that swims, as the page shows it, and the record up to then."""
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -13,12 +12,12 @@ POINTS = 300
 NOW = 10
 """Periods of which the present power is the mean: it jumps with every beat."""
 
-TIME, ERROR, DEPTH_ERROR, POWER, SOLVE_MS = range(5)
+TIME, ERROR, DEPTH_ERROR, POWER = range(4)
 """Columns of a record: time [s], distance from where it should be [m], that of the depth [m], driving power
-of all fins with motor losses [W], time of the allocation [ms]."""
-ASKED, DELIVERED, PLACE, WANTED, FORCES = 5, 11, 17, 20, 23
-"""First columns of the asked (6) and delivered (6) wrench [N, N m], the position (3) [m], where that should
-be (3) [m], and of the force of each fin (n) [N]; then comes the probability of each fin being broken (n)."""
+of all fins with motor losses [W]."""
+SURGE, PLACE, FORCES = 4, 6, 9
+"""First columns of the asked and delivered surge (2) [N], the position (3) [m], and of the force of each fin
+(n) [N]; then comes the probability of each fin being broken (n)."""
 
 
 class Figures(NamedTuple):
@@ -70,28 +69,17 @@ class Moment(NamedTuple):
     figures: Figures | None
     """What the swim has come to; None before the first step."""
     record: Array
-    """Rows of ticks (N, 23 + 2 n), thinned out; `TIME` to `FORCES` say where what is."""
-
-
-def doubted(probability: Array, fins: tuple[str, ...]) -> tuple[str, ...]:
-    """The fins that are broken more likely than not, by probabilities (n,)."""
-    return tuple(name for name, chance in zip(fins, probability, strict=True) if chance > 0.5)
+    """Rows of ticks (N, 9 + 2 n), thinned out; `TIME` to `FORCES` say where what is."""
 
 
 def row_of(tick: Tick) -> Array:
     """The row of a tick in a record."""
     off = tick.position - tick.reference
     power = float(tick.driving_power.sum())
-    head = (tick.time, float(np.linalg.norm(off)), abs(float(off[2])), power, tick.solve_ms)
+    surge = tick.asked[0], tick.delivered[0]
+    head = (tick.time, float(np.linalg.norm(off)), abs(float(off[2])), power, *surge)
     force = np.linalg.norm(tick.fin_force, axis=1)
-    return np.concatenate(
-        [head, tick.asked, tick.delivered, tick.position, tick.reference, force, tick.fault_probability]
-    )
-
-
-def thinned(rows: Array) -> Array:
-    """At most `POINTS` rows of a record."""
-    return rows[:: max(1, math.ceil(len(rows) / POINTS))]
+    return np.concatenate([head, tick.position, force, tick.fault_probability])
 
 
 def figures_of(rows: Array, period_s: float) -> Figures | None:

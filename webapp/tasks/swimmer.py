@@ -1,5 +1,6 @@
 """One robot of a swim: its closed loop, its record, where it is at the moment."""
 
+import math
 from dataclasses import fields
 
 import numpy as np
@@ -10,7 +11,7 @@ from finlab.control import FaultMonitor
 from finlab.sim import ClosedLoop, RunLog, Tick, perturbed
 from finlab.sim.log import lies_over, log_of_ticks
 from webapp.session.swim_plan import Plan
-from webapp.tasks.moment import FORCES, POINTS, Moment, doubted, figures_of, row_of, thinned
+from webapp.tasks.moment import FORCES, POINTS, Moment, figures_of, row_of
 
 
 class Swimmer:
@@ -66,6 +67,7 @@ class Swimmer:
         """What there is to show after the last step; called on the thread that swims."""
         swim, n = self.swim, len(self.fins)
         last = self._ticks[-1] if self._ticks else None
+        chances = np.zeros(n) if last is None else last.fault_probability
         rows = np.array(self._rows) if self._rows else np.zeros((0, FORCES + 2 * n))
         return Moment(
             time=swim.time,
@@ -80,12 +82,12 @@ class Swimmer:
             lost=swim.lost,
             failed=swim.damage.failed,
             found=tuple(self._found.items()),
-            doubted=() if last is None else doubted(last.fault_probability, self.fins),
+            doubted=tuple(name for name, chance in zip(self.fins, chances, strict=True) if chance > 0.5),
             controllable=swim.controllable,
             capsized=self._capsized,
             done=swim.done,
             figures=figures_of(rows, self.period_s),
-            record=thinned(rows),
+            record=rows[:: max(1, math.ceil(len(rows) / POINTS))],
         )
 
 
