@@ -73,23 +73,3 @@ def test_show_of_a_torpedo_asks_for_its_speed(capsys: pytest.CaptureFixture[str]
     assert "At rest rudder_top, rudder_bottom, elevator_left, elevator_right give nothing" in out
     assert main(["layout", "show", "torpedo", "--flow", "1.5", "0", "0", "0", "0", "0"]) == 0
     assert "Only together with other axes: sway" in capsys.readouterr().out
-
-
-@pytest.mark.parametrize(
-    ("verb", "argv"),
-    [
-        ("fit robot", ["fit", "robot", "turtle_hybrid", "swim.csv", "-o", "x.yaml"]),
-    ],
-)
-def test_verbs_for_fins_only_name_the_actuator(
-    verb: str,
-    argv: list[str],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    assert main(argv) == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert line.startswith(f"finlab: error: {verb} works for robots of fins only, and 'lift_left' of layout")
-    assert "is of type thruster" in line
