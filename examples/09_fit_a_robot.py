@@ -25,7 +25,7 @@ def main() -> None:
         log, path = Path(folder) / "log.npz", Path(folder) / "mine.yaml"
         # A real robot writes a CSV file instead; 10_swim_from_rosbag.py makes one of a rosbag.
         excitation(drawn, 60.0, truth=built).run().save(log)
-        fit = fit_robot(drawn, [read_swim(log, drawn)], tried=())
+        fit = fit_robot(drawn, [read_swim(log, drawn)], other_law=False)
         print("\n".join(summary(fit)))
         fitted = write_robot(fit, path)
     for robot in (drawn, fitted):

@@ -72,7 +72,7 @@ def robot(
     layout: Annotated[Positional[str], arg(metavar="LAYOUT")],
     logs: Annotated[Positional[tuple[Path, ...]], arg(metavar="LOG...")],
     output: Annotated[Path, arg(metavar="LAYOUT2", aliases=["-o"])],
-    residual: bool = True,
+    other_law: bool = True,
 ) -> None:
     """Learn a robot from swims: its actuators' strengths and directions, and its body.
 
@@ -85,8 +85,8 @@ def robot(
         layout: the robot as it is believed to be: layout file or the name of a shipped layout.
         logs: swims of that robot.
         output: the layout as the swims show it; fins whose law is another one become tables beside it.
-        residual: of robots of fins look for forces within the beat and another law of thrust, too, and use
-            what helps on parts not seen.
+        other_law: of robots of fins look for another law of thrust, too, and use it where it helps on parts
+            not seen.
     """
     from finlab.cli.inputs import open_robot
     from finlab.errors import DataError
@@ -94,7 +94,6 @@ def robot(
     from finlab.fit.robot.report import summary, table
     from finlab.fit.robot.robot_fit import fit_robot
     from finlab.fit.robot.swim_file import read_swim
-    from finlab.fit.robot.unknowns import RESIDUAL
 
     if output.suffix.lower() not in (".yaml", ".yml", ".json"):
         raise DataError(
@@ -102,7 +101,7 @@ def robot(
         )
     believed = open_robot(layout)[0]
     swims = [read_swim(log, believed) for log in logs]
-    fit = fit_robot(believed, swims, RESIDUAL if residual else (), _tell)
+    fit = fit_robot(believed, swims, other_law, _tell)
     write_robot(fit, output)
     print("\n".join(summary(fit)))
     print()

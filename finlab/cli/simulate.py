@@ -138,8 +138,7 @@ def summary(log: RunLog) -> str:
         + (f", lost: {', '.join(lost)}" if lost else ""),
         f"ATE {row['ate']:.4f} m   RTE over {RTE_DELTA_S:g} s {row['rte']:.4f} m   "
         f"depth RMSE {row['depth_rmse']:.4f} m   farthest {row['max']:.3f} m",
-        f"power {row['driving_w']:.2f} W with motor losses, {row['torque_w']:.2f} W by torque, "
-        f"{row['inertial_w']:.2f} W inertial   "
+        f"power {row['driving_w']:.2f} W with motor losses, {row['inertial_w']:.2f} W inertial   "
         f"allocation {row['solve_ms']:.2f} ms (median)",
     ]
     if (when := log.capsized_s) is not None:

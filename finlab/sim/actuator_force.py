@@ -23,7 +23,7 @@ class Push(NamedTuple):
     force: Array
     """Forces (n, 3) in own frames [N]."""
     power: Array
-    """Inertial, torque and driving power (3, n) [W]; of what is no fin, none and twice that of its law."""
+    """Inertial and driving power (2, n) [W]; of what is no fin, none and that of its law."""
 
 
 class ActuatorForce:
@@ -54,8 +54,8 @@ class ActuatorForce:
         """
         motion = self.motion
         motion.step(command, dt)
-        fins, fin_watts = np.zeros((0, 3)), np.zeros((3, 0))
-        others, watts = np.zeros((0, 3)), np.zeros((3, 0))
+        fins, fin_watts = np.zeros((0, 3)), np.zeros((2, 0))
+        others, watts = np.zeros((0, 3)), np.zeros((2, 0))
         if len(motion.of_fins):
             fins = self.of_fins(dt) * share[motion.of_fins, None]
             fin_watts = np.array(fin_power(*self._beat.speed_and_acceleration(), self._fins.blade))
@@ -64,7 +64,7 @@ class ActuatorForce:
             works = share[motion.of_others] * motion.pushes[motion.of_others]
             others = self._others.force(mean, flow=water) * works[:, None]
             spent = self._others.power(mean, flow=water) * motion.pushes[motion.of_others]
-            watts = np.array([0.0 * spent, spent, spent])
+            watts = np.array([0.0 * spent, spent])
         return Push(motion.joined(fins, others), motion.joined(fin_watts.T, watts.T).T)
 
     def of_fins(self, dt: float) -> Array:

@@ -347,7 +347,7 @@ class ClosedLoop:
         for fault in self.broken.values():
             if fault.kind == "torn":
                 share[self.layout.index(fault.fin)] = fault.share
-        mean, power = np.zeros((n, 6)), np.zeros((3, n))
+        mean, power = np.zeros((n, 6)), np.zeros((2, n))
         for k in range(n_steps):
             push = self._forces.step(moved, dt, self.vehicle.velocity_in_water(self.state), share)
             wrenches = np.einsum("nk,nkw->nw", push.force, self._forces.effectiveness)
@@ -371,11 +371,9 @@ class ClosedLoop:
             delivered=mean.sum(axis=0),
             command=sent,
             fin_motion=self.motion.command,
-            fin_angle=self.motion.joined(self.fins.angle, np.zeros(len(self.motion.of_others))),
             fin_force=mean[:, :3],
             inertial_power=power[0],
-            torque_power=power[1],
-            driving_power=power[2],
+            driving_power=power[1],
             alive=self._alive(),
             **self._suspicion(),
             solve_ms=solve_ms,

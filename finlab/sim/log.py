@@ -16,7 +16,7 @@ from finlab.files.schema import checked
 from finlab.whole_file import write_whole
 
 FORMAT = "finlab-swim"
-VERSION = 3
+VERSION = 4
 MAX_BYTES = 200_000_000
 """Largest log that is read, unpacked [bytes]; an hour has a quarter of it."""
 
@@ -58,16 +58,13 @@ class Tick(NamedTuple):
     lost."""
     fin_motion: AnyArray
     """What the fins did at the end of the period (n, 3), in the same units."""
-    fin_angle: AnyArray
-    """Angle of each fin (n,) at the end of the period [rad]."""
     fin_force: AnyArray
     """Force of each fin (n, 3) in the body frame, mean over the period [N]."""
     inertial_power: AnyArray
     """|I alpha omega| of each fin (n,), mean over the period [W]."""
-    torque_power: AnyArray
-    """max(torque times speed, 0) of each fin (n,), mean over the period [W]."""
     driving_power: AnyArray
-    """The same with the heat in the motors' windings (n,), mean over the period [W]."""
+    """max(torque times speed, 0) of each fin with the heat in its motor's windings (n,), mean over the period
+    [W]."""
     alive: AnyArray
     """Which fins move as commanded, stuck and torn ones among them (n,)."""
     fault_probability: AnyArray
@@ -84,8 +81,8 @@ FINS, COMMANDS = (None,), (None, 3)
 SHAPES: dict[str, tuple[int | None, ...]] = {
     "position": (3,), "quaternion": (4,), "motion": (6,), "flow": (3,), "measured": (12,), "reference": (3,),
     "asked": (6,), "allocated": (6,), "delivered": (6,), "command": COMMANDS, "fin_motion": COMMANDS,
-    "fin_angle": FINS, "fin_force": COMMANDS, "inertial_power": FINS, "torque_power": FINS,
-    "driving_power": FINS, "alive": FINS, "fault_probability": FINS, "strength": FINS, "strength_std": FINS,
+    "fin_force": COMMANDS, "inertial_power": FINS, "driving_power": FINS,
+    "alive": FINS, "fault_probability": FINS, "strength": FINS, "strength_std": FINS,
 }  # fmt: skip
 """Shape of a column at each tick, None for the number of fins; the others are numbers."""
 
@@ -137,7 +134,7 @@ class RunLog:
 
 
 _ABOUT = [(field.name, field.type) for field in fields(RunLog) if field.name != "columns"]
-_FORM = [("format", Literal["finlab-swim"]), ("version", Literal[3])]
+_FORM = [("format", Literal["finlab-swim"]), ("version", Literal[4])]
 _About: Any = defstruct("About", [*_FORM, *_ABOUT])
 """What an NPZ file says of a swim beside its columns."""
 

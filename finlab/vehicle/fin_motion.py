@@ -83,15 +83,13 @@ class FinMotion(FinLag):
 
 
 class FinPower(NamedTuple):
-    """Power of each fin (..., n) [W], by three measures."""
+    """Power of each fin (..., n) [W], by two measures."""
 
     inertial: Array
     """|I alpha omega|, the paper's: what turns the fin's own inertia, braking counted like driving."""
-    torque: Array
-    """max(tau omega, 0): inertia, carried water and drag together, nothing won back by braking."""
     driving: Array
-    """The same and the heat in the motor's windings, copper_loss tau^2: what a battery gives, but for the
-    electronics."""
+    """max(tau omega, 0), inertia, carried water and drag together, nothing won back by braking, and the heat
+    in the motor's windings, copper_loss tau^2: what a battery gives, but for the electronics."""
 
 
 def fin_power(speed: Array, acceleration: Array, blade: Blade, copper_loss: float = COPPER_LOSS) -> FinPower:
@@ -100,4 +98,4 @@ def fin_power(speed: Array, acceleration: Array, blade: Blade, copper_loss: floa
     torque = blade.inertia * acceleration + blade.drag * speed * np.abs(speed)
     mechanical = np.maximum(torque * speed, 0.0)
     inertial = np.abs(blade.own_inertia * acceleration * speed)
-    return FinPower(inertial, mechanical, mechanical + copper_loss * torque * torque)
+    return FinPower(inertial, mechanical + copper_loss * torque * torque)

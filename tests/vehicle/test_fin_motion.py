@@ -105,7 +105,7 @@ def test_mean_power_is_what_a_sinusoid_has(pair: Layout) -> None:
         motion.step(command, DT)
         power = fin_power(*motion.speed_and_acceleration(), Blade(), 0.7)
         inertial.append(power.inertial[0])
-        torque.append(power.torque[0])
+        torque.append(fin_power(*motion.speed_and_acceleration(), Blade(), 0.0).driving[0])
         driving.append(power.driving[0])
     swing = 2 * math.pi * frequency
     assert np.mean(inertial) == pytest.approx(OWN_INERTIA * amplitude**2 * swing**3 / math.pi, rel=0.01)

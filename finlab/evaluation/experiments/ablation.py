@@ -35,7 +35,6 @@ def run(
     layouts: int = 20,
     targets: int = 100,
     candidates: int = 64,
-    temperature: float = 0.02,
     checkpoint: str | None = None,
     seed: int = 0,
 ) -> list[Row]:
@@ -47,7 +46,6 @@ def run(
         layouts: of the split.
         targets: on each layout.
         candidates: drawn for each target.
-        temperature: of the draw.
         checkpoint: of method paper, a shipped name or a folder.
         seed: of all draws; all rows have the same cases and candidates.
     """
@@ -55,8 +53,8 @@ def run(
     cases = make_split(split, layouts, targets, seed)
     rows: list[Row] = []
     for variant in variants:
-        options = {"n_candidates": candidates, "temperature": temperature}
-        method = MethodSpec("paper", choose_method("paper", checkpoint, **{**options, **VARIANTS[variant]}))
+        options = {"n_candidates": candidates, **VARIANTS[variant]}
+        method = MethodSpec("paper", choose_method("paper", checkpoint, **options))
         times = [
             method.on(case.layout).allocate(case.targets[0], failed=case.failed, seed=seed).solve_ms
             for case in islice(cycle(cases), TIMED_CALLS + 1)

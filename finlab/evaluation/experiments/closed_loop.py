@@ -57,10 +57,9 @@ def follow_row(log: RunLog) -> Row:
 
 
 def power_row(log: RunLog) -> Row:
-    """Mean power of all fins [W] by all three measures, and the median time of an allocation."""
+    """Mean power of all fins [W] by both measures, and the median time of an allocation."""
     return {
         "inertial_w": float(log.inertial_power.sum(axis=1).mean()),
-        "torque_w": float(log.torque_power.sum(axis=1).mean()),
         "driving_w": float(log.driving_power.sum(axis=1).mean()),
         "solve_ms": float(np.median(log.solve_ms)),
     }

@@ -5,8 +5,6 @@ seed is as uncertain as the run at hand: the difference of the two has sqrt(2) t
 percentiles are those of a normal variable at sqrt(2) x 1.96, so that the rerun lies inside 95 times of 100.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import binomtest, bootstrap
@@ -16,29 +14,19 @@ from finlab.arrays import Array
 LEVEL = 0.994426
 """Share of a normal variable within sqrt(2) times 1.96 standard deviations."""
 REPLICATES = 2000
-
-
-class Interval(NamedTuple):
-    """Ends of an interval."""
-
-    low: float
-    high: float
+Interval = tuple[float, float]
+"""Its low and its high end."""
 
 
 def mean_interval(values: Array, group: NDArray[np.int64]) -> Interval:
-    """Of the mean of values (N,), whose layouts are numbered in group (N,)."""
-    return ratio_interval(values, np.ones(len(values)), group)
-
-
-def ratio_interval(numerator: Array, denominator: Array, group: NDArray[np.int64]) -> Interval:
-    """Of the sum of numerators over the sum of denominators, each (N,); a lone layout is split into its
+    """Of the mean of values (N,), whose layouts are numbered in group (N,); a lone layout is split into its
     entries."""
     found, member = np.unique(group, return_inverse=True)
     member = member if len(found) > 1 else np.arange(len(group))
-    sums = [np.bincount(member, values) for values in (numerator, denominator)]
+    sums = [np.bincount(member, values), np.bincount(member)]
     if len(sums[0]) < 2:
-        lone = float(numerator.sum() / denominator.sum()) if len(group) else float("nan")
-        return Interval(lone, lone)
+        lone = float(values.mean()) if len(values) else float("nan")
+        return lone, lone
 
     def ratio(above: Array, below: Array, axis: int) -> Array:
         return np.asarray(above.sum(axis) / below.sum(axis))
@@ -52,12 +40,13 @@ def ratio_interval(numerator: Array, denominator: Array, group: NDArray[np.int64
         method="percentile",
         rng=0,
     )
-    return Interval(*map(float, drawn.confidence_interval))
+    low, high = drawn.confidence_interval
+    return float(low), float(high)
 
 
 def share_interval(holds: NDArray[np.bool_], group: NDArray[np.int64]) -> Interval:
     """Of the share of entries (N,) that hold; never narrower than Wilson's interval for N separate draws,
     since a run without a single failure does not show that there are none."""
-    drawn = mean_interval(holds.astype(np.float64), group)
+    low, high = mean_interval(holds.astype(np.float64), group)
     apart = binomtest(int(holds.sum()), len(holds)).proportion_ci(LEVEL, "wilson")
-    return Interval(min(drawn.low, float(apart.low)), max(drawn.high, float(apart.high)))
+    return min(low, float(apart.low)), max(high, float(apart.high))

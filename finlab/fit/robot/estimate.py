@@ -7,7 +7,6 @@ derivatives by differences, all swims integrated side by side; the windows' stat
 normal equations. Each unknown is believed to lie within its scale of what the layout says.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -133,24 +132,18 @@ def fit_windows(
     return levenberg_marquardt(problem.at(vector, begin), moved, MOST_STEPS, DAMPING, SETTLED)
 
 
-def unseen_gains(
-    model: RobotModel, fitted: Fitted, windows: Windows, deviation: Array, names: Sequence[str]
-) -> dict[str, Array]:
-    """By how much more blocks of unknowns would lessen half the squared residuals of windows not seen.
+def unseen_gain(model: RobotModel, fitted: Fitted, windows: Windows, deviation: Array, name: str) -> Array:
+    """By how much a block of unknowns more would lessen half the squared residuals of windows not seen (W,).
 
     Cross-validation to second order about the fit: the windows are dealt to some folds, and the normal
-    equations of all windows but those of a fold tell the change of the unknowns, with a block and without it.
-
-    Returns:
-        (W,) for each block's name.
+    equations of all windows but those of a fold tell the change of the unknowns, with the block and without.
     """
-    whole = Unknowns(model.blocks, (*fitted.unknowns.names, *names))
+    whole = Unknowns(model.blocks, (*fitted.unknowns.names, name))
     vector = whole.taken_over(fitted.unknowns, fitted.vector)
     at, believed = _Problem(model, whole, windows, deviation).at(vector, fitted.start), whole.believed
     fold = np.arange(windows.start.shape[1]) % FOLDS
-    known = np.zeros(whole.size, bool)
-    for name in fitted.unknowns.names:
-        known[whole.place(name)] = True
+    known = np.ones(whole.size, bool)
+    known[whole.place(name)] = False
 
     def gain(chosen: NDArray[np.bool_]) -> Array:
         """What windows gain by changes of the chosen unknowns that the others ask for (W,)."""
@@ -165,12 +158,7 @@ def unseen_gains(
             found[unseen] = at.scores[np.ix_(unseen, here)] @ change - 0.5 * (own @ change) @ change
         return found
 
-    before, gains = gain(known), {}
-    for name in names:
-        chosen = known.copy()
-        chosen[whole.place(name)] = True
-        gains[name] = gain(chosen) - before
-    return gains
+    return gain(np.ones_like(known)) - gain(known)
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from finlab.fit.robot.learned_actuators import learned
 from finlab.fit.robot.model import shape_factor
 from finlab.fit.robot.report import summary
 from finlab.fit.robot.robot_fit import RobotFit
+from finlab.fit.robot.unknowns import SHAPE
 from finlab.layout import Body, Fin, FinModelSpec, Layout, load_layout, save_layout
 from finlab.layout.force_table_file import COLUMNS, POWER_COLUMN
 from finlab.layout.layout import MAX_DESCRIPTION_LENGTH
@@ -36,9 +37,8 @@ def write_robot(fit: RobotFit, path: str | os.PathLike[str]) -> Layout:
     lean = fit.found("lean")
     certain = np.abs(lean) > np.maximum(DEFLECTIONS[0] * fit.found_error("lean"), DEFLECTIONS[1])
     parts = list(learned(fit, np.where(certain, lean, 0.0)))
-    other_law = fit.part("shape") is not None
     for i, (drawn, part) in enumerate(zip(layout.actuators, parts, strict=True)):
-        if isinstance(drawn, Fin) and isinstance(part, Fin) and (other_law or part.model.type == "table"):
+        if isinstance(drawn, Fin) and isinstance(part, Fin) and (fit.other_law or part.model.type == "table"):
             table = place.with_name(f"{place.stem}-fin{i + 1}.csv")
             write_whole(table, _table(fit, i, drawn), DataError)
             parts[i] = replace(part, model=FinModelSpec("table", (("path", table.name),)))
@@ -57,7 +57,7 @@ def _table(fit: RobotFit, i: int, fin: Fin) -> str:
     axes.append(np.linspace(-np.pi, np.pi, GRID[2], endpoint=False))
     command = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     force = float(np.exp(fit.found("strength")[i])) * np.asarray(law.force(command))
-    shape = fit.part("shape")
+    shape = fit.part(SHAPE)
     if shape is not None:
         force = force * shape_factor(fit.model.shape_terms(command), shape)[:, None]
     power = np.asarray(law.power(command))

@@ -8,8 +8,7 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.fit.robot.swim import STEP_S, Swim
-from finlab.fit.robot.swing import swing_forces
-from finlab.fit.robot.unknowns import SENSORS, Unknowns, blocks_of
+from finlab.fit.robot.unknowns import SENSORS, SHAPE, Unknowns, blocks_of
 from finlab.layout import Layout, Rudder, Thruster
 from finlab.layout.arrays import moved_effectiveness
 from finlab.physics import plant_of
@@ -39,7 +38,7 @@ class RobotModel:
             name: replace(block, scale=block.scale * doubts.get(name, 1.0))
             for name, block in blocks_of(layout.names, doubt).items()
         }
-        self._plant, self._swims = plant_of(layout), swims
+        self._plant = plant_of(layout)
         self.motion = np.concatenate([swim.motion for swim in swims])
         self.alone = self._plant.forces(self.motion)
         """What each actuator gives by the layout's law (M, SUBSTEPS, n, 3) [N], in its own frame."""
@@ -72,10 +71,6 @@ class RobotModel:
     def _shapes(self) -> Array:
         return self.shape_terms(np.nan_to_num(self.motion))
 
-    @cached_property
-    def _beat(self) -> Array:
-        return np.concatenate([swing_forces(self.layout, swim.command) for swim in self._swims])
-
     def shape_terms(self, command: Array) -> Array:
         """Terms (..., 5) of the logarithm of a fin's true law over the layout's, for commands (..., 3): a
         polynomial, so that it ends somewhere where fins hardly beat."""
@@ -90,7 +85,7 @@ class RobotModel:
         layout, lean = self.layout, unknowns.of("lean", vector)
         force = self.alone + lean[:, None] * self._by_lean if self.steers.any() else self.alone
         share = np.exp(unknowns.of("strength", vector)) * np.ones(force.shape[:-1])
-        shape = unknowns.part("shape", vector)
+        shape = unknowns.part(SHAPE, vector)
         if shape is not None:
             share *= shape_factor(self._shapes, shape)
         position = layout.position - unknowns.of("center", vector)
@@ -98,10 +93,6 @@ class RobotModel:
         frames = turned_frames(layout, unknowns.of("mounting", vector), turned)
         columns = moved_effectiveness(layout, position, frames)
         mean = (force * share[..., None]).mean(axis=1)
-        beat = unknowns.part("beat", vector)
-        if beat is not None:
-            mean -= beat[-1] * np.gradient(mean, STEP_S, axis=0)
-            mean[..., 1:] += self._beat @ beat[:-1]
         wrench: Array = mean.reshape(len(mean), -1) @ columns.reshape(-1, 6)
         wrench[:, [0, 1, 5]] += unknowns.of("bias", vector)
         return wrench

@@ -41,7 +41,7 @@ class OnlineFit:
         self.factor = np.ones((layout.n, 3))
         """By what commands to the robot as it was learned are multiplied for its drives (n, 3)."""
         self._moving = motion_of(layout)
-        self._last: deque[tuple[Array, Array, Array]] = deque(maxlen=round(LAST_S / STEP_S))
+        self._last: deque[tuple[Array, Array]] = deque(maxlen=round(LAST_S / STEP_S))
         self._steps = 0
 
     def step(self, measured: Array, command: Array) -> Layout | None:
@@ -51,13 +51,13 @@ class OnlineFit:
             measured: what the sensors said last (12,), in the order of `CHANNELS`.
             command: of the drives for this step (n, 3), NaN for those at rest.
         """
-        self._last.append((followed(self._moving, command), measured, command))
+        self._last.append((followed(self._moving, command), measured))
         self._steps += 1
         if self._steps % round(EVERY_S / STEP_S):
             return None
-        motion, said, commands = (np.array(part) for part in zip(*self._last, strict=True))
-        swim = Swim("the swim", motion, only_new(said), commands)
-        fit = fit_robot(self.layout, [swim], (), doubts=DOUBTS)
+        motion, said = (np.array(part) for part in zip(*self._last, strict=True))
+        swim = Swim("the swim", motion, only_new(said))
+        fit = fit_robot(self.layout, [swim], other_law=False, doubts=DOUBTS)
         if fit.explained < SOUND:
             self.notes.append(
                 f"{self._steps * STEP_S:.0f} s: nothing is learned, since simulated swims explain "

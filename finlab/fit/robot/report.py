@@ -4,10 +4,7 @@ from finlab.fit.robot.robot_fit import UNTOLD, RobotFit
 from finlab.layout import Azimuth, Thruster
 from finlab.layout.force_table_file import DOUBT
 
-MEANINGS = {
-    "beat": "forces that swing within the beat",
-    "shape": "thrust that grows otherwise with amplitude and frequency",
-}
+OTHER_LAW = "thrust that grows otherwise with amplitude and frequency"
 
 
 def summary(fit: RobotFit) -> tuple[str, ...]:
@@ -15,11 +12,10 @@ def summary(fit: RobotFit) -> tuple[str, ...]:
     doubts = fit.doubts()
     head = (f"{DOUBT}: {'; '.join(doubts)}",) if doubts else ()
     seconds = 0.1 * len(fit.model.motion)
-    used, unused = ([MEANINGS[name] for name in names] for names in (fit.helps, fit.no_help))
     lines = [
         f"fitted to {seconds:.0f} s of swimming, of whose motion simulated swims explain {fit.explained:.1%}",
-        *([f"used, since it helps on parts not seen: {'; '.join(used)}"] if used else []),
-        *([f"tried, and no help: {'; '.join(unused)}"] if unused else []),
+        *([f"used, since it helps on parts not seen: {OTHER_LAW}"] if fit.other_law else []),
+        *([f"tried, and no help: {OTHER_LAW}"] if fit.other_law is False else []),
         "a common scale of all forces, damping and inertia does not follow from motion; it rests on the mass "
         "and added mass that the layout gave",
     ]

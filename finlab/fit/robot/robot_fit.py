@@ -1,7 +1,7 @@
 """From swims to a robot: what is fitted in which order, what helps on parts not seen, what is known.
 
-First all that every robot has; then, one after the other, forces within the beat and another law of thrust,
-each kept only where it lessens the error on windows that its fit has not seen.
+First all that every robot has; then, of fins, another law of thrust, which is kept only where it lessens the
+error on windows that its fit has not seen.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -13,10 +13,10 @@ from threadpoolctl import threadpool_limits
 
 from finlab.arrays import Array
 from finlab.errors import DataError
-from finlab.fit.robot.estimate import DEVIATION, Fitted, Windows, cut, fit_windows, unseen_gains
+from finlab.fit.robot.estimate import DEVIATION, Fitted, Windows, cut, fit_windows, unseen_gain
 from finlab.fit.robot.model import RobotModel
 from finlab.fit.robot.swim import STEP_S, Swim, smoothed
-from finlab.fit.robot.unknowns import BASE, RESIDUAL, Unknowns
+from finlab.fit.robot.unknowns import BASE, SHAPE, Unknowns
 from finlab.layout import Layout
 
 SURE = 3.0
@@ -43,10 +43,9 @@ class RobotFit:
     model: RobotModel
     fitted: Fitted
     explained: float
-    helps: tuple[str, ...]
-    """Blocks of unknowns that lessen the error on windows not seen, and are used."""
-    no_help: tuple[str, ...]
-    """Blocks that were tried besides."""
+    other_law: bool | None
+    """Whether another law of thrust lessens the error on windows not seen, and is used; None where none was
+    tried."""
 
     @property
     def covariance(self) -> Array:
@@ -102,7 +101,7 @@ class RobotFit:
 def fit_robot(
     layout: Layout,
     swims: Sequence[Swim],
-    tried: Sequence[str] = RESIDUAL,
+    other_law: bool = True,
     progress: Callable[[str], None] = lambda words: None,
     doubts: Mapping[str, float] = NO_DOUBTS,
 ) -> RobotFit:
@@ -111,7 +110,7 @@ def fit_robot(
     Args:
         layout: the robot as it is believed to be; what its body does not say is U-CAT's.
         swims: what was measured.
-        tried: what is looked for besides, where it helps: some of `RESIDUAL`, which are about fins alone.
+        other_law: whether robots of fins are tried with another law of thrust, too.
         progress: told before each step what comes next.
         doubts: factors of how far some blocks of unknowns may be off, by name.
 
@@ -121,12 +120,10 @@ def fit_robot(
     if not swims:
         raise DataError("expected at least one swim, got none")
     with threadpool_limits(limits=1, user_api="blas"):
-        return _fit(RobotModel(layout, swims, doubts), swims, tried if layout.is_of_fins else (), progress)
+        return _fit(RobotModel(layout, swims, doubts), swims, other_law and layout.is_of_fins, progress)
 
 
-def _fit(
-    model: RobotModel, swims: Sequence[Swim], tried: Sequence[str], tell: Callable[[str], None]
-) -> RobotFit:
+def _fit(model: RobotModel, swims: Sequence[Swim], other_law: bool, tell: Callable[[str], None]) -> RobotFit:
     measured = np.concatenate([swim.measured for swim in swims])
     smooth = np.concatenate([smoothed(swim.measured) for swim in swims])
     windows = cut([len(swim) for swim in swims], measured, smooth)
@@ -139,43 +136,26 @@ def _fit(
         vector, start = fitted.vector, fitted.start
         deviation = _deviation(fitted, deviation)
         _keep_delays(model, fitted)
-    fitted, deviation = _with_what_helps(model, windows, deviation, fitted, tried, tell)
+    helps = None
+    if other_law:
+        tell("looking for another law of thrust")
+        gain = unseen_gain(model, fitted, windows, deviation, SHAPE)
+        helps = bool(gain.mean() > SURE * sem(gain))
+    if helps:
+        unknowns = Unknowns(model.blocks, (*BASE, SHAPE))
+        vector = unknowns.taken_over(fitted.unknowns, fitted.vector)
+        for _ in range(ROUNDS):
+            tell("fitting another law of thrust")
+            fitted = fit_windows(model, unknowns, windows, deviation, vector, fitted.start)
+            vector, deviation = fitted.vector, _deviation(fitted, deviation)
+            _keep_delays(model, fitted)
     deviation = _deviation(fitted, deviation)
     _keep_delays(model, fitted)
     tell("fitting all together")
     fitted = fit_windows(model, fitted.unknowns, windows, deviation, fitted.vector, fitted.start)
     if not np.isfinite(fitted.vector).all():
         raise DataError(f"{swims[0].name}: the fit goes astray; is the layout that of the robot that swam?")
-    helps = tuple(name for name in tried if name in fitted.unknowns.names)
-    no_help = tuple(name for name in tried if name not in helps)
-    return RobotFit(model, fitted, _explained(fitted, windows), helps, no_help)
-
-
-def _with_what_helps(
-    model: RobotModel,
-    windows: Windows,
-    deviation: Array,
-    fitted: Fitted,
-    left: Sequence[str],
-    tell: Callable[[str], None],
-) -> tuple[Fitted, Array]:
-    """The fit with all of `left` that helps on windows not seen, and deviations (12,)."""
-    left = list(left)
-    while left:
-        tell("looking for what else helps")
-        gains = unseen_gains(model, fitted, windows, deviation, left)
-        best = max(left, key=lambda name: float(gains[name].mean()))
-        if not gains[best].mean() > SURE * sem(gains[best]):
-            break
-        left.remove(best)
-        unknowns = Unknowns(model.blocks, (*fitted.unknowns.names, best))
-        vector = unknowns.taken_over(fitted.unknowns, fitted.vector)
-        for _ in range(ROUNDS):
-            tell(f"fitting {best}")
-            fitted = fit_windows(model, unknowns, windows, deviation, vector, fitted.start)
-            vector, deviation = fitted.vector, _deviation(fitted, deviation)
-            _keep_delays(model, fitted)
-    return fitted, deviation
+    return RobotFit(model, fitted, _explained(fitted, windows), helps)
 
 
 def _deviation(fitted: Fitted, deviation: Array) -> Array:

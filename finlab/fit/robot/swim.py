@@ -31,8 +31,6 @@ class Swim:
     measured: Array
     """What the sensors said at the beginning of each step (N, 12), in the order of `CHANNELS`; NaN where
     there is nothing new."""
-    command: Array
-    """What was commanded for each step (N, n, 3), NaN for an actuator that was lost."""
 
     def __len__(self) -> int:
         return len(self.motion)
@@ -46,7 +44,7 @@ def replay(layout: Layout, command: Array) -> Array:
 
 
 def motion_of(layout: Layout) -> ActuatorMotion:
-    """Actuators at rest, fins with what happens within the beat."""
+    """Actuators at rest, fins no faster than their servos."""
     return ActuatorMotion(layout, FinMotion(layout))
 
 

@@ -79,7 +79,7 @@ def _log(path: Path, layout: Layout) -> Swim:
     _check_duration(len(time) * STEP_S, path)
     command = command[:, order]
     _check_commands(command, [f"{path}: row {k}" for k in range(1, n + 1)], layout)
-    return Swim(path.name, replay(layout, command), only_new(measured), command)
+    return Swim(path.name, replay(layout, command), only_new(measured))
 
 
 def _check_duration(seconds: float, path: Path) -> None:
@@ -112,7 +112,7 @@ def _csv(path: Path, layout: Layout) -> Swim:
     grid = np.arange(time[0], time[-1], STEP_S)
     held = np.searchsorted(time, grid + 1e-6, side="right") - 1
     command, measured = command[held], _on_grid(time, only_new(measured), grid)
-    return Swim(path.name, replay(layout, command), measured, command)
+    return Swim(path.name, replay(layout, command), measured)
 
 
 def _check_time(time: Array, places: Sequence[str]) -> None:

@@ -8,16 +8,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from finlab.arrays import Array
-from finlab.fit.robot.swing import TERMS
 
 AXES = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 BASE = (
     *("strength", "mounting", "lean", "center", "bias"),
     *("buoyancy", "lift", "current", "inertia", "linear", "quadratic", "delay"),
 )
-RESIDUAL = ("beat", "shape")
-"""What is looked for besides, where it helps: forces within the beat and of fins that turn, another law of
-thrust."""
+SHAPE = "shape"
+"""What is looked for besides in robots of fins, where it helps: another law of thrust."""
 
 SENSORS = {
     "position and heading": (0, 1, 5),
@@ -51,7 +49,6 @@ def blocks_of(names: Sequence[str], damping: Array) -> dict[str, Block]:
         return Block(name, tuple(labels), unit, np.broadcast_to(scale, len(labels)).astype(float), force)
 
     shape = ("amplitude", "frequency", "amplitude^2", "amplitude x frequency", "frequency^2")
-    swings = [f"force within the beat, {k}" for k in range(1, TERMS + 1)]
     blocks = (
         block("strength", [f"strength of {name}, logarithm" for name in names], 0.3, ""),
         block("mounting", [f"mounting angle of {name}" for name in names], 0.1, "rad"),
@@ -65,8 +62,7 @@ def blocks_of(names: Sequence[str], damping: Array) -> dict[str, Block]:
         block("linear", [f"linear damping in {axis}" for axis in AXES], damping[0], "N s/m, N m s", False),
         block("quadratic", [f"quadratic damping in {axis}" for axis in AXES], damping[1], "", False),
         block("delay", [f"delay of {sensor}" for sensor in SENSORS], 0.05, "s", False),
-        block("beat", [*swings, "delay of thrust [s]"], np.array([1.0] * TERMS + [0.1]), ""),
-        block("shape", [f"thrust by {name}" for name in shape], (0.5, 0.5, 0.3, 0.3, 0.3), ""),
+        block(SHAPE, [f"thrust by {name}" for name in shape], (0.5, 0.5, 0.3, 0.3, 0.3), ""),
     )
     return {one.name: one for one in blocks}
 

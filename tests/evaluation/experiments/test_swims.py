@@ -82,7 +82,6 @@ def _log(command: list[list[list[float]]], missing: list[float]) -> RunLog:
         asked=asked,
         allocated=np.zeros((n, 6)),
         inertial_power=power,
-        torque_power=power,
         driving_power=power,
         solve_ms=np.ones(n),
     )

@@ -50,7 +50,7 @@ def truth(drawn: Layout) -> Layout:
 @pytest.fixture(scope="module")
 def fit(drawn: Layout, truth: Layout) -> RobotFit:
     command, measured = swim(truth, 60.0, seed=1)
-    return fit_robot(drawn, [Swim("made up", replay(drawn, command), only_new(measured), command)])
+    return fit_robot(drawn, [Swim("made up", replay(drawn, command), only_new(measured))])
 
 
 def test_strengths_directions_and_centre_are_found_within_their_errors(fit: RobotFit) -> None:
@@ -65,8 +65,7 @@ def test_strengths_directions_and_centre_are_found_within_their_errors(fit: Robo
 
 def test_what_is_not_there_is_not_used_and_nothing_is_doubted(fit: RobotFit) -> None:
     assert fit.doubts() == ()
-    # Forces that swing within the beat leave no trace in a layout; here they mend the servos' coarse steps.
-    assert set(fit.helps) <= {"beat"} and len(fit.helps) + len(fit.no_help) == 2
+    assert fit.other_law is False
     assert fit.explained > 0.8
     text = "\n".join(summary(fit))
     assert "tried, and no help" in text and "common scale" in text
@@ -94,8 +93,8 @@ def test_late_sensors_are_found_out(drawn: Layout, truth: Layout) -> None:
     late = measured.copy()
     late[2:, 6:9] = measured[:-2, 6:9]
     late[1:, [0, 1, 5]] = measured[:-1, [0, 1, 5]]
-    made = Swim("late", replay(drawn, command)[2:], late[2:], command[2:])
-    found = fit_robot(drawn, [made], tried=())
+    made = Swim("late", replay(drawn, command)[2:], late[2:])
+    found = fit_robot(drawn, [made], other_law=False)
     delay, error = found.found("delay"), found.found_error("delay")
     # The made-up swims themselves take forces from the ends of steps of 0.02 s.
     np.testing.assert_array_less(np.abs(delay - [0.1, 0.0, 0.0, 0.2]), np.maximum(4.0 * error, 0.02))
@@ -109,7 +108,7 @@ def test_a_fin_that_never_works_is_said_to_be_unknown(drawn: Layout) -> None:
     motion = replay(lost, command)
     whole = np.zeros((*motion.shape[:2], 3, 3))
     whole[:, :, [0, 2]] = motion
-    found = fit_robot(drawn, [Swim("two fins", whole, only_new(measured), whole[:, 0])], tried=())
+    found = fit_robot(drawn, [Swim("two fins", whole, only_new(measured))], other_law=False)
     assert any("front_left" in doubt for doubt in found.doubts())
     assert "strength of front_left, logarithm" in found.untold()
     assert summary(found)[0].startswith("not to be trusted")
@@ -129,7 +128,7 @@ def test_the_command_reads_a_csv_file(
     arguments = [
         "fit",
         "robot",
-        "--no-residual",
+        "--no-other-law",
         f"{tmp_path}/drawn.yaml",
         f"{tmp_path}/swim.csv",
         "-o",
