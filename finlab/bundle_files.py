@@ -86,7 +86,14 @@ def read_bundle_files(path: str | os.PathLike[str]) -> dict[str, bytes]:
         files = {name: read_file(folder / name, largest(name), "a bundle's file") for name in there}
     else:
         content = read_file(source, LARGEST_BUNDLE + 100_000, "a bundle's folder or its zip archive")
-        files = unpacked(content, source, partial(_largest, source), LARGEST_BUNDLE)
+        return bundle_files_of(content, source)
+    check_bundle_files(files, source)
+    return files
+
+
+def bundle_files_of(content: bytes, source: str) -> dict[str, bytes]:
+    """The same of a zip archive, by its content; `source` is what errors call it."""
+    files = unpacked(content, source, partial(_largest, source), LARGEST_BUNDLE)
     check_bundle_files(files, source)
     return files
 

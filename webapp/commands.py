@@ -18,7 +18,6 @@ CTRL, CTRL_SHIFT, ALT = "cmd/ctrl", "cmd/ctrl+shift", "alt"
 class Command(NamedTuple):
     """One thing to do."""
 
-    group: str
     label: str
     act: Callable[[], object]
     key: str = ""
@@ -41,43 +40,37 @@ def commands(page: Page) -> list[Command]:
         page.jobs.swimming.set_running(not page.jobs.swimming.running)
 
     return [
+        *(Command(task, partial(session.show_task, task), str(k + 1), ALT) for k, task in enumerate(TASKS)),
+        Command("Fold or open the drawer", session.fold_drawer, "J", CTRL),
+        Command("Undo", session.undo, "Z", CTRL),
+        Command("Redo", session.redo, "Z", CTRL_SHIFT),
+        Command("Select the next fin", session.select_next, "N"),
+        Command("Select nothing", partial(session.select, None), "escape"),
+        Command("Duplicate the selected fin", session.duplicate, "D", CTRL),
+        Command("Mirror the selected fin", session.mirror, "M"),
+        Command("Delete the selected fin", session.delete, "delete"),
+        Command("Add a fin", partial(session.add, "fin"), "I"),
+        Command("New design", page.designs.new),
+        Command("Save the design", page.designs.save, "S", CTRL),
+        Command("Share the design by a link", page.designs.share),
+        Command("Unlink the selected fin from its mirror image", session.unlink),
+        Command("Start over", session.start_over),
+        Command("Fail or repair the selected fin", fail_selected, "X"),
+        *(Command(f"Ask for: {name}", partial(session.set_preset, name)) for name in PRESETS),
+        *(Command(f"Keep {word} least", partial(session.keep_least, word)) for word in LEAST),
+        Command("Compare the methods", compare),
+        Command("Swim: pause or go on", swim_on, "B"),
+        Command("Swim: back to the design", page.scenery.end_swim),
+        Command("Frame what is selected", robot.frame, "F"),
         *(
-            Command("Tasks", task, partial(session.show_task, task), str(k + 1), ALT)
-            for k, task in enumerate(TASKS)
-        ),
-        Command("Tasks", "Fold or open the drawer", session.fold_drawer, "J", CTRL),
-        Command("Design", "Undo", session.undo, "Z", CTRL),
-        Command("Design", "Redo", session.redo, "Z", CTRL_SHIFT),
-        Command("Design", "Select the next fin", session.select_next, "N"),
-        Command("Design", "Select nothing", partial(session.select, None), "escape"),
-        Command("Design", "Duplicate the selected fin", session.duplicate, "D", CTRL),
-        Command("Design", "Mirror the selected fin", session.mirror, "M"),
-        Command("Design", "Delete the selected fin", session.delete, "delete"),
-        Command("Design", "Add a fin", partial(session.add, "fin"), "I"),
-        Command("Design", "New design", page.designs.new),
-        Command("Design", "Save the design", page.designs.save, "S", CTRL),
-        Command("Design", "Share the design by a link", page.designs.share),
-        Command("Design", "Unlink the selected fin from its mirror image", session.unlink),
-        Command("Design", "Start over", session.start_over),
-        Command("Wrench", "Fail or repair the selected fin", fail_selected, "X"),
-        *(Command("Wrench", f"Ask for: {name}", partial(session.set_preset, name)) for name in PRESETS),
-        *(Command("Wrench", f"Keep {word} least", partial(session.keep_least, word)) for word in LEAST),
-        Command("Wrench", "Compare the methods", compare),
-        Command("Swim", "Swim: pause or go on", swim_on, "B"),
-        Command("Swim", "Swim: back to the design", page.scenery.end_swim),
-        Command("View", "Frame what is selected", robot.frame, "F"),
-        *(
-            Command("View", f"Camera: {view}", partial(robot.look_from, view), key)
+            Command(f"Camera: {view}", partial(robot.look_from, view), key)
             for view, key in (("3D", "1"), ("Top", "2"), ("Side", "3"), ("Front", "4"))
         ),
-        Command("View", "Freeze or move the fins", partial(session.toggle, "frozen"), "P"),
-        Command("View", "Dark or light theme", partial(session.toggle, "dark")),
-        Command("Help", "Tour: start, or next stop", session.tour, "T"),
-        *(
-            Command("Help", f"Lesson: {lesson.title}", partial(session.open_stop, lesson.name))
-            for lesson in LESSONS
-        ),
-        Command("Files", "Export the bundle for the robot", page.jobs.exports.bundle),
+        Command("Freeze or move the fins", partial(session.toggle, "frozen"), "P"),
+        Command("Dark or light theme", partial(session.toggle, "dark")),
+        Command("Tour: start, or next stop", session.tour, "T"),
+        *(Command(f"Lesson: {lesson.title}", partial(session.open_stop, lesson.name)) for lesson in LESSONS),
+        Command("Export the bundle for the robot", page.jobs.exports.bundle),
     ]
 
 

@@ -5,21 +5,23 @@ it, and is kept under a name made from its content.
 """
 
 import hashlib
-import tempfile
+import os
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import NamedTuple
 
-from finlab.bundle_files import ABOUT, LARGEST, LARGEST_BUNDLE, LARGEST_TABLE, read_bundle_files
-from finlab.errors import DataError, FinlabError, LayoutError
+from finlab.bundle_files import ABOUT, LARGEST, LARGEST_BUNDLE, LARGEST_TABLE, bundle_files_of
+from finlab.errors import DataError, LayoutError
 from finlab.files.archive import unpacked
-from finlab.files.guarded import read_file
+from finlab.files.guarded import decoded, read_file
+from finlab.files.plain_values import parse_json, parse_yaml
 from finlab.hull.mesh_file import MAX_FACES, read_mesh, simplified, stl_of
-from finlab.layout import Fin, FinModelSpec, Layout
+from finlab.layout import Fin, FinModelSpec, Layout, parse_layout
 from finlab.layout.body import MESH_SUFFIXES
-from finlab.layout.load import MAX_BYTES, layout_and_failed
+from finlab.layout.load import A_LAYOUT, MAX_BYTES
+from finlab.layout.robot_file import robot_of
 from finlab.whole_file import make_folder, write_whole
 
 LAYOUTS = (".yaml", ".yml", ".json")
@@ -74,15 +76,36 @@ def read_archive(source: str, content: bytes, folder: Path) -> Opened:
         LayoutError: it is no such archive, its layout is none, or names a table that is not in it.
         DataError: a bundle that was changed, or a table that cannot be read.
     """
-    with tempfile.TemporaryDirectory() as place:
-        packed = Path(place) / "upload.zip"
-        try:
-            file, parts = _unpacked(packed, content, source, Path(place) / "files")
-            layout, failed = layout_and_failed(file, may_open=False)
-            return adopted(layout, parts, folder, source)._replace(failed=failed)
-        except FinlabError as error:
-            text = str(error).replace(str(packed), source).replace(f"{place}/files/", f"{source}/")
-            raise type(error)(text) from None
+    inside = Path(os.path.abspath(source))
+    if unpacked(content, source, {ABOUT: LARGEST[ABOUT]}.get, LARGEST_BUNDLE, LayoutError):
+        parts = bundle_files_of(content, source)
+        robot = robot_of(parts, source)
+        layout, failed = robot.layout, robot.failed
+    else:
+        parts = unpacked(content, source, partial(_largest, source), LARGEST_BUNDLE, LayoutError)
+        layouts = [name for name in parts if name.endswith(LAYOUTS)]
+        if len(layouts) != 1:
+            raise LayoutError(
+                f"holds {len(parts)} files, {len(layouts)} of them layouts; expected a bundle, or one "
+                "layout file with its force tables",
+                source=source,
+            )
+        (file,) = layouts
+        layout = layout_of(f"{source}/{file}", parts[file], (inside / file).parent)
+        failed = ()
+    by_path = {str(inside / name): part for name, part in parts.items()}
+    return adopted(layout, by_path, folder, source)._replace(failed=failed)
+
+
+def layout_of(source: str, content: bytes, folder: Path | None = None) -> Layout:
+    """The layout in the content of a file; what it names is taken to be in `folder`, and not looked at.
+
+    Raises:
+        LayoutError: it is no text, or no layout.
+    """
+    text = decoded(content, source, A_LAYOUT, LayoutError)
+    parse = parse_json if source.lower().endswith(".json") else parse_yaml
+    return parse_layout(parse(text, source, LayoutError), source, folder, may_open=False)
 
 
 def adopted(layout: Layout, parts: Mapping[str, bytes], folder: Path, source: str) -> Opened:
@@ -148,29 +171,6 @@ def _keep(path: Path, content: bytes) -> None:
     make_folder(path.parent)
     if not path.exists():
         write_whole(path, content, DataError)
-
-
-def _unpacked(packed: Path, content: bytes, source: str, folder: Path) -> tuple[Path, dict[str, bytes]]:
-    """What to load of an archive: its layout's file, or itself where it is a bundle; and its other files, by
-    the paths by which that can name them."""
-    if unpacked(content, source, {ABOUT: LARGEST[ABOUT]}.get, LARGEST_BUNDLE, LayoutError):
-        packed.write_bytes(content)
-        return packed, {f"{packed}/{name}": c for name, c in read_bundle_files(packed).items()}
-    parts = unpacked(content, source, partial(_largest, source), LARGEST_BUNDLE, LayoutError)
-    layouts = [name for name in parts if name.endswith(LAYOUTS)]
-    if len(layouts) != 1:
-        raise LayoutError(
-            f"holds {len(parts)} files, {len(layouts)} of them layouts; expected a bundle, or one "
-            "layout file with its force tables",
-            source=source,
-        )
-    path = folder / layouts[0]
-    try:
-        path.parent.mkdir(parents=True)
-        path.write_bytes(parts.pop(layouts[0]))
-    except (OSError, ValueError):  # a name that is too long for a path
-        raise LayoutError(f"holds {layouts[0]!r:.60}, which cannot be a file", source=source) from None
-    return path, {str(folder / name): part for name, part in parts.items()}
 
 
 def _largest(source: str, name: str) -> int:

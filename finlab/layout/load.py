@@ -32,11 +32,8 @@ def load_layout(layout: str | os.PathLike[str]) -> Layout:
     return layout_and_failed(layout)[0]
 
 
-def layout_and_failed(
-    layout: str | os.PathLike[str], *, may_open: bool = True
-) -> tuple[Layout, tuple[str, ...]]:
-    """A layout as `load_layout` opens it, and the actuators that a bundle marks as failed; `may_open` as
-    for `parse_layout`."""
+def layout_and_failed(layout: str | os.PathLike[str]) -> tuple[Layout, tuple[str, ...]]:
+    """A layout as `load_layout` opens it, and the actuators that a bundle marks as failed."""
     file = layout_path(layout)
     source = str(layout)
     if is_bundle(file):
@@ -45,7 +42,7 @@ def layout_and_failed(
     content = read_text(file, MAX_BYTES, A_LAYOUT, LayoutError)
     parse = parse_json if file.suffix.lower() == ".json" else parse_yaml
     data, folder = parse(content, source, LayoutError), file.resolve().parent
-    return parse_layout(data, source, folder, may_open=may_open), ()
+    return parse_layout(data, source, folder), ()
 
 
 def layout_path(layout: str | os.PathLike[str]) -> Path:

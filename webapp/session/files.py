@@ -21,20 +21,20 @@ from finlab.deploy.design_files import (
     TABLE_FOLDER,
     Opened,
     adopted,
+    layout_of,
     read_archive,
     stored_mesh,
     with_hull_inside,
 )
 from finlab.errors import FinlabError, LayoutError
 from finlab.files.archive import packed as pack
-from finlab.files.guarded import decoded
-from finlab.files.plain_values import parse_json, parse_yaml, yaml_text
+from finlab.files.plain_values import yaml_text
 from finlab.hull.mesh import Mesh
 from finlab.hull.mesh_file import SizeError, stl_of
 from finlab.hull.surface import UNITS, Surface
-from finlab.layout import Layout, layout_to_dict, load_layout, parse_layout
+from finlab.layout import Layout, layout_to_dict, load_layout
 from finlab.layout.body import Hull
-from finlab.layout.load import A_LAYOUT, MAX_BYTES
+from finlab.layout.load import MAX_BYTES
 from finlab.physics import plant_of
 
 FRAGMENT = "design="
@@ -92,19 +92,12 @@ def read_layout(name: str, content: bytes) -> Opened:
     source = Path(str(name)).name[:80] or "upload"
     if source.lower().endswith(".zip"):
         opened = read_archive(source, content, cache_folder())
+    elif len(content) > MAX_BYTES:
+        raise LayoutError(f"is larger than {MAX_BYTES:,} bytes, a layout has a few thousand", source=source)
     else:
-        opened = adopted(_read_alone(source, content), {}, cache_folder(), source)
+        opened = adopted(layout_of(source, content), {}, cache_folder(), source)
     plant_of(opened.layout)  # reads the tables of its fins
     return opened
-
-
-def _read_alone(source: str, content: bytes) -> Layout:
-    """The layout in a file that came without others; nothing that it names is looked at."""
-    if len(content) > MAX_BYTES:
-        raise LayoutError(f"is larger than {MAX_BYTES:,} bytes, a layout has a few thousand", source=source)
-    text = decoded(content, source, A_LAYOUT, LayoutError)
-    parse = parse_json if source.lower().endswith(".json") else parse_yaml
-    return parse_layout(parse(text, source, LayoutError), source=source, may_open=False)
 
 
 def layout_file(layout: Layout) -> tuple[str, bytes]:

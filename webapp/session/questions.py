@@ -42,9 +42,7 @@ class Questions(Core):
 
     def set_preset(self, name: str) -> None:
         """The target wrench of a preset."""
-        if name not in PRESETS:
-            raise FinlabError(f"there is no preset {name!r:.40}")
-        self._commit("", replace(self.state, target=PRESETS[name]))
+        self._commit("", replace(self.state, target=PRESETS[chosen(name, "preset", PRESETS)]))
 
     def set_setting(self, key: str, value: Any) -> None:
         """The temperature, the method or the policy; `key` is the field of `State`."""

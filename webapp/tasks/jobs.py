@@ -1,7 +1,6 @@
 """All that works for one page beside the event loop."""
 
 import asyncio
-from collections.abc import Callable
 
 from webapp.session.state import State
 from webapp.tasks.analyst import REST_S, Question, find, find_ranges
@@ -73,7 +72,7 @@ class Jobs:
         """The page has gone."""
         self.swimming.stop()
         self.refining.stop()
-        forget: list[Callable[[], None]] = [task.forget for task in (self.comparison, self.improver)]
-        forget += [task.forget for task in (self.fitting, self.answering, self.analyst, self.ranging)]
-        for each in forget:
-            each()
+        for task in (self.comparison, self.improver, self.fitting, self.answering):
+            task.forget()
+        for worked in (self.analyst, self.ranging):
+            worked.forget()
