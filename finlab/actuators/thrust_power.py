@@ -148,21 +148,18 @@ def radial_table(model: ThrustModel, sign: int, least: float, most: float) -> Ra
     top = abs(float(own.marginal(ends)[1, 0]))
 
     def answer(price: Array) -> Array:
-        return np.clip(_sizes(model, sign, price), least, most)
+        """Sizes of the force [N] whose marginal cost is a price [W/N]."""
+        if isinstance(model, PowerLaw):
+            factor = model.forward if sign > 0 or model.reverse is None else model.reverse
+            size: Array = (price / (model.exponent * factor)) ** (1.0 / (model.exponent - 1.0))
+        else:
+            sides = sides_of(model)
+            curve = sides.forward if sign > 0 else sides.reverse
+            assert curve is not None, "the limits of the force are within the table"
+            size = curve.answer(price)
+        return np.clip(size, least, most)
 
     return RadialTable.of_price(top, answer, rest)
-
-
-def _sizes(model: ThrustModel, sign: int, price: Array) -> Array:
-    """Sizes of the force [N] whose marginal cost is a price [W/N]."""
-    if isinstance(model, PowerLaw):
-        factor = model.forward if sign > 0 or model.reverse is None else model.reverse
-        found: Array = (price / (model.exponent * factor)) ** (1.0 / (model.exponent - 1.0))
-        return found
-    sides = sides_of(model)
-    curve = sides.forward if sign > 0 else sides.reverse
-    assert curve is not None, "the limits of the force are within the table"
-    return curve.answer(price)
 
 
 def held(force: AnyArray, dead_band: Array) -> AnyArray:

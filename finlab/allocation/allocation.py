@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Generic, NamedTuple, Self, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.evaluate import REACHED, body_forces, judged_effort, judged_power
+from finlab.allocation.evaluate import REACHED, judged_effort, judged_power
 from finlab.allocation.policy import CLOSEST, Policy, limits_reached
 from finlab.allocation.solution import Candidates, PlainData
 from finlab.allocation.tables import allocation_text
@@ -98,7 +98,7 @@ class Answer(PlainData, Generic[Number]):
     @cached_property
     def forces(self) -> Array:
         """Force (n, 3) or (N, n, 3) of each fin [N], body frame, by its own law or table; zero if failed."""
-        return self._by_parts(lambda rows: body_forces(self._plant, rows))
+        return self._by_parts(self._plant.fin_forces)
 
     @cached_property
     def wrench(self) -> Array:

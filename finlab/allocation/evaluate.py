@@ -13,14 +13,6 @@ REACHED = 1e-3
 """Share of the yardstick up to which an error is none: the wrench counts as delivered."""
 
 
-def body_forces(plant: Plant, command: Array) -> Array:
-    """Force of each actuator (..., n, 3) [N], body frame, of commands (..., n, 3); zero if failed (NaN)."""
-    force = plant.forces(command)
-    # The first half of a column is its actuator's axis in the body frame.
-    forces: Array = np.matmul(force[..., None, :], plant.effectiveness[..., :3])[..., 0, :]
-    return forces
-
-
 def judged_power(plant: Plant, command: Array) -> Array:
     """Mean mechanical power (N,) [W] of commands (N, n, 3); what has failed (NaN) takes none."""
     power: Array = np.nansum(plant.power(command), axis=-1)

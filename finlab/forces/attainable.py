@@ -1,7 +1,7 @@
 """The forces, or torques, that a layout can give, as a body to be drawn: a convex hull of wrenches."""
 
 from collections.abc import Callable, Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import count
 from typing import Literal
 
@@ -18,10 +18,24 @@ FLAT = 1e-5
 """Thickness, as a share of the size, below which a hull counts as flat."""
 
 
-@dataclass(frozen=True, eq=False)
-class Polytope:
-    """A convex hull of dimension 0 to 3, and the planes that bound it."""
+Kind = Literal["force", "torque"]
 
+N_DIRECTIONS = 120
+"""Directions that are looked at first; faces that are too far off add theirs."""
+MAX_ROUNDS = 4
+SPECK = 1e-5
+"""Share of the sum of all thrusts below which a point counts as the origin; the solver is no more exact."""
+TOLERANCE = 0.01
+"""Gap at which no more directions are added, as a share of the farthest vertex."""
+
+
+@dataclass(frozen=True, eq=False)
+class AttainableSet:
+    """A convex polytope of forces or torques that can be had with all else at zero, body frame [N] or [N m].
+    Every vertex is attained, by the actuators or, where an arc is too wide or a force is that of a flow, by
+    the convex hulls of what they can push."""
+
+    kind: Kind
     vertices: Array
     """Corners (V, 3)."""
     faces: NDArray[np.intp]
@@ -34,10 +48,12 @@ class Polytope:
     """Outward unit normals (N, 3) of bounding planes; a flat hull lies between two of them."""
     offsets: Array
     """How far out (N,) those planes are."""
+    gap: float = np.inf
+    """Nothing attainable lies further than this outside any face [N] or [N m]."""
 
 
-def hull_of(points: Array) -> Polytope:
-    """Returns the convex hull of points (P, 3), at least one."""
+def _hull_of(points: Array, kind: Kind) -> AttainableSet:
+    """The convex hull of points (P, 3), at least one."""
     center = points.mean(axis=0)
     _, extent, axes = np.linalg.svd(points - center, full_matrices=True)
     size = np.abs(points).max()
@@ -45,7 +61,7 @@ def hull_of(points: Array) -> Polytope:
     thick = np.ptp(inside, axis=0) > max(FLAT * size, 1e-9)
     dimension = int(thick.sum())
     if dimension == 3:
-        return _body(points)
+        return _body(points, kind)
     kept, flat = axes[thick], axes[~thick]
     if dimension == 2:
         polygon = ConvexHull(inside[:, thick])
@@ -60,7 +76,8 @@ def hull_of(points: Array) -> Polytope:
         corners, normals, offsets = np.array([0]), np.zeros((0, 3)), np.zeros(0)
     sides = np.concatenate([flat, -flat])
     vertices = points[corners]
-    return Polytope(
+    return AttainableSet(
+        kind,
         vertices,
         np.zeros((0, 3), dtype=np.intp),
         np.arange(len(corners)) if dimension else np.zeros(0, dtype=np.intp),
@@ -70,7 +87,7 @@ def hull_of(points: Array) -> Polytope:
     )
 
 
-def _body(points: Array) -> Polytope:
+def _body(points: Array, kind: Kind) -> AttainableSet:
     hull = ConvexHull(points)
     corners = hull.vertices
     place = np.zeros(len(points), dtype=np.intp)
@@ -80,31 +97,8 @@ def _body(points: Array) -> Polytope:
     backward = (np.cross(b - a, c - a) * normals).sum(-1) < 0.0
     faces = np.where(backward[:, None], faces[:, ::-1], faces)
     planes = np.unique(np.round(hull.equations, 9), axis=0)
-    return Polytope(
-        points[corners], place[faces], np.zeros(0, dtype=np.intp), 3, planes[:, :3].copy(), -planes[:, 3]
-    )
-
-
-Kind = Literal["force", "torque"]
-
-N_DIRECTIONS = 120
-"""Directions that are looked at first; faces that are too far off add theirs."""
-MAX_ROUNDS = 4
-SPECK = 1e-5
-"""Share of the sum of all thrusts below which a point counts as the origin; the solver is no more exact."""
-TOLERANCE = 0.01
-"""Gap at which no more directions are added, as a share of the farthest vertex."""
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class AttainableSet(Polytope):
-    """A convex polytope of forces or torques that can be had with all else at zero, body frame [N] or [N m].
-    Every vertex is attained, by the actuators or, where an arc is too wide or a force is that of a flow, by
-    the convex hulls of what they can push."""
-
-    kind: Kind
-    gap: float
-    """Nothing attainable lies further than this outside any face [N] or [N m]."""
+    none = np.zeros(0, dtype=np.intp)
+    return AttainableSet(kind, points[corners], place[faces], none, 3, planes[:, :3].copy(), -planes[:, 3])
 
 
 def attainable_set(
@@ -140,7 +134,7 @@ def attainable_set(
     points = support(np.concatenate([axes, spread / np.linalg.norm(spread, axis=-1, keepdims=True)]))[0]
     if sets.center is None:  # every actuator may rest
         points = np.concatenate([points, np.zeros((1, 3))])
-    found = hull_of(points)
+    found = _hull_of(points, kind)
     for round_ in count():
         new, reach = support(found.normals)
         beyond = reach - found.offsets
@@ -149,8 +143,8 @@ def attainable_set(
         if round_ == MAX_ROUNDS or not far.any():
             break
         points = np.concatenate([found.vertices, new[far]])
-        found = hull_of(points)
-    return AttainableSet(**vars(found), kind=kind, gap=max(float(beyond.max()), 0.0))
+        found = _hull_of(points, kind)
+    return replace(found, gap=max(float(beyond.max()), 0.0))
 
 
 Support = Callable[[Array], tuple[Array, Array]]

@@ -27,7 +27,7 @@ from finlab.arrays import Array
 from finlab.layout import Fin, Layout
 from finlab.layout.angles import TURN, wrapped
 from finlab.layout.arrays import own_effectiveness
-from finlab.physics.inflow import inflow_of
+from finlab.physics.plant import plant_of
 
 LEVER = 0.2
 """Length [m] that makes torques comparable to forces: about the distance of a fin from the centre."""
@@ -221,12 +221,10 @@ def shapes_of(layout: Layout, flow: ArrayLike | None = None) -> list[Shape]:
     shapes: dict[str, Shape] = {}
     for places, law in laws_of(layout):
         if law.feels_flow:
-            inflow = None
-            if flow is not None:
-                inflow = inflow_of(np.asarray(flow, np.float64), layout.position, layout.frames)[places]
+            met = plant_of(layout).inflow(None if flow is None else np.asarray(flow, np.float64))
             lower, upper = layout.lower[places], layout.upper[places]
             command = lower + np.linspace(0.0, 1.0, ALONG)[:, None, None] * (upper - lower)
-            force = law.force(command, inflow)[..., 1:]
+            force = law.force(command, None if met is None else met[places])[..., 1:]
             for k, place in enumerate(places):
                 shapes[layout.names[place]] = _polygon(np.eye(3)[1:], force[:, k], 0.0, SIDES)
     others = tuple(part for part in layout.actuators if part.name not in shapes)

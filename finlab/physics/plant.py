@@ -21,7 +21,6 @@ from finlab.errors import CommandError
 from finlab.layout.angles import TURN, is_full_turn
 from finlab.layout.arrays import own_effectiveness
 from finlab.layout.layout import Layout
-from finlab.physics.inflow import inflow_of
 from finlab.physics.wrench import body_force, wrench_of_forces
 
 
@@ -67,7 +66,10 @@ class Plant:
         flow = self.flow if flow is None else flow
         if flow is None or not self.feels_flow:
             return None
-        return inflow_of(np.asarray(flow, np.float64), self.layout.position, self.layout.frames)
+        water = np.asarray(flow, np.float64)[..., None, :]
+        moved = water[..., :3] + np.cross(water[..., 3:], self.layout.position)
+        met: Array = np.einsum("...nb,nab->...na", moved, self.layout.frames)
+        return met
 
     def wrench(self, command: ArrayLike, *, flow: Array | None = None) -> Array:
         """Returns the wrench that a command causes.

@@ -83,12 +83,10 @@ class FinGroup(Group):
         self._tables = tables
         self._laws = [make_law(fin.model) for fin in fins]
         self._stacked = stack_laws([fin.model for fin in fins])
-        self.planes = [
+        self.responses = [
             Plane(matrix[1:], each.table, each.middle, each.half, each.gauge)
             for each, matrix in zip(tables, effectiveness, strict=True)
         ]
-        """What each offers."""
-        self.responses = list(self.planes)
         self._largest = np.array([each.table.largest for each in tables])
         self._beat = np.array([each.beat for each in tables])
         self._deflection = np.array([np.broadcast_to(each.deflection, POINTS) for each in tables])

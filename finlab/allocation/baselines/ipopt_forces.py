@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from finlab.actuators.response import Group, Line, Plane
-from finlab.allocation.baselines.pseudo_inverse import PseudoInverse
+from finlab.allocation.baselines.pseudo_inverse import PseudoInverse, pushed_axes
 from finlab.allocation.dual.answers import Answers
 from finlab.arrays import Array
 from finlab.layout.angles import TURN
@@ -25,24 +25,19 @@ REST = 1e-3
 """Share of its largest force up to which an actuator that cannot rest is taken for one that can."""
 NARROW = 1e-6
 """Half of an arc [rad] below which an actuator pushes along one line."""
-SAME_DIRECTION = 1e-6
-"""Singular values of the effectiveness below this share of the largest count as no authority."""
 
 
 class ForceProgram:
-    """`err_norm^2 + weight * power` over the forces of one robot, the target as its parameter.
+    """Power over the forces of one robot, the wrench as a constraint, the target as its parameter.
 
     Args:
         casadi: the module.
         inverse: the robot; where the search starts, and what turns forces into commands.
         sigma: per-axis standard deviation (6,) of the error.
-        weight: of the power; None where power alone is kept least, with the wrench as a constraint.
         options: of IPOPT.
     """
 
-    def __init__(
-        self, casadi: Any, inverse: PseudoInverse, sigma: Array, weight: float | None, options: dict[str, Any]
-    ) -> None:
+    def __init__(self, casadi: Any, inverse: PseudoInverse, sigma: Array, options: dict[str, Any]) -> None:
         self._inverse, n = inverse, inverse.plant.n
         self._most = np.maximum(inverse.largest, 1e-9)
         share, target = casadi.MX.sym("share", 2 * n), casadi.MX.sym("target", 6)
@@ -62,14 +57,9 @@ class ForceProgram:
         cost: Any = sum(part.cost for part in self._parts)
         limits = [limit for part in self._parts for limit in part.limits]
         residual = (wrench - target) / casadi.DM(sigma)
-        if weight is None:
-            # No constraint says what another one says.
-            axes, size, _ = np.linalg.svd(inverse.effectiveness * per / sigma[:, None])
-            pushed = casadi.DM(axes[:, : int((size > SAME_DIRECTION * size[0]).sum())].T) @ residual
-            limits += [(axis, 0.0, 0.0) for axis in casadi.vertsplit(pushed)]
-            objective = cost / max(sum(part.full_cost for part in self._parts), 1e-300)
-        else:
-            objective = casadi.sumsqr(residual) + weight * cost
+        pushed = casadi.DM(pushed_axes(inverse.effectiveness * per / sigma[:, None])) @ residual
+        limits += [(axis, 0.0, 0.0) for axis in casadi.vertsplit(pushed)]
+        objective = cost / max(sum(part.full_cost for part in self._parts), 1e-300)
         conditions = casadi.vertcat(*(value for value, _, _ in limits))
         program = {"x": share, "p": target, "f": objective, "g": conditions}
         self._solver = casadi.nlpsol("forces", "ipopt", program, options)

@@ -1,6 +1,5 @@
 """What the methods that know the fin model share: limits, starts, the objective by which starts compete."""
 
-import time
 from abc import abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
@@ -22,22 +21,6 @@ SOLVED = 1e-5
 """Normalized error up to which an answer is exact."""
 USUAL_SHARE = 0.1
 """What a robot is mostly asked for, as a share of its yardstick."""
-
-
-class TimeLimit:
-    """Processor time of this thread, which other work on the machine does not shorten.
-
-    Args:
-        seconds: how long from now.
-    """
-
-    def __init__(self, seconds: float) -> None:
-        self._end = time.thread_time() + seconds
-
-    @property
-    def over(self) -> bool:
-        """Whether the time is up."""
-        return time.thread_time() > self._end
 
 
 class ModelBased(LeastErrorMethod):

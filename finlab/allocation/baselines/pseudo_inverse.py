@@ -10,6 +10,8 @@ from finlab.physics import Plant
 
 RCOND = 1e-3
 """Singular values below this share of the largest count as zero."""
+SAME_DIRECTION = 1e-6
+"""The same where directions of the wrench are told apart in which the actuators push at all."""
 
 _FULL = 0.0, np.pi
 """Middle and half of an arc [rad] that cuts nothing off."""
@@ -81,3 +83,10 @@ def _largest(response: Response) -> float:
         reverse = 0.0 if response.reverse is None else response.reverse.largest
         return max(response.forward.largest, reverse)
     return response.table.largest * (1.0 if response.gauge is None else float(response.gauge.max()))
+
+
+def pushed_axes(effectiveness: Array) -> Array:
+    """Directions (r, 6) of the wrench in which columns (6, k) push at all: no constraint says what another
+    one says."""
+    axes, size, _ = np.linalg.svd(effectiveness)
+    return np.asarray(axes[:, : int((size > SAME_DIRECTION * size[0]).sum())].T)

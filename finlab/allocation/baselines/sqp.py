@@ -3,12 +3,14 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from time import thread_time
 from typing import Any
 
 import numpy as np
 from scipy.optimize import minimize
 
-from finlab.allocation.baselines.model_based import ModelBased, TimeLimit, TimeLimitedSettings
+from finlab.allocation.baselines.model_based import ModelBased, TimeLimitedSettings
+from finlab.allocation.baselines.pseudo_inverse import pushed_axes
 from finlab.allocation.levenberg_marquardt import CommandProblem, refine
 from finlab.allocation.settings import choice, number
 from finlab.arrays import Array
@@ -22,8 +24,6 @@ APPROACH, POLISH = 30, 2
 """Levenberg-Marquardt steps from a start onto the target, and after the last quadratic program."""
 SETTLED = 1e-8
 """Change of the cost, as a share of a usual one, at which the programs end."""
-SAME_DIRECTION = 1e-6
-"""Singular values of the fins' effectiveness below this share of the largest count as no authority."""
 
 Solve = Callable[[Array, Array], Array]
 """From a normalized target (6,) and a start (n, 3) to the command (n, 3) where the solver ends."""
@@ -62,12 +62,12 @@ class Sqp(ModelBased):
         answer = self._inverse.command(targets)
         random = plant.sample(np.random.default_rng(seed), (self.settings.n_starts - 1,))
         for i, target in enumerate(targets / self.sigma):
-            limit = TimeLimit(self.settings.time_limit_s)
+            over = thread_time() + self.settings.time_limit_s
             starts = np.array([answer[i], (plant.lower + plant.upper) / 2, *random])
             near = refine(problem, target[None], starts, APPROACH)
             tried = [*near.command]
             for start in near.command[near.error <= NEAR]:
-                if not limit.over:
+                if thread_time() <= over:
                     tried.append(solve(target, start))
             answer[i] = self._best(targets[i], np.array(tried), POLISH)
         return answer
@@ -82,7 +82,7 @@ def cheapest_program(plant: Plant, meter: CostMeter, sigma: Array, steps: int) -
         sigma: per-axis standard deviation (6,) of the error.
         steps: most quadratic programs.
     """
-    axes, width = pushed_axes(plant, sigma), plant.width
+    axes, width = pushed_axes(layout_effectiveness(plant.layout) / sigma[:, None]), plant.width
     free = width.ravel() > 0.0
     usual = max(float(meter(plant.sample(np.random.default_rng(0), (16,))).mean()), 1e-300)
 
@@ -115,10 +115,3 @@ def cheapest_program(plant: Plant, meter: CostMeter, sigma: Array, steps: int) -
         return command_at(np.clip(end, 0.0, 1.0)) if np.isfinite(end).all() else start
 
     return solve
-
-
-def pushed_axes(plant: Plant, sigma: Array) -> Array:
-    """Directions (r, 6) of the normalized wrench in which the fins push at all: no constraint says what
-    another one says."""
-    axes, size, _ = np.linalg.svd(layout_effectiveness(plant.layout) / sigma[:, None])
-    return np.asarray(axes[:, : int((size > SAME_DIRECTION * size[0]).sum())].T)
