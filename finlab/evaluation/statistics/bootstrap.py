@@ -19,13 +19,18 @@ Interval = tuple[float, float]
 
 
 def mean_interval(values: Array, group: NDArray[np.int64]) -> Interval:
-    """Of the mean of values (N,), whose layouts are numbered in group (N,); a lone layout is split into its
+    """Of the mean of values (N,), whose layouts are numbered in group (N,)."""
+    return ratio_interval(values, np.ones(len(values)), group)
+
+
+def ratio_interval(numerator: Array, denominator: Array, group: NDArray[np.int64]) -> Interval:
+    """Of the sum of numerators over the sum of denominators, each (N,); a lone layout is split into its
     entries."""
     found, member = np.unique(group, return_inverse=True)
     member = member if len(found) > 1 else np.arange(len(group))
-    sums = [np.bincount(member, values), np.bincount(member)]
+    sums = [np.bincount(member, values) for values in (numerator, denominator)]
     if len(sums[0]) < 2:
-        lone = float(values.mean()) if len(values) else float("nan")
+        lone = float(numerator.sum() / denominator.sum()) if len(group) else float("nan")
         return lone, lone
 
     def ratio(above: Array, below: Array, axis: int) -> Array:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from finlab.arrays import Array
 from finlab.fit.robot.model import RobotModel
 from finlab.fit.robot.swim import ANGLES, STEP_S
-from finlab.fit.robot.unknowns import Unknowns
+from finlab.fit.robot.unknowns import BASE, Unknowns
 from finlab.layout.angles import wrapped
 from finlab.least_squares import Damping, levenberg_marquardt
 from finlab.vehicle.fossen import Dynamics
@@ -133,13 +133,13 @@ def fit_windows(
 
 
 def unseen_gain(model: RobotModel, fitted: Fitted, windows: Windows, deviation: Array, name: str) -> Array:
-    """By how much a block of unknowns more would lessen half the squared residuals of windows not seen (W,).
+    """By how much a block beside `BASE` would lessen half the squared residuals of windows not seen (W,).
 
     Cross-validation to second order about the fit: the windows are dealt to some folds, and the normal
     equations of all windows but those of a fold tell the change of the unknowns, with the block and without.
     """
-    whole = Unknowns(model.blocks, (*fitted.unknowns.names, name))
-    vector = whole.taken_over(fitted.unknowns, fitted.vector)
+    whole = Unknowns(model.blocks, (*BASE, name))
+    vector = np.pad(fitted.vector, (0, whole.size - len(fitted.vector)))
     at, believed = _Problem(model, whole, windows, deviation).at(vector, fitted.start), whole.believed
     fold = np.arange(windows.start.shape[1]) % FOLDS
     known = np.ones(whole.size, bool)

@@ -143,7 +143,7 @@ def _fit(model: RobotModel, swims: Sequence[Swim], other_law: bool, tell: Callab
         helps = bool(gain.mean() > SURE * sem(gain))
     if helps:
         unknowns = Unknowns(model.blocks, (*BASE, SHAPE))
-        vector = unknowns.taken_over(fitted.unknowns, fitted.vector)
+        vector = np.pad(fitted.vector, (0, unknowns.size - len(fitted.vector)))
         for _ in range(ROUNDS):
             tell("fitting another law of thrust")
             fitted = fit_windows(model, unknowns, windows, deviation, vector, fitted.start)

@@ -95,11 +95,6 @@ class Unknowns:
         gauge[place] = self.scale[place] / (place.stop - place.start) / SAME_SCALE
         return np.eye(self.size) + np.outer(gauge, gauge)
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the blocks."""
-        return tuple(block.name for block in self.blocks)
-
     def part(self, name: str, vector: Array) -> Array | None:
         """The unknowns (..., k) of one block in its own units, from vectors (..., size); None where it is not
         looked for."""
@@ -118,11 +113,3 @@ class Unknowns:
     def place(self, name: str) -> slice:
         """Where a block stands."""
         return self._where[name]
-
-    def taken_over(self, other: "Unknowns", vector: Array) -> Array:
-        """A vector of another choice of blocks as one of these; what that one lacks is zero."""
-        result = np.zeros(self.size)
-        for name, where in self._where.items():
-            if name in other._where:
-                result[where] = vector[other._where[name]]
-        return result

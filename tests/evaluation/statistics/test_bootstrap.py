@@ -5,6 +5,7 @@ import pytest
 
 from finlab.evaluation.statistics.bootstrap import (
     mean_interval,
+    ratio_interval,
     share_interval,
 )
 
@@ -25,13 +26,16 @@ def test_the_width_is_that_of_the_groups() -> None:
     assert high - low == pytest.approx(2 * SPREAD / np.sqrt(GROUPS), rel=0.15)
 
 
-@pytest.mark.parametrize("kind", ["mean", "share"])
+@pytest.mark.parametrize("kind", ["mean", "share", "ratio"])
 def test_reruns_land_inside(kind: str) -> None:
     def look(seed: int) -> tuple[float, object]:
         values, group = _draw(seed)
         if kind == "mean":
             return values.mean(), mean_interval(values, group)
-        return (values < 5.5).mean(), share_interval(values < 5.5, group)
+        if kind == "share":
+            return (values < 5.5).mean(), share_interval(values < 5.5, group)
+        below = values + np.random.default_rng(seed + 999).normal(size=GROUPS).repeat(EACH)
+        return values.sum() / below.sum(), ratio_interval(values, below, group)
 
     seen = [look(seed) for seed in range(24)]
     inside = [low <= value <= high for value, _ in seen for _, (low, high) in seen]
