@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 import viser
 
 from webapp.page import Page
-from webapp.session.lessons import LESSONS
 from webapp.session.looking import TASKS
 from webapp.session.state import LEAST
 from webapp.session.targets import PRESETS
@@ -32,10 +31,6 @@ def commands(page: Page) -> list[Command]:
     def fail_selected() -> None:
         session.toggle_failure(session.selected or session.state.layout.names[0])
 
-    def compare() -> None:
-        session.show_drawer("Comparison")
-        page.jobs.comparison.start(session.state)
-
     def swim_on() -> None:
         page.jobs.swimming.set_running(not page.jobs.swimming.running)
 
@@ -58,7 +53,6 @@ def commands(page: Page) -> list[Command]:
         Command("Fail or repair the selected fin", fail_selected, "X"),
         *(Command(f"Ask for: {name}", partial(session.set_preset, name)) for name in PRESETS),
         *(Command(f"Keep {word} least", partial(session.keep_least, word)) for word in LEAST),
-        Command("Compare the methods", compare),
         Command("Swim: pause or go on", swim_on, "B"),
         Command("Swim: back to the design", page.scenery.end_swim),
         Command("Frame what is selected", robot.frame, "F"),
@@ -69,7 +63,6 @@ def commands(page: Page) -> list[Command]:
         Command("Freeze or move the fins", partial(session.toggle, "frozen"), "P"),
         Command("Dark or light theme", partial(session.toggle, "dark")),
         Command("Tour: start, or next stop", session.tour, "T"),
-        *(Command(f"Lesson: {lesson.title}", partial(session.open_stop, lesson.name)) for lesson in LESSONS),
         Command("Export the bundle for the robot", page.jobs.exports.bundle),
     ]
 

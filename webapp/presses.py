@@ -9,6 +9,7 @@ from functools import partial
 
 import viser
 
+from finlab.errors import FinlabError
 from webapp.handles import add_html, on_user_change
 from webapp.markup.html import html, marker
 from webapp.viser_internals import run_file, run_script, uuid_of
@@ -25,6 +26,17 @@ Act = Callable[[str, str], object]
 def press(kind: str, key: str) -> str:
     """Attributes of an element that can be pressed; its text is "", "shift" or "ctrl", what was held."""
     return html("data-press='{}' data-key='{}'", kind, key)
+
+
+def placed(key: str, count: int) -> int:
+    """The place that a page names, of `count`.
+
+    Raises:
+        FinlabError: there is no such place.
+    """
+    if not key.isdecimal() or len(key) > 6 or int(key) >= count:
+        raise FinlabError("that one is gone")
+    return int(key)
 
 
 class Presses:

@@ -13,7 +13,7 @@ from finlab.layout import Body, load_layout
 from finlab.layout.body import Hull
 from finlab.vehicle.body import GRAVITY
 from webapp.session import Session
-from webapp.session.body_edits import DYNAMICS, with_dynamics
+from webapp.session.layout_edits import DYNAMICS, with_dynamics
 
 
 @pytest.fixture

@@ -6,7 +6,6 @@ from functools import partial
 
 from markupsafe import Markup
 
-from finlab.errors import FinlabError
 from finlab.layout import Actuator, Fin
 from finlab.layout.directions import direction
 from finlab.layout.layout import MAX_ACTUATORS
@@ -14,7 +13,7 @@ from webapp.handles import add_html
 from webapp.markup.answer import swatch
 from webapp.markup.html import html, marker
 from webapp.page import Page
-from webapp.presses import press
+from webapp.presses import placed, press
 from webapp.session.layout_edits import NEW
 from webapp.session.links import partner
 from webapp.session.state import State
@@ -36,9 +35,7 @@ def add_actuator_list(page: Page) -> None:
 
     def select(key: str, held: str) -> None:
         names = session.state.layout.names
-        if not key.isdecimal() or int(key) >= len(names):
-            raise FinlabError("that actuator is gone")
-        (session.select_also if held else session.select)(names[int(key)])
+        (session.select_also if held else session.select)(names[placed(key, len(names))])
 
     page.add_html(actuator_list)
     page.presses.on("fin", select)

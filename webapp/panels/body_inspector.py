@@ -19,11 +19,6 @@ KNOWN = {
     "linear_damping": "linear damping",
     "quadratic_damping": "quadratic damping",
 }
-FORMULAS = (
-    "Mass: of the water that the hull displaces. Inertia: one density. Added mass: the ellipsoid of its "
-    "volume and proportions, after Lamb (1932). Damping: pressure after Hoerner (1965), about axes by "
-    "strips; friction after Blasius at 0.2 m/s. All of the bare hull: fins, wires and ports come on top."
-)
 PARTS: dict[str, tuple[tuple[str, int, str], ...]] = {
     "inertia_kgm2": (("Inertia [kg m²]", 0, "About x, y, z. From the hull: a solid of one density."),),
     "added_mass": (
@@ -67,7 +62,9 @@ def add_body(page: Page) -> None:
     text = gui.add_text("About", "", multiline=True)
     page.bind(text, session.describe_robot, lambda layout: layout.description)
     acts = {"Estimate": session.estimate, "Forget": forget}
-    page.add_buttons("From the hull", acts, hint=FORMULAS)
+    page.add_buttons(
+        "From the hull", acts, hint="Of the bare hull: fins, wires and ports come on top; each box says how."
+    )
     page.bind_number(
         gui.add_number("Mass [kg]", 0.0, step=0.5, hint="From the hull: of the water that it displaces."),
         partial(session.set_dynamics, "mass_kg"),

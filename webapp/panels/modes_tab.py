@@ -6,7 +6,6 @@ import numpy as np
 from markupsafe import Markup
 
 from finlab.allocation.allocation import Allocation
-from finlab.errors import FinlabError
 from finlab.layout import Layout
 from finlab.mdn.method import WHOLE
 from webapp.handles import add_html
@@ -14,7 +13,7 @@ from webapp.markup.html import html, marker
 from webapp.markup.mode_plot import mode_plot
 from webapp.markup.words import error_digits, source_words, three_digits
 from webapp.page import Page
-from webapp.presses import press
+from webapp.presses import placed, press
 from webapp.session.state import DRAWING, State
 from webapp.tasks.mode_names import Modes
 from webapp.theme import css, mode_color
@@ -102,17 +101,6 @@ def _origin_words(layout: Layout, method: str, best: Allocation | None, in_reach
         elif best is not None and not best.target.any():
             said = NOTHING
     return html("<div class='fl dim'>{}</div>", said)
-
-
-def placed(key: str, count: int) -> int:
-    """The place that a page names, of `count`.
-
-    Raises:
-        FinlabError: there is no such place.
-    """
-    if not key.isdecimal() or len(key) > 6 or int(key) >= count:
-        raise FinlabError("that one is gone")
-    return int(key)
 
 
 def mode_table(modes: Modes, mode: int) -> str:

@@ -1,10 +1,9 @@
 """The way through tour and lessons, and back to the work as it was left."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import Any
 
 from finlab.allocation.allocation import Allocation
-from finlab.layout import Layout
-from webapp.session.display import Display
 from webapp.session.lessons import LESSONS, TOUR, Seen, Stop
 from webapp.session.looking import Desk, Looking
 from webapp.session.state import State, chosen
@@ -12,18 +11,9 @@ from webapp.session.state import State, chosen
 BY_NAME = {stop.name: stop for stop in (*TOUR, *LESSONS)}
 
 
-@dataclass(frozen=True)
-class Left:
-    """The work as it was."""
-
-    state: State
-    saved: Layout
-    past: tuple[tuple[str, State], ...]
-    future: tuple[tuple[str, State], ...]
-    display: Display
-    chosen: tuple[str, ...]
-    mode: int
-    desk: Desk
+Steps = tuple[tuple[str, State], ...]
+KEPT = ("saved", "display", "_chosen", "mode", "desk")
+"""What of a session comes back beside its history."""
 
 
 class Guiding(Looking):
@@ -32,7 +22,8 @@ class Guiding(Looking):
     stop: Stop | None = None
     solved = False
     """Whether its exercise has been done since it was opened."""
-    _left: Left | None = None
+    _left: tuple[State, Steps, Steps, dict[str, Any]] | None = None
+    """The work as it was: state, what could be undone and redone, and what is `KEPT`."""
 
     @property
     def course(self) -> tuple[Stop, ...]:
@@ -48,9 +39,7 @@ class Guiding(Looking):
         stop = BY_NAME[chosen(name, "lesson", BY_NAME)]
         if self._left is None:
             past, future = tuple(self.history.past), tuple(self.history.future)
-            self._left = Left(
-                self.state, self.saved, past, future, self.display, self._chosen, self.mode, self.desk
-            )
+            self._left = self.state, past, future, {key: getattr(self, key) for key in KEPT}
         self.history.resume(stop.state, (), ())  # what can be undone is what is done here
         self._settled()
         self.saved = stop.state.layout
@@ -86,10 +75,10 @@ class Guiding(Looking):
         """All is as it was left, and what could be undone then can be undone now."""
         left, self._left, self.stop = self._left, None, None
         if left is not None:
-            self.history.resume(left.state, left.past, left.future)
+            self.history.resume(*left[:3])
             self._settled()
-            self.display, self.desk, self._chosen = left.display, left.desk, left.chosen
-            self.saved, self.mode, self.step = left.saved, left.mode, None
+            for key, value in left[3].items():
+                setattr(self, key, value)
 
     def take(self, answer: Allocation) -> None:
         """See what the fins do now; an exercise that is done stays so until another stop is opened."""

@@ -1,13 +1,14 @@
 """Intents about what a layout says of its actuators: of one, or of all that are selected at once."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
 from finlab.hull import estimated
 from finlab.layout import Actuator, Layout
 from finlab.layout.directions import Vector, part_of, replaced, turned_about
-from webapp.session import actuator_edits, body_edits, layout_edits
+from webapp.session import actuator_edits, layout_edits
 from webapp.session.editing import Editing, which
 from webapp.session.links import followed, partner
 
@@ -75,30 +76,28 @@ class Inspecting(Editing):
 
     def rename_robot(self, wanted: str) -> None:
         """Another name of the robot."""
-        layout = self.state.layout
-        named = body_edits.described(layout, wanted, layout.description)
+        named = replace(self.state.layout, name=wanted.strip())
         self._edit(f"Rename the robot to {named.name}", named)
 
     def describe_robot(self, text: str) -> None:
         """Another description of the robot."""
-        layout = self.state.layout
-        self._edit("Describe the robot", body_edits.described(layout, layout.name, text))
+        self._edit("Describe the robot", replace(self.state.layout, description=text.strip()))
 
     def set_dynamics(self, key: str, value: Any) -> None:
         """Another field of the body, one of `DYNAMICS`; None forgets it."""
-        changed = body_edits.with_dynamics(self.state.layout, **{key: value})
+        changed = layout_edits.with_dynamics(self.state.layout, **{key: value})
         word = actuator_edits.words(key.rsplit("_", 1)[0] if key.rsplit("_", 1)[-1] in UNITS else key)
         self._edit(f"{word} of the robot", changed)
 
     def forget_dynamics(self) -> None:
         """Nothing is said of mass, damping and buoyancy."""
-        nothing: dict[str, Any] = dict.fromkeys(body_edits.DYNAMICS)
-        self._edit("Forget mass and damping", body_edits.with_dynamics(self.state.layout, **nothing))
+        nothing: dict[str, Any] = dict.fromkeys(layout_edits.DYNAMICS)
+        self._edit("Forget mass and damping", layout_edits.with_dynamics(self.state.layout, **nothing))
 
     def estimate(self, anew: bool = False) -> None:
         """What the hull says of the body; a mass that is known stays, unless all is estimated `anew`."""
         layout = self.state.layout
-        known = body_edits.with_dynamics(layout, mass_kg=None) if anew else layout
+        known = layout_edits.with_dynamics(layout, mass_kg=None) if anew else layout
         self._edit("Estimate mass and damping from the hull", estimated(known))
 
     def _selected_names(self) -> tuple[str, ...]:

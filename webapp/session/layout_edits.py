@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
@@ -44,6 +44,8 @@ NEW: dict[str, Actuator] = {
 }
 """What is added, by type: U-CAT's fin; a T200 of Blue Robotics at 16 V, as shipped layouts have it, fixed or
 on a pod; a tail fin of REMUS 100."""
+
+DYNAMICS = tuple(field.name for field in fields(Body) if field.name != "hull")
 
 
 def moved(layout: Layout, name: str, position: Vector) -> Layout:
@@ -233,3 +235,14 @@ def balanced(layout: Layout, center: Vector) -> Layout:
     body = replace(body, hull=hull, center_of_buoyancy_m=None if buoyancy is None else moved(buoyancy))
     parts = tuple(replace(part, position=moved(part.position)) for part in layout.actuators)
     return replace(layout, actuators=parts, body=body)
+
+
+def with_dynamics(layout: Layout, **values: Any) -> Layout:
+    """The layout with other fields of `DYNAMICS` of its body; None forgets one.
+
+    Raises:
+        FinlabError: there is no such field, or not with this value.
+    """
+    for key in values:
+        chosen(key, "field of the body", DYNAMICS)
+    return replace(layout, body=replace(layout.body or Body(), **values))

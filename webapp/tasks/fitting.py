@@ -66,7 +66,10 @@ class Fitting(Newest[Upload, Fitted]):
             raise FinlabError("a fit is under way already; wait for it, or cancel it")
         short = re.sub(r"[^\w .()+-]", "_", Path(str(name)).name)[-60:].lstrip(". ") or "upload.csv"
         if len(content) > MAX_BYTES:
-            raise DataError(too_large(short, len(content)))
+            raise DataError(
+                f"{short}: has {len(content):,} bytes, expected at most {MAX_BYTES:,}; cut it into shorter "
+                "series, write cycle means, or use `finlab fit fin`"
+            )
         part = part_of(self._context.session.state.layout, actuator)
         if isinstance(part, Rudder):
             raise FinlabError(f"{actuator} is a rudder, without a table; type its coefficients")
@@ -143,14 +146,6 @@ class Fitting(Newest[Upload, Fitted]):
         if upload is self.question and self.busy:
             self.progress = words
             self._context.changed()
-
-
-def too_large(name: str, size: int) -> str:
-    """What to say of a file that is too large for the page."""
-    return (
-        f"{name}: has {size:,} bytes, expected at most {MAX_BYTES:,}; cut it into shorter series, write "
-        "cycle means, or use `finlab fit fin`"
-    )
 
 
 def _model(part: Actuator) -> object:
