@@ -43,12 +43,11 @@ class RadialTable:
     """Power [W] at the least force."""
 
     @classmethod
-    def of_forces(cls, top: float, force: Array, rest: float, slope: Array | None = None) -> "RadialTable":
-        """A table from forces (CELLS + 1,) at `price_grid(top)`; slopes that are not given are those of a
-        monotone cubic (Fritsch and Carlson, 1980)."""
+    def of_forces(cls, top: float, force: Array, rest: float) -> "RadialTable":
+        """A table from forces (CELLS + 1,) at `price_grid(top)`; slopes are those of a monotone
+        cubic (Fritsch and Carlson, 1980)."""
         force = np.maximum.accumulate(np.asarray(force, np.float64))
-        slope = monotone_slopes(price_grid(top), force) if slope is None else slope
-        return cls(float(top), force, np.asarray(slope, np.float64), float(rest))
+        return cls(float(top), force, monotone_slopes(price_grid(top), force), float(rest))
 
     @classmethod
     def of_price(cls, top: float, answer: Callable[[Array], Array], rest: float = 0.0) -> "RadialTable":

@@ -164,14 +164,7 @@ class Answer(PlainData, Generic[Number]):
             return one
         if len(self.command) <= CHUNK:
             return judge(self.command)
-        result: Array | None = None
-        for rows in chunks(len(self.command)):
-            part: Array = judge(self.command[rows])
-            if result is None:
-                result = np.empty((len(self.command), *part.shape[1:]))
-            result[rows] = part
-        assert result is not None
-        return result
+        return np.concatenate([judge(self.command[rows]) for rows in chunks(len(self.command))])
 
     def _equal_names(self) -> list[str]:
         return [*super()._equal_names(), *self.TOLD]

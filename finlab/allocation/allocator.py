@@ -99,19 +99,17 @@ class Allocator:
             raise AllocationError(f"method: expected the name of a method, got {method!r:.60}")
 
     @classmethod
-    def from_bundle(cls, path: str | os.PathLike[str], **settings: Any) -> Allocator:
+    def from_bundle(cls, path: str | os.PathLike[str]) -> Allocator:
         """The allocator of a bundle's robot, as `finlab export` wrote it.
 
         Args:
             path: of the bundle, a folder or a zip archive.
-            settings: those that are to differ from the bundle's.
 
         Raises:
-            AllocationError: an unknown setting, or a wrong value.
             DataError: the bundle cannot be read, or was changed.
             LayoutError: its layout cannot be read.
         """
-        choice = bundled_method(read_bundle_files(path), str(path), **settings)
+        choice = bundled_method(read_bundle_files(path), str(path))
         return cls.of_choice(load_layout(path), choice)
 
     @classmethod
@@ -318,7 +316,7 @@ class Allocator:
             partial(answer_notes, ready.fins.healthy, ready.method, self.checkpoint, flow, target),
             partial(_among_all, solution.candidates, fins),
             partial(_among_all, solution.samples, fins),
-            solution.bound or _no_bound,
+            *(() if solution.bound is None else (solution.bound,)),
         )
         return {
             "target": target,
@@ -363,10 +361,6 @@ class Allocator:
 
     def __repr__(self) -> str:
         return f"Allocator({self._layout.name!r:.60}, method={self.method!r})"
-
-
-def _no_bound() -> None:
-    """No bound is proved."""
 
 
 def _among_all(make: Callable[[], Candidates] | None, fins: Fins) -> Candidates | None:

@@ -83,11 +83,10 @@ def choose_method(method: str, checkpoint: Checkpoint = None, **settings: Any) -
     return MethodChoice(kind, checked_settings(kind, settings), weights)
 
 
-def bundled_method(files: Files, source: str = "bundle", **changes: Any) -> MethodChoice:
-    """The method of a bundle with what its files hold; some of its settings may be changed.
+def bundled_method(files: Files, source: str) -> MethodChoice:
+    """The method of a bundle with what its files hold.
 
     Raises:
-        AllocationError: a change of an unknown setting, or to a wrong value.
         CheckpointError: this finlab has no such networks.
         DataError: the bundle is of another format, has a method that runs on no robot, or settings that no
             robot should try.
@@ -107,8 +106,6 @@ def bundled_method(files: Files, source: str = "bundle", **changes: Any) -> Meth
         settings = checked_settings(kind, values)
     except AllocationError as error:
         raise DataError(f"{place}: settings: {error}") from None
-    if changes:
-        settings = checked_settings(kind, vars(settings) | changes)
     if method not in LEARNED:
         return MethodChoice(kind, settings)
     networks = read_checkpoint(checkpoint_path(checkpoint or LEARNED[method]))

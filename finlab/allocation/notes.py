@@ -104,7 +104,9 @@ def _made(layout: Layout, stamps: tuple[tuple[int, int] | None, ...]) -> tuple[s
 def _notes_of(model: FinModelSpec, limits: Limits, stamp: tuple[int, int] | None) -> tuple[str, ...]:
     """The sentences about any fin of a model within limits, with a place for its name."""
     law = make_law(model)
-    return (*_doubtful(law), *_restless(law, limits), *_beyond_table(law, limits))
+    told = law.notes if isinstance(law, TableLaw) else ()
+    doubts = [f"the model of fin {{name}} is {note}" for note in told if note.startswith(DOUBT)]
+    return (*doubts, *_restless(law, limits), *_beyond_table(law, limits))
 
 
 def _restless(law: FinLaw, limits: Limits) -> list[str]:
@@ -118,11 +120,6 @@ def _restless(law: FinLaw, limits: Limits) -> list[str]:
         f"fin {{name}} cannot rest: within its limits it always pushes with at least {least:.3g} N of at "
         f"most {most:.3g} N; wrenches that need less of it are out of reach"
     ]
-
-
-def _doubtful(law: FinLaw) -> list[str]:
-    notes = law.notes if isinstance(law, TableLaw) else ()
-    return [f"the model of fin {{name}} is {note}" for note in notes if note.startswith(DOUBT)]
 
 
 def _beyond_table(law: FinLaw, limits: Limits) -> list[str]:

@@ -63,17 +63,22 @@ def usable_fins(layout: Layout, failed: Sequence[str], health: Health | None = N
     return Fins(layout, tuple(failed), layout.without(failed), alive)
 
 
+def _numbers(values: ArrayLike, name: str, expected: str, copy: bool = True) -> Array:
+    """What is called `name` as float64, or a `CommandError` that says what was expected."""
+    try:
+        array = np.array(values) if copy else np.asarray(values)
+        if array.dtype.kind == "c":
+            raise TypeError("complex")
+        return array.astype(np.float64, copy=False)
+    except (TypeError, ValueError) as error:
+        raise CommandError(f"{name}: expected {expected}, got {values!r:.100}") from error
+
+
 def check_wrenches(wrench: ArrayLike, *, single: bool, name: str = "wrench") -> Array:
     """One wrench (6,) or many (N, 6) as finite float64, or a `CommandError` that says what is wrong with
     what is called `name`. Arrays of many are not copied."""
     expected = "six numbers [Fx, Fy, Fz, Tx, Ty, Tz]" if single else "an array of shape (N, 6)"
-    try:
-        array = np.array(wrench) if single else np.asarray(wrench)
-        if array.dtype.kind == "c":
-            raise TypeError("complex")
-        array = array.astype(np.float64, copy=False)
-    except (TypeError, ValueError) as error:
-        raise CommandError(f"{name}: expected {expected} in N and N m, got {wrench!r}") from error
+    array = _numbers(wrench, name, f"{expected} in N and N m", copy=single)
     if array.shape != (6,) if single else (array.ndim != 2 or array.shape[1] != 6):
         raise CommandError(f"{name}: expected {expected} in N and N m, got an array of shape {array.shape}")
     if not (np.abs(array) <= MAX_WRENCH).all():
@@ -89,13 +94,10 @@ def check_flow(flow: ArrayLike | None) -> Array | None:
     `CommandError` that says what is wrong."""
     if flow is None:
         return None
-    expected = "expected six numbers [VX, VY, VZ, WX, WY, WZ] in m/s and rad/s, body relative to the water"
-    try:
-        array = np.array(flow, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise CommandError(f"flow: {expected}, got {flow!r:.100}") from error
+    expected = "six numbers [VX, VY, VZ, WX, WY, WZ] in m/s and rad/s, body relative to the water"
+    array = _numbers(flow, "flow", expected)
     if array.shape != (6,):
-        raise CommandError(f"flow: {expected}, got an array of shape {array.shape}")
+        raise CommandError(f"flow: expected {expected}, got an array of shape {array.shape}")
     if not (np.abs(array) <= MAX_FLOW).all():
         raise CommandError(
             f"flow: each component must be finite and at most {MAX_FLOW:g} in size, got {flow!r:.100}"
@@ -119,12 +121,7 @@ def check_seed(seed: object) -> None:
 
 def check_previous(previous: ArrayLike, layout: Layout) -> Array:
     """The previous command (n, 3), failed fins may hold NaN."""
-    try:
-        array = np.array(previous, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise CommandError(
-            f"previous: expected a command of shape ({layout.n}, 3), got {previous!r}"
-        ) from error
+    array = _numbers(previous, "previous", f"a command of shape ({layout.n}, 3)")
     if np.isinf(array).any():
         raise CommandError("previous: expected finite commands (NaN only for failed fins), got infinity")
     if array.shape != (layout.n, 3):

@@ -2,12 +2,8 @@
 
 from finlab.actuators.fin.models import make_law as make_law
 from finlab.actuators.fin.models import read_table as read_table
-from finlab.actuators.fin.models import stack_laws as stack_laws
 from finlab.actuators.fin.table import TableLaw as TableLaw
 from finlab.actuators.law import FinLaw as FinLaw
-from finlab.actuators.law import PlanarLaw as PlanarLaw
 from finlab.layout.force_table_file import write_table as write_table
 from finlab.physics.plant import Plant as Plant
 from finlab.physics.plant import plant_of as plant_of
-from finlab.physics.wrench import body_force as body_force
-from finlab.physics.wrench import wrench_of_forces as wrench_of_forces

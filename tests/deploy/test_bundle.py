@@ -4,7 +4,6 @@ import hashlib
 import json
 import zipfile
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -86,12 +85,10 @@ def test_the_command_line_takes_a_bundle_with_its_lost_fins(
     assert values["failed"] == ["back_left"] and values["method"] == "dual"
 
 
-def test_settings_travel_and_can_be_changed(tmp_path: Path) -> None:
+def test_settings_travel(tmp_path: Path) -> None:
     desk = Allocator(finlab.load_layout("octo"), robust=0.5, period_s=0.05)
     make_bundle(desk).write(tmp_path)
     assert Allocator.from_bundle(tmp_path).settings == desk.settings
-    changed: Any = desk.settings
-    assert Allocator.from_bundle(tmp_path, period_s=0.2).settings == replace(changed, period_s=0.2)
 
 
 @pytest.mark.parametrize(

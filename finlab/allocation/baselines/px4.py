@@ -43,8 +43,8 @@ class Px4Settings(Settings):
 
     desaturation: str = choice(
         "airmode 0",
-        ("none", "airmode 0", "airmode 1", "airmode 2", "axes"),
-        "what gives way at limits: nothing (plain pseudo-inverse), PX4's three modes (MC_AIRMODE), or each "
+        ("none", "airmode 0", "axes"),
+        "what gives way at limits: nothing (plain pseudo-inverse), what PX4 does with MC_AIRMODE 0, or each "
         "axis in turn, least important first, as in older versions",
     )
 
@@ -74,13 +74,10 @@ class Px4(LeastErrorMethod):
         if form == "axes":
             for axis in (SWAY, SURGE, YAW, HEAVE, PITCH, ROLL):
                 u = self._desaturated(u, axis)
-        elif form == "airmode 2":
-            u = self._desaturated(self._desaturated(u, HEAVE), YAW)
         elif form != "none":
             u = u - part[..., YAW]
-            u = self._desaturated(u, HEAVE, reduce_only=form == "airmode 0")
-            if form == "airmode 0":
-                u = self._desaturated(self._desaturated(u, ROLL), PITCH)
+            u = self._desaturated(u, HEAVE, reduce_only=True)
+            u = self._desaturated(self._desaturated(u, ROLL), PITCH)
             u = self._desaturated(u + part[..., YAW], YAW, margin=YAW_MARGIN)
             u = self._desaturated(u, HEAVE, reduce_only=True)
         command = np.zeros((*u.shape, 3))
