@@ -56,29 +56,21 @@ def _summary(card: ScoreCard, before: ScoreCard | None) -> str:
     if before is not None:
         ranks = row("axes independent", *(f"{one.authority.rank} of 6" for one in (before, card)), "")
         head = html("<tr><th></th><th>before</th><th>now</th><th></th></tr>{}", ranks)
-    rows = (
-        _alone(words, of(card)) if before is None else _beside(words, of(card), of(before))
-        for words, of in FIGURES.items()
-    )
+    known = [one for one in (before, card) if one is not None]
+    rows = [_figure(words, [of(one) for one in known]) for words, of in FIGURES.items()]
     return html("<div class='said'>{}</div><table>{}{}</table>", rank_sentence(card.authority), head, rows)
 
 
-def _alone(words: str, now: float | None) -> str:
-    return "" if now is None else row(words, three_digits(now))
-
-
-def _beside(words: str, now: float | None, old: float | None) -> str:
-    """A row of both layouts; a robot of one fin has no worst loss."""
-    if now is None and old is None:
+def _figure(words: str, values: list[float | None]) -> str:
+    """A row of one layout, or of both and a sign; a robot of one fin has no worst loss."""
+    if not any(value is not None for value in values):
         return ""
-    kind = sign = ""
-    if now is not None and old is not None:
-        change = now - old
-        same = abs(change) < 1e-3 * max(abs(now), abs(old), 1e-9)
-        kind = "" if same else "given" if change > 0 else "missing"
-        sign = "=" if same else "▲" if change > 0 else "▼"
-    figures = ("–" if value is None else three_digits(value) for value in (old, now))
-    return row(words, *figures, html("<span class='{}'>{}</span>", kind, sign))
+    signs, (old, now) = [""] * (len(values) - 1), (values[0], values[-1])
+    if signs and now is not None and old is not None:
+        same = abs(now - old) < 1e-3 * max(abs(now), abs(old), 1e-9)
+        kind, sign = ("", "=") if same else ("given", "▲") if now > old else ("missing", "▼")
+        signs = [html("<span class='{}'>{}</span>", kind, sign)]
+    return row(words, *(three_digits(value) for value in values), *signs)
 
 
 def _axes(card: ScoreCard, before: ScoreCard | None) -> str:

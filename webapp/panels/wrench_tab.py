@@ -97,12 +97,10 @@ def _at_rest(layout: Layout, flow: Flow | None) -> str:
 
 def _sentence(ranges_error: str | None) -> str:
     """Why nothing is known of what is in reach."""
-    said = (
-        ""
-        if ranges_error is None
-        else html("<div class='fl missing'>What is in reach: {}</div>", ranges_error)
-    )
-    return marker("fl-reach-end") + said
+    if ranges_error is None:
+        return marker("fl-reach-end")
+    said = "{}<div class='fl missing'>What is in reach: {}</div>"
+    return html(said, marker("fl-reach-end"), ranges_error)
 
 
 def reach_marks(low: float, high: float, width: float) -> tuple[tuple[float, str], ...]:
