@@ -4,7 +4,6 @@ To be run on the robot before first use. Are the actuators' laws and tables the 
 this computer's answers.
 """
 
-from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -81,14 +80,9 @@ def self_check(robot: DeployedRobot) -> list[Finding]:
         differs.append(float(np.linalg.norm((stored - np.array(case.delivered_wrench)) / scale)))
         errors.append(robot.allocator.allocate(case.wrench, failed=failed).err_norm)
     return [
-        Finding("wrench of the stored commands (err_norm)", worst(differs), SELF_TEST_TOLERANCE),
-        Finding("own answers, judged by the actuators' own laws (err_norm)", worst(errors), REACHED),
+        Finding("wrench of the stored commands (err_norm)", float(np.max(differs)), SELF_TEST_TOLERANCE),
+        Finding("own answers, judged by the actuators' own laws (err_norm)", float(np.max(errors)), REACHED),
     ]
-
-
-def worst(values: Iterable[float]) -> float:
-    """The largest value, not below 0; NaN if any value is NaN."""
-    return float(np.max([0.0, *values]))
 
 
 def _rounded(values: Array) -> Array:

@@ -12,18 +12,14 @@ def layout_lines(fit: ThrusterFit, path: Path) -> tuple[str, ...]:
     least, most = fit.force
     torque = fit.torque_per_newton
     unit = f", unit: {fit.table.unit}" if fit.table.unit else ""
+    name = json.dumps(path.name, ensure_ascii=False)  # text to YAML, whatever it is made of
     lines = (
         f"force_n: [{least:g}, {most:g}]",
         f"dead_band_n: {fit.dead_band:g}" * (fit.dead_band > 0.0),
         f"torque_per_newton_m: {torque:.4g}" * (torque != 0.0),
-        f"model: {{type: table, path: {_quoted(path.name)}{unit}}}",
+        f"model: {{type: table, path: {name}{unit}}}",
     )
     return tuple(line for line in lines if line)
-
-
-def _quoted(text: str) -> str:
-    """Text as YAML takes it for text, whatever it is made of."""
-    return json.dumps(text, ensure_ascii=False)
 
 
 def thruster_csv(fit: ThrusterFit, path: Path) -> str:

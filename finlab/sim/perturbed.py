@@ -14,7 +14,7 @@ from msgspec import Meta
 
 from finlab.errors import LayoutError
 from finlab.files.schema import checked
-from finlab.layout import Body, Layout
+from finlab.layout import Layout
 from finlab.layout.directions import rotation, with_axes
 from finlab.vehicle.body import complete_body
 from finlab.vehicle.vehicle import Vehicle
@@ -57,7 +57,7 @@ def perturbed(
         quadratic_damping=_scaled(body.quadratic_damping, damping),
         added_mass=_scaled(body.added_mass, added_mass),
         inertia_kgm2=_scaled(body.inertia_kgm2, inertia),
-        buoyancy_n=buoyancy * _lift(body),
+        buoyancy_n=buoyancy * Vehicle(body).lift,
     )
     parts = []
     for k, part in enumerate(layout.actuators):
@@ -77,7 +77,3 @@ def checked_truth(layout: Layout, truth: Layout) -> Layout:
 
 def _scaled(values: Sequence[float] | None, factor: float) -> tuple[float, ...] | None:
     return None if values is None else tuple(factor * value for value in values)
-
-
-def _lift(body: Body) -> float:
-    return Vehicle(body).lift
