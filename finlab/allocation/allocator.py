@@ -178,15 +178,6 @@ class Allocator:
         """Another allocator by the same method, networks and settings, for another robot."""
         return self.of_choice(layout, self._choice)
 
-    def with_settings(self, **changes: Any) -> Allocator:
-        """Another allocator for the same robot, method and networks, with some settings changed.
-
-        Raises:
-            AllocationError: the method knows no such setting, or cannot work with its value.
-        """
-        settings = checked_settings(self._choice.kind, {**vars(self.settings), **changes})
-        return self.of_choice(self._layout, replace(self._choice, settings=settings))
-
     def allocate(
         self,
         wrench: ArrayLike,

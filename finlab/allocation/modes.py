@@ -43,8 +43,6 @@ class Mode(PlainData):
 
     command: Array
     """(n, 3): amplitude [rad], frequency [Hz], zero direction [rad]; NaN for failed fins."""
-    wrench: Array
-    """Wrench (6,) that the method's own model expects [N, N m]."""
     err_norm: float
     """Normalized error of that wrench."""
     effort: float
@@ -85,7 +83,6 @@ def find_modes(candidates: Candidates, force: Array, lower: Array, upper: Array)
         modes.append(
             Mode(
                 command=command,
-                wrench=candidates.wrench[first],
                 err_norm=float(candidates.err_norm[first]),
                 effort=float(candidates.effort[first]),
                 power=float(candidates.power[first]),

@@ -169,9 +169,7 @@ def test_what_is_no_objective_is_refused() -> None:
         AnyRobot("sqp", price=1.0)
 
 
-def test_settings_are_told_and_changed_like_any_other() -> None:
+def test_settings_are_told_like_any_other() -> None:
     allocator = Allocator(load_layout("A"), "sqp", objective="effort", n_steps=7)
     told = vars(allocator.settings)
     assert told["objective"] == "effort" and told["n_steps"] == 7
-    other = vars(allocator.with_settings(time_limit_s=3.0, objective="power").settings)
-    assert other == {**told, "time_limit_s": 3.0, "objective": "power"}
