@@ -91,9 +91,7 @@ class Refined(NamedTuple):
     """Normalized error (R,) of that wrench."""
 
 
-def refine(
-    problem: CommandProblem, target: AnyArray, command: AnyArray, steps: int, *, damping: float = 1e-6
-) -> Refined:
+def refine(problem: CommandProblem, target: AnyArray, command: AnyArray, steps: int) -> Refined:
     """Reduce the tracking error of commands (R, n, 3) towards normalized targets (R, 6).
 
     Each step is the smallest change, in units of the limit ranges, that cancels the error to first
@@ -104,7 +102,6 @@ def refine(
         target: normalized wrenches (R, 6), or one for all rows (1, 6).
         command: where to start (R, n, 3).
         steps: number of steps.
-        damping: first damping of each row.
     """
 
     def moved(at: _Evaluated, damping: AnyArray, last: bool) -> _Evaluated:
@@ -118,7 +115,7 @@ def refine(
 
     # Where nothing better is found this is the answer: it must not lie outside by a turn or a rounding error.
     start = _evaluated(problem, target, problem.feasible(command), None if steps else _NO_GRADIENT)
-    best = levenberg_marquardt(start, moved, steps, Damping(damping))
+    best = levenberg_marquardt(start, moved, steps, Damping(1e-6))
     return Refined(best.command, best.wrench, np.sqrt(best.cost))
 
 

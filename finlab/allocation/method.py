@@ -8,7 +8,6 @@ from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 
-from finlab.allocation.in_time import in_time
 from finlab.allocation.policy import Policy
 from finlab.allocation.settings import Settings
 from finlab.allocation.solution import Candidates, Solution
@@ -17,6 +16,7 @@ from finlab.errors import AllocationError, LayoutError
 from finlab.layout import FinModelSpec, Layout
 from finlab.networks.trained import TrainedWeights
 from finlab.physics import plant_of
+from finlab.vehicle.actuator_motion import following_delay
 
 Takes = Literal["any actuator", "fins", "horizontal fins", "thrusters"]
 """What a method's robot may have."""
@@ -109,10 +109,19 @@ class Method(ABC):
         return ()
 
     def in_time(self, target: Array, reference: Array) -> Array:
-        """Which wrench (6,) is answered: a target (6,), or, where the time between ticks is a setting, one of
-        those that are expected (K, 6)."""
+        """Which wrench (6,) is answered: a target (6,), or, where the time between ticks is a setting, that
+        of the moment at which the slowest actuator will have followed, among those of the next K ticks
+        (K, 6); after the last, the last. A command that is held for a period is late by half of it besides.
+        """
         period_s = vars(self.settings).get("period_s")
-        return target if period_s is None else in_time(self.layout, target, reference, period_s)
+        if period_s is None:
+            return target
+        late = following_delay(self.layout) / period_s + 0.5
+        before = min(int(late), len(reference))
+        after = min(before + 1, len(reference))
+        expected = np.concatenate([target[None], reference])
+        result: Array = expected[before] + (late - int(late)) * (expected[after] - expected[before])
+        return result
 
     def check_policy(self, policy: Policy) -> None:
         """Raise an `AllocationError` at a policy that the method does not know."""

@@ -36,18 +36,14 @@ def answer_notes(
         notes = (*notes, f"no actuator gives {' or '.join(left)}: what is asked of it is left out")
     if not method.unknown_fins or method.fin_model is None:
         return notes
+    model = method.fin_model
+    values = [f"{k} {v:g}" if isinstance(v, float) else f"{k} {v}" for k, v in model.values().items()]
     return (
         f"the method does not know these fins: {', '.join(method.unknown_fins)}; checkpoint "
-        f"{checkpoint!r} takes them for fins of model {_listed(method.fin_model)}: trust the "
+        f"{checkpoint!r} takes them for fins of model {model.type!r} ({', '.join(values)}): trust the "
         "plant's error or train a surrogate for them",
         *notes,
     )
-
-
-def _listed(model: FinModelSpec) -> str:
-    """A fin model with its parameters in words."""
-    values = [f"{k} {v:g}" if isinstance(v, float) else f"{k} {v}" for k, v in model.values().items()]
-    return f"{model.type!r} ({', '.join(values)})"
 
 
 def fin_notes(layout: Layout, flow: Array | None = None) -> tuple[str, ...]:

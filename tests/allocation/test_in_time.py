@@ -7,7 +7,7 @@ import pytest
 
 from finlab import load_layout
 from finlab.allocation import Allocator
-from finlab.allocation.in_time import in_time
+from finlab.arrays import Array
 from finlab.errors import CommandError
 from finlab.evaluation.method_specs import load_method_spec
 from finlab.layout import Layout, Servo
@@ -16,6 +16,10 @@ from finlab.vehicle.fin_lag import LagStep
 PERIOD_S = 0.1
 RISING = np.outer(np.arange(1.0, 41.0), [1.0, 0.0, 0.5, 0.0, 0.0, 0.1])
 """What is asked for grows by a newton a tick."""
+
+
+def in_time(robot: Layout, target: Array, reference: Array) -> Array:
+    return Allocator(robot)._whole.method.in_time(target, reference)
 
 
 def with_pole(pole: float) -> Layout:
@@ -27,7 +31,7 @@ def with_pole(pole: float) -> Layout:
 @pytest.mark.parametrize("pole", [1.0, 2.0, 3.5])
 def test_it_is_the_one_that_the_slowest_fin_is_in_time_for(pole: float) -> None:
     """A filter that follows a ramp lags by what is looked ahead: what it gives is then what is asked for."""
-    asked = in_time(with_pole(pole), np.zeros(6), RISING, PERIOD_S)[0]
+    asked = in_time(with_pole(pole), np.zeros(6), RISING)[0]
     lag, value, rate = LagStep.of(np.array([pole]), PERIOD_S), np.zeros(1), np.zeros(1)
     for tick in range(200):
         value, rate = lag.follow(value, rate, np.array([tick + asked]))
@@ -37,8 +41,8 @@ def test_it_is_the_one_that_the_slowest_fin_is_in_time_for(pole: float) -> None:
 
 def test_after_the_last_wrench_comes_the_last() -> None:
     robot = with_pole(3.5)
-    np.testing.assert_array_equal(in_time(robot, np.zeros(6), RISING[:2], PERIOD_S), RISING[1])
-    np.testing.assert_array_equal(in_time(robot, np.ones(6), RISING[:0], PERIOD_S), np.ones(6))
+    np.testing.assert_array_equal(in_time(robot, np.zeros(6), RISING[:2]), RISING[1])
+    np.testing.assert_array_equal(in_time(robot, np.ones(6), RISING[:0]), np.ones(6))
 
 
 def test_the_default_method_answers_it_and_others_answer_the_present() -> None:
