@@ -40,7 +40,8 @@ class Rule:
                 made = escape(made)  # content that is not marked as markup is text
             # A user may have changed a value.
             before = self.handle.value if self.key == "value" else self.last
-            if before is UNKNOWN or before != made:
+            empty = made != made and before != before  # NaN, as before
+            if before is UNKNOWN or (before != made and not empty):
                 setattr(self.handle, self.key, str(made) if self.key == "content" else made)
             self.last = made
         self.is_due = False

@@ -14,6 +14,7 @@ from finlab.errors import LayoutError
 from finlab.layout import Azimuth, Fin, Layout, Rudder, Thruster, load_layout
 from finlab.layout.thrust_model import PowerLaw
 from tests.webapp.test_faults import Tab
+from tests.webapp.test_faults_in_handlers import handles, use
 from webapp.markup.answer import fin_table
 from webapp.panels.actuator_list import actuator_list
 from webapp.session import Session, files
@@ -160,3 +161,18 @@ def test_a_method_that_does_not_take_a_robot_gives_way_when_that_is_opened() -> 
     assert session.state.method == "qp", "it stays where it takes the robot"
     session.add("thruster")
     assert session.state.method == "dual"
+
+
+def test_a_box_is_empty_where_nothing_is_said_and_zero_empties_it(tab: Tab) -> None:
+    session = tab.view.session
+    tab.open(FISH)
+    tab.on_loop(lambda: tab.view.do(lambda: (session.show_task("Design"), session.select("pod"))))
+    (box,) = (h for h in handles(tab.server) if getattr(h, "label", "") == "Turn rate [°/s]")
+    assert np.isnan(box.value)
+    use(tab.server, tab.view, box, 30.0)
+    pod = session.state.layout.actuators[session.state.layout.index("pod")]
+    assert isinstance(pod, Azimuth) and pod.turn_rate == pytest.approx(np.pi / 6) and box.value == 30.0
+    use(tab.server, tab.view, box, 0.0)
+    tab.settle()
+    pod = session.state.layout.actuators[session.state.layout.index("pod")]
+    assert isinstance(pod, Azimuth) and pod.turn_rate is None and np.isnan(box.value)
