@@ -1,6 +1,7 @@
-"""`finlab-runtime check|serve BUNDLE`: the command that runs on the robot."""
+"""`finlab-runtime check|allocate|serve BUNDLE`: the command that runs on the robot."""
 
 import argparse
+import json
 import math
 import os
 import sys
@@ -14,6 +15,8 @@ from finlab.errors import FinlabError
 
 if TYPE_CHECKING:
     from finlab.deploy.robot import DeployedRobot
+
+POLICIES = ("closest", "direction", "priority")
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -60,6 +63,21 @@ def check(arguments: argparse.Namespace) -> int:
     return 1
 
 
+def allocate(arguments: argparse.Namespace) -> int:
+    """Print the commands for one target."""
+    from finlab.deploy.record import allocation_record
+
+    answer = _robot(arguments).allocate(
+        arguments.wrench,
+        failed=arguments.failed,
+        policy=arguments.policy,
+        flow=arguments.flow,
+        seed=arguments.seed,
+    )
+    print(json.dumps(allocation_record(answer), allow_nan=False) if arguments.json else answer)
+    return 0
+
+
 def serve(arguments: argparse.Namespace) -> int:
     """Answer requests until they end or a signal asks to stop."""
     from finlab.deploy.transport import StandardStreams
@@ -104,7 +122,7 @@ def _parser() -> argparse.ArgumentParser:
         epilog="example: finlab-runtime check my_robot",
     )
     parser.add_argument("--version", action="version", version=f"finlab-runtime {__version__}")
-    verbs = parser.add_subparsers(required=True, metavar="check|serve")
+    verbs = parser.add_subparsers(required=True, metavar="check|allocate|serve")
 
     def verb(run: Callable[[argparse.Namespace], int], text: str, example: str) -> argparse.ArgumentParser:
         made: argparse.ArgumentParser = verbs.add_parser(
@@ -116,6 +134,18 @@ def _parser() -> argparse.ArgumentParser:
         return made
 
     verb(check, "Run the self-test; do this on the robot before first use.", "finlab-runtime check my_robot")
+    one = verb(
+        allocate, "Commands for one target.", "finlab-runtime allocate my_robot --wrench 1 0 0.5 0 0 0.1"
+    )
+    names = ("FX", "FY", "FZ", "TX", "TY", "TZ")
+    one.add_argument("--wrench", nargs=6, type=float, required=True, metavar=names, help="[N, N m]")
+    one.add_argument("--failed", action="append", default=[], metavar="NAME", help="fin that is lost")
+    one.add_argument("--policy", choices=POLICIES, default="closest", help="what to do out of reach")
+    speeds = ("VX", "VY", "VZ", "WX", "WY", "WZ")
+    through = "velocity relative to the water [m/s, rad/s]"
+    one.add_argument("--flow", nargs=6, type=float, metavar=speeds, help=through)
+    one.add_argument("--seed", type=int, default=0, help="seed of the candidates")
+    one.add_argument("--json", action="store_true", help="print one JSON object")
     loop = verb(
         serve,
         "Read targets as JSON lines, write commands as JSON lines.",

@@ -1,11 +1,13 @@
 """What `finlab-runtime` prints, and what it takes."""
 
+import json
 import os
 import subprocess
 import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import finlab
@@ -14,6 +16,8 @@ from finlab.deploy.bundle import Bundle
 from finlab.deploy.command import main
 from finlab.layout import save_layout
 
+TARGET = [1.0, 0.0, 0.5, 0.0, 0.0, 0.1]
+WRENCH = ["--wrench", *map(str, TARGET)]
 HEAVY = ("torch", "scipy", "viser", "matplotlib", "yaml", "tyro", "tqdm", "threadpoolctl")
 
 
@@ -30,6 +34,7 @@ def test_nothing_heavy_is_loaded(folder: Path) -> None:
         f"for name in {HEAVY!r}: sys.modules[name] = None\n"
         "from finlab.deploy.command import main\n"
         f"assert main(['check', {str(folder)!r}]) == 0\n"
+        f"assert main(['allocate', {str(folder)!r}, *{WRENCH!r}]) == 0\n"
         "import os; assert os.environ['OPENBLAS_NUM_THREADS'] == '1'\n"
     )
     environment = {name: value for name, value in os.environ.items() if not name.endswith("NUM_THREADS")}
@@ -38,6 +43,24 @@ def test_nothing_heavy_is_loaded(folder: Path) -> None:
     )
     assert done.returncode == 0, done.stderr
     assert "this computer answers as the one that made the bundle" in done.stdout
+
+
+def test_allocate_prints_a_table_or_one_object(folder: Path, capsys: Any) -> None:
+    question = ["allocate", str(folder), *WRENCH, "--failed", "back_left"]
+    truth = finlab.Allocator(finlab.load_layout("A")).allocate(TARGET, failed=["back_left"])
+    assert main([*question, "--json"]) == 0
+    shown = json.loads(capsys.readouterr().out)
+    lost = shown["fins"].index("back_left")
+    assert shown["failed"] == ["back_left"] and shown["target"] == TARGET and shown["command"][lost] is None
+    kept = [row for row in shown["command"] if row is not None]
+    np.testing.assert_array_equal(kept, np.delete(truth.command, lost, axis=0))
+    assert (shown["power"], shown["wrench_plant"]) == (truth.power, truth.wrench.tolist())
+    far = ["--wrench", "90", "0", "0", "0", "0", "0", "--policy", "direction"]
+    assert main(["allocate", str(folder), *far, "--failed", "back_left"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].split()[:5] == ["actuator", "type", "command", "force", "[N]"], "the table of the library"
+    assert lines[1 + lost].split() == ["back_left", "fin", "failed"]
+    assert any(line.startswith("err_norm ") for line in lines)
 
 
 def test_a_layout_file_is_refused_with_the_way_out(
@@ -69,9 +92,11 @@ def test_check_prints_each_finding(
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ([], "the following arguments are required: check|serve"),
+        ([], "the following arguments are required: check|allocate|serve"),
         (["fly", "bundle"], "invalid choice: 'fly'"),
         (["check"], "the following arguments are required: BUNDLE"),
+        (["allocate", "bundle", "--wrench", "1"], "--wrench: expected 6 arguments"),
+        (["allocate", "bundle", "--wrench", *"123456", "--policy=hope"], "invalid choice: 'hope'"),
         (["serve", "bundle", "--watchdog-s=2", "--no-watchdog"], "not allowed with argument"),
     ],
 )
@@ -83,6 +108,6 @@ def test_a_wrong_call_ends_with_usage_and_2(arguments: list[str], message: str, 
 
 def test_every_page_of_help_has_an_example(capsys: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", "400")  # an example is not folded
-    for verb in ([], ["check"], ["serve"]):
+    for verb in ([], ["check"], ["allocate"], ["serve"]):
         assert main([*verb, "--help"]) == 0
         assert "\nexample: " in capsys.readouterr().out
