@@ -101,10 +101,8 @@ def test_a_robot_with_thrusters_is_shown_and_answered(page: Any) -> None:
 
 
 def test_methods_side_by_side(page: Any) -> None:
-    page.press("Commands")
-    page.page.get_by_placeholder("Search commands").wait_for()
-    page.page.keyboard.type("compare the meth", delay=20)
-    page.page.keyboard.press("Enter")
+    page.tab("Comparison")
+    page.press("Compare the methods")
     comparison = page.view.jobs.comparison
     page.until(lambda: page.session.drawer == "Comparison" and comparison.run.state is not None)
     page.until(lambda: not comparison.run.running)
