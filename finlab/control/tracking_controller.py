@@ -156,7 +156,8 @@ class TrackingController:
         # Damping in yaw counts at the rate that is wanted: one that the body does not have would spin it.
         rates = np.zeros((2, 4))
         rates[:, 3] = now.yaw_rate, yaw_rate
-        drift[3] -= np.diff(self._observer.slowed_by(rates)[:, 3])[0]
+        measured, planned = self._observer.slowed_by(rates)[:, 3]
+        drift[3] += measured - planned
         result = np.zeros(6)
         result[AXES] = self._observer.inertia * (ahead + g.velocity * miss - drift) * self._commanded
         if self._dives:

@@ -16,11 +16,10 @@ from finlab.bundle_files import ABOUT, LARGEST, LARGEST_BUNDLE, LARGEST_TABLE, b
 from finlab.errors import DataError, LayoutError
 from finlab.files.archive import unpacked
 from finlab.files.guarded import decoded, read_file
-from finlab.files.plain_values import parse_json, parse_yaml
 from finlab.hull.mesh_file import MAX_FACES, read_mesh, simplified, stl_of
-from finlab.layout import Fin, FinModelSpec, Layout, parse_layout
+from finlab.layout import Fin, FinModelSpec, Layout
 from finlab.layout.body import MESH_SUFFIXES
-from finlab.layout.load import A_LAYOUT, MAX_BYTES
+from finlab.layout.load import A_LAYOUT, MAX_BYTES, layout_in
 from finlab.layout.robot_file import robot_of
 from finlab.whole_file import make_folder, write_whole
 
@@ -104,8 +103,7 @@ def layout_of(source: str, content: bytes, folder: Path | None = None) -> Layout
         LayoutError: it is no text, or no layout.
     """
     text = decoded(content, source, A_LAYOUT, LayoutError)
-    parse = parse_json if source.lower().endswith(".json") else parse_yaml
-    return parse_layout(parse(text, source, LayoutError), source, folder, may_open=False)
+    return layout_in(text, Path(source).suffix, source, folder, may_open=False)
 
 
 def adopted(layout: Layout, parts: Mapping[str, bytes], folder: Path, source: str) -> Opened:

@@ -40,9 +40,19 @@ def layout_and_failed(layout: str | os.PathLike[str]) -> tuple[Layout, tuple[str
         robot = robot_of(read_bundle_files(file), source)
         return robot.layout, robot.failed
     content = read_text(file, MAX_BYTES, A_LAYOUT, LayoutError)
-    parse = parse_json if file.suffix.lower() == ".json" else parse_yaml
-    data, folder = parse(content, source, LayoutError), file.resolve().parent
-    return parse_layout(data, source, folder), ()
+    return layout_in(content, file.suffix, source, file.resolve().parent), ()
+
+
+def layout_in(
+    text: str, suffix: str, source: str, folder: Path | None = None, *, may_open: bool = True
+) -> Layout:
+    """The layout in the text of a file whose name ends in `suffix`; the rest as for `parse_layout`.
+
+    Raises:
+        LayoutError: it is no JSON or YAML, or no layout.
+    """
+    parse = parse_json if suffix.lower() == ".json" else parse_yaml
+    return parse_layout(parse(text, source, LayoutError), source, folder, may_open=may_open)
 
 
 def layout_path(layout: str | os.PathLike[str]) -> Path:

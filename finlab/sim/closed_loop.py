@@ -298,7 +298,7 @@ class ClosedLoop:
         believed = self._believed
         believed.step(self._command, self.period_s)
         force = self._plant.force(believed.command, flow=self._flow) * believed.pushes[:, None]
-        force[[self.layout.index(name) for name in self.damage.failed]] = 0.0
+        force[list(self.layout.indices(self.damage.failed))] = 0.0
         before, self._gave = self._gave, force.ravel() @ self._plant.effectiveness.reshape(-1, 6)
         return 0.5 * (before + self._gave)
 

@@ -59,12 +59,14 @@ def perturbed(
         inertia_kgm2=_scaled(body.inertia_kgm2, inertia),
         buoyancy_n=buoyancy * Vehicle(body).lift,
     )
+    swum = replace(layout, body=changed)
+    if askew == 0.0 and not any(center):
+        return swum
     parts = []
     for k, part in enumerate(layout.actuators):
         turn = rotation((0.0, 0.0, 1.0), askew * (-1.0) ** k)
         parts.append(with_axes(part, np.array(part.frame) @ turn.T, np.subtract(part.position, center)))
-    moved = askew != 0.0 or any(center)
-    return replace(layout, body=changed, actuators=tuple(parts) if moved else layout.actuators)
+    return replace(swum, actuators=tuple(parts))
 
 
 def checked_truth(layout: Layout, truth: Layout) -> Layout:

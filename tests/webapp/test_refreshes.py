@@ -2,7 +2,6 @@
 
 import sys
 import time
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -10,24 +9,15 @@ import pytest
 
 import webapp
 from finlab.assets import shipped_checkpoints
-from finlab.layout import load_layout
 from tests.webapp.test_faults import Tab
+from tests.webapp.test_other_robots import tab
 from webapp.board import Board
 from webapp.facts import Facts
-from webapp.tasks.background import Workers
-from webapp.tasks.solver import Solver
+
+__all__ = ["tab"]
 
 OURS = str(Path(webapp.__file__).parent)
 MOST_CALLS, MOST_WRITTEN = 1500, 2
-
-
-@pytest.fixture(scope="module")
-def tab() -> Iterator[Tab]:
-    workers = Workers()
-    tab = Tab(workers, load_layout("ucat"), Solver())
-    yield tab
-    tab.close()
-    workers.stop()
 
 
 @pytest.mark.skipif("default" not in shipped_checkpoints(), reason="no trained checkpoint in the tree")
