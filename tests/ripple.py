@@ -34,7 +34,7 @@ class RippleForce(ActuatorForce):
         angle, speed = motion.angle + math.pi, motion.speed
         normal = np.stack([-np.sin(angle), np.cos(angle)], axis=-1)
         momentum = 0.5 * self.blade.virtual_mass * length**2 * speed[:, None] * normal
-        drag = self.blade.force_drag * speed * np.abs(speed)
+        drag = self.blade.drag_per_length * length**3 / 3.0 * speed * np.abs(speed)
         force[:, 1:] -= (momentum - self._momentum) / dt + drag[:, None] * normal
         self._momentum = momentum
         return force

@@ -59,12 +59,6 @@ class Blade:
         """K [N m s^2]: 1/8 rho Cd W L^4."""
         return 0.25 * self.drag_per_length * self.length**4
 
-    @property
-    def force_drag(self) -> Any:
-        """Normal force over the squared angular speed [N s^2]: 1/6 rho Cd W L^3, the sum of the strips'; K is
-        that of their torques."""
-        return self.drag_per_length * self.length**3 / 3.0
-
     @cached_property
     def _drag_over_inertia(self) -> Any:
         return self.drag / self.inertia
