@@ -91,7 +91,7 @@ def _axes(card: ScoreCard, before: ScoreCard | None) -> str:
     columns = ("",) if before is None else ("before", "now")
     head = html(
         "<tr><th>largest on its own</th>{}<th title='after the worst loss of a fin'>one lost</th>"
-        "<th title='least power for 1 N, or 0.1 N m'>power [W]</th></tr>",
+        "<th title='least power for so much'>W at 1 N, 0.1 N m</th></tr>",
         (html("<th>{}</th>", word) for word in columns),
     )
     return html("<table>{}{}</table>", head, rows)
