@@ -48,7 +48,7 @@ def test_a_fin_lost_in_a_current_is_found(page: Any, tmp_path: Path) -> None:
     swimming = page.view.jobs.swimming
     page.choose("Scenario", "lost-in-current")
     page.until(lambda: not page.session.swim.announced)
-    page.until(lambda: "In a current of 7 cm/s a fin is lost half-way" in page.page.inner_text("body"))
+    page.until(lambda: "In a current of 0.07 m/s a fin is lost half-way" in page.page.inner_text("body"))
     page.choose("Method", "analytic")
     page.until(lambda: page.session.state.method == "analytic")
     page.type("Speed", "8")

@@ -141,7 +141,7 @@ def warnings(layout: Layout) -> tuple[str, ...]:
     for a, b in combinations(layout.fins, 2):
         gap = float(np.linalg.norm(np.subtract(a.position, b.position)))
         if gap < SPAN:
-            sentences.append(f"{a.name} and {b.name} are {100 * gap:.0f} cm apart and may touch.")
+            sentences.append(f"{a.name} and {b.name} are {gap:.2f} m apart and may touch.")
     for fin in layout.fins:
         if hull.contains(np.array(fin.position) + 0.05 * np.array(fin.frame[0])):
             sentences.append(f"{fin.name} beats inside the hull.")

@@ -67,8 +67,8 @@ def _figures(figures: Figures | None) -> tuple[tuple[str, str], ...]:
     if figures is None:
         return ()
     return (
-        ("off the path, root mean square", f"{100 * figures.track_m:.1f} cm"),
-        ("off in depth", f"{100 * figures.depth_m:.1f} cm"),
+        ("off the path, root mean square", f"{figures.track_m:.3f} m"),
+        ("off in depth", f"{figures.depth_m:.3f} m"),
         ("mean power", f"{figures.mean_w:.2f} W"),
         ("energy so far", f"{figures.energy_wh * 1000:.1f} mWh"),
     )

@@ -33,7 +33,9 @@ PARTS: dict[str, tuple[tuple[str, int, str], ...]] = {
         ("Drag ∝ v² [N s²/m²]", 0, "Along x, y, z. From the hull: ½ ρ A 0.44 d/l, Hoerner's blunt bodies."),
         ("turning [N m s²]", 3, "About x, y, z. From the hull: strips in cross-flow but for the round core."),
     ),
-    "center_of_buoyancy_m": (("Buoyancy at [m]", 0, "Its centre, from that of gravity; above it, it rights the robot."),),
+    "center_of_buoyancy_m": (
+        ("Buoyancy at [m]", 0, "Its centre, from that of gravity; above it, it rights the robot."),
+    ),
 }
 """Fields of `Body` with several numbers: their rows of three, the first number of each, what they are."""
 

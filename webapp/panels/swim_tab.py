@@ -53,8 +53,12 @@ def add_run(page: Page) -> None:
     add_html(gui, marker("fl-primary"))
     page.add_button("Start", start, icon=viser.Icon.PLAYER_PLAY, hint="From the beginning.")
     runs = {"Pause": hold, "Go on": hold, "Step": swimming.step, "End": page.scenery.end_swim}
-    run = page.add_buttons("Run", runs, hint="Step swims for 0.1 s; B pauses or goes on.")
-    page.board.show(run, options=lambda paused: ("Go on" if paused else "Pause", "Step", "End"))
+    run = page.add_buttons("Run", runs, visible=False, hint="Step swims for 0.1 s; B pauses or goes on.")
+    page.board.show(
+        run,
+        options=lambda paused: ("Go on" if paused else "Pause", "Step", "End"),
+        visible=lambda swims: swims,
+    )
     speed = "Simulated time per real time; a slow machine falls short of it."
     _bind(page, "speed", gui.add_slider("Speed", *SPEEDS, 0.1, 1.0, hint=speed))
     page.board.act(lambda swim: swimming.pace.set_speed(swim.speed))
@@ -83,7 +87,8 @@ def add_figures(page: Page) -> None:
     page.add_html(swim_card)
     page.add_html(_trim)
     log = {"Log (NPZ)": partial(page.jobs.exports.swim, page.jobs.swimming)}
-    page.add_buttons("Save", log, hint="For numpy and `fit robot`.")
+    save = page.add_buttons("Save", log, visible=False, hint="For numpy and `fit robot`.")
+    page.board.show(save, visible=lambda swims: swims)
 
 
 def _trim(able: Layout, failed: tuple[str, ...], layout: Layout) -> str:

@@ -90,8 +90,8 @@ def timeline(record: Array, n: int, duration_s: float) -> list[str]:
     surge = list(rows[:, SURGE : SURGE + 2].T)
     ends = cost_axis("surge [N]", np.append((-SMALL, SMALL), surge), TICKS)
     return [
-        sizes("off the path [cm]", [100.0 * rows[:, ERROR]]),
-        sizes("off in depth [cm]", [100.0 * rows[:, DEPTH_ERROR]]),
+        sizes("off the path [m]", [rows[:, ERROR]]),
+        sizes("off in depth [m]", [rows[:, DEPTH_ERROR]]),
         sizes("power [W]", [power]),
         plot(ends, surge, (ASKED, DELIVERED), ("asked", "delivered")),
         sizes("forces [N]", list(rows[:, FORCES : FORCES + n].T), FIN_LINES),

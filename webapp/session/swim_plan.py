@@ -16,7 +16,7 @@ from webapp.session.state import State, chosen, number
 
 LOST_IN_CURRENT = HardDay(
     "lost-in-current",
-    "In a current of 7 cm/s a fin is lost half-way, and a monitor has to find out.",
+    "In a current of 0.07 m/s a fin is lost half-way, and a monitor has to find out.",
     current=CURRENT,
     lost=1,
     announced=False,
