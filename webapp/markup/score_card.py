@@ -90,7 +90,7 @@ def _axes(card: ScoreCard, before: ScoreCard | None) -> str:
         )
     columns = ("",) if before is None else ("before", "now")
     head = html(
-        "<tr><th>largest on its own</th>{}<th title='after the worst loss of a fin'>one lost</th>"
+        "<tr><th>largest on its own</th>{}<th title='after the worst loss of one'>one lost</th>"
         "<th title='least power for so much'>W at 1 N, 0.1 N m</th></tr>",
         (html("<th>{}</th>", word) for word in columns),
     )
@@ -113,7 +113,7 @@ def _losses(layout: Layout, card: ScoreCard) -> str:
         cost = html("<span class='missing'>loses {}</span>", listed(loss.lost)) if loss.lost else ""
         name = html("without {}{}", swatch(layout.index(loss.actuator)), loss.actuator)
         rows.append(row(name, f"{three_digits(loss.weakest)} N", html("<div class='words'>{}</div>", cost)))
-    return html("<table><tr><th>one fin lost</th><th>weakest</th><th></th></tr>{}</table>", rows)
+    return html("<table><tr><th>one lost</th><th>weakest</th><th></th></tr>{}</table>", rows)
 
 
 def check_card(quick: QuickCheck, several: bool, warnings: tuple[str, ...]) -> str:

@@ -6,7 +6,7 @@ from functools import partial
 
 from markupsafe import Markup
 
-from finlab.layout import Actuator, Fin
+from finlab.layout import Actuator
 from finlab.layout.directions import direction
 from finlab.layout.layout import MAX_ACTUATORS
 from webapp.handles import add_html
@@ -72,7 +72,7 @@ def add_actuator_list(page: Page) -> None:
 def actuator_list(state: State, selection: tuple[str, ...]) -> str:
     """All actuators with their places and directions; `selection` has the names of the selected ones."""
     heads = Markup().join(html("<th class='place'>{}</th>", axis) for axis in ("x", "y", "z"))
-    names = state.layout.names
+    names, kinds = state.layout.names, sorted({part.type for part in state.layout.actuators})
     robot = html(
         "<tr class='{}' {}><td colspan='5'>{}<span class='name whole'>{}</span></td></tr>",
         "" if selection else "chosen",
@@ -81,17 +81,18 @@ def actuator_list(state: State, selection: tuple[str, ...]) -> str:
         state.layout.name,
     )
     return html(
-        "<div class='fl fin-list'><table><tr><th></th>{}<th class='place' title='{}'>points</th>"
+        "<div class='fl fin-list'><table><tr><th>{}</th>{}<th class='place' title='{}'>points</th>"
         "</tr>{}{}</table><div class='dim units'>Press to select, with Ctrl several. <span class='place'>"
         "x, y, z in m, points in °.</span></div></div>",
+        kinds[0] if len(kinds) == 1 else "",
         heads,
         POINTS,
         robot,
-        [_row(state, index, name in selection) for index, name in enumerate(names)],
+        [_row(state, index, name in selection, len(kinds) > 1) for index, name in enumerate(names)],
     )
 
 
-def _row(state: State, index: int, chosen: bool) -> str:
+def _row(state: State, index: int, chosen: bool, mixed: bool) -> str:
     part = state.layout.actuators[index]
     places = [_minus(f"{value:.3f}") for value in part.position]
     twin = partner(state.links, part.name)
@@ -104,7 +105,7 @@ def _row(state: State, index: int, chosen: bool) -> str:
         part.name,
         part.name,
         ["" if twin is None else html("<span class='dim' title='moves with {}'>⇄</span>", twin)]
-        + ["" if isinstance(part, Fin) else html("<div class='dim'>{}</div>", part.type)],
+        + [html("<div class='dim'>{}</div>", part.type) if mixed else ""],
         [html("<td class='place'>{}</td>", shown) for shown in (*places, points_words(part))],
     )
 

@@ -104,7 +104,11 @@ def add_improving(page: Page) -> None:
 
 
 def _searched(
-    better: Improvement | None, progress: Progress | None, improving: bool, better_error: str | None
+    better: Improvement | None,
+    progress: Progress | None,
+    improving: bool,
+    better_error: str | None,
+    draft: SearchRequest,
 ) -> str:
     """How far a search is, or what came of it."""
     text = "Searching …" if improving else ""
@@ -114,8 +118,14 @@ def _searched(
         text = _before_and_after(better)
     elif progress is not None:
         best, before = (three_digits(abs(v)) for v in (progress.best, progress.before))
-        text = html("Best so far <b>{}</b>, {} before, round {}.", best, before, progress.round)
+        words = "Best so far <b>{}{}</b>, {}{} before, round {}."
+        unit = _unit(GOAL_WORDS[draft.goal])
+        text = html(words, best, unit, before, unit, progress.round)
     return html("<div class='fl'>{}</div>", text)
+
+
+def _unit(goal: str) -> str:
+    return " W" if goal == "mission_power" else " N"
 
 
 def _before_and_after(found: Improvement) -> str:
@@ -124,7 +134,7 @@ def _before_and_after(found: Improvement) -> str:
     before, after = (three_digits(abs(v)) for v in (found.value_before, found.value_after))
     goal = next(words for words, name in GOAL_WORDS.items() if name == found.goal)
     stopped = " The search was stopped early." if found.cancelled else ""
-    unit = " W" if found.goal == "mission_power" else " N"
+    unit = _unit(found.goal)
     some = found.goal != "mission_power" and len(found.axes) < len(AXES)
     of = f" of {listed(found.axes)}, with anything on the others" if some else ""
     heading = html(
