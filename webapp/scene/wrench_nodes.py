@@ -24,7 +24,7 @@ NEWTONS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
 """Forces [N] that an arrow of 0.1 m may stand for."""
 LENGTH = 0.1
 """Length that the legend speaks of [m]."""
-LONGEST, SHORTEST = 0.42, 0.14
+LONGEST, SHORTEST = 0.3, 0.1
 """The longest arrow stays within these [m]; between them the scale is left alone, so it seldom jumps."""
 
 TORQUES = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
