@@ -14,11 +14,13 @@ from typing import NamedTuple
 
 from finlab.bundle_files import ABOUT, LARGEST, LARGEST_BUNDLE, LARGEST_TABLE, bundle_files_of
 from finlab.errors import DataError, LayoutError
+from finlab.exchange import Exchange, read_foreign
 from finlab.files.archive import unpacked
 from finlab.files.guarded import decoded, read_file
 from finlab.hull.mesh_file import MAX_FACES, read_mesh, simplified, stl_of
 from finlab.layout import Fin, FinModelSpec, Layout
 from finlab.layout.body import MESH_SUFFIXES
+from finlab.layout.file_form import under
 from finlab.layout.load import A_LAYOUT, MAX_BYTES, layout_in
 from finlab.layout.robot_file import robot_of
 from finlab.whole_file import make_folder, write_whole
@@ -26,6 +28,9 @@ from finlab.whole_file import make_folder, write_whole
 LAYOUTS = (".yaml", ".yml", ".json")
 TABLE_FOLDER, HULL_FOLDER = "tables", "hulls"
 """Where files are kept, inside a folder."""
+LARGEST_DESCRIPTION = 1_000_000
+"""Largest robot description of a stranger [bytes]."""
+A_DESCRIPTION = "a robot description (URDF, SDF), parameters of PX4, or rows of ArduSub"
 
 
 def stored_table(content: bytes, folder: Path) -> FinModelSpec:
@@ -64,6 +69,8 @@ class Opened(NamedTuple):
     """Files that it named and that did not come with it, though the layout makes sense without."""
     failed: tuple[str, ...] = ()
     """Actuators that a bundle says are lost."""
+    notes: tuple[str, ...] = ()
+    """What was taken where a robot description is silent."""
 
 
 def read_archive(source: str, content: bytes, folder: Path) -> Opened:
@@ -94,6 +101,23 @@ def read_archive(source: str, content: bytes, folder: Path) -> Opened:
         failed = ()
     by_path = {str(inside / name): part for name, part in parts.items()}
     return adopted(layout, by_path, folder, source)._replace(failed=failed)
+
+
+def read_description(source: str, content: bytes) -> Opened:
+    """The layout in a robot description (URDF, SDF), parameters of PX4, or ArduSub's rows of factors.
+
+    Raises:
+        LayoutError: it is too large, none of these, or something in it is wrong.
+    """
+    if len(content) > LARGEST_DESCRIPTION:
+        raise LayoutError(f"is larger than {LARGEST_DESCRIPTION:,} bytes", source=source)
+    exchange, path = Exchange(), Path(source)
+    text = decoded(content, source, A_DESCRIPTION, LayoutError)
+    with under(source=source):
+        layout = read_foreign(text, path.stem.strip()[:64].strip() or "robot", path.suffix.lower(), exchange)
+        if layout is None:
+            raise LayoutError(f"expected {A_DESCRIPTION}")
+    return Opened(layout, notes=tuple(exchange.notes))
 
 
 def layout_of(source: str, content: bytes, folder: Path | None = None) -> Layout:

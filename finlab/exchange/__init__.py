@@ -1,5 +1,7 @@
 """Layouts in the forms of others: robot descriptions, parameters of autopilots, allocation matrices."""
 
+from finlab.exchange.convert import FOREIGN as FOREIGN
 from finlab.exchange.convert import convert as convert
 from finlab.exchange.convert import read_any as read_any
+from finlab.exchange.convert import read_foreign as read_foreign
 from finlab.exchange.exchange import Exchange as Exchange

@@ -33,6 +33,8 @@ WRITERS: dict[str, Callable[[Layout, Exchange, str], str]] = {
 FORM_OF = {".urdf": "urdf", ".sdf": "sdf", ".params": "px4"}
 FORM_OF |= {".cpp": "ardusub", ".csv": "matrix", ".yaml": "layout", ".yml": "layout", ".json": "layout"}
 """What a suffix stands for where the user does not say."""
+FOREIGN = (".urdf", ".sdf", ".params", ".cpp")
+"""Suffixes of robot descriptions, and of what autopilots read."""
 
 
 def convert(file: str, output: str | os.PathLike[str], to: str | None, exchange: Exchange) -> Layout:
@@ -69,16 +71,28 @@ def read_any(file: str, exchange: Exchange) -> Layout:
     name = path.stem.strip()[:64].strip() or "robot"
     suffix = path.suffix.lower()
     with under(source=file):
-        if text.lstrip().startswith("<"):
-            return read_description(text, name, exchange)
-        if FORM_OF.get(suffix) != "layout":
-            if "CA_ROTOR" in text:
-                return read_px4(text, name, exchange)
-            if re.search(r"add_motor|(?i:throttle\W+forward)", text):
-                return read_ardusub(text, name, exchange)
-            if suffix == ".csv":
-                return read_matrix(csv_values(text), name, exchange)
+        found = read_foreign(text, name, suffix, exchange)
+        if found is not None:
+            return found
+        if suffix == ".csv":
+            return read_matrix(csv_values(text), name, exchange)
         data = (parse_json if suffix == ".json" else parse_yaml)(text, "", LayoutError)
         if isinstance(data, dict) and {"format", "fins", "actuators"} & set(data):
             return parse_layout(data, "", path.resolve().parent)
         return read_matrix(data, name, exchange)
+
+
+def read_foreign(text: str, name: str, suffix: str, exchange: Exchange) -> Layout | None:
+    """Returns the layout, called `name`, in a robot description or in what autopilots read; None where the
+    text of a file with this suffix is neither.
+
+    Raises:
+        LayoutError: something in it is wrong, or missing.
+    """
+    if text.lstrip().startswith("<"):
+        return read_description(text, name, exchange)
+    if FORM_OF.get(suffix) != "layout" and "CA_ROTOR" in text:
+        return read_px4(text, name, exchange)
+    if FORM_OF.get(suffix) != "layout" and re.search(r"add_motor|(?i:throttle\W+forward)", text):
+        return read_ardusub(text, name, exchange)
+    return None

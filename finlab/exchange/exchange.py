@@ -50,7 +50,7 @@ class Exchange:
             LayoutError: a value is out of bounds.
         """
         if self.force is None and force is None:
-            self.note("It has no limits of force: those of a T200 at 16 V are taken (--force LEAST MOST).")
+            self.note("It has no limits of force: those of a T200 at 16 V are taken; correct `force_n`.")
         self.note("It has no power: that of a T200 at 16 V is taken; write your own as `model`.")
         ends = self.force or force or T200_FORCE
         return Thruster(name, vector(place), vector(axis), ends, T200_POWER, torque_per_newton=reaction)

@@ -9,11 +9,14 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import viser
 
 from finlab.allocation import Allocator
 from finlab.errors import DataError, FinlabError, LayoutError
+from finlab.exchange import Exchange
+from finlab.exchange.convert import WRITERS
 from finlab.files.plain_values import yaml_text
 from finlab.hull import hull_of
 from finlab.layout import FinModelSpec, layout_to_dict, load_layout
@@ -216,3 +219,16 @@ def test_markup_in_names_and_descriptions_stays_text(server: viser.ViserServer, 
     texts = [handle.content for handle in handles if isinstance(handle, viser.GuiHtmlHandle)]
     assert any("&lt;img" in text for text in texts)
     assert not any("<img" in text or "<script>alert" in text for text in texts)
+
+
+def test_descriptions_of_others_are_opened_and_what_they_lack_is_said() -> None:
+    text = (Path(__file__).parents[1] / "exchange" / "bluerov2_heavy.urdf").read_bytes()
+    opened = files.read_layout("bluerov2_heavy.urdf", text)
+    known = load_layout("bluerov2_heavy")
+    assert opened.layout.name == "bluerov2_heavy" and "power" in " ".join(opened.notes)
+    assert np.allclose(opened.layout.position[:4], known.position[:4], atol=1e-9)
+    rotors = WRITERS["px4"](known, Exchange(), ".params").encode()
+    assert files.read_layout("rov.params", rotors).layout.n == 8
+    for bad in (text.replace(b"<robot", b"<!DOCTYPE a []><robot", 1), b"<a/>", b"\xff\xfe", b"nothing"):
+        with pytest.raises(FinlabError, match=r"rov\.sdf"):
+            files.read_layout("rov.sdf", bad)

@@ -23,10 +23,12 @@ from finlab.deploy.design_files import (
     adopted,
     layout_of,
     read_archive,
+    read_description,
     stored_mesh,
     with_hull_inside,
 )
 from finlab.errors import FinlabError, LayoutError
+from finlab.exchange import FOREIGN
 from finlab.files.archive import packed as pack
 from finlab.files.plain_values import yaml_text
 from finlab.hull.mesh import Mesh
@@ -82,7 +84,7 @@ def bundle_name(layout: Layout) -> str:
 
 
 def read_layout(name: str, content: bytes) -> Opened:
-    """The layout in an uploaded layout file, bundle, or archive of a layout with its files.
+    """The layout in an uploaded layout file, bundle, archive of a layout with its files, or description.
 
     Raises:
         LayoutError: the file is too large, no text or no layout, or names a force table that did not come
@@ -92,6 +94,8 @@ def read_layout(name: str, content: bytes) -> Opened:
     source = Path(str(name)).name[:80] or "upload"
     if source.lower().endswith(".zip"):
         opened = read_archive(source, content, cache_folder())
+    elif source.lower().endswith(FOREIGN):
+        opened = read_description(source, content)
     elif len(content) > MAX_BYTES:
         raise LayoutError(f"is larger than {MAX_BYTES:,} bytes, a layout has a few thousand", source=source)
     else:

@@ -20,7 +20,10 @@ from webapp.tasks.context import Context
 from webapp.tasks.swimming import Swimming
 from webapp.viser_internals import run_file, run_script
 
-KINDS = "a design (YAML, JSON, ZIP), measurements of a fin (CSV), or a hull (STL, OBJ, GLB, PLY)"
+KINDS = (
+    "a design (YAML, JSON, ZIP), a robot description (URDF, SDF, PX4's .params), "
+    "measurements of a fin (CSV), or a hull (STL, OBJ, GLB, PLY)"
+)
 SHARED = (
     "The link carries the whole design and the wrench that is asked for. Whoever opens it gets a copy, on a "
     "finlab of their own."
@@ -104,6 +107,8 @@ class Designs:
             self._context.notify("Opened from a link", text, calm=True)
         if wrench:
             self._session.ask_for(wrench.split(","))
+        if opened.notes:
+            self._context.notify(f"Opened {opened.layout.name}", " ".join(opened.notes), calm=True)
         for file in opened.missing:
             text = f"{file} did not come along, so a hull that fits is drawn; put both into one ZIP archive"
             self._context.notify("Without its hull", text)
