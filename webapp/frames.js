@@ -8,10 +8,14 @@
   const SETTLE_MS = 230; // a little less than viser's own
   const SLOW = 0.5; // propellers turn no faster than in slow motion: they would seem to turn back
   const LONGEST_STEP_S = 0.2; // a long pause must not become a leap
+  const FIRST_MS = 50; // where drawing is slow, words and numbers that have come are painted before the picture
+  const WORK_MS = 1000; // for so long after a key or a press beside the view actuators stand still there
+  const TIMED_EVERY = 15; // frames
+  const SPACING = 1.4; // between frames that take long, in times of one
   const APART = 1.9; // between the phases of fins, which look alive so
 
   let parts = [], speed = 1, frozen = true, phases = [], turns = [];
-  let touched = performance.now(), due = 0, drawnAt = -Infinity, drawn = [], timer = 0, stepped = 0;
+  let touched = performance.now(), due = 0, drawnAt = -Infinity, drawn = [], timer = 0, stepped = 0, cost = 0, worked = -Infinity;
   const viewer = () => window.__viserMutable;
   const root = () => viewer()?.scene?.__r3f?.root.getState();
 
@@ -28,13 +32,16 @@
       const now = performance.now();
       const seen = [...camera.matrixWorld.elements, ...camera.projectionMatrix.elements, gl.domElement.width, gl.domElement.height];
       const moved = seen.some((value, k) => value !== drawn[k]);
-      const settling = now < due + QUICK_MS && now - drawnAt >= QUICK_MS, settled = drawnAt < due && now >= due;
+      const settling = now < due + QUICK_MS && now >= free(), settled = drawnAt < due && now >= due;
       if (!moved && !settling && !settled) return;
       drawn = seen;
       drawnAt = now;
       paint(scene);
-      window.finlabFrames.count++;
       draw(scene, camera);
+      if (++window.finlabFrames.count % TIMED_EVERY || now - worked < WORK_MS) return;
+      const context = gl.getContext();
+      context.readPixels(0, 0, 1, 1, context.RGBA, context.UNSIGNED_BYTE, new Uint8Array(4)); // when it is there
+      cost = Math.min(performance.now() - now, LONGEST_STEP_S * 1000);
     };
     gl.domElement.addEventListener('webglcontextrestored', ask);
   }
@@ -65,7 +72,14 @@
     controls.moveTo(target.x - y, target.y + z, target.z - x, false); // z is up in viser, y in three.js
   }
 
-  const ask = () => { due = performance.now() + SETTLE_MS; };
+  // Where a frame takes long, time is left to the rest of the page, and what a user asks for goes first.
+  const slow = () => cost > QUICK_MS;
+  const free = () => drawnAt + (slow() ? SPACING * cost : QUICK_MS);
+  function ask() {
+    const now = performance.now();
+    due = now + SETTLE_MS;
+    if (slow() && now >= free()) drawnAt = now + FIRST_MS - SPACING * cost;
+  }
 
   function listenToRequests() {
     const view = viewer(), request = view.requestRender;
@@ -73,8 +87,9 @@
     view.requestRender = Object.assign(() => { follow(); ask(); request(); }, { finlab: true });
   }
 
-  function touch() {
+  function touch(event) {
     touched = performance.now();
+    if (event && event.type !== 'pointermove' && event.target.tagName !== 'CANVAS') worked = touched;
     due = Math.max(due, touched + 2 * QUICK_MS); // what the pointer is over may look otherwise
     beat();
   }
@@ -106,6 +121,7 @@
     if (timer || document.hidden || !alive()) return;
     const since = performance.now() - touched;
     if (since > REST_MS) return;
+    const pause = since < LOOKED_AT_MS ? QUICK_MS : SLOW_MS;
     timer = setTimeout(() => requestAnimationFrame(() => {
       timer = 0;
       const now = performance.now(), elapsed = Math.min((now - stepped) / 1000, LONGEST_STEP_S);
@@ -117,7 +133,7 @@
       });
       if (alive()) pose();
       beat();
-    }), since < LOOKED_AT_MS ? QUICK_MS : SLOW_MS);
+    }), slow() ? Math.max(pause, worked + WORK_MS - performance.now()) : pause);
   }
 
   window.finlabFrames = {

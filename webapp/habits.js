@@ -1,5 +1,5 @@
-// What the page of viser does otherwise: with Ctrl the camera stays where it is, keys have their usual second names,
-// and buttons have hints.
+// What the page of viser does otherwise: with Ctrl, or on a slider, the camera stays where it is, keys have their usual
+// second names, and buttons have hints.
 (() => {
   if (window.finlabFrame) return;
   const page = document.documentElement;
@@ -64,7 +64,8 @@
 
   // Commands listen on the root of the document, the camera on the document, which comes after.
   page.addEventListener('keydown', (event) => {
-    if ((event.ctrlKey || event.metaKey || event.altKey) && MOVES.test(event.code)) event.stopPropagation();
+    const others = event.ctrlKey || event.metaKey || event.altKey || event.target.closest?.('[role=slider]');
+    if (others && MOVES.test(event.code)) event.stopPropagation();
   });
 
   window.addEventListener('beforeunload', (event) => { if (window.finlabDrops) event.preventDefault(); });

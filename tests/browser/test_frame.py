@@ -141,6 +141,12 @@ def test_the_camera_frames_turns_and_leaves_ctrl_alone(page: Any) -> None:
     page.page.keyboard.up("d")
     page.page.keyboard.up("Control")
     assert page.page.evaluate(CAMERA) == before
+    page.page.locator("[role=slider]:visible").first.focus()
+    asked = page.session.state.target
+    page.page.keyboard.press("ArrowRight", delay=300)
+    page.until(lambda: page.session.state.target != asked)
+    assert page.page.evaluate(CAMERA) == before, "an arrow key on a slider is the slider's"
+    page.page.evaluate("document.activeElement.blur()")
     page.page.keyboard.down("d")
     page.until(lambda: page.page.evaluate(CAMERA) != before)
     page.page.keyboard.up("d")
