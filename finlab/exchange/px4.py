@@ -47,9 +47,7 @@ def read_px4(text: str, name: str, exchange: Exchange) -> Layout:
     if values.get("CA_SV_CS_COUNT", 0.0) or values.get("CA_SV_TL_COUNT", 0.0):
         exchange.note("Its surfaces and tilting servos (CA_SV_*) are left out: they hold no forces.")
     if exchange.force is None:
-        exchange.note(
-            "CA_ROTORi_CT is taken for the newtons at full output; correct `force_n` if not."
-        )
+        exchange.note("CA_ROTORi_CT is taken for the newtons at full output; correct `force_n` if not.")
     parts = []
     for i in range(count):
         *vectors, size, km = (values.get(f"CA_ROTOR{i}_{key}", usual) for key, usual in USUAL.items())
