@@ -110,11 +110,6 @@ def fin_color(index: int) -> Rgb:
     return FIN_COLORS[index % len(FIN_COLORS)]
 
 
-def mode_color(index: int) -> Rgb:
-    """Colour of the mode at this place."""
-    return MODE_COLORS[index % len(MODE_COLORS)]
-
-
 def css(color: Rgb, alpha: float = 1.0) -> str:
     """The colour as CSS."""
     return f"rgba({color[0]},{color[1]},{color[2]},{alpha:g})"

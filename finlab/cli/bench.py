@@ -32,7 +32,7 @@ def bench(
     check_json_file(json)
     from finlab.evaluation.experiments.wrench import HARD, experiment
     from finlab.evaluation.progress import begin
-    from finlab.evaluation.report.text import to_text
+    from finlab.evaluation.report.document import to_text
 
     begin("bench")
     asked = tuple(splits.split(",")) if splits else QUICK if quick else HARD

@@ -43,7 +43,7 @@ def _not_asked() -> None:
 def verb_of(experiment: Experiment) -> Callable[..., None]:
     """A function whose signature says to the parser which options there are."""
     from finlab.evaluation.progress import begin
-    from finlab.evaluation.report.text import to_text
+    from finlab.evaluation.report.document import to_text
 
     options = experiment.options()
 

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from finlab.actuators.fin.response import largest_forces
+from finlab.actuators.fin.response import fin_table
 from finlab.arrays import Array
 from finlab.control.measurement import Measurement
 from finlab.layout import Body, Fin, Layout, Rudder
@@ -225,11 +225,9 @@ def strongest_wrench(layout: Layout, speed: float = CRUISE) -> Array:
     a speed [m/s] that counts for rudders."""
     effectiveness = plant_of(layout).effectiveness
     reach = np.zeros(6)
-    # Not that of the largest command: a soft fin may push more with a smaller one.
-    largest = iter(largest_forces(layout).tolist())
     for part, own in zip(layout.actuators, effectiveness, strict=True):
         if isinstance(part, Fin):
-            most = next(largest)
+            most = fin_table(part).largest  # a soft fin may push more with a smaller command than the largest
         elif isinstance(part, Rudder):
             angle = min(part.stall, max(map(abs, part.deflection)))
             most = 0.5 * part.density * part.area * speed**2 * part.slope * angle

@@ -28,8 +28,6 @@ from finlab.whole_file import make_folder, write_whole
 LAYOUTS = (".yaml", ".yml", ".json")
 TABLE_FOLDER, HULL_FOLDER = "tables", "hulls"
 """Where files are kept, inside a folder."""
-LARGEST_DESCRIPTION = 1_000_000
-"""Largest robot description of a stranger [bytes]."""
 A_DESCRIPTION = "a robot description (URDF, SDF), parameters of PX4, or rows of ArduSub"
 
 
@@ -107,10 +105,8 @@ def read_description(source: str, content: bytes) -> Opened:
     """The layout in a robot description (URDF, SDF), parameters of PX4, or ArduSub's rows of factors.
 
     Raises:
-        LayoutError: it is too large, none of these, or something in it is wrong.
+        LayoutError: it is none of these, or something in it is wrong.
     """
-    if len(content) > LARGEST_DESCRIPTION:
-        raise LayoutError(f"is larger than {LARGEST_DESCRIPTION:,} bytes", source=source)
     exchange, path = Exchange(), Path(source)
     text = decoded(content, source, A_DESCRIPTION, LayoutError)
     with under(source=source):

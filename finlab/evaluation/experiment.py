@@ -9,9 +9,13 @@ import inspect
 import math
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from importlib import import_module
+from importlib.resources import files
 from types import NoneType
 from typing import Any, get_args, get_type_hints
+
+import yaml
 
 from finlab.errors import DataError
 from finlab.evaluation.report.document import Block, Column, Row, Table
@@ -140,3 +144,9 @@ def load_experiment(name: str) -> Experiment:
     found = import_module(f"finlab.evaluation.experiments.{name}").experiment
     assert isinstance(found, Experiment)
     return found
+
+
+@cache
+def paper_figures() -> Any:
+    """Figures that the paper prints, by table; the file names the source of each."""
+    return yaml.safe_load(files("finlab.evaluation").joinpath("paper_figures.yaml").read_text("utf-8"))

@@ -10,7 +10,7 @@ from webapp.markup.html import html
 from webapp.markup.plot import EXACT, RIGHT, WIDTH, Plot, Point, cost_axis, error_axis
 from webapp.presses import press
 from webapp.tasks.mode_names import Modes
-from webapp.theme import DEAD, css, mode_color
+from webapp.theme import DEAD, MODE_COLORS, css
 
 LEFT = 54
 """Where the axis that goes up stands [px]."""
@@ -76,7 +76,7 @@ def _rings(places: list[Point], shown: int) -> list[str]:
     parts = []
     labels = _labels(places)
     for k, ((x, y), (u, v)) in reversed(list(enumerate(zip(places, labels, strict=True)))):
-        color = css(mode_color(k))
+        color = css(MODE_COLORS[k])
         fill = color if k == shown else "transparent"
         radius = RING + APART * sum(math.dist((x, y), place) < RING for place in places[:k])
         parts.append(html(ring, press("mode", str(k)), x, y, radius, color, fill, u, v + 3.8, k + 1))
@@ -89,7 +89,7 @@ def _logarithm(error: Array) -> Array:
 
 def _color(end: int, alpha: float) -> str:
     """Of a sample that ends at a mode, grey for none."""
-    return css(DEAD if end < 0 else mode_color(end), alpha)
+    return css(DEAD if end < 0 else MODE_COLORS[end], alpha)
 
 
 def _sample_dots(places: Array, ends: list[int], faint: bool) -> str:

@@ -16,7 +16,7 @@ from webapp.markup.words import fins_words, listed, three_digits
 from webapp.page import Page
 from webapp.panels.damage import add_fin_buttons
 from webapp.session.display import DRAWN
-from webapp.session.search_request import GOAL_WORDS, WAY, SearchRequest
+from webapp.session.search_request import GOAL_UNITS, GOAL_WORDS, WAY, SearchRequest
 from webapp.tasks.analyst import Findings
 
 
@@ -117,15 +117,10 @@ def _searched(
     elif better is not None:
         text = _before_and_after(better)
     elif progress is not None:
-        best, before = (three_digits(abs(v)) for v in (progress.best, progress.before))
-        words = "Best so far <b>{}{}</b>, {}{} before, round {}."
-        unit = _unit(GOAL_WORDS[draft.goal])
-        text = html(words, best, unit, before, unit, progress.round)
+        unit = GOAL_UNITS[draft.goal]
+        best, before = (three_digits(abs(v)) + unit for v in (progress.best, progress.before))
+        text = html("Best so far <b>{}</b>, {} before, round {}.", best, before, progress.round)
     return html("<div class='fl'>{}</div>", text)
-
-
-def _unit(goal: str) -> str:
-    return " W" if goal == "mission_power" else " N"
 
 
 def _before_and_after(found: Improvement) -> str:
@@ -134,7 +129,7 @@ def _before_and_after(found: Improvement) -> str:
     before, after = (three_digits(abs(v)) for v in (found.value_before, found.value_after))
     goal = next(words for words, name in GOAL_WORDS.items() if name == found.goal)
     stopped = " The search was stopped early." if found.cancelled else ""
-    unit = _unit(found.goal)
+    unit = GOAL_UNITS[goal]
     some = found.goal != "mission_power" and len(found.axes) < len(AXES)
     of = f" of {listed(found.axes)}, with anything on the others" if some else ""
     heading = html(

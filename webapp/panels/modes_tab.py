@@ -16,7 +16,7 @@ from webapp.page import Page
 from webapp.presses import placed, press
 from webapp.session.state import DRAWING, State
 from webapp.tasks.mode_names import Modes
-from webapp.theme import css, mode_color
+from webapp.theme import MODE_COLORS, css
 
 UNKNOWN = "The network has learned fins alone, so it proposes nothing for this robot."
 BEYOND = "This wrench is out of reach, so the network is not asked: there is one answer, by policy {}."
@@ -143,4 +143,4 @@ def mode_table(modes: Modes, mode: int) -> str:
 
 
 def _swatch(k: int) -> str:
-    return html("<span class='swatch mode' style='border-color:{}'>{}</span>", css(mode_color(k)), k + 1)
+    return html("<span class='swatch mode' style='border-color:{}'>{}</span>", css(MODE_COLORS[k]), k + 1)

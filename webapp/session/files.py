@@ -94,10 +94,10 @@ def read_layout(name: str, content: bytes) -> Opened:
     source = Path(str(name)).name[:80] or "upload"
     if source.lower().endswith(".zip"):
         opened = read_archive(source, content, cache_folder())
-    elif source.lower().endswith(FOREIGN):
-        opened = read_description(source, content)
     elif len(content) > MAX_BYTES:
         raise LayoutError(f"is larger than {MAX_BYTES:,} bytes, a layout has a few thousand", source=source)
+    elif source.lower().endswith(FOREIGN):
+        opened = read_description(source, content)
     else:
         opened = adopted(layout_of(source, content), {}, cache_folder(), source)
     plant_of(opened.layout)  # reads the tables of its fins

@@ -16,6 +16,7 @@ GOAL_WORDS = {
     "worst single failure": "worst_single_failure",
 }
 """What may be improved, in words, and the name that the search knows."""
+GOAL_UNITS = {words: " W" if name == "mission_power" else " N" for words, name in GOAL_WORDS.items()}
 WAY = (0.05, 0.05, 0.05, 180.0)
 """How far an actuator may go along x, y and z [m] and turn either way [deg] unless it is said otherwise."""
 

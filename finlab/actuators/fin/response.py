@@ -17,7 +17,7 @@ from finlab.actuators.law import FinLaw, PlanarLaw
 from finlab.actuators.response import POINTS, Group, Plane, RadialTable, price_grid
 from finlab.arrays import Array
 from finlab.errors import DataError
-from finlab.layout import Fin, FinModelSpec, Layout, Limits
+from finlab.layout import Fin, FinModelSpec, Limits
 from finlab.layout.angles import TURN, is_full_turn, wrapped
 from finlab.precision import NEARLY, NOTHING, ROUNDING, ROUNDS
 
@@ -55,15 +55,6 @@ class FinTable(NamedTuple):
     def largest(self) -> float:
         """The largest force in any direction [N]."""
         return self.table.largest * (1.0 if self.gauge is None else float(self.gauge.max()))
-
-
-def largest_forces(layout: Layout) -> Array:
-    """Returns the largest force (n,) [N] that each fin of a robot can give in any direction.
-
-    Raises:
-        DataError: a fin's force table cannot be read, or gives no thrust within the limits.
-    """
-    return np.array([fin_table(fin).largest for fin in layout.fins])
 
 
 class FinGroup(Group):

@@ -7,9 +7,8 @@ from typing import Any
 import numpy as np
 
 from finlab.allocation.methods import choose_method
-from finlab.evaluation.experiment import Experiment, check_names
+from finlab.evaluation.experiment import Experiment, check_names, paper_figures
 from finlab.evaluation.method_specs import MethodSpec
-from finlab.evaluation.paper_figures import paper_figures
 from finlab.evaluation.progress import progress
 from finlab.evaluation.report.document import Column, Row
 from finlab.evaluation.scoring import joined, paper_sigma, score

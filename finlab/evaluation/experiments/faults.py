@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from itertools import combinations, product
 
 from finlab.control import steers
-from finlab.evaluation.experiment import Experiment
+from finlab.evaluation.experiment import Experiment, paper_figures
 from finlab.evaluation.experiments.closed_loop import (
     ABOUT_ERRORS,
     ERRORS,
@@ -15,7 +15,6 @@ from finlab.evaluation.experiments.closed_loop import (
     over_seeds,
 )
 from finlab.evaluation.method_specs import load_method_specs
-from finlab.evaluation.paper_figures import paper_figures
 from finlab.evaluation.progress import progress
 from finlab.evaluation.report.document import Column, Row
 from finlab.layout import Layout, load_layout

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from itertools import product
 
-from finlab.evaluation.experiment import Experiment
+from finlab.evaluation.experiment import Experiment, paper_figures
 from finlab.evaluation.experiments.closed_loop import (
     ABOUT_ERRORS,
     ERRORS,
@@ -12,7 +12,6 @@ from finlab.evaluation.experiments.closed_loop import (
     over_seeds,
 )
 from finlab.evaluation.method_specs import load_method_specs
-from finlab.evaluation.paper_figures import paper_figures
 from finlab.evaluation.progress import progress
 from finlab.evaluation.report.document import Column, Row
 from finlab.layout import load_layout

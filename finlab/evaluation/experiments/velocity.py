@@ -6,10 +6,9 @@ from itertools import product
 import numpy as np
 
 from finlab.errors import DataError
-from finlab.evaluation.experiment import Experiment
+from finlab.evaluation.experiment import Experiment, paper_figures
 from finlab.evaluation.experiments.closed_loop import POWER, depth_error, over_seeds, power_row
 from finlab.evaluation.method_specs import load_method_specs
-from finlab.evaluation.paper_figures import paper_figures
 from finlab.evaluation.progress import progress
 from finlab.evaluation.report.document import Column, Row
 from finlab.layout import load_layout

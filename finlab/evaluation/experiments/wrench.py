@@ -5,9 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from finlab.errors import DataError
-from finlab.evaluation.experiment import Experiment
+from finlab.evaluation.experiment import Experiment, paper_figures
 from finlab.evaluation.method_specs import SLOW, installed_methods, load_method_specs
-from finlab.evaluation.paper_figures import paper_figures
 from finlab.evaluation.report.document import Column, Row
 from finlab.evaluation.scoring import Columns, run_method
 from finlab.evaluation.splits import SPLITS, Case, make_split, own_sigma

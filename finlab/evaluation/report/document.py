@@ -1,15 +1,19 @@
-"""A document as a list of blocks, and the same in Markdown; `text` has it for the command line.
+"""A document as a list of blocks, and the same in Markdown, or as plain text for the command line.
 
 A heading, a paragraph or a list is a string of Markdown; a paragraph *all in italics* is a remark in small.
 """
 
+import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from finlab.evaluation.report.numbers import FORMATS
+from finlab.text_table import aligned
 
 Row = dict[str, Any]
+WIDTH = 110
+"""Of plain text."""
 
 
 @dataclass(frozen=True)
@@ -73,3 +77,17 @@ def _text_table(table: Table) -> str:
             cells[named] = f"**{cells[named]}**"
         lines.append(cells)
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+
+
+def to_text(*blocks: Block) -> str:
+    """Headings without their marks, paragraphs in lines, tables with aligned columns."""
+    return "\n\n".join(map(_plain, blocks))
+
+
+def _plain(block: Block) -> str:
+    if isinstance(block, str):
+        lines = (line.strip("#* ").replace("`", "") for line in block.splitlines())
+        return "\n".join(textwrap.fill(line, WIDTH) for line in lines)
+    head = [column.heading for column in block.columns]
+    cells = [[block.cell(row, column).replace("`", "") for column in block.columns] for row in block.rows]
+    return aligned(head, cells, [not column.is_number for column in block.columns])

@@ -4,9 +4,8 @@ from typing import Any
 
 import pytest
 
-from finlab.evaluation.report.document import Column, Table, to_markdown
+from finlab.evaluation.report.document import Column, Table, to_markdown, to_text
 from finlab.evaluation.report.numbers import FORMATS
-from finlab.evaluation.report.text import to_text
 
 COLUMNS = (Column("name", "method"), Column("value", "error <", "error", "ends"))
 ROWS: list[dict[str, Any]] = [
