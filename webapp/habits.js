@@ -78,5 +78,4 @@
     const isCut = label.scrollWidth > label.clientWidth;
     button.title = [isCut && label.textContent, window.finlabHints?.get(button.id)].filter(Boolean).join('\n');
   });
-
 })();

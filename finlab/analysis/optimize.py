@@ -19,6 +19,8 @@ from finlab.layout import Layout
 
 CLEARANCE = 0.10
 """Least distance between two actuators [m], or what there is now if that is less."""
+CHUNK = 64
+"""Variants that are looked at together: places of 64 actuators take much room."""
 PENALTY = 1e3
 """Cost of actuators that are too close or break another rule, per metre; far beyond any goal."""
 
@@ -98,7 +100,7 @@ def optimize_layout(
             move of a single coordinate costs one.
         flow: velocity (6,) of the body relative to the water [m/s, rad/s], body frame; None at rest.
         progress: called after each round.
-        cancelled: asked after each round; the search stops when it answers True.
+        cancelled: asked after each round, and within long ones; the search stops when it answers True.
 
     Raises:
         LayoutError: something about the actuators, bounds, pairs, goal or axes does not fit; it says what.
@@ -155,17 +157,25 @@ def _search(
 ) -> tuple[Array, bool]:
     """The best vector (D,), and whether the search was stopped."""
     needed = np.minimum(_gaps(moves.start_position[None])[0], clearance)
-    best, done, stopped = before, 0, False
+    best, least, found, done, stopped = before, np.inf, moves.start, 0, False
 
     def cost(vectors: Array) -> Array:
-        nonlocal best
-        effectiveness = vectors.reshape(len(moves.start), -1).T
+        rows = vectors.reshape(len(moves.start), -1).T
+        return np.concatenate([some(rows[k : k + CHUNK]) for k in range(0, len(rows), CHUNK)])
+
+    def some(effectiveness: Array) -> Array:
+        nonlocal best, least, found
+        if cancelled is not None and cancelled():
+            return np.full(len(effectiveness), np.inf)
         value = measure(moves.sets(effectiveness), lambda row: moves.moved(effectiveness[row]))
         position, frames = moves.geometry(effectiveness)
         close = np.maximum(needed - _gaps(position), 0.0).sum(-1) + rule(position, frames)
         fine = value[close <= 0.0]
         best = max(best, float(fine.max())) if len(fine) else best
-        return np.asarray(-value + PENALTY * close)
+        costs = np.asarray(-value + PENALTY * close)
+        if costs.min() < least:
+            least, found = costs.min(), effectiveness[np.argmin(costs)]
+        return costs
 
     def after_round(vector: Array, convergence: float) -> bool:
         nonlocal done, stopped
@@ -175,7 +185,7 @@ def _search(
         stopped = cancelled is not None and cancelled()
         return stopped
 
-    result = differential_evolution(
+    differential_evolution(
         cost,  # type: ignore[arg-type]  # of all vectors at once, since it is vectorized
         Box(moves.lower, moves.upper),
         x0=moves.start,
@@ -188,7 +198,7 @@ def _search(
         updating="deferred",
         callback=after_round,  # type: ignore[arg-type]  # True stops it
     )
-    return result.x, stopped
+    return found, stopped  # rows that were not looked at any more count as bad, so not scipy's own
 
 
 def _gaps(position: Array) -> Array:

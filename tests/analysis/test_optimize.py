@@ -14,6 +14,8 @@ from finlab.analysis import (
     mirror_pairs,
     optimize_layout,
 )
+from finlab.analysis.optimize import CHUNK
+from finlab.arrays import Array
 from finlab.errors import FinlabError, LayoutError
 from finlab.layout import Layout
 
@@ -53,6 +55,18 @@ def test_it_stops_when_told(shipped: Layouts) -> None:
     )
     assert found.cancelled
     assert len(seen) == 1
+
+
+def test_it_stops_within_a_round(shipped: Layouts) -> None:
+    layout, seen = shipped("A"), list[int]()
+
+    def rule(position: Array, frames: Array) -> Array:
+        seen.append(len(position))
+        return np.zeros(len(position))
+
+    found = optimize_layout(layout, layout.names, rule=rule, cancelled=lambda: bool(seen))
+    assert seen[0] <= CHUNK and sum(seen[1:]) == 2, "one chunk, and the layouts before and after"
+    assert found.cancelled and found.value_after >= found.value_before
 
 
 def test_nothing_better_leaves_the_layout_as_it_was(shipped: Layouts) -> None:

@@ -80,13 +80,12 @@ def add_improving(page: Page) -> None:
         lambda draft: draft.way[3],
         digits=2,
     )
-    stops = "About a minute for eight actuators, longer for more; it stops after a round."
     add_html(gui, marker("fl-primary"))
     search = page.add_button(
         "Search",
         lambda: improver.start(session.state, session.draft),
         icon=viser.Icon.SPARKLES,
-        hint=stops,
+        hint="About a minute for eight actuators, longer for more.",
     )
     board.show(search, disabled=lambda improving: improving)
     bar = gui.add_progress_bar(0.0, visible=False)

@@ -28,8 +28,6 @@ INSIDE = 0.02
 """How far a place inside the hull counts as wrong [m]."""
 APART_M = 0.02
 """Least distance between what two actuators sweep."""
-CHUNK = 64
-"""Variants that are looked at together: places of 64 actuators take much room."""
 GRID = 0.001, math.radians(1.0)
 """What is proposed is round: steps of places [m] and angles [rad]."""
 
@@ -54,11 +52,6 @@ class Room:
 
     def broken(self, position: Array, frames: Array) -> Array:
         """How far positions (P, n, 3) [m] and own axes (P, n, 3, 3) break the rules (P,) [m]."""
-        if len(position) > CHUNK:
-            parts = range(0, len(position), CHUNK)
-            return np.concatenate(
-                [self.broken(position[k : k + CHUNK], frames[k : k + CHUNK]) for k in parts]
-            )
         inside = (self._outside & self._hull.contains(self._places(position, frames))).sum(axis=(-1, -2))
         close = np.maximum(self._needed - self.gaps(position, frames) - 1e-9, 0.0).sum(axis=-1)
         return np.asarray(INSIDE * inside + close)
@@ -114,7 +107,7 @@ class Improver(Newest[Search, Improvement]):
         self.ask(search)
 
     def cancel(self) -> None:
-        """Stop after the present round; what has been found by then is offered."""
+        """Stop soon; what has been found by then is offered."""
         if self.question is not None:
             self.question.stop.set()
 

@@ -12,8 +12,7 @@ from finlab.evaluation.report.numbers import FORMATS
 from finlab.text_table import aligned
 
 Row = dict[str, Any]
-WIDTH = 110
-"""Of plain text."""
+WIDTH = 110  # of plain text
 
 
 @dataclass(frozen=True)
