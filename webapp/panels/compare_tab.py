@@ -7,12 +7,13 @@ from finlab.allocation.allocation import Allocation
 from finlab.allocation.evaluate import REACHED
 from webapp.handles import add_html
 from webapp.markup.html import html, marker
-from webapp.markup.verdict import verdict_of
+from webapp.markup.verdict import Verdict, verdict_of
 from webapp.markup.words import error_digits, three_digits, unlearned_sentence
 from webapp.page import Page
 from webapp.session.state import least_of
 from webapp.tasks.comparison import Run
-from webapp.theme import NEARLY, css
+
+KINDS = {Verdict.EXACT: "given", Verdict.APPROXIMATE: "near", Verdict.OUT_OF_REACH: "missing"}
 
 
 def add_comparison(page: Page) -> None:
@@ -48,9 +49,9 @@ def comparison_table(run: Run, stale: bool) -> str:
             words = unlearned_sentence(answer.layout, answer.unknown_fins)
             cells = html("<td colspan='4' class='words missing'>{}</td>", words)
         elif isinstance(answer, Allocation):
-            color = css(verdict_of(answer, in_reach).color)
             figures = (answer.power, answer.effort, answer.solve_ms)
-            error = html("<td style='color:{}'>{}</td>", color, error_digits(answer.err_norm))
+            kind = KINDS[verdict_of(answer, in_reach)]
+            error = html("<td class='{}'>{}</td>", kind, error_digits(answer.err_norm))
             cells = error + Markup().join(html("<td>{}</td>", three_digits(value)) for value in figures)
         else:
             cells = html("<td colspan='4' class='words dim'>{}</td>", answer or ("…" if run.running else "–"))
@@ -61,10 +62,9 @@ def comparison_table(run: Run, stale: bool) -> str:
     )
     said = html(
         "<div class='said'><span class='given'>Green</span>: exact, an error of at most {}. <span "
-        "style='color:{}'>Ochre</span>: approximate, another method is exact. <span "
+        "class='near'>Ochre</span>: approximate, another method is exact. <span "
         "class='missing'>Orange</span>: out of reach of all.</div>",
         REACHED,
-        css(NEARLY),
     )
     note = (
         Markup("<div class='missing'>The question has changed since; compare again.</div>") if stale else ""

@@ -23,15 +23,14 @@ from webapp.presses import press
 from webapp.session.lessons import Stop
 from webapp.session.looking import DRAWERS, Desk
 from webapp.tasks.swimmer import Swimmer
-from webapp.theme import ASKED, DELIVERED, MISSING, REACH, REACH_DARK, css
+from webapp.theme import ASKED, DELIVERED, MISSING, NEARLY, REACH, REACH_DARK, css
 from webapp.viser_internals import run_file, run_script
 
 _VARIABLES = (
     f":root {{ --fl-asked: {css(ASKED)}; --fl-delivered: {css(DELIVERED)}; --fl-missing: {css(MISSING)}; "
-    f"--fl-reach: {css(REACH)}; }} [data-mantine-color-scheme=dark] {{ --fl-reach: {css(REACH_DARK)}; }}"
+    f"--fl-near: {css(NEARLY)}; --fl-reach: {css(REACH)}; }} "
+    f"[data-mantine-color-scheme=dark] {{ --fl-reach: {css(REACH_DARK)}; }}"
 )
-
-
 SHEETS = ("style.css", "frame.css", "narrow.css", "compact.css")
 STYLE = html(
     "<style>{}{}</style>",
