@@ -8,9 +8,12 @@
 
   function name() {
     asked = 0;
+    const list = document.querySelector('.mantine-Spotlight-content');
+    list?.setAttribute('aria-label', 'Commands');
+    list?.querySelector('[data-scrollarea-viewport]')?.setAttribute('tabindex', '0');
     for (const label of document.querySelectorAll('label[for]')) {
       const row = label.closest('.mantine-Flex-root');
-      const found = row ? [...row.querySelectorAll('input:not([type=hidden]):not([type=file]), [role=slider]')] : [];
+      const found = row ? [...row.querySelectorAll('input:not([type=hidden]):not([type=file]), textarea, [role=slider]')] : [];
       const alike = (box) => found.filter((other) => other.getAttribute('role') === box.getAttribute('role'));
       for (const box of found) {
         const kin = alike(box), place = kin.length > 1 ? `, ${kin.indexOf(box) + 1} of ${kin.length}` : '';

@@ -31,10 +31,8 @@ def bench(
     """
     check_json_file(json)
     from finlab.evaluation.experiments.wrench import HARD, experiment
-    from finlab.evaluation.progress import begin
     from finlab.evaluation.report.document import to_text
 
-    begin("bench")
     asked = tuple(splits.split(",")) if splits else QUICK if quick else HARD
     size = {"layouts": 5, "targets": 4} if quick else {"layouts": 20, "targets": 10}
     rows = experiment.rows(split=asked, methods=methods, seed=seed, **size)

@@ -29,9 +29,6 @@ def report(
     """
     if out.exists() and not out.is_dir():
         raise DataError(f"out: expected a folder, got the file {out}")
-    from finlab.evaluation.progress import begin
-
-    begin("report")
     from finlab.evaluation.report.make import make_report
 
     names = [name.strip() for name in sections.split(",") if name.strip()]

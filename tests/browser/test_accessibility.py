@@ -3,7 +3,7 @@
 from importlib.resources import files
 from typing import Any
 
-from webapp.session.looking import TASKS
+from webapp.session.looking import DRAWERS, TASKS
 
 AXE = files("axe_playwright_python").joinpath("axe.min.js").read_text("utf-8")
 """axe-core itself, as its wrapper for Python ships it."""
@@ -31,16 +31,28 @@ def findings(page: Any, rules: list[str] | None = None) -> list[str]:
 
 
 def test_no_serious_finding_light_or_dark(page: Any) -> None:
+    page.tab("Design")
+    assert findings(page) == [], "nothing selected"
     page.key("n")
     for task in TASKS:
-        page.tab(task)
-        assert findings(page) == [], task
+        for name in (task, *DRAWERS.get(task, ())):
+            page.tab(name)
+            assert findings(page) == [], name
+    page.key("Control+k")
+    page.page.get_by_placeholder("Search commands").wait_for()
+    assert findings(page) == [], "commands"
+    page.page.keyboard.press("Escape")
     page.session.set_display("dark", True)  # where nothing but colours is another
     page.key("Alt+1")
     page.page.wait_for_function(SCHEME, arg="dark")
     for task in TASKS:
-        page.tab(task)
-        assert findings(page, ["color-contrast"]) == [], f"{task}, dark"
+        for name in (task, *DRAWERS.get(task, ())):
+            page.tab(name)
+            assert findings(page, ["color-contrast"]) == [], f"{name}, dark"
+    page.tab("Comparison")
+    page.press("Compare the methods")
+    page.until(lambda: not page.view.jobs.comparison.run.running)
+    assert findings(page, ["color-contrast"]) == [], "methods compared, dark"
 
 
 def test_boxes_have_names_and_one_without_is_found(page: Any) -> None:
