@@ -42,6 +42,7 @@ def _not_asked() -> None:
 
 def verb_of(experiment: Experiment) -> Callable[..., None]:
     """A function whose signature says to the parser which options there are."""
+    from finlab.evaluation.progress import begin
     from finlab.evaluation.report.document import to_text
 
     options = experiment.options()
@@ -49,6 +50,7 @@ def verb_of(experiment: Experiment) -> Callable[..., None]:
     def verb(**given: Any) -> None:
         json = given.pop("json")
         check_json_file(json)
+        begin(experiment.name)
         chosen = {name: _parsed(name, options[name], value) for name, value in given.items()}
         rows = []
         for row in experiment.each_row(**chosen):

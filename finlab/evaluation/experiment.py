@@ -15,8 +15,6 @@ from importlib.resources import files
 from types import NoneType
 from typing import Any, get_args, get_type_hints
 
-import yaml
-
 from finlab.errors import DataError
 from finlab.evaluation.report.document import Block, Column, Row, Table
 
@@ -149,4 +147,6 @@ def load_experiment(name: str) -> Experiment:
 @cache
 def paper_figures() -> Any:
     """Figures that the paper prints, by table; the file names the source of each."""
+    import yaml
+
     return yaml.safe_load(files("finlab.evaluation").joinpath("paper_figures.yaml").read_text("utf-8"))
