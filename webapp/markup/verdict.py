@@ -19,7 +19,7 @@ from webapp.theme import DELIVERED, MISSING, NEARLY, UNLEARNED, Rgb
 
 WORKING = "Working …"
 """What stands in place of a verdict while the present question has no answer."""
-SPOKEN = 0.3
+SPOKEN = 0.05
 """Share of the largest miss, each axis over its scale, from which another axis is spoken of, too."""
 
 PROVED = 1e-4
