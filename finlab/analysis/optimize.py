@@ -161,9 +161,9 @@ def _search(
 
     def cost(vectors: Array) -> Array:
         rows = vectors.reshape(len(moves.start), -1).T
-        return np.concatenate([some(rows[k : k + CHUNK]) for k in range(0, len(rows), CHUNK)])
+        return np.concatenate([chunk_cost(rows[k : k + CHUNK]) for k in range(0, len(rows), CHUNK)])
 
-    def some(effectiveness: Array) -> Array:
+    def chunk_cost(effectiveness: Array) -> Array:
         nonlocal best, least, found
         if cancelled is not None and cancelled():
             return np.full(len(effectiveness), np.inf)

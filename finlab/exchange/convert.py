@@ -33,7 +33,7 @@ WRITERS: dict[str, Callable[[Layout, Exchange, str], str]] = {
 FORM_OF = {".urdf": "urdf", ".sdf": "sdf", ".params": "px4"}
 FORM_OF |= {".cpp": "ardusub", ".csv": "matrix", ".yaml": "layout", ".yml": "layout", ".json": "layout"}
 """What a suffix stands for where the user does not say."""
-FOREIGN = (".urdf", ".sdf", ".params", ".cpp")
+FOREIGN = tuple(suffix for suffix, form in FORM_OF.items() if form not in ("layout", "matrix"))
 """Suffixes of robot descriptions, and of what autopilots read."""
 
 

@@ -3,6 +3,7 @@
 import viser
 
 from finlab.allocation.methods import METHODS, method_class
+from finlab.deploy.design_files import LAYOUTS
 from finlab.exchange import FOREIGN
 from finlab.layout import Layout
 from webapp.handles import add_html
@@ -14,7 +15,7 @@ from webapp.session.lessons import LESSONS, TOUR, Stop
 from webapp.session.state import LEAST, least_of
 from webapp.tasks.designs import KINDS
 
-DESIGNS = ",".join((".yaml", ".yml", ".json", ".zip", *FOREIGN))
+DESIGNS = ",".join((*LAYOUTS, ".zip", *FOREIGN))
 METHOD_WORDS = {
     "dual": "least watts, exact, any actuator",
     "mdn": "least effort, a network proposes, made exact",
