@@ -5,6 +5,7 @@ from dataclasses import dataclass, fields
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finlab.arrays import Array
 
@@ -91,23 +92,34 @@ class Solution(NamedTuple):
     """Gives the raw candidates before refinement, for a single target."""
     prices: Array | None = None
     """What one more unit of each axis of the wrenches costs (N, 6) [W/N, W/(N m)], where the method tells."""
+    notes: tuple[str, ...] = ()
+    """Sentences about these answers."""
 
 
-def joined(parts: Iterable[tuple[Solution, Array]], count: int, n: int) -> Solution:
-    """Returns solutions for `count` targets one after the other, each with its commands among those of all n
-    actuators."""
+Rows = slice | NDArray[np.intp]
+"""Places of targets."""
+
+
+def joined(parts: Iterable[tuple[Rows, Solution, Array]], count: int, n: int) -> Solution:
+    """Returns one solution for `count` targets of those for some of them, each with its commands among those of
+    all n actuators."""
     command = np.full((count, n, 3), np.nan)
-    bounds: list[Callable[[], Array]] = []
+    bounds: list[tuple[Rows, Callable[[], Array]]] = []
     wrench: Array | None = None
-    start = 0
-    for part, among_all in parts:
-        rows = slice(start, start + len(among_all))
-        start = rows.stop
+    notes: dict[str, None] = {}
+    for rows, part, among_all in parts:
         command[rows] = among_all
+        notes |= dict.fromkeys(part.notes)
         if part.bound is not None:
-            bounds.append(part.bound)
+            bounds.append((rows, part.bound))
         if part.wrench is not None:
             wrench = np.empty((count, 6)) if wrench is None else wrench
             wrench[rows] = part.wrench
-    bound = (lambda: np.concatenate([part() for part in bounds])) if bounds else None
-    return Solution(command, bound, wrench)
+
+    def bound() -> Array:
+        found = np.empty(count)
+        for rows, part in bounds:
+            found[rows] = part()
+        return found
+
+    return Solution(command, bound if bounds else None, wrench, notes=tuple(notes))
