@@ -196,8 +196,8 @@ class Allocator:
         """Commands for one target.
 
         Args:
-            wrench: desired wrench (6,) [N, N m] in the body frame; NaN for an axis that does not count here,
-                which takes what the cheapest answer gives it, as those do that the layout does not command.
+            wrench: desired wrench (6,) [N, N m] in the body frame; NaN for an axis that is free here: it
+                takes what the cheapest answer gives it, as those do that the layout does not command.
             failed: names of fins that do not work; they leave the graph.
             previous: command (n, 3) of the previous tick: what follows stays within the rates of the
                 actuators. Or the answer that gave it: the search then begins there, which is quicker.
@@ -211,8 +211,8 @@ class Allocator:
             seed: the same target and seed give the same answer.
 
         Raises:
-            CommandError: the wrench is not six numbers, or none of them counts, or `previous`, `reference` or `flow` has
-                another shape.
+            CommandError: the wrench is not six numbers, none of them counts, or `previous`, `reference` or
+                `flow` has another shape.
             AllocationError: the method does not know the policy.
             LayoutError: an unknown fin, or none left.
             DataError: a fin's force table cannot be read.
@@ -238,13 +238,14 @@ class Allocator:
         solution = method.solve(
             target[None], policy=policy, previous=before, flow=water, seed=seed, **options
         )
-        command = solution.command if before is not None else method.plant.rested(solution.command)
+        if before is None:
+            solution = solution._replace(command=method.plant.rested(solution.command))
         solve_ms = (time.perf_counter() - start) * 1e3
         return Allocation(
             **self._about(
                 np.where(counts, target, np.nan), asked, ready, solution, policy, health, water, seed
             ),
-            command=fins.among_all(command)[0].copy(),
+            command=fins.among_all(solution.command)[0].copy(),
             solve_ms=solve_ms,
             settings=vars(self.settings).copy(),
             previous=None if before is None else fins.among_all(before),
@@ -286,15 +287,16 @@ class Allocator:
         ready.method.check_policy(policy)
         start = time.perf_counter()
 
-        def parts() -> Iterator[tuple[Rows, Solution, Array]]:
+        def parts() -> Iterator[tuple[Rows, Solution]]:
             for axes, places in same_axes(self._layout, asked):
                 one = self._ready(failed, health, axes)
                 for rows in chunks_of(places, len(asked)):
-                    target = np.where(one.method.layout.commanded, asked[rows], 0.0)
+                    counts = one.method.layout.commanded
+                    target = asked[rows] if counts.all() else np.where(counts, asked[rows], 0.0)
                     part = one.method.solve(target, policy=policy, flow=water, seed=seed + first_of(rows))
-                    yield rows, part, fins.among_all(one.method.plant.rested(part.command))
+                    yield rows, part._replace(command=one.method.plant.rested(part.command))
 
-        solution = joined(parts(), len(asked), len(fins.alive))
+        solution = joined(parts(), len(asked), fins.alive)
         counts = self._layout.commanded
         targets = asked if counts.all() else np.where(counts, asked, np.nan)
         elapsed_ms = (time.perf_counter() - start) * 1e3
@@ -320,12 +322,10 @@ class Allocator:
         fins = ready.fins
         later = Later(
             ready.plant.at(flow),
-            partial(
-                answer_notes, fins.healthy, ready.method, self.checkpoint, flow, asked, solution.notes
-            ),
+            partial(answer_notes, fins.healthy, ready.method, self.checkpoint, flow, asked, solution.notes),
             partial(_among_all, solution.candidates, fins),
             partial(_among_all, solution.samples, fins),
-            *(() if solution.bound is None else (solution.bound,)),
+            *(() if solution.bound is None else (partial(solution.bound, solution.command),)),
         )
         return {
             "target": target,

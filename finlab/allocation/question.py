@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from finlab.allocation.solution import among_all
 from finlab.arrays import Array
 from finlab.errors import AllocationError, CommandError
 from finlab.layout import Layout
@@ -37,11 +38,7 @@ class Fins(NamedTuple):
 
     def among_all(self, command: Array) -> Array:
         """Commands (..., m, 3) of the healthy fins put among all n; the failed ones hold NaN."""
-        if len(self.alive) == command.shape[-2]:
-            return command
-        full = np.full((*command.shape[:-2], len(self.alive), 3), np.nan)
-        full[..., self.alive, :] = command
-        return full
+        return among_all(command, self.alive)
 
 
 def usable_fins(layout: Layout, failed: Sequence[str], health: Health | None = None) -> Fins:
@@ -79,8 +76,8 @@ def _numbers(values: ArrayLike, name: str, expected: str, copy: bool = True) -> 
 
 
 def check_wrenches(wrench: ArrayLike, *, single: bool, name: str = "wrench") -> Array:
-    """One wrench (6,) or many (N, 6) as float64, NaN for an axis that does not count, or a `CommandError` that
-    says what is wrong with what is called `name`. Arrays of many are not copied."""
+    """One wrench (6,) or many (N, 6) as float64, NaN for an axis that does not count, or a `CommandError`
+    that says what is wrong with what is called `name`. Arrays of many are not copied."""
     expected = "six numbers [Fx, Fy, Fz, Tx, Ty, Tz]" if single else "an array of shape (N, 6)"
     array = _numbers(wrench, name, f"{expected} in N and N m", copy=single)
     if array.shape != (6,) if single else (array.ndim != 2 or array.shape[1] != 6):
@@ -90,7 +87,7 @@ def check_wrenches(wrench: ArrayLike, *, single: bool, name: str = "wrench") -> 
         axis = AXES[int(np.argwhere(bad)[0][-1])]
         value = array[bad][0]
         raise CommandError(
-            f"{name}: {axis} must be at most {MAX_WRENCH:g} in size, or NaN where it does not count, got {value}"
+            f"{name}: {axis} must be at most {MAX_WRENCH:g} in size, or NaN where it is free, got {value}"
         )
     return array
 
@@ -106,15 +103,15 @@ def axes_of(layout: Layout, wrench: Array) -> Axes | None:
         return None
     if not asked.any():
         raise CommandError(
-            f"wrench: NaN on each axis that layout {layout.name} commands ({', '.join(layout.axes)}), expected a "
-            "number on one of them"
+            f"wrench: NaN on each axis that layout {layout.name} commands ({', '.join(layout.axes)}), "
+            "expected a number on one of them"
         )
     return tuple(axis for axis, counts in zip(AXES, asked, strict=True) if counts)
 
 
 def same_axes(layout: Layout, wrenches: Array) -> list[tuple[Axes | None, NDArray[np.intp] | None]]:
-    """Groups of wrenches (N, 6) that ask for the same axes: the axes as `axes_of` gives them, and their places;
-    None for all.
+    """Groups of wrenches (N, 6) that ask for the same axes: the axes as `axes_of` gives them, and their
+    places; None for all.
 
     Raises:
         CommandError: a wrench asks for no axis.

@@ -82,8 +82,9 @@ class Solution(NamedTuple):
 
     command: Array
     """Chosen commands (N, n, 3)."""
-    bound: Callable[[], Array] | None = None
-    """Gives the power (N,) [W] that no answer can undercut; None for methods that prove none."""
+    bound: Callable[[Array], Array] | None = None
+    """Gives the power (N,) [W] that no answer can undercut which gives the wrenches of the chosen commands
+    (N, n, 3); None for methods that prove none."""
     wrench: Array | None = None
     """Wrench (N, 6) that the method itself expects, where it has a model of its own."""
     candidates: Callable[[], Candidates] | None = None
@@ -96,19 +97,29 @@ class Solution(NamedTuple):
     """Sentences about these answers."""
 
 
+def among_all(command: Array, alive: NDArray[np.bool_]) -> Array:
+    """Commands (..., m, 3) of the actuators that are alive (n,) put among all n; the failed ones hold NaN."""
+    if len(alive) == command.shape[-2]:
+        return command
+    full = np.full((*command.shape[:-2], len(alive), 3), np.nan)
+    full[..., alive, :] = command
+    return full
+
+
 Rows = slice | NDArray[np.intp]
 """Places of targets."""
 
 
-def joined(parts: Iterable[tuple[Rows, Solution, Array]], count: int, n: int) -> Solution:
-    """Returns one solution for `count` targets of those for some of them, each with its commands among those of
-    all n actuators."""
-    command = np.full((count, n, 3), np.nan)
-    bounds: list[tuple[Rows, Callable[[], Array]]] = []
+def joined(parts: Iterable[tuple[Rows, Solution]], count: int, alive: NDArray[np.bool_]) -> Solution:
+    """Returns one solution for `count` targets and all n actuators, of which some are alive (n,), of
+    solutions for some targets and those that are alive."""
+    command = np.full((count, len(alive), 3), np.nan)
+    places = slice(None) if alive.all() else np.flatnonzero(alive)
+    bounds: list[tuple[Rows, Callable[[Array], Array]]] = []
     wrench: Array | None = None
     notes: dict[str, None] = {}
-    for rows, part, among_all in parts:
-        command[rows] = among_all
+    for rows, part in parts:
+        command[rows] = among_all(part.command, alive)
         notes |= dict.fromkeys(part.notes)
         if part.bound is not None:
             bounds.append((rows, part.bound))
@@ -116,10 +127,10 @@ def joined(parts: Iterable[tuple[Rows, Solution, Array]], count: int, n: int) ->
             wrench = np.empty((count, 6)) if wrench is None else wrench
             wrench[rows] = part.wrench
 
-    def bound() -> Array:
+    def bound(command: Array) -> Array:
         found = np.empty(count)
         for rows, part in bounds:
-            found[rows] = part()
+            found[rows] = part(command[rows][:, places])
         return found
 
     return Solution(command, bound if bounds else None, wrench, notes=tuple(notes))

@@ -7,12 +7,12 @@ import numpy as np
 from msgspec import Meta
 from numpy.typing import NDArray
 
-AXES = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
-"""The axes of a wrench, in order: forces [N] and torques [N m] along x forward, y left, z up."""
 Axis = Literal["Fx", "Fy", "Fz", "Tx", "Ty", "Tz"]
+AXES: tuple[Axis, ...] = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
+"""The axes of a wrench, in order: forces [N] and torques [N m] along x forward, y left, z up."""
 CommandedAxes = Annotated[
     tuple[Axis, ...],
-    Meta(min_length=1, max_length=6, description="axes of the wrench that the robot commands; others are free"),
+    Meta(min_length=1, max_length=6, description="axes of the wrench that the robot commands"),
 ]
 
 

@@ -176,8 +176,9 @@ class Plant:
         """Dead bands (n, 3) [N] of the commands that are forces; None where there is none."""
         bands = np.zeros((self.n, 3))
         for i, part in enumerate(self.layout.actuators):
-            if getattr(part, "dead_band", 0.0):
-                bands[i, part.LIMITS.index("force")] = part.dead_band
+            limits: tuple[str, ...] = getattr(part, "LIMITS", ())
+            if "force" in limits:
+                bands[i, limits.index("force")] = getattr(part, "dead_band", 0.0)
         return bands if bands.any() else None
 
     def rested(self, command: Array) -> Array:

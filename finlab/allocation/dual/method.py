@@ -115,7 +115,7 @@ class Dual(Method):
         """See `Method`. For a single target, Newton's method begins at `prices` (6,) [W/N, W/(N m)], where
         they are given."""
         if len(targets) == 0:
-            return Solution(np.empty((0, self.layout.n, 3)), lambda: np.empty(0))
+            return Solution(np.empty((0, self.layout.n, 3)), lambda _: np.empty(0))
         if (moved := self.at(flow)) is not self:
             return moved.solve(targets, policy=policy, previous=previous, seed=seed, prices=prices)
         if self.compiled.drags:
@@ -124,22 +124,22 @@ class Dual(Method):
 
     def _one_by_one(self, targets: Array, policy: Policy, previous: Array | None) -> Solution:
         """Answers of a robot whose drag has another price for each target."""
-        commands, bounds = [], np.empty(len(targets))
+        commands, proved = [], np.empty(len(targets))
         for i, target in enumerate(targets):
             other = copy(self)
-            other.compiled, bounds[i] = at_the_price_of_drag(self.compiled, target)
-            if bounds[i] == 0.0 and policy.kind == "direction":
+            other.compiled, proved[i] = at_the_price_of_drag(self.compiled, target)
+            if proved[i] == 0.0 and policy.kind == "direction":
                 low, high = 0.0, 1.0
                 for _ in range(ROUNDS):  # halve the share of the target that is within reach
                     share = 0.5 * (low + high)
                     found, bound = at_the_price_of_drag(self.compiled, share * target)
                     if bound > 0.0:
-                        low, other.compiled, bounds[i] = share, found, bound
+                        low, other.compiled, proved[i] = share, found, bound
                     else:
                         high = share
                 target = low * target
             commands.append(other._solve(target[None], policy, previous).command)
-        return Solution(np.concatenate(commands), None if self._unproved else lambda: bounds)
+        return Solution(np.concatenate(commands), None if self._unproved else lambda _: proved)
 
     def _solve(
         self, targets: Array, policy: Policy, previous: Array | None, prices: Array | None = None
@@ -151,12 +151,12 @@ class Dual(Method):
         notes = set()
         if policy.kind == "direction":
             for row in np.flatnonzero(~found.within):
-                notes.add(self._kept_on_the_ray(targets[row], row, aim, found, command))
+                notes.add(self._kept_on_the_ray(targets[row], int(row), aim, found, command))
         if previous is not None and not self._rates.allow(previous, command[0]):
             command = self._in_a_tick(aim, found, previous)
-        bound: Callable[[], Array] = partial(self._bound, command, aim, found)
+        bound: Callable[[Array], Array] = partial(self._bound, aim, found)
         if len(targets) > 1:
-            bound = partial(self._bound_again, targets, policy, command)
+            bound = partial(self._bound_again, targets, policy)
         notes |= self._not_held(targets[~found.within])
         return Solution(
             command, None if self._unproved else bound, prices=found.price, notes=tuple(sorted(notes - {""}))
@@ -192,14 +192,16 @@ class Dual(Method):
         """The sentence about axes that come together only, and that targets (N, 6) ask for apart."""
         robot = self.compiled.robot
         scaled = targets / robot.scale
-        left = np.abs(scaled - (scaled @ robot.basis) @ robot.basis.T) > NEARLY * np.abs(scaled).max(initial=0.0)
+        left = np.abs(scaled - (scaled @ robot.basis) @ robot.basis.T) > NEARLY * np.abs(scaled).max(
+            initial=0.0
+        )
         driven = np.array([axis not in self.undriven for axis in AXES])
         axes = [axis for axis, one in zip(AXES, left.any(axis=0) & driven, strict=True) if one]
         if not axes:
             return set()
         return {
-            f"no actuators give {' and '.join(axes)} apart as is asked: where one of them does not count, leave it "
-            "out of the layout's axes, or ask nan of it"
+            f"no actuators give {', '.join(axes)} apart as is asked: where one of them does not count, leave "
+            "it out of the layout's axes, or ask nan of it"
         }
 
     @property
@@ -208,19 +210,21 @@ class Dual(Method):
         size = np.abs(self.compiled.robot.effectiveness).max(axis=0)
         return tuple(axis for axis, most in zip(AXES, size, strict=True) if most <= NOTHING * size.max())
 
-    def _bound(self, command: Array, aim: Array, found: Forces) -> Array:
+    def _bound(self, aim: Array, found: Forces, command: Array) -> Array:
         """Power (N,) [W] that no answer undercuts which gives the wrenches that commands (N, n, 3) give."""
         given = wrench_of_forces(self.plant.force(command), self.plant.effectiveness)
         bound = proved_power(self.compiled, given, found.price)
         bound = np.where(self._error(command, aim) <= NEARLY, np.maximum(bound, found.value), bound)
         power = self.plant.power(command).sum(axis=-1)
-        rounded = (bound > power) & (bound <= power * (1.0 + NEARLY) + NEARLY * self.compiled.robot.largest_power)
+        rounded = (bound > power) & (
+            bound <= power * (1.0 + NEARLY) + NOTHING * self.compiled.robot.largest_power
+        )
         return np.where(rounded, power, bound)
 
     def _bound_again(self, targets: Array, policy: Policy, command: Array) -> Array:
-        """The same of answers to many targets (N, 6), whose prices are found again, so that nothing of them is
-        kept."""
-        return self._bound(command, *self._aimed(targets, policy))
+        """The same of answers to many targets (N, 6), whose prices are found again, so that nothing of them
+        is kept."""
+        return self._bound(*self._aimed(targets, policy), command)
 
     @property
     def _unproved(self) -> bool:
@@ -236,7 +240,7 @@ class Dual(Method):
         if not len(target):  # nothing pushes, such as rudders at rest
             nothing = np.zeros((len(robot.effectiveness), len(targets)))
             none = np.zeros((len(targets), 6))
-            return Forces(nothing, none, ~targets.any(axis=1), target, np.zeros(len(targets)), none)
+            return Forces(nothing, none, np.all(targets == 0.0, axis=1), target, np.zeros(len(targets)), none)
         root = solve(robot, target, sets, prices)
         within = root.solved.copy()
         if robot.basis.shape[1] < 6:
@@ -258,8 +262,8 @@ class Dual(Method):
         return Forces(force, robot.price(prices), within, prices, value, aim)
 
     def _cheaper_in_gaps(self, sets: Sets, near: Nearest, force: Array) -> None:
-        """Replaces forces (k,) that give a wrench out of reach in one part of sets with gaps by those of least
-        power in all of it, where they are found."""
+        """Replaces forces (k,) that give a wrench out of reach in one part of sets with gaps by those of
+        least power in all of it, where they are found."""
         robot = self.compiled.robot
         target = robot.target(near.wrench[None])
         root = solve(robot, target, sets)

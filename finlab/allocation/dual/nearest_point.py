@@ -10,6 +10,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finlab.arrays import Array
 from finlab.precision import NOTHING, ROUNDING
@@ -73,7 +74,7 @@ def nearest_point(
     return Mixture(forces, shares, miss)
 
 
-def _mixed(points: Array, shares: Array, target: Array) -> tuple[Array, Array]:
+def _mixed(points: Array, shares: Array, target: Array) -> tuple[Array, NDArray[np.intp]]:
     """Shares of the points (d, m) whose mixture is nearest to a target (d,), and which points these are."""
     kept = np.arange(len(shares))
     while len(kept) > 1:
@@ -102,13 +103,14 @@ def farthest_along(farthest: Farthest, rows: Array, ray: Array) -> Mixture:
         rows: coordinates (k, d) of a point per newton.
         ray: its end (d,).
     """
-    share, normal, found = 1.0, ray, None
-    for _ in range(MOST_POINTS):
+    share, normal = 1.0, ray
+    found, last = None, np.inf
+    while True:
         along, price = float(normal @ ray), rows @ normal
         bound = float(farthest(price) @ price) / along if along > 0.0 else 0.0
         share = min(max(bound, 0.0), share)
         found = nearest_point(farthest, rows, share * ray, found)
         normal = -found.miss
-        if share == 0.0 or float(np.linalg.norm(normal)) <= 2.0 * CLOSE_BY:
-            break
-    return found
+        if share == 0.0 or float(np.linalg.norm(normal)) <= 2.0 * CLOSE_BY or share >= last:
+            return found
+        last = share

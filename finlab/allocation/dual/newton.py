@@ -8,7 +8,7 @@ keeps the step finite and is adapted to what a step brought (Levenberg, Marquard
 steps are refused).
 """
 
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,7 +48,8 @@ class Prices(NamedTuple):
 
     def take(self, columns: NDArray[np.intp]) -> "Prices":
         """The same for some of the targets."""
-        return Prices(*(values[..., columns] for values in self))
+        parts: list[Any] = [values[..., columns] for values in self]
+        return Prices(*parts)
 
     def put(self, columns: NDArray[np.intp], found: "Prices") -> None:
         """Replaces what was found for some of the targets."""
@@ -256,8 +257,11 @@ def _many(robot: DualRobot, state: _State, sets: Sets, ridge: Array, most: Array
 
 
 def _columns(state: _State, columns: NDArray[np.intp]) -> _State:
-    return _State(*(values[..., columns] for values in state))
+    parts: list[Any] = [None if values is None else values[..., columns] for values in state]
+    return _State(*parts)
 
 
 def _merged(good: NDArray[np.bool_], trial: _State, state: _State) -> _State:
-    return _State(*(np.where(good, new, old) for new, old in zip(trial, state, strict=True)))
+    both: Any = zip(trial, state, strict=True)
+    parts: list[Any] = [None if new is None else np.where(good, new, old) for new, old in both]
+    return _State(*parts)

@@ -13,7 +13,7 @@ import numpy as np
 
 from finlab.allocation.dual.answers import Sets
 from finlab.allocation.dual.branch import halves
-from finlab.allocation.dual.nearest_point import CLOSE_BY, farthest_along, nearest_point
+from finlab.allocation.dual.nearest_point import CLOSE_BY, Mixture, farthest_along, nearest_point
 from finlab.allocation.dual.newton import solve
 from finlab.allocation.dual.robot import DualRobot
 from finlab.allocation.policy import Policy
@@ -73,7 +73,9 @@ def nearest(robot: DualRobot, sets: Sets, wrench: Array, policy: Policy, yardsti
     return cheapest(robot, part, force, inside, met)
 
 
-def _missed(robot: DualRobot, force: Array, wrench: Array, policy: Policy, yardstick: Array) -> tuple[float, ...]:
+def _missed(
+    robot: DualRobot, force: Array, wrench: Array, policy: Policy, yardstick: Array
+) -> tuple[float, ...]:
     """How much forces (k,) leave undone of a wrench (6,), by what counts to a policy."""
     missing = (wrench - robot.effectiveness.T @ force) / yardstick
     if policy.kind == "priority":
@@ -94,8 +96,8 @@ def cheapest(
     robot: DualRobot, sets: Sets, force: Array, inside: Array, wanted: Array | None = None
 ) -> Nearest:
     """The least power for the wrench that some forces (k,) give, or for one hardly apart (6,); where Newton's
-    method does not settle at the rim of what can be given, a little towards a wrench inside (6,), and else these
-    forces themselves."""
+    method does not settle at the rim of what can be given, a little towards a wrench inside (6,), and else
+    these forces themselves."""
     wrench = robot.effectiveness.T @ force
     aims = [wrench, wrench + NEARLY * (inside - wrench)]
     for aim in aims if wanted is None else [wanted, *aims]:
@@ -125,7 +127,8 @@ def priority(robot: DualRobot, sets: Sets, wrench: Array, policy: Policy, yardst
     A group that asks for more than there is pulls at the axes that are held: it is served twice, the second
     time with what it misses shortened to `PULL`, which has the same nearest point.
     """
-    held, aim, near = np.zeros(6), np.array(wrench), None
+    held, aim = np.zeros(6), np.array(wrench)
+    near: Mixture | None = None
     for group in policy.groups:
         weight, close = (HELD * held + group) / yardstick, CLOSE_BY * (HELD if held.any() else 1.0)
         rows = robot.effectiveness * weight
@@ -136,6 +139,7 @@ def priority(robot: DualRobot, sets: Sets, wrench: Array, policy: Policy, yardst
             aim = np.where(group, got + min(1.0, PULL / max(missed, PULL)) * (wrench - got), aim)
         held = np.maximum(held, group)
         aim = np.where(group & (missed > NEARLY), got, aim)
+    assert near is not None  # there is a group
     return near.force
 
 

@@ -15,6 +15,7 @@ from finlab.arrays import Array
 from finlab.layout.angles import wrapped
 from finlab.physics.plant import Plant
 
+
 class Box(NamedTuple):
     """Commands that may follow a previous one."""
 
