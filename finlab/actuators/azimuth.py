@@ -61,6 +61,7 @@ class AzimuthGroup(Group):
         """Takes turning thrusters and the wrench (m, 3, 6) per newton along each own axis."""
         self._lower = np.array([azimuth.lower for azimuth in azimuths])
         self._upper = np.array([azimuth.upper for azimuth in azimuths])
+        self._power = ThrustPower([azimuth.model for azimuth in azimuths])
         middle, half = _arcs(self._lower[:, 0], self._upper[:, 0])
         self.responses = [
             Plane(
@@ -84,6 +85,10 @@ class AzimuthGroup(Group):
         command[..., 0] = middle + wrapped(angle - middle)
         command[..., 1] = size
         return np.clip(command, self._lower, self._upper)
+
+    def radial_worth(self, price: Array) -> Array:
+        """See `Group`."""
+        return self._power.worth(price, self._lower[:, 1], self._upper[:, 1])
 
     def reach(self, lower: Array, upper: Array) -> Array:
         """See `Group`."""

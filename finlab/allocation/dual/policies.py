@@ -13,6 +13,7 @@ import numpy as np
 
 from finlab.allocation.dual.answers import Sets
 from finlab.allocation.dual.branch import halves
+from finlab.allocation.dual.deadline import Deadline
 from finlab.allocation.dual.nearest_point import CLOSE_BY, Mixture, farthest_along, nearest_point
 from finlab.allocation.dual.newton import solve
 from finlab.allocation.dual.robot import DualRobot
@@ -39,7 +40,9 @@ class Nearest(NamedTuple):
     """Prices (r,) of it, at its least power."""
 
 
-def nearest(robot: DualRobot, sets: Sets, wrench: Array, policy: Policy, yardstick: Array) -> Nearest:
+def nearest(
+    robot: DualRobot, sets: Sets, wrench: Array, policy: Policy, yardstick: Array, deadline: Deadline
+) -> Nearest:
     """Forces for one wrench (6,) [N, N m] that no forces within the sets give.
 
     Sets with gaps are cut until the best answer of all parts lies in none.
@@ -50,6 +53,7 @@ def nearest(robot: DualRobot, sets: Sets, wrench: Array, policy: Policy, yardsti
         wrench: the target.
         policy: what counts.
         yardstick: scales (6,) of the missing wrench [N, N m].
+        deadline: when the search in gaps ends.
     """
 
     def served(part: Sets) -> tuple[tuple[float, ...], int, Array, Sets]:
@@ -62,7 +66,7 @@ def nearest(robot: DualRobot, sets: Sets, wrench: Array, policy: Policy, yardsti
     for round_ in range(ROUNDS + len(sets.high)):
         _, _, force, part = heapq.heappop(parts)
         cut = halves(robot, part, force)
-        if cut is None:
+        if cut is None or deadline.passed():
             break
         parts = parts if round_ < ROUNDS else []  # there are too many: the better half is taken
         for each in cut:
