@@ -34,7 +34,7 @@ from finlab.arrays import Array
 from finlab.layout.wrench_axes import AXES
 from finlab.networks.trained import TrainedWeights
 from finlab.physics.wrench import wrench_of_forces
-from finlab.precision import CLOSE, FINE, NEARLY, NOTHING, ROUNDS
+from finlab.precision import CLOSE, FINE, NEARLY, NOTHING, ROUNDING, ROUNDS
 
 EXACT = 1e-8
 """Error, on the robot's yardstick, up to which commands need no further step."""
@@ -244,7 +244,7 @@ class Dual(Method):
         rounded = (bound > power) & (
             bound <= power * (1.0 + NEARLY) + NOTHING * self.compiled.robot.largest_power
         )
-        return np.where(rounded, power, bound)
+        return np.where(rounded, power, bound) * (1.0 - ROUNDING)
 
     def _bound_again(self, targets: Array, policy: Policy, command: Array) -> Array:
         """The same of answers to many targets (N, 6), whose prices are found again, so that nothing of them

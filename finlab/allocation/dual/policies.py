@@ -103,7 +103,8 @@ def cheapest(
     method does not settle at the rim of what can be given, a little towards a wrench inside (6,), and else
     these forces themselves."""
     wrench = robot.effectiveness.T @ force
-    aims = [wrench, wrench + NEARLY * (inside - wrench)]
+    inwards = (inside - wrench) / max(1.0, float(np.linalg.norm((inside - wrench) / robot.scale)))
+    aims = [wrench, wrench + NEARLY * inwards]
     for aim in aims if wanted is None else [wanted, *aims]:
         found = solve(robot, robot.target(aim[None]), sets, way="one", most_steps=STEPS_AT_RIM)
         if found.solved[0]:
@@ -128,19 +129,21 @@ def direction(robot: DualRobot, sets: Sets, wrench: Array, policy: Policy, yards
 def priority(robot: DualRobot, sets: Sets, wrench: Array, policy: Policy, yardstick: Array) -> Array:
     """Forces (k,) [N] that serve groups of axes of a wrench (6,), each as far as those before it allow.
 
-    A group that asks for more than there is pulls at the axes that are held: it is served twice, the second
-    time with what it misses shortened to `PULL`, which has the same nearest point.
+    A group that asks for more than there is pulls at the axes that are held: it is served again with what it
+    misses shortened to `PULL`, which has the same nearest point.
     """
     held, aim = np.zeros(6), np.array(wrench)
     near: Mixture | None = None
     for group in policy.groups:
         weight, close = (HELD * held + group) / yardstick, CLOSE_BY * (HELD if held.any() else 1.0)
         rows = robot.effectiveness * weight
-        for _ in range(2 if held.any() else 1):
+        for _ in range(ROUNDS if held.any() else 1):
             near = nearest_point(robot.farthest(sets), rows, aim * weight, near, close)
             got = robot.effectiveness.T @ near.force
             missed = float(np.linalg.norm((wrench - got)[group] / yardstick[group]))
-            aim = np.where(group, got + min(1.0, PULL / max(missed, PULL)) * (wrench - got), aim)
+            if missed <= PULL or near.miss @ near.miss <= 4.0 * PULL**2:
+                break
+            aim = np.where(group, got + PULL / missed * (wrench - got), aim)
         held = np.maximum(held, group)
         aim = np.where(group & (missed > NEARLY), got, aim)
     assert near is not None  # there is a group
