@@ -106,7 +106,7 @@ def optimize_layout(
         LayoutError: something about the actuators, bounds, pairs, goal or axes does not fit; it says what.
         CommandError: `flow` is not six finite numbers, or `mission` not such wrenches.
     """
-    bounds, water, commanded = bounds or {}, check_flow(flow), layout.axes
+    bounds, water, start = bounds or {}, check_flow(flow), layout
     if axes is not None:
         layout = replace(layout, axes=named_axes(axes))
     known = {name: bounds.get(name) or Bounds.around(layout.actuators[layout.index(name)]) for name in names}
@@ -128,13 +128,13 @@ def optimize_layout(
     found, stopped = _search(moves, quick, before, clearance, broken, rounds, seed, progress, cancelled)
     best = moves.moved(found)
     after = measured(best)
-    layout, best = (replace(robot, axes=commanded) for robot in (layout, best))
+    best = replace(best, axes=start.axes)
     wrong = [float(broken(robot.position[None], robot.frames[None])[0]) for robot in (layout, best)]
     better = after > before + 1e-9 * abs(before)
     improved = wrong[1] <= 0.0 and (better or wrong[0] > 0.0)
-    card = score_card(layout, flow=water)
+    card = score_card(start, flow=water)
     return Improvement(
-        layout=best if improved else layout,
+        layout=best if improved else start,
         improved=improved,
         cancelled=stopped,
         goal=goal,
