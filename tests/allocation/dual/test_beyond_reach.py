@@ -1,4 +1,4 @@
-"""Policies beyond reach on random robots of thrusters, beside a linear programme and bounded least squares."""
+"""Policies beyond reach on robots of thrusters, beside a linear programme and least squares."""
 
 import itertools
 from functools import cache
