@@ -5,7 +5,7 @@ error on windows that its fit has not seen.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import sem
@@ -15,6 +15,7 @@ from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.fit.robot.estimate import DEVIATION, Fitted, Windows, cut, fit_windows, unseen_gain
 from finlab.fit.robot.model import RobotModel
+from finlab.fit.robot.signs import opposed_in, pushing_back
 from finlab.fit.robot.swim import STEP_S, Swim, smoothed
 from finlab.fit.robot.unknowns import BASE, SHAPE, Unknowns
 from finlab.layout import Layout
@@ -46,6 +47,8 @@ class RobotFit:
     other_law: bool | None
     """Whether another law of thrust lessens the error on windows not seen, and is used; None where none was
     tried."""
+    opposed: tuple[str, ...] = ()
+    """Actuators that push the other way than drawn; the layout of the model has them turned about."""
 
     @property
     def covariance(self) -> Array:
@@ -119,13 +122,27 @@ def fit_robot(
     """
     if not swims:
         raise DataError("expected at least one swim, got none")
-    with threadpool_limits(limits=1, user_api="blas"):
-        return _fit(RobotModel(layout, swims, doubts), swims, other_law and layout.is_of_fins, progress)
-
-
-def _fit(model: RobotModel, swims: Sequence[Swim], other_law: bool, tell: Callable[[str], None]) -> RobotFit:
-    measured = np.concatenate([swim.measured for swim in swims])
     smooth = np.concatenate([smoothed(swim.measured) for swim in swims])
+    with threadpool_limits(limits=1, user_api="blas"):
+
+        def fitted(robot: Layout, opposed: tuple[str, ...]) -> RobotFit:
+            model = RobotModel(robot, swims, doubts)
+            return replace(
+                _fit(model, swims, smooth, other_law and layout.is_of_fins, progress), opposed=opposed
+            )
+
+        names = pushing_back(RobotModel(layout, swims, doubts), swims, smooth)
+        fits = [fitted(opposed_in(layout, names), names)]
+        if names and fits[0].explained < SOUND:
+            fits.append(fitted(layout, ()))
+        return max(fits, key=lambda fit: fit.explained)
+
+
+def _fit(
+    model: RobotModel, swims: Sequence[Swim], smooth: Array, other_law: bool, tell: Callable[[str], None]
+) -> RobotFit:
+    """Fits actuators and body to swims, of which smoothed measurements (M, 12) tell where to begin."""
+    measured = np.concatenate([swim.measured for swim in swims])
     windows = cut([len(swim) for swim in swims], measured, smooth)
     model.meet(smooth[:, 6:])
     unknowns, deviation = Unknowns(model.blocks, BASE), DEVIATION
