@@ -4,6 +4,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finlab.arrays import Array
 from finlab.control.hypotheses import LEVELS, Hypotheses
@@ -17,6 +18,9 @@ from finlab.layout.damage import Damage
 
 LOST_BELOW = 0.2
 """A strength below which a fin is given up as lost."""
+OPPOSED_BELOW, OPPOSED_SURE = -0.3, 3.0
+"""A strength below which an actuator pushes the other way than the layout says, and standard deviations by which
+it lies below 0."""
 WHOLE_ABOVE = 0.9
 """A strength from which a fin that was torn is whole again."""
 HOLD_S = 0.2
@@ -89,6 +93,12 @@ class FaultMonitor:
         """Names of the fins that are taken for lost, torn or stuck."""
         marked = self._lost | self._torn | ~np.isnan(self._held)
         return tuple(self.layout.names[k] for k in np.flatnonzero(marked))
+
+    @property
+    def opposed(self) -> tuple[str, ...]:
+        """Names of those that push the other way than the layout says; the allocator does without them until
+        the layout is put right."""
+        return tuple(self.layout.names[k] for k in np.flatnonzero(self._lost & self._pushing_back()))
 
     @property
     def tells(self) -> bool:
@@ -188,6 +198,11 @@ class FaultMonitor:
     def _judge(self, other: Array) -> None:
         """Acts on what has become all but certain."""
         beliefs = self._beliefs
+        back = self._pushing_back() & ~self._lost
+        if beliefs.settled and back.any() and (self._lost | back).sum() < self.layout.n:
+            self._lost |= back
+            self._torn &= ~back
+            self._told &= ~back
         if True in self._torn.tolist():
             strength = beliefs.strength
             gone = self._torn & (strength < LOST_BELOW)
@@ -214,11 +229,16 @@ class FaultMonitor:
             return
         turned = kind == len(LEVELS)
         level = float(beliefs.strength[fin]) if turned else LEVELS[kind]
-        if level == 0.0 and self._lost.sum() == self.layout.n - 1:
+        if level < LOST_BELOW and self._lost.sum() == self.layout.n - 1:
             return  # the last one that works
         beliefs.adopt(fin, kind)
         self._told[fin] = False
         self._mark(fin, level, float(other[fin]) if turned else float(self._held[fin]))
+
+    def _pushing_back(self) -> NDArray[np.bool_]:
+        """Which actuators (n,) surely push the other way than the layout says."""
+        strength = self._beliefs.strength
+        return (strength < OPPOSED_BELOW) & (strength < -OPPOSED_SURE * self._beliefs.strength_std)
 
     def _lose_both(self, pair: int) -> None:
         """Two fins are lost at one moment."""

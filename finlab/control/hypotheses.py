@@ -14,8 +14,8 @@ from finlab.arrays import Array
 from finlab.control.monitor_settings import MonitorSettings
 from finlab.control.motion_model import CURRENT, FIRST_FIN, MOTION, RISING, STRENGTH, TILT, TORQUE, Step
 
-LEVELS = (0.0, 0.35, 0.7, 1.0)
-"""Strengths that a fin may suddenly have."""
+LEVELS = (0.0, -1.0, 0.35, 0.7, 1.0)
+"""Strengths that a fin may suddenly have; a motor that is wired wrongly has -1."""
 LOSSES = 0.6
 """Share of all events that are losses."""
 TOGETHER = 0.1
