@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.arrays import Array
-from finlab.control.hypotheses import LEVELS, Hypotheses
+from finlab.control.hypotheses import LEVELS, OPPOSED, Hypotheses
 from finlab.control.measurement import Measurement
 from finlab.control.monitor_settings import MonitorSettings
 from finlab.control.motion_model import MotionModel
@@ -81,6 +81,7 @@ class FaultMonitor:
         self._torn = np.zeros(n, dtype=bool)
         self._lost = np.zeros(n, dtype=bool)
         self._told = np.zeros(n, dtype=bool)
+        self._back = np.zeros(n, dtype=bool)
         self._suspect, self._sure = 0, 0
         self._held = np.full(n, np.nan)
         self._since = self._model.motion.direction.copy()
@@ -98,7 +99,7 @@ class FaultMonitor:
     def opposed(self) -> tuple[str, ...]:
         """Names of those that push the other way than the layout says; the allocator does without them until
         the layout is put right."""
-        return tuple(self.layout.names[k] for k in np.flatnonzero(self._lost & self._pushing_back()))
+        return tuple(self.layout.names[k] for k in np.flatnonzero(self._back))
 
     @property
     def tells(self) -> bool:
@@ -198,11 +199,10 @@ class FaultMonitor:
     def _judge(self, other: Array) -> None:
         """Acts on what has become all but certain."""
         beliefs = self._beliefs
-        back = self._pushing_back() & ~self._lost
-        if beliefs.settled and back.any() and (self._lost | back).sum() < self.layout.n:
-            self._lost |= back
-            self._torn &= ~back
-            self._told &= ~back
+        back = self._pushing_back() & ~self._back
+        if back.any() and (self._lost | back).sum() < self.layout.n:
+            for fin in np.flatnonzero(back):
+                self._mark(int(fin), -1.0, math.nan)
         if True in self._torn.tolist():
             strength = beliefs.strength
             gone = self._torn & (strength < LOST_BELOW)
@@ -212,10 +212,11 @@ class FaultMonitor:
                 for index in np.flatnonzero(gone):
                     beliefs.believe(int(index), 0.0)
             self._torn &= strength < WHOLE_ABOVE
-        if beliefs.doubt < self.settings.threshold or not beliefs.settled:
+        if beliefs.doubt < self.settings.threshold:
             self._sure = 0
             return
-        by_kind, total = beliefs.probability, beliefs.changed
+        by_kind = beliefs.probability
+        total = beliefs.changed if beliefs.settled else by_kind[:, OPPOSED]
         fin = int(total.argmax())
         sure = float(total[fin]) >= self.settings.threshold
         self._sure = (self._sure + 1 if fin == self._suspect else 1) if sure else 0
@@ -248,6 +249,6 @@ class FaultMonitor:
             self._mark(fin, 0.0, math.nan)
 
     def _mark(self, fin: int, strength: float, stuck: float) -> None:
-        self._lost[fin] = strength < LOST_BELOW
+        self._lost[fin], self._back[fin] = strength < LOST_BELOW, strength < OPPOSED_BELOW
         self._torn[fin] = LOST_BELOW <= strength < WHOLE_ABOVE
         self._held[fin] = stuck if strength >= LOST_BELOW else math.nan
