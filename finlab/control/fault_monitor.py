@@ -25,6 +25,8 @@ WHOLE_ABOVE = 0.9
 """A strength from which a fin that was torn is whole again."""
 HOLD_S = 0.2
 """A belief is acted on once it has been certain for so long [s]: a single odd sample decides nothing."""
+HOLD_EARLY_S = 0.5
+"""The same before current and trim are learned, when only what pushes the other way is acted on [s]."""
 ASTRAY = 1e4
 """A misfit of the motion, a variance over that of the settings, from which on nothing can be told of it."""
 COARSE = 0.05
@@ -221,7 +223,7 @@ class FaultMonitor:
         sure = float(total[fin]) >= self.settings.threshold
         self._sure = (self._sure + 1 if fin == self._suspect else 1) if sure else 0
         self._suspect = fin
-        if self._sure * self.period_s < HOLD_S - 1e-9:
+        if self._sure * self.period_s < (HOLD_S if beliefs.settled else HOLD_EARLY_S) - 1e-9:
             return
         kind = int(by_kind[fin].argmax())
         both = np.where((beliefs.pairs == fin).any(axis=1), beliefs.both, 0.0)
