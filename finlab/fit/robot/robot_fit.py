@@ -32,6 +32,9 @@ WEAKLY_KNOWN = 0.1
 """Standard error of an actuator's strength beside those of the others, as a share, that is worth a doubt."""
 DEVIATION_RANGE = (0.1, 30.0)
 """Deviations of sensors within these multiples of what is believed."""
+FAINT, CLEAR = 0.2, 20.0
+"""Strength below which an actuator is tried as one that pushes the other way, and by how much the logarithm of the
+likelihood must grow by that."""
 NO_DOUBTS: Mapping[str, float] = {}
 ROUNDS = 2
 """Times that deviations are estimated and the base fitted again."""
@@ -47,6 +50,8 @@ class RobotFit:
     other_law: bool | None
     """Whether another law of thrust lessens the error on windows not seen, and is used; None where none was
     tried."""
+    unlikely: float = 0.0
+    """Negative logarithm of the likelihood of what was measured, but for a constant."""
     opposed: tuple[str, ...] = ()
     """Actuators that push the other way than drawn; the layout of the model has them turned about."""
 
@@ -132,10 +137,17 @@ def fit_robot(
             )
 
         names = pushing_back(RobotModel(layout, swims, doubts), swims, smooth)
-        fits = [fitted(opposed_in(layout, names), names)]
-        if names and fits[0].explained < SOUND:
-            fits.append(fitted(layout, ()))
-        return max(fits, key=lambda fit: fit.explained)
+        best = fitted(opposed_in(layout, names), names)
+        if names and best.explained < SOUND:
+            best = max(best, fitted(layout, ()), key=lambda fit: fit.explained)
+        while (strength := best.found("strength")).min() < np.log(FAINT):
+            other = best.opposed, (layout.names[int(strength.argmin())],)
+            turned = tuple(sorted(set(other[0]) ^ set(other[1]), key=layout.index))
+            fit = fitted(opposed_in(layout, turned), turned)
+            if fit.found("strength")[strength.argmin()] < np.log(FAINT) or fit.unlikely > best.unlikely - CLEAR:
+                break
+            best = fit
+        return best
 
 
 def _fit(
@@ -172,7 +184,9 @@ def _fit(
     fitted = fit_windows(model, fitted.unknowns, windows, deviation, fitted.vector, fitted.start)
     if not np.isfinite(fitted.vector).all():
         raise DataError(f"{swims[0].name}: the fit goes astray; is the layout that of the robot that swam?")
-    return RobotFit(model, fitted, _explained(fitted, windows), helps)
+    said = np.isfinite(fitted.residual).sum(axis=(0, 2))
+    unlikely = float(fitted.cost[0] + said @ np.log(deviation))
+    return RobotFit(model, fitted, _explained(fitted, windows), helps, unlikely)
 
 
 def _deviation(fitted: Fitted, deviation: Array) -> Array:
