@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from finlab.allocation.dual.rates import Rates
 from finlab.arrays import Array
 from finlab.control.hypotheses import LEVELS, OPPOSED, Hypotheses
 from finlab.control.measurement import Measurement
@@ -15,6 +16,7 @@ from finlab.control.probe import Probe
 from finlab.layout import Body, Layout
 from finlab.layout.angles import TURN
 from finlab.layout.damage import Damage
+from finlab.physics import plant_of
 
 LOST_BELOW = 0.2
 """A strength below which a fin is given up as lost."""
@@ -84,6 +86,8 @@ class FaultMonitor:
         self._lost = np.zeros(n, dtype=bool)
         self._told = np.zeros(n, dtype=bool)
         self._back = np.zeros(n, dtype=bool)
+        self._rates = Rates.of(plant_of(layout), layout.rates, period_s)
+        self._sent, self._coming_back = np.full((n, 3), np.nan), np.zeros(n, dtype=bool)
         self._suspect, self._sure = 0, 0
         self._held = np.full(n, np.nan)
         self._since = self._model.motion.direction.copy()
@@ -147,7 +151,10 @@ class FaultMonitor:
         """Takes the robot for another one with the same body: what is not lost is as that layout says."""
         self.layout = layout
         self._model.adopt(layout)
+        self._rates = Rates.of(plant_of(layout), layout.rates, self.period_s)
         self._torn[:] = False
+        self._lost &= ~self._back
+        self._back[:] = False
         for k in np.flatnonzero(~self._lost):
             self._beliefs.believe(int(k), 1.0)
 
@@ -156,10 +163,18 @@ class FaultMonitor:
 
         Now and then a fin that the monitor has called lost beats for two seconds: if it gives nothing by it,
         it is lost, and of one that has been repaired the robot feels it, and takes it back. Fins that all but
-        rest push a little, see `MonitorSettings.least_push`.
+        rest push a little, see `MonitorSettings.least_push`. Both change no faster than the rates of the drives
+        allow from what was returned last, as does the way back to what is commanded.
         """
         lost, direction = self._lost & ~self._told, self._model.motion.direction
-        return self._probe.added(command, lost, direction)
+        wanted = self._probe.added(command, lost, direction)
+        own = (np.isfinite(wanted[:, :1]) & ~(wanted == command)).any(axis=1) | self._coming_back
+        rests = np.isnan(self._sent[:, :1])
+        box = self._rates.box(np.where(rests, self._model.motion.command, self._sent))
+        result = np.where(own[:, None], box.clipped(wanted), wanted)
+        self._coming_back = (np.isfinite(result) & ~(result == command)).any(axis=1)
+        self._sent = result
+        return result
 
     def verdict(self) -> Diagnosis:
         """What is believed now."""
