@@ -144,7 +144,10 @@ def fit_robot(
             other = best.opposed, (layout.names[int(strength.argmin())],)
             turned = tuple(sorted(set(other[0]) ^ set(other[1]), key=layout.index))
             fit = fitted(opposed_in(layout, turned), turned)
-            if fit.found("strength")[strength.argmin()] < np.log(FAINT) or fit.unlikely > best.unlikely - CLEAR:
+            if (
+                fit.found("strength")[strength.argmin()] < np.log(FAINT)
+                or fit.unlikely > best.unlikely - CLEAR
+            ):
                 break
             best = fit
         return best
