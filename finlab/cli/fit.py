@@ -48,8 +48,8 @@ def actuator(
 
     The table has a command (PWM, or input from -1 to 1, or rpm), force, and power or voltage and
     current, and perhaps torque; units stand in the header, `force [kgf]`. Commands may be repeated. What is
-    printed goes into a layout. `finlab fit fin` is for fins. A workbook (.xlsx) has a table in a sheet, one or
-    several.
+    printed goes into a layout. `finlab fit fin` is for fins. Of a workbook (.xlsx) all sheets are
+    read that hold a table.
 
     Args:
         data: CSV files or workbooks of one thruster.

@@ -21,8 +21,8 @@ from finlab.physics import plant_of
 LOST_BELOW = 0.2
 """A strength below which a fin is given up as lost."""
 OPPOSED_BELOW, OPPOSED_SURE = -0.3, 3.0
-"""A strength below which an actuator pushes the other way than the layout says, and standard deviations by which
-it lies below 0."""
+"""A strength below which an actuator pushes the other way than the layout says, and standard deviations
+by which it lies below 0."""
 WHOLE_ABOVE = 0.9
 """A strength from which a fin that was torn is whole again."""
 HOLD_S = 0.2
@@ -163,8 +163,8 @@ class FaultMonitor:
 
         Now and then a fin that the monitor has called lost beats for two seconds: if it gives nothing by it,
         it is lost, and of one that has been repaired the robot feels it, and takes it back. Fins that all but
-        rest push a little, see `MonitorSettings.least_push`. Both change no faster than the rates of the drives
-        allow from what was returned last, as does the way back to what is commanded.
+        rest push a little, see `MonitorSettings.least_push`. Both change no faster than the rates of the
+        drives allow from what was returned last, as does the way back to what is commanded.
         """
         lost, direction = self._lost & ~self._told, self._model.motion.direction
         wanted = self._probe.added(command, lost, direction)
@@ -218,8 +218,8 @@ class FaultMonitor:
         beliefs = self._beliefs
         back = self._pushing_back() & ~self._back
         if back.any() and (self._lost | back).sum() < self.layout.n:
-            for fin in np.flatnonzero(back):
-                self._mark(int(fin), -1.0, math.nan)
+            for each in np.flatnonzero(back):
+                self._mark(int(each), -1.0, math.nan)
         if True in self._torn.tolist():
             strength = beliefs.strength
             gone = self._torn & (strength < LOST_BELOW)

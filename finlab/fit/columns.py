@@ -20,17 +20,20 @@ LONGEST, MOST_BLANKS = 120, 10_000
 """Characters of a header that count, without and with its blanks."""
 ALIKE = 0.01
 """Share of the largest value by which two columns of one quantity may differ."""
+_SAME_UNIT = {
+    "newton newtons": 1.0, "gf g grams gram-force": 9.80665e-3, "kgf kg kgs kg-f kilograms kp": 9.80665,
+    "lbf lb lbs lbsf lb-f pounds": 4.44822, "ozf oz": 0.278014, "watts volts amps": 1.0,
+    "us µs μs usec microseconds": 1.0, "ms msec milliseconds": 1e3, "nm n-m": 1.0, "ncm": 0.01,
+    "kgfm kgm": 9.80665, "kgcm kgfcm": 0.0980665, "gcm gfcm": 9.80665e-5, "ozin ozfin": 7.06155e-3,
+    "inlb inlbf lbin lbfin": 0.112985, "ftlb ftlbf lbft lbfft": 1.35582,
+}  # fmt: skip
+"""Spellings of units that the header of a bench may name."""
 UNITS = {
     "rad": 1.0, "deg": math.pi / 180.0, "°": math.pi / 180.0,
     "hz": 1.0, "rpm": 1.0 / 60.0, "bpm": 1.0 / 60.0, "rev/min": 1.0 / 60.0, "rad/s": 1.0 / TURN,
-    "n": 1.0, "mn": 1e-3, "kn": 1e3, "w": 1.0, "mw": 1e-3, "kw": 1e3, "v": 1.0, "a": 1.0, "ma": 1e-3,
-    **dict.fromkeys(("gf", "g", "grams", "gramf", "gram-force"), 9.80665e-3), "newton": 1.0, "newtons": 1.0,
-    **dict.fromkeys(("kgf", "kg", "kgs", "kg-f", "kilograms", "kilogram-force", "kp"), 9.80665),
-    **dict.fromkeys(("lbf", "lb", "lbs", "lbsf", "lb-f", "pounds", "pound-force"), 4.44822),
-    **dict.fromkeys(("ozf", "oz"), 0.278014), "volts": 1.0, "amps": 1.0, "watts": 1.0, "usec": 1.0,
-    "microseconds": 1.0, "milliseconds": 1e3, "msec": 1e3, "ozin": 7.0615518e-3, "inlb": 0.112985, "lbin": 0.112985,
-    "ftlb": 1.35582, "lbft": 1.35582, "inlbf": 0.112985, "lbfin": 0.112985, "n-m": 1.0, "kgcm": 0.0980665, "ncm": 0.01,
-    "kgfm": 9.80665, "gcm": 9.80665e-5, "gfcm": 9.80665e-5, "nm": 1.0, "mnm": 1e-3, "us": 1.0, "µs": 1.0, "μs": 1.0, "ms": 1e3, "%": 0.01, "-": 1.0,
+    "n": 1.0, "mn": 1e-3, "kn": 1e3, "w": 1.0, "mw": 1e-3, "kw": 1e3, "v": 1.0, "mv": 1e-3,
+    "a": 1.0, "ma": 1e-3, "mnm": 1e-3, "%": 0.01, "-": 1.0,
+    **{unit: scale for units, scale in _SAME_UNIT.items() for unit in units.split()},
 }  # fmt: skip
 """Units that a header may name, in SI (frequencies in Hz, pulses in us)."""
 

@@ -14,17 +14,18 @@ from finlab.fit.columns import Columns, named_column, read_columns, taken_column
 from finlab.fit.voltages import Rows, at_voltage, by_voltage
 from finlab.fit.workbook import sheets
 
-NAMES = {
-    **dict.fromkeys(("pwm", "pulse", "pulse_width", "pulsewidth", "pwm_signal", "pwm_value", "pwm_input", "pwm_width", "esc",
-                     "esc_signal", "esc_pwm", "esc_input", "servo_signal", "signal"), "PWM"),
-    "rpm": "rpm", "motor_speed": "rpm", "speed": "rpm",
-    **dict.fromkeys(("input", "command", "throttle", "esc_throttle", "motor_throttle", "duty", "duty_cycle"), "input"),
-    **dict.fromkeys(("force", "thrust", "thrust_force", "total_thrust", "measured_thrust", "measured_force"), "force"),
-    **dict.fromkeys(("power", "p", "electrical_power", "electric_power", "input_power", "power_in"), "power"),
-    **dict.fromkeys(("voltage", "volts", "supply_voltage", "input_voltage", "battery_voltage", "bus_voltage"), "voltage"),
-    **dict.fromkeys(("current", "amps", "supply_current", "input_current", "battery_current"), "current"),
-    "torque": "torque", "motor_torque": "torque",
-}  # fmt: skip
+_WORDS = {
+    "PWM": "pwm pulse pulse_width pulsewidth pwm_signal pwm_value pwm_input pwm_width signal servo_signal "
+    "esc esc_signal esc_pwm esc_input",
+    "rpm": "rpm speed motor_speed",
+    "input": "input command throttle esc_throttle motor_throttle duty duty_cycle",
+    "force": "force thrust thrust_force total_thrust measured_thrust measured_force",
+    "power": "power p electrical_power electric_power input_power power_in",
+    "voltage": "voltage volts supply_voltage input_voltage battery_voltage bus_voltage",
+    "current": "current amps supply_current input_current battery_current",
+    "torque": "torque motor_torque",
+}
+NAMES = {word: name for name, words in _WORDS.items() for word in words.split()}
 COMMANDS = {"PWM": "us", "input": "", "rpm": "rpm"}
 """Columns of commands with their units; the first that a file has is taken."""
 EXPECTED = (
@@ -37,7 +38,8 @@ TAKEN = {"PWM": "us", "force": "N", "power": "W", "voltage": "V", "current": "A"
 PULSES = ("us", "µs", "μs", "ms", "usec", "msec", "microseconds", "milliseconds")
 """Units of pulses, as a header may name them."""
 UNSIGNED, PUSHES = 0.03, 0.1
-"""Shares of the largest force: up to which a thruster rests, and from which on a side of the neutral pushes."""
+"""Shares of the largest force: up to which a thruster rests, and from which on one pushes on either side of
+the neutral command."""
 MIN_COMMANDS = 5
 """Fewest different commands."""
 NEGATIVE = 0.02
@@ -123,8 +125,7 @@ def _renamed(columns: Columns) -> Columns:
     """A throttle that is told as a pulse is one."""
     header = columns.headers.get("input", "")
     if header and "PWM" not in columns.values and named_column(header, NAMES).unit in PULSES:
-        for held in (columns.values, columns.headers):
-            held["PWM"] = held.pop("input")  # type: ignore[attr-defined]
+        columns.values["PWM"], columns.headers["PWM"] = columns.values.pop("input"), header
     return columns
 
 
@@ -143,8 +144,8 @@ def _rows(file: Columns, kind: str, notes: list[str]) -> list[Rows]:
         raise DataError(
             f"{place}: the power is {power.min():.4g} W, expected what the thruster takes, 0 or more"
         )
-    kept = {name: values[name] for name in ("voltage", "torque") if name in values}
-    rows: Rows = {"command": command, "force": force, "power": power, **kept}
+    rows = {name: values[name] for name in ("voltage", "torque") if name in values}
+    rows |= {"command": command, "force": force, "power": power}
     apart = by_voltage(rows, command) if "voltage" in rows else [rows]
     return [_signed(each, COMMANDS[kind], notes) for each in apart]
 
@@ -164,8 +165,8 @@ def _signed(rows: Rows, unit: str, notes: list[str]) -> Rows:
         return rows
     which = "sizes alone" if force.max() > -force.min() else "negative alone"
     notes.append(
-        f"forces have no sign, they are {which}: those below the neutral command, {neutral:g}{f' {unit}' if unit else ''}, "
-        "count as reverse, negative"
+        f"forces have no sign, they are {which}: those below the neutral command, "
+        f"{f'{neutral:g} {unit}'.rstrip()}, count as reverse, negative"
     )
     return {**rows, "force": np.where(command < neutral, -size, size)}
 

@@ -56,16 +56,23 @@ def at_voltage(tables: Sequence[Rows], voltage: float | None, source: str) -> tu
             raise DataError(f"{source}: tells no voltage, so that it cannot be read at {voltage:g} V")
         return _joined(tables), ()
     if len(levels) > 1 and not np.isfinite(known).all():
-        raise DataError(f"{source}: some tables were measured at {named}, of others it is not known; give one kind")
+        raise DataError(
+            f"{source}: some tables were measured at {named}, of others it is not known; give one kind"
+        )
     if voltage is None:
         if len(levels) > 1:
             raise DataError(f"{source}: measured at {named}; say which counts, --voltage {levels[-1]:.4g}")
         return _joined(tables), ()
     which = np.array([int(np.argmin(np.abs(np.array(levels) - own))) for own in known])
     near = int(np.argmin(np.abs(np.array(levels) - voltage)))
-    within = [_joined([rows for rows, k in zip(tables, which, strict=True) if k == level]) for level in range(len(levels))]
+    within = [
+        _joined([rows for rows, k in zip(tables, which, strict=True) if k == level])
+        for level in range(len(levels))
+    ]
     if abs(voltage - levels[near]) <= 0.5 * NEAR * levels[near]:
-        return within[near], (f"of {named} the rows at {levels[near]:.4g} V are taken",) if len(levels) > 1 else ()
+        return within[near], (f"of {named} the rows at {levels[near]:.4g} V are taken",) if len(
+            levels
+        ) > 1 else ()
     if not levels[0] < voltage < levels[-1]:
         raise DataError(f"{source}: measured at {named}, which tells nothing of {voltage:g} V")
     upper = int(np.searchsorted(levels, voltage))

@@ -25,7 +25,9 @@ DAMAGED = (ParseError, ArithmeticError, AttributeError, LookupError, OSError, Ty
 Row = Sequence[object]
 
 
-def sheets(path: Path, is_header: Callable[[Sequence[str]], bool]) -> tuple[dict[str, CsvTable], tuple[str, ...]]:
+def sheets(
+    path: Path, is_header: Callable[[Sequence[str]], bool]
+) -> tuple[dict[str, CsvTable], tuple[str, ...]]:
     """Returns the sheets of a workbook that hold a table, by name, and the names of those that do not.
 
     Args:
@@ -40,10 +42,15 @@ def sheets(path: Path, is_header: Callable[[Sequence[str]], bool]) -> tuple[dict
         import openpyxl
     except ImportError:
         raise DataError(
-            f"{path}: workbooks are read by openpyxl, which is not installed: pip install 'finlab-marine[bench]', or "
-            "save the sheet as CSV"
+            f"{path}: workbooks are read by openpyxl, which is not installed: "
+            "pip install 'finlab-marine[bench]', or save the sheet as CSV"
         ) from None
-    unpacked(content, str(path), lambda name: MOST_UNPACKED if name.endswith((".xml", ".rels")) else None, MOST_UNPACKED)
+    unpacked(
+        content,
+        str(path),
+        lambda name: MOST_UNPACKED if name.endswith((".xml", ".rels")) else None,
+        MOST_UNPACKED,
+    )
     found, other = {}, []
     try:
         book = openpyxl.load_workbook(io.BytesIO(content), read_only=True, data_only=True)
@@ -56,14 +63,18 @@ def sheets(path: Path, is_header: Callable[[Sequence[str]], bool]) -> tuple[dict
             else:
                 found[sheet.title] = table
     except DAMAGED as problem:
-        raise DataError(f"{path}: cannot be read as a workbook (.xlsx): {str(problem) or type(problem).__name__:.80}") from None
+        raise DataError(
+            f"{path}: cannot be read as a workbook (.xlsx): {str(problem) or type(problem).__name__:.80}"
+        ) from None
     return found, tuple(other)
 
 
 def _table(sheet: Any, source: str, is_header: Callable[[Sequence[str]], bool]) -> CsvTable | None:
     """The table of a sheet from its header on; None where there is none."""
     sheet.reset_dimensions()
-    rows = [_words(row) for row in islice(sheet.iter_rows(max_col=MOST_COLUMNS, values_only=True), MOST_ROWS + 1)]
+    rows = [
+        _words(row) for row in islice(sheet.iter_rows(max_col=MOST_COLUMNS, values_only=True), MOST_ROWS + 1)
+    ]
     if len(rows) > MOST_ROWS:
         raise DataError(f"{source}: has more than {MOST_ROWS} rows; delete those that hold nothing")
     above = next((k for k, row in enumerate(rows[:TITLES]) if is_header(row)), None)

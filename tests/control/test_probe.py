@@ -52,7 +52,7 @@ def test_a_lost_fin_is_probed_unless_somebody_said_that_it_is_lost(layout_a: Lay
 
 
 def test_pushes_and_the_way_back_are_held_to_the_rates(layout_a: Layout) -> None:
-    """Commands within the rates, fins that rest, hardly push or are lost: what is sent stays within them, too."""
+    """Commands within the rates of fins that hardly push or are lost: what is sent is within them, too."""
     settings = replace(MonitorSettings(), probe_every_s=3.0)
     monitor, rng = FaultMonitor(layout_a, settings=settings), np.random.default_rng(0)
     monitor._lost[2] = True

@@ -15,7 +15,7 @@ def summary(fit: RobotFit) -> tuple[str, ...]:
     lines = [
         f"fitted to {seconds:.0f} s of swimming, of whose motion simulated swims explain {fit.explained:.1%}",
         *(
-            f"{name} pushes the other way than the layout says; in the layout that is written it is turned about"
+            f"{name} pushes the other way than the layout says; in the layout that is written it is turned"
             for name in fit.opposed
         ),
         *([f"used, since it helps on parts not seen: {OTHER_LAW}"] if fit.other_law else []),

@@ -2,7 +2,8 @@
 
 What the measured accelerations need beside what the body does by itself is linear in the shares that the
 actuators give of their laws' forces, and in errors of the damping: one weighted least-squares problem of both
-sides after the same low-pass filter (equation error; V. Klein and E. Morelli, Aircraft System Identification).
+sides after the same low-pass filter (equation error; V. Klein and E. Morelli, Aircraft System
+Identification).
 """
 
 from collections.abc import Sequence
@@ -39,7 +40,7 @@ def opposed_in(layout: Layout, names: Sequence[str]) -> Layout:
 
 
 def pushing_back(model: RobotModel, swims: Sequence[Swim], smooth: Array) -> tuple[str, ...]:
-    """Returns the names of the actuators that push the other way, of swims with smoothed measurements (M, 12).
+    """Returns the names of the actuators that push the other way, from smoothed measurements (M, 12) of swims.
 
     One that the swims do not tell apart from others counts as drawn.
     """
