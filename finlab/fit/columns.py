@@ -21,7 +21,7 @@ LONGEST, MOST_BLANKS = 120, 10_000
 ALIKE = 0.01
 """Share of the largest value by which two columns of one quantity may differ."""
 _SAME_UNIT = {
-    "newton newtons": 1.0, "gf g grams gram-force": 9.80665e-3, "kgf kg kgs kg-f kilograms kp": 9.80665,
+    "newton newtons": 1.0, "gf g grams gram-force": 9.80665e-3, "kgf kg kgs kg-f kilograms": 9.80665,
     "lbf lb lbs lbsf lb-f pounds": 4.44822, "ozf oz": 0.278014, "watts volts amps": 1.0,
     "us µs μs usec microseconds": 1.0, "ms msec milliseconds": 1e3, "nm n-m": 1.0, "ncm": 0.01,
     "kgfm kgm": 9.80665, "kgcm kgfcm": 0.0980665, "gcm gfcm": 9.80665e-5, "ozin ozfin": 7.06155e-3,

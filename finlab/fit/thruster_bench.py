@@ -144,8 +144,8 @@ def _rows(file: Columns, kind: str, notes: list[str]) -> list[Rows]:
         raise DataError(
             f"{place}: the power is {power.min():.4g} W, expected what the thruster takes, 0 or more"
         )
-    rows = {name: values[name] for name in ("voltage", "torque") if name in values}
-    rows |= {"command": command, "force": force, "power": power}
+    rows = {"command": command, "force": force, "power": power}
+    rows |= {name: values[name] for name in values if name in ("voltage", "torque")}
     apart = by_voltage(rows, command) if "voltage" in rows else [rows]
     return [_signed(each, COMMANDS[kind], notes) for each in apart]
 

@@ -13,7 +13,7 @@ from finlab.files.archive import unpacked
 from finlab.files.csv_table import CsvTable
 from finlab.files.guarded import read_file
 
-MAX_BYTES, MOST_UNPACKED = 20_000_000, 60_000_000
+MAX_BYTES, MOST_UNPACKED = 10_000_000, 20_000_000
 """Largest workbook, and what is in it without its pictures [bytes]."""
 MOST_ROWS, MOST_COLUMNS, MOST_SHEETS = 20_000, 60, 50
 """Of a sheet, and of a workbook."""

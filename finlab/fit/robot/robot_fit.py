@@ -33,8 +33,8 @@ WEAKLY_KNOWN = 0.1
 DEVIATION_RANGE = (0.1, 30.0)
 """Deviations of sensors within these multiples of what is believed."""
 FAINT, CLEAR = 0.2, 20.0
-"""Strength below which an actuator is tried as one that pushes the other way, and by how much the logarithm of
-the likelihood must grow by that."""
+"""Strength below which an actuator is tried as one that pushes the other way, and by how much the logarithm
+of the likelihood must grow by that."""
 NO_DOUBTS: Mapping[str, float] = {}
 ROUNDS = 2
 """Times that deviations are estimated and the base fitted again."""

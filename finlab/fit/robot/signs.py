@@ -40,7 +40,7 @@ def opposed_in(layout: Layout, names: Sequence[str]) -> Layout:
 
 
 def pushing_back(model: RobotModel, swims: Sequence[Swim], smooth: Array) -> tuple[str, ...]:
-    """Returns the names of the actuators that push the other way, from smoothed measurements (M, 12) of swims.
+    """Returns the names of the actuators that push the other way, by smoothed measurements (M, 12).
 
     One that the swims do not tell apart from others counts as drawn.
     """
