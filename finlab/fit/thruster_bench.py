@@ -35,8 +35,6 @@ EXPECTED = (
 NEEDED = ("|".join(COMMANDS), "force", "power|voltage", "power|current")
 TAKEN = {"PWM": "us", "force": "N", "power": "W", "voltage": "V", "current": "A", "torque": "N m"}
 """Units of columns that name none."""
-PULSES = ("us", "µs", "μs", "ms", "usec", "msec", "microseconds", "milliseconds")
-"""Units of pulses, as a header may name them."""
 UNSIGNED, PUSHES = 0.03, 0.1
 """Shares of the largest force: up to which a thruster rests, and from which on one pushes on either side of
 the neutral command."""
@@ -106,8 +104,7 @@ def _tables(path: Path) -> tuple[list[Columns], tuple[str, ...]]:
         columns = _renamed(taken_columns(table, NAMES, NEEDED, EXPECTED))
         volts = re.search(r"(\d+(?:[.,]\d+)?) ?v(?:olts?)?\b", title, flags=re.IGNORECASE)
         if volts and "voltage" not in columns.values:
-            level = float(volts[1].replace(",", "."))
-            columns.values["voltage"] = np.full(len(columns.places), level)
+            columns.values["voltage"] = np.full(len(columns.places), float(volts[1].replace(",", ".")))
         tables.append(columns)
     return tables, (f"no table in sheet {', '.join(other):.200}",) if other else ()
 
@@ -124,7 +121,7 @@ def _is_header(cells: Sequence[str]) -> bool:
 def _renamed(columns: Columns) -> Columns:
     """A throttle that is told as a pulse is one."""
     header = columns.headers.get("input", "")
-    if header and "PWM" not in columns.values and named_column(header, NAMES).unit in PULSES:
+    if "PWM" not in columns.values and re.match("[uµμm]", named_column(header, NAMES).unit):
         columns.values["PWM"], columns.headers["PWM"] = columns.values.pop("input"), header
     return columns
 
@@ -156,12 +153,9 @@ def _signed(rows: Rows, unit: str, notes: list[str]) -> Rows:
     size = np.abs(force)
     if min(-force.min(), force.max()) > UNSIGNED * size.max():
         return rows
-    rest = size <= UNSIGNED * size.max()
-    if not rest.any():
-        return rows
-    neutral = float(np.median(command[rest]))
+    neutral = float(np.median(command[size <= max(UNSIGNED * size.max(), size.min())]))
     sides = command < neutral, command > neutral
-    if not all(own.any() and size[own].max() > PUSHES * size.max() for own in sides):
+    if not all(size[own].max(initial=0.0) > PUSHES * size.max() for own in sides):
         return rows
     which = "sizes alone" if force.max() > -force.min() else "negative alone"
     notes.append(
@@ -172,11 +166,7 @@ def _signed(rows: Rows, unit: str, notes: list[str]) -> Rows:
 
 
 def _checked(values: Rows, kind: str, source: str, notes: tuple[str, ...]) -> Bench:
-    """The bench of rows of one voltage.
-
-    Raises:
-        DataError: nothing was measured, or too few commands.
-    """
+    """The bench of rows of one voltage, if they can be one."""
     command, force, power = values["command"], values["force"], values["power"]
     if not force.any() or not power.any():
         raise DataError(f"{source}: {'power' if force.any() else 'force'} is 0 throughout; is it connected?")

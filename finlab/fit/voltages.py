@@ -45,40 +45,28 @@ def at_voltage(tables: Sequence[Rows], voltage: float | None, source: str) -> tu
     Raises:
         DataError: there are several and none was asked for, or that one does not lie among them.
     """
-    known = [float(np.median(np.abs(rows["voltage"]))) if "voltage" in rows else np.nan for rows in tables]
-    levels: list[float] = []
-    for own in sorted(own for own in known if np.isfinite(own)):
-        if not levels or own - levels[-1] > NEAR * own:
-            levels.append(own)
-    named = f"{', '.join(f'{level:.4g}' for level in levels)} V"
-    if not levels:
-        if voltage is not None:
-            raise DataError(f"{source}: tells no voltage, so that it cannot be read at {voltage:g} V")
-        return _joined(tables), ()
-    if len(levels) > 1 and not np.isfinite(known).all():
-        raise DataError(
-            f"{source}: some tables were measured at {named}, of others it is not known; give one kind"
-        )
+    known = np.array([np.median(np.abs(rows["voltage"])) if "voltage" in rows else np.nan for rows in tables])
+    order = np.argsort(known)
+    steps = np.diff(known[order]) > NEAR * known[order][1:]
+    groups = np.split(order, np.flatnonzero(steps) + 1)
+    if np.isnan(known).any() and (voltage is not None or len(groups) > 1):
+        raise DataError(f"{source}: does not tell at which voltage all rows were measured")
+    levels = np.array([np.median(known[own]) for own in groups])
+    named = f"measured at {', '.join(f'{level:.4g}' for level in levels)} V"
+    if voltage is None and len(groups) > 1:
+        raise DataError(f"{source}: {named}; say which counts, --voltage {levels[-1]:.4g}")
+    within = [_joined([tables[k] for k in own]) for own in groups]
     if voltage is None:
-        if len(levels) > 1:
-            raise DataError(f"{source}: measured at {named}; say which counts, --voltage {levels[-1]:.4g}")
-        return _joined(tables), ()
-    which = np.array([int(np.argmin(np.abs(np.array(levels) - own))) for own in known])
-    near = int(np.argmin(np.abs(np.array(levels) - voltage)))
-    within = [
-        _joined([rows for rows, k in zip(tables, which, strict=True) if k == level])
-        for level in range(len(levels))
-    ]
+        return within[0], ()
+    near = int(np.argmin(np.abs(levels - voltage)))
     if abs(voltage - levels[near]) <= 0.5 * NEAR * levels[near]:
-        return within[near], (f"of {named} the rows at {levels[near]:.4g} V are taken",) if len(
-            levels
-        ) > 1 else ()
+        return within[near], (f"{named}: the rows at {levels[near]:.4g} V are taken",) * (len(groups) > 1)
     if not levels[0] < voltage < levels[-1]:
-        raise DataError(f"{source}: measured at {named}, which tells nothing of {voltage:g} V")
+        raise DataError(f"{source}: {named}, which tells nothing of {voltage:g} V")
     upper = int(np.searchsorted(levels, voltage))
-    share = (voltage - levels[upper - 1]) / (levels[upper] - levels[upper - 1])
-    note = f"interpolated between the rows at {levels[upper - 1]:.4g} V and at {levels[upper]:.4g} V"
-    return _between(within[upper - 1], within[upper], share), (note,)
+    low, high = levels[upper - 1 : upper + 1].tolist()
+    rows = _between(within[upper - 1], within[upper], (voltage - low) / (high - low))
+    return rows, (f"interpolated between the rows at {low:.4g} V and at {high:.4g} V",)
 
 
 def _joined(tables: Sequence[Rows]) -> Rows:

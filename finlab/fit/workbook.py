@@ -22,12 +22,10 @@ TITLES = 30
 DAMAGED = (ParseError, ArithmeticError, AttributeError, LookupError, OSError, TypeError, ValueError)
 """What openpyxl ends with on files that are no workbooks."""
 
-Row = Sequence[object]
+IsHeader = Callable[[Sequence[str]], bool]
 
 
-def sheets(
-    path: Path, is_header: Callable[[Sequence[str]], bool]
-) -> tuple[dict[str, CsvTable], tuple[str, ...]]:
+def sheets(path: Path, is_header: IsHeader) -> tuple[dict[str, CsvTable], tuple[str, ...]]:
     """Returns the sheets of a workbook that hold a table, by name, and the names of those that do not.
 
     Args:
@@ -45,36 +43,26 @@ def sheets(
             f"{path}: workbooks are read by openpyxl, which is not installed: "
             "pip install 'finlab-marine[bench]', or save the sheet as CSV"
         ) from None
-    unpacked(
-        content,
-        str(path),
-        lambda name: MOST_UNPACKED if name.endswith((".xml", ".rels")) else None,
-        MOST_UNPACKED,
-    )
-    found, other = {}, []
+    most = MOST_UNPACKED
+    unpacked(content, str(path), lambda name: most if name.endswith((".xml", ".rels")) else None, most)
+    found: dict[str, CsvTable | None] = {}
     try:
         book = openpyxl.load_workbook(io.BytesIO(content), read_only=True, data_only=True)
         if len(book.worksheets) > MOST_SHEETS:
             raise DataError(f"{path}: has {len(book.worksheets)} sheets, expected at most {MOST_SHEETS}")
         for sheet in book.worksheets:
-            table = _table(sheet, f"{path}, sheet {sheet.title}", is_header)
-            if table is None:
-                other.append(sheet.title)
-            else:
-                found[sheet.title] = table
+            found[sheet.title] = _table(sheet, f"{path}, sheet {sheet.title}", is_header)
     except DAMAGED as problem:
-        raise DataError(
-            f"{path}: cannot be read as a workbook (.xlsx): {str(problem) or type(problem).__name__:.80}"
-        ) from None
-    return found, tuple(other)
+        raise DataError(f"{path}: cannot be read as a workbook (.xlsx): {problem!r:.80}") from None
+    other = tuple(title for title, table in found.items() if table is None)
+    return {title: table for title, table in found.items() if table is not None}, other
 
 
-def _table(sheet: Any, source: str, is_header: Callable[[Sequence[str]], bool]) -> CsvTable | None:
+def _table(sheet: Any, source: str, is_header: IsHeader) -> CsvTable | None:
     """The table of a sheet from its header on; None where there is none."""
     sheet.reset_dimensions()
-    rows = [
-        _words(row) for row in islice(sheet.iter_rows(max_col=MOST_COLUMNS, values_only=True), MOST_ROWS + 1)
-    ]
+    cells = sheet.iter_rows(max_col=MOST_COLUMNS, values_only=True)
+    rows = [_words(row) for row in islice(cells, MOST_ROWS + 1)]
     if len(rows) > MOST_ROWS:
         raise DataError(f"{source}: has more than {MOST_ROWS} rows; delete those that hold nothing")
     above = next((k for k, row in enumerate(rows[:TITLES]) if is_header(row)), None)
@@ -89,7 +77,7 @@ def _table(sheet: Any, source: str, is_header: Callable[[Sequence[str]], bool]) 
     return CsvTable(text.getvalue().encode(), source)
 
 
-def _words(row: Row) -> list[str]:
+def _words(row: Sequence[object]) -> list[str]:
     """Cells as text, without empty ones at the end."""
     cells = ["" if cell is None else " ".join(str(cell).split()) for cell in row]
     while cells and not cells[-1]:

@@ -138,8 +138,6 @@ def fit_robot(
 
         names = pushing_back(RobotModel(layout, swims, doubts), swims, smooth)
         best = fitted(opposed_in(layout, names), names)
-        if names and best.explained < SOUND:
-            best = max(best, fitted(layout, ()), key=lambda fit: fit.explained)
         while (strength := best.found("strength")).min() < np.log(FAINT):
             other = best.opposed, (layout.names[int(strength.argmin())],)
             turned = tuple(sorted(set(other[0]) ^ set(other[1]), key=layout.index))
