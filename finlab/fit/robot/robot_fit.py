@@ -130,22 +130,20 @@ def fit_robot(
     smooth = np.concatenate([smoothed(swim.measured) for swim in swims])
     with threadpool_limits(limits=1, user_api="blas"):
 
-        def fitted(robot: Layout, opposed: tuple[str, ...]) -> RobotFit:
-            model = RobotModel(robot, swims, doubts)
-            return replace(
-                _fit(model, swims, smooth, other_law and layout.is_of_fins, progress), opposed=opposed
-            )
+        def fitted(opposed: tuple[str, ...]) -> RobotFit:
+            model = RobotModel(opposed_in(layout, opposed), swims, doubts)
+            fit = _fit(model, swims, smooth, other_law and layout.is_of_fins, progress)
+            return replace(fit, opposed=opposed)
 
-        names = pushing_back(RobotModel(layout, swims, doubts), swims, smooth)
-        best = fitted(opposed_in(layout, names), names)
+        best = fitted(pushing_back(RobotModel(layout, swims, doubts), swims, smooth))
         while (strength := best.found("strength")).min() < np.log(FAINT):
-            other = best.opposed, (layout.names[int(strength.argmin())],)
-            turned = tuple(sorted(set(other[0]) ^ set(other[1]), key=layout.index))
-            fit = fitted(opposed_in(layout, turned), turned)
-            if (
-                fit.found("strength")[strength.argmin()] < np.log(FAINT)
-                or fit.unlikely > best.unlikely - CLEAR
-            ):
+            weak = int(strength.argmin())
+            turned = (name for k, name in enumerate(layout.names) if (name in best.opposed) != (k == weak))
+            try:
+                fit = fitted(tuple(turned))
+            except DataError:  # it goes astray
+                break
+            if fit.found("strength")[weak] < np.log(FAINT) or fit.unlikely > best.unlikely - CLEAR:
                 break
             best = fit
         return best
