@@ -125,7 +125,7 @@ def test_voltages_of_one_table_are_apart_but_a_supply_may_sag(tmp_path: Path, sh
 @pytest.mark.parametrize(
     ("columns", "note"),
     [
-        ({"ESC signal (\u00b5s)": PWM, "Thrust (kgf)": force() / N_PER_KGF, "Speed (Hz)": PWM}, "rpm is left"),
+        ({"ESC signal (\u00b5s)": PWM, "Thrust (kgf)": force() / N_PER_KGF, "Speed (Hz)": PWM}, "rpm"),
         ({"Throttle (\u00b5s)": PWM, "Thrust (lbf)": force() / N_PER_LB, "Thrust (N)": force()}, ""),
         ({"PWM": PWM, "Thrust (lbs)": force() / N_PER_LB}, "no unit stands at PWM: taken for us"),
         ({"PWM (us)": PWM, "Force": force()}, "no unit stands at Force: taken for N"),
