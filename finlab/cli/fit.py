@@ -42,16 +42,19 @@ def fin(
 def actuator(
     data: Annotated[Positional[tuple[Path, ...]], arg(metavar="DATA.csv...")],
     output: Annotated[Path, arg(metavar="TABLE.csv", aliases=["-o"])],
+    voltage: float | None = None,
 ) -> None:
     """Fit a thruster to its bench table.
 
     The table has a command (PWM, or input from -1 to 1, or rpm), force, and power or voltage and
     current, and perhaps torque; units stand in the header, `force [kgf]`. Commands may be repeated. What is
-    printed goes into a layout. `finlab fit fin` is for fins.
+    printed goes into a layout. `finlab fit fin` is for fins. Of a workbook (.xlsx) all sheets are
+    read that hold a table.
 
     Args:
-        data: CSV files of one thruster.
+        data: CSV files or workbooks of one thruster.
         output: the table of thrust.
+        voltage: which of several counts [V]; between two of them forces and powers are interpolated.
     """
     from finlab.errors import DataError
     from finlab.fit.fin_file import check_table_path
@@ -61,7 +64,7 @@ def actuator(
     from finlab.whole_file import write_whole
 
     check_table_path(output)
-    fit = fit_thruster(read_bench(data))
+    fit = fit_thruster(read_bench(data, voltage))
     write_whole(output, thruster_csv(fit, output), DataError)
     print("\n".join(summary(fit)))
     print(f"\n{output}: in a layout's thruster\n  " + "\n  ".join(layout_lines(fit, output)))

@@ -180,7 +180,9 @@ def monitored(loop: ClosedLoop) -> str:
     from finlab.layout.damage import Damage
 
     failed, health = Damage() if loop.verdict is None else loop.verdict.damage
-    words = [f"{name} lost" for name in failed]
+    opposed = () if loop.monitor is None else loop.monitor.opposed
+    words = [f"{name} pushes the other way" for name in opposed]
+    words += [f"{name} lost" for name in failed if name not in opposed]
     if loop.monitor is not None and not loop.monitor.tells:
         words += ["that it cannot tell: the robot moves otherwise than its model"]
     if health is not None:

@@ -4,9 +4,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
+from finlab.allocation.dual.rates import Rates
 from finlab.arrays import Array
-from finlab.control.hypotheses import LEVELS, Hypotheses
+from finlab.control.hypotheses import LEVELS, OPPOSED, Hypotheses
 from finlab.control.measurement import Measurement
 from finlab.control.monitor_settings import MonitorSettings
 from finlab.control.motion_model import MotionModel
@@ -14,13 +16,19 @@ from finlab.control.probe import Probe
 from finlab.layout import Body, Layout
 from finlab.layout.angles import TURN
 from finlab.layout.damage import Damage
+from finlab.physics import plant_of
 
 LOST_BELOW = 0.2
 """A strength below which a fin is given up as lost."""
+OPPOSED_BELOW, OPPOSED_SURE = -0.3, 3.0
+"""A strength below which an actuator pushes the other way than the layout says, and standard deviations
+by which it lies below 0."""
 WHOLE_ABOVE = 0.9
 """A strength from which a fin that was torn is whole again."""
 HOLD_S = 0.2
 """A belief is acted on once it has been certain for so long [s]: a single odd sample decides nothing."""
+HOLD_EARLY_S = 0.5
+"""The same before current and trim are learned, when only what pushes the other way is acted on [s]."""
 ASTRAY = 1e4
 """A misfit of the motion, a variance over that of the settings, from which on nothing can be told of it."""
 COARSE = 0.05
@@ -77,6 +85,9 @@ class FaultMonitor:
         self._torn = np.zeros(n, dtype=bool)
         self._lost = np.zeros(n, dtype=bool)
         self._told = np.zeros(n, dtype=bool)
+        self._back = np.zeros(n, dtype=bool)
+        self._rates = Rates.of(plant_of(layout), layout.rates, period_s)
+        self._sent, self._coming_back = np.full((n, 3), np.nan), np.zeros(n, dtype=bool)
         self._suspect, self._sure = 0, 0
         self._held = np.full(n, np.nan)
         self._since = self._model.motion.direction.copy()
@@ -89,6 +100,12 @@ class FaultMonitor:
         """Names of the fins that are taken for lost, torn or stuck."""
         marked = self._lost | self._torn | ~np.isnan(self._held)
         return tuple(self.layout.names[k] for k in np.flatnonzero(marked))
+
+    @property
+    def opposed(self) -> tuple[str, ...]:
+        """Names of those that push the other way than the layout says; the allocator does without them until
+        the layout is put right."""
+        return tuple(self.layout.names[k] for k in np.flatnonzero(self._back))
 
     @property
     def tells(self) -> bool:
@@ -134,7 +151,10 @@ class FaultMonitor:
         """Takes the robot for another one with the same body: what is not lost is as that layout says."""
         self.layout = layout
         self._model.adopt(layout)
+        self._rates = Rates.of(plant_of(layout), layout.rates, self.period_s)
         self._torn[:] = False
+        self._lost &= ~self._back
+        self._back[:] = False
         for k in np.flatnonzero(~self._lost):
             self._beliefs.believe(int(k), 1.0)
 
@@ -143,10 +163,18 @@ class FaultMonitor:
 
         Now and then a fin that the monitor has called lost beats for two seconds: if it gives nothing by it,
         it is lost, and of one that has been repaired the robot feels it, and takes it back. Fins that all but
-        rest push a little, see `MonitorSettings.least_push`.
+        rest push a little, see `MonitorSettings.least_push`. Both change no faster than the rates of the
+        drives allow from what was returned last, as does the way back to what is commanded.
         """
         lost, direction = self._lost & ~self._told, self._model.motion.direction
-        return self._probe.added(command, lost, direction)
+        wanted = self._probe.added(command, lost, direction)
+        own = (np.isfinite(wanted[:, :1]) & ~(wanted == command)).any(axis=1) | self._coming_back
+        rests = np.isnan(self._sent[:, :1])
+        box = self._rates.box(np.where(rests, self._model.motion.command, self._sent))
+        result = np.where(own[:, None], box.clipped(wanted), wanted)
+        self._coming_back = (np.isfinite(result) & ~(result == command)).any(axis=1)
+        self._sent = result
+        return result
 
     def verdict(self) -> Diagnosis:
         """What is believed now."""
@@ -188,6 +216,10 @@ class FaultMonitor:
     def _judge(self, other: Array) -> None:
         """Acts on what has become all but certain."""
         beliefs = self._beliefs
+        back = self._pushing_back() & ~self._back
+        if back.any() and (self._lost | back).sum() < self.layout.n:
+            for each in np.flatnonzero(back):
+                self._mark(int(each), -1.0, math.nan)
         if True in self._torn.tolist():
             strength = beliefs.strength
             gone = self._torn & (strength < LOST_BELOW)
@@ -197,15 +229,16 @@ class FaultMonitor:
                 for index in np.flatnonzero(gone):
                     beliefs.believe(int(index), 0.0)
             self._torn &= strength < WHOLE_ABOVE
-        if beliefs.doubt < self.settings.threshold or not beliefs.settled:
+        if beliefs.doubt < self.settings.threshold:
             self._sure = 0
             return
-        by_kind, total = beliefs.probability, beliefs.changed
+        by_kind = beliefs.probability
+        total = beliefs.changed if beliefs.settled else by_kind[:, OPPOSED]
         fin = int(total.argmax())
         sure = float(total[fin]) >= self.settings.threshold
         self._sure = (self._sure + 1 if fin == self._suspect else 1) if sure else 0
         self._suspect = fin
-        if self._sure * self.period_s < HOLD_S - 1e-9:
+        if self._sure * self.period_s < (HOLD_S if beliefs.settled else HOLD_EARLY_S) - 1e-9:
             return
         kind = int(by_kind[fin].argmax())
         both = np.where((beliefs.pairs == fin).any(axis=1), beliefs.both, 0.0)
@@ -214,11 +247,16 @@ class FaultMonitor:
             return
         turned = kind == len(LEVELS)
         level = float(beliefs.strength[fin]) if turned else LEVELS[kind]
-        if level == 0.0 and self._lost.sum() == self.layout.n - 1:
+        if level < LOST_BELOW and self._lost.sum() == self.layout.n - 1:
             return  # the last one that works
         beliefs.adopt(fin, kind)
         self._told[fin] = False
         self._mark(fin, level, float(other[fin]) if turned else float(self._held[fin]))
+
+    def _pushing_back(self) -> NDArray[np.bool_]:
+        """Which actuators (n,) surely push the other way than the layout says."""
+        strength = self._beliefs.strength
+        return (strength < OPPOSED_BELOW) & (strength < -OPPOSED_SURE * self._beliefs.strength_std)
 
     def _lose_both(self, pair: int) -> None:
         """Two fins are lost at one moment."""
@@ -228,6 +266,6 @@ class FaultMonitor:
             self._mark(fin, 0.0, math.nan)
 
     def _mark(self, fin: int, strength: float, stuck: float) -> None:
-        self._lost[fin] = strength < LOST_BELOW
+        self._lost[fin], self._back[fin] = strength < LOST_BELOW, strength < OPPOSED_BELOW
         self._torn[fin] = LOST_BELOW <= strength < WHOLE_ABOVE
         self._held[fin] = stuck if strength >= LOST_BELOW else math.nan

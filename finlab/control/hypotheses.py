@@ -14,8 +14,10 @@ from finlab.arrays import Array
 from finlab.control.monitor_settings import MonitorSettings
 from finlab.control.motion_model import CURRENT, FIRST_FIN, MOTION, RISING, STRENGTH, TILT, TORQUE, Step
 
-LEVELS = (0.0, 0.35, 0.7, 1.0)
-"""Strengths that a fin may suddenly have."""
+LEVELS = (0.0, -1.0, 0.35, 0.7, 1.0)
+"""Strengths that a fin may suddenly have; a motor that is wired wrongly has -1."""
+OPPOSED = 1
+"""Place of that last one, of which there is evidence from the start."""
 LOSSES = 0.6
 """Share of all events that are losses."""
 TOGETHER = 0.1
@@ -95,6 +97,7 @@ class Hypotheses:
         level[:, -1] = 0.0
         possible = np.abs(level) > APART
         possible[:, -1] = True
+        possible[self.strength < -APART, 0] = False  # one that pushes back is not lost by resting
         often = np.full(m, (1.0 - LOSSES) / (m - 1))
         often[0] = LOSSES
         single = np.where(possible, self.settings.failures * often, 0.0)
@@ -146,7 +149,10 @@ class Hypotheses:
         """What is taken for true may have ended just now; returns how much (n, m) of each belief is new."""
         self._age_s += dt
         if not self.settled:
+            opposed, likely = self.off[:, OPPOSED].copy(), self.probability[:, OPPOSED].copy()
             self._settle()
+            self.off[:, OPPOSED], self.probability[:, OPPOSED] = opposed, likely
+            self.doubt = float(self._probability.sum())
             return np.ones_like(self.probability)
         fresh, kept = dt * (1.0 - self.doubt), 1.0 - dt / self.settings.doubt_s
         new = self._rate * fresh

@@ -142,7 +142,9 @@ class MotionModel:
         force *= (moves.pushes | ~(np.isnan(held) | self._turned_off))[:, None]
         self._thrust = force[0]
         now = np.matmul(force[:, :, None, :], self._plant.effectiveness)[:, :, 0]
-        mean, self._force = 0.5 * (self._force + now), now
+        # What stops, stops at once.
+        mean = np.where(np.isfinite(command[:, :1]), 0.5 * (self._force + now), now)
+        self._force = now
         return mean[0], mean[1] - mean[0]
 
     def _either_way(self) -> Array | None:

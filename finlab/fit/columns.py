@@ -5,22 +5,35 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from finlab.arrays import Array
 from finlab.errors import DataError
-from finlab.files.csv_table import read_table
+from finlab.files.csv_table import CsvTable, read_table
 from finlab.layout.angles import TURN
 
 MAX_BYTES = 200_000_000
 """Largest file that is read [bytes]; a swim of an hour at 50 Hz has half of it."""
+LONGEST, MOST_BLANKS = 120, 10_000
+"""Characters of a header that count, without and with its blanks."""
+ALIKE = 0.01
+"""Share of the largest value by which two columns of one quantity may differ."""
+_SAME_UNIT = {
+    "newton newtons": 1.0, "gf g grams gram-force": 9.80665e-3, "kgf kg kgs kg-f kilograms": 9.80665,
+    "lbf lb lbs lbsf lb-f pounds": 4.44822, "ozf oz": 0.278014, "watts volts amps": 1.0,
+    "us µs μs usec microseconds": 1.0, "ms msec milliseconds": 1e3, "nm n-m": 1.0, "ncm": 0.01,
+    "kgfm kgm": 9.80665, "kgcm kgfcm": 0.0980665, "gcm gfcm": 9.80665e-5, "ozin ozfin": 7.06155e-3,
+    "inlb inlbf lbin lbfin": 0.112985, "ftlb ftlbf lbft lbfft": 1.35582,
+}  # fmt: skip
+"""Spellings of units that the header of a bench may name."""
 UNITS = {
     "rad": 1.0, "deg": math.pi / 180.0, "°": math.pi / 180.0,
     "hz": 1.0, "rpm": 1.0 / 60.0, "bpm": 1.0 / 60.0, "rev/min": 1.0 / 60.0, "rad/s": 1.0 / TURN,
-    "n": 1.0, "mn": 1e-3, "kn": 1e3, "w": 1.0, "mw": 1e-3, "kw": 1e3, "v": 1.0, "a": 1.0, "ma": 1e-3,
-    "gf": 9.80665e-3, "g": 9.80665e-3, "kgf": 9.80665, "kg": 9.80665, "lbf": 4.44822, "lb": 4.44822,
-    "nm": 1.0, "mnm": 1e-3, "us": 1.0, "µs": 1.0, "μs": 1.0, "ms": 1e3, "%": 0.01, "-": 1.0,
+    "n": 1.0, "mn": 1e-3, "kn": 1e3, "w": 1.0, "mw": 1e-3, "kw": 1e3, "v": 1.0, "mv": 1e-3,
+    "a": 1.0, "ma": 1e-3, "mnm": 1e-3, "%": 0.01, "-": 1.0,
+    **{unit: scale for units, scale in _SAME_UNIT.items() for unit in units.split()},
 }  # fmt: skip
 """Units that a header may name, in SI (frequencies in Hz, pulses in us)."""
 
@@ -31,14 +44,26 @@ class Columns:
 
     values: dict[str, Array]
     """In SI, by name, (n,) each."""
+    headers: dict[str, str]
+    """What stands above each of them in the file."""
+    bare: tuple[str, ...]
+    """Names of those whose header names no unit."""
     places: tuple[str, ...]
     """Where each row stands, file and line."""
 
 
-def named_column(
-    header: str, names: Mapping[str, str], units: Mapping[str, float] = UNITS
-) -> tuple[str, float]:
-    """Returns what a header cell stands for and its unit in SI: `A [deg]`, `amplitude_deg`, `Force (Kg f)`,
+class Header(NamedTuple):
+    """What a header cell stands for."""
+
+    name: str
+    scale: float
+    """Its unit in SI."""
+    unit: str
+    """The unit as it stands there, in lower case; empty where there is none."""
+
+
+def named_column(header: str, names: Mapping[str, str], units: Mapping[str, float] = UNITS) -> Header:
+    """Returns what a header cell stands for: `A [deg]`, `amplitude_deg`, `Force (Kg f)`,
     `Fx`; "" for what no fit reads. With units of its own a name counts as it stands, else in lower case. A
     `stroke` is the angle from end to end, twice the amplitude.
 
@@ -46,15 +71,16 @@ def named_column(
         DataError: the unit is not known.
     """
     behind = "deg|rad|hz|rpm|us|nm|mN|kgf|lbf|N|W|mW|V|A"
-    parts = re.fullmatch(rf"\s*(.+?)\s*(?:[\[(](.*)[\])]|_({behind}))?\s*", header, flags=re.IGNORECASE)
+    short = " ".join(header[:MOST_BLANKS].split())[:LONGEST]
+    parts = re.fullmatch(rf"(.+?) ?(?:[\[(](.*)[\])]|_({behind}))?", short, flags=re.IGNORECASE)
     told = parts[1] if parts else ""
     name = names.get(told.lower().replace(" ", "_") if units is UNITS else told, "")
     if parts is None or not name:
-        return "", 1.0
+        return Header("", 1.0, "")
     unit = re.sub(r"[\s.*·]", "", (parts[2] or parts[3] or "")).lower()
     if unit and unit not in units:
-        raise DataError(f"column {header}: unit {unit!r:.20} is not known, expected {', '.join(units)}")
-    return name, (0.5 if told.lower() == "stroke" else 1.0) * units.get(unit, 1.0)
+        raise DataError(f"column {short}: unit {unit!r:.20} is not known, expected {', '.join(units)}")
+    return Header(name, (0.5 if told.lower() == "stroke" else 1.0) * units.get(unit, 1.0), unit)
 
 
 def read_columns(
@@ -79,15 +105,27 @@ def read_columns(
         DataError: the file cannot be read, or lacks a column.
     """
     table = read_table(path, MAX_BYTES, "a CSV file of measurements", gaps)
+    return taken_columns(table, names, needed, expected, units)
+
+
+def taken_columns(
+    table: CsvTable,
+    names: Mapping[str, str],
+    needed: Sequence[str],
+    expected: str,
+    units: Mapping[str, float] = UNITS,
+) -> Columns:
+    """Returns the columns of a table that have a name; arguments and errors as in `read_columns`.
+
+    Of several columns for one quantity that agree, such as a force in kgf and in N, the first is taken.
+    """
+    path = table.source
     try:
         named = [named_column(cell, names, units) for cell in table.header]
     except DataError as error:
         raise DataError(f"{path}: {error}") from None
-    used = [i for i, (name, _) in enumerate(named) if name]
-    found = [named[i][0] for i in used]
-    for name in found:
-        if found.count(name) > 1:
-            raise DataError(f"{path}: two columns stand for {name}; keep one")
+    used = [i for i, column in enumerate(named) if column.name]
+    found = [named[i].name for i in used]
     for name in needed:
         if not set(name.split("|")) & set(found):
             told = ", ".join(table.header)
@@ -96,9 +134,18 @@ def read_columns(
                 f"expected {expected}"
             )
     numbers, lines = table.numbers(used)
-    scale = np.array([named[i][1] for i in used])
-    values = dict(zip(found, (numbers * scale).T, strict=True))
-    return Columns(values, tuple(f"{path.name} line {line}" for line in lines))
+    values: dict[str, Array] = {}
+    first: dict[str, int] = {}
+    for i, column in zip(used, numbers.T, strict=True):
+        own, name = column * named[i].scale, named[i].name
+        if name not in values:
+            values[name], first[name] = own, i
+        elif not np.allclose(own, values[name], rtol=0.0, atol=ALIKE * np.abs(own).max(), equal_nan=True):
+            pair = f"{table.header[first[name]]:.40} and {table.header[i]:.40}"
+            raise DataError(f"{path}: two columns stand for {name}, {pair}, and differ; keep one")
+    headers = {name: table.header[i] for name, i in first.items()}
+    bare = tuple(name for name, i in first.items() if not named[i].unit)
+    return Columns(values, headers, bare, tuple(f"{Path(path).name} line {line}" for line in lines))
 
 
 def together(files: Sequence[Columns]) -> dict[str, Array]:

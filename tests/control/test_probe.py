@@ -45,7 +45,30 @@ def test_a_lost_fin_is_probed_unless_somebody_said_that_it_is_lost(layout_a: Lay
     beats = [np.isfinite(found.probed(command)[2, 0]) for _ in range(90)]
     assert beats == [30 <= k % 60 < 50 or k >= 60 and k < 80 for k in range(1, 91)]
     assert all(np.isnan(told.probed(command)[2, 0]) for _ in range(90))
-    for _ in range(30):
+    for _ in range(40):  # ten ticks into a probe: it is turned and swings up as fast as the servos may
         probed = found.probed(command)
     push = forces(layout_a, probed)[2]
     assert push[1] == pytest.approx(FORCE_N, rel=0.05) and abs(push[0]) < 1e-9
+
+
+def test_pushes_and_the_way_back_are_held_to_the_rates(layout_a: Layout) -> None:
+    """Commands within the rates of fins that hardly push or are lost: what is sent is within them, too."""
+    settings = replace(MonitorSettings(), probe_every_s=3.0)
+    monitor, rng = FaultMonitor(layout_a, settings=settings), np.random.default_rng(0)
+    monitor._lost[2] = True
+    command = np.tile([0.3, 0.2, 0.0], (4, 1))
+    most, before, pushed = 0.1 * layout_a.rates, None, 0
+    for _ in range(400):
+        command = command + rng.uniform(-1.0, 1.0, (4, 3)) * most
+        command[:, :2] = np.clip(command[:, :2], layout_a.lower[:, :2], [0.6, 2.0])
+        command[2] = np.nan
+        sent = monitor.probed(command)
+        pushed += not np.array_equal(sent, command, equal_nan=True)
+        if before is not None:
+            change = np.abs(sent - before)
+            change[:, 2] = np.minimum(change[:, 2], 2 * np.pi - change[:, 2])
+            # Of one that rests nothing is known but where it points.
+            assert not (change > most + 1e-9)[np.isfinite(before[:, 0])].any()
+        before = sent
+        command[2] = [0.3, 0.2, 0.0]
+    assert pushed > 100

@@ -83,7 +83,7 @@ def emptied(columns: Columns, tmp_path: Path) -> Path:
         (lambda c: c | {"phi": 0.0 * c["Fx"], "Fy": 0.0 * c["Fy"] + 2.0}, "column Fy is 2 throughout"),
         (lambda c: {k: v for k, v in c.items() if k != "Fz"}, "column Fz is missing"),
         (lambda c: {k: v for k, v in c.items() if k != "A"}, "column A is missing"),
-        (lambda c: c | {"amplitude": c["A"]}, "two columns stand for A"),
+        (lambda c: c | {"amplitude": 2.0 * c["A"]}, "two columns stand for A"),
         (lambda c: c | {"A": -c["A"]}, "half amplitudes from -0"),
         (lambda c: c | {"f": 2000.0 * c["f"]}, "expected 0 to 20"),
         (lambda c: c | {"A": np.degrees(c["A"])}, r"header, `A \[deg\]`"),

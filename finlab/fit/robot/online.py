@@ -69,6 +69,7 @@ class OnlineFit:
             f"{name} {own:.2f} +- {own * unsure:.2f}"
             for name, own, unsure in zip(self.layout.names, strength, error, strict=True)
         )
-        self.notes.append(f"{self._steps * STEP_S:.0f} s: learned strengths {', '.join(told)}")
+        turned = "".join(f"; {name} pushes the other way" for name in fit.opposed)
+        self.notes.append(f"{self._steps * STEP_S:.0f} s: learned strengths {', '.join(told)}{turned}")
         self.factor = asked_more(self.layout, strength)
         return replace(self.layout, actuators=learned(fit, fit.found("lean")))

@@ -14,6 +14,10 @@ def summary(fit: RobotFit) -> tuple[str, ...]:
     seconds = 0.1 * len(fit.model.motion)
     lines = [
         f"fitted to {seconds:.0f} s of swimming, of whose motion simulated swims explain {fit.explained:.1%}",
+        *(
+            f"{name} pushes the other way than the layout says; in the layout that is written it is turned"
+            for name in fit.opposed
+        ),
         *([f"used, since it helps on parts not seen: {OTHER_LAW}"] if fit.other_law else []),
         *([f"tried, and no help: {OTHER_LAW}"] if fit.other_law is False else []),
         "a common scale of all forces, damping and inertia does not follow from motion; it rests on the mass "

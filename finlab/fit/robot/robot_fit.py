@@ -5,7 +5,7 @@ error on windows that its fit has not seen.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import sem
@@ -15,6 +15,7 @@ from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.fit.robot.estimate import DEVIATION, Fitted, Windows, cut, fit_windows, unseen_gain
 from finlab.fit.robot.model import RobotModel
+from finlab.fit.robot.signs import opposed_in, pushing_back
 from finlab.fit.robot.swim import STEP_S, Swim, smoothed
 from finlab.fit.robot.unknowns import BASE, SHAPE, Unknowns
 from finlab.layout import Layout
@@ -31,6 +32,9 @@ WEAKLY_KNOWN = 0.1
 """Standard error of an actuator's strength beside those of the others, as a share, that is worth a doubt."""
 DEVIATION_RANGE = (0.1, 30.0)
 """Deviations of sensors within these multiples of what is believed."""
+FAINT, CLEAR = 0.2, 20.0
+"""Strength below which an actuator is tried as one that pushes the other way, and by how much the logarithm
+of the likelihood must grow by that."""
 NO_DOUBTS: Mapping[str, float] = {}
 ROUNDS = 2
 """Times that deviations are estimated and the base fitted again."""
@@ -46,6 +50,10 @@ class RobotFit:
     other_law: bool | None
     """Whether another law of thrust lessens the error on windows not seen, and is used; None where none was
     tried."""
+    unlikely: float = 0.0
+    """Negative logarithm of the likelihood of what was measured, but for a constant."""
+    opposed: tuple[str, ...] = ()
+    """Actuators that push the other way than drawn; the layout of the model has them turned about."""
 
     @property
     def covariance(self) -> Array:
@@ -119,13 +127,33 @@ def fit_robot(
     """
     if not swims:
         raise DataError("expected at least one swim, got none")
-    with threadpool_limits(limits=1, user_api="blas"):
-        return _fit(RobotModel(layout, swims, doubts), swims, other_law and layout.is_of_fins, progress)
-
-
-def _fit(model: RobotModel, swims: Sequence[Swim], other_law: bool, tell: Callable[[str], None]) -> RobotFit:
-    measured = np.concatenate([swim.measured for swim in swims])
     smooth = np.concatenate([smoothed(swim.measured) for swim in swims])
+    with threadpool_limits(limits=1, user_api="blas"):
+
+        def fitted(opposed: tuple[str, ...]) -> RobotFit:
+            model = RobotModel(opposed_in(layout, opposed), swims, doubts)
+            fit = _fit(model, swims, smooth, other_law and layout.is_of_fins, progress)
+            return replace(fit, opposed=opposed)
+
+        best = fitted(pushing_back(RobotModel(layout, swims, doubts), swims, smooth))
+        while (strength := best.found("strength")).min() < np.log(FAINT):
+            weak = int(strength.argmin())
+            turned = (name for k, name in enumerate(layout.names) if (name in best.opposed) != (k == weak))
+            try:
+                fit = fitted(tuple(turned))
+            except DataError:  # it goes astray
+                break
+            if fit.found("strength")[weak] < np.log(FAINT) or fit.unlikely > best.unlikely - CLEAR:
+                break
+            best = fit
+        return best
+
+
+def _fit(
+    model: RobotModel, swims: Sequence[Swim], smooth: Array, other_law: bool, tell: Callable[[str], None]
+) -> RobotFit:
+    """Fits actuators and body to swims, of which smoothed measurements (M, 12) tell where to begin."""
+    measured = np.concatenate([swim.measured for swim in swims])
     windows = cut([len(swim) for swim in swims], measured, smooth)
     model.meet(smooth[:, 6:])
     unknowns, deviation = Unknowns(model.blocks, BASE), DEVIATION
@@ -155,7 +183,9 @@ def _fit(model: RobotModel, swims: Sequence[Swim], other_law: bool, tell: Callab
     fitted = fit_windows(model, fitted.unknowns, windows, deviation, fitted.vector, fitted.start)
     if not np.isfinite(fitted.vector).all():
         raise DataError(f"{swims[0].name}: the fit goes astray; is the layout that of the robot that swam?")
-    return RobotFit(model, fitted, _explained(fitted, windows), helps)
+    said = np.isfinite(fitted.residual).sum(axis=(0, 2))
+    unlikely = float(fitted.cost[0] + said @ np.log(deviation))
+    return RobotFit(model, fitted, _explained(fitted, windows), helps, unlikely)
 
 
 def _deviation(fitted: Fitted, deviation: Array) -> Array:

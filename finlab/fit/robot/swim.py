@@ -18,6 +18,8 @@ CHANNELS = ("x", "y", "z", "roll", "pitch", "yaw", "u", "v", "w", "p", "q", "r")
 """What sensors may say: position in the world [m], attitude [rad], velocity [m/s] and angular rates [rad/s]
 in the body frame."""
 ANGLES = slice(3, 6)
+SMOOTHED = (11, 2)
+"""Samples and order of the filter by Savitzky and Golay."""
 
 
 @dataclass(frozen=True)
@@ -79,7 +81,7 @@ def smoothed(measured: Array) -> Array:
         values = measured[fresh, k]
         values = np.unwrap(values) if ANGLES.start <= k < ANGLES.stop else values
         full[:, k] = np.interp(grid, grid[fresh], values)
-    full[:, said] = savgol_filter(full[:, said], 11, 2, axis=0)
+    full[:, said] = savgol_filter(full[:, said], *SMOOTHED, axis=0)
     pace = np.gradient(full, STEP_S, axis=0)
     rates = body_rates(full[:, ANGLES], pace[:, ANGLES])
     velocity = body_velocity(full[:, ANGLES], pace[:, :3])

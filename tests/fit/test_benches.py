@@ -1,0 +1,169 @@
+"""Benches as others write them: workbooks, thrust stands, several voltages, missing units and signs."""
+
+import csv
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import openpyxl
+import pytest
+
+from finlab.arrays import Array
+from finlab.cli import main
+from finlab.errors import DataError
+from finlab.fit.thruster_bench import read_bench
+from finlab.fit.thruster_fit import ThrusterFit, fit_thruster
+
+PWM = np.arange(1100.0, 1901.0, 50.0)
+N_PER_KGF, N_PER_LB = 9.80665, 4.44822
+ENDS = (-41.0, 52.0)
+"""Forces [N] at the ends of the commands, at 16 V."""
+
+
+def force(volts: float = 16.0) -> Array:
+    x = (PWM - 1500.0) / 400.0
+    return np.asarray(np.where(x > 0.0, ENDS[1], -ENDS[0]) * np.sign(x) * np.abs(x) ** 1.6 * volts / 16.0)
+
+
+def power(volts: float = 16.0) -> Array:
+    return np.asarray(390.0 * (np.abs(PWM - 1500.0) / 400.0) ** 2.5 * (volts / 16.0) ** 2 + 1.0)
+
+
+def written(path: Path, columns: dict[str, Array]) -> Path:
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(columns)
+        writer.writerows(zip(*columns.values(), strict=True))
+    return path
+
+
+def workbook(path: Path, volts: tuple[float, ...], column: bool) -> Path:
+    """Sheets of a maker: a page of words, then one table for each voltage, below a title."""
+    book = openpyxl.Workbook()
+    book.active.append(["How this was measured", "in a tank"])
+    for v in volts:
+        sheet = book.create_sheet(f"T300 at {v:g} V")
+        sheet.append(["Performance"])
+        sheet.append(
+            [
+                " PWM (\u00b5s)",
+                "RPM",
+                "Power\n(W)",
+                "Force (Kg f)",
+                *(["Voltage (V)"] * column),
+                "Efficiency (g/W)",
+            ]
+        )
+        for p, n, w in zip(PWM, force(v), power(v), strict=True):
+            sheet.append(
+                [
+                    p,
+                    8.0 * abs(p - 1500.0),
+                    w,
+                    n / N_PER_KGF,
+                    *([v] * column),
+                    None if n == 0.0 else abs(n) / w,
+                ]
+            )
+    book.save(path)
+    return path
+
+
+def fitted(*paths: Path, volts: float | None = None) -> ThrusterFit:
+    return fit_thruster(read_bench(paths, volts))
+
+
+@pytest.mark.parametrize("column", [True, False])
+def test_a_workbook_is_read_at_the_voltage_that_is_asked_for(tmp_path: Path, column: bool) -> None:
+    path = workbook(tmp_path / "maker.xlsx", (10.0, 12.0, 16.0), column)
+    with pytest.raises(DataError, match="measured at 10, 12, 16 V; say which counts, --voltage 16"):
+        fitted(path)
+    for volts in (10.0, 12.0, 16.0, 11.0, 14.0):  # forces of this maker grow with the voltage itself
+        fit = fitted(path, volts=volts)
+        np.testing.assert_allclose(fit.force, np.array(ENDS) * volts / 16.0, rtol=1e-3)
+        notes = " ".join(fit.notes)
+        assert "no table in sheet Sheet" in notes and ("interpolated" in notes) == (volts in (11.0, 14.0))
+    with pytest.raises(DataError, match="tells nothing of 20 V"):
+        fitted(path, volts=20.0)
+
+
+def test_one_sheet_needs_no_voltage_and_what_is_no_workbook_gets_a_sentence(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = workbook(tmp_path / "one.xlsx", (16.0,), True)
+    np.testing.assert_allclose(fitted(path).force, ENDS, rtol=1e-3)
+    (tmp_path / "no.xlsx").write_text("PWM,force")
+    with pytest.raises(DataError, match="cannot be read as a zip archive"):
+        fitted(tmp_path / "no.xlsx")
+    with pytest.raises(DataError, match="no sheet holds a table"):
+        fitted(workbook(tmp_path / "words.xlsx", (), True))
+    monkeypatch.setitem(sys.modules, "openpyxl", None)
+    with pytest.raises(DataError, match="openpyxl, which is not installed"):
+        fitted(path)
+
+
+@pytest.mark.parametrize("shift", [0.0, 10.0])
+def test_voltages_of_one_table_are_apart_but_a_supply_may_sag(tmp_path: Path, shift: float) -> None:
+    both = {
+        "PWM (us)": np.append(PWM, PWM + shift), "Force (N)": np.append(force(12.0), force()),
+        "Power (W)": np.append(power(12.0), power()), "Voltage (V)": np.repeat([12.0, 16.0], len(PWM)),
+    }  # fmt: skip
+    path = written(tmp_path / "both.csv", both)
+    with pytest.raises(DataError, match="measured at 12, 16 V"):
+        fitted(path)
+    np.testing.assert_allclose(fitted(path, volts=12.0).force, np.array(ENDS) * 0.75, rtol=1e-3)
+    sagging = {
+        "PWM (us)": PWM,
+        "Force (N)": force(),
+        "Voltage (V)": 16.0 - power() / 130.0,
+        "Current (A)": power() / 15.0,
+    }
+    np.testing.assert_allclose(fitted(written(tmp_path / "sag.csv", sagging)).force, ENDS, rtol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("columns", "note"),
+    [
+        ({"ESC signal (\u00b5s)": PWM, "Thrust (kgf)": force() / N_PER_KGF, "Speed (Hz)": PWM}, "rpm"),
+        ({"Throttle (\u00b5s)": PWM, "Thrust (lbf)": force() / N_PER_LB, "Thrust (N)": force()}, ""),
+        ({"PWM": PWM, "Thrust (lbs)": force() / N_PER_LB}, "no unit stands at PWM: taken for us"),
+        ({"PWM (us)": PWM, "Force": force()}, "no unit stands at Force: taken for N"),
+        ({"PWM (us)": PWM, "Force (N)": np.abs(force())}, "they are sizes alone: those below the neutral"),
+        ({"ESC (us)": PWM, "Force (N)": -np.abs(force())}, "no sign, they are negative alone"),
+        ({"Throttle (%)": (PWM - 1500.0) / 4.0, "Thrust [gf]": 1e3 * force() / N_PER_KGF}, ""),
+    ],
+)  # fmt: skip
+def test_headers_units_and_signs_of_others(tmp_path: Path, columns: dict[str, Array], note: str) -> None:
+    fit = fitted(written(tmp_path / "bench.csv", columns | {"Electrical Power (W)": power()}))
+    np.testing.assert_allclose(fit.force, ENDS, rtol=1e-3)
+    assert note in " ".join(fit.notes) if note else not fit.notes
+
+
+def test_forces_that_contradict_each_other_are_named_and_one_way_is_no_missing_sign(tmp_path: Path) -> None:
+    two = {"PWM (us)": PWM, "Thrust (N)": force(), "Thrust (kgf)": force(), "Power (W)": power()}
+    with pytest.raises(DataError, match=r"Thrust \(N\) and Thrust \(kgf\), and differ"):
+        fitted(written(tmp_path / "two.csv", two))
+    ahead = PWM >= 1500.0
+    one = {"PWM (us)": PWM[ahead], "Force (N)": force()[ahead], "Power (W)": power()[ahead]}
+    assert fitted(written(tmp_path / "one.csv", one)).force == pytest.approx((0.0, ENDS[1]), rel=1e-3)
+
+
+def test_the_command_line_takes_a_voltage(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = workbook(tmp_path / "maker.xlsx", (12.0, 16.0), True)
+    command = ["fit", "actuator", str(path), "-o", str(tmp_path / "table.csv")]
+    assert main(command) == 2 and "--voltage 16" in capsys.readouterr().err
+    assert main([*command, "--voltage", "14"]) == 0
+    assert "interpolated between the rows at 12 V and at 16 V" in capsys.readouterr().out
+
+
+def test_blanks_take_no_time(tmp_path: Path) -> None:
+    path = tmp_path / "blanks.csv"
+    rows = "\n".join(f"{p},{n},{w}" for p, n, w in zip(PWM, force(), power(), strict=True))
+    path.write_text(
+        f"PWM (us),Force{' ' * 9000}(N),Power{'(' * 9000} (W)\n" + f"{' ' * 9000},,\n" * 300 + rows
+    )
+    before = time.process_time()
+    with pytest.raises(DataError, match="power or voltage is missing"):
+        read_bench([path])
+    assert time.process_time() - before < 1.0
