@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.actuators.response import CELLS, Line, Plane, price_grid
+from finlab.actuators.response import CELLS, Line, Plane, RadialTable, price_grid
 from finlab.allocation.dual.gauges import Gauges
 from finlab.arrays import Array
 from finlab.layout.angles import wrapped
@@ -128,8 +128,9 @@ class Answers:
         tables = [table for both in sides for table in both]
         self._coefficients = np.concatenate([table.polynomials() for table in tables]).T.copy()
         self._top = np.array([table.top for table in tables])
-        self.tops = self._top.reshape(-1, 2).max(axis=1)
         self._ends = np.array([table.force for table in tables])
+        self.prices = np.array([_usual_price(table) for table in tables]).reshape(-1, 2).max(axis=1)
+        """Price (n,) [W/N] of the largest force of each, if it were as dear as that of half the force says."""
         shares = self._ends / np.maximum(self._ends[:, -1:], 1e-300)
         self._shares = (shares + 2.0 * np.arange(len(tables))[:, None]).ravel()
         """The tables' forces as shares of the largest, one table after the other."""
@@ -376,6 +377,14 @@ class Answers:
             own[places] = share * own[places] + (1.0 - share) * others + turn * extra
         gain: Array = np.where(beyond, 0.5 * (root - ahead), 0.0).sum(axis=0)
         return gain
+
+
+def _usual_price(table: RadialTable) -> float:
+    """Price [W/N] of the largest force where power grows as its power of 1.5 from half of it on: at the peak
+    of a soft fin the price itself says nothing of the forces below."""
+    middle = 0.5 * (table.force[0] + table.force[-1])
+    price = float(np.interp(middle, table.force, price_grid(table.top)))
+    return min(max(price * np.sqrt(2.0), CLOSE * table.top), table.top)
 
 
 class _Fan(NamedTuple):

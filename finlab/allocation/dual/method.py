@@ -236,7 +236,8 @@ class Dual(Method):
         error = self._error(command, aim)
         rough = np.flatnonzero(error > EXACT)
         if len(rough):
-            command[rough] = refine(self._problem, aim[rough] / self.scale, command[rough], ROUNDS).command
+            asked = aim[rough] / self.scale
+            command[rough] = refine(self._problem, asked, command[rough], ROUNDS, EXACT).command
         return command
 
     def _error(self, command: Array, aim: Array) -> Array:
@@ -257,6 +258,6 @@ class Dual(Method):
         force = within_tick(self.compiled.robot, sets, asked, found.prices, 1.0 / self.scale)
         command = self.plant.feasible(box.clipped(self.compiled.commands(force, previous)))
         if self._error(command, aim)[0] > EXACT:
-            command = refine(problem, aim / self.scale, box.clipped(command), TICK_STEPS).command
+            command = refine(problem, aim / self.scale, box.clipped(command), TICK_STEPS, EXACT).command
             command = self.plant.feasible(box.clipped(command))
         return command

@@ -62,8 +62,8 @@ class DualRobot:
 
     @cached_property
     def gain(self) -> Array:
-        """Force over price (k, 1) [N^2/W] of each direction at its limit."""
-        each = self.most / self.answers.tops[:, None]
+        """Force over price (k, 1) [N^2/W] of each direction at its limit, by what half the force costs."""
+        each = self.most / self.answers.prices[:, None]
         return np.concatenate([each, each[self.answers.lines :]])
 
     @cached_property
