@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from finlab.allocation.evaluate import REACHED, judged_effort, judged_power
 from finlab.allocation.policy import CLOSEST, Policy, limits_reached
-from finlab.allocation.solution import Candidates, PlainData
+from finlab.allocation.solution import Candidates, PlainData, Rows
 from finlab.allocation.tables import allocation_text
 from finlab.arrays import Array
 from finlab.layout import Layout
@@ -62,7 +62,7 @@ class Answer(PlainData, Generic[Number]):
     health: Health | None = None
     """What was known of fins that work in part."""
     target: Array
-    """Desired wrench (6,) or (N, 6), [N, N m], body frame."""
+    """Desired wrench (6,) or (N, 6), [N, N m], body frame; NaN along axes that do not count."""
     command: Array
     """Command (n, 3) or (N, n, 3) of every fin: amplitude [rad], frequency [Hz], zero direction [rad]; NaN if
     failed."""
@@ -92,8 +92,9 @@ class Answer(PlainData, Generic[Number]):
 
     @property
     def unallocated(self) -> Array:
-        """What the robot does not deliver: target minus delivered wrench (6,) or (N, 6)."""
-        return self.target - self.wrench
+        """What the robot does not deliver: target minus delivered wrench (6,) or (N, 6); 0 along axes that do
+        not count."""
+        return np.nan_to_num(self.target - self.wrench)
 
     @cached_property
     def forces(self) -> Array:
@@ -129,7 +130,8 @@ class Answer(PlainData, Generic[Number]):
     @property
     def expected_error(self) -> Number:
         """Size of `expected_miss`, each axis over its `scale`: by how much the true wrench may be off."""
-        return self._number(np.linalg.norm(self.expected_miss / self.scale, axis=-1))
+        counted = np.where(np.isnan(self.target), 0.0, self.expected_miss / self.scale)
+        return self._number(np.linalg.norm(counted, axis=-1))
 
     @cached_property
     def power(self) -> Number:
@@ -275,7 +277,7 @@ class Allocation(Answer[float]):
     @property
     def share(self) -> float:
         """Share of the target that is delivered in its own direction; 1 where nothing is asked."""
-        asked, given = self.target / self.scale, self.wrench / self.scale
+        asked, given = np.nan_to_num(self.target / self.scale), self.wrench / self.scale
         size = float(asked @ asked)
         return 1.0 if size < 1e-14 else float(asked @ given) / size
 
@@ -334,3 +336,15 @@ class Allocation(Answer[float]):
 def chunks(n: int) -> Iterator[slice]:
     """Slices of at most `CHUNK` of n rows."""
     return (slice(start, start + CHUNK) for start in range(0, n, CHUNK))
+
+
+def chunks_of(places: NDArray[np.intp] | None, n: int) -> Iterator[Rows]:
+    """At most `CHUNK` places at a time, of all n rows where they are None."""
+    if places is None:
+        return chunks(n)
+    return (places[part] for part in chunks(len(places)))
+
+
+def first_of(rows: Rows) -> int:
+    """The first of some places."""
+    return int(rows.start if isinstance(rows, slice) else rows[0])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any, NamedTuple, Self
@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from finlab.allocation.allocation import CHUNK, Allocation, BatchAllocation, Later
+from finlab.allocation.allocation import Allocation, BatchAllocation, Later, chunks_of, first_of
 from finlab.allocation.method import Method
 from finlab.allocation.methods import (
     Checkpoint,
@@ -24,16 +24,19 @@ from finlab.allocation.methods import (
 from finlab.allocation.notes import answer_notes
 from finlab.allocation.policy import CLOSEST, Policy, as_policy
 from finlab.allocation.question import (
+    Axes,
     Fins,
+    axes_of,
     check_flow,
     check_layout,
     check_previous,
     check_seed,
     check_wrenches,
+    same_axes,
     usable_fins,
 )
 from finlab.allocation.settings import Settings
-from finlab.allocation.solution import Candidates, Solution, joined
+from finlab.allocation.solution import Candidates, Rows, Solution, joined
 from finlab.allocation.yardstick import yardstick
 from finlab.arrays import Array
 from finlab.bundle_files import read_bundle_files
@@ -193,7 +196,8 @@ class Allocator:
         """Commands for one target.
 
         Args:
-            wrench: desired wrench (6,) [N, N m] in the body frame.
+            wrench: desired wrench (6,) [N, N m] in the body frame; NaN for an axis that is free here: it
+                takes what the cheapest answer gives it, as those do that the layout does not command.
             failed: names of fins that do not work; they leave the graph.
             previous: command (n, 3) of the previous tick: what follows stays within the rates of the
                 actuators. Or the answer that gave it: the search then begins there, which is quicker.
@@ -207,16 +211,16 @@ class Allocator:
             seed: the same target and seed give the same answer.
 
         Raises:
-            CommandError: the wrench is not six finite numbers, or `previous`, `reference` or `flow` has
-                another shape.
+            CommandError: the wrench is not six numbers, none of them counts, or `previous`, `reference` or
+                `flow` has another shape.
             AllocationError: the method does not know the policy.
             LayoutError: an unknown fin, or none left.
             DataError: a fin's force table cannot be read.
         """
-        target, policy = check_wrenches(wrench, single=True), as_policy(policy)
+        asked, policy = check_wrenches(wrench, single=True), as_policy(policy)
         check_seed(seed)
         water = check_flow(flow)
-        ready = self._ready(failed, health)
+        ready = self._ready(failed, health, axes_of(self._layout, asked))
         fins, method = ready.fins, ready.method
         method.check_policy(policy)
         options: dict[str, Any] = {}
@@ -226,14 +230,21 @@ class Allocator:
             previous = previous.command
         before = None if previous is None else check_previous(previous, fins.layout)[fins.alive]
         start = time.perf_counter()
+        counts = method.layout.commanded
+        target = np.where(counts, asked, 0.0)
         if reference is not None:
-            target = method.in_time(target, check_wrenches(reference, single=False, name="reference"))
+            later = np.where(counts, check_wrenches(reference, single=False, name="reference"), 0.0)
+            target = method.in_time(target, np.nan_to_num(later))
         solution = method.solve(
             target[None], policy=policy, previous=before, flow=water, seed=seed, **options
         )
+        if before is None:
+            solution = solution._replace(command=method.plant.rested(solution.command))
         solve_ms = (time.perf_counter() - start) * 1e3
         return Allocation(
-            **self._about(target, ready, solution, policy, health, water, seed),
+            **self._about(
+                np.where(counts, target, np.nan), asked, ready, solution, policy, health, water, seed
+            ),
             command=fins.among_all(solution.command)[0].copy(),
             solve_ms=solve_ms,
             settings=vars(self.settings).copy(),
@@ -250,7 +261,7 @@ class Allocator:
             AllocationError: the answer is of another robot.
         """
         ready = self._ready_for(result)
-        ways = ready.method.refinement(result.target, flow=result.flow, seed=result.seed)
+        ways = ready.method.refinement(np.nan_to_num(result.target), flow=result.flow, seed=result.seed)
         return tuple(replace(way, command=ready.fins.among_all(way.command)) for way in ways)
 
     def allocate_batch(
@@ -268,23 +279,29 @@ class Allocator:
         The answer keeps the targets as they are, not a copy, and the commands; what else there is to tell is
         computed when it is asked for.
         """
-        targets, policy = check_wrenches(wrenches, single=False), as_policy(policy)
+        asked, policy = check_wrenches(wrenches, single=False), as_policy(policy)
         check_seed(seed)
         water = check_flow(flow)
         ready = self._ready(failed, health)
-        fins, method = ready.fins, ready.method
-        method.check_policy(policy)
+        fins = ready.fins
+        ready.method.check_policy(policy)
         start = time.perf_counter()
-        parts = (
-            method.solve(targets[k : k + CHUNK], policy=policy, flow=water, seed=seed + k)
-            for k in range(0, len(targets), CHUNK)
-        )
-        solution = joined(
-            ((part, fins.among_all(part.command)) for part in parts), len(targets), len(fins.alive)
-        )
+
+        def parts() -> Iterator[tuple[Rows, Solution]]:
+            for axes, places in same_axes(self._layout, asked):
+                one = self._ready(failed, health, axes)
+                for rows in chunks_of(places, len(asked)):
+                    counts = one.method.layout.commanded
+                    target = asked[rows] if counts.all() else np.where(counts, asked[rows], 0.0)
+                    part = one.method.solve(target, policy=policy, flow=water, seed=seed + first_of(rows))
+                    yield rows, part._replace(command=one.method.plant.rested(part.command))
+
+        solution = joined(parts(), len(asked), fins.alive)
+        counts = self._layout.commanded
+        targets = asked if counts.all() else np.where(counts, asked, np.nan)
         elapsed_ms = (time.perf_counter() - start) * 1e3
         return BatchAllocation(
-            **self._about(targets, ready, solution, policy, health, water, seed),
+            **self._about(targets, asked, ready, solution, policy, health, water, seed),
             command=solution.command,
             solve_ms=np.broadcast_to(elapsed_ms / max(len(targets), 1), len(targets)),
             wrench_expected=solution.wrench,
@@ -293,6 +310,7 @@ class Allocator:
     def _about(
         self,
         target: Array,
+        asked: Array,
         ready: Ready,
         solution: Solution,
         policy: Policy,
@@ -304,10 +322,10 @@ class Allocator:
         fins = ready.fins
         later = Later(
             ready.plant.at(flow),
-            partial(answer_notes, ready.fins.healthy, ready.method, self.checkpoint, flow, target),
+            partial(answer_notes, fins.healthy, ready.method, self.checkpoint, flow, asked, solution.notes),
             partial(_among_all, solution.candidates, fins),
             partial(_among_all, solution.samples, fins),
-            *(() if solution.bound is None else (solution.bound,)),
+            *(() if solution.bound is None else (partial(solution.bound, solution.command),)),
         )
         return {
             "target": target,
@@ -334,20 +352,21 @@ class Allocator:
             )
         return ready
 
-    def _ready(self, failed: Sequence[str], health: Health | None) -> Ready:
-        """The robot in a state, prepared now or kept from an earlier question."""
-        if health is None and (failed == () or failed == []):
+    def _ready(self, failed: Sequence[str], health: Health | None, axes: Axes | None = None) -> Ready:
+        """The robot in a state, asked for some axes, prepared now or kept from an earlier question."""
+        if axes is None and health is None and (failed == () or failed == []):
             return self._whole
-        key = usable_fins(self._layout, failed).failed, health
-        found = self._prepared.pop(key, None) or self._make(failed, health)
+        key = usable_fins(self._layout, failed).failed, health, axes
+        found = self._prepared.pop(key, None) or self._make(failed, health, axes)
         self._prepared[key] = found  # the newest is last
         while len(self._prepared) > MOST_PREPARED:
             self._prepared.pop(next(iter(self._prepared)), None)
         return found
 
-    def _make(self, failed: Sequence[str], health: Health | None) -> Ready:
+    def _make(self, failed: Sequence[str], health: Health | None, axes: Axes | None = None) -> Ready:
         fins, choice = usable_fins(self._layout, failed, health), self._choice
-        method = choice.kind(fins.healthy, choice.settings, self._scale, choice.weights)
+        layout = fins.healthy if axes is None else replace(fins.healthy, axes=axes)
+        method = choice.kind(layout, choice.settings, self._scale, choice.weights)
         return Ready(fins, method, plant_of(fins.layout))
 
     def __repr__(self) -> str:

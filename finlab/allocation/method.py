@@ -46,7 +46,7 @@ class Method(ABC):
         """Prepare the method for a layout.
 
         Args:
-            layout: the healthy fins.
+            layout: the healthy fins, and the axes that count.
             settings: a `settings_class`.
             scale: yardstick (6,) of the error [N, N m], of the whole robot.
             weights: trained networks, for methods that have any.
@@ -59,7 +59,7 @@ class Method(ABC):
         """
         self.check_robot(layout)
         self.layout, self.settings, self.scale, self.weights = layout, settings, scale, weights
-        self.plant = plant_of(layout)
+        self.plant = plant_of(layout).counting(layout.commanded)
 
     @classmethod
     def check_robot(cls, layout: Layout) -> None:
@@ -96,7 +96,7 @@ class Method(ABC):
         """Solve for targets.
 
         Args:
-            targets: desired wrenches (N, 6) [N, N m].
+            targets: desired wrenches (N, 6) [N, N m]; 0 along axes that do not count.
             policy: what to do with those out of reach; one that `check_policy` accepts.
             previous: command (n, 3) of the previous tick, for a single target, or None.
             flow: velocity (6,) of the body relative to the water [m/s, rad/s], or None at rest.

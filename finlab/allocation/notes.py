@@ -26,14 +26,24 @@ BEYOND = 1e-6
 
 
 def answer_notes(
-    layout: Layout, method: Method, checkpoint: str | None, flow: Array | None, target: Array
+    layout: Layout,
+    method: Method,
+    checkpoint: str | None,
+    flow: Array | None,
+    target: Array,
+    own: tuple[str, ...] = (),
 ) -> tuple[str, ...]:
-    """Returns the sentences about answers of a method for targets (6,) or (N, 6): those of `fin_notes`, what
-    is asked of axes that nothing drives, and fins that the networks of a checkpoint do not know."""
-    notes = fin_notes(layout, flow)
+    """Returns the sentences about answers of a method for targets (6,) or (N, 6): those of `fin_notes`, those
+    of the method's `own`, what is asked of axes that nothing drives or that do not count, and fins that the
+    networks of a checkpoint do not know."""
+    notes = fin_notes(layout, flow) + own
     asked = np.asarray((np.abs(target) > NEARLY * method.scale).reshape(-1, 6).any(axis=0))
-    if left := [axis for axis in method.undriven if asked[AXES.index(axis)]]:
+    named = [axis for axis, there in zip(AXES, asked, strict=True) if there]
+    if left := [axis for axis in named if axis in method.undriven]:
         notes = (*notes, f"no actuator gives {' or '.join(left)}: what is asked of it is left out")
+    if left := [axis for axis in named if axis not in layout.axes]:
+        its = f"layout {layout.name} does not command {' or '.join(left)} (axes)"
+        notes = (*notes, f"{its}: what is asked of it does not count")
     if not method.unknown_fins or method.fin_model is None:
         return notes
     model = method.fin_model

@@ -11,9 +11,9 @@ from finlab.arrays import Array
 from finlab.errors import CommandError
 from finlab.layout import Layout
 from finlab.layout.angles import is_full_turn
+from finlab.layout.wrench_axes import AXES as AXES
+from finlab.layout.wrench_axes import mask_of
 
-AXES = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
-"""The wrench's axes, in order."""
 KINDS = ("closest", "direction", "priority")
 """`closest`: least weighted error. `direction`: the same direction, scaled down. `priority`: groups of axes,
 each served as far as those before it allow."""
@@ -66,7 +66,7 @@ class Policy:
         named = {axis for group in self.order for axis in group}
         rest = tuple(axis for axis in AXES if axis not in named)
         groups = (*self.order, *((rest,) if rest else ()))
-        return [np.array([axis in group for axis in AXES]) for group in groups if group]
+        return [mask_of(group) for group in groups if group]
 
 
 CLOSEST = Policy()

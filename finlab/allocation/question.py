@@ -6,17 +6,22 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from finlab.allocation.policy import AXES
+from finlab.allocation.solution import among_all
 from finlab.arrays import Array
 from finlab.errors import AllocationError, CommandError
 from finlab.layout import Layout
 from finlab.layout.damage import Health
+from finlab.layout.wrench_axes import AXES, Axis
 
 MAX_WRENCH = 1e6
 """Largest magnitude of a target component [N, N m]; beyond it something is wrong upstream."""
 
 MAX_FLOW = 100.0
 """Largest magnitude of a component of the flow [m/s, rad/s]."""
+
+
+Axes = tuple[Axis, ...]
+"""Axes that a question asks for."""
 
 
 class Fins(NamedTuple):
@@ -33,11 +38,7 @@ class Fins(NamedTuple):
 
     def among_all(self, command: Array) -> Array:
         """Commands (..., m, 3) of the healthy fins put among all n; the failed ones hold NaN."""
-        if len(self.alive) == command.shape[-2]:
-            return command
-        full = np.full((*command.shape[:-2], len(self.alive), 3), np.nan)
-        full[..., self.alive, :] = command
-        return full
+        return among_all(command, self.alive)
 
 
 def usable_fins(layout: Layout, failed: Sequence[str], health: Health | None = None) -> Fins:
@@ -70,23 +71,57 @@ def _numbers(values: ArrayLike, name: str, expected: str, copy: bool = True) -> 
         if array.dtype.kind == "c":
             raise TypeError("complex")
         return array.astype(np.float64, copy=False)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise CommandError(f"{name}: expected {expected}, got {values!r:.100}") from error
 
 
 def check_wrenches(wrench: ArrayLike, *, single: bool, name: str = "wrench") -> Array:
-    """One wrench (6,) or many (N, 6) as finite float64, or a `CommandError` that says what is wrong with
-    what is called `name`. Arrays of many are not copied."""
+    """One wrench (6,) or many (N, 6) as float64, NaN for an axis that does not count, or a `CommandError`
+    that says what is wrong with what is called `name`. Arrays of many are not copied."""
     expected = "six numbers [Fx, Fy, Fz, Tx, Ty, Tz]" if single else "an array of shape (N, 6)"
     array = _numbers(wrench, name, f"{expected} in N and N m", copy=single)
     if array.shape != (6,) if single else (array.ndim != 2 or array.shape[1] != 6):
         raise CommandError(f"{name}: expected {expected} in N and N m, got an array of shape {array.shape}")
-    if not (np.abs(array) <= MAX_WRENCH).all():
-        bad = ~(np.abs(array) <= MAX_WRENCH)
+    if (np.abs(array) > MAX_WRENCH).any():
+        bad = np.abs(array) > MAX_WRENCH
         axis = AXES[int(np.argwhere(bad)[0][-1])]
         value = array[bad][0]
-        raise CommandError(f"{name}: {axis} must be finite and at most {MAX_WRENCH:g} in size, got {value}")
+        raise CommandError(
+            f"{name}: {axis} must be at most {MAX_WRENCH:g} in size, or NaN where it is free, got {value}"
+        )
     return array
+
+
+def axes_of(layout: Layout, wrench: Array) -> Axes | None:
+    """The axes of a robot that a wrench (6,) asks for; None where these are all that it commands.
+
+    Raises:
+        CommandError: there is none.
+    """
+    asked = layout.commanded & ~np.isnan(wrench)
+    if (asked == layout.commanded).all():
+        return None
+    if not asked.any():
+        raise CommandError(
+            f"wrench: NaN on each axis that layout {layout.name} commands ({', '.join(layout.axes)}), "
+            "expected a number on one of them"
+        )
+    return tuple(axis for axis, counts in zip(AXES, asked, strict=True) if counts)
+
+
+def same_axes(layout: Layout, wrenches: Array) -> list[tuple[Axes | None, NDArray[np.intp] | None]]:
+    """Groups of wrenches (N, 6) that ask for the same axes: the axes as `axes_of` gives them, and their
+    places; None for all.
+
+    Raises:
+        CommandError: a wrench asks for no axis.
+    """
+    free = np.isnan(wrenches)
+    if not free.any():
+        return [(None, None)]
+    patterns, group = np.unique(free, axis=0, return_inverse=True)
+    rows = [np.flatnonzero(group.ravel() == i) for i in range(len(patterns))]
+    return [(axes_of(layout, wrenches[places[0]]), places) for places in rows]
 
 
 def check_flow(flow: ArrayLike | None) -> Array | None:

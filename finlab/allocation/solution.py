@@ -5,6 +5,7 @@ from dataclasses import dataclass, fields
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finlab.arrays import Array
 
@@ -81,8 +82,9 @@ class Solution(NamedTuple):
 
     command: Array
     """Chosen commands (N, n, 3)."""
-    bound: Callable[[], Array] | None = None
-    """Gives the power (N,) [W] that no answer can undercut; None for methods that prove none."""
+    bound: Callable[[Array], Array] | None = None
+    """Gives the power (N,) [W] that no answer can undercut which gives the wrenches of the chosen commands
+    (N, n, 3); None for methods that prove none."""
     wrench: Array | None = None
     """Wrench (N, 6) that the method itself expects, where it has a model of its own."""
     candidates: Callable[[], Candidates] | None = None
@@ -91,23 +93,44 @@ class Solution(NamedTuple):
     """Gives the raw candidates before refinement, for a single target."""
     prices: Array | None = None
     """What one more unit of each axis of the wrenches costs (N, 6) [W/N, W/(N m)], where the method tells."""
+    notes: tuple[str, ...] = ()
+    """Sentences about these answers."""
 
 
-def joined(parts: Iterable[tuple[Solution, Array]], count: int, n: int) -> Solution:
-    """Returns solutions for `count` targets one after the other, each with its commands among those of all n
-    actuators."""
-    command = np.full((count, n, 3), np.nan)
-    bounds: list[Callable[[], Array]] = []
+def among_all(command: Array, alive: NDArray[np.bool_]) -> Array:
+    """Commands (..., m, 3) of the actuators that are alive (n,) put among all n; the failed ones hold NaN."""
+    if len(alive) == command.shape[-2]:
+        return command
+    full = np.full((*command.shape[:-2], len(alive), 3), np.nan)
+    full[..., alive, :] = command
+    return full
+
+
+Rows = slice | NDArray[np.intp]
+"""Places of targets."""
+
+
+def joined(parts: Iterable[tuple[Rows, Solution]], count: int, alive: NDArray[np.bool_]) -> Solution:
+    """Returns one solution for `count` targets and all n actuators, of which some are alive (n,), of
+    solutions for some targets and those that are alive."""
+    command = np.full((count, len(alive), 3), np.nan)
+    places = slice(None) if alive.all() else np.flatnonzero(alive)
+    bounds: list[tuple[Rows, Callable[[Array], Array]]] = []
     wrench: Array | None = None
-    start = 0
-    for part, among_all in parts:
-        rows = slice(start, start + len(among_all))
-        start = rows.stop
-        command[rows] = among_all
+    notes: dict[str, None] = {}
+    for rows, part in parts:
+        command[rows] = among_all(part.command, alive)
+        notes |= dict.fromkeys(part.notes)
         if part.bound is not None:
-            bounds.append(part.bound)
+            bounds.append((rows, part.bound))
         if part.wrench is not None:
             wrench = np.empty((count, 6)) if wrench is None else wrench
             wrench[rows] = part.wrench
-    bound = (lambda: np.concatenate([part() for part in bounds])) if bounds else None
-    return Solution(command, bound, wrench)
+
+    def bound(command: Array) -> Array:
+        found = np.empty(count)
+        for rows, part in bounds:
+            found[rows] = part(command[rows][:, places])
+        return found
+
+    return Solution(command, bound if bounds else None, wrench, notes=tuple(notes))

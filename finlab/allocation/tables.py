@@ -5,13 +5,17 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from finlab.allocation.policy import AXES
+import numpy as np
+
 from finlab.layout.commands import AzimuthCommand, Command, FinCommand, RudderCommand
+from finlab.layout.wrench_axes import AXES
 from finlab.text_table import aligned
 
 if TYPE_CHECKING:
     from finlab.allocation.allocation import Allocation
 
+NEARLY_ALL = 0.995
+"""Share of a wrench from which on it is printed as all of it."""
 COLUMNS = ("actuator", "type", "command", "force [N]")
 """Columns of the table of actuators."""
 WRENCH_COLUMNS = ("", *(f"{axis} [{'N' if axis.startswith('F') else 'N m'}]" for axis in AXES))
@@ -48,7 +52,10 @@ def wrench_rows(result: Allocation) -> list[tuple[str, ...]]:
     if result.expected_error:
         wrenches["uncertain"] = result.expected_miss
     # `+ 0.0` turns a rounded -0.0 into 0.0.
-    return [(name, *(f"{round(v, 3) + 0.0:.3f}" for v in row)) for name, row in wrenches.items()]
+    return [
+        (name, *("free" if math.isnan(v) else f"{round(v, 3) + 0.0:.3f}" for v in row))
+        for name, row in wrenches.items()
+    ]
 
 
 def summary(result: Allocation) -> str:
@@ -69,7 +76,16 @@ def remarks(result: Allocation) -> list[str]:
         # With fins that the method does not know, what is missing says nothing about the robot.
         return words
     limits = f"; {', '.join(result.binding)}" if result.binding else ""
-    return [f"not reached: {100 * result.share:.0f} % of the wrench is delivered{limits}", *words]
+    return [f"not reached: {_short_of(result)}{limits}", *words]
+
+
+def _short_of(result: Allocation) -> str:
+    """What is missing, in words: the share that is there, or where that is nearly all, the worst axis."""
+    if result.share < NEARLY_ALL:
+        return f"{100 * result.share:.0f} % of the wrench is delivered"
+    worst = int(np.argmax(np.abs(result.unallocated / result.scale)))
+    unit = "N" if worst < 3 else "N m"
+    return f"{AXES[worst]} is off by {abs(result.unallocated[worst]):.3g} {unit}"
 
 
 def allocation_text(result: Allocation) -> str:

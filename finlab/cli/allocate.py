@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import isnan
 from typing import Annotated, Any
 
 from tyro.conf import Positional, UseAppendAction, arg
@@ -35,7 +36,7 @@ def allocate(
 
     Args:
         layout: layout file, bundle, or the name of a shipped layout.
-        wrench: target in the body frame [N, N m].
+        wrench: target in the body frame [N, N m]; nan for an axis that does not count.
         failed: name of a fin that does not work.
         method: dual, mdn, paper, qp, sqp, px4, ardusub, analytic or ipopt.
         robust: for method dual: watts that an expected error of 1 % of the yardstick is worth.
@@ -59,6 +60,8 @@ def allocate(
     from finlab.errors import FinlabError
 
     check_json_file(json)
+    if any(map(isnan, wrench)) and not any(value for value in wrench if not isnan(value)):
+        raise FinlabError("wrench: asks for nothing, since every axis is 0 or free; expected a value on one")
     robot, lost = open_robot(layout, failed)
     options: dict[str, Any] = {} if robust is None else {"robust": robust}
     allocator = Allocator(robot, method, checkpoint=checkpoint, **options)

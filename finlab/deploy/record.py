@@ -16,7 +16,7 @@ def allocation_record(result: Allocation) -> dict[str, object]:
     return {
         **command_record(result.layout, result.command, result.forces),
         "failed": list(result.failed),
-        "target": result.target.tolist(),
+        "target": [None if np.isnan(value) else value for value in result.target.tolist()],
         "flow": None if result.flow is None else result.flow.tolist(),
         "wrench_expected": None if expected is None else expected.tolist(),
         "wrench_plant": result.wrench.tolist(),

@@ -23,6 +23,7 @@ from finlab.layout.checked import form
 from finlab.layout.file_form import ACTUATOR, BODY, HORIZONTAL_FIN, Reader, plain, under
 from finlab.layout.fin import Fin
 from finlab.layout.layout import MAX_ACTUATORS, Layout
+from finlab.layout.wrench_axes import AXES
 from finlab.whole_file import write_whole
 
 FORMAT = "finlab-layout"
@@ -53,6 +54,7 @@ LAYOUT_OF_FINS = form(
     called="LayoutOfFins",
     tag=("version", 1),
     actuators=None,
+    axes=None,
     fins=Annotated[list[HORIZONTAL_FIN], _COUNT],
     **_OF_A_LAYOUT,
 )
@@ -84,8 +86,9 @@ def parse_layout(
         for name in (key, "body"):
             with under(name):
                 told[name] = reader.value(getattr(file, name))
+        axes = getattr(file, "axes", None) or AXES
         try:
-            return Layout(file.name, told[key], file.description or "", told["body"])
+            return Layout(file.name, told[key], file.description or "", told["body"], tuple(axes))
         except LayoutError as error:
             raise LayoutError(error.problem, error.key.replace("actuators[", f"{key}[")) from None
 
@@ -105,11 +108,14 @@ def check_version(data: Any, form: str, *versions: int) -> None:
 def layout_to_dict(layout: Layout) -> dict[str, Any]:
     """Returns the layout as the plain values of a layout file; `parse_layout` gives the same layout back."""
     horizontal = all(isinstance(part, Fin) and part.mounting_angle is not None for part in layout.actuators)
+    horizontal &= layout.axes == AXES
     version = 1 if horizontal else 2
     data: dict[str, Any] = {"format": FORMAT, "version": version, "name": layout.name}
     if layout.description:
         data["description"] = layout.description
     data["frame"] = dict(FRAME)
+    if layout.axes != AXES:
+        data["axes"] = list(layout.axes)
     parts = plain(layout.actuators)
     if horizontal:
         data["fins"] = [{key: value for key, value in part.items() if key != "type"} for part in parts]

@@ -8,7 +8,7 @@ from typing import Annotated, Any, NoReturn
 
 import numpy as np
 from msgspec import Meta
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from finlab.arrays import Array
 from finlab.errors import LayoutError
@@ -16,6 +16,7 @@ from finlab.layout.actuator import Actuator
 from finlab.layout.body import Body
 from finlab.layout.checked import Checked, Name
 from finlab.layout.fin import Fin
+from finlab.layout.wrench_axes import AXES, CommandedAxes, mask_of
 
 MAX_ACTUATORS = 64
 """Most actuators a layout may have."""
@@ -35,12 +36,17 @@ class Layout(Checked):
     """What there is to know about it, for people."""
     body: Body | None = None
     """Hull, mass and hydrodynamics, where known."""
+    axes: CommandedAxes = AXES
+    """Axes of the wrench that the robot commands; the others take what the cheapest answer gives them."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
         object.__setattr__(self, "actuators", tuple(self.actuators))
         if not 1 <= self.n <= MAX_ACTUATORS:
             raise LayoutError(f"expected 1 to {MAX_ACTUATORS} actuators, got {self.n}", "actuators")
+        if len(set(self.axes)) < len(self.axes):
+            raise LayoutError(f"every axis may be named once, got {', '.join(self.axes)}", "axes")
+        object.__setattr__(self, "axes", tuple(axis for axis in AXES if axis in self.axes))
         first_use: dict[str, int] = {}
         for i, name in enumerate(self.names):
             if name in first_use:
@@ -51,7 +57,7 @@ class Layout(Checked):
 
     @cached_property
     def _hash(self) -> int:
-        return hash((self.name, self.actuators, self.description, self.body))
+        return hash((self.name, self.actuators, self.description, self.body, self.axes))
 
     def __hash__(self) -> int:
         # Kept: every call of an allocator looks its layout up, and hashing all parts takes longer.
@@ -97,6 +103,11 @@ class Layout(Checked):
             f"{what} works for {wanted} only, and {part.name!r} of layout {self.name} {found}; "
             "method dual of `finlab allocate` takes any actuator"
         )
+
+    @cached_property
+    def commanded(self) -> NDArray[np.bool_]:
+        """Which axes of a wrench the robot commands (6,)."""
+        return mask_of(self.axes)
 
     @cached_property
     def position(self) -> Array:

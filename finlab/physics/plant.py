@@ -16,6 +16,7 @@ from finlab.actuators.fin.blade import Blade
 from finlab.actuators.fin.models import file_stamps, make_law
 from finlab.actuators.law import ActuatorLaw
 from finlab.actuators.registry import free_angles, laws_of
+from finlab.actuators.thrust_power import held
 from finlab.arrays import Array
 from finlab.errors import CommandError
 from finlab.layout.angles import TURN, is_full_turn
@@ -58,6 +59,15 @@ class Plant:
             return self
         other = copy(self)
         other.flow = np.asarray(flow, np.float64)
+        return other
+
+    def counting(self, axes: NDArray[np.bool_]) -> Self:
+        """Returns the plant for those to whom only some axes (6,) of the wrench count, the others being 0;
+        itself where all do."""
+        if axes.all():
+            return self
+        other = copy(self)
+        other.effectiveness = np.where(axes, self.effectiveness, 0.0)
         return other
 
     def inflow(self, flow: Array | None) -> Array | None:
@@ -160,6 +170,23 @@ class Plant:
         values = np.asarray(command, np.float64)
         wrapped = self.lower + np.mod(values - self.lower, TURN)
         return np.clip(np.where(self.turns, wrapped, values), self.lower, self.upper)
+
+    @cached_property
+    def _dead_band(self) -> Array | None:
+        """Dead bands (n, 3) [N] of the commands that are forces; None where there is none."""
+        bands = np.zeros((self.n, 3))
+        for i, part in enumerate(self.layout.actuators):
+            limits: tuple[str, ...] = getattr(part, "LIMITS", ())
+            if "force" in limits:
+                bands[i, limits.index("force")] = getattr(part, "dead_band", 0.0)
+        return bands if bands.any() else None
+
+    def rested(self, command: Array) -> Array:
+        """Returns commands (..., n, 3) with those inside a dead band, which give no force, at rest."""
+        if self._dead_band is None:
+            return command
+        rest = np.clip(0.0, self.lower, self.upper)
+        return np.where(held(command, self._dead_band) == command, command, rest)
 
     def sample(self, rng: np.random.Generator, size: tuple[int, ...]) -> Array:
         """Returns uniform commands (*size, n, 3) within the limits."""

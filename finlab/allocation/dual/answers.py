@@ -16,14 +16,10 @@ from numpy.typing import NDArray
 from finlab.actuators.response import CELLS, Line, Plane, RadialTable, price_grid
 from finlab.allocation.dual.gauges import Gauges
 from finlab.arrays import Array
-from finlab.layout.angles import wrapped
-from finlab.precision import CLOSE, FINE, NOTHING, ROUNDS
+from finlab.precision import FINE, NOTHING, ROUNDS
 
 TURNING = 1e-2
 """Price, as a share of the mean one of the least force, over which a force that cannot rest turns round."""
-STEADY = 1e-3
-"""Share of its price by which that of an actuator at a limit may change in a step to first order; of the
-largest price, those of others by ten times this share."""
 _EDGES = price_grid(1.0)
 """Ends of the tables' intervals, as shares of the largest price."""
 
@@ -207,38 +203,15 @@ class Answers:
             parts = [size[:lines], *parts[0]], [slope[:lines], *parts[1]]
         return Answer(np.concatenate(parts[0]), np.concatenate(parts[1]), total)
 
-    def change(self, derivative: Array, price: Array) -> Array:
-        """Change of the forces (k, N) [N] to first order, by the derivatives of an answer (l + 3 p, N), where
-        prices change by (k, N) [W/N]."""
-        lines, n, planes = self.lines, self.lines + self.planes, self.planes
-        first, second = price[lines:n], price[n:]
-        xx, xy, yy = derivative[lines:n], derivative[n : n + planes], derivative[n + planes :]
-        line = derivative[:lines] * price[:lines]
-        return np.concatenate([line, xx * first + xy * second, xy * first + yy * second])
-
-    def linear(self, force: Array, change: Array, sets: Sets) -> NDArray[np.bool_]:
-        """Where (N,) forces (k, N) may change by (k, N), to first order: within the sets, and so little that
-        the second order, of forces like the square of their price, costs nothing."""
+    def farthest(self, price: Array, sets: Sets) -> Array:
+        """Forces (k, N) [N] that are worth most at prices (k, N), whatever their power."""
         lines, n = self.lines, self.lines + self.planes
-        old, new = self._sized(force), self._sized(force + change)
-        small = self._sized(change) ** 2 <= 4.0 * CLOSE * np.abs(old) * np.abs(old).max(axis=0)
-        inside = (new >= sets.low) & (new <= sets.high * (1.0 + CLOSE**2))
-        fits = (small & inside).all(axis=0)
-        if sets.arcs and fits.any():
-            angle = np.arctan2(force[n:] + change[n:], force[lines:n] + change[lines:n])
-            fits &= (np.abs(wrapped(angle - sets.middle)) <= sets.half + NOTHING).all(axis=0)
-        return np.asarray(fits & (not self.gauges))
-
-    def kept(self, force: Array, price: Array, change: Array, sets: Sets) -> NDArray[np.bool_]:
-        """Where (N,) prices (k, N) change so little, by (k, N), that actuators whose forces (k, N) are at a
-        limit stay there, and the dual value is nearly the largest."""
-        size, price, change = self._sized(force), np.abs(self._sized(price)), np.abs(self._sized(change))
-        free = (size < sets.high * (1.0 - NOTHING)) & (size > sets.low)
-        return np.asarray((change <= STEADY * np.where(free, 10.0 * price.max(axis=0), price)).all(axis=0))
-
-    def _sized(self, force: Array) -> Array:
-        """What lines give (n, N) and the sizes of what planes give, of forces or prices (k, N)."""
-        return np.concatenate([force[: self.lines], self.sizes(force)]) if self.lines else self.sizes(force)
+        line = np.where(price[:lines] > 0.0, sets.high[:lines], sets.low[:lines])
+        if not self.planes:
+            return line
+        fan = self._fan(price[lines:n], price[n:], sets, 1e-300)
+        size = np.where(fan.along > 0.0, sets.high[lines:], sets.low[lines:])
+        return np.concatenate([line, size * fan.first, size * fan.second])
 
     def worth(self, price: Array, sets: Sets) -> tuple[Array, Array]:
         """Prices (n, N) [W/N] along the forces that answer prices (k, N), of lines with their sign, and what

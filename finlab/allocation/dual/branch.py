@@ -90,7 +90,7 @@ def least_power(robot: DualRobot, target: Array, sets: Sets, root: Prices) -> Br
         if not len(nearer):
             break
         parts = _dive(robot, parts, nearer, amount[:, nearer], answer)
-        answer = solve(robot, target[:, parts.row], parts.sets, parts.prices, value=True)
+        answer = solve(robot, target[:, parts.row], parts.sets, parts.prices, value=True, way="many")
     parts, answer, value = start, root, np.full(count, np.inf)
     for round_ in range(ROUNDS + 1):
         amount = gaps(robot, answer.force, parts.sets)
@@ -102,7 +102,7 @@ def least_power(robot: DualRobot, target: Array, sets: Sets, root: Prices) -> Br
         if not len(kept):
             break
         parts = _cut(robot, parts, kept, amount[:, kept], answer)
-        answer = solve(robot, target[:, parts.row], parts.sets, parts.prices, value=True)
+        answer = solve(robot, target[:, parts.row], parts.sets, parts.prices, value=True, way="many")
     return Branched(best.force, best.found, value)
 
 

@@ -22,14 +22,15 @@ from finlab.allocation.dual.compiled import Compiled
 from finlab.allocation.dual.doubt import price_of_doubt
 from finlab.allocation.dual.drag import at_the_price_of_drag
 from finlab.allocation.dual.newton import Prices, solve
-from finlab.allocation.dual.policies import nearest
+from finlab.allocation.dual.policies import Nearest, nearest
 from finlab.allocation.dual.rates import Rates, within_tick
 from finlab.allocation.levenberg_marquardt import CommandProblem, refine
 from finlab.allocation.method import Method
-from finlab.allocation.policy import AXES, Policy
+from finlab.allocation.policy import CLOSEST, Policy
 from finlab.allocation.settings import Settings, number
 from finlab.allocation.solution import Solution
 from finlab.arrays import Array
+from finlab.layout.wrench_axes import AXES
 from finlab.networks.trained import TrainedWeights
 from finlab.physics.wrench import wrench_of_forces
 from finlab.precision import FINE, NEARLY, NOTHING, ROUNDS
@@ -63,6 +64,8 @@ class Forces(NamedTuple):
     """The same (r, N) in the robot's basis [W]."""
     value: Array
     """Power (N,) [W] that branches on gaps have proved to be needed; 0 where there was none."""
+    aim: Array
+    """The wrenches (N, 6) [N, N m] that they give: the targets, or those that the policy gives."""
 
 
 class Dual(Method):
@@ -112,7 +115,7 @@ class Dual(Method):
         """See `Method`. For a single target, Newton's method begins at `prices` (6,) [W/N, W/(N m)], where
         they are given."""
         if len(targets) == 0:
-            return Solution(np.empty((0, self.layout.n, 3)), lambda: np.empty(0))
+            return Solution(np.empty((0, self.layout.n, 3)), lambda _: np.empty(0))
         if (moved := self.at(flow)) is not self:
             return moved.solve(targets, policy=policy, previous=previous, seed=seed, prices=prices)
         if self.compiled.drags:
@@ -121,22 +124,22 @@ class Dual(Method):
 
     def _one_by_one(self, targets: Array, policy: Policy, previous: Array | None) -> Solution:
         """Answers of a robot whose drag has another price for each target."""
-        commands, bounds = [], np.empty(len(targets))
+        commands, proved = [], np.empty(len(targets))
         for i, target in enumerate(targets):
             other = copy(self)
-            other.compiled, bounds[i] = at_the_price_of_drag(self.compiled, target)
-            if bounds[i] == 0.0 and policy.kind == "direction":
+            other.compiled, proved[i] = at_the_price_of_drag(self.compiled, target)
+            if proved[i] == 0.0 and policy.kind == "direction":
                 low, high = 0.0, 1.0
                 for _ in range(ROUNDS):  # halve the share of the target that is within reach
                     share = 0.5 * (low + high)
                     found, bound = at_the_price_of_drag(self.compiled, share * target)
                     if bound > 0.0:
-                        low, other.compiled, bounds[i] = share, found, bound
+                        low, other.compiled, proved[i] = share, found, bound
                     else:
                         high = share
                 target = low * target
             commands.append(other._solve(target[None], policy, previous).command)
-        return Solution(np.concatenate(commands), None if self._unproved else lambda: bounds)
+        return Solution(np.concatenate(commands), None if self._unproved else lambda _: proved)
 
     def _solve(
         self, targets: Array, policy: Policy, previous: Array | None, prices: Array | None = None
@@ -145,22 +148,61 @@ class Dual(Method):
         begin = None if prices is None else robot.basis.T @ (robot.scale * prices)[:, None]
         aim, found = self._aimed(targets, policy, begin)
         command = self._commands(aim, found, previous)
-        bound: Callable[[], Array] = partial(self._bound, aim, found)
-        if len(targets) > 1:
-            bound = partial(self._bound_again, targets, policy)
+        notes = set()
+        if policy.kind == "direction":
+            for row in np.flatnonzero(~found.within):
+                notes.add(self._kept_on_the_ray(targets[row], int(row), aim, found, command))
         if previous is not None and not self._rates.allow(previous, command[0]):
             command = self._in_a_tick(aim, found, previous)
-        return Solution(command, None if self._unproved else bound, prices=found.price)
+        bound: Callable[[Array], Array] = partial(self._bound, aim, found)
+        if len(targets) > 1:
+            bound = partial(self._bound_again, targets, policy)
+        notes |= self._not_held(targets[~found.within])
+        return Solution(
+            command, None if self._unproved else bound, prices=found.price, notes=tuple(sorted(notes - {""}))
+        )
 
     def _aimed(self, targets: Array, policy: Policy, prices: Array | None = None) -> tuple[Array, Forces]:
         """What is given for targets (N, 6): themselves, or what the policy asks for; and by which forces."""
-        robot = self.compiled.robot
         asked = targets - self.compiled.beside
-        found = self._forces(asked, robot.sets, policy, prices)
-        aim = targets
-        if not found.within.all():
-            aim = np.where(found.within[:, None], asked, robot.wrench(found.force)) + self.compiled.beside
-        return aim, found
+        found = self._forces(asked, self.compiled.robot.sets, policy, prices)
+        return found.aim + self.compiled.beside, found
+
+    def _kept_on_the_ray(self, target: Array, row: int, aim: Array, found: Forces, command: Array) -> str:
+        """Replaces a row of aims (N, 6) and commands (N, n, 3) that are to lie along a target (6,) and do
+        not, by the largest share that does; the sentence where there is none."""
+        along = target / self.scale
+        low, high, size = 0.0, float(aim[row] / self.scale @ along), max(float(along @ along), 1e-300)
+        if high <= NEARLY * size or self._error(command[row : row + 1], aim[row : row + 1])[0] <= NEARLY:
+            return ""
+        kept = False
+        for _ in range(ROUNDS):
+            share = 0.5 * (low + high) if kept or high else 0.0
+            tried = share / size * target[None]
+            one = self._forces(tried - self.compiled.beside, self.compiled.robot.sets, CLOSEST)
+            its = self._commands(tried, one)
+            if self._error(its, tried)[0] <= NEARLY:
+                low, kept, command[row], aim[row] = share, True, its[0], tried[0]
+                found.price[row], found.value[row] = one.price[0], one.value[0]
+            else:
+                high = share
+        return "" if kept else "no share of the target was found that the actuators can give alone"
+
+    def _not_held(self, targets: Array) -> set[str]:
+        """The sentence about axes that come together only, and that targets (N, 6) ask for apart."""
+        robot = self.compiled.robot
+        scaled = targets / robot.scale
+        left = np.abs(scaled - (scaled @ robot.basis) @ robot.basis.T) > NEARLY * np.abs(scaled).max(
+            initial=0.0
+        )
+        driven = np.array([axis not in self.undriven for axis in AXES])
+        axes = [axis for axis, one in zip(AXES, left.any(axis=0) & driven, strict=True) if one]
+        if not axes:
+            return set()
+        return {
+            f"no actuators give {', '.join(axes)} apart as is asked: where one of them does not count, leave "
+            "it out of the layout's axes, or ask nan of it"
+        }
 
     @property
     def undriven(self) -> tuple[str, ...]:
@@ -168,13 +210,21 @@ class Dual(Method):
         size = np.abs(self.compiled.robot.effectiveness).max(axis=0)
         return tuple(axis for axis, most in zip(AXES, size, strict=True) if most <= NOTHING * size.max())
 
-    def _bound(self, aim: Array, found: Forces) -> Array:
-        """Power (N,) [W] that no answer for wrenches (N, 6) undercuts."""
-        return np.maximum(proved_power(self.compiled, aim, found.price), found.value)
+    def _bound(self, aim: Array, found: Forces, command: Array) -> Array:
+        """Power (N,) [W] that no answer undercuts which gives the wrenches that commands (N, n, 3) give."""
+        given = wrench_of_forces(self.plant.force(command), self.plant.effectiveness)
+        bound = proved_power(self.compiled, given, found.price)
+        bound = np.where(self._error(command, aim) <= NEARLY, np.maximum(bound, found.value), bound)
+        power = self.plant.power(command).sum(axis=-1)
+        rounded = (bound > power) & (
+            bound <= power * (1.0 + NEARLY) + NOTHING * self.compiled.robot.largest_power
+        )
+        return np.where(rounded, power, bound)
 
-    def _bound_again(self, targets: Array, policy: Policy) -> Array:
-        """The same of many targets (N, 6), whose prices are found again, so that nothing of them is kept."""
-        return self._bound(*self._aimed(targets, policy))
+    def _bound_again(self, targets: Array, policy: Policy, command: Array) -> Array:
+        """The same of answers to many targets (N, 6), whose prices are found again, so that nothing of them
+        is kept."""
+        return self._bound(*self._aimed(targets, policy), command)
 
     @property
     def _unproved(self) -> bool:
@@ -189,13 +239,8 @@ class Dual(Method):
         target = robot.target(targets)
         if not len(target):  # nothing pushes, such as rudders at rest
             nothing = np.zeros((len(robot.effectiveness), len(targets)))
-            return Forces(
-                nothing,
-                np.zeros((len(targets), 6)),
-                np.asarray(~targets.any(axis=1)),
-                target,
-                np.zeros(len(targets)),
-            )
+            none = np.zeros((len(targets), 6))
+            return Forces(nothing, none, np.all(targets == 0.0, axis=1), target, np.zeros(len(targets)), none)
         root = solve(robot, target, sets, prices)
         within = root.solved.copy()
         if robot.basis.shape[1] < 6:
@@ -203,15 +248,29 @@ class Dual(Method):
             within &= np.linalg.norm(rest, axis=1) <= NEARLY * (
                 1e-3 + np.linalg.norm(targets / robot.scale, axis=1)
             )
-        force, prices, value = root.force, root.prices, np.zeros(len(targets))
+        force, prices, value, aim = root.force, root.prices, np.zeros(len(targets)), targets
         if may_have_gaps(robot, sets, force):
             force, value = self._in_gaps(target, sets, root, within)
         if not within.all():
-            force, prices = force.copy(), prices.copy()
+            force, prices, value, aim = force.copy(), prices.copy(), value.copy(), aim.copy()
             for row in np.flatnonzero(~within):
-                near = nearest(robot, sets.take(np.array([row])), targets[row], policy, self.scale)
-                force[:, row], prices[:, row] = near.force, near.prices
-        return Forces(force, robot.price(prices), within, prices, value)
+                at = np.array([row])
+                near = nearest(robot, sets.take(at), targets[row], policy, self.scale)
+                aim[row], force[:, row], prices[:, row] = near.wrench, near.force, near.prices
+                if may_have_gaps(robot, sets, near.force[:, None]):
+                    self._cheaper_in_gaps(sets.take(at), near, force[:, row])
+        return Forces(force, robot.price(prices), within, prices, value, aim)
+
+    def _cheaper_in_gaps(self, sets: Sets, near: Nearest, force: Array) -> None:
+        """Replaces forces (k,) that give a wrench out of reach in one part of sets with gaps by those of
+        least power in all of it, where they are found."""
+        robot = self.compiled.robot
+        target = robot.target(near.wrench[None])
+        root = solve(robot, target, sets)
+        within = root.solved.copy()
+        found, _ = self._in_gaps(target, sets, root, within)
+        if within[0]:
+            force[:] = found[:, 0]
 
     def _in_gaps(
         self, target: Array, sets: Sets, root: Prices, within: NDArray[np.bool_]
@@ -238,7 +297,7 @@ class Dual(Method):
         if len(rough):
             asked = aim[rough] / self.scale
             command[rough] = refine(self._problem, asked, command[rough], ROUNDS, EXACT).command
-        return command
+        return self.plant.rested(command)
 
     def _error(self, command: Array, aim: Array) -> Array:
         given = wrench_of_forces(self.plant.force(command), self.plant.effectiveness)
@@ -260,4 +319,5 @@ class Dual(Method):
         if self._error(command, aim)[0] > EXACT:
             command = refine(problem, aim / self.scale, box.clipped(command), TICK_STEPS, EXACT).command
             command = self.plant.feasible(box.clipped(command))
-        return command
+        rested = self.plant.rested(command)
+        return np.where(box.clipped(rested) == rested, rested, command)

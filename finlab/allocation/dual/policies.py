@@ -1,9 +1,8 @@
-"""Targets out of reach: the nearest wrench, the same direction, or groups of axes in order, by the same dual.
+"""Targets out of reach: the nearest wrench, the same direction, or groups of axes in order.
 
-`closest` allows a miss `m = E l` with `E` the inverse of `rho` times the squared weights: exact as `rho`
-grows. `direction` pays a reward for the share `t` of the target that is given. `priority` asks for the axes
-of one group after the other, the groups before it met exactly. At the wrench that is got, one more solution
-finds the least watts.
+Each is the point of a convex set nearest to another (`nearest_point`), in coordinates in which what counts
+more is longer. `closest` takes the axes by their weights, `direction` the farthest share of the target,
+`priority` the axes of one group after the other, what those before it have got held.
 """
 
 import heapq
@@ -11,20 +10,22 @@ from itertools import count
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finlab.allocation.dual.answers import Sets
 from finlab.allocation.dual.branch import halves
-from finlab.allocation.dual.newton import Prices, Terms, solve
+from finlab.allocation.dual.nearest_point import CLOSE_BY, Mixture, farthest_along, nearest_point
+from finlab.allocation.dual.newton import solve
 from finlab.allocation.dual.robot import DualRobot
 from finlab.allocation.policy import Policy
 from finlab.arrays import Array
-from finlab.precision import CLOSE, NEARLY, NOTHING, ROUNDING, ROUNDS
+from finlab.precision import CLOSE, FINE, NEARLY, ROUNDS
 
-STIFFNESS = (10.0, 1e3, 1e5, 1e7)
-"""Costs of a miss, one after the other, as multiples of the robot's largest power per actuator."""
-REWARD = 1e4
-"""Reward for a share of a target, as a multiple of the same."""
+HELD = 1e3
+"""Weight of an axis that is held over one of the group that is served."""
+STEPS_AT_RIM = 60
+"""Steps after which Newton's method is given up at the rim of what can be given."""
+PULL = 1e-3
+"""What a group may miss, on the yardstick, without pulling at the axes that are held."""
 
 
 class Nearest(NamedTuple):
@@ -32,8 +33,10 @@ class Nearest(NamedTuple):
 
     force: Array
     """Forces (k,) [N] of the robot's directions."""
+    wrench: Array
+    """The wrench (6,) [N, N m] that they give."""
     prices: Array
-    """Prices (r,) of the wrench that they give, at its least power."""
+    """Prices (r,) of it, at its least power."""
 
 
 def nearest(robot: DualRobot, sets: Sets, wrench: Array, policy: Policy, yardstick: Array) -> Nearest:
@@ -48,29 +51,40 @@ def nearest(robot: DualRobot, sets: Sets, wrench: Array, policy: Policy, yardsti
         policy: what counts.
         yardstick: scales (6,) of the missing wrench [N, N m].
     """
-    weight = robot.scale / yardstick
-    asked = wrench / robot.scale
 
     def served(part: Sets) -> tuple[tuple[float, ...], int, Array, Sets]:
         """How badly a part serves the policy, and its forces."""
-        if policy.kind == "direction":
-            force = direction(robot, part, asked)
-        elif policy.kind == "priority":
-            force = priority(robot, part, asked, policy.groups, weight)
-        else:
-            force = closest(robot, part, asked, weight * _axis_weights(policy))
-        return _missed(robot, force, asked, policy, weight), next(number), force, part
+        force = SERVING[policy.kind](robot, part, wrench, policy, yardstick)
+        return _missed(robot, force, wrench, policy, yardstick), next(number), force, part
 
     number = count()
     parts = [served(sets)]
-    for _ in range(ROUNDS):
+    for round_ in range(ROUNDS + len(sets.high)):
         _, _, force, part = heapq.heappop(parts)
         cut = halves(robot, part, force)
         if cut is None:
             break
+        parts = parts if round_ < ROUNDS else []  # there are too many: the better half is taken
         for each in cut:
             heapq.heappush(parts, served(each))
-    return _cheapest(robot, part, force)
+    inside = np.zeros(6) if policy.kind == "direction" else robot.effectiveness.T @ robot.middle(part)
+    given = robot.effectiveness.T @ force
+    met = np.where(np.abs(given - wrench) <= FINE * yardstick, wrench, given)
+    return cheapest(robot, part, force, inside, met)
+
+
+def _missed(
+    robot: DualRobot, force: Array, wrench: Array, policy: Policy, yardstick: Array
+) -> tuple[float, ...]:
+    """How much forces (k,) leave undone of a wrench (6,), by what counts to a policy."""
+    missing = (wrench - robot.effectiveness.T @ force) / yardstick
+    if policy.kind == "priority":
+        return tuple(round(float(np.linalg.norm(missing[group])), 6) for group in policy.groups)
+    if policy.kind == "direction":
+        along = wrench / yardstick
+        left = float(missing @ along) / max(float(along @ along), 1e-300)
+        return round(float(np.linalg.norm(missing - left * along)), 6), left
+    return (float(np.linalg.norm(missing * _axis_weights(policy))),)
 
 
 def _axis_weights(policy: Policy) -> Array:
@@ -78,121 +92,56 @@ def _axis_weights(policy: Policy) -> Array:
     return np.asarray(np.maximum(weights / weights.max(), CLOSE))
 
 
-def _missed(robot: DualRobot, force: Array, asked: Array, policy: Policy, weight: Array) -> tuple[float, ...]:
-    """How much forces (k,) leave undone of a scaled wrench (6,), by what counts to a policy."""
-    missing = (asked - robot.effectiveness.T @ force / robot.scale) * weight
-    if policy.kind == "priority":
-        return tuple(round(float(np.linalg.norm(missing[group])), 6) for group in policy.groups)
-    if policy.kind == "direction":
-        along = asked * weight
-        return (float(missing @ along),)
-    return (float(np.linalg.norm(missing * _axis_weights(policy))),)
-
-
-def _cheapest(robot: DualRobot, sets: Sets, force: Array) -> Nearest:
-    """The least power for the wrench that some forces (k,) give."""
-    target = (robot.matrix.T @ force)[:, None]
-    for share in (1.0, 1.0 - NEARLY):
-        found = solve(robot, share * target, sets)
+def cheapest(
+    robot: DualRobot, sets: Sets, force: Array, inside: Array, wanted: Array | None = None
+) -> Nearest:
+    """The least power for the wrench that some forces (k,) give, or for one hardly apart (6,); where Newton's
+    method does not settle at the rim of what can be given, a little towards a wrench inside (6,), and else
+    these forces themselves."""
+    wrench = robot.effectiveness.T @ force
+    aims = [wrench, wrench + NEARLY * (inside - wrench)]
+    for aim in aims if wanted is None else [wanted, *aims]:
+        found = solve(robot, robot.target(aim[None]), sets, way="one", most_steps=STEPS_AT_RIM)
         if found.solved[0]:
-            return Nearest(found.force[:, 0], found.prices[:, 0])
-    return Nearest(force, found.prices[:, 0])
+            return Nearest(found.force[:, 0], aim, found.prices[:, 0])
+    return Nearest(force, wrench, found.prices[:, 0])
 
 
-def closest(robot: DualRobot, sets: Sets, wrench: Array, weight: Array) -> Array:
-    """Forces (k,) [N] whose scaled wrench comes nearest to a scaled one (6,), each axis by its weight
-    (6,)."""
-    metric = robot.basis.T * weight**2
-    inner = metric @ robot.basis
-    target = np.linalg.solve(inner, metric @ wrench)[:, None].astype(np.float64)
-    compliance = np.linalg.inv(inner).astype(np.float64)
-    return _nearer(robot, sets, target, compliance).force[:, 0]
+def closest(robot: DualRobot, sets: Sets, wrench: Array, policy: Policy, yardstick: Array) -> Array:
+    """Forces (k,) [N] whose wrench comes nearest to one (6,), each axis by its weight over the yardstick."""
+    weight = _axis_weights(policy) / yardstick
+    return nearest_point(robot.farthest(sets), robot.effectiveness * weight, wrench * weight).force
 
 
-def _nearer(robot: DualRobot, sets: Sets, target: Array, compliance: Array) -> Prices:
-    """Prices for a target (r, 1) that may be missed, the more it costs the less: a miss is `compliance` (r,
-    r) times the prices over the stiffness."""
-    unit = _unit(sets)
-    prices, last = None, STIFFNESS[0]
-    for stiffness in STIFFNESS:
-        if prices is not None:
-            prices = prices + (stiffness / last - 1.0) * _unanswered(robot, prices, sets)
-        found = solve(robot, target, sets, prices, Terms(penalty=compliance / (stiffness * unit)))
-        prices, last = found.prices, stiffness
-    return found
+def direction(robot: DualRobot, sets: Sets, wrench: Array, policy: Policy, yardstick: Array) -> Array:
+    """Forces (k,) [N] that give the largest share of a wrench (6,), all else 0."""
+    scaled = wrench / robot.scale
+    held = np.linalg.norm(robot.basis @ (robot.basis.T @ scaled) - scaled) <= NEARLY * np.linalg.norm(scaled)
+    rows = robot.effectiveness / yardstick
+    return farthest_along(robot.farthest(sets), rows, wrench / yardstick if held else 0.0 * wrench).force
 
 
-def _unit(sets: Sets) -> float:
-    """The largest power per actuator [W]."""
-    return float(sets.most_cost[0]) / len(sets.high) + 1e-12
+def priority(robot: DualRobot, sets: Sets, wrench: Array, policy: Policy, yardstick: Array) -> Array:
+    """Forces (k,) [N] that serve groups of axes of a wrench (6,), each as far as those before it allow.
 
-
-def _unanswered(robot: DualRobot, prices: Array, sets: Sets) -> Array:
-    """The part (r, 1) of prices to which no actuator answers: they are at their limits along it."""
-    answer = robot.answers(robot.matrix @ prices, sets)
-    hessian = (robot.outer @ answer.derivative).reshape(robot.shape)
-    values, vectors = np.linalg.eigh(hessian)
-    still = vectors[:, values <= NOTHING * max(values[-1], robot.least_trace)]
-    part: Array = still @ (still.T @ prices)
-    return part
-
-
-def direction(robot: DualRobot, sets: Sets, wrench: Array) -> Array:
-    """Forces (k,) [N] that give the largest share of a scaled wrench (6,)."""
-    target = (robot.basis.T @ wrench)[:, None]
-    if np.linalg.norm(robot.basis @ target[:, 0] - wrench) > NEARLY * np.linalg.norm(wrench):
-        return solve(robot, 0.0 * target, sets).force[:, 0]
-    target = target / max(float(np.linalg.norm(target)) / 4.0, 1.0)  # farther than any robot reaches
-    return solve(robot, target, sets, None, Terms(reward=REWARD * _unit(sets))).force[:, 0]
-
-
-def priority(
-    robot: DualRobot, sets: Sets, wrench: Array, groups: list[NDArray[np.bool_]], weight: Array
-) -> Array:
-    """Forces (k,) [N] that serve groups of axes (masks (6,)) of a scaled wrench (6,), each as far as those
-    before it allow.
-
-    A group that is missed lies on a face of the reach: the actuators that its normal drives stay at their
-    limits, and what is left of the group's axes is held.
+    A group that asks for more than there is pulls at the axes that are held: it is served twice, the second
+    time with what it misses shortened to `PULL`, which has the same nearest point.
     """
-    held, aim = np.zeros((6, 0)), np.array(wrench)
-    for group in groups:
-        basis = np.concatenate([held, np.eye(6)[:, group]], axis=1)
-        part = robot.within(basis)
-        compliance = np.zeros(basis.shape[1])
-        compliance[held.shape[1] :] = 1.0 / weight[group] ** 2
-        found = _nearer(part, sets, (basis.T @ aim)[:, None], np.diag(compliance))
-        force = found.force[:, 0]
-        got = (robot.effectiveness.T @ force) / robot.scale
-        missed = np.linalg.norm(basis.T @ (got - aim))
-        held = basis
-        if missed > NEARLY * np.linalg.norm(basis.T @ aim):
-            normal = _unanswered(part, found.prices, sets)[:, 0]
-            driven = np.abs(part.matrix @ normal)
-            least = max(float(driven.max()), float(np.abs(part.matrix).max() * np.linalg.norm(normal)))
-            sets = _kept_at_limits(robot, sets, force, driven > NEARLY * least)  # none at an axis without any
-            held = _beside(basis, normal)
-        aim = np.where(_spanned(held), got, aim)
-    return force
+    held, aim = np.zeros(6), np.array(wrench)
+    near: Mixture | None = None
+    for group in policy.groups:
+        weight, close = (HELD * held + group) / yardstick, CLOSE_BY * (HELD if held.any() else 1.0)
+        rows = robot.effectiveness * weight
+        for _ in range(2 if held.any() else 1):
+            near = nearest_point(robot.farthest(sets), rows, aim * weight, near, close)
+            got = robot.effectiveness.T @ near.force
+            missed = float(np.linalg.norm((wrench - got)[group] / yardstick[group]))
+            aim = np.where(group, got + min(1.0, PULL / max(missed, PULL)) * (wrench - got), aim)
+        held = np.maximum(held, group)
+        aim = np.where(group & (missed > NEARLY), got, aim)
+    assert near is not None  # there is a group
+    return near.force
 
 
-def _beside(basis: Array, normal: Array) -> Array:
-    """The part (6, q - 1) of a basis (6, q) at right angles to one of its directions (q,)."""
-    size = float(np.linalg.norm(normal))
-    if size == 0.0:
-        return basis
-    _, _, right = np.linalg.svd((normal / size)[None], full_matrices=True)
-    return np.asarray(basis @ right[1:].T)
-
-
-def _spanned(basis: Array) -> NDArray[np.bool_]:
-    """Which axes (6,) a basis (6, q) touches."""
-    return np.asarray((np.abs(basis) > ROUNDING).any(axis=1))
-
-
-def _kept_at_limits(robot: DualRobot, sets: Sets, force: Array, directions: NDArray[np.bool_]) -> Sets:
-    """Sets in which the actuators of some directions (k,) keep their forces (k,)."""
-    lines, planes = robot.answers.lines, robot.answers.planes
-    planar = directions[lines : lines + planes] | directions[lines + planes :]
-    fixed = np.concatenate([directions[:lines], planar])[:, None]
-    return robot.frozen(sets, force[:, None], fixed)
+SERVING = {"closest": closest, "direction": direction, "priority": priority}
+"""What each policy does."""

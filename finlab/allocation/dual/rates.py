@@ -7,15 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.dual.answers import Sets
-from finlab.allocation.dual.newton import Terms, solve
+from finlab.allocation.dual.nearest_point import nearest_point
+from finlab.allocation.dual.newton import solve
+from finlab.allocation.dual.policies import cheapest
 from finlab.allocation.dual.robot import DualRobot
 from finlab.arrays import Array
 from finlab.layout.angles import wrapped
 from finlab.physics.plant import Plant
-
-STIFFNESS = (100.0, 1e4)
-"""Costs of a miss, one after the other, as multiples of the robot's largest power: what they leave undone,
-steps on the commands find."""
 
 
 class Box(NamedTuple):
@@ -91,10 +89,5 @@ def within_tick(robot: DualRobot, sets: Sets, wrench: Array, prices: Array, weig
     found = solve(robot, target, sets, prices)
     if found.solved[0]:
         return found.force
-    metric = robot.basis.T * (weight * robot.scale) ** 2
-    unit = float(sets.most_cost[0]) + 1e-12
-    penalty = np.asarray(np.linalg.inv(metric @ robot.basis) / unit, np.float64)
-    for stiffness in STIFFNESS:
-        found = solve(robot, target, sets, prices, Terms(penalty=penalty / stiffness))
-        prices = found.prices
-    return found.force
+    near = nearest_point(robot.farthest(sets), robot.effectiveness * weight, wrench[0] * weight)
+    return cheapest(robot, sets, near.force, robot.effectiveness.T @ robot.middle(sets)).force[:, None]

@@ -1,6 +1,7 @@
 """A robot as the dual sees it: scaled effectiveness in the range that its actuators span, and their sets."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -61,6 +62,11 @@ class DualRobot:
         return np.concatenate([self.most, self.most[self.answers.lines :]])
 
     @cached_property
+    def largest_power(self) -> float:
+        """Power [W] of all actuators at the dearer ends of their sets."""
+        return float(self.sets.most_cost[0])
+
+    @cached_property
     def gain(self) -> Array:
         """Force over price (k, 1) [N^2/W] of each direction at its limit, by what half the force costs."""
         each = self.most / self.answers.prices[:, None]
@@ -101,9 +107,17 @@ class DualRobot:
         """Rows and columns of the Hessian."""
         return self.matrix.shape[1], self.matrix.shape[1]
 
-    def within(self, basis: Array) -> "DualRobot":
-        """The same robot with only some directions (6, q) of the scaled wrench asked for."""
-        return replace(self, basis=basis, matrix=(self.effectiveness / self.scale) @ basis)
+    def farthest(self, sets: Sets) -> Callable[[Array], Array]:
+        """Gives the forces (k,) [N] within the sets of one target that are worth most at prices (k,)."""
+        return lambda price: self.answers.farthest(price[:, None], sets)[:, 0]
+
+    def middle(self, sets: Sets) -> Array:
+        """Forces (k,) [N] inside the sets of one target."""
+        lines = self.answers.lines
+        size = 0.5 * (sets.low + sets.high)[:, 0]
+        angle, turns = sets.middle[:, 0], sets.half[:, 0] < np.pi
+        planar = np.where(turns, size[lines:], 0.0)
+        return np.concatenate([size[:lines], planar * np.cos(angle), planar * np.sin(angle)])
 
     def frozen(self, sets: Sets, force: Array, fixed: NDArray[np.bool_]) -> Sets:
         """Sets in which fixed actuators (n, N) give their forces (k, N) [N] and nothing else."""
