@@ -14,6 +14,7 @@ from finlab.actuators.thrust_power import ThrustPower, held, radial_table
 from finlab.arrays import Array, Values
 from finlab.layout.angles import TURN, is_full_turn, wrapped
 from finlab.layout.azimuth import Azimuth
+from finlab.precision import NEARLY
 
 
 class AzimuthLaw(ActuatorLaw):
@@ -61,33 +62,50 @@ class AzimuthGroup(Group):
         """Takes turning thrusters and the wrench (m, 3, 6) per newton along each own axis."""
         self._lower = np.array([azimuth.lower for azimuth in azimuths])
         self._upper = np.array([azimuth.upper for azimuth in azimuths])
+        self._power = ThrustPower([azimuth.model for azimuth in azimuths])
         middle, half = _arcs(self._lower[:, 0], self._upper[:, 0])
         self.responses = [
-            Plane(
-                matrix[1:],
-                radial_table(azimuth.model, 1, *azimuth.force),
-                float(middle[i]),
-                float(half[i]),
-                band=azimuth.dead_band,
-            )
+            _response(azimuth, matrix[1:], float(middle[i]), float(half[i]))
             for i, (azimuth, matrix) in enumerate(zip(azimuths, effectiveness, strict=True))
         ]
 
     def commands(self, force: Array, previous: Array | None = None) -> Array:
         """See `Group`. Where no force is asked for, the angle stays that of the `previous` commands
-        (..., m, 3), or comes as near to 0 as the arc allows."""
+        (..., m, 3), or comes as near to 0 as the arc allows. What can be given forward and in reverse is
+        given at the least power."""
         size = np.hypot(force[..., 0], force[..., 1])
         before = np.zeros_like(size) if previous is None else np.nan_to_num(previous[..., 0])
         angle = np.where(size > 0.0, np.arctan2(force[..., 1], force[..., 0]), before)
-        middle, _ = _arcs(self._lower[:, 0], self._upper[:, 0])
+        middle, half = _arcs(self._lower[:, 0], self._upper[:, 0])
         command = np.zeros((*size.shape, 3))
         command[..., 0] = middle + wrapped(angle - middle)
         command[..., 1] = size
+        if (self._lower[:, 1] < 0.0).any():
+            around = middle + wrapped(angle + np.pi - middle)
+            beside = [np.maximum(np.abs(a - middle) - half, 0.0) for a in (command[..., 0], around)]
+            limit = -self._lower[:, 1]
+            aside = beside[0] - beside[1]
+            beyond = np.maximum(size - self._upper[:, 1], 0.0) - np.maximum(size - limit, 0.0)
+            cheaper = self._power.watts(np.minimum(size, self._upper[:, 1])) > self._power.watts(
+                -np.minimum(size, limit)
+            )
+            back = (aside > NEARLY) | (aside > -NEARLY) & ((beyond > 0.0) | (beyond == 0.0) & cheaper)
+            back &= (limit > 0.0) & (size > 0.0)
+            command[..., 0] = np.where(back, around, command[..., 0])
+            command[..., 1] = np.where(back, -size, size)
         return np.clip(command, self._lower, self._upper)
 
     def reach(self, lower: Array, upper: Array) -> Array:
         """See `Group`."""
         return np.stack([lower[:, 1], upper[:, 1], *_arcs(lower[:, 0], upper[:, 0])], axis=-1)
+
+
+def _response(azimuth: Azimuth, matrix: Array, middle: float, half: float) -> Plane:
+    """What one offers; `matrix` (2, 6) is the wrench per newton."""
+    least, most = azimuth.force
+    table = radial_table(azimuth.model, 1, max(least, 0.0), most)
+    reverse = radial_table(azimuth.model, -1, 0.0, -least) if least < 0.0 else None
+    return Plane(matrix, table, middle, half, band=azimuth.dead_band, reverse=reverse)
 
 
 def _arcs(low: Array, high: Array) -> tuple[Array, Array]:

@@ -166,6 +166,13 @@ class Plane:
     from angle 0 on; None for a fin that is alike all round."""
     band: float = 0.0
     """Forces smaller than this one, other than 0, cannot be held [N]."""
+    reverse: RadialTable | None = None
+    """Answer of forces against the directions of the arc, from rest on; None where it pushes one way."""
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Least and largest force [N], below 0 in reverse."""
+        return -self.reverse.largest if self.reverse else float(self.table.force[0]), self.table.largest
 
 
 Response = Line | Plane
@@ -180,7 +187,8 @@ def with_square(response: Response, weight: float) -> Response:
         return replace(response, forward=response.forward.with_square(weight), reverse=reverse)
     if response.gauge is not None:
         weight *= float(np.mean(response.gauge**2))
-    return replace(response, table=response.table.with_square(weight))
+    reverse = response.reverse and response.reverse.with_square(weight)
+    return replace(response, table=response.table.with_square(weight), reverse=reverse)
 
 
 class Group(ABC):

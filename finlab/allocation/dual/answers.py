@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from finlab.actuators.response import CELLS, Line, Plane, RadialTable, price_grid
 from finlab.allocation.dual.gauges import Gauges
 from finlab.arrays import Array
-from finlab.precision import FINE, NOTHING, ROUNDS
+from finlab.precision import CLOSE, FINE, NOTHING, ROUNDS
 
 TURNING = 1e-2
 """Price, as a share of the mean one of the least force, over which a force that cannot rest turns round."""
@@ -52,6 +52,12 @@ class Sets:
     """Middles of the arcs of the p planes (p, 1) or (p, N) [rad]."""
     half: Array
     """Halves of these arcs [rad]; pi for full circles."""
+    reverse: Array
+    """Largest sizes (p, 1) or (p, N) [N] of forces against these arcs; 0 where there are none."""
+    reverse_cost: Array
+    """Power at them [W]."""
+    flipped: Array
+    """1 where a plane gives its reverse only, about whose arc the other arrays speak then, else 0."""
 
     whole: bool = False
     """Whether these are all that the actuators' tables give, from rest on: then nothing needs to be cut
@@ -86,11 +92,28 @@ class Sets:
         wide = arc & ((self.half > 0.5 * np.pi) | ((low > 0.0) & (self.half > 0.0)))
         return np.flatnonzero(wide.any(axis=1))
 
+    @cached_property
+    def reversing(self) -> NDArray[np.intp]:
+        """Places of the planes that push either way, of any of the targets."""
+        return np.flatnonzero((self.reverse > 0.0).any(axis=1))
+
+    @cached_property
+    def ways(self) -> tuple["Sets", "Sets"]:
+        """What these planes alone give forward, and in reverse."""
+        places = self.reversing
+        none, planes = np.zeros((len(places), 1)), len(self.low) - len(self.half) + places
+        low, high, low_cost, high_cost = (values[planes] for values in self.parts[:4])
+        middle, half, reverse, reverse_cost, flipped = (values[places] for values in self.parts[4:])
+        forward = Sets(low, high, low_cost, high_cost, middle, half, none, none, flipped)
+        return forward, Sets(
+            none, reverse, low_cost, reverse_cost, middle + np.pi, half, none, none, none + 1.0
+        )
+
     @classmethod
     def of(cls, parts: Iterable[Array], whole: bool = False) -> "Sets":
         """The sets of all arrays, in order."""
-        low, high, low_cost, high_cost, middle, half = parts
-        return cls(low, high, low_cost, high_cost, middle, half, whole)
+        low, high, low_cost, high_cost, middle, half, reverse, reverse_cost, flipped = parts
+        return cls(low, high, low_cost, high_cost, middle, half, reverse, reverse_cost, flipped, whole)
 
     @cached_property
     def least_cost(self) -> float:
@@ -100,13 +123,18 @@ class Sets:
     @cached_property
     def most_cost(self) -> Array:
         """Power (1,) or (N,) [W] of all actuators at the dearer ends of their sets."""
-        found: Array = np.maximum(self.low_cost, self.high_cost).sum(axis=0)
-        return found
+        found: Array = np.maximum(self.low_cost, self.high_cost)
+        if len(self.reversing):
+            planes = slice(len(self.low) - len(self.half), None)
+            found = found + np.zeros(max(found.shape[1], self.reverse_cost.shape[1]))
+            found[planes] = np.maximum(found[planes], self.reverse_cost)
+        return np.asarray(found.sum(axis=0))
 
     @property
     def parts(self) -> tuple[Array, ...]:
         """All arrays, in order."""
-        return self.low, self.high, self.low_cost, self.high_cost, self.middle, self.half
+        ends = self.low, self.high, self.low_cost, self.high_cost
+        return *ends, self.middle, self.half, self.reverse, self.reverse_cost, self.flipped
 
     def take(self, columns: NDArray[np.intp]) -> "Sets":
         """The same for some of the targets."""
@@ -120,13 +148,13 @@ class Answers:
         """Makes the tables of the actuators, lines before planes."""
         self.lines, self.planes = len(lines), len(planes)
         sides = [(line.forward, line.reverse or line.forward) for line in lines]
-        sides += [(plane.table, plane.table) for plane in planes]
+        sides += [(plane.table, plane.reverse or plane.table) for plane in planes]
         tables = [table for both in sides for table in both]
         self._coefficients = np.concatenate([table.polynomials() for table in tables]).T.copy()
         self._top = np.array([table.top for table in tables])
         self._ends = np.array([table.force for table in tables])
         self.prices = np.array([_usual_price(table) for table in tables]).reshape(-1, 2).max(axis=1)
-        """Price (n,) [W/N] of the largest force of each, if it were as dear as that of half the force says."""
+        """Price (n,) [W/N] of the largest force of each, were it as dear as that of half the force says."""
         shares = self._ends / np.maximum(self._ends[:, -1:], 1e-300)
         self._shares = (shares + 2.0 * np.arange(len(tables))[:, None]).ravel()
         """The tables' forces as shares of the largest, one table after the other."""
@@ -162,8 +190,8 @@ class Answers:
 
     def marginal(self, force: Array) -> tuple[Array, Array]:
         """Prices (n, N) [W/N] at which forces (n, N) within the tables are given, without a sign, and their
-        power [W]; of planes at their sizes."""
-        row = self._row + ((np.arange(len(force)) < self.lines)[:, None] & (force < 0.0))
+        power [W]; of planes at their sizes, below 0 in reverse."""
+        row = self._row + (force < 0.0)
         size, largest = np.abs(force), np.maximum(self._ends[row, -1], 1e-300)
         place = np.searchsorted(self._shares, (size / largest + 2.0 * row).ravel()).reshape(size.shape)
         cell = np.clip(place - row * (CELLS + 1) - 1, 0, CELLS - 1)
@@ -189,19 +217,54 @@ class Answers:
             force, slope, conjugate = self._limited(price, lines, self._row, sets, worth=worth)
             return Answer(force, slope, None if conjugate is None else conjugate.sum(axis=0))
         first, second = price[lines:n], price[n:]
-        fan = self._fan(first, second, sets, sets.squared_gap)
+        fan = self._fan(first, second, sets, sets.squared_gap, self.gauges)
         value = np.concatenate([price[:lines], fan.along]) if lines else fan.along
         forked = fan.beyond is not None and len(sets.forked) > 0
-        size, slope, conjugate = self._limited(value, lines, self._row, sets, worth=worth or forked)
+        torn, row = forked or len(sets.reversing) > 0, self._rows(sets)
+        size, slope, conjugate = self._limited(value, lines, row, sets, worth=worth or torn)
         planar = _Planar.of(fan, size[lines:], slope[lines:])
-        total = None if conjugate is None else conjugate.sum(axis=0)
-        if forked:
-            assert conjugate is not None and total is not None
-            total += self._fork(sets.forked, planar, conjugate[lines:], fan, first, second, sets)
+        if forked and conjugate is not None:
+            self._fork(planar, conjugate[lines:], fan, (first, second), sets, row[lines:], self.gauges)
+        if len(sets.reversing) and conjugate is not None:
+            places, width = sets.reversing, FINE * sets.ways[1].high_cost + 1e-12
+            other, others = self._one_way(price, sets, 1)
+            _blend(planar, conjugate[lines:], places, other, others, width, sets.reverse[places] > 0.0)
         parts = [planar.first, planar.second], [planar.xx, planar.xy, planar.yy]
         if lines:
             parts = [size[:lines], *parts[0]], [slope[:lines], *parts[1]]
+        total = None if conjugate is None else conjugate.sum(axis=0)
         return Answer(np.concatenate(parts[0]), np.concatenate(parts[1]), total)
+
+    def _rows(self, sets: Sets) -> NDArray[np.intp]:
+        """Rows (n, 1) or (n, N) of the actuators' tables."""
+        if not sets.flipped.any():
+            return self._row
+        flipped = np.pad(sets.flipped, ((self.lines, 0), (0, 0))).astype(np.intp)
+        return self._row + flipped
+
+    def _one_way(self, price: Array, sets: Sets, way: int) -> tuple["_Planar", Array]:
+        """Answers (q, N) of planes that push either way to prices (k, N), and their conjugates [W], as if
+        they pushed one of both `ways`."""
+        n, places, sets = self.lines + self.planes, sets.reversing, sets.ways[way]
+        first, second = price[self.lines : n][places], price[n:][places]
+        row = self._row[self.lines + places] + sets.flipped.astype(np.intp)
+        fan = self._fan(first, second, sets, sets.squared_gap)
+        size, slope, conjugate = self._limited(fan.along, 0, row, sets)
+        assert conjugate is not None
+        planar = _Planar.of(fan, size, slope)
+        if len(sets.forked):
+            self._fork(planar, conjugate, fan, (first, second), sets, row)
+        return planar, conjugate
+
+    def undecided(self, price: Array, sets: Sets) -> tuple[Array, NDArray[np.bool_]]:
+        """How far [N] the answers (q, N) to prices (k, N) of planes that push either way are from what they
+        can give one way, and whether they are more forward than in reverse."""
+        places = sets.reversing
+        (ahead, own), (back, others) = (self._one_way(price, sets, way) for way in (0, 1))
+        share = _share(own - others, FINE * sets.ways[1].high_cost + 1e-12)
+        share = np.where(sets.reverse[places] > 0.0, share, 1.0)
+        off = np.hypot(ahead.first - back.first, ahead.second - back.second)
+        return np.minimum(share, 1.0 - share) * off, share >= 0.5
 
     def farthest(self, price: Array, sets: Sets) -> Array:
         """Forces (k, N) [N] that are worth most at prices (k, N), whatever their power."""
@@ -209,9 +272,17 @@ class Answers:
         line = np.where(price[:lines] > 0.0, sets.high[:lines], sets.low[:lines])
         if not self.planes:
             return line
-        fan = self._fan(price[lines:n], price[n:], sets, 1e-300)
+        first, second = price[lines:n], price[n:]
+        fan = self._fan(first, second, sets, 1e-300, self.gauges)
         size = np.where(fan.along > 0.0, sets.high[lines:], sets.low[lines:])
-        return np.concatenate([line, size * fan.first, size * fan.second])
+        x, y = size * fan.first, size * fan.second
+        if len(places := sets.reversing):
+            back = self._fan(first[places], second[places], sets.ways[1], 1e-300)
+            other = np.where(back.along > 0.0, sets.reverse[places], 0.0)
+            better = other * back.along > size[places] * fan.along[places]
+            x[places] = np.where(better, other * back.first, x[places])
+            y[places] = np.where(better, other * back.second, y[places])
+        return np.concatenate([line, x, y])
 
     def worth(self, price: Array, sets: Sets) -> tuple[Array, Array]:
         """Prices (n, N) [W/N] along the forces that answer prices (k, N), of lines with their sign, and what
@@ -221,9 +292,12 @@ class Answers:
         along = np.empty((lines + planes, price.shape[1]))
         along[:lines] = price[:lines]
         if planes:
-            along[lines:] = self._fan(first, second, sets, 1e-300).along
-        conjugate = self._limited(along, lines, self._row, sets)[2]
+            along[lines:] = self._fan(first, second, sets, 1e-300, self.gauges).along
+        conjugate = self._limited(along, lines, self._rows(sets), sets)[2]
         assert conjugate is not None
+        if len(places := sets.reversing):
+            both = [self._one_way(price, sets, way)[1] for way in (0, 1)]
+            conjugate[lines + places] = np.where(sets.reverse[places] > 0.0, np.maximum(*both), both[0])
         return along, conjugate
 
     def _limited(
@@ -258,13 +332,20 @@ class Answers:
             conjugate = np.where(above & ~below, price * high - sets.high_cost[of], conjugate)
         return np.minimum(np.maximum(force, low), high), np.where(below | above, 0.0, slope), conjugate
 
-    def _fan(self, first: Array, second: Array, sets: Sets, squared_gap: Array | float) -> "_Fan":
+    def _fan(
+        self,
+        first: Array,
+        second: Array,
+        sets: Sets,
+        squared_gap: Array | float,
+        gauges: Gauges | None = None,
+    ) -> "_Fan":
         """Directions in which planes answer prices (p, N), those of a smooth size of the prices."""
         size = along = np.sqrt(first * first + second * second + squared_gap)
         x, y = first / size, second / size
         tangent = 1.0 / size
         fan_x, fan_y = x, y
-        if self.gauges:
+        if gauges:
             fan_x, fan_y, tangent, along = self._uneven(x, y, tangent, size)
         xx, xy, yy = tangent * (1.0 - x * x), -tangent * x * y, tangent * (1.0 - y * y)
         if not sets.arcs:
@@ -276,7 +357,7 @@ class Answers:
         # The nearer end by the price itself: by the force, both are alike where the arc has no width.
         nearer = np.where(second * cos - first * sin < 0.0, -1.0, 1.0)
         angle = sets.middle + nearer * sets.half
-        end_x, end_y = self._end(angle)
+        end_x, end_y = _end(angle, gauges)
         keep = np.where(beyond, 0.0, 1.0)
         return _Fan(
             np.where(beyond, first * end_x + second * end_y, along),
@@ -303,61 +384,72 @@ class Answers:
         along[places] *= value
         return fan_x, fan_y, tangent, along
 
-    def _end(self, angle: Array) -> tuple[Array, Array]:
-        """The directions (p, N) of forces at angles (p, N), with the gauges' sizes."""
-        x, y = np.cos(angle), np.sin(angle)
-        if self.gauges:
-            places = self.gauges.places
-            rho = self.gauges.along(angle[places])
-            x[places] *= rho
-            y[places] *= rho
-        return x, y
-
     def _fork(
         self,
-        places: NDArray[np.intp],
         planar: "_Planar",
         conjugate: Array,
         fan: "_Fan",
-        first: Array,
-        second: Array,
+        price: tuple[Array, Array],
         sets: Sets,
-    ) -> Array:
-        """Blend the answers of planes beyond their arcs with those of the other ends; the change (N,) of the
-        sum of conjugates."""
+        row: NDArray[np.intp],
+        gauges: Gauges | None = None,
+    ) -> None:
+        """Blend the answers and conjugates (p, N) [W] of planes beyond their arcs with those of the other
+        ends, in place."""
         assert fan.beyond is not None and fan.other is not None
-        beyond = fan.beyond[places]
-        x, y = (values[places] for values in self._end(fan.other + np.zeros_like(first)))
-        price = first[places] * x + second[places] * y
-        row = self.lines + places
-        size, slope, worth = self._limited(price, 0, self._row[row], sets, row)
+        places, of = sets.forked, len(sets.low) - len(sets.half) + sets.forked
+        first, second = price
+        x, y = (values[places] for values in _end(fan.other + np.zeros_like(first), gauges))
+        along = first[places] * x + second[places] * y
+        size, slope, worth = self._limited(along, 0, row[places], sets, of)
         assert worth is not None
         other = _Planar(size * x, size * y, slope * x * x, slope * x * y, slope * y * y)
-        width = FINE * sets.high_cost[row] + 1e-12
-        ahead = conjugate[places] - worth
-        root = np.sqrt(ahead * ahead + width * width)
-        share = np.where(beyond, 0.5 * (1.0 + ahead / root), 1.0)
-        turn = np.where(beyond, 0.5 * width * width / root**3, 0.0)
-        dx, dy = planar.first[places] - other.first, planar.second[places] - other.second
-        for name, extra in (
-            ("first", 0.0),
-            ("second", 0.0),
-            ("xx", dx * dx),
-            ("xy", dx * dy),
-            ("yy", dy * dy),
-        ):
-            own, others = getattr(planar, name), getattr(other, name)
-            own[places] = share * own[places] + (1.0 - share) * others + turn * extra
-        gain: Array = np.where(beyond, 0.5 * (root - ahead), 0.0).sum(axis=0)
-        return gain
+        width = FINE * sets.high_cost[of] + 1e-12
+        _blend(planar, conjugate, places, other, worth, width, fan.beyond[places])
+
+
+def _end(angle: Array, gauges: Gauges | None) -> tuple[Array, Array]:
+    """The directions (p, N) of forces at angles (p, N), with the gauges' sizes."""
+    x, y = np.cos(angle), np.sin(angle)
+    if gauges:
+        rho = gauges.along(angle[gauges.places])
+        x[gauges.places] *= rho
+        y[gauges.places] *= rho
+    return x, y
+
+
+def _share(ahead: Array, width: Array) -> Array:
+    """Share of the first of two answers whose conjugate is higher by `ahead` [W], in a blend of a width."""
+    return np.asarray(0.5 * (1.0 + ahead / np.sqrt(ahead * ahead + width * width)))
+
+
+def _blend(
+    planar: "_Planar",
+    conjugate: Array,
+    places: NDArray[np.intp],
+    other: "_Planar",
+    others: Array,
+    width: Array,
+    where: NDArray[np.bool_],
+) -> None:
+    """Blend, in place, the answers and conjugates (p, N) of planes at some places (q,) with other ones
+    (q, N), where they may give these, to those of the smooth larger one of both conjugates."""
+    ahead = conjugate[places] - others
+    root = np.sqrt(ahead * ahead + width * width)
+    share = np.where(where, _share(ahead, width), 1.0)
+    turn = np.where(where, 0.5 * width * width / root**3, 0.0)
+    dx, dy = planar.first[places] - other.first, planar.second[places] - other.second
+    for own, new, extra in zip(planar, other, (0.0, 0.0, dx * dx, dx * dy, dy * dy), strict=True):
+        own[places] = share * own[places] + (1.0 - share) * new + turn * extra
+    conjugate[places] += np.where(where, 0.5 * (root - ahead), 0.0)
 
 
 def _usual_price(table: RadialTable) -> float:
     """Price [W/N] of the largest force where power grows as its power of 1.5 from half of it on: at the peak
     of a soft fin the price itself says nothing of the forces below."""
     middle = 0.5 * (table.force[0] + table.force[-1])
-    price = float(np.interp(middle, table.force, price_grid(table.top)))
-    return min(max(price * np.sqrt(2.0), CLOSE * table.top), table.top)
+    price = float(np.sqrt(2.0) * np.interp(middle, table.force, price_grid(table.top)))
+    return min(max(price, CLOSE * table.top), table.top)
 
 
 class _Fan(NamedTuple):

@@ -47,8 +47,9 @@ class _Parts:
     prices: Array
 
 
-def gaps(robot: DualRobot, force: Array, sets: Sets) -> Array:
-    """How far (n, N) forces (k, N) are in a gap of their sets, as a share; 0 where they are not."""
+def gaps(robot: DualRobot, force: Array, sets: Sets, prices: Array | None = None) -> Array:
+    """How far (n, N) forces (k, N) are in a gap of their sets, as a share; 0 where they are not. Those of
+    prices (r, N) are in one where they are between what an actuator gives forward and in reverse."""
     lines, planes = robot.answers.lines, robot.answers.planes
     x, y = force[lines : lines + planes], force[lines + planes :]
     size = np.concatenate([np.abs(force[:lines]), np.hypot(x, y)])
@@ -65,12 +66,30 @@ def gaps(robot: DualRobot, force: Array, sets: Sets) -> Array:
         wide = sets.half > NARROW
         found[lines:] = np.where(aside & wide, off, 0.0)
         found[lines:] += np.where(hole & wide, 1.0 - radial / np.maximum(low, 1e-300), 0.0)
+    if len(places := sets.reversing):
+        found[lines + places] = _between_ways(robot, force, sets, prices, found[lines + places])
     return found
+
+
+def _between_ways(robot: DualRobot, force: Array, sets: Sets, prices: Array | None, amount: Array) -> Array:
+    """`gaps` (q, N) of the planes that push either way, from those of their forces forward alone."""
+    lines, planes, places = robot.answers.lines, robot.answers.planes, sets.reversing
+    most, both = robot.most[lines + places], sets.reverse[places] > 0.0
+    x, y = (force[at : at + planes][places] for at in (lines, lines + planes))
+    if prices is not None:
+        off, ahead = robot.answers.undecided(robot.matrix @ prices, sets)
+        return np.asarray(np.where(both, np.where(off > CLOSE * most, np.pi, amount * ahead), amount))
+    angle, size = np.arctan2(y, x) - sets.middle[places], np.hypot(x, y)
+    outside = np.full(size.shape, True)
+    for turn, largest in ((0.0, sets.high[lines + places]), (np.pi, sets.reverse[places])):
+        aside = np.abs(wrapped(angle + turn)) - sets.half[places] > CLOSE
+        outside &= aside | (size > largest + NEARLY * most)
+    return np.asarray(np.where(both, np.where(outside & (size > NEARLY * most), np.pi, 0.0), amount))
 
 
 def may_have_gaps(robot: DualRobot, sets: Sets, force: Array) -> bool:
     """Whether forces (k, N) may lie in gaps: a quick look."""
-    if robot.band.any() or len(sets.forked):
+    if robot.band.any() or len(sets.forked) or len(sets.reversing):
         return True
     if sets.rests:
         return False
@@ -85,7 +104,7 @@ def least_power(robot: DualRobot, target: Array, sets: Sets, root: Prices) -> Br
     best = _Best(robot, root)
     parts, answer = start, root
     for _ in range(ROUNDS):
-        amount = gaps(robot, answer.force, parts.sets)
+        amount = gaps(robot, answer.force, parts.sets, answer.prices)
         nearer = np.flatnonzero(best.keep(parts, answer, amount))
         if not len(nearer):
             break
@@ -93,7 +112,7 @@ def least_power(robot: DualRobot, target: Array, sets: Sets, root: Prices) -> Br
         answer = solve(robot, target[:, parts.row], parts.sets, parts.prices, value=True, way="many")
     parts, answer, value = start, root, np.full(count, np.inf)
     for round_ in range(ROUNDS + 1):
-        amount = gaps(robot, answer.force, parts.sets)
+        amount = gaps(robot, answer.force, parts.sets, answer.prices)
         open_ = best.keep(parts, answer, amount)
         kept = _cheapest(np.flatnonzero(open_ & (round_ < ROUNDS)), parts.row, answer.value)
         left = np.ones(len(parts.row), bool)
@@ -177,7 +196,9 @@ def _dive(robot: DualRobot, parts: _Parts, kept: NDArray[np.intp], amount: Array
     angle, size = np.arctan2(y, x), np.hypot(x, y)
     hole = chosen[lines:] & (size < 0.98 * sets.low[lines:])
     side = np.where(np.abs(force[:lines]) > 0.5 * robot.band[:lines], 1.0, -1.0)
-    side = np.concatenate([side, np.where(wrapped(angle - sets.middle) < 0.0, -1.0, 1.0)])
+    off = wrapped(angle - sets.middle)
+    turned = np.where(sets.reverse > 0.0, np.cos(off), off)
+    side = np.concatenate([side, np.where(turned < 0.0, -1.0, 1.0)])
     cut = chosen.copy()
     cut[lines:] &= ~hole
     sets = narrowed(robot, sets, force, cut, side)
@@ -192,12 +213,18 @@ def _dive(robot: DualRobot, parts: _Parts, kept: NDArray[np.intp], amount: Array
 
 def narrowed(robot: DualRobot, sets: Sets, force: Array, chosen: NDArray[np.bool_], side: Array) -> Sets:
     """Sets (n, N) of which chosen ones (n, N) are cut, and one side is kept: of an arc the half towards
-    smaller (-1) or larger angles (1), of a full circle the half away from or around the force, of a dead band
-    rest or the forces beyond it, by forces (k, N)."""
+    smaller (-1) or larger angles (1), of a full circle the half away from or around the force, of what pushes
+    either way the reverse (-1) or the rest (1), of a dead band rest or the forces beyond it, by forces
+    (k, N)."""
     lines, planes = robot.answers.lines, robot.answers.planes
-    low, high, low_cost, high_cost, middle, half = (np.array(values) for values in sets.parts)
+    low, high, low_cost, high_cost, middle, half, reverse, reverse_cost, flipped = map(np.array, sets.parts)
     if planes:
-        plane, turn = chosen[lines:], side[lines:]
+        either = chosen[lines:] & (reverse > 0.0)
+        plane, turn, back = chosen[lines:] & ~either, side[lines:], either & (side[lines:] < 0.0)
+        high[lines:] = np.where(back, reverse, high[lines:])
+        high_cost[lines:] = np.where(back, reverse_cost, high_cost[lines:])
+        middle, flipped = np.where(back, middle + np.pi, middle), np.where(back, 1.0, flipped)
+        reverse = np.where(either, 0.0, reverse)
         angle = np.arctan2(force[lines + planes :], force[lines : lines + planes])
         full = half >= np.pi
         moved = np.where(full, angle + np.where(turn > 0.0, 0.0, np.pi), middle + 0.5 * turn * half)
@@ -215,4 +242,4 @@ def narrowed(robot: DualRobot, sets: Sets, force: Array, chosen: NDArray[np.bool
         below = cut & ~above
         high[:lines] = np.where(below, edge, high[:lines])
         high_cost[:lines] = np.where(below, cost, high_cost[:lines])
-    return Sets(low, high, low_cost, high_cost, middle, half)
+    return Sets(low, high, low_cost, high_cost, middle, half, reverse, reverse_cost, flipped)

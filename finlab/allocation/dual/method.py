@@ -278,7 +278,8 @@ class Dual(Method):
         """Forces (k, N) in sets with gaps, and the power (N,) [W] that is proved to be needed there; `within`
         loses the targets that they do not meet."""
         robot = self.compiled.robot
-        rows = np.flatnonzero(within & (gaps(robot, root.force, sets) > 0.0).any(axis=0))
+        inside = gaps(robot, root.force, sets, root.prices) > 0.0
+        rows = np.flatnonzero(within & inside.any(axis=0))
         if not len(rows):
             return root.force, np.broadcast_to(0.0, len(within))
         value = np.zeros(len(within))
