@@ -76,23 +76,24 @@ class AzimuthGroup(Group):
         size = np.hypot(force[..., 0], force[..., 1])
         before = np.zeros_like(size) if previous is None else np.nan_to_num(previous[..., 0])
         angle = np.where(size > 0.0, np.arctan2(force[..., 1], force[..., 0]), before)
-        middle, half = _arcs(self._lower[:, 0], self._upper[:, 0])
-        command = np.zeros((*size.shape, 3))
+        ahead, back = self._pushed(angle, size), self._pushed(angle + np.pi, -size)
+        if (self._lower[:, 1] >= 0.0).all():
+            return ahead
+        asked, least = np.stack([size * np.cos(angle), size * np.sin(angle)]), NEARLY * self._upper[:, 1]
+        missing, watts = [], []
+        for way in (ahead, back):
+            given = way[..., 1] * np.stack([np.cos(way[..., 0]), np.sin(way[..., 0])])
+            missing.append(np.linalg.norm(given - asked, axis=0))
+            watts.append(self._power.watts(way[..., 1]))
+        cheaper = (missing[1] <= missing[0] + least) & (watts[1] < watts[0] * (1.0 - NEARLY))
+        return np.where(((missing[1] < missing[0] - least) | cheaper)[..., None], back, ahead)
+
+    def _pushed(self, angle: Array, force: Array) -> Array:
+        """Commands (..., m, 3) that come nearest to angles [rad] and forces [N] (..., m)."""
+        middle, _ = _arcs(self._lower[:, 0], self._upper[:, 0])
+        command = np.zeros((*force.shape, 3))
         command[..., 0] = middle + wrapped(angle - middle)
-        command[..., 1] = size
-        if (self._lower[:, 1] < 0.0).any():
-            around = middle + wrapped(angle + np.pi - middle)
-            beside = [np.maximum(np.abs(a - middle) - half, 0.0) for a in (command[..., 0], around)]
-            limit = -self._lower[:, 1]
-            aside = beside[0] - beside[1]
-            beyond = np.maximum(size - self._upper[:, 1], 0.0) - np.maximum(size - limit, 0.0)
-            cheaper = self._power.watts(np.minimum(size, self._upper[:, 1])) > self._power.watts(
-                -np.minimum(size, limit)
-            )
-            back = (aside > NEARLY) | (aside > -NEARLY) & ((beyond > 0.0) | (beyond == 0.0) & cheaper)
-            back &= (limit > 0.0) & (size > 0.0)
-            command[..., 0] = np.where(back, around, command[..., 0])
-            command[..., 1] = np.where(back, -size, size)
+        command[..., 1] = force
         return np.clip(command, self._lower, self._upper)
 
     def reach(self, lower: Array, upper: Array) -> Array:

@@ -104,6 +104,7 @@ class Sets:
         none, planes = np.zeros((len(places), 1)), len(self.low) - len(self.half) + places
         low, high, low_cost, high_cost = (values[planes] for values in self.parts[:4])
         middle, half, reverse, reverse_cost, flipped = (values[places] for values in self.parts[4:])
+        reverse_cost = np.where(reverse > 0.0, reverse_cost, 0.0)
         forward = Sets(low, high, low_cost, high_cost, middle, half, none, none, flipped)
         return forward, Sets(
             none, reverse, low_cost, reverse_cost, middle + np.pi, half, none, none, none + 1.0
