@@ -143,7 +143,8 @@ class _Best:
             if answer.value[i] < self._value[row]:
                 self._value[row], self.found[row] = answer.value[i], True
                 self.force[:, row] = answer.force[:, i]
-        return answer.solved & ~whole & (answer.value < self._value[parts.row] * (1.0 - CLOSE))
+        open_ = answer.solved | (~answer.beyond & (amount > 0.0).any(axis=0))
+        return open_ & ~whole & (answer.value < self._value[parts.row] * (1.0 - CLOSE))
 
     def _hollow(self, force: Array, sets: Sets) -> NDArray[np.bool_]:
         """Where the smoothed dual of a narrow arc has a force (k, N) that is smaller than any in it."""

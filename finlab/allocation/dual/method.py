@@ -21,7 +21,7 @@ from finlab.allocation.dual.branch import gaps, least_power, may_have_gaps
 from finlab.allocation.dual.compiled import Compiled
 from finlab.allocation.dual.doubt import price_of_doubt
 from finlab.allocation.dual.drag import at_the_price_of_drag
-from finlab.allocation.dual.newton import Prices, solve
+from finlab.allocation.dual.newton import MOST_STEPS, Prices, solve
 from finlab.allocation.dual.policies import Nearest, nearest
 from finlab.allocation.dual.rates import Rates, within_tick
 from finlab.allocation.levenberg_marquardt import CommandProblem, refine
@@ -37,6 +37,8 @@ from finlab.precision import FINE, NEARLY, NOTHING, ROUNDS
 
 EXACT = 1e-8
 """Error, on the robot's yardstick, up to which commands need no further step."""
+STEPS_AT_KINK = 60
+"""Steps after which a target at a gap is left to the parts of it."""
 TICK_STEPS = 5
 """The same where a command of a tick is not exact."""
 
@@ -241,15 +243,16 @@ class Dual(Method):
             nothing = np.zeros((len(robot.effectiveness), len(targets)))
             none = np.zeros((len(targets), 6))
             return Forces(nothing, none, np.all(targets == 0.0, axis=1), target, np.zeros(len(targets)), none)
-        root = solve(robot, target, sets, prices)
-        within = root.solved.copy()
+        torn = len(sets.forked) + len(sets.reversing) > 0
+        root = solve(robot, target, sets, prices, most_steps=STEPS_AT_KINK if torn else MOST_STEPS)
+        within = root.solved | (~root.beyond & torn)
         if robot.basis.shape[1] < 6:
             rest = targets / robot.scale - (robot.basis @ target).T
             within &= np.linalg.norm(rest, axis=1) <= NEARLY * (
                 1e-3 + np.linalg.norm(targets / robot.scale, axis=1)
             )
         force, prices, value, aim = root.force, root.prices, np.zeros(len(targets)), targets
-        if may_have_gaps(robot, sets, force):
+        if torn or may_have_gaps(robot, sets, force):
             force, value = self._in_gaps(target, sets, root, within)
         if not within.all():
             force, prices, value, aim = force.copy(), prices.copy(), value.copy(), aim.copy()
@@ -267,7 +270,7 @@ class Dual(Method):
         robot = self.compiled.robot
         target = robot.target(near.wrench[None])
         root = solve(robot, target, sets)
-        within = root.solved.copy()
+        within = ~root.beyond
         found, _ = self._in_gaps(target, sets, root, within)
         if within[0]:
             force[:] = found[:, 0]
@@ -280,6 +283,7 @@ class Dual(Method):
         robot = self.compiled.robot
         inside = gaps(robot, root.force, sets, root.prices) > 0.0
         rows = np.flatnonzero(within & inside.any(axis=0))
+        within &= root.solved | inside.any(axis=0)
         if not len(rows):
             return root.force, np.broadcast_to(0.0, len(within))
         value = np.zeros(len(within))

@@ -115,7 +115,7 @@ def solve(
         value: whether the dual value is asked for.
         way: whether targets take the way of one or of many; where either will do, what remains unsolved is
             tried the other way, so that a target has the same answer alone and among others.
-        most_steps: after how many steps the way of one gives up.
+        most_steps: after how many steps a target is given up.
     """
     sets = robot.sets if sets is None else sets
     count = target.shape[1]
@@ -131,12 +131,14 @@ def solve(
             found = _one(robot, state, sets, float(ridge[0]), float(most[0]), value, most_steps)
             if found.solved[0] or found.beyond[0] or way == "one":
                 return found
-        found = _many(robot, _state(robot, target, prices, sets), sets, ridge, most)
+        found = _many(robot, _state(robot, target, prices, sets), sets, ridge, most, most_steps)
         if count > 1 and way == "either":
             for row in np.flatnonzero(~(found.solved | found.beyond)):
                 at = slice(row, row + 1)
                 state = _state(robot, target[:, at], prices[:, at], sets.take(np.array([row])))
-                again = _one(robot, state, sets.take(np.array([row])), float(ridge[row]), most[row], True)
+                again = _one(
+                    robot, state, sets.take(np.array([row])), float(ridge[row]), most[row], True, most_steps
+                )
                 found.put(np.array([row]), again)
     return found
 
@@ -219,7 +221,7 @@ def _valued(robot: DualRobot, state: _State, sets: Sets) -> _State:
     return state if state.conjugate is not None else _state(robot, state.target, state.prices, sets)
 
 
-def _many(robot: DualRobot, state: _State, sets: Sets, ridge: Array, most: Array) -> Prices:
+def _many(robot: DualRobot, state: _State, sets: Sets, ridge: Array, most: Array, most_steps: int) -> Prices:
     """`solve` for many targets, those that are done left out."""
     count = state.target.shape[1]
     place, growth = np.arange(count), np.full(count, 2.0)
@@ -231,10 +233,10 @@ def _many(robot: DualRobot, state: _State, sets: Sets, ridge: Array, most: Array
         np.zeros(count, bool),
         np.zeros(count, np.intp),
     )
-    for steps in range(MOST_STEPS + 1):
+    for steps in range(most_steps + 1):
         solved = state.size <= TOLERANCE
         beyond = ~solved & (state.value > most)
-        done = solved | beyond | (steps == MOST_STEPS) | (ridge > MOST_RIDGE)
+        done = solved | beyond | (steps == most_steps) | (ridge > MOST_RIDGE)
         if done.any():
             own = Prices(state.prices, state.force, state.value, solved, beyond, np.full(len(place), steps))
             found.put(place[done], own.take(np.flatnonzero(done)))
