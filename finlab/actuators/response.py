@@ -213,9 +213,10 @@ class Group(ABC):
         """Wrenches (N, 6) [N, N m] that come on top of forces (N, m, 2) of the answers."""
         return np.zeros((len(force), 6))
 
-    def radial_worth(self, price: Array) -> Array | None:
+    def radial_worth(self, price: Array, back: Array) -> Array | None:
         """Returns the most (N, m) [W] that force along its own direction is worth at prices (N, m) [W/N],
-        less its power, by the law itself (of lines signed prices); None where that is what the tables say."""
+        less its power, by the law itself (of lines signed prices; of planes that push either way `back` in
+        reverse); None where that is what the tables say."""
         return None
 
     def worth(self, price: Array) -> Array | None:

@@ -285,21 +285,22 @@ class Answers:
             y[places] = np.where(better, other * back.second, y[places])
         return np.concatenate([line, x, y])
 
-    def worth(self, price: Array, sets: Sets) -> tuple[Array, Array]:
-        """Prices (n, N) [W/N] along the forces that answer prices (k, N), of lines with their sign, and what
-        these forces are worth, less their power [W], by the tables."""
-        lines, planes = self.lines, self.planes
-        first, second = price[lines : lines + planes], price[lines + planes :]
-        along = np.empty((lines + planes, price.shape[1]))
-        along[:lines] = price[:lines]
-        if planes:
+    def worth(self, price: Array, sets: Sets) -> tuple[Array, Array, Array]:
+        """Prices (n, N) [W/N] along the forces that answer prices (k, N), of lines with their sign, and of
+        planes in reverse; and what these forces are worth, less their power [W], by the tables."""
+        lines, n = self.lines, self.lines + self.planes
+        first, second, along = price[lines:n], price[n:], price[:n].copy()
+        back = np.zeros_like(along)
+        if self.planes:
             along[lines:] = self._fan(first, second, sets, 1e-300, self.gauges).along
         conjugate = self._limited(along, lines, self._rows(sets), sets)[2]
         assert conjugate is not None
         if len(places := sets.reversing):
+            way = sets.ways[1]
+            back[lines + places] = self._fan(first[places], second[places], way, 1e-300).along
             both = [self._one_way(price, sets, way)[1] for way in (0, 1)]
             conjugate[lines + places] = np.where(sets.reverse[places] > 0.0, np.maximum(*both), both[0])
-        return along, conjugate
+        return along, back, conjugate
 
     def _limited(
         self,

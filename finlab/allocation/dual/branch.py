@@ -21,6 +21,8 @@ from finlab.precision import CLOSE, NEARLY, NOTHING, ROUNDS
 
 MOST_PARTS = 48
 """Open parts of one target that are followed, the cheapest first."""
+STEPS_AT_KINK = 60
+"""Steps of Newton's method after which a target at a gap is left to its parts."""
 HOLLOW = 1e-3
 """Share of a robot's largest force from which on a least force leaves a gap around rest."""
 NARROW = 0.2
@@ -109,7 +111,7 @@ def least_power(robot: DualRobot, target: Array, sets: Sets, root: Prices) -> Br
         if not len(nearer):
             break
         parts = _dive(robot, parts, nearer, amount[:, nearer], answer)
-        answer = solve(robot, target[:, parts.row], parts.sets, parts.prices, value=True, way="many")
+        answer = _solved(robot, target, parts)
     parts, answer, value = start, root, np.full(count, np.inf)
     for round_ in range(ROUNDS + 1):
         amount = gaps(robot, answer.force, parts.sets, answer.prices)
@@ -121,8 +123,14 @@ def least_power(robot: DualRobot, target: Array, sets: Sets, root: Prices) -> Br
         if not len(kept):
             break
         parts = _cut(robot, parts, kept, amount[:, kept], answer)
-        answer = solve(robot, target[:, parts.row], parts.sets, parts.prices, value=True, way="many")
+        answer = _solved(robot, target, parts)
     return Branched(best.force, best.found, value)
+
+
+def _solved(robot: DualRobot, target: Array, parts: _Parts) -> Prices:
+    """The prices of parts; what is unsolved and has a gap is cut on."""
+    steps = STEPS_AT_KINK
+    return solve(robot, target[:, parts.row], parts.sets, parts.prices, True, "many", most_steps=steps)
 
 
 class _Best:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from finlab.allocation.dual.answers import Sets
 from finlab.allocation.dual.bounds import proved_power
-from finlab.allocation.dual.branch import gaps, least_power, may_have_gaps
+from finlab.allocation.dual.branch import STEPS_AT_KINK, gaps, least_power, may_have_gaps
 from finlab.allocation.dual.compiled import Compiled
 from finlab.allocation.dual.doubt import price_of_doubt
 from finlab.allocation.dual.drag import at_the_price_of_drag
@@ -37,8 +37,6 @@ from finlab.precision import FINE, NEARLY, NOTHING, ROUNDS
 
 EXACT = 1e-8
 """Error, on the robot's yardstick, up to which commands need no further step."""
-STEPS_AT_KINK = 60
-"""Steps after which a target at a gap is left to the parts of it."""
 TICK_STEPS = 5
 """The same where a command of a tick is not exact."""
 
