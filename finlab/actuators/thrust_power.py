@@ -1,7 +1,7 @@
 """Power of a propeller over its force: a power law, or a convex curve through a table of measurements."""
 
 from collections.abc import Sequence
-from functools import lru_cache, partial
+from functools import lru_cache
 
 import numpy as np
 
@@ -146,30 +146,20 @@ def radial_table(model: ThrustModel, sign: int, least: float, most: float) -> Ra
     ends = np.array([[sign * least], [sign * most]])
     rest = float(own.watts(ends)[0, 0])
     top = abs(float(own.marginal(ends)[1, 0]))
-    return RadialTable.of_price(top, partial(best_size, model, sign, least, most), rest)
 
+    def answer(price: Array) -> Array:
+        """Sizes of the force [N] whose marginal cost is a price [W/N]."""
+        if isinstance(model, PowerLaw):
+            factor = model.forward if sign > 0 or model.reverse is None else model.reverse
+            size: Array = (price / (model.exponent * factor)) ** (1.0 / (model.exponent - 1.0))
+        else:
+            sides = sides_of(model)
+            curve = sides.forward if sign > 0 else sides.reverse
+            assert curve is not None, "the limits of the force are within the table"
+            size = curve.answer(price)
+        return np.clip(size, least, most)
 
-def best_size(model: ThrustModel, sign: int, least: float, most: float, price: Array) -> Array:
-    """Returns the sizes of the force [N] of one side that are worth most at prices [W/N] from 0 on; other
-    arguments as for `radial_table`."""
-    if isinstance(model, PowerLaw):
-        factor = model.forward if sign > 0 or model.reverse is None else model.reverse
-        size: Array = (price / (model.exponent * factor)) ** (1.0 / (model.exponent - 1.0))
-    else:
-        sides = sides_of(model)
-        curve = sides.forward if sign > 0 else sides.reverse
-        assert curve is not None, "the limits of the force are within the table"
-        size = curve.answer(price)
-    return np.clip(size, least, most)
-
-
-def best_worth(model: ThrustModel, sign: int, limits: tuple[float, float], price: Array) -> Array:
-    """Returns the most [W] that forces of one side within limits [N] are worth at prices [W/N], less their
-    power."""
-    least, most = max(sign * limits[(1 - sign) // 2], 0.0), max(sign * limits[(1 + sign) // 2], 0.0)
-    size = best_size(model, sign, least, most, np.maximum(price, 0.0)) if most > 0.0 else 0.0 * price
-    worth: Array = price * size - ThrustPower([model]).watts(sign * size[..., None])[..., 0]
-    return worth
+    return RadialTable.of_price(top, answer, rest)
 
 
 def held(force: AnyArray, dead_band: Array) -> AnyArray:

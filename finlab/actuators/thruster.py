@@ -10,7 +10,7 @@ import numpy as np
 
 from finlab.actuators.law import ActuatorLaw
 from finlab.actuators.response import Group, Line
-from finlab.actuators.thrust_power import ThrustPower, best_worth, held, radial_table
+from finlab.actuators.thrust_power import ThrustPower, held, radial_table
 from finlab.arrays import Array, Values
 from finlab.layout.thruster import Thruster
 
@@ -58,21 +58,12 @@ class ThrusterGroup(Group):
             for thruster, sign, matrix in zip(thrusters, self._sign, effectiveness, strict=True)
         ]
         self._limits = np.array([thruster.force for thruster in thrusters])
-        self._thrusters = list(thrusters)
 
     def commands(self, force: Array, previous: Array | None = None) -> Array:
         """See `Group`."""
         command = np.zeros((*force.shape[:-1], 3))
         command[..., 0] = np.clip(self._sign * force[..., 0], self._limits[:, 0], self._limits[:, 1])
         return command
-
-    def radial_worth(self, price: Array, back: Array) -> Array:
-        """See `Group`."""
-        paid, found = self._sign * price, np.empty(price.shape)
-        for i, part in enumerate(self._thrusters):
-            sides = (best_worth(part.model, sign, part.force, sign * paid[:, i]) for sign in (1, -1))
-            found[:, i] = np.maximum(*sides)
-        return found
 
     def reach(self, lower: Array, upper: Array) -> Array:
         """See `Group`."""
