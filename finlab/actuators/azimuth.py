@@ -10,7 +10,7 @@ import numpy as np
 
 from finlab.actuators.law import ActuatorLaw
 from finlab.actuators.response import Group, Plane
-from finlab.actuators.thrust_power import ThrustPower, best_worth, held, radial_table
+from finlab.actuators.thrust_power import ThrustPower, held, radial_table
 from finlab.arrays import Array, Values
 from finlab.layout.angles import TURN, is_full_turn, wrapped
 from finlab.layout.azimuth import Azimuth
@@ -60,7 +60,6 @@ class AzimuthGroup(Group):
 
     def __init__(self, azimuths: Sequence[Azimuth], effectiveness: Array) -> None:
         """Takes turning thrusters and the wrench (m, 3, 6) per newton along each own axis."""
-        self._azimuths = list(azimuths)
         self._lower = np.array([azimuth.lower for azimuth in azimuths])
         self._upper = np.array([azimuth.upper for azimuth in azimuths])
         self._power = ThrustPower([azimuth.model for azimuth in azimuths])
@@ -99,12 +98,9 @@ class AzimuthGroup(Group):
 
     def radial_worth(self, price: Array, back: Array) -> Array:
         """See `Group`."""
-        found = np.empty(price.shape)
-        for i, part in enumerate(self._azimuths):
-            found[:, i] = best_worth(part.model, 1, part.force, price[:, i])
-            if part.force[0] < 0.0:
-                found[:, i] = np.maximum(found[:, i], best_worth(part.model, -1, part.force, back[:, i]))
-        return found
+        least, most = self._lower[:, 1], self._upper[:, 1]
+        ahead = self._power.worth(price, np.maximum(least, 0.0), most)
+        return np.where(least < 0.0, np.maximum(ahead, self._power.worth(-back, least, 0.0 * most)), ahead)
 
     def reach(self, lower: Array, upper: Array) -> Array:
         """See `Group`."""

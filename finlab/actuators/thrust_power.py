@@ -27,6 +27,12 @@ class ByPower:
         slope = np.where(force < 0.0, -self.reverse, self.forward) * np.abs(force) ** (self.exponent - 1.0)
         return slope * force, self.exponent * slope
 
+    def answer(self, price: Array) -> Array:
+        """Returns the forces (..., n) [N] whose marginal cost is a price [W/N]."""
+        factor = self.exponent * np.where(price < 0.0, self.reverse, self.forward)
+        size: Array = (np.abs(price) / factor) ** (1.0 / (self.exponent - 1.0))
+        return np.copysign(size, price)
+
 
 class Curve:
     """Watts over the size of the force of one side: convex, quadratic between knots, with a marginal cost
@@ -98,6 +104,15 @@ class Sides:
                 marginal[on] = sign * slope
         return watts, marginal
 
+    def answer(self, price: Array) -> Array:
+        """Returns the forces [N] that are worth most at prices [W/N]; 0 on a side that there is not."""
+        force = np.zeros_like(price)
+        for curve, sign in ((self.forward, 1.0), (self.reverse, -1.0)):
+            if curve is not None:
+                on = price * sign > 0.0
+                force[on] = sign * curve.answer(sign * price[on])
+        return force
+
 
 @lru_cache(maxsize=256)
 def sides_of(model: PowerTable) -> Sides:
@@ -126,6 +141,20 @@ class ThrustPower:
         """Returns its derivative [W/N] by the force."""
         return self._both(force, 1)
 
+    def answer(self, price: Array) -> Array:
+        """Returns the forces (..., n) [N] whose marginal cost is a price [W/N]."""
+        force = np.empty(price.shape)
+        for places, power in self._groups:
+            force[..., places] = power.answer(price[..., places])
+        return force
+
+    def worth(self, price: Array, least: Array, most: Array) -> Array:
+        """Returns the most [W] that forces between `least` and `most` (n,) [N] are worth at prices (..., n)
+        [W/N], less their power."""
+        force = np.clip(self.answer(price), least, most)
+        worth: Array = price * force - self.watts(force)
+        return worth
+
     def _both(self, force: AnyArray, which: int) -> AnyArray:
         result: AnyArray = np.empty(np.shape(force))
         for places, power in self._groups:
@@ -149,15 +178,7 @@ def radial_table(model: ThrustModel, sign: int, least: float, most: float) -> Ra
 
     def answer(price: Array) -> Array:
         """Sizes of the force [N] whose marginal cost is a price [W/N]."""
-        if isinstance(model, PowerLaw):
-            factor = model.forward if sign > 0 or model.reverse is None else model.reverse
-            size: Array = (price / (model.exponent * factor)) ** (1.0 / (model.exponent - 1.0))
-        else:
-            sides = sides_of(model)
-            curve = sides.forward if sign > 0 else sides.reverse
-            assert curve is not None, "the limits of the force are within the table"
-            size = curve.answer(price)
-        return np.clip(size, least, most)
+        return np.clip(sign * own.answer(sign * price[:, None])[:, 0], least, most)
 
     return RadialTable.of_price(top, answer, rest)
 

@@ -58,12 +58,17 @@ class ThrusterGroup(Group):
             for thruster, sign, matrix in zip(thrusters, self._sign, effectiveness, strict=True)
         ]
         self._limits = np.array([thruster.force for thruster in thrusters])
+        self._power = ThrustPower([thruster.model for thruster in thrusters])
 
     def commands(self, force: Array, previous: Array | None = None) -> Array:
         """See `Group`."""
         command = np.zeros((*force.shape[:-1], 3))
         command[..., 0] = np.clip(self._sign * force[..., 0], self._limits[:, 0], self._limits[:, 1])
         return command
+
+    def radial_worth(self, price: Array, back: Array) -> Array:
+        """See `Group`."""
+        return self._power.worth(self._sign * price, *self._limits.T)
 
     def reach(self, lower: Array, upper: Array) -> Array:
         """See `Group`."""

@@ -68,9 +68,8 @@ def test_the_largest_wrench_is_still_taken() -> None:
     np.testing.assert_array_equal(check_wrenches(most, single=True), most)
     assert check_wrenches([1, 2, 3, 4, 5, 6], single=True).dtype == np.float64
     assert check_wrenches(np.empty((0, 6)), single=False).shape == (0, 6)
-    with pytest.raises(
-        CommandError, match=r"wrench: Tx must be finite and at most 1e\+06 in size, got -1000001"
-    ):
+    sentence = r"wrench: Tx must be at most 1e\+06 in size, or NaN where it is free, got -1000001"
+    with pytest.raises(CommandError, match=sentence):
         check_wrenches([[0] * 6, [0, 0, 0, -MAX_WRENCH - 1, 0, 9e9]], single=False)
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.dual.answers import Sets
+from finlab.allocation.dual.deadline import Deadline
 from finlab.allocation.dual.newton import Prices, dual_value, solve
 from finlab.allocation.dual.robot import DualRobot
 from finlab.arrays import Array
@@ -98,7 +99,7 @@ def may_have_gaps(robot: DualRobot, sets: Sets, force: Array) -> bool:
     return bool((robot.answers.sizes(force) < 0.98 * sets.low[robot.answers.lines :]).any())
 
 
-def least_power(robot: DualRobot, target: Array, sets: Sets, root: Prices) -> Branched:
+def least_power(robot: DualRobot, target: Array, sets: Sets, root: Prices, deadline: Deadline) -> Branched:
     """Forces in the sets for targets (r, N) some of whose answers `root` are in gaps."""
     count = target.shape[1]
     start = _Parts(np.arange(count), _columns(sets, count), root.prices)
@@ -116,7 +117,8 @@ def least_power(robot: DualRobot, target: Array, sets: Sets, root: Prices) -> Br
     for round_ in range(ROUNDS + 1):
         amount = gaps(robot, answer.force, parts.sets, answer.prices)
         open_ = best.keep(parts, answer, amount)
-        kept = _cheapest(np.flatnonzero(open_ & (round_ < ROUNDS)), parts.row, answer.value)
+        goes_on = round_ < ROUNDS and not (open_.any() and deadline.passed())
+        kept = _cheapest(np.flatnonzero(open_ & goes_on), parts.row, answer.value)
         left = np.ones(len(parts.row), bool)
         left[kept] = False
         np.minimum.at(value, parts.row[left], answer.value[left])

@@ -19,6 +19,7 @@ from finlab.allocation.dual.answers import Sets
 from finlab.allocation.dual.bounds import proved_power
 from finlab.allocation.dual.branch import STEPS_AT_KINK, gaps, least_power, may_have_gaps
 from finlab.allocation.dual.compiled import Compiled
+from finlab.allocation.dual.deadline import ENDED, Deadline
 from finlab.allocation.dual.doubt import price_of_doubt
 from finlab.allocation.dual.drag import at_the_price_of_drag
 from finlab.allocation.dual.newton import MOST_STEPS, Prices, solve
@@ -26,19 +27,23 @@ from finlab.allocation.dual.policies import Nearest, nearest
 from finlab.allocation.dual.rates import Rates, within_tick
 from finlab.allocation.levenberg_marquardt import CommandProblem, refine
 from finlab.allocation.method import Method
-from finlab.allocation.policy import CLOSEST, Policy
+from finlab.allocation.policy import Policy
 from finlab.allocation.settings import Settings, number
 from finlab.allocation.solution import Solution
 from finlab.arrays import Array
 from finlab.layout.wrench_axes import AXES
 from finlab.networks.trained import TrainedWeights
 from finlab.physics.wrench import wrench_of_forces
-from finlab.precision import FINE, NEARLY, NOTHING, ROUNDS
+from finlab.precision import CLOSE, FINE, NEARLY, NOTHING, ROUNDING, ROUNDS
 
 EXACT = 1e-8
 """Error, on the robot's yardstick, up to which commands need no further step."""
 TICK_STEPS = 5
 """The same where a command of a tick is not exact."""
+STARTS = 16
+"""Starts of a search for forces that cancel each other."""
+NEAR_REST = 0.05
+"""Share of the limits' ranges up to which sizes of these starts are."""
 
 
 @dataclass(frozen=True)
@@ -146,47 +151,67 @@ class Dual(Method):
     ) -> Solution:
         robot = self.compiled.robot
         begin = None if prices is None else robot.basis.T @ (robot.scale * prices)[:, None]
-        aim, found = self._aimed(targets, policy, begin)
+        deadline = Deadline(len(targets))
+        aim, found = self._aimed(targets, policy, deadline, begin)
         command = self._commands(aim, found, previous)
         notes = set()
         if policy.kind == "direction":
             for row in np.flatnonzero(~found.within):
-                notes.add(self._kept_on_the_ray(targets[row], int(row), aim, found, command))
+                notes.add(self._kept_on_the_ray(targets[row], int(row), aim, found, command, deadline))
         if previous is not None and not self._rates.allow(previous, command[0]):
             command = self._in_a_tick(aim, found, previous)
         bound: Callable[[Array], Array] = partial(self._bound, aim, found)
         if len(targets) > 1:
             bound = partial(self._bound_again, targets, policy)
-        notes |= self._not_held(targets[~found.within])
+        notes |= self._not_held(targets[~found.within]) | ({ENDED} if deadline.struck else set())
         return Solution(
             command, None if self._unproved else bound, prices=found.price, notes=tuple(sorted(notes - {""}))
         )
 
-    def _aimed(self, targets: Array, policy: Policy, prices: Array | None = None) -> tuple[Array, Forces]:
+    def _aimed(
+        self, targets: Array, policy: Policy, deadline: Deadline, prices: Array | None = None
+    ) -> tuple[Array, Forces]:
         """What is given for targets (N, 6): themselves, or what the policy asks for; and by which forces."""
-        asked = targets - self.compiled.beside
-        found = self._forces(asked, self.compiled.robot.sets, policy, prices)
+        found = self._forces(targets - self.compiled.beside, policy, deadline, prices)
         return found.aim + self.compiled.beside, found
 
-    def _kept_on_the_ray(self, target: Array, row: int, aim: Array, found: Forces, command: Array) -> str:
+    def _kept_on_the_ray(
+        self, target: Array, row: int, aim: Array, found: Forces, command: Array, deadline: Deadline
+    ) -> str:
         """Replaces a row of aims (N, 6) and commands (N, n, 3) that are to lie along a target (6,) and do
         not, by the largest share that does; the sentence where there is none."""
         along = target / self.scale
         low, high, size = 0.0, float(aim[row] / self.scale @ along), max(float(along @ along), 1e-300)
-        if high <= NEARLY * size or self._error(command[row : row + 1], aim[row : row + 1])[0] <= NEARLY:
+        if self._error(command[row : row + 1], aim[row : row + 1])[0] <= NEARLY:
             return ""
         kept = False
-        for _ in range(ROUNDS):
-            share = 0.5 * (low + high) if kept or high else 0.0
+        while high > low + CLOSE * size and not deadline.passed():
+            share = 0.5 * (low + high)
             tried = share / size * target[None]
-            one = self._forces(tried - self.compiled.beside, self.compiled.robot.sets, CLOSEST)
+            one = self._forces(tried - self.compiled.beside, None, deadline)
             its = self._commands(tried, one)
             if self._error(its, tried)[0] <= NEARLY:
                 low, kept, command[row], aim[row] = share, True, its[0], tried[0]
                 found.price[row], found.value[row] = one.price[0], one.value[0]
             else:
                 high = share
+        if not kept and (rest := self._cancelled) is not None:
+            kept, command[row], aim[row], found.price[row], found.value[row] = True, rest, 0.0, 0.0, 0.0
         return "" if kept else "no share of the target was found that the actuators can give alone"
+
+    @cached_property
+    def _cancelled(self) -> Array | None:
+        """A command (n, 3) of actuators that cannot rest whose forces cancel each other; None where none is
+        found from some starts near their least forces."""
+        lower, upper = self.layout.lower, self.layout.upper
+        share = np.random.default_rng(0).random((STARTS, *lower.shape))
+        share[..., : lower.shape[1] - 1] *= NEAR_REST
+        found = refine(self._problem, np.zeros((1, 6)), lower + share * (upper - lower), 2 * ROUNDS)
+        cancelled = found.error <= NEARLY
+        if not cancelled.any():
+            return None
+        power = self.plant.power(found.command).sum(axis=-1)
+        return np.asarray(found.command[np.where(cancelled, power, np.inf).argmin()])
 
     def _not_held(self, targets: Array) -> set[str]:
         """The sentence about axes that come together only, and that targets (N, 6) ask for apart."""
@@ -219,12 +244,12 @@ class Dual(Method):
         rounded = (bound > power) & (
             bound <= power * (1.0 + NEARLY) + NOTHING * self.compiled.robot.largest_power
         )
-        return np.where(rounded, power, bound)
+        return np.where(rounded, power, bound) * (1.0 - ROUNDING)
 
     def _bound_again(self, targets: Array, policy: Policy, command: Array) -> Array:
         """The same of answers to many targets (N, 6), whose prices are found again, so that nothing of them
         is kept."""
-        return self._bound(*self._aimed(targets, policy), command)
+        return self._bound(*self._aimed(targets, policy, Deadline(len(targets))), command)
 
     @property
     def _unproved(self) -> bool:
@@ -233,9 +258,11 @@ class Dual(Method):
         measured = any(fin.model.type == "table" for fin in self.layout.fins)
         return measured or self.compiled.doubt is not None
 
-    def _forces(self, targets: Array, sets: Sets, policy: Policy, prices: Array | None = None) -> Forces:
-        """Forces of least power for wrenches (N, 6), or for those that the policy gives in their place."""
-        robot = self.compiled.robot
+    def _forces(
+        self, targets: Array, policy: Policy | None, deadline: Deadline, prices: Array | None = None
+    ) -> Forces:
+        """Forces of least power for wrenches (N, 6), or for those that a policy gives in their place."""
+        robot, sets = self.compiled.robot, self.compiled.robot.sets
         target = robot.target(targets)
         if not len(target):  # nothing pushes, such as rudders at rest
             nothing = np.zeros((len(robot.effectiveness), len(targets)))
@@ -250,31 +277,31 @@ class Dual(Method):
                 1e-3 + np.linalg.norm(targets / robot.scale, axis=1)
             )
         force, prices, value, aim = root.force, root.prices, np.zeros(len(targets)), targets
-        if torn or may_have_gaps(robot, sets, force):
-            force, value = self._in_gaps(target, sets, root, within)
-        if not within.all():
+        if may_have_gaps(robot, sets, force):
+            force, value = self._in_gaps(target, sets, root, within, deadline)
+        if not within.all() and policy is not None:
             force, prices, value, aim = force.copy(), prices.copy(), value.copy(), aim.copy()
             for row in np.flatnonzero(~within):
                 at = np.array([row])
-                near = nearest(robot, sets.take(at), targets[row], policy, self.scale)
+                near = nearest(robot, sets.take(at), targets[row], policy, self.scale, deadline)
                 aim[row], force[:, row], prices[:, row] = near.wrench, near.force, near.prices
                 if may_have_gaps(robot, sets, near.force[:, None]):
-                    self._cheaper_in_gaps(sets.take(at), near, force[:, row])
+                    self._cheaper_in_gaps(sets.take(at), near, force[:, row], deadline)
         return Forces(force, robot.price(prices), within, prices, value, aim)
 
-    def _cheaper_in_gaps(self, sets: Sets, near: Nearest, force: Array) -> None:
+    def _cheaper_in_gaps(self, sets: Sets, near: Nearest, force: Array, deadline: Deadline) -> None:
         """Replaces forces (k,) that give a wrench out of reach in one part of sets with gaps by those of
         least power in all of it, where they are found."""
         robot = self.compiled.robot
         target = robot.target(near.wrench[None])
         root = solve(robot, target, sets)
         within = ~root.beyond
-        found, _ = self._in_gaps(target, sets, root, within)
+        found, _ = self._in_gaps(target, sets, root, within, deadline)
         if within[0]:
             force[:] = found[:, 0]
 
     def _in_gaps(
-        self, target: Array, sets: Sets, root: Prices, within: NDArray[np.bool_]
+        self, target: Array, sets: Sets, root: Prices, within: NDArray[np.bool_], deadline: Deadline
     ) -> tuple[Array, Array]:
         """Forces (k, N) in sets with gaps, and the power (N,) [W] that is proved to be needed there; `within`
         loses the targets that they do not meet."""
@@ -285,7 +312,7 @@ class Dual(Method):
         if not len(rows):
             return root.force, np.broadcast_to(0.0, len(within))
         value = np.zeros(len(within))
-        cut = least_power(robot, target[:, rows], sets.take(rows), root.take(rows))
+        cut = least_power(robot, target[:, rows], sets.take(rows), root.take(rows), deadline)
         force = root.force.copy()
         force[:, rows] = cut.force
         within[rows[~cut.found]] = False

@@ -13,6 +13,7 @@ import numpy as np
 
 from finlab.allocation.dual.answers import Sets
 from finlab.allocation.dual.branch import halves
+from finlab.allocation.dual.deadline import Deadline
 from finlab.allocation.dual.nearest_point import CLOSE_BY, Mixture, farthest_along, nearest_point
 from finlab.allocation.dual.newton import solve
 from finlab.allocation.dual.robot import DualRobot
@@ -39,7 +40,9 @@ class Nearest(NamedTuple):
     """Prices (r,) of it, at its least power."""
 
 
-def nearest(robot: DualRobot, sets: Sets, wrench: Array, policy: Policy, yardstick: Array) -> Nearest:
+def nearest(
+    robot: DualRobot, sets: Sets, wrench: Array, policy: Policy, yardstick: Array, deadline: Deadline
+) -> Nearest:
     """Forces for one wrench (6,) [N, N m] that no forces within the sets give.
 
     Sets with gaps are cut until the best answer of all parts lies in none.
@@ -50,6 +53,7 @@ def nearest(robot: DualRobot, sets: Sets, wrench: Array, policy: Policy, yardsti
         wrench: the target.
         policy: what counts.
         yardstick: scales (6,) of the missing wrench [N, N m].
+        deadline: when the search in gaps ends.
     """
 
     def served(part: Sets) -> tuple[tuple[float, ...], int, Array, Sets]:
@@ -62,7 +66,7 @@ def nearest(robot: DualRobot, sets: Sets, wrench: Array, policy: Policy, yardsti
     for round_ in range(ROUNDS + len(sets.high)):
         _, _, force, part = heapq.heappop(parts)
         cut = halves(robot, part, force)
-        if cut is None:
+        if cut is None or deadline.passed():
             break
         parts = parts if round_ < ROUNDS else []  # there are too many: the better half is taken
         for each in cut:
@@ -99,7 +103,8 @@ def cheapest(
     method does not settle at the rim of what can be given, a little towards a wrench inside (6,), and else
     these forces themselves."""
     wrench = robot.effectiveness.T @ force
-    aims = [wrench, wrench + NEARLY * (inside - wrench)]
+    inwards = (inside - wrench) / max(1.0, float(np.linalg.norm((inside - wrench) / robot.scale)))
+    aims = [wrench, wrench + NEARLY * inwards]
     for aim in aims if wanted is None else [wanted, *aims]:
         found = solve(robot, robot.target(aim[None]), sets, way="one", most_steps=STEPS_AT_RIM)
         if found.solved[0]:
@@ -124,19 +129,21 @@ def direction(robot: DualRobot, sets: Sets, wrench: Array, policy: Policy, yards
 def priority(robot: DualRobot, sets: Sets, wrench: Array, policy: Policy, yardstick: Array) -> Array:
     """Forces (k,) [N] that serve groups of axes of a wrench (6,), each as far as those before it allow.
 
-    A group that asks for more than there is pulls at the axes that are held: it is served twice, the second
-    time with what it misses shortened to `PULL`, which has the same nearest point.
+    A group that asks for more than there is pulls at the axes that are held: it is served again with what it
+    misses shortened to `PULL`, which has the same nearest point.
     """
     held, aim = np.zeros(6), np.array(wrench)
     near: Mixture | None = None
     for group in policy.groups:
         weight, close = (HELD * held + group) / yardstick, CLOSE_BY * (HELD if held.any() else 1.0)
         rows = robot.effectiveness * weight
-        for _ in range(2 if held.any() else 1):
+        for _ in range(ROUNDS if held.any() else 1):
             near = nearest_point(robot.farthest(sets), rows, aim * weight, near, close)
             got = robot.effectiveness.T @ near.force
             missed = float(np.linalg.norm((wrench - got)[group] / yardstick[group]))
-            aim = np.where(group, got + min(1.0, PULL / max(missed, PULL)) * (wrench - got), aim)
+            if missed <= PULL or near.miss @ near.miss <= 4.0 * PULL**2:
+                break
+            aim = np.where(group, got + PULL / missed * (wrench - got), aim)
         held = np.maximum(held, group)
         aim = np.where(group & (missed > NEARLY), got, aim)
     assert near is not None  # there is a group

@@ -1,5 +1,7 @@
 """Priorities where an axis is driven badly: what a weak axis costs takes nothing from those before it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,7 @@ from finlab.allocation import Allocator, Policy
 from finlab.allocation.baselines.px4 import ORDER
 from finlab.evaluation.experiments.thrusters import _draws, misses_more, missing_by_group
 from finlab.layout import load_layout
+from finlab.layout.wrench_axes import AXES
 
 
 @pytest.mark.parametrize("lost", [0, 1, 2])
@@ -26,6 +29,6 @@ def test_on_a_surveyed_frame_a_priority_misses_no_more_than_px4(lost: int) -> No
     "order", [Policy.order, (("Tz",), ("Fx", "Fz")), (("Fx", "Tz"), ("Fz",)), (("Fz", "Fx"), ("Tz",))]
 )
 def test_an_axis_that_nothing_drives_holds_up_no_other(order: tuple[tuple[str, ...], ...]) -> None:
-    allocator = Allocator(load_layout("no_yaw"))
+    allocator = Allocator(replace(load_layout("no_yaw"), axes=AXES))
     answer = allocator.allocate([1.0, 0.0, 0.5, 0.0, 0.0, 0.2], policy=Policy("priority", order=order))
     np.testing.assert_allclose(answer.unallocated, [0.0, 0.0, 0.0, 0.0, 0.0, 0.2], atol=1e-4)
