@@ -141,6 +141,10 @@ class Line:
     """Least force [N], where that is more than the tables give."""
     high: float = np.inf
     """Largest force [N], where that is less than the tables give."""
+    drag: Array | None = None
+    """Wrench (6,) per newton of drag [-, m] that comes with the force; None where none does."""
+    speed: float = 0.0
+    """Power per newton of it [m/s]."""
 
     @property
     def ends(self) -> tuple[float, float]:
@@ -220,13 +224,9 @@ class Group(ABC):
         return None
 
     def worth(self, price: Array) -> Array | None:
-        """Returns the most (m,) [W] that all the actuators can give is worth at a price (6,) of the wrench,
-        less its power; None where that is what the responses say."""
+        """Returns the most (N, m) [W] that all that the actuators can give, but `beside`, is worth at prices
+        (N, 6) of the wrench, less its power; None where the answers' forces are all."""
         return None
-
-    def paid(self, price: Array) -> "Group":
-        """Returns the group where what comes on top of its forces has a price (6,) [W/N, W/(N m)], too."""
-        return self
 
     @abstractmethod
     def commands(self, force: Array, previous: Array | None = None) -> Array:

@@ -149,7 +149,7 @@ def test_a_price_of_drag_counts_in_the_answer_of_a_rudder() -> None:
     inflow = np.array([[0.0, 1.5, 0.1]])
     wrench, law = columns([part]), RudderLaw([part])
     multipliers = np.array([2.0, 3.0, 0.0, 0.0, 0.0, 0.5])
-    group = RudderGroup([part], wrench).at(inflow).paid(multipliers)
+    group = RudderGroup([part], wrench).at(inflow)
     robot = dual_robot(group.responses)
     lift = robot.answers((robot.effectiveness @ multipliers)[:, None], robot.sets).force
     command = group.commands(np.array([[[lift[0, 0], 0.0]]]))

@@ -1,8 +1,13 @@
 """The answers of all actuators of one robot to prices, for many targets at once.
 
 Targets come last in all arrays: prices (k, N) [W/N] of the actuators' own directions, in the order lines,
-first directions of planes, second directions of planes. Each answer is the gradient of a conjugate: a line's
-`T(|s|) sign(s)`, a plane's `T(v) g` with `v = s . g` and `g` the direction of the force, its size the gauge.
+first directions of planes, second directions of planes, what lines drag along. Each answer is the gradient
+of a conjugate: a line's `T(|s|) sign(s)`, a plane's `T(v) g` with `v = s . g` and `g` the direction of the
+force, its size the gauge.
+
+A line that drags, such as a rudder, gives the force T and with it the drag that its power says, U times the
+drag. Where drag is paid `a` [W/N], a force is as dear as r = 1 - a/U times its power: it answers a price v as
+another one answers v/r. Where r < 0, drag is welcome, and the answer is one of both ends.
 """
 
 from collections.abc import Iterable
@@ -20,6 +25,8 @@ from finlab.precision import CLOSE, FINE, NOTHING, ROUNDS
 
 TURNING = 1e-2
 """Price, as a share of the mean one of the least force, over which a force that cannot rest turns round."""
+LEAST_RATIO = 1e-6
+"""Price of drag, as a share of the speed, up to which drag counts as welcome."""
 _EDGES = price_grid(1.0)
 """Ends of the tables' intervals, as shares of the largest price."""
 
@@ -30,8 +37,8 @@ class Answer(NamedTuple):
     force: Array
     """Forces (k, N) [N]."""
     derivative: Array
-    """Derivatives by the prices (l + 3 p, N) [N^2/W]: of lines, then of planes first-first, first-second and
-    second-second."""
+    """Derivatives by the prices (l + 3 p + 2 f, N) [N^2/W]: of lines, then of planes first-first,
+    first-second and second-second, then of lines that drag force-drag and drag-drag."""
     conjugate: Array | None
     """Sum of the conjugates (N,) [W]; None where it was not asked for."""
 
@@ -160,13 +167,28 @@ class Answers:
         self._shares = (shares + 2.0 * np.arange(len(tables))[:, None]).ravel()
         """The tables' forces as shares of the largest, one table after the other."""
         self._row = 2 * np.arange(len(sides))[:, None]
+        self.dragging = np.array([i for i, line in enumerate(lines) if line.drag is not None], np.intp)
+        """Places of the f lines that drag."""
+        self._speed = np.array([[line.speed] for line in lines])[self.dragging]
+        self._rest = np.array([[line.forward.rest] for line in lines])[self.dragging]
         self.gauges = Gauges([plane.gauge for plane in planes])
+
+    def pair(self, force: Array) -> tuple[Array, Array]:
+        """First and second entries (p, N) of the planes of forces or prices (k, N)."""
+        n = self.lines + self.planes
+        return force[self.lines : n], force[n : n + self.planes]
 
     def sizes(self, force: Array) -> Array:
         """Sizes (p, N) [N] of the planes' forces, of forces (k, N) along all directions."""
-        n = self.lines + self.planes
-        size: Array = np.hypot(force[self.lines : n], force[n:])
+        size: Array = np.hypot(*self.pair(force))
         return size
+
+    def drag(self, force: Array) -> Array:
+        """What the lines that drag drag along (f, N) [N] more than at rest with forces (l, N) [N]."""
+        own = np.zeros((self.lines + self.planes, force.shape[1]))
+        own[self.dragging] = force[self.dragging]
+        rise: Array = (self.marginal(own)[1][self.dragging] - self._rest) / self._speed
+        return rise
 
     def radial(
         self, price: Array, row: NDArray[np.intp], worth: bool = True
@@ -213,15 +235,20 @@ class Answers:
 
     def __call__(self, price: Array, sets: Sets, worth: bool = True) -> Answer:
         """Answers to prices (k, N), with or without their conjugates."""
-        lines, n = self.lines, self.lines + self.planes
+        lines, n, drags = self.lines, self.lines + self.planes, len(self.dragging) > 0
+        if drags:
+            price, ratio = self._without_drag(price)
         if not self.planes:
-            force, slope, conjugate = self._limited(price, lines, self._row, sets, worth=worth)
+            force, slope, conjugate = self._limited(price[:n], lines, self._row, sets, worth=worth or drags)
+            if drags and conjugate is not None:
+                rise, steep = self._dragged(price, ratio, force, slope, conjugate, sets)
+                force, slope = np.concatenate([force, rise]), np.concatenate([slope, *steep])
             return Answer(force, slope, None if conjugate is None else conjugate.sum(axis=0))
-        first, second = price[lines:n], price[n:]
+        first, second = self.pair(price)
         fan = self._fan(first, second, sets, sets.squared_gap, self.gauges)
         value = np.concatenate([price[:lines], fan.along]) if lines else fan.along
         forked = fan.beyond is not None and len(sets.forked) > 0
-        torn, row = forked or len(sets.reversing) > 0, self._rows(sets)
+        torn, row = forked or drags or len(sets.reversing) > 0, self._rows(sets)
         size, slope, conjugate = self._limited(value, lines, row, sets, worth=worth or torn)
         planar = _Planar.of(fan, size[lines:], slope[lines:])
         if forked and conjugate is not None:
@@ -231,10 +258,43 @@ class Answers:
             other, others = self._one_way(price, sets, 1)
             _blend(planar, conjugate[lines:], places, other, others, width, sets.reverse[places] > 0.0)
         parts = [planar.first, planar.second], [planar.xx, planar.xy, planar.yy]
+        if drags and conjugate is not None:
+            rise, steep = self._dragged(price, ratio, size, slope, conjugate, sets)
+            parts = [*parts[0], rise], [*parts[1], *steep]
         if lines:
             parts = [size[:lines], *parts[0]], [slope[:lines], *parts[1]]
         total = None if conjugate is None else conjugate.sum(axis=0)
         return Answer(np.concatenate(parts[0]), np.concatenate(parts[1]), total)
+
+    def _without_drag(self, price: Array) -> tuple[Array, Array]:
+        """Prices (k, N) that lines without drag answer as those that drag do, and the price of drag (f, N)
+        as a share of what it takes: the speed."""
+        ratio = 1.0 - price[len(price) - len(self.dragging) :] / self._speed
+        price = price.copy()
+        price[self.dragging] /= np.where(ratio > LEAST_RATIO, ratio, 1.0)
+        return price, ratio
+
+    def _dragged(
+        self, price: Array, ratio: Array, force: Array, slope: Array, conjugate: Array, sets: Sets
+    ) -> tuple[Array, tuple[Array, Array]]:
+        """Drag (f, N) [N] that comes with the forces, and its derivatives; forces (n, N), their derivatives
+        and conjugates are changed, in place, into what they are with the drag, by `_without_drag`."""
+        at, rest, speed = self.dragging, self._rest, self._speed
+        own, paid = force[at], ratio > LEAST_RATIO
+        rise = (price[at] * own - conjugate[at] - rest) / speed
+        low, high = sets.low[at], sets.high[at]
+        less, more = (sets.low_cost[at] - rest) / speed, (sets.high_cost[at] - rest) / speed
+        ahead = price[at] * (high - low) - ratio * speed * (more - less)
+        width = FINE * speed * np.maximum(less, more) + 1e-12
+        root = np.sqrt(ahead * ahead + width * width)
+        share, turn = _share(ahead, width), 0.5 * width * width / root**3
+        worth = price[at] * low - ratio * speed * less + 0.5 * (ahead + root) - rest
+        steep = np.where(paid, slope[at] / np.where(paid, ratio, 1.0), turn * (high - low) ** 2)
+        per = np.where(paid, price[at] / speed, (more - less) / np.maximum(high - low, 1e-300))
+        force[at] = np.where(paid, own, low + share * (high - low))
+        slope[at] = steep
+        conjugate[at] = np.where(paid, ratio * (conjugate[at] + rest) - rest, worth)
+        return np.where(paid, rise, less + share * (more - less)), (steep * per, steep * per * per)
 
     def _rows(self, sets: Sets) -> NDArray[np.intp]:
         """Rows (n, 1) or (n, N) of the actuators' tables."""
@@ -246,8 +306,8 @@ class Answers:
     def _one_way(self, price: Array, sets: Sets, way: int) -> tuple["_Planar", Array]:
         """Answers (q, N) of planes that push either way to prices (k, N), and their conjugates [W], as if
         they pushed one of both `ways`."""
-        n, places, sets = self.lines + self.planes, sets.reversing, sets.ways[way]
-        first, second = price[self.lines : n][places], price[n:][places]
+        places, sets = sets.reversing, sets.ways[way]
+        first, second = (values[places] for values in self.pair(price))
         row = self._row[self.lines + places] + sets.flipped.astype(np.intp)
         fan = self._fan(first, second, sets, sets.squared_gap)
         size, slope, conjugate = self._limited(fan.along, 0, row, sets)
@@ -269,11 +329,12 @@ class Answers:
 
     def farthest(self, price: Array, sets: Sets) -> Array:
         """Forces (k, N) [N] that are worth most at prices (k, N), whatever their power."""
-        lines, n = self.lines, self.lines + self.planes
+        lines = self.lines
         line = np.where(price[:lines] > 0.0, sets.high[:lines], sets.low[:lines])
+        drag = [self._farthest_dragged(price, line, sets)] if len(self.dragging) else []
         if not self.planes:
-            return line
-        first, second = price[lines:n], price[n:]
+            return np.concatenate([line, *drag])
+        first, second = self.pair(price)
         fan = self._fan(first, second, sets, 1e-300, self.gauges)
         size = np.where(fan.along > 0.0, sets.high[lines:], sets.low[lines:])
         x, y = size * fan.first, size * fan.second
@@ -283,13 +344,25 @@ class Answers:
             better = other * back.along > size[places] * fan.along[places]
             x[places] = np.where(better, other * back.first, x[places])
             y[places] = np.where(better, other * back.second, y[places])
-        return np.concatenate([line, x, y])
+        return np.concatenate([line, x, y, *drag])
+
+    def _farthest_dragged(self, price: Array, line: Array, sets: Sets) -> Array:
+        """Drag (f, N) [N] of the lines that drag, whose forces (l, N) become what is worth most with it."""
+        at, cost = self.dragging, -price[len(price) - len(self.dragging) :]
+        own = np.zeros((self.lines + self.planes, price.shape[1]))
+        own[at] = price[at] * self._speed / np.where(cost > 0.0, cost, 1.0)
+        inner = self._limited(own[: self.lines], self.lines, self._row[: self.lines], sets, slice(self.lines))
+        ends = [end[: self.lines] + np.zeros_like(line) for end in (sets.low, sets.high)]
+        worth = [price[at] * end[at] - cost * self.drag(end) for end in ends]
+        outer = np.where(worth[1] > worth[0], ends[1][at], ends[0][at])
+        line[at] = np.where(cost > 0.0, inner[0][at], outer)
+        return self.drag(line)
 
     def worth(self, price: Array, sets: Sets) -> tuple[Array, Array, Array]:
         """Prices (n, N) [W/N] along the forces that answer prices (k, N), of lines with their sign, and of
         planes in reverse; and what these forces are worth, less their power [W], by the tables."""
         lines, n = self.lines, self.lines + self.planes
-        first, second, along = price[lines:n], price[n:], price[:n].copy()
+        (first, second), along = self.pair(price), price[:n].copy()
         back = np.zeros_like(along)
         if self.planes:
             along[lines:] = self._fan(first, second, sets, 1e-300, self.gauges).along

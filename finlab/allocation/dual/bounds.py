@@ -18,7 +18,8 @@ def proved_power(compiled: Compiled, wrench: Array, price: Array) -> Array:
     along[:, robot.order] = robot.answers.worth((price @ robot.effectiveness.T).T, robot.sets)
     ahead, back, worth = along
     for places, group in compiled.groups:
-        own = group.radial_worth(ahead[places].T, back[places].T)
+        own = group.worth(price)
+        own = group.radial_worth(ahead[places].T, back[places].T) if own is None else own
         if own is not None:
             worth[places] = own.T
     return np.asarray(np.einsum("ni,ni->n", price, wrench - compiled.beside) - worth.sum(axis=0))

@@ -54,13 +54,16 @@ def gaps(robot: DualRobot, force: Array, sets: Sets, prices: Array | None = None
     """How far (n, N) forces (k, N) are in a gap of their sets, as a share; 0 where they are not. Those of
     prices (r, N) are in one where they are between what an actuator gives forward and in reverse."""
     lines, planes = robot.answers.lines, robot.answers.planes
-    x, y = force[lines : lines + planes], force[lines + planes :]
+    x, y = robot.answers.pair(force)
     size = np.concatenate([np.abs(force[:lines]), np.hypot(x, y)])
     found = np.zeros(size.shape)
     if lines:
         band = robot.band[:lines]
         inside = (size[:lines] < band * (1.0 - NOTHING)) & (size[:lines] > NOTHING * robot.most[:lines])
         found[:lines] = np.where(inside & (sets.low[:lines] < sets.high[:lines]), 1.0, 0.0)
+    if len(dragging := robot.answers.dragging):
+        over = (force[lines + 2 * planes :] - robot.answers.drag(force[:lines])) / robot.most_drag
+        found[dragging] = np.where(over > HOLLOW, over, 0.0)
     if planes:
         low, radial = sets.low[lines:], size[lines:]
         off = np.abs(wrapped(np.arctan2(y, x) - sets.middle)) - sets.half
@@ -76,9 +79,9 @@ def gaps(robot: DualRobot, force: Array, sets: Sets, prices: Array | None = None
 
 def _between_ways(robot: DualRobot, force: Array, sets: Sets, prices: Array | None, amount: Array) -> Array:
     """`gaps` (q, N) of the planes that push either way, from those of their forces forward alone."""
-    lines, planes, places = robot.answers.lines, robot.answers.planes, sets.reversing
+    lines, places = robot.answers.lines, sets.reversing
     most, both = robot.most[lines + places], sets.reverse[places] > 0.0
-    x, y = (force[at : at + planes][places] for at in (lines, lines + planes))
+    x, y = (values[places] for values in robot.answers.pair(force))
     if prices is not None:
         off, ahead = robot.answers.undecided(robot.matrix @ prices, sets)
         return np.asarray(np.where(both, np.where(off > CLOSE * most, np.pi, amount * ahead), amount))
@@ -92,7 +95,7 @@ def _between_ways(robot: DualRobot, force: Array, sets: Sets, prices: Array | No
 
 def may_have_gaps(robot: DualRobot, sets: Sets, force: Array) -> bool:
     """Whether forces (k, N) may lie in gaps: a quick look."""
-    if robot.band.any() or len(sets.forked) or len(sets.reversing):
+    if robot.band.any() or len(sets.forked) or len(sets.reversing) or len(robot.answers.dragging):
         return True
     if sets.rests:
         return False
@@ -203,10 +206,12 @@ def _dive(robot: DualRobot, parts: _Parts, kept: NDArray[np.intp], amount: Array
     """Each open part with all its gaps left on their nearer sides; fins that cannot rest keep that force."""
     lines, planes = robot.answers.lines, robot.answers.planes
     force, sets, chosen = answer.force[:, kept], parts.sets.take(kept), amount > 0.0
-    x, y = force[lines : lines + planes], force[lines + planes :]
+    x, y = robot.answers.pair(force)
     angle, size = np.arctan2(y, x), np.hypot(x, y)
     hole = chosen[lines:] & (size < 0.98 * sets.low[lines:])
     side = np.where(np.abs(force[:lines]) > 0.5 * robot.band[:lines], 1.0, -1.0)
+    dragging = robot.answers.dragging
+    side[dragging] = np.where(force[dragging] < 0.5 * (sets.low + sets.high)[dragging], -1.0, 1.0)
     off = wrapped(angle - sets.middle)
     turned = np.where(sets.reverse > 0.0, np.cos(off), off)
     side = np.concatenate([side, np.where(turned < 0.0, -1.0, 1.0)])
@@ -216,7 +221,7 @@ def _dive(robot: DualRobot, parts: _Parts, kept: NDArray[np.intp], amount: Array
     inside = sets.middle + np.clip(wrapped(angle - sets.middle), -sets.half, sets.half)
     ring = force.copy()
     ring[lines : lines + planes] = np.where(hole, sets.low[lines:] * np.cos(inside), x)
-    ring[lines + planes :] = np.where(hole, sets.low[lines:] * np.sin(inside), y)
+    ring[lines + planes : lines + 2 * planes] = np.where(hole, sets.low[lines:] * np.sin(inside), y)
     fixed = np.zeros(chosen.shape, bool)
     fixed[lines:] = hole
     return _Parts(parts.row[kept], robot.frozen(sets, ring, fixed), answer.prices[:, kept])
@@ -225,8 +230,8 @@ def _dive(robot: DualRobot, parts: _Parts, kept: NDArray[np.intp], amount: Array
 def narrowed(robot: DualRobot, sets: Sets, force: Array, chosen: NDArray[np.bool_], side: Array) -> Sets:
     """Sets (n, N) of which chosen ones (n, N) are cut, and one side is kept: of an arc the half towards
     smaller (-1) or larger angles (1), of a full circle the half away from or around the force, of what pushes
-    either way the reverse (-1) or the rest (1), of a dead band rest or the forces beyond it, by forces
-    (k, N)."""
+    either way the reverse (-1) or the rest (1), of a dead band rest or the forces beyond it, of what drags the forces
+    below or above, by forces (k, N)."""
     lines, planes = robot.answers.lines, robot.answers.planes
     low, high, low_cost, high_cost, middle, half, reverse, reverse_cost, flipped = map(np.array, sets.parts)
     if planes:
@@ -236,16 +241,20 @@ def narrowed(robot: DualRobot, sets: Sets, force: Array, chosen: NDArray[np.bool
         high_cost[lines:] = np.where(back, reverse_cost, high_cost[lines:])
         middle, flipped = np.where(back, middle + np.pi, middle), np.where(back, 1.0, flipped)
         reverse = np.where(either, 0.0, reverse)
-        angle = np.arctan2(force[lines + planes :], force[lines : lines + planes])
+        angle = np.arctan2(*robot.answers.pair(force)[::-1])
         full = half >= np.pi
         moved = np.where(full, angle + np.where(turn > 0.0, 0.0, np.pi), middle + 0.5 * turn * half)
         middle, half = np.where(plane, wrapped(moved), middle), np.where(plane, 0.5 * half, half)
     if lines:
         cut, beyond, positive = chosen[:lines], side[:lines] > 0.0, force[:lines] > 0.0
         edge = np.where(beyond, np.where(positive, 1.0, -1.0) * robot.band[:lines], 0.0)
-        row = np.arange(lines)[:, None]
+        row, dragging = np.arange(lines)[:, None], robot.answers.dragging
         cost = robot.band_cost[row, np.where(beyond, np.where(positive, 2, 0), 1)]
         above = cut & (beyond == positive)  # the part lies above the edge
+        if len(dragging):
+            own = np.pad(force[:lines], ((0, planes), (0, 0)))
+            edge[dragging], cost[dragging] = own[dragging], robot.answers.marginal(own)[1][dragging]
+            above[dragging] = (cut & beyond)[dragging]
         low[:lines], low_cost[:lines] = (
             np.where(above, edge, low[:lines]),
             np.where(above, cost, low_cost[:lines]),

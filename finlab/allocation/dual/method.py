@@ -7,7 +7,6 @@ the previous ones (`rates`).
 """
 
 from collections.abc import Callable
-from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Any, NamedTuple, Self
@@ -21,7 +20,6 @@ from finlab.allocation.dual.branch import STEPS_AT_KINK, gaps, least_power, may_
 from finlab.allocation.dual.compiled import Compiled
 from finlab.allocation.dual.deadline import ENDED, Deadline
 from finlab.allocation.dual.doubt import price_of_doubt
-from finlab.allocation.dual.drag import at_the_price_of_drag
 from finlab.allocation.dual.newton import MOST_STEPS, Prices, solve
 from finlab.allocation.dual.policies import Nearest, nearest
 from finlab.allocation.dual.rates import Rates, within_tick
@@ -123,28 +121,7 @@ class Dual(Method):
             return Solution(np.empty((0, self.layout.n, 3)), lambda _: np.empty(0))
         if (moved := self.at(flow)) is not self:
             return moved.solve(targets, policy=policy, previous=previous, seed=seed, prices=prices)
-        if self.compiled.drags:
-            return self._one_by_one(targets, policy, previous)
         return self._solve(targets, policy, previous, prices)
-
-    def _one_by_one(self, targets: Array, policy: Policy, previous: Array | None) -> Solution:
-        """Answers of a robot whose drag has another price for each target."""
-        commands, proved = [], np.empty(len(targets))
-        for i, target in enumerate(targets):
-            other = copy(self)
-            other.compiled, proved[i] = at_the_price_of_drag(self.compiled, target)
-            if proved[i] == 0.0 and policy.kind == "direction":
-                low, high = 0.0, 1.0
-                for _ in range(ROUNDS):  # halve the share of the target that is within reach
-                    share = 0.5 * (low + high)
-                    found, bound = at_the_price_of_drag(self.compiled, share * target)
-                    if bound > 0.0:
-                        low, other.compiled, proved[i] = share, found, bound
-                    else:
-                        high = share
-                target = low * target
-            commands.append(other._solve(target[None], policy, previous).command)
-        return Solution(np.concatenate(commands), None if self._unproved else lambda _: proved)
 
     def _solve(
         self, targets: Array, policy: Policy, previous: Array | None, prices: Array | None = None

@@ -80,13 +80,13 @@ class _State(NamedTuple):
 def start(robot: DualRobot, target: Array, sets: Sets) -> tuple[Array, NDArray[np.bool_]]:
     """Prices (r, N) to begin with, and where an actuator may be at its limit (N,): those of a quadratic cost,
     made once to fit a cost `~ T^1.5`."""
-    gain, lines = robot.gain, robot.answers.lines
+    gain, lines, dragging = robot.gain, robot.answers.lines, robot.answers.dragging
     force = robot.first_force @ target
     size = np.concatenate([np.abs(force[:lines]), robot.answers.sizes(force)])
     share = size / robot.most
     saturated = np.asarray((share > 0.8).any(axis=0))
     fit = np.sqrt(np.minimum(np.maximum(share, 1e-4), 1.0))
-    weight = gain * np.concatenate([fit, fit[lines:]])
+    weight = gain * np.concatenate([fit, fit[lines:], fit[dragging]])
     hessian = weight.T @ robot.squares.T
     diagonal = hessian[:, :: robot.shape[0] + 1]
     # Of a robot with only some directions asked for, nothing may drive one of them.

@@ -42,7 +42,8 @@ class DualRobot:
     def outer(self) -> Array:
         """Products (r r, l + 3 p) that make the Hessian of derivatives of the answers."""
         lines, planes = self.answers.lines, self.answers.planes
-        line, first, second = np.split(self.matrix, [lines, lines + planes])
+        ends = np.cumsum([lines, planes, planes])
+        line, first, second, drag = np.split(self.matrix, ends)
         mixed = _products(first, second)
         parts = [
             _products(line, line),
@@ -50,7 +51,10 @@ class DualRobot:
             mixed + mixed.swapaxes(1, 2),
             _products(second, second),
         ]
-        return np.concatenate(parts).reshape(lines + 3 * planes, -1).T.copy()
+        if len(drag):
+            along = _products(line[self.answers.dragging], drag)
+            parts += [along + along.swapaxes(1, 2), _products(drag, drag)]
+        return np.concatenate(parts).reshape(-1, self.shape[0] * self.shape[1]).T.copy()
 
     @cached_property
     def most(self) -> Array:
@@ -61,7 +65,7 @@ class DualRobot:
     @cached_property
     def largest(self) -> Array:
         """The same (k, 1) [N] for each direction."""
-        return np.concatenate([self.most, self.most[self.answers.lines :]])
+        return np.concatenate([self.most, self.most[self.answers.lines :], self.most_drag])
 
     @cached_property
     def largest_power(self) -> float:
@@ -72,7 +76,8 @@ class DualRobot:
     def gain(self) -> Array:
         """Force over price (k, 1) [N^2/W] of each direction at its limit, by what half the force costs."""
         each = self.most / self.answers.prices[:, None]
-        return np.concatenate([each, each[self.answers.lines :]])
+        steep = (self.most_drag / self.most[self.answers.dragging]) ** 2
+        return np.concatenate([each, each[self.answers.lines :], each[self.answers.dragging] * steep])
 
     @cached_property
     def squares(self) -> Array:
@@ -104,6 +109,11 @@ class DualRobot:
         mean = float(hessian.trace()) / max(len(hessian), 1)
         return np.asarray(hessian / mean + NEARLY * np.eye(len(hessian)))
 
+    @cached_property
+    def most_drag(self) -> Array:
+        """Drag (f, 1) [N] of the largest forces of the lines that drag."""
+        return _most_drag(self.answers, self.most)
+
     @property
     def shape(self) -> tuple[int, int]:
         """Rows and columns of the Hessian."""
@@ -120,12 +130,13 @@ class DualRobot:
         angle = sets.middle[:, 0]
         turns = (sets.half[:, 0] < np.pi) & (sets.reverse[:, 0] == 0.0)
         planar = np.where(turns, size[lines:], 0.0)
-        return np.concatenate([size[:lines], planar * np.cos(angle), planar * np.sin(angle)])
+        drag = self.answers.drag(size[:, None])[:, 0]
+        return np.concatenate([size[:lines], planar * np.cos(angle), planar * np.sin(angle), drag])
 
     def frozen(self, sets: Sets, force: Array, fixed: NDArray[np.bool_]) -> Sets:
         """Sets in which fixed actuators (n, N) give their forces (k, N) [N] and nothing else."""
-        lines, planes = self.answers.lines, self.answers.planes
-        x, y = force[lines : lines + planes], force[lines + planes :]
+        lines = self.answers.lines
+        x, y = self.answers.pair(force)
         size = np.concatenate([force[:lines], np.hypot(x, y)])
         within = np.clip(size, sets.low, sets.high)
         within[lines:] *= 1.0 - 2.0 * sets.flipped
@@ -176,6 +187,11 @@ def _range(effectiveness: Array, most: Array) -> tuple[Array, Array]:
     scale = np.where(size > NOTHING * max(size.max(), 1e-300), size, 1.0)
     left, values, _ = np.linalg.svd((effectiveness * most / scale).T, full_matrices=False)
     return scale, left[:, values > NOTHING * max(values[0], 1e-300)]
+
+
+def _most_drag(answers: Answers, most: Array) -> Array:
+    """Drag (f, 1) [N] of the largest forces (n, 1) [N]."""
+    return answers.drag(most) + 1e-12
 
 
 def _is_whole(line: Line, low: float, high: float) -> bool:
@@ -238,9 +254,10 @@ def dual_robot(responses: list[Response]) -> DualRobot:
     sets = replace(limited_sets(answers, least, high, arcs), whole=whole)
     rows = [line.effectiveness for line in lines]
     rows += [plane.effectiveness[0] for plane in planes] + [plane.effectiveness[1] for plane in planes]
+    rows += [line.drag for line in lines if line.drag is not None]
     effectiveness = np.array(rows)
     most = np.abs(ends).max(axis=1, keepdims=True)
-    most = np.concatenate([most, most[len(lines) :]])
+    most = np.concatenate([most, most[len(lines) :], _most_drag(answers, most)])
     scale, basis = _range(effectiveness, most)
     return DualRobot(
         np.array(line_places + plane_places),
