@@ -52,7 +52,8 @@ class _Parts:
 
 def gaps(robot: DualRobot, force: Array, sets: Sets, prices: Array | None = None) -> Array:
     """How far (n, N) forces (k, N) are in a gap of their sets, as a share; 0 where they are not. Those of
-    prices (r, N) are in one where they are between what an actuator gives forward and in reverse."""
+    prices (r, N) are in one where they are between what an actuator gives forward and in reverse, but not
+    where they drag more than lift does: that is left to the commands."""
     lines, planes = robot.answers.lines, robot.answers.planes
     x, y = robot.answers.pair(force)
     size = np.concatenate([np.abs(force[:lines]), np.hypot(x, y)])
@@ -61,7 +62,7 @@ def gaps(robot: DualRobot, force: Array, sets: Sets, prices: Array | None = None
         band = robot.band[:lines]
         inside = (size[:lines] < band * (1.0 - NOTHING)) & (size[:lines] > NOTHING * robot.most[:lines])
         found[:lines] = np.where(inside & (sets.low[:lines] < sets.high[:lines]), 1.0, 0.0)
-    if len(dragging := robot.answers.dragging):
+    if prices is None and len(dragging := robot.answers.dragging):
         over = (force[lines + 2 * planes :] - robot.answers.drag(force[:lines])) / robot.most_drag
         found[dragging] = np.where(over > HOLLOW, over, 0.0)
     if planes:
@@ -230,8 +231,8 @@ def _dive(robot: DualRobot, parts: _Parts, kept: NDArray[np.intp], amount: Array
 def narrowed(robot: DualRobot, sets: Sets, force: Array, chosen: NDArray[np.bool_], side: Array) -> Sets:
     """Sets (n, N) of which chosen ones (n, N) are cut, and one side is kept: of an arc the half towards
     smaller (-1) or larger angles (1), of a full circle the half away from or around the force, of what pushes
-    either way the reverse (-1) or the rest (1), of a dead band rest or the forces beyond it, of what drags the forces
-    below or above, by forces (k, N)."""
+    either way the reverse (-1) or the rest (1), of a dead band rest or the forces beyond it, of what drags
+    the forces below or above, by forces (k, N)."""
     lines, planes = robot.answers.lines, robot.answers.planes
     low, high, low_cost, high_cost, middle, half, reverse, reverse_cost, flipped = map(np.array, sets.parts)
     if planes:

@@ -6,7 +6,7 @@ becomes the one that the policy asks for (`policies`); from tick to tick, comman
 the previous ones (`rates`).
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Any, NamedTuple, Self
@@ -20,6 +20,7 @@ from finlab.allocation.dual.branch import STEPS_AT_KINK, gaps, least_power, may_
 from finlab.allocation.dual.compiled import Compiled
 from finlab.allocation.dual.deadline import ENDED, Deadline
 from finlab.allocation.dual.doubt import price_of_doubt
+from finlab.allocation.dual.drag import command_with_drag
 from finlab.allocation.dual.newton import MOST_STEPS, Prices, solve
 from finlab.allocation.dual.policies import Nearest, nearest
 from finlab.allocation.dual.rates import Rates, within_tick
@@ -69,6 +70,18 @@ class Forces(NamedTuple):
     """Power (N,) [W] that branches on gaps have proved to be needed; 0 where there was none."""
     aim: Array
     """The wrenches (N, 6) [N, N m] that they give: the targets, or those that the policy gives."""
+    command: Array | None = None
+    """Commands (N, n, 3) that give the targets, drag and all, NaN where there are none; None for robots
+    without drag."""
+
+    @classmethod
+    def joined(cls, each: Sequence["Forces"]) -> "Forces":
+        """Those of single targets."""
+        parts: list[Any] = list(zip(*each, strict=True))
+        axes = {"force": 1, "prices": 1}
+        return cls(
+            *(np.concatenate(part, axes.get(name, 0)) for name, part in zip(cls._fields, parts, strict=True))
+        )
 
 
 class Dual(Method):
@@ -240,12 +253,14 @@ class Dual(Method):
     ) -> Forces:
         """Forces of least power for wrenches (N, 6), or for those that a policy gives in their place."""
         robot, sets = self.compiled.robot, self.compiled.robot.sets
-        target = robot.target(targets)
+        target, drags = robot.target(targets), len(robot.answers.dragging) > 0
+        if drags and len(targets) > 1:
+            return Forces.joined([self._forces(one[None], policy, deadline) for one in targets])
         if not len(target):  # nothing pushes, such as rudders at rest
             nothing = np.zeros((len(robot.effectiveness), len(targets)))
             none = np.zeros((len(targets), 6))
             return Forces(nothing, none, np.all(targets == 0.0, axis=1), target, np.zeros(len(targets)), none)
-        torn = len(sets.forked) + len(sets.reversing) > 0
+        torn = drags or len(sets.forked) + len(sets.reversing) > 0
         root = solve(robot, target, sets, prices, most_steps=STEPS_AT_KINK if torn else MOST_STEPS)
         within = root.solved | (~root.beyond & torn)
         if robot.basis.shape[1] < 6:
@@ -256,6 +271,7 @@ class Dual(Method):
         force, prices, value, aim = root.force, root.prices, np.zeros(len(targets)), targets
         if may_have_gaps(robot, sets, force):
             force, value = self._in_gaps(target, sets, root, within, deadline)
+        command = self._with_drag(targets[0], force, within, not root.beyond[0]) if drags else None
         if not within.all() and policy is not None:
             force, prices, value, aim = force.copy(), prices.copy(), value.copy(), aim.copy()
             for row in np.flatnonzero(~within):
@@ -264,7 +280,18 @@ class Dual(Method):
                 aim[row], force[:, row], prices[:, row] = near.wrench, near.force, near.prices
                 if may_have_gaps(robot, sets, near.force[:, None]):
                     self._cheaper_in_gaps(sets.take(at), near, force[:, row], deadline)
-        return Forces(force, robot.price(prices), within, prices, value, aim)
+        return Forces(force, robot.price(prices), within, prices, value, aim, command)
+
+    def _with_drag(self, target: Array, force: Array, within: NDArray[np.bool_], search: bool) -> Array:
+        """A command (1, n, 3) for a wrench (6,) from forces (k, 1) near to it, NaN where there is none; says
+        in `within` (1,) whether there is one."""
+        feels = np.zeros(self.layout.n, bool)
+        for places, group in self.compiled.groups:
+            feels[places] = group.feels_flow
+        asked, begin = (target + self.compiled.beside) / self.scale, self.compiled.commands(force)[0]
+        command = command_with_drag(self._problem, self.plant, feels, asked, begin, EXACT, search)
+        within[0] = command is not None
+        return np.full((1, self.layout.n, 3), np.nan) if command is None else command[None]
 
     def _cheaper_in_gaps(self, sets: Sets, near: Nearest, force: Array, deadline: Deadline) -> None:
         """Replaces forces (k,) that give a wrench out of reach in one part of sets with gaps by those of
@@ -303,6 +330,9 @@ class Dual(Method):
         rough = np.flatnonzero(error > EXACT)
         if len(rough):
             asked = aim[rough] / self.scale
+            if found.command is not None:
+                own = found.command[rough]
+                command[rough] = np.where(np.isnan(own), command[rough], own)
             command[rough] = refine(self._problem, asked, command[rough], ROUNDS, EXACT).command
         return self.plant.rested(command)
 

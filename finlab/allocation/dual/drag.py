@@ -1,0 +1,48 @@
+"""Commands of robots with drag: what the dual leaves to their own laws.
+
+The dual takes a foil for all between its curve of lift and drag and the chord of it. From the forces that are
+cheapest there, Levenberg-Marquardt steps mostly lead to commands that give the wrench; where they do not,
+other starts are tried.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.allocation.levenberg_marquardt import CommandProblem, refine
+from finlab.arrays import Array
+from finlab.physics.plant import Plant
+from finlab.precision import NEARLY, ROUNDS
+
+STARTS = 32
+"""Commands from which a wrench is tried; of half of them only what feels the flow is random."""
+
+
+def command_with_drag(
+    problem: CommandProblem,
+    plant: Plant,
+    feels: NDArray[np.bool_],
+    wrench: Array,
+    command: Array,
+    enough: float,
+    search: bool,
+) -> Array | None:
+    """Returns a command (n, 3) that gives a normalized wrench (6,), the cheapest of those found; None where
+    there is none.
+
+    Args:
+        problem: the robot.
+        plant: its power.
+        feels: which actuators (n,) feel the flow.
+        wrench: what is to be given.
+        command: where to begin (n, 3).
+        enough: normalized error at which no further step is taken.
+        search: whether to try other starts where that one leads nowhere.
+    """
+    found = refine(problem, wrench[None], command[None], ROUNDS, enough)
+    if found.error[0] > NEARLY and search:
+        starts = plant.sample(np.random.default_rng(0), (STARTS,))
+        starts[::2, ~feels] = command[~feels]
+        found = refine(problem, wrench[None], starts, 2 * ROUNDS, enough)
+    met = found.error <= NEARLY
+    power = np.where(met, plant.power(found.command).sum(axis=-1), np.inf)
+    return found.command[power.argmin()] if met.any() else None
