@@ -10,6 +10,7 @@ its convex hull, at which `T` has a steep place.
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -23,9 +24,12 @@ POINTS = 512
 """Directions around a circle, and sizes of a force, for which a fin is asked."""
 
 
+_GRID = np.linspace(0.0, 1.0, CELLS + 1) ** 4
+
+
 def price_grid(top: float) -> Array:
     """Prices (CELLS + 1,) [W/N] from 0 to `top`, the ends of a table's intervals."""
-    grid: Array = top * np.linspace(0.0, 1.0, CELLS + 1) ** 4
+    grid: Array = top * _GRID
     return grid
 
 
@@ -83,13 +87,10 @@ class RadialTable:
     def scaled(self, share: float, cost: float = 1.0) -> "RadialTable":
         """The table with `share` times the force, and `cost` times the power, at each command."""
         per = share / cost
-        return replace(
-            self,
-            top=self.top / per,
-            force=self.force * share,
-            slope=self.slope * share * per,
-            rest=self.rest * cost,
-        )
+        found = RadialTable(self.top / per, self.force * share, self.slope * share * per, self.rest * cost)
+        known = self.polynomials * [share, share, share, share, cost]
+        found.__dict__["polynomials"] = known  # of many tables scaled in each new flow
+        return found
 
     def with_square(self, weight: float) -> "RadialTable":
         """The table where a force T [N] costs `weight` T^2 [W] more: what answered a price v now answers
@@ -98,6 +99,7 @@ class RadialTable:
         top, rest = float(price[-1]), self.rest + weight * float(self.force[0]) ** 2
         return self.of_forces(top, np.interp(price_grid(top), price, self.force), rest)
 
+    @cached_property
     def polynomials(self) -> Array:
         """Coefficients (CELLS + 1, 5): of the force in rising powers of the price, as a share of the largest,
         from the beginning of each interval on, and the conjugate there [W]; the last are those beyond the

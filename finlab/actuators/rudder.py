@@ -186,22 +186,23 @@ class RudderGroup(Group):
         return responses
 
     def worth(self, price: Array) -> Array:
-        """See `Group`: by the law at many deflections, and the parabola through the best of them."""
-        met, share = self._met, np.linspace(0.0, 1.0, POINTS)[:, None]
-        angle = self._limits[:, 0] + share * (self._limits[:, 1] - self._limits[:, 0])
-        found = self._law.coefficients(angle - met.course)
-        lift, drag = met.pressure * found.lift, met.pressure * (found.drag - self._law.drag)
-        gain, cost = price @ self._across.T, met.speed - price @ self._against.T
-        most = np.empty(gain.shape)
-        for i, (own, behind) in enumerate(zip(lift.T, drag.T, strict=True)):
-            worth = np.outer(gain[:, i], own) - np.outer(cost[:, i], behind)
-            best = np.clip(worth.argmax(axis=1), 1, POINTS - 2)
-            before, at, after = (worth[np.arange(len(worth)), best + k] for k in (-1, 0, 1))
-            bend, rise = np.minimum(before - 2.0 * at + after, -1e-300), 0.5 * (after - before)
-            offset = np.clip(-rise / bend, -1.0, 1.0)
-            most[:, i] = np.maximum(worth.max(axis=1), at + offset * (rise + 0.5 * offset * bend))
-        found_most: Array = most - met.pressure * met.speed * self._law.drag
-        return found_most
+        """See `Group`: by the law at many deflections, more around the best of them, and a parabola."""
+        gain, cost = price @ self._across.T, self._met.speed - price @ self._against.T
+        step = (self._limits[:, 1] - self._limits[:, 0]) / POINTS
+        middle = self._limits.mean(axis=1) + 0.0 * gain
+        for count in (POINTS // 2, 8, 8):
+            angle = middle + step * np.arange(-count, count + 1)[:, None, None]
+            angle = np.clip(angle, self._limits[:, 0], self._limits[:, 1])
+            found = self._law.coefficients(angle - self._met.course)
+            worth = gain * found.lift - cost * (found.drag - self._law.drag)
+            best = worth.argmax(axis=0)[None]
+            middle, step = np.take_along_axis(angle, best, axis=0)[0], step / 8.0
+        best = np.clip(best, 1, 2 * count - 1)
+        before, at, after = (np.take_along_axis(worth, best + k, axis=0)[0] for k in (-1, 0, 1))
+        rise, bend = 0.5 * (after - before), np.minimum(before - 2.0 * at + after, -1e-300)
+        offset = np.clip(-rise / bend, -1.0, 1.0)
+        most = np.maximum(worth.max(axis=0), at + offset * (rise + 0.5 * offset * bend))
+        return np.asarray(self._met.pressure * (most - self._met.speed * self._law.drag))
 
     @property
     def beside(self) -> Array:

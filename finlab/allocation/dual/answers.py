@@ -158,7 +158,7 @@ class Answers:
         sides = [(line.forward, line.reverse or line.forward) for line in lines]
         sides += [(plane.table, plane.reverse or plane.table) for plane in planes]
         tables = [table for both in sides for table in both]
-        self._coefficients = np.concatenate([table.polynomials() for table in tables]).T.copy()
+        self._coefficients = np.concatenate([table.polynomials for table in tables]).T.copy()
         self._top = np.array([table.top for table in tables])
         self._ends = np.array([table.force for table in tables])
         self.prices = np.array([_usual_price(table) for table in tables]).reshape(-1, 2).max(axis=1)

@@ -9,6 +9,7 @@ import numpy as np
 
 from finlab.allocation.dual.compiled import Compiled
 from finlab.arrays import Array
+from finlab.precision import ROUNDING
 
 
 def proved_power(compiled: Compiled, wrench: Array, price: Array) -> Array:
@@ -22,4 +23,6 @@ def proved_power(compiled: Compiled, wrench: Array, price: Array) -> Array:
         own = group.radial_worth(ahead[places].T, back[places].T) if own is None else own
         if own is not None:
             worth[places] = own.T
-    return np.asarray(np.einsum("ni,ni->n", price, wrench - compiled.beside) - worth.sum(axis=0))
+    paid = price * (wrench - compiled.beside)
+    rounding = ROUNDING * (np.abs(paid).sum(axis=1) + np.abs(worth).sum(axis=0))
+    return np.asarray(paid.sum(axis=1) - worth.sum(axis=0) - rounding)

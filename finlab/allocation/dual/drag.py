@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from finlab.allocation.levenberg_marquardt import CommandProblem, refine
 from finlab.arrays import Array
 from finlab.physics.plant import Plant
-from finlab.precision import NEARLY, ROUNDS
+from finlab.precision import NEARLY, NOTHING, ROUNDS
 
 STARTS = 32
 """Commands from which a wrench is tried; of half of them only what feels the flow is random."""
@@ -46,3 +46,16 @@ def command_with_drag(
     met = found.error <= NEARLY
     power = np.where(met, plant.power(found.command).sum(axis=-1), np.inf)
     return found.command[power.argmin()] if met.any() else None
+
+
+def prices_at(problem: CommandProblem, plant: Plant, command: Array, directions: Array) -> Array:
+    """Returns the prices (r, 1) of normalized `directions` (6, r) at which a command (n, 3) would be the cheapest
+    for what it gives, as near as there are: there, what a command that can change adds to the wrench is worth
+    the power that it adds."""
+    jacobian = problem.fin.force_and_jacobian(command[None])[1][0] @ problem.effectiveness
+    low, high = problem.edges
+    free = (command > low) & (command < high)
+    width = problem.width[free]
+    rows = width[:, None] * (jacobian[free] @ directions)
+    prices: Array = np.linalg.lstsq(rows, width * plant.power_gradient(command)[free], rcond=NOTHING)[0]
+    return prices[:, None]

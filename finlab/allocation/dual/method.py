@@ -20,8 +20,8 @@ from finlab.allocation.dual.branch import STEPS_AT_KINK, gaps, least_power, may_
 from finlab.allocation.dual.compiled import Compiled
 from finlab.allocation.dual.deadline import ENDED, Deadline
 from finlab.allocation.dual.doubt import price_of_doubt
-from finlab.allocation.dual.drag import command_with_drag
-from finlab.allocation.dual.newton import MOST_STEPS, Prices, solve
+from finlab.allocation.dual.drag import command_with_drag, prices_at
+from finlab.allocation.dual.newton import MOST_STEPS, Prices, solve, start
 from finlab.allocation.dual.policies import Nearest, nearest
 from finlab.allocation.dual.rates import Rates, within_tick
 from finlab.allocation.levenberg_marquardt import CommandProblem, refine
@@ -261,7 +261,9 @@ class Dual(Method):
             none = np.zeros((len(targets), 6))
             return Forces(nothing, none, np.all(targets == 0.0, axis=1), target, np.zeros(len(targets)), none)
         torn = drags or len(sets.forked) + len(sets.reversing) > 0
-        root = solve(robot, target, sets, prices, most_steps=STEPS_AT_KINK if torn else MOST_STEPS)
+        steps = STEPS_AT_KINK if torn else MOST_STEPS
+        prices = self._prices_with_drag(targets[0], target) if drags and prices is None else prices
+        root = solve(robot, target, sets, prices, way="one" if drags else "either", most_steps=steps)
         within = root.solved | (~root.beyond & torn)
         if robot.basis.shape[1] < 6:
             rest = targets / robot.scale - (robot.basis @ target).T
@@ -281,6 +283,16 @@ class Dual(Method):
                 if may_have_gaps(robot, sets, near.force[:, None]):
                     self._cheaper_in_gaps(sets.take(at), near, force[:, row], deadline)
         return Forces(force, robot.price(prices), within, prices, value, aim, command)
+
+    def _prices_with_drag(self, wrench: Array, target: Array) -> Array | None:
+        """Prices (r, 1) to begin with: those of commands near to forces at quadratic costs that give the
+        wrench (6,), a target (r, 1); None where there are none."""
+        robot = self.compiled.robot
+        begin = robot.answers(robot.matrix @ start(robot, target, robot.sets)[0], robot.sets, False).force
+        within = np.ones(1, bool)
+        command = self._with_drag(wrench, begin, within, False)
+        directions = self.scale[:, None] * robot.basis / robot.scale[:, None]
+        return prices_at(self._problem, self.plant, command[0], directions) if within[0] else None
 
     def _with_drag(self, target: Array, force: Array, within: NDArray[np.bool_], search: bool) -> Array:
         """A command (1, n, 3) for a wrench (6,) from forces (k, 1) near to it, NaN where there is none; says
