@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from finlab.actuators.response import CELLS, Line, Plane, RadialTable, price_grid
 from finlab.allocation.dual.gauges import Gauges
 from finlab.arrays import Array
-from finlab.precision import CLOSE, FINE, NOTHING, ROUNDS
+from finlab.precision import CLOSE, FINE, NOTHING, ROUNDING, ROUNDS
 
 TURNING = 1e-2
 """Price, as a share of the mean one of the least force, over which a force that cannot rest turns round."""
@@ -227,7 +227,9 @@ class Answers:
             slope = a1 + x * (2.0 * a2 + 3.0 * x * a3)
             excess = a0 + x * (a1 + x * (a2 + x * a3)) - size
             change = np.divide(excess, slope, out=np.zeros_like(x), where=slope > 0.0)
-            x = np.minimum(np.maximum(x - change, 0.0), width)
+            last, x = x, np.minimum(np.maximum(x - change, 0.0), width)
+            if (np.abs(x - last) <= ROUNDING * width).all():
+                break
         top = self._top[row]
         conjugate = start + top * x * (a0 + x * (a1 / 2.0 + x * (a2 / 3.0 + x * (a3 / 4.0))))
         price = top * (_EDGES[cell] + x)

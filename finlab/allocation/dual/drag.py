@@ -6,25 +6,15 @@ other starts are tried.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finlab.allocation.levenberg_marquardt import CommandProblem, refine
 from finlab.arrays import Array
 from finlab.physics.plant import Plant
 from finlab.precision import NEARLY, NOTHING, ROUNDS
 
-STARTS = 32
-"""Commands from which a wrench is tried; of half of them only what feels the flow is random."""
-
 
 def command_with_drag(
-    problem: CommandProblem,
-    plant: Plant,
-    feels: NDArray[np.bool_],
-    wrench: Array,
-    command: Array,
-    enough: float,
-    search: bool,
+    problem: CommandProblem, plant: Plant, wrench: Array, starts: Array, enough: float
 ) -> Array | None:
     """Returns a command (n, 3) that gives a normalized wrench (6,), the cheapest of those found; None where
     there is none.
@@ -32,26 +22,22 @@ def command_with_drag(
     Args:
         problem: the robot.
         plant: its power.
-        feels: which actuators (n,) feel the flow.
         wrench: what is to be given.
-        command: where to begin (n, 3).
+        starts: commands (R, n, 3) to begin with.
         enough: normalized error at which no further step is taken.
-        search: whether to try other starts where that one leads nowhere.
     """
-    found = refine(problem, wrench[None], command[None], ROUNDS, enough)
-    if found.error[0] > NEARLY and search:
-        starts = plant.sample(np.random.default_rng(0), (STARTS,))
-        starts[::2, ~feels] = command[~feels]
-        found = refine(problem, wrench[None], starts, 2 * ROUNDS, enough)
+    found = refine(problem, wrench[None], starts, 2 * ROUNDS, enough)
     met = found.error <= NEARLY
-    power = np.where(met, plant.power(found.command).sum(axis=-1), np.inf)
-    return found.command[power.argmin()] if met.any() else None
+    if not met.any():
+        return None
+    power = plant.power(found.command).sum(axis=-1)
+    return np.asarray(found.command[np.where(met, power, np.inf).argmin()])
 
 
 def prices_at(problem: CommandProblem, plant: Plant, command: Array, directions: Array) -> Array:
-    """Returns the prices (r, 1) of normalized `directions` (6, r) at which a command (n, 3) would be the cheapest
-    for what it gives, as near as there are: there, what a command that can change adds to the wrench is worth
-    the power that it adds."""
+    """Returns the prices (r, 1) of normalized `directions` (6, r) at which a command (n, 3) would be the
+    cheapest for what it gives, as near as there are: there, what a command that can change adds to the wrench
+    is worth the power that it adds."""
     jacobian = problem.fin.force_and_jacobian(command[None])[1][0] @ problem.effectiveness
     low, high = problem.edges
     free = (command > low) & (command < high)
