@@ -27,6 +27,8 @@ TURNING = 1e-2
 """Price, as a share of the mean one of the least force, over which a force that cannot rest turns round."""
 LEAST_RATIO = 1e-6
 """Price of drag, as a share of the speed, up to which drag counts as welcome."""
+DULL = 1e-2
+"""Share of a foil's power by which its two ends may differ and both be taken, where drag is welcome."""
 _EDGES = price_grid(1.0)
 """Ends of the tables' intervals, as shares of the largest price."""
 
@@ -287,7 +289,7 @@ class Answers:
         low, high = sets.low[at], sets.high[at]
         less, more = (sets.low_cost[at] - rest) / speed, (sets.high_cost[at] - rest) / speed
         ahead = price[at] * (high - low) - ratio * speed * (more - less)
-        width = FINE * speed * np.maximum(less, more) + 1e-12
+        width = DULL * speed * np.maximum(less, more) + 1e-12
         root = np.sqrt(ahead * ahead + width * width)
         share, turn = _share(ahead, width), 0.5 * width * width / root**3
         worth = price[at] * low - ratio * speed * less + 0.5 * (ahead + root) - rest

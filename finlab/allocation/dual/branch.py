@@ -96,7 +96,7 @@ def _between_ways(robot: DualRobot, force: Array, sets: Sets, prices: Array | No
 
 def may_have_gaps(robot: DualRobot, sets: Sets, force: Array) -> bool:
     """Whether forces (k, N) may lie in gaps: a quick look."""
-    if robot.band.any() or len(sets.forked) or len(sets.reversing) or len(robot.answers.dragging):
+    if robot.band.any() or len(sets.forked) or len(sets.reversing):
         return True
     if sets.rests:
         return False

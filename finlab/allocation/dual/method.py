@@ -41,8 +41,10 @@ TICK_STEPS = 5
 """The same where a command of a tick is not exact."""
 STARTS = 16
 """Starts of a search for forces that cancel each other, or that give a wrench with their drag."""
-STEPS_WITH_DRAG = 12
+STEPS_WITH_DRAG = 20
 """Newton's steps from the prices of commands that give the target."""
+STEPS_OF_ONLY = 4
+"""The same where no other commands near to these give it."""
 NEAR_REST = 0.05
 """Share of the limits' ranges up to which sizes of these starts are."""
 
@@ -103,6 +105,7 @@ class Dual(Method):
         super().__init__(layout, settings, scale, weights)
         doubt = price_of_doubt(layout, scale, self.settings.robust)
         self.compiled = Compiled(layout, self.plant, doubt)
+        self._last: tuple[bytes, Self] | None = None
 
     @cached_property
     def _problem(self) -> CommandProblem:
@@ -114,10 +117,13 @@ class Dual(Method):
 
     def at(self, flow: Array | None) -> Self:
         """See `Method`."""
+        key = b"" if flow is None else flow.tobytes()
+        if self._last is not None and self._last[0] == key:
+            return self._last[1]
         other = super().at(flow)
         if other is not self:
-            inflow = other.plant.inflow(None)
-            other.compiled = self.compiled.at(inflow)
+            other.compiled, other._last = self.compiled.at(other.plant.inflow(None)), None
+            self._last = key, other
         return other
 
     def solve(
@@ -265,8 +271,9 @@ class Dual(Method):
         torn = drags or len(sets.forked) + len(sets.reversing) > 0
         steps, known = STEPS_AT_KINK if torn else MOST_STEPS, None
         if drags and (known := self._first_with_drag(targets[0], target)) is not None:
-            steps, directions = STEPS_WITH_DRAG, self.scale[:, None] * robot.basis / robot.scale[:, None]
-            prices = prices_at(self._problem, self.plant, known, directions)
+            directions = self.scale[:, None] * robot.basis / robot.scale[:, None]
+            prices, only = prices_at(self._problem, self.plant, known, directions)
+            steps = STEPS_OF_ONLY if only else STEPS_WITH_DRAG
         root = solve(robot, target, sets, prices, way="one" if drags else "either", most_steps=steps)
         within = root.solved | (~root.beyond & torn)
         if robot.basis.shape[1] < 6:
@@ -348,6 +355,8 @@ class Dual(Method):
 
     def _commands(self, aim: Array, found: Forces, previous: Array | None = None) -> Array:
         """Commands (N, n, 3) that give wrenches (N, 6) exactly, by the plant."""
+        if previous is None and found.command is not None and not np.isnan(found.command).any():
+            return self.plant.rested(found.command)
         command = self.compiled.commands(found.force, previous)
         error = self._error(command, aim)
         rough = np.flatnonzero(error > EXACT)
