@@ -34,14 +34,14 @@ def command_with_drag(
     return np.asarray(found.command[np.where(met, power, np.inf).argmin()])
 
 
-def prices_at(problem: CommandProblem, plant: Plant, command: Array, directions: Array) -> tuple[Array, bool]:
+def prices_at(problem: CommandProblem, plant: Plant, command: Array, directions: Array) -> Array:
     """Returns the prices (r, 1) of normalized `directions` (6, r) at which a command (n, 3) would be the
     cheapest for what it gives, as near as there are: there, what a command that can change adds to the wrench
-    is worth the power that it adds; and whether no other commands near to it give the same."""
+    is worth the power that it adds."""
     jacobian = problem.fin.force_and_jacobian(command[None])[1][0] @ problem.effectiveness
     low, high = problem.edges
     free = (command > low) & (command < high)
     width = problem.width[free]
     rows = width[:, None] * (jacobian[free] @ directions)
-    prices, _, rank, _ = np.linalg.lstsq(rows, width * plant.power_gradient(command)[free], rcond=NOTHING)
-    return prices[:, None], bool(rank == len(rows))
+    prices: Array = np.linalg.lstsq(rows, width * plant.power_gradient(command)[free], rcond=NOTHING)[0]
+    return prices[:, None]

@@ -41,10 +41,8 @@ TICK_STEPS = 5
 """The same where a command of a tick is not exact."""
 STARTS = 16
 """Starts of a search for forces that cancel each other, or that give a wrench with their drag."""
-STEPS_WITH_DRAG = 20
+STEPS_WITH_DRAG = 12
 """Newton's steps from the prices of commands that give the target."""
-STEPS_OF_ONLY = 4
-"""The same where no other commands near to these give it."""
 NEAR_REST = 0.05
 """Share of the limits' ranges up to which sizes of these starts are."""
 
@@ -214,6 +212,8 @@ class Dual(Method):
     def _not_held(self, targets: Array) -> set[str]:
         """The sentence about axes that come together only, and that targets (N, 6) ask for apart."""
         robot = self.compiled.robot
+        if not len(targets):
+            return set()
         scaled = targets / robot.scale
         left = np.abs(scaled - (scaled @ robot.basis) @ robot.basis.T) > NEARLY * np.abs(scaled).max(
             initial=0.0
@@ -269,11 +269,12 @@ class Dual(Method):
             none = np.zeros((len(targets), 6))
             return Forces(nothing, none, np.all(targets == 0.0, axis=1), target, np.zeros(len(targets)), none)
         torn = drags or len(sets.forked) + len(sets.reversing) > 0
-        steps, known = STEPS_AT_KINK if torn else MOST_STEPS, None
-        if drags and (known := self._first_with_drag(targets[0], target)) is not None:
+        steps, first = STEPS_AT_KINK if torn else MOST_STEPS, None
+        if drags:
+            first = robot.answers(robot.matrix @ start(robot, target, sets)[0], sets, False).force
             directions = self.scale[:, None] * robot.basis / robot.scale[:, None]
-            prices, only = prices_at(self._problem, self.plant, known, directions)
-            steps = STEPS_OF_ONLY if only else STEPS_WITH_DRAG
+            steps, near = STEPS_WITH_DRAG, self.compiled.commands(first)[0]
+            prices = prices_at(self._problem, self.plant, near, directions) if prices is None else prices
         root = solve(robot, target, sets, prices, way="one" if drags else "either", most_steps=steps)
         within = root.solved | (~root.beyond & torn)
         if robot.basis.shape[1] < 6:
@@ -284,7 +285,7 @@ class Dual(Method):
         force, prices, value, aim = root.force, root.prices, np.zeros(len(targets)), targets
         if may_have_gaps(robot, sets, force):
             force, value = self._in_gaps(target, sets, root, within, deadline)
-        command = self._with_drag(targets[0], force, known, within, root.beyond[0]) if drags else None
+        command = None if first is None else self._with_drag(targets[0], force, first, within, root)
         if not within.all() and policy is not None:
             force, prices, value, aim = force.copy(), prices.copy(), value.copy(), aim.copy()
             for row in np.flatnonzero(~within):
@@ -295,33 +296,24 @@ class Dual(Method):
                     self._cheaper_in_gaps(sets.take(at), near, force[:, row], deadline)
         return Forces(force, robot.price(prices), within, prices, value, aim, command)
 
-    def _first_with_drag(self, wrench: Array, target: Array) -> Array | None:
-        """A command (n, 3) near to forces at quadratic costs that gives a wrench (6,), a target (r, 1)."""
-        robot = self.compiled.robot
-        begin = robot.answers(robot.matrix @ start(robot, target, robot.sets)[0], robot.sets, False).force
-        return command_with_drag(
-            self._problem, self.plant, self._asked(wrench), self.compiled.commands(begin), EXACT
-        )
-
     def _with_drag(
-        self, wrench: Array, force: Array, known: Array | None, within: NDArray[np.bool_], beyond: bool
+        self, wrench: Array, force: Array, first: Array, within: NDArray[np.bool_], root: Prices
     ) -> Array:
-        """A command (1, n, 3) for a wrench (6,) from forces (k, 1) near to it or the one known, NaN where
-        there is none; says in `within` (1,) whether there is one."""
-        asked, begin = self._asked(wrench), self.compiled.commands(force)
-        begin = begin if known is None else np.concatenate([begin, known[None]])
-        command = command_with_drag(self._problem, self.plant, asked, begin, EXACT)
-        if command is None and not beyond:
+        """A command (1, n, 3) for a wrench (6,) from forces (k, 1) near to it, or the first ones; NaN where
+        there is none. Says in `within` (1,) whether there is one."""
+        asked, begin = wrench + self.compiled.beside, self.compiled.commands(force)
+        if root.solved[0] and self._error(begin, asked[None])[0] <= EXACT:
+            return begin
+        begin = np.concatenate([begin, self.compiled.commands(first)])
+        command = command_with_drag(self._problem, self.plant, asked / self.scale, begin, EXACT)
+        if command is None and not root.beyond[0]:
             starts = self.plant.sample(np.random.default_rng(0), (STARTS,))
             for places, group in self.compiled.groups:
                 if not group.feels_flow:
                     starts[::2, places] = begin[0, places]
-            command = command_with_drag(self._problem, self.plant, asked, starts, EXACT)
+            command = command_with_drag(self._problem, self.plant, asked / self.scale, starts, EXACT)
         within[0] = command is not None
         return np.full((1, self.layout.n, 3), np.nan) if command is None else command[None]
-
-    def _asked(self, wrench: Array) -> Array:
-        return np.asarray((wrench + self.compiled.beside) / self.scale)
 
     def _cheaper_in_gaps(self, sets: Sets, near: Nearest, force: Array, deadline: Deadline) -> None:
         """Replaces forces (k,) that give a wrench out of reach in one part of sets with gaps by those of
