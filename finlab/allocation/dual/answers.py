@@ -171,8 +171,8 @@ class Answers:
         self._row = 2 * np.arange(len(sides))[:, None]
         self.dragging = np.array([i for i, line in enumerate(lines) if line.drag is not None], np.intp)
         """Places of the f lines that drag."""
-        self._speed = np.array([[line.speed] for line in lines])[self.dragging]
-        self._rest = np.array([[line.forward.rest] for line in lines])[self.dragging]
+        self._speed = np.array([[lines[i].speed] for i in self.dragging]).reshape(-1, 1)
+        self._rest = np.array([[lines[i].forward.rest] for i in self.dragging]).reshape(-1, 1)
         self.gauges = Gauges([plane.gauge for plane in planes])
 
     def pair(self, force: Array) -> tuple[Array, Array]:
@@ -187,6 +187,8 @@ class Answers:
 
     def drag(self, force: Array) -> Array:
         """What the lines that drag drag along (f, N) [N] more than at rest with forces (l, N) [N]."""
+        if not len(self.dragging):
+            return np.zeros((0, force.shape[1]))
         own = np.zeros((self.lines + self.planes, force.shape[1]))
         own[self.dragging] = force[self.dragging]
         rise: Array = (self.marginal(own)[1][self.dragging] - self._rest) / self._speed
