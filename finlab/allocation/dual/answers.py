@@ -7,7 +7,8 @@ force, its size the gauge.
 
 A line that drags, such as a rudder, gives the force T and with it the drag that its power says, U times the
 drag. Where drag is paid `a` [W/N], a force is as dear as r = 1 - a/U times its power: it answers a price v as
-another one answers v/r. Where r < 0, drag is welcome, and the answer is one of both ends.
+another one answers v/r. Where r < 0, drag is welcome, and is what the dearer end gives: r is softened to a
+positive number s(r), and the conjugate s c*(v/s) has (s - r) times the largest power on top, which is convex.
 """
 
 from collections.abc import Iterable
@@ -25,10 +26,8 @@ from finlab.precision import CLOSE, FINE, NOTHING, ROUNDING, ROUNDS
 
 TURNING = 1e-2
 """Price, as a share of the mean one of the least force, over which a force that cannot rest turns round."""
-LEAST_RATIO = 1e-6
-"""Price of drag, as a share of the speed, up to which drag counts as welcome."""
-DULL = 1e-2
-"""Share of a foil's power by which its two ends may differ and both be taken, where drag is welcome."""
+SOFT = 0.15
+"""Price of drag, as a share of the speed, within which drag turns from dear to welcome."""
 _EDGES = price_grid(1.0)
 """Ends of the tables' intervals, as shares of the largest price."""
 
@@ -273,34 +272,26 @@ class Answers:
         return Answer(np.concatenate(parts[0]), np.concatenate(parts[1]), total)
 
     def _without_drag(self, price: Array) -> tuple[Array, Array]:
-        """Prices (k, N) that lines without drag answer as those that drag do, and the price of drag (f, N)
-        as a share of what it takes: the speed."""
+        """Prices (k, N) that lines without drag answer as those that drag do, and r (f, N)."""
         ratio = 1.0 - price[len(price) - len(self.dragging) :] / self._speed
         price = price.copy()
-        price[self.dragging] /= np.where(ratio > LEAST_RATIO, ratio, 1.0)
+        price[self.dragging] /= _softened(ratio)[0]
         return price, ratio
 
     def _dragged(
         self, price: Array, ratio: Array, force: Array, slope: Array, conjugate: Array, sets: Sets
     ) -> tuple[Array, tuple[Array, Array]]:
-        """Drag (f, N) [N] that comes with the forces, and its derivatives; forces (n, N), their derivatives
-        and conjugates are changed, in place, into what they are with the drag, by `_without_drag`."""
+        """Drag (f, N) [N] that comes with the forces, and its derivatives; the derivatives and conjugates of
+        forces (n, N) are changed, in place, into what they are with the drag, by `_without_drag`."""
         at, rest, speed = self.dragging, self._rest, self._speed
-        own, paid = force[at], ratio > LEAST_RATIO
-        rise = (price[at] * own - conjugate[at] - rest) / speed
-        low, high = sets.low[at], sets.high[at]
-        less, more = (sets.low_cost[at] - rest) / speed, (sets.high_cost[at] - rest) / speed
-        ahead = price[at] * (high - low) - ratio * speed * (more - less)
-        width = DULL * speed * np.maximum(less, more) + 1e-12
-        root = np.sqrt(ahead * ahead + width * width)
-        share, turn = _share(ahead, width), 0.5 * width * width / root**3
-        worth = price[at] * low - ratio * speed * less + 0.5 * (ahead + root) - rest
-        steep = np.where(paid, slope[at] / np.where(paid, ratio, 1.0), turn * (high - low) ** 2)
-        per = np.where(paid, price[at] / speed, (more - less) / np.maximum(high - low, 1e-300))
-        force[at] = np.where(paid, own, low + share * (high - low))
-        slope[at] = steep
-        conjugate[at] = np.where(paid, ratio * (conjugate[at] + rest) - rest, worth)
-        return np.where(paid, rise, less + share * (more - less)), (steep * per, steep * per * per)
+        own, (soft, rate, bend) = price[at], _softened(ratio)
+        cost = own * force[at] - conjugate[at] - rest
+        most = np.maximum(sets.low_cost[at], sets.high_cost[at]) - rest
+        conjugate[at] = soft * (conjugate[at] + rest) + (soft - ratio) * most - rest
+        slope[at] /= soft
+        along = own * rate / speed
+        square = slope[at] * along * along + (most - cost) * bend / speed**2
+        return (rate * cost + (1.0 - rate) * most) / speed, (slope[at] * along, square)
 
     def _rows(self, sets: Sets) -> NDArray[np.intp]:
         """Rows (n, 1) or (n, N) of the actuators' tables."""
@@ -497,6 +488,14 @@ def _end(angle: Array, gauges: Gauges | None) -> tuple[Array, Array]:
         x[gauges.places] *= rho
         y[gauges.places] *= rho
     return x, y
+
+
+def _softened(ratio: Array) -> tuple[Array, Array, Array]:
+    """Smooth positive parts of numbers, and their first two derivatives."""
+    root = np.sqrt(ratio * ratio + SOFT * SOFT)
+    far = root + np.abs(ratio)
+    soft = 0.5 * np.where(ratio > 0.0, far, SOFT * SOFT / far)  # without cancellation
+    return soft, soft / root, 0.5 * SOFT * SOFT / root**3
 
 
 def _share(ahead: Array, width: Array) -> Array:

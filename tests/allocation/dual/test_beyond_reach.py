@@ -102,7 +102,9 @@ def test_a_command_inside_a_dead_band_is_neutral() -> None:
         for k in range(6):
             axis = rng.normal(size=3)
             axis /= np.linalg.norm(axis)
-            parts.append(band | {"name": f"t{k}", "axis": axis.tolist(), "position_m": rng.uniform(-1, 1, 3).tolist()})
+            parts.append(
+                band | {"name": f"t{k}", "axis": axis.tolist(), "position_m": rng.uniform(-1, 1, 3).tolist()}
+            )
         allocator = Allocator(parse_layout(layout_of(f"b{number}", parts)))
         targets = rng.normal(size=(20, 6)) * allocator.scale * 10.0 ** rng.uniform(-2, 1, (20, 1))
         for policy, target in itertools.product(("closest", "direction", "priority"), targets):
