@@ -10,7 +10,7 @@ import numpy as np
 from finlab.allocation.levenberg_marquardt import CommandProblem, refine
 from finlab.arrays import Array
 from finlab.physics.plant import Plant
-from finlab.precision import NEARLY, NOTHING, ROUNDS
+from finlab.precision import CLOSE, NEARLY, NOTHING, ROUNDS
 
 
 def command_with_drag(
@@ -45,3 +45,42 @@ def prices_at(problem: CommandProblem, plant: Plant, command: Array, directions:
     rows = width[:, None] * (jacobian[free] @ directions)
     prices: Array = np.linalg.lstsq(rows, width * plant.power_gradient(command)[free], rcond=NOTHING)[0]
     return prices[:, None]
+
+
+def cheapened(problem: CommandProblem, plant: Plant, wrench: Array, command: Array, enough: float) -> Array:
+    """Returns a command (n, 3) for a normalized wrench (6,) that takes no more power than another one.
+
+    Each step follows the power's slope along what gives the same wrench (sequential quadratic programming,
+    with the size of the curvature), as far as that lowers the power.
+    """
+    least, size = float(plant.power(command).sum()), 1.0
+    for _ in range(ROUNDS):
+        step = _cheaper_step(problem, plant, command)
+        found = command_with_drag(problem, plant, wrench, (command + size * step)[None], enough)
+        power = np.inf if found is None else float(plant.power(found).sum())
+        gain, size = least - power, size if power < least else 0.25 * size
+        if found is not None and gain > 0.0:
+            command, least = found, power
+        if abs(gain) <= CLOSE * least:
+            break
+    return command
+
+
+def _cheaper_step(problem: CommandProblem, plant: Plant, command: Array) -> Array:
+    """A step (n, 3) of a command along which the wrench stays and the power falls."""
+    width = np.maximum(problem.width, NOTHING)
+    tried = command + np.concatenate([np.zeros((1, 1, 3)), NEARLY * np.eye(3)[:, None]]) * width
+    jacobian = width[:, :, None] * (problem.fin.force_and_jacobian(tried)[1] @ problem.effectiveness)
+    slope = width * plant.power_gradient(tried)
+    low, high = problem.edges
+    free = (command > low) & (command < high)
+    price = np.linalg.lstsq(jacobian[0][free], slope[0][free], rcond=NOTHING)[0]
+    left = slope - jacobian @ price
+    free |= np.where(command <= low, left[0] < 0.0, left[0] > 0.0) & (problem.width > 0.0)
+    bend = np.abs(np.stack([left[k + 1, :, k] - left[0, :, k] for k in range(3)], axis=-1)) / NEARLY
+    bend = np.maximum(bend, CLOSE * bend.max() + 1e-300)[free]
+    rows, left = jacobian[0][free], left[0][free]
+    held = np.linalg.lstsq(rows.T @ (rows / bend[:, None]), rows.T @ (left / bend), rcond=NOTHING)[0]
+    step = np.zeros(command.shape)
+    step[free] = np.clip(-(left - rows @ held) / bend, -0.25, 0.25)
+    return step * width

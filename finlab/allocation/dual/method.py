@@ -20,7 +20,7 @@ from finlab.allocation.dual.branch import STEPS_AT_KINK, gaps, least_power, may_
 from finlab.allocation.dual.compiled import Compiled
 from finlab.allocation.dual.deadline import ENDED, Deadline
 from finlab.allocation.dual.doubt import price_of_doubt
-from finlab.allocation.dual.drag import command_with_drag, prices_at
+from finlab.allocation.dual.drag import cheapened, command_with_drag, prices_at
 from finlab.allocation.dual.newton import MOST_STEPS, Prices, solve, start
 from finlab.allocation.dual.policies import Nearest, nearest
 from finlab.allocation.dual.rates import Rates, within_tick
@@ -313,7 +313,9 @@ class Dual(Method):
                     starts[::2, places] = begin[0, places]
             command = command_with_drag(self._problem, self.plant, asked / self.scale, starts, EXACT)
         within[0] = command is not None
-        return np.full((1, self.layout.n, 3), np.nan) if command is None else command[None]
+        if command is None:
+            return np.full((1, self.layout.n, 3), np.nan)
+        return cheapened(self._problem, self.plant, asked / self.scale, command, EXACT)[None]
 
     def _cheaper_in_gaps(self, sets: Sets, near: Nearest, force: Array, deadline: Deadline) -> None:
         """Replaces forces (k,) that give a wrench out of reach in one part of sets with gaps by those of
