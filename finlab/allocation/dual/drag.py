@@ -61,7 +61,7 @@ def cheapened(problem: CommandProblem, plant: Plant, wrench: Array, command: Arr
         gain, size = least - power, size if power < least else 0.25 * size
         if found is not None and gain > 0.0:
             command, least = found, power
-        if abs(gain) <= CLOSE * least:
+        if abs(gain) <= 10.0 * CLOSE * least:
             break
     return command
 

@@ -41,7 +41,7 @@ TICK_STEPS = 5
 """The same where a command of a tick is not exact."""
 STARTS = 16
 """Starts of a search for forces that cancel each other, or that give a wrench with their drag."""
-STEPS_WITH_DRAG = 30
+STEPS_WITH_DRAG = 12
 """Newton's steps from the prices of commands that give the target."""
 NEAR_REST = 0.05
 """Share of the limits' ranges up to which sizes of these starts are."""
