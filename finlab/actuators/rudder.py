@@ -186,18 +186,17 @@ class RudderGroup(Group):
         return responses
 
     def worth(self, price: Array) -> Array:
-        """See `Group`: by the law at many deflections, more around the best of them, and a parabola."""
+        """See `Group`: by the law at many deflections, more around the best of them, a parabola."""
         gain, cost = price @ self._across.T, self._met.speed - price @ self._against.T
-        step = (self._limits[:, 1] - self._limits[:, 0]) / POINTS
-        middle = self._limits.mean(axis=1) + 0.0 * gain
-        for count in (POINTS // 2, 8, 8):
-            angle = middle + step * np.arange(-count, count + 1)[:, None, None]
-            angle = np.clip(angle, self._limits[:, 0], self._limits[:, 1])
+        low, high = (ends + 0.0 * gain for ends in self._limits.T)
+        for count in (POINTS, 16, 16):
+            step = (high - low) / count
+            angle = low + step * np.arange(count + 1)[:, None, None]
             found = self._law.coefficients(angle - self._met.course)
             worth = gain * found.lift - cost * (found.drag - self._law.drag)
-            best = worth.argmax(axis=0)[None]
-            middle, step = np.take_along_axis(angle, best, axis=0)[0], step / 8.0
-        best = np.clip(best, 1, 2 * count - 1)
+            best = np.clip(worth.argmax(axis=0)[None], 1, count - 1)
+            middle = np.take_along_axis(angle, best, axis=0)[0]
+            low, high = middle - step, middle + step
         before, at, after = (np.take_along_axis(worth, best + k, axis=0)[0] for k in (-1, 0, 1))
         rise, bend = 0.5 * (after - before), np.minimum(before - 2.0 * at + after, -1e-300)
         offset = np.clip(-rise / bend, -1.0, 1.0)

@@ -35,10 +35,14 @@ class Compiled:
 
     def _prepare(self) -> None:
         responses: list[object] = [None] * self.count
+        self.weight = np.zeros(self.count)
+        """What doubt makes a squared force (n,) cost [W/N^2]."""
         for places, group in self.groups:
             for place, response in zip(places, group.responses, strict=True):
-                weight = 0.0 if self.doubt is None else (response.effectiveness**2 @ self.doubt[place]).sum()
-                responses[place] = with_square(response, float(weight)) if weight else response
+                if self.doubt is not None:
+                    self.weight[place] = (response.effectiveness**2 @ self.doubt[place]).sum()
+                weight = float(self.weight[place])
+                responses[place] = with_square(response, weight) if weight else response
         self.robot: DualRobot = dual_robot(responses)  # type: ignore[arg-type]
         self.beside = sum((group.beside.sum(axis=0) for _, group in self.groups), np.zeros(6))
         """Wrench (6,) [N, N m] that the actuators give beside their answers' forces, such as the drag of

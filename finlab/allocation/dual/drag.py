@@ -5,6 +5,8 @@ cheapest there, Levenberg-Marquardt steps mostly lead to commands that give the 
 other starts are tried.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from finlab.allocation.levenberg_marquardt import CommandProblem, refine
@@ -13,15 +15,38 @@ from finlab.physics.plant import Plant
 from finlab.precision import CLOSE, NEARLY, NOTHING, ROUNDS
 
 
+class Cost(NamedTuple):
+    """What is kept least: power, and what the doubt about forces costs."""
+
+    plant: Plant
+    weight: Array
+    """What a squared force (n,) costs [W/N^2]."""
+
+    def of(self, command: Array) -> Array:
+        """Returns the costs (R,) [W] of commands (R, n, 3)."""
+        cost: Array = self.plant.power(command).sum(axis=-1)
+        if self.weight.any():
+            cost = cost + (self.plant.force(command) ** 2).sum(axis=-1) @ self.weight
+        return cost
+
+    def slope(self, command: Array) -> Array:
+        """Returns their derivatives (R, n, 3)."""
+        slope = self.plant.power_gradient(command)
+        if self.weight.any():
+            force, jacobian = self.plant.force_and_jacobian(command)
+            slope = slope + 2.0 * self.weight[:, None] * (jacobian @ force[..., None])[..., 0]
+        return slope
+
+
 def command_with_drag(
-    problem: CommandProblem, plant: Plant, wrench: Array, starts: Array, enough: float
+    problem: CommandProblem, cost: Cost, wrench: Array, starts: Array, enough: float
 ) -> Array | None:
     """Returns a command (n, 3) that gives a normalized wrench (6,), the cheapest of those found; None where
     there is none.
 
     Args:
         problem: the robot.
-        plant: its power.
+        cost: what is kept least.
         wrench: what is to be given.
         starts: commands (R, n, 3) to begin with.
         enough: normalized error at which no further step is taken.
@@ -30,11 +55,10 @@ def command_with_drag(
     met = found.error <= NEARLY
     if not met.any():
         return None
-    power = plant.power(found.command).sum(axis=-1)
-    return np.asarray(found.command[np.where(met, power, np.inf).argmin()])
+    return np.asarray(found.command[np.where(met, cost.of(found.command), np.inf).argmin()])
 
 
-def prices_at(problem: CommandProblem, plant: Plant, command: Array, directions: Array) -> Array:
+def prices_at(problem: CommandProblem, cost: Cost, command: Array, directions: Array) -> Array:
     """Returns the prices (r, 1) of normalized `directions` (6, r) at which a command (n, 3) would be the
     cheapest for what it gives, as near as there are: there, what a command that can change adds to the wrench
     is worth the power that it adds."""
@@ -43,21 +67,21 @@ def prices_at(problem: CommandProblem, plant: Plant, command: Array, directions:
     free = (command > low) & (command < high)
     width = problem.width[free]
     rows = width[:, None] * (jacobian[free] @ directions)
-    prices: Array = np.linalg.lstsq(rows, width * plant.power_gradient(command)[free], rcond=NOTHING)[0]
+    prices: Array = np.linalg.lstsq(rows, width * cost.slope(command[None])[0][free], rcond=NOTHING)[0]
     return prices[:, None]
 
 
-def cheapened(problem: CommandProblem, plant: Plant, wrench: Array, command: Array, enough: float) -> Array:
+def cheapened(problem: CommandProblem, cost: Cost, wrench: Array, command: Array, enough: float) -> Array:
     """Returns a command (n, 3) for a normalized wrench (6,) that takes no more power than another one.
 
     Each step follows the power's slope along what gives the same wrench (sequential quadratic programming,
     with the size of the curvature), as far as that lowers the power.
     """
-    least, size = float(plant.power(command).sum()), 1.0
+    least, size = float(cost.of(command[None])[0]), 1.0
     for _ in range(ROUNDS):
-        step = _cheaper_step(problem, plant, command)
-        found = command_with_drag(problem, plant, wrench, (command + size * step)[None], enough)
-        power = np.inf if found is None else float(plant.power(found).sum())
+        step = _cheaper_step(problem, cost, command)
+        found = command_with_drag(problem, cost, wrench, (command + size * step)[None], enough)
+        power = np.inf if found is None else float(cost.of(found[None])[0])
         gain, size = least - power, size if power < least else 0.25 * size
         if found is not None and gain > 0.0:
             command, least = found, power
@@ -66,12 +90,12 @@ def cheapened(problem: CommandProblem, plant: Plant, wrench: Array, command: Arr
     return command
 
 
-def _cheaper_step(problem: CommandProblem, plant: Plant, command: Array) -> Array:
+def _cheaper_step(problem: CommandProblem, cost: Cost, command: Array) -> Array:
     """A step (n, 3) of a command along which the wrench stays and the power falls."""
     width = np.maximum(problem.width, NOTHING)
     tried = command + np.concatenate([np.zeros((1, 1, 3)), NEARLY * np.eye(3)[:, None]]) * width
     jacobian = width[:, :, None] * (problem.fin.force_and_jacobian(tried)[1] @ problem.effectiveness)
-    slope = width * plant.power_gradient(tried)
+    slope = width * cost.slope(tried)
     low, high = problem.edges
     free = (command > low) & (command < high)
     price = np.linalg.lstsq(jacobian[0][free], slope[0][free], rcond=NOTHING)[0]

@@ -20,8 +20,8 @@ from finlab.allocation.dual.branch import STEPS_AT_KINK, gaps, least_power, may_
 from finlab.allocation.dual.compiled import Compiled
 from finlab.allocation.dual.deadline import ENDED, Deadline
 from finlab.allocation.dual.doubt import price_of_doubt
-from finlab.allocation.dual.drag import cheapened, command_with_drag, prices_at
-from finlab.allocation.dual.newton import MOST_STEPS, Prices, solve, start
+from finlab.allocation.dual.drag import Cost, cheapened, command_with_drag, prices_at
+from finlab.allocation.dual.newton import MOST_STEPS, Prices, dual_value, solve, start
 from finlab.allocation.dual.policies import Nearest, nearest
 from finlab.allocation.dual.rates import Rates, within_tick
 from finlab.allocation.levenberg_marquardt import CommandProblem, refine
@@ -43,6 +43,8 @@ STARTS = 16
 """Starts of a search for forces that cancel each other, or that give a wrench with their drag."""
 STEPS_WITH_DRAG = 12
 """Newton's steps from the prices of commands that give the target."""
+FAR_OFF = 1.3
+"""Power over what is proved to be needed, from which on other starts are tried."""
 NEAR_REST = 0.05
 """Share of the limits' ranges up to which sizes of these starts are."""
 
@@ -108,6 +110,10 @@ class Dual(Method):
     @cached_property
     def _problem(self) -> CommandProblem:
         return CommandProblem.of(self.plant, self.scale)
+
+    @property
+    def _cost(self) -> Cost:
+        return Cost(self.plant, self.compiled.weight)
 
     @cached_property
     def _rates(self) -> Rates:
@@ -272,9 +278,9 @@ class Dual(Method):
         steps, first = STEPS_AT_KINK if torn else MOST_STEPS, None
         if drags:
             first = robot.answers(robot.matrix @ start(robot, target, sets)[0], sets, False).force
-            directions = self.scale[:, None] * robot.basis / robot.scale[:, None]
             steps, near = STEPS_WITH_DRAG, self.compiled.commands(first)[0]
-            prices = prices_at(self._problem, self.plant, near, directions) if prices is None else prices
+            if prices is None:
+                prices = prices_at(self._problem, self._cost, near, self._directions)
         root = solve(robot, target, sets, prices, way="one" if drags else "either", most_steps=steps)
         within = root.solved | (~root.beyond & torn)
         if robot.basis.shape[1] < 6:
@@ -285,7 +291,10 @@ class Dual(Method):
         force, prices, value, aim = root.force, root.prices, np.zeros(len(targets)), targets
         if may_have_gaps(robot, sets, force):
             force, value = self._in_gaps(target, sets, root, within, deadline)
-        command = None if first is None else self._with_drag(targets[0], force, first, within, root)
+        command = None
+        if first is not None:
+            command, prices = self._with_drag(targets[0], force, first, root)
+            within[0] = not np.isnan(command).any()
         if not within.all() and policy is not None:
             force, prices, value, aim = force.copy(), prices.copy(), value.copy(), aim.copy()
             for row in np.flatnonzero(~within):
@@ -296,26 +305,43 @@ class Dual(Method):
                     self._cheaper_in_gaps(sets.take(at), near, force[:, row], deadline)
         return Forces(force, robot.price(prices), within, prices, value, aim, command)
 
-    def _with_drag(
-        self, wrench: Array, force: Array, first: Array, within: NDArray[np.bool_], root: Prices
-    ) -> Array:
-        """A command (1, n, 3) for a wrench (6,) from forces (k, 1) near to it, or the first ones; NaN where
-        there is none. Says in `within` (1,) whether there is one."""
-        asked, begin = wrench + self.compiled.beside, self.compiled.commands(force)
-        if root.solved[0] and self._error(begin, asked[None])[0] <= EXACT:
-            return begin
-        begin = np.concatenate([begin, self.compiled.commands(first)])
-        command = command_with_drag(self._problem, self.plant, asked / self.scale, begin, EXACT)
-        if command is None and not root.beyond[0]:
-            starts = self.plant.sample(np.random.default_rng(0), (STARTS,))
-            for places, group in self.compiled.groups:
-                if not group.feels_flow:
-                    starts[::2, places] = begin[0, places]
-            command = command_with_drag(self._problem, self.plant, asked / self.scale, starts, EXACT)
-        within[0] = command is not None
-        if command is None:
-            return np.full((1, self.layout.n, 3), np.nan)
-        return cheapened(self._problem, self.plant, asked / self.scale, command, EXACT)[None]
+    def _with_drag(self, wrench: Array, force: Array, first: Array, root: Prices) -> tuple[Array, Array]:
+        """A command (1, n, 3) for a wrench (6,) from forces (k, 1) near to it, or the first ones, NaN where
+        there is none; and its prices (r, 1)."""
+        robot, begin, problem, cost = (
+            self.compiled.robot,
+            self.compiled.commands(force),
+            self._problem,
+            self._cost,
+        )
+        asked = (wrench + self.compiled.beside) / self.scale
+        if root.solved[0] and self._error(begin, (self.scale * asked)[None])[0] <= EXACT:
+            return begin, root.prices
+        starts = np.concatenate([begin, self.compiled.commands(first)])
+        command, prices = command_with_drag(problem, cost, asked, starts, EXACT), root.prices
+        if command is not None:
+            command = cheapened(problem, cost, asked, command, EXACT)
+            both = np.concatenate([prices, prices_at(problem, cost, command, self._directions)], axis=1)
+            value = dual_value(robot, robot.target(wrench[None]), robot.sets, both)
+            prices = both[:, value.argmax()][:, None]
+            if cost.of(command[None])[0] <= FAR_OFF * value.max():
+                return command[None], prices
+        starts = self.plant.sample(np.random.default_rng(0), (STARTS,))
+        for places, group in self.compiled.groups:
+            if not group.feels_flow:
+                starts[::2, places] = begin[0, places]
+        other = None if root.beyond[0] else command_with_drag(problem, cost, asked, starts, EXACT)
+        if other is not None:
+            other = cheapened(problem, cost, asked, other, EXACT)
+            found = np.stack([other if command is None else command, other])
+            command = found[cost.of(found).argmin()]
+        return np.full_like(begin, np.nan) if command is None else command[None], prices
+
+    @property
+    def _directions(self) -> Array:
+        """The basis' directions (6, r) on the yardstick."""
+        robot = self.compiled.robot
+        return np.asarray(self.scale[:, None] * robot.basis / robot.scale[:, None])
 
     def _cheaper_in_gaps(self, sets: Sets, near: Nearest, force: Array, deadline: Deadline) -> None:
         """Replaces forces (k,) that give a wrench out of reach in one part of sets with gaps by those of

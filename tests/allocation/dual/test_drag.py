@@ -114,7 +114,7 @@ def test_a_torpedo_that_loses_actuators_has_an_answer_and_a_bound_below_it(polic
     for failed in [(), *[(name,) for name in names], tuple(names[:-1]), tuple(names[1:])]:
         for flow in (None, AHEAD):
             asked = rng.normal(size=6) * [60.0, 20.0, 20.0, 5.0, 20.0, 20.0]
-            previous = allocator.plant.sample(rng, ()) if rng.random() < 0.5 else None
+            previous = Plant(layout).sample(rng, ()) if rng.random() < 0.5 else None
             answer = allocator.allocate(asked, policy=policy, failed=failed, flow=flow, previous=previous)
             assert np.isfinite(answer.power)
             assert answer.bound is None or answer.bound <= answer.power + 1e-9
