@@ -6,8 +6,8 @@ it stands for its convex hull, the disc cut off along the chord between the stop
 cut it in two. Where a fin pushes harder in some directions than in others, the disc is cut down to its convex
 hull, too. A thruster pushes along a line, one way or both. What feels the flow, such as a rudder, pushes what
 its law gives between its limits: here the convex hull of that, a polygon. Dead bands, and the tiny thrust
-that a fin cannot go below, are left out; an azimuth that cannot stop has the polygon around what is left, and one
-that pushes either way within an arc that around both.
+that a fin cannot go below, are left out; an azimuth that cannot stop has the polygon around what is left, one
+that pushes either way within an arc that around both parts.
 
 Wrenches are scaled: torques are divided by `LEVER`, so that all six entries are in newton.
 """

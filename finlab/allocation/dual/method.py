@@ -41,7 +41,7 @@ TICK_STEPS = 5
 """The same where a command of a tick is not exact."""
 STARTS = 16
 """Starts of a search for forces that cancel each other, or that give a wrench with their drag."""
-STEPS_WITH_DRAG = 12
+STEPS_WITH_DRAG = 24
 """Newton's steps from the prices of commands that give the target."""
 FAR_OFF = 1.3
 """Power over what is proved to be needed, from which on other starts are tried."""
@@ -321,9 +321,11 @@ class Dual(Method):
         command, prices = command_with_drag(problem, cost, asked, starts, EXACT), root.prices
         if command is not None:
             command = cheapened(problem, cost, asked, command, EXACT)
-            both = np.concatenate([prices, prices_at(problem, cost, command, self._directions)], axis=1)
-            value = dual_value(robot, robot.target(wrench[None]), robot.sets, both)
-            prices = both[:, value.argmax()][:, None]
+            if not root.solved[0]:
+                tried = prices_at(problem, cost, command, self._directions)
+                prices = np.concatenate([prices, tried], axis=1)
+            value = dual_value(robot, robot.target(wrench[None]), robot.sets, prices)
+            prices = prices[:, value.argmax()][:, None]
             if cost.of(command[None])[0] <= FAR_OFF * value.max():
                 return command[None], prices
         starts = self.plant.sample(np.random.default_rng(0), (STARTS,))
