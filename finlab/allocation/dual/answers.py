@@ -28,8 +28,6 @@ TURNING = 1e-2
 """Price, as a share of the mean one of the least force, over which a force that cannot rest turns round."""
 SOFT = 0.2
 """Price of drag, as a share of the speed, below which drag turns from dear to welcome."""
-LEAST_EXPONENT = -8.0
-"""Where drag is welcome, it counts as if it had that exponential of its price."""
 _EDGES = price_grid(1.0)
 """Ends of the tables' intervals, as shares of the largest price."""
 
@@ -495,10 +493,10 @@ def _end(angle: Array, gauges: Gauges | None) -> tuple[Array, Array]:
 def _softened(ratio: Array) -> tuple[Array, Array, Array]:
     """Positive numbers, smooth and convex, that are the same from `SOFT` on, and their derivatives."""
     below = np.minimum(ratio / SOFT - 1.0, 0.0)
-    rate = np.exp(np.maximum(below, LEAST_EXPONENT))
-    falls = (below < 0.0) & (below > LEAST_EXPONENT)
-    slope = np.where(below > LEAST_EXPONENT, rate, 0.0)
-    return np.where(below < 0.0, SOFT * rate, ratio), slope, np.where(falls, rate / SOFT, 0.0)
+    rate = np.exp(below)
+    slope = np.where(rate > CLOSE, rate, 0.0)
+    soft = np.where(below < 0.0, SOFT * np.maximum(rate, CLOSE), ratio)
+    return soft, slope, np.where(below < 0.0, slope / SOFT, 0.0)
 
 
 def _share(ahead: Array, width: Array) -> Array:

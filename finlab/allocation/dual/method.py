@@ -43,8 +43,6 @@ STARTS = 16
 """Starts of a search for forces that cancel each other, or that give a wrench with their drag."""
 STEPS_WITH_DRAG = 24
 """Newton's steps from the prices of commands that give the target."""
-FAR_OFF = 1.3
-"""Power over what is proved to be needed, from which on other starts are tried."""
 NEAR_REST = 0.05
 """Share of the limits' ranges up to which sizes of these starts are."""
 
@@ -326,7 +324,8 @@ class Dual(Method):
                 prices = np.concatenate([prices, tried], axis=1)
             value = dual_value(robot, robot.target(wrench[None]), robot.sets, prices)
             prices = prices[:, value.argmax()][:, None]
-            if cost.of(command[None])[0] <= FAR_OFF * value.max():
+            # Else others may be far cheaper, as the dual leaves out the doubt of what drags.
+            if self.compiled.doubt is None and cost.of(command[None])[0] <= 2.0 * value.max():
                 return command[None], prices
         starts = self.plant.sample(np.random.default_rng(0), (STARTS,))
         for places, group in self.compiled.groups:
