@@ -7,10 +7,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from finlab.arrays import Array
+from finlab.errors import LayoutError
 from finlab.forces.extent import RANK_TOLERANCE, singular_values, weakest
-from finlab.forces.force_sets import SCALE, force_sets
+from finlab.forces.force_sets import SCALE, ForceSets, force_sets
 from finlab.forces.reach import max_wrench_along_exactly
 from finlab.layout import Layout
+from finlab.layout.wrench_axes import AXES as WRENCH
+from finlab.layout.wrench_axes import Axis
 
 AXES = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 NOTHING = 1e-4
@@ -24,16 +27,23 @@ class HeldAxes:
 
     rank: int
     condition: float | None
-    """Largest over smallest singular value; None below rank 6."""
+    """Largest over smallest singular value; None below the rank of all axes that count."""
+    free: tuple[str, ...]
+    """Axes that the robot does not command, which do not count."""
     without_authority: tuple[str, ...]
-    """Axes that no actuator pushes at all."""
+    """Axes that are commanded and that no actuator pushes at all."""
     coupled: tuple[str, ...]
     """Axes that are pushed, but never without pushing others too."""
 
     @property
     def alone(self) -> tuple[str, ...]:
         """Axes that can be pushed alone."""
-        return tuple(axis for axis in AXES if axis not in self.without_authority + self.coupled)
+        return tuple(axis for axis in AXES if axis not in self.free + self.without_authority + self.coupled)
+
+    @property
+    def counted(self) -> int:
+        """How many axes count."""
+        return len(AXES) - len(self.free)
 
 
 @dataclass(frozen=True)
@@ -41,13 +51,14 @@ class Authority(HeldAxes):
     """What a set of actuators holds, within their limits too."""
 
     singular_values: tuple[float, ...]
-    """Of the matrix whose columns are the actuators' scaled wrenches at full thrust (6,) [N], falling."""
+    """Of the matrix whose columns are the actuators' scaled wrenches at full thrust [N], falling; as many as
+    axes count."""
     largest: tuple[float, ...]
     """Largest wrench along each axis with the other five at zero (6,) [N, N m]."""
     most_negative: tuple[float, ...]
     """The same along the negative axes, as a size (6,) [N, N m]."""
     weakest: float
-    """Scaled wrench [N] that is within reach in every direction; 0 below rank 6."""
+    """Scaled wrench [N] that is within reach in every direction of the axes that count; 0 below that rank."""
     weakest_direction: tuple[float, ...]
     """Unit scaled wrench (6,) along which no more than `weakest` can be had."""
 
@@ -113,8 +124,8 @@ def _authorities(
     sets = force_sets(layout, flow=flow).tile(len(failures))
     for row, failed in enumerate(failures):
         sets.lose(row, list(layout.indices(tuple(failed))))
-    values, vectors = singular_values(sets)
-    held = [held_axes(*pair) for pair in zip(values, vectors, strict=True)]
+    values, _ = singular_values(sets.along(counted := np.flatnonzero(layout.commanded)))
+    held = held_axes(layout, sets)
     axes = np.concatenate([np.eye(6), -np.eye(6)])
     size, _ = max_wrench_along_exactly(sets, axes)
     if sets.corners is not None:
@@ -122,7 +133,9 @@ def _authorities(
         alone = np.array([[axis in own.alone for axis in AXES] for own in held])
         size = np.where(np.tile(alone, 2), size, 0.0)
     size = np.where(size > NOTHING, size, 0.0)
-    least = weakest(sets)
+    least = weakest(sets.along(counted))
+    direction = np.zeros((len(failures), 6))
+    direction[:, counted] = least.direction
     return [
         Authority(
             **vars(held[k]),
@@ -130,14 +143,38 @@ def _authorities(
             largest=_floats(size[k, :6] * SCALE),
             most_negative=_floats(size[k, 6:] * SCALE),
             weakest=float(least.size[k]),
-            weakest_direction=_floats(least.direction[k]),
+            weakest_direction=_floats(direction[k]),
         )
         for k in range(len(failures))
     ]
 
 
-def held_axes(values: Array, vectors: Array) -> HeldAxes:
-    """Returns what singular values (6,), falling, and left vectors (6, 6) hold."""
+def commanded_axes(layout: Layout) -> tuple[str, ...]:
+    """Returns those of `AXES` that a robot commands."""
+    return tuple(axis for axis, counts in zip(AXES, layout.commanded, strict=True) if counts)
+
+
+def named_axes(names: Sequence[str]) -> tuple[Axis, ...]:
+    """Returns the axes of a wrench, each once, in order, of some of `AXES`.
+
+    Raises:
+        LayoutError: there is none, or one of another name.
+    """
+    wrong = [name for name in names if name not in AXES]
+    if wrong or not names:
+        raise LayoutError(f"axes: expected some of {', '.join(AXES)}, got {', '.join(wrong) or 'none'}")
+    return tuple(axis for axis, name in zip(WRENCH, AXES, strict=True) if name in names)
+
+
+def held_axes(layout: Layout, sets: ForceSets) -> list[HeldAxes]:
+    """Returns what the sets of variants of a layout hold of the axes that it commands."""
+    axes = commanded_axes(layout)
+    values, vectors = singular_values(sets.along(np.flatnonzero(layout.commanded)))
+    return [_held(axes, *pair) for pair in zip(values, vectors, strict=True)]
+
+
+def _held(axes: tuple[str, ...], values: Array, vectors: Array) -> HeldAxes:
+    """What singular values (m,), falling, and left vectors (m, m) hold of m axes."""
     kept = values > RANK_TOLERANCE * max(values[0], 1e-9)
     # How much of each axis lies in the span of all wrenches: one that is held whole can be pushed alone.
     held = np.linalg.norm(vectors[:, kept], axis=1)
@@ -145,9 +182,10 @@ def held_axes(values: Array, vectors: Array) -> HeldAxes:
     coupled = pushed & (held <= 1.0 - RANK_TOLERANCE)
     return HeldAxes(
         rank=int(kept.sum()),
-        condition=float(values[0] / values[5]) if kept.all() else None,
-        without_authority=tuple(np.array(AXES)[~pushed].tolist()),
-        coupled=tuple(np.array(AXES)[coupled].tolist()),
+        condition=float(values[0] / values[-1]) if kept.all() else None,
+        free=tuple(axis for axis in AXES if axis not in axes),
+        without_authority=tuple(np.array(axes)[~pushed].tolist()),
+        coupled=tuple(np.array(axes)[coupled].tolist()),
     )
 
 

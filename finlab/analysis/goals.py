@@ -12,12 +12,13 @@ from numpy.typing import ArrayLike
 
 from finlab.allocation import Allocator
 from finlab.allocation.evaluate import REACHED
-from finlab.analysis.authority import AXES, authority
+from finlab.analysis.authority import AXES, authority, commanded_axes, named_axes
 from finlab.arrays import Array
 from finlab.errors import LayoutError
 from finlab.forces.extent import weakest
 from finlab.forces.force_sets import ForceSets, force_sets
 from finlab.layout import Layout
+from finlab.layout.wrench_axes import AXES as WRENCH
 
 GoalName = Literal["weakest_direction", "mission_power", "worst_single_failure"]
 GOALS: tuple[GoalName, ...] = get_args(GoalName)
@@ -43,7 +44,7 @@ def make_goal(
     mission: ArrayLike = MISSION,
     *,
     fine: bool = True,
-    axes: Sequence[str] = AXES,
+    axes: Sequence[str] | None = None,
     flow: Array | None = None,
 ) -> Goal:
     """Returns the measure called `name` for variants of a layout.
@@ -55,18 +56,20 @@ def make_goal(
         layout: its limits and models hold for all variants.
         mission: wrenches (N, 6) [N, N m].
         fine: as the score card has it; otherwise quick.
-        axes: those of `AXES` whose directions count; on the others, anything may come.
+        axes: those of `AXES` whose directions count; on the others, anything may come. None for all that the
+            layout commands.
         flow: velocity (6,) of the body relative to the water; None at rest.
 
     Raises:
         LayoutError: unknown goal or axis, or too few actuators for a failure.
     """
     search: dict[str, Any] = {} if fine else QUICK_SEARCH
-    places = _places(axes)
+    named = layout.axes if axes is None else named_axes(axes)
+    places = [WRENCH.index(axis) for axis in named]
 
     def of_weakest(sets: ForceSets, _: object = None) -> Array:
         if len(places) < len(AXES):
-            sets = sets._replace(effectiveness=np.ascontiguousarray(sets.effectiveness[..., places]))
+            sets = sets.along(places)
         return weakest(sets, **search).size
 
     if name == "weakest_direction":
@@ -90,8 +93,8 @@ def _directions(sets: ForceSets) -> Array:
 
 
 def axes_to_raise(layout: Layout, flow: Array | None = None) -> tuple[str, ...]:
-    """Returns the axes that count when none are named: all six, or those that the layout pushes alone now
-    where it has too few actuators to push both ways along six, wherever they go.
+    """Returns the axes that count when none are named: all that the layout commands, or those that it pushes
+    alone now where it has too few actuators to push both ways along all, wherever they go.
 
     Raises:
         LayoutError: there are none.
@@ -100,8 +103,9 @@ def axes_to_raise(layout: Layout, flow: Array | None = None) -> tuple[str, ...]:
     back = 0.0 if sets.back is None else sets.back[0]
     one_way = (sets.half[0] <= 0.5 * np.pi) & ~sets.cornered[0] & (back == 0.0)
     # What pushes one way only has to be one more than there are axes.
-    if _directions(sets).sum() > len(AXES) - (not one_way.any()):
-        return AXES
+    asked = commanded_axes(layout)
+    if _directions(sets).sum() > len(asked) - (not one_way.any()):
+        return asked
     held = authority(layout, flow=flow).reachable
     if not held:
         raise LayoutError(
@@ -109,14 +113,6 @@ def axes_to_raise(layout: Layout, flow: Array | None = None) -> tuple[str, ...]:
             "flow where actuators need one"
         )
     return held
-
-
-def _places(axes: Sequence[str]) -> list[int]:
-    """Places of axes, each once, in order."""
-    wrong = [axis for axis in axes if axis not in AXES]
-    if wrong or not axes:
-        raise LayoutError(f"axes: expected some of {', '.join(AXES)}, got {', '.join(wrong) or 'none'}")
-    return [place for place, axis in enumerate(AXES) if axis in axes]
 
 
 def _after_worst_failure(of_rest: Callable[[ForceSets], Array]) -> Goal:

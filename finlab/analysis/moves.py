@@ -16,7 +16,6 @@ from scipy.spatial.transform import Rotation
 from finlab.analysis.authority import held_axes
 from finlab.arrays import Array
 from finlab.errors import LayoutError
-from finlab.forces.extent import singular_values
 from finlab.forces.force_sets import ForceSets, assembled, shapes_of
 from finlab.layout import Layout
 from finlab.layout.actuator import Actuator
@@ -157,7 +156,7 @@ class Moves:
         themselves; all stay free where each of them does."""
         step = PROBE * np.diag(self.upper - self.lower)
         tried = np.clip(np.concatenate([self.start - step, self.start + step]), self.lower, self.upper)
-        held = [held_axes(*pair) for pair in zip(*singular_values(self.sets(tried)), strict=True)]
+        held = held_axes(self.layout, self.sets(tried))
         kept = np.array([set(axes) <= set(each.alone) for each in held]).reshape(2, -1).all(axis=0)
         if kept.any():
             self._free[np.flatnonzero(self._free)[~kept]] = False
@@ -194,7 +193,7 @@ class Moves:
         shapes = [self._shapes] * len(vectors)
         if self._flow is not None:
             shapes = [shapes_of(self.moved(vector), self._flow) for vector in vectors]
-        return assembled(shapes, moved_effectiveness(self.layout, position, frames))
+        return assembled(shapes, moved_effectiveness(self.layout, position, frames) * self.layout.commanded)
 
     def moved(self, vector: Array) -> Layout:
         """Returns the layout with its actuators moved by a vector (D,)."""

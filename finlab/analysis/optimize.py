@@ -1,7 +1,7 @@
 """Improve a layout: move chosen actuators within bounds until a goal is as good as it gets."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -9,7 +9,7 @@ from scipy.optimize import Bounds as Box
 from scipy.optimize import differential_evolution
 
 from finlab.allocation.question import check_flow
-from finlab.analysis.authority import AXES
+from finlab.analysis.authority import commanded_axes, named_axes
 from finlab.analysis.goals import MISSION, Goal, axes_to_raise, make_goal
 from finlab.analysis.moves import Bounds, Moves, mirror_pairs
 from finlab.analysis.score_card import ScoreCard, score_card
@@ -96,8 +96,8 @@ def optimize_layout(
         rule: another one that they have to keep, such as to stand outside of a hull.
         grid: steps [m], [rad] of the coordinates and angles that are found; 0 for any number.
         axes: axes whose directions count for the two goals of directions, with anything on the others; all
-            six when None, or, with too few actuators for six, those that are pushed alone now, of which no
-            move of a single coordinate costs one.
+            that the layout commands when None, or, with too few actuators for them, those that are pushed
+            alone now, of which no move of a single coordinate costs one.
         flow: velocity (6,) of the body relative to the water [m/s, rad/s], body frame; None at rest.
         progress: called after each round.
         cancelled: asked after each round, and within long ones; the search stops when it answers True.
@@ -106,17 +106,19 @@ def optimize_layout(
         LayoutError: something about the actuators, bounds, pairs, goal or axes does not fit; it says what.
         CommandError: `flow` is not six finite numbers, or `mission` not such wrenches.
     """
-    bounds, water = bounds or {}, check_flow(flow)
+    bounds, water, start = bounds or {}, check_flow(flow), layout
+    if axes is not None:
+        layout = replace(layout, axes=named_axes(axes))
     known = {name: bounds.get(name) or Bounds.around(layout.actuators[layout.index(name)]) for name in names}
     pairs = mirror_pairs(layout) if mirror is None else mirror
     moves = Moves(layout, names, known, pairs, grid, water)
     broken = rule or (lambda position, frames: np.zeros(len(position)))
     if axes is None and goal != "mission_power":
         axes = axes_to_raise(layout, water)
-        if len(axes) < len(AXES):
+        if len(axes) < len(layout.axes):
             moves.keep_alone(axes)
     measure, quick = (
-        make_goal(goal, layout, mission, fine=fine, axes=axes or AXES, flow=water) for fine in (True, False)
+        make_goal(goal, layout, mission, fine=fine, axes=axes, flow=water) for fine in (True, False)
     )
 
     def measured(robot: Layout) -> float:
@@ -126,19 +128,20 @@ def optimize_layout(
     found, stopped = _search(moves, quick, before, clearance, broken, rounds, seed, progress, cancelled)
     best = moves.moved(found)
     after = measured(best)
+    best = replace(best, axes=start.axes)
     wrong = [float(broken(robot.position[None], robot.frames[None])[0]) for robot in (layout, best)]
     better = after > before + 1e-9 * abs(before)
     improved = wrong[1] <= 0.0 and (better or wrong[0] > 0.0)
-    card = score_card(layout, flow=water)
+    card = score_card(start, flow=water)
     return Improvement(
-        layout=best if improved else layout,
+        layout=best if improved else start,
         improved=improved,
         cancelled=stopped,
         goal=goal,
         value_before=before,
         value_after=after if improved else before,
         moved=moves.names,
-        axes=tuple(axes or AXES),
+        axes=tuple(axes or commanded_axes(layout)),
         card_before=card,
         card_after=score_card(best, flow=water) if improved else card,
     )

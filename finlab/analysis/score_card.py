@@ -19,7 +19,6 @@ from finlab.analysis.authority import (
 )
 from finlab.analysis.least_power import least_power
 from finlab.arrays import Array
-from finlab.forces.extent import singular_values
 from finlab.forces.force_sets import MAX_CUT, force_sets, wide_arcs
 from finlab.layout import Layout
 
@@ -139,7 +138,7 @@ def quick_check(layout: Layout, failed: Collection[str] = (), flow: ArrayLike | 
     sets = force_sets(layout, failed, check_flow(flow)).tile(1 + len(single))
     for row, name in enumerate(single, start=1):
         sets.lose(row, layout.index(name))
-    held, *left = (held_axes(*pair) for pair in zip(*singular_values(sets), strict=True))
+    held, *left = held_axes(layout, sets)
     lost = {
         name: tuple(axis for axis in held.alone if axis not in after.alone)
         for name, after in zip(single, left, strict=True)

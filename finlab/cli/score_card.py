@@ -29,9 +29,11 @@ def _span_lines(card: ScoreCard) -> list[str]:
     """Which axes the actuators push at all, and which they push alone, before any limit."""
     held = card.authority
     verb = "pushes" if card.n_actuators == 1 else "push"
-    lines = [f"{card.counted} {verb} in {held.rank} of 6 independent directions."]
+    lines = [f"{card.counted} {verb} in {held.rank} of {held.counted} independent directions."]
     if card.failed:
         lines.append("Failed: " + ", ".join(card.failed) + ".")
+    if held.free:
+        lines.append("Not commanded, free: " + ", ".join(held.free) + ".")
     if held.without_authority:
         lines.append("Out of reach: " + ", ".join(held.without_authority) + ".")
     if held.coupled:
@@ -52,6 +54,7 @@ def _axis_table(card: ScoreCard) -> list[str]:
             _number(card.unit_power[k]),
         )
         for k, axis in enumerate(_axes())
+        if axis not in held.free
     ]
     return table(head, rows)
 

@@ -82,6 +82,10 @@ class ForceSets(NamedTuple):
             if field is not None:
                 field[rows, places] = 0.0
 
+    def along(self, places: Sequence[int] | NDArray[np.intp]) -> ForceSets:
+        """Returns the sets in some of the wrench's coordinates alone."""
+        return self._replace(effectiveness=np.ascontiguousarray(self.effectiveness[..., places]))
+
     @property
     def offset(self) -> Array | float:
         """Scaled wrenches (R, m) of what the sets are seen from."""
@@ -173,7 +177,8 @@ class Shape(NamedTuple):
 
 
 def force_sets(layout: Layout, failed: Collection[str] = (), flow: ArrayLike | None = None) -> ForceSets:
-    """Returns what the actuators of one robot can push; those called `failed` push nothing.
+    """Returns what the actuators of one robot can push along the axes that it commands; those called `failed`
+    push nothing, and nothing counts along the other axes.
 
     Args:
         layout: the robot.
@@ -184,7 +189,7 @@ def force_sets(layout: Layout, failed: Collection[str] = (), flow: ArrayLike | N
         LayoutError: there is no actuator of a name in `failed`.
     """
     lost = layout.indices(tuple(failed))
-    sets = assembled([shapes_of(layout, flow)], own_effectiveness(layout)[None])
+    sets = assembled([shapes_of(layout, flow)], own_effectiveness(layout)[None] * layout.commanded)
     sets.lose(0, list(lost))
     return sets
 

@@ -1,6 +1,7 @@
 """Rank, weakest directions, and the cost of each failure."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from finlab.analysis import authority, losses
 from finlab.forces.extent import weakest
 from finlab.forces.force_sets import force_sets
 from finlab.layout import Layout
+from finlab.layout.wrench_axes import AXES
 from tests.forces.conftest import THRUST
 
 Layouts = Callable[[str], Layout]
@@ -24,13 +26,16 @@ def test_layout_a_in_closed_form(shipped: Layouts) -> None:
 
 
 def test_no_yaw_has_no_yaw(shipped: Layouts) -> None:
-    held = authority(shipped("no_yaw"))
+    held = authority(replace(shipped("no_yaw"), axes=AXES))
     assert held.rank == 5
     assert held.without_authority == ("yaw",)
     assert held.condition is None
     assert held.weakest == 0.0
     assert np.abs(held.weakest_direction) == pytest.approx(np.eye(6)[5])
     assert held.reachable == ("surge", "sway", "heave", "roll", "pitch")
+    held = authority(shipped("no_yaw"))
+    assert (held.rank, held.counted, held.free, held.without_authority) == (5, 5, ("yaw",), ())
+    assert held.weakest > 1.0 and held.condition is not None and held.weakest_direction[5] == 0.0
 
 
 @pytest.mark.parametrize("name", ["A", "B", "mixed", "restricted", "hexa"])

@@ -8,6 +8,7 @@ import pytest
 from finlab.actuators.fin.blade import Blade
 from finlab.analysis.least_power import least_power
 from finlab.layout import FinModelSpec, load_layout
+from finlab.layout.wrench_axes import AXES
 
 WRENCHES = np.concatenate([np.diag([1, 1, 1, 0.1, 0.1, 0.1]), [[1.2, 0, 0.5, 0, 0, 0.15]]])
 
@@ -21,7 +22,7 @@ def least_for(force: float, blade: Blade) -> float:
 
 
 def test_a_pair_shares_heave_evenly() -> None:
-    layout = load_layout("pair")
+    layout = replace(load_layout("pair"), axes=AXES)
     power = least_power(layout, [[0, 0, 4.0, 0, 0, 0], [0, 0, 0, 0, 0.5, 0], [0, 0, 40.0, 0, 0, 0]])
     assert power[0] == pytest.approx(2 * least_for(2.0, Blade()), rel=3e-3)
     assert np.isnan(power[1:]).all()  # a torque it has not, a force beyond its reach

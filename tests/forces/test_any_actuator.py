@@ -1,5 +1,7 @@
 """Reach of robots of any actuators, against linear programs over the forces of a plant written apart."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,6 +10,7 @@ from finlab.forces.force_sets import SCALE, force_sets
 from finlab.forces.reach import axis_ranges, max_wrench_along_exactly
 from finlab.layout import Azimuth, Layout, Thruster, load_layout
 from finlab.layout.thrust_model import PowerLaw
+from finlab.layout.wrench_axes import AXES as WRENCH
 from finlab.physics import Plant
 from tests.least_power import farthest
 from tests.mixed_robots import load, random_flow, random_plant, random_robot
@@ -57,7 +60,7 @@ def test_where_the_water_pushes_harder_than_all_can_hold() -> None:
     ("name", "flow"), [("turtle_hybrid", None), ("catamaran", None), ("torpedo", AT_SPEED)]
 )
 def test_no_command_goes_beyond_and_the_best_are_as_good(name: str, flow: tuple[float, ...] | None) -> None:
-    layout = load_layout(name)
+    layout = replace(load_layout(name), axes=WRENCH)
     plant, sets = Plant(layout), force_sets(layout, flow=flow)
     drawn = np.random.default_rng(2).standard_normal((30, 6))
     directions = np.concatenate([AXES, drawn / np.linalg.norm(drawn, axis=1, keepdims=True)])
@@ -88,7 +91,7 @@ def test_a_thruster_that_pulls_only_and_an_azimuth_that_cannot_stop() -> None:
 
 
 def test_a_torpedo_needs_speed() -> None:
-    layout = load_layout("torpedo")
+    layout = replace(load_layout("torpedo"), axes=WRENCH)
     still, ahead = score_card(layout), score_card(layout, flow=AT_SPEED)
     assert (still.authority.rank, ahead.authority.rank) == (1, 4)
     assert any("At rest rudder_top" in note for note in still.notes)

@@ -38,10 +38,12 @@ def score_table(layout: Layout, card: ScoreCard, before: ScoreCard | None) -> st
 
 def rank_sentence(a: Authority | QuickCheck) -> str:
     """Rank, conditioning and what is missing, in words."""
-    text = html("<b>{} of 6</b> axes independent", a.rank)
+    text = html("<b>{} of {}</b> axes independent", a.rank, a.counted)
     if a.condition is not None:
         text += f", condition number {three_digits(a.condition)}"
     text += "."
+    if a.free:
+        text += html(" Free, not commanded: {}.", listed(a.free))
     if a.without_authority:
         text += html(" <span class='missing'>It cannot {}.</span>", listed(a.without_authority))
     if a.coupled:
@@ -54,7 +56,11 @@ def rank_sentence(a: Authority | QuickCheck) -> str:
 def _summary(card: ScoreCard, before: ScoreCard | None) -> str:
     head = ""
     if before is not None:
-        ranks = row("axes independent", *(f"{one.authority.rank} of 6" for one in (before, card)), "")
+        ranks = row(
+            "axes independent",
+            *(f"{one.authority.rank} of {one.authority.counted}" for one in (before, card)),
+            "",
+        )
         head = html("<tr><th></th><th>before</th><th>now</th><th></th></tr>{}", ranks)
     known = [one for one in (before, card) if one is not None]
     rows = [_figure(words, [of(one) for one in known]) for words, of in FIGURES.items()]
@@ -77,6 +83,8 @@ def _axes(card: ScoreCard, before: ScoreCard | None) -> str:
     known = [one.authority for one in (before, card) if one is not None]
     rows = []
     for k, word in enumerate(AXES):
+        if word in card.authority.free:
+            continue
         left = [loss.share_left[k] for loss in card.losses]
         least = min((share for share in left if share is not None), default=None)
         power = card.unit_power[k]

@@ -22,7 +22,7 @@ from finlab.precision import CLOSE, NEARLY, NOTHING, ROUNDS
 
 MOST_PARTS = 48
 """Open parts of one target that are followed, the cheapest first."""
-STEPS_AT_KINK = 60
+STEPS_AT_KINK = 5 * ROUNDS
 """Steps of Newton's method after which a target at a gap is left to its parts."""
 HOLLOW = 1e-3
 """Share of a robot's largest force from which on a least force leaves a gap around rest."""

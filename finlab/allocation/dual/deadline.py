@@ -4,8 +4,6 @@ from time import thread_time
 
 LIMIT_S = 0.15
 """Processor time [s] of this thread after which a search for one target ends with what it has found."""
-ENDED = "the search for a better answer was ended by its limit of processor time"
-"""The note on an answer whose search was ended."""
 
 
 class Deadline:
@@ -13,10 +11,15 @@ class Deadline:
 
     def __init__(self, targets: int) -> None:
         self._end = thread_time() + LIMIT_S * targets
-        self.struck = False
-        """Whether a search has ended by it."""
+        self._struck = False
 
     def passed(self) -> bool:
         """Whether a search has to end now."""
-        self.struck = self.struck or thread_time() > self._end
-        return self.struck
+        self._struck = self._struck or thread_time() > self._end
+        return self._struck
+
+    @property
+    def notes(self) -> set[str]:
+        """The sentence about a search that has ended so."""
+        ended = "the search for a better answer was ended by its limit of processor time"
+        return {ended} if self._struck else set()

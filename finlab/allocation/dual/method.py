@@ -18,7 +18,7 @@ from finlab.allocation.dual.answers import Sets
 from finlab.allocation.dual.bounds import proved_power
 from finlab.allocation.dual.branch import STEPS_AT_KINK, gaps, least_power, may_have_gaps
 from finlab.allocation.dual.compiled import Compiled
-from finlab.allocation.dual.deadline import ENDED, Deadline
+from finlab.allocation.dual.deadline import Deadline
 from finlab.allocation.dual.doubt import price_of_doubt
 from finlab.allocation.dual.drag import Cost, cheapened, command_with_drag, prices_at
 from finlab.allocation.dual.newton import MOST_STEPS, Prices, dual_value, solve, start
@@ -39,12 +39,8 @@ EXACT = 1e-8
 """Error, on the robot's yardstick, up to which commands need no further step."""
 TICK_STEPS = 5
 """The same where a command of a tick is not exact."""
-STARTS = 16
-"""Starts of a search for forces that cancel each other, or that give a wrench with their drag."""
-STEPS_WITH_DRAG = 24
-"""Newton's steps from the prices of commands that give the target."""
-NEAR_REST = 0.05
-"""Share of the limits' ranges up to which sizes of these starts are."""
+STEPS_WITH_DRAG = 2 * ROUNDS
+"""Newton's steps from the prices of commands near to a target."""
 
 
 @dataclass(frozen=True)
@@ -163,7 +159,7 @@ class Dual(Method):
         bound: Callable[[Array], Array] = partial(self._bound, aim, found)
         if len(targets) > 1:
             bound = partial(self._bound_again, targets, policy)
-        notes |= self._not_held(targets[~found.within]) | ({ENDED} if deadline.struck else set())
+        notes |= self._not_held(targets[~found.within]) | deadline.notes
         return Solution(
             command, None if self._unproved else bound, prices=found.price, notes=tuple(sorted(notes - {""}))
         )
@@ -204,8 +200,8 @@ class Dual(Method):
         """A command (n, 3) of actuators that cannot rest whose forces cancel each other; None where none is
         found from some starts near their least forces."""
         lower, upper = self.layout.lower, self.layout.upper
-        share = np.random.default_rng(0).random((STARTS, *lower.shape))
-        share[..., : lower.shape[1] - 1] *= NEAR_REST
+        share = np.random.default_rng(0).random((ROUNDS, *lower.shape))
+        share[..., :-1] **= 4
         found = refine(self._problem, np.zeros((1, 6)), lower + share * (upper - lower), 2 * ROUNDS)
         cancelled = found.error <= NEARLY
         if not cancelled.any():
@@ -327,7 +323,7 @@ class Dual(Method):
             # Else others may be far cheaper, as the dual leaves out the doubt of what drags.
             if self.compiled.doubt is None and cost.of(command[None])[0] <= 2.0 * value.max():
                 return command[None], prices
-        starts = self.plant.sample(np.random.default_rng(0), (STARTS,))
+        starts = self.plant.sample(np.random.default_rng(0), (ROUNDS,))
         for places, group in self.compiled.groups:
             if not group.feels_flow:
                 starts[::2, places] = begin[0, places]
