@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from finlab.allocation.dual.answers import Sets
 from finlab.allocation.dual.bounds import proved_power
-from finlab.allocation.dual.branch import STEPS_AT_KINK, gaps, least_power, may_have_gaps
+from finlab.allocation.dual.branch import HOLLOW, STEPS_AT_KINK, gaps, least_power, may_have_gaps
 from finlab.allocation.dual.compiled import Compiled
 from finlab.allocation.dual.deadline import Deadline
 from finlab.allocation.dual.doubt import price_of_doubt
@@ -382,7 +382,15 @@ class Dual(Method):
             if found.command is not None:
                 own = found.command[rough]
                 command[rough] = np.where(np.isnan(own), command[rough], own)
-            command[rough] = refine(self._problem, asked, command[rough], ROUNDS, EXACT).command
+            found_at = refine(self._problem, asked, command[rough], ROUNDS, EXACT)
+            command[rough] = found_at.command
+            stuck = np.flatnonzero((found_at.error > NEARLY) & found.within[rough])
+            if len(stuck):  # such as idle fins in line: no small change of their directions helps
+                nudge = np.random.default_rng(0).uniform(-HOLLOW, HOLLOW, command.shape[1:])
+                nudged = command[rough[stuck]] + nudge * self._problem.width
+                again = refine(self._problem, asked[stuck], nudged, ROUNDS, EXACT)
+                better = again.error < found_at.error[stuck]
+                command[rough[stuck[better]]] = again.command[better]
         return self.plant.rested(command)
 
     def _error(self, command: Array, aim: Array) -> Array:
