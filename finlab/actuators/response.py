@@ -187,10 +187,8 @@ Response = Line | Plane
 
 def with_square(response: Response, weight: float) -> Response:
     """Returns what an actuator offers where a force F [N] costs `weight` F^2 [W] more; of a fin that is not
-    alike all round with the mean over all directions. What drags is left as it is: its power is its drag."""
+    alike all round with the mean over all directions."""
     if isinstance(response, Line):
-        if response.drag is not None:
-            return response
         reverse = response.reverse and response.reverse.with_square(weight)
         return replace(response, forward=response.forward.with_square(weight), reverse=reverse)
     if response.gauge is not None:
