@@ -78,22 +78,33 @@ class _State(NamedTuple):
 
 
 def start(robot: DualRobot, target: Array, sets: Sets) -> tuple[Array, NDArray[np.bool_]]:
-    """Prices (r, N) to begin with, and where an actuator may be at its limit (N,): those of a quadratic cost,
-    made once to fit a cost `~ T^1.5`."""
-    gain, lines, dragging = robot.gain, robot.answers.lines, robot.answers.dragging
+    """Prices (r, N) to begin with, and where an actuator may be at its limit (N,): those that come nearest to
+    the marginal costs of the forces of quadratic costs, weighted by what costs `~ T^1.5` would answer."""
+    answers, lines = robot.answers, robot.answers.lines
     force = robot.first_force @ target
-    size = np.concatenate([np.abs(force[:lines]), robot.answers.sizes(force)])
+    size = np.concatenate([np.abs(force[:lines]), answers.sizes(force)])
     share = size / robot.most
     saturated = np.asarray((share > 0.8).any(axis=0))
-    fit = np.sqrt(np.minimum(np.maximum(share, 1e-4), 1.0))
-    weight = gain * np.concatenate([fit, fit[lines:], fit[dragging]])
-    hessian = weight.T @ robot.squares.T
+    within = np.minimum(size, 0.97 * robot.most)
+    within[:lines] *= np.where(force[:lines] < 0.0, -1.0, 1.0)
+    price = answers.marginal(within)[0] / np.maximum(size, 1e-300)
+    fit = robot.gain * _by_direction(robot, np.sqrt(np.minimum(np.maximum(share, 1e-4), 1.0)))
+    hessian = fit.T @ robot.squares.T
     diagonal = hessian[:, :: robot.shape[0] + 1]
     # Of a robot with only some directions asked for, nothing may drive one of them.
     diagonal += NOTHING * diagonal.sum(axis=1, keepdims=True)
     hessian = hessian.reshape(-1, *robot.shape)
-    prices: Array = solve_systems(hessian, target.T[..., None])[..., 0].T
+    right = target  # where lift drags, forces of quadratic costs say little of its marginal cost
+    if not len(answers.dragging):
+        right = robot.matrix.T @ (fit * _by_direction(robot, price) * force)
+    prices: Array = solve_systems(hessian, right.T[..., None])[..., 0].T
     return prices, saturated
+
+
+def _by_direction(robot: DualRobot, values: Array) -> Array:
+    """Values (k, N) of the directions of actuators that have values (n, N)."""
+    lines, dragging = robot.answers.lines, robot.answers.dragging
+    return np.concatenate([values, values[lines:], values[dragging]])
 
 
 def solve(
