@@ -384,13 +384,13 @@ class Dual(Method):
                 command[rough] = np.where(np.isnan(own), command[rough], own)
             found_at = refine(self._problem, asked, command[rough], ROUNDS, EXACT)
             command[rough] = found_at.command
-            stuck = np.flatnonzero((found_at.error > NEARLY) & found.within[rough])
-            if len(stuck):  # such as idle fins in line: no small change of their directions helps
-                nudge = np.random.default_rng(0).uniform(-HOLLOW, HOLLOW, command.shape[1:])
-                nudged = command[rough[stuck]] + nudge * self._problem.width
-                again = refine(self._problem, asked[stuck], nudged, ROUNDS, EXACT)
-                better = again.error < found_at.error[stuck]
-                command[rough[stuck[better]]] = again.command[better]
+            for row in rough[(found_at.error > NEARLY) & found.within[rough]].tolist():
+                # Such as idle fins in line, or a least force: no small change of these commands helps.
+                draw = np.random.default_rng(0).uniform(-1.0, 1.0, (2 * ROUNDS, *command.shape[1:]))
+                shares = np.geomspace(HOLLOW, 1.0, len(draw))[:, None, None]
+                starts = command[row] + shares * draw * self._problem.width
+                other = command_with_drag(self._problem, self._cost, aim[row] / self.scale, starts, EXACT)
+                command[row] = command[row] if other is None else other
         return self.plant.rested(command)
 
     def _error(self, command: Array, aim: Array) -> Array:
