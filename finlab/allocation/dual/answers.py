@@ -11,9 +11,6 @@ another one answers v/r. Where r < 0, drag is welcome, and is what the dearer en
 positive number s(r), and the conjugate s c*(v/s) has (s - r) times the largest power on top, which is convex.
 """
 
-from collections.abc import Iterable
-from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,11 +18,11 @@ from numpy.typing import NDArray
 
 from finlab.actuators.response import CELLS, Line, Plane, RadialTable, price_grid
 from finlab.allocation.dual.gauges import Gauges
+from finlab.allocation.dual.planar import Fan, Planar, blend, end_of, share_of
+from finlab.allocation.dual.sets import Sets
 from finlab.arrays import Array
-from finlab.precision import CLOSE, FINE, NOTHING, ROUNDING, ROUNDS
+from finlab.precision import CLOSE, FINE, ROUNDING, ROUNDS
 
-TURNING = 1e-2
-"""Price, as a share of the mean one of the least force, over which a force that cannot rest turns round."""
 SOFT = 0.2
 """Price of drag, as a share of the speed, below which drag turns from dear to welcome."""
 _EDGES = price_grid(1.0)
@@ -42,112 +39,6 @@ class Answer(NamedTuple):
     first-second and second-second, then of lines that drag force-drag and drag-drag."""
     conjugate: Array | None
     """Sum of the conjugates (N,) [W]; None where it was not asked for."""
-
-
-@dataclass(frozen=True, eq=False)
-class Sets:
-    """What the n actuators may give: (n, 1) for all targets alike, or (n, N). Lines first."""
-
-    low: Array
-    """Least force, of planes least size [N]."""
-    high: Array
-    """Largest force or size [N]."""
-    low_cost: Array
-    """Power at the least force [W]."""
-    high_cost: Array
-    """Power at the largest force [W]."""
-    middle: Array
-    """Middles of the arcs of the p planes (p, 1) or (p, N) [rad]."""
-    half: Array
-    """Halves of these arcs [rad]; pi for full circles."""
-    reverse: Array
-    """Largest sizes (p, 1) or (p, N) [N] of forces against these arcs; 0 where there are none."""
-    reverse_cost: Array
-    """Power at them [W]."""
-    flipped: Array
-    """1 where a plane gives its reverse only, about whose arc the other arrays speak then, else 0."""
-
-    whole: bool = False
-    """Whether these are all that the actuators' tables give, from rest on: then nothing needs to be cut
-    off."""
-
-    @cached_property
-    def arcs(self) -> bool:
-        """Whether any arc is less than a full circle."""
-        return bool((self.half < np.pi).any())
-
-    @cached_property
-    def rests(self) -> bool:
-        """Whether all planes can rest."""
-        return not (self.low[len(self.low) - len(self.half) :] > 0.0).any()
-
-    @cached_property
-    def squared_gap(self) -> Array:
-        """Squares of the prices (p, 1) or (p, N) [W^2/N^2] below which a plane's direction is undecided."""
-        planes = slice(len(self.low) - len(self.half), None)
-        low, least = (
-            self.low[planes],
-            NOTHING * self.high_cost[planes] / np.maximum(self.high[planes], 1e-300),
-        )
-        turning = TURNING * self.low_cost[planes] / np.maximum(low, 1e-300)
-        return np.asarray(np.where(low > 0.0, np.maximum(turning, least), least) ** 2 + 1e-300)
-
-    @cached_property
-    def forked(self) -> NDArray[np.intp]:
-        """Places of the planes whose set has a gap: wide arcs, and arcs of forces that cannot rest."""
-        arc = self.half < np.pi
-        low = self.low[len(self.low) - len(self.half) :]
-        wide = arc & ((self.half > 0.5 * np.pi) | ((low > 0.0) & (self.half > 0.0)))
-        return np.flatnonzero(wide.any(axis=1))
-
-    @cached_property
-    def reversing(self) -> NDArray[np.intp]:
-        """Places of the planes that push either way, of any of the targets."""
-        return np.flatnonzero((self.reverse > 0.0).any(axis=1))
-
-    @cached_property
-    def ways(self) -> tuple["Sets", "Sets"]:
-        """What these planes alone give forward, and in reverse."""
-        places = self.reversing
-        none, planes = np.zeros((len(places), 1)), len(self.low) - len(self.half) + places
-        low, high, low_cost, high_cost = (values[planes] for values in self.parts[:4])
-        middle, half, reverse, reverse_cost, flipped = (values[places] for values in self.parts[4:])
-        reverse_cost = np.where(reverse > 0.0, reverse_cost, 0.0)
-        forward = Sets(low, high, low_cost, high_cost, middle, half, none, none, flipped)
-        return forward, Sets(
-            none, reverse, low_cost, reverse_cost, middle + np.pi, half, none, none, none + 1.0
-        )
-
-    @classmethod
-    def of(cls, parts: Iterable[Array], whole: bool = False) -> "Sets":
-        """The sets of all arrays, in order."""
-        low, high, low_cost, high_cost, middle, half, reverse, reverse_cost, flipped = parts
-        return cls(low, high, low_cost, high_cost, middle, half, reverse, reverse_cost, flipped, whole)
-
-    @cached_property
-    def least_cost(self) -> float:
-        """At most this much [W] is worth less than nothing of what the actuators cannot help to give."""
-        return float(np.maximum(self.low_cost, 0.0).sum(axis=0).max())
-
-    @cached_property
-    def most_cost(self) -> Array:
-        """Power (1,) or (N,) [W] of all actuators at the dearer ends of their sets."""
-        found: Array = np.maximum(self.low_cost, self.high_cost)
-        if len(self.reversing):
-            planes = slice(len(self.low) - len(self.half), None)
-            found = found + np.zeros(max(found.shape[1], self.reverse_cost.shape[1]))
-            found[planes] = np.maximum(found[planes], self.reverse_cost)
-        return np.asarray(found.sum(axis=0))
-
-    @property
-    def parts(self) -> tuple[Array, ...]:
-        """All arrays, in order."""
-        ends = self.low, self.high, self.low_cost, self.high_cost
-        return *ends, self.middle, self.half, self.reverse, self.reverse_cost, self.flipped
-
-    def take(self, columns: NDArray[np.intp]) -> "Sets":
-        """The same for some of the targets."""
-        return Sets.of((a if a.shape[-1] == 1 else a[:, columns] for a in self.parts), self.whole)
 
 
 class Answers:
@@ -255,13 +146,13 @@ class Answers:
         forked = fan.beyond is not None and len(sets.forked) > 0
         torn, row = forked or drags or len(sets.reversing) > 0, self._rows(sets)
         size, slope, conjugate = self._limited(value, lines, row, sets, worth=worth or torn)
-        planar = _Planar.of(fan, size[lines:], slope[lines:])
+        planar = Planar.of(fan, size[lines:], slope[lines:])
         if forked and conjugate is not None:
             self._fork(planar, conjugate[lines:], fan, (first, second), sets, row[lines:], self.gauges)
         if len(sets.reversing) and conjugate is not None:
             places, width = sets.reversing, FINE * sets.ways[1].high_cost + 1e-12
             other, others = self._one_way(price, sets, 1)
-            _blend(planar, conjugate[lines:], places, other, others, width, sets.reverse[places] > 0.0)
+            blend(planar, conjugate[lines:], places, other, others, width, sets.reverse[places] > 0.0)
         parts = [planar.first, planar.second], [planar.xx, planar.xy, planar.yy]
         if drags and conjugate is not None:
             rise, steep = self._dragged(price, ratio, size, slope, conjugate, sets)
@@ -300,7 +191,7 @@ class Answers:
         flipped = np.pad(sets.flipped, ((self.lines, 0), (0, 0))).astype(np.intp)
         return self._row + flipped
 
-    def _one_way(self, price: Array, sets: Sets, way: int) -> tuple["_Planar", Array]:
+    def _one_way(self, price: Array, sets: Sets, way: int) -> tuple[Planar, Array]:
         """Answers (q, N) of planes that push either way to prices (k, N), and their conjugates [W], as if
         they pushed one of both `ways`."""
         places, sets = sets.reversing, sets.ways[way]
@@ -309,7 +200,7 @@ class Answers:
         fan = self._fan(first, second, sets, sets.squared_gap)
         size, slope, conjugate = self._limited(fan.along, 0, row, sets)
         assert conjugate is not None
-        planar = _Planar.of(fan, size, slope)
+        planar = Planar.of(fan, size, slope)
         if len(sets.forked):
             self._fork(planar, conjugate, fan, (first, second), sets, row)
         return planar, conjugate
@@ -319,7 +210,7 @@ class Answers:
         can give one way, and whether they are more forward than in reverse."""
         places = sets.reversing
         (ahead, own), (back, others) = (self._one_way(price, sets, way) for way in (0, 1))
-        share = _share(own - others, FINE * sets.ways[1].high_cost + 1e-12)
+        share = share_of(own - others, FINE * sets.ways[1].high_cost + 1e-12)
         share = np.where(sets.reverse[places] > 0.0, share, 1.0)
         off = np.hypot(ahead.first - back.first, ahead.second - back.second)
         return np.minimum(share, 1.0 - share) * off, share >= 0.5
@@ -411,7 +302,7 @@ class Answers:
         sets: Sets,
         squared_gap: Array | float,
         gauges: Gauges | None = None,
-    ) -> "_Fan":
+    ) -> Fan:
         """Directions in which planes answer prices (p, N), those of a smooth size of the prices."""
         size = along = np.sqrt(first * first + second * second + squared_gap)
         x, y = first / size, second / size
@@ -421,7 +312,7 @@ class Answers:
             fan_x, fan_y, tangent, along = self._uneven(x, y, tangent, size)
         xx, xy, yy = tangent * (1.0 - x * x), -tangent * x * y, tangent * (1.0 - y * y)
         if not sets.arcs:
-            return _Fan(along, fan_x, fan_y, xx, xy, yy, None, None)
+            return Fan(along, fan_x, fan_y, xx, xy, yy, None, None)
         cos, sin = np.cos(sets.middle), np.sin(sets.middle)
         ahead, aside = fan_x * cos + fan_y * sin, fan_y * cos - fan_x * sin
         beyond = np.abs(aside) * np.cos(sets.half) > ahead * np.sin(sets.half)
@@ -429,9 +320,9 @@ class Answers:
         # The nearer end by the price itself: by the force, both are alike where the arc has no width.
         nearer = np.where(second * cos - first * sin < 0.0, -1.0, 1.0)
         angle = sets.middle + nearer * sets.half
-        end_x, end_y = _end(angle, gauges)
+        end_x, end_y = end_of(angle, gauges)
         keep = np.where(beyond, 0.0, 1.0)
-        return _Fan(
+        return Fan(
             np.where(beyond, first * end_x + second * end_y, along),
             np.where(beyond, end_x, fan_x),
             np.where(beyond, end_y, fan_y),
@@ -458,9 +349,9 @@ class Answers:
 
     def _fork(
         self,
-        planar: "_Planar",
+        planar: Planar,
         conjugate: Array,
-        fan: "_Fan",
+        fan: Fan,
         price: tuple[Array, Array],
         sets: Sets,
         row: NDArray[np.intp],
@@ -471,23 +362,13 @@ class Answers:
         assert fan.beyond is not None and fan.other is not None
         places, of = sets.forked, len(sets.low) - len(sets.half) + sets.forked
         first, second = price
-        x, y = (values[places] for values in _end(fan.other + np.zeros_like(first), gauges))
+        x, y = (values[places] for values in end_of(fan.other + np.zeros_like(first), gauges))
         along = first[places] * x + second[places] * y
         size, slope, worth = self._limited(along, 0, row[places], sets, of)
         assert worth is not None
-        other = _Planar(size * x, size * y, slope * x * x, slope * x * y, slope * y * y)
+        other = Planar(size * x, size * y, slope * x * x, slope * x * y, slope * y * y)
         width = FINE * sets.high_cost[of] + 1e-12
-        _blend(planar, conjugate, places, other, worth, width, fan.beyond[places])
-
-
-def _end(angle: Array, gauges: Gauges | None) -> tuple[Array, Array]:
-    """The directions (p, N) of forces at angles (p, N), with the gauges' sizes."""
-    x, y = np.cos(angle), np.sin(angle)
-    if gauges:
-        rho = gauges.along(angle[gauges.places])
-        x[gauges.places] *= rho
-        y[gauges.places] *= rho
-    return x, y
+        blend(planar, conjugate, places, other, worth, width, fan.beyond[places])
 
 
 def _softened(ratio: Array) -> tuple[Array, Array, Array]:
@@ -499,75 +380,9 @@ def _softened(ratio: Array) -> tuple[Array, Array, Array]:
     return soft, slope, np.where(below < 0.0, slope / SOFT, 0.0)
 
 
-def _share(ahead: Array, width: Array) -> Array:
-    """Share of the first of two answers whose conjugate is higher by `ahead` [W], in a blend of a width."""
-    return np.asarray(0.5 * (1.0 + ahead / np.sqrt(ahead * ahead + width * width)))
-
-
-def _blend(
-    planar: "_Planar",
-    conjugate: Array,
-    places: NDArray[np.intp],
-    other: "_Planar",
-    others: Array,
-    width: Array,
-    where: NDArray[np.bool_],
-) -> None:
-    """Blend, in place, the answers and conjugates (p, N) of planes at some places (q,) with other ones
-    (q, N), where they may give these, to those of the smooth larger one of both conjugates."""
-    ahead = conjugate[places] - others
-    root = np.sqrt(ahead * ahead + width * width)
-    share = np.where(where, _share(ahead, width), 1.0)
-    turn = np.where(where, 0.5 * width * width / root**3, 0.0)
-    dx, dy = planar.first[places] - other.first, planar.second[places] - other.second
-    for own, new, extra in zip(planar, other, (0.0, 0.0, dx * dx, dx * dy, dy * dy), strict=True):
-        own[places] = share * own[places] + (1.0 - share) * new + turn * extra
-    conjugate[places] += np.where(where, 0.5 * (root - ahead), 0.0)
-
-
 def _usual_price(table: RadialTable) -> float:
     """Price [W/N] of the largest force where power grows as its power of 1.5 from half of it on: at the peak
     of a soft fin the price itself says nothing of the forces below."""
     middle = 0.5 * (table.force[0] + table.force[-1])
     price = float(np.sqrt(2.0) * np.interp(middle, table.force, price_grid(table.top)))
     return min(max(price, CLOSE * table.top), table.top)
-
-
-class _Fan(NamedTuple):
-    """Directions of the forces of planes, with their gauges (p, N), and what changes them."""
-
-    along: Array
-    """Prices along the directions of the force, times the gauges [W/N]."""
-    first: Array
-    second: Array
-    xx: Array
-    """First-first part of the change of direction with the price, over the force [N/W]."""
-    xy: Array
-    yy: Array
-    beyond: NDArray[np.bool_] | None
-    """Which are at an end of their arc; None where all arcs are full circles."""
-    other: Array | None
-    """The angle of the other end [rad]."""
-
-
-class _Planar(NamedTuple):
-    """Answers of planes (p, N)."""
-
-    first: Array
-    second: Array
-    xx: Array
-    xy: Array
-    yy: Array
-
-    @classmethod
-    def of(cls, fan: _Fan, size: Array, slope: Array) -> "_Planar":
-        """The answers along a fan of directions, of sizes and their derivatives (p, N)."""
-        x, y = fan.first, fan.second
-        steep_x = slope * x
-        return cls(
-            size * x,
-            size * y,
-            steep_x * x + size * fan.xx,
-            steep_x * y + size * fan.xy,
-            slope * y * y + size * fan.yy,
-        )

@@ -12,10 +12,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.dual.answers import Sets
 from finlab.allocation.dual.deadline import Deadline
 from finlab.allocation.dual.newton import Prices, dual_value, solve
 from finlab.allocation.dual.robot import DualRobot
+from finlab.allocation.dual.sets import Sets
 from finlab.arrays import Array
 from finlab.layout.angles import wrapped
 from finlab.precision import CLOSE, NEARLY, NOTHING, ROUNDS

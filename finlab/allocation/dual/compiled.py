@@ -6,8 +6,8 @@ import numpy as np
 
 from finlab.actuators.registry import groups_of
 from finlab.actuators.response import with_square
-from finlab.allocation.dual.answers import Sets
 from finlab.allocation.dual.robot import DualRobot, dual_robot
+from finlab.allocation.dual.sets import Sets
 from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.physics.plant import Plant

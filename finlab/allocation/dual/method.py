@@ -14,7 +14,6 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.dual.answers import Sets
 from finlab.allocation.dual.bounds import proved_power
 from finlab.allocation.dual.branch import HOLLOW, STEPS_AT_KINK, gaps, least_power, may_have_gaps
 from finlab.allocation.dual.compiled import Compiled
@@ -24,6 +23,7 @@ from finlab.allocation.dual.drag import Cost, cheapened, command_with_drag, pric
 from finlab.allocation.dual.newton import MOST_STEPS, Prices, dual_value, solve, start
 from finlab.allocation.dual.policies import Nearest, nearest
 from finlab.allocation.dual.rates import Rates, within_tick
+from finlab.allocation.dual.sets import Sets
 from finlab.allocation.levenberg_marquardt import CommandProblem, refine
 from finlab.allocation.method import Method
 from finlab.allocation.policy import Policy

@@ -13,8 +13,8 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.dual.answers import Sets
 from finlab.allocation.dual.robot import DualRobot
+from finlab.allocation.dual.sets import Sets
 from finlab.arrays import Array
 from finlab.precision import NEARLY, NOTHING, ROUNDING
 from finlab.small_systems import solve as solve_systems

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.actuators.response import Line, Plane, Response, price_grid
-from finlab.allocation.dual.answers import Answers, Sets
+from finlab.allocation.dual.answers import Answers
+from finlab.allocation.dual.sets import Sets
 from finlab.arrays import Array
 from finlab.precision import NEARLY, NOTHING
 
