@@ -377,14 +377,16 @@ class Dual(Method):
         command = self.compiled.commands(found.force, previous)
         error = self._error(command, aim)
         rough = np.flatnonzero(error > EXACT)
-        if len(rough):
-            asked = aim[rough] / self.scale
-            if found.command is not None:
-                own = found.command[rough]
-                command[rough] = np.where(np.isnan(own), command[rough], own)
-            found_at = refine(self._problem, asked, command[rough], ROUNDS, EXACT)
-            command[rough] = found_at.command
-            for row in rough[(found_at.error > NEARLY) & found.within[rough]].tolist():
+        if not len(rough):
+            return self.plant.rested(command)
+        if found.command is not None:
+            own = found.command[rough]
+            command[rough] = np.where(np.isnan(own), command[rough], own)
+        # Steps that lead nowhere depend on the last bit: with drag each target goes its way alone.
+        for rows in [rough] if found.command is None else np.split(rough, range(1, len(rough))):
+            ends = refine(self._problem, aim[rows] / self.scale, command[rows], ROUNDS, EXACT)
+            command[rows] = ends.command
+            for row in rows[(ends.error > NEARLY) & found.within[rows]].tolist():
                 # Such as idle fins in line, or a least force: no small change of these commands helps.
                 draw = np.random.default_rng(0).uniform(-1.0, 1.0, (2 * ROUNDS, *command.shape[1:]))
                 shares = np.geomspace(HOLLOW, 1.0, len(draw))[:, None, None]
