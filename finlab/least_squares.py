@@ -50,6 +50,7 @@ def levenberg_marquardt(
     steps: int,
     rule: Damping = USUAL,
     settled: float = 0.0,
+    enough: float = 0.0,
 ) -> At:
     """Lower the cost of R problems.
 
@@ -60,11 +61,15 @@ def levenberg_marquardt(
         steps: most steps, those included that are undone.
         rule: of the damping.
         settled: relative gain at or below which a step that helps is the last one; 0 to take all steps.
+        enough: cost at or below which a row takes no further step.
     """
     damping = np.full(len(at.cost), rule.first)
     for step in range(steps):
+        finished = at.cost <= enough
+        if finished.all():
+            break
         new = moved(at, damping, step == steps - 1)
-        worse = ~(new.cost <= at.cost)  # a cost that is not a number is no improvement
+        worse = finished | ~(new.cost <= at.cost)  # a cost that is not a number is no improvement
         done = settled > 0.0 and not worse.any() and bool((at.cost - new.cost <= settled * at.cost).all())
         at = _better(at, new, worse)
         if done:

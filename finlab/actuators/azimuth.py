@@ -14,6 +14,7 @@ from finlab.actuators.thrust_power import ThrustPower, held, radial_table
 from finlab.arrays import Array, Values
 from finlab.layout.angles import TURN, is_full_turn, wrapped
 from finlab.layout.azimuth import Azimuth
+from finlab.precision import NEARLY
 
 
 class AzimuthLaw(ActuatorLaw):
@@ -64,35 +65,54 @@ class AzimuthGroup(Group):
         self._power = ThrustPower([azimuth.model for azimuth in azimuths])
         middle, half = _arcs(self._lower[:, 0], self._upper[:, 0])
         self.responses = [
-            Plane(
-                matrix[1:],
-                radial_table(azimuth.model, 1, *azimuth.force),
-                float(middle[i]),
-                float(half[i]),
-                band=azimuth.dead_band,
-            )
+            _response(azimuth, matrix[1:], float(middle[i]), float(half[i]))
             for i, (azimuth, matrix) in enumerate(zip(azimuths, effectiveness, strict=True))
         ]
 
     def commands(self, force: Array, previous: Array | None = None) -> Array:
         """See `Group`. Where no force is asked for, the angle stays that of the `previous` commands
-        (..., m, 3), or comes as near to 0 as the arc allows."""
+        (..., m, 3), or comes as near to 0 as the arc allows. What can be given forward and in reverse is
+        given at the least power."""
         size = np.hypot(force[..., 0], force[..., 1])
         before = np.zeros_like(size) if previous is None else np.nan_to_num(previous[..., 0])
         angle = np.where(size > 0.0, np.arctan2(force[..., 1], force[..., 0]), before)
+        ahead, back = self._pushed(angle, size), self._pushed(angle + np.pi, -size)
+        if (self._lower[:, 1] >= 0.0).all():
+            return ahead
+        asked, least = np.stack([size * np.cos(angle), size * np.sin(angle)]), NEARLY * self._upper[:, 1]
+        missing, watts = [], []
+        for way in (ahead, back):
+            given = way[..., 1] * np.stack([np.cos(way[..., 0]), np.sin(way[..., 0])])
+            missing.append(np.linalg.norm(given - asked, axis=0))
+            watts.append(self._power.watts(way[..., 1]))
+        cheaper = (missing[1] <= missing[0] + least) & (watts[1] < watts[0] * (1.0 - NEARLY))
+        return np.where(((missing[1] < missing[0] - least) | cheaper)[..., None], back, ahead)
+
+    def _pushed(self, angle: Array, force: Array) -> Array:
+        """Commands (..., m, 3) that come nearest to angles [rad] and forces [N] (..., m)."""
         middle, _ = _arcs(self._lower[:, 0], self._upper[:, 0])
-        command = np.zeros((*size.shape, 3))
+        command = np.zeros((*force.shape, 3))
         command[..., 0] = middle + wrapped(angle - middle)
-        command[..., 1] = size
+        command[..., 1] = force
         return np.clip(command, self._lower, self._upper)
 
-    def radial_worth(self, price: Array) -> Array:
+    def radial_worth(self, price: Array, back: Array) -> Array:
         """See `Group`."""
-        return self._power.worth(price, self._lower[:, 1], self._upper[:, 1])
+        least, most = self._lower[:, 1], self._upper[:, 1]
+        ahead = self._power.worth(price, np.maximum(least, 0.0), most)
+        return np.where(least < 0.0, np.maximum(ahead, self._power.worth(-back, least, 0.0 * most)), ahead)
 
     def reach(self, lower: Array, upper: Array) -> Array:
         """See `Group`."""
         return np.stack([lower[:, 1], upper[:, 1], *_arcs(lower[:, 0], upper[:, 0])], axis=-1)
+
+
+def _response(azimuth: Azimuth, matrix: Array, middle: float, half: float) -> Plane:
+    """What one offers; `matrix` (2, 6) is the wrench per newton."""
+    least, most = azimuth.force
+    table = radial_table(azimuth.model, 1, max(least, 0.0), most)
+    reverse = radial_table(azimuth.model, -1, 0.0, -least) if least < 0.0 else None
+    return Plane(matrix, table, middle, half, band=azimuth.dead_band, reverse=reverse)
 
 
 def _arcs(low: Array, high: Array) -> tuple[Array, Array]:

@@ -10,6 +10,7 @@ its convex hull, at which `T` has a steep place.
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -23,9 +24,12 @@ POINTS = 512
 """Directions around a circle, and sizes of a force, for which a fin is asked."""
 
 
+_GRID = np.linspace(0.0, 1.0, CELLS + 1) ** 4
+
+
 def price_grid(top: float) -> Array:
     """Prices (CELLS + 1,) [W/N] from 0 to `top`, the ends of a table's intervals."""
-    grid: Array = top * np.linspace(0.0, 1.0, CELLS + 1) ** 4
+    grid: Array = top * _GRID
     return grid
 
 
@@ -83,13 +87,10 @@ class RadialTable:
     def scaled(self, share: float, cost: float = 1.0) -> "RadialTable":
         """The table with `share` times the force, and `cost` times the power, at each command."""
         per = share / cost
-        return replace(
-            self,
-            top=self.top / per,
-            force=self.force * share,
-            slope=self.slope * share * per,
-            rest=self.rest * cost,
-        )
+        found = RadialTable(self.top / per, self.force * share, self.slope * share * per, self.rest * cost)
+        known = self.polynomials * [share, share, share, share, cost]
+        found.__dict__["polynomials"] = known  # of many tables scaled in each new flow
+        return found
 
     def with_square(self, weight: float) -> "RadialTable":
         """The table where a force T [N] costs `weight` T^2 [W] more: what answered a price v now answers
@@ -98,6 +99,7 @@ class RadialTable:
         top, rest = float(price[-1]), self.rest + weight * float(self.force[0]) ** 2
         return self.of_forces(top, np.interp(price_grid(top), price, self.force), rest)
 
+    @cached_property
     def polynomials(self) -> Array:
         """Coefficients (CELLS + 1, 5): of the force in rising powers of the price, as a share of the largest,
         from the beginning of each interval on, and the conjugate there [W]; the last are those beyond the
@@ -141,6 +143,10 @@ class Line:
     """Least force [N], where that is more than the tables give."""
     high: float = np.inf
     """Largest force [N], where that is less than the tables give."""
+    drag: Array | None = None
+    """Wrench (6,) per newton of drag [-, m] that comes with the force; None where none does."""
+    speed: float = 0.0
+    """Power per newton of it [m/s]."""
 
     @property
     def ends(self) -> tuple[float, float]:
@@ -166,6 +172,13 @@ class Plane:
     from angle 0 on; None for a fin that is alike all round."""
     band: float = 0.0
     """Forces smaller than this one, other than 0, cannot be held [N]."""
+    reverse: RadialTable | None = None
+    """Answer of forces against the directions of the arc, from rest on; None where it pushes one way."""
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Least and largest force [N], below 0 in reverse."""
+        return -self.reverse.largest if self.reverse else float(self.table.force[0]), self.table.largest
 
 
 Response = Line | Plane
@@ -180,7 +193,8 @@ def with_square(response: Response, weight: float) -> Response:
         return replace(response, forward=response.forward.with_square(weight), reverse=reverse)
     if response.gauge is not None:
         weight *= float(np.mean(response.gauge**2))
-    return replace(response, table=response.table.with_square(weight))
+    reverse = response.reverse and response.reverse.with_square(weight)
+    return replace(response, table=response.table.with_square(weight), reverse=reverse)
 
 
 class Group(ABC):
@@ -205,19 +219,16 @@ class Group(ABC):
         """Wrenches (N, 6) [N, N m] that come on top of forces (N, m, 2) of the answers."""
         return np.zeros((len(force), 6))
 
-    def radial_worth(self, price: Array) -> Array | None:
+    def radial_worth(self, price: Array, back: Array) -> Array | None:
         """Returns the most (N, m) [W] that force along its own direction is worth at prices (N, m) [W/N],
-        less its power, by the law itself (of lines signed prices); None where that is what the tables say."""
+        less its power, by the law itself (of lines signed prices; of planes that push either way `back` in
+        reverse); None where that is what the tables say."""
         return None
 
     def worth(self, price: Array) -> Array | None:
-        """Returns the most (m,) [W] that all the actuators can give is worth at a price (6,) of the wrench,
-        less its power; None where that is what the responses say."""
+        """Returns the most (N, m) [W] that all that the actuators can give, but `beside`, is worth at prices
+        (N, 6) of the wrench, less its power; None where the answers' forces are all."""
         return None
-
-    def paid(self, price: Array) -> "Group":
-        """Returns the group where what comes on top of its forces has a price (6,) [W/N, W/(N m)], too."""
-        return self
 
     @abstractmethod
     def commands(self, force: Array, previous: Array | None = None) -> Array:

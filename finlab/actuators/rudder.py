@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from finlab.actuators.law import ActuatorLaw
-from finlab.actuators.response import CELLS, Group, Line, RadialTable, Response
+from finlab.actuators.response import CELLS, POINTS, Group, Line, RadialTable, Response
 from finlab.arrays import Array, Values
 from finlab.layout.rudder import Rudder
 from finlab.precision import NOTHING
@@ -24,8 +24,6 @@ SHARPNESS = 50.0
 """How fast the flow separates around the angle of stall [1/rad]."""
 PEAK = 0.995
 """Share of the largest lift that is asked of a rudder: towards the peak a newton has no price."""
-LEAST_PRICE = 0.05
-"""Least price of a newton of drag, as a share of what it takes: the speed [W/N]."""
 LEAST_DRAG = 1e-3
 """Drag coefficient per squared lift coefficient that counts at least, so that each price has one answer."""
 
@@ -135,8 +133,8 @@ def _along(met: Met, lift: Array, drag: Array) -> Array:
 
 
 class RudderGroup(Group):
-    """What the rudders of a robot offer for prices in one flow: a lift, at the cost of its drag, which is a
-    force, too, and comes on top."""
+    """What the rudders of a robot offer for prices in one flow: a lift, and the drag that comes with it; what
+    drags without lift comes on top."""
 
     feels_flow = True
 
@@ -151,8 +149,8 @@ class RudderGroup(Group):
             falls = np.append(np.diff(lift) <= 0.0, True)
             last = int(np.argmax(lift >= PEAK * lift[np.argmax(falls)])) + 1
             self._curves.append((lift[:last], angle[:last, 0], drag[:last]))
-            drag = drag[:last] + LEAST_DRAG * lift[:last] ** 2
-            self._tables.append(RadialTable.of_costs(lift[:last], drag))
+            rise = np.maximum(drag[:last] - drag[0], LEAST_DRAG * lift[:last] ** 2)
+            self._tables.append(RadialTable.of_costs(lift[:last], drag[0] + rise))
         self._meet(np.zeros((len(rudders), 3)))
 
     def at(self, inflow: Array | None) -> "RudderGroup":
@@ -170,39 +168,40 @@ class RudderGroup(Group):
         along = np.stack([np.cos(course), np.sin(course)], axis=-1)
         self._across = np.einsum("mk,mkw->mw", across, self._effectiveness)
         self._against = -np.einsum("mk,mkw->mw", along, self._effectiveness)
-        self.responses = self._responses(self._met.speed)
+        self.responses = self._responses()
 
-    def _responses(self, drag_price: Array) -> list[Response]:
-        """What each offers where a newton of drag costs (m,) [W/N]."""
+    def _responses(self) -> list[Response]:
+        """What each offers."""
         responses: list[Response] = []
         ends = zip(*self._lift(self._limits).T.tolist(), strict=True)
         for i, (low, high) in enumerate(ends):
-            pressure = self._met.pressure[i]
-            table = RadialTable.of_forces(1.0, np.zeros(CELLS + 1), 0.0)
-            if pressure >= NOTHING:
-                table = self._tables[i].scaled(pressure, pressure * drag_price[i])
-            responses.append(Line(self._across[i], table, table, low=low, high=high))
+            pressure, speed = float(self._met.pressure[i]), float(self._met.speed[i])
+            if pressure < NOTHING:
+                table = RadialTable.of_forces(1.0, np.zeros(CELLS + 1), 0.0)
+                responses.append(Line(self._across[i], table, table, low=low, high=high))
+                continue
+            table = self._tables[i].scaled(pressure, pressure * speed)
+            drag = self._against[i]
+            responses.append(Line(self._across[i], table, table, low=low, high=high, drag=drag, speed=speed))
         return responses
 
-    def worth(self, price: Array) -> Array | None:
-        """See `Group`: by lift and drag at many deflections, whatever drag is worth; None at rest."""
-        if (self._met.pressure < NOTHING).all():
-            return None
-        pressure, most = self._met.pressure, np.zeros(len(self._limits))
-        gain, cost = self._across @ price, self._met.speed - self._against @ price
-        for i, (lifts, _, drags) in enumerate(self._curves):
-            low, high = self._lift(self._limits)[i]
-            lift = np.clip(np.concatenate([-lifts, lifts]) * pressure[i], low, high)
-            drag = np.interp(np.abs(lift) / max(pressure[i], NOTHING), lifts, drags) * pressure[i]
-            most[i] = (gain[i] * lift - cost[i] * drag).max()
-        return most
-
-    def paid(self, price: Array) -> "RudderGroup":
-        """See `Group`. Where drag is welcome, it counts as if it were nearly free: a line asks for a cost."""
-        other = copy(self)
-        cost = self._met.speed - self._against @ price
-        other.responses = self._responses(np.maximum(cost, LEAST_PRICE * self._met.speed))
-        return other
+    def worth(self, price: Array) -> Array:
+        """See `Group`: by the law at many deflections, more around the best of them, a parabola."""
+        gain, cost = price @ self._across.T, self._met.speed - price @ self._against.T
+        low, high = (ends + 0.0 * gain for ends in self._limits.T)
+        for count in (POINTS, 16, 16):
+            step = (high - low) / count
+            angle = low + step * np.arange(count + 1)[:, None, None]
+            found = self._law.coefficients(angle - self._met.course)
+            worth = gain * found.lift - cost * (found.drag - self._law.drag)
+            best = np.clip(worth.argmax(axis=0)[None], 1, count - 1)
+            middle = np.take_along_axis(angle, best, axis=0)[0]
+            low, high = middle - step, middle + step
+        before, at, after = (np.take_along_axis(worth, best + k, axis=0)[0] for k in (-1, 0, 1))
+        rise, bend = 0.5 * (after - before), np.minimum(before - 2.0 * at + after, -1e-300)
+        offset = np.clip(-rise / bend, -1.0, 1.0)
+        most = np.maximum(worth.max(axis=0), at + offset * (rise + 0.5 * offset * bend))
+        return np.asarray(self._met.pressure * (most - self._met.speed * self._law.drag))
 
     @property
     def beside(self) -> Array:

@@ -66,7 +66,7 @@ class ThrusterGroup(Group):
         command[..., 0] = np.clip(self._sign * force[..., 0], self._limits[:, 0], self._limits[:, 1])
         return command
 
-    def radial_worth(self, price: Array) -> Array:
+    def radial_worth(self, price: Array, back: Array) -> Array:
         """See `Group`."""
         return self._power.worth(self._sign * price, *self._limits.T)
 

@@ -91,7 +91,9 @@ class Refined(NamedTuple):
     """Normalized error (R,) of that wrench."""
 
 
-def refine(problem: CommandProblem, target: AnyArray, command: AnyArray, steps: int) -> Refined:
+def refine(
+    problem: CommandProblem, target: AnyArray, command: AnyArray, steps: int, enough: float = 0.0
+) -> Refined:
     """Reduce the tracking error of commands (R, n, 3) towards normalized targets (R, 6).
 
     Each step is the smallest change, in units of the limit ranges, that cancels the error to first
@@ -102,6 +104,7 @@ def refine(problem: CommandProblem, target: AnyArray, command: AnyArray, steps: 
         target: normalized wrenches (R, 6), or one for all rows (1, 6).
         command: where to start (R, n, 3).
         steps: number of steps.
+        enough: error at or below which a row takes no further step.
     """
 
     def moved(at: _Evaluated, damping: AnyArray, last: bool) -> _Evaluated:
@@ -115,7 +118,7 @@ def refine(problem: CommandProblem, target: AnyArray, command: AnyArray, steps: 
 
     # Where nothing better is found this is the answer: it must not lie outside by a turn or a rounding error.
     start = _evaluated(problem, target, problem.feasible(command), None if steps else _NO_GRADIENT)
-    best = levenberg_marquardt(start, moved, steps, Damping(1e-6))
+    best = levenberg_marquardt(start, moved, steps, Damping(1e-6), enough=enough**2)
     return Refined(best.command, best.wrench, np.sqrt(best.cost))
 
 

@@ -106,13 +106,10 @@ def _propeller(
         exchange.note(
             f"{joint.child} sits beside the axis about which it turns: its place at angle 0 is taken."
         )
-    if part.force[0] < 0.0:
-        exchange.note("An azimuth of finlab pushes one way only; reverse is left out.")
     arc = mount.ends if mount.ends[1] - mount.ends[0] < TURN else (-math.pi, math.pi)
     # Where it sits along its thrust changes nothing, but for what turns with it.
-    position, ends = vector(place - (arm @ zero) * zero), (max(part.force[0], 0.0), part.force[1])
-    turn = vector(mount.axis), vector(zero)
-    return Azimuth(part.name, position, *turn, ends, T200_POWER, arc, part.dead_band)
+    position, turn = vector(place - (arm @ zero) * zero), (vector(mount.axis), vector(zero))
+    return Azimuth(part.name, position, *turn, part.force, T200_POWER, arc, part.dead_band)
 
 
 def _force(plugin: Element) -> tuple[float, float] | None:

@@ -6,7 +6,8 @@ it stands for its convex hull, the disc cut off along the chord between the stop
 cut it in two. Where a fin pushes harder in some directions than in others, the disc is cut down to its convex
 hull, too. A thruster pushes along a line, one way or both. What feels the flow, such as a rudder, pushes what
 its law gives between its limits: here the convex hull of that, a polygon. Dead bands, and the tiny thrust
-that a fin cannot go below, are left out; an azimuth that cannot stop has the polygon around what is left.
+that a fin cannot go below, are left out; an azimuth that cannot stop has the polygon around what is left, one
+that pushes either way within an arc that around both parts.
 
 Wrenches are scaled: torques are divided by `LEVER`, so that all six entries are in newton.
 """
@@ -253,15 +254,19 @@ def _shape(response: Response, is_fin: bool) -> Shape:
         far, near = max(high, -low), min(high, -low)
         back = near / far if near > 0.0 else None
         return Shape(directions, far, 0.0 if high >= -low else math.pi, 0.0, back=back)
-    directions, least = response.effectiveness[:, :3], response.table.force[0]
-    largest, boundary = response.table.largest, None
+    directions, (least, largest) = response.effectiveness[:, :3], response.ends
+    boundary = None
     if response.gauge is not None:
         largest, boundary = largest * float(response.gauge.max()), _boundary(response, response.gauge)
     middle, half = response.middle, response.half
-    if is_fin or least <= THINNEST * largest or half > 0.5 * np.pi:
-        return Shape(directions, largest, middle, half, boundary)
-    angle = middle + half * np.append(np.linspace(-1.0, 1.0, ALONG), (-1.0, 1.0))
-    size = np.append(np.full(ALONG, largest), (least, least))
+    turn = half * np.linspace(-1.0, 1.0, ALONG)
+    if least < 0.0 and half < np.pi:
+        angle, size = middle + np.append(turn, turn), np.repeat((largest, least), ALONG)
+    elif is_fin or least <= THINNEST * largest or half > 0.5 * np.pi:
+        return Shape(directions, max(largest, -least), middle, half, boundary)
+    else:
+        angle = middle + np.append(turn, (-half, half))
+        size = np.append(np.full(ALONG, largest), (least, least))
     return _polygon(
         directions, size[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1), np.pi, BOUNDARY
     )

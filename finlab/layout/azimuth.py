@@ -12,7 +12,7 @@ from finlab.layout.angles import FILE_TURN_TOLERANCE, TURN, is_full_turn
 from finlab.layout.axes import Direction3
 from finlab.layout.checked import Name
 from finlab.layout.commanded import Commanded
-from finlab.layout.thrust_model import KEYS, MAX_FORCE, ThrustModel, check_force
+from finlab.layout.thrust_model import KEYS, Newtons, ThrustModel, check_force
 from finlab.layout.thruster import ForceRate, Metres, Place, Seconds, Threshold
 from finlab.layout.uncertainty import Uncertainty
 
@@ -20,12 +20,11 @@ Angle = Annotated[float, Meta(ge=-TURN - 1e-9, le=TURN + 1e-9)]
 TurnRate = Annotated[float, Meta(ge=1e-3, le=1000.0)]
 AngleDegrees = Annotated[float, Meta(ge=-360.0, le=360.0)]
 TurnRateDegrees = Annotated[float, Meta(ge=0.06, le=57000.0)]
-Push = Annotated[float, Meta(ge=0.0, le=MAX_FORCE)]
 
 
 @dataclass(frozen=True)
 class Azimuth(Commanded):
-    """A thruster that turns and pushes one way; its command is angle and force. Checked on construction."""
+    """A thruster that turns; its command is angle and force. Checked on construction."""
 
     KEYS: ClassVar[Mapping[str, str]] = KEYS
     DEGREES: ClassVar[Mapping[str, tuple[str, Any]]] = {
@@ -44,8 +43,9 @@ class Azimuth(Commanded):
     """Unit vector about which the thruster turns, body frame."""
     zero: Direction3
     """Unit vector across it: direction of the force at angle 0; it turns towards turn_axis x zero."""
-    force: tuple[Push, Push]
-    """Least and most force [N]; above 0 for one that cannot stop."""
+    force: tuple[Newtons, Newtons]
+    """Least and most force [N]: below 0 for one that also pushes against its angle, above 0 for one that
+    cannot stop."""
     model: ThrustModel
     """What power it takes."""
     arc: tuple[Angle, Angle] = (-math.pi, math.pi)
@@ -65,9 +65,11 @@ class Azimuth(Commanded):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not self.force[0] < self.force[1]:
+        least, most = self.force
+        if not (least < most and most > 0.0):
             raise LayoutError(
-                f"expected a least below the most force, got {self.force[0]:g} and {self.force[1]:g}",
+                f"expected a most force above 0 and above the least, got {least:g} and {most:g}; turn `zero` "
+                "round where it only pulls",
                 "force_n",
             )
         if self.dead_band > self.force[1]:

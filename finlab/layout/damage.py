@@ -176,7 +176,8 @@ def _damaged(
         low, high = part.force
         return part if weak is None else replace(part, force=(weak * low, weak * high))
     if isinstance(part, Azimuth):
-        force = part.force if weak is None else _weakened(part.force, weak)
+        low, high = part.force
+        force = part.force if weak is None else _weakened((max(low, weak * low), high), weak)
         return replace(part, force=force, arc=_held(stuck, part.arc))
     model = part.model if thrust is None else part.model.scaled(thrust)
     if running is not None:

@@ -51,6 +51,7 @@ class Plant:
         """Whether forces depend on the flow."""
         self.flow: Array | None = None
         """The flow (..., 6) where a call names none."""
+        self._inflow: Array | None = None
 
     def at(self, flow: ArrayLike | None) -> Self:
         """Returns the plant for those who ask it many times at one flow (..., 6); itself where the flow is
@@ -59,6 +60,7 @@ class Plant:
             return self
         other = copy(self)
         other.flow = np.asarray(flow, np.float64)
+        other._inflow = other.inflow(other.flow)
         return other
 
     def counting(self, axes: NDArray[np.bool_]) -> Self:
@@ -73,8 +75,9 @@ class Plant:
     def inflow(self, flow: Array | None) -> Array | None:
         """Returns the velocity (..., n, 3) of each actuator's place through the water in its own frame
         [m/s]; None at rest, or where no force depends on it."""
-        flow = self.flow if flow is None else flow
-        if flow is None or not self.feels_flow:
+        if flow is None:
+            return self._inflow
+        if not self.feels_flow:
             return None
         water = np.asarray(flow, np.float64)[..., None, :]
         moved = water[..., :3] + np.cross(water[..., 3:], self.layout.position)

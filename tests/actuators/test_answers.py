@@ -135,12 +135,12 @@ def test_a_rudder_answers_a_price_with_the_lift_whose_drag_it_pays() -> None:
     inflow = np.array([[0.0, 1.5, 0.1]])
     wrench, law = columns([part]), RudderLaw([part])
     robot = dual_robot(RudderGroup([part], wrench).at(inflow).responses)
-    price = np.linspace(-3.0, 3.0, 31)[None]
+    price = np.stack([np.linspace(-3.0, 3.0, 31), np.zeros(31)])
     answer = robot.answers(price, robot.sets)
     delta = np.linspace(-0.5, 0.5, 4001)[:, None, None] * [1.0, 0.0, 0.0]
     course = law.met(inflow).course[0]
     lift = law.force(delta, inflow)[:, 0] @ [0.0, -np.sin(course), np.cos(course)]
-    worth = price * lift[:, None] - law.power(delta, inflow)
+    worth = price[0] * lift[:, None] - law.power(delta, inflow)
     np.testing.assert_allclose(answer.conjugate, worth.max(axis=0), rtol=0.02, atol=0.02)
 
 
@@ -149,7 +149,7 @@ def test_a_price_of_drag_counts_in_the_answer_of_a_rudder() -> None:
     inflow = np.array([[0.0, 1.5, 0.1]])
     wrench, law = columns([part]), RudderLaw([part])
     multipliers = np.array([2.0, 3.0, 0.0, 0.0, 0.0, 0.5])
-    group = RudderGroup([part], wrench).at(inflow).paid(multipliers)
+    group = RudderGroup([part], wrench).at(inflow)
     robot = dual_robot(group.responses)
     lift = robot.answers((robot.effectiveness @ multipliers)[:, None], robot.sets).force
     command = group.commands(np.array([[[lift[0, 0], 0.0]]]))

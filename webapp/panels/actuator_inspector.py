@@ -51,7 +51,7 @@ PAIRS = (
     Box("f [Hz]", "frequency", FIN, f"Least and most, up to {MAX_FREQUENCY:g} Hz."),
     Box("φ [°]", "zero_direction", FIN, "From and to; −180 to 180 is any direction.", 5.0, True),
     Box("Force [N]", "force", FIXED, "Least and most along the axis; astern it is negative.", 1.0),
-    Box("Force [N]", "force", PODS, "Least and most; above 0 for one that cannot stop.", 1.0),
+    Box("Force [N]", "force", PODS, "Least and most; above 0: it cannot stop.", 1.0),
     Box("Arc [°]", "arc", PODS, "Least and greatest angle from zero; −180 to 180 is any.", 5.0, True),
     Box("Deflection [°]", "deflection", RUDDER, "Least and greatest.", 1.0, True),
 )
@@ -65,7 +65,7 @@ NUMBERS = (
 )
 LAW = (
     Box("Ahead [W]", "forward", (*FIXED, *PODS), "Power at 1 N; F newtons take it times F^exponent."),
-    Box("Astern [W]", "reverse", FIXED, "The same of a negative force; 0: as ahead.", free=True),
+    Box("Astern [W]", "reverse", (*FIXED, *PODS), "The same of a negative force; 0: as ahead.", free=True),
     Box("Exponent", "exponent", (*FIXED, *PODS), "1.5 is that of an ideal propeller at rest."),
     Box("Area [m²]", "area", RUDDER, "Of the foil.", 0.001),
     Box("Aspect ratio", "aspect_ratio", RUDDER, "2 span²/area for a foil on a hull."),

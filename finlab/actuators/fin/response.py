@@ -130,7 +130,7 @@ class FinGroup(Group):
         command[..., 2] = np.clip(self._middle + wrapped(turn - self._middle), self._lower, self._upper)
         return command
 
-    def radial_worth(self, price: Array) -> Array:
+    def radial_worth(self, price: Array, back: Array) -> Array:
         """See `Group`: from the commands of the table on both sides of each price, by the law."""
         found = np.empty(price.shape)
         for i, table in enumerate(self._tables):

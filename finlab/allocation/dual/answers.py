@@ -1,25 +1,30 @@
 """The answers of all actuators of one robot to prices, for many targets at once.
 
 Targets come last in all arrays: prices (k, N) [W/N] of the actuators' own directions, in the order lines,
-first directions of planes, second directions of planes. Each answer is the gradient of a conjugate: a line's
-`T(|s|) sign(s)`, a plane's `T(v) g` with `v = s . g` and `g` the direction of the force, its size the gauge.
+first directions of planes, second directions of planes, what lines drag along. Each answer is the gradient
+of a conjugate: a line's `T(|s|) sign(s)`, a plane's `T(v) g` with `v = s . g` and `g` the direction of the
+force, its size the gauge.
+
+A line that drags, such as a rudder, gives the force T and with it the drag that its power says, U times the
+drag. Where drag is paid `a` [W/N], a force is as dear as r = 1 - a/U times its power: it answers a price v as
+another one answers v/r. Where r < 0, drag is welcome, and is what the dearer end gives: r is softened to a
+positive number s(r), and the conjugate s c*(v/s) has (s - r) times the largest power on top, which is convex.
 """
 
-from collections.abc import Iterable
-from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.actuators.response import CELLS, Line, Plane, price_grid
+from finlab.actuators.response import CELLS, Line, Plane, RadialTable, price_grid
 from finlab.allocation.dual.gauges import Gauges
+from finlab.allocation.dual.planar import Fan, Planar, blend, end_of, share_of
+from finlab.allocation.dual.sets import Sets
 from finlab.arrays import Array
-from finlab.precision import FINE, NOTHING, ROUNDS
+from finlab.precision import CLOSE, FINE, ROUNDING, ROUNDS
 
-TURNING = 1e-2
-"""Price, as a share of the mean one of the least force, over which a force that cannot rest turns round."""
+SOFT = 0.2
+"""Price of drag, as a share of the speed, below which drag turns from dear to welcome."""
 _EDGES = price_grid(1.0)
 """Ends of the tables' intervals, as shares of the largest price."""
 
@@ -30,87 +35,10 @@ class Answer(NamedTuple):
     force: Array
     """Forces (k, N) [N]."""
     derivative: Array
-    """Derivatives by the prices (l + 3 p, N) [N^2/W]: of lines, then of planes first-first, first-second and
-    second-second."""
+    """Derivatives by the prices (l + 3 p + 2 f, N) [N^2/W]: of lines, then of planes first-first,
+    first-second and second-second, then of lines that drag force-drag and drag-drag."""
     conjugate: Array | None
     """Sum of the conjugates (N,) [W]; None where it was not asked for."""
-
-
-@dataclass(frozen=True, eq=False)
-class Sets:
-    """What the n actuators may give: (n, 1) for all targets alike, or (n, N). Lines first."""
-
-    low: Array
-    """Least force, of planes least size [N]."""
-    high: Array
-    """Largest force or size [N]."""
-    low_cost: Array
-    """Power at the least force [W]."""
-    high_cost: Array
-    """Power at the largest force [W]."""
-    middle: Array
-    """Middles of the arcs of the p planes (p, 1) or (p, N) [rad]."""
-    half: Array
-    """Halves of these arcs [rad]; pi for full circles."""
-
-    whole: bool = False
-    """Whether these are all that the actuators' tables give, from rest on: then nothing needs to be cut
-    off."""
-
-    @cached_property
-    def arcs(self) -> bool:
-        """Whether any arc is less than a full circle."""
-        return bool((self.half < np.pi).any())
-
-    @cached_property
-    def rests(self) -> bool:
-        """Whether all planes can rest."""
-        return not (self.low[len(self.low) - len(self.half) :] > 0.0).any()
-
-    @cached_property
-    def squared_gap(self) -> Array:
-        """Squares of the prices (p, 1) or (p, N) [W^2/N^2] below which a plane's direction is undecided."""
-        planes = slice(len(self.low) - len(self.half), None)
-        low, least = (
-            self.low[planes],
-            NOTHING * self.high_cost[planes] / np.maximum(self.high[planes], 1e-300),
-        )
-        turning = TURNING * self.low_cost[planes] / np.maximum(low, 1e-300)
-        return np.asarray(np.where(low > 0.0, np.maximum(turning, least), least) ** 2 + 1e-300)
-
-    @cached_property
-    def forked(self) -> NDArray[np.intp]:
-        """Places of the planes whose set has a gap: wide arcs, and arcs of forces that cannot rest."""
-        arc = self.half < np.pi
-        low = self.low[len(self.low) - len(self.half) :]
-        wide = arc & ((self.half > 0.5 * np.pi) | ((low > 0.0) & (self.half > 0.0)))
-        return np.flatnonzero(wide.any(axis=1))
-
-    @classmethod
-    def of(cls, parts: Iterable[Array], whole: bool = False) -> "Sets":
-        """The sets of all arrays, in order."""
-        low, high, low_cost, high_cost, middle, half = parts
-        return cls(low, high, low_cost, high_cost, middle, half, whole)
-
-    @cached_property
-    def least_cost(self) -> float:
-        """At most this much [W] is worth less than nothing of what the actuators cannot help to give."""
-        return float(np.maximum(self.low_cost, 0.0).sum(axis=0).max())
-
-    @cached_property
-    def most_cost(self) -> Array:
-        """Power (1,) or (N,) [W] of all actuators at the dearer ends of their sets."""
-        found: Array = np.maximum(self.low_cost, self.high_cost).sum(axis=0)
-        return found
-
-    @property
-    def parts(self) -> tuple[Array, ...]:
-        """All arrays, in order."""
-        return self.low, self.high, self.low_cost, self.high_cost, self.middle, self.half
-
-    def take(self, columns: NDArray[np.intp]) -> "Sets":
-        """The same for some of the targets."""
-        return Sets.of((a if a.shape[-1] == 1 else a[:, columns] for a in self.parts), self.whole)
 
 
 class Answers:
@@ -120,23 +48,41 @@ class Answers:
         """Makes the tables of the actuators, lines before planes."""
         self.lines, self.planes = len(lines), len(planes)
         sides = [(line.forward, line.reverse or line.forward) for line in lines]
-        sides += [(plane.table, plane.table) for plane in planes]
+        sides += [(plane.table, plane.reverse or plane.table) for plane in planes]
         tables = [table for both in sides for table in both]
-        self._coefficients = np.concatenate([table.polynomials() for table in tables]).T.copy()
+        self._coefficients = np.concatenate([table.polynomials for table in tables]).T.copy()
         self._top = np.array([table.top for table in tables])
-        self.tops = self._top.reshape(-1, 2).max(axis=1)
         self._ends = np.array([table.force for table in tables])
+        self.prices = np.array([_usual_price(table) for table in tables]).reshape(-1, 2).max(axis=1)
+        """Price (n,) [W/N] of the largest force of each, were it as dear as that of half the force says."""
         shares = self._ends / np.maximum(self._ends[:, -1:], 1e-300)
         self._shares = (shares + 2.0 * np.arange(len(tables))[:, None]).ravel()
         """The tables' forces as shares of the largest, one table after the other."""
         self._row = 2 * np.arange(len(sides))[:, None]
+        self.dragging = np.array([i for i, line in enumerate(lines) if line.drag is not None], np.intp)
+        """Places of the f lines that drag."""
+        self._speed = np.array([[lines[i].speed] for i in self.dragging]).reshape(-1, 1)
+        self._rest = np.array([[lines[i].forward.rest] for i in self.dragging]).reshape(-1, 1)
         self.gauges = Gauges([plane.gauge for plane in planes])
+
+    def pair(self, force: Array) -> tuple[Array, Array]:
+        """First and second entries (p, N) of the planes of forces or prices (k, N)."""
+        n = self.lines + self.planes
+        return force[self.lines : n], force[n : n + self.planes]
 
     def sizes(self, force: Array) -> Array:
         """Sizes (p, N) [N] of the planes' forces, of forces (k, N) along all directions."""
-        n = self.lines + self.planes
-        size: Array = np.hypot(force[self.lines : n], force[n:])
+        size: Array = np.hypot(*self.pair(force))
         return size
+
+    def drag(self, force: Array) -> Array:
+        """What the lines that drag drag along (f, N) [N] more than at rest with forces (l, N) [N]."""
+        if not len(self.dragging):
+            return np.zeros((0, force.shape[1]))
+        own = np.zeros((self.lines + self.planes, force.shape[1]))
+        own[self.dragging] = force[self.dragging]
+        rise: Array = (self.marginal(own)[1][self.dragging] - self._rest) / self._speed
+        return rise
 
     def radial(
         self, price: Array, row: NDArray[np.intp], worth: bool = True
@@ -161,8 +107,8 @@ class Answers:
 
     def marginal(self, force: Array) -> tuple[Array, Array]:
         """Prices (n, N) [W/N] at which forces (n, N) within the tables are given, without a sign, and their
-        power [W]; of planes at their sizes."""
-        row = self._row + ((np.arange(len(force)) < self.lines)[:, None] & (force < 0.0))
+        power [W]; of planes at their sizes, below 0 in reverse."""
+        row = self._row + (force < 0.0)
         size, largest = np.abs(force), np.maximum(self._ends[row, -1], 1e-300)
         place = np.searchsorted(self._shares, (size / largest + 2.0 * row).ravel()).reshape(size.shape)
         cell = np.clip(place - row * (CELLS + 1) - 1, 0, CELLS - 1)
@@ -175,7 +121,9 @@ class Answers:
             slope = a1 + x * (2.0 * a2 + 3.0 * x * a3)
             excess = a0 + x * (a1 + x * (a2 + x * a3)) - size
             change = np.divide(excess, slope, out=np.zeros_like(x), where=slope > 0.0)
-            x = np.minimum(np.maximum(x - change, 0.0), width)
+            last, x = x, np.minimum(np.maximum(x - change, 0.0), width)
+            if (np.abs(x - last) <= ROUNDING * width).all():
+                break
         top = self._top[row]
         conjugate = start + top * x * (a0 + x * (a1 / 2.0 + x * (a2 / 3.0 + x * (a3 / 4.0))))
         price = top * (_EDGES[cell] + x)
@@ -183,47 +131,137 @@ class Answers:
 
     def __call__(self, price: Array, sets: Sets, worth: bool = True) -> Answer:
         """Answers to prices (k, N), with or without their conjugates."""
-        lines, n = self.lines, self.lines + self.planes
+        lines, n, drags = self.lines, self.lines + self.planes, len(self.dragging) > 0
+        if drags:
+            price, ratio = self._without_drag(price)
         if not self.planes:
-            force, slope, conjugate = self._limited(price, lines, self._row, sets, worth=worth)
+            force, slope, conjugate = self._limited(price[:n], lines, self._row, sets, worth=worth or drags)
+            if drags and conjugate is not None:
+                rise, steep = self._dragged(price, ratio, force, slope, conjugate, sets)
+                force, slope = np.concatenate([force, rise]), np.concatenate([slope, *steep])
             return Answer(force, slope, None if conjugate is None else conjugate.sum(axis=0))
-        first, second = price[lines:n], price[n:]
-        fan = self._fan(first, second, sets, sets.squared_gap)
+        first, second = self.pair(price)
+        fan = self._fan(first, second, sets, sets.squared_gap, self.gauges)
         value = np.concatenate([price[:lines], fan.along]) if lines else fan.along
         forked = fan.beyond is not None and len(sets.forked) > 0
-        size, slope, conjugate = self._limited(value, lines, self._row, sets, worth=worth or forked)
-        planar = _Planar.of(fan, size[lines:], slope[lines:])
-        total = None if conjugate is None else conjugate.sum(axis=0)
-        if forked:
-            assert conjugate is not None and total is not None
-            total += self._fork(sets.forked, planar, conjugate[lines:], fan, first, second, sets)
+        torn, row = forked or drags or len(sets.reversing) > 0, self._rows(sets)
+        size, slope, conjugate = self._limited(value, lines, row, sets, worth=worth or torn)
+        planar = Planar.of(fan, size[lines:], slope[lines:])
+        if forked and conjugate is not None:
+            self._fork(planar, conjugate[lines:], fan, (first, second), sets, row[lines:], self.gauges)
+        if len(sets.reversing) and conjugate is not None:
+            places, width = sets.reversing, FINE * sets.ways[1].high_cost + 1e-12
+            other, others = self._one_way(price, sets, 1)
+            blend(planar, conjugate[lines:], places, other, others, width, sets.reverse[places] > 0.0)
         parts = [planar.first, planar.second], [planar.xx, planar.xy, planar.yy]
+        if drags and conjugate is not None:
+            rise, steep = self._dragged(price, ratio, size, slope, conjugate, sets)
+            parts = [*parts[0], rise], [*parts[1], *steep]
         if lines:
             parts = [size[:lines], *parts[0]], [slope[:lines], *parts[1]]
+        total = None if conjugate is None else conjugate.sum(axis=0)
         return Answer(np.concatenate(parts[0]), np.concatenate(parts[1]), total)
+
+    def _without_drag(self, price: Array) -> tuple[Array, Array]:
+        """Prices (k, N) that lines without drag answer as those that drag do, and r (f, N)."""
+        ratio = 1.0 - price[len(price) - len(self.dragging) :] / self._speed
+        price = price.copy()
+        price[self.dragging] /= _softened(ratio)[0]
+        return price, ratio
+
+    def _dragged(
+        self, price: Array, ratio: Array, force: Array, slope: Array, conjugate: Array, sets: Sets
+    ) -> tuple[Array, tuple[Array, Array]]:
+        """Drag (f, N) [N] that comes with the forces, and its derivatives; the derivatives and conjugates of
+        forces (n, N) are changed, in place, into what they are with the drag, by `_without_drag`."""
+        at, rest, speed = self.dragging, self._rest, self._speed
+        own, (soft, rate, bend) = price[at], _softened(ratio)
+        cost = own * force[at] - conjugate[at] - rest
+        most = np.maximum(sets.low_cost[at], sets.high_cost[at]) - rest
+        conjugate[at] = soft * (conjugate[at] + rest) + (soft - ratio) * most - rest
+        slope[at] /= soft
+        along = own * rate / speed
+        square = slope[at] * along * along + (most - cost) * bend / speed**2
+        return (rate * cost + (1.0 - rate) * most) / speed, (slope[at] * along, square)
+
+    def _rows(self, sets: Sets) -> NDArray[np.intp]:
+        """Rows (n, 1) or (n, N) of the actuators' tables."""
+        if not sets.flipped.any():
+            return self._row
+        flipped = np.pad(sets.flipped, ((self.lines, 0), (0, 0))).astype(np.intp)
+        return self._row + flipped
+
+    def _one_way(self, price: Array, sets: Sets, way: int) -> tuple[Planar, Array]:
+        """Answers (q, N) of planes that push either way to prices (k, N), and their conjugates [W], as if
+        they pushed one of both `ways`."""
+        places, sets = sets.reversing, sets.ways[way]
+        first, second = (values[places] for values in self.pair(price))
+        row = self._row[self.lines + places] + sets.flipped.astype(np.intp)
+        fan = self._fan(first, second, sets, sets.squared_gap)
+        size, slope, conjugate = self._limited(fan.along, 0, row, sets)
+        assert conjugate is not None
+        planar = Planar.of(fan, size, slope)
+        if len(sets.forked):
+            self._fork(planar, conjugate, fan, (first, second), sets, row)
+        return planar, conjugate
+
+    def undecided(self, price: Array, sets: Sets) -> tuple[Array, NDArray[np.bool_]]:
+        """How far [N] the answers (q, N) to prices (k, N) of planes that push either way are from what they
+        can give one way, and whether they are more forward than in reverse."""
+        places = sets.reversing
+        (ahead, own), (back, others) = (self._one_way(price, sets, way) for way in (0, 1))
+        share = share_of(own - others, FINE * sets.ways[1].high_cost + 1e-12)
+        share = np.where(sets.reverse[places] > 0.0, share, 1.0)
+        off = np.hypot(ahead.first - back.first, ahead.second - back.second)
+        return np.minimum(share, 1.0 - share) * off, share >= 0.5
 
     def farthest(self, price: Array, sets: Sets) -> Array:
         """Forces (k, N) [N] that are worth most at prices (k, N), whatever their power."""
-        lines, n = self.lines, self.lines + self.planes
+        lines = self.lines
         line = np.where(price[:lines] > 0.0, sets.high[:lines], sets.low[:lines])
+        drag = [self._farthest_dragged(price, line, sets)] if len(self.dragging) else []
         if not self.planes:
-            return line
-        fan = self._fan(price[lines:n], price[n:], sets, 1e-300)
+            return np.concatenate([line, *drag])
+        first, second = self.pair(price)
+        fan = self._fan(first, second, sets, 1e-300, self.gauges)
         size = np.where(fan.along > 0.0, sets.high[lines:], sets.low[lines:])
-        return np.concatenate([line, size * fan.first, size * fan.second])
+        x, y = size * fan.first, size * fan.second
+        if len(places := sets.reversing):
+            back = self._fan(first[places], second[places], sets.ways[1], 1e-300)
+            other = np.where(back.along > 0.0, sets.reverse[places], 0.0)
+            better = other * back.along > size[places] * fan.along[places]
+            x[places] = np.where(better, other * back.first, x[places])
+            y[places] = np.where(better, other * back.second, y[places])
+        return np.concatenate([line, x, y, *drag])
 
-    def worth(self, price: Array, sets: Sets) -> tuple[Array, Array]:
-        """Prices (n, N) [W/N] along the forces that answer prices (k, N), of lines with their sign, and what
-        these forces are worth, less their power [W], by the tables."""
-        lines, planes = self.lines, self.planes
-        first, second = price[lines : lines + planes], price[lines + planes :]
-        along = np.empty((lines + planes, price.shape[1]))
-        along[:lines] = price[:lines]
-        if planes:
-            along[lines:] = self._fan(first, second, sets, 1e-300).along
-        conjugate = self._limited(along, lines, self._row, sets)[2]
+    def _farthest_dragged(self, price: Array, line: Array, sets: Sets) -> Array:
+        """Drag (f, N) [N] of the lines that drag, whose forces (l, N) become what is worth most with it."""
+        at, cost = self.dragging, -price[len(price) - len(self.dragging) :]
+        own = np.zeros((self.lines + self.planes, price.shape[1]))
+        own[at] = price[at] * self._speed / np.where(cost > 0.0, cost, 1.0)
+        inner = self._limited(own[: self.lines], self.lines, self._row[: self.lines], sets, slice(self.lines))
+        ends = [end[: self.lines] + np.zeros_like(line) for end in (sets.low, sets.high)]
+        worth = [price[at] * end[at] - cost * self.drag(end) for end in ends]
+        outer = np.where(worth[1] > worth[0], ends[1][at], ends[0][at])
+        line[at] = np.where(cost > 0.0, inner[0][at], outer)
+        return self.drag(line)
+
+    def worth(self, price: Array, sets: Sets) -> tuple[Array, Array, Array]:
+        """Prices (n, N) [W/N] along the forces that answer prices (k, N), of lines with their sign, and of
+        planes in reverse; and what these forces are worth, less their power [W], by the tables."""
+        lines, n = self.lines, self.lines + self.planes
+        (first, second), along = self.pair(price), price[:n].copy()
+        back = np.zeros_like(along)
+        if self.planes:
+            along[lines:] = self._fan(first, second, sets, 1e-300, self.gauges).along
+        conjugate = self._limited(along, lines, self._rows(sets), sets)[2]
         assert conjugate is not None
-        return along, conjugate
+        if len(places := sets.reversing):
+            way = sets.ways[1]
+            back[lines + places] = self._fan(first[places], second[places], way, 1e-300).along
+            both = [self._one_way(price, sets, way)[1] for way in (0, 1)]
+            conjugate[lines + places] = np.where(sets.reverse[places] > 0.0, np.maximum(*both), both[0])
+        return along, back, conjugate
 
     def _limited(
         self,
@@ -257,17 +295,24 @@ class Answers:
             conjugate = np.where(above & ~below, price * high - sets.high_cost[of], conjugate)
         return np.minimum(np.maximum(force, low), high), np.where(below | above, 0.0, slope), conjugate
 
-    def _fan(self, first: Array, second: Array, sets: Sets, squared_gap: Array | float) -> "_Fan":
+    def _fan(
+        self,
+        first: Array,
+        second: Array,
+        sets: Sets,
+        squared_gap: Array | float,
+        gauges: Gauges | None = None,
+    ) -> Fan:
         """Directions in which planes answer prices (p, N), those of a smooth size of the prices."""
         size = along = np.sqrt(first * first + second * second + squared_gap)
         x, y = first / size, second / size
         tangent = 1.0 / size
         fan_x, fan_y = x, y
-        if self.gauges:
+        if gauges:
             fan_x, fan_y, tangent, along = self._uneven(x, y, tangent, size)
         xx, xy, yy = tangent * (1.0 - x * x), -tangent * x * y, tangent * (1.0 - y * y)
         if not sets.arcs:
-            return _Fan(along, fan_x, fan_y, xx, xy, yy, None, None)
+            return Fan(along, fan_x, fan_y, xx, xy, yy, None, None)
         cos, sin = np.cos(sets.middle), np.sin(sets.middle)
         ahead, aside = fan_x * cos + fan_y * sin, fan_y * cos - fan_x * sin
         beyond = np.abs(aside) * np.cos(sets.half) > ahead * np.sin(sets.half)
@@ -275,9 +320,9 @@ class Answers:
         # The nearer end by the price itself: by the force, both are alike where the arc has no width.
         nearer = np.where(second * cos - first * sin < 0.0, -1.0, 1.0)
         angle = sets.middle + nearer * sets.half
-        end_x, end_y = self._end(angle)
+        end_x, end_y = end_of(angle, gauges)
         keep = np.where(beyond, 0.0, 1.0)
-        return _Fan(
+        return Fan(
             np.where(beyond, first * end_x + second * end_y, along),
             np.where(beyond, end_x, fan_x),
             np.where(beyond, end_y, fan_y),
@@ -302,90 +347,42 @@ class Answers:
         along[places] *= value
         return fan_x, fan_y, tangent, along
 
-    def _end(self, angle: Array) -> tuple[Array, Array]:
-        """The directions (p, N) of forces at angles (p, N), with the gauges' sizes."""
-        x, y = np.cos(angle), np.sin(angle)
-        if self.gauges:
-            places = self.gauges.places
-            rho = self.gauges.along(angle[places])
-            x[places] *= rho
-            y[places] *= rho
-        return x, y
-
     def _fork(
         self,
-        places: NDArray[np.intp],
-        planar: "_Planar",
+        planar: Planar,
         conjugate: Array,
-        fan: "_Fan",
-        first: Array,
-        second: Array,
+        fan: Fan,
+        price: tuple[Array, Array],
         sets: Sets,
-    ) -> Array:
-        """Blend the answers of planes beyond their arcs with those of the other ends; the change (N,) of the
-        sum of conjugates."""
+        row: NDArray[np.intp],
+        gauges: Gauges | None = None,
+    ) -> None:
+        """Blend the answers and conjugates (p, N) [W] of planes beyond their arcs with those of the other
+        ends, in place."""
         assert fan.beyond is not None and fan.other is not None
-        beyond = fan.beyond[places]
-        x, y = (values[places] for values in self._end(fan.other + np.zeros_like(first)))
-        price = first[places] * x + second[places] * y
-        row = self.lines + places
-        size, slope, worth = self._limited(price, 0, self._row[row], sets, row)
+        places, of = sets.forked, len(sets.low) - len(sets.half) + sets.forked
+        first, second = price
+        x, y = (values[places] for values in end_of(fan.other + np.zeros_like(first), gauges))
+        along = first[places] * x + second[places] * y
+        size, slope, worth = self._limited(along, 0, row[places], sets, of)
         assert worth is not None
-        other = _Planar(size * x, size * y, slope * x * x, slope * x * y, slope * y * y)
-        width = FINE * sets.high_cost[row] + 1e-12
-        ahead = conjugate[places] - worth
-        root = np.sqrt(ahead * ahead + width * width)
-        share = np.where(beyond, 0.5 * (1.0 + ahead / root), 1.0)
-        turn = np.where(beyond, 0.5 * width * width / root**3, 0.0)
-        dx, dy = planar.first[places] - other.first, planar.second[places] - other.second
-        for name, extra in (
-            ("first", 0.0),
-            ("second", 0.0),
-            ("xx", dx * dx),
-            ("xy", dx * dy),
-            ("yy", dy * dy),
-        ):
-            own, others = getattr(planar, name), getattr(other, name)
-            own[places] = share * own[places] + (1.0 - share) * others + turn * extra
-        gain: Array = np.where(beyond, 0.5 * (root - ahead), 0.0).sum(axis=0)
-        return gain
+        other = Planar(size * x, size * y, slope * x * x, slope * x * y, slope * y * y)
+        width = FINE * sets.high_cost[of] + 1e-12
+        blend(planar, conjugate, places, other, worth, width, fan.beyond[places])
 
 
-class _Fan(NamedTuple):
-    """Directions of the forces of planes, with their gauges (p, N), and what changes them."""
-
-    along: Array
-    """Prices along the directions of the force, times the gauges [W/N]."""
-    first: Array
-    second: Array
-    xx: Array
-    """First-first part of the change of direction with the price, over the force [N/W]."""
-    xy: Array
-    yy: Array
-    beyond: NDArray[np.bool_] | None
-    """Which are at an end of their arc; None where all arcs are full circles."""
-    other: Array | None
-    """The angle of the other end [rad]."""
+def _softened(ratio: Array) -> tuple[Array, Array, Array]:
+    """Positive numbers, smooth and convex, that are the same from `SOFT` on, and their derivatives."""
+    below = np.minimum(ratio / SOFT - 1.0, 0.0)
+    rate = np.exp(below)
+    slope = np.where(rate > CLOSE, rate, 0.0)
+    soft = np.where(below < 0.0, SOFT * np.maximum(rate, CLOSE), ratio)
+    return soft, slope, np.where(below < 0.0, slope / SOFT, 0.0)
 
 
-class _Planar(NamedTuple):
-    """Answers of planes (p, N)."""
-
-    first: Array
-    second: Array
-    xx: Array
-    xy: Array
-    yy: Array
-
-    @classmethod
-    def of(cls, fan: _Fan, size: Array, slope: Array) -> "_Planar":
-        """The answers along a fan of directions, of sizes and their derivatives (p, N)."""
-        x, y = fan.first, fan.second
-        steep_x = slope * x
-        return cls(
-            size * x,
-            size * y,
-            steep_x * x + size * fan.xx,
-            steep_x * y + size * fan.xy,
-            slope * y * y + size * fan.yy,
-        )
+def _usual_price(table: RadialTable) -> float:
+    """Price [W/N] of the largest force where power grows as its power of 1.5 from half of it on: at the peak
+    of a soft fin the price itself says nothing of the forces below."""
+    middle = 0.5 * (table.force[0] + table.force[-1])
+    price = float(np.sqrt(2.0) * np.interp(middle, table.force, price_grid(table.top)))
+    return min(max(price, CLOSE * table.top), table.top)

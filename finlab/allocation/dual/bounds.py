@@ -9,17 +9,20 @@ import numpy as np
 
 from finlab.allocation.dual.compiled import Compiled
 from finlab.arrays import Array
+from finlab.precision import ROUNDING
 
 
 def proved_power(compiled: Compiled, wrench: Array, price: Array) -> Array:
     """Power (N,) [W] that no answer for wrenches (N, 6) undercuts, by prices (N, 6) [W/N, W/(N m)]."""
     robot = compiled.robot
-    value, table = robot.answers.worth((price @ robot.effectiveness.T).T, robot.sets)
-    radial = np.empty(value.shape)
-    worth = np.empty(value.shape)
-    radial[robot.order], worth[robot.order] = value, table
+    along = np.empty((3, compiled.count, len(wrench)))
+    along[:, robot.order] = robot.answers.worth((price @ robot.effectiveness.T).T, robot.sets)
+    ahead, back, worth = along
     for places, group in compiled.groups:
-        own = group.radial_worth(radial[places].T)
+        own = group.worth(price)
+        own = group.radial_worth(ahead[places].T, back[places].T) if own is None else own
         if own is not None:
             worth[places] = own.T
-    return np.asarray(np.einsum("ni,ni->n", price, wrench - compiled.beside) - worth.sum(axis=0))
+    paid = price * (wrench - compiled.beside)
+    rounding = ROUNDING * (np.abs(paid).sum(axis=1) + np.abs(worth).sum(axis=0))
+    return np.asarray(paid.sum(axis=1) - worth.sum(axis=0) - rounding)

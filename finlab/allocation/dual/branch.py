@@ -12,16 +12,18 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.dual.answers import Sets
 from finlab.allocation.dual.deadline import Deadline
 from finlab.allocation.dual.newton import Prices, dual_value, solve
 from finlab.allocation.dual.robot import DualRobot
+from finlab.allocation.dual.sets import Sets
 from finlab.arrays import Array
 from finlab.layout.angles import wrapped
 from finlab.precision import CLOSE, NEARLY, NOTHING, ROUNDS
 
 MOST_PARTS = 48
 """Open parts of one target that are followed, the cheapest first."""
+STEPS_AT_KINK = 5 * ROUNDS
+"""Steps of Newton's method after which a target at a gap is left to its parts."""
 HOLLOW = 1e-3
 """Share of a robot's largest force from which on a least force leaves a gap around rest."""
 NARROW = 0.2
@@ -48,16 +50,21 @@ class _Parts:
     prices: Array
 
 
-def gaps(robot: DualRobot, force: Array, sets: Sets) -> Array:
-    """How far (n, N) forces (k, N) are in a gap of their sets, as a share; 0 where they are not."""
+def gaps(robot: DualRobot, force: Array, sets: Sets, prices: Array | None = None) -> Array:
+    """How far (n, N) forces (k, N) are in a gap of their sets, as a share; 0 where they are not. Those of
+    prices (r, N) are in one where they are between what an actuator gives forward and in reverse, but not
+    where they drag more than lift does: that is left to the commands."""
     lines, planes = robot.answers.lines, robot.answers.planes
-    x, y = force[lines : lines + planes], force[lines + planes :]
+    x, y = robot.answers.pair(force)
     size = np.concatenate([np.abs(force[:lines]), np.hypot(x, y)])
     found = np.zeros(size.shape)
     if lines:
         band = robot.band[:lines]
         inside = (size[:lines] < band * (1.0 - NOTHING)) & (size[:lines] > NOTHING * robot.most[:lines])
         found[:lines] = np.where(inside & (sets.low[:lines] < sets.high[:lines]), 1.0, 0.0)
+    if prices is None and len(dragging := robot.answers.dragging):
+        over = (force[lines + 2 * planes :] - robot.answers.drag(force[:lines])) / robot.most_drag
+        found[dragging] = np.where(over > HOLLOW, over, 0.0)
     if planes:
         low, radial = sets.low[lines:], size[lines:]
         off = np.abs(wrapped(np.arctan2(y, x) - sets.middle)) - sets.half
@@ -66,12 +73,30 @@ def gaps(robot: DualRobot, force: Array, sets: Sets) -> Array:
         wide = sets.half > NARROW
         found[lines:] = np.where(aside & wide, off, 0.0)
         found[lines:] += np.where(hole & wide, 1.0 - radial / np.maximum(low, 1e-300), 0.0)
+    if len(places := sets.reversing):
+        found[lines + places] = _between_ways(robot, force, sets, prices, found[lines + places])
     return found
+
+
+def _between_ways(robot: DualRobot, force: Array, sets: Sets, prices: Array | None, amount: Array) -> Array:
+    """`gaps` (q, N) of the planes that push either way, from those of their forces forward alone."""
+    lines, places = robot.answers.lines, sets.reversing
+    most, both = robot.most[lines + places], sets.reverse[places] > 0.0
+    x, y = (values[places] for values in robot.answers.pair(force))
+    if prices is not None:
+        off, ahead = robot.answers.undecided(robot.matrix @ prices, sets)
+        return np.asarray(np.where(both, np.where(off > CLOSE * most, np.pi, amount * ahead), amount))
+    angle, size = np.arctan2(y, x) - sets.middle[places], np.hypot(x, y)
+    outside = np.full(size.shape, True)
+    for turn, largest in ((0.0, sets.high[lines + places]), (np.pi, sets.reverse[places])):
+        aside = np.abs(wrapped(angle + turn)) - sets.half[places] > CLOSE
+        outside &= aside | (size > largest + NEARLY * most)
+    return np.asarray(np.where(both, np.where(outside & (size > NEARLY * most), np.pi, 0.0), amount))
 
 
 def may_have_gaps(robot: DualRobot, sets: Sets, force: Array) -> bool:
     """Whether forces (k, N) may lie in gaps: a quick look."""
-    if robot.band.any() or len(sets.forked):
+    if robot.band.any() or len(sets.forked) or len(sets.reversing):
         return True
     if sets.rests:
         return False
@@ -86,15 +111,15 @@ def least_power(robot: DualRobot, target: Array, sets: Sets, root: Prices, deadl
     best = _Best(robot, root)
     parts, answer = start, root
     for _ in range(ROUNDS):
-        amount = gaps(robot, answer.force, parts.sets)
+        amount = gaps(robot, answer.force, parts.sets, answer.prices)
         nearer = np.flatnonzero(best.keep(parts, answer, amount))
         if not len(nearer):
             break
         parts = _dive(robot, parts, nearer, amount[:, nearer], answer)
-        answer = solve(robot, target[:, parts.row], parts.sets, parts.prices, value=True, way="many")
+        answer = _solved(robot, target, parts)
     parts, answer, value = start, root, np.full(count, np.inf)
     for round_ in range(ROUNDS + 1):
-        amount = gaps(robot, answer.force, parts.sets)
+        amount = gaps(robot, answer.force, parts.sets, answer.prices)
         open_ = best.keep(parts, answer, amount)
         goes_on = round_ < ROUNDS and not (open_.any() and deadline.passed())
         kept = _cheapest(np.flatnonzero(open_ & goes_on), parts.row, answer.value)
@@ -104,8 +129,14 @@ def least_power(robot: DualRobot, target: Array, sets: Sets, root: Prices, deadl
         if not len(kept):
             break
         parts = _cut(robot, parts, kept, amount[:, kept], answer)
-        answer = solve(robot, target[:, parts.row], parts.sets, parts.prices, value=True, way="many")
+        answer = _solved(robot, target, parts)
     return Branched(best.force, best.found, value)
+
+
+def _solved(robot: DualRobot, target: Array, parts: _Parts) -> Prices:
+    """The prices of parts; what is unsolved and has a gap is cut on."""
+    steps = STEPS_AT_KINK
+    return solve(robot, target[:, parts.row], parts.sets, parts.prices, True, "many", most_steps=steps)
 
 
 class _Best:
@@ -126,7 +157,8 @@ class _Best:
             if answer.value[i] < self._value[row]:
                 self._value[row], self.found[row] = answer.value[i], True
                 self.force[:, row] = answer.force[:, i]
-        return answer.solved & ~whole & (answer.value < self._value[parts.row] * (1.0 - CLOSE))
+        open_ = answer.solved | (~answer.beyond & (amount > 0.0).any(axis=0))
+        return open_ & ~whole & (answer.value < self._value[parts.row] * (1.0 - CLOSE))
 
     def _hollow(self, force: Array, sets: Sets) -> NDArray[np.bool_]:
         """Where the smoothed dual of a narrow arc has a force (k, N) that is smaller than any in it."""
@@ -175,18 +207,22 @@ def _dive(robot: DualRobot, parts: _Parts, kept: NDArray[np.intp], amount: Array
     """Each open part with all its gaps left on their nearer sides; fins that cannot rest keep that force."""
     lines, planes = robot.answers.lines, robot.answers.planes
     force, sets, chosen = answer.force[:, kept], parts.sets.take(kept), amount > 0.0
-    x, y = force[lines : lines + planes], force[lines + planes :]
+    x, y = robot.answers.pair(force)
     angle, size = np.arctan2(y, x), np.hypot(x, y)
     hole = chosen[lines:] & (size < 0.98 * sets.low[lines:])
     side = np.where(np.abs(force[:lines]) > 0.5 * robot.band[:lines], 1.0, -1.0)
-    side = np.concatenate([side, np.where(wrapped(angle - sets.middle) < 0.0, -1.0, 1.0)])
+    dragging = robot.answers.dragging
+    side[dragging] = np.where(force[dragging] < 0.5 * (sets.low + sets.high)[dragging], -1.0, 1.0)
+    off = wrapped(angle - sets.middle)
+    turned = np.where(sets.reverse > 0.0, np.cos(off), off)
+    side = np.concatenate([side, np.where(turned < 0.0, -1.0, 1.0)])
     cut = chosen.copy()
     cut[lines:] &= ~hole
     sets = narrowed(robot, sets, force, cut, side)
     inside = sets.middle + np.clip(wrapped(angle - sets.middle), -sets.half, sets.half)
     ring = force.copy()
     ring[lines : lines + planes] = np.where(hole, sets.low[lines:] * np.cos(inside), x)
-    ring[lines + planes :] = np.where(hole, sets.low[lines:] * np.sin(inside), y)
+    ring[lines + planes : lines + 2 * planes] = np.where(hole, sets.low[lines:] * np.sin(inside), y)
     fixed = np.zeros(chosen.shape, bool)
     fixed[lines:] = hole
     return _Parts(parts.row[kept], robot.frozen(sets, ring, fixed), answer.prices[:, kept])
@@ -194,22 +230,32 @@ def _dive(robot: DualRobot, parts: _Parts, kept: NDArray[np.intp], amount: Array
 
 def narrowed(robot: DualRobot, sets: Sets, force: Array, chosen: NDArray[np.bool_], side: Array) -> Sets:
     """Sets (n, N) of which chosen ones (n, N) are cut, and one side is kept: of an arc the half towards
-    smaller (-1) or larger angles (1), of a full circle the half away from or around the force, of a dead band
-    rest or the forces beyond it, by forces (k, N)."""
+    smaller (-1) or larger angles (1), of a full circle the half away from or around the force, of what pushes
+    either way the reverse (-1) or the rest (1), of a dead band rest or the forces beyond it, of what drags
+    the forces below or above, by forces (k, N)."""
     lines, planes = robot.answers.lines, robot.answers.planes
-    low, high, low_cost, high_cost, middle, half = (np.array(values) for values in sets.parts)
+    low, high, low_cost, high_cost, middle, half, reverse, reverse_cost, flipped = map(np.array, sets.parts)
     if planes:
-        plane, turn = chosen[lines:], side[lines:]
-        angle = np.arctan2(force[lines + planes :], force[lines : lines + planes])
+        either = chosen[lines:] & (reverse > 0.0)
+        plane, turn, back = chosen[lines:] & ~either, side[lines:], either & (side[lines:] < 0.0)
+        high[lines:] = np.where(back, reverse, high[lines:])
+        high_cost[lines:] = np.where(back, reverse_cost, high_cost[lines:])
+        middle, flipped = np.where(back, middle + np.pi, middle), np.where(back, 1.0, flipped)
+        reverse = np.where(either, 0.0, reverse)
+        angle = np.arctan2(*robot.answers.pair(force)[::-1])
         full = half >= np.pi
         moved = np.where(full, angle + np.where(turn > 0.0, 0.0, np.pi), middle + 0.5 * turn * half)
         middle, half = np.where(plane, wrapped(moved), middle), np.where(plane, 0.5 * half, half)
     if lines:
         cut, beyond, positive = chosen[:lines], side[:lines] > 0.0, force[:lines] > 0.0
         edge = np.where(beyond, np.where(positive, 1.0, -1.0) * robot.band[:lines], 0.0)
-        row = np.arange(lines)[:, None]
+        row, dragging = np.arange(lines)[:, None], robot.answers.dragging
         cost = robot.band_cost[row, np.where(beyond, np.where(positive, 2, 0), 1)]
         above = cut & (beyond == positive)  # the part lies above the edge
+        if len(dragging):
+            own = np.pad(force[:lines], ((0, planes), (0, 0)))
+            edge[dragging], cost[dragging] = own[dragging], robot.answers.marginal(own)[1][dragging]
+            above[dragging] = (cut & beyond)[dragging]
         low[:lines], low_cost[:lines] = (
             np.where(above, edge, low[:lines]),
             np.where(above, cost, low_cost[:lines]),
@@ -217,4 +263,4 @@ def narrowed(robot: DualRobot, sets: Sets, force: Array, chosen: NDArray[np.bool
         below = cut & ~above
         high[:lines] = np.where(below, edge, high[:lines])
         high_cost[:lines] = np.where(below, cost, high_cost[:lines])
-    return Sets(low, high, low_cost, high_cost, middle, half)
+    return Sets(low, high, low_cost, high_cost, middle, half, reverse, reverse_cost, flipped)

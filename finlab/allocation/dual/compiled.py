@@ -6,8 +6,8 @@ import numpy as np
 
 from finlab.actuators.registry import groups_of
 from finlab.actuators.response import with_square
-from finlab.allocation.dual.answers import Sets
 from finlab.allocation.dual.robot import DualRobot, dual_robot
+from finlab.allocation.dual.sets import Sets
 from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.physics.plant import Plant
@@ -35,14 +35,18 @@ class Compiled:
 
     def _prepare(self) -> None:
         responses: list[object] = [None] * self.count
+        self.weight = np.zeros(self.count)
+        """What doubt makes a squared force (n,) cost [W/N^2]."""
         for places, group in self.groups:
             for place, response in zip(places, group.responses, strict=True):
-                weight = 0.0 if self.doubt is None else (response.effectiveness**2 @ self.doubt[place]).sum()
-                responses[place] = with_square(response, float(weight)) if weight else response
+                if self.doubt is not None:
+                    self.weight[place] = (response.effectiveness**2 @ self.doubt[place]).sum()
+                weight = float(self.weight[place])
+                responses[place] = with_square(response, weight) if weight else response
         self.robot: DualRobot = dual_robot(responses)  # type: ignore[arg-type]
         self.beside = sum((group.beside.sum(axis=0) for _, group in self.groups), np.zeros(6))
-        """Wrench (6,) [N, N m] that the actuators give beside their answers' forces, such as a rudder's
-        drag."""
+        """Wrench (6,) [N, N m] that the actuators give beside their answers' forces, such as the drag of
+        rudders without lift."""
 
     def at(self, inflow: Array | None) -> "Compiled":
         """The same in another flow: velocities (n, 3) [m/s] of the actuators' places in their own frames."""
@@ -53,32 +57,12 @@ class Compiled:
         other._prepare()
         return other
 
-    @property
-    def drags(self) -> bool:
-        """Whether the actuators give more than their answers' forces."""
-        return any(group.worth(np.zeros(6)) is not None for _, group in self.groups)
-
-    def paid(self, price: Array, beside: Array) -> "Compiled":
-        """The same where what the actuators give beside their answers' forces is a wrench `beside` (6,), and
-        more of it has a price (6,) [W/N, W/(N m)]."""
-        other = copy(self)
-        other.groups = [(places, group.paid(price)) for places, group in self.groups]
-        other._prepare()
-        other.beside = beside
-        return other
-
-    def beside_of(self, force: Array) -> Array:
-        """Wrench (6,) [N, N m] that comes with forces (k, 1) [N] of the dual."""
-        own = self.forces(force)
-        found: Array = np.sum([group.beside_of(own[:, places])[0] for places, group in self.groups], axis=0)
-        return found
-
     def forces(self, force: Array) -> Array:
         """Forces (N, n, 2) [N] of the actuators along their own directions from those of the dual (k, N)."""
         lines, planes, order = self.robot.answers.lines, self.robot.answers.planes, self.robot.order
         own = np.zeros((force.shape[1], self.count, 2))
         own[:, order[: lines + planes], 0] = force[: lines + planes].T
-        own[:, order[lines:], 1] = force[lines + planes :].T
+        own[:, order[lines:], 1] = force[lines + planes : lines + 2 * planes].T
         return own
 
     def commands(self, force: Array, previous: Array | None = None) -> Array:

@@ -1,49 +1,110 @@
-"""Drag of rudders: a force that comes with lift, and that has a price as every force has.
+"""Commands of robots with drag: what the dual leaves to their own laws.
 
-A compiled robot offers lift at the watts of its drag. The force of the drag has to be met by the others,
-which costs them more or less; how much is known once prices are. So prices and drag are found in turn.
+The dual takes a foil for all between its curve of lift and drag and the chord of it. From the forces that are
+cheapest there, Levenberg-Marquardt steps mostly lead to commands that give the wrench; where they do not,
+other starts are tried.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 
-from finlab.allocation.dual.compiled import Compiled
-from finlab.allocation.dual.newton import solve
+from finlab.allocation.levenberg_marquardt import CommandProblem, refine
 from finlab.arrays import Array
-from finlab.precision import NEARLY, ROUNDS
+from finlab.physics.plant import Plant
+from finlab.precision import CLOSE, NEARLY, NOTHING, ROUNDS
 
 
-def at_the_price_of_drag(compiled: Compiled, wrench: Array) -> tuple[Compiled, float]:
-    """Returns the robot as it is for one wrench (6,), with its drag and the cost of more of it, and the power
-    [W] that no answer undercuts; the robot as it was where the wrench is out of reach or nothing settles."""
-    now, prices, bound = compiled, None, 0.0
+class Cost(NamedTuple):
+    """What is kept least: power, and what the doubt about forces costs."""
+
+    plant: Plant
+    weight: Array
+    """What a squared force (n,) costs [W/N^2]."""
+
+    def of(self, command: Array) -> Array:
+        """Returns the costs (R,) [W] of commands (R, n, 3)."""
+        cost: Array = self.plant.power(command).sum(axis=-1)
+        if self.weight.any():
+            cost = cost + (self.plant.force(command) ** 2).sum(axis=-1) @ self.weight
+        return cost
+
+    def slope(self, command: Array) -> Array:
+        """Returns their derivatives (R, n, 3)."""
+        slope = self.plant.power_gradient(command)
+        if self.weight.any():
+            force, jacobian = self.plant.force_and_jacobian(command)
+            slope = slope + 2.0 * self.weight[:, None] * (jacobian @ force[..., None])[..., 0]
+        return slope
+
+
+def command_with_drag(
+    problem: CommandProblem, cost: Cost, wrench: Array, starts: Array, enough: float
+) -> Array | None:
+    """Returns a command (n, 3) that gives a normalized wrench (6,), the cheapest of those found; None where
+    there is none.
+
+    Args:
+        problem: the robot.
+        cost: what is kept least.
+        wrench: what is to be given.
+        starts: commands (R, n, 3) to begin with.
+        enough: normalized error at which no further step is taken.
+    """
+    found = refine(problem, wrench[None], starts, 2 * ROUNDS, enough)
+    met = found.error <= NEARLY
+    if not met.any():
+        return None
+    return np.asarray(found.command[np.where(met, cost.of(found.command), np.inf).argmin()])
+
+
+def prices_at(problem: CommandProblem, cost: Cost, command: Array, directions: Array) -> Array:
+    """Returns the prices (r, 1) of normalized `directions` (6, r) at which a command (n, 3) would be the
+    cheapest for what it gives, as near as there are: there, what a command that can change adds to the wrench
+    is worth the power that it adds."""
+    jacobian = problem.fin.force_and_jacobian(command[None])[1][0] @ problem.effectiveness
+    low, high = problem.edges
+    free = (command > low) & (command < high)
+    width = problem.width[free]
+    rows = width[:, None] * (jacobian[free] @ directions)
+    prices: Array = np.linalg.lstsq(rows, width * cost.slope(command[None])[0][free], rcond=NOTHING)[0]
+    return prices[:, None]
+
+
+def cheapened(problem: CommandProblem, cost: Cost, wrench: Array, command: Array, enough: float) -> Array:
+    """Returns a command (n, 3) for a normalized wrench (6,) that takes no more power than another one.
+
+    Each step follows the power's slope along what gives the same wrench (sequential quadratic programming,
+    with the size of the curvature), as far as that lowers the power.
+    """
+    least, size = float(cost.of(command[None])[0]), 1.0
     for _ in range(ROUNDS):
-        robot = now.robot
-        found = solve(robot, robot.target((wrench - now.beside)[None]), None, prices)
-        if not found.solved[0]:
-            return compiled, 0.0
-        prices = found.prices
-        price = robot.basis @ prices[:, 0] / robot.scale
-        bound = max(bound, _dual_value(now, wrench, found.force, price))
-        beside = now.beside_of(found.force)
-        if np.linalg.norm((beside - now.beside) / robot.scale) < NEARLY:
-            return now, bound
-        now = compiled.paid(price, beside)
-    return compiled, bound
+        step = _cheaper_step(problem, cost, command)
+        found = command_with_drag(problem, cost, wrench, (command + size * step)[None], enough)
+        power = np.inf if found is None else float(cost.of(found[None])[0])
+        gain, size = least - power, size if power < least else 0.25 * size
+        if found is not None and gain > 0.0:
+            command, least = found, power
+        if abs(gain) <= 10.0 * CLOSE * least:
+            break
+    return command
 
 
-def _dual_value(compiled: Compiled, wrench: Array, force: Array, price: Array) -> float:
-    """Power [W] that no answer undercuts, by a price (6,) [W/N, W/(N m)] and the forces (k, 1) [N] that
-    answer it: the price of the wrench less what all that the actuators can give is worth at most."""
-    robot = compiled.robot
-    lines, planes = robot.answers.lines, robot.answers.planes
-    paid = (robot.effectiveness @ price) * force[:, 0]
-    paid[lines : lines + planes] += paid[lines + planes :]
-    size = force[: lines + planes].copy()
-    size[lines:] = np.hypot(force[lines : lines + planes], force[lines + planes :])
-    worth = np.empty(compiled.count)
-    worth[robot.order] = paid[: lines + planes] - robot.answers.marginal(size)[1][:, 0]
-    for places, group in compiled.groups:
-        own = None if compiled.doubt is not None else group.worth(price)
-        if own is not None:
-            worth[places] = own
-    return float(price @ wrench - worth.sum())
+def _cheaper_step(problem: CommandProblem, cost: Cost, command: Array) -> Array:
+    """A step (n, 3) of a command along which the wrench stays and the power falls."""
+    width = np.maximum(problem.width, NOTHING)
+    tried = command + np.concatenate([np.zeros((1, 1, 3)), NEARLY * np.eye(3)[:, None]]) * width
+    jacobian = width[:, :, None] * (problem.fin.force_and_jacobian(tried)[1] @ problem.effectiveness)
+    slope = width * cost.slope(tried)
+    low, high = problem.edges
+    free = (command > low) & (command < high)
+    price = np.linalg.lstsq(jacobian[0][free], slope[0][free], rcond=NOTHING)[0]
+    left = slope - jacobian @ price
+    free |= np.where(command <= low, left[0] < 0.0, left[0] > 0.0) & (problem.width > 0.0)
+    bend = np.abs(np.stack([left[k + 1, :, k] - left[0, :, k] for k in range(3)], axis=-1)) / NEARLY
+    bend = np.maximum(bend, CLOSE * bend.max() + 1e-300)[free]
+    rows, left = jacobian[0][free], left[0][free]
+    held = np.linalg.lstsq(rows.T @ (rows / bend[:, None]), rows.T @ (left / bend), rcond=NOTHING)[0]
+    step = np.zeros(command.shape)
+    step[free] = np.clip(-(left - rows @ held) / bend, -0.25, 0.25)
+    return step * width

@@ -6,8 +6,7 @@ becomes the one that the policy asks for (`policies`); from tick to tick, comman
 the previous ones (`rates`).
 """
 
-from collections.abc import Callable
-from copy import copy
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Any, NamedTuple, Self
@@ -15,16 +14,16 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.dual.answers import Sets
 from finlab.allocation.dual.bounds import proved_power
-from finlab.allocation.dual.branch import gaps, least_power, may_have_gaps
+from finlab.allocation.dual.branch import HOLLOW, STEPS_AT_KINK, gaps, least_power, may_have_gaps
 from finlab.allocation.dual.compiled import Compiled
 from finlab.allocation.dual.deadline import Deadline
 from finlab.allocation.dual.doubt import price_of_doubt
-from finlab.allocation.dual.drag import at_the_price_of_drag
-from finlab.allocation.dual.newton import Prices, solve
+from finlab.allocation.dual.drag import Cost, cheapened, command_with_drag, prices_at
+from finlab.allocation.dual.newton import MOST_STEPS, Prices, dual_value, solve, start
 from finlab.allocation.dual.policies import Nearest, nearest
 from finlab.allocation.dual.rates import Rates, within_tick
+from finlab.allocation.dual.sets import Sets
 from finlab.allocation.levenberg_marquardt import CommandProblem, refine
 from finlab.allocation.method import Method
 from finlab.allocation.policy import Policy
@@ -40,6 +39,8 @@ EXACT = 1e-8
 """Error, on the robot's yardstick, up to which commands need no further step."""
 TICK_STEPS = 5
 """The same where a command of a tick is not exact."""
+STEPS_WITH_DRAG = 2 * ROUNDS
+"""Newton's steps from the prices of commands near to a target."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +68,18 @@ class Forces(NamedTuple):
     """Power (N,) [W] that branches on gaps have proved to be needed; 0 where there was none."""
     aim: Array
     """The wrenches (N, 6) [N, N m] that they give: the targets, or those that the policy gives."""
+    command: Array | None = None
+    """Commands (N, n, 3) that give the targets, drag and all, NaN where there are none; None for robots
+    without drag."""
+
+    @classmethod
+    def joined(cls, each: Sequence["Forces"]) -> "Forces":
+        """Those of single targets."""
+        parts: list[Any] = list(zip(*each, strict=True))
+        axes = {"force": 1, "prices": 1}
+        return cls(
+            *(np.concatenate(part, axes.get(name, 0)) for name, part in zip(cls._fields, parts, strict=True))
+        )
 
 
 class Dual(Method):
@@ -86,10 +99,15 @@ class Dual(Method):
         super().__init__(layout, settings, scale, weights)
         doubt = price_of_doubt(layout, scale, self.settings.robust)
         self.compiled = Compiled(layout, self.plant, doubt)
+        self._last: tuple[bytes, Self] | None = None
 
     @cached_property
     def _problem(self) -> CommandProblem:
         return CommandProblem.of(self.plant, self.scale)
+
+    @property
+    def _cost(self) -> Cost:
+        return Cost(self.plant, self.compiled.weight)
 
     @cached_property
     def _rates(self) -> Rates:
@@ -97,10 +115,13 @@ class Dual(Method):
 
     def at(self, flow: Array | None) -> Self:
         """See `Method`."""
+        key = b"" if flow is None else flow.tobytes()
+        if self._last is not None and self._last[0] == key:
+            return self._last[1]
         other = super().at(flow)
         if other is not self:
-            inflow = other.plant.inflow(None)
-            other.compiled = self.compiled.at(inflow)
+            other.compiled, other._last = self.compiled.at(other.plant.inflow(None)), None
+            self._last = key, other
         return other
 
     def solve(
@@ -119,28 +140,7 @@ class Dual(Method):
             return Solution(np.empty((0, self.layout.n, 3)), lambda _: np.empty(0))
         if (moved := self.at(flow)) is not self:
             return moved.solve(targets, policy=policy, previous=previous, seed=seed, prices=prices)
-        if self.compiled.drags:
-            return self._one_by_one(targets, policy, previous)
         return self._solve(targets, policy, previous, prices)
-
-    def _one_by_one(self, targets: Array, policy: Policy, previous: Array | None) -> Solution:
-        """Answers of a robot whose drag has another price for each target."""
-        commands, proved = [], np.empty(len(targets))
-        for i, target in enumerate(targets):
-            other = copy(self)
-            other.compiled, proved[i] = at_the_price_of_drag(self.compiled, target)
-            if proved[i] == 0.0 and policy.kind == "direction":
-                low, high = 0.0, 1.0
-                for _ in range(ROUNDS):  # halve the share of the target that is within reach
-                    share = 0.5 * (low + high)
-                    found, bound = at_the_price_of_drag(self.compiled, share * target)
-                    if bound > 0.0:
-                        low, other.compiled, proved[i] = share, found, bound
-                    else:
-                        high = share
-                target = low * target
-            commands.append(other._solve(target[None], policy, previous).command)
-        return Solution(np.concatenate(commands), None if self._unproved else lambda _: proved)
 
     def _solve(
         self, targets: Array, policy: Policy, previous: Array | None, prices: Array | None = None
@@ -212,6 +212,8 @@ class Dual(Method):
     def _not_held(self, targets: Array) -> set[str]:
         """The sentence about axes that come together only, and that targets (N, 6) ask for apart."""
         robot = self.compiled.robot
+        if not len(targets):
+            return set()
         scaled = targets / robot.scale
         left = np.abs(scaled - (scaled @ robot.basis) @ robot.basis.T) > NEARLY * np.abs(scaled).max(
             initial=0.0
@@ -259,13 +261,22 @@ class Dual(Method):
     ) -> Forces:
         """Forces of least power for wrenches (N, 6), or for those that a policy gives in their place."""
         robot, sets = self.compiled.robot, self.compiled.robot.sets
-        target = robot.target(targets)
+        target, drags = robot.target(targets), len(robot.answers.dragging) > 0
+        if drags and len(targets) > 1:
+            return Forces.joined([self._forces(one[None], policy, deadline) for one in targets])
         if not len(target):  # nothing pushes, such as rudders at rest
             nothing = np.zeros((len(robot.effectiveness), len(targets)))
             none = np.zeros((len(targets), 6))
             return Forces(nothing, none, np.all(targets == 0.0, axis=1), target, np.zeros(len(targets)), none)
-        root = solve(robot, target, sets, prices)
-        within = root.solved.copy()
+        torn = drags or len(sets.forked) + len(sets.reversing) > 0
+        steps, first = STEPS_AT_KINK if torn else MOST_STEPS, None
+        if drags:
+            first = robot.answers(robot.matrix @ start(robot, target, sets)[0], sets, False).force
+            steps, near = STEPS_WITH_DRAG, self.compiled.commands(first)[0]
+            if prices is None:
+                prices = prices_at(self._problem, self._cost, near, self._directions)
+        root = solve(robot, target, sets, prices, way="one" if drags else "either", most_steps=steps)
+        within = root.solved | (~root.beyond & torn)
         if robot.basis.shape[1] < 6:
             rest = targets / robot.scale - (robot.basis @ target).T
             within &= np.linalg.norm(rest, axis=1) <= NEARLY * (
@@ -274,6 +285,10 @@ class Dual(Method):
         force, prices, value, aim = root.force, root.prices, np.zeros(len(targets)), targets
         if may_have_gaps(robot, sets, force):
             force, value = self._in_gaps(target, sets, root, within, deadline)
+        command = None
+        if first is not None:
+            command, prices = self._with_drag(targets[0], force, first, root)
+            within[0] = not np.isnan(command).any()
         if not within.all() and policy is not None:
             force, prices, value, aim = force.copy(), prices.copy(), value.copy(), aim.copy()
             for row in np.flatnonzero(~within):
@@ -282,7 +297,48 @@ class Dual(Method):
                 aim[row], force[:, row], prices[:, row] = near.wrench, near.force, near.prices
                 if may_have_gaps(robot, sets, near.force[:, None]):
                     self._cheaper_in_gaps(sets.take(at), near, force[:, row], deadline)
-        return Forces(force, robot.price(prices), within, prices, value, aim)
+        return Forces(force, robot.price(prices), within, prices, value, aim, command)
+
+    def _with_drag(self, wrench: Array, force: Array, first: Array, root: Prices) -> tuple[Array, Array]:
+        """A command (1, n, 3) for a wrench (6,) from forces (k, 1) near to it, or the first ones, NaN where
+        there is none; and its prices (r, 1)."""
+        robot, begin, problem, cost = (
+            self.compiled.robot,
+            self.compiled.commands(force),
+            self._problem,
+            self._cost,
+        )
+        asked = (wrench + self.compiled.beside) / self.scale
+        if root.solved[0] and self._error(begin, (self.scale * asked)[None])[0] <= EXACT:
+            return begin, root.prices
+        starts = np.concatenate([begin, self.compiled.commands(first)])
+        command, prices = command_with_drag(problem, cost, asked, starts, EXACT), root.prices
+        if command is not None:
+            command = cheapened(problem, cost, asked, command, EXACT)
+            if not root.solved[0]:
+                tried = prices_at(problem, cost, command, self._directions)
+                prices = np.concatenate([prices, tried], axis=1)
+            value = dual_value(robot, robot.target(wrench[None]), robot.sets, prices)
+            prices = prices[:, value.argmax()][:, None]
+            # Else others may be far cheaper, as the dual leaves out the doubt of what drags.
+            if self.compiled.doubt is None and cost.of(command[None])[0] <= 2.0 * value.max():
+                return command[None], prices
+        starts = self.plant.sample(np.random.default_rng(0), (ROUNDS,))
+        for places, group in self.compiled.groups:
+            if not group.feels_flow:
+                starts[::2, places] = begin[0, places]
+        other = None if root.beyond[0] else command_with_drag(problem, cost, asked, starts, EXACT)
+        if other is not None:
+            other = cheapened(problem, cost, asked, other, EXACT)
+            found = np.stack([other if command is None else command, other])
+            command = found[cost.of(found).argmin()]
+        return np.full_like(begin, np.nan) if command is None else command[None], prices
+
+    @property
+    def _directions(self) -> Array:
+        """The basis' directions (6, r) on the yardstick."""
+        robot = self.compiled.robot
+        return np.asarray(self.scale[:, None] * robot.basis / robot.scale[:, None])
 
     def _cheaper_in_gaps(self, sets: Sets, near: Nearest, force: Array, deadline: Deadline) -> None:
         """Replaces forces (k,) that give a wrench out of reach in one part of sets with gaps by those of
@@ -290,7 +346,7 @@ class Dual(Method):
         robot = self.compiled.robot
         target = robot.target(near.wrench[None])
         root = solve(robot, target, sets)
-        within = root.solved.copy()
+        within = ~root.beyond
         found, _ = self._in_gaps(target, sets, root, within, deadline)
         if within[0]:
             force[:] = found[:, 0]
@@ -301,7 +357,9 @@ class Dual(Method):
         """Forces (k, N) in sets with gaps, and the power (N,) [W] that is proved to be needed there; `within`
         loses the targets that they do not meet."""
         robot = self.compiled.robot
-        rows = np.flatnonzero(within & (gaps(robot, root.force, sets) > 0.0).any(axis=0))
+        inside = gaps(robot, root.force, sets, root.prices) > 0.0
+        rows = np.flatnonzero(within & inside.any(axis=0))
+        within &= root.solved | inside.any(axis=0)
         if not len(rows):
             return root.force, np.broadcast_to(0.0, len(within))
         value = np.zeros(len(within))
@@ -314,11 +372,27 @@ class Dual(Method):
 
     def _commands(self, aim: Array, found: Forces, previous: Array | None = None) -> Array:
         """Commands (N, n, 3) that give wrenches (N, 6) exactly, by the plant."""
+        if previous is None and found.command is not None and not np.isnan(found.command).any():
+            return self.plant.rested(found.command)
         command = self.compiled.commands(found.force, previous)
         error = self._error(command, aim)
         rough = np.flatnonzero(error > EXACT)
-        if len(rough):
-            command[rough] = refine(self._problem, aim[rough] / self.scale, command[rough], ROUNDS).command
+        if not len(rough):
+            return self.plant.rested(command)
+        if found.command is not None:
+            own = found.command[rough]
+            command[rough] = np.where(np.isnan(own), command[rough], own)
+        # Steps that lead nowhere depend on the last bit: with drag each target goes its way alone.
+        for rows in [rough] if found.command is None else np.split(rough, range(1, len(rough))):
+            ends = refine(self._problem, aim[rows] / self.scale, command[rows], ROUNDS, EXACT)
+            command[rows] = ends.command
+            for row in rows[(ends.error > NEARLY) & found.within[rows]].tolist():
+                # Such as idle fins in line, or a least force: no small change of these commands helps.
+                draw = np.random.default_rng(0).uniform(-1.0, 1.0, (2 * ROUNDS, *command.shape[1:]))
+                shares = np.geomspace(HOLLOW, 1.0, len(draw))[:, None, None]
+                starts = command[row] + shares * draw * self._problem.width
+                other = command_with_drag(self._problem, self._cost, aim[row] / self.scale, starts, EXACT)
+                command[row] = command[row] if other is None else other
         return self.plant.rested(command)
 
     def _error(self, command: Array, aim: Array) -> Array:
@@ -339,7 +413,7 @@ class Dual(Method):
         force = within_tick(self.compiled.robot, sets, asked, found.prices, 1.0 / self.scale)
         command = self.plant.feasible(box.clipped(self.compiled.commands(force, previous)))
         if self._error(command, aim)[0] > EXACT:
-            command = refine(problem, aim / self.scale, box.clipped(command), TICK_STEPS).command
+            command = refine(problem, aim / self.scale, box.clipped(command), TICK_STEPS, EXACT).command
             command = self.plant.feasible(box.clipped(command))
         rested = self.plant.rested(command)
         return np.where(box.clipped(rested) == rested, rested, command)

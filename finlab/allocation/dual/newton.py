@@ -13,8 +13,8 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.dual.answers import Sets
 from finlab.allocation.dual.robot import DualRobot
+from finlab.allocation.dual.sets import Sets
 from finlab.arrays import Array
 from finlab.precision import NEARLY, NOTHING, ROUNDING
 from finlab.small_systems import solve as solve_systems
@@ -78,22 +78,33 @@ class _State(NamedTuple):
 
 
 def start(robot: DualRobot, target: Array, sets: Sets) -> tuple[Array, NDArray[np.bool_]]:
-    """Prices (r, N) to begin with, and where an actuator may be at its limit (N,): those of a quadratic cost,
-    made once to fit a cost `~ T^1.5`."""
-    gain, lines = robot.gain, robot.answers.lines
+    """Prices (r, N) to begin with, and where an actuator may be at its limit (N,): those that come nearest to
+    the marginal costs of the forces of quadratic costs, weighted by what costs `~ T^1.5` would answer."""
+    answers, lines = robot.answers, robot.answers.lines
     force = robot.first_force @ target
-    size = np.concatenate([np.abs(force[:lines]), robot.answers.sizes(force)])
+    size = np.concatenate([np.abs(force[:lines]), answers.sizes(force)])
     share = size / robot.most
     saturated = np.asarray((share > 0.8).any(axis=0))
-    fit = np.sqrt(np.minimum(np.maximum(share, 1e-4), 1.0))
-    weight = gain * np.concatenate([fit, fit[lines:]])
-    hessian = weight.T @ robot.squares.T
+    within = np.minimum(size, 0.97 * robot.most)
+    within[:lines] *= np.where(force[:lines] < 0.0, -1.0, 1.0)
+    price = answers.marginal(within)[0] / np.maximum(size, 1e-300)
+    fit = robot.gain * _by_direction(robot, np.sqrt(np.minimum(np.maximum(share, 1e-4), 1.0)))
+    hessian = fit.T @ robot.squares.T
     diagonal = hessian[:, :: robot.shape[0] + 1]
     # Of a robot with only some directions asked for, nothing may drive one of them.
     diagonal += NOTHING * diagonal.sum(axis=1, keepdims=True)
     hessian = hessian.reshape(-1, *robot.shape)
-    prices: Array = solve_systems(hessian, target.T[..., None])[..., 0].T
+    right = target  # where lift drags, forces of quadratic costs say little of its marginal cost
+    if not len(answers.dragging):
+        right = robot.matrix.T @ (fit * _by_direction(robot, price) * force)
+    prices: Array = solve_systems(hessian, right.T[..., None])[..., 0].T
     return prices, saturated
+
+
+def _by_direction(robot: DualRobot, values: Array) -> Array:
+    """Values (k, N) of the directions of actuators that have values (n, N)."""
+    lines, dragging = robot.answers.lines, robot.answers.dragging
+    return np.concatenate([values, values[lines:], values[dragging]])
 
 
 def solve(
@@ -115,7 +126,7 @@ def solve(
         value: whether the dual value is asked for.
         way: whether targets take the way of one or of many; where either will do, what remains unsolved is
             tried the other way, so that a target has the same answer alone and among others.
-        most_steps: after how many steps the way of one gives up.
+        most_steps: after how many steps a target is given up.
     """
     sets = robot.sets if sets is None else sets
     count = target.shape[1]
@@ -131,12 +142,14 @@ def solve(
             found = _one(robot, state, sets, float(ridge[0]), float(most[0]), value, most_steps)
             if found.solved[0] or found.beyond[0] or way == "one":
                 return found
-        found = _many(robot, _state(robot, target, prices, sets), sets, ridge, most)
+        found = _many(robot, _state(robot, target, prices, sets), sets, ridge, most, most_steps)
         if count > 1 and way == "either":
             for row in np.flatnonzero(~(found.solved | found.beyond)):
                 at = slice(row, row + 1)
                 state = _state(robot, target[:, at], prices[:, at], sets.take(np.array([row])))
-                again = _one(robot, state, sets.take(np.array([row])), float(ridge[row]), most[row], True)
+                again = _one(
+                    robot, state, sets.take(np.array([row])), float(ridge[row]), most[row], True, most_steps
+                )
                 found.put(np.array([row]), again)
     return found
 
@@ -219,7 +232,7 @@ def _valued(robot: DualRobot, state: _State, sets: Sets) -> _State:
     return state if state.conjugate is not None else _state(robot, state.target, state.prices, sets)
 
 
-def _many(robot: DualRobot, state: _State, sets: Sets, ridge: Array, most: Array) -> Prices:
+def _many(robot: DualRobot, state: _State, sets: Sets, ridge: Array, most: Array, most_steps: int) -> Prices:
     """`solve` for many targets, those that are done left out."""
     count = state.target.shape[1]
     place, growth = np.arange(count), np.full(count, 2.0)
@@ -231,10 +244,10 @@ def _many(robot: DualRobot, state: _State, sets: Sets, ridge: Array, most: Array
         np.zeros(count, bool),
         np.zeros(count, np.intp),
     )
-    for steps in range(MOST_STEPS + 1):
+    for steps in range(most_steps + 1):
         solved = state.size <= TOLERANCE
         beyond = ~solved & (state.value > most)
-        done = solved | beyond | (steps == MOST_STEPS) | (ridge > MOST_RIDGE)
+        done = solved | beyond | (steps == most_steps) | (ridge > MOST_RIDGE)
         if done.any():
             own = Prices(state.prices, state.force, state.value, solved, beyond, np.full(len(place), steps))
             found.put(place[done], own.take(np.flatnonzero(done)))

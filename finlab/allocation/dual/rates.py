@@ -6,11 +6,11 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.dual.answers import Sets
 from finlab.allocation.dual.nearest_point import nearest_point
 from finlab.allocation.dual.newton import solve
 from finlab.allocation.dual.policies import cheapest
 from finlab.allocation.dual.robot import DualRobot
+from finlab.allocation.dual.sets import Sets
 from finlab.arrays import Array
 from finlab.layout.angles import wrapped
 from finlab.physics.plant import Plant

@@ -1,14 +1,15 @@
 """A robot as the dual sees it: scaled effectiveness in the range that its actuators span, and their sets."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.actuators.response import Line, Plane, Response
-from finlab.allocation.dual.answers import Answers, Sets
+from finlab.actuators.response import Line, Plane, Response, price_grid
+from finlab.allocation.dual.answers import Answers
+from finlab.allocation.dual.sets import Sets
 from finlab.arrays import Array
 from finlab.precision import NEARLY, NOTHING
 
@@ -23,6 +24,8 @@ class DualRobot:
     """Their answers to prices."""
     sets: Sets
     """What each may give."""
+    ends: Array
+    """Least and largest forces (n, 2) [N], of planes sizes, below 0 in reverse."""
     band: Array
     """Dead bands (n, 1) [N]: smaller forces, other than 0, cannot be held."""
     band_cost: Array
@@ -40,7 +43,8 @@ class DualRobot:
     def outer(self) -> Array:
         """Products (r r, l + 3 p) that make the Hessian of derivatives of the answers."""
         lines, planes = self.answers.lines, self.answers.planes
-        line, first, second = np.split(self.matrix, [lines, lines + planes])
+        ends = np.cumsum([lines, planes, planes])
+        line, first, second, drag = np.split(self.matrix, ends)
         mixed = _products(first, second)
         parts = [
             _products(line, line),
@@ -48,18 +52,21 @@ class DualRobot:
             mixed + mixed.swapaxes(1, 2),
             _products(second, second),
         ]
-        return np.concatenate(parts).reshape(lines + 3 * planes, -1).T.copy()
+        if len(drag):
+            along = _products(line[self.answers.dragging], drag)
+            parts += [along + along.swapaxes(1, 2), _products(drag, drag)]
+        return np.concatenate(parts).reshape(-1, self.shape[0] * self.shape[1]).T.copy()
 
     @cached_property
     def most(self) -> Array:
         """Largest force or size (n, 1) [N] of each actuator."""
-        found: Array = np.maximum(np.abs(self.sets.low), self.sets.high)[:, :1] + 1e-12
+        found: Array = np.abs(self.ends).max(axis=1, keepdims=True) + 1e-12
         return found
 
     @cached_property
     def largest(self) -> Array:
         """The same (k, 1) [N] for each direction."""
-        return np.concatenate([self.most, self.most[self.answers.lines :]])
+        return np.concatenate([self.most, self.most[self.answers.lines :], self.most_drag])
 
     @cached_property
     def largest_power(self) -> float:
@@ -68,9 +75,10 @@ class DualRobot:
 
     @cached_property
     def gain(self) -> Array:
-        """Force over price (k, 1) [N^2/W] of each direction at its limit."""
-        each = self.most / self.answers.tops[:, None]
-        return np.concatenate([each, each[self.answers.lines :]])
+        """Force over price (k, 1) [N^2/W] of each direction at its limit, by what half the force costs."""
+        each = self.most / self.answers.prices[:, None]
+        steep = (self.most_drag / self.most[self.answers.dragging]) ** 2
+        return np.concatenate([each, each[self.answers.lines :], each[self.answers.dragging] * steep])
 
     @cached_property
     def squares(self) -> Array:
@@ -102,6 +110,11 @@ class DualRobot:
         mean = float(hessian.trace()) / max(len(hessian), 1)
         return np.asarray(hessian / mean + NEARLY * np.eye(len(hessian)))
 
+    @cached_property
+    def most_drag(self) -> Array:
+        """Drag (f, 1) [N] of the largest forces of the lines that drag."""
+        return _most_drag(self.answers, self.most)
+
     @property
     def shape(self) -> tuple[int, int]:
         """Rows and columns of the Hessian."""
@@ -115,16 +128,20 @@ class DualRobot:
         """Forces (k,) [N] inside the sets of one target."""
         lines = self.answers.lines
         size = 0.5 * (sets.low + sets.high)[:, 0]
-        angle, turns = sets.middle[:, 0], sets.half[:, 0] < np.pi
+        angle = sets.middle[:, 0]
+        turns = (sets.half[:, 0] < np.pi) & (sets.reverse[:, 0] == 0.0)
         planar = np.where(turns, size[lines:], 0.0)
-        return np.concatenate([size[:lines], planar * np.cos(angle), planar * np.sin(angle)])
+        drag = self.answers.drag(size[:, None])[:, 0]
+        return np.concatenate([size[:lines], planar * np.cos(angle), planar * np.sin(angle), drag])
 
     def frozen(self, sets: Sets, force: Array, fixed: NDArray[np.bool_]) -> Sets:
         """Sets in which fixed actuators (n, N) give their forces (k, N) [N] and nothing else."""
-        lines, planes = self.answers.lines, self.answers.planes
-        x, y = force[lines : lines + planes], force[lines + planes :]
+        lines = self.answers.lines
+        x, y = self.answers.pair(force)
         size = np.concatenate([force[:lines], np.hypot(x, y)])
-        cost = self.answers.marginal(np.clip(size, sets.low, sets.high))[1]
+        within = np.clip(size, sets.low, sets.high)
+        within[lines:] *= 1.0 - 2.0 * sets.flipped
+        cost = self.answers.marginal(within)[1]
         planar = fixed[lines:]
         return Sets(
             np.where(fixed, size, sets.low),
@@ -133,16 +150,16 @@ class DualRobot:
             np.where(fixed, cost, sets.high_cost),
             np.where(planar, np.arctan2(y, x), sets.middle),
             np.where(planar, 0.0, sets.half),
+            np.where(planar, 0.0, sets.reverse),
+            sets.reverse_cost,
+            sets.flipped,
         )
 
     def restricted(self, reach: Array) -> Sets:
         """Sets of actuators that give no more than rows (n, 4) of least and largest force [N], middle and
         half of the arc [rad], in the robot's order; what they give beyond their tables is left out."""
-        lines = self.answers.lines
-        low = np.clip(reach[:, :1], self.sets.low, self.sets.high)
-        high = np.clip(reach[:, 1:2], self.sets.low, self.sets.high)
-        cost = self.answers.marginal(np.concatenate([low, high], axis=1))[1]
-        return Sets(low, high, cost[:, :1], cost[:, 1:], reach[lines:, 2:3], reach[lines:, 3:])
+        low, high = np.clip(reach[:, :2], self.ends[:, :1], self.ends[:, 1:]).T[..., None]
+        return limited_sets(self.answers, low, high, reach[self.answers.lines :, 2:])
 
     def target(self, wrench: Array) -> Array:
         """Wrenches (N, 6) in the basis (r, N)."""
@@ -173,12 +190,50 @@ def _range(effectiveness: Array, most: Array) -> tuple[Array, Array]:
     return scale, left[:, values > NOTHING * max(values[0], 1e-300)]
 
 
+def _most_drag(answers: Answers, most: Array) -> Array:
+    """Drag (f, 1) [N] of the largest forces (n, 1) [N]."""
+    return answers.drag(most) + 1e-12
+
+
 def _is_whole(line: Line, low: float, high: float) -> bool:
     """Whether limits of a line are those of its tables, which begin at rest."""
     reverse = line.reverse
     if reverse is None or line.forward.force[0] or reverse.force[0]:
         return False
     return low == -reverse.largest and high == line.forward.largest
+
+
+def _needs_no_reverse(plane: Plane) -> bool:
+    """Whether a plane that turns all round gives forward what it gives in reverse, at no more power."""
+    ahead, back = plane.table, plane.reverse
+    if back is None or plane.half < np.pi or back.largest > ahead.largest or back.rest < ahead.rest:
+        return False
+    price = price_grid(back.top)
+    own = np.interp(price, price_grid(ahead.top), ahead.force)
+    return bool((own >= back.force * (1.0 - NEARLY)).all())
+
+
+def limited_sets(answers: Answers, low: Array, high: Array, arcs: Array) -> Sets:
+    """Sets of actuators between forces (n, 1) [N] of their tables, of planes below 0 in reverse, in arcs
+    (p, 2), middles and halves [rad]."""
+    lines = answers.lines
+    plane = (np.arange(len(low)) >= lines)[:, None]
+    flipped, back = plane & (high <= 0.0) & (low < 0.0), plane & (low < 0.0)
+    near = np.where(flipped, high, np.where(back, 0.0, low))
+    far = np.where(flipped, low, high)
+    cost = answers.marginal(np.concatenate([near, far, low], axis=1))[1]
+    both = back & ~flipped
+    return Sets(
+        np.where(plane, np.abs(near), near),
+        np.where(plane, np.abs(far), far),
+        cost[:, :1],
+        cost[:, 1:2],
+        arcs[:, :1] + np.pi * flipped[lines:],
+        arcs[:, 1:],
+        np.where(both, -low, 0.0)[lines:],
+        cost[lines:, 2:],
+        flipped[lines:].astype(np.float64),
+    )
 
 
 def dual_robot(responses: list[Response]) -> DualRobot:
@@ -188,36 +243,30 @@ def dual_robot(responses: list[Response]) -> DualRobot:
     lines = [each for each in responses if isinstance(each, Line)]
     planes = [each for each in responses if isinstance(each, Plane)]
     answers = Answers(lines, planes)
-    low, high = [line.ends[0] for line in lines], [line.ends[1] for line in lines]
-    low += [plane.table.force[0] for plane in planes]
-    high += [plane.table.largest for plane in planes]
-    low_, high_ = np.array(low)[:, None], np.array(high)[:, None]
+    ends = np.array([line.ends for line in lines] + [plane.ends for plane in planes])
+    low, high = ends[:, :1], ends[:, 1:]
     band = np.array([line.band for line in lines] + [plane.band for plane in planes])[:, None]
-    ends = [sign * np.minimum(band, high_) for sign in (-1.0, 0.0, 1.0)]
-    cost = answers.marginal(np.concatenate([low_, high_, *ends], axis=1))[1]
-    sets = Sets(
-        low_,
-        high_,
-        cost[:, :1],
-        cost[:, 1:2],
-        np.array([plane.middle for plane in planes]).reshape(-1, 1),
-        np.array([plane.half for plane in planes]).reshape(-1, 1),
-        all(map(_is_whole, lines, low, high))
-        and not any(plane.half < np.pi and plane.table.force[0] for plane in planes),
-    )
+    at_band = [sign * np.minimum(band, high) for sign in (-1.0, 0.0, 1.0)]
+    arcs = np.array([(plane.middle, plane.half) for plane in planes]).reshape(-1, 2)
+    idle = np.array([_needs_no_reverse(plane) for plane in planes], bool)
+    least = np.where(np.pad(idle, (len(lines), 0))[:, None], 0.0, low)
+    whole = all(map(_is_whole, lines, low[:, 0], high[:, 0]))
+    whole &= not any(plane.half < np.pi and plane.table.force[0] for plane in planes)
+    sets = replace(limited_sets(answers, least, high, arcs), whole=whole)
     rows = [line.effectiveness for line in lines]
     rows += [plane.effectiveness[0] for plane in planes] + [plane.effectiveness[1] for plane in planes]
+    rows += [line.drag for line in lines if line.drag is not None]
     effectiveness = np.array(rows)
-    most = np.abs(
-        np.concatenate([np.maximum(-low_, high_)[: len(lines)], high_[len(lines) :], high_[len(lines) :]])
-    )
+    most = np.abs(ends).max(axis=1, keepdims=True)
+    most = np.concatenate([most, most[len(lines) :], _most_drag(answers, most)])
     scale, basis = _range(effectiveness, most)
     return DualRobot(
         np.array(line_places + plane_places),
         answers,
         sets,
+        ends,
         band,
-        cost[:, 2:],
+        answers.marginal(np.concatenate(at_band, axis=1))[1],
         effectiveness,
         scale,
         basis,

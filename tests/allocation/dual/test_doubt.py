@@ -78,11 +78,12 @@ def test_no_price_of_doubt_is_better_by_its_own_measure_than_the_one_asked_for(k
     answers = [Allocator(layout, robust=price).allocate_batch(targets, flow=flow) for price in prices]
     within = np.all([answer.reachable for answer in answers], axis=0)
     assert within.sum() >= 6
-    # The drag of rudders errs, too, and fins that are not alike all round count by their mean.
-    slack = 1.02 if kind in ("rudders", "fins uneven") else 1.001
+    # Fins that are not alike all round count by their mean; drag errs, too, and has more than one valley.
+    slack = {"fins uneven": 1.02, "rudders": 1.5}.get(kind, 1.001)
     for price, own in zip(prices, answers, strict=True):
         least = np.min([total(other, price) for other in answers], axis=0)
         assert (total(own, price)[within] <= least[within] * slack + 1e-9).all(), price
+        assert np.median(total(own, price)[within] / least[within]) < 1.001
     assert answers[-1].expected_error[within].sum() < answers[0].expected_error[within].sum()
 
 

@@ -1,10 +1,16 @@
 """Robots with rudders that move: exact with the drag, and cheapest with its price."""
 
+import math
+
 import numpy as np
+import pytest
 
 import finlab
+from finlab import Allocator
+from finlab.layout import Actuator, Thruster, load_layout
 from finlab.layout.layout import Layout
 from finlab.layout.rudder import Rudder
+from finlab.layout.thrust_model import PowerLaw
 from finlab.physics.plant import Plant
 from tests.mixed_robots import load, random_flow, random_plant, random_robot, within
 
@@ -53,3 +59,76 @@ def test_many_wrenches_at_once_are_answered_as_one_by_one() -> None:
     together = allocator.allocate_batch(wrenches, flow=flow)
     alone = [allocator.allocate(wrench, flow=flow).power for wrench in wrenches]
     np.testing.assert_allclose(together.power, alone, rtol=1e-9)
+
+
+AHEAD = np.array([1.5, 0.0, 0.0, 0.0, 0.0, 0.0])
+
+
+def frame_of_foils(rng: np.random.Generator) -> Layout:
+    """Two to four foils whose shafts lie across the way ahead, and two or three thrusters."""
+    parts: list[Actuator] = []
+    for i in range(rng.integers(2, 5)):
+        turn, most = rng.uniform(0.0, 2.0 * math.pi), rng.uniform(0.3, 0.7)
+        place, shaft = tuple(rng.uniform(-1.0, 1.0, 3)), (0.0, math.cos(turn), math.sin(turn))
+        stall, area = rng.uniform(0.35, 0.6), 10.0 ** rng.uniform(-2.3, -1.0)
+        foil = Rudder(
+            f"f{i}", place, shaft, (1, 0, 0), area, (-most, most), rng.uniform(1.0, 6.0), stall=stall
+        )
+        parts.append(foil)
+    for i in range(rng.integers(2, 4)):
+        axis = rng.normal(size=3) if rng.random() < 0.5 else np.array([1.0, 0.0, 0.0])
+        axis, place = axis / np.linalg.norm(axis), tuple(rng.uniform(-1.0, 1.0, 3))
+        parts.append(Thruster(f"t{i}", place, tuple(axis), (-40.0, 50.0), PowerLaw(1.0)))
+    return Layout("foils", tuple(parts))
+
+
+def at_work(layout: Layout, plant: Plant, rng: np.random.Generator) -> np.ndarray:
+    """A uniform command (n, 3) whose foils do not stall."""
+    command = plant.sample(rng, ())
+    for i, part in enumerate(layout.actuators):
+        if isinstance(part, Rudder):
+            command[i, 0] = np.clip(command[i, 0], -0.8 * part.stall, 0.8 * part.stall)
+    return command
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_what_foils_at_work_give_is_found_at_no_more_power(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    layout = frame_of_foils(rng)
+    allocator, plant = Allocator(layout), Plant(layout)
+    for _ in range(5):
+        command = at_work(layout, plant, rng)
+        wrench = plant.wrench(command, flow=AHEAD)
+        answer = allocator.allocate(wrench, flow=AHEAD)
+        assert answer.reachable and answer.err_norm <= 1e-6
+        np.testing.assert_allclose(plant.wrench(answer.command, flow=AHEAD), wrench, atol=1e-4)
+        assert answer.power <= 1.01 * plant.power(command, flow=AHEAD).sum()
+        assert answer.bound is not None and answer.bound <= answer.power
+
+
+@pytest.mark.parametrize("policy", ["closest", "direction", "priority"])
+def test_a_torpedo_that_loses_actuators_has_an_answer_and_a_bound_below_it(policy: str) -> None:
+    layout = load_layout("torpedo")
+    allocator, rng = Allocator(layout), np.random.default_rng(3)
+    names = [part.name for part in layout.actuators]
+    for failed in [(), *[(name,) for name in names], tuple(names[:-1]), tuple(names[1:])]:
+        for flow in (None, AHEAD):
+            asked = rng.normal(size=6) * [60.0, 20.0, 20.0, 5.0, 20.0, 20.0]
+            previous = Plant(layout).sample(rng, ()) if rng.random() < 0.5 else None
+            answer = allocator.allocate(asked, policy=policy, failed=failed, flow=flow, previous=previous)
+            assert np.isfinite(answer.power)
+            assert answer.bound is None or answer.bound <= answer.power + 1e-9
+
+
+def test_a_foil_whose_drag_is_welcome_answers_with_the_dearest_lift() -> None:
+    """Power counts U newtons of drag; where each is paid more, the conjugate is that of the law."""
+    rudder = Rudder("r", (-0.5, 0, 0), (0, 0, 1), (1, 0, 0), 0.05, (-0.3, 0.3), 2.0)
+    allocator = Allocator(Layout("rudder", (rudder,)))
+    group = allocator._whole.method.at(AHEAD).compiled.groups[0][1]  # type: ignore[attr-defined]
+    plant = Plant(Layout("rudder", (rudder,)))
+    turned = np.linspace(-0.3, 0.3, 20_001)[:, None, None] * [1.0, 0.0, 0.0]
+    given, power = plant.wrench(turned, flow=AHEAD), plant.power(turned, flow=AHEAD).sum(axis=-1)
+    rest = plant.wrench(np.zeros((1, 3)), flow=AHEAD)
+    for price in np.random.default_rng(0).normal(size=(40, 6)) * [6.0, 2.0, 2.0, 2.0, 2.0, 2.0]:
+        worth = ((given - rest) @ price - power).max()
+        assert group.worth(price[None])[0, 0] == pytest.approx(worth, rel=1e-6, abs=1e-6)
