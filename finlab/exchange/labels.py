@@ -10,10 +10,11 @@ from finlab.layout.wrench_axes import AXES, Axis
 Frame = Literal["FLU", "FRD"]
 FRAMES: dict[Frame, str] = {"FLU": "x forward, y left, z up", "FRD": "x forward, y right, z down"}
 _FRAME_WORDS: dict[Frame, frozenset[str]] = {
-    "FLU": frozenset("flu enu nwu rep103 rep left port up".split()),
-    "FRD": frozenset("frd ned sname fsd right starboard down".split()),
+    "FLU": frozenset(["flu", "enu", "nwu", "rep103", "rep", "left", "port", "up"]),
+    "FRD": frozenset(["frd", "ned", "sname", "fsd", "right", "starboard", "down"]),
 }
-_FRAME_KEYS = "frame bodyframe convention coordinateframe coordinatesystem referenceframe axesconvention"
+FRAME_KEYS = "frameid frame bodyframe convention coordinateframe "
+FRAME_KEYS += "coordinatesystem referenceframe axesconvention"
 _AXIS_WORDS = {
     "Fx": "fx x surge forcex xforce",
     "Fy": "fy y sway forcey yforce",
@@ -35,6 +36,7 @@ CENTER = "centerofmass centreofmass centerofgravity centreofgravity cog com cg"
 PAIR = "bounds limits range forcelimits thrustlimits forcebounds thrustbounds thrustrange forcerange"
 LEAST = "least min lower minimum minforce minthrust forcemin thrustmin lowerlimit lowerbound fmin tmin"
 MOST = "most max upper maximum maxforce maxthrust forcemax thrustmax upperlimit upperbound fmax tmax"
+LIMIT_KEYS = f"{PAIR} {LEAST} {MOST} {COUNT} {ROWS_OF}"
 LENGTHS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 FORCES = {"n": 1.0, "kn": 1000.0, "kgf": 9.80665, "lbf": 4.4482216}
 DEGREES = {"rad": 1.0, "deg": 57.29577951308232}
@@ -81,7 +83,7 @@ def frame_said(scopes: Iterable[Mapping[str, Any]], comments: Iterable[str]) -> 
         LayoutError: a frame is named by a word that is not known.
     """
     for scope in scopes:
-        key, value, _ = lookup(scope, _FRAME_KEYS)
+        key, value, _ = lookup(scope, FRAME_KEYS.removeprefix("frameid "))
         text = " ".join(map(str, value.values())) if isinstance(value, Mapping) else str(value)
         if key and frame_in(text) is None:
             raise LayoutError(f"is {text!r:.60}, expected {_words()}; or leave it out, and say --frame", key)

@@ -1,7 +1,7 @@
 """Allocation matrices: the wrench of each thruster per unit of its command, from plain values and to text."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,6 +11,7 @@ from finlab.errors import LayoutError
 from finlab.exchange import labels
 from finlab.exchange.exchange import TO_FRD, Exchange
 from finlab.exchange.labels import axis_of, lookup, plain
+from finlab.exchange.limits import Ends, limits_in
 from finlab.exchange.walk import Node, nodes, numbers_in
 from finlab.files.plain_values import yaml_text
 from finlab.layout import Layout, own_effectiveness
@@ -18,19 +19,14 @@ from finlab.layout.wrench_axes import AXES, Axis
 
 UNIT = 0.05
 """A column whose force is this close to 1 holds the wrench per newton."""
-WORDS = frozenset("tam tcm allocation allocator alloc mixer mixing mix effectiveness".split())
+WORDS = "tam tcm allocation allocator alloc mixer mixing mix effectiveness"
 """Words of a key that holds an allocation matrix."""
-BESIDE = frozenset(
-    "matrix thruster thrusters thrust force forces b t configuration config control motor motors".split()
-)
+BESIDE = "matrix thruster thrusters thrust force forces b t configuration config control motor motors"
 """Words that may stand beside `matrix` in such a key."""
-OTHER = frozenset(
-    "mass inertia damping drag added coriolis covariance weight weights gain gains rotation".split()
-)
-INVERSE = frozenset("inverse inv pinv pseudo pseudoinverse".split())
-
-
-CLEAR = frozenset("fx fy fz tx ty tz mx my mz".split())
+OTHER = "mass inertia damping drag added coriolis covariance weight weights gain gains rotation "
+OTHER += "inverse inv pinv pseudo pseudoinverse"
+"""Words of a key that holds another matrix."""
+CLEAR = {"fx", "fy", "fz", "tx", "ty", "tz", "mx", "my", "mz"}
 """Labels that are those of a wrench under any key."""
 
 
@@ -44,6 +40,8 @@ class Matrix(NamedTuple):
     """Names of the thrusters in it; none where it has none."""
     order: str
     """How it was read, as a note says it."""
+    ends: list[Ends | None] | None = None
+    """Limits of the commands that stand in its rows."""
 
 
 def matrices(data: Any, exchange: Exchange, table: bool) -> list[Matrix]:
@@ -63,7 +61,8 @@ def key_words(key: str) -> set[str]:
 def is_allocation(node: Node) -> bool:
     """Whether a node's key is that of an allocation matrix."""
     words = key_words(node.key)
-    return not words & (OTHER | INVERSE) and bool(words & WORDS or ("matrix" in words and words <= BESIDE))
+    known = bool(words & {*WORDS.split()}) or ("matrix" in words and words <= {*BESIDE.split()})
+    return known and not words & {*OTHER.split()}
 
 
 def _matrix(node: Node, exchange: Exchange, table: bool) -> Matrix | None:
@@ -74,6 +73,8 @@ def _matrix(node: Node, exchange: Exchange, table: bool) -> Matrix | None:
         }
         if len(labelled) > 1 and (sure or len({plain(key) for key in value} & CLEAR) > 1):
             return _labelled(node, labelled)
+        if value and all(isinstance(row, Mapping) for row in value.values()):
+            return _of_records(node, {str(key): row for key, row in value.items()}, exchange)
         if not sure or not value:
             return None
         flat = lookup(value, "data")[1]
@@ -84,6 +85,8 @@ def _matrix(node: Node, exchange: Exchange, table: bool) -> Matrix | None:
             names, value = [*map(str, value)], [*value.values()]
         else:
             return None
+    if isinstance(value, list) and value and all(isinstance(row, Mapping) for row in value):
+        return _of_records(node, {f"thruster{i}": row for i, row in enumerate(value, 1)}, exchange)
     if not sure or not isinstance(value, list) or not value:
         return None
     array = numbers_in(value)
@@ -111,6 +114,36 @@ def _labelled(node: Node, labelled: Mapping[Axis, Any]) -> Matrix:
     return Matrix(node, rows, [], "by its labels")
 
 
+def _of_records(node: Node, rows: Mapping[str, Mapping[str, Any]], exchange: Exchange) -> Matrix | None:
+    """A matrix of a mapping for each thruster, by name, that holds its wrench."""
+    held = [
+        {axis: key for key in row if (axis := axis_of(key)) and np.ndim(row[key]) == 0}
+        for row in rows.values()
+    ]
+    first = held[0]
+    if len(first) < 2 or not set(first) & {"Fx", "Fy", "Fz"}:
+        return None
+    keys = {plain(key) for key in first.values()}
+    if {"x", "y"} <= keys and not keys & (CLEAR | {"k", "m", "n"}):
+        raise LayoutError(
+            f"has {', '.join(map(str, first.values()))} of each thruster, which may be its wrench, or its place and "
+            "angles; call them Fx to Tz, or x, y, z and dx, dy, dz",
+            node.words,
+        )
+    columns = []
+    for (name, row), own in zip(rows.items(), held, strict=True):
+        column = numbers_in([row[key] for key in own.values()])
+        if set(own) != set(first) or column is None:
+            raise LayoutError(
+                f"expected numbers {', '.join(first)}, as of the others", f"{node.words}.{name}"
+            )
+        columns.append([row[own[axis]] for axis in first])
+    named = [str(lookup(row, labels.NAME)[1] or name) for name, row in rows.items()]
+    ends = [limits_in(row, 1, exchange)[0] for row in rows.values()]
+    wrenches = dict(zip(first, np.array(columns, np.float64).T, strict=True))
+    return Matrix(node, wrenches, named, "a row per thruster", ends)
+
+
 def _shaped(flat: list[Any], rows: Any, columns: Any, node: Node) -> Any:
     """Numbers in one list with their shape, row by row."""
     array = numbers_in(flat)
@@ -123,7 +156,7 @@ def _shaped(flat: list[Any], rows: Any, columns: Any, node: Node) -> Any:
 
 def _unfolded(array: Array, node: Node) -> Array:
     """A matrix in one list, row by row, of as many columns as there are names."""
-    for scope in node.scopes:
+    for _, scope in node.scopes:
         names, count = (lookup(scope, words)[1] for words in (labels.NAMES, labels.COUNT))
         n = len(names) if isinstance(names, list) else count
         if isinstance(n, int) and n > 0 and array.size % n == 0:
@@ -138,7 +171,7 @@ def _unfolded(array: Array, node: Node) -> Array:
 
 def _of_array(array: Array, names: list[str], node: Node, exchange: Exchange, table: bool) -> Matrix:
     """A matrix whose rows have no labels of their own; keys beside it may name the axes."""
-    said = next((value for scope in node.scopes if (value := lookup(scope, labels.ROWS_OF)[1])), None)
+    said = next((value for _, scope in node.scopes if (value := lookup(scope, labels.ROWS_OF)[1])), None)
     axes = [axis_of(each) for each in said] if isinstance(said, list) else [*AXES]
     known = [axis for axis in axes if axis is not None]
     if len(set(known)) < len(axes):

@@ -9,12 +9,12 @@ from finlab.arrays import Array
 from finlab.errors import LayoutError
 from finlab.exchange import labels
 from finlab.exchange.exchange import TO_FRD, Exchange
-from finlab.exchange.labels import FRAMES, axis_of, frame_said, lookup
+from finlab.exchange.labels import FRAMES, frame_said, lookup
 from finlab.exchange.limits import Ends, limits_in
 from finlab.exchange.matrix import UNIT, Matrix, matrices
 from finlab.exchange.per_thruster import Row, lists_in, records_in, thruster_of
-from finlab.exchange.walk import Node, nodes, numbers_in, unread
-from finlab.layout import MAX_ACTUATORS, Layout, Thruster
+from finlab.exchange.walk import Node, Path, nodes, numbers_in, unread
+from finlab.layout import MAX_ACTUATORS, Layout
 from finlab.layout.wrench_axes import AXES
 
 Comments = Sequence[str]
@@ -64,7 +64,7 @@ def _nothing(data: Any) -> str:
 
 def _frd(node: Node, exchange: Exchange, comments: Comments) -> bool:
     """Whether the file is in x forward, y right, z down; the note says why."""
-    frame, where = frame_said(node.scopes, comments)
+    frame, where = frame_said([scope for _, scope in node.scopes], comments)
     if exchange.frame and frame and exchange.frame != frame:
         exchange.note(f"It says {where}; --frame {exchange.frame} was taken in its stead.")
     elif exchange.frame is None and frame:
@@ -78,8 +78,6 @@ def _of_rows(
     node: Node, rows: dict[str, Row], data: Any, name: str, exchange: Exchange, comments: Comments
 ) -> Layout:
     """The layout of thrusters by place and direction."""
-    if isinstance(node.value, Mapping):
-        node = Node(node.path, node.value, (node.value, *node.scopes))
     frd, center, used = _frd(node, exchange, comments), np.zeros(3), {node.path}
     for each in nodes(data) if exchange.origin == "gravity" else ():
         at = (
@@ -94,12 +92,12 @@ def _of_rows(
     exchange.note(f"{node.words} was read: places in m, directions, limits in N.")
     if len(rows) > MAX_ACTUATORS:
         raise LayoutError(f"expected up to {MAX_ACTUATORS} thrusters, got {len(rows)}", node.words)
-    shared = next((pair for scope in node.scopes if (pair := limits_in(scope, 1, exchange)[0])), None)
+    shared = next((pair for _, scope in node.scopes[:2] if (pair := limits_in(scope, 1, exchange)[0])), None)
     parts = []
     for key, row in rows.items():
         own = row if shared is None or limits_in(row, 1, exchange)[0] else {**row, "limits": list(shared)}
         parts.append(thruster_of(key, own, frd, center, exchange))
-    _say_unread(data, used, exchange)
+    _say_unread(data, used, node, exchange)
     return Layout(name, tuple(parts))
 
 
@@ -108,8 +106,6 @@ def _of_matrix(matrix: Matrix, data: Any, name: str, exchange: Exchange, comment
     node, n = matrix.node, len(next(iter(matrix.rows.values())))
     if n > MAX_ACTUATORS:
         raise LayoutError(f"expected up to {MAX_ACTUATORS} columns, got {n}")
-    if isinstance(node.value, Mapping):
-        node = Node(node.path, node.value, (node.value, *node.scopes))
     columns = np.stack([matrix.rows.get(axis, np.zeros(n)) for axis in AXES])
     unit = "N and N m" if _per_newton(columns) else "N and N m at a command of 1"
     exchange.note(f"{matrix.node.words} was read, {matrix.order}, in {unit}.")
@@ -117,14 +113,14 @@ def _of_matrix(matrix: Matrix, data: Any, name: str, exchange: Exchange, comment
         columns = columns * TO_FRD
     used = {matrix.node.path}
     names = matrix.names or _names(node, n, used)
-    ends = _ends(data, node, names, used, exchange)
+    ends = matrix.ends or _ends(data, node, names, used, exchange)
     if not any(ends) and not _per_newton(columns):
         exchange.note("It has no limits: commands are taken to go from -1 to 1 (--force LEAST MOST).")
         ends = [(-1.0, 1.0)] * n
     missing = [axis for axis in AXES if axis not in matrix.rows]
     if missing:
         exchange.note(f"It has no row {', '.join(missing)}: 0 is taken there, and not commanded (`axes`).")
-    _say_unread(data, used, exchange)
+    _say_unread(data, used, node, exchange)
     parts = tuple(exchange.of_column(*each) for each in zip(names, columns.T, ends, strict=True))
     return Layout(name, parts, axes=tuple(axis for axis in AXES if axis in matrix.rows))
 
@@ -133,25 +129,23 @@ def _per_newton(columns: Array) -> bool:
     return bool((np.abs(np.linalg.norm(columns[:3], axis=0) - 1.0) <= UNIT).all())
 
 
-def _names(node: Node, n: int, used: set[tuple[str, ...]]) -> list[str]:
+def _names(node: Node, n: int, used: set[Path]) -> list[str]:
     """Names of a matrix's thrusters from the nearest mapping around it that has some."""
-    for depth, scope in enumerate(node.scopes):
+    for path, scope in node.scopes:
         key, names, _ = lookup(scope, labels.NAMES)
         if isinstance(names, list) and all(isinstance(each, str | int) for each in names):
             if len(names) != n:
                 raise LayoutError(
                     f"expected a name, and least and most command, for each of {n} columns", key or "names"
                 )
-            used.add((*node.path[: len(node.scopes) - depth - 1], key))
+            used.add((*path, key))
             return [*map(str, names)]
     return [f"thruster{i + 1}" for i in range(n)]
 
 
-def _ends(
-    data: Any, node: Node, names: list[str], used: set[tuple[str, ...]], exchange: Exchange
-) -> list[Ends | None]:
+def _ends(data: Any, node: Node, names: list[str], used: set[Path], exchange: Exchange) -> list[Ends | None]:
     """Limits of a matrix's thrusters: around it, or in any mapping that names one of them."""
-    for scope in node.scopes:
+    for _, scope in node.scopes[:2]:
         ends = limits_in(scope, len(names), exchange)
         if any(ends):
             return ends
@@ -172,7 +166,12 @@ def _ends(
     return [known.get(name) for name in names]
 
 
-def _say_unread(data: Any, used: set[tuple[str, ...]], exchange: Exchange) -> None:
-    keys = [key for key in unread(data, used).split(", ") if key and axis_of(key) is None]
+def _say_unread(data: Any, used: set[Path], node: Node, exchange: Exchange) -> None:
+    """A note on the keys that were not read."""
+    around = [(path, scope, labels.FRAME_KEYS) for path, scope in node.scopes]
+    around += [(path, scope, labels.LIMIT_KEYS) for path, scope in node.scopes[:2]]
+    for path, scope, words in around:
+        used |= {(*path, key) for key in scope if lookup({key: 0}, words, labels.FORCES)[0]}
+    keys = unread(data, used)
     if keys:
-        exchange.note(f"Not read: {', '.join(keys)}.")
+        exchange.note(f"Not read: {keys}.")

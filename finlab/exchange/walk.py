@@ -1,6 +1,6 @@
 """All places in plain values, and which of them were read."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,12 +11,17 @@ MOST = 300
 """Most characters of a list of keys."""
 
 
-class Node(NamedTuple):
-    """A value, the keys that lead to it, and the mappings around it, the innermost first."""
+Path = tuple[str, ...]
 
-    path: tuple[str, ...]
+
+class Node(NamedTuple):
+    """A value in plain values."""
+
+    path: Path
+    """The keys that lead to it."""
     value: Any
-    scopes: tuple[Mapping[str, Any], ...]
+    scopes: tuple[tuple[Path, Mapping[str, Any]], ...]
+    """The mappings around it and their paths, the innermost first; a mapping itself is the first."""
 
     @property
     def key(self) -> str:
@@ -30,26 +35,20 @@ class Node(NamedTuple):
 
 
 def nodes(data: Any) -> Iterator[Node]:
-    """Yields all mappings, lists and values in plain values, outer ones first; numbers in lists stay there."""
-    waiting = [Node((), data, ())]
+    """Yields all mappings, lists and values in plain values, outer ones first, but no numbers in lists."""
+    waiting: list[Node] = [Node((), data, ())]
     while waiting:
-        node = waiting.pop()
-        yield node
-        if isinstance(node.value, Mapping):
-            inner = [
-                Node((*node.path, key), each, (node.value, *node.scopes)) for key, each in node.value.items()
-            ]
-            waiting += reversed(inner)
-        elif isinstance(node.value, list):
-            inner = [
-                Node((*node.path, f"[{i}]"), each, node.scopes)
-                for i, each in enumerate(node.value)
-                if isinstance(each, Mapping | list)
-            ]
-            waiting += reversed(inner)
+        path, value, scopes = waiting.pop()
+        inner: Iterable[tuple[str, Any]] = ()
+        if isinstance(value, Mapping):
+            scopes, inner = ((path, value), *scopes), value.items()
+        elif isinstance(value, list):
+            inner = ((f"[{i}]", each) for i, each in enumerate(value) if isinstance(each, Mapping | list))
+        yield Node(path, value, scopes)
+        waiting += [Node((*path, key), each, scopes) for key, each in [*inner][::-1]]
 
 
-def unread(data: Any, used: set[tuple[str, ...]]) -> str:
+def unread(data: Any, used: set[Path]) -> str:
     """Returns the keys of values that lie below none that were used, with commas between."""
     keys = [
         node.words
