@@ -37,8 +37,8 @@ class Exchange:
     """What the rows of a matrix without labels are, where it may be both."""
     model: str | None = None
     """Name of the model to take from a robot description of several; the first with thrusters when None."""
-    folder: Path | None = None
-    """Folder of the file; None for a file from a browser, which may open no other."""
+    path: Path | None = None
+    """The file; None for one from a browser, which may open no other."""
     notes: list[str] = field(default_factory=list)
     """Sentences."""
 
