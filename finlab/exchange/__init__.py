@@ -3,5 +3,5 @@
 from finlab.exchange.convert import FOREIGN as FOREIGN
 from finlab.exchange.convert import convert as convert
 from finlab.exchange.convert import read_any as read_any
-from finlab.exchange.convert import read_foreign as read_foreign
+from finlab.exchange.convert import read_robot as read_robot
 from finlab.exchange.exchange import Exchange as Exchange

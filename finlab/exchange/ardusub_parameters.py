@@ -13,9 +13,8 @@ CONFIGURED = (
     "BLUEROV1 VECTORED VECTORED_6DOF VECTORED_6DOF_90DEG SIMPLEROV_3 SIMPLEROV_4 SIMPLEROV_5".split()  # noqa: SIM905
 )
 """Frames by FRAME_CONFIG; 7 is a frame of one's own, in the firmware or a script."""
-SIGNS_OF_ARDUPILOT = re.compile(
-    r"^[\s\d]*(?:FRAME_C(?:ONFIG|LASS)|MOT_\w+|SYSID_THISMAV|SERVO\d+_FUNCTION)\b", re.M
-)
+OF_ARDUPILOT = re.compile(r"^[ \t\d]{0,20}(?:FRAME_C(?:ONFIG|LASS)|MOT_\w+|SYSID_THISMAV)\b", re.MULTILINE)
+"""A line by which parameters of ArduPilot are known."""
 
 
 def read_ardusub_parameters(text: str, name: str, exchange: Exchange) -> Layout:

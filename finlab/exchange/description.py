@@ -68,15 +68,14 @@ class Description:
     """Names of what it includes, which is not read."""
 
 
-def parse_description(text: str, name: str, drives: Drives, exchange: Exchange) -> Description:
-    """Returns what a URDF or SDF text says; `name` is what the robot is called where it has none.
+def parse_description(root: Element, name: str, drives: Drives, exchange: Exchange) -> Description:
+    """Returns what the outermost element of URDF or SDF says; `name` is what the robot is called where it has none.
 
     Of several models it is the one that `exchange` names, or the first whose plugins are such as `drives` knows.
 
     Raises:
         LayoutError: it is neither, it uses what is not allowed, or something in it is missing or no number.
     """
-    root = root_of(text)
     if is_xacro(root):
         root = root_of(expanded(exchange.path))
         exchange.note("It was expanded by xacro.")
