@@ -61,6 +61,8 @@ def key_words(key: str) -> set[str]:
 def is_allocation(node: Node) -> bool:
     """Whether a node's key is that of an allocation matrix."""
     words = key_words(node.key)
+    if not node.path or node.path[-1].startswith("["):
+        return False
     known = bool(words & {*WORDS.split()}) or ("matrix" in words and words <= {*BESIDE.split()})
     return known and not words & {*OTHER.split()}
 

@@ -142,7 +142,12 @@ def _split(row: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
 
 
 def _place(row: Row) -> bool:
-    return bool(lookup(row, labels.POSITION, labels.LENGTHS)[0])
+    return _short(lookup(row, labels.POSITION, labels.LENGTHS)[1])
+
+
+def _short(value: Any) -> bool:
+    """Whether a value may be a vector of one thruster."""
+    return isinstance(value, Mapping | str) or (isinstance(value, list) and len(value) < 6)
 
 
 def _points(row: Row) -> bool:
@@ -152,8 +157,11 @@ def _points(row: Row) -> bool:
         LayoutError: it may be a direction as well as angles.
     """
     key, value, _ = lookup(row, labels.UNCLEAR)
-    told = bool(lookup(row, labels.DIRECTION)[0] or lookup(row, labels.ANGLES, labels.DEGREES)[0])
-    if key and not told and _place(row) and np.size(value) == 3:
+    told = any(
+        _short(lookup(row, words, units)[1])
+        for words, units in ((labels.DIRECTION, None), (labels.ANGLES, labels.DEGREES))
+    )
+    if key and not told and _place(row) and _short(value):
         raise LayoutError(
             "may be a direction, or roll, pitch and yaw; call it `direction`, or `rpy` in radians", key
         )
