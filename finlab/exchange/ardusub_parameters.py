@@ -20,7 +20,7 @@ OF_ARDUPILOT = re.compile(r"^[ \t\d]{0,20}(?:FRAME_C(?:ONFIG|LASS)|MOT_\w+|SYSID
 def read_ardusub_parameters(text: str, name: str, exchange: Exchange) -> Layout:
     """Returns the layout, called `name`, of the frame in a list of parameters.
 
-    A motor of MOT_n_DIRECTION -1 turns the other way for the same output, so that it pushes as its frame says.
+    MOT_n_DIRECTION -1 turns a motor the other way for the same output, so that it pushes as its frame says.
 
     Raises:
         LayoutError: FRAME_CONFIG is not in it, or names a frame of one's own; a value is no number.
@@ -30,13 +30,13 @@ def read_ardusub_parameters(text: str, name: str, exchange: Exchange) -> Layout:
     if config is None:
         other = " of another vehicle (FRAME_CLASS)" if "FRAME_CLASS" in values else ""
         raise LayoutError(
-            f"holds {len(values)} parameters of ArduPilot{other}, but no FRAME_CONFIG, by which ArduSub names the "
-            "motors of a robot"
+            f"holds {len(values)} parameters of ArduPilot{other}, but no FRAME_CONFIG, by which ArduSub names "
+            "the motors of a robot"
         )
     if config not in range(len(CONFIGURED)):
         raise LayoutError(
-            f"is {config:g}, a frame of one's own, which parameters do not hold; give the script (.lua) or source "
-            f"with its motors; finlab knows {', '.join(f'{i} {each}' for i, each in enumerate(CONFIGURED))}",
+            f"is {config:g}, a frame of one's own, which parameters do not hold; give the script (.lua) or "
+            f"source with its motors; finlab knows {', '.join(f'{i} {each}' for i, each in enumerate(CONFIGURED))}",
             "FRAME_CONFIG",
         )
     frame = CONFIGURED[int(config)]
@@ -49,7 +49,7 @@ def read_ardusub_parameters(text: str, name: str, exchange: Exchange) -> Layout:
         turned += [str(i)] if sign < 0 else []
     if turned:
         exchange.note(
-            f"MOT_n_DIRECTION reverses the outputs of motors {', '.join(turned)}, so that they push as the frame says: "
-            "forces of the layout are those of the frame."
+            f"MOT_n_DIRECTION reverses the outputs of motors {', '.join(turned)}, so that they push as the "
+            "frame says: forces of the layout are those of the frame."
         )
     return of_factors(name, [f"motor{i}" for i in range(1, n + 1)], FRAMES[frame], exchange)

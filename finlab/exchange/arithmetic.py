@@ -19,8 +19,8 @@ _FUNCTIONS: dict[str, Callable[[float], float]] = {
 }  # fmt: skip
 _SUFFIX = re.compile(r"(?<![\w.])(\d+\.?\d*(?:[eE][-+]?\d+)?|\.\d+(?:[eE][-+]?\d+)?)[fFlL]\b")
 _DEFINED = re.compile(
-    r"^[ \t]*(?:#[ \t]*define[ \t]+(\w+)[ \t]+(?!\()|(?:(?:static|const|constexpr|local|float|double)[ \t]+)+(\w+)"
-    r"[ \t]*=[ \t]*)([^;\n/]{1,200})",
+    r"^[ \t]*(?:#[ \t]*define[ \t]+(\w+)[ \t]+(?!\()"
+    r"|(?:(?:static|const|constexpr|local|float|double)[ \t]+)+(\w+)[ \t]*=[ \t]*)([^;\n]{1,200})",
     re.MULTILINE,
 )
 
@@ -53,7 +53,7 @@ def constants_in(text: str) -> dict[str, float]:
         name = found[1] or found[2]
         twice |= {name} & values.keys()
         try:
-            values[name] = value_of(found[3].partition("--")[0], values)
+            values[name] = value_of(found[3], values)
         except ValueError:
             continue
     return {name: value for name, value in values.items() if name not in twice}

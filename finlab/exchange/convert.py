@@ -42,8 +42,8 @@ PARAMETERS = (".params", ".parm", ".param")
 FOREIGN = (".urdf", ".sdf", ".world", ".xacro", ".scn", *PARAMETERS, *PROGRAMS)
 """Suffixes of robot descriptions, and of what autopilots read; their content says what they hold."""
 UNKNOWN = (
-    "holds none of the forms that are read: a layout, a robot description (URDF, SDF, Stonefish), parameters of "
-    "PX4 or ArduSub, motors of ArduSub, thrusters or a matrix in YAML, JSON or CSV"
+    "holds none of the forms that are read: a layout, a robot description (URDF, SDF, Stonefish), parameters "
+    "of PX4 or ArduSub, motors of ArduSub, thrusters or a matrix in YAML, JSON or CSV"
 )
 
 
@@ -122,11 +122,9 @@ def _read_lines(text: str, name: str, suffix: str, exchange: Exchange) -> Layout
         return read_plain(plain_of(table), name, exchange, table.comments, table=True)
     if suffix in PARAMETERS and (values := read_parameters(text, "")):
         raise LayoutError(
-            f"holds {len(values)} parameters of an autopilot, but neither CA_ROTOR_COUNT (PX4) nor FRAME_CONFIG "
-            "(ArduSub), by which they name thrusters"
+            f"holds {len(values)} parameters of an autopilot, but neither CA_ROTOR_COUNT (PX4) nor "
+            "FRAME_CONFIG (ArduSub), by which they name thrusters"
         )
     if suffix in PROGRAMS:
-        raise LayoutError(
-            "is a program without a call of add_motor_raw_6dof, the form in which ArduSub adds motors"
-        )
+        raise LayoutError("is a program without a call of add_motor_raw_6dof, by which ArduSub adds motors")
     return None

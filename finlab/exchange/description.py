@@ -69,9 +69,9 @@ class Description:
 
 
 def parse_description(root: Element, name: str, drives: Drives, exchange: Exchange) -> Description:
-    """Returns what the outermost element of URDF or SDF says; `name` is what the robot is called where it has none.
+    """Returns what the outermost element of URDF or SDF says; `name` is the robot's where it has none.
 
-    Of several models it is the one that `exchange` names, or the first whose plugins are such as `drives` knows.
+    Of several models it is the one that `exchange` names, or the first with a plugin that `drives` a thruster.
 
     Raises:
         LayoutError: it is neither, it uses what is not allowed, or something in it is missing or no number.
@@ -161,15 +161,18 @@ def _pose(part: Element) -> Array:
     if quaternion and not values[3:].any():
         raise LayoutError(f"{what} has a quaternion without length")
     degrees = found is not None and found.get("degrees") == "true"
-    turn = Rotation.from_quat(values[3:]) if quaternion else Rotation.from_euler("xyz", values[3:], degrees)
     pose = np.eye(4)
-    pose[:3, :3], pose[:3, 3] = turn.as_matrix(), values[:3]
+    pose[:3, 3] = values[:3]
+    if not values[3:].any():
+        return pose
+    turn = Rotation.from_quat(values[3:]) if quaternion else Rotation.from_euler("xyz", values[3:], degrees)
+    pose[:3, :3] = turn.as_matrix()
     return pose
 
 
 def _placed(hung: dict[str, tuple[str, Array]], included: list[str]) -> dict[str, Array]:
-    """Poses (4, 4) of frames in the description's own, from what each hangs on and its pose there; without those
-    that hang on what is included."""
+    """Poses (4, 4) of frames in the description's own, from what each hangs on and its pose there; without
+    those that hang on what is included."""
     poses, lost = {"": np.eye(4)}, set()
     outside = tuple(f"{name}::" for name in included)
     try:
@@ -216,7 +219,7 @@ def _joint(scope: str, part: Element, named: Named, poses: dict[str, Array], old
 
 
 def _link(scope: str, name: str, named: Named) -> str:
-    """The name of a link as the whole description has it; a frame stands for the link that it is attached to."""
+    """The name of a link with its scope; a frame stands for the link that it is attached to."""
     for _ in range(20):
         key = _key(scope, name, named)
         if not key.startswith("frame "):

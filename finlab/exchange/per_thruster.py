@@ -147,7 +147,9 @@ def _place(row: Row) -> bool:
 
 def _short(value: Any) -> bool:
     """Whether a value may be a vector of one thruster."""
-    return isinstance(value, Mapping | str) or (isinstance(value, list) and len(value) < 6)
+    return isinstance(value, Mapping | str) or (
+        isinstance(value, list) and len(value) < 6 and not any(isinstance(each, list) for each in value)
+    )
 
 
 def _points(row: Row) -> bool:

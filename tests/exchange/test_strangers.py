@@ -141,12 +141,19 @@ def test_motors_of_programs_and_lists_are_the_same() -> None:
     calls = [f"add_motor_raw_6dof({{}}{i}, 0, 0, {yaw}, 0, {ahead}, 0, {i + 1})" for i, (yaw, ahead) in enumerate(
         [("-SIDE", "cosf(radians(60))"), ("0.25f * 2", "5e-1f"), ("-0.5", "-0.5"), (".5", "-.5")])]  # fmt: skip
     cpp = "static const float SIDE = 0.5f;\nvoid add_motor_raw_6dof(int8_t n, float roll);\n/* add_motor_raw_6dof(\n */\n"
-    cpp += ";\n".join(call.format("AP_MOTORS_MOT_") for call in calls).replace("MOT_3", "MOT_4").replace("MOT_2", "MOT_3")
+    cpp += (
+        ";\n".join(call.format("AP_MOTORS_MOT_") for call in calls)
+        .replace("MOT_3", "MOT_4")
+        .replace("MOT_2", "MOT_3")
+    )
     cpp = cpp.replace("MOT_1, 0, 0, 0.25", "MOT_2, 0, 0, 0.25").replace("MOT_0", "MOT_1")
-    lua = "local SIDE = 1 / 2\n" + "\n".join(f"motors:{call}".format("") for call in calls).replace("cosf", "math.cos")
+    lua = "local SIDE = 1 / 2\n" + "\n".join(f"motors:{call}".format("") for call in calls).replace(
+        "cosf", "math.cos"
+    )
     lua = lua.replace("radians", "math.rad").replace("0.25f", "0.25").replace("5e-1f", "5e-1")
     csv = "lateral,forward,throttle,yaw,pitch,roll,motor\n" + "\n".join(
-        f"0,{ahead},1e-20,{yaw},0,0,{i}" for i, (yaw, ahead) in enumerate([(-5e-1, 0.5), (0.5, 0.5), (-0.5, -0.5), (0.5, -0.5)], 1)
+        f"0,{ahead},1e-20,{yaw},0,0,{i}"
+        for i, (yaw, ahead) in enumerate([(-5e-1, 0.5), (0.5, 0.5), (-0.5, -0.5), (0.5, -0.5)], 1)
     )
     (one, _), (two, _), (three, _) = read("a.cpp", cpp), read("a.lua", lua), read("a.csv", csv)
     assert one.names == two.names == three.names == ("motor1", "motor2", "motor3", "motor4")
@@ -154,7 +161,13 @@ def test_motors_of_programs_and_lists_are_the_same() -> None:
     np.testing.assert_allclose(columns(one), columns(three), atol=1e-12)
 
 
-@pytest.mark.parametrize("text", ["FRAME_CONFIG,1.000000\nMOT_2_DIRECTION,-1", "# Vehicle-Id\n1 1 FRAME_CONFIG 1 6\n1\t1\tMOT_2_DIRECTION\t-1\t6"])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "FRAME_CONFIG,1.000000\nMOT_2_DIRECTION,-1",
+        "# Vehicle-Id\n1 1 FRAME_CONFIG 1 6\n1\t1\tMOT_2_DIRECTION\t-1\t6",
+    ],
+)
 def test_parameters_of_ardusub_name_a_frame(text: str) -> None:
     layout, notes = read("a.params", text)
     assert layout.n == 6 and "frame VECTORED" in notes and "motors 2," in notes
@@ -181,9 +194,18 @@ def test_models_inside_models_and_names_of_others() -> None:
     np.testing.assert_allclose(layout.position[0], [0.4, -0.4, 0], atol=1e-12)
 
 
-@pytest.mark.parametrize(("version", "told", "axis"), [("1.6", "", (0, 1, 0)), ("1.6", "<use_parent_model_frame>1</use_parent_model_frame>", (1, 0, 0)), ("1.4", "", (1, 0, 0))])
+@pytest.mark.parametrize(
+    ("version", "told", "axis"),
+    [
+        ("1.6", "", (0, 1, 0)),
+        ("1.6", "<use_parent_model_frame>1</use_parent_model_frame>", (1, 0, 0)),
+        ("1.4", "", (1, 0, 0)),
+    ],
+)
 def test_axes_in_the_frame_of_the_model(version: str, told: str, axis: tuple[float, ...]) -> None:
-    turned = SCREW.replace("-0.4 0 0 0 0 0", "-0.4 0 0 0 0 1.5707963267948966").replace("</xyz>", f"</xyz>{told}")
+    turned = SCREW.replace("-0.4 0 0 0 0 0", "-0.4 0 0 0 0 1.5707963267948966").replace(
+        "</xyz>", f"</xyz>{told}"
+    )
     layout, _ = read("a.sdf", sdf(turned + THRUSTER, version))
     np.testing.assert_allclose(layout.actuators[0].frame[0], axis, atol=1e-12)
 
@@ -217,8 +239,14 @@ def test_uuv_simulator(tmp_path: Path) -> None:
         layout, notes = read("a.urdf", urdf(more))
         np.testing.assert_allclose([layout.lower[0, 0], layout.upper[0, 0]], force)
         assert "uuv_thruster of t" in notes
-    layout, _ = read("a.urdf", urdf("", "<type>fossen</type><linear_damping>-1 -2 -3 -4 -5 -6</linear_damping>"))
-    assert layout.body is not None and layout.body.linear_damping == (1, 2, 3, 4, 5, 6) and layout.body.added_mass is None
+    layout, _ = read(
+        "a.urdf", urdf("", "<type>fossen</type><linear_damping>-1 -2 -3 -4 -5 -6</linear_damping>")
+    )
+    assert (
+        layout.body is not None
+        and layout.body.linear_damping == (1, 2, 3, 4, 5, 6)
+        and layout.body.added_mass is None
+    )
 
 
 def test_stonefish_looks_right_and_down() -> None:
@@ -235,8 +263,14 @@ def test_stonefish_looks_right_and_down() -> None:
 def test_xacro_is_expanded_where_it_is_installed(tmp_path: Path) -> None:
     pytest.importorskip("xacro")
     path = tmp_path / "a.xacro"
-    text = (Path(__file__).parent / "bluerov2_heavy.urdf").read_text().replace("<robot ", '<robot xmlns:xacro="http://ros.org/wiki/xacro" ')
-    path.write_text(text.replace("</robot>", '<xacro:property name="a" value="2"/><link name="b${a*2}"/></robot>'))
+    text = (
+        (Path(__file__).parent / "bluerov2_heavy.urdf")
+        .read_text()
+        .replace("<robot ", '<robot xmlns:xacro="http://ros.org/wiki/xacro" ')
+    )
+    path.write_text(
+        text.replace("</robot>", '<xacro:property name="a" value="2"/><link name="b${a*2}"/></robot>')
+    )
     assert read_any(str(path), Exchange()).n == 8
     path.write_text(text.replace("</robot>", '<link name="${nobody}"/></robot>'))
     with pytest.raises(LayoutError, match="xacro refuses: .*nobody"):
