@@ -92,8 +92,8 @@ def convert_layout(
         thrusters: links that are thrusters although no plugin drives them.
         origin: where the layout's origin goes: the centre of gravity of all links, or the root link's frame.
         force: least and most force [N] of every thruster, in place of the file's.
-        frame: frame of a matrix or of places: x forward, and y left, z up (FLU) or y right, z down (FRD); what the
-            file says, else FLU, by default.
+        frame: frame of a matrix or of places: x forward, and y left, z up (FLU) or y right, z down (FRD);
+            what the file says, else FLU, by default.
         rows: what the rows of a matrix without labels are, where they may be both.
         model: which model of a description of several; the first with thrusters by default.
     """

@@ -30,13 +30,13 @@ def read_ardusub_parameters(text: str, name: str, exchange: Exchange) -> Layout:
     if config is None:
         other = " of another vehicle (FRAME_CLASS)" if "FRAME_CLASS" in values else ""
         raise LayoutError(
-            f"holds {len(values)} parameters of ArduPilot{other}, but no FRAME_CONFIG, by which ArduSub names "
-            "the motors of a robot"
+            f"holds {len(values)} parameters of ArduPilot{other}, but no FRAME_CONFIG, by which ArduSub "
+            "names the motors of a robot"
         )
     if config not in range(len(CONFIGURED)):
         raise LayoutError(
             f"is {config:g}, a frame of one's own, which parameters do not hold; give the script (.lua) or "
-            f"source with its motors; finlab knows {', '.join(f'{i} {each}' for i, each in enumerate(CONFIGURED))}",
+            f"source with its motors; finlab knows 0 to 6: {', '.join(CONFIGURED)}",
             "FRAME_CONFIG",
         )
     frame = CONFIGURED[int(config)]

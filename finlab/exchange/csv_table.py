@@ -70,7 +70,9 @@ def plain_of(table: Table) -> dict[str, Any]:
 
 def _by_axis(header: list[str], rows: Sequence[Row]) -> dict[str, Any]:
     """A row for each axis, and perhaps the least and most commands."""
-    width, matrix, ends = len(header or rows[0][1]) - 1, {}, {}
+    width = len(header or rows[0][1]) - 1
+    matrix: dict[str, list[float]] = {}
+    ends: dict[str, list[float]] = {}
     for row in rows:
         label, cells = row[1][0], _numbers(row, row[1][1:], width)
         key = axis_of(label) or ("least" if plain(label) in LEAST else "most" if plain(label) in MOST else "")

@@ -71,7 +71,7 @@ class Description:
 def parse_description(root: Element, name: str, drives: Drives, exchange: Exchange) -> Description:
     """Returns what the outermost element of URDF or SDF says; `name` is the robot's where it has none.
 
-    Of several models it is the one that `exchange` names, or the first with a plugin that `drives` a thruster.
+    Of several models it is the one that `exchange` names, or the first with a plugin that `drives` one.
 
     Raises:
         LayoutError: it is neither, it uses what is not allowed, or something in it is missing or no number.
@@ -214,8 +214,8 @@ def _joint(scope: str, part: Element, named: Named, poses: dict[str, Array], old
     except ValueError:
         raise LayoutError(f"a limit of {what} is no number") from None
     ends = (low, high) if max(abs(low), abs(high)) < 1e9 else (-math.inf, math.inf)
-    names = (_link(scope, said(part, path), named) for path in ("parent@link parent", "child@link child"))
-    return Joint(name, kind, *names, place, axis / (length or 1.0), ends)
+    parent, child = (_link(scope, said(part, f"{end}@link {end}"), named) for end in ("parent", "child"))
+    return Joint(name, kind, parent, child, place, axis / (length or 1.0), ends)
 
 
 def _link(scope: str, name: str, named: Named) -> str:

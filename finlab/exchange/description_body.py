@@ -94,9 +94,7 @@ def _of_gz(plugin: Element, known: Known, exchange: Exchange) -> None:
         read |= set(told)
         _keep(known, field, told, tags, exchange)
     if not read:
-        exchange.note(
-            "Its plugin Hydrodynamics holds no derivatives that are known: added mass and damping are unknown."
-        )
+        exchange.note("Hydrodynamics holds no derivatives by known tags: added mass and damping are unknown.")
     others = [
         each.tag for each in plugin if each.tag not in read and each.tag not in ("link_name", "water_density")
     ]

@@ -23,11 +23,7 @@ def expanded(path: Path | None) -> str:
             expanding opens other files.
     """
     if path is None or find_spec("xacro") is None:
-        why = (
-            "`finlab layout convert` expands it"
-            if path is None
-            else "install it: pip install finlab-marine[xacro]"
-        )
+        why = "`finlab layout convert` expands it" if path is None else "pip install finlab-marine[xacro]"
         raise LayoutError(
             f"is a xacro file, not a robot description; run `xacro FILE > robot.urdf` first ({why})"
         )

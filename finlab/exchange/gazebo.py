@@ -31,7 +31,7 @@ BESIDE = 0.01
 
 
 def read_description(text: str, name: str, exchange: Exchange) -> Layout:
-    """Returns the layout in a URDF, SDF or Stonefish text; `name` is what it is called where the text has none.
+    """Returns the layout in a URDF, SDF or Stonefish text; `name` is its name where the text has none.
 
     Raises:
         LayoutError: it cannot be read, lacks a link or joint, or nothing in it is an actuator.
@@ -51,12 +51,11 @@ def read_description(text: str, name: str, exchange: Exchange) -> Layout:
     pushing += [(_joint_of(robot, link), Element("plugin")) for link in exchange.thrusters]
     parts: list[Actuator] = [_propeller(robot, joint, plugin, start, exchange) for joint, plugin in pushing]
     parts += [_fin(_joint_of(robot, link), start, exchange) for link in exchange.fins]
-    left = {
-        plugin.get("filename") or plugin.get("name", "") for _, plugin in robot.plugins if not _known(plugin)
-    }
+    others = [plugin for _, plugin in robot.plugins if not _known(plugin)]
+    left = dict.fromkeys(plugin.get("filename") or plugin.get("name", "") for plugin in others)
     if not parts:
         raise LayoutError(
-            "has no plugin Thruster of gz-sim or uuv_simulator; name the links that are fins (--fins LINK...) or "
+            "has no thruster's plugin of gz-sim or uuv; name the links that are fins (--fins LINK...) or "
             f"thrusters (--thrusters LINK...); a joint moves {_moved(robot)}; its plugins: {_listed(left)}"
         )
     if left:

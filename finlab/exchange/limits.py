@@ -14,7 +14,7 @@ Ends = tuple[float, float]
 
 
 def limits_in(values: Mapping[str, Any], n: int, exchange: Exchange) -> list[Ends | None]:
-    """Returns least and most [N, or of a command] of each of n thrusters in a mapping; None where it says none.
+    """Returns least and most [N, or of a command] of each of n thrusters in a mapping; None where unsaid.
 
     One pair, or one number of each, is for all. A most alone is for both ways.
 

@@ -128,8 +128,8 @@ def _of_records(node: Node, rows: Mapping[str, Mapping[str, Any]], exchange: Exc
     keys = {plain(key) for key in first.values()}
     if {"x", "y"} <= keys and not keys & (CLEAR | {"k", "m", "n"}):
         raise LayoutError(
-            f"has {', '.join(map(str, first.values()))} of each thruster, which may be its wrench, or its place and "
-            "angles; call them Fx to Tz, or x, y, z and dx, dy, dz",
+            f"has {', '.join(map(str, first.values()))} of each thruster, which may be its wrench, or its "
+            "place and angles; call them Fx to Tz, or x, y, z and dx, dy, dz",
             node.words,
         )
     columns = []
@@ -165,8 +165,8 @@ def _unfolded(array: Array, node: Node) -> Array:
             return array.reshape(-1, n)
     shapes = ", ".join(f"{k} rows of {array.size // k}" for k in range(2, 7) if array.size % k == 0)
     raise LayoutError(
-        f"is {array.size} numbers in one list, which may be {shapes or 'of any shape'}; write a list per axis, or "
-        "the names of the thrusters beside it",
+        f"is {array.size} numbers in one list, which may be {shapes or 'of any shape'}; write a list "
+        "per axis, or the names of the thrusters beside it",
         node.words,
     )
 
@@ -181,22 +181,22 @@ def _of_array(array: Array, names: list[str], node: Node, exchange: Exchange, ta
     by_axes, by_thrusters = len(array) == len(axes), array.shape[1] == len(axes)
     if not by_axes and not by_thrusters:
         raise LayoutError(
-            f"is {len(array)} rows of {array.shape[1]} numbers, expected six rows, or beside them `axes` with a name "
-            "for each (Fx, Fy, Tz), or rows with labels",
+            f"is {len(array)} rows of {array.shape[1]} numbers, expected six rows, or beside them "
+            "`axes` with a name for each (Fx, Fy, Tz), or rows with labels",
             node.words,
         )
     if by_axes and by_thrusters and not names and exchange.rows is None and table:
         by_axes, by_thrusters = _unit(array[:3]), _unit(array[:, :3].T)
         if by_axes == by_thrusters:
             raise LayoutError(
-                f"is {len(array)} rows without labels, which may be axes or thrusters, or the inverse; label them "
-                "Fx, Fy, Fz, Tx, Ty, Tz, or say --rows axes or --rows thrusters"
+                f"is {len(array)} rows without labels, which may be axes or thrusters, or the inverse; label "
+                "them Fx, Fy, Fz, Tx, Ty, Tz, or say --rows axes or --rows thrusters"
             )
     across = bool(names) or (exchange.rows == "thrusters" if by_axes and by_thrusters else by_thrusters)
     if across and not names and exchange.rows is None and len(axes) == 6 and not _unit(array[:, :3].T):
         raise LayoutError(
-            f"is {len(array)} rows of 6 numbers without labels: a row per thruster (then say --rows thrusters), or "
-            "the inverse of the matrix, which is not read",
+            f"is {len(array)} rows of 6 numbers without labels: a row per thruster (say --rows thrusters), "
+            "or the inverse of the matrix, which is not read",
             node.words,
         )
     kind = "thrusters" if across else "axes"

@@ -1,4 +1,4 @@
-"""The models of a description: which of them is the robot, the parts of models inside it, and what is included."""
+"""The models of a description: which is the robot, the parts of models inside it, and what is included."""
 
 from collections.abc import Callable, Iterator
 from typing import NamedTuple

@@ -27,13 +27,13 @@ def records_in(node: Node) -> dict[str, Row]:
         LayoutError: some have a place or a direction alone.
     """
     if isinstance(node.value, Mapping):
-        rows = {str(key): row for key, row in node.value.items() if isinstance(row, Mapping)}
+        held = [(str(key), row) for key, row in node.value.items()]
     elif isinstance(node.value, list):
-        rows = {f"[{i}]": row for i, row in enumerate(node.value) if isinstance(row, Mapping)}
+        held = [(f"[{i}]", row) for i, row in enumerate(node.value)]
     else:
         return {}
-    rows = {key: dict(_split(row)) for key, row in rows.items()}
-    whole = {key: row for key, row in rows.items() if _place(row) and _points(row)}
+    rows = {key: dict(_split(row)) for key, row in held if isinstance(row, Mapping)}
+    whole: dict[str, Row] = {key: row for key, row in rows.items() if _place(row) and _points(row)}
     for key, row in rows.items() if whole else ():
         if key not in whole and (_place(row) or _points(row)):
             lacks = "direction" if _place(row) else "position"
@@ -128,7 +128,7 @@ def thruster_of(key: str, row: Row, frd: bool, center: Array, exchange: Exchange
 
 
 def _split(row: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
-    """A mapping's items; `x`, `y`, `z` become one position, and `dx`, `dy`, `dz` or the like one direction."""
+    """A mapping's items; `x`, `y`, `z` become one position, `dx`, `dy`, `dz` or the like one direction."""
     short = {str(key).lower().strip(): value for key, value in row.items()}
     yield from row.items()
     if {"x", "y"} <= set(short):

@@ -1,4 +1,4 @@
-"""Which plugins of simulators drive a thruster, and with what force: gz-sim, and uuv_simulator with its heirs.
+"""Plugins of simulators that drive a thruster, and their forces: gz-sim, uuv_simulator and its heirs.
 
 A plugin Thruster of gz-sim pushes along its joint's axis, in newtons, or by an angular velocity w with
 CT density D^4 w |w|. libuuv_thruster_ros_plugin (Plankton and DAVE have it, too) clamps its command, and
@@ -9,6 +9,7 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
+from finlab.arrays import Array
 from finlab.errors import LayoutError
 from finlab.exchange.description import Description, Joint, number, said
 from finlab.exchange.exchange import Exchange
@@ -87,19 +88,21 @@ def _uuv_force(plugin: Element, name: str, exchange: Exchange) -> tuple[float, f
     return ends
 
 
-def _converted(plugin: Element, kind: str, speeds: np.ndarray) -> np.ndarray:
+def _converted(plugin: Element, kind: str, speeds: Array) -> Array:
     """Thrust [N] at some commands (2,)."""
-    turned = speeds * np.abs(speeds)
+    turned: Array = speeds * np.abs(speeds)
     if kind == "Basic":
-        return number(plugin, "conversion/rotorConstant") * turned
+        turned *= number(plugin, "conversion/rotorConstant")
+        return turned
     if kind == "Bessa":
         left, right = (number(plugin, f"conversion/delta{side}") for side in "LR")
         sides = [number(plugin, f"conversion/rotorConstant{side}") for side in "LR"]
         forces = np.where(turned < left, sides[0] * (turned - left), sides[1] * (turned - right))
-        return np.where((turned >= left) & (turned <= right), 0.0, forces)
+        forces = np.where((turned >= left) & (turned <= right), 0.0, forces)
+        return forces
     told = [said(plugin, f"conversion/{key}Values").split() for key in ("input", "output")]
     try:
         inputs, outputs = (np.array(values, dtype=np.float64) for values in told)
-        return np.interp(speeds, inputs, outputs)
+        return np.array(np.interp(speeds, inputs, outputs))
     except ValueError:
         raise LayoutError("conversion LinearInterp expects as many inputValues as outputValues") from None

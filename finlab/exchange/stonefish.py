@@ -14,7 +14,7 @@ from finlab.arrays import Array
 from finlab.errors import LayoutError
 from finlab.exchange.arithmetic import value_of
 from finlab.exchange.exchange import TO_FRD, Exchange
-from finlab.layout import MAX_ACTUATORS, Layout
+from finlab.layout import MAX_ACTUATORS, Layout, Thruster
 
 DENSITY = 1000.0
 """Of the water where the scenario does not say [kg/m^3]."""
@@ -49,7 +49,7 @@ def read_stonefish(root: Element, name: str, exchange: Exchange) -> Layout:
         )
     if files:
         exchange.note(f"What it includes is not read: {files}.")
-    poses, parts = _poses(robot, constants), []
+    poses, parts = _poses(robot, constants), list[Thruster]()
     for part in robot.iter("actuator"):
         kind, link = part.get("type", ""), _of(part, "link").get("name", "")
         if kind not in ("thruster", "simple_thruster", "push"):
@@ -128,38 +128,24 @@ def _force(
         text = next((found.get(key) for key in keys if found is not None and found.get(key)), None)
         return None if text is None else _number(text, constants)
 
-    limits = [told("limits", key) for key in ("lower", "upper")] or []
-    limits = limits if None not in limits else [told("specs", f"{key}_limit") for key in ("lower", "upper")]
     if part.get("type") != "thruster":
-        return None if limits[0] is None or limits[1] is None else (limits[0], limits[1])
-    model, size, water = (
-        _of(part, "thrust_model").get("type", ""),
-        told("propeller", "diameter"),
-        root.find(".//water"),
-    )
+        ends = [told("limits", key) or told("specs", f"{key}_limit") for key in ("lower", "upper")]
+        return None if ends[0] is None or ends[1] is None else (ends[0], ends[1])
+    model, size = _of(part, "thrust_model").get("type", ""), told("propeller", "diameter")
     rpm, speed = told("specs", "max_rpm"), told("specs", "max_setpoint")
-    speed = rpm * math.pi / 30 if rpm is not None else speed
-    ahead = told("thrust_model/thrust_coeff", "forward", "value") or told("specs", "thrust_coeff")
-    back = told("thrust_model/thrust_coeff", "reverse", "value") or told(
-        "specs", "thrust_coeff", "thrust_coeff_backward"
+    speed = speed if rpm is None else rpm * math.pi / 30
+    ahead, back = (
+        told("thrust_model/thrust_coeff", key, "value") or told("specs", f"thrust_coeff{old}", "thrust_coeff")
+        for key, old in (("forward", ""), ("reverse", "_backward"))
     )
-    if (
-        speed is None
-        or ahead is None
-        or back is None
-        or (model not in ("fluid_dynamics", "quadratic") and rpm is None)
-    ):
+    spins = model == "fluid_dynamics" or (rpm is not None and not model)
+    if speed is None or ahead is None or back is None or not (model == "quadratic" or (spins and size)):
         exchange.note(f"Force of {part.get('name')} is not read: thrust model {model or 'none'!r:.40}.")
         return None
     gain = speed**2
-    if model != "quadratic" and size is not None:
-        density = (
-            None
-            if water is None or not water.get("density")
-            else _number(water.get("density", ""), constants)
-        )
-        gain = (density or DENSITY) * (speed / (2 * math.pi)) ** 2 * size**4
-        exchange.note(
-            f"Forces are those of {model or 'fluid_dynamics'} at the largest setpoint, in {density or DENSITY:g} kg/m^3."
-        )
+    if spins and size:
+        water = next((each.get("density", "") for each in root.iter("water") if each.get("density")), "")
+        density = _number(water, constants) if water else DENSITY
+        gain = density * (speed / (2 * math.pi)) ** 2 * size**4
+        exchange.note(f"Forces are those of fluid_dynamics at the largest setpoint, in {density:g} kg/m^3.")
     return -abs(back) * gain, abs(ahead) * gain

@@ -290,7 +290,7 @@ def test_xacro_is_expanded_where_it_is_installed(tmp_path: Path) -> None:
         ("a.cpp", "add_motor(" * 100_000),
         ("a.cpp", "void add_motor(x)\n" * 60_000 + "/*" * 60_000),
         ("a.lua", "local a = 1\n" * 60_000 + "add_motor(--[[" * 30_000),
-        ("a.params", "CA_ROTOR_COUNT 1 " + "A_B " * 200_000),
+        ("a.params", "CA_ROTOR_COUNT x " + "A_B " * 200_000),
         ("a.parm", "MOT_" * 200_000 + "\n" + " " * 500_000 + "FRAME_CONFIG x"),
         ("a.json", '{"a":' + "[" * 900 + "1" + "]" * 900 + "," + ",".join(f'"k{i}": [1,2,3]' for i in range(50_000)) + "}"),
         ("a.scn", "<scenario>" + '<robot name="r"><actuator type="thruster"><origin xyz="' + "${" * 100_000 + '"/></actuator></robot></scenario>'),
