@@ -52,7 +52,7 @@ def read_description(text: str, name: str, exchange: Exchange) -> Layout:
     parts: list[Actuator] = [_propeller(robot, joint, plugin, start, exchange) for joint, plugin in pushing]
     parts += [_fin(_joint_of(robot, link), start, exchange) for link in exchange.fins]
     others = [plugin for _, plugin in robot.plugins if not _known(plugin)]
-    left = dict.fromkeys(plugin.get("filename") or plugin.get("name", "") for plugin in others)
+    left = dict.fromkeys(plugin.get("filename", "") or plugin.get("name", "") for plugin in others)
     if not parts:
         raise LayoutError(
             "has no thruster's plugin of gz-sim or uuv; name the links that are fins (--fins LINK...) or "

@@ -6,9 +6,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from finlab.arrays import Array
+from finlab.errors import LayoutError
 
-MOST = 300
-"""Most characters of a list of keys."""
+MOST, MAX_NODES = 300, 30_000
+"""Most characters of a list of keys, and most values that are looked at."""
 
 
 Path = tuple[str, ...]
@@ -35,9 +36,17 @@ class Node(NamedTuple):
 
 
 def nodes(data: Any) -> Iterator[Node]:
-    """Yields all mappings, lists and values in plain values, outer ones first, but no numbers in lists."""
+    """Yields all mappings, lists and values in plain values, outer ones first, but no numbers in lists.
+
+    Raises:
+        LayoutError: there are too many.
+    """
     waiting: list[Node] = [Node((), data, ())]
+    count = 0
     while waiting:
+        count += 1
+        if count > MAX_NODES:
+            raise LayoutError(f"has more than {MAX_NODES:,} entries, too many to be read")
         path, value, scopes = waiting.pop()
         inner: Iterable[tuple[str, Any]] = ()
         if isinstance(value, Mapping):

@@ -1,4 +1,5 @@
-"""Files as other programs write them: read rightly, or refused in a sentence that names what stands in the way."""
+"""Files as other programs write them: read rightly, or refused in a sentence that says why."""
+# ruff: noqa: E501  # files stand as they are written
 
 import time
 from pathlib import Path
@@ -17,7 +18,7 @@ SCREW = (
 )
 THRUSTER = '<plugin filename="gz-sim-thruster-system" name="gz::sim::systems::Thruster"><joint_name>sj</joint_name></plugin>'
 COLUMNS = np.array([[1, 0, 0, 0, 0, 0.3], [1, 0, 0, 0, 0, -0.3], [0, 0, 1, 0.1, -0.2, 0]])
-"""Wrenches per newton of port, starboard, lift, x forward, y left, z up... of a robot of three."""
+"""Wrenches per newton of a robot's port, starboard and lift, x forward, y left, z up."""
 
 
 def read(file: str, text: str, **said: object) -> tuple[Layout, str]:
@@ -214,7 +215,7 @@ WATER = '<plugin filename="gz-sim-hydrodynamics-system" name="gz::sim::systems::
 
 
 def test_derivatives_that_are_not_said_stay_unknown() -> None:
-    six = "".join(f"<{tag}>-{i}</{tag}>" for i, tag in enumerate("xUU yVV zWW kPP mQQ nRR".split()))
+    six = "".join(f"<{tag}>-{i}</{tag}>" for i, tag in enumerate(["xUU", "yVV", "zWW", "kPP", "mQQ", "nRR"]))
     layout, notes = read("a.sdf", sdf(SCREW + THRUSTER + WATER.format(six + "<xU>-4</xU><xDotV>1</xDotV>")))
     body = layout.body
     assert body is not None and body.quadratic_damping == (0, 1, 2, 3, 4, 5)
