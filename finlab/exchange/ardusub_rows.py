@@ -5,12 +5,10 @@ from typing import NamedTuple
 
 from finlab.errors import LayoutError
 from finlab.exchange.arithmetic import constants_in, value_of
-from finlab.exchange.csv_table import is_number, table_of
+from finlab.exchange.csv_table import FACTORS, is_number, table_of
 from finlab.exchange.labels import plain
 from finlab.layout import MAX_ACTUATORS
 
-COLUMNS = ("roll", "pitch", "yaw", "throttle", "forward", "lateral")
-"""Factors in the order of a call."""
 LONGEST = 500
 """Most characters of a call that are looked at."""
 _CALL = re.compile(r"\badd_motor\w*[ \t]*\(")
@@ -26,22 +24,12 @@ class MotorRow(NamedTuple):
 
 
 def rows_in(text: str) -> list[MotorRow]:
-    """Returns the motors of a program's calls, or of a table whose header names `COLUMNS` in any order.
+    """Returns the motors of a program's calls, or of a table whose header names `FACTORS` in any order.
 
     Raises:
         LayoutError: a call or row does not parse; it is named by its number.
     """
     return _called(text) if "add_motor" in text else _tabled(text)
-
-
-def is_table(text: str) -> bool:
-    """Whether a text begins with the header of a table of factors."""
-    lines = (
-        line
-        for line in text[:10_000].splitlines()
-        if line.strip() and not line.lstrip().startswith(("#", "//"))
-    )
-    return {*COLUMNS} <= {plain(cell) for cell in re.split(r"[,;\t ]+", next(lines, ""))}
 
 
 def _called(text: str) -> list[MotorRow]:
@@ -100,12 +88,12 @@ def _arguments(text: str) -> list[str] | None:
 def _tabled(text: str) -> list[MotorRow]:
     table = table_of(text)
     places = {plain(name): i for i, name in enumerate(table.header)}
-    named = next((i for i, name in enumerate(table.header) if plain(name) not in COLUMNS), None)
+    named = next((i for i, name in enumerate(table.header) if plain(name) not in FACTORS), None)
     rows = []
     for i, (line, cells) in enumerate(table.rows, 1):
-        if len(cells) < max(places[name] for name in COLUMNS) + 1:
+        if len(cells) < max(places[name] for name in FACTORS) + 1:
             raise LayoutError(f"row {line} has {len(cells)} cells, expected {len(table.header)}")
-        factors = [cells[places[name]] for name in COLUMNS]
+        factors = [cells[places[name]] for name in FACTORS]
         wrong = next((cell for cell in factors if not is_number(cell)), None)
         if wrong is not None:
             raise LayoutError(f"row {line}: {wrong!r:.40} is no number")

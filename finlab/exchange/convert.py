@@ -8,8 +8,7 @@ from finlab.assets import shipped_layouts
 from finlab.errors import CommandError, LayoutError
 from finlab.exchange.ardusub import read_ardusub, write_ardusub
 from finlab.exchange.ardusub_parameters import OF_ARDUPILOT, read_ardusub_parameters
-from finlab.exchange.ardusub_rows import is_table as is_factor_table
-from finlab.exchange.csv_table import plain_of, table_of
+from finlab.exchange.csv_table import is_factor_table, plain_of, table_of
 from finlab.exchange.description_text import SDF, URDF, description_text
 from finlab.exchange.exchange import Exchange
 from finlab.exchange.gazebo import read_description

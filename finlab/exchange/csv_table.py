@@ -2,6 +2,7 @@
 
 import csv
 import math
+import re
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -9,8 +10,12 @@ from finlab.errors import LayoutError
 from finlab.exchange import labels
 from finlab.exchange.labels import axis_of, plain
 
+FACTORS = ("roll", "pitch", "yaw", "throttle", "forward", "lateral")
+"""Columns of motor factors of ArduSub, in the order of its calls."""
 Row = tuple[int, list[str]]
 """The number of a line, and its cells."""
+MEASURED = {"phi", "pwm", "escsignal", "rpm", "current", "power", "voltage", "t", "time"}
+"""Columns of measurements."""
 LEAST, MOST = labels.LEAST.split(), labels.MOST.split()
 
 
@@ -57,6 +62,9 @@ def plain_of(table: Table) -> dict[str, Any]:
         LayoutError: a row has another length, or a cell that is no number; the row is named.
     """
     header, rows = table.header, table.rows
+    measured = MEASURED & {plain(cell).removesuffix("us") for cell in header}
+    if measured:
+        raise LayoutError(f"holds measurements ({', '.join(sorted(measured))}); `finlab fit` reads them")
     labelled = [row for row in rows if axis_of(row[1][0])]
     if len(labelled) > 1 and not is_number(rows[0][1][0]):
         return _by_axis(header, rows)
@@ -66,6 +74,22 @@ def plain_of(table: Table) -> dict[str, Any]:
     width = len(header or rows[0][1]) if rows else 0
     named = {"names": header} if header else {}
     return {**named, "matrix": [_numbers(row, row[1], width) for row in rows]}
+
+
+def is_robot_table(content: bytes) -> bool:
+    """Whether a CSV file holds a robot, and no measurements."""
+    try:
+        text = content.decode("utf-8-sig")
+        return is_factor_table(text) or bool(plain_of(table_of(text)))
+    except (LayoutError, UnicodeDecodeError):
+        return False
+
+
+def is_factor_table(text: str) -> bool:
+    """Whether a text begins with the header of a table of motor factors."""
+    stripped = (line.strip() for line in text[:10_000].splitlines())
+    lines = (line for line in stripped if line and not line.startswith(("#", "//")))
+    return {*FACTORS} <= {plain(cell) for cell in re.split(r"[,;\t ]+", next(lines, ""))}
 
 
 def _by_axis(header: list[str], rows: Sequence[Row]) -> dict[str, Any]:

@@ -42,6 +42,11 @@ FORCES = {"n": 1.0, "kn": 1000.0, "kgf": 9.80665, "lbf": 4.4482216}
 DEGREES = {"rad": 1.0, "deg": 57.29577951308232}
 
 
+ROW = f"{NAME} {POSITION} {DIRECTION} {ANGLES} {LIMIT_KEYS} x y z "
+ROW += "dx dy dz ax ay az nx ny nz ux uy uz dirx diry dirz"
+"""Keys of a thruster that are read."""
+
+
 def plain(label: object) -> str:
     """Returns a label's letters and digits in lower case, without a unit in brackets."""
     return re.sub(r"[^a-z0-9]", "", re.split(r"[(\[]", str(label), maxsplit=1)[0].lower())
@@ -66,6 +71,13 @@ def lookup(
         if plain(label) in known:
             return str(key), value, size
     return "", None, 1.0
+
+
+def unknown_in(rows: Iterable[Mapping[str, Any]]) -> str:
+    """Returns the keys of thrusters that are not read, with commas between."""
+    keys = dict.fromkeys(str(key) for row in rows for key in row)
+    units = {**LENGTHS, **FORCES, **DEGREES}
+    return ", ".join(key for key in keys if not axis_of(key) and not lookup({key: 0}, ROW, units)[0])[:300]
 
 
 def frame_in(text: str) -> Frame | None:

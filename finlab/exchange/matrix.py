@@ -42,6 +42,8 @@ class Matrix(NamedTuple):
     """How it was read, as a note says it."""
     ends: list[Ends | None] | None = None
     """Limits of the commands that stand in its rows."""
+    left: str = ""
+    """Keys of its rows that were not read."""
 
 
 def matrices(data: Any, exchange: Exchange, table: bool) -> list[Matrix]:
@@ -143,7 +145,7 @@ def _of_records(node: Node, rows: Mapping[str, Mapping[str, Any]], exchange: Exc
     named = [str(lookup(row, labels.NAME)[1] or name) for name, row in rows.items()]
     ends = [limits_in(row, 1, exchange)[0] for row in rows.values()]
     wrenches = dict(zip(first, np.array(columns, np.float64).T, strict=True))
-    return Matrix(node, wrenches, named, "a row per thruster", ends)
+    return Matrix(node, wrenches, named, "a row per thruster", ends, labels.unknown_in(rows.values()))
 
 
 def _shaped(flat: list[Any], rows: Any, columns: Any, node: Node) -> Any:

@@ -97,7 +97,7 @@ def _of_rows(
     for key, row in rows.items():
         own = row if shared is None or limits_in(row, 1, exchange)[0] else {**row, "limits": list(shared)}
         parts.append(thruster_of(key, own, frd, center, exchange))
-    _say_unread(data, used, node, exchange)
+    _say_unread(data, used, node, exchange, labels.unknown_in(rows.values()))
     return Layout(name, tuple(parts))
 
 
@@ -120,7 +120,7 @@ def _of_matrix(matrix: Matrix, data: Any, name: str, exchange: Exchange, comment
     missing = [axis for axis in AXES if axis not in matrix.rows]
     if missing:
         exchange.note(f"It has no row {', '.join(missing)}: 0 is taken there, and not commanded (`axes`).")
-    _say_unread(data, used, node, exchange)
+    _say_unread(data, used, node, exchange, matrix.left)
     parts = tuple(exchange.of_column(*each) for each in zip(names, columns.T, ends, strict=True))
     return Layout(name, parts, axes=tuple(axis for axis in AXES if axis in matrix.rows))
 
@@ -166,12 +166,14 @@ def _ends(data: Any, node: Node, names: list[str], used: set[Path], exchange: Ex
     return [known.get(name) for name in names]
 
 
-def _say_unread(data: Any, used: set[Path], node: Node, exchange: Exchange) -> None:
+def _say_unread(data: Any, used: set[Path], node: Node, exchange: Exchange, left: str) -> None:
     """A note on the keys that were not read."""
     around = [(path, scope, labels.FRAME_KEYS) for path, scope in node.scopes]
     around += [(path, scope, labels.LIMIT_KEYS) for path, scope in node.scopes[:2]]
     for path, scope, words in around:
         used |= {(*path, key) for key in scope if lookup({key: 0}, words, labels.FORCES)[0]}
+    if left:
+        exchange.note(f"Not read of each thruster: {left}.")
     keys = unread(data, used)
     if keys:
         exchange.note(f"Not read: {keys}.")

@@ -208,7 +208,7 @@ def test_what_has_no_place_is_named(tmp_path: Path) -> None:
         ("a.cpp", "add_motor_raw_6dof(AP_MOTORS_MOT_1, 1, 0, 0, 0, 0, 0, 1);", "'motor1' has no force"),
         ("a.cpp", "add_motor(1, 0, 0, 0, 1, 0, 0, 1);\n" * 2, "adds a motor twice, motor2; keep"),
         ("a.yaml", "matrix: [[1], [2]]", "matrix: is 2 rows of 1 numbers, expected six"),
-        ("a.yaml", "limits: [[0, 1]]\nnames: [a, b]\nmatrix: [1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]", "limits: ex"),
+        ("a.yaml", "limits: [[0, 1]]\nnames: [a, b]\nmatrix: [1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]", "limits"),
         ("a.csv", "\n".join([",".join("1" * 65)] * 6), "expected up to 64 columns, got 65"),
         ("a.json", "[1", "is not valid JSON"),
     ],
