@@ -88,6 +88,9 @@ def _arguments(text: str) -> list[str] | None:
 def _tabled(text: str) -> list[MotorRow]:
     table = table_of(text)
     places = {plain(name): i for i, name in enumerate(table.header)}
+    lacking = [name for name in FACTORS if name not in places]
+    if lacking:
+        raise LayoutError(f"has no column {', '.join(lacking)} in a table of factors")
     named = next((i for i, name in enumerate(table.header) if plain(name) not in FACTORS), None)
     rows = []
     for i, (line, cells) in enumerate(table.rows, 1):
@@ -98,5 +101,7 @@ def _tabled(text: str) -> list[MotorRow]:
         if wrong is not None:
             raise LayoutError(f"row {line}: {wrong!r:.40} is no number")
         name = str(i) if named is None else cells[named]
+        if max(abs(float(cell)) for cell in factors) > 1e9:
+            raise LayoutError(f"row {line} holds a factor of no ordinary size")
         rows.append(MotorRow(f"motor{name}" if name.isdecimal() else name, [float(cell) for cell in factors]))
     return rows

@@ -85,7 +85,7 @@ def _matrix(node: Node, exchange: Exchange, table: bool) -> Matrix | None:
         if isinstance(flat, list):
             shape = [lookup(value, words)[1] for words in ("rows", "cols columns")]
             value = _shaped(flat, shape[0], shape[1], node)
-        elif all(isinstance(row, list) for row in value.values()):
+        elif len(value) > 1 and all(isinstance(row, list) for row in value.values()):
             names, value = [*map(str, value)], [*value.values()]
         else:
             return None

@@ -81,7 +81,8 @@ def parts_of(top: Element) -> Parts:
 def include_name(include: Element) -> str:
     """Returns what an <include> is called: its name, or the end of its address."""
     address = include.findtext("uri") or include.findtext("url") or "without a name"
-    return (include.findtext("name") or address.strip().rstrip("/").rpartition("/")[2]).strip()[:60]
+    name = include.findtext("name") or address.strip().rstrip("/").rpartition("/")[2]
+    return " ".join(name.split())[:60]
 
 
 def name_of(element: Element) -> str:

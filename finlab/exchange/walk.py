@@ -76,4 +76,4 @@ def numbers_in(values: Any) -> Array | None:
         array = np.array(values, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):
         return None
-    return array if array.size and np.isfinite(array).all() else None
+    return array if array.size and (np.abs(array) < 1e9).all() else None
