@@ -68,6 +68,7 @@ def _keep(known: Known, field: str, told: dict[str, str], tags: Any, exchange: E
     values = numbers_in([told[tag] for tag in tags if tag in told])
     if len(told) == 6 and values is not None:
         known[field] = tuple(np.abs(values).tolist())
+        exchange.note(f"{field} was read from {', '.join(tags)}.")
         wrong = [
             tag
             for tag, value in zip(tags, values, strict=True)

@@ -60,6 +60,7 @@ def read_description(text: str, name: str, exchange: Exchange) -> Layout:
         )
     if left:
         exchange.note(f"Plugins that are not read: {_listed(left)}.")
+    exchange.note(f"Model {robot.name} was read, x forward, y left, z up, in m, kg and N.")
     place = "centre of gravity" if at_gravity else "base frame"
     return Layout(
         robot.name, tuple(parts), f"Origin at the {place}.", body_of(robot, exchange) if at_gravity else None

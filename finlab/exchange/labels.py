@@ -9,10 +9,11 @@ from finlab.layout.wrench_axes import AXES, Axis
 
 Frame = Literal["FLU", "FRD"]
 FRAMES: dict[Frame, str] = {"FLU": "x forward, y left, z up", "FRD": "x forward, y right, z down"}
-_FRAME_WORDS: dict[Frame, frozenset[str]] = {
-    "FLU": frozenset(["flu", "enu", "nwu", "rep103", "rep", "left", "port", "up"]),
-    "FRD": frozenset(["frd", "ned", "sname", "fsd", "right", "starboard", "down"]),
+_FRAME_WORDS: dict[Frame, set[str]] = {
+    "FLU": {"flu", "enu", "nwu", "rep103", "rep"},
+    "FRD": {"frd", "ned", "sname", "fsd"},
 }
+_SIDES: dict[Frame, set[str]] = {"FLU": {"left", "port", "up"}, "FRD": {"right", "starboard", "down"}}
 FRAME_KEYS = "frameid frame bodyframe convention coordinateframe "
 FRAME_KEYS += "coordinatesystem referenceframe axesconvention"
 _AXIS_WORDS = {
@@ -68,7 +69,8 @@ def lookup(
         found = re.search(r"[_ (\[]+([a-z]+)[)\]]?$", label, re.IGNORECASE)
         if found and units and found[1].lower() in units:
             label, size = label[: found.start()], units[found[1].lower()]
-        if plain(label) in known:
+        word = plain(label)
+        if word in known or word.removeprefix("thruster").removeprefix("s") in known:
             return str(key), value, size
     return "", None, 1.0
 
@@ -84,8 +86,11 @@ def frame_in(text: str) -> Frame | None:
     """Returns the frame that a text names by words such as NED, FLU, `y right`; None where it names none, or
     a left-handed one."""
     words = set(re.findall(r"[a-z]+(?:103)?", text[:2000].lower()))
-    named: list[Frame] = [frame for frame, known in _FRAME_WORDS.items() if words & known]
-    return named[0] if len(named) == 1 else None
+    for known in (_FRAME_WORDS, _SIDES):
+        named: list[Frame] = [frame for frame, of_it in known.items() if words & of_it]
+        if named:
+            return named[0] if len(named) == 1 else None
+    return None
 
 
 def frame_said(scopes: Iterable[Mapping[str, Any]], comments: Iterable[str]) -> tuple[Frame | None, str]:

@@ -63,10 +63,11 @@ def key_words(key: str) -> set[str]:
 def is_allocation(node: Node) -> bool:
     """Whether a node's key is that of an allocation matrix."""
     words = key_words(node.key)
+    around = {word for key in node.path[-3:] for word in key_words(key)}
     if not node.path or node.path[-1].startswith("["):
         return False
     known = bool(words & {*WORDS.split()}) or ("matrix" in words and words <= {*BESIDE.split()})
-    return known and not words & {*OTHER.split()}
+    return known and not around & {*OTHER.split()}
 
 
 def _matrix(node: Node, exchange: Exchange, table: bool) -> Matrix | None:

@@ -48,7 +48,7 @@ def sdf(inside: str, version: str = "1.9") -> str:
          "y right, z down"),
         ("a.csv", "name,Fx,Fy,Fz,Tx,Ty,Tz,min,max\nport,1,0,0,0,0,0.3,-5,6\nstarboard,1,0,0,0,0,-3e-1,-5,6\n"
                   "lift,0,0,1,0.1,-0.2,0,-5,6\n", "a row per thruster"),
-        ("a.csv", "# body frame SNAME\nX;Y;Z;K;M;N\n1;0;0;0;0;-.3\n1;0;0;0;0;.3\n0;0;-1;.1;.2;0\n", "its comment"),
+        ("a.csv", "# body frame SNAME, port and starboard\nX;Y;Z;K;M;N\n1;0;0;0;0;-.3\n1;0;0;0;0;.3\n0;0;-1;.1;.2;0\n", "its comment"),
         ("a.txt", "1 0 0 0 0 0.3\n1 0 0 0 0 -0.3\n0 0 1 0.1 -0.2 0\n", "taken for thrusters"),
     ],
 )  # fmt: skip
@@ -64,6 +64,7 @@ def test_matrices_of_every_shape(file: str, text: str, read_as: str) -> None:
         ("a.yaml", "matrix: [1, 1, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0]", "12 numbers in one list, which may be 2 rows of 6, 3 rows"),
         ("a.yaml", "mass_matrix: [[1,0],[0,1],[1,1],[0,0],[0,0],[0,0]]", "its lists of numbers, mass_matrix"),
         ("a.yaml", "tam: [[1, 1], [0, 0], [0.3, -0.3]]", "is 3 rows of 2 numbers, expected six rows"),
+        ("a.yaml", "body: {inertia: {matrix: [[1,0,0],[0,1,0],[0,0,1],[0,0,0],[0,0,0],[0,0,0]]}}", "no key that says so"),
         ("a.yaml", "tam: [[1, 1], [0, 0, 0]]", "tam: is no matrix: its rows differ"),
         ("a.yaml", "frame: quadrant\ntam: {fx: [1], fz: [0]}", "frame: is 'quadrant', expected FLU, ENU"),
         ("a.yaml", "tam: {fx: [1], fz: [0]}\nmixer: {fx: [1], fz: [0]}", "a matrix more than once, at tam, mixer"),
@@ -126,7 +127,7 @@ def test_a_boat_commands_the_axes_of_its_rows() -> None:
         ("a.yaml", "t: {a: {position: [0.1, 0.2, 0], rpy_deg: [0, -90, 0], force_limits_n: [-9.80665, 9.80665]}}"),
         ("a.csv", "thruster,x (mm),y (mm),z,dx,dy,dz,min,max\na,100,200,0,0,0,1,-9.80665,9.80665".replace(" (mm)", "")
                   .replace("100,200", "0.1,0.2")),
-        ("a.json", '{"thrusters": {"names": ["a", "b"], "positions": [[0.1, 0.2, 0], [0, 1, 0]], "max_force": 9.80665, '
+        ("a.json", '{"thrusters": {"names": ["a", "b"], "thruster_positions": [[0.1, 0.2, 0], [0, 1, 0]], "max_force": 9.80665, '
                    '"directions": [[0, 0, 1], [1, 0, 0]]}}'),
     ],
 )  # fmt: skip
