@@ -5,9 +5,10 @@ import math
 import operator
 import re
 from collections.abc import Callable, Mapping
+from itertools import islice
 
-MOST = 200
-"""Most characters of an expression."""
+MOST, MOST_CONSTANTS = 200, 2000
+"""Most characters of an expression, and most constants of a program."""
 CONSTANTS = {"pi": math.pi, "M_PI": math.pi, "M_PI_2": math.pi / 2, "M_PI_4": math.pi / 4, "PI": math.pi}
 CONSTANTS |= {"M_SQRT2": math.sqrt(2), "M_SQRT1_2": math.sqrt(0.5), "math.pi": math.pi}
 _OPERATORS: dict[type[ast.AST], Callable[[float, float], float]] = {
@@ -49,7 +50,7 @@ def constants_in(text: str) -> dict[str, float]:
     """Returns the constants that a program of C++ or Lua defines once, by name; others are left out."""
     values: dict[str, float] = {}
     twice: set[str] = set()
-    for found in _DEFINED.finditer(text):
+    for found in islice(_DEFINED.finditer(text), MOST_CONSTANTS):
         name = found[1] or found[2]
         twice |= {name} & values.keys()
         try:

@@ -16,6 +16,8 @@ Row = tuple[int, list[str]]
 """The number of a line, and its cells."""
 MEASURED = {"phi", "pwm", "escsignal", "rpm", "current", "power", "voltage", "t", "time"}
 """Columns of measurements."""
+MAX_ROWS = 1000
+"""Most rows that are read; a robot has up to 64 actuators."""
 LEAST, MOST = labels.LEAST.split(), labels.MOST.split()
 
 
@@ -35,11 +37,13 @@ def table_of(text: str) -> Table:
     Raises:
         LayoutError: it is no table.
     """
+    if text.count("\n") > 20 * MAX_ROWS:
+        raise LayoutError(f"holds {text.count(chr(10)):,} lines, expected a table of up to {MAX_ROWS} rows")
     lines = [(i, line.strip()) for i, line in enumerate(text.splitlines(), 1) if line.strip()]
     comments = [line for _, line in lines if line.startswith(("#", "//"))]
     lines = [(i, line) for i, line in lines if not line.startswith(("#", "//"))]
-    if not lines:
-        raise LayoutError("holds no rows")
+    if not 0 < len(lines) <= MAX_ROWS:
+        raise LayoutError(f"holds {len(lines) or 'no'} rows, expected up to {MAX_ROWS}")
     mark = next((mark for mark in ",;\t" if mark in lines[0][1]), " ")
     try:
         cells = [*csv.reader((line for _, line in lines), delimiter=mark, skipinitialspace=True)]

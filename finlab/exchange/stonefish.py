@@ -16,6 +16,8 @@ from finlab.exchange.arithmetic import value_of
 from finlab.exchange.exchange import TO_FRD, Exchange
 from finlab.layout import MAX_ACTUATORS, Layout, Thruster
 
+MAX_JOINTS = 1000
+"""Most joints of a link that are read."""
 DENSITY = 1000.0
 """Of the water where the scenario does not say [kg/m^3]."""
 
@@ -81,7 +83,7 @@ def _poses(robot: Element, constants: dict[str, str]) -> dict[str, Array]:
     waiting = [*poses]
     while waiting:
         parent = waiting.pop()
-        for joint in below.pop(parent, []):
+        for joint in below.pop(parent, [])[:MAX_JOINTS]:
             child = _of(joint, "child").get("name", "")
             poses[child] = poses[parent] @ _pose(joint, constants)
             waiting.append(child)

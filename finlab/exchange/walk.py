@@ -44,10 +44,10 @@ def nodes(data: Any) -> Iterator[Node]:
     waiting: list[Node] = [Node((), data, ())]
     count = 0
     while waiting:
-        count += 1
+        path, value, scopes = waiting.pop()
+        count += len(value) if isinstance(value, Mapping | list) else 0
         if count > MAX_NODES:
             raise LayoutError(f"has more than {MAX_NODES:,} entries, too many to be read")
-        path, value, scopes = waiting.pop()
         inner: Iterable[tuple[str, Any]] = ()
         if isinstance(value, Mapping):
             scopes, inner = ((path, value), *scopes), value.items()
