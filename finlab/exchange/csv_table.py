@@ -73,7 +73,15 @@ def plain_of(table: Table) -> dict[str, Any]:
     if len(labelled) > 1 and not is_number(rows[0][1][0]):
         return _by_axis(header, rows)
     axes = [axis for cell in header if (axis := axis_of(cell))]
-    if len(axes) > 1 or {plain(cell) for cell in header} & {*labels.POSITION.split()}:
+    if len(axes) > 1 or {plain(cell) for cell in header} & {
+        "px",
+        "posx",
+        "dx",
+        "ax",
+        "nx",
+        "ux",
+        *labels.POSITION.split(),
+    }:
         return {"thrusters": [_record(header, row) for row in rows]}
     width = len(header or rows[0][1]) if rows else 0
     named = {"names": header} if header else {}

@@ -41,6 +41,9 @@ def read_description(text: str, name: str, exchange: Exchange) -> Layout:
         return read_stonefish(root, name, exchange)
     robot = parse_description(root, name, drives, exchange)
     at_gravity = exchange.origin == "gravity"
+    if at_gravity and robot.mass <= 0 and robot.included:
+        inside = ", ".join(robot.included)[:300]
+        raise LayoutError(f"has no masses but in <include> {inside}, which is not opened: give its model.sdf")
     if at_gravity and robot.mass <= 0:
         raise LayoutError(
             "has no masses, so its centre of gravity is unknown; use --origin base if that is at it"

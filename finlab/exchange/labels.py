@@ -44,7 +44,7 @@ DEGREES = {"rad": 1.0, "deg": 57.29577951308232}
 
 
 ROW = f"{NAME} {POSITION} {DIRECTION} {ANGLES} {LIMIT_KEYS} x y z "
-ROW += "dx dy dz ax ay az nx ny nz ux uy uz dirx diry dirz"
+ROW += "px py pz posx posy posz dx dy dz ax ay az nx ny nz ux uy uz dirx diry dirz"
 """Keys of a thruster that are read."""
 
 

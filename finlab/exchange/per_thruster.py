@@ -135,6 +135,10 @@ def _split(row: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
         if any(axis_of(key) for key in short if key not in ("x", "y", "z", "fx", "fy", "fz")):
             return  # a wrench, or a place with angles: whoever reads wrenches sees to it
         yield "position", [short["x"], short["y"], short.get("z", 0.0)]
+    for letter in ("p", "pos", "pos_"):
+        keys = [f"{letter}{axis}" for axis in "xyz"]
+        if set(keys[:2]) <= set(short):
+            yield "position", [short[keys[0]], short[keys[1]], short.get(keys[2], 0.0)]
     for letter in ("d", "a", "n", "u", "dir_", "dir", "f" if "x" in short else "d"):
         keys = [f"{letter}{axis}" for axis in "xyz"]
         if set(keys[:2]) <= set(short):

@@ -90,6 +90,7 @@ def test_matrices_of_every_shape(file: str, text: str, read_as: str) -> None:
          "names joint 'x::j', which moves no link in it, or stands in what is included: x"),
         ("a.world", f'<sdf version="1.9"><world name="w"><include><name>my auv</name><uri>m</uri>{THRUSTER}</include>'
                     '<include><uri>model://sun</uri></include></world></sdf>', "the robot is in <include> my auv, which"),
+        ("a.sdf", sdf('<include merge="true"><uri>model://wamv</uri></include>' + THRUSTER), "in <include> wamv, which is not"),
         ("a.xacro", '<robot xmlns:xacro="x"><link name="${a}"/></robot>', "is a xacro file, .* expands it"),
         ("a.xml", "<launch/>", "got <launch>"),
         ("a.scn", '<scenario><include file="b.scn"/></scenario>', "scenario of Stonefish with no robot .* includes b.scn"),
@@ -127,6 +128,7 @@ def test_a_boat_commands_the_axes_of_its_rows() -> None:
         ("a.yaml", "t: {a: {position: [0.1, 0.2, 0], rpy_deg: [0, -90, 0], force_limits_n: [-9.80665, 9.80665]}}"),
         ("a.csv", "thruster,x (mm),y (mm),z,dx,dy,dz,min,max\na,100,200,0,0,0,1,-9.80665,9.80665".replace(" (mm)", "")
                   .replace("100,200", "0.1,0.2")),
+        ("a.csv", "name,px,py,pz,ax,ay,az,min,max\na,0.1,0.2,0,0,0,1,-9.80665,9.80665"),
         ("a.json", '{"thrusters": {"names": ["a", "b"], "thruster_positions": [[0.1, 0.2, 0], [0, 1, 0]], "max_force": 9.80665, '
                    '"directions": [[0, 0, 1], [1, 0, 0]]}}'),
     ],
