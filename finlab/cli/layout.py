@@ -78,7 +78,9 @@ def convert_layout(
     thrusters: Annotated[tuple[str, ...], arg(metavar="LINK...")] = (),
     origin: Literal["gravity", "base"] = "gravity",
     force: Annotated[tuple[float, float] | None, arg(metavar="LEAST MOST")] = None,
-    frame: Literal["FLU", "FRD"] = "FLU",
+    frame: Literal["FLU", "FRD"] | None = None,
+    rows: Literal["axes", "thrusters"] | None = None,
+    model: Annotated[str | None, arg(metavar="NAME")] = None,
 ) -> None:
     """Make a layout of a file of others, or the other way round: URDF, SDF, PX4, ArduSub, a matrix.
 
@@ -90,11 +92,14 @@ def convert_layout(
         thrusters: links that are thrusters although no plugin drives them.
         origin: where the layout's origin goes: the centre of gravity of all links, or the root link's frame.
         force: least and most force [N] of every thruster, in place of the file's.
-        frame: frame of a matrix: x forward, and y left, z up (FLU) or y right, z down (FRD).
+        frame: frame of a matrix or of places: x forward, and y left, z up (FLU) or y right, z down (FRD);
+            what the file says, else FLU, by default.
+        rows: what the rows of a matrix without labels are, where they may be both.
+        model: which model of a description of several; the first with thrusters by default.
     """
     from finlab.exchange import Exchange, convert
 
-    exchange = Exchange(fins, thrusters, origin, force, frame)
+    exchange = Exchange(fins, thrusters, origin, force, frame, rows, model)
     layout = convert(file, output, to, exchange)
     print(
         "\n".join(

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from finlab.bundle_files import ABOUT, LARGEST, LARGEST_BUNDLE, LARGEST_TABLE, bundle_files_of
 from finlab.errors import DataError, LayoutError
-from finlab.exchange import Exchange, read_foreign
+from finlab.exchange import Exchange, read_robot
 from finlab.files.archive import unpacked
 from finlab.files.guarded import decoded, read_file
 from finlab.hull.mesh_file import MAX_FACES, read_mesh, simplified, stl_of
@@ -28,7 +28,7 @@ from finlab.whole_file import make_folder, write_whole
 LAYOUTS = (".yaml", ".yml", ".json")
 TABLE_FOLDER, HULL_FOLDER = "tables", "hulls"
 """Where files are kept, inside a folder."""
-A_DESCRIPTION = "a robot description (URDF, SDF), parameters of PX4, or rows of ArduSub"
+A_DESIGN = "a layout, a robot description, parameters, a matrix"
 
 
 def stored_table(content: bytes, folder: Path) -> FinModelSpec:
@@ -101,19 +101,17 @@ def read_archive(source: str, content: bytes, folder: Path) -> Opened:
     return adopted(layout, by_path, folder, source)._replace(failed=failed)
 
 
-def read_description(source: str, content: bytes) -> Opened:
-    """The layout in a robot description (URDF, SDF), parameters of PX4, or ArduSub's rows of factors.
+def read_design(source: str, content: bytes, folder: Path) -> Opened:
+    """The layout in a file of any form that `finlab layout convert` reads, which opens no other file.
 
     Raises:
         LayoutError: it is none of these, or something in it is wrong.
     """
-    exchange, path = Exchange(), Path(source)
-    text = decoded(content, source, A_DESCRIPTION, LayoutError)
+    exchange = Exchange()
+    text = decoded(content, source, A_DESIGN, LayoutError)
     with under(source=source):
-        layout = read_foreign(text, path.stem.strip()[:64].strip() or "robot", path.suffix.lower(), exchange)
-        if layout is None:
-            raise LayoutError(f"expected {A_DESCRIPTION}")
-    return Opened(layout, notes=tuple(exchange.notes))
+        layout = read_robot(text, source, exchange)
+    return adopted(layout, {}, folder, source)._replace(notes=tuple(exchange.notes))
 
 
 def layout_of(source: str, content: bytes, folder: Path | None = None) -> Layout:

@@ -4,13 +4,12 @@ Factors hold directions of forces and signs of torques, no lengths and no newton
 columns and signs.
 """
 
-import re
-
 import numpy as np
 
 from finlab.arrays import Array
 from finlab.errors import LayoutError
 from finlab.exchange.ardusub_frames import AXES, SIGNS
+from finlab.exchange.ardusub_rows import rows_in
 from finlab.exchange.exchange import Exchange
 from finlab.layout import Layout, own_effectiveness
 
@@ -20,30 +19,35 @@ ORDER = [AXES.index(axis) for axis in ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")]
 """Columns of factors in the order of a wrench."""
 WEAK = 0.1
 """Torques about an axis are none where they stay below this share of those about another one."""
-_MOTOR = re.compile(
-    r"^[^\w/]*(?:\w+\()?(?:AP_MOTORS_MOT_)?(\w[^,;()]*?)((?:[\s,]+[-+]?(?:\d+(?:\.\d*)?|\.\d+)f?){6})(?=[\s,)]|$)"
-)
 
 
 def read_ardusub(text: str, name: str, exchange: Exchange) -> Layout:
-    """Returns the layout, called `name`, of motors: in lines `add_motor_raw_6dof(...)`, in a table with a
-    motor and its factors in each row.
+    """Returns the layout, called `name`, of motors: in calls `add_motor_raw_6dof(...)` of C++ or Lua, or in a
+    table with a motor and its factors in each row.
 
     Raises:
-        LayoutError: it has no motors, one of them twice, or one that gives no force.
+        LayoutError: it has no motors, one of them twice, or one that gives no force; a row does not parse.
     """
-    rows = [found for line in text.splitlines() if (found := _MOTOR.match(line[:500]))]
-    names = [f"motor{found[1]}" if found[1].isdecimal() else found[1] for found in rows]
-    factors = np.array([re.findall(r"[-+.\d]+", found[2]) for found in rows], dtype=np.float64)
+    rows = rows_in(text)
+    names = [row.name for row in rows]
     if not rows:
         raise LayoutError("has no rows of factors, a motor and its six factors in each")
-    if len(set(names)) < len(names):
-        raise LayoutError("adds a motor twice; keep the lines of one frame")
+    twice = next((name for i, name in enumerate(names) if name in names[:i]), None)
+    if twice is not None:
+        raise LayoutError(f"adds a motor twice, {twice}; keep the lines of one frame")
+    return of_factors(name, names, np.array([row.factors for row in rows]), exchange)
+
+
+def of_factors(name: str, names: list[str], factors: Array, exchange: Exchange) -> Layout:
+    """Returns the layout, called `name`, of motors by their names and factors (n, 6).
+
+    Raises:
+        LayoutError: one gives no force.
+    """
     exchange.note(f"Factors hold no lengths: one of 1 is taken for an arm of {ARM} m; correct `position_m`.")
     columns = (factors * SIGNS)[:, ORDER]
     columns[:, 3:] *= ARM * np.linalg.norm(columns[:, :3], axis=1, keepdims=True)
-    parts = [exchange.of_column(*each, None) for each in zip(names, columns, strict=True)]
-    return Layout(name, tuple(parts))
+    return Layout(name, tuple(exchange.of_column(*each, None) for each in zip(names, columns, strict=True)))
 
 
 def factors_of(layout: Layout, exchange: Exchange) -> tuple[list[str], Array]:

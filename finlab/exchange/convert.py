@@ -1,17 +1,20 @@
 """Which file holds which form, told by its end and content, and one form made into another."""
 
 import os
-import re
 from collections.abc import Callable
 from pathlib import Path
 
 from finlab.assets import shipped_layouts
 from finlab.errors import CommandError, LayoutError
 from finlab.exchange.ardusub import read_ardusub, write_ardusub
+from finlab.exchange.ardusub_parameters import OF_ARDUPILOT, read_ardusub_parameters
+from finlab.exchange.csv_table import is_factor_table, plain_of, table_of
 from finlab.exchange.description_text import SDF, URDF, description_text
 from finlab.exchange.exchange import Exchange
 from finlab.exchange.gazebo import read_description
-from finlab.exchange.matrix import csv_values, read_matrix, write_matrix
+from finlab.exchange.matrix import write_matrix
+from finlab.exchange.parameters import read_parameters
+from finlab.exchange.plain_robot import read_plain
 from finlab.exchange.px4 import read_px4, write_px4
 from finlab.files.guarded import is_regular, read_text
 from finlab.files.plain_values import parse_json, parse_yaml
@@ -33,8 +36,14 @@ WRITERS: dict[str, Callable[[Layout, Exchange, str], str]] = {
 FORM_OF = {".urdf": "urdf", ".sdf": "sdf", ".params": "px4"}
 FORM_OF |= {".cpp": "ardusub", ".csv": "matrix", ".yaml": "layout", ".yml": "layout", ".json": "layout"}
 """What a suffix stands for where the user does not say."""
-FOREIGN = tuple(suffix for suffix, form in FORM_OF.items() if form not in ("layout", "matrix"))
-"""Suffixes of robot descriptions, and of what autopilots read."""
+TABLES, PROGRAMS = (".csv", ".tsv", ".txt", ".dat"), (".cpp", ".h", ".hpp", ".lua")
+PARAMETERS = (".params", ".parm", ".param")
+FOREIGN = (".urdf", ".sdf", ".world", ".xacro", ".scn", *PARAMETERS, *PROGRAMS)
+"""Suffixes of robot descriptions, and of what autopilots read; their content says what they hold."""
+UNKNOWN = (
+    "holds none of the forms that are read: a layout, a robot description (URDF, SDF, Stonefish), parameters "
+    "of PX4 or ArduSub, motors of ArduSub, thrusters or a matrix in YAML, JSON or CSV"
+)
 
 
 def convert(file: str, output: str | os.PathLike[str], to: str | None, exchange: Exchange) -> Layout:
@@ -68,31 +77,53 @@ def read_any(file: str, exchange: Exchange) -> Layout:
     if file in shipped_layouts() or not is_regular(path) or path.suffix.lower() == ".zip":
         return load_layout(file)
     text = read_text(path, MAX_BYTES, "a robot description, parameters, a matrix or a layout", LayoutError)
-    name = path.stem.strip()[:64].strip() or "robot"
-    suffix = path.suffix.lower()
+    exchange.path = path.resolve()
     with under(source=file):
-        found = read_foreign(text, name, suffix, exchange)
-        if found is not None:
-            return found
-        if suffix == ".csv":
-            return read_matrix(csv_values(text), name, exchange)
-        data = (parse_json if suffix == ".json" else parse_yaml)(text, "", LayoutError)
-        if isinstance(data, dict) and {"format", "fins", "actuators"} & set(data):
-            return parse_layout(data, "", path.resolve().parent)
-        return read_matrix(data, name, exchange)
+        return read_robot(text, path.name, exchange)
 
 
-def read_foreign(text: str, name: str, suffix: str, exchange: Exchange) -> Layout | None:
-    """Returns the layout, called `name`, in a robot description or in what autopilots read; None where the
-    text of a file with this suffix is neither.
+def read_robot(text: str, file: str, exchange: Exchange) -> Layout:
+    """Returns the layout in the text of a file of this name, of any form.
 
     Raises:
-        LayoutError: something in it is wrong, or missing.
+        LayoutError: something in it is wrong or missing, or it holds no form that is known.
     """
+    path = Path(file)
+    name, suffix = path.stem.strip()[:64].strip() or "robot", path.suffix.lower()
     if text.lstrip().startswith("<"):
         return read_description(text, name, exchange)
-    if FORM_OF.get(suffix) != "layout" and "CA_ROTOR" in text:
+    if FORM_OF.get(suffix) != "layout":
+        found = _read_lines(text, name, suffix, exchange)
+        if found is not None:
+            return found
+    data = (parse_json if suffix == ".json" else parse_yaml)(text, "", LayoutError)
+    parts = data.get("actuators") if isinstance(data, dict) else None
+    typed = isinstance(parts, list) and any(isinstance(part, dict) and "type" in part for part in parts)
+    if isinstance(data, dict) and (typed or {"format", "fins"} & set(data)):
+        folder = exchange.path.parent if exchange.path else None
+        return parse_layout(data, "", folder, may_open=folder is not None)
+    if not isinstance(data, dict | list):
+        raise LayoutError(UNKNOWN)
+    comments = [line for line in text.splitlines() if line.lstrip().startswith("#")]
+    return read_plain(data, name, exchange, comments)
+
+
+def _read_lines(text: str, name: str, suffix: str, exchange: Exchange) -> Layout | None:
+    """The layout in lines of parameters, motors or cells; None where the text is none of these."""
+    if "CA_ROTOR" in text:
         return read_px4(text, name, exchange)
-    if FORM_OF.get(suffix) != "layout" and re.search(r"add_motor|(?i:throttle\W+forward)", text):
+    if "add_motor" in text or is_factor_table(text):
         return read_ardusub(text, name, exchange)
+    if OF_ARDUPILOT.search(text):
+        return read_ardusub_parameters(text, name, exchange)
+    if suffix in TABLES:
+        table = table_of(text)
+        return read_plain(plain_of(table), name, exchange, table.comments, table=True)
+    if suffix in PARAMETERS and (values := read_parameters(text, "")):
+        raise LayoutError(
+            f"holds {len(values)} parameters of an autopilot, but neither CA_ROTOR_COUNT (PX4) nor "
+            "FRAME_CONFIG (ArduSub), by which they name thrusters"
+        )
+    if suffix in PROGRAMS:
+        raise LayoutError("is a program without a call of add_motor_raw_6dof, by which ArduSub adds motors")
     return None

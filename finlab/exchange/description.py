@@ -1,15 +1,13 @@
 """Robot descriptions, URDF of ROS or SDF of Gazebo: where links and joints are, what they weigh, and plugins.
 
 A description is taken in its zero position, in the frame of its root link or model: x forward, y left, z up
-(REP-103). Nothing but its text is read; models inside a model and <include> stay closed.
+(REP-103). Nothing but its text is read: models inside a model are parts of it, and what is included is named.
 """
 
 import math
-import re
 from dataclasses import dataclass
 from graphlib import CycleError, TopologicalSorter
 from typing import NamedTuple
-from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 import numpy as np
@@ -17,9 +15,13 @@ from scipy.spatial.transform import Rotation
 
 from finlab.arrays import Array
 from finlab.errors import LayoutError
+from finlab.exchange.exchange import Exchange
+from finlab.exchange.expanded import expanded
+from finlab.exchange.models import Drives, chosen, name_of, parts_of
+from finlab.exchange.xml_text import is_xacro, root_of
 
-Named = dict[str, Element]
-"""Links, joints and frames by `link NAME`, `joint NAME` and `frame NAME`."""
+Named = dict[str, tuple[str, Element]]
+"""Links, joints, frames and models inside by `link NAME` and so on, with the scope of their names."""
 ADDED = ("xx", "yy", "zz", "pp", "qq", "rr")
 """Diagonal of SDF's <fluid_added_mass>."""
 MOMENTS = ("xx", "xy", "xz", "yy", "yz", "zz")
@@ -56,33 +58,50 @@ class Description:
     """[kg]; 0 where no link has one."""
     center: Array
     """Centre of gravity (3,) [m]."""
-    inertia: Array
-    """(3, 3) about the centre of gravity [kg m^2]."""
-    added: Array
-    """Added mass (6,), diagonal [kg, kg m^2]; 0 where no link has one."""
-    plugins: list[Element]
+    inertia: Array | None
+    """(3, 3) about the centre of gravity [kg m^2]; None where a link with a mass has none."""
+    added: dict[str, float]
+    """Added mass by the name of its entry (`xx`), all links together [kg, kg m^2]."""
+    plugins: list[tuple[str, Element]]
+    """With the scope of the names in them."""
+    included: tuple[str, ...]
+    """Names of what it includes, which is not read."""
 
 
-def parse_description(text: str, name: str) -> Description:
-    """Returns what a URDF or SDF text says; `name` is what the robot is called where it has none.
+def parse_description(root: Element, name: str, drives: Drives, exchange: Exchange) -> Description:
+    """Returns what the outermost element of URDF or SDF says; `name` is the robot's where it has none.
+
+    Of several models it is the one that `exchange` names, or the first with a plugin that `drives` one.
 
     Raises:
         LayoutError: it is neither, it uses what is not allowed, or something in it is missing or no number.
     """
-    root = _root(text)
-    models = [root] if root.tag == "robot" else list(root.iter("model"))
-    if not models:
-        raise LayoutError(f"expected a <robot> of URDF or a <model> of SDF, got <{root.tag:.40}>")
-    top = next((model for model in models if model.find(".//plugin") is not None), models[0])
-    named = {f"{tag} {_name(part)}": part for tag in ("link", "joint", "frame") for part in top.findall(tag)}
-    movers = {said(part, "child@link"): key for key, part in named.items() if part.tag == "joint"}
-    hung = {key: _hung(part, named, movers) for key, part in named.items()}
-    poses = _placed(hung)
-    moving = [_joint(part, named, poses) for part in top.findall("joint")]
+    if is_xacro(root):
+        root = root_of(expanded(exchange.path))
+        exchange.note("It was expanded by xacro.")
+    top = chosen(root, drives, exchange)
+    named, plugins, included = parts_of(top)
+    movers = {said(part, "child@link"): key for key, (_, part) in named.items() if part.tag == "joint"}
+    hung = {key: _hung(scope, part, named, movers) for key, (scope, part) in named.items()}
+    poses = _placed(hung, included)
+    old = _version(root) < (1, 5)
+    moving = [
+        _joint(scope, part, named, poses, old)
+        for key, (scope, part) in named.items()
+        if part.tag == "joint" and key in poses
+    ]
     joints = {joint.name: joint for joint in moving if f"link {joint.child}" in named}
     movers_of = {joint.child: joint for joint in joints.values()}
-    plugins = [*top.findall("gazebo/plugin"), *top.findall("plugin"), *top.findall("link/plugin")]
-    return Description(top.get("name") or name, joints, movers_of, *_masses(named, poses), plugins)
+    if included:
+        exchange.note(f"What it includes is left out, with its mass: {', '.join(included)[:300]}.")
+    masses = _masses(named, poses)
+    return Description(top.get("name") or name, joints, movers_of, *masses, plugins, tuple(included))
+
+
+def _version(root: Element) -> tuple[int, ...]:
+    """The version of SDF; URDF has none, and counts as the newest."""
+    text = root.get("version", "") if root.tag == "sdf" else ""
+    return tuple(int(part) for part in text.split(".") if part.isdecimal() and len(part) < 6) or (9,)
 
 
 def said(element: Element, paths: str, usual: str = "") -> str:
@@ -114,43 +133,23 @@ def number(element: Element, paths: str, usual: float = 0.0) -> float:
     return float(numbers(text, 1, f"<{paths}>")[0]) if text else usual
 
 
-def _root(text: str) -> Element:
-    """The outermost element. Entities could pull in other files or grow without bound, and descriptions have
-    no use for them; as the text is UTF-8 whatever its first line says, no other encoding can hide them."""
-    text = re.sub(r"^\s*<\?xml[^>]*\?>", "", text)
-    if "<!DOCTYPE" in text or "<!ENTITY" in text:
-        raise LayoutError("declares a DOCTYPE or entities, which are not allowed; remove them")
-    if re.search(r"<xacro:|\$\{|\$\((?:find|arg) ", re.sub(r"(?s)<!--.*?-->", "", text)):
-        raise LayoutError("is a xacro file, not a robot description; run `xacro FILE > robot.urdf` first")
-    try:
-        return ElementTree.fromstring(text)
-    except (ElementTree.ParseError, ValueError) as error:
-        raise LayoutError(f"is not readable XML: {str(error)[:120]}") from None
-
-
-def _name(element: Element) -> str:
-    name = element.get("name")
-    if not name:
-        raise LayoutError(f"has a <{element.tag}> without a name")
-    return name
-
-
-def _hung(part: Element, named: Named, movers: dict[str, str]) -> tuple[str, Array]:
+def _hung(scope: str, part: Element, named: Named, movers: dict[str, str]) -> tuple[str, Array]:
     """What a frame hangs on ("" for the description itself), and its pose there: in URDF a joint on its
-    parent, and a link where its joint is; in SDF a link on the model, and a joint on its child."""
+    parent, and a link where its joint is; in SDF a link or model on the model, and a joint on its child."""
     told = said(part, "pose@relative_to") or part.get("attached_to", "")
-    if told:
-        return _key(told, named), _pose(part)
-    if part.tag == "joint":
-        return f"link {said(part, 'parent@link child')}", _pose(part)
-    return movers.get(part.get("name", ""), "") if part.tag == "link" else "", _pose(part)
+    if not told and part.tag == "joint":
+        told = said(part, "parent@link child")
+    if told or part.tag != "link":
+        return _key(scope, told, named), _pose(part)
+    return movers.get(part.get("name", ""), "") or _key(scope, "", named), _pose(part)
 
 
-def _key(name: str, named: Named) -> str:
-    """The key of the frame that SDF calls by a name."""
+def _key(scope: str, name: str, named: Named) -> str:
+    """The key of the frame that a description calls by a name in a scope."""
     if name in ("", "__model__"):
-        return ""
-    return next((f"{tag} {name}" for tag in ("link", "joint", "frame") if f"{tag} {name}" in named), name)
+        return f"model {scope[:-2]}" if scope else ""
+    keys = (f"{tag} {scope}{name}" for tag in ("link", "joint", "frame", "model"))
+    return next((key for key in keys if key in named), f"{scope}{name}")
 
 
 def _pose(part: Element) -> Array:
@@ -162,20 +161,30 @@ def _pose(part: Element) -> Array:
     if quaternion and not values[3:].any():
         raise LayoutError(f"{what} has a quaternion without length")
     degrees = found is not None and found.get("degrees") == "true"
-    turn = Rotation.from_quat(values[3:]) if quaternion else Rotation.from_euler("xyz", values[3:], degrees)
     pose = np.eye(4)
-    pose[:3, :3], pose[:3, 3] = turn.as_matrix(), values[:3]
+    pose[:3, 3] = values[:3]
+    if not values[3:].any():
+        return pose
+    turn = Rotation.from_quat(values[3:]) if quaternion else Rotation.from_euler("xyz", values[3:], degrees)
+    pose[:3, :3] = turn.as_matrix()
     return pose
 
 
-def _placed(hung: dict[str, tuple[str, Array]]) -> dict[str, Array]:
-    """Poses (4, 4) of frames in the description's own, from what each hangs on and its pose there."""
-    poses = {"": np.eye(4)}
+def _placed(hung: dict[str, tuple[str, Array]], included: list[str]) -> dict[str, Array]:
+    """Poses (4, 4) of frames in the description's own, from what each hangs on and its pose there; without
+    those that hang on what is included."""
+    poses, lost = {"": np.eye(4)}, set()
+    outside = tuple(f"{name}::" for name in included)
     try:
         for key in TopologicalSorter({key: [base] for key, (base, _) in hung.items()}).static_order():
-            if key:
+            if key not in hung and (key in included or key.startswith(outside)):
+                lost.add(key)
+            elif key:
                 base, pose = hung[key]
-                poses[key] = poses[base] @ pose
+                if base in lost:
+                    lost.add(key)
+                else:
+                    poses[key] = poses[base] @ pose
     except (CycleError, KeyError) as error:
         where = f"{error.args[-1]!r:.80}"
         raise LayoutError(
@@ -184,11 +193,13 @@ def _placed(hung: dict[str, tuple[str, Array]]) -> dict[str, Array]:
     return poses
 
 
-def _joint(part: Element, named: Named, poses: dict[str, Array]) -> Joint:
-    name, what = _name(part), f"joint {_name(part)!r:.60}"
+def _joint(scope: str, part: Element, named: Named, poses: dict[str, Array], old: bool) -> Joint:
+    """A joint; in `old` SDF an axis is seen from the model, as where use_parent_model_frame says so."""
+    name, what = f"{scope}{name_of(part)}", f"joint {name_of(part)!r:.60}"
     xyz, kind = part.find("axis/xyz"), part.get("type", "")
     seen_from = xyz.get("expressed_in") if xyz is not None else None
-    frame = _key(seen_from, named) if seen_from else f"joint {name}"
+    of_model = said(part, "axis/use_parent_model_frame", str(int(old))).lower() in ("1", "true")
+    frame = _key(scope, seen_from or "__model__", named) if seen_from or of_model else f"joint {name}"
     if frame not in poses:
         raise LayoutError(f"has no frame {seen_from!r:.60}, in which the axis of {what} is expressed")
     usual = "1 0 0" if part.find("parent[@link]") is not None else "0 0 1"
@@ -203,26 +214,41 @@ def _joint(part: Element, named: Named, poses: dict[str, Array]) -> Joint:
     except ValueError:
         raise LayoutError(f"a limit of {what} is no number") from None
     ends = (low, high) if max(abs(low), abs(high)) < 1e9 else (-math.inf, math.inf)
-    names = said(part, "parent@link parent"), said(part, "child@link child")
-    return Joint(name, kind, *names, place, axis / (length or 1.0), ends)
+    parent, child = (_link(scope, said(part, f"{end}@link {end}"), named) for end in ("parent", "child"))
+    return Joint(name, kind, parent, child, place, axis / (length or 1.0), ends)
 
 
-def _masses(named: Named, poses: dict[str, Array]) -> tuple[float, Array, Array, Array]:
-    """Mass, centre of gravity (3,), inertia (3, 3) about it and added mass (6,) of all links together."""
-    parts, added = [], np.zeros(6)
-    for key, link in named.items():
-        inertial = link.find("inertial")
+def _link(scope: str, name: str, named: Named) -> str:
+    """The name of a link with its scope; a frame stands for the link that it is attached to."""
+    for _ in range(20):
+        key = _key(scope, name, named)
+        if not key.startswith("frame "):
+            return key.removeprefix("link ")
+        scope, part = named[key]
+        name = part.get("attached_to", "")
+    return name
+
+
+def _masses(named: Named, poses: dict[str, Array]) -> tuple[float, Array, Array | None, dict[str, float]]:
+    """Mass, centre of gravity (3,), inertia (3, 3) about it and added mass of all links together."""
+    parts, added, whole = [], dict[str, float](), True
+    for key, (_, link) in named.items():
+        inertial = link.find("inertial") if key in poses else None
         if inertial is not None:
             told = [number(inertial, f"inertia@i{moment} inertia/i{moment}") for moment in MOMENTS]
             inertia = np.array(told)[[[0, 1, 2], [1, 3, 4], [2, 4, 5]]]
-            pose = poses[key] @ _pose(inertial)
-            own = pose[:3, :3] @ inertia @ pose[:3, :3].T
-            parts.append((number(inertial, "mass@value mass"), pose[:3, 3], own))
-            added += [number(inertial, f"fluid_added_mass/{axis}") for axis in ADDED]
-    mass, center, inertia = sum(part[0] for part in parts), np.zeros(3), np.zeros((3, 3))
-    if mass > 0.0:
-        center = sum((kg * at for kg, at, _ in parts), center) / mass
+            pose, mass = poses[key] @ _pose(inertial), number(inertial, "mass@value mass")
+            whole &= mass == 0.0 or all(
+                said(inertial, f"inertia@i{xx} inertia/i{xx}") for xx in ("xx", "yy", "zz")
+            )
+            parts.append((mass, pose[:3, 3], pose[:3, :3] @ inertia @ pose[:3, :3].T))
+            for axis in ADDED:
+                if said(inertial, f"fluid_added_mass/{axis}"):
+                    added[axis] = added.get(axis, 0.0) + number(inertial, f"fluid_added_mass/{axis}")
+    total, center, about = sum(part[0] for part in parts), np.zeros(3), np.zeros((3, 3))
+    if total > 0.0:
+        center = sum((kg * at for kg, at, _ in parts), center) / total
         for kg, at, own in parts:
             arm = at - center
-            inertia += own + kg * (arm @ arm * np.eye(3) - np.outer(arm, arm))
-    return mass, center, inertia, added
+            about += own + kg * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+    return total, center, about if whole else None, added

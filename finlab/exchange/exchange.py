@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -30,8 +31,14 @@ class Exchange:
     """Where the layout's origin goes: the centre of gravity of all links, or the description's own."""
     force: tuple[float, float] | None = None
     """Least and most force of every thruster [N]; the file's, else those of a T200, when None."""
-    frame: Literal["FLU", "FRD"] = "FLU"
-    """Frame of a matrix."""
+    frame: Literal["FLU", "FRD"] | None = None
+    """Frame of a matrix or of places; the file's, else FLU, when None."""
+    rows: Literal["axes", "thrusters"] | None = None
+    """What the rows of a matrix without labels are, where it may be both."""
+    model: str | None = None
+    """Name of the model to take from a robot description of several; the first with thrusters when None."""
+    path: Path | None = None
+    """The file; None for one from a browser, which may open no other."""
     notes: list[str] = field(default_factory=list)
     """Sentences."""
 

@@ -5,39 +5,27 @@ CA_R_REV says that it reverses (PX4, ActuatorEffectivenessRotors).
 """
 
 import math
-import re
 
 import numpy as np
 
 from finlab.errors import LayoutError
 from finlab.exchange.exchange import TO_FRD, Exchange
+from finlab.exchange.parameters import read_parameters
 from finlab.layout import Layout, Thruster
 
 MAX_ROTORS = 12
 FRD = TO_FRD[:3, 0]
-LONGEST = 500
-"""Most characters of a line that are looked at."""
-_LINE = re.compile(
-    r"(?:^|[\s,])([A-Z][A-Z0-9]*_\w+)[\s,=]+([-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?)(?=[\s,]|$)"
-)
 USUAL = {"PX": 0.0, "PY": 0.0, "PZ": 0.0, "AX": 0.0, "AY": 0.0, "AZ": -1.0, "CT": 6.5, "KM": 0.05}
 """Keys of a rotor, and their defaults."""
-
-
-def read_parameters(text: str) -> dict[str, float]:
-    """Returns parameters by name: of lines `param set-default NAME VALUE`, `NAME VALUE`, `NAME,VALUE`, and
-    those of QGroundControl, `1 1 NAME VALUE TYPE`. What follows # is a comment; the last value counts."""
-    lines = (_LINE.search(line[:LONGEST].partition("#")[0]) for line in text.splitlines())
-    return {found[1]: float(found[2]) for found in lines if found and abs(float(found[2])) < 1e9}
 
 
 def read_px4(text: str, name: str, exchange: Exchange) -> Layout:
     """Returns the layout, called `name`, of the rotors in a parameter file or airframe script.
 
     Raises:
-        LayoutError: it has no rotors, or one without direction or force.
+        LayoutError: it has no rotors, or one without direction or force; a value is no number.
     """
-    values = read_parameters(text)
+    values = read_parameters(text, "CA_")
     count = int(values.get("CA_ROTOR_COUNT", 0))
     if not 0 < count <= MAX_ROTORS:
         raise LayoutError(f"expected 1 to {MAX_ROTORS} rotors, got {count}", "CA_ROTOR_COUNT")
@@ -46,6 +34,14 @@ def read_px4(text: str, name: str, exchange: Exchange) -> Layout:
     reversing = int(values.get("CA_R_REV", 2**count - 1))
     if values.get("CA_SV_CS_COUNT", 0.0) or values.get("CA_SV_TL_COUNT", 0.0):
         exchange.note("Its surfaces and tilting servos (CA_SV_*) are left out: they hold no forces.")
+    for key, usual in USUAL.items():
+        lacking = [str(i) for i in range(count) if f"CA_ROTOR{i}_{key}" not in values]
+        if lacking:
+            which = ", ".join(lacking) if len(lacking) < count else "all"
+            exchange.note(f"No CA_ROTORi_{key} of rotors {which}: {usual:g} is taken, the default of PX4.")
+    beyond = sorted(key for key in values if key.startswith("CA_ROTOR") and _rotor(key) >= count)
+    if beyond:
+        exchange.note(f"CA_ROTOR_COUNT is {count}; not read: {', '.join(beyond[:12])}.")
     if exchange.force is None:
         exchange.note("CA_ROTORi_CT is taken for the newtons at full output; correct `force_n` if not.")
     parts = []
@@ -59,6 +55,12 @@ def read_px4(text: str, name: str, exchange: Exchange) -> Layout:
         axis *= math.copysign(1.0 / length, size)
         parts.append(exchange.thruster(f"rotor{i + 1}", place, axis, force, -km))
     return Layout(name, tuple(parts))
+
+
+def _rotor(key: str) -> int:
+    """The number of the rotor that a parameter is of; -1 for others."""
+    number = key.removeprefix("CA_ROTOR").partition("_")[0]
+    return int(number) if number.isdecimal() and len(number) < 4 else -1
 
 
 def write_px4(layout: Layout, exchange: Exchange, suffix: str) -> str:

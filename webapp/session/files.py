@@ -20,15 +20,12 @@ from finlab.deploy.bundle import with_tables_inside
 from finlab.deploy.design_files import (
     TABLE_FOLDER,
     Opened,
-    adopted,
-    layout_of,
     read_archive,
-    read_description,
+    read_design,
     stored_mesh,
     with_hull_inside,
 )
 from finlab.errors import FinlabError, LayoutError
-from finlab.exchange import FOREIGN
 from finlab.files.archive import packed as pack
 from finlab.files.plain_values import yaml_text
 from finlab.hull.mesh import Mesh
@@ -96,10 +93,8 @@ def read_layout(name: str, content: bytes) -> Opened:
         opened = read_archive(source, content, cache_folder())
     elif len(content) > MAX_BYTES:
         raise LayoutError(f"is larger than {MAX_BYTES:,} bytes, a layout has a few thousand", source=source)
-    elif source.lower().endswith(FOREIGN):
-        opened = read_description(source, content)
     else:
-        opened = adopted(layout_of(source, content), {}, cache_folder(), source)
+        opened = read_design(source, content, cache_folder())
     plant_of(opened.layout)  # reads the tables of its fins
     return opened
 

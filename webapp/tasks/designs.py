@@ -10,6 +10,8 @@ import viser
 from finlab.deploy.bundle import make_bundle
 from finlab.deploy.design_files import Opened
 from finlab.errors import FinlabError
+from finlab.exchange import is_robot_table
+from finlab.exchange.convert import TABLES
 from finlab.hull import hull_of
 from finlab.layout import Layout
 from webapp.presses import Presses
@@ -21,7 +23,7 @@ from webapp.tasks.swimming import Swimming
 from webapp.viser_internals import run_file, run_script
 
 KINDS = (
-    "a design (YAML, JSON, ZIP), a robot description (URDF, SDF, PX4's .params), "
+    "a design (YAML, JSON, ZIP), a robot of others (URDF, SDF, Stonefish, PX4, ArduSub, a matrix), "
     "measurements of a fin (CSV), or a hull (STL, OBJ, GLB, PLY)"
 )
 SHARED = (
@@ -157,7 +159,8 @@ class Opening:
         Raises:
             FinlabError: it is of no kind that is opened, or whoever takes it refuses it.
         """
-        take = self._takers.get(PurePath(name).suffix.lower())
+        suffix = PurePath(name).suffix.lower()
+        take = self._takers.get(".yaml" if suffix in TABLES and is_robot_table(content) else suffix)
         if take is None:
             raise FinlabError(f"{PurePath(name).name[-60:]!r} cannot be opened; expected {KINDS}")
         take(name, content)

@@ -1,0 +1,119 @@
+"""Words of others for axes of a wrench, frames, places, directions and limits."""
+
+import re
+from collections.abc import Iterable, Mapping
+from typing import Any, Literal
+
+from finlab.errors import LayoutError
+from finlab.layout.wrench_axes import AXES, Axis
+
+Frame = Literal["FLU", "FRD"]
+FRAMES: dict[Frame, str] = {"FLU": "x forward, y left, z up", "FRD": "x forward, y right, z down"}
+_FRAME_WORDS: dict[Frame, set[str]] = {
+    "FLU": {"flu", "enu", "nwu", "rep103", "rep"},
+    "FRD": {"frd", "ned", "sname", "fsd"},
+}
+_SIDES: dict[Frame, set[str]] = {"FLU": {"left", "port", "up"}, "FRD": {"right", "starboard", "down"}}
+FRAME_KEYS = "frameid frame bodyframe convention coordinateframe "
+FRAME_KEYS += "coordinatesystem referenceframe axesconvention"
+_AXIS_WORDS = {
+    "Fx": "fx x surge forcex xforce",
+    "Fy": "fy y sway forcey yforce",
+    "Fz": "fz z heave forcez zforce",
+    "Tx": "tx mx rx k roll torquex momentx taux xtorque",
+    "Ty": "ty my ry m pitch torquey momenty tauy ytorque",
+    "Tz": "tz mz rz n yaw torquez momentz tauz ztorque",
+}
+_AXES: dict[str, Axis] = {word: axis for axis in AXES for word in _AXIS_WORDS[axis].split()}
+NAME = "name thruster joint thrustername jointname motor actuator id label"
+NAMES = "names thrusters thrusternames joints jointnames motors actuators"
+COUNT = "count n num number nthrusters numthrusters numberofthrusters thrustercount"
+POSITION = "position positions pos xyz location locations place placement leverarm r coordinates origin"
+DIRECTION = "direction directions dir axis axes forcedirection forcedirections thrustdirection "
+DIRECTION += "thrustdirections thrustaxis thrustvector unitvector vector"
+ANGLES, UNCLEAR = "rpy euler eulerangles rollpitchyaw", "orientation orientations attitude rotation"
+ROWS_OF = "axes dof dofs rows rownames axisnames degreesoffreedom controlledaxes"
+CENTER = "centerofmass centreofmass centerofgravity centreofgravity cog com cg"
+PAIR = "bounds limits range forcelimits thrustlimits forcebounds thrustbounds thrustrange forcerange"
+LEAST = "least min lower minimum minforce minthrust forcemin thrustmin lowerlimit lowerbound fmin tmin"
+MOST = "most max upper maximum maxforce maxthrust forcemax thrustmax upperlimit upperbound fmax tmax"
+LIMIT_KEYS = f"{PAIR} {LEAST} {MOST} {COUNT} {ROWS_OF}"
+LENGTHS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
+FORCES = {"n": 1.0, "kn": 1000.0, "kgf": 9.80665, "lbf": 4.4482216}
+DEGREES = {"rad": 1.0, "deg": 57.29577951308232}
+
+
+ROW = f"{NAME} {POSITION} {DIRECTION} {ANGLES} {LIMIT_KEYS} x y z "
+ROW += "px py pz posx posy posz dx dy dz ax ay az nx ny nz ux uy uz dirx diry dirz"
+"""Keys of a thruster that are read."""
+
+
+def plain(label: object) -> str:
+    """Returns a label's letters and digits in lower case, without a unit in brackets."""
+    return re.sub(r"[^a-z0-9]", "", re.split(r"[(\[]", str(label), maxsplit=1)[0].lower())
+
+
+def axis_of(label: object) -> Axis | None:
+    """Returns the axis that a label names, such as `Fx`, `rz` or `surge`; None for others."""
+    return _AXES.get(plain(label))
+
+
+def lookup(
+    values: Mapping[str, Any], words: str, units: Mapping[str, float] | None = None
+) -> tuple[str, Any, float]:
+    """Returns the first key of a mapping that is one of some words, its value and the size of its unit, which
+    may end the key (`position_mm`) or stand behind it in brackets; an empty key where there is none."""
+    known = words.split()
+    for key, value in values.items():
+        label, size = str(key)[:100], 1.0
+        found = re.search(r"[_ (\[]+([a-z]+)[)\]]?$", label, re.IGNORECASE)
+        if found and units and found[1].lower() in units:
+            label, size = label[: found.start()], units[found[1].lower()]
+        word = plain(label)
+        if word in known or word.removeprefix("thruster").removeprefix("s") in known:
+            return str(key), value, size
+    return "", None, 1.0
+
+
+def unknown_in(rows: Iterable[Mapping[str, Any]]) -> str:
+    """Returns the keys of thrusters that are not read, with commas between."""
+    keys = dict.fromkeys(str(key) for row in rows for key in row)
+    units = {**LENGTHS, **FORCES, **DEGREES}
+    return ", ".join(key for key in keys if not axis_of(key) and not lookup({key: 0}, ROW, units)[0])[:300]
+
+
+def frame_in(text: str) -> Frame | None:
+    """Returns the frame that a text names by words such as NED, FLU, `y right`; None where it names none, or
+    a left-handed one."""
+    words = set(re.findall(r"[a-z]+(?:103)?", text[:2000].lower()))
+    for known in (_FRAME_WORDS, _SIDES):
+        named: list[Frame] = [frame for frame, of_it in known.items() if words & of_it]
+        if named:
+            return named[0] if len(named) == 1 else None
+    return None
+
+
+def frame_said(scopes: Iterable[Mapping[str, Any]], comments: Iterable[str]) -> tuple[Frame | None, str]:
+    """Returns the frame that mappings, the innermost first, or else comments name, and where it says so.
+
+    Raises:
+        LayoutError: a frame is named by a word that is not known.
+    """
+    for scope in scopes:
+        key, value, _ = lookup(scope, FRAME_KEYS.removeprefix("frameid "))
+        text = " ".join(map(str, value.values())) if isinstance(value, Mapping) else str(value)
+        if key and frame_in(text) is None:
+            raise LayoutError(f"is {text!r:.60}, expected {_words()}; or leave it out, and say --frame", key)
+        if key:
+            return frame_in(text), f"{key} {text}"
+        frame = frame_in(str(lookup(scope, "frameid")[1]))
+        if frame:
+            return frame, "frame_id"
+    for comment in comments:
+        if re.search(r"\b(?:FLU|FRD|NED|ENU|SNAME|frame)\b", comment) and (frame := frame_in(comment)):
+            return frame, "its comment"
+    return None, ""
+
+
+def _words() -> str:
+    return "FLU, ENU or REP-103 (x forward, y left, z up), or FRD, NED or SNAME (x forward, y right, z down)"

@@ -1,0 +1,307 @@
+"""Files as other programs write them: read rightly, or refused in a sentence that says why."""
+# ruff: noqa: E501  # files stand as they are written
+
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from finlab.errors import LayoutError
+from finlab.exchange import Exchange, read_any, read_robot
+from finlab.layout import Layout, own_effectiveness
+
+SCREW = (
+    '<link name="hull"><inertial><mass>12</mass><inertia><ixx>.2</ixx><iyy>.3</iyy><izz>.3</izz></inertia></inertial>'
+    '</link><link name="screw"><pose>-0.4 0 0 0 0 0</pose></link><joint name="sj" type="revolute"><parent>hull</parent>'
+    "<child>screw</child><axis><xyz>1 0 0</xyz></axis></joint>"
+)
+THRUSTER = '<plugin filename="gz-sim-thruster-system" name="gz::sim::systems::Thruster"><joint_name>sj</joint_name></plugin>'
+COLUMNS = np.array([[1, 0, 0, 0, 0, 0.3], [1, 0, 0, 0, 0, -0.3], [0, 0, 1, 0.1, -0.2, 0]])
+"""Wrenches per newton of a robot's port, starboard and lift, x forward, y left, z up."""
+
+
+def read(file: str, text: str, **said: object) -> tuple[Layout, str]:
+    exchange = Exchange(**said)  # type: ignore[arg-type]
+    return read_robot(text, file, exchange), " ".join(exchange.notes)
+
+
+def columns(layout: Layout) -> np.ndarray:
+    return own_effectiveness(layout)[:, 0]
+
+
+def sdf(inside: str, version: str = "1.9") -> str:
+    return f'<sdf version="{version}"><model name="rov">{inside}</model></sdf>'
+
+
+@pytest.mark.parametrize(
+    ("file", "text", "read_as"),
+    [
+        ("a.yaml", "names: [port, starboard, lift]\ntam: [1, 1, 0, 0, 0, 0, 0, 0, 1, 0, 0, .1, 0, 0, -.2, .3, -.3, 0]", "tam"),
+        ("a.yaml", "tam: {rows: 6, cols: 3, dt: d, data: [1,1,0, 0,0,0, 0,0,1, 0,0,.1, 0,0,-.2, .3,-.3,0]}", "tam"),
+        ("a.yaml", "node:\n  allocation_matrix:\n    surge: [1, 1, 0]\n    sway: [0, 0, 0]\n    heave: [0, 0, 1]\n"
+                   "    roll: [0, 0, 1e-1]\n    pitch: [0, 0, -0.2]\n    yaw: [0.3, -0.3, 0]", "node.allocation_matrix"),
+        ("a.yaml", "mixer: {port: [1,0,0,0,0,.3], starboard: [1,0,0,0,0,-.3], lift: [0,0,1,.1,-.2,0]}\n"
+                   "mass_matrix: [[1,0,0,0,0,0],[0,1,0,0,0,0],[0,0,1,0,0,0],[0,0,0,1,0,0],[0,0,0,0,1,0],[0,0,0,0,0,1]]",
+         "Not read: mass_matrix"),
+        ("a.yaml", "frame: ned\nmatrix: {fx: [1,1,0], fy: [0,0,0], fz: [0,0,-1], mx: [0,0,.1], my: [0,0,.2], mz: [-.3,.3,0]}",
+         "y right, z down"),
+        ("a.csv", "name,Fx,Fy,Fz,Tx,Ty,Tz,min,max\nport,1,0,0,0,0,0.3,-5,6\nstarboard,1,0,0,0,0,-3e-1,-5,6\n"
+                  "lift,0,0,1,0.1,-0.2,0,-5,6\n", "a row per thruster"),
+        ("a.csv", "# body frame SNAME, port and starboard\nX;Y;Z;K;M;N\n1;0;0;0;0;-.3\n1;0;0;0;0;.3\n0;0;-1;.1;.2;0\n", "its comment"),
+        ("a.txt", "1 0 0 0 0 0.3\n1 0 0 0 0 -0.3\n0 0 1 0.1 -0.2 0\n", "taken for thrusters"),
+    ],
+)  # fmt: skip
+def test_matrices_of_every_shape(file: str, text: str, read_as: str) -> None:
+    layout, notes = read(file, text)
+    np.testing.assert_allclose(columns(layout), COLUMNS, atol=1e-12)
+    assert read_as in notes
+
+
+@pytest.mark.parametrize(
+    ("file", "text", "message"),
+    [
+        ("a.yaml", "matrix: [1, 1, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0]", "12 numbers in one list, which may be 2 rows of 6, 3 rows"),
+        ("a.yaml", "mass_matrix: [[1,0],[0,1],[1,1],[0,0],[0,0],[0,0]]", "its lists of numbers, mass_matrix"),
+        ("a.yaml", "tam: [[1, 1], [0, 0], [0.3, -0.3]]", "is 3 rows of 2 numbers, expected six rows"),
+        ("a.yaml", "body: {inertia: {matrix: [[1,0,0],[0,1,0],[0,0,1],[0,0,0],[0,0,0],[0,0,0]]}}", "no key that says so"),
+        ("a.yaml", "tam: [[1, 1], [0, 0, 0]]", "tam: is no matrix: its rows differ"),
+        ("a.yaml", "frame: quadrant\ntam: {fx: [1], fz: [0]}", "frame: is 'quadrant', expected FLU, ENU"),
+        ("a.yaml", "tam: {fx: [1], fz: [0]}\nmixer: {fx: [1], fz: [0]}", "a matrix more than once, at tam, mixer"),
+        ("a.yaml", "a: &x [1]\nb: *x", "anchors and aliases .* write the value out"),
+        ("a.csv", "\n".join(",".join(f"{i * j + 1}.5" for i in range(6)) for j in range(6)), "without labels, which may be"),
+        ("a.csv", "\n".join(["0.5,0,0,0.1,0,1"] * 4), "a row per thruster .* or the inverse"),
+        ("a.csv", "axis,a,b\nFx,1,1\nFy,0,O\nTz,.3,-.3", "row 3: 'O' is no number"),
+        ("a.csv", "axis,a,b\nFx,1,1\nFg,0,0\nTz,.3,-.3", "row 3 begins with 'Fg'"),
+        ("a.csv", "name,x,y,z,roll,pitch,yaw\na,0,0,0,0,0,1\n", "which may be its wrench, or its place and angles"),
+        ("a.csv", "name,Fx,Fy,Tz\na,1,0,0.3\nb,1,0,x\n", "row 3: Tz is 'x', expected a number"),
+        ("a.csv", "motor,roll,pitch,yaw,throttle,forward,lateral\n1,0,0,1,0,1,0\n2,0,0,-1,0,1,l\n", "row 3: 'l' is no"),
+        ("a.params", "1 1 CA_ROTOR_COUNT 1 6\n1 1 CA_ROTOR0_PX 0.5x 9", "line 2: CA_ROTOR0_PX is '0.5x'"),
+        ("a.parm", "FRAME_CONFIG 7", "FRAME_CONFIG: is 7, a frame of one's own"),
+        ("a.parm", "FRAME_CLASS 1\nMOT_SPIN_MIN 0.1", "parameters of ArduPilot of another vehicle"),
+        ("a.params", "1 1 BAT1_N_CELLS 4 6", "holds 1 parameters of an autopilot, but neither"),
+        ("a.lua", "motors:add_motor_raw_6dof(0, 0, 0, 1,\n 0, side, 0, 1)", "line 1: 'side' is not defined in the file"),
+        ("a.cpp", "x\nadd_motor_raw_6dof(AP_MOTORS_MOT_1, 0, 0, 1/2, 0, 1, 0, 1);", "line 2: '1/2' divides whole"),
+        ("a.lua", "print(1)", "is a program without a call of add_motor_raw_6dof"),
+        ("a.yaml", "thrusters:\n- {position: [0,0,0], orientation: [0,0,1]}", "may be a direction, or roll, pitch"),
+        ("a.yaml", "t:\n  a: {position: [0,0,0], axis: [1,0,0]}\n  b: {position: [0,0,0]}", "t.b: has no direction"),
+        ("a.txt", "Dear all,", "holds no|has no matrix|holds none"),
+        ("a.sdf", sdf('<include><uri>model://x</uri></include>' + SCREW + THRUSTER.replace("sj", "x::j")),
+         "names joint 'x::j', which moves no link in it, or stands in what is included: x"),
+        ("a.world", f'<sdf version="1.9"><world name="w"><include><name>my auv</name><uri>m</uri>{THRUSTER}</include>'
+                    '<include><uri>model://sun</uri></include></world></sdf>', "the robot is in <include> my auv, which"),
+        ("a.sdf", sdf('<include merge="true"><uri>model://wamv</uri></include>' + THRUSTER), "in <include> wamv, which is not"),
+        ("a.xacro", '<robot xmlns:xacro="x"><link name="${a}"/></robot>', "is a xacro file, .* expands it"),
+        ("a.xml", "<launch/>", "got <launch>"),
+        ("a.scn", '<scenario><include file="b.scn"/></scenario>', "scenario of Stonefish with no robot .* includes b.scn"),
+    ],
+)  # fmt: skip
+def test_what_stands_in_the_way_is_named(file: str, text: str, message: str) -> None:
+    with pytest.raises(LayoutError, match=message):
+        read(file, text)
+
+
+def test_rows_and_frames_may_be_said() -> None:
+    rng = np.random.default_rng(3)
+    matrix = rng.normal(size=(6, 6)).round(3)
+    text = "\n".join(",".join(map(str, row)) for row in matrix.tolist())
+    for rows, expected in (("axes", matrix.T), ("thrusters", matrix)):
+        layout, _ = read("a.csv", text, rows=rows, force=(-1.0, 1.0))
+        size = np.linalg.norm(expected[:, :3], axis=1, keepdims=True)
+        np.testing.assert_allclose(columns(layout), expected / size, atol=1e-12)
+    layout, notes = read("a.yaml", "frame: FLU\ntam: {fx: [1], fy: [0], fz: [0], tz: [1]}", frame="FRD")
+    assert columns(layout)[0, 5] == -1.0 and "--frame FRD was taken" in notes
+
+
+def test_a_boat_commands_the_axes_of_its_rows() -> None:
+    layout, notes = read("a.csv", "axis,l,r\nFx,1,1\nTz,-0.4,0.4\n")
+    assert layout.axes == ("Fx", "Tz") and "no row Fy, Fz, Tx, Ty" in notes
+    np.testing.assert_allclose(columns(layout), [[1, 0, 0, 0, 0, -0.4], [1, 0, 0, 0, 0, 0.4]], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("file", "text"),
+    [
+        ("a.yaml", "thrusters:\n- {name: a, pos_mm: [100, 200, 0], axis: [0, 0, 2], max_thrust_kgf: 1}"),
+        ("a.yaml", "cog: [0.1, 0, 0]\nt: {a: {xyz: {x: 0.2, y: 0.2, z: 0}, direction: [0, 0, 1], min: -9.80665, max: 9.80665}}"),
+        ("a.yaml", "frame: SNAME\nt: {a: {position: [0.1, -0.2, 0], direction: [0, 0, -1]}, bounds: [-9.80665, 9.80665]}"),
+        ("a.yaml", "t: {a: {position: [0.1, 0.2, 0], rpy_deg: [0, -90, 0], force_limits_n: [-9.80665, 9.80665]}}"),
+        ("a.csv", "thruster,x (mm),y (mm),z,dx,dy,dz,min,max\na,100,200,0,0,0,1,-9.80665,9.80665".replace(" (mm)", "")
+                  .replace("100,200", "0.1,0.2")),
+        ("a.csv", "name,px,py,pz,ax,ay,az,min,max\na,0.1,0.2,0,0,0,1,-9.80665,9.80665"),
+        ("a.json", '{"thrusters": {"names": ["a", "b"], "thruster_positions": [[0.1, 0.2, 0], [0, 1, 0]], "max_force": 9.80665, '
+                   '"directions": [[0, 0, 1], [1, 0, 0]]}}'),
+    ],
+)  # fmt: skip
+def test_thrusters_by_place_and_direction(file: str, text: str) -> None:
+    layout, _ = read(file, text)
+    first = layout.actuators[0]
+    assert first.name == "a"
+    np.testing.assert_allclose([first.position, first.frame[0]], [[0.1, 0.2, 0], [0, 0, 1]], atol=1e-9)
+    np.testing.assert_allclose([first.lower[0], first.upper[0]], [-9.80665, 9.80665])
+
+
+def test_motors_of_programs_and_lists_are_the_same() -> None:
+    calls = [f"add_motor_raw_6dof({{}}{i}, 0, 0, {yaw}, 0, {ahead}, 0, {i + 1})" for i, (yaw, ahead) in enumerate(
+        [("-SIDE", "cosf(radians(60))"), ("0.25f * 2", "5e-1f"), ("-0.5", "-0.5"), (".5", "-.5")])]  # fmt: skip
+    cpp = "static const float SIDE = 0.5f;\nvoid add_motor_raw_6dof(int8_t n, float roll);\n/* add_motor_raw_6dof(\n */\n"
+    cpp += (
+        ";\n".join(call.format("AP_MOTORS_MOT_") for call in calls)
+        .replace("MOT_3", "MOT_4")
+        .replace("MOT_2", "MOT_3")
+    )
+    cpp = cpp.replace("MOT_1, 0, 0, 0.25", "MOT_2, 0, 0, 0.25").replace("MOT_0", "MOT_1")
+    lua = "local SIDE = 1 / 2\n" + "\n".join(f"motors:{call}".format("") for call in calls).replace(
+        "cosf", "math.cos"
+    )
+    lua = lua.replace("radians", "math.rad").replace("0.25f", "0.25").replace("5e-1f", "5e-1")
+    csv = "lateral,forward,throttle,yaw,pitch,roll,motor\n" + "\n".join(
+        f"0,{ahead},1e-20,{yaw},0,0,{i}"
+        for i, (yaw, ahead) in enumerate([(-5e-1, 0.5), (0.5, 0.5), (-0.5, -0.5), (0.5, -0.5)], 1)
+    )
+    (one, _), (two, _), (three, _) = read("a.cpp", cpp), read("a.lua", lua), read("a.csv", csv)
+    assert one.names == two.names == three.names == ("motor1", "motor2", "motor3", "motor4")
+    np.testing.assert_allclose(columns(one), columns(two), atol=1e-12)
+    np.testing.assert_allclose(columns(one), columns(three), atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "FRAME_CONFIG,1.000000\nMOT_2_DIRECTION,-1",
+        "# Vehicle-Id\n1 1 FRAME_CONFIG 1 6\n1\t1\tMOT_2_DIRECTION\t-1\t6",
+    ],
+)
+def test_parameters_of_ardusub_name_a_frame(text: str) -> None:
+    layout, notes = read("a.params", text)
+    assert layout.n == 6 and "frame VECTORED" in notes and "motors 2," in notes
+
+
+def test_px4_says_what_its_defaults_filled() -> None:
+    _, notes = read("a.params", "CA_ROTOR_COUNT 2\nCA_ROTOR0_CT 4\nCA_ROTOR2_PX 1")
+    assert "No CA_ROTORi_CT of rotors 1: 6.5 is taken" in notes and "not read: CA_ROTOR2_PX" in notes
+
+
+def test_models_inside_models_and_names_of_others() -> None:
+    buoy = '<model name="buoy"><link name="b"/><plugin filename="blink" name="x::Blinker"/></model>'
+    world = f'<sdf version="1.9"><world name="w">{buoy}<model name="a">{SCREW}{THRUSTER}</model><model name="b">{SCREW}{THRUSTER}</model></world></sdf>'
+    layout, notes = read("a.sdf", world)
+    assert layout.name == "a" and "other robots: b" in notes
+    assert read("a.sdf", world, model="b")[0].name == "b"
+    with pytest.raises(LayoutError, match="has no model 'c'; it has buoy, a, b"):
+        read("a.sdf", world, model="c")
+    arm = f'<model name="arm"><pose>1 0 0 0 0 1.5707963267948966</pose>{SCREW}{THRUSTER}</model><link name="hull"><inertial><mass>8</mass></inertial></link>'
+    layout, notes = read("a.sdf", sdf(arm))
+    assert layout.body is not None and layout.body.mass_kg == 20.0 and layout.body.inertia_kgm2 is None
+    assert layout.names == ("arm::screw",) and "no inertia" in notes
+    np.testing.assert_allclose(layout.actuators[0].frame[0], [0, 1, 0], atol=1e-12)
+    np.testing.assert_allclose(layout.position[0], [0.4, -0.4, 0], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("version", "told", "axis"),
+    [
+        ("1.6", "", (0, 1, 0)),
+        ("1.6", "<use_parent_model_frame>1</use_parent_model_frame>", (1, 0, 0)),
+        ("1.4", "", (1, 0, 0)),
+    ],
+)
+def test_axes_in_the_frame_of_the_model(version: str, told: str, axis: tuple[float, ...]) -> None:
+    turned = SCREW.replace("-0.4 0 0 0 0 0", "-0.4 0 0 0 0 1.5707963267948966").replace(
+        "</xyz>", f"</xyz>{told}"
+    )
+    layout, _ = read("a.sdf", sdf(turned + THRUSTER, version))
+    np.testing.assert_allclose(layout.actuators[0].frame[0], axis, atol=1e-12)
+
+
+WATER = '<plugin filename="gz-sim-hydrodynamics-system" name="gz::sim::systems::Hydrodynamics">{}</plugin>'
+
+
+def test_derivatives_that_are_not_said_stay_unknown() -> None:
+    six = "".join(f"<{tag}>-{i}</{tag}>" for i, tag in enumerate(["xUU", "yVV", "zWW", "kPP", "mQQ", "nRR"]))
+    layout, notes = read("a.sdf", sdf(SCREW + THRUSTER + WATER.format(six + "<xU>-4</xU><xDotV>1</xDotV>")))
+    body = layout.body
+    assert body is not None and body.quadratic_damping == (0, 1, 2, 3, 4, 5)
+    assert body.linear_damping is None and body.added_mass is None
+    assert "linear_damping is left out: the file says these alone of six: xU -4" in notes and "xDotV" in notes
+
+
+def test_uuv_simulator(tmp_path: Path) -> None:
+    def urdf(thruster: str, water: str = "") -> str:
+        plugin = f'<gazebo><plugin name="t" filename="libuuv_thruster_ros_plugin.so"><linkName>t</linkName><jointName>j</jointName>{thruster}</plugin></gazebo>'
+        fossen = f'<gazebo><plugin name="h" filename="libuuv_underwater_object_ros_plugin.so"><link name="hull"><hydrodynamic_model>{water}</hydrodynamic_model></link></plugin></gazebo>'
+        return f'<robot name="r"><link name="hull"><inertial><mass value="3"/></inertial></link><link name="t"/><joint name="j" type="continuous"><parent link="hull"/><child link="t"/><axis xyz="1 0 0"/></joint>{plugin}{fossen}</robot>'
+
+    clamps = "<clampMin>-10</clampMin><clampMax>20</clampMax>"
+    for more, force in (
+        (clamps + "<conversion><type>Basic</type><rotorConstant>0.1</rotorConstant></conversion>", (-10, 40)),
+        (clamps + "<gain>2</gain><thrustMax>100</thrustMax><thrustMin>-100</thrustMin><conversion><type>Basic</type><rotorConstant>0.1</rotorConstant></conversion>", (-40, 100)),
+        (clamps + "<conversion><type>Bessa</type><rotorConstantL>0.1</rotorConstantL><rotorConstantR>0.2</rotorConstantR><deltaL>-50</deltaL><deltaR>100</deltaR></conversion>", (-5, 60)),
+        (clamps + "<conversion><type>LinearInterp</type><inputValues>-10 0 20</inputValues><outputValues>-3 0 7</outputValues></conversion>", (-3, 7)),
+        ("", (-39.91, 51.44)),
+    ):  # fmt: skip
+        layout, notes = read("a.urdf", urdf(more))
+        np.testing.assert_allclose([layout.lower[0, 0], layout.upper[0, 0]], force)
+        assert "uuv_thruster of t" in notes
+    layout, _ = read(
+        "a.urdf", urdf("", "<type>fossen</type><linear_damping>-1 -2 -3 -4 -5 -6</linear_damping>")
+    )
+    assert (
+        layout.body is not None
+        and layout.body.linear_damping == (1, 2, 3, 4, 5, 6)
+        and layout.body.added_mass is None
+    )
+
+
+def test_stonefish_looks_right_and_down() -> None:
+    part = '<actuator name="a" type="thruster"><link name="{}"/><origin xyz="$(arg x) 0.2 0.1" rpy="0 ${{-pi/2}} 0"/>' \
+           '<specs max_setpoint="10"/><thrust_model type="quadratic"><thrust_coeff value="0.2"/></thrust_model></actuator>'  # fmt: skip
+    joint = '<joint type="fixed"><parent name="H"/><child name="L"/><origin xyz="1 0 0" rpy="0 0 0"/></joint>'
+    robot = f'<robot name="s"><base_link name="H"/>{joint}{part.format("L")}</robot>'
+    layout, notes = read("a.scn", f'<scenario><arg name="x" default="-0.5"/>{robot}</scenario>')
+    (one,) = layout.actuators
+    np.testing.assert_allclose([one.position, one.frame[0]], [[0.5, -0.2, -0.1], [0, 0, -1]], atol=1e-12)
+    assert (one.lower[0], one.upper[0]) == (pytest.approx(-20), pytest.approx(20)) and "Stonefish" in notes
+
+
+def test_xacro_is_expanded_where_it_is_installed(tmp_path: Path) -> None:
+    pytest.importorskip("xacro")
+    path = tmp_path / "a.xacro"
+    text = (
+        (Path(__file__).parent / "bluerov2_heavy.urdf")
+        .read_text()
+        .replace("<robot ", '<robot xmlns:xacro="http://ros.org/wiki/xacro" ')
+    )
+    path.write_text(
+        text.replace("</robot>", '<xacro:property name="a" value="2"/><link name="b${a*2}"/></robot>')
+    )
+    assert read_any(str(path), Exchange()).n == 8
+    path.write_text(text.replace("</robot>", '<link name="${nobody}"/></robot>'))
+    with pytest.raises(LayoutError, match="xacro refuses: .*nobody"):
+        read_any(str(path), Exchange())
+
+
+@pytest.mark.parametrize(
+    ("file", "text"),
+    [
+        ("a.sdf", "<!--" * 60_000),
+        ("a.sdf", sdf('<model name="m">' * 90 + "</model>" * 90)),
+        ("a.sdf", sdf("".join(f'<model name="m{i}"><link name="l"/></model>' for i in range(20_000)))),
+        ("a.sdf", "<a>" * 200_000),
+        ("a.csv", "a" + " " * 300_000 + ",Fx\n" + "1,1\n" * 20_000),
+        ("a.csv", ("," * 50 + "\n") * 20_000),
+        ("a.csv", "a,b\n" + " " * 500_000 + "\n" + '"' * 200_000),
+        ("a.cpp", "add_motor(" * 100_000),
+        ("a.cpp", "void add_motor(x)\n" * 60_000 + "/*" * 60_000),
+        ("a.lua", "local a = 1\n" * 60_000 + "add_motor(--[[" * 30_000),
+        ("a.params", "CA_ROTOR_COUNT x " + "A_B " * 200_000),
+        ("a.parm", "MOT_" * 200_000 + "\n" + " " * 500_000 + "FRAME_CONFIG x"),
+        ("a.json", '{"a":' + "[" * 900 + "1" + "]" * 900 + "," + ",".join(f'"k{i}": [1,2,3]' for i in range(50_000)) + "}"),
+        ("a.scn", "<scenario>" + '<robot name="r"><actuator type="thruster"><origin xyz="' + "${" * 100_000 + '"/></actuator></robot></scenario>'),
+    ],
+)  # fmt: skip
+def test_hostile_files_take_linear_time(file: str, text: str) -> None:
+    start = time.process_time()
+    with pytest.raises(LayoutError):
+        read(file, text)
+    assert time.process_time() - start < 2.0
