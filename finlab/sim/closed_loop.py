@@ -256,7 +256,7 @@ class ClosedLoop:
         self._answered, command = answer, self._sent(answer.command)
         if self.monitor is not None:
             command = self.monitor.probed(command)
-        tick = self._move(now, setpoint, answer.target, command, answer.solve_ms)
+        tick = self._move(now, setpoint, asked, command, answer.solve_ms)
         self._command = command
         self._ticks.append(tick)
         found = None if self.learner is None else self.learner.step(tick.measured, tick.command)

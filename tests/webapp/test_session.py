@@ -3,12 +3,14 @@
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from finlab.assets import shipped_layouts
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
 from tests.webapp.hands import move_fin, turn_fin
+from webapp.markup.answer import wrench_bars
 from webapp.session import Session
 
 
@@ -151,3 +153,23 @@ def test_settings_have_the_ranges_of_their_method(value: object) -> None:
         session.set_setting("temperature", value)
     session.set_setting("temperature", 0.5)
     assert session.state.temperature == 0.5
+
+
+def test_an_axis_is_freed_and_commanded_again() -> None:
+    session = Session(load_layout("bluerov2"))
+    session.toggle_axis(2)
+    assert session.state.layout.axes == ("Fx", "Fy", "Tx", "Tz")
+    session.toggle_axis(4)
+    assert session.state.layout.axes == ("Fx", "Fy", "Tx", "Ty", "Tz")
+    session.undo()
+    session.undo()
+    assert session.state.layout == load_layout("bluerov2")
+    for axis in (0, 1, 2, 3):
+        session.toggle_axis(axis)
+    with pytest.raises(FinlabError, match="at least one axis"):
+        session.toggle_axis(5)
+
+
+def test_bars_say_which_axes_are_free() -> None:
+    bars = wrench_bars([1.0, 0.0, 0.0, 0.0, np.nan, 0.0], [1.0, 0.0, 0.0, 0.0, 0.3, 0.0])
+    assert bars.count("free") == 1 and "nan" not in bars

@@ -32,12 +32,13 @@ def wrench_bars(asked: ArrayLike, given: ArrayLike | None) -> str:
     """The bars of all six axes.
 
     Args:
-        asked: target wrench (6,) [N, N m].
+        asked: target wrench (6,) [N, N m]; NaN for an axis that is free.
         given: delivered wrench (6,), None while there is none.
     """
     asked = np.asarray(asked, dtype=float)
     given = None if given is None else np.asarray(given, dtype=float)
-    values = np.array([asked, asked if given is None else given])
+    wanted = np.nan_to_num(asked)
+    values = np.array([wanted, wanted if given is None else given])
     # One scale for the forces and one for the torques, so that bars compare; it moves in coarse steps only.
     scales = [
         max(nice_limit(np.abs(values[:, part]).max()), least)
@@ -47,11 +48,13 @@ def wrench_bars(asked: ArrayLike, given: ArrayLike | None) -> str:
     for k in range(6):
         scale = scales[k // 3]
         rows.append(html("<span>{} <span class='dim'>{}</span></span>", AXIS_WORDS[k], AXES[k]))
-        rows.append(_track(asked[k] / scale, None if given is None else given[k] / scale))
-        rest = None if given is None else _value(asked[k] - given[k], k)
+        free = np.isnan(asked[k])
+        rows.append(_track(None if free else asked[k] / scale, None if given is None else given[k] / scale))
+        rest = None if given is None or free else _value(asked[k] - given[k], k)
         kind = "missing" if rest is not None and float(rest.replace("−", "-")) else "dim"
         delivered = "–" if given is None else _value(given[k], k)
-        cells = (("asked", _value(asked[k], k)), ("given", delivered), (kind, rest or "–"))
+        wish = "free" if free else _value(asked[k], k)
+        cells = (("asked", wish), ("given", delivered), (kind, rest or "–"))
         rows += [html("<span class='right {}'>{}</span>", *cell) for cell in cells]
     return html("<div class='fl'><div class='bars'>{}</div></div>", rows)
 
@@ -71,14 +74,15 @@ def _value(value: float, axis: int) -> str:
     return f"{rounded:+.{digits}f}".replace("-", "−") if rounded else f"{0:.{digits}f}"
 
 
-def _track(asked: float, given: float | None) -> str:
+def _track(asked: float | None, given: float | None) -> str:
     parts: list[str] = [
         Markup("<i style='left:50%;top:0;width:1px;height:14px;background:rgba(128,128,128,.55)'></i>")
     ]
-    parts.append(_bar(0.0, asked, 1, 5, "var(--fl-asked)"))
+    if asked is not None:
+        parts.append(_bar(0.0, asked, 1, 5, "var(--fl-asked)"))
     if given is not None:
         parts.append(_bar(0.0, given, 8, 5, "var(--fl-delivered)"))
-        if abs(asked - given) > 0.02:
+        if asked is not None and abs(asked - given) > 0.02:
             parts.append(_bar(given, asked, 8, 5, "var(--fl-missing)"))
     return html("<div class='track'>{}</div>", parts)
 

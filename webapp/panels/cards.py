@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 
+import numpy as np
 from markupsafe import Markup
 
 from finlab.allocation.allocation import Allocation
@@ -65,8 +66,8 @@ def add_answer(page: Page) -> None:
     page.add_html(_said)
 
 
-def _bars(shown: Allocation | None, target: tuple[float, ...], busy: bool) -> str:
-    asked = shown.target if shown is not None and busy else target
+def _bars(shown: Allocation | None, target: tuple[float, ...], layout: Layout, busy: bool) -> str:
+    asked = shown.target if shown is not None and busy else np.where(layout.commanded, target, np.nan)
     return wrench_bars(asked, None if shown is None else shown.wrench)
 
 

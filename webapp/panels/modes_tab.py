@@ -98,7 +98,7 @@ def _origin_words(layout: Layout, method: str, best: Allocation | None, in_reach
         said = PROPOSED + beside
         if best is not None and not in_reach:
             said = BEYOND.format(best.policy.kind)
-        elif best is not None and not best.target.any():
+        elif best is not None and not np.nan_to_num(best.target).any():
             said = NOTHING
     return html("<div class='fl dim'>{}</div>", said)
 

@@ -15,6 +15,7 @@ from webapp.markup.html import html, marker
 from webapp.markup.words import listed, three_digits
 from webapp.page import Page
 from webapp.panels.damage import add_fin_buttons
+from webapp.presses import placed, press
 from webapp.session.state import AXIS_UNITS, AXIS_WORDS, MAX_SPEED, Flow
 from webapp.session.targets import PRESETS, axis_reach, full_thrust, slider_end
 from webapp.viser_internals import put_marks
@@ -47,6 +48,7 @@ def add_target(page: Page) -> None:
     presets = gui.add_button_group("Preset", tuple(PRESETS), hint="Target wrenches to start from.")
     page.on_change(presets, session.set_preset)
     add_html(gui, marker("fl-reach"))
+    page.presses.on("axis", lambda key, _held: session.toggle_axis(placed(key, 6)))
     sliders = [_add_slider(page, k) for k in range(6)]
 
     def mark(ranges: Ranges | None, able: Layout, failed: tuple[str, ...], flow: Flow | None) -> None:
@@ -55,7 +57,7 @@ def add_target(page: Page) -> None:
         for k, slider in enumerate(sliders):
             marks: tuple[tuple[float, str], ...] = ()
             hint = AXIS_WORDS[k].capitalize()
-            if ranges is not None:
+            if ranges is not None and able.commanded[k]:
                 low, high = float(ranges.low[k]), float(ranges.high[k])
                 marks, hint = reach_marks(low, high, slider.max - slider.min), _hint(k, low, high, most[k])
             put_marks(slider, marks)
@@ -76,7 +78,9 @@ def add_target(page: Page) -> None:
 def _add_slider(page: Page, axis: int) -> viser.GuiSliderHandle[float]:
     session, step = page.session, 0.01 if axis < 3 else 0.001
     label, hint = f"{AXES[axis]} [{AXIS_UNITS[axis]}]", AXIS_WORDS[axis].capitalize()
+    page.add_html(lambda layout: _switch(axis, bool(layout.commanded[axis])))
     slider = page.gui.add_slider(label, -10.0, 10.0, step, 0.0, hint=hint)
+    page.board.show(slider, disabled=lambda layout: not layout.commanded[axis])
 
     def end(able: Layout, failed: tuple[str, ...], flow: Flow | None, target: tuple[float, ...]) -> float:
         return max(slider_end(float(axis_reach(able, failed, flow)[axis])), abs(target[axis]))
@@ -84,6 +88,19 @@ def _add_slider(page: Page, axis: int) -> viser.GuiSliderHandle[float]:
     # First the ends: a value beyond them would not be shown.
     page.board.show(slider, max=end, min=lambda able, failed, flow, target: -end(able, failed, flow, target))
     return page.bind_number(slider, partial(session.set_target, axis), lambda target: target[axis])
+
+
+def _switch(axis: int, counts: bool) -> str:
+    """Whether an axis counts; it lies beside the axis's slider."""
+    does = "counts: press to free it" if counts else "is free, takes what comes: press to command it"
+    return html(
+        "<div class='fl-axis'><span role='switch' tabindex='0' aria-checked='{}' aria-label='{}' "
+        "title='{}' {}></span></div>",
+        "true" if counts else "false",
+        f"{AXES[axis]} counts",
+        f"{AXES[axis]} {does}",
+        press("axis", str(axis)),
+    )
 
 
 def _at_rest(layout: Layout, flow: Flow | None) -> str:

@@ -58,7 +58,8 @@ class Stop:
 
 def _aligned(seen: Seen) -> bool:
     """Whether something is delivered, and in the direction that was asked for."""
-    given, asked = (wrench / seen.answer.scale for wrench in (seen.answer.wrench, seen.answer.target))
+    both = seen.answer.wrench, np.nan_to_num(seen.answer.target)
+    given, asked = (wrench / seen.answer.scale for wrench in both)
     size = float(np.linalg.norm(given) * np.linalg.norm(asked))
     return size > 0.0 and float(given @ asked) / size > ALIGNED
 

@@ -52,6 +52,11 @@ class Questions(Core):
         """Watts or effort, by the method that keeps them least."""
         self.set_setting("method", LEAST[chosen(word, "least", LEAST)])
 
+    def toggle_axis(self, axis: int) -> None:
+        """An axis of the wrench counts, or is free."""
+        verb = "Free" if self.state.layout.commanded[axis] else "Command"
+        self._commit(f"{verb} {AXES[axis]}", self.state.with_axis_toggled(axis))
+
     def toggle_failure(self, name: str) -> None:
         """An actuator fails, or is repaired."""
         verb = "Repair" if name in self.state.failed else "Fail"

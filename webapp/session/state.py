@@ -5,6 +5,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
+import numpy as np
+
 from finlab.allocation.mdn_settings import MdnSettings
 from finlab.allocation.methods import METHODS, method_class
 from finlab.allocation.policy import AXES, KINDS
@@ -87,6 +89,14 @@ class State:
         target[axis] = checked
         fx, fy, fz, tx, ty, tz = target
         return replace(self, target=(fx, fy, fz, tx, ty, tz))
+
+    def with_axis_toggled(self, axis: int) -> "State":
+        """One axis commanded, or free."""
+        counts = self.layout.commanded ^ (np.arange(6) == axis)
+        if not counts.any():
+            raise FinlabError("a robot commands at least one axis; switch another one on first")
+        axes = tuple(name for name, one in zip(AXES, counts, strict=True) if one)
+        return replace(self, layout=replace(self.layout, axes=axes))
 
     def with_failure_toggled(self, name: str) -> "State":
         """One actuator failed or repaired."""

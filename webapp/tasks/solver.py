@@ -107,7 +107,8 @@ class Solver:
         _ = answer.bound, answer.notes  # to prove what is least takes longer than to find it
         if answer.samples is not None and answer.candidates is not None and state.method == "paper":
             return modes_of(answer, answer.candidates, "network", (answer.samples,))
-        if not (reply.in_reach and answer.effort is not None and answer.target.any()):  # effort is of fins
+        asks = np.nan_to_num(answer.target).any()
+        if not (reply.in_reach and answer.effort is not None and asks):  # effort is of fins
             return NO_MODES
         if state.method == "mdn" and answer.candidates is not None:
             own, badge = answer.candidates.rows([0]), "network"
@@ -150,5 +151,5 @@ def judged(answer: Allocation) -> Allocation:
 
 def _judged(answer: Allocation, found: Candidates) -> Candidates:
     wrench = plant_of(answer.layout).wrench(found.command)
-    error = np.linalg.norm((wrench - answer.target) / answer.scale, axis=-1)
+    error = np.linalg.norm(np.nan_to_num(wrench - answer.target) / answer.scale, axis=-1)
     return replace(found, wrench=wrench, err_norm=error)
