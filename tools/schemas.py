@@ -7,13 +7,17 @@ from pathlib import Path
 import msgspec
 
 from finlab.layout.file import ANY_LAYOUT
+from finlab.layout.graph_form import Graph
 
 PACKAGE = Path(__file__).parents[1] / "finlab"
 
 
 def schemas() -> dict[Path, str]:
     """Returns the text of each schema by its file."""
-    kinds = {"layout/layout.schema.json": ("finlab-layout-2", ANY_LAYOUT)}
+    kinds = {
+        "layout/layout.schema.json": ("finlab-layout-2", ANY_LAYOUT),
+        "layout/graph.schema.json": ("finlab-graph-4", Graph),
+    }
     texts = {}
     for name, (title, kind) in kinds.items():
         head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "$id": f"{title}.schema.json"}

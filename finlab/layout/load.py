@@ -9,6 +9,8 @@ from finlab.errors import LayoutError
 from finlab.files.guarded import read_text
 from finlab.files.plain_values import parse_json, parse_yaml
 from finlab.layout.file import parse_layout
+from finlab.layout.file_form import under
+from finlab.layout.graph_form import is_graph, layout_in_graph
 from finlab.layout.layout import Layout
 from finlab.layout.robot_file import robot_of
 
@@ -20,10 +22,10 @@ A_LAYOUT = "a layout file (.yaml or .json)"
 def load_layout(layout: str | os.PathLike[str]) -> Layout:
     """Returns a shipped layout by its bare name, such as "A", or the layout in a file or bundle.
 
-    Files are layout files (YAML, JSON); a bundle is a folder or zip archive made by `finlab export`. A bare
-    name is never looked up in the current folder while a layout of that name is shipped; write `./A` for a
-    file called `A` there. Relative paths inside a layout file (a force table, a hull mesh) are taken from the
-    file's own folder.
+    Files are layout files (YAML, JSON) and layout graph files (JSON); a bundle is a folder or zip archive
+    made by `finlab export`. A bare name is never looked up in the current folder while a layout of that name
+    is shipped; write `./A` for a file called `A` there. Relative paths inside a layout file (a force table, a
+    hull mesh) are taken from the file's own folder.
 
     Raises:
         LayoutError: the file cannot be read or is not a valid layout; the message names file and key.
@@ -52,7 +54,11 @@ def layout_in(
         LayoutError: it is no JSON or YAML, or no layout.
     """
     parse = parse_json if suffix.lower() == ".json" else parse_yaml
-    return parse_layout(parse(text, source, LayoutError), source, folder, may_open=may_open)
+    data = parse(text, source, LayoutError)
+    if is_graph(data):
+        with under(source=source):
+            data = layout_in_graph(data)
+    return parse_layout(data, source, folder, may_open=may_open)
 
 
 def layout_path(layout: str | os.PathLike[str]) -> Path:

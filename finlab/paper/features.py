@@ -10,6 +10,8 @@ from finlab.arrays import Values, library_of
 
 RAW_SIZE = 10
 """Number of node features (paper: x_i in R^10)."""
+POSITION_SCALE = 0.3
+"""Positions [m] of order one: the paper's layouts lie within."""
 SCALES = (0.6, 2.1, math.pi)
 """Amplitude [rad], frequency [Hz] and zero direction [rad] of order one."""
 
@@ -19,4 +21,4 @@ def raw_features(position: Values, mounting_angle: Values, lower: Values, upper:
     xp = library_of(position)
     limits = [limit[..., i] / scale for i, scale in enumerate(SCALES) for limit in (lower, upper)]
     angle = mounting_angle[..., None] / math.pi
-    return xp.concatenate([position / 0.3, angle, xp.stack(limits, axis=-1)], axis=-1)
+    return xp.concatenate([position / POSITION_SCALE, angle, xp.stack(limits, axis=-1)], axis=-1)

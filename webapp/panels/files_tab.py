@@ -19,6 +19,8 @@ def add_files(page: Page) -> None:
     icon = viser.Icon.PACKAGE_EXPORT
     page.add_button("Export the bundle (ZIP)", page.jobs.exports.bundle, icon=icon)
     page.add_html(_bundle)
+    page.add_button("Export the graph (JSON)", page.jobs.exports.graph, icon=viser.Icon.TOPOLOGY_COMPLEX)
+    page.add_html(_graph)
     page.add_button("Save the design", page.designs.save, icon=viser.Icon.DEVICE_FLOPPY)
     page.add_html(_design)
 
@@ -27,6 +29,12 @@ def _bundle(state: State) -> str:
     file = bundle_name(state.layout)
     about = "for the robot: its actuators' physics, method, README and checksums. Test it there first"
     return _about(file, about, shlex.join(["finlab-runtime", "check", file]))
+
+
+def _graph(state: State) -> str:
+    file = f"{state.layout.name}.graph.json"
+    about = "the graph of actuators that the networks see: nodes, features, edges, for networkx and learners"
+    return _about(file, about, shlex.join(["finlab", "layout", "show", file]))
 
 
 def _design(state: State) -> str:

@@ -9,6 +9,7 @@ import viser
 
 from finlab.deploy.bundle import make_bundle
 from finlab.deploy.design_files import Opened
+from finlab.deploy.graph_file import graph_text
 from finlab.errors import FinlabError
 from finlab.exchange import is_robot_table
 from finlab.exchange.convert import TABLES
@@ -51,6 +52,11 @@ class Exports:
             files.bundle_name(state.layout),
             lambda: make_bundle(shipped(state.layout, state.method), state.failed).zip_bytes(),
         )
+
+    def graph(self) -> None:
+        """Send the graph of the robot's actuators: the same text as `finlab export --graph`."""
+        layout = self._session.state.layout
+        self._send(f"{file_stem(layout.name)}.graph.json", lambda: graph_text(layout).encode())
 
     def swim(self, swimming: Swimming) -> None:
         """Send the log of the robot that swims as NPZ."""

@@ -1,0 +1,84 @@
+"""The parts of a layout graph file as types, of which `graph.schema.json` is made, and the layout in one."""
+
+from typing import Annotated, Any, Literal
+
+from msgspec import Meta, Struct, to_builtins
+
+from finlab.errors import LayoutError
+from finlab.files.schema import checked
+from finlab.layout.checked import Name
+from finlab.layout.layout import MAX_ACTUATORS
+
+
+class Edge(Struct, forbid_unknown_fields=True):
+    """Two actuators, or one twice."""
+
+    source: Name
+    target: Name
+
+
+class Normalization(Struct, forbid_unknown_fields=True):
+    """What numbers are divided by to be of order one."""
+
+    features: dict[str, float]
+    """Of the features of fins with horizontal shafts, by name, as the paper's network takes them."""
+    wrench: dict[str, float]
+    """Of each axis of a wrench [N, N m]: the robot's own yardstick, in which errors are measured."""
+
+
+class Data(Struct, forbid_unknown_fields=True):
+    """What holds for the whole graph."""
+
+    layout: dict[str, Any]
+    """A layout file of version 2 without its actuators, which are the nodes."""
+    normalization: Normalization
+    format: Literal["finlab-graph"] = "finlab-graph"
+    version: Literal[4] = 4
+
+
+class Graph(Struct, forbid_unknown_fields=True):
+    """A robot's actuators as nodes, each joined with every other one and with itself; node-link form.
+
+    A node has the actuator's name as `id`, what a layout file says of it, and `features`: numbers by name and
+    unit.
+    """
+
+    directed: Literal[False]
+    multigraph: Literal[False]
+    graph: Data
+    nodes: Annotated[list[dict[str, Any]], Meta(min_length=1, max_length=MAX_ACTUATORS)]
+    edges: list[Edge]
+
+
+def is_graph(data: Any) -> bool:
+    """Whether plain values are those of a layout graph file."""
+    about = data.get("graph") if isinstance(data, dict) else None
+    return isinstance(about, dict) and about.get("format") == "finlab-graph"
+
+
+def layout_in_graph(data: Any) -> dict[str, Any]:
+    """Returns the plain values of the layout file that a graph file holds.
+
+    Raises:
+        LayoutError: a part of the graph is missing, unknown or not what it has to be.
+    """
+    graph = checked(data, Graph)
+    names = [node.get("id") for node in graph.nodes]
+    if [(edge.source, edge.target) for edge in graph.edges] != edges_of(names):
+        raise LayoutError("expected each actuator with itself and with those after it, in order", "edges")
+    parts = [
+        {"name": node.get("id")} | {key: node[key] for key in node if key not in ("id", "features")}
+        for node in graph.nodes
+    ]
+    return {**graph.graph.layout, "actuators": parts}
+
+
+def edges_of(names: list[Any]) -> list[tuple[Any, Any]]:
+    """Returns all pairs of names, each with itself too."""
+    return [(a, b) for k, a in enumerate(names) for b in names[k:]]
+
+
+def plain_graph(graph: Graph) -> dict[str, Any]:
+    """Returns a graph file's plain values."""
+    values: dict[str, Any] = to_builtins(graph)
+    return values

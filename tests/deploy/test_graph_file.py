@@ -1,0 +1,71 @@
+"""The layout graph file: the same robot comes back, networkx opens it, the schema holds."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import jsonschema
+import networkx
+import numpy as np
+import pytest
+
+from finlab.allocation import Allocator
+from finlab.assets import shipped_layouts
+from finlab.cli import main
+from finlab.deploy.graph_file import features_of, graph_text, write_graph
+from finlab.errors import LayoutError
+from finlab.layout import load_layout
+from finlab.paper.features import raw_features
+
+SCHEMA = Path(__file__).parents[2] / "finlab" / "layout" / "graph.schema.json"
+
+
+@pytest.mark.parametrize("name", sorted(shipped_layouts()))
+def test_the_same_robot_comes_back(name: str, tmp_path: Path) -> None:
+    layout, file = load_layout(name), tmp_path / "robot.json"
+    write_graph(layout, file)
+    assert load_layout(file) == layout
+    data = json.loads(file.read_text())
+    jsonschema.validate(data, json.loads(SCHEMA.read_text()))
+    graph = networkx.node_link_graph(data, edges="edges")
+    assert tuple(graph.nodes) == layout.names
+    assert graph.number_of_edges() == layout.n * (layout.n + 1) // 2
+    np.testing.assert_allclose(
+        list(data["graph"]["normalization"]["wrench"].values()), Allocator(layout).scale
+    )
+
+
+def test_features_over_their_scales_are_what_the_papers_network_sees() -> None:
+    layout = load_layout("A")
+    data = json.loads(graph_text(layout))
+    scales = data["graph"]["normalization"]["features"]
+    seen = raw_features(layout.position, layout.mounting_angle, layout.lower, layout.upper)
+    for node, row in zip(data["nodes"], seen, strict=True):
+        assert list(node["features"]) == list(scales) and len(scales) == 10
+        np.testing.assert_allclose([node["features"][key] / scales[key] for key in scales], row)
+    part = load_layout("turtle_hybrid").actuators[-1]
+    assert {"x [m]", "force_min [N]", "force_max [N]"} <= set(features_of(part))
+
+
+def test_a_graph_that_was_changed_says_where(tmp_path: Path) -> None:
+    data, file = json.loads(graph_text(load_layout("A"))), tmp_path / "a.json"
+    for change, words in (
+        (lambda d: d["edges"].pop(), "edges"),
+        (lambda d: d["nodes"][1].update(colour=3), "actuators.1..colour"),
+        (lambda d: d["graph"].update(version=9), "graph.version"),
+        (lambda d: d["nodes"].clear(), "nodes"),
+    ):
+        broken = json.loads(json.dumps(data))
+        change(broken)
+        file.write_text(json.dumps(broken))
+        with pytest.raises(LayoutError, match=words):
+            load_layout(file)
+
+
+def test_the_command_writes_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "b.graph.json"
+    assert main(["export", "bluerov2", "--graph", str(file)]) == 0
+    assert "6 thrusters, 6 nodes" in capsys.readouterr().out
+    assert load_layout(file) == replace(load_layout("bluerov2"))
+    assert main(["export", "bluerov2"]) == 2
+    assert "nothing to write" in capsys.readouterr().err
