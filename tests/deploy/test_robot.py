@@ -1,6 +1,7 @@
 """A robot out of its bundle: the library's answers, and a self-check that notices what is wrong."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -86,3 +87,22 @@ def test_robots_of_any_actuators_are_exported_and_answer(tmp_path: Path) -> None
     np.testing.assert_array_equal(answer.command, desk.allocate(wrench, flow=flow).command)
     wrench_there = plant_of(layout).wrench(answer.command, flow=np.array(flow))
     np.testing.assert_allclose(answer.wrench, wrench_there, atol=1e-12)
+
+
+def test_check_names_the_extreme_that_has_no_answer(
+    robot: DeployedRobot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    healthy, asked = type(robot.allocator).allocate, []
+
+    def broken(self: Any, wrench: Any, **options: Any) -> Any:
+        asked.append((tuple(np.sign(wrench)), options.get("policy"), tuple(options["failed"])))
+        if options.get("policy") == "priority" and wrench[4] < 0.0 and options["failed"] == ("back_left",):
+            raise IndexError("of a group")
+        return healthy(self, wrench, **options)
+
+    monkeypatch.setattr(type(robot.allocator), "allocate", broken)
+    (found,) = (finding for finding in self_check(robot) if not finding.good)
+    assert found.value == 1.0
+    assert found.question.endswith("first priority -Ty, back_left lost: IndexError: of a group")
+    far = {question for question in asked if question[1] is not None}
+    assert len(far) == 12 * 3 * (1 + robot.layout.n), "each axis both ways, all policies, each fin lost"
