@@ -9,7 +9,7 @@ import pytest
 import finlab
 from finlab.deploy.bundle import Bundle, make_bundle
 from finlab.deploy.robot import DeployedRobot, load_robot, parse_robot
-from finlab.deploy.self_check import self_check
+from finlab.deploy.self_check import extremes, self_check
 from finlab.errors import FinlabError
 from finlab.layout import Layout
 from finlab.layout.rudder import Rudder
@@ -89,20 +89,20 @@ def test_robots_of_any_actuators_are_exported_and_answer(tmp_path: Path) -> None
     np.testing.assert_allclose(answer.wrench, wrench_there, atol=1e-12)
 
 
-def test_check_names_the_extreme_that_has_no_answer(
-    robot: DeployedRobot, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    healthy, asked = type(robot.allocator).allocate, []
+def test_extremes_name_the_one_that_has_no_answer(monkeypatch: pytest.MonkeyPatch) -> None:
+    layout, asked = finlab.load_layout("bluerov2"), []
+    robot = DeployedRobot(finlab.Allocator(layout))
+    healthy, lost = type(robot.allocator).allocate, layout.names[1]
 
-    def broken(self: Any, wrench: Any, **options: Any) -> Any:
-        asked.append((tuple(np.sign(wrench)), options.get("policy"), tuple(options["failed"])))
-        if options.get("policy") == "priority" and wrench[4] < 0.0 and options["failed"] == ("back_left",):
+    def broken(self: Any, wrench: Any, *, failed: Any, policy: str) -> Any:
+        asked.append((tuple(np.sign(wrench)), policy, tuple(failed)))
+        if policy == "priority" and wrench[5] < 0.0 and tuple(failed) == (lost,):
             raise IndexError("of a group")
-        return healthy(self, wrench, **options)
+        return healthy(self, wrench, failed=failed, policy=policy)
 
+    assert extremes(robot).good
     monkeypatch.setattr(type(robot.allocator), "allocate", broken)
-    (found,) = (finding for finding in self_check(robot) if not finding.good)
-    assert found.value == 1.0
-    assert found.question.endswith("first priority -Ty, back_left lost: IndexError: of a group")
-    far = {question for question in asked if question[1] is not None}
-    assert len(far) == 12 * 3 * (1 + robot.layout.n), "each axis both ways, all policies, each fin lost"
+    found = extremes(robot)
+    assert found.value == 1.0 and not found.good
+    assert found.question.endswith(f"first priority -Tz, {lost} lost: IndexError: of a group")
+    assert len(set(asked)) == len(asked) == 2 * layout.commanded.sum() * 3 * (1 + layout.n)
