@@ -138,7 +138,7 @@ class StandardStreams:
 def _waiting(source: int) -> int:
     """How many bytes can be read now, at most `CHUNK` and at least one."""
     try:
-        (size,) = struct.unpack("i", fcntl.ioctl(source, termios.FIONREAD, bytes(4)))
+        size: int = struct.unpack("i", fcntl.ioctl(source, termios.FIONREAD, bytes(4)))[0]
     except OSError:
         return CHUNK
     return min(max(size, 1), CHUNK)
