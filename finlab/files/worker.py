@@ -72,6 +72,18 @@ def in_worker(read: Callable[..., Found], *arguments: Any) -> Found:
     return result
 
 
+def end_with_parent() -> None:
+    """Let this process end as soon as the one that started it has, however that ended."""
+    parent = multiprocessing.parent_process()
+
+    def wait() -> None:
+        if parent is not None:
+            parent.join()
+            os._exit(1)
+
+    threading.Thread(target=wait, daemon=True).start()
+
+
 def prepare(modules: Sequence[str]) -> None:
     """Let the process that is copied be ready, with modules imported, before the first file comes."""
     multiprocessing.set_forkserver_preload(list(modules))
