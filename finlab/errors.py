@@ -5,8 +5,20 @@ line prints it behind `finlab: error: ` and exits with status 2; the app shows i
 """
 
 
+def printable(text: str) -> str:
+    """Returns a text with whatever a terminal would obey, or not show, as Python's escapes: names in it may
+    come from a stranger."""
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() or c in "\n\u00a0" else ascii(c)[1:-1] for c in text)
+
+
 class FinlabError(Exception):
     """Base of all errors that finlab raises on purpose. Its text is meant to be read by a user."""
+
+    def __init__(self, text: str = "") -> None:
+        """Takes the sentence, and makes it `printable`."""
+        super().__init__(printable(text))
 
     @classmethod
     def at(cls, source: str, problem: str, key: str = "") -> "FinlabError":

@@ -1,10 +1,14 @@
 """Files that are either there whole or not at all, and folders for them."""
 
 import os
+from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 
 from finlab.errors import DataError, FinlabError, LayoutError
+
+PART = ".part"
+"""What the name of a file that is being written ends with; it begins with a dot."""
 
 
 def write_whole(
@@ -18,18 +22,37 @@ def write_whole(
         FinlabError: of the kind `error`; the file cannot be written.
     """
     file = Path(os.path.realpath(path))
-    part = file.with_name(f".{file.name}.{os.getpid()}.part")
     data = content.encode() if isinstance(content, str) else content
     try:
         if file.exists() and not file.is_file():
             file.write_bytes(data)
             return
-        part.write_bytes(data)
-        os.replace(part, file)
     except OSError as failure:
-        with suppress(OSError):
-            part.unlink()
         raise error(f"{path}: cannot be written: {failure.strerror}") from None
+    write_together({file: data}, error, str(path))
+
+
+def write_together(files: Mapping[Path, bytes], error: type[FinlabError], name: str) -> None:
+    """Write files beside their places, and put them there in order once all are on the disk.
+
+    Raises:
+        FinlabError: of the kind `error`; one cannot be written, and none is there. It calls them `name`.
+    """
+    parts = {file.with_name(f".{file.name}.{os.getpid()}{PART}"): file for file in files}
+    try:
+        for part, file in parts.items():
+            with part.open("wb") as stream:
+                stream.write(files[file])
+                stream.flush()
+                os.fsync(stream.fileno())
+        for part, file in parts.items():
+            os.replace(part, file)
+    except OSError as failure:
+        raise error(f"{name}: cannot be written: {failure.strerror}") from None
+    finally:
+        for part in parts:
+            with suppress(OSError):
+                part.unlink()
 
 
 def make_folder(path: str | os.PathLike[str]) -> Path:

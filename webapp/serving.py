@@ -6,6 +6,7 @@ import threading
 from pathlib import Path
 
 from finlab.errors import FinlabError
+from finlab.files.worker import prepare
 from finlab.layout import load_layout
 from webapp.app import App
 from webapp.guard import Guard
@@ -32,6 +33,7 @@ def serve(
     Raises:
         FinlabError: the port is taken, or layout or checkpoint cannot be read.
     """
+    prepare(["webapp.session.files", "webapp.tasks.fitting"])
     first = load_layout(layout or FIRST_LAYOUT)
     _check_port(host, port)
     solver = Solver(checkpoint)

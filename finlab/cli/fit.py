@@ -27,12 +27,13 @@ def fin(
         output: the fitted fin.
         seed: draws samples where there are too many.
     """
+    from finlab.files.worker import in_worker
     from finlab.fit.fin_file import check_table_path, summary, write_fin
     from finlab.fit.fin_fit import fit_fin
     from finlab.fit.measurements import read_measurements
 
     check_table_path(output)
-    fit = fit_fin(read_measurements(data), seed, _tell)
+    fit = fit_fin(in_worker(read_measurements, data), seed, _tell)
     write_fin(fit, output)
     print("\n".join(summary(fit)))
     print(f"{output}: name it in a layout, model: {{type: table, path: {output.name}}}")
@@ -57,6 +58,7 @@ def actuator(
         voltage: which of several counts [V]; between two of them forces and powers are interpolated.
     """
     from finlab.errors import DataError
+    from finlab.files.worker import in_worker
     from finlab.fit.fin_file import check_table_path
     from finlab.fit.thruster_bench import read_bench
     from finlab.fit.thruster_file import layout_lines, summary, thruster_csv
@@ -64,7 +66,7 @@ def actuator(
     from finlab.whole_file import write_whole
 
     check_table_path(output)
-    fit = fit_thruster(read_bench(data, voltage))
+    fit = fit_thruster(in_worker(read_bench, data, voltage))
     write_whole(output, thruster_csv(fit, output), DataError)
     print("\n".join(summary(fit)))
     print(f"\n{output}: in a layout's thruster\n  " + "\n  ".join(layout_lines(fit, output)))
@@ -93,6 +95,7 @@ def robot(
     """
     from finlab.cli.inputs import open_robot
     from finlab.errors import DataError
+    from finlab.files.worker import in_worker
     from finlab.fit.robot.fitted_layout import write_robot
     from finlab.fit.robot.report import summary, table
     from finlab.fit.robot.robot_fit import fit_robot
@@ -103,7 +106,7 @@ def robot(
             f"{output}: a layout is a YAML or JSON file, expected a name that ends in .yaml or .json"
         )
     believed = open_robot(layout)[0]
-    swims = [read_swim(log, believed) for log in logs]
+    swims = [in_worker(read_swim, log, believed) for log in logs]
     fit = fit_robot(believed, swims, other_law, _tell)
     write_robot(fit, output)
     print("\n".join(summary(fit)))

@@ -17,9 +17,12 @@ def open_robot(text: str, failed: tuple[str, ...] = ()) -> tuple[Layout, tuple[s
     Raises:
         LayoutError: neither a readable file nor a shipped layout.
     """
+    from finlab.assets import shipped_layouts
+    from finlab.files.worker import in_worker
     from finlab.layout.load import layout_and_failed
 
-    layout, lost = layout_and_failed(text)
+    shipped = text in shipped_layouts()
+    layout, lost = layout_and_failed(text) if shipped else in_worker(layout_and_failed, text)
     return layout, tuple(dict.fromkeys([*lost, *failed]))
 
 

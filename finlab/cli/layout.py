@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from tyro.conf import Positional, UseAppendAction, arg
 from tyro.extras import SubcommandApp
@@ -12,6 +12,10 @@ from tyro.extras import SubcommandApp
 from finlab.cli.json_file import JsonFile, check_json_file, put_json
 from finlab.cli.layout_table import layout_text
 from finlab.cli.optimize import Flow, optimize
+
+if TYPE_CHECKING:
+    from finlab.exchange import Exchange
+    from finlab.layout import Layout
 
 verbs = SubcommandApp()
 verbs.command(optimize)
@@ -97,12 +101,20 @@ def convert_layout(
         rows: what the rows of a matrix without labels are, where they may be both.
         model: which model of a description of several; the first with thrusters by default.
     """
-    from finlab.exchange import Exchange, convert
+    from finlab.exchange import Exchange
+    from finlab.files.worker import in_worker
 
     exchange = Exchange(fins, thrusters, origin, force, frame, rows, model)
-    layout = convert(file, output, to, exchange)
+    layout, exchange = in_worker(_converted, file, output, to, exchange)
     print(
         "\n".join(
             [f"{output}: {layout.name} with {layout.counted}", *(f"- {note}" for note in exchange.notes)]
         )
     )
+
+
+def _converted(file: str, output: Path, to: str | None, exchange: Exchange) -> tuple[Layout, Exchange]:
+    """The layout that went from one file into the other, and what there is to say of it."""
+    from finlab.exchange import convert
+
+    return convert(file, output, to, exchange), exchange

@@ -9,6 +9,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from shutil import rmtree
 
 import finlab
 from finlab.allocation.allocator import Allocator
@@ -34,7 +35,7 @@ from finlab.files.archive import packed
 from finlab.layout import Fin, FinModelSpec, Layout
 from finlab.layout.force_table_file import table_bytes
 from finlab.layout.robot_file import Robot, robot_bytes
-from finlab.whole_file import write_whole
+from finlab.whole_file import PART, write_together, write_whole
 
 
 @dataclass(frozen=True)
@@ -51,20 +52,27 @@ class Bundle:
             DataError: the folder holds something else, or cannot be written.
         """
         path = Path(folder)
+        made = not path.exists()
         try:
             path.mkdir(parents=True, exist_ok=True)
-            present = {file.relative_to(path).as_posix() for file in path.rglob("*") if not file.is_dir()}
-            if strangers := sorted(name for name in present if largest(name) < 0):
+            present = [file for file in path.rglob("*") if not file.is_dir()]
+            left = [file.relative_to(path).as_posix() for file in present if not file.name.endswith(PART)]
+            if strangers := sorted(name for name in left if largest(name) < 0):
                 raise DataError(
                     f"{path}: holds {strangers[0]!r:.60}, which is no part of a bundle; name an empty folder"
                 )
-            for name in present:  # the checksums come last: a half-written bundle is refused
-                (path / name).unlink()
-            for name, content in self.files.items():
+            for name in self.files:
                 (path / name).parent.mkdir(exist_ok=True)
-                (path / name).write_bytes(content)
+            # The checksums come last: what a kill leaves is refused.
+            write_together({path / name: part for name, part in self.files.items()}, DataError, str(path))
+            for file in present:
+                if file.relative_to(path).as_posix() not in self.files:
+                    file.unlink()
         except OSError as error:
             raise DataError(f"{error.filename or path}: cannot be written: {error.strerror}") from None
+        finally:
+            if made and not (path / CHECKSUMS).exists():
+                rmtree(path, ignore_errors=True)
 
     def write_zip(self, file: str | os.PathLike[str]) -> None:
         """Write one zip archive, in place of an existing file; a `DataError` where it cannot be written."""

@@ -45,14 +45,14 @@ def _robot(arguments: argparse.Namespace) -> "DeployedRobot":
 
 def check(arguments: argparse.Namespace) -> int:
     """Print each question of the self-test with its answer."""
-    from finlab.deploy.self_check import self_check
+    from finlab.deploy.self_check import extremes, self_check
 
     robot = _robot(arguments)
     print(
         f"{arguments.bundle}: {robot.layout.name}, {robot.layout.counted}, "
         f"method {robot.allocator.method}, ready in {time.perf_counter() - arguments.started:.2f} s"
     )
-    findings = self_check(robot)
+    findings = [*self_check(robot), extremes(robot)]
     for finding in findings:
         word = "ok" if finding.good else "FAILED"
         print(f"  {word:6} {finding.question}: {finding.value:.2g}, allowed {finding.limit:.2g}")

@@ -13,7 +13,7 @@ from finlab.allocation.allocator import Allocator
 from finlab.allocation.methods import bundled_method
 from finlab.arrays import Array
 from finlab.bundle_files import Files, check_bundle_files, is_bundle, read_bundle_files
-from finlab.errors import AllocationError, DataError
+from finlab.errors import DataError
 from finlab.layout import Layout
 from finlab.layout.commands import neutral_row
 from finlab.layout.robot_file import Case, robot_of
@@ -40,13 +40,13 @@ class DeployedRobot:
         names as failed stays failed, whatever `failed` adds.
 
         Raises:
-            AllocationError: also where the answer is no number, as a broken bundle gives it.
+            DataError: the answer is no number, as a broken bundle gives it.
         """
         lost = (*self.failed, *(name for name in failed if name not in self.failed))
         answer = self.allocator.allocate(wrench, failed=lost, **options)
         works = [name not in lost for name in self.layout.names]
         if not np.isfinite(answer.command[works]).all():
-            raise AllocationError(
+            raise DataError(
                 "the bundle answers with NaN; export it again, and run `finlab-runtime check` on it"
             )
         return answer

@@ -1,19 +1,22 @@
 """`finlab-runtime check`: does this computer answer as the desk did, and truly?
 
-To be run on the robot before first use. Are the actuators' laws and tables the same here, and do they confirm
-this computer's answers.
+To be run on the robot before first use. Are the actuators' laws and tables the same here, do they confirm
+this computer's answers, and is there an answer to the extremes.
 """
 
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
 
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.evaluate import REACHED
+from finlab.allocation.policy import KINDS
 from finlab.arrays import Array
 from finlab.deploy.robot import DeployedRobot
 from finlab.errors import DataError
 from finlab.layout.robot_file import Case
+from finlab.layout.wrench_axes import AXES
 from finlab.physics import plant_of
 
 N_SELF_TEST = 4
@@ -21,6 +24,8 @@ N_SELF_TEST = 4
 SELF_TEST_TOLERANCE = 1e-6
 """Allowed normalized error between the wrench of a self-test's command and what another machine computes for
 it; both are written with nine digits."""
+FAR = 10.0
+"""Size of an extreme target in yardsticks: beyond the reach of any robot."""
 
 
 class Finding(NamedTuple):
@@ -64,7 +69,7 @@ def self_tests(allocator: Allocator, failed: tuple[str, ...]) -> tuple[Case, ...
 
 
 def self_check(robot: DeployedRobot) -> list[Finding]:
-    """Ask everything.
+    """Ask what the bundle knows the answers of.
 
     Raises:
         DataError: the bundle has no self-tests, or a force table cannot be read.
@@ -83,6 +88,25 @@ def self_check(robot: DeployedRobot) -> list[Finding]:
         Finding("wrench of the stored commands (err_norm)", float(np.max(differs)), SELF_TEST_TOLERANCE),
         Finding("own answers, judged by the actuators' own laws (err_norm)", float(np.max(errors)), REACHED),
     ]
+
+
+def extremes(robot: DeployedRobot) -> Finding:
+    """Ask for each axis both ways, far out of reach, by all policies, with each actuator lost in turn; the
+    value is how many of these have no answer, and the question names the first of them."""
+    layout, silent, n = robot.layout, [], 0
+    alive = [name for name in layout.names if name not in robot.failed]
+    for lost in [(), *([name] for name in alive if len(alive) > 1)]:
+        for policy, i in product(KINDS, np.flatnonzero(layout.commanded)):
+            for way in (-1.0, 1.0):
+                target = np.zeros(6)
+                target[i], n = way * FAR * robot.allocator.scale[i], n + 1
+                try:
+                    robot.allocate(target, failed=lost, policy=policy)
+                except Exception as error:  # each is a finding
+                    what = f"{policy} {'+' if way > 0.0 else '-'}{AXES[i]}, {' '.join(lost) or 'none'} lost"
+                    silent.append(f"{what}: {type(error).__name__}: {error!s:.100}")
+    first = f", first {silent[0]}" if silent else ""
+    return Finding(f"extremes without an answer, of {n}{first}", float(len(silent)), 0.0)
 
 
 def _rounded(values: Array) -> Array:

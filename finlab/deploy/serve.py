@@ -9,16 +9,20 @@ status     meaning
 =========  ============================================================================================
 `ok`       commands for the newest target
 `neutral`  no target for longer than the watchdog allows; the fins are commanded to rest
-`error`    the request was not understood; `error` holds one sentence and there are no commands
+`error`    the request was refused, which changes nothing, or could not be answered, and the line before is
+           `neutral`; `error` holds one sentence and there are no commands
 =========  ============================================================================================
 
 From one answer to the next, commands change no faster than the servos' rates allow in a tick of 0.1 s.
 Only the newest request counts: those that waited behind it are skipped, since a robot wants the present, not
-the past. However the service ends, a neutral command is the last that it sends.
+the past; one that is older than the watchdog allows, as after a pause of the process, is dropped. However the
+service ends, a neutral command is the last that it sends.
 """
 
 import json
+import math
 import time
+import traceback
 from collections.abc import Mapping
 from typing import Any
 
@@ -29,7 +33,7 @@ from finlab.arrays import Array
 from finlab.deploy.record import command_record
 from finlab.deploy.robot import DeployedRobot
 from finlab.deploy.transport import MAX_LINE, StandardStreams, Unsent
-from finlab.errors import CommandError, FinlabError
+from finlab.errors import AllocationError, CommandError, LayoutError
 from finlab.files.guarded import decoded
 from finlab.files.plain_values import parse_json
 from finlab.files.schema import checked
@@ -40,6 +44,8 @@ RECENT_S = 0.5
 
 MAX_ID = 1_000
 """Longest `id`, as JSON [characters]."""
+_REFUSED = (CommandError, LayoutError, AllocationError)
+"""What is wrong with a request; anything else is a fault of the robot's files or of ours."""
 
 
 class Request(Struct, forbid_unknown_fields=True):
@@ -101,40 +107,54 @@ class Server:
             if patience is not None:
                 patience = max(patience - (time.monotonic() - fresh), 0.0)
             line = transport.newest(patience)
-            reply = self._rest() if line is None else self.answer(line)
-            if reply["status"] != "error":  # an invalid request does not keep the fins beating
+            if line is None or self._is_late(fresh, line.since):
+                transport.send(_line(self._rest()))
                 fresh = time.monotonic()
-            transport.send(_line(reply))
+            if line is None or self._is_late(line.since, time.monotonic()):
+                continue
+            replies = self.answers(line.text)
+            if replies[-1]["status"] == "ok":  # an invalid request does not keep the fins beating
+                now = time.monotonic()
+                if self._is_late(line.since, now):  # the process paused while it solved
+                    replies = [self._rest()]
+                fresh = now
+            for reply in replies:
+                transport.send(_line(reply))
 
-    def answer(self, line: bytes) -> dict[str, Any]:
-        """The answer to one request, as plain values."""
+    def _is_late(self, since: float, now: float) -> bool:
+        """Whether more time has passed than the watchdog allows."""
+        return now - since > (math.inf if self._watchdog is None else self._watchdog)
+
+    def answers(self, line: bytes) -> list[dict[str, Any]]:
+        """The answer to one request, as plain values; where it is good and the solve failed, rest comes
+        first, and then the error."""
         name: Any = None
         fresh = time.monotonic() - self._sent_at < RECENT_S
         try:
             request = parse_request(line)
             name = request.id
-            self._failed = tuple(request.failed)
             answer = self._robot.allocate(
                 request.wrench,
-                failed=self._failed,
+                failed=request.failed,
                 previous=self._sent if fresh else None,
                 reference=request.reference,
                 policy=request.policy,
                 flow=request.flow,
             )
-        except FinlabError as error:
-            return {"id": name, "status": "error", "error": str(error)}
-        reply = self._reply(name, "ok", answer.command, answer.forces) | {
-            "wrench": answer.wrench.tolist(),
-            "unallocated": answer.unallocated.tolist(),
-            "err_norm": answer.err_norm,
-            "expected_error": answer.expected_error,
-            "effort": answer.effort,
-            "power": answer.power,
-            "solve_ms": answer.solve_ms,
-        }
+            reply = self._reply(name, "ok", answer.command, answer.forces) | _told(answer)
+            _line(reply)
+        except _REFUSED as error:
+            return [_error(name, str(error))]
+        except Exception as error:  # the robot goes on, whatever is wrong
+            place = traceback.extract_tb(error.__traceback__)[-1]
+            what = f"{type(error).__name__}, {place.name}, line {place.lineno}: {error!s:.200}"
+            return [
+                self._rest(),
+                _error(name, f"the target could not be answered ({what}); the robot rests, ask again"),
+            ]
+        self._failed = tuple(request.failed)
         self._sent, self._sent_at = answer, time.monotonic()
-        return reply
+        return [reply]
 
     def _rest(self) -> dict[str, Any]:
         now, self._sent = None if self._sent is None else self._sent.command, None
@@ -145,6 +165,24 @@ class Server:
         layout = self._robot.layout
         forces = plant_of(layout).fin_forces(command) if forces is None else forces
         return {"id": name, "status": status, **command_record(layout, command, forces)}
+
+
+def _told(answer: Allocation) -> dict[str, Any]:
+    """What a reply tells of an answer beside its commands."""
+    return {
+        "target": [None if math.isnan(value) else value for value in answer.target.tolist()],
+        "wrench": answer.wrench.tolist(),
+        "unallocated": answer.unallocated.tolist(),
+        "err_norm": answer.err_norm,
+        "expected_error": answer.expected_error,
+        "effort": answer.effort,
+        "power": answer.power,
+        "solve_ms": answer.solve_ms,
+    }
+
+
+def _error(name: Any, sentence: str) -> dict[str, Any]:
+    return {"id": name, "status": "error", "error": sentence}
 
 
 def _line(reply: Mapping[str, Any]) -> bytes:

@@ -1,10 +1,17 @@
 """How the server's lines travel: over standard input and output, until they end or a signal asks to stop."""
 
+import fcntl
 import os
+import select
 import signal
+import struct
+import termios
+import time
+from collections import deque
 from queue import Empty, SimpleQueue
 from threading import Thread
 from types import FrameType
+from typing import NamedTuple
 
 from finlab.errors import FinlabError
 
@@ -16,6 +23,17 @@ PATIENCE = 1.0
 """How long [s] a reader that takes nothing is waited for once the service has to stop."""
 CHUNK = 65_536
 """Bytes that are read at once."""
+LOOK_S = 0.02
+"""How often the reader looks whether something has come [s]; after a pause of the process, what had come by
+then is as old as the last look."""
+
+
+class Line(NamedTuple):
+    """A request on its way."""
+
+    text: bytes
+    since: float
+    """Monotonic time [s] after which its first byte has come."""
 
 
 class Unsent(FinlabError):
@@ -26,11 +44,12 @@ class Unsent(FinlabError):
 
 
 class StandardStreams:
-    """Requests from one file descriptor, answers to another; the newest request wins."""
+    """Requests from one file descriptor, answers to another; the newest request alone is kept."""
 
     def __init__(self) -> None:
         """Notes signals from now on."""
-        self._lines: SimpleQueue[bytes | None] = SimpleQueue()  # None wakes up who waits
+        self._line: deque[Line] = deque(maxlen=1)
+        self._wake: SimpleQueue[None] = SimpleQueue()  # may be used in a signal's handler, as no lock may
         self._stopped = self._ended = self._sending = False
         self._sink = -1
         signal.signal(signal.SIGALRM, self._late)
@@ -43,24 +62,23 @@ class StandardStreams:
         self._sink = sink
         for end in (source, sink):
             os.set_blocking(end, True)
-        Thread(target=self._read, args=(source,), daemon=True).start()
+        Thread(target=self._read, args=(source, time.monotonic()), daemon=True).start()
 
-    def newest(self, timeout: float | None) -> bytes | None:
+    def newest(self, timeout: float | None) -> Line | None:
         """The newest request that waits; None after `timeout` seconds without one.
 
         Raises:
             EOFError: the requests have ended, or a signal asks to stop.
         """
-        line: bytes | None = None
-        try:
-            while not (self._stopped or self._ended):
-                told = self._lines.get(timeout=0.0 if line else timeout)
-                line, self._ended = told or line, told is None
-        except Empty:
-            pass
-        if self._stopped or (self._ended and line is None):
+        end = None if timeout is None else time.monotonic() + timeout
+        while not (self._stopped or self._line or self._ended):
+            try:
+                self._wake.get(timeout=None if end is None else max(end - time.monotonic(), 0.0))
+            except Empty:
+                return None
+        if self._stopped or not self._line:
             raise EOFError
-        return line
+        return self._line.pop()
 
     def send(self, line: bytes) -> None:
         """Send one answer; `Unsent` where it is not taken."""
@@ -75,22 +93,38 @@ class StandardStreams:
             self._sending = False
             signal.setitimer(signal.ITIMER_REAL, 0.0)
 
-    def _read(self, source: int) -> None:
-        part, chunk = b"", b"\n"
+    def _read(self, source: int, looked: float) -> None:
+        """Read until the end. Bytes that are there at a look came after the look before, and a line has the
+        age of its first byte: none is ever taken for younger than it is."""
+        part, since, chunk = b"", looked, b"\n"
+        ready = select.poll()
+        ready.register(source, select.POLLIN)
         while chunk:
+            while not ready.poll(LOOK_S * 1e3):
+                looked = time.monotonic()
+            came, looked, size = looked, time.monotonic(), _waiting(source)
             try:
-                chunk = os.read(source, CHUNK)
+                chunk = os.read(source, size)
             except OSError:  # a terminal that was closed
                 chunk = b""
+            begun = part
             *lines, part = (part + (chunk or b"\n")).split(b"\n")
             part = part[: MAX_LINE + 1]  # enough to refuse it
-            if told := [line for line in lines if line.strip()]:
-                self._lines.put(told[-1])
-        self._lines.put(None)
+            if told := [number for number, line in enumerate(lines) if line.strip()]:
+                self._line.append(Line(lines[told[-1]], since if begun and told[-1] == 0 else came))
+                self._call()
+            if lines or not begun:
+                since = came
+        self._ended = True
+        self._call()
+
+    def _call(self) -> None:
+        if self._wake.empty():  # one call is enough, and calls that nobody hears do not pile up
+            self._wake.put(None)
 
     def _stop(self, number: int, frame: FrameType | None) -> None:
         self._stopped = True
-        self._lines.put(None)
+        self._call()
         self._hurry()
 
     def _hurry(self) -> None:
@@ -99,3 +133,12 @@ class StandardStreams:
 
     def _late(self, number: int, frame: FrameType | None) -> None:
         raise Unsent(f"its reader took nothing for {PATIENCE:g} s")
+
+
+def _waiting(source: int) -> int:
+    """How many bytes can be read now, at most `CHUNK` and at least one."""
+    try:
+        size: int = struct.unpack("i", fcntl.ioctl(source, termios.FIONREAD, bytes(4)))[0]
+    except OSError:
+        return CHUNK
+    return min(max(size, 1), CHUNK)

@@ -2,11 +2,15 @@
 
 import os
 import stat
+from io import BytesIO
 from pathlib import Path
+from typing import BinaryIO
 
 from finlab.errors import DataError, FinlabError
 
 Name = str | os.PathLike[str]
+PART = 1 << 20
+"""Bytes that are read at once."""
 
 
 def read_file(path: Name, most: int, what: str, error: type[FinlabError] = DataError) -> bytes:
@@ -30,8 +34,7 @@ def read_file(path: Name, most: int, what: str, error: type[FinlabError] = DataE
                 raise error.at(str(path), f"is a folder, expected {what}")
             if not stat.S_ISREG(about.st_mode):
                 raise error.at(str(path), f"is not a regular file, expected {what}")
-            # A file may grow while it is read, and some report no size at all.
-            content = file.read(most + 1) if about.st_size <= most else None
+            content = _read(file, most) if about.st_size <= most else None
     except FileNotFoundError:
         raise error.at(str(path), f"no such file, expected {what}") from None
     except IsADirectoryError:
@@ -42,6 +45,15 @@ def read_file(path: Name, most: int, what: str, error: type[FinlabError] = DataE
     if content is None or len(content) > most:
         raise error.at(str(path), f"is larger than {most:,} bytes, too large for {what}")
     return content
+
+
+def _read(file: BinaryIO, most: int) -> bytes:
+    """The content, or its first `most` + 1 bytes: a file may grow while it is read, and some report no size
+    at all. A single `read` of that many would take the memory of the largest file for a small one."""
+    content = BytesIO()
+    while part := file.read(min(PART, most + 1 - content.tell())):
+        content.write(part)
+    return content.getvalue()
 
 
 def read_text(path: Name, most: int, what: str, error: type[FinlabError] = DataError) -> str:

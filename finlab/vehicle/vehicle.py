@@ -133,6 +133,6 @@ class Vehicle:
         k3 = self.derivative([a + 0.5 * dt * b for a, b in zip(y0, k2, strict=True)], wrench)
         k4 = self.derivative([a + dt * b for a, b in zip(y0, k3, strict=True)], wrench)
         y = [a + dt / 6 * (b + 2 * (c + d) + e) for a, b, c, d, e in zip(y0, k1, k2, k3, k4, strict=True)]
-        norm = math.sqrt(y[3] ** 2 + y[4] ** 2 + y[5] ** 2 + y[6] ** 2)
+        norm = math.hypot(*y[3:7])  # of any size, as those of a motion beyond all bounds
         y[3:7] = [value / norm for value in y[3:7]]
         return y

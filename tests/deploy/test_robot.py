@@ -1,6 +1,7 @@
 """A robot out of its bundle: the library's answers, and a self-check that notices what is wrong."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ import pytest
 import finlab
 from finlab.deploy.bundle import Bundle, make_bundle
 from finlab.deploy.robot import DeployedRobot, load_robot, parse_robot
-from finlab.deploy.self_check import self_check
+from finlab.deploy.self_check import extremes, self_check
 from finlab.errors import FinlabError
 from finlab.layout import Layout
 from finlab.layout.rudder import Rudder
@@ -86,3 +87,22 @@ def test_robots_of_any_actuators_are_exported_and_answer(tmp_path: Path) -> None
     np.testing.assert_array_equal(answer.command, desk.allocate(wrench, flow=flow).command)
     wrench_there = plant_of(layout).wrench(answer.command, flow=np.array(flow))
     np.testing.assert_allclose(answer.wrench, wrench_there, atol=1e-12)
+
+
+def test_extremes_name_the_one_that_has_no_answer(monkeypatch: pytest.MonkeyPatch) -> None:
+    layout, asked = finlab.load_layout("bluerov2"), []
+    robot = DeployedRobot(finlab.Allocator(layout))
+    healthy, lost = type(robot.allocator).allocate, layout.names[1]
+
+    def broken(self: Any, wrench: Any, *, failed: Any, policy: str) -> Any:
+        asked.append((tuple(np.sign(wrench)), policy, tuple(failed)))
+        if policy == "priority" and wrench[5] < 0.0 and tuple(failed) == (lost,):
+            raise IndexError("of a group")
+        return healthy(self, wrench, failed=failed, policy=policy)
+
+    assert extremes(robot).good
+    monkeypatch.setattr(type(robot.allocator), "allocate", broken)
+    found = extremes(robot)
+    assert found.value == 1.0 and not found.good
+    assert found.question.endswith(f"first priority -Tz, {lost} lost: IndexError: of a group")
+    assert len(set(asked)) == len(asked) == 2 * layout.commanded.sum() * 3 * (1 + layout.n)

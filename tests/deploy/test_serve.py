@@ -2,9 +2,11 @@
 
 import json
 import os
+import resource
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import IO, Any
@@ -17,8 +19,8 @@ from finlab.deploy import serve as serve_module
 from finlab.deploy.bundle import Bundle
 from finlab.deploy.robot import DeployedRobot, parse_robot
 from finlab.deploy.serve import RECENT_S, Server
-from finlab.deploy.transport import MAX_LINE, SIGNALS, StandardStreams, Unsent
-from finlab.errors import FinlabError
+from finlab.deploy.transport import MAX_LINE, SIGNALS, Line, StandardStreams, Unsent
+from finlab.errors import DataError, FinlabError
 from finlab.layout import load_layout
 
 GOOD: dict[str, Any] = {"wrench": [1, 0, 0.5, 0, 0, 0.1]}
@@ -46,7 +48,7 @@ class Script:
         self.sent: list[dict[str, Any]] = []
         self.waits: list[float | None] = []
 
-    def newest(self, timeout: float | None) -> bytes | None:
+    def newest(self, timeout: float | None) -> Line | None:
         self.waits.append(timeout)
         self.now += 0.3
         if not self.requests:
@@ -54,7 +56,10 @@ class Script:
         request = self.requests.pop(0)
         if isinstance(request, Exception):
             raise request
-        return request if isinstance(request, bytes | None) else json.dumps(request).encode()
+        if request is None:
+            return None
+        text = request if isinstance(request, bytes) else json.dumps(request).encode()
+        return Line(text, max(self.now, time.monotonic()))
 
     def send(self, line: bytes) -> None:
         assert line.endswith(b"}\n")
@@ -124,8 +129,8 @@ def test_only_good_targets_and_rest_wind_up_the_watchdog(
     monkeypatch.setattr("finlab.deploy.serve.time.monotonic", lambda: script.now)
     Server(robot, 1.0).run(script)
     status = [reply["status"] for reply in script.sent]
-    assert status == ["ok", *["error"] * 2, "ok", *["error"] * 4, "neutral", "neutral"]
-    assert script.waits == pytest.approx([1.0, 1.0, 0.7, 0.4, 1.0, 0.7, 0.4, 0.1, 0.0, 1.0])
+    assert status == ["ok", *["error"] * 2, "ok", *["error"] * 3, "neutral", "error", *["neutral"] * 2]
+    assert script.waits == pytest.approx([1.0, 1.0, 0.7, 0.4, 1.0, 0.7, 0.4, 0.1, 1.0, 1.0])
     np.testing.assert_array_equal(np.array(script.sent[-1]["command"]), robot.neutral())
     script = Script(GOOD, b"nonsense")
     Server(robot, None).run(script)
@@ -146,12 +151,12 @@ def test_commands_change_no_faster_than_servos_do(
     monkeypatch.setattr(serve_module.time, "monotonic", lambda: now[0])
     server = Server(robot)
     forwards, backwards = (json.dumps({"wrench": [x, 0, 0.5, 0, 0, 0]}).encode() for x in (1, -1))
-    before = np.array(server.answer(forwards)["command"])
+    before = np.array(server.answers(forwards)[0]["command"])
     truth = robot.allocate([-1, 0, 0.5, 0, 0, 0], previous=before)
     assert truth.err_norm > 0.05, "forwards and backwards are ticks apart"
-    np.testing.assert_allclose(np.array(server.answer(backwards)["command"]), truth.command, atol=1e-9)
+    np.testing.assert_allclose(np.array(server.answers(backwards)[0]["command"]), truth.command, atol=1e-9)
     now[0] += RECENT_S
-    assert server.answer(forwards)["err_norm"] < 1e-5, "commands of long ago bind no more"
+    assert server.answers(forwards)[0]["err_norm"] < 1e-5, "commands of long ago bind no more"
 
 
 def test_thrusters_and_rudders_rest_in_their_own_words() -> None:
@@ -180,8 +185,77 @@ def test_an_answer_that_is_no_number_is_an_error(
         return answer.with_command(answer.command * np.nan)
 
     monkeypatch.setattr(type(robot.allocator), "allocate", broken)
-    reply = served(robot, GOOD)[0]
-    assert reply["status"] == "error" and "answers with NaN" in reply["error"] and "command" not in reply
+    rest, reply = served(robot, GOOD)[:2]
+    assert rest["status"] == "neutral" and "command" not in reply
+    assert reply["status"] == "error" and "answers with NaN" in reply["error"]
+
+
+@pytest.mark.parametrize("fault", [IndexError("of ours"), MemoryError(), RecursionError(), DataError("gone")])
+def test_after_a_fault_in_a_solve_the_robot_rests_and_the_next_request_is_answered(
+    fault: Exception, robot: DeployedRobot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    healthy = type(robot.allocator).allocate
+
+    def broken(self: Any, wrench: Any, **options: Any) -> Any:
+        if wrench[0] > 5.0:
+            raise fault
+        return healthy(self, wrench, **options)
+
+    monkeypatch.setattr(type(robot.allocator), "allocate", broken)
+    lost = {"failed": ["back_left"]}
+    sent = served(robot, GOOD | lost, {"wrench": [9, 0, 0, 0, 0, 0], "id": 3}, GOOD | lost)
+    assert [reply["status"] for reply in sent] == ["ok", "neutral", "error", "ok", "neutral"]
+    assert sent[2]["id"] == 3 and type(fault).__name__ in sent[2]["error"]
+    assert sent[1]["command"][2] is None and sent[3]["command"][2] is None
+
+
+@pytest.mark.parametrize(
+    "refused", [{"policy": "hope"}, {"wrench": [1, 2]}, {"flow": [1]}, {"wrench": [None] * 6}]
+)
+def test_a_refused_request_does_not_decide_which_fins_beat(
+    refused: dict[str, Any], robot: DeployedRobot
+) -> None:
+    lost = {"failed": ["back_left"]}
+    for first, second in ((GOOD | lost, GOOD | refused), (GOOD, GOOD | lost | refused)):
+        good, error, end = served(robot, first, second)
+        assert error["status"] == "error" and end["status"] == "neutral"
+        assert [row is None for row in end["command"]] == [row is None for row in good["command"]]
+
+
+def test_axes_that_are_not_commanded_are_null(robot: DeployedRobot) -> None:
+    reply = served(robot, {"wrench": [0.5, None, 0.5, None, None, 0]})[0]
+    assert reply["target"] == [0.5, None, 0.5, None, None, 0.0]
+    assert reply["err_norm"] < 1e-6 and reply["unallocated"][1] == 0.0
+
+
+def test_what_waited_longer_than_the_watchdog_allows_is_dropped(
+    robot: DeployedRobot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Before a solve, and after one in which the process paused; after silence, rest comes first."""
+    now = [100.0]
+    monkeypatch.setattr(serve_module.time, "monotonic", lambda: now[0])
+    answer = Server.answers
+
+    def paused(self: Server, line: bytes) -> list[dict[str, Any]]:
+        replies = answer(self, line)
+        now[0] += 4.0 * (b"slow" in line)
+        return replies
+
+    monkeypatch.setattr(Server, "answers", paused)
+
+    class Late(Script):
+        def newest(self, timeout: float | None) -> Line | None:
+            if not self.requests:
+                raise EOFError
+            age, silence, name = self.requests.pop(0)
+            now[0] += silence
+            return Line(json.dumps(GOOD | {"id": name}).encode(), now[0] - age)
+
+    script = Late((0.0, 0.1, "a"), (3.9, 4.0, "old"), (0.0, 0.1, "b"), (0.0, 0.1, "slow"), (0.0, 0.1, "c"))
+    Server(robot, 1.0).run(script)
+    told = [(reply["status"], reply["id"]) for reply in script.sent]
+    rest = ("neutral", None)
+    assert told == [("ok", "a"), rest, ("ok", "b"), rest, ("ok", "c"), rest]
 
 
 @pytest.fixture
@@ -192,20 +266,24 @@ def streams() -> Iterator[StandardStreams]:
         signal.signal(number, handler)
 
 
+def text(line: Line | None) -> bytes:
+    return b"" if line is None else line.text
+
+
 def test_streams_keep_only_the_newest_request(streams: StandardStreams) -> None:
     (source, requests), (answers, sink) = os.pipe(), os.pipe()
     streams.open(source, sink)
     assert streams.newest(0.0) is None and streams.newest(0.02) is None
     os.write(requests, b"one\n\ntwo\nthree\n   \n")
-    assert streams.newest(1.0) == b"three"
+    assert text(streams.newest(1.0)) == b"three"
     streams.send(b"answer\n")
     assert os.read(answers, 100) == b"answer\n"
     os.write(requests, b"begun")
     assert streams.newest(0.02) is None
     os.write(requests, b" and ended\n" + b"x" * 9_000 + b"\nthe last")
-    assert streams.newest(1.0) == b"x" * 9_000
+    assert text(streams.newest(1.0)) == b"x" * 9_000
     os.close(requests)
-    assert streams.newest(None) == b"the last", "the end of a line may be missing"
+    assert text(streams.newest(None)) == b"the last", "the end of a line may be missing"
     with pytest.raises(EOFError):
         streams.newest(None)
     os.close(answers)
@@ -220,7 +298,34 @@ def test_a_line_without_end_takes_no_memory_and_no_time(streams: StandardStreams
         os.write(requests, bytes(MAX_LINE))
     assert streams.newest(0.1) is None
     os.write(requests, b"\n")
-    assert len(streams.newest(10.0) or b"") == MAX_LINE + 1, "enough to refuse it"
+    assert len(text(streams.newest(10.0))) == MAX_LINE + 1, "enough to refuse it"
+    os.close(requests)
+
+
+def test_a_line_is_as_old_as_its_first_byte_may_be(streams: StandardStreams) -> None:
+    (source, requests), sink = os.pipe(), os.open("/dev/null", os.O_WRONLY)
+    begin = time.monotonic()
+    streams.open(source, sink)
+    os.write(requests, b"be")
+    time.sleep(0.2)
+    os.write(requests, b"gun\n")
+    first = streams.newest(1.0)
+    assert first is not None and begin <= first.since < begin + 0.15
+    time.sleep(0.1)
+    before = time.monotonic()
+    os.write(requests, b"new\n")
+    second = streams.newest(1.0)
+    assert second is not None and before - 0.1 < second.since <= time.monotonic()
+    os.close(requests)
+
+
+def test_requests_that_nobody_takes_need_no_memory(streams: StandardStreams) -> None:
+    (source, requests), sink = os.pipe(), os.open("/dev/null", os.O_WRONLY)
+    streams.open(source, sink)
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    for _ in range(2_000):
+        os.write(requests, b"x" * 60_000 + b"\n")
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 30_000, "kB, of 120 MB"
     os.close(requests)
 
 
@@ -250,6 +355,28 @@ def ended(service: subprocess.Popen[bytes]) -> tuple[list[str], str]:
     """The status of each line that was still to be read, and what was said on stderr."""
     out, told = service.communicate(timeout=60)
     return [json.loads(line)["status"] for line in out.splitlines()], told.decode()
+
+
+def test_after_a_pause_of_the_process_the_first_line_is_rest(folder: Path) -> None:
+    """A feeder goes on meanwhile, and its targets of that time are not followed."""
+    service = started(folder, "--watchdog-s=0.5", stdout=subprocess.PIPE)
+    feed, out = pipe(service.stdin), pipe(service.stdout)
+    for paused in (False, True):
+        for i in range(15):
+            feed.write(json.dumps(GOOD | {"id": [paused, i]}).encode() + b"\n")
+            feed.flush()
+            while not paused and (reply := json.loads(out.readline()))["id"] != [False, i]:
+                assert reply["status"] == "neutral"
+            time.sleep(0.07 * paused)
+        service.send_signal(signal.SIGCONT if paused else signal.SIGSTOP)
+    assert json.loads(out.readline())["status"] == "neutral"
+    feed.write(json.dumps(GOOD | {"id": "new"}).encode() + b"\n")
+    feed.flush()
+    while (reply := json.loads(out.readline()))["status"] == "neutral":
+        pass
+    assert reply["id"] == "new"
+    feed.close()
+    service.wait(60)
 
 
 @pytest.mark.parametrize("number", SIGNALS)

@@ -9,6 +9,7 @@ from markupsafe import Markup
 from scipy.spatial.transform import Rotation
 
 from finlab.errors import FinlabError
+from finlab.files.worker import in_worker
 from finlab.hull import contradicts, displaced, hull_of, lift_of
 from finlab.hull.mesh_file import LARGEST, MAX_BYTES, MAX_FACES, turned
 from finlab.hull.surface import UNITS
@@ -32,7 +33,7 @@ def add_hull(page: Page) -> None:
     session, gui = page.session, page.gui
 
     def load(name: str, content: bytes) -> None:
-        page.reading.make(lambda: _drawn(page, stored_hull(name, content)), take, "hull")
+        page.reading.make(lambda: _drawn(page, in_worker(stored_hull, name, content)), take, "hull")
 
     def take(hull: Hull) -> None:
         """Mesh files do not say in which unit they are: where it need not be metres, the user says it."""

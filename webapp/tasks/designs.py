@@ -13,6 +13,7 @@ from finlab.deploy.graph_file import graph_text
 from finlab.errors import FinlabError
 from finlab.exchange import is_robot_table
 from finlab.exchange.convert import TABLES
+from finlab.files.worker import in_worker
 from finlab.hull import hull_of
 from finlab.layout import Layout
 from webapp.presses import Presses
@@ -91,12 +92,12 @@ class Designs:
 
     def open(self, name: str, content: bytes) -> None:
         """A design from a file that the browser sent."""
-        self._read(partial(files.read_layout, name, content))
+        self._read(partial(in_worker, files.read_layout, name, content))
 
     def open_link(self, text: str) -> None:
         """A design from the part of an address behind the #; it may be anything."""
         design, _, wrench = text.removeprefix(FRAGMENT).partition(WRENCH)
-        self._read(partial(unpacked, design), wrench)
+        self._read(partial(in_worker, unpacked, design), wrench)
 
     def _read(self, read: Callable[[], Opened], wrench: str | None = None) -> None:
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from finlab.actuators.fin.models import read_table
 from finlab.deploy.design_files import stored_table
 from finlab.errors import DataError, FinlabError, LayoutError
+from finlab.files.worker import in_worker
 from finlab.layout import Actuator, Fin, Rudder, Thruster
 from finlab.layout.directions import part_of
 from finlab.layout.thrust_model import PowerTable
@@ -119,7 +120,7 @@ class Fitting(Newest[Upload, Fitted]):
             try:
                 if not isinstance(upload.part, Fin):
                     return _bench(path, done)
-                if _is_table(path):
+                if in_worker(_is_table, path):
                     return Fitted(done, {"model": stored_table(upload.content, table_folder())})
                 return self._fit_measurements(path, upload, done)
             except FinlabError as error:
@@ -131,7 +132,7 @@ class Fitting(Newest[Upload, Fitted]):
         from finlab.fit.measurements import read_measurements
 
         tell = partial(self._tell, upload)
-        fit = fit_fin(read_measurements([path]), progress=tell)
+        fit = fit_fin(in_worker(read_measurements, [path]), progress=tell)
         tell("writing the table")
         model = stored_table(fin_csv(fit).encode(), table_folder())
         return Fitted(done, {"model": model}, fit)
@@ -165,8 +166,8 @@ def _bench(path: Path, done: Upload) -> Fitted:
         }
 
     with suppress(LayoutError):
-        return Fitted(done, within(PowerTable.read(path)))
-    fit = fit_thruster(read_bench([path]))
+        return Fitted(done, within(in_worker(PowerTable.read, path)))
+    fit = fit_thruster(in_worker(read_bench, [path]))
     beside = {"dead_band": fit.dead_band, "torque_per_newton": fit.torque_per_newton}
     return Fitted(done, {**within(fit.table), **beside, "uncertainty": None}, fit)
 

@@ -24,6 +24,7 @@ from torch import Tensor, nn
 from tqdm import tqdm
 
 from finlab.errors import DataError
+from finlab.files.worker import end_with_parent
 from finlab.mdn.network import ForceMixture
 from finlab.mdn.training.answers import Answers, Batch, write_answers
 from finlab.mdn.training.first_weights import first_weights
@@ -94,7 +95,8 @@ def train_mdn(preset: str, out: Path, *, seed: int = 0, **training: Any) -> Trai
 def answers_in(folder: Path, settings: AnswerSettings, seed: int) -> list[Path]:
     """The files of answers, in order; those that are missing are written first, on all cores."""
     write, silent = partial(write_answers, folder, settings, seed), not sys.stderr.isatty()
-    with multiprocessing.get_context("spawn").Pool(min(settings.files, os.cpu_count() or 1)) as pool:
+    count = min(settings.files, os.cpu_count() or 1)
+    with multiprocessing.get_context("spawn").Pool(count, end_with_parent) as pool:
         made = pool.imap(write, range(settings.files))
         return list(tqdm(made, "answers", settings.files, unit="file", disable=silent))
 

@@ -1,0 +1,99 @@
+"""A file is read in a process of its own: what it takes is bounded, and what it says comes back."""
+
+import os
+import resource
+import threading
+import time
+from collections.abc import Iterator
+
+import pytest
+
+from finlab.errors import DataError, FinlabError, LayoutError
+from finlab.files import worker
+from finlab.files.worker import in_worker
+
+
+@pytest.fixture(params=["copied", "beside threads"], autouse=True)
+def _started(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Both ways to make the process."""
+    end = threading.Event()
+    if request.param != "copied":
+        threading.Thread(target=end.wait, daemon=True).start()
+    yield
+    end.set()
+
+
+def refuse(kind: type[FinlabError]) -> None:
+    raise kind("a.yaml: is wrong")
+
+
+def spin() -> None:
+    while True:
+        pass
+
+
+def fill() -> int:
+    return len([bytearray(1_000_000) for _ in range(3_000)])
+
+
+def peak() -> int:
+    """Memory that a reader had while it was still within its limits [MB]."""
+    parts = []
+    try:
+        while True:
+            parts.append(bytearray(b"x" * 1_000_000))
+    except MemoryError:
+        parts.clear()
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024
+
+
+def test_what_is_read_comes_back() -> None:
+    assert in_worker(divmod, 7, 2) == (3, 1)
+    assert in_worker(os.getpid) != os.getpid()
+
+
+@pytest.mark.parametrize("kind", [FinlabError, DataError, LayoutError])
+def test_a_refusal_comes_back_as_it_is(kind: type[FinlabError]) -> None:
+    with pytest.raises(kind, match=r"^a\.yaml: is wrong$"):
+        in_worker(refuse, kind)
+
+
+def test_a_reader_that_fails_or_ends_is_a_sentence() -> None:
+    with pytest.raises(
+        FinlabError, match=r"fault of finlab \(ZeroDivisionError in .*report it with the file"
+    ):
+        in_worker(divmod, 1, 0)
+    with pytest.raises(FinlabError, match="reading the file takes too much memory"):
+        in_worker(os._exit, 1)
+
+
+def test_time_is_bounded() -> None:
+    before, begin = resource.getrusage(resource.RUSAGE_CHILDREN), time.monotonic()
+    with pytest.raises(FinlabError, match=r"too much time, more than 1\.7 s"):
+        in_worker(spin)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    assert after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime < 2.0
+    assert time.monotonic() - begin < worker.PATIENCE * worker.CPU_S
+
+
+def test_memory_is_bounded() -> None:
+    with pytest.raises(FinlabError, match="too much memory, more than 270 MB"):
+        in_worker(fill)
+    assert in_worker(peak) < 300 + resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024
+
+
+def test_limits_grow_with_the_file() -> None:
+    content = bytes(20_000_000)
+    assert in_worker(fill_with, content) == 300
+    with pytest.raises(FinlabError, match="too much memory"):
+        in_worker(fill_with, b"")
+
+
+def fill_with(content: bytes) -> int:
+    return len([bytearray(1_000_000) for _ in range(300)])
+
+
+def test_a_reader_that_only_waits_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(worker, "PATIENCE", 0.2)
+    with pytest.raises(FinlabError, match="too much time"):
+        in_worker(time.sleep, 60.0)
