@@ -51,10 +51,10 @@ def score(case: Case, targets: Array, command: Array, solve_ms: Array, *, number
 
     Returns:
         Arrays (N,): `layout`, its number; `err_norm`, the norm of what is missing over `sigma_of`;
-        `err_phys`, the same in N and N m; `effort`, the paper's J_en; `power` [W]; `solve_ms`.
+        axes that are free left out; `err_phys`, the same in N and N m; `effort`, the paper's J_en; `power` [W]; `solve_ms`.
     """
     plant = plant_of(case.layout)
-    missing = plant.wrench(command) - targets
+    missing = (plant.wrench(command) - targets) * case.layout.commanded
     return {
         "layout": np.full(len(targets), number, np.int64),
         "err_norm": np.linalg.norm(missing / sigma_of(case), axis=-1),

@@ -15,7 +15,7 @@ from finlab.layout import Layout
 from finlab.layout.load import layout_and_failed
 from finlab.physics import plant_of
 
-SUCCESS_LEVELS = (0.01, 0.5)
+SUCCESS_LEVELS = (0.01, 0.5, 1.0)
 """Levels t of `success_t`, the share of targets with `err_norm <= t`."""
 OWN_DOMAIN = 0x0711
 """Leads the seed of the draws on a user's own layout."""
@@ -141,6 +141,8 @@ experiment = Experiment(
         Column("err_norm_max", "largest", "error"),
         Column("success_0.01", "within 0.01", "share", "success_0.01_interval"),
         Column("success_0.5", "within 0.5", "share"),
+        Column("success_1.0", "within 1.0", "share"),
+        Column("err_phys_mean", "mean error in N and N m", "error"),
         Column("power_mean", "mean power", "three", unit="W"),
         Column("solve_ms_p50", "median time", "three", unit="ms"),
     ),
