@@ -12,9 +12,8 @@ from finlab.exchange.csv_table import is_factor_table, plain_of, table_of
 from finlab.exchange.description_text import SDF, URDF, description_text
 from finlab.exchange.exchange import Exchange
 from finlab.exchange.gazebo import read_description
-from finlab.exchange.matrix import write_matrix
 from finlab.exchange.parameters import read_parameters
-from finlab.exchange.plain_robot import read_plain
+from finlab.exchange.plain_robot import read_plain, write_matrix
 from finlab.exchange.px4 import read_px4, write_px4
 from finlab.files.guarded import is_regular, read_text
 from finlab.files.plain_values import parse_json, parse_yaml
