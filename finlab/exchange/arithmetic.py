@@ -2,23 +2,23 @@
 
 import ast
 import math
-import operator
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from itertools import islice
+from typing import Any
 
 MOST, MOST_CONSTANTS = 200, 2000
 """Most characters of an expression, and most constants of a program."""
-CONSTANTS = {"pi": math.pi, "M_PI": math.pi, "M_PI_2": math.pi / 2, "M_PI_4": math.pi / 4, "PI": math.pi}
-CONSTANTS |= {"M_SQRT2": math.sqrt(2), "M_SQRT1_2": math.sqrt(0.5), "math.pi": math.pi}
-_OPERATORS: dict[type[ast.AST], Callable[[float, float], float]] = {
-    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv
-}  # fmt: skip
-_FUNCTIONS: dict[str, Callable[[float], float]] = {
-    "sin": math.sin, "cos": math.cos, "tan": math.tan, "sqrt": math.sqrt, "radians": math.radians,
-    "rad": math.radians, "abs": abs, "float": float, "deg": math.degrees,
-}  # fmt: skip
-_SUFFIX = re.compile(r"(?<![\w.])(\d+\.?\d*(?:[eE][-+]?\d+)?|\.\d+(?:[eE][-+]?\d+)?)[fFlL]\b")
+_NAMES: dict[str, Any] = {name: getattr(math, name) for name in ("sin", "cos", "tan", "sqrt", "radians", "pi")}
+_NAMES |= {f"{name}f": value for name, value in _NAMES.items()}
+_NAMES |= {"rad": math.radians, "abs": abs, "fabsf": abs, "M_PI": math.pi, "PI": math.pi, "M_PI_2": math.pi / 2}
+_NAMES |= {"M_PI_4": math.pi / 4, "M_SQRT2": math.sqrt(2), "M_SQRT1_2": math.sqrt(0.5)}
+_ALLOWED = (
+    *(ast.Expression, ast.BinOp, ast.UnaryOp, ast.Add, ast.Sub, ast.Mult, ast.Div, ast.USub, ast.UAdd),
+    *(ast.Constant, ast.Name, ast.Load, ast.Call),
+)
+"""What an expression may be made of."""
+_WRITTEN = re.compile(r"(?<![\w.])(\d+\.?\d*(?:[eE][-+]?\d+)?|\.\d+(?:[eE][-+]?\d+)?)[fFlL]\b|std::|math\.")
 _DEFINED = re.compile(
     r"^[ \t]*(?:#[ \t]*define[ \t]+(\w+)[ \t]+(?!\()"
     r"|(?:(?:static|const|constexpr|local|float|double)[ \t]+)+(\w+)[ \t]*=[ \t]*)([^;\n]{1,200})",
@@ -32,17 +32,22 @@ def value_of(text: str, constants: Mapping[str, float]) -> float:
     Raises:
         ValueError: it is something else, or not finite; the message names what is not known.
     """
-    if len(text) > MOST:
-        raise ValueError(f"is longer than {MOST} characters")
-    cleaned = _SUFFIX.sub(r"\1", text.strip()).replace("std::", "")
+    what, names = f"{text.strip()!r:.60}", {**_NAMES, **constants}
     try:
-        value = _value(ast.parse(cleaned, mode="eval").body, {**CONSTANTS, **constants})
-    except (SyntaxError, RecursionError, MemoryError):
-        raise ValueError(f"{text.strip()!r:.60} is no number") from None
-    except (ArithmeticError, TypeError) as error:
-        raise ValueError(f"{text.strip()!r:.60}: {error}") from None
+        if len(text) > MOST:
+            raise SyntaxError
+        tree = ast.parse(_WRITTEN.sub(r"\1", text.strip()), mode="eval")
+        for node in ast.walk(tree):
+            number = not isinstance(node, ast.Constant) or type(node.value) in (int, float)
+            if not isinstance(node, _ALLOWED) or not number:
+                raise SyntaxError
+            if isinstance(node, ast.Name) and node.id not in names:
+                raise ValueError(f"{node.id!r:.60} is not defined in the file")
+        value = float(eval(compile(tree, "", "eval"), {"__builtins__": {}}, names))
+    except (SyntaxError, TypeError, ArithmeticError, RecursionError, MemoryError):
+        raise ValueError(f"{what} is no number") from None
     if not abs(value) < 1e9:
-        raise ValueError(f"{text.strip()!r:.60} is no number of ordinary size")
+        raise ValueError(f"{what} is no number of ordinary size")
     return value
 
 
@@ -58,22 +63,3 @@ def constants_in(text: str) -> dict[str, float]:
         except ValueError:
             continue
     return {name: value for name, value in values.items() if name not in twice}
-
-
-def _value(node: ast.expr, constants: Mapping[str, float]) -> float:
-    match node:
-        case ast.Constant(value=float() | int() as number) if not isinstance(number, bool):
-            return float(number)
-        case ast.UnaryOp(op=ast.USub(), operand=inner):
-            return -_value(inner, constants)
-        case ast.UnaryOp(op=ast.UAdd(), operand=inner):
-            return _value(inner, constants)
-        case ast.BinOp(left=left, op=kind, right=right) if type(kind) in _OPERATORS:
-            return _OPERATORS[type(kind)](_value(left, constants), _value(right, constants))
-        case ast.Name() | ast.Attribute() if (name := ast.unparse(node)) in constants:
-            return constants[name]
-        case ast.Call(func=called, args=[inner], keywords=[]):
-            function = _FUNCTIONS.get(ast.unparse(called).removeprefix("math.").removesuffix("f"))
-            if function is not None:
-                return function(_value(inner, constants))
-    raise ValueError(f"{ast.unparse(node)!r:.60} is not defined in the file")
