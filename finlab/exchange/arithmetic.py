@@ -9,9 +9,18 @@ from typing import Any
 
 MOST, MOST_CONSTANTS = 200, 2000
 """Most characters of an expression, and most constants of a program."""
-_NAMES: dict[str, Any] = {name: getattr(math, name) for name in ("sin", "cos", "tan", "sqrt", "radians", "pi")}
+_NAMES: dict[str, Any] = {
+    name: getattr(math, name) for name in ("sin", "cos", "tan", "sqrt", "radians", "pi")
+}
 _NAMES |= {f"{name}f": value for name, value in _NAMES.items()}
-_NAMES |= {"rad": math.radians, "abs": abs, "fabsf": abs, "M_PI": math.pi, "PI": math.pi, "M_PI_2": math.pi / 2}
+_NAMES |= {
+    "rad": math.radians,
+    "abs": abs,
+    "fabsf": abs,
+    "M_PI": math.pi,
+    "PI": math.pi,
+    "M_PI_2": math.pi / 2,
+}
 _NAMES |= {"M_PI_4": math.pi / 4, "M_SQRT2": math.sqrt(2), "M_SQRT1_2": math.sqrt(0.5)}
 _ALLOWED = (
     *(ast.Expression, ast.BinOp, ast.UnaryOp, ast.Add, ast.Sub, ast.Mult, ast.Div, ast.USub, ast.UAdd),

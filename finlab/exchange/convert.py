@@ -6,9 +6,9 @@ from pathlib import Path
 
 from finlab.assets import shipped_layouts
 from finlab.errors import CommandError, LayoutError
-from finlab.exchange.ardusub import read_ardusub, write_ardusub
-from finlab.exchange.ardusub_parameters import OF_ARDUPILOT, read_ardusub_parameters
-from finlab.exchange.csv_table import is_factor_table, plain_of, table_of
+from finlab.exchange.ardusub import OF_ARDUPILOT, of_motors, read_parameters_of_ardusub, write_ardusub
+from finlab.exchange.ardusub_rows import called, tabled
+from finlab.exchange.csv_table import plain_of, table_of
 from finlab.exchange.description_text import SDF, URDF, description_text
 from finlab.exchange.exchange import Exchange
 from finlab.exchange.gazebo import read_description
@@ -111,12 +111,14 @@ def _read_lines(text: str, name: str, suffix: str, exchange: Exchange) -> Layout
     """The layout in lines of parameters, motors or cells; None where the text is none of these."""
     if "CA_ROTOR" in text:
         return read_px4(text, name, exchange)
-    if "add_motor" in text or is_factor_table(text):
-        return read_ardusub(text, name, exchange)
+    if "add_motor" in text:
+        return of_motors(name, called(text), exchange)
     if OF_ARDUPILOT.search(text):
-        return read_ardusub_parameters(text, name, exchange)
+        return read_parameters_of_ardusub(text, name, exchange)
     if suffix in TABLES:
         table = table_of(text)
+        if table.of_factors:
+            return of_motors(name, tabled(table), exchange)
         return read_plain(plain_of(table), name, exchange, table.comments, table=True)
     if suffix in PARAMETERS and (values := read_parameters(text, "")):
         raise LayoutError(

@@ -75,7 +75,7 @@ def test_matrices_of_every_shape(file: str, text: str, read_as: str) -> None:
         ("a.csv", "axis,a,b\nFx,1,1\nFg,0,0\nTz,.3,-.3", "row 3 begins with 'Fg'"),
         ("a.csv", "name,x,y,z,roll,pitch,yaw\na,0,0,0,0,0,1\n", "which may be its wrench, or its place and angles"),
         ("a.csv", "name,Fx,Fy,Tz\na,1,0,0.3\nb,1,0,x\n", "row 3: Tz is 'x', expected a number"),
-        ("a.csv", "motor,roll,pitch,yaw,throttle,forward,lateral\n1,0,0,1,0,1,0\n2,0,0,-1,0,1,l\n", "row 3: 'l' is no"),
+        ("a.csv", "motor,roll,pitch,yaw,throttle,forward,lateral\n1,0,0,1,0,1,0\n2,0,0,-1,0,1,l\n", "row 3: lateral is 'l'"),
         ("a.params", "1 1 CA_ROTOR_COUNT 1 6\n1 1 CA_ROTOR0_PX 0.5x 9", "line 2: CA_ROTOR0_PX is '0.5x'"),
         ("a.parm", "FRAME_CONFIG 7", "FRAME_CONFIG: is 7, a frame of one's own"),
         ("a.parm", "FRAME_CLASS 1\nMOT_SPIN_MIN 0.1", "parameters of ArduPilot of another vehicle"),
