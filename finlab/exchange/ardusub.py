@@ -27,11 +27,8 @@ WEAK = 0.1
 
 
 def of_motors(name: str, rows: list[MotorRow], exchange: Exchange) -> Layout:
-    """Returns the layout, called `name`, of motors and their factors.
-
-    Raises:
-        LayoutError: there is none, one of them twice, or one that gives no force.
-    """
+    """Returns the layout, called `name`, of motors and their factors. Raises LayoutError: there is none, one
+    of them twice, or one that gives no force."""
     names = [motor for motor, _ in rows]
     if not rows:
         raise LayoutError("has no rows of factors, a motor and its six factors in each")
@@ -48,10 +45,7 @@ def read_parameters_of_ardusub(text: str, name: str, exchange: Exchange) -> Layo
     """Returns the layout, called `name`, of the frame in a list of parameters.
 
     MOT_n_DIRECTION -1 turns a motor the other way for the same output, so that it pushes as its frame says.
-
-    Raises:
-        LayoutError: FRAME_CONFIG is not in it, or names a frame of one's own; a value is no number.
-    """
+    Raises LayoutError: FRAME_CONFIG is not in it, or names a frame of one's own; a value is no number."""
     values = read_parameters(text, "FRAME_ MOT_1 MOT_2 MOT_3 MOT_4 MOT_5 MOT_6 MOT_7 MOT_8")
     config, frames = values.get("FRAME_CONFIG"), [*FRAMES]
     if config is None:
@@ -81,11 +75,8 @@ def read_parameters_of_ardusub(text: str, name: str, exchange: Exchange) -> Layo
 
 
 def factors_of(layout: Layout, exchange: Exchange) -> tuple[list[str], Array]:
-    """Returns the names of a layout's thrusters and their factors (n, 6), the largest of each kind 1.
-
-    Raises:
-        LayoutError: there is no thruster.
-    """
+    """Returns the names of a layout's thrusters and their factors (n, 6), the largest of each kind 1. Raises
+    LayoutError: there is no thruster."""
     kept = exchange.thrusters_of(layout, "A table of factors", "limits", "lengths")
     full = np.maximum(kept.upper, -kept.lower)[:, :1]
     factors = (own_effectiveness(kept)[:, 0] * full)[:, np.argsort(ORDER)] * SIGNS
@@ -99,11 +90,8 @@ def factors_of(layout: Layout, exchange: Exchange) -> tuple[list[str], Array]:
 
 
 def write_ardusub(layout: Layout, exchange: Exchange, suffix: str) -> str:
-    """Returns the factors of a layout's thrusters: for `.csv` a table, else lines of source.
-
-    Raises:
-        LayoutError: there is no thruster.
-    """
+    """Returns the factors of a layout's thrusters: for `.csv` a table, else lines of source. Raises
+    LayoutError: there is no thruster."""
     names, factors = factors_of(layout, exchange)
     lines = ["motor,roll,pitch,yaw,throttle,forward,lateral"] if suffix == ".csv" else []
     for i, (name, row) in enumerate(zip(names, factors.tolist(), strict=True), 1):

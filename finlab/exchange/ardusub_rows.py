@@ -20,10 +20,7 @@ MotorRow = tuple[str, list[float]]
 
 def called(text: str) -> list[MotorRow]:
     """Returns the motors of calls of `add_motor_raw_6dof` in C++ or Lua, which may go over several lines.
-
-    Raises:
-        LayoutError: a call does not parse; its line is named.
-    """
+    Raises LayoutError: a call does not parse; its line is named."""
     lua = "motors:" in text or re.search(r"^\s{0,20}local ", text, re.MULTILINE) is not None
     code, rows = _without_comments(text, lua), list[MotorRow]()
     constants, line, seen = constants_in(code), 1, 0
@@ -72,11 +69,8 @@ def _arguments(text: str) -> list[str]:
 
 
 def tabled(table: Table) -> list[MotorRow]:
-    """Returns the motors in a table whose header names `FACTORS` in any order.
-
-    Raises:
-        LayoutError: a row does not parse; it is named.
-    """
+    """Returns the motors in a table whose header names `FACTORS` in any order. Raises LayoutError: a row does
+    not parse; it is named."""
     rows = []
     for i, record in enumerate(records_of(table), 1):
         name = str(lookup(record, labels.NAME)[1] or i)

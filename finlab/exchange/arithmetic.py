@@ -37,10 +37,7 @@ _DEFINED = re.compile(
 
 def value_of(text: str, constants: Mapping[str, float]) -> float:
     """Returns the value of numbers, constants, + - * /, brackets and functions such as `cosf(radians(45))`.
-
-    Raises:
-        ValueError: it is something else, or not finite; the message names what is not known.
-    """
+    ValueError: it is something else, or not finite; the message names what is not known."""
     what, names = f"{text.strip()!r:.60}", {**_NAMES, **constants}
     try:
         if len(text) > MOST:

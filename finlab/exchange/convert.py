@@ -40,7 +40,7 @@ PARAMETERS = (".params", ".parm", ".param")
 FOREIGN = (".urdf", ".sdf", ".world", ".xacro", ".scn", *PARAMETERS, *PROGRAMS)
 """Suffixes of robot descriptions, and of what autopilots read; their content says what they hold."""
 UNKNOWN = (
-    "holds none of the forms that are read: a layout, a robot description (URDF, SDF, Stonefish), parameters "
+    "holds none of the forms that are read: a layout, a robot description (URDF, SDF), parameters "
     "of PX4 or ArduSub, motors of ArduSub, thrusters or a matrix in YAML, JSON or CSV"
 )
 
@@ -49,11 +49,8 @@ def convert(file: str, output: str | os.PathLike[str], to: str | None, exchange:
     """Makes one file into another, and returns the layout that went through.
 
     `file` is of any form, a bundle, or the name of a shipped layout; `to` is `layout` or one of `WRITERS`, by
-    the suffix of the output when None.
-
-    Raises:
-        FinlabError: a file cannot be read or written, or the output's suffix says no form.
-    """
+    the suffix of the output when None. FinlabError: a file cannot be read or written, or the output's suffix
+    says no form."""
     suffix = Path(output).suffix.lower()
     form = to or FORM_OF.get(suffix)
     if form is None:
@@ -67,11 +64,8 @@ def convert(file: str, output: str | os.PathLike[str], to: str | None, exchange:
 
 
 def read_any(file: str, exchange: Exchange) -> Layout:
-    """Returns the layout in a file of any form; `exchange` says what to take where it is silent.
-
-    Raises:
-        FinlabError: it cannot be read, or holds no form that is known.
-    """
+    """Returns the layout in a file of any form; `exchange` says what to take where it is silent. FinlabError:
+    it cannot be read, or holds no form that is known."""
     path = Path(file)
     if file in shipped_layouts() or not is_regular(path) or path.suffix.lower() == ".zip":
         return load_layout(file)
@@ -82,11 +76,8 @@ def read_any(file: str, exchange: Exchange) -> Layout:
 
 
 def read_robot(text: str, file: str, exchange: Exchange) -> Layout:
-    """Returns the layout in the text of a file of this name, of any form.
-
-    Raises:
-        LayoutError: something in it is wrong or missing, or it holds no form that is known.
-    """
+    """Returns the layout in the text of a file of this name, of any form. Raises LayoutError: something in it
+    is wrong or missing, or it holds no form that is known."""
     path = Path(file)
     name, suffix = path.stem.strip()[:64].strip() or "robot", path.suffix.lower()
     if text.lstrip().startswith("<"):

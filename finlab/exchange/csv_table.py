@@ -37,12 +37,8 @@ class Table(NamedTuple):
 
 
 def table_of(text: str) -> Table:
-    """Returns the cells of a text whose cells commas, semicolons, tabs or blanks part; lines that begin
-    with # or // are comments.
-
-    Raises:
-        LayoutError: it is no table.
-    """
+    """Returns the cells of a text whose cells commas, semicolons, tabs or blanks part; lines that begin with
+    # or // are comments. Raises LayoutError: it is no table."""
     if text.count("\n") > 20 * MAX_ROWS:
         raise LayoutError(f"holds {text.count(chr(10)):,} lines, expected a table of up to {MAX_ROWS} rows")
     lines = [(i, line.strip()) for i, line in enumerate(text.splitlines(), 1) if line.strip(" \t,;")]
@@ -64,11 +60,8 @@ def table_of(text: str) -> Table:
 
 
 def plain_of(table: Table) -> dict[str, Any]:
-    """Returns a table as plain values: a matrix, or a mapping for each thruster.
-
-    Raises:
-        LayoutError: a row has another length, or a cell that is no number; the row is named.
-    """
+    """Returns a table as plain values: a matrix, or a mapping for each thruster. Raises LayoutError: a row
+    has another length, or a cell that is no number; the row is named."""
     header, rows = table.header, table.rows
     columns = {plain(cell) for cell in header}
     if measured := MEASURED & {cell.removesuffix("us") for cell in columns}:
@@ -82,11 +75,8 @@ def plain_of(table: Table) -> dict[str, Any]:
 
 
 def records_of(table: Table) -> list[dict[str, Any]]:
-    """Returns each row by the names of its columns; the first that has none is the thruster's name.
-
-    Raises:
-        LayoutError: a row has another length, or no number where one is needed.
-    """
+    """Returns each row by the names of its columns; the first that has none is the thruster's name. Raises
+    LayoutError: a row has another length, or no number where one is needed."""
     records = []
     for line, row in table.rows:
         if len(row) != len(table.header):
@@ -122,7 +112,7 @@ def _by_axis(header: list[str], rows: Sequence[Row], width: int) -> dict[str, An
                 f"row {row[0]} begins with {label!r:.40}, expected Fx to Tz, least, most once each"
             )
         held[key] = _numbers(row, row[1][1:], width - 1)
-    ends = {key: held.pop(key) for key in ("least", "most") if key in held}
+    ends: dict[str, Any] = {key: held.pop(key) for key in ("least", "most") if key in held}
     return {**ends, **({"names": header[1:]} if header else {}), "matrix": held}
 
 

@@ -95,10 +95,7 @@ def frame_in(text: str) -> Frame | None:
 
 def frame_said(scopes: Iterable[Mapping[str, Any]], comments: Iterable[str]) -> tuple[Frame | None, str]:
     """Returns the frame that mappings, the innermost first, or else comments name, and where it says so.
-
-    Raises:
-        LayoutError: a frame is named by a word that is not known.
-    """
+    Raises LayoutError: a frame is named by a word that is not known."""
     for scope in scopes:
         key, value, _ = lookup(scope, FRAME_KEYS.removeprefix("frameid "))
         text = " ".join(map(str, value.values())) if isinstance(value, Mapping) else str(value)

@@ -25,11 +25,8 @@ def read_plain(
 ) -> Layout:
     """Returns the layout, called `name`, of the thrusters in plain values.
 
-    `comments` of the file may name the frame; a `table` has rows that nothing but their labels names.
-
-    Raises:
-        LayoutError: none are there, or several times, or they may be read in two ways.
-    """
+    `comments` of the file may name the frame; a `table` has rows that nothing but their labels names. Raises
+    LayoutError: none are there, or several times, or they may be read in two ways."""
     found = found_in(data, exchange, table)
     if len(found.rows) > MAX_ACTUATORS:
         what = "columns" if found.axes else "thrusters"
@@ -191,11 +188,8 @@ def _limits_in(values: Mapping[str, Any], n: int, exchange: Exchange) -> list[En
 
 
 def write_matrix(layout: Layout, exchange: Exchange, suffix: str) -> str:
-    """Returns the matrix of a layout's thrusters per newton, as CSV for `.csv`, else as YAML.
-
-    Raises:
-        LayoutError: there is no thruster.
-    """
+    """Returns the matrix of a layout's thrusters per newton, as CSV for `.csv`, else as YAML. Raises
+    LayoutError: there is no thruster."""
     kept = exchange.thrusters_of(layout, "A matrix", "places along the lines of the forces")
     rows = own_effectiveness(kept)[:, 0].T * (TO_FRD if exchange.frame == "FRD" else 1.0) + 0.0
     names, limits = list(kept.names), np.stack([kept.lower, kept.upper], axis=1)[..., 0].tolist()

@@ -20,11 +20,8 @@ USUAL = {"PX": 0.0, "PY": 0.0, "PZ": 0.0, "AX": 0.0, "AY": 0.0, "AZ": -1.0, "CT"
 
 
 def read_px4(text: str, name: str, exchange: Exchange) -> Layout:
-    """Returns the layout, called `name`, of the rotors in a parameter file or airframe script.
-
-    Raises:
-        LayoutError: it has no rotors, or one without direction or force; a value is no number.
-    """
+    """Returns the layout, called `name`, of the rotors in a parameter file or airframe script. Raises
+    LayoutError: it has no rotors, or one without direction or force; a value is no number."""
     values = read_parameters(text, "CA_")
     count = int(values.get("CA_ROTOR_COUNT", 0))
     if not 0 < count <= MAX_ROTORS:
@@ -65,10 +62,7 @@ def _rotor(key: str) -> int:
 
 def write_px4(layout: Layout, exchange: Exchange, suffix: str) -> str:
     """Returns a layout's thrusters as lines of an airframe script, for `.params` as a list of QGroundControl.
-
-    Raises:
-        LayoutError: there is no thruster, or there are too many.
-    """
+    Raises LayoutError: there is no thruster, or there are too many."""
     parts = [part for part in exchange.thrusters_of(layout, "PX4").actuators if isinstance(part, Thruster)]
     if len(parts) > MAX_ROTORS:
         raise LayoutError(f"PX4 takes up to {MAX_ROTORS} rotors, layout {layout.name} has {len(parts)}")

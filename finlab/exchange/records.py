@@ -45,11 +45,8 @@ class Found(NamedTuple):
 def found_in(data: Any, exchange: Exchange, table: bool) -> Found:
     """Returns the thrusters in plain values, or in a `table` whose six rows nothing names.
 
-    Places and directions go before a matrix, since they tell more.
-
-    Raises:
-        LayoutError: none are there, or several times, or they may be read in two ways.
-    """
+    Places and directions go before a matrix, since they tell more. Raises LayoutError: none are there, or
+    several times, or they may be read in two ways."""
     placed = [each for node in nodes(data) if (each := _placed(node, exchange))]
     every = placed or [each for node in nodes(data) if (each := _wrenches(node, exchange, table))]
     if len(every) > 1:
@@ -69,8 +66,9 @@ def found_in(data: Any, exchange: Exchange, table: bool) -> Found:
 
 def _held(value: Any) -> dict[str, Mapping[str, Any]]:
     """The mappings right below a value, by their keys or places."""
+    if isinstance(value, list):
+        value = {f"[{i}]": each for i, each in enumerate(value)}
     pairs = value.items() if isinstance(value, Mapping) else ()
-    pairs = ((f"[{i}]", each) for i, each in enumerate(value)) if isinstance(value, list) else pairs
     return {str(key): each for key, each in pairs if isinstance(each, Mapping)}
 
 
@@ -112,11 +110,8 @@ def _short(value: Any) -> bool:
 
 
 def _points(row: Row) -> bool:
-    """Whether a mapping says where its thruster points.
-
-    Raises:
-        LayoutError: it may be a direction as well as angles.
-    """
+    """Whether a mapping says where its thruster points. Raises LayoutError: it may be a direction as well as
+    angles."""
     places = (lookup(row, labels.DIRECTION), lookup(row, labels.ANGLES, labels.DEGREES))
     points = any(_short(value) for _, value, _ in places)
     key, value, _ = lookup(row, labels.UNCLEAR)
@@ -191,8 +186,8 @@ def _wrenches(node: Node, exchange: Exchange, table: bool) -> Found | None:
         return None
     if isinstance(value[0], list):
         return _of_array(_array(value, node), names, node, exchange, table)
-    array = numbers_in(value)
-    return None if array is None else _of_array(_unfolded(array, node), names, node, exchange, table)
+    flat = numbers_in(value)
+    return None if flat is None else _of_array(_unfolded(flat, node), names, node, exchange, table)
 
 
 def _array(rows: Sequence[Any], node: Node) -> Array:

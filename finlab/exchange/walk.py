@@ -35,10 +35,7 @@ class Node(NamedTuple):
 
 def nodes(data: Any) -> Iterator[Node]:
     """Yields all mappings, lists and values in plain values, outer ones first, but no numbers in lists.
-
-    Raises:
-        LayoutError: there are too many.
-    """
+    Raises LayoutError: there are too many."""
     waiting: list[Node] = [Node((), data, ())]
     count = 0
     while waiting:

@@ -15,11 +15,8 @@ def root_of(text: str) -> Element:
     """Returns the outermost element; a prefix such as `gz:` is a part of a name and needs no declaration.
 
     Entities could pull in other files or grow without bound, and robot descriptions have no use for them; as
-    the text is UTF-8 whatever its first line says, no other encoding can hide them.
-
-    Raises:
-        LayoutError: it is no XML, too deep or too large, or declares a DOCTYPE.
-    """
+    the text is UTF-8 whatever its first line says, no other encoding can hide them. Raises LayoutError: it is
+    no XML, too deep or too large, or declares a DOCTYPE."""
     builder, parser = TreeBuilder(), expat.ParserCreate()
     depth = count = 0
 

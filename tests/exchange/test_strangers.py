@@ -93,7 +93,7 @@ def test_matrices_of_every_shape(file: str, text: str, read_as: str) -> None:
         ("a.sdf", sdf('<include merge="true"><uri>model://wamv</uri></include>' + THRUSTER), "in <include> wamv, which is not"),
         ("a.xacro", '<robot xmlns:xacro="x"><link name="${a}"/></robot>', "is a xacro file, .* expands it"),
         ("a.xml", "<launch/>", "got <launch>"),
-        ("a.scn", '<scenario><include file="b.scn"/></scenario>', "scenario of Stonefish with no robot .* includes b.scn"),
+        ("a.scn", '<scenario><include file="b.scn"/></scenario>', "is a scenario of Stonefish, which is not read"),
     ],
 )  # fmt: skip
 def test_what_stands_in_the_way_is_named(file: str, text: str, message: str) -> None:
@@ -251,17 +251,6 @@ def test_uuv_simulator(tmp_path: Path) -> None:
         and layout.body.linear_damping == (1, 2, 3, 4, 5, 6)
         and layout.body.added_mass is None
     )
-
-
-def test_stonefish_looks_right_and_down() -> None:
-    part = '<actuator name="a" type="thruster"><link name="{}"/><origin xyz="$(arg x) 0.2 0.1" rpy="0 ${{-pi/2}} 0"/>' \
-           '<specs max_setpoint="10"/><thrust_model type="quadratic"><thrust_coeff value="0.2"/></thrust_model></actuator>'  # fmt: skip
-    joint = '<joint type="fixed"><parent name="H"/><child name="L"/><origin xyz="1 0 0" rpy="0 0 0"/></joint>'
-    robot = f'<robot name="s"><base_link name="H"/>{joint}{part.format("L")}</robot>'
-    layout, notes = read("a.scn", f'<scenario><arg name="x" default="-0.5"/>{robot}</scenario>')
-    (one,) = layout.actuators
-    np.testing.assert_allclose([one.position, one.frame[0]], [[0.5, -0.2, -0.1], [0, 0, -1]], atol=1e-12)
-    assert (one.lower[0], one.upper[0]) == (pytest.approx(-20), pytest.approx(20)) and "Stonefish" in notes
 
 
 def test_xacro_is_expanded_where_it_is_installed(tmp_path: Path) -> None:
