@@ -49,8 +49,8 @@ def convert(file: str, output: str | os.PathLike[str], to: str | None, exchange:
     """Makes one file into another, and returns the layout that went through.
 
     `file` is of any form, a bundle, or the name of a shipped layout; `to` is `layout` or one of `WRITERS`, by
-    the suffix of the output when None. FinlabError: a file cannot be read or written, or the output's suffix
-    says no form."""
+    the suffix of the output when None. Raises FinlabError: a file cannot be read or written, or the end
+    of the output says no form."""
     suffix = Path(output).suffix.lower()
     form = to or FORM_OF.get(suffix)
     if form is None:
@@ -64,8 +64,8 @@ def convert(file: str, output: str | os.PathLike[str], to: str | None, exchange:
 
 
 def read_any(file: str, exchange: Exchange) -> Layout:
-    """Returns the layout in a file of any form; `exchange` says what to take where it is silent. FinlabError:
-    it cannot be read, or holds no form that is known."""
+    """Returns the layout in a file of any form; `exchange` says what to take where it is silent. Raises
+    FinlabError: it cannot be read, or holds no form that is known."""
     path = Path(file)
     if file in shipped_layouts() or not is_regular(path) or path.suffix.lower() == ".zip":
         return load_layout(file)

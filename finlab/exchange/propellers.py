@@ -85,7 +85,10 @@ def _converted(plugin: Element, kind: str, speeds: Array) -> Array:
         )
         return back * np.minimum(turned - left, 0.0) + ahead * np.maximum(turned - right, 0.0)
     try:
-        words = (said(plugin, f"conversion/{key}Values").split() for key in ("input", "output"))
-        return np.array(np.interp(speeds, *(np.array(each, np.float64) for each in words)))
+        xs, ys = (
+            np.array(said(plugin, f"conversion/{key}Values").split(), np.float64)
+            for key in ("input", "output")
+        )
+        return np.array(np.interp(speeds, xs, ys))
     except ValueError:
         raise LayoutError("conversion LinearInterp expects as many inputValues as outputValues") from None

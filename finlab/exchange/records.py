@@ -98,7 +98,7 @@ def _joined(row: Mapping[str, Any]) -> Row:
     for what, starts in (("position", ("", "p", "pos")), ("direction", ("d", "a", "n", "u", "dir", "f"))):
         for start in starts:
             if {f"{start}x", f"{start}y"} <= set(short):
-                whole[what] = [short.get(f"{start}{axis}", 0.0) for axis in "xyz"]
+                whole.setdefault(what, [short.get(f"{start}{axis}", 0.0) for axis in "xyz"])
     return whole
 
 
