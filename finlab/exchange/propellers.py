@@ -5,11 +5,9 @@ CT density D^4 w |w|. libuuv_thruster_ros_plugin (Plankton and DAVE have it, too
 converts it.
 """
 
+import math
 from xml.etree.ElementTree import Element
 
-import numpy as np
-
-from finlab.arrays import Array
 from finlab.errors import LayoutError
 from finlab.exchange.description import Description, Joint, number, said
 from finlab.exchange.exchange import Exchange
@@ -61,34 +59,15 @@ def force_of(plugin: Element, name: str, exchange: Exchange) -> tuple[float, flo
 
 
 def _uuv_force(plugin: Element, name: str, exchange: Exchange) -> tuple[float, float] | None:
-    kind, low, high = said(plugin, "conversion/type"), -np.inf, np.inf
-    if said(plugin, "clampMin") and said(plugin, "clampMax") and kind in ("Basic", "Bessa", "LinearInterp"):
+    kind, low, high = said(plugin, "conversion/type"), -math.inf, math.inf
+    if said(plugin, "clampMin") and said(plugin, "clampMax") and kind == "Basic":
         scale = number(plugin, "gain", 1.0) * number(plugin, "propeller_efficiency", 1.0)
-        speeds = scale * np.array([number(plugin, "clampMin"), number(plugin, "clampMax")])
-        low, high = np.sort(number(plugin, "thrust_efficiency", 1.0) * _converted(plugin, kind, speeds))
+        speeds = (scale * number(plugin, "clampMin"), scale * number(plugin, "clampMax"))
+        gain = number(plugin, "thrust_efficiency", 1.0) * number(plugin, "conversion/rotorConstant")
+        low, high = sorted(gain * speed * abs(speed) for speed in speeds)
         exchange.note(f"uuv_thruster of {name}: clamps and conversion {kind} give {low:g} to {high:g} N.")
     else:
         exchange.note(f"uuv_thruster of {name}: no clamps, or conversion {kind!r:.40}, which is not read.")
     if said(plugin, "thrustMin") and said(plugin, "thrustMax"):
         low, high = max(low, number(plugin, "thrustMin")), min(high, number(plugin, "thrustMax"))
-    return (float(low), float(high)) if np.isfinite(low) else None
-
-
-def _converted(plugin: Element, kind: str, speeds: Array) -> Array:
-    """Thrust [N] at some commands (2,)."""
-    turned: Array = speeds * np.abs(speeds)
-    if kind == "Basic":
-        return turned * number(plugin, "conversion/rotorConstant")
-    if kind == "Bessa":
-        (left, back), (right, ahead) = (
-            [number(plugin, f"conversion/{key}{side}") for key in ("delta", "rotorConstant")] for side in "LR"
-        )
-        return back * np.minimum(turned - left, 0.0) + ahead * np.maximum(turned - right, 0.0)
-    try:
-        xs, ys = (
-            np.array(said(plugin, f"conversion/{key}Values").split(), np.float64)
-            for key in ("input", "output")
-        )
-        return np.array(np.interp(speeds, xs, ys))
-    except ValueError:
-        raise LayoutError("conversion LinearInterp expects as many inputValues as outputValues") from None
+    return (low, high) if math.isfinite(low) else None

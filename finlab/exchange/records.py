@@ -170,24 +170,19 @@ def _wrenches(node: Node, exchange: Exchange, table: bool) -> Found | None:
     if isinstance(value, Mapping):
         rows = {axis: row for key, row in value.items() if (axis := axis_of(key)) and isinstance(row, list)}
         if len(rows) > 1 and (sure or len({plain(key) for key in value} & CLEAR) > 1):
-            array = _array([*rows.values()], node)
-            names = _names(node, array.shape[1])
-            return Found(node, {name: {} for name in names}, tuple(rows), array, "by its labels")
-        flat, n, m = (lookup(value, words)[1] for words in ("data", "rows", "cols columns"))
-        if sure and isinstance(flat, list):
-            if not (isinstance(n, int) and isinstance(m, int) and n * m == len(flat) > 0):
-                raise LayoutError(
-                    f"rows {n} and cols {m} do not fit {len(flat)} numbers of data"[:200], node.words
-                )
-            value = [flat[i : i + m] for i in range(0, len(flat), m)]
+            matrix = _array([*rows.values()], node)
+            named = {name: Row() for name in _names(node, matrix.shape[1])}
+            return Found(node, named, tuple(rows), matrix, "by its labels")
+        if sure and isinstance(flat := lookup(value, "data")[1], list):
+            value = flat
         elif len(value) > 1 and all(isinstance(row, list) for row in value.values()):
             names, value = [*map(str, value)], [*value.values()]
     if not sure or not isinstance(value, list) or not value:
         return None
     if isinstance(value[0], list):
         return _of_array(_array(value, node), names, node, exchange, table)
-    flat = numbers_in(value)
-    return None if flat is None else _of_array(_unfolded(flat, node), names, node, exchange, table)
+    array = numbers_in(value)
+    return _of_array(_unfolded(array, node), names, node, exchange, table) if array is not None else None
 
 
 def _array(rows: Sequence[Any], node: Node) -> Array:
@@ -212,16 +207,12 @@ def _of_records(node: Node, rows: Mapping[str, Mapping[str, Any]]) -> Found | No
             "place and angles; call them Fx to Tz, or x, y, z and dx, dy, dz",
             node.words,
         )
-    columns = []
-    for (name, row), own in zip(rows.items(), (first, *others), strict=True):
-        column = numbers_in([row.get(own.get(axis, "")) for axis in first])
-        if set(own) != set(first) or column is None:
-            raise LayoutError(
-                f"expected numbers {', '.join(first)}, as of the others", f"{node.words}.{name}"
-            )
-        columns.append(column)
+    pairs = zip(rows.values(), (first, *others), strict=True)
+    columns = numbers_in([[row.get(own.get(axis, "")) for axis in first] for row, own in pairs])
+    if columns is None or any(set(own) != set(first) for own in others):
+        raise LayoutError(f"expected numbers {', '.join(first)} of each thruster", node.words)
     named = {key: {**row} for key, row in rows.items()}
-    return Found(node, named, tuple(first), np.transpose(columns), "a row per thruster")
+    return Found(node, named, tuple(first), columns.T, "a row per thruster")
 
 
 def _names(node: Node, n: int) -> list[str]:
@@ -236,11 +227,13 @@ def _names(node: Node, n: int) -> list[str]:
 
 
 def _unfolded(array: Array, node: Node) -> Array:
-    """A matrix in one list, row by row, of as many columns as there are names."""
+    """A matrix in one list, row by row, of as many columns as there are names, or as is said."""
     for _, scope in node.scopes:
-        names, count = (lookup(scope, words)[1] for words in (labels.NAMES, labels.COUNT))
+        names, count = (lookup(scope, words)[1] for words in (labels.NAMES, f"cols columns {labels.COUNT}"))
         n = len(names) if isinstance(names, list) else count
-        if isinstance(n, int) and n > 0 and array.size % n == 0:
+        rows = lookup(scope, "rows")[1]
+        fits = isinstance(n, int) and n > 0 and array.size % n == 0
+        if fits and (not isinstance(rows, int) or rows * n == array.size):
             return array.reshape(-1, n)
     shapes = ", ".join(f"{k} rows of {array.size // k}" for k in range(2, 7) if array.size % k == 0)
     raise LayoutError(

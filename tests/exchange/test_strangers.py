@@ -236,8 +236,7 @@ def test_uuv_simulator(tmp_path: Path) -> None:
     for more, force in (
         (clamps + "<conversion><type>Basic</type><rotorConstant>0.1</rotorConstant></conversion>", (-10, 40)),
         (clamps + "<gain>2</gain><thrustMax>100</thrustMax><thrustMin>-100</thrustMin><conversion><type>Basic</type><rotorConstant>0.1</rotorConstant></conversion>", (-40, 100)),
-        (clamps + "<conversion><type>Bessa</type><rotorConstantL>0.1</rotorConstantL><rotorConstantR>0.2</rotorConstantR><deltaL>-50</deltaL><deltaR>100</deltaR></conversion>", (-5, 60)),
-        (clamps + "<conversion><type>LinearInterp</type><inputValues>-10 0 20</inputValues><outputValues>-3 0 7</outputValues></conversion>", (-3, 7)),
+        (clamps + "<conversion><type>Bessa</type></conversion>", (-39.91, 51.44)),
         ("", (-39.91, 51.44)),
     ):  # fmt: skip
         layout, notes = read("a.urdf", urdf(more))
