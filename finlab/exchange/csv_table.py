@@ -53,7 +53,10 @@ def table_of(text: str) -> Table:
         raise LayoutError(f"is no table: {error}") from None
     if len(cells) != len(lines):
         raise LayoutError("has a cell with line ends inside, expected a row per line")
-    rows = [(i, _stripped(row)) for (i, _), row in zip(lines, cells, strict=True)]
+    rows = [(i, [cell.strip() for cell in row]) for (i, _), row in zip(lines, cells, strict=True)]
+    for _, row in rows:
+        while len(row) > 1 and not row[-1]:
+            row.pop()
     head = rows[0][1]
     named = not any(map(is_number, head)) or plain(head[0]) in ("axis", "axes", "dof", "row") or not head[0]
     return Table(head, rows[1:], comments) if named else Table([], rows, comments)
@@ -131,11 +134,3 @@ def is_number(cell: str) -> bool:
         return "_" not in cell and math.isfinite(float(cell))
     except ValueError:
         return False
-
-
-def _stripped(row: list[str]) -> list[str]:
-    """Cells without blanks around them, and without empty ones at the end."""
-    cells = [cell.strip() for cell in row]
-    while len(cells) > 1 and not cells[-1]:
-        cells.pop()
-    return cells

@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 from finlab.arrays import Array
 from finlab.errors import LayoutError
 from finlab.exchange.exchange import Exchange
-from finlab.exchange.models import Drives, Named, chosen, name_of, parts_of
+from finlab.exchange.models import Drives, Named, chosen, parts_of
 from finlab.exchange.xml_text import expanded, is_xacro, root_of
 
 ADDED = ("xx", "yy", "zz", "pp", "qq", "rr")
@@ -175,7 +175,8 @@ def _placed(hung: dict[str, tuple[str, Array]], included: list[str]) -> dict[str
 
 def _joint(scope: str, part: Element, named: Named, poses: dict[str, Array], old: bool) -> Joint:
     """A joint; in `old` SDF an axis is seen from the model, as where use_parent_model_frame says so."""
-    name, what, kind = f"{scope}{name_of(part)}", f"joint {name_of(part)!r:.60}", part.get("type", "")
+    own, kind = part.get("name", ""), part.get("type", "")
+    name, what = f"{scope}{own}", f"joint {own!r:.60}"
     seen_from = said(part, "axis/xyz@expressed_in")
     of_model = said(part, "axis/use_parent_model_frame", str(int(old))).lower() in ("1", "true")
     frame = _key(scope, seen_from or "__model__", named) if seen_from or of_model else f"joint {name}"

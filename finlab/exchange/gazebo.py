@@ -5,7 +5,6 @@ joint sits where its force acts, and its axis is the shaft.
 """
 
 import math
-from collections.abc import Iterable
 from dataclasses import replace
 from xml.etree.ElementTree import Element
 
@@ -16,6 +15,7 @@ from finlab.errors import LayoutError
 from finlab.exchange.description import TURNING, Description, Joint, number, parse_description
 from finlab.exchange.description_body import UUV, body_of
 from finlab.exchange.exchange import T200_POWER, Exchange, vector
+from finlab.exchange.models import listed
 from finlab.exchange.propellers import driven, drives, force_of, is_plugin
 from finlab.exchange.xml_text import root_of
 from finlab.layout import MAX_ACTUATORS, Actuator, Azimuth, Fin, Layout
@@ -60,10 +60,10 @@ def read_description(text: str, name: str, exchange: Exchange) -> Layout:
     if not parts:
         raise LayoutError(
             "has no thruster's plugin of gz-sim or uuv; name the links that are fins (--fins LINK...) or "
-            f"thrusters (--thrusters LINK...); a joint moves {_moved(robot)}; its plugins: {_listed(left)}"
+            f"thrusters (--thrusters LINK...); a joint moves {_moved(robot)}; its plugins: {listed(left)}"
         )
     if left:
-        exchange.note(f"Plugins that are not read: {_listed(left)}.")
+        exchange.note(f"Plugins that are not read: {listed(left)}.")
     exchange.note(f"Model {robot.name} was read, x forward, y left, z up, in m, kg and N.")
     place, body = ("centre of gravity", body_of(robot, exchange)) if at_gravity else ("base frame", None)
     return Layout(robot.name, tuple(parts), f"Origin at the {place}.", body)
@@ -77,11 +77,7 @@ def _joint_of(robot: Description, link: str) -> Joint:
 
 def _moved(robot: Description) -> str:
     turning = [link for link, joint in robot.movers.items() if joint.kind in TURNING]
-    return _listed(sorted(robot.movers, key=lambda link: (link not in turning, link)))
-
-
-def _listed(names: Iterable[str]) -> str:
-    return f"{', '.join(names) or 'none'}"[:300]
+    return listed(sorted(robot.movers, key=lambda link: (link not in turning, link)))
 
 
 def _propeller(

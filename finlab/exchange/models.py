@@ -1,6 +1,6 @@
 """The models of a description: which is the robot, the parts of models inside it, and what is included."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from xml.etree.ElementTree import Element
 
 from finlab.errors import LayoutError
@@ -20,7 +20,7 @@ def chosen(root: Element, drives: Drives, exchange: Exchange) -> Element:
     names = [model.get("name", "") for model in models]
     if exchange.model is not None:
         if exchange.model not in names:
-            raise LayoutError(f"has no model {exchange.model!r:.60}; it has {_listed(names)}")
+            raise LayoutError(f"has no model {exchange.model!r:.60}; it has {listed(names)}")
         return models[names.index(exchange.model)]
     pushed = [model for model in models if any(map(drives, model.iter("plugin")))]
     robots = [
@@ -38,7 +38,7 @@ def chosen(root: Element, drives: Drives, exchange: Exchange) -> Element:
     top, *others = robots or models
     if others:
         kind = "robots" if robots else "models"
-        left = _listed([model.get("name", "") for model in others])
+        left = listed([model.get("name", "") for model in others])
         exchange.note(f"{top.get('name')} was read; it holds other {kind}: {left} (--model NAME).")
     return top
 
@@ -50,12 +50,12 @@ def parts_of(top: Element) -> tuple[Named, list[tuple[str, Element]], list[str]]
     named, plugins, included, waiting = Named(), list[tuple[str, Element]](), list[str](), [("", top)]
     while waiting:
         scope, model = waiting.pop()
-        for tag in ("link", "joint", "frame", "model"):
-            named |= {f"{tag} {scope}{name_of(part)}": (scope, part) for part in model.findall(tag)}
-        inside = model.findall("model")
-        if any(part.get("placement_frame") for part in inside):
-            raise LayoutError("has a model with a placement_frame, which is not read")
-        waiting += [(f"{scope}{name_of(part)}::", part) for part in inside]
+        for part in (part for tag in ("link", "joint", "frame", "model") for part in model.findall(tag)):
+            name = f"{scope}{part.get('name') or ''}"
+            if name == scope or part.get("placement_frame"):
+                raise LayoutError(f"has a <{part.tag}> without a name, or with a placement_frame")
+            named[f"{part.tag} {name}"] = scope, part
+            waiting += [(f"{name}::", part)] if part.tag == "model" else []
         for path in ("gazebo/plugin", "plugin", "link/plugin", "joint/plugin"):
             plugins += [(scope, plugin) for plugin in model.findall(path)]
         included += [f"{scope}{_include_name(each)}" for each in model.findall("include")]
@@ -69,14 +69,7 @@ def _include_name(include: Element) -> str:
     return " ".join(name.split())[:60]
 
 
-def name_of(element: Element) -> str:
-    """Returns an element's name. Raises LayoutError: it has none."""
-    name = element.get("name")
-    if not name:
-        raise LayoutError(f"has a <{element.tag}> without a name")
-    return name
-
-
-def _listed(names: list[str]) -> str:
-    text = ", ".join(names)
-    return text if len(text) < 300 else f"{text[:300].rpartition(',')[0]}, ... ({len(names)})"
+def listed(names: Iterable[str]) -> str:
+    """Returns names as a sentence has them, the first of many."""
+    text = ", ".join(names) or "none"
+    return text if len(text) < 300 else f"{text[:300].rpartition(',')[0]}, ..."

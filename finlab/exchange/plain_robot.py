@@ -169,8 +169,8 @@ def _limits_in(values: Mapping[str, Any], n: int, exchange: Exchange) -> list[En
     if key and pair is not None:
         if ends is None or ends.shape not in ((2,), (n, 2), (2, n)):
             raise LayoutError(f"expected least and most, or both of each of {n} thrusters", key)
-        ends = (ends if ends.shape in ((n, 2), (2,)) else ends.T) * size
-        return [(low, high) for low, high in np.broadcast_to(ends, (n, 2)).tolist()]
+        ends = np.broadcast_to(ends if ends.shape in ((n, 2), (2,)) else ends.T, (n, 2)) * size
+        return [(low, high) for low, high in ends.tolist()]
     low_key, low, low_size = lookup(values, labels.LEAST, labels.FORCES)
     high_key, high, high_size = lookup(values, labels.MOST, labels.FORCES)
     if high is None:

@@ -5,6 +5,7 @@ CA_R_REV says that it reverses (PX4, ActuatorEffectivenessRotors).
 """
 
 import math
+import re
 
 import numpy as np
 
@@ -36,7 +37,8 @@ def read_px4(text: str, name: str, exchange: Exchange) -> Layout:
         if lacking:
             which = ", ".join(lacking) if len(lacking) < count else "all"
             exchange.note(f"No CA_ROTORi_{key} of rotors {which}: {usual:g} is taken, the default of PX4.")
-    beyond = sorted(key for key in values if key.startswith("CA_ROTOR") and _rotor(key) >= count)
+    rotors = {key: found for key in values if (found := re.match(r"CA_ROTOR(\d{1,3})_", key))}
+    beyond = sorted(key for key, found in rotors.items() if int(found[1]) >= count)
     if beyond:
         exchange.note(f"CA_ROTOR_COUNT is {count}; not read: {', '.join(beyond[:12])}.")
     if exchange.force is None:
@@ -52,12 +54,6 @@ def read_px4(text: str, name: str, exchange: Exchange) -> Layout:
         axis *= math.copysign(1.0 / length, size)
         parts.append(exchange.thruster(f"rotor{i + 1}", place, axis, force, -km))
     return Layout(name, tuple(parts))
-
-
-def _rotor(key: str) -> int:
-    """The number of the rotor that a parameter is of; -1 for others."""
-    number = key.removeprefix("CA_ROTOR").partition("_")[0]
-    return int(number) if number.isdecimal() and len(number) < 4 else -1
 
 
 def write_px4(layout: Layout, exchange: Exchange, suffix: str) -> str:
