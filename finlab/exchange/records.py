@@ -233,7 +233,7 @@ def _unfolded(array: Array, node: Node) -> Array:
         n = len(names) if isinstance(names, list) else count
         rows = lookup(scope, "rows")[1]
         fits = isinstance(n, int) and n > 0 and array.size % n == 0
-        if fits and (not isinstance(rows, int) or rows * n == array.size):
+        if fits and (rows is None or isinstance(rows, list) or rows == array.size // n):
             return array.reshape(-1, n)
     shapes = ", ".join(f"{k} rows of {array.size // k}" for k in range(2, 7) if array.size % k == 0)
     raise LayoutError(

@@ -62,6 +62,8 @@ def test_matrices_of_every_shape(file: str, text: str, read_as: str) -> None:
     ("file", "text", "message"),
     [
         ("a.yaml", "matrix: [1, 1, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0]", "12 numbers in one list, which may be 2 rows of 6, 3 rows"),
+        ("a.yaml", "tam: {rows: 5, cols: 2, data: [1, 1, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0]}", "12 numbers in one list, which may"),
+        ("a.yaml", "names: [a, a]\ntam: [[1, 1], [0, 0], [0, 0], [0, 0], [0, 0], [1, -1]]", "holds 2 names, expected 2, each another"),
         ("a.yaml", "mass_matrix: [[1,0],[0,1],[1,1],[0,0],[0,0],[0,0]]", "its lists of numbers, mass_matrix"),
         ("a.yaml", "tam: [[1, 1], [0, 0], [0.3, -0.3]]", "is 3 rows of 2 numbers, expected six rows"),
         ("a.yaml", "body: {inertia: {matrix: [[1,0,0],[0,1,0],[0,0,1],[0,0,0],[0,0,0],[0,0,0]]}}", "no key that says so"),
