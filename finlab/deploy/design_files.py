@@ -32,11 +32,8 @@ A_DESIGN = "a layout, a robot description, parameters, a matrix"
 
 
 def stored_table(content: bytes, folder: Path) -> FinModelSpec:
-    """The model of a force table, which is kept in a folder under a name made from its content.
-
-    Raises:
-        FinlabError: it cannot be kept.
-    """
+    """The model of a force table, which is kept in a folder under a name made from its content. FinlabError:
+    it cannot be kept."""
     path = folder / f"{hashlib.sha256(content).hexdigest()}.csv"
     _keep(path, content)
     return FinModelSpec("table", (("path", str(path)),))
@@ -44,11 +41,7 @@ def stored_table(content: bytes, folder: Path) -> FinModelSpec:
 
 def with_hull_inside(layout: Layout) -> tuple[Layout, dict[str, bytes]]:
     """A layout whose hull's mesh has a name that can travel, and its content by that name; as it is where its
-    hull is drawn from a shape.
-
-    Raises:
-        DataError: the mesh cannot be read.
-    """
+    hull is drawn from a shape. DataError: the mesh cannot be read."""
     hull = None if layout.body is None else layout.body.hull
     if layout.body is None or hull is None or hull.mesh is None:
         return layout, {}
@@ -103,10 +96,7 @@ def read_archive(source: str, content: bytes, folder: Path) -> Opened:
 
 def read_design(source: str, content: bytes, folder: Path) -> Opened:
     """The layout in a file of any form that `finlab layout convert` reads, which opens no other file.
-
-    Raises:
-        LayoutError: it is none of these, or something in it is wrong.
-    """
+    LayoutError: it is none of these, or something in it is wrong."""
     exchange = Exchange()
     text = decoded(content, source, A_DESIGN, LayoutError)
     with under(source=source):
@@ -116,10 +106,7 @@ def read_design(source: str, content: bytes, folder: Path) -> Opened:
 
 def layout_of(source: str, content: bytes, folder: Path | None = None) -> Layout:
     """The layout in the content of a file; what it names is taken to be in `folder`, and not looked at.
-
-    Raises:
-        LayoutError: it is no text, or no layout.
-    """
+    LayoutError: it is no text, or no layout."""
     text = decoded(content, source, A_LAYOUT, LayoutError)
     return layout_in(text, Path(source).suffix, source, folder, may_open=False)
 
@@ -168,11 +155,8 @@ def adopted(layout: Layout, parts: Mapping[str, bytes], folder: Path, source: st
 def stored_mesh(name: str, content: bytes, scale: float, folder: Path) -> str:
     """Path of a hull's mesh, which is checked and kept inside a folder under a name made from its content.
 
-    One of too many triangles is kept with fewer.
-
-    Raises:
-        FinlabError: it is no closed mesh, too large, or cannot be kept.
-    """
+    One of too many triangles is kept with fewer. FinlabError: it is no closed mesh, too large, or cannot be
+    kept."""
     mesh, report = read_mesh(name, content, scale)
     if report.triangles > MAX_FACES:
         fewer = simplified(mesh, MAX_FACES)

@@ -36,4 +36,4 @@ FRAMES: dict[str, Array] = {
         "SIMPLEROV_5": (*_SIMPLE, *_TWO, (0, 0, 0, 0, 0, 1)),
     }.items()
 }
-"""Name of a frame -> factors (n, 6)."""
+"""Name of a frame -> factors (n, 6), in the order of FRAME_CONFIG."""

@@ -1,12 +1,16 @@
-"""Rows of motor factors: calls in C++ and Lua, and tables."""
+"""Rows of motor factors: calls in C++ and Lua, with simple arithmetic, and tables."""
 
+import ast
+import math
 import re
-from typing import NamedTuple
+from collections.abc import Mapping
+from itertools import islice
+from typing import Any
 
 from finlab.errors import LayoutError
-from finlab.exchange.arithmetic import constants_in, value_of
-from finlab.exchange.csv_table import FACTORS, is_number, table_of
-from finlab.exchange.labels import plain
+from finlab.exchange import labels
+from finlab.exchange.csv_table import FACTORS, Table, records_of
+from finlab.exchange.labels import lookup, plain
 from finlab.layout import MAX_ACTUATORS
 
 LONGEST = 500
@@ -14,26 +18,39 @@ LONGEST = 500
 _CALL = re.compile(r"\badd_motor\w*[ \t]*\(")
 _WHOLE = re.compile(r"(?<![\w.])\d+[ \t]*/[ \t]*\d+(?![\w.])")
 _DECLARED = re.compile(r"^\s*(?:const\s+)?(?:float|double|int|u?int8_t|auto)\b")
+MOST, MOST_CONSTANTS = 200, 2000
+"""Most characters of an expression, and most constants of a program."""
+_NAMES: dict[str, Any] = {
+    name: getattr(math, name) for name in ("sin", "cos", "tan", "sqrt", "radians", "pi")
+}
+_NAMES |= {f"{name}f": value for name, value in _NAMES.items()}
+_NAMES |= {
+    "rad": math.radians,
+    "abs": abs,
+    "fabsf": abs,
+    "M_PI": math.pi,
+    "PI": math.pi,
+    "M_PI_2": math.pi / 2,
+}
+_NAMES |= {"M_PI_4": math.pi / 4, "M_SQRT2": math.sqrt(2), "M_SQRT1_2": math.sqrt(0.5)}
+_ALLOWED = (
+    *(ast.Expression, ast.BinOp, ast.UnaryOp, ast.Add, ast.Sub, ast.Mult, ast.Div, ast.USub, ast.UAdd),
+    *(ast.Constant, ast.Name, ast.Load, ast.Call),
+)
+"""What an expression may be made of."""
+_WRITTEN = re.compile(r"(?<![\w.])(\d+\.?\d*(?:[eE][-+]?\d+)?|\.\d+(?:[eE][-+]?\d+)?)[fFlL]\b|std::|math\.")
+_DEFINED = re.compile(
+    r"^[ \t]*(?:#[ \t]*define[ \t]+(\w+)[ \t]+(?!\()"
+    r"|(?:(?:static|const|constexpr|local|float|double)[ \t]+)+(\w+)[ \t]*=[ \t]*)([^;\n]{1,200})",
+    re.MULTILINE,
+)
+MotorRow = tuple[str, list[float]]
+"""A motor and its six factors."""
 
 
-class MotorRow(NamedTuple):
-    """A motor and its six factors."""
-
-    name: str
-    factors: list[float]
-
-
-def rows_in(text: str) -> list[MotorRow]:
-    """Returns the motors of a program's calls, or of a table whose header names `FACTORS` in any order.
-
-    Raises:
-        LayoutError: a call or row does not parse; it is named by its number.
-    """
-    return _called(text) if "add_motor" in text else _tabled(text)
-
-
-def _called(text: str) -> list[MotorRow]:
-    """Motors of calls of `add_motor_raw_6dof`, which may go over several lines."""
+def called(text: str) -> list[MotorRow]:
+    """Returns the motors of calls of `add_motor_raw_6dof` in C++ or Lua, which may go over several lines.
+    Raises LayoutError: a call does not parse; its line is named."""
     lua = "motors:" in text or re.search(r"^\s{0,20}local ", text, re.MULTILINE) is not None
     code, rows = _without_comments(text, lua), list[MotorRow]()
     constants, line, seen = constants_in(code), 1, 0
@@ -41,67 +58,91 @@ def _called(text: str) -> list[MotorRow]:
         line, seen = line + code.count("\n", seen, found.start()), found.start()
         cells = _arguments(code[found.end() : found.end() + LONGEST])
         before = code[max(0, found.start() - 40) : found.start()].rpartition("\n")[2]
-        if re.search(r"\b(?:void|function)\b", before) or (cells and any(map(_DECLARED.match, cells))):
+        if re.search(r"\b(?:void|function)\b", before) or any(map(_DECLARED.match, cells)):
             continue
-        if cells is None or len(cells) not in (7, 8):
+        if len(cells) not in (7, 8):
             raise LayoutError(f"line {line}: expected a motor and its six factors in brackets")
         if len(rows) == MAX_ACTUATORS:
             raise LayoutError(f"line {line}: adds more than {MAX_ACTUATORS} motors")
-        whole = next((cell for cell in cells[1:7] if _WHOLE.search(cell)), None) if not lua else None
-        if whole is not None:
-            raise LayoutError(f"line {line}: {whole.strip()!r:.60} divides whole numbers, which C++ rounds")
+        if not lua and (cell := next(filter(_WHOLE.search, cells[1:7]), None)):
+            raise LayoutError(f"line {line}: {cell.strip()!r:.60} divides whole numbers, which C++ rounds")
         try:
             factors = [value_of(cell, constants) for cell in cells[1:7]]
         except ValueError as error:
             raise LayoutError(f"line {line}: {error}; write its number") from None
         name = cells[0].strip().removeprefix("AP_MOTORS_MOT_")
         number = int(name) + (name == cells[0].strip()) if name.isdecimal() and len(name) < 4 else 0
-        rows.append(MotorRow(f"motor{number}" if number else name[:60], factors))
+        rows.append((f"motor{number}" if number else name[:60], factors))
     return rows
 
 
 def _without_comments(code: str, lua: bool) -> str:
     """A program without its comments, and with all ends of lines."""
     start, stop, mark = ("--[[", "]]", "--") if lua else ("/*", "*/", "//")
-    parts = code.split(start)
-    kept = [parts[0]]
-    for part in parts[1:]:
+    kept, *parts = code.split(start)
+    for part in parts:
         inside, _, after = part.partition(stop)
-        kept += ["\n" * inside.count("\n"), after]
-    return "\n".join(line.partition(mark)[0] for line in "".join(kept).split("\n"))
+        kept += "\n" * inside.count("\n") + after
+    return "\n".join(line.partition(mark)[0] for line in kept.split("\n"))
 
 
-def _arguments(text: str) -> list[str] | None:
-    """What stands between a bracket and the one that closes it, parted by commas; None where none does."""
+def _arguments(text: str) -> list[str]:
+    """What stands between a bracket and the one that closes it, parted by commas; none where none does."""
     depth, cells = 0, [""]
     for letter in text:
         depth += (letter in "([{") - (letter in ")]}")
         if depth < 0:
             return cells
-        if letter == "," and depth == 0:
-            cells.append("")
-        else:
-            cells[-1] += letter
-    return None
+        cells += [""] if letter == "," and depth == 0 else []
+        cells[-1] += letter if letter != "," or depth else ""
+    return []
 
 
-def _tabled(text: str) -> list[MotorRow]:
-    table = table_of(text)
-    places = {plain(name): i for i, name in enumerate(table.header)}
-    lacking = [name for name in FACTORS if name not in places]
-    if lacking:
-        raise LayoutError(f"has no column {', '.join(lacking)} in a table of factors")
-    named = next((i for i, name in enumerate(table.header) if plain(name) not in FACTORS), None)
+def tabled(table: Table) -> list[MotorRow]:
+    """Returns the motors in a table whose header names `FACTORS` in any order. Raises LayoutError: a row does
+    not parse; it is named."""
     rows = []
-    for i, (line, cells) in enumerate(table.rows, 1):
-        if len(cells) < max(places[name] for name in FACTORS) + 1:
-            raise LayoutError(f"row {line} has {len(cells)} cells, expected {len(table.header)}")
-        factors = [cells[places[name]] for name in FACTORS]
-        wrong = next((cell for cell in factors if not is_number(cell)), None)
-        if wrong is not None:
-            raise LayoutError(f"row {line}: {wrong!r:.40} is no number")
-        name = str(i) if named is None else cells[named]
-        if max(abs(float(cell)) for cell in factors) > 1e9:
-            raise LayoutError(f"row {line} holds a factor of no ordinary size")
-        rows.append(MotorRow(f"motor{name}" if name.isdecimal() else name, [float(cell) for cell in factors]))
+    for i, record in enumerate(records_of(table), 1):
+        name = str(lookup(record, labels.NAME)[1] or i)
+        by_word = {plain(key): value for key, value in record.items()}
+        factors = [by_word[word] for word in FACTORS]
+        if not all(isinstance(factor, float) and abs(factor) < 1e9 for factor in factors):
+            raise LayoutError(f"{name!r:.60} lacks a factor, or has one of no ordinary size")
+        rows.append((f"motor{name}" if name.isdecimal() else name, factors))
     return rows
+
+
+def value_of(text: str, constants: Mapping[str, float]) -> float:
+    """Returns the value of numbers, constants, + - * /, brackets and functions such as `cosf(radians(45))`.
+    ValueError: it is something else, or not finite; the message names what is not known."""
+    what, names = f"{text.strip()!r:.60}", {**_NAMES, **constants}
+    try:
+        if len(text) > MOST:
+            raise SyntaxError
+        tree = ast.parse(_WRITTEN.sub(r"\1", text.strip()), mode="eval")
+        for node in ast.walk(tree):
+            number = not isinstance(node, ast.Constant) or type(node.value) in (int, float)
+            if not isinstance(node, _ALLOWED) or not number:
+                raise SyntaxError
+            if isinstance(node, ast.Name) and node.id not in names:
+                raise ValueError(f"{node.id!r:.60} is not defined in the file")
+        value = float(eval(compile(tree, "", "eval"), {"__builtins__": {}}, names))
+    except (SyntaxError, TypeError, ArithmeticError, RecursionError, MemoryError):
+        raise ValueError(f"{what} is no number") from None
+    if not abs(value) < 1e9:
+        raise ValueError(f"{what} is no number of ordinary size")
+    return value
+
+
+def constants_in(text: str) -> dict[str, float]:
+    """Returns the constants that a program of C++ or Lua defines once, by name; others are left out."""
+    values: dict[str, float] = {}
+    twice: set[str] = set()
+    for found in islice(_DEFINED.finditer(text), MOST_CONSTANTS):
+        name = found[1] or found[2]
+        twice |= {name} & values.keys()
+        try:
+            values[name] = value_of(found[3], values)
+        except ValueError:
+            continue
+    return {name: value for name, value in values.items() if name not in twice}

@@ -6,15 +6,14 @@ from pathlib import Path
 
 from finlab.assets import shipped_layouts
 from finlab.errors import CommandError, LayoutError
-from finlab.exchange.ardusub import read_ardusub, write_ardusub
-from finlab.exchange.ardusub_parameters import OF_ARDUPILOT, read_ardusub_parameters
-from finlab.exchange.csv_table import is_factor_table, plain_of, table_of
+from finlab.exchange.ardusub import OF_ARDUPILOT, of_motors, read_parameters_of_ardusub, write_ardusub
+from finlab.exchange.ardusub_rows import called, tabled
+from finlab.exchange.csv_table import plain_of, table_of
 from finlab.exchange.description_text import SDF, URDF, description_text
 from finlab.exchange.exchange import Exchange
 from finlab.exchange.gazebo import read_description
-from finlab.exchange.matrix import write_matrix
 from finlab.exchange.parameters import read_parameters
-from finlab.exchange.plain_robot import read_plain
+from finlab.exchange.plain_robot import read_plain, write_matrix
 from finlab.exchange.px4 import read_px4, write_px4
 from finlab.files.guarded import is_regular, read_text
 from finlab.files.plain_values import parse_json, parse_yaml
@@ -41,7 +40,7 @@ PARAMETERS = (".params", ".parm", ".param")
 FOREIGN = (".urdf", ".sdf", ".world", ".xacro", ".scn", *PARAMETERS, *PROGRAMS)
 """Suffixes of robot descriptions, and of what autopilots read; their content says what they hold."""
 UNKNOWN = (
-    "holds none of the forms that are read: a layout, a robot description (URDF, SDF, Stonefish), parameters "
+    "holds none of the forms that are read: a layout, a robot description (URDF, SDF), parameters "
     "of PX4 or ArduSub, motors of ArduSub, thrusters or a matrix in YAML, JSON or CSV"
 )
 
@@ -50,11 +49,8 @@ def convert(file: str, output: str | os.PathLike[str], to: str | None, exchange:
     """Makes one file into another, and returns the layout that went through.
 
     `file` is of any form, a bundle, or the name of a shipped layout; `to` is `layout` or one of `WRITERS`, by
-    the suffix of the output when None.
-
-    Raises:
-        FinlabError: a file cannot be read or written, or the output's suffix says no form.
-    """
+    the suffix of the output when None. Raises FinlabError: a file cannot be read or written, or the end
+    of the output says no form."""
     suffix = Path(output).suffix.lower()
     form = to or FORM_OF.get(suffix)
     if form is None:
@@ -68,11 +64,8 @@ def convert(file: str, output: str | os.PathLike[str], to: str | None, exchange:
 
 
 def read_any(file: str, exchange: Exchange) -> Layout:
-    """Returns the layout in a file of any form; `exchange` says what to take where it is silent.
-
-    Raises:
-        FinlabError: it cannot be read, or holds no form that is known.
-    """
+    """Returns the layout in a file of any form; `exchange` says what to take where it is silent. Raises
+    FinlabError: it cannot be read, or holds no form that is known."""
     path = Path(file)
     if file in shipped_layouts() or not is_regular(path) or path.suffix.lower() == ".zip":
         return load_layout(file)
@@ -83,11 +76,8 @@ def read_any(file: str, exchange: Exchange) -> Layout:
 
 
 def read_robot(text: str, file: str, exchange: Exchange) -> Layout:
-    """Returns the layout in the text of a file of this name, of any form.
-
-    Raises:
-        LayoutError: something in it is wrong or missing, or it holds no form that is known.
-    """
+    """Returns the layout in the text of a file of this name, of any form. Raises LayoutError: something in it
+    is wrong or missing, or it holds no form that is known."""
     path = Path(file)
     name, suffix = path.stem.strip()[:64].strip() or "robot", path.suffix.lower()
     if text.lstrip().startswith("<"):
@@ -112,12 +102,14 @@ def _read_lines(text: str, name: str, suffix: str, exchange: Exchange) -> Layout
     """The layout in lines of parameters, motors or cells; None where the text is none of these."""
     if "CA_ROTOR" in text:
         return read_px4(text, name, exchange)
-    if "add_motor" in text or is_factor_table(text):
-        return read_ardusub(text, name, exchange)
+    if "add_motor" in text:
+        return of_motors(name, called(text), exchange)
     if OF_ARDUPILOT.search(text):
-        return read_ardusub_parameters(text, name, exchange)
+        return read_parameters_of_ardusub(text, name, exchange)
     if suffix in TABLES:
         table = table_of(text)
+        if table.of_factors:
+            return of_motors(name, tabled(table), exchange)
         return read_plain(plain_of(table), name, exchange, table.comments, table=True)
     if suffix in PARAMETERS and (values := read_parameters(text, "")):
         raise LayoutError(

@@ -2,7 +2,6 @@
 
 import csv
 import math
-import re
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -16,9 +15,11 @@ Row = tuple[int, list[str]]
 """The number of a line, and its cells."""
 MEASURED = {"phi", "pwm", "escsignal", "rpm", "current", "power", "voltage", "t", "time"}
 """Columns of measurements."""
+PLACES = {"px", "posx", "dx", "ax", "nx", "ux", *labels.POSITION.split()}
+"""Columns by which a table of places is known."""
 MAX_ROWS = 1000
 """Most rows that are read; a robot has up to 64 actuators."""
-LEAST, MOST = labels.LEAST.split(), labels.MOST.split()
+ENDS = {word: "least" for word in labels.LEAST.split()} | {word: "most" for word in labels.MOST.split()}
 
 
 class Table(NamedTuple):
@@ -29,17 +30,18 @@ class Table(NamedTuple):
     rows: list[Row]
     comments: list[str]
 
+    @property
+    def of_factors(self) -> bool:
+        """Whether it holds motor factors."""
+        return {*FACTORS} <= {plain(cell) for cell in self.header}
+
 
 def table_of(text: str) -> Table:
-    """Returns the cells of a text whose cells commas, semicolons, tabs or blanks part; lines that begin
-    with # or // are comments.
-
-    Raises:
-        LayoutError: it is no table.
-    """
+    """Returns the cells of a text whose cells commas, semicolons, tabs or blanks part; lines that begin with
+    # or // are comments. Raises LayoutError: it is no table."""
     if text.count("\n") > 20 * MAX_ROWS:
         raise LayoutError(f"holds {text.count(chr(10)):,} lines, expected a table of up to {MAX_ROWS} rows")
-    lines = [(i, line.strip()) for i, line in enumerate(text.splitlines(), 1) if line.strip()]
+    lines = [(i, line.strip()) for i, line in enumerate(text.splitlines(), 1) if line.strip(" \t,;")]
     comments = [line for _, line in lines if line.startswith(("#", "//"))]
     lines = [(i, line) for i, line in lines if not line.startswith(("#", "//"))]
     if not 0 < len(lines) <= MAX_ROWS:
@@ -51,86 +53,70 @@ def table_of(text: str) -> Table:
         raise LayoutError(f"is no table: {error}") from None
     if len(cells) != len(lines):
         raise LayoutError("has a cell with line ends inside, expected a row per line")
-    rows = [(i, _stripped(row)) for (i, _), row in zip(lines, cells, strict=True)]
-    rows = [row for row in rows if row[1]]
-    head = rows[0][1] if rows else []
-    named = bool(head) and not any(map(is_number, head))
-    named |= bool(head) and plain(head[0]) in ("", "axis", "axes", "dof", "row") and not is_number(head[0])
+    rows = [(i, [cell.strip() for cell in row]) for (i, _), row in zip(lines, cells, strict=True)]
+    for _, row in rows:
+        while len(row) > 1 and not row[-1]:
+            row.pop()
+    head = rows[0][1]
+    named = not any(map(is_number, head)) or plain(head[0]) in ("axis", "axes", "dof", "row") or not head[0]
     return Table(head, rows[1:], comments) if named else Table([], rows, comments)
 
 
 def plain_of(table: Table) -> dict[str, Any]:
-    """Returns a table as plain values: a matrix, or a mapping for each thruster.
-
-    Raises:
-        LayoutError: a row has another length, or a cell that is no number; the row is named.
-    """
+    """Returns a table as plain values: a matrix, or a mapping for each thruster. Raises LayoutError: a row
+    has another length, or a cell that is no number; the row is named."""
     header, rows = table.header, table.rows
-    measured = MEASURED & {plain(cell).removesuffix("us") for cell in header}
-    if measured:
+    columns = {plain(cell) for cell in header}
+    if measured := MEASURED & {cell.removesuffix("us") for cell in columns}:
         raise LayoutError(f"holds measurements ({', '.join(sorted(measured))}); `finlab fit` reads them")
-    labelled = [row for row in rows if axis_of(row[1][0])]
-    if len(labelled) > 1 and not is_number(rows[0][1][0]):
-        return _by_axis(header, rows)
-    axes = [axis for cell in header if (axis := axis_of(cell))]
-    if len(axes) > 1 or {plain(cell) for cell in header} & {
-        "px",
-        "posx",
-        "dx",
-        "ax",
-        "nx",
-        "ux",
-        *labels.POSITION.split(),
-    }:
-        return {"thrusters": [_record(header, row) for row in rows]}
-    width = len(header or rows[0][1]) if rows else 0
-    named = {"names": header} if header else {}
+    width, named = len(header or rows[0][1]) if rows else 0, {"names": header} if header else {}
+    if sum(axis_of(row[1][0]) is not None for row in rows) > 1:
+        return _by_axis(header, rows, width)
+    if sum(axis_of(cell) is not None for cell in header) > 1 or columns & PLACES:
+        return {"thrusters": records_of(table)}
     return {**named, "matrix": [_numbers(row, row[1], width) for row in rows]}
+
+
+def records_of(table: Table) -> list[dict[str, Any]]:
+    """Returns each row by the names of its columns; the first that has none is the thruster's name. Raises
+    LayoutError: a row has another length, or no number where one is needed."""
+    records = []
+    for line, row in table.rows:
+        if len(row) != len(table.header):
+            raise LayoutError(f"row {line} has {len(row)} cells, expected {len(table.header)}")
+        cells: dict[str, Any] = {}
+        for key, cell in zip(table.header, row, strict=True):
+            is_name = plain(key) in labels.NAME.split() or not key
+            needed = axis_of(key) or plain(key) in (*ENDS, *FACTORS)
+            if needed and cell and not is_name and not is_number(cell):
+                raise LayoutError(f"row {line}: {key} is {cell!r:.40}, expected a number")
+            cells[key or "name"] = float(cell) if is_number(cell) and not is_name else cell
+        records.append(cells)
+    return records
 
 
 def is_robot_table(content: bytes) -> bool:
     """Whether a CSV file holds a robot, and no measurements."""
     try:
-        text = content.decode("utf-8-sig")
-        return is_factor_table(text) or bool(plain_of(table_of(text)))
+        table = table_of(content.decode("utf-8-sig"))
+        return table.of_factors or bool(plain_of(table))
     except (LayoutError, UnicodeDecodeError):
         return False
 
 
-def is_factor_table(text: str) -> bool:
-    """Whether a text begins with the header of a table of motor factors."""
-    stripped = (line.strip() for line in text[:10_000].splitlines())
-    lines = (line for line in stripped if line and not line.startswith(("#", "//")))
-    return {*FACTORS} <= {plain(cell) for cell in re.split(r"[,;\t ]+", next(lines, ""))}
-
-
-def _by_axis(header: list[str], rows: Sequence[Row]) -> dict[str, Any]:
+def _by_axis(header: list[str], rows: Sequence[Row], width: int) -> dict[str, Any]:
     """A row for each axis, and perhaps the least and most commands."""
-    width = len(header or rows[0][1]) - 1
-    matrix: dict[str, list[float]] = {}
-    ends: dict[str, list[float]] = {}
+    held: dict[str, list[float]] = {}
     for row in rows:
-        label, cells = row[1][0], _numbers(row, row[1][1:], width)
-        key = axis_of(label) or ("least" if plain(label) in LEAST else "most" if plain(label) in MOST else "")
-        if not key or key in (matrix | ends):
+        label = row[1][0]
+        key = axis_of(label) or ENDS.get(plain(label), "")
+        if not key or key in held:
             raise LayoutError(
                 f"row {row[0]} begins with {label!r:.40}, expected Fx to Tz, least, most once each"
             )
-        (ends if key in ("least", "most") else matrix)[key] = cells
-    return {**ends, **({"names": header[1:]} if header else {}), "matrix": matrix}
-
-
-def _record(header: list[str], row: Row) -> dict[str, Any]:
-    """A thruster's row by the names of its columns; a column without numbers has its name."""
-    if len(row[1]) != len(header):
-        raise LayoutError(f"row {row[0]} has {len(row[1])} cells, expected {len(header)}")
-    cells: dict[str, Any] = {}
-    for key, cell in zip(header, row[1], strict=True):
-        is_name = plain(key) in labels.NAME.split() or not key
-        if not is_name and cell and not is_number(cell) and (axis_of(key) or plain(key) in (*LEAST, *MOST)):
-            raise LayoutError(f"row {row[0]}: {key} is {cell!r:.40}, expected a number")
-        cells[key or "name"] = float(cell) if is_number(cell) and not is_name else cell
-    return cells
+        held[key] = _numbers(row, row[1][1:], width - 1)
+    ends: dict[str, Any] = {key: held.pop(key) for key in ("least", "most") if key in held}
+    return {**ends, **({"names": header[1:]} if header else {}), "matrix": held}
 
 
 def _numbers(row: Row, cells: Sequence[str], width: int) -> list[float]:
@@ -148,11 +134,3 @@ def is_number(cell: str) -> bool:
         return "_" not in cell and math.isfinite(float(cell))
     except ValueError:
         return False
-
-
-def _stripped(row: list[str]) -> list[str]:
-    """Cells without blanks around them, and without empty ones at the end."""
-    cells = [cell.strip() for cell in row]
-    while cells and not cells[-1]:
-        cells.pop()
-    return cells

@@ -16,12 +16,9 @@ from scipy.spatial.transform import Rotation
 from finlab.arrays import Array
 from finlab.errors import LayoutError
 from finlab.exchange.exchange import Exchange
-from finlab.exchange.expanded import expanded
-from finlab.exchange.models import Drives, chosen, name_of, parts_of
-from finlab.exchange.xml_text import is_xacro, root_of
+from finlab.exchange.models import Drives, Named, chosen, parts_of
+from finlab.exchange.xml_text import expanded, is_xacro, root_of
 
-Named = dict[str, tuple[str, Element]]
-"""Links, joints, frames and models inside by `link NAME` and so on, with the scope of their names."""
 ADDED = ("xx", "yy", "zz", "pp", "qq", "rr")
 """Diagonal of SDF's <fluid_added_mass>."""
 MOMENTS = ("xx", "xy", "xz", "yy", "yz", "zz")
@@ -64,7 +61,7 @@ class Description:
     """Added mass by the name of its entry (`xx`), all links together [kg, kg m^2]."""
     plugins: list[tuple[str, Element]]
     """With the scope of the names in them."""
-    included: tuple[str, ...]
+    included: list[str]
     """Names of what it includes, which is not read."""
 
 
@@ -72,36 +69,26 @@ def parse_description(root: Element, name: str, drives: Drives, exchange: Exchan
     """Returns what the outermost element of URDF or SDF says; `name` is the robot's where it has none.
 
     Of several models it is the one that `exchange` names, or the first with a plugin that `drives` one.
-
-    Raises:
-        LayoutError: it is neither, it uses what is not allowed, or something in it is missing or no number.
-    """
+    Raises LayoutError: it is neither, it uses what is not allowed, or something in it is missing or no
+    number."""
     if is_xacro(root):
         root = root_of(expanded(exchange.path))
         exchange.note("It was expanded by xacro.")
     top = chosen(root, drives, exchange)
     named, plugins, included = parts_of(top)
     movers = {said(part, "child@link"): key for key, (_, part) in named.items() if part.tag == "joint"}
-    hung = {key: _hung(scope, part, named, movers) for key, (scope, part) in named.items()}
-    poses = _placed(hung, included)
-    old = _version(root) < (1, 5)
+    poses = _placed({key: _hung(*each, named, movers) for key, each in named.items()}, included)
+    old = root.tag == "sdf" and root.get("version", "") in ("1.0", "1.1", "1.2", "1.3", "1.4")
     moving = [
-        _joint(scope, part, named, poses, old)
-        for key, (scope, part) in named.items()
-        if part.tag == "joint" and key in poses
+        _joint(*each, named, poses, old)
+        for key, each in named.items()
+        if each[1].tag == "joint" and key in poses
     ]
     joints = {joint.name: joint for joint in moving if f"link {joint.child}" in named}
-    movers_of = {joint.child: joint for joint in joints.values()}
     if included:
         exchange.note(f"What it includes is left out, with its mass: {', '.join(included)[:300]}.")
-    masses = _masses(named, poses)
-    return Description(top.get("name") or name, joints, movers_of, *masses, plugins, tuple(included))
-
-
-def _version(root: Element) -> tuple[int, ...]:
-    """The version of SDF; URDF has none, and counts as the newest."""
-    text = root.get("version", "") if root.tag == "sdf" else ""
-    return tuple(int(part) for part in text.split(".") if part.isdecimal() and len(part) < 6) or (9,)
+    by_link = {joint.child: joint for joint in joints.values()}
+    return Description(top.get("name") or name, joints, by_link, *_masses(named, poses), plugins, included)
 
 
 def said(element: Element, paths: str, usual: str = "") -> str:
@@ -136,12 +123,11 @@ def number(element: Element, paths: str, usual: float = 0.0) -> float:
 def _hung(scope: str, part: Element, named: Named, movers: dict[str, str]) -> tuple[str, Array]:
     """What a frame hangs on ("" for the description itself), and its pose there: in URDF a joint on its
     parent, and a link where its joint is; in SDF a link or model on the model, and a joint on its child."""
-    told = said(part, "pose@relative_to") or part.get("attached_to", "")
-    if not told and part.tag == "joint":
-        told = said(part, "parent@link child")
-    if told or part.tag != "link":
-        return _key(scope, told, named), _pose(part)
-    return movers.get(part.get("name", ""), "") or _key(scope, "", named), _pose(part)
+    base = said(part, "pose@relative_to") or part.get("attached_to", "")
+    if not base and part.tag == "joint":
+        base = said(part, "parent@link child")
+    mover = movers.get(part.get("name", "")) if part.tag == "link" and not base else None
+    return mover or _key(scope, base, named), _pose(part)
 
 
 def _key(scope: str, name: str, named: Named) -> str:
@@ -154,68 +140,60 @@ def _key(scope: str, name: str, named: Named) -> str:
 
 def _pose(part: Element) -> Array:
     """The pose (4, 4) that a part has as <origin> in URDF, or as <pose> in SDF."""
-    what, found = f"the pose of {part.tag} {part.get('name', '')!r:.60}", part.find("pose")
-    text = " ".join(said(part, f"origin@{key}", "0 0 0") for key in ("xyz", "rpy"))
-    quaternion = found is not None and found.get("rotation_format") == "quat_xyzw"
-    values = numbers(said(part, "pose", text), 7 if quaternion else 6, what)
-    if quaternion and not values[3:].any():
-        raise LayoutError(f"{what} has a quaternion without length")
-    degrees = found is not None and found.get("degrees") == "true"
-    pose = np.eye(4)
+    what = f"the pose of {part.tag} {part.get('name', '')!r:.60}"
+    origin = " ".join(said(part, f"origin@{key}", "0 0 0") for key in ("xyz", "rpy"))
+    quaternion = said(part, "pose@rotation_format") == "quat_xyzw"
+    values = numbers(said(part, "pose", origin), 7 if quaternion else 6, what)
+    pose, turn = np.eye(4), values[3:]
     pose[:3, 3] = values[:3]
-    if not values[3:].any():
-        return pose
-    turn = Rotation.from_quat(values[3:]) if quaternion else Rotation.from_euler("xyz", values[3:], degrees)
-    pose[:3, :3] = turn.as_matrix()
+    if quaternion and not turn.any():
+        raise LayoutError(f"{what} has a quaternion without length")
+    if turn.any():
+        angles = np.radians(turn) if said(part, "pose@degrees") == "true" else turn
+        rotation = Rotation.from_quat(turn) if quaternion else Rotation.from_euler("xyz", angles)
+        pose[:3, :3] = rotation.as_matrix()
     return pose
 
 
 def _placed(hung: dict[str, tuple[str, Array]], included: list[str]) -> dict[str, Array]:
     """Poses (4, 4) of frames in the description's own, from what each hangs on and its pose there; without
     those that hang on what is included."""
-    poses, lost = {"": np.eye(4)}, set()
+    poses, lost = {"": np.eye(4)}, {*included}
     outside = tuple(f"{name}::" for name in included)
     try:
         for key in TopologicalSorter({key: [base] for key, (base, _) in hung.items()}).static_order():
-            if key not in hung and (key in included or key.startswith(outside)):
+            base, pose = hung.get(key, ("", poses[""]))
+            if base in lost or (key not in hung and key.startswith(outside)):
                 lost.add(key)
-            elif key:
-                base, pose = hung[key]
-                if base in lost:
-                    lost.add(key)
-                else:
-                    poses[key] = poses[base] @ pose
+            elif key and key not in lost:
+                poses[key] = poses[base] @ hung[key][1]
     except (CycleError, KeyError) as error:
         where = f"{error.args[-1]!r:.80}"
-        raise LayoutError(
-            f"has no place for {where}: it is missing, or hangs on itself in a circle"
-        ) from None
+        raise LayoutError(f"has no place for {where}: missing, or hangs on itself in a circle") from None
     return poses
 
 
 def _joint(scope: str, part: Element, named: Named, poses: dict[str, Array], old: bool) -> Joint:
     """A joint; in `old` SDF an axis is seen from the model, as where use_parent_model_frame says so."""
-    name, what = f"{scope}{name_of(part)}", f"joint {name_of(part)!r:.60}"
-    xyz, kind = part.find("axis/xyz"), part.get("type", "")
-    seen_from = xyz.get("expressed_in") if xyz is not None else None
+    own, kind = part.get("name", ""), part.get("type", "")
+    name, what = f"{scope}{own}", f"joint {own!r:.60}"
+    seen_from = said(part, "axis/xyz@expressed_in")
     of_model = said(part, "axis/use_parent_model_frame", str(int(old))).lower() in ("1", "true")
     frame = _key(scope, seen_from or "__model__", named) if seen_from or of_model else f"joint {name}"
     if frame not in poses:
         raise LayoutError(f"has no frame {seen_from!r:.60}, in which the axis of {what} is expressed")
     usual = "1 0 0" if part.find("parent[@link]") is not None else "0 0 1"
     axis = poses[frame][:3, :3] @ numbers(said(part, "axis@xyz axis/xyz", usual), 3, f"the axis of {what}")
-    place = poses[f"joint {name}"][:3, 3]
     length = float(np.linalg.norm(axis))
     if length == 0.0 and kind in TURNING:
         raise LayoutError(f"the axis of {what} has no length")
-    texts = (said(part, f"limit@{end} axis/limit/{end}") for end in ("lower", "upper"))
     try:
-        low, high = (float(text or math.inf) if kind != "continuous" else math.inf for text in texts)
+        low, high = (float(said(part, f"limit@{end} axis/limit/{end}", "inf")) for end in ("lower", "upper"))
     except ValueError:
         raise LayoutError(f"a limit of {what} is no number") from None
-    ends = (low, high) if max(abs(low), abs(high)) < 1e9 else (-math.inf, math.inf)
+    ends = (low, high) if max(abs(low), abs(high)) < 1e9 and kind != "continuous" else (-math.inf, math.inf)
     parent, child = (_link(scope, said(part, f"{end}@link {end}"), named) for end in ("parent", "child"))
-    return Joint(name, kind, parent, child, place, axis / (length or 1.0), ends)
+    return Joint(name, kind, parent, child, poses[f"joint {name}"][:3, 3], axis / (length or 1.0), ends)
 
 
 def _link(scope: str, name: str, named: Named) -> str:
@@ -231,16 +209,14 @@ def _link(scope: str, name: str, named: Named) -> str:
 
 def _masses(named: Named, poses: dict[str, Array]) -> tuple[float, Array, Array | None, dict[str, float]]:
     """Mass, centre of gravity (3,), inertia (3, 3) about it and added mass of all links together."""
-    parts, added, whole = [], dict[str, float](), True
+    parts, added, known = [], dict[str, float](), True
     for key, (_, link) in named.items():
         inertial = link.find("inertial") if key in poses else None
         if inertial is not None:
-            told = [number(inertial, f"inertia@i{moment} inertia/i{moment}") for moment in MOMENTS]
-            inertia = np.array(told)[[[0, 1, 2], [1, 3, 4], [2, 4, 5]]]
             pose, mass = poses[key] @ _pose(inertial), number(inertial, "mass@value mass")
-            whole &= mass == 0.0 or all(
-                said(inertial, f"inertia@i{xx} inertia/i{xx}") for xx in ("xx", "yy", "zz")
-            )
+            paths = [f"inertia@i{moment} inertia/i{moment}" for moment in MOMENTS]
+            inertia = np.array([number(inertial, path) for path in paths])[[[0, 1, 2], [1, 3, 4], [2, 4, 5]]]
+            known &= mass == 0.0 or all(said(inertial, paths[k]) for k in (0, 3, 5))
             parts.append((mass, pose[:3, 3], pose[:3, :3] @ inertia @ pose[:3, :3].T))
             for axis in ADDED:
                 if said(inertial, f"fluid_added_mass/{axis}"):
@@ -251,4 +227,4 @@ def _masses(named: Named, poses: dict[str, Array]) -> tuple[float, Array, Array 
         for kg, at, own in parts:
             arm = at - center
             about += own + kg * (arm @ arm * np.eye(3) - np.outer(arm, arm))
-    return total, center, about if whole else None, added
+    return total, center, about if known else None, added

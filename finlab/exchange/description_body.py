@@ -21,35 +21,25 @@ DERIVATIVES = {
     "quadratic_damping": "xUabsU yVabsV zWabsW kPabsP mQabsQ nRabsR",
 }
 """Fields of a body, and their tags in the plugin Hydrodynamics."""
-OLD = "xUU yVV zWW kPP mQQ nRR".split()  # noqa: SIM905
+OLD = "xUU yVV zWW kPP mQQ nRR"
 """Tags of quadratic damping before gz-sim 7."""
 UUV = "uuv_underwater_object"
 Known = dict[str, tuple[float, ...]]
 
 
 def body_of(robot: Description, exchange: Exchange) -> Body:
-    """Returns what the description says of the body at its centre of gravity.
-
-    Raises:
-        LayoutError: a value is no number, or out of bounds.
-    """
+    """Returns what the description says of the body at its centre of gravity. Raises LayoutError: a value is
+    no number, or out of bounds."""
     known: Known = {}
-    _keep(known, "added_mass", {axis: str(value) for axis, value in robot.added.items()}, ADDED, exchange)
+    _keep(known, "added_mass", {axis: str(value) for axis, value in robot.added.items()}, exchange)
     water = [plugin for _, plugin in robot.plugins if is_plugin(plugin, "Hydrodynamics")]
     objects = [plugin for _, plugin in robot.plugins if UUV in plugin.get("filename", "")]
-    for plugin in water[:1]:
-        _of_gz(plugin, known, exchange)
-    models = [
-        link
-        for plugin in objects
-        for link in plugin.findall("link")
-        if link.find("hydrodynamic_model") is not None
-    ]
-    for link in models[:1]:
-        _of_uuv(link, known, exchange)
-    for more, what in ((water[1:], "Hydrodynamics"), (models[1:], "hydrodynamic_model")):
-        if more:
-            exchange.note(f"It has {len(more) + 1} plugins with {what}: the first was read.")
+    models = [model for plugin in objects for model in plugin.findall("link/hydrodynamic_model")]
+    for read, found, what in ((_of_gz, water, "Hydrodynamics"), (_of_uuv, models, "hydrodynamic_model")):
+        for plugin in found[:1]:
+            read(plugin, known, exchange)
+        if len(found) > 1:
+            exchange.note(f"It has {len(found)} plugins with {what}: the first was read.")
     if water or objects:
         exchange.note("Its buoyancy is not read: it is taken for the weight, at the centre of gravity.")
     moments: Vector | None = None
@@ -63,69 +53,51 @@ def body_of(robot: Description, exchange: Exchange) -> Body:
     return Body(mass_kg=robot.mass, inertia_kgm2=moments if moments and min(moments) > 0 else None, **values)
 
 
-def _keep(known: Known, field: str, told: dict[str, str], tags: Any, exchange: Exchange) -> None:
-    """Keeps six values where all are said."""
-    values = numbers_in([told[tag] for tag in tags if tag in told])
+def _keep(known: Known, field: str, told: dict[str, str], exchange: Exchange) -> None:
+    """Keeps the values of six tags where all are said."""
+    values = numbers_in([*told.values()])
     if len(told) == 6 and values is not None:
         known[field] = tuple(np.abs(values).tolist())
-        exchange.note(f"{field} was read from {', '.join(tags)}.")
-        wrong = [
-            tag
-            for tag, value in zip(tags, values, strict=True)
-            if value > 0 and tag[0] in "xyzkmn" and tag not in ADDED
-        ]
+        exchange.note(f"{field} was read from {', '.join(told)}.")
+        wrong = [tag for tag, value in zip(told, values, strict=True) if value > 0 and tag not in ADDED]
         if wrong:
             exchange.note(
                 f"{', '.join(wrong)} > 0, against the sign of a derivative: the magnitude is taken."
             )
     elif told:
-        words = ", ".join(f"{tag} {told[tag]:.20}" for tag in tags if tag in told)
+        words = ", ".join(f"{tag} {value:.20}" for tag, value in told.items())
         why = "is not six numbers" if len(told) == 6 else "says these alone of six"
         exchange.note(f"{field} is left out: the file {why}: {words}.")
 
 
 def _of_gz(plugin: Element, known: Known, exchange: Exchange) -> None:
     """Derivatives of the plugin of gz-sim."""
-    read = set()
-    for field, text in DERIVATIVES.items():
-        tags = text.split()
-        if field == "quadratic_damping" and not any(said(plugin, tag) for tag in tags):
-            tags = OLD
-        told = {tag: value for tag in tags if (value := said(plugin, tag))}
-        read |= set(told)
-        _keep(known, field, told, tags, exchange)
-    if not read:
+    read = {"link_name", "water_density"}
+    for field, tags in (*DERIVATIVES.items(), ("quadratic_damping", OLD)):
+        values = {tag: value for tag in tags.split() if (value := said(plugin, tag))}
+        if field not in known or tags != OLD:
+            _keep(known, field, values, exchange)
+            read |= set(values)
+    if len(read) == 2:
         exchange.note("Hydrodynamics holds no derivatives by known tags: added mass and damping are unknown.")
-    others = [
-        each.tag for each in plugin if each.tag not in read and each.tag not in ("link_name", "water_density")
-    ]
+    others = dict.fromkeys(each.tag for each in plugin if each.tag not in read)
     if others:
-        exchange.note(f"Not read of Hydrodynamics: {', '.join(dict.fromkeys(others))[:300]}.")
+        exchange.note(f"Not read of Hydrodynamics: {', '.join(others)[:300]}.")
 
 
-def _of_uuv(link: Element, known: Known, exchange: Exchange) -> None:
+def _of_uuv(model: Element, known: Known, exchange: Exchange) -> None:
     """A block of Fossen's model of uuv_simulator: six numbers, or the diagonal of 36."""
-    kind = said(link, "hydrodynamic_model/type")
-    if kind != "fossen":
-        exchange.note(
-            f"hydrodynamic_model of type {kind!r:.40} is not read: added mass and damping are unknown."
-        )
-        return
-    for field in DERIVATIVES:
-        words = said(link, f"hydrodynamic_model/{field}").split()
-        if not words:
-            continue
-        if len(words) == 36:
-            whole = numbers_in(words)
-            if whole is not None and np.abs(whole.reshape(6, 6) - np.diag(whole[::7])).max() > 0:
-                exchange.note(f"Of {field} the diagonal was read.")
+    kind = said(model, "type")
+    for field in DERIVATIVES if kind == "fossen" else ():
+        words = said(model, field).split()
+        table = numbers_in(words) if len(words) == 36 else None
+        if table is not None:
             words = words[::7]
-        _keep(
-            known,
-            field,
-            dict(zip(ADDED, words, strict=False)) if len(words) == 6 else {"all": " ".join(words)},
-            ADDED,
-            exchange,
-        )
-    if said(link, "hydrodynamic_model/linear_damping_forward_speed"):
+            if np.count_nonzero(table) > np.count_nonzero(table[::7]):
+                exchange.note(f"Of {field} the diagonal was read.")
+        whole = {"all": " ".join(words)} if words else {}
+        _keep(known, field, dict(zip(ADDED, words, strict=True)) if len(words) == 6 else whole, exchange)
+    if kind != "fossen":
+        exchange.note(f"hydrodynamic_model of type {kind!r:.40} is not read: the water's forces are unknown.")
+    if said(model, "linear_damping_forward_speed"):
         exchange.note("linear_damping_forward_speed is not read.")

@@ -51,11 +51,7 @@ class Exchange:
         self, name: str, place: Array, axis: Array, force: tuple[float, float] | None, reaction: float = 0.0
     ) -> Thruster:
         """Returns a thruster by its place (3,) [m], axis (3,), the file's force [N], None where it says none,
-        and its reaction torque per newton [m].
-
-        Raises:
-            LayoutError: a value is out of bounds.
-        """
+        and its reaction torque per newton [m]. Raises LayoutError: a value is out of bounds."""
         if self.force is None and force is None:
             self.note("It has no limits of force: those of a T200 at 16 V are taken; correct `force_n`.")
         self.note("It has no power: that of a T200 at 16 V is taken; write your own as `model`.")
@@ -64,11 +60,8 @@ class Exchange:
 
     def of_column(self, name: str, column: Array, force: tuple[float, float] | None) -> Thruster:
         """Returns the thruster whose wrench per unit of its command is `column` (6,) [N, N m]; `force` has
-        the limits of the command. It sits on the line of its force nearest to the origin.
-
-        Raises:
-            LayoutError: the column holds no force.
-        """
+        the limits of the command. It sits on the line of its force nearest to the origin. Raises LayoutError:
+        the column holds no force."""
         size = float(np.linalg.norm(column[:3]))
         if not 1e-9 < size < 1e9:
             raise LayoutError(f"{name!r:.60} has no force; no actuator of finlab gives torque alone")
@@ -81,10 +74,7 @@ class Exchange:
 
     def thrusters_of(self, layout: Layout, form: str, *lost: str) -> Layout:
         """Returns a layout's thrusters alone, for a form with no place for others, nor for what is `lost`.
-
-        Raises:
-            LayoutError: there is none.
-        """
+        Raises LayoutError: there is none."""
         others = {part.name: part.type for part in layout.actuators if not isinstance(part, Thruster)}
         if len(others) == layout.n:
             raise LayoutError(f"layout {layout.name} has no thruster, and {form} has a place for these alone")

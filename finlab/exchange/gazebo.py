@@ -5,7 +5,6 @@ joint sits where its force acts, and its axis is the shaft.
 """
 
 import math
-from collections.abc import Iterable
 from dataclasses import replace
 from xml.etree.ElementTree import Element
 
@@ -16,8 +15,8 @@ from finlab.errors import LayoutError
 from finlab.exchange.description import TURNING, Description, Joint, number, parse_description
 from finlab.exchange.description_body import UUV, body_of
 from finlab.exchange.exchange import T200_POWER, Exchange, vector
+from finlab.exchange.models import listed
 from finlab.exchange.propellers import driven, drives, force_of, is_plugin
-from finlab.exchange.stonefish import read_stonefish
 from finlab.exchange.xml_text import root_of
 from finlab.layout import MAX_ACTUATORS, Actuator, Azimuth, Fin, Layout
 from finlab.layout.angles import TURN
@@ -31,22 +30,21 @@ BESIDE = 0.01
 
 
 def read_description(text: str, name: str, exchange: Exchange) -> Layout:
-    """Returns the layout in a URDF, SDF or Stonefish text; `name` is its name where the text has none.
-
-    Raises:
-        LayoutError: it cannot be read, lacks a link or joint, or nothing in it is an actuator.
-    """
+    """Returns the layout in a URDF or SDF text; `name` is its name where the text has none. Raises
+    LayoutError: it cannot be read, lacks a link or joint, or nothing in it is an actuator."""
     root = root_of(text)
-    if root.tag == "scenario":
-        return read_stonefish(root, name, exchange)
-    robot = parse_description(root, name, drives, exchange)
     at_gravity = exchange.origin == "gravity"
-    if at_gravity and robot.mass <= 0 and robot.included:
-        inside = ", ".join(robot.included)[:300]
-        raise LayoutError(f"has no masses but in <include> {inside}, which is not opened: give its model.sdf")
-    if at_gravity and robot.mass <= 0:
+    if root.tag == "scenario":
         raise LayoutError(
-            "has no masses, so its centre of gravity is unknown; use --origin base if that is at it"
+            "is a scenario of Stonefish, which is not read; give thrusters by place and direction, in YAML"
+        )
+    robot = parse_description(root, name, drives, exchange)
+    if at_gravity and robot.mass <= 0:
+        inside = ", ".join(robot.included)[:300]
+        raise LayoutError(
+            f"has no masses but in <include> {inside}, which is not opened: give its model.sdf"
+            if inside
+            else "has no masses, so its centre of gravity is unknown; use --origin base if that is at it"
         )
     start = robot.center if at_gravity else np.zeros(3)
     plugins = [each for each in robot.plugins if drives(each[1])][: MAX_ACTUATORS + 1]
@@ -54,24 +52,21 @@ def read_description(text: str, name: str, exchange: Exchange) -> Layout:
     pushing += [(_joint_of(robot, link), Element("plugin")) for link in exchange.thrusters]
     parts: list[Actuator] = [_propeller(robot, joint, plugin, start, exchange) for joint, plugin in pushing]
     parts += [_fin(_joint_of(robot, link), start, exchange) for link in exchange.fins]
-    others = [plugin for _, plugin in robot.plugins if not _known(plugin)]
-    left = dict.fromkeys(plugin.get("filename", "") or plugin.get("name", "") for plugin in others)
+    left = dict.fromkeys(
+        plugin.get("filename", "") or plugin.get("name", "")
+        for _, plugin in robot.plugins
+        if not (drives(plugin) or is_plugin(plugin, "Hydrodynamics") or UUV in plugin.get("filename", ""))
+    )
     if not parts:
         raise LayoutError(
             "has no thruster's plugin of gz-sim or uuv; name the links that are fins (--fins LINK...) or "
-            f"thrusters (--thrusters LINK...); a joint moves {_moved(robot)}; its plugins: {_listed(left)}"
+            f"thrusters (--thrusters LINK...); a joint moves {_moved(robot)}; its plugins: {listed(left)}"
         )
     if left:
-        exchange.note(f"Plugins that are not read: {_listed(left)}.")
+        exchange.note(f"Plugins that are not read: {listed(left)}.")
     exchange.note(f"Model {robot.name} was read, x forward, y left, z up, in m, kg and N.")
-    place = "centre of gravity" if at_gravity else "base frame"
-    return Layout(
-        robot.name, tuple(parts), f"Origin at the {place}.", body_of(robot, exchange) if at_gravity else None
-    )
-
-
-def _known(plugin: Element) -> bool:
-    return drives(plugin) or is_plugin(plugin, "Hydrodynamics") or UUV in plugin.get("filename", "")
+    place, body = ("centre of gravity", body_of(robot, exchange)) if at_gravity else ("base frame", None)
+    return Layout(robot.name, tuple(parts), f"Origin at the {place}.", body)
 
 
 def _joint_of(robot: Description, link: str) -> Joint:
@@ -82,11 +77,7 @@ def _joint_of(robot: Description, link: str) -> Joint:
 
 def _moved(robot: Description) -> str:
     turning = [link for link, joint in robot.movers.items() if joint.kind in TURNING]
-    return _listed(sorted(robot.movers, key=lambda link: (link not in turning, link)))
-
-
-def _listed(names: Iterable[str]) -> str:
-    return f"{', '.join(names) or 'none'}"[:300]
+    return listed(sorted(robot.movers, key=lambda link: (link not in turning, link)))
 
 
 def _propeller(

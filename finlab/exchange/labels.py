@@ -14,8 +14,9 @@ _FRAME_WORDS: dict[Frame, set[str]] = {
     "FRD": {"frd", "ned", "sname", "fsd"},
 }
 _SIDES: dict[Frame, set[str]] = {"FLU": {"left", "port", "up"}, "FRD": {"right", "starboard", "down"}}
-FRAME_KEYS = "frameid frame bodyframe convention coordinateframe "
-FRAME_KEYS += "coordinatesystem referenceframe axesconvention"
+FRAME_KEYS = (
+    "frame bodyframe convention coordinateframe coordinatesystem referenceframe axesconvention frameid"
+)
 _AXIS_WORDS = {
     "Fx": "fx x surge forcex xforce",
     "Fy": "fy y sway forcey yforce",
@@ -41,8 +42,6 @@ LIMIT_KEYS = f"{PAIR} {LEAST} {MOST} {COUNT} {ROWS_OF}"
 LENGTHS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 FORCES = {"n": 1.0, "kn": 1000.0, "kgf": 9.80665, "lbf": 4.4482216}
 DEGREES = {"rad": 1.0, "deg": 57.29577951308232}
-
-
 ROW = f"{NAME} {POSITION} {DIRECTION} {ANGLES} {LIMIT_KEYS} x y z "
 ROW += "px py pz posx posy posz dx dy dz ax ay az nx ny nz ux uy uz dirx diry dirz"
 """Keys of a thruster that are read."""
@@ -95,25 +94,15 @@ def frame_in(text: str) -> Frame | None:
 
 def frame_said(scopes: Iterable[Mapping[str, Any]], comments: Iterable[str]) -> tuple[Frame | None, str]:
     """Returns the frame that mappings, the innermost first, or else comments name, and where it says so.
-
-    Raises:
-        LayoutError: a frame is named by a word that is not known.
-    """
-    for scope in scopes:
-        key, value, _ = lookup(scope, FRAME_KEYS.removeprefix("frameid "))
+    Raises LayoutError: a frame is named by a word that is not known."""
+    for key, value, _ in (lookup(scope, FRAME_KEYS) for scope in scopes):
         text = " ".join(map(str, value.values())) if isinstance(value, Mapping) else str(value)
-        if key and frame_in(text) is None:
-            raise LayoutError(f"is {text!r:.60}, expected {_words()}; or leave it out, and say --frame", key)
-        if key:
-            return frame_in(text), f"{key} {text}"
-        frame = frame_in(str(lookup(scope, "frameid")[1]))
-        if frame:
-            return frame, "frame_id"
+        if frame := frame_in(text):
+            return frame, f"{key} {text}"
+        if key and plain(key) != "frameid":
+            words = "FLU, ENU or REP-103 (y left, z up), or FRD, NED or SNAME (y right, z down)"
+            raise LayoutError(f"is {text!r:.60}, expected {words}; or leave it out, and say --frame", key)
     for comment in comments:
         if re.search(r"\b(?:FLU|FRD|NED|ENU|SNAME|frame)\b", comment) and (frame := frame_in(comment)):
             return frame, "its comment"
     return None, ""
-
-
-def _words() -> str:
-    return "FLU, ENU or REP-103 (x forward, y left, z up), or FRD, NED or SNAME (x forward, y right, z down)"

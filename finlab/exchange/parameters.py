@@ -13,12 +13,9 @@ _ASKING = {"compare", "greater", "show", "echo", "if", "reset", "touch"}
 
 
 def read_parameters(text: str, wanted: str) -> dict[str, float]:
-    """Returns parameters by name, of lines `param set-default NAME VALUE`, `NAME VALUE`, `NAME,VALUE` and
-    `1 1 NAME VALUE TYPE`. What follows # is a comment; the last value counts.
-
-    Raises:
-        LayoutError: a name that begins with one of the words in `wanted` has no number behind it.
-    """
+    """Returns parameters by name, of lines `param set-default NAME VALUE`, `NAME VALUE`, `NAME,VALUE` and `1
+    1 NAME VALUE TYPE`. What follows # is a comment; the last value counts. Raises LayoutError: a name that
+    begins with one of the words in `wanted` has no number behind it."""
     values: dict[str, float] = {}
     begins = tuple(wanted.split())
     for number, line in enumerate(text.splitlines(), 1):

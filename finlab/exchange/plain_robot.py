@@ -1,70 +1,53 @@
-"""Robots of thrusters in plain values, of YAML, JSON or a table: by places and directions, or by a matrix."""
+"""Robots of thrusters in plain values, of YAML, JSON or a table, and matrices as text."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from finlab.arrays import Array
 from finlab.errors import LayoutError
 from finlab.exchange import labels
 from finlab.exchange.exchange import TO_FRD, Exchange
 from finlab.exchange.labels import FRAMES, frame_said, lookup
-from finlab.exchange.limits import Ends, limits_in
-from finlab.exchange.matrix import UNIT, Matrix, matrices
-from finlab.exchange.per_thruster import Row, lists_in, records_in, thruster_of
-from finlab.exchange.walk import Node, Path, nodes, numbers_in, unread
-from finlab.layout import MAX_ACTUATORS, Layout
+from finlab.exchange.records import UNIT, Found, Row, found_in, is_unit
+from finlab.exchange.walk import Path, nodes, numbers_in, unread
+from finlab.files.plain_values import yaml_text
+from finlab.layout import MAX_ACTUATORS, Layout, Thruster, own_effectiveness
 from finlab.layout.wrench_axes import AXES
 
-Comments = Sequence[str]
+Ends = tuple[float, float]
 
 
 def read_plain(
-    data: Any, name: str, exchange: Exchange, comments: Comments = (), table: bool = False
+    data: Any, name: str, exchange: Exchange, comments: Sequence[str] = (), table: bool = False
 ) -> Layout:
     """Returns the layout, called `name`, of the thrusters in plain values.
 
-    Places and directions go before a matrix, since they tell more. `comments` of the file may name the frame;
-    a `table` has rows that nothing but their labels names.
-
-    Raises:
-        LayoutError: neither is there, or several, or one that may be read in two ways.
-    """
-    placed = [(node, rows) for node in nodes(data) if (rows := records_in(node) or lists_in(node, exchange))]
-    if placed:
-        node = _only([node for node, _ in placed], "thrusters by place and direction")
-        return _of_rows(node, placed[0][1], data, name, exchange, comments)
-    held = matrices(data, exchange, table)
-    if not held:
-        raise LayoutError(_nothing(data))
-    _only([matrix.node for matrix in held], "a matrix")
-    return _of_matrix(held[0], data, name, exchange, comments)
-
-
-def _only(found: list[Node], what: str) -> Node:
-    if len(found) > 1:
-        keys = ", ".join(node.words for node in found[:6])
-        raise LayoutError(f"holds {what} more than once, at {keys}; leave one in the file")
-    return found[0]
+    `comments` of the file may name the frame; a `table` has rows that nothing but their labels names. Raises
+    LayoutError: none are there, or several times, or they may be read in two ways."""
+    found = found_in(data, exchange, table)
+    if len(found.rows) > MAX_ACTUATORS:
+        what = "columns" if found.axes else "thrusters"
+        raise LayoutError(f"expected up to {MAX_ACTUATORS} {what}, got {len(found.rows)}", found.node.words)
+    frd, used = _frd(found, exchange, comments), {found.node.path}
+    parts = (_of_matrix if found.axes else _of_places)(found, data, frd, used, exchange)
+    for path, scope in found.node.scopes:
+        near = labels.LIMIT_KEYS if path in [path for path, _ in found.node.scopes[:2]] else ""
+        words = f"{labels.FRAME_KEYS} {labels.NAMES} {near}"
+        used |= {(*path, key) for key in scope if lookup({key: 0}, words, labels.FORCES)[0]}
+    left = labels.unknown_in(found.rows.values())
+    if left:
+        exchange.note(f"Not read of each thruster: {left}.")
+    if keys := unread(data, used):
+        exchange.note(f"Not read: {keys}.")
+    return Layout(name, parts, axes=tuple(axis for axis in AXES if axis in found.axes or not found.axes))
 
 
-def _nothing(data: Any) -> str:
-    """What a file holds in which nothing was found."""
-    shaped = (
-        (node, numbers_in(node.value)) for node in nodes(data) if isinstance(node.value, list) and node.path
-    )
-    lists = [f"{node.words} {array.shape}" for node, array in shaped if array is not None and array.size > 5]
-    seen = f"; its lists of numbers, {', '.join(lists[:8])}, have no key that says so" if lists else ""
-    return (
-        "has no matrix, expected six rows of numbers (Fx, Fy, Fz, Tx, Ty, Tz) under a key such as `tam` or "
-        f"`allocation_matrix`, or a position and a direction of each thruster{seen}"
-    )
-
-
-def _frd(node: Node, exchange: Exchange, comments: Comments) -> bool:
+def _frd(found: Found, exchange: Exchange, comments: Sequence[str]) -> bool:
     """Whether the file is in x forward, y right, z down; the note says why."""
-    frame, where = frame_said([scope for _, scope in node.scopes], comments)
+    frame, where = frame_said([scope for _, scope in found.node.scopes], comments)
     if exchange.frame and frame and exchange.frame != frame:
         exchange.note(f"It says {where}; --frame {exchange.frame} was taken in its stead.")
     elif exchange.frame is None and frame:
@@ -74,106 +57,146 @@ def _frd(node: Node, exchange: Exchange, comments: Comments) -> bool:
     return (exchange.frame or frame) == "FRD"
 
 
-def _of_rows(
-    node: Node, rows: dict[str, Row], data: Any, name: str, exchange: Exchange, comments: Comments
-) -> Layout:
-    """The layout of thrusters by place and direction."""
-    frd, center, used = _frd(node, exchange, comments), np.zeros(3), {node.path}
+def _of_places(
+    found: Found, data: Any, frd: bool, used: set[Path], exchange: Exchange
+) -> tuple[Thruster, ...]:
+    """Thrusters by place and direction."""
+    center = np.zeros(3)
     for each in nodes(data) if exchange.origin == "gravity" else ():
-        at = (
-            numbers_in(each.value)
-            if isinstance(each.value, list) and lookup({each.key: 0}, labels.CENTER)[0]
-            else None
-        )
+        at = numbers_in(each.value) if lookup({each.key: 0}, labels.CENTER)[0] else None
         if at is not None and at.shape == (3,):
             center = at
             used.add(each.path)
             exchange.note(f"The origin is at {each.words}, {at[0]:g} {at[1]:g} {at[2]:g} m.")
-    exchange.note(f"{node.words} was read: places in m, directions, limits in N.")
-    if len(rows) > MAX_ACTUATORS:
-        raise LayoutError(f"expected up to {MAX_ACTUATORS} thrusters, got {len(rows)}", node.words)
-    shared = next((pair for _, scope in node.scopes[:2] if (pair := limits_in(scope, 1, exchange)[0])), None)
-    parts = []
-    for key, row in rows.items():
-        own = row if shared is None or limits_in(row, 1, exchange)[0] else {**row, "limits": list(shared)}
-        parts.append(thruster_of(key, own, frd, center, exchange))
-    _say_unread(data, used, node, exchange, labels.unknown_in(rows.values()))
-    return Layout(name, tuple(parts))
+    exchange.note(f"{found.node.words} was read: places in m, directions, limits in N.")
+    sign, parts = TO_FRD[:3, 0] if frd else np.ones(3), []
+    for (key, row), ends in zip(found.rows.items(), _ends(found, data, used, exchange), strict=True):
+        place_key, place, size = lookup(row, labels.POSITION, labels.LENGTHS)
+        at = _three(place, f"{key}.{place_key}") * size - center
+        axis = _direction(key, row, exchange)
+        parts.append(exchange.thruster(_name(key, row), at * sign, axis * sign, ends))
+    return tuple(parts)
 
 
-def _of_matrix(matrix: Matrix, data: Any, name: str, exchange: Exchange, comments: Comments) -> Layout:
-    """The layout of the columns of a matrix."""
-    node, n = matrix.node, len(next(iter(matrix.rows.values())))
-    if n > MAX_ACTUATORS:
-        raise LayoutError(f"expected up to {MAX_ACTUATORS} columns, got {n}")
-    columns = np.stack([matrix.rows.get(axis, np.zeros(n)) for axis in AXES])
-    unit = "N and N m" if _per_newton(columns) else "N and N m at a command of 1"
-    exchange.note(f"{matrix.node.words} was read, {matrix.order}, in {unit}.")
-    if _frd(node, exchange, comments):
-        columns = columns * TO_FRD
-    used = {matrix.node.path}
-    names = matrix.names or _names(node, n, used)
-    ends = matrix.ends or _ends(data, node, names, used, exchange)
-    if not any(ends) and not _per_newton(columns):
-        exchange.note("It has no limits: commands are taken to go from -1 to 1 (--force LEAST MOST).")
-        ends = [(-1.0, 1.0)] * n
-    missing = [axis for axis in AXES if axis not in matrix.rows]
+def _name(key: str, row: Row) -> str:
+    """A thruster's name: its own, else its key, else its number."""
+    name = str(lookup(row, labels.NAME)[1] or "").strip()
+    key = f"thruster{int(key[1:-1]) + 1}" if key.startswith("[") else key
+    return key if not name or name.isdecimal() else name
+
+
+def _direction(key: str, row: Row, exchange: Exchange) -> Array:
+    """The direction (3,) of length 1 in which a thruster pushes."""
+    axis_key, value, _ = lookup(row, labels.DIRECTION)
+    if axis_key:
+        axis = _three(value, f"{key}.{axis_key}")
+    else:
+        axis_key, value, size = lookup(row, labels.ANGLES, labels.DEGREES)
+        turn = _three(value, f"{key}.{axis_key}") / size
+        if np.abs(turn).max() > 2 * np.pi:
+            raise LayoutError("is more than a turn; are these degrees? call it rpy_deg", f"{key}.{axis_key}")
+        exchange.note(f"{axis_key} turns the axis x of a thruster, along which it pushes.")
+        axis = Rotation.from_euler("xyz", turn).apply([1.0, 0.0, 0.0])
+    length = float(np.linalg.norm(axis))
+    if length < 1e-9:
+        raise LayoutError("has no length", f"{key}.{axis_key}")
+    if abs(length - 1.0) > UNIT:
+        exchange.note(f"{key}.{axis_key} has length {length:g}; its direction alone is read.")
+    return axis / length
+
+
+def _three(value: Any, what: str) -> Array:
+    array = numbers_in([value.get(axis) for axis in "xyz"] if isinstance(value, Mapping) else value)
+    if array is None or array.shape != (3,):
+        raise LayoutError(f"is {value!r:.60}, expected three numbers", what)
+    return array
+
+
+def _of_matrix(
+    found: Found, data: Any, frd: bool, used: set[Path], exchange: Exchange
+) -> tuple[Thruster, ...]:
+    """Thrusters by the columns of a matrix."""
+    columns = np.zeros((6, len(found.rows)))
+    columns[[AXES.index(axis) for axis in found.axes]] = found.columns
+    per_newton = is_unit(columns[:3])
+    unit = "N and N m" if per_newton else "N and N m at a command of 1"
+    exchange.note(f"{found.node.words} was read, {found.order}, in {unit}.")
+    missing = [axis for axis in AXES if axis not in found.axes]
     if missing:
         exchange.note(f"It has no row {', '.join(missing)}: 0 is taken there, and not commanded (`axes`).")
-    _say_unread(data, used, node, exchange, matrix.left)
-    parts = tuple(exchange.of_column(*each) for each in zip(names, columns.T, ends, strict=True))
-    return Layout(name, parts, axes=tuple(axis for axis in AXES if axis in matrix.rows))
+    ends = _ends(found, data, used, exchange)
+    if not any(ends) and not per_newton:
+        exchange.note("It has no limits: commands are taken to go from -1 to 1 (--force LEAST MOST).")
+        ends = [(-1.0, 1.0)] * len(ends)
+    columns = columns * (TO_FRD if frd else 1.0)
+    names = [_name(key, row) for key, row in found.rows.items()]
+    return tuple(exchange.of_column(*each) for each in zip(names, columns.T, ends, strict=True))
 
 
-def _per_newton(columns: Array) -> bool:
-    return bool((np.abs(np.linalg.norm(columns[:3], axis=0) - 1.0) <= UNIT).all())
-
-
-def _names(node: Node, n: int, used: set[Path]) -> list[str]:
-    """Names of a matrix's thrusters from the nearest mapping around it that has some."""
-    for path, scope in node.scopes:
-        key, names, _ = lookup(scope, labels.NAMES)
-        if isinstance(names, list) and all(isinstance(each, str | int) for each in names):
-            if len(names) != n:
-                raise LayoutError(
-                    f"expected a name, and least and most command, for each of {n} columns", key or "names"
-                )
-            used.add((*path, key))
-            return [*map(str, names)]
-    return [f"thruster{i + 1}" for i in range(n)]
-
-
-def _ends(data: Any, node: Node, names: list[str], used: set[Path], exchange: Exchange) -> list[Ends | None]:
-    """Limits of a matrix's thrusters: around it, or in any mapping that names one of them."""
-    for _, scope in node.scopes[:2]:
-        ends = limits_in(scope, len(names), exchange)
-        if any(ends):
-            return ends
+def _ends(found: Found, data: Any, used: set[Path], exchange: Exchange) -> list[Ends | None]:
+    """Least and most of each thruster: its own, those around, or in any mapping that names it."""
+    keys = [_name(key, row) for key, row in found.rows.items()]
+    ends = [_limits_in(row, 1, exchange)[0] for row in found.rows.values()]
+    for _, scope in found.node.scopes[:2]:
+        shared = _limits_in(scope, len(keys), exchange)
+        ends = [own or other for own, other in zip(ends, shared, strict=True)]
+    if any(ends):
+        return ends
     known: dict[str, Ends] = {}
     for each in nodes(data):
         if isinstance(each.value, Mapping):
             key, named, _ = lookup(each.value, labels.NAME)
             named = named if key else each.key
             pair = (
-                limits_in(each.value, 1, exchange)[0] if isinstance(named, str) and named in names else None
+                _limits_in(each.value, 1, exchange)[0] if isinstance(named, str) and named in keys else None
             )
             if pair is not None:
                 known[named] = pair
                 used.add(each.path)
-    without = [name for name in names if name not in known]
+    without = [key for key in keys if key not in known]
     if known and without:
         exchange.note(f"It has no limits of {', '.join(without)}.")
-    return [known.get(name) for name in names]
+    return [known.get(key) for key in keys]
 
 
-def _say_unread(data: Any, used: set[Path], node: Node, exchange: Exchange, left: str) -> None:
-    """A note on the keys that were not read."""
-    around = [(path, scope, labels.FRAME_KEYS) for path, scope in node.scopes]
-    around += [(path, scope, labels.LIMIT_KEYS) for path, scope in node.scopes[:2]]
-    for path, scope, words in around:
-        used |= {(*path, key) for key in scope if lookup({key: 0}, words, labels.FORCES)[0]}
-    if left:
-        exchange.note(f"Not read of each thruster: {left}.")
-    keys = unread(data, used)
-    if keys:
-        exchange.note(f"Not read: {keys}.")
+def _limits_in(values: Mapping[str, Any], n: int, exchange: Exchange) -> list[Ends | None]:
+    """Least and most [N, or of a command] of each of n thrusters in a mapping; None where unsaid.
+
+    One pair, or one number of each, is for all. A most alone is for both ways.
+    """
+    key, pair, size = lookup(values, labels.PAIR, labels.FORCES)
+    ends = numbers_in(pair)
+    if key and pair is not None:
+        if ends is None or ends.shape not in ((2,), (n, 2), (2, n)):
+            raise LayoutError(f"expected least and most, or both of each of {n} thrusters", key)
+        ends = np.broadcast_to(ends if ends.shape in ((n, 2), (2,)) else ends.T, (n, 2)) * size
+        return [(low, high) for low, high in ends.tolist()]
+    low_key, low, low_size = lookup(values, labels.LEAST, labels.FORCES)
+    high_key, high, high_size = lookup(values, labels.MOST, labels.FORCES)
+    if high is None:
+        return [None] * n
+    most, least = numbers_in(high), numbers_in(low if low is not None else high)
+    if most is None or least is None or not {most.size, least.size} <= {1, n}:
+        raise LayoutError(f"expected a number, or one for each of {n} thrusters", f"{low_key} {high_key}")
+    if low is None:
+        exchange.note(f"{high_key} says nothing of reverse: as much is taken for it.")
+        least, low_size = -least, high_size
+    lows, highs = (
+        np.broadcast_to(side.ravel() * by, n) for side, by in ((least, low_size), (most, high_size))
+    )
+    return [*zip(lows.tolist(), highs.tolist(), strict=True)]
+
+
+def write_matrix(layout: Layout, exchange: Exchange, suffix: str) -> str:
+    """Returns the matrix of a layout's thrusters per newton, as CSV for `.csv`, else as YAML. Raises
+    LayoutError: there is no thruster."""
+    kept = exchange.thrusters_of(layout, "A matrix", "places along the lines of the forces")
+    rows = own_effectiveness(kept)[:, 0].T * (TO_FRD if exchange.frame == "FRD" else 1.0) + 0.0
+    names, limits = list(kept.names), np.stack([kept.lower, kept.upper], axis=1)[..., 0].tolist()
+    matrix = dict(zip(AXES, rows.tolist(), strict=True))
+    if suffix != ".csv":
+        head = {"frame": exchange.frame or "FLU", "unit": "N", "names": names, "limits": limits}
+        return yaml_text({**head, "matrix": matrix})
+    table = {"axis": names, **matrix, **dict(zip(("least", "most"), zip(*limits, strict=True), strict=True))}
+    lines = [",".join(map(str, [key, *row])) for key, row in table.items()]
+    return "\n".join([f"# frame: {exchange.frame or 'FLU'}", *lines]) + "\n"

@@ -5,6 +5,7 @@ CA_R_REV says that it reverses (PX4, ActuatorEffectivenessRotors).
 """
 
 import math
+import re
 
 import numpy as np
 
@@ -20,11 +21,8 @@ USUAL = {"PX": 0.0, "PY": 0.0, "PZ": 0.0, "AX": 0.0, "AY": 0.0, "AZ": -1.0, "CT"
 
 
 def read_px4(text: str, name: str, exchange: Exchange) -> Layout:
-    """Returns the layout, called `name`, of the rotors in a parameter file or airframe script.
-
-    Raises:
-        LayoutError: it has no rotors, or one without direction or force; a value is no number.
-    """
+    """Returns the layout, called `name`, of the rotors in a parameter file or airframe script. Raises
+    LayoutError: it has no rotors, or one without direction or force; a value is no number."""
     values = read_parameters(text, "CA_")
     count = int(values.get("CA_ROTOR_COUNT", 0))
     if not 0 < count <= MAX_ROTORS:
@@ -39,7 +37,8 @@ def read_px4(text: str, name: str, exchange: Exchange) -> Layout:
         if lacking:
             which = ", ".join(lacking) if len(lacking) < count else "all"
             exchange.note(f"No CA_ROTORi_{key} of rotors {which}: {usual:g} is taken, the default of PX4.")
-    beyond = sorted(key for key in values if key.startswith("CA_ROTOR") and _rotor(key) >= count)
+    rotors = {key: found for key in values if (found := re.match(r"CA_ROTOR(\d{1,3})_", key))}
+    beyond = sorted(key for key, found in rotors.items() if int(found[1]) >= count)
     if beyond:
         exchange.note(f"CA_ROTOR_COUNT is {count}; not read: {', '.join(beyond[:12])}.")
     if exchange.force is None:
@@ -57,18 +56,9 @@ def read_px4(text: str, name: str, exchange: Exchange) -> Layout:
     return Layout(name, tuple(parts))
 
 
-def _rotor(key: str) -> int:
-    """The number of the rotor that a parameter is of; -1 for others."""
-    number = key.removeprefix("CA_ROTOR").partition("_")[0]
-    return int(number) if number.isdecimal() and len(number) < 4 else -1
-
-
 def write_px4(layout: Layout, exchange: Exchange, suffix: str) -> str:
     """Returns a layout's thrusters as lines of an airframe script, for `.params` as a list of QGroundControl.
-
-    Raises:
-        LayoutError: there is no thruster, or there are too many.
-    """
+    Raises LayoutError: there is no thruster, or there are too many."""
     parts = [part for part in exchange.thrusters_of(layout, "PX4").actuators if isinstance(part, Thruster)]
     if len(parts) > MAX_ROTORS:
         raise LayoutError(f"PX4 takes up to {MAX_ROTORS} rotors, layout {layout.name} has {len(parts)}")

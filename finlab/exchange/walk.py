@@ -10,8 +10,6 @@ from finlab.errors import LayoutError
 
 MOST, MAX_NODES = 300, 30_000
 """Most characters of a list of keys, and most values that are looked at."""
-
-
 Path = tuple[str, ...]
 
 
@@ -37,23 +35,21 @@ class Node(NamedTuple):
 
 def nodes(data: Any) -> Iterator[Node]:
     """Yields all mappings, lists and values in plain values, outer ones first, but no numbers in lists.
-
-    Raises:
-        LayoutError: there are too many.
-    """
+    Raises LayoutError: there are too many."""
     waiting: list[Node] = [Node((), data, ())]
     count = 0
     while waiting:
-        path, value, scopes = waiting.pop()
+        path, value, scopes = node = waiting.pop()
         count += len(value) if isinstance(value, Mapping | list) else 0
         if count > MAX_NODES:
             raise LayoutError(f"has more than {MAX_NODES:,} entries, too many to be read")
         inner: Iterable[tuple[str, Any]] = ()
         if isinstance(value, Mapping):
             scopes, inner = ((path, value), *scopes), value.items()
+            node = Node(path, value, scopes)
         elif isinstance(value, list):
             inner = ((f"[{i}]", each) for i, each in enumerate(value) if isinstance(each, Mapping | list))
-        yield Node(path, value, scopes)
+        yield node
         waiting += [Node((*path, key), each, scopes) for key, each in [*inner][::-1]]
 
 

@@ -100,11 +100,8 @@ def read_layout(name: str, content: bytes) -> Opened:
 
 
 def layout_file(layout: Layout) -> tuple[str, bytes]:
-    """Name and content of the layout's file: YAML, or an archive with the files that it names.
-
-    Raises:
-        DataError: a table or the hull's mesh cannot be read, or is too large to travel.
-    """
+    """Name and content of the layout's file: YAML, or an archive with the files that it names. DataError: a
+    table or the hull's mesh cannot be read, or is too large to travel."""
     stem = file_stem(layout.name)
     inside, tables = with_tables_inside(layout)
     inside, hull = with_hull_inside(inside)
@@ -124,11 +121,7 @@ def table_folder() -> Path:
 
 def stored_hull(name: str, content: bytes) -> Hull:
     """The hull in an uploaded mesh file, which is checked and kept under a name made from its content; in the
-    first unit in which it has the size of one.
-
-    Raises:
-        FinlabError: it is no mesh, too large, or cannot be kept.
-    """
+    first unit in which it has the size of one. FinlabError: it is no mesh, too large, or cannot be kept."""
     short = Path(str(name)).name[-80:] or "upload"
     for scale in UNITS.values():
         with contextlib.suppress(SizeError):
@@ -138,10 +131,7 @@ def stored_hull(name: str, content: bytes) -> Hull:
 
 def reshaped_hull(hull: Hull, change: Callable[[Mesh], Mesh]) -> Hull:
     """A hull from a mesh file with another shape, in metres about the middle of its box; kept like an upload.
-
-    Raises:
-        FinlabError: the hull is no mesh, its file is gone, or what comes of it is no hull.
-    """
+    FinlabError: the hull is no mesh, its file is gone, or what comes of it is no hull."""
     if hull.mesh is None:
         raise FinlabError("the hull is drawn from a shape; import a mesh first")
     drawn = Surface.of_file(hull.mesh, hull.scale, (0.0, 0.0, 0.0))
@@ -150,11 +140,8 @@ def reshaped_hull(hull: Hull, change: Callable[[Mesh], Mesh]) -> Hull:
 
 
 def packed(layout: Layout, most: int = MAX_LINK) -> str:
-    """A whole design as text of letters, digits, `-` and `_`.
-
-    Raises:
-        FinlabError: it is longer than `most` characters, or a file of it cannot be read.
-    """
+    """A whole design as text of letters, digits, `-` and `_`. FinlabError: it is longer than `most`
+    characters, or a file of it cannot be read."""
     name, content = layout_file(layout)
     is_archive = name.endswith(".zip")
     data = content if is_archive else zlib.compress(content, 9)
@@ -169,11 +156,8 @@ def packed(layout: Layout, most: int = MAX_LINK) -> str:
 
 
 def unpacked(text: str) -> Opened:
-    """The design in a link, checked like an upload; it may be anything.
-
-    Raises:
-        FinlabError: it holds no design, or a wrong one.
-    """
+    """The design in a link, checked like an upload; it may be anything. FinlabError: it holds no design, or a
+    wrong one."""
     kind, coded = text[:1], text[1:]
     try:
         data = base64.b64decode(coded + "=" * (-len(coded) % 4), altchars=b"-_", validate=True)

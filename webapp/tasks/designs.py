@@ -25,7 +25,7 @@ from webapp.tasks.swimming import Swimming
 from webapp.viser_internals import run_file, run_script
 
 KINDS = (
-    "a design (YAML, JSON, ZIP), a robot of others (URDF, SDF, Stonefish, PX4, ArduSub, a matrix), "
+    "a design (YAML, JSON, ZIP), a robot of others (URDF, SDF, PX4, ArduSub, a matrix), "
     "measurements of a fin (CSV), or a hull (STL, OBJ, GLB, PLY)"
 )
 SHARED = (
