@@ -13,8 +13,8 @@ import numpy as np
 from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.layout.arrays import layout_effectiveness
+from finlab.layout.wrench_axes import mask_of
 
-AXES = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
 LEVER_M = 0.25
 """Torques count as forces at this lever when open axes are traded against each other [m]; about U-CAT's."""
 RANK_TOLERANCE = 1e-6
@@ -34,8 +34,8 @@ class Completion:
         """
         scale = np.array([1.0, 1.0, 1.0, 1 / LEVER_M, 1 / LEVER_M, 1 / LEVER_M])
         planar = layout_effectiveness(layout.without(failed) if failed else layout) * scale[:, None]
-        chosen = np.array([axis in axes for axis in AXES])
-        wanted, held = planar[chosen], planar[[axis not in (*axes, *free) for axis in AXES]]
+        chosen = mask_of(axes)
+        wanted, held = planar[chosen], planar[~mask_of((*axes, *free))]
         left, values, right = np.linalg.svd(wanted)
         rank = int((values > RANK_TOLERANCE * max(float(values[0]), 1e-9)).sum())
         self.controllable = rank == len(wanted)

@@ -150,18 +150,16 @@ def _fins(rng: np.random.Generator, name: str) -> tuple[Layout, tuple[str, ...]]
 def _fins_mixed(rng: np.random.Generator, name: str) -> tuple[Layout, tuple[str, ...]]:
     """Each fin of a random model of its own."""
     layout = random_layout(rng, name)
-    return replace(
-        layout, actuators=tuple(replace(fin, model=random_fin_model(rng)) for fin in layout.fins)
-    ), ()
+    fins = (replace(fin, model=random_fin_model(rng)) for fin in layout.fins)
+    return replace(layout, actuators=tuple(fins)), ()
 
 
 def _tables(rng: np.random.Generator, name: str) -> tuple[Layout, tuple[str, ...]]:
     """The same, each fin known by a noisy table."""
     layout, _ = _fins_mixed(rng, name)
     noise = zip(layout.fins, rng.spawn(layout.n_fins), strict=True)
-    return replace(
-        layout, actuators=tuple(noisy_table(own, fin, f"{name}-{fin.name}") for fin, own in noise)
-    ), ()
+    fins = (noisy_table(own, fin, f"{name}-{fin.name}") for fin, own in noise)
+    return replace(layout, actuators=tuple(fins)), ()
 
 
 def _robots(*kinds: ActuatorDraw, count: tuple[int, int], each: bool = False) -> Draw:

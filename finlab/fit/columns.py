@@ -84,7 +84,7 @@ def named_column(header: str, names: Mapping[str, str], units: Mapping[str, floa
 
 
 def read_columns(
-    path: Path,
+    file: Path | CsvTable,
     names: Mapping[str, str],
     needed: Sequence[str],
     expected: str,
@@ -93,32 +93,22 @@ def read_columns(
 ) -> Columns:
     """Returns the columns of a file that have a name.
 
+    Of several columns for one quantity that agree, such as a force in kgf and in N, the first is taken.
+
     Args:
-        path: a CSV file with a header; lines that begin with # are passed over.
+        file: a CSV file with a header, whose lines that begin with # are passed over, or a table.
         names: what words in the header stand for, as `named_column` takes them.
         needed: names of columns without which the file is refused; of `a|b` one is enough.
         expected: what the error then says of the columns.
         units: that the header may name.
-        gaps: whether cells may be empty, which makes them NaN.
+        gaps: whether cells of a file may be empty, which makes them NaN.
 
     Raises:
         DataError: the file cannot be read, or lacks a column.
     """
-    table = read_table(path, MAX_BYTES, "a CSV file of measurements", gaps)
-    return taken_columns(table, names, needed, expected, units)
-
-
-def taken_columns(
-    table: CsvTable,
-    names: Mapping[str, str],
-    needed: Sequence[str],
-    expected: str,
-    units: Mapping[str, float] = UNITS,
-) -> Columns:
-    """Returns the columns of a table that have a name; arguments and errors as in `read_columns`.
-
-    Of several columns for one quantity that agree, such as a force in kgf and in N, the first is taken.
-    """
+    table = file
+    if not isinstance(table, CsvTable):
+        table = read_table(table, MAX_BYTES, "a CSV file of measurements", gaps)
     path = table.source
     try:
         named = [named_column(cell, names, units) for cell in table.header]
@@ -148,7 +138,7 @@ def taken_columns(
     return Columns(values, headers, bare, tuple(f"{Path(path).name} line {line}" for line in lines))
 
 
-def together(files: Sequence[Columns]) -> dict[str, Array]:
-    """Returns the columns that all files have, one file's rows after the other's, by name."""
-    shared = [name for name in files[0].values if all(name in file.values for file in files)]
-    return {name: np.concatenate([file.values[name] for file in files]) for name in shared}
+def together(tables: Sequence[Mapping[str, Array]]) -> dict[str, Array]:
+    """Returns the columns that all tables have, one table's rows after the other's, by name."""
+    shared = [name for name in tables[0] if all(name in table for table in tables)]
+    return {name: np.concatenate([table[name] for table in tables]) for name in shared}

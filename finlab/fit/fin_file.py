@@ -7,7 +7,7 @@ import numpy as np
 
 from finlab.errors import DataError
 from finlab.fit.fin_fit import FinFit
-from finlab.layout.force_table_file import COLUMNS, DEVIATIONS, DOUBT, POWER_COLUMN
+from finlab.layout.force_table_file import COLUMNS, DEVIATIONS, DOUBT, POWER_COLUMN, table_text
 from finlab.whole_file import write_whole
 
 GRID = (13, 13, 18)
@@ -21,8 +21,7 @@ def fin_csv(fit: FinFit) -> str:
     power = fit.predict_power(command)
     table = np.hstack([command, force, *([power[:, None]] if power is not None else []), deviation])
     header = [*COLUMNS, *([POWER_COLUMN] if power is not None else []), *DEVIATIONS]
-    rows = (",".join(f"{value:.6g}" for value in row) for row in table + 0.0)
-    return "\n".join([*(f"# {line}" for line in summary(fit)), ",".join(header), *rows, ""])
+    return table_text(summary(fit), header, table, 6)
 
 
 def write_fin(fit: FinFit, path: str | os.PathLike[str]) -> None:

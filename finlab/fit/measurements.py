@@ -127,7 +127,7 @@ def _checked(read: list[Columns], source: str) -> Measurements:
         raise DataError(
             f"{source}: {len(places)} samples, expected at least {MIN_SAMPLES}; 300 are a good number"
         )
-    columns = together(read)
+    columns = together([file.values for file in read])
     for name, unit in (("A", "rad"), ("f", "Hz")):
         if np.ptp(columns[name]) < SAME:
             raise DataError(

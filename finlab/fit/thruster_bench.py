@@ -10,7 +10,7 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.errors import DataError
-from finlab.fit.columns import Columns, named_column, read_columns, taken_columns
+from finlab.fit.columns import Columns, named_column, read_columns
 from finlab.fit.voltages import Rows, at_voltage, by_voltage
 from finlab.fit.workbook import sheets
 
@@ -101,7 +101,7 @@ def _tables(path: Path) -> tuple[list[Columns], tuple[str, ...]]:
         raise DataError(f"{path}: no sheet holds a table ({', '.join(other):.200}), expected {EXPECTED}")
     tables = []
     for title, table in found.items():
-        columns = _renamed(taken_columns(table, NAMES, NEEDED, EXPECTED))
+        columns = _renamed(read_columns(table, NAMES, NEEDED, EXPECTED))
         volts = re.search(r"(\d+(?:[.,]\d+)?) ?v(?:olts?)?\b", title, flags=re.IGNORECASE)
         if volts and "voltage" not in columns.values:
             columns.values["voltage"] = np.full(len(columns.places), float(volts[1].replace(",", ".")))

@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 
 from finlab.fit.thruster_fit import ThrusterFit
+from finlab.layout.force_table_file import table_text
 from finlab.layout.thrust_model import COLUMNS
 
 
@@ -24,9 +25,7 @@ def layout_lines(fit: ThrusterFit, path: Path) -> tuple[str, ...]:
 
 def thruster_csv(fit: ThrusterFit, path: Path) -> str:
     """Returns the file's text: lines that begin with # and say what the fit found, a header, the rows."""
-    notes = [f"# {line}" for line in (*summary(fit), *layout_lines(fit, path))]
-    rows = [",".join(f"{value:.12g}" for value in row) for row in fit.table.rows]
-    return "\n".join([*notes, ",".join(COLUMNS), *rows, ""])
+    return table_text((*summary(fit), *layout_lines(fit, path)), COLUMNS, fit.table.rows, 12)
 
 
 def summary(fit: ThrusterFit) -> tuple[str, ...]:

@@ -3,9 +3,11 @@
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finlab.arrays import Array
 from finlab.errors import DataError
+from finlab.fit.columns import together
 
 Rows = Mapping[str, Array]
 """Columns of a bench by name (n,), with `command`, `force` and `power`."""
@@ -21,9 +23,7 @@ def by_voltage(rows: Rows, command: Array) -> list[Rows]:
     A supply that sags under load is one: there commands of a lower voltage lie beyond those of a higher one.
     """
     volts = np.abs(rows["voltage"])
-    order = np.argsort(volts, kind="stable")
-    steps = np.diff(volts[order]) > NEAR * volts[order][1:]
-    parts = np.split(order, np.flatnonzero(steps) + 1)
+    parts = _levels(volts)
     tables = [parts[-1]]
     for part in parts[-2::-1]:
         higher = command[tables[-1]]
@@ -46,16 +46,14 @@ def at_voltage(tables: Sequence[Rows], voltage: float | None, source: str) -> tu
         DataError: there are several and none was asked for, or that one does not lie among them.
     """
     known = np.array([np.median(np.abs(rows["voltage"])) if "voltage" in rows else np.nan for rows in tables])
-    order = np.argsort(known)
-    steps = np.diff(known[order]) > NEAR * known[order][1:]
-    groups = np.split(order, np.flatnonzero(steps) + 1)
+    groups = _levels(known)
     if np.isnan(known).any() and (voltage is not None or len(groups) > 1):
         raise DataError(f"{source}: does not tell at which voltage all rows were measured")
     levels = np.array([np.median(known[own]) for own in groups])
     named = f"measured at {', '.join(f'{level:.4g}' for level in levels)} V"
     if voltage is None and len(groups) > 1:
         raise DataError(f"{source}: {named}; say which counts, --voltage {levels[-1]:.4g}")
-    within = [_joined([tables[k] for k in own]) for own in groups]
+    within = [together([tables[k] for k in own]) for own in groups]
     if voltage is None:
         return within[0], ()
     near = int(np.argmin(np.abs(levels - voltage)))
@@ -69,10 +67,11 @@ def at_voltage(tables: Sequence[Rows], voltage: float | None, source: str) -> tu
     return rows, (f"interpolated between the rows at {low:.4g} V and at {high:.4g} V",)
 
 
-def _joined(tables: Sequence[Rows]) -> Rows:
-    """One table's rows after the other's, of columns that all have."""
-    shared = [name for name in tables[0] if all(name in rows for rows in tables)]
-    return {name: np.concatenate([rows[name] for rows in tables]) for name in shared}
+def _levels(volts: Array) -> list[NDArray[np.intp]]:
+    """Places of voltages (n,) that are one, the lowest first."""
+    order = np.argsort(volts, kind="stable")
+    steps = np.diff(volts[order]) > NEAR * volts[order][1:]
+    return np.split(order, np.flatnonzero(steps) + 1)
 
 
 def _between(low: Rows, high: Rows, share: float) -> Rows:

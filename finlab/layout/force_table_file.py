@@ -11,6 +11,7 @@ free. Lines that begin with # say what to know of the table; other columns are p
 import csv
 import math
 import os
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -91,6 +92,12 @@ def write_table(
         writer = csv.writer(file)
         writer.writerow(COLUMNS)
         writer.writerows([f"{value:.10g}" for value in row] for row in np.hstack([command, force + 0.0]))
+
+
+def table_text(notes: Iterable[str], header: Sequence[str], rows: Iterable[Any], digits: int) -> str:
+    """Returns the text of a CSV file: notes behind #, a header, rows of numbers with so many digits."""
+    lines = (",".join(f"{value + 0.0:.{digits}g}" for value in row) for row in rows)
+    return "\n".join([*(f"# {note}" for note in notes), ",".join(header), *lines, ""])
 
 
 def table_bytes(path: str | os.PathLike[str]) -> bytes:

@@ -381,12 +381,5 @@ class ClosedLoop:
 
     def _suspicion(self) -> dict[str, Array]:
         """The monitor's columns of a tick, NaN without one."""
-        if self.verdict is None:
-            unknown = np.full(self.layout.n, np.nan)
-            return {"fault_probability": unknown, "strength": unknown, "strength_std": unknown}
-        found = self.verdict
-        return {
-            "fault_probability": found.probability,
-            "strength": found.strength,
-            "strength_std": found.strength_std,
-        }
+        found = (np.full(self.layout.n, np.nan),) * 3 if self.verdict is None else self.verdict[1:]
+        return dict(zip(("fault_probability", "strength", "strength_std"), found, strict=True))

@@ -88,6 +88,5 @@ def damping_rates(body: Dynamics[Any, Any], flow: Any) -> list[Any]:
 
 def damping_jacobian(body: Dynamics[Any, Any], flow: Any) -> list[Any]:
     """Returns the derivatives (6) of those decelerations, each by its own speed [1/s]: minus the diagonal of
-    the Jacobian."""
-    terms = zip(body.linear, body.quadratic, flow, body.inertia, strict=True)
-    return [(linear + 2.0 * quadratic * abs(speed)) / m for linear, quadratic, speed, m in terms]
+    the Jacobian. The quadratic part counts twice, as at twice the speed."""
+    return damping_rates(body, [2.0 * speed for speed in flow])

@@ -39,7 +39,7 @@ HEIGHT = 140
 SHARES, COLORS = (1.0, 2 / 3, 1 / 3), (ORANGE, GREEN, BLUE)
 """Of the largest amplitude, and the colours of curves."""
 POINTS = 41
-CSV = ".csv,.txt"
+CSV = ".csv,.txt,.xlsx"
 
 Shown = Callable[[str | None, Layout], Actuator]
 

@@ -5,7 +5,8 @@ Systems, IROS 2012. Robot and reference share one world frame and one clock, so 
 are paired by time. Only positions count: the reference prescribes no attitude.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -72,6 +73,15 @@ def over_seeds(rows: Sequence[Row]) -> Row:
         values = np.array([row[key] for row in rows])
         means[key], means[f"{key}_std"] = float(values.mean()), float(values.std(ddof=min(1, len(rows) - 1)))
     return means
+
+
+def mean_rows(key: str, done: Mapping[tuple[Any, str], Sequence[Row]], last: Any) -> list[Row]:
+    """One row for each value under `key` and method, of the rows of its runs; the value `last` at the end."""
+    order = sorted(done, key=lambda pair: pair[0] == last)
+    return [
+        {key: value, "method": name, "runs": len(done[value, name]), **over_seeds(done[value, name])}
+        for value, name in order
+    ]
 
 
 POWER = (

@@ -4,13 +4,7 @@ from collections.abc import Sequence
 from itertools import product
 
 from finlab.evaluation.experiment import Experiment, paper_figures
-from finlab.evaluation.experiments.closed_loop import (
-    ABOUT_ERRORS,
-    ERRORS,
-    POWER,
-    follow_row,
-    over_seeds,
-)
+from finlab.evaluation.experiments.closed_loop import ABOUT_ERRORS, ERRORS, POWER, follow_row, mean_rows
 from finlab.evaluation.method_specs import load_method_specs
 from finlab.evaluation.progress import progress
 from finlab.evaluation.report.document import Column, Row
@@ -43,11 +37,7 @@ def run(
         row = follow_row(ClosedLoop(robot, method.on(robot), path, seed=seed + k).run())
         done.setdefault((robot.name, name), []).append(row)
         done.setdefault(("all", name), []).append(row)
-    order = sorted(done, key=lambda key: key[0] == "all")
-    return [
-        {"layout": layout, "method": name, "runs": len(done[layout, name]), **over_seeds(done[layout, name])}
-        for layout, name in order
-    ]
+    return mean_rows("layout", done, "all")
 
 
 def _printed(rows: Sequence[Row]) -> list[Row]:

@@ -7,7 +7,7 @@ import numpy as np
 
 from finlab.errors import DataError
 from finlab.evaluation.experiment import Experiment, paper_figures
-from finlab.evaluation.experiments.closed_loop import POWER, depth_error, over_seeds, power_row
+from finlab.evaluation.experiments.closed_loop import POWER, depth_error, mean_rows, power_row
 from finlab.evaluation.method_specs import load_method_specs
 from finlab.evaluation.progress import progress
 from finlab.evaluation.report.document import Column, Row
@@ -46,11 +46,7 @@ def run(
         row = _row(ClosedLoop(robot, method.on(robot), straight(speed, duration), seed=seed + k).run())
         done.setdefault((speed, name), []).append(row)
         done.setdefault((None, name), []).append(row)
-    order = sorted(done, key=lambda key: key[0] is None)
-    return [
-        {"speed": speed, "method": name, "runs": len(done[speed, name]), **over_seeds(done[speed, name])}
-        for speed, name in order
-    ]
+    return mean_rows("speed", done, None)
 
 
 def _row(log: RunLog) -> Row:

@@ -7,22 +7,17 @@ from typing import Any
 
 def error(value: float) -> str:
     """Two significant digits: 0.00029, 0.086, 1.8, 3.1e-7."""
-    if value == 0:
-        return "0"
-    if not math.isfinite(value):
-        return "–"
-    if abs(value) < 9.5e-5:
+    if 0 < abs(value) < 9.5e-5:
         mantissa, _, power = f"{value:.1e}".partition("e")
         return f"{mantissa}e{int(power)}"
-    digits = max(0, 1 - math.floor(math.log10(abs(value))))
-    return f"{value:.{digits}f}"
+    return three(value, 2)
 
 
-def three(value: float) -> str:
-    """Three significant digits: 2.86, 0.0857, 178."""
+def three(value: float, count: int = 3) -> str:
+    """Three significant digits, or another number of them: 2.86, 0.0857, 178."""
     if value == 0 or not math.isfinite(value):
         return "0" if value == 0 else "–"
-    digits = max(0, 2 - math.floor(math.log10(abs(value))))
+    digits = max(0, count - 1 - math.floor(math.log10(abs(value))))
     return f"{value:.{digits}f}" if digits < 7 else f"{value:.2e}"
 
 

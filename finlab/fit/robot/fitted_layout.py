@@ -14,7 +14,7 @@ from finlab.fit.robot.report import summary
 from finlab.fit.robot.robot_fit import RobotFit
 from finlab.fit.robot.unknowns import SHAPE
 from finlab.layout import Body, Fin, FinModelSpec, Layout, load_layout, save_layout
-from finlab.layout.force_table_file import COLUMNS, POWER_COLUMN
+from finlab.layout.force_table_file import COLUMNS, POWER_COLUMN, table_text
 from finlab.layout.layout import MAX_DESCRIPTION_LENGTH
 from finlab.physics import make_law
 from finlab.whole_file import write_whole
@@ -61,15 +61,8 @@ def _table(fit: RobotFit, i: int, fin: Fin) -> str:
     if shape is not None:
         force = force * shape_factor(fit.model.shape_terms(command), shape)[:, None]
     power = np.asarray(law.power(command))
-    rows = np.hstack([command, force, power[:, None]]) + 0.0
-    return "\n".join(
-        [
-            f"# fin {fin.name}, fitted to a swim of the whole robot",
-            ",".join([*COLUMNS, POWER_COLUMN]),
-            *(",".join(f"{value:.8g}" for value in row) for row in rows),
-            "",
-        ]
-    )
+    notes = [f"fin {fin.name}, fitted to a swim of the whole robot"]
+    return table_text(notes, [*COLUMNS, POWER_COLUMN], np.hstack([command, force, power[:, None]]), 8)
 
 
 def _body(fit: RobotFit) -> Body:

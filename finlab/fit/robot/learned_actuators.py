@@ -1,8 +1,6 @@
 """The actuators of a fitted robot: places, directions, strengths, and how sure they are."""
 
-import math
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -11,6 +9,7 @@ from finlab.fit.robot.model import turned_frames
 from finlab.fit.robot.robot_fit import RobotFit
 from finlab.layout import Azimuth, Fin, Layout, Rudder, Thruster
 from finlab.layout.actuator import Actuator
+from finlab.layout.directions import with_axes
 from finlab.layout.thrust_model import PowerLaw, PowerTable, ThrustModel
 from finlab.layout.uncertainty import Uncertainty
 
@@ -26,9 +25,8 @@ def learned(fit: RobotFit, lean: Array) -> tuple[Actuator, ...]:
     layout, share = fit.model.layout, np.exp(fit.found("strength"))
     frames = turned_frames(layout, fit.found("mounting"), lean)
     for i, part in enumerate(layout.actuators):
-        position = tuple((np.array(part.position) - center).tolist())
-        moved = replace(_turned(part, frames[i], bool(lean[i])), position=position, uncertainty=unsure[i])
-        parts.append(scaled(moved, float(share[i])))
+        moved = with_axes(part, frames[i], np.array(part.position) - center)
+        parts.append(scaled(replace(moved, uncertainty=unsure[i]), float(share[i])))
     return tuple(parts)
 
 
@@ -36,20 +34,7 @@ def leaned(layout: Layout, lean: Array) -> Layout:
     """Returns a robot whose actuators lean by angles (n,) [rad]; see `turned_frames`."""
     frames = turned_frames(layout, np.zeros(layout.n), lean)
     pairs = zip(layout.actuators, frames, strict=True)
-    return replace(layout, actuators=tuple(_turned(part, frame, True) for part, frame in pairs))
-
-
-def _turned(part: Actuator, frame: Array, leans: bool) -> Actuator:
-    """An actuator with own axes (3, 3); a fin with a horizontal shaft that does not lean keeps its angle."""
-    first, second = (tuple(axis.tolist()) for axis in frame[:2])
-    if isinstance(part, Thruster):
-        return replace(part, axis=first)
-    if isinstance(part, Fin):
-        if part.mounting_angle is not None and not leans:
-            return replace(part, mounting_angle=math.atan2(first[1], first[0]))
-        return replace(part, mounting_angle=None, shaft=first, zero=second)
-    axes: dict[str, Any] = dict(zip(part.AXES, (first, second), strict=True))
-    return replace(part, **axes)
+    return replace(layout, actuators=tuple(with_axes(part, frame) for part, frame in pairs))
 
 
 def scaled(part: Actuator, share: float) -> Actuator:

@@ -157,13 +157,17 @@ def _fit(
     windows = cut([len(swim) for swim in swims], measured, smooth)
     model.meet(smooth[:, 6:])
     unknowns, deviation = Unknowns(model.blocks, BASE), DEVIATION
-    vector, start = np.zeros(unknowns.size), windows.start
-    for _ in range(ROUNDS):
-        tell("fitting actuators and body")
-        fitted = fit_windows(model, unknowns, windows, deviation, vector, start)
-        vector, start = fitted.vector, fitted.start
-        deviation = _deviation(fitted, deviation)
-        _keep_delays(model, fitted)
+
+    def fit(vector: Array, start: Array, what: str) -> Fitted:
+        nonlocal deviation
+        for _ in range(ROUNDS):
+            tell(f"fitting {what}")
+            fitted = fit_windows(model, unknowns, windows, deviation, vector, start)
+            vector, start, deviation = fitted.vector, fitted.start, _deviation(fitted, deviation)
+            _keep_delays(model, fitted)
+        return fitted
+
+    fitted = fit(np.zeros(unknowns.size), windows.start, "actuators and body")
     helps = None
     if other_law:
         tell("looking for another law of thrust")
@@ -172,11 +176,7 @@ def _fit(
     if helps:
         unknowns = Unknowns(model.blocks, (*BASE, SHAPE))
         vector = np.pad(fitted.vector, (0, unknowns.size - len(fitted.vector)))
-        for _ in range(ROUNDS):
-            tell("fitting another law of thrust")
-            fitted = fit_windows(model, unknowns, windows, deviation, vector, fitted.start)
-            vector, deviation = fitted.vector, _deviation(fitted, deviation)
-            _keep_delays(model, fitted)
+        fitted = fit(vector, fitted.start, "another law of thrust")
     deviation = _deviation(fitted, deviation)
     _keep_delays(model, fitted)
     tell("fitting all together")
