@@ -198,7 +198,7 @@ def archive_of(path: Path, **files: bytes) -> Path:
         (lambda p: archive_of(p / "a.zip", **{ROBOT: bytes(1_000_001)}), "larger than 1,000,000 bytes"),
         (
             lambda p: archive_of(p / "a.zip", **{table_name(b"%d" % k): b"" for k in range(501)}),
-            "holds a file twice, or more than 500 files",
+            "holds a file twice",
         ),
         (
             lambda p: archive_of(p / "a.zip", **{TABLES + "../" + "0" * 64 + ".csv": b""}),
