@@ -2,6 +2,8 @@
 
 import asyncio
 import contextlib
+import ctypes
+import gc
 import json
 import time
 
@@ -20,6 +22,8 @@ FRAME_S = 1 / 25
 STORAGE_KEY = "finlab-sessions"
 PATIENCE_S = (0.5, 1.0, 1.5, 2.0, 4.0, 8.0, 16.0, 30.0, 30.0)
 """How long a page may take to say which sessions it knows [s], try by try."""
+REST_S = 3.0
+"""How long after a page has gone its memory is given back [s]; once for all that go in that time."""
 PRESENT_S = (1.0, 1.0)
 """The same for a page whose work another one asks for: it may be gone without a word."""
 MAX_KEYS = 8
@@ -47,6 +51,7 @@ class App:
         self._keys: dict[int, str] = {}
         self._loop = server.get_event_loop()
         self._door = asyncio.Lock()
+        self._giving: asyncio.TimerHandle | None = None
         server.scene.world_axes.visible = False
         # With the first words to a browser: it would else draw its own light and shadows before ours.
         server.scene.configure_environment_map(None)
@@ -104,6 +109,15 @@ class App:
             view.close()
         if key is not None:
             self._store.leave(key)
+        if self._giving is None:
+            self._giving = self._loop.call_later(REST_S, self._give_back)
+
+    def _give_back(self) -> None:
+        """A page is full of references in circles, and what it took would else stay with the process."""
+        self._giving = None
+        gc.collect()
+        with contextlib.suppress(AttributeError, OSError):  # glibc alone has it
+            ctypes.CDLL(None).malloc_trim(0)
 
     async def _animate(self) -> None:
         before = time.monotonic()

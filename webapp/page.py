@@ -30,13 +30,13 @@ from webapp.tasks.jobs import Jobs
 from webapp.tasks.reading import Reading
 from webapp.tasks.solver import Solver
 from webapp.theme import BLUE, VERMILLION
-from webapp.viser_internals import run_script, uuid_of
+from webapp.viser_internals import hold_uploads, run_script, uuid_of
 
 PATIENCE_S = 0.025
 """How long a change waits for its answer before the page is written without it [s]."""
 
 MAX_UPLOAD = LARGEST_BUNDLE
-"""Largest file that a browser may send [bytes]; each kind of file has a limit of its own below it."""
+"""Largest size of files on their way from a page [bytes]; each kind has a limit of its own below it."""
 
 Input = TypeVar("Input")
 
@@ -69,6 +69,7 @@ class Page(ABC):
         self.ask = Asking(client.gui, self.presses).ask
         self.designs = Designs(context, self.jobs.exports, self.presses)
         self.opening = Opening(client.gui, self.presses)
+        hold_uploads(client.gui, MAX_UPLOAD, partial(self.notify, "Not possible"))
         self._build()
         self.presses.start()
         self._refresh()
@@ -178,16 +179,11 @@ class Page(ABC):
         button = self.gui.add_upload_button(label, **options)
         self._hint(button)
 
-        def take(file: viser.UploadedFile) -> None:
-            name, size = file.name[-80:], len(file.content)
-            if size > MAX_UPLOAD:
-                raise FinlabError(f"{name}: has {size:,} bytes, expected at most {MAX_UPLOAD:,}")
-            act(name, file.content)
-
         @button.on_upload
         async def _uploaded(event: Any) -> None:
             if event.client is not None:
-                self.do(partial(take, event.target.value))
+                file = event.target.value
+                self.do(partial(act, file.name[-80:], file.content))
 
         return button
 

@@ -1,5 +1,6 @@
 """Serves the app: opens the port, warms the solver up, and serves until it is stopped."""
 
+import gc
 import signal
 import socket
 import threading
@@ -45,6 +46,7 @@ def serve(
     try:
         if port not in (0, server.get_port()):
             raise FinlabError(f"port {port} was taken while the app started; choose another --port")
+        gc.freeze()  # what is there now stays: pages that go are found in less time
         stop = _signalled()  # whoever knows the address may send one
         secret = "" if guard.token is None else f"/?token={guard.token}"
         print(f"finlab app: http://{host}:{server.get_port()}{secret}  (Ctrl-C stops it)", flush=True)

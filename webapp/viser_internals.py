@@ -6,8 +6,9 @@ import io
 import logging
 import secrets
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import cache
+from http import HTTPStatus
 from importlib.resources import files
 from types import SimpleNamespace
 from typing import Any, get_type_hints
@@ -22,6 +23,7 @@ from websockets.http11 import Request, Response
 
 from webapp.first_page import name_page
 from webapp.guard import SECURE, Guard
+from webapp.guard import answer as status_page
 
 MAX_MESSAGE = 16 * 1024 * 1024
 """Longest message from a page [bytes]: the picture of a large view."""
@@ -49,7 +51,10 @@ def _guarded(guard: Guard) -> Iterator[None]:
         def ask(connection: Any, request: Request) -> Response | None:
             headers = {name.lower(): value for name, value in request.headers.raw_items()}
             verdict = guard.check(request.path, headers)
-            answer: Response | None = process_request(connection, request) if verdict is None else verdict
+            try:
+                answer: Response | None = verdict or process_request(connection, request)
+            except OSError:  # viser looks for a file of that name, which may be too long for one
+                answer = status_page(HTTPStatus.NOT_FOUND, "There is no such page.\n")
             return answer if verdict is not None or answer is None else name_page(answer)
 
         def secured(connection: Any, request: Request, response: Response) -> None:
@@ -136,6 +141,47 @@ def run_script(gui: viser.GuiApi, source: str) -> None:
 def run_file(gui: viser.GuiApi, name: str, more: str = "") -> None:
     """Run a script that lies beside this file, and a line more."""
     run_script(gui, files("webapp").joinpath(name).read_text("utf-8") + more)
+
+
+def hold_uploads(gui: viser.GuiApi, most: int, refuse: Callable[[str], object]) -> None:
+    """Hold what a page sends against what it announced: viser trusts it until the last part.
+
+    Args:
+        gui: the page's.
+        most: largest size of the files that are on their way from it, together [bytes].
+        refuse: called with a sentence that says why a file is dropped.
+    """
+    interface, states = gui._websock_interface, gui._current_file_upload_states
+
+    def drop(message: Any, size: int, sentence: str) -> None:
+        states.pop(message.transfer_uuid, None)
+        done = message.source_component_uuid, message.transfer_uuid, size, size
+        interface.queue_message(_messages.FileTransferPartAck(*done))  # the page waits no longer
+        refuse(sentence)
+
+    def begin(client: Any, message: Any) -> None:
+        name, size, parts = str(message.filename)[-80:], message.size_bytes, message.part_count
+        if type(size) is not int or type(parts) is not int or not 0 <= parts <= max(size, 0):
+            drop(message, 0, f"{name}: is announced with {size!r:.20} bytes in {parts!r:.20} parts")
+        elif size + sum(state["total_bytes"] for state in states.values()) > most:
+            drop(message, size, f"{name}: has {size:,} bytes, expected at most {most:,} on their way at once")
+        else:
+            gui._handle_file_transfer_start(client, message)
+
+    def gather(client: Any, message: Any) -> None:
+        state = states.get(message.transfer_uuid)
+        if state is None:
+            return
+        came = len(message.content) if isinstance(message.content, bytes) else most
+        if state["transferred_bytes"] + came > (size := state["total_bytes"]):
+            drop(message, size, f"{state['filename'][-80:]}: sends more than the {size:,} bytes it announced")
+        else:
+            gui._handle_file_transfer_part(client, message)
+
+    interface._incoming_handlers |= {
+        _messages.FileTransferStartUpload: [begin],
+        _messages.FileTransferPart: [gather],
+    }
 
 
 def stop_server(server: viser.ViserServer) -> None:

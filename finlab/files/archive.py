@@ -31,6 +31,8 @@ _DAMAGED = (
 )
 """What reading a damaged or locked archive ends with."""
 _PACKED = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
+_ENTRY = b"PK\x01\x02"
+"""What an entry of an archive's list of files begins with."""
 MOST_FILES = 500
 """Most files in an archive."""
 
@@ -55,11 +57,13 @@ def unpacked(
         FinlabError: of the kind `error`; the archive is damaged, holds a name twice, or a file is too large.
     """
     found: dict[str, bytes] = {}
+    if content.count(_ENTRY) > MOST_FILES:  # before a list of them is made
+        raise error.at(source, f"holds more than {MOST_FILES} files; pack it again")
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             entries = {entry.filename: entry for entry in archive.infolist() if not entry.is_dir()}
-            if len(archive.namelist()) > MOST_FILES or len(set(archive.namelist())) < len(archive.namelist()):
-                raise error.at(source, f"holds a file twice, or more than {MOST_FILES} files; pack it again")
+            if len(set(archive.namelist())) < len(archive.namelist()):
+                raise error.at(source, "holds a file twice; pack it again")
             for name, entry in entries.items():
                 if (own := largest(name)) is None:
                     continue

@@ -15,12 +15,11 @@ from typing import Any, NamedTuple, TypeVar
 
 from finlab.errors import FinlabError
 
-CPU_S, CPU_S_PER_BYTE = 1.7, 0.5e-6
-"""Processor time of a small file [s], and what each byte of it adds: a mesh takes 0.35 s per megabyte."""
-MEMORY, MEMORY_PER_BYTE = 270_000_000, 45
-"""Memory of the process with a small file [bytes], and what each byte of it adds: a GLB mesh takes 46."""
-LEAST_ROOM = 60_000_000
-"""Memory that a file may take in any case [bytes], however large the process that asked."""
+CPU_S, CPU_S_PER_BYTE = 1.8, 0.6e-6
+"""Processor time of a small file [s], and of each byte of a large one: a mesh takes 0.35 s per megabyte."""
+ROOM, ROOM_PER_BYTE = 150_000_000, 50
+"""Memory that reading a small file may take [bytes], and each byte of a large one: a GLB mesh takes 46. The
+process has about 110 MB before."""
 PATIENCE = 20.0
 """Times the processor time after which the process is ended although it has not used it."""
 
@@ -29,7 +28,7 @@ Found = TypeVar("Found")
 
 class _Limits(NamedTuple):
     seconds: float
-    memory: float
+    room: int
 
 
 def in_worker(read: Callable[..., Found], *arguments: Any) -> Found:
@@ -46,7 +45,7 @@ def in_worker(read: Callable[..., Found], *arguments: Any) -> Found:
         FinlabError: so did `read`; or it took too much time or memory, or failed.
     """
     size = sum(map(_size, arguments))
-    limits = _Limits(CPU_S + CPU_S_PER_BYTE * size, MEMORY + MEMORY_PER_BYTE * size)
+    limits = _Limits(max(CPU_S, CPU_S_PER_BYTE * size), max(ROOM, ROOM_PER_BYTE * size))
     context: Any = _context()
     here, there = context.Pipe(duplex=False)
     process = context.Process(target=_child, args=(there, limits, read, arguments), daemon=True)
@@ -144,18 +143,14 @@ def _limit(limits: _Limits) -> None:
         resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
         signal.signal(signal.SIGPROF, signal.SIG_DFL)
         signal.setitimer(signal.ITIMER_PROF, limits.seconds)  # the other one counts whole seconds
-        page = resource.getpagesize()
-        pages, resident = map(int, Path("/proc/self/statm").read_text().split()[:2])
-        room = int(max(limits.memory - resident * page, LEAST_ROOM))
-        resource.setrlimit(resource.RLIMIT_AS, (pages * page + room,) * 2)
+        pages = int(Path("/proc/self/statm").read_text().split()[0])
+        resource.setrlimit(resource.RLIMIT_AS, (pages * resource.getpagesize() + limits.room,) * 2)
 
 
 def _ended(code: int | None, limits: _Limits) -> FinlabError:
     """Why the process has ended without a word."""
     late = code in (-signal.SIGPROF, -signal.SIGXCPU, -signal.SIGKILL)
     why = (
-        f"time, more than {limits.seconds:.1f} s"
-        if late
-        else f"memory, more than {limits.memory / 1e6:.0f} MB"
+        f"time, more than {limits.seconds:.1f} s" if late else f"memory, more than {limits.room / 1e6:.0f} MB"
     )
     return FinlabError(f"reading the file takes too much {why}; make it smaller or simpler")

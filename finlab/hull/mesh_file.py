@@ -10,6 +10,7 @@ import trimesh
 from finlab.arrays import Array
 from finlab.errors import FinlabError
 from finlab.hull.mesh import Mesh
+from finlab.hull.mesh_size import check_glb, in_one_part
 from finlab.layout.body import MESH_SUFFIXES
 
 MAX_BYTES = 20_000_000
@@ -74,7 +75,10 @@ def _loaded(name: str, content: bytes) -> trimesh.Trimesh:
         raise FinlabError(f"{name}: expected a file ending in {', '.join(MESH_SUFFIXES)}")
     if len(content) > MAX_BYTES:
         raise FinlabError(f"{name}: is {len(content):,} bytes long, expected at most {MAX_BYTES:,}")
+    if kind == ".glb":
+        check_glb(name, content)
     try:
+        content = in_one_part(content) if kind == ".obj" else content
         # Without a resolver nothing beside this file is read: no textures, no materials. Without processing,
         # corners that are no numbers are not quietly left out.
         mesh = trimesh.load_mesh(BytesIO(content), file_type=kind[1:], process=False)

@@ -101,3 +101,23 @@ def test_shipped_robots_need_one_step_and_impossible_ones_say_so(ucat: Body) -> 
         vehicle.step(at_rest(), STILL, 0.02)
     with pytest.raises(LayoutError, match="beyond all bounds"):
         vehicle.step(np.full(STATE_SIZE, np.nan), STILL, 0.02)
+
+
+def test_a_motion_beyond_all_bounds_is_a_sentence(ucat: Body) -> None:
+    """Whatever a body's numbers are: no step overflows, and the next one is refused."""
+    rng = np.random.default_rng(0)
+    refused = 0
+    for _ in range(200):
+        light = replace(
+            ucat,
+            inertia_kgm2=tuple(10.0 ** rng.uniform(-9, -3, 3)),
+            added_mass=tuple(10.0 ** rng.uniform(-9, 7, 6)),
+            linear_damping=(0.0,) * 6,
+            quadratic_damping=(0.0,) * 6,
+        )
+        vehicle, wrench = Vehicle(light), tuple(10.0 ** rng.uniform(0, 6, 6))
+        try:
+            swim(vehicle, at_rest(), wrench, 0.5, 0.1)
+        except LayoutError as error:
+            refused += "its motion changes" in str(error)
+    assert refused > 100

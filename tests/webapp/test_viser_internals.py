@@ -1,14 +1,16 @@
 """What is put in place of viser's private parts gives what viser gives."""
 
 import gzip
+from http.client import HTTPConnection
+from typing import Any
 from urllib.request import Request, urlopen
 from zipfile import ZipFile
 
 import pytest
 import viser
-from viser import _icons
+from viser import _icons, _messages
 
-from webapp.viser_internals import start_server, stop_server
+from webapp.viser_internals import hold_uploads, start_server, stop_server
 
 
 def test_icons_and_properties_are_viser_s_own_and_read_once(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -44,4 +46,78 @@ def test_the_first_page_has_our_name_and_icon() -> None:
             page = gzip.decompress(body) if answer.headers["Content-Encoding"] == "gzip" else body
         assert page.count(b"<title>") == 1 and b"<title>finlab</title>" in page
         assert page.count(b'rel="icon"') == 1
+    stop_server(server)
+
+
+def test_names_that_no_file_can_have_are_not_found() -> None:
+    server = start_server()
+    for path in ("/" + "a" * 5_000, "/a/" * 1_000 + "b" * 300, "/%00", "/" + "%C3%A4" * 200):
+        connection = HTTPConnection("127.0.0.1", server.get_port(), timeout=20)
+        connection.request("GET", path)
+        assert 400 <= connection.getresponse().status < 500
+    stop_server(server)
+
+
+class Sending:
+    """A page with one button, whose messages are made by hand."""
+
+    def __init__(self, server: viser.ViserServer) -> None:
+        """At most a thousand bytes are taken."""
+        self.refused: list[str] = []
+        self.gui = server.gui
+        self.button = str(self.gui.add_upload_button("Open")._impl.uuid)
+        hold_uploads(self.gui, 1_000, self.refused.append)
+
+    def _tell(self, message: Any) -> None:
+        for hear in self.gui._websock_interface._incoming_handlers[type(message)]:
+            hear(0, message)  # type: ignore[arg-type, call-arg]
+
+    def begin(self, size: Any, parts: Any, key: str = "a") -> None:
+        """Announce a file."""
+        self._tell(_messages.FileTransferStartUpload(self.button, key, "a.csv", "text/csv", parts, size))
+
+    def part(self, index: int, content: Any, key: str = "a") -> None:
+        """Send a part of it."""
+        self._tell(_messages.FileTransferPart(self.button, key, index, content))
+
+    @property
+    def kept(self) -> int:
+        """Bytes that are held."""
+        states = self.gui._current_file_upload_states.values()
+        return sum(len(part) for state in states for part in state["parts"].values())
+
+
+def test_a_file_that_sends_more_than_it_announced_is_dropped_there(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    server = start_server()
+    page = Sending(server)
+    page.begin(10, 3)
+    page.part(0, b"hello")
+    assert page.kept == 5 and not page.refused
+    page.part(1, b"x" * 6)
+    assert page.kept == 0 and "sends more than the 10 bytes" in page.refused[0]
+    page.part(2, b"x" * 6)
+    assert page.kept == 0 and len(page.refused) == 1
+    page.begin(10, 2, "b")
+    page.part(0, "text", "b")
+    assert page.kept == 0 and len(page.refused) == 2
+    stop_server(server)
+
+
+def test_files_on_their_way_are_bounded_and_an_honest_one_arrives() -> None:
+    server = start_server()
+    page = Sending(server)
+    for size, parts in ((1_001, 1), (-1, 1), (2**70, 1), (5, 6), (None, 1), (1.0, 1), (5, -1)):
+        page.begin(size, parts)
+        page.part(0, b"x")
+        assert page.kept == 0
+    assert len(page.refused) == 7
+    for key in "abcd":
+        page.begin(400, 2, key)
+        page.part(0, b"x" * 300, key)
+    assert page.kept == 600 and len(page.refused) == 9
+    page.part(1, b"y" * 100)
+    handle: Any = page.gui._gui_input_handle_from_uuid[page.button]
+    assert handle.value.content == b"x" * 300 + b"y" * 100
     stop_server(server)

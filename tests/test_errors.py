@@ -1,0 +1,23 @@
+"""Sentences hold names that may come from a stranger."""
+
+import pytest
+
+from finlab.errors import DataError, FinlabError, LayoutError, printable
+
+
+@pytest.mark.parametrize(
+    ("name", "shown"),
+    [
+        ("plain ö 10 °", "plain ö 10 °"),
+        ("a\x1b[2Jb", "a\\x1b[2Jb"),
+        ("a\rb\tc\x00", "a\\rb\\tc\\x00"),
+        ("left\u202eright", "left\\u202eright"),
+        ("two\nlines", "two\nlines"),
+        ("half\ud800", "half\\ud800"),
+    ],
+)
+def test_what_a_terminal_would_obey_is_escaped(name: str, shown: str) -> None:
+    assert printable(name) == shown == printable(shown)
+    assert str(FinlabError(name)) == str(DataError.at(name, "")) == shown
+    error = LayoutError("is wrong", name).under("body", "a.yaml")
+    assert str(error) == f"a.yaml: body.{shown}: is wrong" and error.key == f"body.{name}"
