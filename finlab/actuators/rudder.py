@@ -221,11 +221,12 @@ class RudderGroup(Group):
 
     def commands(self, force: Array, previous: Array | None = None) -> Array:
         """See `Group`."""
+        size = np.abs(force[..., 0]) / np.maximum(self._met.pressure, NOTHING)
         command = np.zeros((*force.shape[:-1], 3))
         for i, (lifts, angles, _) in enumerate(self._curves):
-            size = np.abs(force[..., i, 0]) / max(self._met.pressure[i], NOTHING)
-            angle = np.sign(force[..., i, 0]) * np.interp(size, lifts, angles)
-            command[..., i, 0] = np.clip(angle + self._turned[i], *self._limits[i])
+            command[..., i, 0] = np.interp(size[..., i], lifts, angles)
+        angle = np.copysign(command[..., 0], force[..., 0]) + self._turned
+        command[..., 0] = np.minimum(np.maximum(angle, self._limits[:, 0]), self._limits[:, 1])
         return command
 
     def reach(self, lower: Array, upper: Array) -> Array:
