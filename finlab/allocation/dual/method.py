@@ -341,7 +341,7 @@ class Dual(Method):
         least power in all of it, where they are found."""
         robot = self.compiled.robot
         target = robot.target(near.wrench[None])
-        root = solve(robot, target, sets)
+        root = solve(robot, target, sets, deadline=deadline)
         within = ~root.beyond
         found, _ = self._in_gaps(target, sets, root, within, deadline)
         if within[0]:
