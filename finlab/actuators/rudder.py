@@ -47,6 +47,14 @@ class Met(NamedTuple):
     course: Array
     """Direction of travel from zero towards shaft x zero [rad]."""
 
+    def force(self, lift: Array, drag: Array) -> Array:
+        """Returns forces (..., n, 3) [N] in own frames of coefficients (..., n)."""
+        cos, sin = np.cos(self.course), np.sin(self.course)
+        force = np.zeros((*lift.shape, 3))
+        force[..., 1] = -self.pressure * (drag * cos + lift * sin)
+        force[..., 2] = self.pressure * (lift * cos - drag * sin)
+        return force
+
 
 class RudderLaw(ActuatorLaw):
     """n rudders."""
@@ -89,21 +97,15 @@ class RudderLaw(ActuatorLaw):
 
     def force(self, command: Values, inflow: Array | None = None) -> Values:
         """See `ActuatorLaw`."""
-        if inflow is None:
-            return 0.0 * command
-        met = self.met(inflow)
-        found = self.coefficients(command[..., 0] - met.course)
-        return _along(met, found.lift, found.drag)
+        return self.force_and_jacobian(command, inflow)[0]
 
     def force_and_jacobian(self, command: Array, inflow: Array | None = None) -> tuple[Array, Array]:
         """See `ActuatorLaw`."""
-        if inflow is None:
-            return np.zeros(command.shape), np.zeros((*command.shape, 3))
-        met = self.met(inflow)
+        met = self.met(np.zeros(command.shape) if inflow is None else inflow)
         found = self.coefficients(command[..., 0] - met.course)
-        force = _along(met, found.lift, found.drag)
+        force = met.force(found.lift, found.drag)
         jacobian = np.zeros((*force.shape, 3))
-        jacobian[..., 0, :] = _along(met, found.lift_slope, found.drag_slope)
+        jacobian[..., 0, :] = met.force(found.lift_slope, found.drag_slope)
         return force, jacobian
 
     def power(self, command: Values, inflow: Array | None = None) -> Values:
@@ -115,21 +117,9 @@ class RudderLaw(ActuatorLaw):
 
     def power_gradient(self, command: Array, inflow: Array | None = None) -> Array:
         """See `ActuatorLaw`."""
-        gradient = np.zeros(command.shape)
-        if inflow is not None:
-            met = self.met(inflow)
-            slope = met.pressure * met.speed * self.coefficients(command[..., 0] - met.course).drag_slope
-            gradient = np.zeros((*slope.shape, 3))
-            gradient[..., 0] = slope
-        return gradient
-
-
-def _along(met: Met, lift: Array, drag: Array) -> Array:
-    """Forces (..., n, 3) [N] in own frames of coefficients (..., n)."""
-    cos, sin = np.cos(met.course), np.sin(met.course)
-    along = met.pressure * -drag
-    across = met.pressure * lift
-    return np.stack([np.zeros_like(along), along * cos - across * sin, along * sin + across * cos], axis=-1)
+        met = self.met(np.zeros(command.shape) if inflow is None else inflow)
+        slope = met.pressure * met.speed * self.coefficients(command[..., 0] - met.course).drag_slope
+        return slope[..., None] * [1.0, 0.0, 0.0]
 
 
 class RudderGroup(Group):
@@ -231,11 +221,12 @@ class RudderGroup(Group):
 
     def commands(self, force: Array, previous: Array | None = None) -> Array:
         """See `Group`."""
+        size = np.abs(force[..., 0]) / np.maximum(self._met.pressure, NOTHING)
         command = np.zeros((*force.shape[:-1], 3))
         for i, (lifts, angles, _) in enumerate(self._curves):
-            size = np.abs(force[..., i, 0]) / max(self._met.pressure[i], NOTHING)
-            angle = np.sign(force[..., i, 0]) * np.interp(size, lifts, angles)
-            command[..., i, 0] = np.clip(angle + self._turned[i], *self._limits[i])
+            command[..., i, 0] = np.interp(size[..., i], lifts, angles)
+        angle = np.copysign(command[..., 0], force[..., 0]) + self._turned
+        command[..., 0] = np.minimum(np.maximum(angle, self._limits[:, 0]), self._limits[:, 1])
         return command
 
     def reach(self, lower: Array, upper: Array) -> Array:

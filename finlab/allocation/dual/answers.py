@@ -133,11 +133,11 @@ class Answers:
         """Answers to prices (k, N), with or without their conjugates."""
         lines, n, drags = self.lines, self.lines + self.planes, len(self.dragging) > 0
         if drags:
-            price, ratio = self._without_drag(price)
+            price, *without = self._without_drag(price)
         if not self.planes:
             force, slope, conjugate = self._limited(price[:n], lines, self._row, sets, worth=worth or drags)
             if drags and conjugate is not None:
-                rise, steep = self._dragged(price, ratio, force, slope, conjugate, sets)
+                rise, steep = self._dragged(price, without, force, slope, conjugate, sets)
                 force, slope = np.concatenate([force, rise]), np.concatenate([slope, *steep])
             return Answer(force, slope, None if conjugate is None else conjugate.sum(axis=0))
         first, second = self.pair(price)
@@ -155,27 +155,28 @@ class Answers:
             blend(planar, conjugate[lines:], places, other, others, width, sets.reverse[places] > 0.0)
         parts = [planar.first, planar.second], [planar.xx, planar.xy, planar.yy]
         if drags and conjugate is not None:
-            rise, steep = self._dragged(price, ratio, size, slope, conjugate, sets)
+            rise, steep = self._dragged(price, without, size, slope, conjugate, sets)
             parts = [*parts[0], rise], [*parts[1], *steep]
         if lines:
             parts = [size[:lines], *parts[0]], [slope[:lines], *parts[1]]
         total = None if conjugate is None else conjugate.sum(axis=0)
         return Answer(np.concatenate(parts[0]), np.concatenate(parts[1]), total)
 
-    def _without_drag(self, price: Array) -> tuple[Array, Array]:
-        """Prices (k, N) that lines without drag answer as those that drag do, and r (f, N)."""
+    def _without_drag(self, price: Array) -> tuple[Array, ...]:
+        """Prices (k, N) that lines without drag answer as those that drag do, r (f, N), and what softens it."""
         ratio = 1.0 - price[len(price) - len(self.dragging) :] / self._speed
+        softened = _softened(ratio)
         price = price.copy()
-        price[self.dragging] /= _softened(ratio)[0]
-        return price, ratio
+        price[self.dragging] /= softened[0]
+        return price, ratio, *softened
 
     def _dragged(
-        self, price: Array, ratio: Array, force: Array, slope: Array, conjugate: Array, sets: Sets
+        self, price: Array, without: list[Array], force: Array, slope: Array, conjugate: Array, sets: Sets
     ) -> tuple[Array, tuple[Array, Array]]:
         """Drag (f, N) [N] that comes with the forces, and its derivatives; the derivatives and conjugates of
         forces (n, N) are changed, in place, into what they are with the drag, by `_without_drag`."""
         at, rest, speed = self.dragging, self._rest, self._speed
-        own, (soft, rate, bend) = price[at], _softened(ratio)
+        own, (ratio, soft, rate, bend) = price[at], without
         cost = own * force[at] - conjugate[at] - rest
         most = np.maximum(sets.low_cost[at], sets.high_cost[at]) - rest
         conjugate[at] = soft * (conjugate[at] + rest) + (soft - ratio) * most - rest

@@ -116,7 +116,7 @@ def least_power(robot: DualRobot, target: Array, sets: Sets, root: Prices, deadl
         if not len(nearer):
             break
         parts = _dive(robot, parts, nearer, amount[:, nearer], answer)
-        answer = _solved(robot, target, parts)
+        answer = _solved(robot, target, parts, deadline)
     parts, answer, value = start, root, np.full(count, np.inf)
     for round_ in range(ROUNDS + 1):
         amount = gaps(robot, answer.force, parts.sets, answer.prices)
@@ -129,14 +129,14 @@ def least_power(robot: DualRobot, target: Array, sets: Sets, root: Prices, deadl
         if not len(kept):
             break
         parts = _cut(robot, parts, kept, amount[:, kept], answer)
-        answer = _solved(robot, target, parts)
+        answer = _solved(robot, target, parts, deadline)
     return Branched(best.force, best.found, value)
 
 
-def _solved(robot: DualRobot, target: Array, parts: _Parts) -> Prices:
+def _solved(robot: DualRobot, target: Array, parts: _Parts, deadline: Deadline) -> Prices:
     """The prices of parts; what is unsolved and has a gap is cut on."""
-    steps = STEPS_AT_KINK
-    return solve(robot, target[:, parts.row], parts.sets, parts.prices, True, "many", most_steps=steps)
+    own = target[:, parts.row]
+    return solve(robot, own, parts.sets, parts.prices, True, "many", STEPS_AT_KINK, deadline)
 
 
 class _Best:

@@ -9,7 +9,7 @@ LIMIT_S = 0.15
 class Deadline:
     """When the searches of one call end."""
 
-    def __init__(self, targets: int) -> None:
+    def __init__(self, targets: float) -> None:
         self._end = thread_time() + LIMIT_S * targets
         self._struck = False
 
@@ -23,3 +23,7 @@ class Deadline:
         """The sentence about a search that has ended so."""
         ended = "the search for a better answer was ended by its limit of processor time"
         return {ended} if self._struck else set()
+
+
+NEVER = Deadline(float("inf"))
+"""One that does not come."""

@@ -38,11 +38,19 @@ class Cost(NamedTuple):
         return slope
 
 
+class Priced(NamedTuple):
+    """A command that gives a wrench."""
+
+    command: Array
+    """The command (n, 3)."""
+    cost: float
+    """Its cost [W]."""
+
+
 def command_with_drag(
     problem: CommandProblem, cost: Cost, wrench: Array, starts: Array, enough: float
-) -> Array | None:
-    """Returns a command (n, 3) that gives a normalized wrench (6,), the cheapest of those found; None where
-    there is none.
+) -> Priced | None:
+    """Returns what gives a normalized wrench (6,), the cheapest of those found; None where there is none.
 
     Args:
         problem: the robot.
@@ -52,10 +60,11 @@ def command_with_drag(
         enough: normalized error at which no further step is taken.
     """
     found = refine(problem, wrench[None], starts, 2 * ROUNDS, enough)
-    met = found.error <= NEARLY
-    if not met.any():
+    met = np.flatnonzero(found.error <= NEARLY)
+    if not len(met):
         return None
-    return np.asarray(found.command[np.where(met, cost.of(found.command), np.inf).argmin()])
+    costs = cost.of(found.command[met])
+    return Priced(found.command[met[costs.argmin()]], float(costs.min()))
 
 
 def prices_at(problem: CommandProblem, cost: Cost, command: Array, directions: Array) -> Array:
@@ -71,27 +80,40 @@ def prices_at(problem: CommandProblem, cost: Cost, command: Array, directions: A
     return prices[:, None]
 
 
-def cheapened(problem: CommandProblem, cost: Cost, wrench: Array, command: Array, enough: float) -> Array:
-    """Returns a command (n, 3) for a normalized wrench (6,) that takes no more power than another one.
+def cheapened(
+    problem: CommandProblem, cost: Cost, wrench: Array, starts: Array, enough: float
+) -> Priced | None:
+    """Returns what gives a normalized wrench (6,) at least cost near to the cheapest of some commands
+    (R, n, 3); None where steps from none of these give it.
 
     Each step follows the power's slope along what gives the same wrench (sequential quadratic programming,
-    with the size of the curvature), as far as that lowers the power.
+    with the size of the curvature), as far as that lowers the power. A single start that is near to giving
+    the wrench takes such a step first.
     """
-    least, size = float(cost.of(command[None])[0]), 1.0
-    for _ in range(ROUNDS):
-        step = _cheaper_step(problem, cost, command)
-        found = command_with_drag(problem, cost, wrench, (command + size * step)[None], enough)
-        power = np.inf if found is None else float(cost.of(found[None])[0])
-        gain, size = least - power, size if power < least else 0.25 * size
+    best, size = None, 1.0
+    if len(starts) == 1:
+        step, gain = _cheaper_step(problem, cost, starts[0])
+        best = command_with_drag(problem, cost, wrench, starts + step, enough)
+        if best is not None and gain <= 10.0 * CLOSE * best.cost:
+            return best
+    best = best or command_with_drag(problem, cost, wrench, starts, enough)
+    for _ in range(ROUNDS if best is not None else 0):
+        assert best is not None
+        step = size * _cheaper_step(problem, cost, best.command)[0]
+        found = command_with_drag(problem, cost, wrench, (best.command + step)[None], enough)
+        gain = -np.inf if found is None else best.cost - found.cost
         if found is not None and gain > 0.0:
-            command, least = found, power
-        if abs(gain) <= 10.0 * CLOSE * least:
+            best = found
+        else:
+            size *= 0.25
+        if abs(gain) <= 10.0 * CLOSE * best.cost:
             break
-    return command
+    return best
 
 
-def _cheaper_step(problem: CommandProblem, cost: Cost, command: Array) -> Array:
-    """A step (n, 3) of a command along which the wrench stays and the power falls."""
+def _cheaper_step(problem: CommandProblem, cost: Cost, command: Array) -> tuple[Array, float]:
+    """A step (n, 3) of a command along which the wrench stays and the power falls, and by how much it would
+    fall [W]."""
     width = np.maximum(problem.width, NOTHING)
     tried = command + np.concatenate([np.zeros((1, 1, 3)), NEARLY * np.eye(3)[:, None]]) * width
     jacobian = width[:, :, None] * (problem.fin.force_and_jacobian(tried)[1] @ problem.effectiveness)
@@ -106,5 +128,5 @@ def _cheaper_step(problem: CommandProblem, cost: Cost, command: Array) -> Array:
     rows, left = jacobian[0][free], left[0][free]
     held = np.linalg.lstsq(rows.T @ (rows / bend[:, None]), rows.T @ (left / bend), rcond=NOTHING)[0]
     step = np.zeros(command.shape)
-    step[free] = np.clip(-(left - rows @ held) / bend, -0.25, 0.25)
-    return step * width
+    step[free] = own = np.clip(-(left - rows @ held) / bend, -0.25, 0.25)
+    return step * width, float(-(left + 0.5 * bend * own) @ own)

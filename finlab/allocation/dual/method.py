@@ -275,7 +275,7 @@ class Dual(Method):
             steps, near = STEPS_WITH_DRAG, self.compiled.commands(first)[0]
             if prices is None:
                 prices = prices_at(self._problem, self._cost, near, self._directions)
-        root = solve(robot, target, sets, prices, way="one" if drags else "either", most_steps=steps)
+        root = solve(robot, target, sets, prices, drags, "one" if drags else "either", steps)
         within = root.solved | (~root.beyond & torn)
         if robot.basis.shape[1] < 6:
             rest = targets / robot.scale - (robot.basis @ target).T
@@ -287,7 +287,7 @@ class Dual(Method):
             force, value = self._in_gaps(target, sets, root, within, deadline)
         command = None
         if first is not None:
-            command, prices = self._with_drag(targets[0], force, first, root)
+            command, prices = self._with_drag(targets[0], force, first, root, deadline)
             within[0] = not np.isnan(command).any()
         if not within.all() and policy is not None:
             force, prices, value, aim = force.copy(), prices.copy(), value.copy(), aim.copy()
@@ -299,40 +299,36 @@ class Dual(Method):
                     self._cheaper_in_gaps(sets.take(at), near, force[:, row], deadline)
         return Forces(force, robot.price(prices), within, prices, value, aim, command)
 
-    def _with_drag(self, wrench: Array, force: Array, first: Array, root: Prices) -> tuple[Array, Array]:
+    def _with_drag(
+        self, wrench: Array, force: Array, first: Array, root: Prices, deadline: Deadline
+    ) -> tuple[Array, Array]:
         """A command (1, n, 3) for a wrench (6,) from forces (k, 1) near to it, or the first ones, NaN where
         there is none; and its prices (r, 1)."""
-        robot, begin, problem, cost = (
-            self.compiled.robot,
-            self.compiled.commands(force),
-            self._problem,
-            self._cost,
-        )
-        asked = (wrench + self.compiled.beside) / self.scale
-        if root.solved[0] and self._error(begin, (self.scale * asked)[None])[0] <= EXACT:
-            return begin, root.prices
-        starts = np.concatenate([begin, self.compiled.commands(first)])
-        command, prices = command_with_drag(problem, cost, asked, starts, EXACT), root.prices
-        if command is not None:
-            command = cheapened(problem, cost, asked, command, EXACT)
+        robot, problem, cost = self.compiled.robot, self._problem, self._cost
+        aim, prices, begin = wrench + self.compiled.beside, root.prices, self.compiled.commands(force)
+        if root.solved[0] and self._error(begin, aim[None])[0] <= EXACT:
+            return begin, prices
+        asked, value = aim / self.scale, root.value
+
+        best_of = partial(cheapened, problem, cost, asked, enough=EXACT)
+        best = best_of(begin) or best_of(self.compiled.commands(first))
+        if best is not None:
             if not root.solved[0]:
-                tried = prices_at(problem, cost, command, self._directions)
+                tried = prices_at(problem, cost, best.command, self._directions)
                 prices = np.concatenate([prices, tried], axis=1)
-            value = dual_value(robot, robot.target(wrench[None]), robot.sets, prices)
-            prices = prices[:, value.argmax()][:, None]
+                value = dual_value(robot, robot.target(wrench[None]), robot.sets, prices)
+                prices = prices[:, value.argmax()][:, None]
             # Else others may be far cheaper, as the dual leaves out the doubt of what drags.
-            if self.compiled.doubt is None and cost.of(command[None])[0] <= 2.0 * value.max():
-                return command[None], prices
+            if self.compiled.doubt is None and best.cost <= 2.0 * value.max():
+                return best.command[None], prices
         starts = self.plant.sample(np.random.default_rng(0), (ROUNDS,))
         for places, group in self.compiled.groups:
             if not group.feels_flow:
                 starts[::2, places] = begin[0, places]
-        other = None if root.beyond[0] else command_with_drag(problem, cost, asked, starts, EXACT)
-        if other is not None:
-            other = cheapened(problem, cost, asked, other, EXACT)
-            found = np.stack([other if command is None else command, other])
-            command = found[cost.of(found).argmin()]
-        return np.full_like(begin, np.nan) if command is None else command[None], prices
+        other = None if root.beyond[0] or deadline.passed() else best_of(starts)
+        found = [each for each in (best, other) if each is not None]
+        command = min(found, key=lambda each: each.cost).command if found else np.full_like(begin[0], np.nan)
+        return command[None], prices
 
     @property
     def _directions(self) -> Array:
@@ -345,7 +341,7 @@ class Dual(Method):
         least power in all of it, where they are found."""
         robot = self.compiled.robot
         target = robot.target(near.wrench[None])
-        root = solve(robot, target, sets)
+        root = solve(robot, target, sets, deadline=deadline)
         within = ~root.beyond
         found, _ = self._in_gaps(target, sets, root, within, deadline)
         if within[0]:
@@ -392,7 +388,7 @@ class Dual(Method):
                 shares = np.geomspace(HOLLOW, 1.0, len(draw))[:, None, None]
                 starts = command[row] + shares * draw * self._problem.width
                 other = command_with_drag(self._problem, self._cost, aim[row] / self.scale, starts, EXACT)
-                command[row] = command[row] if other is None else other
+                command[row] = command[row] if other is None else other.command
         return self.plant.rested(command)
 
     def _error(self, command: Array, aim: Array) -> Array:

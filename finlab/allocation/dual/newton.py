@@ -13,6 +13,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from finlab.allocation.dual.deadline import NEVER, Deadline
 from finlab.allocation.dual.robot import DualRobot
 from finlab.allocation.dual.sets import Sets
 from finlab.arrays import Array
@@ -115,6 +116,7 @@ def solve(
     value: bool = False,
     way: Literal["either", "one", "many"] = "either",
     most_steps: int = MOST_STEPS,
+    deadline: Deadline = NEVER,
 ) -> Prices:
     """Prices for targets. One target is solved without the value, which takes long, until that is needed.
 
@@ -127,6 +129,7 @@ def solve(
         way: whether targets take the way of one or of many; where either will do, what remains unsolved is
             tried the other way, so that a target has the same answer alone and among others.
         most_steps: after how many steps a target is given up.
+        deadline: when all are.
     """
     sets = robot.sets if sets is None else sets
     count = target.shape[1]
@@ -136,21 +139,19 @@ def solve(
     else:
         ridge = np.full(count, NEARLY)
     most = sets.most_cost * (1.0 + 1e-9) + 1e-9 + np.zeros(count)
+    end = most_steps, deadline
     with np.errstate(invalid="ignore"):  # systems without an inverse are told by what is not finite
         if count == 1 and way != "many":
             state = _state(robot, target, prices, sets, value or bool(ridge[0] > NEARLY))
-            found = _one(robot, state, sets, float(ridge[0]), float(most[0]), value, most_steps)
+            found = _one(robot, state, sets, float(ridge[0]), float(most[0]), value, end)
             if found.solved[0] or found.beyond[0] or way == "one":
                 return found
-        found = _many(robot, _state(robot, target, prices, sets), sets, ridge, most, most_steps)
+        found = _many(robot, _state(robot, target, prices, sets), sets, ridge, most, end)
         if count > 1 and way == "either":
             for row in np.flatnonzero(~(found.solved | found.beyond)):
-                at = slice(row, row + 1)
-                state = _state(robot, target[:, at], prices[:, at], sets.take(np.array([row])))
-                again = _one(
-                    robot, state, sets.take(np.array([row])), float(ridge[row]), most[row], True, most_steps
-                )
-                found.put(np.array([row]), again)
+                at = np.array([row])
+                own, state = sets.take(at), _state(robot, target[:, at], prices[:, at], sets.take(at))
+                found.put(at, _one(robot, state, own, float(ridge[row]), most[row], True, end))
     return found
 
 
@@ -196,18 +197,18 @@ def _one(
     ridge: float,
     most: float,
     value: bool,
-    most_steps: int = MOST_STEPS,
+    end: tuple[int, Deadline],
 ) -> Prices:
     """`solve` for one target. The dual value takes long: it is asked for where a step was too long, or the
     target may be out of reach."""
     spare = most - sets.least_cost  # the value is no more than what is paid and this cost
     growth, told = 2.0, state.conjugate is not None
-    for steps in range(most_steps + 1):
+    for steps in range(end[0] + 1):
         solved, beyond = bool(state.size[0] <= TOLERANCE), False
         if not solved and state.paid[0] > spare:
             told, state = True, _valued(robot, state, sets)
             beyond = bool(state.value[0] > most)
-        if solved or beyond or steps == most_steps or ridge > MOST_RIDGE:
+        if solved or beyond or steps == end[0] or ridge > MOST_RIDGE or end[1].passed():
             break
         step = _step(robot, state, np.array([ridge]))
         trial = _state(robot, state.target, state.prices + step, sets, told)
@@ -232,7 +233,9 @@ def _valued(robot: DualRobot, state: _State, sets: Sets) -> _State:
     return state if state.conjugate is not None else _state(robot, state.target, state.prices, sets)
 
 
-def _many(robot: DualRobot, state: _State, sets: Sets, ridge: Array, most: Array, most_steps: int) -> Prices:
+def _many(
+    robot: DualRobot, state: _State, sets: Sets, ridge: Array, most: Array, end: tuple[int, Deadline]
+) -> Prices:
     """`solve` for many targets, those that are done left out."""
     count = state.target.shape[1]
     place, growth = np.arange(count), np.full(count, 2.0)
@@ -244,10 +247,10 @@ def _many(robot: DualRobot, state: _State, sets: Sets, ridge: Array, most: Array
         np.zeros(count, bool),
         np.zeros(count, np.intp),
     )
-    for steps in range(most_steps + 1):
+    for steps in range(end[0] + 1):
         solved = state.size <= TOLERANCE
         beyond = ~solved & (state.value > most)
-        done = solved | beyond | (steps == most_steps) | (ridge > MOST_RIDGE)
+        done = solved | beyond | (steps == end[0] or end[1].passed()) | (ridge > MOST_RIDGE)
         if done.any():
             own = Prices(state.prices, state.force, state.value, solved, beyond, np.full(len(place), steps))
             found.put(place[done], own.take(np.flatnonzero(done)))

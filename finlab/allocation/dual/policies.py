@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from finlab.allocation.dual.branch import halves
-from finlab.allocation.dual.deadline import Deadline
+from finlab.allocation.dual.deadline import NEVER, Deadline
 from finlab.allocation.dual.nearest_point import CLOSE_BY, Mixture, farthest_along, nearest_point
 from finlab.allocation.dual.newton import solve
 from finlab.allocation.dual.robot import DualRobot
@@ -74,7 +74,7 @@ def nearest(
     inside = np.zeros(6) if policy.kind == "direction" else robot.effectiveness.T @ robot.middle(part)
     given = robot.effectiveness.T @ force
     met = np.where(np.abs(given - wrench) <= FINE * yardstick, wrench, given)
-    return cheapest(robot, part, force, inside, met)
+    return cheapest(robot, part, force, inside, met, deadline)
 
 
 def _missed(
@@ -97,7 +97,12 @@ def _axis_weights(policy: Policy) -> Array:
 
 
 def cheapest(
-    robot: DualRobot, sets: Sets, force: Array, inside: Array, wanted: Array | None = None
+    robot: DualRobot,
+    sets: Sets,
+    force: Array,
+    inside: Array,
+    wanted: Array | None = None,
+    deadline: Deadline = NEVER,
 ) -> Nearest:
     """The least power for the wrench that some forces (k,) give, or for one hardly apart (6,); where Newton's
     method does not settle at the rim of what can be given, a little towards a wrench inside (6,), and else
@@ -106,7 +111,7 @@ def cheapest(
     inwards = (inside - wrench) / max(1.0, float(np.linalg.norm((inside - wrench) / robot.scale)))
     aims = [wrench, wrench + NEARLY * inwards]
     for aim in aims if wanted is None else [wanted, *aims]:
-        found = solve(robot, robot.target(aim[None]), sets, way="one", most_steps=STEPS_AT_RIM)
+        found = solve(robot, robot.target(aim[None]), sets, None, False, "one", STEPS_AT_RIM, deadline)
         if found.solved[0]:
             return Nearest(found.force[:, 0], aim, found.prices[:, 0])
     return Nearest(force, wrench, found.prices[:, 0])
