@@ -1,0 +1,1 @@
+"""How the paper's two networks are trained: forward samples, surrogate, allocator. It needs torch."""

@@ -1,0 +1,1 @@
+"""Training of any network: the loop, its state on disk, its devices and its curves. It needs torch."""
