@@ -204,6 +204,16 @@ class DataSet:
         return Batch(*(part[layout] for part in robots), commands[layout, command], wrench[layout, command])
 
 
+def fresh_batch(settings: DataSettings) -> Batch:
+    """All samples of a data set, in memory alone."""
+    robots = [_samples(settings, k) for k in range(settings.layouts)]
+    times = [len(robot["wrench"]) for robot in robots]
+    whole = {name: np.stack([robot[name] for robot in robots]) for name in Batch._fields}
+    once = {name: np.repeat(whole[name], times, axis=0) for name in Batch._fields[:5]}
+    flat = {name: np.concatenate(whole[name]) for name in Batch._fields[5:]}
+    return Batch(*(torch.from_numpy(part) for part in (once | flat).values()))
+
+
 def _part(folder: Path, number: int) -> Path:
     return folder / f"part-{number:05d}.npz"
 
