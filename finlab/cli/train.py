@@ -79,9 +79,7 @@ def surrogate(
     from finlab.paper.training.surrogate import train_surrogate
 
     check_positive(steps=steps)
-    made = train_surrogate(
-        preset, output, data=data, seed=seed, steps=steps, resume=resume, device=device
-    )
+    made = train_surrogate(preset, output, data=data, seed=seed, steps=steps, resume=resume, device=device)
     _report(output, made)
 
 
@@ -96,7 +94,7 @@ def allocator(
     resume: bool = False,
     device: _Device = None,
 ) -> None:
-    """Train the paper's network with a trained surrogate, which stays as it is, and write a checkpoint folder.
+    """Train the paper's network with a frozen surrogate and write a whole checkpoint folder.
 
     Args:
         output: folder for checkpoint, model card, log, curves and state.

@@ -8,7 +8,7 @@ APART = ("step", "samples", "seconds")
 
 
 def curves(rows: list[dict[str, float]]) -> bytes | None:
-    """A PNG of a log's columns over its steps; None where matplotlib is not installed or nothing is logged."""
+    """A PNG of a log's columns over its steps; None without matplotlib, and of an empty log."""
     try:
         from matplotlib.figure import Figure
     except ImportError:

@@ -76,7 +76,12 @@ class Training:
     """A run: its weights, their running average, its optimizer and its log."""
 
     def __init__(
-        self, weights: Weights, settings: LoopSettings, folder: Path, identity: dict[str, Any], place: Workplace
+        self,
+        weights: Weights,
+        settings: LoopSettings,
+        folder: Path,
+        identity: dict[str, Any],
+        place: Workplace,
     ) -> None:
         """Prepare a run.
 
@@ -121,8 +126,8 @@ class Training:
             raise DataError(f"{path}: no state to go on from ({reason}); train without --resume") from error
         if changed:
             raise DataError(
-                f"{self.folder}: holds a run with other settings ({', '.join(changed)}); resume with the same "
-                "ones, or train without --resume"
+                f"{self.folder}: holds a run with other settings ({', '.join(changed)}); resume with the same"
+                " ones, or train without --resume"
             )
 
     def run(self, terms_of: Terms, save: Callable[[State, dict[str, Any]], None], spent: float = 0.0) -> None:

@@ -35,11 +35,13 @@ def card(weights: TrainedWeights) -> str:
         rows.append(("components", "8", sizes["n_components"]))
     if weights.surrogate_sizes is not None:
         rows.append(("surrogate, hidden", "512", ", ".join(map(str, weights.surrogate_sizes["hidden"]))))
-    rows += [(f"{part}: {name}", "", f"{x:.4g}") for part, m in weights.metrics.items() for name, x in m.items()]
+    rows += [
+        (f"{part}: {name}", "", f"{x:.4g}") for part, m in weights.metrics.items() for name, x in m.items()
+    ]
     table = "\n".join(f"| {name} | {printed} | {done} |" for name, printed, done in rows)
     what = "network and surrogate" if sizes is not None else "surrogate"
     return (
-        f"# Model card: `{weights.name}`\n\nThe paper's {what}, preset `{weights.preset}`, for method `paper`. "
+        f"# Model card: `{weights.name}`\n\nThe paper's {what}, preset `{weights.preset}`, for method `paper`.\n"
         f"Weights: SHA-256 {weights.sha256}.\n\n| | printed | done |\n|---|---|---|\n{table}\n{_CHOICES}"
         "\n`log.csv` and `curves.png` show the training; `config.json` holds every setting.\n"
     )
@@ -49,7 +51,11 @@ def _rows(verb: str, run: dict[str, Any]) -> list[tuple[str, Any, Any]]:
     data, training, network = run["data"], run["training"], verb == "allocator"
     rate = f"{training['learning_rate']:g}" + (", falling along a cosine" if training["cosine"] else "")
     rows: list[tuple[str, Any, Any]] = [
-        ("data", "1000 layouts x 5000 commands", f"{data['layouts']} x {data['commands']}, seed {data['seed']}"),
+        (
+            "data",
+            "1000 layouts x 5000 commands",
+            f"{data['layouts']} x {data['commands']}, seed {data['seed']}",
+        ),
         ("layouts with limits of their own", "", f"{data['varied_limits']:g}"),
         ("fin model", "", data["fin_model"]["type"]),
         ("samples", "575 million" if network else "", run["samples"]),
@@ -58,7 +64,8 @@ def _rows(verb: str, run: dict[str, Any]) -> list[tuple[str, Any, Any]]:
         ("running average of the weights", "", f"{training['ema']:g}"),
     ]
     if network:
-        beta = f"{training['guidance_start']:g} to {training['guidance']:g}, share {training['ramp']:g} of the steps"
+        ends = f"{training['guidance_start']:g} to {training['guidance']:g}"
+        beta = f"{ends}, over a share {training['ramp']:g} of the steps"
         rows += [("guidance beta", "a linear ramp", beta), ("entropy lambda", "", f"{training['entropy']:g}")]
     else:
         layouts = "one" if training["one_layout"] else "mixed"

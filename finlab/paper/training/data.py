@@ -6,19 +6,14 @@ parts and a `data.json` that says how it was drawn and holds the wrenches' mean 
 
 import io
 import json
-import multiprocessing
-import os
-import sys
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
-from threading import Thread
 from typing import Any, NamedTuple
 
 import numpy as np
 import torch
 from torch import Tensor
-from tqdm import tqdm
 
 from finlab.arrays import AnyArray, Array
 from finlab.errors import DataError
@@ -29,6 +24,7 @@ from finlab.layout.random import TRAINING_FINS
 from finlab.networks.normalization import Normalization
 from finlab.physics import Plant
 from finlab.training.loop import seeded_generator
+from finlab.training.parts import parts_by_processes
 from finlab.whole_file import make_folder, sweep_parts, write_whole
 
 DATA_SEED = 20_000
@@ -97,26 +93,11 @@ def generate(folder: Path, settings: DataSettings) -> None:
     if (folder / DATA_FILE).exists() and _about(folder)["settings"] != settings.as_values():
         raise DataError(f"{folder}: holds a data set that was drawn otherwise; take an empty folder")
     _write_about(folder, settings, None)
-    numbers = range(-(-settings.layouts // settings.together))
-    write, silent = partial(write_part, folder, settings), not sys.stderr.isatty()
-    count = min(len(numbers), os.cpu_count() or 1)
-    with multiprocessing.get_context("spawn").Pool(count, initializer=end_with_parent) as pool:
-        sums = list(tqdm(pool.imap(write, numbers), "data", len(numbers), unit="part", disable=silent))
+    count = -(-settings.layouts // settings.together)
+    sums = parts_by_processes(partial(write_part, folder, settings), count, "data")
     total = np.sum(sums, axis=0) / (settings.layouts * settings.commands)
     deviation = np.sqrt(np.maximum(total[1] - total[0] ** 2, 0.0))
     _write_about(folder, settings, Normalization(total[0], np.maximum(deviation, LEAST_STD)))
-
-
-def end_with_parent() -> None:
-    """End this process when the one that started it ends, however that comes about."""
-    parent = multiprocessing.parent_process()
-
-    def watch() -> None:
-        if parent is not None:
-            parent.join()
-            os._exit(1)
-
-    Thread(target=watch, daemon=True).start()
 
 
 def write_part(folder: Path, settings: DataSettings, number: int) -> Array:
@@ -164,17 +145,17 @@ class DataSet:
         try:
             self.settings: dict[str, Any] = about["settings"]
             """As in `data.json`."""
-            counts = (int(self.settings[name]) for name in ("layouts", "commands"))
-            self.layouts, self.commands = counts
+            self.layouts, self.commands = (int(self.settings[name]) for name in ("layouts", "commands"))
             self.normalization = Normalization.parse(about["normalization"])
         except (KeyError, TypeError, ValueError) as error:
             raise DataError(f"{folder}: an unfinished data set; run `finlab data generate` again") from error
-        parts = [_read_part(_part(folder, k)) for k in range(-(-self.layouts // max(1, PART // self.commands)))]
+        count = -(-self.layouts // DataSettings(commands=self.commands).together)
+        parts = [_read_part(_part(folder, k)) for k in range(count)]
         whole = {name: np.concatenate([part[name] for part in parts]) for name in Batch._fields}
         if whole["wrench"].shape != (self.layouts, self.commands, 6):
             raise DataError(f"{folder}: its parts are not those of its {DATA_FILE}")
-        robots = Batch(*(torch.from_numpy(whole[name]).to(device) for name in Batch._fields))
-        self._robots, self._device, self._epoch = robots, device, -1
+        self._parts = [torch.from_numpy(whole[name]).to(device) for name in Batch._fields]
+        self._device, self._epoch = device, -1
         self._order = torch.empty(0)
 
     def batch(self, step: int, size: int, seed: int, one_layout: bool, rows: slice) -> Batch:
@@ -191,7 +172,9 @@ class DataSet:
         count = self.layouts if one_layout else self.layouts * self.commands
         epoch, place = divmod(step, max(1, count if one_layout else count // size))
         if epoch != self._epoch:
-            order = torch.randperm(count, generator=seeded_generator(seed, epoch, self._device), device=self._device)
+            order = torch.randperm(
+                count, generator=seeded_generator(seed, epoch, self._device), device=self._device
+            )
             self._epoch, self._order = epoch, order
         if one_layout:
             draw = seeded_generator(seed, 1_000_000 + step, self._device)
@@ -200,8 +183,9 @@ class DataSet:
         else:
             chosen = self._order[place * size : (place + 1) * size][rows]
             layout, command = chosen // self.commands, chosen % self.commands
-        *robots, commands, wrench = self._robots
-        return Batch(*(part[layout] for part in robots), commands[layout, command], wrench[layout, command])
+        *robots, commands, wrench = self._parts
+        mixed = commands[layout, command], wrench[layout, command]
+        return Batch._make([*(part[layout] for part in robots), *mixed])
 
 
 def fresh_batch(settings: DataSettings) -> Batch:

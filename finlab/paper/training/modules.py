@@ -4,6 +4,8 @@ Robots are padded to n fins; `mask` (B, n) is True where there is one. The names
 `NetworkConfig` and `SurrogateConfig`, which answer without PyTorch.
 """
 
+from itertools import pairwise
+
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
@@ -58,14 +60,15 @@ class AllocatorNetwork(nn.Module):
         layer = nn.TransformerEncoderLayer(
             width, config.heads, config.feedforward, dropout=0.0, batch_first=True, norm_first=True
         )
-        self.transformer = nn.TransformerEncoder(
-            layer, config.transformer_layers, enable_nested_tensor=False
-        )
+        self.transformer = nn.TransformerEncoder(layer, config.transformer_layers, enable_nested_tensor=False)
         for parameter in self.transformer.parameters():  # the encoder copies one layer
             if parameter.dim() > 1:
                 nn.init.xavier_uniform_(parameter)
         self.norm = nn.LayerNorm(width)
-        self.head, self.weight = nn.Linear(width, 6 * config.n_components), nn.Linear(width, config.n_components)
+        self.head, self.weight = (
+            nn.Linear(width, 6 * config.n_components),
+            nn.Linear(width, config.n_components),
+        )
 
     def forward(self, x: Tensor, target: Tensor, mask: Tensor) -> Mixture:
         """Mixtures over each fin's command in normalized coordinates.
@@ -93,13 +96,13 @@ class Surrogate(nn.Module):
 
     def __init__(self, config: SurrogateConfig) -> None:
         super().__init__()
-        widths = (RAW_SIZE + 3, *config.hidden)
-        hidden = [part for pair in zip(widths, config.hidden) for part in (nn.Linear(*pair), nn.SiLU())]
-        self.net = nn.Sequential(*hidden, nn.Linear(widths[-1], 3))
+        linear = [nn.Linear(*pair) for pair in pairwise([RAW_SIZE + 3, *config.hidden, 3])]
+        hidden = [part for layer in linear[:-1] for part in (layer, nn.SiLU())]
+        self.net = nn.Sequential(*hidden, linear[-1])
         self.descriptor = nn.Sequential(nn.Linear(RAW_SIZE, DESCRIPTOR), nn.Tanh())
         self.affine = nn.Linear(DESCRIPTOR, 12)
         with torch.no_grad():
-            first = hidden[0].weight
+            first = linear[0].weight
             first *= FIRST_WEIGHT / first.abs().max()
             for parameter in self.affine.parameters():  # at first no layout is stretched or shifted
                 parameter.zero_()
@@ -114,4 +117,5 @@ class Surrogate(nn.Module):
         wrench = torch.cat([force, torque], -1).sum(1)
         described = (self.descriptor(x) * mask[..., None]).sum(1) / mask.sum(1, keepdim=True)
         scale, bias = self.affine(described).float().chunk(2, -1)
-        return wrench * (1.0 + scale) + bias
+        answer: Tensor = wrench * (1.0 + scale) + bias
+        return answer

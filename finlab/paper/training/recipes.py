@@ -64,7 +64,9 @@ RECIPES = {
         SurrogateTraining(300, 512, 3e-3, warmup=20, ema=0.9),
         AllocatorTraining(100, 128, 1e-3, warmup=10, ema=0.9, guidance=1.0),
         SurrogateConfig(hidden=(64, 32)),
-        NetworkConfig(width=32, heads=2, graph_layers=1, transformer_layers=1, feedforward=64, n_components=4),
+        NetworkConfig(
+            width=32, heads=2, graph_layers=1, transformer_layers=1, feedforward=64, n_components=4
+        ),
     ),
 }
 """Name -> recipe of `finlab train surrogate` and `finlab train allocator`."""
