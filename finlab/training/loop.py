@@ -188,7 +188,9 @@ class Training:
         Returns the time at which it was done.
         """
         if self.place.rank == 0:
-            save(self.shipped, {"steps_done": self.done, "samples": self.done * self.settings.batch_size})
+            samples = self.done * self.settings.batch_size
+            made = {"steps_done": self.done, "samples": samples, "processes": self.place.world}
+            save(self.shipped, made)
             if self.rows:
                 write_whole(self.folder / LOG_FILE, _table(self.rows), DataError)
             state = {name: getattr(self, name) for name in _KEPT} | {"optimizer": self.optimizer.state_dict()}

@@ -118,7 +118,6 @@ def train_allocator(
             "training": asdict(settings),
             "data": samples.settings,
             "surrogate_sha256": base.sha256,
-            "processes": place.world,
         }
 
         def save(state: State, progress: dict[str, Any]) -> None:

@@ -39,9 +39,9 @@ def card(weights: TrainedWeights) -> str:
         (f"{part}: {name}", "", f"{x:.4g}") for part, m in weights.metrics.items() for name, x in m.items()
     ]
     table = "\n".join(f"| {name} | {printed} | {done} |" for name, printed, done in rows)
-    what = "network and surrogate" if sizes is not None else "surrogate"
+    what = "Network and surrogate" if sizes is not None else "Surrogate"
     return (
-        f"# Model card: `{weights.name}`\n\nThe paper's {what}, preset `{weights.preset}`, for method `paper`.\n"
+        f"# Model card: `{weights.name}`\n\n{what}, preset `{weights.preset}`, for method `paper`.\n"
         f"Weights: SHA-256 {weights.sha256}.\n\n| | printed | done |\n|---|---|---|\n{table}\n{_CHOICES}"
         "\n`log.csv` and `curves.png` show the training; `config.json` holds every setting.\n"
     )

@@ -69,7 +69,6 @@ def train_surrogate(
             "seed": seed,
             "training": asdict(settings),
             "data": samples.settings,
-            "processes": place.world,
         }
 
         def save(state: State, progress: dict[str, Any]) -> None:
