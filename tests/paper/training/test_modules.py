@@ -90,6 +90,8 @@ def test_no_gradient_comes_from_fins_that_do_not_exist(robots: list[Layout]) -> 
     batch, module = padded(robots, 7.0), AllocatorNetwork(SIZES)
     x = features(batch).requires_grad_()
     mixture = module(x, batch.wrench, batch.mask)
-    sum((part * batch.mask[..., None, None].squeeze(-1 if part.dim() == 3 else ())).sum() for part in mixture).backward()
+    sum(
+        (part * batch.mask[..., None, None].squeeze(-1 if part.dim() == 3 else ())).sum() for part in mixture
+    ).backward()
     assert x.grad is not None and x.grad.isfinite().all()
     assert (x.grad[~batch.mask] == 0.0).all() and (x.grad[batch.mask].abs().sum(-1) > 0.0).all()
