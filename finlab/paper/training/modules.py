@@ -17,7 +17,7 @@ from finlab.paper.network import LOG_STD_BOUND, Mixture, NetworkConfig
 from finlab.paper.surrogate import DESCRIPTOR, FORCE_UNIT, SurrogateConfig
 from finlab.paper.training.data import Batch
 
-FIRST_WEIGHT = 0.8
+FIRST_WEIGHT = 2.0
 """Largest first weight of the surrogate's first layer: angles enter as plain numbers whose sines must be
 learned, and wide first weights start nearer to that."""
 

@@ -1,4 +1,4 @@
-"""The networks on PyTorch's layers: robots of mixed numbers of fins in one batch, against each alone in numpy."""
+"""The networks on PyTorch's layers: robots of 2 to 5 fins in one batch, against each alone in numpy."""
 
 import numpy as np
 import pytest

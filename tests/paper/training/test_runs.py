@@ -64,7 +64,7 @@ def test_what_is_trained_allocates_and_is_described(
 def test_a_killed_run_that_goes_on_has_the_weights_of_one_that_was_not(trained: Path, tmp_path: Path) -> None:
     out = str(tmp_path / "killed")
     options = ["--surrogate", str(trained / "surrogate"), "--data", str(trained / "data")]
-    verb = ["train", "allocator", "-o", out, *options, "--preset", "smoke", "--steps", "400", "--resume"]
+    verb = ["train", "allocator", "-o", out, *options, "--preset", "smoke", "--steps", "60", "--resume"]
     code = PATIENT + "sys.exit(main(sys.argv[1:]))"
     for _ in range(2):
         process = subprocess.Popen([sys.executable, "-c", code, *verb])
@@ -76,7 +76,7 @@ def test_a_killed_run_that_goes_on_has_the_weights_of_one_that_was_not(trained: 
     assert main(verb) == 0
     assert main(["train", "allocator", "-o", str(tmp_path / "whole"), *verb[4:-1]]) == 0
     killed, whole = (read_checkpoint(tmp_path / name) for name in ("killed", "whole"))
-    assert killed.training["allocator"]["steps_done"] == 400
+    assert killed.training["allocator"]["steps_done"] == 60
     for name, value in whole.network.items():
         np.testing.assert_allclose(killed.network[name], value, atol=1e-6)
     assert not list(tmp_path.rglob("*.part"))
