@@ -63,9 +63,9 @@ RECIPES = {
     ),
     "smoke": PaperRecipe(
         DataSettings(200, 200),
-        SurrogateTraining(300, 512, 3e-3, warmup=20, ema=0.9),
-        AllocatorTraining(100, 128, 1e-3, warmup=10, ema=0.9, guidance=1.0),
-        SurrogateConfig(hidden=(64, 32)),
+        SurrogateTraining(1500, 256, 3e-3, warmup=20, ema=0.9),
+        AllocatorTraining(150, 128, 2e-3, warmup=10, ema=0.9, guidance=1.0),
+        SurrogateConfig(hidden=(64, 32, 32)),
         NetworkConfig(
             width=32, heads=2, graph_layers=1, transformer_layers=1, feedforward=64, n_components=4
         ),
