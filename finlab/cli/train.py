@@ -1,15 +1,12 @@
-"""`finlab train mdn|surrogate|allocator`: train the network of method `mdn`, or the paper's two networks.
-
-On several graphics cards or machines `torchrun` starts the paper's: `torchrun --nproc-per-node 2 -m finlab
-train allocator ...`.
-"""
+"""`finlab train mdn|surrogate|allocator`: train the network of method `mdn`, or the paper's two networks."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from tyro.conf import arg
+from tyro.conf import OmitArgPrefixes, arg
 from tyro.extras import SubcommandApp
 
 from finlab.cli.inputs import check_positive
@@ -23,8 +20,26 @@ _Preset = Annotated[str, arg(metavar="NAME")]
 _Output = Annotated[Path, arg(metavar="FOLDER", aliases=["-o"])]
 _Seed = Annotated[int, arg(metavar="N")]
 _Count = Annotated[int | None, arg(metavar="N")]
-_Data = Annotated[Path | None, arg(metavar="FOLDER")]
-_Device = Annotated[str | None, arg(metavar="NAME")]
+
+
+@dataclass(frozen=True)
+class Paper:
+    """Options of both of the paper's trainings."""
+
+    output: _Output
+    """folder for checkpoint, model card, log, curves and state."""
+    data: Annotated[Path | None, arg(metavar="FOLDER")] = None
+    """data set of `finlab data generate`; that of the surrogate or of the recipe by default."""
+    preset: _Preset = "paper"
+    """recipe: smoke (a minute), short (20 minutes for both on two cores) or paper."""
+    seed: _Seed = 0
+    """of the first weights, the noise and the order of the data."""
+    steps: _Count = None
+    """optimizer steps instead of the recipe's."""
+    resume: bool = False
+    """go on from the last state in the folder."""
+    device: Annotated[str | None, arg(metavar="NAME")] = None
+    """such as cpu or cuda:1; a graphics card where there is one by default."""
 
 
 @verbs.command
@@ -56,70 +71,32 @@ def mdn(
 
 
 @verbs.command
-def surrogate(
-    output: _Output,
-    data: _Data = None,
-    preset: _Preset = "paper",
-    seed: _Seed = 0,
-    steps: _Count = None,
-    resume: bool = False,
-    device: _Device = None,
-) -> None:
+def surrogate(options: OmitArgPrefixes[Paper]) -> None:
     """Train the paper's physics surrogate and write a checkpoint folder with it alone.
 
-    Args:
-        output: folder for checkpoint, model card, log, curves and state.
-        data: data set; the recipe's, made in the folder, by default.
-        preset: recipe: smoke, short (with the allocator 20 minutes on two cores) or paper.
-        seed: of the first weights and of the order of the data.
-        steps: optimizer steps instead of the recipe's.
-        resume: go on from the last state in the folder.
-        device: such as cpu or cuda:1; a graphics card where there is one by default.
+    With several graphics cards or machines: torchrun --nproc-per-node 2 -m finlab train surrogate ...
     """
-    from finlab.paper.training.surrogate import train_surrogate
+    from finlab.paper.training.train import Options, train_surrogate
 
-    check_positive(steps=steps)
-    made = train_surrogate(preset, output, data=data, seed=seed, steps=steps, resume=resume, device=device)
-    _report(output, made)
+    check_positive(steps=options.steps)
+    _report(options.output, train_surrogate(Options(**vars(options))))
 
 
 @verbs.command
 def allocator(
-    output: _Output,
-    surrogate: Annotated[Path, arg(metavar="NAME|FOLDER")],
-    data: _Data = None,
-    preset: _Preset = "paper",
-    seed: _Seed = 0,
-    steps: _Count = None,
-    resume: bool = False,
-    device: _Device = None,
+    options: OmitArgPrefixes[Paper], surrogate: Annotated[Path, arg(metavar="NAME|FOLDER")]
 ) -> None:
     """Train the paper's network with a frozen surrogate and write a whole checkpoint folder.
 
-    Args:
-        output: folder for checkpoint, model card, log, curves and state.
-        surrogate: checkpoint whose surrogate guides the training.
-        data: data set; that in the surrogate's folder, or else the recipe's, by default.
-        preset: recipe: smoke, short (with the surrogate 20 minutes on two cores) or paper.
-        seed: of the first weights, the noise and the order of the data.
-        steps: optimizer steps instead of the recipe's.
-        resume: go on from the last state in the folder.
-        device: such as cpu or cuda:1; a graphics card where there is one by default.
-    """
-    from finlab.paper.training.allocator import train_allocator
+    With several graphics cards or machines: torchrun --nproc-per-node 2 -m finlab train allocator ...
 
-    check_positive(steps=steps)
-    made = train_allocator(
-        preset,
-        output,
-        surrogate=surrogate,
-        data=data,
-        seed=seed,
-        steps=steps,
-        resume=resume,
-        device=device,
-    )
-    _report(output, made)
+    Args:
+        surrogate: checkpoint whose surrogate guides the training.
+    """
+    from finlab.paper.training.train import Options, train_allocator
+
+    check_positive(steps=options.steps)
+    _report(options.output, train_allocator(Options(**vars(options)), surrogate))
 
 
 def _report(output: Path, made: TrainedWeights) -> None:

@@ -27,6 +27,8 @@ def parts_by_processes(
         least: parts that are waited for at any rate.
     """
     made, silent = list[Made](), not sys.stderr.isatty()
+    if count == 1:
+        return [write(0)]
     context, cores = multiprocessing.get_context("spawn"), min(count, os.cpu_count() or 1)
     with context.Pool(cores, initializer=_end_with_parent) as pool:
         for part in tqdm(pool.imap(write, range(count)), what, count, unit="part", disable=silent):

@@ -11,15 +11,15 @@ from finlab.training.loop import LoopSettings
 
 
 @dataclass(frozen=True)
-class SurrogateTraining(LoopSettings):
-    """How the surrogate is trained: squared error of the normalized wrench (Eq. 5)."""
+class PaperLoop(LoopSettings):
+    """How one of the two networks is trained."""
 
     one_layout: bool = False
-    """Whether a step sees commands of one random layout, as printed, or of as many as there are samples."""
+    """Whether a step sees commands of one random layout, as printed of the surrogate, or of many."""
 
 
 @dataclass(frozen=True)
-class AllocatorTraining(LoopSettings):
+class AllocatorTraining(PaperLoop):
     """How the network is trained: L = L_imit + beta L_guide + lambda L_ent (Eq. 7)."""
 
     guidance: float = 1000.0
@@ -42,7 +42,7 @@ class PaperRecipe:
     """The paper's two networks, and what they learn from."""
 
     data: DataSettings
-    surrogate_training: SurrogateTraining
+    surrogate_training: PaperLoop
     allocator_training: AllocatorTraining
     surrogate: SurrogateConfig = field(default_factory=SurrogateConfig)
     network: NetworkConfig = field(default_factory=NetworkConfig)
@@ -51,19 +51,19 @@ class PaperRecipe:
 RECIPES = {
     "paper": PaperRecipe(
         DataSettings(),
-        SurrogateTraining(115_000, 4096, 1e-3, warmup=100, ema=0.99, one_layout=True),
+        PaperLoop(115_000, 4096, 1e-3, warmup=100, ema=0.99, one_layout=True),
         AllocatorTraining(115 * (5_000_000 // 16_384), 16_384, 1e-4, cosine=False),  # 115 epochs
     ),
     "short": PaperRecipe(
         DataSettings(20_000, 200),
         # Many small steps and a third hidden layer learn more in the same time than few large ones.
-        SurrogateTraining(48_000, 256, 2e-3, warmup=100, ema=0.99),
+        PaperLoop(48_000, 256, 2e-3, warmup=100, ema=0.99),
         AllocatorTraining(8_000, 256, 1e-3, warmup=100, ema=0.99, guidance=10.0),
         SurrogateConfig(hidden=(512, 64, 64)),
     ),
     "smoke": PaperRecipe(
         DataSettings(200, 200),
-        SurrogateTraining(1500, 256, 3e-3, warmup=20, ema=0.9),
+        PaperLoop(1500, 256, 3e-3, warmup=20, ema=0.9),
         AllocatorTraining(150, 128, 2e-3, warmup=10, ema=0.9, guidance=1.0),
         SurrogateConfig(hidden=(64, 32, 32)),
         NetworkConfig(

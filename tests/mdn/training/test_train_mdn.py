@@ -1,6 +1,7 @@
 """Training of the network of method `mdn`: repeatable answers, batches as seen, a likelihood that is one."""
 
 import csv
+import shutil
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -88,6 +89,7 @@ def test_a_run_that_died_ends_with_the_weights_of_one_that_did_not(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     expected = train_mdn("smoke", tmp_path / "undisturbed")
+    shutil.copytree(tmp_path / "undisturbed" / "answers", tmp_path / "died" / "answers")
     saves = 0
 
     def dying(folder: Path, weights: TrainedWeights) -> TrainedWeights:

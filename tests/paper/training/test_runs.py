@@ -107,16 +107,15 @@ def test_a_killed_generation_leaves_whole_parts_and_no_processes(tmp_path: Path)
     pytest.fail("processes outlived the one that started them")
 
 
-@pytest.mark.parametrize("verb", ["surrogate", "allocator"])
-def test_two_processes_have_the_losses_of_one(verb: str, trained: Path, tmp_path: Path) -> None:
-    command = ["-m", "finlab", "train", verb, "-o", str(tmp_path), "--data", str(trained / "data")]
+def test_two_processes_have_the_losses_of_one(trained: Path, tmp_path: Path) -> None:
+    command = ["-m", "finlab", "train", "allocator", "-o", str(tmp_path), "--data", str(trained / "data")]
     command += ["--preset", "smoke", "--steps", "30", "--device", "cpu"]
-    command += ["--surrogate", str(trained / "surrogate")] if verb == "allocator" else []
+    command += ["--surrogate", str(trained / "surrogate")]
     launch = [sys.executable, "-m", "torch.distributed.run", "--nproc-per-node", "2", "--standalone"]
     done = subprocess.run([*launch, *command], capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stderr
-    np.testing.assert_allclose(losses(tmp_path), losses(trained / verb), rtol=1e-3)
-    assert read_checkpoint(tmp_path).training[verb]["processes"] == 2
+    np.testing.assert_allclose(losses(tmp_path), losses(trained / "allocator"), rtol=1e-3)
+    assert read_checkpoint(tmp_path).training["allocator"]["processes"] == 2
 
 
 @pytest.mark.parametrize(
