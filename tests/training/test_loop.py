@@ -61,6 +61,7 @@ def test_a_run_that_died_ends_with_the_weights_and_the_log_of_one_that_did_not(
         with pytest.raises(KeyboardInterrupt):
             run(tmp_path / "died", die_at=step, resume=True)
     found = run(tmp_path / "died", resume=True)
+    assert np.array_equal(run(tmp_path / "died", resume=True)["slope"], found["slope"])  # nothing is left
     assert all(np.array_equal(found[name], expected[name]) for name in expected)
     logs = [[(row["step"], row["loss"]) for row in log_of(tmp_path / f)] for f in ("died", "undisturbed")]
     assert logs[0] == logs[1] and [step for step, _ in logs[0]] == ["0", "20", "40", "44"]
@@ -72,17 +73,6 @@ def test_it_learns_and_leaves_curves_and_nothing_half(tmp_path: Path) -> None:
     assert found["slope"] == pytest.approx(3.0, abs=0.05) and found["shift"] == pytest.approx(-1.0, abs=0.05)
     assert {path.name for path in tmp_path.iterdir()} == {"log.csv", "curves.png", "resume.pt"}
     assert (tmp_path / "curves.png").read_bytes().startswith(b"\x89PNG")
-
-
-def test_a_finished_run_has_nothing_left_to_do(tmp_path: Path) -> None:
-    expected = run(tmp_path)
-    assert np.array_equal(run(tmp_path, resume=True)["slope"], expected["slope"])
-    assert len(log_of(tmp_path)) == 4
-
-
-def test_without_resume_it_begins_anew(tmp_path: Path) -> None:
-    expected = run(tmp_path)
-    assert np.array_equal(run(tmp_path)["slope"], expected["slope"])
 
 
 def test_other_settings_and_damaged_states_are_refused_in_one_sentence(tmp_path: Path) -> None:

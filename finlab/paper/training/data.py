@@ -7,9 +7,10 @@ parts and a `data.json` that says how it was drawn and holds the wrenches' mean 
 import io
 import json
 from dataclasses import asdict, dataclass, replace
-from functools import partial
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any, NamedTuple
+from zipfile import BadZipFile
 
 import numpy as np
 import torch
@@ -170,12 +171,12 @@ class DataSet:
             rows: those of the batch that are answered.
         """
         count = self.layouts if one_layout else self.layouts * self.commands
-        epoch, place = divmod(step, max(1, count if one_layout else count // size))
+        if not one_layout and size > count:
+            raise DataError(f"batches of {size} samples need at least as many, the data set has {count}")
+        epoch, place = divmod(step, count if one_layout else count // size)
         if epoch != self._epoch:
-            order = torch.randperm(
-                count, generator=seeded_generator(seed, epoch, self._device), device=self._device
-            )
-            self._epoch, self._order = epoch, order
+            draw = seeded_generator(seed, epoch, self._device)
+            self._epoch, self._order = epoch, torch.randperm(count, generator=draw, device=self._device)
         if one_layout:
             draw = seeded_generator(seed, 1_000_000 + step, self._device)
             command = torch.randint(self.commands, (size,), generator=draw, device=self._device)[rows]
@@ -188,6 +189,7 @@ class DataSet:
         return Batch._make([*(part[layout] for part in robots), *mixed])
 
 
+@lru_cache(maxsize=1)
 def fresh_batch(settings: DataSettings) -> Batch:
     """All samples of a data set, in memory alone."""
     robots = [_samples(settings, k) for k in range(settings.layouts)]
@@ -206,7 +208,7 @@ def _read_part(path: Path) -> dict[str, AnyArray]:
     try:
         with np.load(path, allow_pickle=False) as file:
             return {name: file[name] for name in Batch._fields}
-    except (OSError, ValueError, KeyError, EOFError) as error:
+    except (OSError, ValueError, KeyError, EOFError, BadZipFile) as error:
         raise DataError(f"{path}: no part of a data set ({error}); remove it and generate again") from error
 
 

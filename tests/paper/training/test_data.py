@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 import torch
 
-from finlab.actuators.fin.models import make_law
 from finlab.errors import DataError
-from finlab.layout import Fin, FinModelSpec, Layout, Limits
+from finlab.layout import Fin, Layout
 from finlab.paper.training import data
 from finlab.paper.training.data import DataSet, DataSettings, generate, write_part
 from finlab.physics import Plant
@@ -92,16 +91,6 @@ def test_a_step_of_one_layout_has_random_commands_of_it(folder: Path) -> None:
     assert len(torch.stack(seen).unique(dim=0)) == 30
 
 
-def test_other_fins_cause_other_wrenches(tmp_path: Path) -> None:
-    spec = FinModelSpec("lighthill")
-    generate(tmp_path, DataSettings(layouts=2, commands=3, varied_limits=0.0, fin_model=spec))
-    batch = DataSet(tmp_path, CPU).batch(0, 6, 0, False, ALL)
-    command = batch.command.double().numpy()
-    thrust = make_law(spec).thrust(command[..., 0], command[..., 1], command[..., 2])
-    vertical = (thrust * np.sin(command[..., 2]) * batch.mask.numpy()).sum(1)
-    np.testing.assert_allclose(batch.wrench[:, 2], vertical, atol=1e-4)
-
-
 def test_refuses_in_one_sentence_what_does_not_fit(folder: Path, tmp_path: Path) -> None:
     with pytest.raises(DataError, match="drawn otherwise"):
         generate(folder, replace(SETTINGS, seed=4))
@@ -115,9 +104,3 @@ def test_refuses_in_one_sentence_what_does_not_fit(folder: Path, tmp_path: Path)
     (tmp_path / "part-00000.npz").write_bytes(b"nothing")
     with pytest.raises(DataError, match="part-00000.npz: no part of a data set"):
         DataSet(tmp_path, CPU)
-
-
-def test_limits_are_nominal_where_none_vary() -> None:
-    batch = data.fresh_batch(DataSettings(layouts=4, commands=1, varied_limits=0.0))
-    expected = torch.tensor([limit[1] for limit in vars(Limits()).values()])
-    assert torch.allclose(batch.upper[batch.mask], expected)

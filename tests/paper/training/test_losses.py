@@ -7,8 +7,8 @@ import pytest
 import torch
 
 from finlab.paper.network import Mixture
-from finlab.paper.training.allocator import guidance, imitation, negative_entropy
 from finlab.paper.training.data import Batch, DataSettings, fresh_batch
+from finlab.paper.training.losses import guidance, imitation, negative_entropy
 from finlab.paper.training.recipes import RECIPES
 
 M = 3
