@@ -36,7 +36,7 @@ def generate(
     """
     from finlab.errors import CommandError
     from finlab.layout import FinModelSpec
-    from finlab.paper.training.data import DataSettings, generate
+    from finlab.paper.training.samples import DataSettings, generate
 
     check_positive(layouts=layouts, commands=commands)
     if seed < 0 or not 0.0 <= varied_limits <= 1.0:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from finlab.errors import DataError
 from finlab.paper.network import NetworkConfig
 from finlab.paper.surrogate import SurrogateConfig
-from finlab.paper.training.data import DataSettings
+from finlab.paper.training.samples import DataSettings
 from finlab.training.loop import LoopSettings
 
 

@@ -16,9 +16,10 @@ from finlab.networks.trained import State, TrainedWeights, sizes_for_file
 from finlab.paper.surrogate import SurrogateConfig
 from finlab.paper.training import losses
 from finlab.paper.training.card import write_card
-from finlab.paper.training.data import N_FINS, Batch, DataSet, DataSettings, fresh_batch, generate
+from finlab.paper.training.data import Batch, DataSet, fresh_batch
 from finlab.paper.training.modules import AllocatorNetwork, Surrogate, features
 from finlab.paper.training.recipes import PaperLoop, recipe
+from finlab.paper.training.samples import N_FINS, DataSettings, generate
 from finlab.training.device import Workplace, workplace
 from finlab.training.loop import Terms, Training, seeded_generator
 

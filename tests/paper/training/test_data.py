@@ -10,8 +10,9 @@ import torch
 
 from finlab.errors import DataError
 from finlab.layout import Fin, Layout
-from finlab.paper.training import data
-from finlab.paper.training.data import DataSet, DataSettings, generate, write_part
+from finlab.paper.training import samples as parts_of
+from finlab.paper.training.data import DataSet
+from finlab.paper.training.samples import DataSettings, generate, write_part
 from finlab.physics import Plant
 
 SETTINGS = DataSettings(layouts=30, commands=40, seed=3)
@@ -29,7 +30,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_layouts_do_not_depend_on_the_parts_they_are_in(
     folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(data, "PART", 10 * SETTINGS.commands)
+    monkeypatch.setattr(parts_of, "PART", 10 * SETTINGS.commands)
     for number in range(3):
         write_part(tmp_path, SETTINGS, number)
     (whole,) = (np.load(path) for path in folder.glob("*.npz"))

@@ -10,8 +10,9 @@ from finlab.networks.trained import TrainedWeights, check_state
 from finlab.paper.features import raw_features
 from finlab.paper.network import NetworkConfig
 from finlab.paper.surrogate import LayoutSurrogate, SurrogateConfig
-from finlab.paper.training.data import N_FINS, Batch
+from finlab.paper.training.data import Batch
 from finlab.paper.training.modules import AllocatorNetwork, Surrogate, features
+from finlab.paper.training.samples import N_FINS
 
 SIZES = NetworkConfig(width=32, heads=4, transformer_layers=2, feedforward=40, n_components=6)
 HIDDEN = SurrogateConfig(hidden=(24, 16))
