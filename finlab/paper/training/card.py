@@ -10,7 +10,7 @@ from finlab.whole_file import write_whole
 CARD_FILE = "README.md"
 
 _CHOICES = """
-Choices that the paper leaves open, in the surrogate: a second hidden layer, SiLU between layers, outputs in
+Choices that the paper leaves open, in the surrogate: further hidden layers, SiLU between layers, outputs in
 units of 4 N, wide first weights, tanh in the pooled descriptor. In the network: residual connections around
 GATv2, a linear layer from node and wrench to the Transformer's width, normalization before each block, log
 sigma through a tanh. In training: one sample per target in the guidance, whose gradient passes the clamp and

@@ -111,11 +111,11 @@ class Surrogate(nn.Module):
         """Wrenches (B, 6) [N, N m] of commands (B, n, 3) of a batch's robots."""
         x, mask = features(batch), batch.mask
         inputs = torch.cat([x, to_normalized(command, batch.lower, batch.upper)], -1)
-        own = self.net(inputs[mask]).float() * FORCE_UNIT
+        own = self.net(inputs[mask]).to(command.dtype) * FORCE_UNIT
         force = own.new_zeros(command.shape).masked_scatter(mask[..., None], own)
         torque = torch.linalg.cross(batch.position, force)
         wrench = torch.cat([force, torque], -1).sum(1)
         described = (self.descriptor(x) * mask[..., None]).sum(1) / mask.sum(1, keepdim=True)
-        scale, bias = self.affine(described).float().chunk(2, -1)
+        scale, bias = self.affine(described).to(command.dtype).chunk(2, -1)
         answer: Tensor = wrench * (1.0 + scale) + bias
         return answer
