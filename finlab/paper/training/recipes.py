@@ -63,7 +63,7 @@ RECIPES = {
     ),
     "smoke": PaperRecipe(
         DataSettings(200, 200),
-        PaperLoop(1500, 256, 3e-3, warmup=20, ema=0.9),
+        PaperLoop(3000, 256, 3e-3, warmup=20, ema=0.9),
         AllocatorTraining(150, 128, 2e-3, warmup=10, ema=0.9, guidance=1.0),
         SurrogateConfig(hidden=(64, 32, 32)),
         NetworkConfig(

@@ -57,7 +57,8 @@ def test_what_is_trained_allocates_and_is_described(
     for name, made in (("surrogate", surrogate), ("allocator", whole)):
         files = {path.name for path in (trained / name).iterdir()}
         assert {"README.md", "log.csv", "curves.png", "resume.pt", "config.json"} <= files
-        assert made.sha256 in (trained / name / "README.md").read_text()
+        card = (trained / name / "README.md").read_text()
+        assert made.sha256 in card and "| surrogate data layouts | 1000 | 60 |" in card
         assert losses(trained / name)[-1] < losses(trained / name)[0]
 
 
