@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -101,6 +102,8 @@ def allocator(
 
 def _report(output: Path, made: TrainedWeights) -> None:
     """Say where the result lies and what was measured."""
+    if os.environ.get("RANK", "0") != "0":  # of several processes the first one speaks
+        return
     print(f"{output}: checkpoint {made.name}, preset {made.preset}, sha256 {made.sha256}")
     for group, values in made.metrics.items():
         for name, value in values.items():

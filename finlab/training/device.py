@@ -1,5 +1,6 @@
 """Where a training runs: on which device, and as which of several processes that torchrun started."""
 
+import gc
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -74,6 +75,7 @@ def workplace(name: str | None, batch_size: int) -> Iterator[Workplace]:
     try:
         yield Workplace(device, rank, world)
     finally:
+        gc.collect()  # modules that are shared hold threads of the group, which must end before it
         distributed.destroy_process_group()
 
 
