@@ -4,6 +4,7 @@ NAME = "finlab-marine"
 """Name of the distribution; the package that is imported is called `finlab`."""
 EXTRAS = {
     "torch": "train",
+    "matplotlib": "plot",
     "viser": "app",
     "trimesh": "app",
     "casadi": "ipopt",

@@ -67,3 +67,10 @@ def make_folder(path: str | os.PathLike[str]) -> Path:
     except OSError as failure:
         raise DataError(f"{path}: cannot be made a folder: {failure.strerror}") from None
     return folder
+
+
+def sweep_parts(folder: Path) -> None:
+    """Remove what a killed process has left of files that it was writing in a folder."""
+    for part in folder.glob(".*.part"):
+        with suppress(OSError):
+            part.unlink()

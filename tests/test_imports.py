@@ -31,7 +31,7 @@ LEVELS = (
     ("physics", "exchange"),
     ("vehicle",),
     ("networks", "hull"),
-    ("forces",),
+    ("forces", "training"),
     ("allocation",),
     ("control", "paper"),
     ("mdn", "sim", "analysis", "fit"),

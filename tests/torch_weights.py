@@ -7,7 +7,3 @@ from finlab.networks.trained import State
 
 def arrays_of(weights: dict[str, torch.Tensor]) -> State:
     return {name: value.detach().numpy() for name, value in weights.items()}
-
-
-def tensors_of(state: State) -> dict[str, torch.Tensor]:
-    return {name: torch.tensor(value) for name, value in state.items()}

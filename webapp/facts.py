@@ -38,6 +38,7 @@ class Facts(NamedTuple):
     """Velocity relative to the water [m/s, rad/s], where one is felt."""
     method: str
     policy: str
+    network: str
     saved: Layout
     undo: str | None
     redo: str | None
@@ -109,6 +110,7 @@ def facts_of(session: Session, jobs: Jobs, dragged: int | None, scale: Scale, be
         flow=state.flow,
         method=state.method,
         policy=state.policy,
+        network=state.network,
         saved=session.saved,
         undo=history.undo_name,
         redo=history.redo_name,

@@ -53,7 +53,7 @@ class Page(ABC):
         loop: asyncio.AbstractEventLoop,
     ) -> None:
         """Build the page and ask for a first answer; `loop` is viser's, on `workers` all is computed."""
-        self.client, self.gui, self.session = client, client.gui, session
+        self.client, self.gui, self.session, self.solver = client, client.gui, session, solver
         self._loop = page = EventLoop(loop, self.fault)
         self._faults: set[str] = set()
         self._soon: asyncio.TimerHandle | None = None

@@ -59,11 +59,12 @@ _DESCRIPTION = "Control allocation for underwater robots: a target wrench in, co
 
 def _command_line(argv: Sequence[str]) -> SubcommandApp:
     """All verbs; a function may return an exit code, None means 0."""
-    from finlab.cli import allocate, app, bench, evaluate, export, fit, layout, simulate, train
+    from finlab.cli import allocate, app, bench, data, evaluate, export, fit, layout, simulate, train
 
     root = SubcommandApp()
     root.command(allocate.allocate)
     root.command(layout.verbs, name="layout", help="Check, show and optimize layout files.")
+    root.command(data.verbs, name="data", help="Generate what the paper's networks learn from.")
     root.command(train.verbs, name="train", help="Train the networks of methods `mdn` and `paper`.")
     root.command(evaluate.verbs(argv), name="eval", help="Measure methods by the fins' own models.")
     root.command(bench.bench)

@@ -16,7 +16,7 @@ def app(
 
     Args:
         layout: layout to open first: a file or the name of a shipped one.
-        checkpoint: trained checkpoint.
+        checkpoint: trained checkpoint, of method mdn or paper.
         host: address to listen on; the default is reachable from this machine only.
         port: port to listen on.
     """

@@ -1,42 +1,109 @@
-"""`finlab train mdn`: train the network of method `mdn`."""
+"""`finlab train mdn|surrogate|allocator`: train the network of method `mdn`, or the paper's two networks."""
 
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
-from tyro.conf import arg
+from tyro.conf import OmitArgPrefixes, arg
 from tyro.extras import SubcommandApp
 
 from finlab.cli.inputs import check_positive
 
+if TYPE_CHECKING:
+    from finlab.networks.trained import TrainedWeights
+
 verbs = SubcommandApp()
 
+_Preset = Annotated[str, arg(metavar="NAME")]
+_Output = Annotated[Path, arg(metavar="FOLDER", aliases=["-o"])]
+_Seed = Annotated[int, arg(metavar="N")]
 _Count = Annotated[int | None, arg(metavar="N")]
+
+
+@dataclass(frozen=True)
+class Paper:
+    """Options of both of the paper's trainings."""
+
+    output: _Output
+    """folder for checkpoint, model card, log, curves and state."""
+    data: Annotated[Path | None, arg(metavar="FOLDER")] = None
+    """data set of `finlab data generate`; that of the surrogate or of the recipe by default."""
+    preset: _Preset = "paper"
+    """recipe: smoke (a minute), short (20 minutes for both on two cores) or paper."""
+    seed: _Seed = 0
+    """of the first weights, the noise and the order of the data."""
+    steps: _Count = None
+    """optimizer steps instead of the recipe's."""
+    resume: bool = False
+    """go on from the last state in the folder."""
+    device: Annotated[str | None, arg(metavar="NAME")] = None
+    """such as cpu or cuda:1; a graphics card where there is one by default."""
 
 
 @verbs.command
 def mdn(
-    output: Annotated[Path, arg(metavar="FOLDER", aliases=["-o"])],
-    preset: Annotated[str, arg(metavar="NAME")] = "default",
-    seed: Annotated[int, arg(metavar="N")] = 0,
+    output: _Output,
+    preset: _Preset = "default",
+    seed: _Seed = 0,
     minutes: _Count = None,
     steps: _Count = None,
+    resume: bool = False,
 ) -> None:
     """Train the network of method `mdn` on what many starts find, and write a checkpoint folder.
 
     The answers are written first, on all cores; a later run into the same folder finds them.
 
     Args:
-        output: folder for checkpoint, answers and log.
+        output: folder for checkpoint, answers, log, curves and state.
         preset: recipe: default or smoke.
         seed: seed of the answers and of the first weights.
-        minutes: time after which the learning ends, instead of the recipe's.
+        minutes: time after which the run ends, answers included, instead of the recipe's.
         steps: most optimizer steps instead of the recipe's.
+        resume: go on from the last state in the folder.
     """
     from finlab.mdn.training.train import train_mdn
 
     check_positive(minutes=minutes, steps=steps)
     seconds = None if minutes is None else 60.0 * minutes
-    made = train_mdn(preset, output, seed=seed, steps=steps, seconds=seconds)
+    _report(output, train_mdn(preset, output, seed=seed, steps=steps, seconds=seconds, resume=resume))
+
+
+@verbs.command
+def surrogate(options: OmitArgPrefixes[Paper]) -> None:
+    """Train the paper's physics surrogate and write a checkpoint folder with it alone.
+
+    With several graphics cards or machines: torchrun --nproc-per-node 2 -m finlab train surrogate ...
+    """
+    from finlab.paper.training.train import Options, train_surrogate
+
+    check_positive(steps=options.steps)
+    _report(options.output, train_surrogate(Options(**vars(options))))
+
+
+@verbs.command
+def allocator(
+    options: OmitArgPrefixes[Paper], surrogate: Annotated[Path, arg(metavar="NAME|FOLDER")]
+) -> None:
+    """Train the paper's network with a frozen surrogate and write a whole checkpoint folder.
+
+    With several graphics cards or machines: torchrun --nproc-per-node 2 -m finlab train allocator ...
+
+    Args:
+        surrogate: checkpoint whose surrogate guides the training.
+    """
+    from finlab.paper.training.train import Options, train_allocator
+
+    check_positive(steps=options.steps)
+    _report(options.output, train_allocator(Options(**vars(options)), surrogate))
+
+
+def _report(output: Path, made: TrainedWeights) -> None:
+    """Say where the result lies and what was measured."""
+    if os.environ.get("RANK", "0") != "0":  # of several processes the first one speaks
+        return
     print(f"{output}: checkpoint {made.name}, preset {made.preset}, sha256 {made.sha256}")
     for group, values in made.metrics.items():
         for name, value in values.items():

@@ -118,6 +118,12 @@ def read_normalization(folder: Path) -> Normalization:
         raise CheckpointError(f"{folder}/{CONFIG_FILE}: normalization is missing or malformed") from error
 
 
+def network_features(folder: Path) -> str | None:
+    """What the network of a checkpoint is fed, such as "raw" of the paper's; None where it holds none."""
+    network = _config(_files(folder, (CONFIG_FILE,)), str(folder), (CONFIG_FILE,)).get("network")
+    return str(network.get("features")) if isinstance(network, dict) else None
+
+
 def resolve_checkpoint(checkpoint: str | os.PathLike[str]) -> Path:
     """The folder of a checkpoint: a shipped one by its bare name, any other by its path.
 

@@ -2,24 +2,18 @@
 
 import torch
 
-from finlab.layout.arrays import force_effectiveness
-from finlab.networks.normalization import to_normalized
-from finlab.paper.features import raw_features
-from finlab.paper.surrogate import SurrogateConfig, correction, of_fins, perceptron
-from finlab.physics.wrench import wrench_of_forces
-
-Place = tuple[torch.Tensor, torch.Tensor, torch.Tensor, torch.Tensor]
+from finlab.layout import Layout
+from finlab.networks.trained import TrainedWeights
+from finlab.paper.training.data import Batch
+from finlab.paper.training.samples import ROBOT
+from finlab.paper.training.train import surrogate_of
 
 
-def wrench_in_torch(
-    config: SurrogateConfig, w: dict[str, torch.Tensor], command: torch.Tensor, place: Place
-) -> torch.Tensor:
-    """Wrenches (R, 6) of commands (R, n, 3) on one layout: its positions, mounting angles and limits."""
-    position, mounting_angle, lower, upper = place
-    x = raw_features(position, mounting_angle, lower, upper)
-    force = perceptron(config, w, of_fins(w, x), to_normalized(command, lower, upper))
-    # The perceptron answers in the body frame, that of a fin whose shaft points forward.
-    wrench = wrench_of_forces(force, force_effectiveness(position, 0.0 * mounting_angle))
-    scale, bias = correction(w, x)
-    answer: torch.Tensor = wrench * (1.0 + scale) + bias
-    return answer
+def wrench_in_torch(weights: TrainedWeights, layout: Layout, command: torch.Tensor) -> torch.Tensor:
+    """Wrenches (R, 6) of commands (R, n, 3) in their precision."""
+    rows, n, _ = command.shape
+    parts = [torch.tensor(getattr(layout, name), dtype=command.dtype) for name in ROBOT[:-1]]
+    parts = [part.expand(rows, *part.shape) for part in parts]
+    batch = Batch(*parts, torch.ones(rows, n, dtype=torch.bool), command, torch.empty(rows, 6))
+    wrench: torch.Tensor = surrogate_of(weights).to(command.dtype)(command, batch)
+    return wrench

@@ -22,7 +22,7 @@ from finlab.physics import Plant
 from finlab.physics.effort import command_effort
 from tests.any_robot import AnyRobot, normalized_error
 from tests.paper.asked_in_torch import wrench_in_torch
-from tests.torch_weights import arrays_of, tensors_of
+from tests.torch_weights import arrays_of
 
 TARGET = [0.5, -0.3, 1.0, 0.05, -0.02, 0.1]
 
@@ -41,13 +41,6 @@ def checkpoint() -> TrainedWeights:
         network_sizes=sizes_for_file(sizes),
         network=arrays_of(first_weights(sizes.shapes(), 0)),
     )
-
-
-def asked(checkpoint: TrainedWeights, command: torch.Tensor, robot: Layout) -> torch.Tensor:
-    """What the surrogate says in torch."""
-    x, angle, lower, upper = place_of(robot)
-    weights = dict(tensors_of(checkpoint.surrogate))
-    return wrench_in_torch(SurrogateConfig.of(checkpoint), weights, command, (x, angle, lower, upper))
 
 
 @pytest.fixture
@@ -184,7 +177,7 @@ def test_adam_goes_where_torch_goes(checkpoint: TrainedWeights, robot: Layout) -
     for step in range(26):
         optimizer.param_groups[0]["lr"] = ADAM_RATE * (1.0 - 0.95 * step / 25)
         command = to_command(x, lower, upper)
-        error = (asked(checkpoint, command, robot) - wanted) / std
+        error = (wrench_in_torch(checkpoint, robot, command) - wanted) / std
         a, f, d = (command / upper.abs()).unbind(-1)
         effort = (a * a + f * f + 0.1 * d * d + a * f).sum(-1)
         score = error.square().sum(-1) + 0.05 * effort

@@ -38,14 +38,6 @@ def untrained(*hidden: int) -> TrainedWeights:
     )
 
 
-def in_torch(weights: TrainedWeights, robot: Layout, command: torch.Tensor) -> torch.Tensor:
-    """The same surrogate asked with tensors in double precision."""
-    state = {name: torch.tensor(values, dtype=torch.float64) for name, values in weights.surrogate.items()}
-    place = robot.position, robot.mounting_angle, robot.lower, robot.upper
-    x, angle, lower, upper = (torch.tensor(part, dtype=torch.float64) for part in place)
-    return wrench_in_torch(SurrogateConfig.of(weights), state, command, (x, angle, lower, upper))
-
-
 def commands(robot: Layout, rows: int) -> np.ndarray:
     unit = np.random.default_rng(0).random((rows, robot.n_fins, 3))
     return robot.lower + unit * (robot.upper - robot.lower)
@@ -56,7 +48,7 @@ def commands(robot: Layout, rows: int) -> np.ndarray:
 def test_wrench_and_gradient_are_those_of_torch(hidden: tuple[int, ...], rows: int, robot: Layout) -> None:
     weights, command = untrained(*hidden), commands(robot, rows)
     surrogate, tensor = LayoutSurrogate(robot, weights), torch.tensor(command, requires_grad=True)
-    expected = in_torch(weights, robot, tensor)
+    expected = wrench_in_torch(weights, robot, tensor)
     np.testing.assert_allclose(surrogate.wrench(command), expected.detach().numpy(), atol=2e-4)
     force, pull = surrogate.force_and_pullback(command)
     assert force.dtype == np.float32
@@ -72,8 +64,8 @@ def test_order_does_not_matter(robot: Layout) -> None:
     weights, command = untrained(16, 8), torch.tensor(commands(robot, 6))
     order = [2, 0, 3, 1]
     shuffled = Layout("shuffled", tuple(robot.fins[i] for i in order))
-    whole = in_torch(weights, robot, command)
-    torch.testing.assert_close(in_torch(weights, shuffled, command[:, order]), whole)
+    whole = wrench_in_torch(weights, robot, command)
+    torch.testing.assert_close(wrench_in_torch(weights, shuffled, command[:, order]), whole)
 
 
 def test_a_checkpoint_without_one_says_so(robot: Layout) -> None:

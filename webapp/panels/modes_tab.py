@@ -56,6 +56,12 @@ def add_candidates(page: Page) -> None:
     warmth = gui.add_slider("Temperature", 0.0, 2.0, 0.01, 0.0, hint=hint)
     page.bind_number(warmth, partial(session.set_setting, "temperature"), _temperature)
     board.show(warmth, visible=lambda modes: bool(modes.ways))
+    solver, hint = page.solver, "What method paper answers with: the shipped network, or one trained in runs."
+    networks = gui.add_dropdown("Network", tuple(solver.networks()), hint=hint)
+    page.bind(
+        networks, partial(session.set_setting, "network"), lambda network: network or solver.first_network
+    )
+    board.show(networks, visible=lambda method: method == "paper")
     page.add_html(mode_table)
     page.add_html(_origin_words)
 

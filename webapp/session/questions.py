@@ -45,7 +45,7 @@ class Questions(Core):
         self._commit("", replace(self.state, target=PRESETS[chosen(name, "preset", PRESETS)]))
 
     def set_setting(self, key: str, value: Any) -> None:
-        """The temperature, the method or the policy; `key` is the field of `State`."""
+        """The temperature, the method, the policy or the network; `key` is the field of `State`."""
         self._commit("", self.state.with_setting(key, value))
 
     def keep_least(self, word: str) -> None:

@@ -50,6 +50,8 @@ class State:
     temperature: float | None = None
     """How far draws may stray from the mixture's means; None for the method's own."""
     method: str = "dual"
+    network: str = ""
+    """Which of the networks that are there method `paper` answers with; empty for the one it began with."""
     policy: str = "closest"
     links: Links = ()
     speed: float = 0.0
@@ -78,6 +80,7 @@ class State:
             target=other.target,
             temperature=other.temperature,
             method=method_for(self.layout, other.method),
+            network=other.network,
             policy=other.policy,
             speed=other.speed,
         )
@@ -172,8 +175,10 @@ class State:
         return replace(self, links=linked(self.links, a, b))
 
     def with_setting(self, key: str, value: Any) -> "State":
-        """The temperature, the method or the policy changed."""
-        chosen(key, "setting", ("temperature", *CHOICES))
+        """The temperature, the method, the policy or the network changed."""
+        chosen(key, "setting", ("temperature", "network", *CHOICES))
+        if key == "network":  # the solver knows which there are
+            return replace(self, network=str(value))
         if key in CHOICES:
             return replace(self, **{key: chosen(value, key, CHOICES[key])})
         settings = DRAWING.get(self.method, DRAWING["mdn"])  # they say what is wrong with a number

@@ -12,10 +12,12 @@ from finlab.allocation.allocator import Allocator
 from finlab.allocation.methods import MethodChoice, choose_method
 from finlab.allocation.solution import Candidates
 from finlab.layout import Layout
+from finlab.networks.checkpoint import resolve_checkpoint
 from finlab.physics import plant_of
 from webapp.markup.verdict import is_proved
-from webapp.session.state import DRAWING, State
+from webapp.session.state import DRAWING, State, chosen
 from webapp.tasks.mode_names import NO_MODES, OWN, Modes, modes_of
+from webapp.tasks.networks import SHIPPED, is_papers, paper_networks
 
 Load = Callable[..., MethodChoice]
 KEPT = 24
@@ -38,16 +40,24 @@ class Solver:
     """Answers states. Used from one thread only, the worker's."""
 
     def __init__(self, checkpoint: str | Path | None = None, load: Load = choose_method) -> None:
-        """`checkpoint` is a name or folder, None for the shipped one; `load` is replaced in tests."""
+        """`checkpoint` is a name or folder for method `mdn` or `paper`, None for the shipped ones; `load` is
+        replaced in tests."""
         self._checkpoint = checkpoint
         self._load = load
-        self._choices: dict[str, MethodChoice] = {}
-        self._made: dict[tuple[Layout, str, float | None], Allocator] = {}
+        self._choices: dict[tuple[str, str], MethodChoice] = {}
+        self._made: dict[tuple[Layout, str, float | None, str], Allocator] = {}
+        own = checkpoint is not None and is_papers(resolve_checkpoint(checkpoint))
+        self.first_network = str(resolve_checkpoint(checkpoint)) if own and checkpoint else SHIPPED
+        """The network that method `paper` begins with."""
 
     @cached_property
     def aside(self) -> "Solver":
         """Another solver with the same checkpoint, for another thread."""
         return Solver(self._checkpoint, self._load)
+
+    def networks(self) -> dict[str, Path]:
+        """The networks that method `paper` may answer with now, by name."""
+        return paper_networks(self._checkpoint)
 
     def shipped(self, layout: Layout, method: str) -> Allocator:
         """The allocator of a robot by a method as it is shipped, whose networks are loaded once.
@@ -55,7 +65,7 @@ class Solver:
         Raises:
             FinlabError: it cannot be made.
         """
-        return self._on(layout, method, None)
+        return self._on(layout, method, None, "")
 
     def allocator(self, state: State) -> Allocator:
         """The allocator for the state's robot and method with the state's settings.
@@ -63,14 +73,16 @@ class Solver:
         Raises:
             FinlabError: it cannot be made.
         """
-        return self._on(state.layout, state.method, state.temperature if state.method in DRAWING else None)
+        temperature = state.temperature if state.method in DRAWING else None
+        return self._on(state.layout, state.method, temperature, state.network)
 
-    def _on(self, layout: Layout, method: str, temperature: float | None) -> Allocator:
+    def _on(self, layout: Layout, method: str, temperature: float | None, network: str) -> Allocator:
         """An allocator, one of the last few or made now."""
-        key = layout, method, temperature
+        network = (network or self.first_network) if method == "paper" else ""
+        key = layout, method, temperature, network
         found = self._made.pop(key, None)
         if found is None:
-            choice = self._choice(method)
+            choice = self._choice(method, network)
             settings = choice.settings
             if temperature is not None and "temperature" in choice.kind.option_names():
                 settings = replace(settings, **{"temperature": temperature})
@@ -80,12 +92,14 @@ class Solver:
             self._made.pop(next(iter(self._made)))
         return found
 
-    def _choice(self, method: str) -> MethodChoice:
+    def _choice(self, method: str, network: str) -> MethodChoice:
         """A method with its networks, loaded once."""
-        if method not in self._choices:
-            checkpoint = self._checkpoint if method == "mdn" else None
-            self._choices[method] = self._load(method, checkpoint=checkpoint)
-        return self._choices[method]
+        if (method, network) not in self._choices:
+            checkpoint = self._checkpoint if method == "mdn" and self.first_network == SHIPPED else None
+            if network and network != SHIPPED:
+                checkpoint = self.networks()[chosen(network, "network", self.networks())]
+            self._choices[method, network] = self._load(method, checkpoint=checkpoint)
+        return self._choices[method, network]
 
     def reply(self, state: State) -> Reply:
         """The answer to a state with all that a page shows of it, computed to the end.

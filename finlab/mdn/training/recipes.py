@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field, replace
 
 from finlab.mdn.network import ForceNetworkConfig
+from finlab.training.loop import LoopSettings
 
 
 @dataclass(frozen=True)
@@ -22,18 +23,9 @@ class AnswerSettings:
 
 
 @dataclass(frozen=True)
-class MdnTraining:
+class MdnTraining(LoopSettings):
     """How the network of method `mdn` is trained: the likelihood of the ways that the teacher has found."""
 
-    steps: int
-    batch_size: int
-    learning_rate: float
-    warmup: int
-    """Steps over which it rises linearly, if there are as many."""
-    ema: float
-    """Decay of the running average of the weights that is shipped."""
-    seconds: float | None
-    """Time after which the run ends whatever step it has come to."""
     anneal: int = 2500
     """Steps over which components stop sharing what they stand for; at first all of them learn from all."""
     spread: float = 0.02

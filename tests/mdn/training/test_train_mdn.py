@@ -1,6 +1,8 @@
 """Training of the network of method `mdn`: repeatable answers, batches as seen, a likelihood that is one."""
 
 import csv
+import shutil
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -9,11 +11,14 @@ import pytest
 import torch
 
 from finlab.mdn.network import ForceNetworkConfig
+from finlab.mdn.training import train
 from finlab.mdn.training.answers import Answers, read_answers, write_answers
 from finlab.mdn.training.first_weights import first_weights
 from finlab.mdn.training.recipes import RECIPES
 from finlab.mdn.training.train import losses, train_mdn
-from finlab.networks.checkpoint import read_checkpoint
+from finlab.networks.checkpoint import read_checkpoint, write_checkpoint
+from finlab.networks.trained import TrainedWeights
+from finlab.training import loop
 
 SMOKE = RECIPES["smoke"]
 
@@ -78,3 +83,33 @@ def test_it_learns(tmp_path: Path) -> None:
 def test_time_that_is_up_ends_the_run(tmp_path: Path) -> None:
     cut = train_mdn("smoke", tmp_path, seconds=1e-9)
     assert cut.training["mdn"]["steps_done"] == 1
+
+
+def test_a_run_that_died_ends_with_the_weights_of_one_that_did_not(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    expected = train_mdn("smoke", tmp_path / "undisturbed")
+    shutil.copytree(tmp_path / "undisturbed" / "answers", tmp_path / "died" / "answers")
+    saves = 0
+
+    def dying(folder: Path, weights: TrainedWeights) -> TrainedWeights:
+        nonlocal saves
+        saves += 1
+        if saves == 12:
+            raise KeyboardInterrupt
+        return write_checkpoint(folder, weights)
+
+    monkeypatch.setattr(loop, "SAVE_EVERY_S", 0.0)
+    monkeypatch.setattr(train, "write_checkpoint", dying)
+    with pytest.raises(KeyboardInterrupt):
+        train_mdn("smoke", tmp_path / "died", resume=True)
+    found = train_mdn("smoke", tmp_path / "died", resume=True)
+    assert 12 < saves < 12 + 30  # it did not begin anew
+    for name, value in expected.network.items():
+        np.testing.assert_allclose(found.network[name], value, atol=1e-6)
+
+
+def test_answers_end_with_half_of_the_time(tmp_path: Path) -> None:
+    settings = replace(SMOKE.answers, files=6)
+    assert len(train.answers_in(tmp_path, settings, 0, until=0.0)) == 2
+    assert len(list(tmp_path.iterdir())) == 2

@@ -1,0 +1,149 @@
+"""The paper's data set (data generation): random layouts, uniform commands, and the wrenches they cause.
+
+This is all the knowledge of physics that training needs: no inverse is ever solved for. A set is a folder of
+parts and a `data.json` that says how it was drawn and holds the wrenches' mean and standard deviation.
+"""
+
+import io
+import json
+from dataclasses import asdict, dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+from zipfile import BadZipFile
+
+import numpy as np
+
+from finlab.arrays import AnyArray, Array
+from finlab.errors import DataError
+from finlab.files.guarded import decoded, read_file
+from finlab.files.plain_values import parse_json
+from finlab.layout import FinModelSpec, Layout, random_layout
+from finlab.layout.random import TRAINING_FINS
+from finlab.networks.normalization import Normalization
+from finlab.physics import Plant
+from finlab.training.parts import parts_by_processes
+from finlab.whole_file import make_folder, sweep_parts, write_whole
+
+DATA_SEED = 20_000
+"""Leads the seed of every layout; no evaluation's seed begins like this."""
+N_FINS = TRAINING_FINS[1]
+"""Fins that every robot is padded to."""
+PART = 250_000
+"""Samples of a part."""
+LEAST_STD = 1e-6
+"""Least standard deviation of an axis (paper: std floor)."""
+DATA_FILE = "data.json"
+FORMAT, VERSION = "finlab-data", 1
+ROBOT = ("position", "mounting_angle", "lower", "upper", "mask")
+"""Arrays of a part that each layout has once."""
+FIELDS = (*ROBOT, "command", "wrench")
+"""All arrays of a part, layouts first; see `Batch`."""
+
+
+@dataclass(frozen=True)
+class DataSettings:
+    """How a data set is drawn."""
+
+    layouts: int = 1000
+    commands: int = 5000
+    """Commands on each layout."""
+    seed: int = 0
+    varied_limits: float = 0.5
+    """Share of the layouts whose fins have limits of their own; not printed."""
+    fin_model: FinModelSpec = FinModelSpec()
+    """Fin model that causes the wrenches."""
+
+    @property
+    def together(self) -> int:
+        """Layouts of a part."""
+        return max(1, PART // self.commands)
+
+    def as_values(self) -> dict[str, Any]:
+        """The settings as in `data.json`."""
+        model = {"type": self.fin_model.type, **dict(self.fin_model.parameters)}
+        return asdict(replace(self, fin_model=FinModelSpec())) | {"fin_model": model}
+
+
+def generate(folder: Path, settings: DataSettings) -> None:
+    """Write a data set, its parts on all cores; parts that are there stay.
+
+    Raises:
+        DataError: the folder holds a set that was drawn otherwise, or a file cannot be written.
+    """
+    make_folder(folder)
+    sweep_parts(folder)
+    if (folder / DATA_FILE).exists() and about(folder)["settings"] != settings.as_values():
+        raise DataError(f"{folder}: holds a data set that was drawn otherwise; take an empty folder")
+    _write_about(folder, settings, None)
+    count = -(-settings.layouts // settings.together)
+    sums = parts_by_processes(partial(write_part, folder, settings), count, "data")
+    total = np.sum(sums, axis=0) / (settings.layouts * settings.commands)
+    deviation = np.sqrt(np.maximum(total[1] - total[0] ** 2, 0.0))
+    _write_about(folder, settings, Normalization(total[0], np.maximum(deviation, LEAST_STD)))
+
+
+def write_part(folder: Path, settings: DataSettings, number: int) -> Array:
+    """Write part `number` unless it is there; sums of its wrenches and of their squares (2, 6)."""
+    path = part_file(folder, number)
+    if not path.exists():
+        first = number * settings.together
+        some = range(first, min(first + settings.together, settings.layouts))
+        robots = [samples_of(settings, k) for k in some]
+        content = io.BytesIO()
+        arrays = {name: np.stack([robot[name] for robot in robots]) for name in FIELDS}
+        np.savez(content, allow_pickle=False, **arrays)
+        write_whole(path, content.getvalue(), DataError)
+    wrench = read_part(path)["wrench"].reshape(-1, 6).astype(np.float64)
+    return np.stack([wrench.sum(0), (wrench**2).sum(0)])
+
+
+def samples_of(settings: DataSettings, number: int) -> dict[str, AnyArray]:
+    """One layout padded with zeros, and its commands; they depend on the seed and the number alone."""
+    rng = np.random.default_rng([DATA_SEED, settings.seed, number])
+    varied = rng.random() < settings.varied_limits
+    layout = random_layout(rng, limits="varied" if varied else "nominal")
+    layout = Layout(layout.name, tuple(replace(fin, model=settings.fin_model) for fin in layout.fins))
+    plant = Plant(layout)
+    command = plant.sample(rng, (settings.commands,))
+    more = N_FINS - layout.n
+
+    def padded(values: AnyArray, axis: int = 0) -> AnyArray:
+        return np.pad(values, [(0, more if k == axis else 0) for k in range(values.ndim)]).astype(np.float32)
+
+    return {
+        **{name: padded(getattr(layout, name)) for name in ROBOT[:-1]},
+        "mask": np.arange(N_FINS) < layout.n,
+        "command": padded(command, 1),
+        "wrench": plant.wrench(command).astype(np.float32),
+    }
+
+
+def part_file(folder: Path, number: int) -> Path:
+    """The file of part `number`."""
+    return folder / f"part-{number:05d}.npz"
+
+
+def read_part(path: Path) -> dict[str, AnyArray]:
+    """The arrays of a part by name; a `DataError` where it is missing or damaged."""
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            return {name: file[name] for name in FIELDS}
+    except (OSError, ValueError, KeyError, EOFError, BadZipFile) as error:
+        raise DataError(f"{path}: no part of a data set ({error}); remove it and generate again") from error
+
+
+def about(folder: Path) -> dict[str, Any]:
+    """What `data.json` says: settings and normalization; a `DataError` where there is none."""
+    path = folder / DATA_FILE
+    text = decoded(read_file(path, 1_000_000, "a data set's file", DataError), str(path), "JSON", DataError)
+    about = parse_json(text, str(path), DataError)
+    if not isinstance(about, dict) or (about.get("format"), about.get("version")) != (FORMAT, VERSION):
+        raise DataError(f"{path}: not a finlab data set (expected format {FORMAT!r}, version {VERSION})")
+    return about
+
+
+def _write_about(folder: Path, settings: DataSettings, normalization: Normalization | None) -> None:
+    values = normalization and {name: part.tolist() for name, part in normalization._asdict().items()}
+    about = {"format": FORMAT, "version": VERSION, "settings": settings.as_values(), "normalization": values}
+    write_whole(folder / DATA_FILE, json.dumps(about, indent=2) + "\n", DataError)

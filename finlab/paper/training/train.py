@@ -1,0 +1,197 @@
+"""`finlab train surrogate` and `finlab train allocator`: the physics surrogate is trained first and on its
+own, then the network with the surrogate frozen."""
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import Tensor, nn
+
+from finlab.errors import DataError
+from finlab.layout import FinModelSpec
+from finlab.networks.checkpoint import read_checkpoint, resolve_checkpoint, write_checkpoint
+from finlab.networks.trained import State, TrainedWeights, sizes_for_file
+from finlab.paper.surrogate import SurrogateConfig
+from finlab.paper.training import losses
+from finlab.paper.training.card import write_card
+from finlab.paper.training.data import Batch, DataSet, fresh_batch
+from finlab.paper.training.modules import AllocatorNetwork, Surrogate, features
+from finlab.paper.training.recipes import PaperLoop, recipe
+from finlab.paper.training.samples import N_FINS, DataSettings, generate
+from finlab.training.device import Workplace, workplace
+from finlab.training.loop import Terms, Training, seeded_generator
+
+NOISE_SEED = 1_000_000
+"""Added to the seed of the noise, so that it is unrelated to the order of the data."""
+JUDGES = DataSettings(layouts=500, commands=20, seed=7_000)
+"""Samples that no training sees, from which the error of a surrogate is measured."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """What both trainings have to know, beside the recipe."""
+
+    preset: str
+    """One of `RECIPES`."""
+    output: Path
+    """Folder for checkpoint, model card, log, curves and state, made if need be."""
+    data: Path | None = None
+    """Folder of a data set; None for the recipe's, made in `output/data`."""
+    seed: int = 0
+    """Of the first weights, the noise and the order of the data."""
+    steps: int | None = None
+    """In place of the recipe's."""
+    resume: bool = False
+    """Whether to go on from the state in `output`."""
+    device: str | None = None
+    """See `workplace`."""
+
+
+class Bench:
+    """A data set in the memory of this process's device, and its share of every batch."""
+
+    def __init__(self, place: Workplace, samples: DataSet, settings: PaperLoop, seed: int) -> None:
+        self.place, self.samples, self.settings, self.seed = place, samples, settings, seed
+        self.rows = place.share(settings.batch_size)
+
+    def batch(self, step: int) -> Batch:
+        """The share of batch number `step`."""
+        settings = self.settings
+        return self.samples.batch(step, settings.batch_size, self.seed, settings.one_layout, self.rows)
+
+    def noise(self, step: int) -> tuple[Tensor, Tensor]:
+        """The share of the noise of `guidance`."""
+        device, shape = self.place.device, (self.settings.batch_size, N_FINS, 1)
+        generator = seeded_generator(NOISE_SEED + self.seed, step, device)
+        uniform = torch.rand(shape, generator=generator, device=device)
+        return uniform[self.rows], torch.randn((*shape, 3), generator=generator, device=device)[self.rows]
+
+    def tensors(self, *values: Any) -> list[Tensor]:
+        """Arrays on the device."""
+        return [torch.tensor(value, dtype=torch.float32, device=self.place.device) for value in values]
+
+
+def train_surrogate(options: Options) -> TrainedWeights:
+    """Train a preset's surrogate and write a checkpoint folder without an allocator network.
+
+    Raises:
+        DataError: an unknown preset, data or a state that do not fit, or a file that cannot be written.
+        CommandError: there is no such device.
+    """
+    made = recipe(options.preset)
+
+    def terms_of(network: nn.Module, bench: Bench) -> Terms:
+        (std,) = bench.tensors(bench.samples.normalization.std)
+
+        def terms(step: int) -> dict[str, Tensor]:
+            batch = bench.batch(step)
+            with bench.place.autocast():
+                return {"loss": losses.physics(network, batch, std).mean()}
+
+        return terms
+
+    def checkpoint(samples: DataSet, state: State) -> TrainedWeights:
+        trained = TrainedWeights(
+            name="",
+            normalization=samples.normalization,
+            surrogate_sizes={"kind": "mlp", "hidden": list(made.surrogate.hidden)},
+            surrogate=state,
+            fin_model=samples.settings["fin_model"],
+        )
+        return replace(trained, metrics={"surrogate": {"wrench_error_norm": surrogate_error(trained)}})
+
+    module = Surrogate, made.surrogate
+    return _train("surrogate", options, made.surrogate_training, module, terms_of, checkpoint)
+
+
+def train_allocator(options: Options, surrogate: Path) -> TrainedWeights:
+    """Train a preset's network, guided by the surrogate of a checkpoint, and write a whole checkpoint folder.
+
+    Without other data that in the surrogate's folder is learned from, if there is any.
+
+    Raises:
+        CheckpointError: the checkpoint holds no surrogate.
+        DataError, CommandError: as in `train_surrogate`.
+    """
+    made, base = recipe(options.preset), read_checkpoint(resolve_checkpoint(surrogate))
+    settings = made.allocator_training
+    surrogate_of(base)  # reports what is missing before data are made
+    if options.data is None and (surrogate / "data").is_dir():
+        options = replace(options, data=surrogate / "data")
+
+    def terms_of(network: nn.Module, bench: Bench) -> Terms:
+        if bench.samples.settings["fin_model"] != base.fin_model:
+            raise DataError(f"{options.data}: its wrenches are of another fin model than the surrogate's")
+        mean, std = bench.tensors(*base.normalization)
+        frozen = surrogate_of(base).to(bench.place.device)
+        ramp = replace(settings, steps=bench.settings.steps)
+
+        def terms(step: int) -> dict[str, Tensor]:
+            batch = bench.batch(step)
+            with bench.place.autocast():
+                mixture = network(features(batch), (batch.wrench - mean) / std, batch.mask)
+                guide = losses.guidance(mixture, frozen, batch, std, bench.noise(step)).mean()
+            imitate = losses.imitation(mixture, batch).mean()
+            entropy = losses.negative_entropy(mixture, batch.mask).mean()
+            loss = imitate + ramp.beta(step) * guide + ramp.entropy * entropy  # Eq. 7
+            return {"loss": loss, "imitation": imitate, "guidance": guide, "entropy": entropy}
+
+        return terms
+
+    def checkpoint(samples: DataSet, state: State) -> TrainedWeights:
+        return replace(base, network_sizes=sizes_for_file(made.network), network=state)
+
+    module = AllocatorNetwork, made.network
+    return _train("allocator", options, settings, module, terms_of, checkpoint, base.sha256)
+
+
+def _train(
+    verb: str,
+    options: Options,
+    settings: PaperLoop,
+    module_of: tuple[Callable[[Any], nn.Module], Any],
+    terms_of: Callable[[nn.Module, Bench], Terms],
+    checkpoint: Callable[[DataSet, State], TrainedWeights],
+    surrogate: str = "",
+) -> TrainedWeights:
+    """Train a module and write the checkpoints that are made of its weights."""
+    settings, output = replace(settings, steps=options.steps or settings.steps), options.output
+    with workplace(options.device, settings.batch_size) as place:
+        if options.data is None and place.rank == 0:
+            generate(output / "data", recipe(options.preset).data)
+        place.wait()
+        samples = DataSet(options.data or output / "data", place.device)
+        torch.manual_seed(options.seed)
+        kind, sizes = module_of
+        module = kind(sizes).to(place.device)
+        identity = {"preset": options.preset, "seed": options.seed, "training": asdict(settings)}
+        identity |= {"data": samples.settings, "surrogate_sha256": surrogate}
+
+        def save(state: State, progress: dict[str, Any]) -> None:
+            made = checkpoint(samples, state)
+            history = {**made.training, verb: identity | progress}
+            made = replace(made, name=output.name, preset=options.preset, training=history)
+            write_card(output, write_checkpoint(output, made))
+
+        training = Training(dict(module.named_parameters()), settings, output, identity, place)
+        if options.resume:
+            training.resume()
+        bench = Bench(place, samples, settings, options.seed)
+        training.run(terms_of(place.shared(module), bench), save)
+        return read_checkpoint(output)
+
+
+def surrogate_of(weights: TrainedWeights) -> Surrogate:
+    """The surrogate of a checkpoint, frozen; a `CheckpointError` where it holds none."""
+    module = Surrogate(SurrogateConfig.of(weights))
+    module.load_state_dict({name: torch.tensor(value) for name, value in weights.surrogate.items()})
+    return module.requires_grad_(False)
+
+
+def surrogate_error(weights: TrainedWeights) -> float:
+    """Mean normalized error of a surrogate's wrench by its fin model, on fresh samples."""
+    batch = fresh_batch(replace(JUDGES, fin_model=FinModelSpec.from_values(weights.fin_model)))
+    std = torch.tensor(weights.normalization.std, dtype=torch.float32)
+    return float(losses.physics(surrogate_of(weights), batch, std).sqrt().mean())

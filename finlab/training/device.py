@@ -1,0 +1,94 @@
+"""Where a training runs: on which device, and as which of several processes that torchrun started."""
+
+import gc
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor, distributed, nn
+from torch.nn.parallel import DistributedDataParallel
+
+from finlab.errors import CommandError
+
+
+@dataclass(frozen=True)
+class Workplace:
+    """A device, and the number of this process among all that train together."""
+
+    device: torch.device
+    rank: int = 0
+    world: int = 1
+
+    def share(self, size: int) -> slice:
+        """The rows of a batch of `size` that are this process's."""
+        rows = size // self.world
+        return slice(self.rank * rows, (self.rank + 1) * rows)
+
+    def shared(self, module: nn.Module) -> nn.Module:
+        """A module whose gradients are averaged over all processes."""
+        return DistributedDataParallel(module) if self.world > 1 else module
+
+    def mean(self, value: Tensor) -> float:
+        """The mean of a number over all processes; every process must ask."""
+        value = value.detach().clone()
+        if self.world > 1:
+            distributed.all_reduce(value)
+        return float(value) / self.world
+
+    def wait(self) -> None:
+        """Wait until every process has come here."""
+        if self.world > 1:
+            distributed.barrier()
+
+    def autocast(self) -> torch.autocast:
+        """Matrix products in bfloat16 where the device multiplies it faster than float32.
+
+        The CPU is asked, not timed: a timing may differ from run to run, and a resumed run would go on in
+        another precision.
+        """
+        kind = self.device.type
+        fast = kind == "cuda" or (kind == "cpu" and torch.cpu._is_avx512_bf16_supported())
+        return torch.autocast(kind, torch.bfloat16, enabled=fast)
+
+
+@contextmanager
+def workplace(name: str | None, batch_size: int) -> Iterator[Workplace]:
+    """The workplace of this process.
+
+    Args:
+        name: a device of torch such as cpu or cuda:1; by default a graphics card where there is one.
+        batch_size: samples of a step, which all processes share.
+
+    Raises:
+        CommandError: there is no such device, or the batch cannot be shared equally.
+    """
+    world, rank = (int(os.environ.get(key, default)) for key, default in (("WORLD_SIZE", 1), ("RANK", 0)))
+    if batch_size % world:
+        raise CommandError(f"batches of {batch_size} samples cannot be shared by {world} processes equally")
+    device = _device(name)
+    if world == 1:
+        yield Workplace(device)
+        return
+    distributed.init_process_group("nccl" if device.type == "cuda" else "gloo")
+    try:
+        yield Workplace(device, rank, world)
+    finally:
+        gc.collect()  # modules that are shared hold threads of the group, which must end before it
+        distributed.destroy_process_group()
+
+
+def _device(name: str | None) -> torch.device:
+    local = os.environ.get("LOCAL_RANK", "0")
+    if name in (None, "cuda") and torch.cuda.is_available():
+        name = f"cuda:{local}"
+    try:
+        device = torch.device(name or "cpu")
+        torch.empty(1, device=device)
+    except (RuntimeError, AssertionError, NotImplementedError) as error:
+        reason = str(error).splitlines()[0][:120]
+        raise CommandError(f"device: {name!r:.40} cannot be used here ({reason}); take cpu") from None
+    if device.type == "cuda":
+        torch.cuda.set_device(device)
+    return device
