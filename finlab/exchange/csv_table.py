@@ -18,7 +18,7 @@ MEASURED = {"phi", "pwm", "escsignal", "rpm", "current", "power", "voltage", "t"
 PLACES = {"px", "posx", "dx", "ax", "nx", "ux", *labels.POSITION.split()}
 """Columns by which a table of places is known."""
 MAX_ROWS = 1000
-"""Most rows that are read; a robot has up to 64 actuators."""
+"""Most rows and columns that are read; a robot has up to 64 actuators."""
 ENDS = {word: "least" for word in labels.LEAST.split()} | {word: "most" for word in labels.MOST.split()}
 
 
@@ -51,8 +51,8 @@ def table_of(text: str) -> Table:
         cells = [*csv.reader((line for _, line in lines), delimiter=mark, skipinitialspace=True)]
     except csv.Error as error:
         raise LayoutError(f"is no table: {error}") from None
-    if len(cells) != len(lines):
-        raise LayoutError("has a cell with line ends inside, expected a row per line")
+    if len(cells) != len(lines) or max(map(len, cells)) > MAX_ROWS:
+        raise LayoutError(f"has a cell with line ends inside, or a row of more than {MAX_ROWS} cells")
     rows = [(i, [cell.strip() for cell in row]) for (i, _), row in zip(lines, cells, strict=True)]
     for _, row in rows:
         while len(row) > 1 and not row[-1]:

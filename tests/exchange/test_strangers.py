@@ -280,6 +280,7 @@ def test_xacro_is_expanded_where_it_is_installed(tmp_path: Path) -> None:
         ("a.sdf", "<a>" * 200_000),
         ("a.csv", "a" + " " * 300_000 + ",Fx\n" + "1,1\n" * 20_000),
         ("a.csv", ("," * 50 + "\n") * 20_000),
+        ("a.csv", "a," * 2_000_000),
         ("a.csv", "a,b\n" + " " * 500_000 + "\n" + '"' * 200_000),
         ("a.cpp", "add_motor(" * 100_000),
         ("a.cpp", "void add_motor(x)\n" * 60_000 + "/*" * 60_000),
