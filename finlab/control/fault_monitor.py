@@ -243,7 +243,11 @@ class FaultMonitor:
         kind = int(by_kind[fin].argmax())
         both = np.where((beliefs.pairs == fin).any(axis=1), beliefs.both, 0.0)
         if self._lost.sum() + 2 < self.layout.n and both.max() > by_kind[fin, kind]:
-            self._lose_both(int(both.argmax()))
+            pair = int(both.argmax())
+            beliefs.adopt_both(pair)
+            for fin in beliefs.pairs[pair].tolist():
+                self._told[fin] = False
+                self._mark(fin, 0.0, math.nan)
             return
         turned = kind == len(LEVELS)
         level = float(beliefs.strength[fin]) if turned else LEVELS[kind]
@@ -257,13 +261,6 @@ class FaultMonitor:
         """Which actuators (n,) surely push the other way than the layout says."""
         strength = self._beliefs.strength
         return (strength < OPPOSED_BELOW) & (strength < -OPPOSED_SURE * self._beliefs.strength_std)
-
-    def _lose_both(self, pair: int) -> None:
-        """Two fins are lost at one moment."""
-        self._beliefs.adopt_both(pair)
-        for fin in self._beliefs.pairs[pair].tolist():
-            self._told[fin] = False
-            self._mark(fin, 0.0, math.nan)
 
     def _mark(self, fin: int, strength: float, stuck: float) -> None:
         self._lost[fin], self._back[fin] = strength < LOST_BELOW, strength < OPPOSED_BELOW

@@ -19,4 +19,3 @@ from finlab.sim.task import SHIPPED as SHIPPED
 from finlab.sim.task import Trajectory as Trajectory
 from finlab.sim.task import make_trajectory as make_trajectory
 from finlab.sim.task import straight as straight
-from finlab.vehicle.vehicle import Vehicle as Vehicle

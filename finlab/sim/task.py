@@ -160,11 +160,7 @@ def station(duration_s: float = 60.0, depth_m: float = 1.0, name: str = "station
 
 
 SHIPPED: dict[str, Callable[..., Trajectory]] = {
-    "circle": circle,
-    "lissajous": lissajous,
-    "square": square,
-    "dive": dive,
-    "station": station,
+    make.__name__: make for make in (circle, lissajous, square, dive, station)
 }
 """Trajectories by name; each takes its duration [s]."""
 
