@@ -12,6 +12,7 @@ from tyro.extras import SubcommandApp
 from finlab.cli.json_file import JsonFile, check_json_file, put_json
 from finlab.cli.layout_table import layout_text
 from finlab.cli.optimize import Flow, optimize
+from finlab.errors import printable
 
 if TYPE_CHECKING:
     from finlab.exchange import Exchange
@@ -106,11 +107,8 @@ def convert_layout(
 
     exchange = Exchange(fins, thrusters, origin, force, frame, rows, model)
     layout, exchange = in_worker(_converted, file, output, to, exchange)
-    print(
-        "\n".join(
-            [f"{output}: {layout.name} with {layout.counted}", *(f"- {note}" for note in exchange.notes)]
-        )
-    )
+    notes = [f"- {printable(note)}" for note in exchange.notes]
+    print("\n".join([f"{output}: {layout.name} with {layout.counted}", *notes]))
 
 
 def _converted(file: str, output: Path, to: str | None, exchange: Exchange) -> tuple[Layout, Exchange]:

@@ -50,8 +50,9 @@ def score(case: Case, targets: Array, command: Array, solve_ms: Array, *, number
         number: of the layout in its split.
 
     Returns:
-        Arrays (N,): `layout`, its number; `err_norm`, the norm of what is missing over `sigma_of`;
-        axes that are free left out; `err_phys`, the same in N and N m; `effort`, the paper's J_en; `power` [W]; `solve_ms`.
+        Arrays (N,): `layout`, its number; `err_norm`, the norm of what is missing over `sigma_of`, without
+        axes that are free; `err_phys`, the same in N and N m; `effort`, the paper's J_en; `power` [W];
+        `solve_ms`.
     """
     plant = plant_of(case.layout)
     missing = (plant.wrench(command) - targets) * case.layout.commanded

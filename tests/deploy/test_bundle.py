@@ -226,7 +226,7 @@ def test_a_full_disk_leaves_nothing_under_the_final_name(
         files = (file for file in path.rglob("*") if file.is_file())
         return {str(file.relative_to(path)): file.read_bytes() for file in files}
 
-    large = Bundle({**bundle.files, ABOUT: b"x" * 300_000})
+    large = Bundle({**bundle.files, ABOUT: np.random.default_rng(0).bytes(300_000)})
     (tmp_path / "old").mkdir()
     write(tmp_path / "old" / "bundle", bundle)
     before, limits = held(tmp_path), resource.getrlimit(resource.RLIMIT_FSIZE)

@@ -110,12 +110,12 @@ def test_a_motion_beyond_all_bounds_is_a_sentence(ucat: Body) -> None:
     for _ in range(200):
         light = replace(
             ucat,
-            inertia_kgm2=tuple(10.0 ** rng.uniform(-9, -3, 3)),
-            added_mass=tuple(10.0 ** rng.uniform(-9, 7, 6)),
+            inertia_kgm2=tuple((10.0 ** rng.uniform(-9, -3, 3)).tolist()),
+            added_mass=tuple((10.0 ** rng.uniform(-9, 7, 6)).tolist()),
             linear_damping=(0.0,) * 6,
             quadratic_damping=(0.0,) * 6,
         )
-        vehicle, wrench = Vehicle(light), tuple(10.0 ** rng.uniform(0, 6, 6))
+        vehicle, wrench = Vehicle(light), tuple((10.0 ** rng.uniform(0, 6, 6)).tolist())
         try:
             swim(vehicle, at_rest(), wrench, 0.5, 0.1)
         except LayoutError as error:
