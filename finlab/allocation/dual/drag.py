@@ -45,12 +45,15 @@ class Priced(NamedTuple):
     """The command (n, 3)."""
     cost: float
     """Its cost [W]."""
+    place: int
+    """From which of some starts it comes."""
 
 
 def command_with_drag(
     problem: CommandProblem, cost: Cost, wrench: Array, starts: Array, enough: float
 ) -> Priced | None:
-    """Returns what gives a normalized wrench (6,), the cheapest of those found; None where there is none.
+    """Returns what gives a normalized wrench (6,), the first of those found that are hardly
+    dearer than the cheapest; None where there is none.
 
     Args:
         problem: the robot.
@@ -64,7 +67,8 @@ def command_with_drag(
     if not len(met):
         return None
     costs = cost.of(found.command[met])
-    return Priced(found.command[met[costs.argmin()]], float(costs.min()))
+    cheap = int(np.argmax(costs <= (1.0 + CLOSE) * costs.min()))
+    return Priced(found.command[met[cheap]], float(costs[cheap]), int(met[cheap]))
 
 
 def prices_at(problem: CommandProblem, cost: Cost, command: Array, directions: Array) -> Array:
@@ -87,16 +91,14 @@ def cheapened(
     (R, n, 3); None where steps from none of these give it.
 
     Each step follows the power's slope along what gives the same wrench (sequential quadratic programming,
-    with the size of the curvature), as far as that lowers the power. A single start that is near to giving
-    the wrench takes such a step first.
+    with the size of the curvature), as far as that lowers the power. The first start, near to giving the
+    wrench, takes such a step at once.
     """
-    best, size = None, 1.0
-    if len(starts) == 1:
-        step, gain = _cheaper_step(problem, cost, starts[0])
-        best = command_with_drag(problem, cost, wrench, starts + step, enough)
-        if best is not None and gain <= 10.0 * CLOSE * best.cost:
-            return best
-    best = best or command_with_drag(problem, cost, wrench, starts, enough)
+    step, gain = _cheaper_step(problem, cost, starts[0])
+    best = command_with_drag(problem, cost, wrench, np.concatenate([starts[:1] + step, starts[1:]]), enough)
+    if best is not None and best.place == 0 and gain <= 10.0 * CLOSE * best.cost:
+        return best
+    best, size = best or command_with_drag(problem, cost, wrench, starts[:1], enough), 1.0
     for _ in range(ROUNDS if best is not None else 0):
         assert best is not None
         step = size * _cheaper_step(problem, cost, best.command)[0]

@@ -287,6 +287,8 @@ class Dual(Method):
             force, value = self._in_gaps(target, sets, root, within, deadline)
         command = None
         if first is not None:
+            # What the tables prove leaves out what foils do beyond them.
+            value = np.zeros(1)
             command, prices = self._with_drag(targets[0], force, first, root, deadline)
             within[0] = not np.isnan(command).any()
         if not within.all() and policy is not None:
@@ -311,7 +313,7 @@ class Dual(Method):
         asked, value = aim / self.scale, root.value
 
         best_of = partial(cheapened, problem, cost, asked, enough=EXACT)
-        best = best_of(begin) or best_of(self.compiled.commands(first))
+        best = best_of(np.concatenate([begin, self.compiled.commands(first)]))
         if best is not None:
             if not root.solved[0]:
                 tried = prices_at(problem, cost, best.command, self._directions)
