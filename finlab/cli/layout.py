@@ -104,7 +104,10 @@ def convert_layout(
     layout, exchange = in_worker(_converted, file, output, to, exchange)
     print(
         "\n".join(
-            [f"{output}: {layout.name} with {layout.counted}", *(f"- {printable(note)}" for note in exchange.notes)]
+            [
+                f"{output}: {layout.name} with {layout.counted}",
+                *(f"- {printable(note)}" for note in exchange.notes),
+            ]
         )
     )
 

@@ -23,7 +23,7 @@ process has about 110 MB before."""
 PATIENCE = 20.0
 """Times the processor time after which the process is ended although it has not used it."""
 
-Found = TypeVar("Found")
+Result = TypeVar("Result")
 
 
 class _Limits(NamedTuple):
@@ -31,7 +31,7 @@ class _Limits(NamedTuple):
     room: int
 
 
-def in_worker(read: Callable[..., Found], *arguments: Any) -> Found:
+def in_worker(read: Callable[..., Result], *arguments: Any) -> Result:
     """Returns what `read(*arguments)` gives, which runs in a process of its own.
 
     What it changes in its arguments stays there. A program of one thread is copied; any other one has a
@@ -55,10 +55,10 @@ def in_worker(read: Callable[..., Found], *arguments: Any) -> Found:
             there.close()
             if not here.poll(PATIENCE * limits.seconds):
                 raise _ended(-signal.SIGKILL, limits)
-            found, error = here.recv()
+            answer, error = here.recv()
         except EOFError:
             process.join()
-            found, error = None, _ended(process.exitcode, limits)
+            answer, error = None, _ended(process.exitcode, limits)
         except OSError as problem:
             raise FinlabError(f"no process can be started to read the file: {problem.strerror}") from None
         finally:
@@ -67,7 +67,7 @@ def in_worker(read: Callable[..., Found], *arguments: Any) -> Found:
                 process.join()
     if error is not None:
         raise error
-    result: Found = found
+    result: Result = answer
     return result
 
 

@@ -1,4 +1,4 @@
-"""What a mesh file asks for, held against what it holds, before a library reads it."""
+"""Checks of what a mesh file asks for against what it holds, before a library reads it."""
 
 import json
 import re
