@@ -112,25 +112,25 @@ def _size(argument: Any) -> int:
 
 def _child(connection: Connection, limits: _Limits, read: Callable[..., Any], arguments: Any) -> None:
     """In the process: read, and send what came of it."""
-    answer: tuple[Any, FinlabError | None]
-    try:
+    with suppress(
+        BaseException
+    ):  # memory may not even suffice to say so; whoever interrupts, interrupts both
         _limit(limits)
-        answer = read(*arguments), None
+        connection.send(_answer(read, arguments))
+    os._exit(1)
+
+
+def _answer(read: Callable[..., Any], arguments: Any) -> tuple[Any, FinlabError | None]:
+    try:
+        return read(*arguments), None
     except FinlabError as problem:
-        answer = None, problem
+        return None, problem
     except MemoryError:
-        os._exit(1)  # as where there is not even memory to say so
+        raise
     except Exception as problem:  # a fault of ours; a stranger's file has no power by it
         at = traceback.extract_tb(problem.__traceback__)[-1]
-        place = f"{Path(at.filename).name}, line {at.lineno}"
-        text = f"reading failed, which is a fault of finlab ({type(problem).__name__} in {place}: "
-        answer = None, FinlabError(f"{text}{problem!s:.100}); report it with the file")
-    except BaseException:  # whoever interrupts, interrupts both
-        os._exit(1)
-    try:
-        connection.send(answer)
-    except BaseException:
-        os._exit(1)
+        text = f"{type(problem).__name__} in {Path(at.filename).name}, line {at.lineno}: {problem!s:.100}"
+        return None, FinlabError(f"reading failed, a fault of finlab ({text}); report it with the file")
 
 
 def _limit(limits: _Limits) -> None:
@@ -150,7 +150,5 @@ def _limit(limits: _Limits) -> None:
 def _ended(code: int | None, limits: _Limits) -> FinlabError:
     """Why the process has ended without a word."""
     late = code in (-signal.SIGPROF, -signal.SIGXCPU, -signal.SIGKILL)
-    why = (
-        f"time, more than {limits.seconds:.1f} s" if late else f"memory, more than {limits.room / 1e6:.0f} MB"
-    )
+    why = f"time, more than {limits.seconds:.1f} s" if late else f"memory, over {limits.room / 1e6:.0f} MB"
     return FinlabError(f"reading the file takes too much {why}; make it smaller or simpler")
