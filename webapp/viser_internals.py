@@ -144,13 +144,8 @@ def run_file(gui: viser.GuiApi, name: str, more: str = "") -> None:
 
 
 def hold_uploads(gui: viser.GuiApi, most: int, refuse: Callable[[str], object]) -> None:
-    """Hold what a page sends against what it announced: viser trusts it until the last part.
-
-    Args:
-        gui: the page's.
-        most: largest size of the files that are on their way from it, together [bytes].
-        refuse: called with a sentence that says why a file is dropped.
-    """
+    """Hold what a page sends against what it announced, where viser trusts it until the last part, and what
+    is on its way from it against `most` bytes; `refuse` hears why a file is dropped."""
     interface, states = gui._websock_interface, gui._current_file_upload_states
 
     def drop(message: Any, size: int, sentence: str) -> None:

@@ -141,7 +141,7 @@ class Server:
                 policy=request.policy,
                 flow=request.flow,
             )
-            reply = self._reply(name, "ok", answer.command, answer.forces) | _told(answer)
+            reply = self._reply(name, "ok", answer.command, answer.forces) | _about(answer)
             _line(reply)
         except _REFUSED as error:
             return [_error(name, str(error))]
@@ -167,7 +167,7 @@ class Server:
         return {"id": name, "status": status, **command_record(layout, command, forces)}
 
 
-def _told(answer: Allocation) -> dict[str, Any]:
+def _about(answer: Allocation) -> dict[str, Any]:
     """What a reply tells of an answer beside its commands."""
     return {
         "target": [None if math.isnan(value) else value for value in answer.target.tolist()],

@@ -110,8 +110,8 @@ class StandardStreams:
             begun = part
             *lines, part = (part + (chunk or b"\n")).split(b"\n")
             part = part[: MAX_LINE + 1]  # enough to refuse it
-            if told := [number for number, line in enumerate(lines) if line.strip()]:
-                self._line.append(Line(lines[told[-1]], since if begun and told[-1] == 0 else came))
+            if places := [number for number, line in enumerate(lines) if line.strip()]:
+                self._line.append(Line(lines[places[-1]], since if begun and places[-1] == 0 else came))
                 self._call()
             if lines or not begun:
                 since = came

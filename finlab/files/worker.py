@@ -23,7 +23,7 @@ process has about 110 MB before."""
 PATIENCE = 20.0
 """Times the processor time after which the process is ended although it has not used it."""
 
-Found = TypeVar("Found")
+Result = TypeVar("Result")
 
 
 class _Limits(NamedTuple):
@@ -31,7 +31,7 @@ class _Limits(NamedTuple):
     room: int
 
 
-def in_worker(read: Callable[..., Found], *arguments: Any) -> Found:
+def in_worker(read: Callable[..., Result], *arguments: Any) -> Result:
     """Returns what `read(*arguments)` gives, which runs in a process of its own.
 
     What it changes in its arguments stays there. A program of one thread is copied; any other one has a
@@ -55,10 +55,10 @@ def in_worker(read: Callable[..., Found], *arguments: Any) -> Found:
             there.close()
             if not here.poll(PATIENCE * limits.seconds):
                 raise _ended(-signal.SIGKILL, limits)
-            found, error = here.recv()
+            answer, error = here.recv()
         except EOFError:
             process.join()
-            found, error = None, _ended(process.exitcode, limits)
+            answer, error = None, _ended(process.exitcode, limits)
         except OSError as problem:
             raise FinlabError(f"no process can be started to read the file: {problem.strerror}") from None
         finally:
@@ -67,7 +67,7 @@ def in_worker(read: Callable[..., Found], *arguments: Any) -> Found:
                 process.join()
     if error is not None:
         raise error
-    result: Found = found
+    result: Result = answer
     return result
 
 
@@ -112,25 +112,25 @@ def _size(argument: Any) -> int:
 
 def _child(connection: Connection, limits: _Limits, read: Callable[..., Any], arguments: Any) -> None:
     """In the process: read, and send what came of it."""
-    answer: tuple[Any, FinlabError | None]
-    try:
+    with suppress(
+        BaseException
+    ):  # memory may not even suffice to say so; whoever interrupts, interrupts both
         _limit(limits)
-        answer = read(*arguments), None
+        connection.send(_answer(read, arguments))
+    os._exit(1)
+
+
+def _answer(read: Callable[..., Any], arguments: Any) -> tuple[Any, FinlabError | None]:
+    try:
+        return read(*arguments), None
     except FinlabError as problem:
-        answer = None, problem
+        return None, problem
     except MemoryError:
-        os._exit(1)  # as where there is not even memory to say so
+        raise
     except Exception as problem:  # a fault of ours; a stranger's file has no power by it
         at = traceback.extract_tb(problem.__traceback__)[-1]
-        place = f"{Path(at.filename).name}, line {at.lineno}"
-        text = f"reading failed, which is a fault of finlab ({type(problem).__name__} in {place}: "
-        answer = None, FinlabError(f"{text}{problem!s:.100}); report it with the file")
-    except BaseException:  # whoever interrupts, interrupts both
-        os._exit(1)
-    try:
-        connection.send(answer)
-    except BaseException:
-        os._exit(1)
+        text = f"{type(problem).__name__} in {Path(at.filename).name}, line {at.lineno}: {problem!s:.100}"
+        return None, FinlabError(f"reading failed, a fault of finlab ({text}); report it with the file")
 
 
 def _limit(limits: _Limits) -> None:
@@ -150,7 +150,5 @@ def _limit(limits: _Limits) -> None:
 def _ended(code: int | None, limits: _Limits) -> FinlabError:
     """Why the process has ended without a word."""
     late = code in (-signal.SIGPROF, -signal.SIGXCPU, -signal.SIGKILL)
-    why = (
-        f"time, more than {limits.seconds:.1f} s" if late else f"memory, more than {limits.room / 1e6:.0f} MB"
-    )
+    why = f"time, more than {limits.seconds:.1f} s" if late else f"memory, over {limits.room / 1e6:.0f} MB"
     return FinlabError(f"reading the file takes too much {why}; make it smaller or simpler")

@@ -63,7 +63,7 @@ def test_a_refusal_comes_back_as_it_is(kind: type[FinlabError]) -> None:
 
 def test_a_reader_that_fails_or_ends_is_a_sentence() -> None:
     with pytest.raises(
-        FinlabError, match=r"fault of finlab \(ZeroDivisionError in .*report it with the file"
+        FinlabError, match=r"a fault of finlab \(ZeroDivisionError in .*report it with the file"
     ):
         in_worker(divmod, 1, 0)
     with pytest.raises(FinlabError, match="reading the file takes too much memory"):
@@ -80,7 +80,7 @@ def test_time_is_bounded() -> None:
 
 
 def test_memory_is_bounded() -> None:
-    with pytest.raises(FinlabError, match="too much memory, more than 150 MB"):
+    with pytest.raises(FinlabError, match="too much memory, over 150 MB"):
         in_worker(fill)
     assert 100 < in_worker(grown) < 150 + 110, "and what was free before"
 
