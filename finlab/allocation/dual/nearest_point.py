@@ -41,7 +41,12 @@ class Mixture(NamedTuple):
 
 
 def nearest_point(
-    farthest: Farthest, rows: Array, target: Array, begin: Mixture | None = None, close: float = CLOSE_BY
+    farthest: Farthest,
+    rows: Array,
+    target: Array,
+    begin: Mixture | None = None,
+    close: float = CLOSE_BY,
+    apart: float = 0.0,
 ) -> Mixture:
     """Returns the point of a set nearest to a target.
 
@@ -51,6 +56,7 @@ def nearest_point(
         target: (d,), in the coordinates' metric.
         begin: a mixture to begin with.
         close: distance up to which a point is the nearest one.
+        apart: share of the miss, with its direction, that needs to be proved of a target outside the set.
     """
     if begin is None:
         forces, shares = farthest(rows @ target)[:, None], np.ones(1)
@@ -66,7 +72,7 @@ def nearest_point(
         last = size
         force = farthest(-(rows @ miss))
         new = rows.T @ force
-        if miss @ (point - new) <= close * size:
+        if miss @ (point - new) <= max(close, apart * size) * size:
             break
         points, forces = np.column_stack([points, new]), np.column_stack([forces, force])
         shares, kept = _mixed(points, np.append(shares, 0.0), target)
@@ -109,7 +115,7 @@ def farthest_along(farthest: Farthest, rows: Array, ray: Array) -> Mixture:
         along, price = float(normal @ ray), rows @ normal
         bound = float(farthest(price) @ price) / along if along > 0.0 else 0.0
         share = min(max(bound, 0.0), share)
-        found = nearest_point(farthest, rows, share * ray, found)
+        found = nearest_point(farthest, rows, share * ray, found, apart=0.5)
         normal = -found.miss
         if share == 0.0 or float(np.linalg.norm(normal)) <= 2.0 * CLOSE_BY or share >= last:
             return found
