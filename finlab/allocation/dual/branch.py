@@ -136,7 +136,7 @@ def least_power(robot: DualRobot, target: Array, sets: Sets, root: Prices, deadl
 def _solved(robot: DualRobot, target: Array, parts: _Parts, deadline: Deadline) -> Prices:
     """The prices of parts; what is unsolved and has a gap is cut on."""
     own = target[:, parts.row]
-    return solve(robot, own, parts.sets, parts.prices, True, "many", STEPS_AT_KINK, deadline)
+    return solve(robot, own, parts.sets, parts.prices, STEPS_AT_KINK, deadline)
 
 
 class _Best:

@@ -271,11 +271,11 @@ class Dual(Method):
         torn = drags or len(sets.forked) + len(sets.reversing) > 0
         steps, first = STEPS_AT_KINK if torn else MOST_STEPS, None
         if drags:
-            first = robot.answers(robot.matrix @ start(robot, target, sets)[0], sets, False).force
+            first = robot.answers(robot.matrix @ start(robot, target, sets)[0], sets).force
             steps, near = STEPS_WITH_DRAG, self.compiled.commands(first)[0]
             if prices is None:
                 prices = prices_at(self._problem, self._cost, near, self._directions)
-        root = solve(robot, target, sets, prices, drags, "one" if drags else "either", steps)
+        root = solve(robot, target, sets, prices, steps)
         within = root.solved | (~root.beyond & torn)
         if robot.basis.shape[1] < 6:
             rest = targets / robot.scale - (robot.basis @ target).T

@@ -95,11 +95,6 @@ class Sets:
         return cls(low, high, low_cost, high_cost, middle, half, reverse, reverse_cost, flipped, whole)
 
     @cached_property
-    def least_cost(self) -> float:
-        """At most this much [W] is worth less than nothing of what the actuators cannot help to give."""
-        return float(np.maximum(self.low_cost, 0.0).sum(axis=0).max())
-
-    @cached_property
     def most_cost(self) -> Array:
         """Power (1,) or (N,) [W] of all actuators at the dearer ends of their sets."""
         found: Array = np.maximum(self.low_cost, self.high_cost)
