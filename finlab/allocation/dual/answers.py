@@ -158,7 +158,7 @@ class Answers:
         return Answer(np.concatenate(parts[0]), np.concatenate(parts[1]), conjugate.sum(axis=0))
 
     def _without_drag(self, price: Array) -> tuple[Array, ...]:
-        """Prices (k, N) that lines without drag answer as those that drag do, r (f, N), and what softens it."""
+        """Prices (k, N) that lines without drag answer as those that drag do, r (f, N), and `_softened`."""
         ratio = 1.0 - price[len(price) - len(self.dragging) :] / self._speed
         softened = _softened(ratio)
         price = price.copy()
