@@ -274,8 +274,6 @@ class Answers:
             force = force * sign
         if sets.arcs:
             slope = np.where(along > 0.0, slope, 0.0)
-        if sets.whole:
-            return force, slope, conjugate
         low, high = sets.low[of], sets.high[of]
         below, above = force <= low, force >= high
         conjugate = np.where(below, price * low - sets.low_cost[of], conjugate)

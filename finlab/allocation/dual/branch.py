@@ -180,7 +180,7 @@ def halves(robot: DualRobot, sets: Sets, force: Array) -> list[Sets] | None:
 
 
 def _columns(sets: Sets, count: int) -> Sets:
-    return Sets.of(np.broadcast_to(values, (len(values), count)) for values in sets.parts)
+    return Sets(*(np.broadcast_to(values, (len(values), count)) for values in sets.parts))
 
 
 def _cheapest(places: NDArray[np.intp], row: NDArray[np.intp], value: Array) -> NDArray[np.intp]:
@@ -198,7 +198,7 @@ def _cut(robot: DualRobot, parts: _Parts, kept: NDArray[np.intp], amount: Array,
     """Both parts of each open part, whose worst gap is cut."""
     twice, side = np.tile(kept, 2), np.repeat([-1.0, 1.0], len(kept))
     chosen = np.arange(len(amount))[:, None] == np.tile(amount.argmax(axis=0), 2)
-    doubled = Sets.of(values[:, twice] for values in parts.sets.parts)
+    doubled = Sets(*(values[:, twice] for values in parts.sets.parts))
     sets = narrowed(robot, doubled, answer.force[:, twice], chosen, side + np.zeros(chosen.shape))
     return _Parts(parts.row[twice], sets, answer.prices[:, twice])
 
