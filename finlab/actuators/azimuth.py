@@ -26,14 +26,12 @@ class AzimuthLaw(ActuatorLaw):
         self.dead_band = np.array([azimuth.dead_band for azimuth in azimuths])
 
     def force(self, command: Values, inflow: Array | None = None) -> Values:
-        """See `ActuatorLaw`."""
         force = np.zeros_like(command)
         size = held(command[..., 1], self.dead_band)
         force[..., 1], force[..., 2] = size * np.cos(command[..., 0]), size * np.sin(command[..., 0])
         return force
 
     def force_and_jacobian(self, command: Array, inflow: Array | None = None) -> tuple[Array, Array]:
-        """See `ActuatorLaw`."""
         force = self.force(command)
         jacobian = np.zeros((*command.shape, 3))
         jacobian[..., 0, 1], jacobian[..., 0, 2] = -force[..., 2], force[..., 1]
@@ -49,7 +47,6 @@ class AzimuthLaw(ActuatorLaw):
         return self.power_curve.watts(held(command[..., 1], self.dead_band))
 
     def power_gradient(self, command: Array, inflow: Array | None = None) -> Array:
-        """See `ActuatorLaw`."""
         gradient = np.zeros(command.shape)
         gradient[..., 1] = self.power_curve.marginal(held(command[..., 1], self.dead_band))
         return gradient
@@ -97,13 +94,11 @@ class AzimuthGroup(Group):
         return np.clip(command, self._lower, self._upper)
 
     def radial_worth(self, price: Array, back: Array) -> Array:
-        """See `Group`."""
         least, most = self._lower[:, 1], self._upper[:, 1]
         ahead = self._power.worth(price, np.maximum(least, 0.0), most)
         return np.where(least < 0.0, np.maximum(ahead, self._power.worth(-back, least, 0.0 * most)), ahead)
 
     def reach(self, lower: Array, upper: Array) -> Array:
-        """See `Group`."""
         return np.stack([lower[:, 1], upper[:, 1], *_arcs(lower[:, 0], upper[:, 0])], axis=-1)
 
 

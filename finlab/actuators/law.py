@@ -53,11 +53,9 @@ class FinLaw(ActuatorLaw):
     """The plate whose beating takes power, where nothing better is known."""
 
     def power(self, command: Values, inflow: Array | None = None) -> Values:
-        """See `ActuatorLaw`."""
         return self.blade.power(command[..., 0], command[..., 1])
 
     def power_gradient(self, command: Array, inflow: Array | None = None) -> Array:
-        """See `ActuatorLaw`."""
         jacobian = np.zeros(command.shape)
         jacobian[..., 0], jacobian[..., 1] = self.blade.power_gradient(command[..., 0], command[..., 1])
         return jacobian
@@ -81,7 +79,6 @@ class PlanarLaw(FinLaw):
         """Returns the thrust's derivatives by amplitude, frequency and zero direction."""
 
     def force(self, command: Values, inflow: Array | None = None) -> Values:
-        """See `ActuatorLaw`."""
         xp = library_of(command)
         amplitude, frequency, zero_direction = command[..., 0], command[..., 1], command[..., 2]
         thrust = self.thrust(amplitude, frequency, zero_direction)
@@ -97,7 +94,6 @@ class PlanarLaw(FinLaw):
         return xp.stack(planar, axis=-1)
 
     def force_and_jacobian(self, command: Array, inflow: Array | None = None) -> tuple[Array, Array]:
-        """See `ActuatorLaw`."""
         parts = command[..., 0], command[..., 1], command[..., 2]
         direction = parts[2] + self.offset
         cos, sin = np.cos(direction), np.sin(direction)

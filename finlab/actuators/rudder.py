@@ -96,11 +96,9 @@ class RudderLaw(ActuatorLaw):
         )
 
     def force(self, command: Values, inflow: Array | None = None) -> Values:
-        """See `ActuatorLaw`."""
         return self.force_and_jacobian(command, inflow)[0]
 
     def force_and_jacobian(self, command: Array, inflow: Array | None = None) -> tuple[Array, Array]:
-        """See `ActuatorLaw`."""
         met = self.met(np.zeros(command.shape) if inflow is None else inflow)
         found = self.coefficients(command[..., 0] - met.course)
         force = met.force(found.lift, found.drag)
@@ -116,7 +114,6 @@ class RudderLaw(ActuatorLaw):
         return met.pressure * met.speed * self.coefficients(command[..., 0] - met.course).drag
 
     def power_gradient(self, command: Array, inflow: Array | None = None) -> Array:
-        """See `ActuatorLaw`."""
         met = self.met(np.zeros(command.shape) if inflow is None else inflow)
         slope = met.pressure * met.speed * self.coefficients(command[..., 0] - met.course).drag_slope
         return slope[..., None] * [1.0, 0.0, 0.0]
@@ -144,7 +141,6 @@ class RudderGroup(Group):
         self._meet(np.zeros((len(rudders), 3)))
 
     def at(self, inflow: Array | None) -> "RudderGroup":
-        """See `Group`."""
         other = copy(self)
         other._meet(np.zeros((len(self._limits), 3)) if inflow is None else inflow)
         return other
@@ -195,12 +191,10 @@ class RudderGroup(Group):
 
     @property
     def beside(self) -> Array:
-        """See `Group`."""
         least: Array = (self._met.pressure * self._law.drag)[:, None] * self._against
         return least
 
     def beside_of(self, force: Array) -> Array:
-        """See `Group`."""
         size = np.abs(force[..., 0]) / np.maximum(self._met.pressure, NOTHING)
         drag = [np.interp(size[:, i], lifts, drags) for i, (lifts, _, drags) in enumerate(self._curves)]
         wrench: Array = (np.stack(drag, axis=-1) * self._met.pressure) @ self._against
@@ -220,7 +214,6 @@ class RudderGroup(Group):
         return found
 
     def commands(self, force: Array, previous: Array | None = None) -> Array:
-        """See `Group`."""
         size = np.abs(force[..., 0]) / np.maximum(self._met.pressure, NOTHING)
         command = np.zeros((*force.shape[:-1], 3))
         for i, (lifts, angles, _) in enumerate(self._curves):
@@ -230,5 +223,4 @@ class RudderGroup(Group):
         return command
 
     def reach(self, lower: Array, upper: Array) -> Array:
-        """See `Group`."""
         return np.pad(self._lift(np.stack([lower[:, 0], upper[:, 0]], axis=-1)), ((0, 0), (0, 2)))

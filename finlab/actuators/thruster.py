@@ -24,13 +24,11 @@ class ThrusterLaw(ActuatorLaw):
         self.dead_band = np.array([thruster.dead_band for thruster in thrusters])
 
     def force(self, command: Values, inflow: Array | None = None) -> Values:
-        """See `ActuatorLaw`."""
         force = np.zeros_like(command)
         force[..., 0] = held(command[..., 0], self.dead_band)
         return force
 
     def force_and_jacobian(self, command: Array, inflow: Array | None = None) -> tuple[Array, Array]:
-        """See `ActuatorLaw`."""
         jacobian = np.zeros((*command.shape, 3))
         force = self.force(command)
         jacobian[..., 0, 0] = force[..., 0] == command[..., 0]
@@ -41,7 +39,6 @@ class ThrusterLaw(ActuatorLaw):
         return self.power_curve.watts(held(command[..., 0], self.dead_band))
 
     def power_gradient(self, command: Array, inflow: Array | None = None) -> Array:
-        """See `ActuatorLaw`."""
         gradient = np.zeros(command.shape)
         gradient[..., 0] = self.power_curve.marginal(held(command[..., 0], self.dead_band))
         return gradient
@@ -61,17 +58,14 @@ class ThrusterGroup(Group):
         self._power = ThrustPower([thruster.model for thruster in thrusters])
 
     def commands(self, force: Array, previous: Array | None = None) -> Array:
-        """See `Group`."""
         command = np.zeros((*force.shape[:-1], 3))
         command[..., 0] = np.clip(self._sign * force[..., 0], self._limits[:, 0], self._limits[:, 1])
         return command
 
     def radial_worth(self, price: Array, back: Array) -> Array:
-        """See `Group`."""
         return self._power.worth(self._sign * price, *self._limits.T)
 
     def reach(self, lower: Array, upper: Array) -> Array:
-        """See `Group`."""
         ends = self._sign[:, None] * np.stack([lower[:, 0], upper[:, 0]], axis=-1)
         return np.pad(np.sort(ends, axis=-1), ((0, 0), (0, 2)))
 

@@ -60,6 +60,10 @@ class Method(ABC):
         self.check_robot(layout)
         self.layout, self.settings, self.scale, self.weights = layout, settings, scale, weights
         self.plant = plant_of(layout).counting(layout.commanded)
+        self.prepare()
+
+    def prepare(self) -> None:  # noqa: B027 - most have nothing to prepare
+        """Make ready what does not depend on the targets; errors as those of the method itself."""
 
     @classmethod
     def check_robot(cls, layout: Layout) -> None:
@@ -174,7 +178,6 @@ class LeastErrorMethod(Method):
         """Solve for targets (N, 6); see `Method.solve`."""
 
     def solve(self, targets: Array, *, flow: Array | None = None, **asked: Any) -> Solution:
-        """See `Method`."""
         if len(targets) == 0:
             return Solution(np.empty((0, self.layout.n, 3)))
         if (moved := self.at(flow)) is not self:

@@ -28,6 +28,5 @@ class Drag(PlanarLaw):
     def thrust_gradient(
         self, amplitude: Array, frequency: Array, zero_direction: Array
     ) -> tuple[Array, Array, Array | float]:
-        """See `PlanarLaw`."""
         beat = 2.0 * self.coefficient * frequency * np.sin(amplitude)
         return beat * frequency * np.cos(amplitude), beat * np.sin(amplitude), 0.0

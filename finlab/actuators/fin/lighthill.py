@@ -50,7 +50,6 @@ class Lighthill(PlanarLaw):
     def thrust_gradient(
         self, amplitude: Array, frequency: Array, zero_direction: Array
     ) -> tuple[Array, Array, Array | float]:
-        """See `PlanarLaw`."""
         beat = self.coefficient * frequency * amplitude
         # d(A J1)/dA = A J0
         return beat * frequency * bessel_j0(amplitude), 2.0 * beat * bessel_j1(amplitude), 0.0

@@ -18,7 +18,6 @@ class Soft(PlanarLaw):
         self.uniform = not np.any(e)
 
     def thrust(self, amplitude: Values, frequency: Values, zero_direction: Values) -> Values:
-        """See `PlanarLaw`."""
         x = amplitude * frequency
         cos = library_of(zero_direction).cos
         uneven = 1.0 + self._e * cos(zero_direction - self._phi_e)
@@ -27,7 +26,6 @@ class Soft(PlanarLaw):
     def thrust_gradient(
         self, amplitude: Array, frequency: Array, zero_direction: Array
     ) -> tuple[Array, Array, Array | float]:
-        """See `PlanarLaw`."""
         x = amplitude * frequency
         fall = (x / self._x0) ** self._q
         # x dT/dx over T is p - q fall / (1 + fall); at rest the slope of x^p is taken a hair above zero.

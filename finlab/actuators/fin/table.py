@@ -39,14 +39,12 @@ class GridLaw(FinLaw):
         return found[..., 0, 0, 0, :], _jacobian(found)
 
     def power(self, command: Values, inflow: Array | None = None) -> Values:
-        """See `FinLaw`."""
         if not self.has_power:
             return super().power(command)
         # A polynomial through points near zero may dip below.
         return np.maximum(self._grids(command, 1)[..., 0, 0, 0, 3], 0.0)
 
     def power_gradient(self, command: Array, inflow: Array | None = None) -> Array:
-        """See `FinLaw`."""
         if not self.has_power:
             return super().power_gradient(command)
         found = self._grids(command, 2)[..., 3:]

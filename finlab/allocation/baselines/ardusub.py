@@ -15,12 +15,9 @@ from scipy.optimize import linear_sum_assignment
 
 from finlab.allocation.method import LeastErrorMethod
 from finlab.allocation.policy import AXES as WRENCH_AXES
-from finlab.allocation.settings import Settings
 from finlab.allocation.solution import Solution
 from finlab.arrays import Array
 from finlab.exchange.ardusub_frames import AXES, FRAMES, SIGNS
-from finlab.layout import Layout
-from finlab.networks.trained import TrainedWeights
 
 COLUMNS = np.array([WRENCH_AXES.index(axis) for axis in AXES])
 """Axis of the wrench for each column of factors."""
@@ -42,10 +39,7 @@ class ArduSub(LeastErrorMethod):
     takes = "thrusters"
     order: ClassVar = ORDER
 
-    def __init__(
-        self, layout: Layout, settings: Settings, scale: Array, weights: TrainedWeights | None = None
-    ) -> None:
-        super().__init__(layout, settings, scale, weights)
+    def prepare(self) -> None:
         effectiveness = self.plant.effectiveness[:, 0, COLUMNS] * SIGNS
         self.factors = frame_factors(effectiveness)
         """Factors (n, 6)."""

@@ -11,12 +11,10 @@ import numpy as np
 
 from finlab.allocation.baselines.ipopt_forces import ForceProgram
 from finlab.allocation.baselines.model_based import SOLVED, ModelBased, TimeLimitedSettings
-from finlab.allocation.settings import Settings, number
+from finlab.allocation.settings import number
 from finlab.arrays import Array
 from finlab.distribution import install
 from finlab.errors import AllocationError
-from finlab.layout import Layout
-from finlab.networks.trained import TrainedWeights
 
 POLISH, APPROACH = 3, 30
 """Levenberg-Marquardt steps from where IPOPT ends onto the target, or as near as they come."""
@@ -54,10 +52,8 @@ class Ipopt(ModelBased):
     settings_class = IpoptSettings
     settings: IpoptSettings
 
-    def __init__(
-        self, layout: Layout, settings: Settings, scale: Array, weights: TrainedWeights | None = None
-    ) -> None:
-        super().__init__(layout, settings, scale, weights)
+    def prepare(self) -> None:
+        super().prepare()
         self._casadi = import_casadi()
 
     def _commands(self, targets: Array, seed: int) -> Array:

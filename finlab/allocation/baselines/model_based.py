@@ -13,8 +13,6 @@ from finlab.allocation.method import LeastErrorMethod
 from finlab.allocation.settings import Settings, number
 from finlab.allocation.solution import Solution
 from finlab.arrays import Array
-from finlab.layout import Layout
-from finlab.networks.trained import TrainedWeights
 from finlab.physics.objective import Name, cost_meter
 
 SOLVED = 1e-5
@@ -28,15 +26,12 @@ class ModelBased(LeastErrorMethod):
 
     settings_class: ClassVar[type[Settings]] = Settings
 
-    def __init__(
-        self, layout: Layout, settings: Settings, scale: Array, weights: TrainedWeights | None = None
-    ) -> None:
-        super().__init__(layout, settings, scale, weights)
+    def prepare(self) -> None:
         self.aim: Name = getattr(self.settings, "objective", "power")
         """What is kept least."""
         if self.aim == "effort":
-            layout.only_fins("objective 'effort'")
-        self.sigma = USUAL_SHARE * scale
+            self.layout.only_fins("objective 'effort'")
+        self.sigma = USUAL_SHARE * self.scale
         """What wrenches (6,) are divided by: what a robot is mostly asked for."""
 
     @cached_property

@@ -15,8 +15,6 @@ from finlab.allocation.method import LeastErrorMethod
 from finlab.allocation.settings import Settings, choice
 from finlab.allocation.solution import Solution
 from finlab.arrays import Array
-from finlab.layout import Layout
-from finlab.networks.trained import TrainedWeights
 
 ROLL, PITCH, YAW, SURGE, SWAY, HEAVE = range(6)
 ROWS = np.array([3, 4, 5, 0, 1, 2])
@@ -58,10 +56,7 @@ class Px4(LeastErrorMethod):
     order: ClassVar = ORDER
     settings: Px4Settings
 
-    def __init__(
-        self, layout: Layout, settings: Settings, scale: Array, weights: TrainedWeights | None = None
-    ) -> None:
-        super().__init__(layout, settings, scale, weights)
+    def prepare(self) -> None:
         lower, upper = self.plant.lower[:, 0], self.plant.upper[:, 0]
         self._most = np.maximum(upper, -lower)
         self._low, self._high = lower / self._most, upper / self._most

@@ -37,8 +37,8 @@ class Answer(NamedTuple):
     derivative: Array
     """Derivatives by the prices (l + 3 p + 2 f, N) [N^2/W]: of lines, then of planes first-first,
     first-second and second-second, then of lines that drag force-drag and drag-drag."""
-    conjugate: Array | None
-    """Sum of the conjugates (N,) [W]; None where it was not asked for."""
+    conjugate: Array
+    """Sum of the conjugates (N,) [W]."""
 
 
 class Answers:
@@ -84,11 +84,9 @@ class Answers:
         rise: Array = (self.marginal(own)[1][self.dragging] - self._rest) / self._speed
         return rise
 
-    def radial(
-        self, price: Array, row: NDArray[np.intp], worth: bool = True
-    ) -> tuple[Array, Array, Array | None]:
-        """Force [N], its derivative and, where it is asked for, conjugate [W] (m, N) at prices (m, N) from 0
-        on in rows (m, 1) or (m, N) of the tables, two for each actuator."""
+    def radial(self, price: Array, row: NDArray[np.intp]) -> tuple[Array, Array, Array]:
+        """Force [N], its derivative and conjugate [W] (m, N) at prices (m, N) from 0 on in rows (m, 1) or
+        (m, N) of the tables, two for each actuator."""
         top = self._top[row]
         share = price / top
         cell = np.minimum((np.sqrt(np.sqrt(share)) * CELLS).astype(np.intp), CELLS)
@@ -99,8 +97,6 @@ class Answers:
         bend = x * x * square
         force = a0 + linear + bend
         slope = (a1 + x * (square + square + cubic)) / top
-        if not worth:
-            return force, slope, None
         # Of the mean force along the interval, the last part is exact to x^4.
         mean = a0 + 0.5 * linear + x * x * (a2 / 3.0 + 0.25 * cubic)
         return force, slope, start + top * x * mean
@@ -129,41 +125,40 @@ class Answers:
         price = top * (_EDGES[cell] + x)
         return price, price * size - conjugate
 
-    def __call__(self, price: Array, sets: Sets, worth: bool = True) -> Answer:
-        """Answers to prices (k, N), with or without their conjugates."""
+    def __call__(self, price: Array, sets: Sets) -> Answer:
+        """Answers to prices (k, N)."""
         lines, n, drags = self.lines, self.lines + self.planes, len(self.dragging) > 0
         if drags:
             price, *without = self._without_drag(price)
         if not self.planes:
-            force, slope, conjugate = self._limited(price[:n], lines, self._row, sets, worth=worth or drags)
-            if drags and conjugate is not None:
+            force, slope, conjugate = self._limited(price[:n], lines, self._row, sets)
+            if drags:
                 rise, steep = self._dragged(price, without, force, slope, conjugate, sets)
                 force, slope = np.concatenate([force, rise]), np.concatenate([slope, *steep])
-            return Answer(force, slope, None if conjugate is None else conjugate.sum(axis=0))
+            return Answer(force, slope, conjugate.sum(axis=0))
         first, second = self.pair(price)
         fan = self._fan(first, second, sets, sets.squared_gap, self.gauges)
         value = np.concatenate([price[:lines], fan.along]) if lines else fan.along
         forked = fan.beyond is not None and len(sets.forked) > 0
-        torn, row = forked or drags or len(sets.reversing) > 0, self._rows(sets)
-        size, slope, conjugate = self._limited(value, lines, row, sets, worth=worth or torn)
+        row = self._rows(sets)
+        size, slope, conjugate = self._limited(value, lines, row, sets)
         planar = Planar.of(fan, size[lines:], slope[lines:])
-        if forked and conjugate is not None:
+        if forked:
             self._fork(planar, conjugate[lines:], fan, (first, second), sets, row[lines:], self.gauges)
-        if len(sets.reversing) and conjugate is not None:
+        if len(sets.reversing):
             places, width = sets.reversing, FINE * sets.ways[1].high_cost + 1e-12
             other, others = self._one_way(price, sets, 1)
             blend(planar, conjugate[lines:], places, other, others, width, sets.reverse[places] > 0.0)
         parts = [planar.first, planar.second], [planar.xx, planar.xy, planar.yy]
-        if drags and conjugate is not None:
+        if drags:
             rise, steep = self._dragged(price, without, size, slope, conjugate, sets)
             parts = [*parts[0], rise], [*parts[1], *steep]
         if lines:
             parts = [size[:lines], *parts[0]], [slope[:lines], *parts[1]]
-        total = None if conjugate is None else conjugate.sum(axis=0)
-        return Answer(np.concatenate(parts[0]), np.concatenate(parts[1]), total)
+        return Answer(np.concatenate(parts[0]), np.concatenate(parts[1]), conjugate.sum(axis=0))
 
     def _without_drag(self, price: Array) -> tuple[Array, ...]:
-        """Prices (k, N) that lines without drag answer as those that drag do, r (f, N), and its softening."""
+        """Prices (k, N) that lines without drag answer as those that drag do, r (f, N), and `_softened`."""
         ratio = 1.0 - price[len(price) - len(self.dragging) :] / self._speed
         softened = _softened(ratio)
         price = price.copy()
@@ -200,7 +195,6 @@ class Answers:
         row = self._row[self.lines + places] + sets.flipped.astype(np.intp)
         fan = self._fan(first, second, sets, sets.squared_gap)
         size, slope, conjugate = self._limited(fan.along, 0, row, sets)
-        assert conjugate is not None
         planar = Planar.of(fan, size, slope)
         if len(sets.forked):
             self._fork(planar, conjugate, fan, (first, second), sets, row)
@@ -256,7 +250,6 @@ class Answers:
         if self.planes:
             along[lines:] = self._fan(first, second, sets, 1e-300, self.gauges).along
         conjugate = self._limited(along, lines, self._rows(sets), sets)[2]
-        assert conjugate is not None
         if len(places := sets.reversing):
             way = sets.ways[1]
             back[lines + places] = self._fan(first[places], second[places], way, 1e-300).along
@@ -265,16 +258,10 @@ class Answers:
         return along, back, conjugate
 
     def _limited(
-        self,
-        price: Array,
-        lines: int,
-        row: NDArray[np.intp],
-        sets: Sets,
-        of: Any = slice(None),
-        worth: bool = True,
-    ) -> tuple[Array, Array, Array | None]:
-        """Forces, derivatives and, where asked for, conjugates (m, N) for prices (m, N) within the limits of
-        some actuators; only the prices of the first, the lines, have a sign."""
+        self, price: Array, lines: int, row: NDArray[np.intp], sets: Sets, of: Any = slice(None)
+    ) -> tuple[Array, Array, Array]:
+        """Forces, derivatives and conjugates (m, N) for prices (m, N) within the limits of some actuators;
+        only the prices of the first, the lines, have a sign."""
         along, flips = price, lines > 0
         if flips:
             sign = np.where(price < 0.0, -1.0, 1.0)
@@ -282,18 +269,15 @@ class Answers:
             along, row = price * sign, row + (sign < 0.0)
         if sets.arcs:  # a price away from the arc's end moves nothing
             along = np.maximum(along, 0.0)
-        force, slope, conjugate = self.radial(along, row, worth)
+        force, slope, conjugate = self.radial(along, row)
         if flips:
             force = force * sign
         if sets.arcs:
             slope = np.where(along > 0.0, slope, 0.0)
-        if sets.whole:
-            return force, slope, conjugate
         low, high = sets.low[of], sets.high[of]
         below, above = force <= low, force >= high
-        if conjugate is not None:
-            conjugate = np.where(below, price * low - sets.low_cost[of], conjugate)
-            conjugate = np.where(above & ~below, price * high - sets.high_cost[of], conjugate)
+        conjugate = np.where(below, price * low - sets.low_cost[of], conjugate)
+        conjugate = np.where(above & ~below, price * high - sets.high_cost[of], conjugate)
         return np.minimum(np.maximum(force, low), high), np.where(below | above, 0.0, slope), conjugate
 
     def _fan(
@@ -366,7 +350,6 @@ class Answers:
         x, y = (values[places] for values in end_of(fan.other + np.zeros_like(first), gauges))
         along = first[places] * x + second[places] * y
         size, slope, worth = self._limited(along, 0, row[places], sets, of)
-        assert worth is not None
         other = Planar(size * x, size * y, slope * x * x, slope * x * y, slope * y * y)
         width = FINE * sets.high_cost[of] + 1e-12
         blend(planar, conjugate, places, other, worth, width, fan.beyond[places])

@@ -136,7 +136,7 @@ def least_power(robot: DualRobot, target: Array, sets: Sets, root: Prices, deadl
 def _solved(robot: DualRobot, target: Array, parts: _Parts, deadline: Deadline) -> Prices:
     """The prices of parts; what is unsolved and has a gap is cut on."""
     own = target[:, parts.row]
-    return solve(robot, own, parts.sets, parts.prices, True, "many", STEPS_AT_KINK, deadline)
+    return solve(robot, own, parts.sets, parts.prices, STEPS_AT_KINK, deadline)
 
 
 class _Best:
@@ -180,7 +180,7 @@ def halves(robot: DualRobot, sets: Sets, force: Array) -> list[Sets] | None:
 
 
 def _columns(sets: Sets, count: int) -> Sets:
-    return Sets.of(np.broadcast_to(values, (len(values), count)) for values in sets.parts)
+    return Sets(*(np.broadcast_to(values, (len(values), count)) for values in sets.parts))
 
 
 def _cheapest(places: NDArray[np.intp], row: NDArray[np.intp], value: Array) -> NDArray[np.intp]:
@@ -198,7 +198,7 @@ def _cut(robot: DualRobot, parts: _Parts, kept: NDArray[np.intp], amount: Array,
     """Both parts of each open part, whose worst gap is cut."""
     twice, side = np.tile(kept, 2), np.repeat([-1.0, 1.0], len(kept))
     chosen = np.arange(len(amount))[:, None] == np.tile(amount.argmax(axis=0), 2)
-    doubled = Sets.of(values[:, twice] for values in parts.sets.parts)
+    doubled = Sets(*(values[:, twice] for values in parts.sets.parts))
     sets = narrowed(robot, doubled, answer.force[:, twice], chosen, side + np.zeros(chosen.shape))
     return _Parts(parts.row[twice], sets, answer.prices[:, twice])
 

@@ -31,7 +31,6 @@ from finlab.allocation.settings import Settings, number
 from finlab.allocation.solution import Solution
 from finlab.arrays import Array
 from finlab.layout.wrench_axes import AXES
-from finlab.networks.trained import TrainedWeights
 from finlab.physics.wrench import wrench_of_forces
 from finlab.precision import CLOSE, FINE, NEARLY, NOTHING, ROUNDING, ROUNDS
 
@@ -93,12 +92,9 @@ class Dual(Method):
     settings_class = DualSettings
     settings: DualSettings
 
-    def __init__(
-        self, layout: Any, settings: Settings, scale: Array, weights: TrainedWeights | None = None
-    ) -> None:
-        super().__init__(layout, settings, scale, weights)
-        doubt = price_of_doubt(layout, scale, self.settings.robust)
-        self.compiled = Compiled(layout, self.plant, doubt)
+    def prepare(self) -> None:
+        doubt = price_of_doubt(self.layout, self.scale, self.settings.robust)
+        self.compiled = Compiled(self.layout, self.plant, doubt)
         self._last: tuple[bytes, Self] | None = None
 
     @cached_property
@@ -114,7 +110,6 @@ class Dual(Method):
         return Rates.of(self.plant, self.layout.rates, self.settings.period_s)
 
     def at(self, flow: Array | None) -> Self:
-        """See `Method`."""
         key = b"" if flow is None else flow.tobytes()
         if self._last is not None and self._last[0] == key:
             return self._last[1]
@@ -229,7 +224,6 @@ class Dual(Method):
 
     @property
     def undriven(self) -> tuple[str, ...]:
-        """See `Method`."""
         size = np.abs(self.compiled.robot.effectiveness).max(axis=0)
         return tuple(axis for axis, most in zip(AXES, size, strict=True) if most <= NOTHING * size.max())
 
@@ -271,11 +265,11 @@ class Dual(Method):
         torn = drags or len(sets.forked) + len(sets.reversing) > 0
         steps, first = STEPS_AT_KINK if torn else MOST_STEPS, None
         if drags:
-            first = robot.answers(robot.matrix @ start(robot, target, sets)[0], sets, False).force
+            first = robot.answers(robot.matrix @ start(robot, target, sets)[0], sets).force
             steps, near = STEPS_WITH_DRAG, self.compiled.commands(first)[0]
             if prices is None:
                 prices = prices_at(self._problem, self._cost, near, self._directions)
-        root = solve(robot, target, sets, prices, drags, "one" if drags else "either", steps)
+        root = solve(robot, target, sets, prices, steps)
         within = root.solved | (~root.beyond & torn)
         if robot.basis.shape[1] < 6:
             rest = targets / robot.scale - (robot.basis @ target).T

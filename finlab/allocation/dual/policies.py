@@ -111,7 +111,7 @@ def cheapest(
     inwards = (inside - wrench) / max(1.0, float(np.linalg.norm((inside - wrench) / robot.scale)))
     aims = [wrench, wrench + NEARLY * inwards]
     for aim in aims if wanted is None else [wanted, *aims]:
-        found = solve(robot, robot.target(aim[None]), sets, None, False, "one", STEPS_AT_RIM, deadline)
+        found = solve(robot, robot.target(aim[None]), sets, None, STEPS_AT_RIM, deadline)
         if found.solved[0]:
             return Nearest(found.force[:, 0], aim, found.prices[:, 0])
     return Nearest(force, wrench, found.prices[:, 0])

@@ -39,37 +39,33 @@ class Box(NamedTuple):
 class Rates:
     """How far the commands of a robot may change in a tick."""
 
-    lower: Array
-    """Lower limits (n, 3)."""
-    upper: Array
-    """Upper limits (n, 3)."""
+    plant: Plant
+    """The robot."""
     step: Array
     """Largest changes (n, 3); infinite where nothing limits them."""
-    turns: NDArray[np.bool_]
-    """Angles (n, 3) that turn freely."""
 
     @classmethod
     def of(cls, plant: Plant, rates: Array, period_s: float) -> Self:
         """Those of a robot whose commands change no faster than `rates` (n, 3) [per second], in ticks of
         `period_s` [s]."""
-        return cls(plant.lower, plant.upper, rates * period_s, plant.turns)
+        return cls(plant, rates * period_s)
 
     def allow(self, previous: Array, command: Array) -> bool:
         """Whether a command (n, 3) may follow a previous one (n, 3), of which actuators may be NaN."""
         change = np.abs(command - previous)
         around = np.minimum(change, np.abs(2.0 * np.pi - change))
-        return not (np.where(self.turns, around, change) > self.step).any()
+        return not (np.where(self.plant.turns, around, change) > self.step).any()
 
     def box(self, previous: Array) -> Box:
         """What may follow a previous command (n, 3); an actuator with NaN is left free."""
-        lower, upper, step = self.lower, self.upper, self.step
+        lower, upper, step = self.plant.lower, self.plant.upper, self.step
         known = np.asarray(np.isfinite(previous).all(axis=1))[:, None]
-        turns = self.turns & known & (step < np.pi)
+        turns = self.plant.turns & known & (step < np.pi)
         center = np.where(known, np.where(turns, previous, np.clip(previous, lower, upper)), lower)
         low, high = np.maximum(center - step, lower), np.minimum(center + step, upper)
         low, high = np.where(turns, center - step, low), np.where(turns, center + step, high)
         low, high = np.where(known, low, lower), np.where(known, high, upper)
-        free = self.turns & ~turns
+        free = self.plant.turns & ~turns
         return Box(np.where(free, lower, low), np.where(free, upper, high), free, turns)
 
 

@@ -1,7 +1,7 @@
 """A robot as the dual sees it: scaled effectiveness in the range that its actuators span, and their sets."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -195,14 +195,6 @@ def _most_drag(answers: Answers, most: Array) -> Array:
     return answers.drag(most) + 1e-12
 
 
-def _is_whole(line: Line, low: float, high: float) -> bool:
-    """Whether limits of a line are those of its tables, which begin at rest."""
-    reverse = line.reverse
-    if reverse is None or line.forward.force[0] or reverse.force[0]:
-        return False
-    return low == -reverse.largest and high == line.forward.largest
-
-
 def _needs_no_reverse(plane: Plane) -> bool:
     """Whether a plane that turns all round gives forward what it gives in reverse, at no more power."""
     ahead, back = plane.table, plane.reverse
@@ -250,9 +242,7 @@ def dual_robot(responses: list[Response]) -> DualRobot:
     arcs = np.array([(plane.middle, plane.half) for plane in planes]).reshape(-1, 2)
     idle = np.array([_needs_no_reverse(plane) for plane in planes], bool)
     least = np.where(np.pad(idle, (len(lines), 0))[:, None], 0.0, low)
-    whole = all(map(_is_whole, lines, low[:, 0], high[:, 0]))
-    whole &= not any(plane.half < np.pi and plane.table.force[0] for plane in planes)
-    sets = replace(limited_sets(answers, least, high, arcs), whole=whole)
+    sets = limited_sets(answers, least, high, arcs)
     rows = [line.effectiveness for line in lines]
     rows += [plane.effectiveness[0] for plane in planes] + [plane.effectiveness[1] for plane in planes]
     rows += [line.drag for line in lines if line.drag is not None]

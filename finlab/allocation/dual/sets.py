@@ -1,6 +1,5 @@
 """What the actuators of a robot may give, for one target or many: limits of forces and their directions."""
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -36,10 +35,6 @@ class Sets:
     """Power at them [W]."""
     flipped: Array
     """1 where a plane gives its reverse only, about whose arc the other arrays speak then, else 0."""
-
-    whole: bool = False
-    """Whether these are all that the actuators' tables give, from rest on: then nothing needs to be cut
-    off."""
 
     @cached_property
     def arcs(self) -> bool:
@@ -88,17 +83,6 @@ class Sets:
             none, reverse, low_cost, reverse_cost, middle + np.pi, half, none, none, none + 1.0
         )
 
-    @classmethod
-    def of(cls, parts: Iterable[Array], whole: bool = False) -> "Sets":
-        """The sets of all arrays, in order."""
-        low, high, low_cost, high_cost, middle, half, reverse, reverse_cost, flipped = parts
-        return cls(low, high, low_cost, high_cost, middle, half, reverse, reverse_cost, flipped, whole)
-
-    @cached_property
-    def least_cost(self) -> float:
-        """At most this much [W] is worth less than nothing of what the actuators cannot help to give."""
-        return float(np.maximum(self.low_cost, 0.0).sum(axis=0).max())
-
     @cached_property
     def most_cost(self) -> Array:
         """Power (1,) or (N,) [W] of all actuators at the dearer ends of their sets."""
@@ -117,4 +101,4 @@ class Sets:
 
     def take(self, columns: NDArray[np.intp]) -> "Sets":
         """The same for some of the targets."""
-        return Sets.of((a if a.shape[-1] == 1 else a[:, columns] for a in self.parts), self.whole)
+        return Sets(*(a if a.shape[-1] == 1 else a[:, columns] for a in self.parts))

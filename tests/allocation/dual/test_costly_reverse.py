@@ -17,6 +17,6 @@ def test_costly_reverse_is_within_reach() -> None:
     lines = [Line(np.eye(6)[i], _table(1.0, 10.0), _table(5.0, 10.0)) for i in range(3)]
     robot = dual_robot(lines)
     target = robot.basis.T @ (np.array([-9.0, -9.0, -9.0, 0.0, 0.0, 0.0]) / robot.scale)
-    found = solve(robot, target[:, None], value=True)
+    found = solve(robot, target[:, None])
     assert found.solved[0] and not found.beyond[0]
     np.testing.assert_allclose(found.value, 3 * 5.0 * 9.0**1.5, rtol=1e-9)
