@@ -14,6 +14,7 @@ from finlab.analysis.score_card import quick_check
 from finlab.assets import shipped_layouts
 from finlab.errors import LayoutError
 from finlab.layout import FinModelSpec, Uncertainty, load_layout
+from finlab.layout.wrench_axes import AXES
 from finlab.vehicle.body import GRAVITY
 from tests.webapp.stand_in import StandIn
 from webapp.markup.score_card import check_card, score_table, warnings
@@ -198,7 +199,7 @@ def test_fins_in_the_way_are_told() -> None:
 
 
 def test_cards_say_what_a_layout_can_do() -> None:
-    ucat, blind = (load_layout(shipped_layouts()[name]) for name in ("ucat", "no_yaw"))
+    ucat, blind = (replace(load_layout(shipped_layouts()[name]), axes=AXES) for name in ("ucat", "no_yaw"))
     found = find(Question(ucat, ("front_left",), blind, "forces"))
     assert found.now is not None and found.whole is not None
     assert found.before is not None and found.before.layout == "no_yaw", "any layout may stand beside"
