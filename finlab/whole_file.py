@@ -71,6 +71,6 @@ def make_folder(path: str | os.PathLike[str]) -> Path:
 
 def sweep_parts(folder: Path) -> None:
     """Remove what a killed process has left of files that it was writing in a folder."""
-    for part in folder.glob(".*.part"):
+    for part in folder.glob(f".*{PART}"):
         with suppress(OSError):
             part.unlink()

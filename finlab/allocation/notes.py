@@ -6,12 +6,12 @@ import numpy as np
 
 from finlab.actuators.fin.models import file_stamps
 from finlab.allocation.method import Method
-from finlab.allocation.policy import AXES
 from finlab.arrays import Array
 from finlab.layout import FinModelSpec, Layout, Limits
 from finlab.layout.angles import wrapped
 from finlab.layout.force_table_file import DOUBT
 from finlab.layout.rudder import Rudder
+from finlab.layout.wrench_axes import axes_in
 from finlab.physics import FinLaw, TableLaw, make_law, plant_of
 from finlab.precision import NEARLY
 from finlab.uncertainty.grid_error import grid_uncertainty
@@ -38,7 +38,7 @@ def answer_notes(
     networks of a checkpoint do not know."""
     notes = fin_notes(layout, flow) + own
     asked = np.asarray((np.abs(target) > NEARLY * method.scale).reshape(-1, 6).any(axis=0))
-    named = [axis for axis, there in zip(AXES, asked, strict=True) if there]
+    named = axes_in(asked)
     if left := [axis for axis in named if axis in method.undriven]:
         notes = (*notes, f"no actuator gives {' or '.join(left)}: what is asked of it is left out")
     if left := [axis for axis in named if axis not in layout.axes]:

@@ -11,7 +11,7 @@ from finlab.arrays import Array
 from finlab.errors import AllocationError, CommandError
 from finlab.layout import Layout
 from finlab.layout.damage import Health
-from finlab.layout.wrench_axes import AXES, Axis
+from finlab.layout.wrench_axes import AXES, Axis, axes_in
 
 MAX_WRENCH = 1e6
 """Largest magnitude of a target component [N, N m]; beyond it something is wrong upstream."""
@@ -106,7 +106,7 @@ def axes_of(layout: Layout, wrench: Array) -> Axes | None:
             f"wrench: NaN on each axis that layout {layout.name} commands ({', '.join(layout.axes)}), "
             "expected a number on one of them"
         )
-    return tuple(axis for axis, counts in zip(AXES, asked, strict=True) if counts)
+    return axes_in(asked)
 
 
 def same_axes(layout: Layout, wrenches: Array) -> list[tuple[Axes | None, NDArray[np.intp] | None]]:

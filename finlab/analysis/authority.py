@@ -124,8 +124,9 @@ def _authorities(
     sets = force_sets(layout, flow=flow).tile(len(failures))
     for row, failed in enumerate(failures):
         sets.lose(row, list(layout.indices(tuple(failed))))
-    values, _ = singular_values(sets.along(counted := np.flatnonzero(layout.commanded)))
-    held = held_axes(layout, sets)
+    counting = sets.along(counted := np.flatnonzero(layout.commanded))
+    values, vectors = singular_values(counting)
+    held = [_held(commanded_axes(layout), *pair) for pair in zip(values, vectors, strict=True)]
     axes = np.concatenate([np.eye(6), -np.eye(6)])
     size, _ = max_wrench_along_exactly(sets, axes)
     if sets.corners is not None:
@@ -133,7 +134,7 @@ def _authorities(
         alone = np.array([[axis in own.alone for axis in AXES] for own in held])
         size = np.where(np.tile(alone, 2), size, 0.0)
     size = np.where(size > NOTHING, size, 0.0)
-    least = weakest(sets.along(counted))
+    least = weakest(counting)
     direction = np.zeros((len(failures), 6))
     direction[:, counted] = least.direction
     return [

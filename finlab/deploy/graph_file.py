@@ -9,6 +9,8 @@ import json
 import os
 from pathlib import Path
 
+from msgspec import to_builtins
+
 from finlab.allocation.yardstick import yardstick
 from finlab.errors import LayoutError
 from finlab.layout import Actuator, Fin, Layout
@@ -20,7 +22,6 @@ from finlab.layout.graph_form import (
     Graph,
     Normalization,
     edges_of,
-    plain_graph,
 )
 from finlab.layout.wrench_axes import AXES
 from finlab.paper.features import POSITION_SCALE, SCALES
@@ -76,7 +77,7 @@ def graph_of(layout: Layout) -> Graph:
 
 def graph_text(layout: Layout) -> str:
     """Returns the text of a robot's graph file; the same robot gives the same text."""
-    return json.dumps(plain_graph(graph_of(layout)), indent=1, allow_nan=False, ensure_ascii=False) + "\n"
+    return json.dumps(to_builtins(graph_of(layout)), indent=1, allow_nan=False, ensure_ascii=False) + "\n"
 
 
 def write_graph(layout: Layout, path: str | os.PathLike[str]) -> None:

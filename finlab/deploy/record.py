@@ -16,7 +16,7 @@ def allocation_record(result: Allocation) -> dict[str, object]:
     return {
         **command_record(result.layout, result.command, result.forces),
         "failed": list(result.failed),
-        "target": [None if np.isnan(value) else value for value in result.target.tolist()],
+        "target": plain_target(result.target),
         "flow": None if result.flow is None else result.flow.tolist(),
         "wrench_expected": None if expected is None else expected.tolist(),
         "wrench_plant": result.wrench.tolist(),
@@ -37,6 +37,11 @@ def allocation_record(result: Allocation) -> dict[str, object]:
         "unknown_fins": list(result.unknown_fins),
         "notes": list(result.notes),
     }
+
+
+def plain_target(target: Array) -> list[float | None]:
+    """Returns a target (6,) as plain values, None for an axis that is free."""
+    return [None if np.isnan(value) else value for value in target.tolist()]
 
 
 def command_record(layout: Layout, command: Array, forces: Array) -> dict[str, object]:

@@ -30,7 +30,7 @@ from msgspec import Struct
 
 from finlab.allocation import Allocation
 from finlab.arrays import Array
-from finlab.deploy.record import command_record
+from finlab.deploy.record import command_record, plain_target
 from finlab.deploy.robot import DeployedRobot
 from finlab.deploy.transport import MAX_LINE, StandardStreams, Unsent
 from finlab.errors import AllocationError, CommandError, LayoutError
@@ -170,7 +170,7 @@ class Server:
 def _about(answer: Allocation) -> dict[str, Any]:
     """What a reply tells of an answer beside its commands."""
     return {
-        "target": [None if math.isnan(value) else value for value in answer.target.tolist()],
+        "target": plain_target(answer.target),
         "wrench": answer.wrench.tolist(),
         "unallocated": answer.unallocated.tolist(),
         "err_norm": answer.err_norm,

@@ -2,7 +2,7 @@
 
 from typing import Annotated, Any, Literal
 
-from msgspec import Meta, Struct, to_builtins
+from msgspec import Meta, Struct
 
 from finlab.errors import LayoutError
 from finlab.files.schema import checked
@@ -76,9 +76,3 @@ def layout_in_graph(data: Any) -> dict[str, Any]:
 def edges_of(names: list[Any]) -> list[tuple[Any, Any]]:
     """Returns all pairs of names, each with itself too."""
     return [(a, b) for k, a in enumerate(names) for b in names[k:]]
-
-
-def plain_graph(graph: Graph) -> dict[str, Any]:
-    """Returns a graph file's plain values."""
-    values: dict[str, Any] = to_builtins(graph)
-    return values

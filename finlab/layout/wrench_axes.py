@@ -19,3 +19,8 @@ CommandedAxes = Annotated[
 def mask_of(axes: Sequence[str]) -> NDArray[np.bool_]:
     """Returns a mask (6,) of some axes."""
     return np.array([axis in axes for axis in AXES])
+
+
+def axes_in(mask: NDArray[np.bool_]) -> tuple[Axis, ...]:
+    """Returns the axes of a mask (6,)."""
+    return tuple(axis for axis, one in zip(AXES, mask, strict=True) if one)

@@ -9,7 +9,7 @@ from finlab.layout.damage import Health
 from webapp.handles import add_html
 from webapp.markup.html import html, marker
 from webapp.page import Page
-from webapp.session.files import bundle_name, design_name, has_files
+from webapp.session.files import bundle_name, design_name, graph_name, has_files
 from webapp.session.state import State
 
 
@@ -32,7 +32,7 @@ def _bundle(state: State) -> str:
 
 
 def _graph(state: State) -> str:
-    file = f"{state.layout.name}.graph.json"
+    file = graph_name(state.layout)
     about = "the graph of actuators that the networks see: nodes, features, edges, for networkx and learners"
     return _about(file, about, shlex.join(["finlab", "layout", "show", file]))
 

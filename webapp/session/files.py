@@ -80,6 +80,11 @@ def bundle_name(layout: Layout) -> str:
     return f"{file_stem(layout.name)}_bundle.zip"
 
 
+def graph_name(layout: Layout) -> str:
+    """Name of the file of its graph."""
+    return f"{file_stem(layout.name)}.graph.json"
+
+
 def read_layout(name: str, content: bytes) -> Opened:
     """The layout in an uploaded layout file, bundle, archive of a layout with its files, or description.
 

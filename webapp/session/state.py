@@ -14,6 +14,7 @@ from finlab.errors import FinlabError
 from finlab.layout import Layout
 from finlab.layout.damage import FAULTS, Health
 from finlab.layout.fin import MAX_AMPLITUDE, MAX_FREQUENCY
+from finlab.layout.wrench_axes import axes_in
 from finlab.paper.settings import PaperSettings
 from finlab.physics import plant_of
 from webapp.session.links import Links, kept, linked
@@ -98,8 +99,7 @@ class State:
         counts = self.layout.commanded ^ (np.arange(6) == axis)
         if not counts.any():
             raise FinlabError("a robot commands at least one axis; switch another one on first")
-        axes = tuple(name for name, one in zip(AXES, counts, strict=True) if one)
-        return replace(self, layout=replace(self.layout, axes=axes))
+        return replace(self, layout=replace(self.layout, axes=axes_in(counts)))
 
     def with_failure_toggled(self, name: str) -> "State":
         """One actuator failed or repaired."""

@@ -57,7 +57,7 @@ class Exports:
     def graph(self) -> None:
         """Send the graph of the robot's actuators: the same text as `finlab export --graph`."""
         layout = self._session.state.layout
-        self._send(f"{file_stem(layout.name)}.graph.json", lambda: graph_text(layout).encode())
+        self._send(files.graph_name(layout), lambda: graph_text(layout).encode())
 
     def swim(self, swimming: Swimming) -> None:
         """Send the log of the robot that swims as NPZ."""

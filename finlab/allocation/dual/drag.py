@@ -49,7 +49,7 @@ class Priced(NamedTuple):
     """From which of some starts it comes."""
 
 
-def command_with_drag(
+def exact_command(
     problem: CommandProblem, cost: Cost, wrench: Array, starts: Array, enough: float
 ) -> Priced | None:
     """Returns what gives a normalized wrench (6,), the first of those found that are hardly
@@ -95,14 +95,14 @@ def cheapened(
     wrench, takes such a step at once.
     """
     step, gain = _cheaper_step(problem, cost, starts[0])
-    best = command_with_drag(problem, cost, wrench, np.concatenate([starts[:1] + step, starts[1:]]), enough)
+    best = exact_command(problem, cost, wrench, np.concatenate([starts[:1] + step, starts[1:]]), enough)
     if best is not None and best.place == 0 and gain <= 10.0 * CLOSE * best.cost:
         return best
-    best, size = best or command_with_drag(problem, cost, wrench, starts[:1], enough), 1.0
+    best, size = best or exact_command(problem, cost, wrench, starts[:1], enough), 1.0
     for _ in range(ROUNDS if best is not None else 0):
         assert best is not None
         step = size * _cheaper_step(problem, cost, best.command)[0]
-        found = command_with_drag(problem, cost, wrench, (best.command + step)[None], enough)
+        found = exact_command(problem, cost, wrench, (best.command + step)[None], enough)
         gain = -np.inf if found is None else best.cost - found.cost
         if found is not None and gain > 0.0:
             best = found

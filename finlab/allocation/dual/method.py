@@ -19,7 +19,7 @@ from finlab.allocation.dual.branch import HOLLOW, STEPS_AT_KINK, gaps, least_pow
 from finlab.allocation.dual.compiled import Compiled
 from finlab.allocation.dual.deadline import Deadline
 from finlab.allocation.dual.doubt import price_of_doubt
-from finlab.allocation.dual.drag import Cost, cheapened, command_with_drag, prices_at
+from finlab.allocation.dual.drag import Cost, cheapened, exact_command, prices_at
 from finlab.allocation.dual.newton import MOST_STEPS, Prices, dual_value, solve, start
 from finlab.allocation.dual.policies import Nearest, nearest
 from finlab.allocation.dual.rates import Rates, within_tick
@@ -30,7 +30,7 @@ from finlab.allocation.policy import Policy
 from finlab.allocation.settings import Settings, number
 from finlab.allocation.solution import Solution
 from finlab.arrays import Array
-from finlab.layout.wrench_axes import AXES
+from finlab.layout.wrench_axes import axes_in, mask_of
 from finlab.physics.wrench import wrench_of_forces
 from finlab.precision import CLOSE, FINE, NEARLY, NOTHING, ROUNDING, ROUNDS
 
@@ -197,12 +197,8 @@ class Dual(Method):
         lower, upper = self.layout.lower, self.layout.upper
         share = np.random.default_rng(0).random((ROUNDS, *lower.shape))
         share[..., :-1] **= 4
-        found = refine(self._problem, np.zeros((1, 6)), lower + share * (upper - lower), 2 * ROUNDS)
-        cancelled = found.error <= NEARLY
-        if not cancelled.any():
-            return None
-        power = self.plant.power(found.command).sum(axis=-1)
-        return np.asarray(found.command[np.where(cancelled, power, np.inf).argmin()])
+        found = exact_command(self._problem, self._cost, np.zeros(6), lower + share * (upper - lower), EXACT)
+        return None if found is None else found.command
 
     def _not_held(self, targets: Array) -> set[str]:
         """The sentence about axes that come together only, and that targets (N, 6) ask for apart."""
@@ -213,8 +209,7 @@ class Dual(Method):
         left = np.abs(scaled - (scaled @ robot.basis) @ robot.basis.T) > NEARLY * np.abs(scaled).max(
             initial=0.0
         )
-        driven = np.array([axis not in self.undriven for axis in AXES])
-        axes = [axis for axis, one in zip(AXES, left.any(axis=0) & driven, strict=True) if one]
+        axes = axes_in(left.any(axis=0) & ~mask_of(self.undriven))
         if not axes:
             return set()
         return {
@@ -225,7 +220,7 @@ class Dual(Method):
     @property
     def undriven(self) -> tuple[str, ...]:
         size = np.abs(self.compiled.robot.effectiveness).max(axis=0)
-        return tuple(axis for axis, most in zip(AXES, size, strict=True) if most <= NOTHING * size.max())
+        return axes_in(size <= NOTHING * size.max())
 
     def _bound(self, aim: Array, found: Forces, command: Array) -> Array:
         """Power (N,) [W] that no answer undercuts which gives the wrenches that commands (N, n, 3) give."""
@@ -383,7 +378,7 @@ class Dual(Method):
                 draw = np.random.default_rng(0).uniform(-1.0, 1.0, (2 * ROUNDS, *command.shape[1:]))
                 shares = np.geomspace(HOLLOW, 1.0, len(draw))[:, None, None]
                 starts = command[row] + shares * draw * self._problem.width
-                other = command_with_drag(self._problem, self._cost, aim[row] / self.scale, starts, EXACT)
+                other = exact_command(self._problem, self._cost, aim[row] / self.scale, starts, EXACT)
                 command[row] = command[row] if other is None else other.command
         return self.plant.rested(command)
 
