@@ -292,7 +292,7 @@ def test_xacro_is_expanded_where_it_is_installed(tmp_path: Path) -> None:
     ],
 )  # fmt: skip
 def test_hostile_files_take_linear_time(file: str, text: str) -> None:
-    start = time.process_time()
+    start = time.thread_time()  # of this thread: other tests' threads may still be busy
     with pytest.raises(LayoutError):
         read(file, text)
-    assert time.process_time() - start < 2.0
+    assert time.thread_time() - start < 2.0

@@ -237,7 +237,7 @@ def wrong_in(kind: Kind, count: int, folder: Path) -> str:
     said: dict[str, int] = {}
     for k in range(count):
         path.write_bytes(kind.damage(rng, kind.content))
-        start = time.process_time()
+        start = time.thread_time()
         try:
             kind.read(path)
         except FinlabError as error:
@@ -246,8 +246,8 @@ def wrong_in(kind: Kind, count: int, folder: Path) -> str:
         except BaseException as error:
             at = traceback.extract_tb(error.__traceback__)[-1]
             said[f"{kind.name}: {error!r:.80} at {at.filename}:{at.lineno}"] = k
-        if time.process_time() - start > 3.0:
-            said[f"{kind.name}: takes {time.process_time() - start:.1f} s"] = k
+        if time.thread_time() - start > 3.0:
+            said[f"{kind.name}: takes {time.thread_time() - start:.1f} s"] = k
     return "\n".join(f"{text} (number {k})" for text, k in said.items())
 
 
@@ -298,6 +298,6 @@ def test_a_large_force_table_is_read_in_time(tmp_path: Path) -> None:
     rows = np.stack([axis.ravel() for axis in grid] * 2, axis=-1) + 0.1234567890123
     np.savetxt(tmp_path / "t.csv", rows, fmt="%.9f", delimiter=",", header="A,f,phi,Fx,Fy,Fz", comments="")
     assert (tmp_path / "t.csv").stat().st_size > 23_000_000
-    start = time.process_time()
+    start = time.thread_time()
     read_table(tmp_path / "t.csv")
-    assert time.process_time() - start < 3.0
+    assert time.thread_time() - start < 3.0

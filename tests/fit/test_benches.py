@@ -163,7 +163,7 @@ def test_blanks_take_no_time(tmp_path: Path) -> None:
     path.write_text(
         f"PWM (us),Force{' ' * 9000}(N),Power{'(' * 9000} (W)\n" + f"{' ' * 9000},,\n" * 300 + rows
     )
-    before = time.process_time()
+    before = time.thread_time()
     with pytest.raises(DataError, match="power or voltage is missing"):
         read_bench([path])
-    assert time.process_time() - before < 1.0
+    assert time.thread_time() - before < 1.0

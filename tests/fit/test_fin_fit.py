@@ -147,9 +147,9 @@ def test_a_fit_takes_seconds_on_one_thread_and_says_what_it_does() -> None:
         told.append(words)
         threads.update(pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas")
 
-    began = time.process_time()
+    began = time.thread_time()
     fit_fin(samples(*eight_directions()), progress=progress)
-    assert time.process_time() - began < 6.0
+    assert time.thread_time() - began < 6.0
     assert threads == {1}
     assert "fitting the thrust" in told and len(told) >= 5
 
