@@ -24,7 +24,7 @@ LEVELS = (
         "text_table",
         "whole_file",
     ),
-    ("bundle_files",),
+    ("bundle_files", "executor"),
     ("layout",),
     ("actuators",),
     ("uncertainty",),

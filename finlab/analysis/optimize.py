@@ -14,6 +14,7 @@ from finlab.analysis.goals import MISSION, Goal, axes_to_raise, make_goal
 from finlab.analysis.moves import Bounds, Moves, mirror_pairs
 from finlab.analysis.score_card import ScoreCard, score_card
 from finlab.arrays import Array
+from finlab.executor import map_parts
 from finlab.forces.force_sets import force_sets
 from finlab.layout import Layout
 
@@ -162,23 +163,26 @@ def _search(
     needed = np.minimum(_gaps(moves.start_position[None])[0], clearance)
     best, least, found, done, stopped = before, np.inf, moves.start, 0, False
 
-    def cost(vectors: Array) -> Array:
-        rows = vectors.reshape(len(moves.start), -1).T
-        return np.concatenate([chunk_cost(rows[k : k + CHUNK]) for k in range(0, len(rows), CHUNK)])
-
-    def chunk_cost(effectiveness: Array) -> Array:
-        nonlocal best, least, found
-        if cancelled is not None and cancelled():
-            return np.full(len(effectiveness), np.inf)
+    def chunk_cost(effectiveness: Array) -> tuple[Array, float]:
+        """Costs (P,), and the best measure of a variant that keeps all rules."""
         value = measure(moves.sets(effectiveness), lambda row: moves.moved(effectiveness[row]))
         position, frames = moves.geometry(effectiveness)
         close = np.maximum(needed - _gaps(position), 0.0).sum(-1) + rule(position, frames)
-        fine = value[close <= 0.0]
-        best = max(best, float(fine.max())) if len(fine) else best
-        costs = np.asarray(-value + PENALTY * close)
-        if costs.min() < least:
-            least, found = costs.min(), effectiveness[np.argmin(costs)]
-        return costs
+        return np.asarray(-value + PENALTY * close), float(value[close <= 0.0].max(initial=-np.inf))
+
+    def cost(vectors: Array) -> Array:
+        nonlocal best, least, found
+        rows, costs = vectors.reshape(len(moves.start), -1).T, list[Array]()
+        chunks = [rows[k : k + CHUNK] for k in range(0, len(rows), CHUNK)]
+        for chunk, (some, fine) in zip(chunks, map_parts(chunk_cost, chunks), strict=False):
+            costs.append(some)
+            best = max(best, fine)
+            if some.min() < least:
+                least, found = some.min(), chunk[np.argmin(some)]
+            if cancelled is not None and cancelled():
+                break
+        known = np.concatenate(costs)
+        return np.pad(known, (0, len(rows) - len(known)), constant_values=np.inf)
 
     def after_round(vector: Array, convergence: float) -> bool:
         nonlocal done, stopped

@@ -7,7 +7,6 @@ import numpy as np
 
 from finlab.arrays import AnyArray, Array
 from finlab.evaluation.method_specs import MethodSpec
-from finlab.evaluation.progress import progress
 from finlab.evaluation.splits import Case
 from finlab.networks.checkpoint import read_normalization, resolve_checkpoint
 from finlab.physics import plant_of
@@ -18,25 +17,23 @@ Columns = dict[str, AnyArray]
 
 
 def run_method(
-    method: MethodSpec, cases: Sequence[Case], *, seed: int = 0, first: int | None = None
+    method: MethodSpec, case: Case, *, number: int = 0, seed: int = 0, first: int | None = None
 ) -> Columns:
-    """What a method does on cases; all targets of a layout are solved together.
+    """What a method does on a case, all targets of which are solved together.
 
     Args:
         method: who answers.
-        cases: layouts with targets.
+        case: a layout with targets.
+        number: of the layout in its split.
         seed: passed to the method.
-        first: only the first so many targets of each layout.
+        first: only the first so many targets.
 
     Returns:
         The columns of `score`.
     """
-    parts = []
-    for k, case in enumerate(progress(cases, "layout", method.name)):
-        targets = case.targets[:first]
-        answer = method.on(case.layout).allocate_batch(targets, failed=case.failed, seed=seed)
-        parts.append(score(case, targets, answer.command, answer.solve_ms, number=k))
-    return joined(parts)
+    targets = case.targets[:first]
+    answer = method.on(case.layout).allocate_batch(targets, failed=case.failed, seed=seed)
+    return score(case, targets, answer.command, answer.solve_ms, number=number)
 
 
 def score(case: Case, targets: Array, command: Array, solve_ms: Array, *, number: int = 0) -> Columns:

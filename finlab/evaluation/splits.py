@@ -86,10 +86,11 @@ def make_split(name: str, n_layouts: int, n_targets: int, seed: int) -> list[Cas
     for value, what, least in ((n_layouts, "layouts", 1), (n_targets, "targets", 1), (seed, "seed", 0)):
         if value < least:
             raise DataError(f"{what}: expected a number of at least {least}, got {value}")
-    return [_make_case(name, n_targets, seed, k) for k in range(n_layouts)]
+    return [make_case(name, n_targets, seed, k) for k in range(n_layouts)]
 
 
-def _make_case(split: str, n_targets: int, seed: int, k: int) -> Case:
+def make_case(split: str, n_targets: int, seed: int, k: int) -> Case:
+    """Case k of `make_split`."""
     entropy = (DOMAIN, SPLITS[split][0], seed, k)
     layout_seed, target_seed, sigma_seed = np.random.SeedSequence(entropy).spawn(3)
     layout, failed = SPLITS[split][1](np.random.default_rng(layout_seed), f"{split}-{seed}-{k}")

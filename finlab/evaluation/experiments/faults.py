@@ -1,7 +1,8 @@
 """The paper's fault experiment: a trajectory with fins lost from the start, or on the way."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import combinations, product
 
 from finlab.control import steers
@@ -14,11 +15,11 @@ from finlab.evaluation.experiments.closed_loop import (
     follow_row,
     over_seeds,
 )
-from finlab.evaluation.method_specs import load_method_specs
-from finlab.evaluation.progress import progress
+from finlab.evaluation.method_specs import MethodSpec, load_method_specs
 from finlab.evaluation.report.document import Column, Row
+from finlab.executor import map_parts
 from finlab.layout import Layout, load_layout
-from finlab.sim import ClosedLoop, make_trajectory
+from finlab.sim import ClosedLoop, Trajectory, make_trajectory
 
 HEALTHY = "healthy"
 ALLOWED = 1.15
@@ -75,10 +76,11 @@ def run(
     faults, specs = all_faults(robot, path.duration_s / 2), load_method_specs(methods, checkpoint)
     cases = [(fault, name) for fault, name in product(faults, specs) if fault.controllable]
     done: dict[tuple[Fault, str], list[Row]] = {}
-    for (fault, name), k in progress(list(product(cases, range(runs))), "swim"):
-        lost = [(fin, fault.time_s) for fin in fault.fins]
-        log = ClosedLoop(robot, specs[name].on(robot), path, failures=lost, seed=seed + k).run()
-        done.setdefault((fault, name), []).append(follow_row(log))
+    swims = list(product(cases, range(seed, seed + runs)))
+    for (case, _), row in zip(
+        swims, map_parts(partial(_swim, robot, path, specs), swims, "swim"), strict=True
+    ):
+        done.setdefault(case, []).append(row)
     rows: list[Row] = []
     for (fault, name), found in done.items():
         row = {"fault": fault.label, "method": name, "runs": len(found), **over_seeds(found)}
@@ -86,6 +88,18 @@ def run(
         row["kept"] = "yes" if max(single["max"] for single in found) < LOST_M else "no"
         rows.append(row)
     return rows + [{"fault": fault.label, "kept": "not swum"} for fault in faults if not fault.controllable]
+
+
+def _swim(
+    robot: Layout,
+    path: Trajectory,
+    methods: Mapping[str, MethodSpec],
+    swim: tuple[tuple[Fault, str], int],
+) -> Row:
+    """Errors of one swim: its fault and method, and its seed."""
+    (fault, name), seed = swim
+    lost = [(fin, fault.time_s) for fin in fault.fins]
+    return follow_row(ClosedLoop(robot, methods[name].on(robot), path, failures=lost, seed=seed).run())
 
 
 def _printed(rows: Sequence[Row]) -> list[Row]:

@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from itertools import product
 
 import numpy as np
@@ -9,10 +10,10 @@ import numpy as np
 from finlab.control.completion import LEVER_M
 from finlab.evaluation.experiment import Experiment, check_names
 from finlab.evaluation.experiments.closed_loop import ABOUT_ERRORS, LOST_M, follow_row
-from finlab.evaluation.experiments.hard_days import HARD_DAYS, HardDay
+from finlab.evaluation.experiments.hard_days import HARD_DAYS, Case, HardDay
 from finlab.evaluation.method_specs import MethodSpec, load_method_specs
-from finlab.evaluation.progress import progress
 from finlab.evaluation.report.document import Column, Row
+from finlab.executor import map_parts
 from finlab.layout import load_layout
 from finlab.layout.angles import command_change
 from finlab.sim import RunLog
@@ -65,12 +66,20 @@ def swim_day(day: HardDay, methods: Mapping[str, MethodSpec], seeds: Sequence[in
     """Figures of each method's swims; hopeless cases are left out."""
     cases = [case for case in day.cases() if not day.is_hopeless(case)]
     swims: dict[str, dict[tuple[str, tuple[str, ...], int], Row]] = {name: {} for name in methods}
-    for case, name, seed in progress(list(product(cases, methods, seeds)), "swim", day.name):
-        loop = day.swim(case, methods[name], seed)
-        start = time.process_time()
-        log = loop.run()
-        swims[name][case.layout, case.fins, seed] = swim_figures(log, time.process_time() - start)
+    parts = list(product(cases, methods, seeds))
+    done = map_parts(partial(_swim, day.name, methods), parts, day.name, "swim")
+    for (case, name, seed), row in zip(parts, done, strict=True):
+        swims[name][case.layout, case.fins, seed] = row
     return dict(swims)
+
+
+def _swim(day: str, methods: Mapping[str, MethodSpec], part: tuple[Case, str, int]) -> Row:
+    """Figures of one swim of a day: its case, method and seed."""
+    case, name, seed = part
+    loop = DAYS[day].swim(case, methods[name], seed)
+    start = time.process_time()
+    log = loop.run()
+    return swim_figures(log, time.process_time() - start)
 
 
 def swim_figures(log: RunLog, cpu_s: float) -> Row:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,9 +12,9 @@ from finlab.allocation.baselines.ardusub import ORDER as ARDUSUB_ORDER
 from finlab.allocation.baselines.px4 import ORDER as PX4_ORDER
 from finlab.arrays import Array
 from finlab.evaluation.experiment import Experiment, check_names
-from finlab.evaluation.progress import progress
 from finlab.evaluation.report.document import Column, Row
 from finlab.evaluation.splits import make_split
+from finlab.executor import map_parts
 from finlab.layout import Layout, load_layout
 from finlab.physics import plant_of
 
@@ -66,8 +67,10 @@ def run(
     for robot in robots:
         for count in lost:
             drawn = list(_draws(robot, count, layouts, targets, seed))
-            for share in progress(reach, "share of reach", f"{robot}, {count} lost"):
-                found = [_scores(layout, share * edge) for layout, edge in drawn]
+            parts = [(layout, share * edge) for share in reach for layout, edge in drawn]
+            scores = map_parts(_scores, parts, f"{robot}, {count} lost", "draw")
+            for share in reach:
+                found = list(islice(scores, layouts))
                 for method in METHODS:
                     about: Row = {
                         "robot": robot,
@@ -103,8 +106,10 @@ def _robot(robot: str, rng: np.random.Generator, seed: int, k: int) -> Layout:
     return replace(layout, actuators=tuple(replace(part, position=tuple(place)) for part, place in moved))
 
 
-def _scores(layout: Layout, targets: Array) -> dict[str, dict[str, Array]]:
-    """By method arrays (N,): what it misses and takes, and what `dual` misses in its order."""
+def _scores(part: tuple[Layout, Array]) -> dict[str, dict[str, Array]]:
+    """By method arrays (N,): what it misses and takes of targets (N, 6) on a robot, and what `dual` misses in
+    its order."""
+    layout, targets = part
     dual, found = Allocator(layout), dict[str, dict[str, Array]]()
     bound = dual.allocate_batch(targets).bound
     ranked: dict[Order, Array] = {

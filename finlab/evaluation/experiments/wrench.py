@@ -1,16 +1,18 @@
 """How far off each method is from wrenches that the robot can deliver."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 
 import numpy as np
 
 from finlab.errors import DataError
 from finlab.evaluation.experiment import Experiment, paper_figures
-from finlab.evaluation.method_specs import SLOW, installed_methods, load_method_specs
+from finlab.evaluation.method_specs import SLOW, MethodSpec, installed_methods, load_method_specs
 from finlab.evaluation.report.document import Column, Row
-from finlab.evaluation.scoring import Columns, run_method
-from finlab.evaluation.splits import SPLITS, Case, make_split, own_sigma
+from finlab.evaluation.scoring import Columns, joined, run_method
+from finlab.evaluation.splits import SPLITS, Case, make_case, make_split, own_sigma
 from finlab.evaluation.statistics.bootstrap import mean_interval, share_interval
+from finlab.executor import map_parts
 from finlab.layout import Layout
 from finlab.layout.load import layout_and_failed
 from finlab.physics import plant_of
@@ -61,13 +63,25 @@ def run(
     sets = _cases(layout, split, layouts, targets, seed)
     usual = ("dual", "paper") if layout is None else installed_methods(layout_and_failed(layout)[0])
     specs = load_method_specs(methods or usual, checkpoint, patient=True)
-    return [
-        {"split": name, "method": method, "n": len(found["layout"]), "scored_by": "plant", **figures(found)}
-        for name, cases in sets.items()
-        for method, spec in specs.items()
-        if len(sets) == 1 or spec.choice.kind.fits(cases[0].layout)
-        for found in [run_method(spec, cases, first=subsample if method in SLOW else None)]
-    ]
+    rows: list[Row] = []
+    for name, cases in sets.items():
+        robot = cases[0]().layout
+        able = {each: spec for each, spec in specs.items() if len(sets) == 1 or spec.choice.kind.fits(robot)}
+        answered = list(map_parts(partial(_scores, able, subsample), list(enumerate(cases)), name, "layout"))
+        for method in able:
+            found = joined([scores[method] for scores in answered])
+            about = {"split": name, "method": method, "n": len(found["layout"]), "scored_by": "plant"}
+            rows.append(about | figures(found))
+    return rows
+
+
+def _scores(
+    methods: Mapping[str, MethodSpec], subsample: int, numbered: tuple[int, Callable[[], Case]]
+) -> dict[str, Columns]:
+    """Scores of each method on a case; it is made where it is answered, tables of fins included."""
+    number, made = numbered[0], numbered[1]()
+    firsts = {method: subsample if method in SLOW else None for method in methods}
+    return {each: run_method(methods[each], made, number=number, first=firsts[each]) for each in methods}
 
 
 def figures(found: Columns) -> Row:
@@ -96,17 +110,19 @@ def figures(found: Columns) -> Row:
 
 def _cases(
     layout: str | None, split: tuple[str, ...], layouts: int, targets: int, seed: int
-) -> dict[str, list[Case]]:
-    """Cases by the name of their set."""
+) -> dict[str, list[Callable[[], Case]]]:
+    """What makes the cases, by the name of their set."""
     if layout is None:
         names = list(SPLITS) if split == ("all",) else split
-        return {name: make_split(name, layouts, targets, seed) for name in names}
+        for name in names:
+            make_split(name, 1, 1, seed)  # refuses what there is not
+        return {name: [partial(make_case, name, targets, seed, k) for k in range(layouts)] for name in names}
     if split != ("id",):
         raise DataError(
             f"split: a layout has none, got {','.join(split)!r} beside {layout!r:.60}; leave one of them out"
         )
-    own = own_case(*layout_and_failed(layout), targets, seed)
-    return {f"layout {own.layout.name}": [own]}
+    robot, failed = layout_and_failed(layout)
+    return {f"layout {robot.name}": [partial(own_case, robot, failed, targets, seed)]}
 
 
 def own_case(layout: Layout, failed: tuple[str, ...], n_targets: int, seed: int) -> Case:

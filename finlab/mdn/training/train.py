@@ -18,6 +18,7 @@ import torch
 from torch import Tensor
 
 from finlab.errors import DataError
+from finlab.executor import cores, map_parts
 from finlab.mdn.network import ForceMixture
 from finlab.mdn.training.answers import Answers, Batch, write_answers
 from finlab.mdn.training.first_weights import first_weights
@@ -31,7 +32,6 @@ from finlab.networks.checkpoint import (
 from finlab.networks.trained import State, TrainedWeights, sizes_for_file
 from finlab.training.device import Workplace
 from finlab.training.loop import STATE_FILE, Terms, Training
-from finlab.training.parts import parts_by_processes
 from finlab.whole_file import make_folder, sweep_parts
 
 TRAIN_SEED = 140_000
@@ -99,7 +99,11 @@ def answers_in(folder: Path, settings: AnswerSettings, seed: int, until: float =
     done at the time `until` of `time.monotonic`, but two at least."""
     sweep_parts(folder)
     write = partial(write_answers, folder, settings, seed)
-    made = parts_by_processes(write, settings.files, "answers", until, least=2)
+    made = list[Path]()
+    for path in map_parts(write, range(settings.files), "answers", jobs=cores()):
+        made.append(path)
+        if len(made) >= 2 and time.monotonic() > until:
+            break
     for path in set(folder.glob("*.npz")) - set(made):
         path.unlink()
     return made

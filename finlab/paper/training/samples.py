@@ -16,13 +16,13 @@ import numpy as np
 
 from finlab.arrays import AnyArray, Array
 from finlab.errors import DataError
+from finlab.executor import cores, map_parts
 from finlab.files.guarded import decoded, read_file
 from finlab.files.plain_values import parse_json
 from finlab.layout import FinModelSpec, Layout, random_layout
 from finlab.layout.random import TRAINING_FINS
 from finlab.networks.normalization import Normalization
 from finlab.physics import Plant
-from finlab.training.parts import parts_by_processes
 from finlab.whole_file import make_folder, sweep_parts, write_whole
 
 DATA_SEED = 20_000
@@ -66,7 +66,7 @@ class DataSettings:
 
 
 def generate(folder: Path, settings: DataSettings) -> None:
-    """Write a data set, its parts on all cores; parts that are there stay.
+    """Write a data set, its parts drawn by `map_parts` on all cores; parts that are there stay.
 
     Raises:
         DataError: the folder holds a set that was drawn otherwise, or a file cannot be written.
@@ -77,25 +77,31 @@ def generate(folder: Path, settings: DataSettings) -> None:
         raise DataError(f"{folder}: holds a data set that was drawn otherwise; take an empty folder")
     _write_about(folder, settings, None)
     count = -(-settings.layouts // settings.together)
-    sums = parts_by_processes(partial(write_part, folder, settings), count, "data")
+    missing = [number for number in range(count) if not part_file(folder, number).exists()]
+    drawn = map_parts(partial(drawn_part, settings), missing, "data", jobs=cores())
+    for number, content in zip(missing, drawn, strict=True):
+        write_whole(part_file(folder, number), content, DataError)
+    sums = [_sums(read_part(part_file(folder, number))["wrench"]) for number in range(count)]
     total = np.sum(sums, axis=0) / (settings.layouts * settings.commands)
     deviation = np.sqrt(np.maximum(total[1] - total[0] ** 2, 0.0))
     _write_about(folder, settings, Normalization(total[0], np.maximum(deviation, LEAST_STD)))
 
 
-def write_part(folder: Path, settings: DataSettings, number: int) -> Array:
-    """Write part `number` unless it is there; sums of its wrenches and of their squares (2, 6)."""
-    path = part_file(folder, number)
-    if not path.exists():
-        first = number * settings.together
-        some = range(first, min(first + settings.together, settings.layouts))
-        robots = [samples_of(settings, k) for k in some]
-        content = io.BytesIO()
-        arrays = {name: np.stack([robot[name] for robot in robots]) for name in FIELDS}
-        np.savez(content, allow_pickle=False, **arrays)
-        write_whole(path, content.getvalue(), DataError)
-    wrench = read_part(path)["wrench"].reshape(-1, 6).astype(np.float64)
-    return np.stack([wrench.sum(0), (wrench**2).sum(0)])
+def drawn_part(settings: DataSettings, number: int) -> bytes:
+    """The file of part `number`."""
+    first = number * settings.together
+    some = range(first, min(first + settings.together, settings.layouts))
+    robots = [samples_of(settings, k) for k in some]
+    content = io.BytesIO()
+    arrays = {name: np.stack([robot[name] for robot in robots]) for name in FIELDS}
+    np.savez(content, allow_pickle=False, **arrays)
+    return content.getvalue()
+
+
+def _sums(wrench: AnyArray) -> Array:
+    """Sums of wrenches and of their squares (2, 6)."""
+    rows = wrench.reshape(-1, 6).astype(np.float64)
+    return np.stack([rows.sum(0), (rows**2).sum(0)])
 
 
 def samples_of(settings: DataSettings, number: int) -> dict[str, AnyArray]:

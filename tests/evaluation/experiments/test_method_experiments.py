@@ -15,7 +15,7 @@ from finlab.evaluation import method_specs
 from finlab.evaluation.experiment import Row, load_experiment
 from finlab.evaluation.experiments.temperature import diversity
 from finlab.evaluation.method_specs import MethodSpec, load_method_spec
-from finlab.evaluation.scoring import paper_sigma, run_method
+from finlab.evaluation.scoring import joined, paper_sigma, run_method
 from finlab.evaluation.splits import make_split
 from finlab.layout import Fin, Layout, Limits
 from finlab.physics import Plant
@@ -46,7 +46,8 @@ class Cheat(Analytic):
 @pytest.mark.parametrize("first", [None, 2])
 def test_the_plant_scores(first: int | None) -> None:
     cases = make_split("failure", 3, 4, 11)
-    found = run_method(MethodSpec("idle", MethodChoice(Idle, Idle.settings_class())), cases, first=first)
+    idle = MethodSpec("idle", MethodChoice(Idle, Idle.settings_class()))
+    found = joined([run_method(idle, case, number=k, first=first) for k, case in enumerate(cases)])
     expected = []
     for case in cases:
         command = case.layout.lower.copy()

@@ -12,7 +12,7 @@ from finlab.errors import DataError
 from finlab.layout import Fin, Layout
 from finlab.paper.training import samples as parts_of
 from finlab.paper.training.data import DataSet
-from finlab.paper.training.samples import DataSettings, generate, write_part
+from finlab.paper.training.samples import DataSettings, drawn_part, generate, part_file
 from finlab.physics import Plant
 
 SETTINGS = DataSettings(layouts=30, commands=40, seed=3)
@@ -32,7 +32,7 @@ def test_layouts_do_not_depend_on_the_parts_they_are_in(
 ) -> None:
     monkeypatch.setattr(parts_of, "PART", 10 * SETTINGS.commands)
     for number in range(3):
-        write_part(tmp_path, SETTINGS, number)
+        part_file(tmp_path, number).write_bytes(drawn_part(SETTINGS, number))
     (whole,) = (np.load(path) for path in folder.glob("*.npz"))
     parts = [np.load(tmp_path / f"part-{number:05d}.npz") for number in range(3)]
     for name in whole.files:
