@@ -8,6 +8,7 @@ EXTRAS = {
     "viser": "app",
     "trimesh": "app",
     "casadi": "ipopt",
+    "distributed": "cluster",
 }
 """Packages that some parts need beside the base install, and the extra that brings each."""
 

@@ -13,7 +13,7 @@ import tyro
 from numpy.typing import NDArray
 
 from finlab.arrays import Array
-from finlab.cli.eval_verb import verb_of
+from finlab.cli.eval_verbs import verb_of
 from finlab.evaluation.experiment import Experiment, check_names
 from finlab.evaluation.method_specs import PATIENCE_S, MethodSpec, load_method_spec, load_method_specs
 from finlab.evaluation.progress import progress

@@ -174,15 +174,16 @@ def _search(
         nonlocal best, least, found
         rows, costs = vectors.reshape(len(moves.start), -1).T, list[Array]()
         chunks = [rows[k : k + CHUNK] for k in range(0, len(rows), CHUNK)]
-        for chunk, (some, fine) in zip(chunks, map_parts(chunk_cost, chunks), strict=False):
+        valued = map_parts(chunk_cost, chunks)
+        for chunk in chunks:
+            if cancelled is not None and cancelled():
+                return np.full(len(rows), np.inf)
+            some, fine = next(valued)
             costs.append(some)
             best = max(best, fine)
             if some.min() < least:
                 least, found = some.min(), chunk[np.argmin(some)]
-            if cancelled is not None and cancelled():
-                break
-        known = np.concatenate(costs)
-        return np.pad(known, (0, len(rows) - len(known)), constant_values=np.inf)
+        return np.concatenate(costs)
 
     def after_round(vector: Array, convergence: float) -> bool:
         nonlocal done, stopped

@@ -1,22 +1,48 @@
-"""The `finlab` command: one file per verb; each parses, calls one library function and prints.
+"""The `finlab` command: verbs that parse, call one library function and print, and their pages of help.
 
-A module holds one function named after its verb, or `verbs`, a `SubcommandApp` of several. It imports the
-library only inside its functions, so that `finlab --help` stays fast and `finlab layout check` never
-loads torch. It writes its files before it prints, so that a reader that goes away (`finlab ... | head`) costs
-none of them.
+A function is named after its verb; `verbs` is a `SubcommandApp` of several. A module imports the library only
+inside its functions, so that `finlab --help` stays fast and `finlab layout check` never loads torch. It
+writes its files before it prints, so that a reader that goes away (`finlab ... | head`) costs none of them.
 """
 
+import io
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import redirect_stdout
 
 from tyro.extras import SubcommandApp
 
 from finlab import __version__
-from finlab.cli.help_page import asks_for_help, help_page
-from finlab.cli.json_file import with_json_file
+from finlab.cli.shared_options import with_json_file
 from finlab.command_end import FAILED, exit_code
 from finlab.distribution import EXTRAS, install
 from finlab.errors import FinlabError
+
+EXAMPLES = {
+    "": "finlab allocate A --wrench 1 0 0.5 0 0 0.1",
+    "allocate": "finlab allocate A --wrench 1 0 0.5 0 0 0.1 --failed front_right --json",
+    "layout": "finlab layout show A",
+    "layout check": "finlab layout check my_robot.yaml",
+    "layout show": "finlab layout show A --failed front_right",
+    "layout optimize": "finlab layout optimize A --fins front_right front_left -o better.yaml",
+    "layout convert": "finlab layout convert robot.urdf my_robot.yaml",
+    "data": "finlab data generate -o runs/data --layouts 200 --commands 500",
+    "train": "finlab train mdn -o runs/mine --preset smoke",
+    "train mdn": "finlab train mdn -o runs/mine --preset smoke",
+    "train surrogate": "finlab train surrogate -o runs/surrogate --preset smoke",
+    "train allocator": "finlab train allocator -o runs/paper --surrogate runs/surrogate --preset smoke",
+    "eval": "finlab eval wrench --split id --layouts 10 --targets 10 --methods dual,sqp",
+    "eval report": "finlab eval report -o runs/report --quick",
+    "bench": "finlab bench dual analytic --quick --json bench.json",
+    "fit": "finlab fit fin cell.csv -o fin.csv",
+    "fit actuator": "finlab fit actuator bench.csv -o thruster.csv",
+    "fit fin": "finlab fit fin cell.csv -o fin.csv",
+    "fit robot": "finlab fit robot my_robot.yaml swim.npz -o fitted.yaml",
+    "simulate": "finlab simulate A --duration 30 -o swim",
+    "export": "finlab export A -o my_robot",
+    "app": "finlab app --layout A --port 8080",
+}
+"""An example for each verb, and for each group of them."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -32,7 +58,7 @@ def _run(argv: list[str]) -> int:
     if argv == ["--version"]:
         print(f"finlab {__version__}")
         return 0
-    if asks_for_help(argv):
+    if not {"--help", "-h"}.isdisjoint(argv):
         code, page = help_page(argv, lambda: _parsed(argv))
         print(page)
         return code
@@ -59,17 +85,34 @@ _DESCRIPTION = "Control allocation for underwater robots: a target wrench in, co
 
 def _command_line(argv: Sequence[str]) -> SubcommandApp:
     """All verbs; a function may return an exit code, None means 0."""
-    from finlab.cli import allocate, app, bench, data, evaluate, export, fit, layout, simulate, train
+    from finlab.cli import eval_verbs, fit, layout_verbs, robot_verbs, simulate, train_verbs
 
     root = SubcommandApp()
-    root.command(allocate.allocate)
-    root.command(layout.verbs, name="layout", help="Check, show and optimize layout files.")
-    root.command(data.verbs, name="data", help="Generate what the paper's networks learn from.")
-    root.command(train.verbs, name="train", help="Train the networks of methods `mdn` and `paper`.")
-    root.command(evaluate.verbs(argv), name="eval", help="Measure methods by the fins' own models.")
-    root.command(bench.bench)
+    root.command(robot_verbs.allocate)
+    root.command(layout_verbs.verbs, name="layout", help="Check, show and optimize layout files.")
+    root.command(train_verbs.data_verbs, name="data", help="Generate what the paper's networks learn from.")
+    root.command(train_verbs.verbs, name="train", help="Train the networks of methods `mdn` and `paper`.")
+    root.command(eval_verbs.verbs(argv), name="eval", help="Measure methods by the fins' own models.")
+    root.command(eval_verbs.bench)
     root.command(fit.verbs, name="fit", help="Fit actuators and robots to measurements.")
     root.command(simulate.simulate)
-    root.command(export.export)
-    root.command(app.app)
+    root.command(robot_verbs.export)
+    root.command(robot_verbs.app)
     return root
+
+
+def help_page(argv: Sequence[str], write: Callable[[], int]) -> tuple[int, str]:
+    """The page that `write` prints for arguments, with its example; before it the exit code."""
+    caught = io.StringIO()
+    with redirect_stdout(caught):  # what is no terminal gets no boxes
+        code = write()
+    return code, f"{caught.getvalue().rstrip().replace('•', '-')}\n\nexample: {example(argv)}"
+
+
+def example(argv: Sequence[str]) -> str:
+    """The example of the verb that arguments begin with."""
+    words = [word for word in argv if not word.startswith("-")]
+    if words[:1] == ["eval"] and len(words) > 1 and " ".join(words[:2]) not in EXAMPLES:
+        return f"finlab eval {words[1]} --json rows.json"
+    names = (" ".join(words[:count]) for count in range(len(words), -1, -1))
+    return next(EXAMPLES[name] for name in names if name in EXAMPLES)

@@ -7,6 +7,8 @@ from typing import Annotated
 from tyro.conf import Positional, arg
 from tyro.extras import SubcommandApp
 
+from finlab.cli.shared_options import Robot, open_robot
+
 verbs = SubcommandApp()
 
 
@@ -74,7 +76,7 @@ def actuator(
 
 @verbs.command
 def robot(
-    layout: Annotated[Positional[str], arg(metavar="LAYOUT")],
+    layout: Robot,
     logs: Annotated[Positional[tuple[Path, ...]], arg(metavar="LOG...")],
     output: Annotated[Path, arg(metavar="LAYOUT2", aliases=["-o"])],
     other_law: bool = True,
@@ -93,7 +95,6 @@ def robot(
         other_law: of robots of fins look for another law of thrust, too, and use it where it helps on parts
             not seen.
     """
-    from finlab.cli.inputs import open_robot
     from finlab.errors import DataError
     from finlab.files.worker import in_worker
     from finlab.fit.robot.fitted_layout import write_robot

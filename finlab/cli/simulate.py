@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional, UseAppendAction, arg
 
-from finlab.cli.inputs import open_robot
+from finlab.cli.shared_options import open_robot
 from finlab.errors import FinlabError
 from finlab.whole_file import make_folder
 

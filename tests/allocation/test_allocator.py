@@ -10,7 +10,7 @@ import pytest
 from finlab.actuators.fin.blade import Blade
 from finlab.allocation import METHODS, Allocation, Allocator, Candidates, Solution, allocator
 from finlab.allocation.method import LeastErrorMethod
-from finlab.cli.allocate import allocate
+from finlab.cli.robot_verbs import allocate
 from finlab.errors import AllocationError, CommandError, LayoutError
 from finlab.layout import Fin, Layout
 from tests.any_robot import AnyRobot

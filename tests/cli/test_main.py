@@ -12,9 +12,8 @@ import pytest
 from tyro.extras import SubcommandApp
 
 import finlab
-from finlab.cli import _command_line, main
-from finlab.cli.help_page import EXAMPLES
-from finlab.cli.json_file import with_json_file
+from finlab.cli import EXAMPLES, _command_line, main
+from finlab.cli.shared_options import with_json_file
 from tests.fit.cell import columns_of, commands, measured, soft, write
 
 FINLAB = [sys.executable, "-m", "finlab"]
@@ -79,7 +78,7 @@ def test_interrupt_exits_with_130(monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupted(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("finlab.cli.layout.layout_text", interrupted)
+    monkeypatch.setattr("finlab.cli.layout_verbs.layout_text", interrupted)
     assert main(["layout", "show", "A"]) == 130
 
 

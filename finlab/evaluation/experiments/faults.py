@@ -77,9 +77,8 @@ def run(
     cases = [(fault, name) for fault, name in product(faults, specs) if fault.controllable]
     done: dict[tuple[Fault, str], list[Row]] = {}
     swims = list(product(cases, range(seed, seed + runs)))
-    for (case, _), row in zip(
-        swims, map_parts(partial(_swim, robot, path, specs), swims, "swim"), strict=True
-    ):
+    errors = map_parts(partial(_swim, robot, path, specs), swims, "faults", "swim")
+    for (case, _), row in zip(swims, errors, strict=True):
         done.setdefault(case, []).append(row)
     rows: list[Row] = []
     for (fault, name), found in done.items():

@@ -67,16 +67,16 @@ def swim_day(day: HardDay, methods: Mapping[str, MethodSpec], seeds: Sequence[in
     cases = [case for case in day.cases() if not day.is_hopeless(case)]
     swims: dict[str, dict[tuple[str, tuple[str, ...], int], Row]] = {name: {} for name in methods}
     parts = list(product(cases, methods, seeds))
-    done = map_parts(partial(_swim, day.name, methods), parts, day.name, "swim")
+    done = map_parts(partial(_swim, day, methods), parts, day.name, "swim")
     for (case, name, seed), row in zip(parts, done, strict=True):
         swims[name][case.layout, case.fins, seed] = row
     return dict(swims)
 
 
-def _swim(day: str, methods: Mapping[str, MethodSpec], part: tuple[Case, str, int]) -> Row:
+def _swim(day: HardDay, methods: Mapping[str, MethodSpec], part: tuple[Case, str, int]) -> Row:
     """Figures of one swim of a day: its case, method and seed."""
     case, name, seed = part
-    loop = DAYS[day].swim(case, methods[name], seed)
+    loop = day.swim(case, methods[name], seed)
     start = time.process_time()
     log = loop.run()
     return swim_figures(log, time.process_time() - start)

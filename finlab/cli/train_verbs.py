@@ -1,4 +1,4 @@
-"""`finlab train mdn|surrogate|allocator`: train the network of method `mdn`, or the paper's two networks."""
+"""`finlab data generate`, and `finlab train mdn|surrogate|allocator`: methods' networks and their data."""
 
 from __future__ import annotations
 
@@ -10,16 +10,15 @@ from typing import TYPE_CHECKING, Annotated
 from tyro.conf import OmitArgPrefixes, arg
 from tyro.extras import SubcommandApp
 
-from finlab.cli.inputs import check_positive
+from finlab.cli.shared_options import Cluster, Count, check_positive
 
 if TYPE_CHECKING:
     from finlab.networks.trained import TrainedWeights
 
-verbs = SubcommandApp()
+data_verbs, verbs = SubcommandApp(), SubcommandApp()
 
 _Preset = Annotated[str, arg(metavar="NAME")]
 _Output = Annotated[Path, arg(metavar="FOLDER", aliases=["-o"])]
-_Seed = Annotated[int, arg(metavar="N")]
 _Count = Annotated[int | None, arg(metavar="N")]
 
 
@@ -33,7 +32,7 @@ class Paper:
     """data set of `finlab data generate`; that of the surrogate or of the recipe by default."""
     preset: _Preset = "paper"
     """recipe: smoke (a minute), short (20 minutes for both on two cores) or paper."""
-    seed: _Seed = 0
+    seed: Count = 0
     """of the first weights, the noise and the order of the data."""
     steps: _Count = None
     """optimizer steps instead of the recipe's."""
@@ -47,7 +46,7 @@ class Paper:
 def mdn(
     output: _Output,
     preset: _Preset = "default",
-    seed: _Seed = 0,
+    seed: Count = 0,
     minutes: _Count = None,
     steps: _Count = None,
     resume: bool = False,
@@ -108,3 +107,40 @@ def _report(output: Path, made: TrainedWeights) -> None:
     for group, values in made.metrics.items():
         for name, value in values.items():
             print(f"{group} {name} {value:.3g}")
+
+
+@data_verbs.command
+def generate(
+    output: _Output,
+    layouts: Count = 1000,
+    commands: Count = 5000,
+    seed: Count = 0,
+    varied_limits: Annotated[float, arg(metavar="SHARE")] = 0.5,
+    fin_model: Annotated[str, arg(metavar="NAME|FILE.csv")] = "drag",
+    cluster: Cluster = None,
+) -> None:
+    """Draw random layouts and commands, and write them with the wrenches that they cause.
+
+    A run that was stopped goes on when it is called again with the same arguments.
+
+    Args:
+        output: folder for the data set.
+        layouts: random layouts of 2 to 5 fins.
+        commands: random commands on each of them.
+        seed: of all draws.
+        varied_limits: share of the layouts whose fins have limits of their own.
+        fin_model: what causes the wrenches: drag, lighthill, soft, or a table of measured forces.
+    """
+    from finlab.errors import CommandError
+    from finlab.executor import on_cluster
+    from finlab.layout import FinModelSpec
+    from finlab.paper.training.samples import DataSettings, generate
+
+    check_positive(layouts=layouts, commands=commands)
+    if seed < 0 or not 0.0 <= varied_limits <= 1.0:
+        raise CommandError(f"expected a seed from 0 and a share from 0 to 1, got {seed} and {varied_limits}")
+    table = (("path", str(Path(fin_model).resolve())),)
+    model = FinModelSpec("table", table) if fin_model.lower().endswith(".csv") else FinModelSpec(fin_model)
+    with on_cluster(cluster):
+        generate(output, DataSettings(layouts, commands, seed, varied_limits, model))
+    print(f"{output}: {layouts} layouts with {commands} commands each, seed {seed}")

@@ -1,0 +1,163 @@
+"""`finlab eval NAME`, a verb made from each experiment, `finlab eval report` and `finlab bench`."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from tyro.conf import Positional, arg
+from tyro.extras import SubcommandApp
+
+from finlab.cli.shared_options import STDOUT, Cluster, Count, JsonFile, check_json_file, put_json
+from finlab.errors import DataError
+
+if TYPE_CHECKING:
+    from finlab.evaluation.experiment import Experiment
+
+
+def verbs(argv: Sequence[str]) -> SubcommandApp:
+    """All verbs of `finlab eval`, from the arguments after `finlab`.
+
+    Only the experiment that these name is imported, or all for `finlab eval --help`; the others have no
+    options here.
+    """
+    from finlab.evaluation.experiment import EXPERIMENTS, load_experiment
+
+    made, wanted = SubcommandApp(), argv[1] if argv[:1] == ["eval"] and len(argv) > 1 else ""
+    for name in EXPERIMENTS:
+        known = name == wanted or wanted.startswith("-")
+        made.command(name=name)(verb_of(load_experiment(name)) if known else _not_named)
+    made.command(report)
+    return made
+
+
+def _not_named() -> None:
+    """An experiment that is not imported."""
+
+
+def verb_of(experiment: Experiment) -> Callable[..., None]:
+    """A function whose signature says to the parser which options there are."""
+    from finlab.evaluation.progress import begin
+    from finlab.evaluation.report.document import to_text
+    from finlab.executor import on_cluster
+
+    options = experiment.options()
+
+    def verb(json: Path | None, cluster: str | None, **typed: Any) -> None:
+        check_json_file(json)
+        begin(experiment.name)
+        chosen = {name: _parsed(name, options[name], value) for name, value in typed.items()}
+        rows = []
+        with on_cluster(cluster):
+            for row in experiment.each_row(**chosen):
+                rows.append(row)
+                if json != STDOUT:  # so that they are there if it is stopped
+                    put_json({"rows": rows}, json)
+        put_json({"rows": rows}, json, to_text(*experiment.words(), *experiment.results(rows)))
+
+    shown = {name: _shown(each) for name, each in options.items()}
+    rows_file = Annotated[
+        JsonFile, arg(help="file for the rows, {'rows': [...]}; the rows alone without one")
+    ]
+    for name, kind in (("json", rows_file), ("cluster", Cluster)):
+        shown[name] = inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=kind)
+    arguments = inspect.cleandoc(experiment.run.__doc__ or "").partition("Args:")[2].partition("\n\n")[0]
+    verb.__doc__ = f"{experiment.question}\n\nArgs:{arguments}"
+    verb.__signature__ = inspect.Signature(list(shown.values()))  # type: ignore[attr-defined]
+    verb.__annotations__ = {name: each.annotation for name, each in shown.items()}
+    return verb
+
+
+def _shown(option: inspect.Parameter) -> inspect.Parameter:
+    """An option as the parser takes it: lists are texts with commas between."""
+    from finlab.evaluation.experiment import is_list, plain_type
+
+    kind, default = option.annotation, option.default
+    if is_list(kind):
+        text = None if default is None else ",".join(map(str, default))
+        kind, default = Annotated[str if text else str | None, arg(metavar="A,B,...")], text
+    else:
+        names = {int: "N", float: "X", str: "NAME"}
+        if (word := names.get(plain_type(kind))) is not None:
+            kind = Annotated[kind, arg(metavar=word)]
+    if option.name == "layout":
+        kind = Annotated[kind, Positional, arg(metavar="LAYOUT")]
+    return option.replace(kind=inspect.Parameter.KEYWORD_ONLY, annotation=kind, default=default)
+
+
+def _parsed(name: str, option: inspect.Parameter, value: Any) -> Any:
+    """What `run` gets for what was typed."""
+    from finlab.evaluation.experiment import is_list, plain_type
+
+    if not is_list(option.annotation) or value is None:
+        return value
+    words = [word.strip() for word in value.split(",") if word.strip()]
+    kind = plain_type(option.annotation)
+    try:
+        if words:
+            return tuple(dict.fromkeys(kind(word) for word in words))
+    except ValueError:
+        pass
+    what = "names" if kind is str else "numbers"
+    raise DataError(f"{name.replace('_', '-')}: expected {what} with commas between, got {value!r:.60}")
+
+
+def report(
+    out: Annotated[Path, arg(aliases=["-o"], metavar="DIR")],
+    quick: bool = False,
+    sections: Annotated[str, arg(metavar="A,B,...")] = "all",
+    seed: Count = 6143,
+) -> None:
+    """Run every experiment and make one page of them in Markdown, and a file of their rows.
+
+    What is done is in DIR if it is stopped.
+
+    Args:
+        out: folder for the report.
+        quick: a look on few cases, in minutes; the whole takes half an hour.
+        sections: run only these experiments.
+        seed: of all draws.
+    """
+    if out.exists() and not out.is_dir():
+        raise DataError(f"out: expected a folder, got the file {out}")
+    from finlab.evaluation.report.make import make_report
+
+    names = [name.strip() for name in sections.split(",") if name.strip()]
+    print(make_report(out, size="quick" if quick else "full", seed=seed, names=names))
+
+
+QUICK = ("id", "ood", "limits", "failure")
+"""Splits of a quick run."""
+
+
+def bench(
+    methods: Annotated[Positional[tuple[str, ...]], arg(metavar="METHOD")] = ("dual",),
+    quick: bool = False,
+    splits: Annotated[str | None, arg(metavar="A,B,...")] = None,
+    seed: Count = 8821,
+    json: JsonFile = None,
+    cluster: Cluster = None,
+) -> None:
+    """Measure allocation methods, yours or finlab's, on the same robots and wrenches: error, power, time.
+
+    Example: finlab bench my_method.py:allocate dual --quick
+
+    Args:
+        methods: a method of finlab (dual, analytic, ipopt, ...), or a Python function as
+            module:function or file.py:function.
+        quick: four splits of robots, five of each, in seconds.
+        splits: sets of robots, as in `finlab eval wrench`.
+        seed: of robots and wrenches.
+    """
+    check_json_file(json)
+    from finlab.evaluation.experiments.wrench import HARD, experiment
+    from finlab.evaluation.report.document import to_text
+    from finlab.executor import on_cluster
+
+    names = tuple(splits.split(",")) if splits else QUICK if quick else HARD
+    size = {"layouts": 5, "targets": 4} if quick else {"layouts": 20, "targets": 10}
+    with on_cluster(cluster):
+        rows = experiment.rows(split=names, methods=methods, seed=seed, **size)
+    put_json({"rows": rows}, json, to_text(*experiment.results(rows)))

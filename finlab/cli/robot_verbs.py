@@ -1,0 +1,160 @@
+"""`finlab allocate`, `finlab export` and `finlab app`: answers for a robot here, on board and on a page."""
+
+from __future__ import annotations
+
+import sys
+from math import isnan
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from tyro.conf import UseAppendAction, arg
+
+from finlab.cli.shared_options import (
+    Count,
+    Flow,
+    JsonFile,
+    Names,
+    Robot,
+    Wrench,
+    check_json_file,
+    open_robot,
+    put_json,
+)
+from finlab.errors import FinlabError
+
+
+def allocate(
+    layout: Robot,
+    wrench: Annotated[Wrench, arg(metavar="FX FY FZ TX TY TZ")],
+    failed: Names = (),
+    method: Annotated[str, arg(metavar="NAME")] = "dual",
+    robust: Annotated[float | None, arg(metavar="W")] = None,
+    checkpoint: Annotated[str | None, arg(metavar="NAME|FOLDER")] = None,
+    policy: Annotated[str, arg(metavar="NAME")] = "closest",
+    axis_weights: Annotated[Wrench | None, arg(metavar="W1 ... W6")] = None,
+    priority: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="AXES")] = (),
+    health: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME=SHARE")] = (),
+    torn: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME=SHARE")] = (),
+    stuck: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME=DEG")] = (),
+    running: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME=A,F,DEG")] = (),
+    flow: Flow = None,
+    bound: bool = False,
+    seed: Count = 0,
+    json: JsonFile = None,
+) -> None:
+    """Find the command of each fin that gives a target wrench.
+
+    Args:
+        wrench: target in the body frame [N, N m]; nan for an axis that does not count.
+        failed: name of a fin that does not work.
+        method: dual, mdn, paper, qp, sqp, px4, ardusub, analytic or ipopt.
+        robust: for method dual: watts that an expected error of 1 % of the yardstick is worth.
+        checkpoint: trained checkpoint; the shipped one of the method by default.
+        policy: for a wrench out of reach: closest, direction (same direction, scaled down) or priority.
+        axis_weights: for `closest`: weight of each axis of the error.
+        priority: for `priority`: a group of axes with commas between, most important first, such as Fz,Tz.
+        health: a weak actuator: share that is left of its limits, such as bow=0.5.
+        torn: a fin or rudder that gives a share of its force at every command.
+        stuck: a fin or azimuth that no longer turns: the angle at which it stays [deg].
+        running: a fin that no longer listens: the command that it keeps [rad, Hz, deg].
+        bound: tell as well the power [W] that no answer can undercut.
+        seed: same target, layout and seed, same answer.
+    """
+    from finlab.allocation import Allocator, Health
+    from finlab.allocation.policy import policy_from
+    from finlab.deploy.record import allocation_record
+
+    check_json_file(json)
+    if any(map(isnan, wrench)) and not any(value for value in wrench if not isnan(value)):
+        raise FinlabError("wrench: asks for nothing, since every axis is 0 or free; expected a value on one")
+    robot, lost = open_robot(layout, failed)
+    options: dict[str, Any] = {} if robust is None else {"robust": robust}
+    allocator = Allocator(robot, method, checkpoint=checkpoint, **options)
+    answer = policy_from(policy, axis_weights, priority)
+    damage = Health.parse(health, torn, stuck, running)
+    result = allocator.allocate(wrench, failed=lost, policy=answer, health=damage, flow=flow, seed=seed)
+    lines = [str(result)]
+    if bound and result.bound is None:
+        raise FinlabError(f"bound: method {method!r} proves none; leave --bound out")
+    if bound:
+        lines.append(f"no exact answer takes less than {result.bound:.4g} W")
+    put_json(allocation_record(result), json, "\n".join(lines))
+
+
+def export(
+    layout: Robot,
+    output: Annotated[Path | None, arg(metavar="DIR", aliases=["-o"])] = None,
+    graph: Annotated[Path | None, arg(metavar="FILE")] = None,
+    zip: bool = False,
+    failed: Names = (),
+    method: Literal["dual", "mdn"] = "dual",
+) -> None:
+    """Write the deployment bundle (the robot, its actuators' physics, settings, README, checksums), or the
+    layout graph file.
+
+    Args:
+        output: folder to write the bundle to.
+        graph: file to write the graph of actuators to (JSON, node-link form), for networkx and learners.
+        zip: write one archive, DIR.zip, instead of a folder.
+        failed: name of a fin that does not work.
+        method: who answers on the robot: dual keeps watts least, mdn the paper's effort, by the networks
+            that come with finlab.
+    """
+
+    if output is None and graph is None:
+        raise FinlabError("nothing to write: expected -o DIR (bundle), --graph FILE, or both")
+    if output is not None and output.suffix == ".json":
+        raise FinlabError(f"{output}: expected a folder, got the name of a file (a graph: --graph FILE)")
+    robot, failed = open_robot(layout, failed)  # before a network is loaded
+    if graph is not None:
+        from finlab.deploy.graph_file import write_graph
+
+        write_graph(robot.without(failed) if failed else robot, graph)
+        print(f"{graph}: {robot.counted}, {len(robot.names) - len(failed)} nodes")
+    if output is None:
+        return
+    from finlab.allocation import Allocator
+
+    allocator = Allocator(robot, method)
+    from finlab.deploy.bundle import make_bundle
+
+    bundle = make_bundle(allocator, failed)
+    if zip:
+        output = output if output.suffix == ".zip" else output.with_name(output.name + ".zip")
+        bundle.write_zip(output)
+    else:
+        bundle.write(output)
+    size = sum(map(len, bundle.files.values())) / 1e6
+    print(f"{output}: {robot.counted}, {len(bundle.files)} files, {size:.2f} MB")
+    print(f"check it on the robot: finlab-runtime check {output.name}")
+
+
+def app(
+    layout: Annotated[str, arg(metavar="LAYOUT")] = "ucat",
+    checkpoint: Annotated[str, arg(metavar="NAME|FOLDER")] = "default",
+    host: Annotated[str, arg(metavar="ADDRESS")] = "127.0.0.1",
+    port: Annotated[int, arg(metavar="N")] = 8080,
+) -> None:
+    """Serve the web app until interrupted.
+
+    Args:
+        layout: layout to open first: a file or the name of a shipped one.
+        checkpoint: trained checkpoint, of method mdn or paper.
+        host: address to listen on; the default is reachable from this machine only.
+        port: port to listen on.
+    """
+    from finlab.assets import webapp_dir
+    from finlab.distribution import install
+
+    # In a wheel it travels inside this package: an installation has no top-level package of so plain a name.
+    if (home := str(webapp_dir().parent)) not in sys.path:
+        sys.path.insert(0, home)
+    try:
+        from webapp.serving import serve
+    except ModuleNotFoundError as error:
+        if str(error.name).split(".")[0] in ("finlab", "webapp"):
+            raise
+        raise FinlabError(
+            f"the web app needs {error.name!r}, which is not installed; run: {install('app')}"
+        ) from error
+    serve(host=host, port=port, layout=layout, checkpoint=checkpoint)

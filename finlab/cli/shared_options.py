@@ -1,0 +1,82 @@
+"""Options that several verbs share: robots by name, counts, `--json [FILE]` and `--cluster ADDRESS`."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from tyro.conf import Positional, UseAppendAction, arg
+
+from finlab.errors import CommandError, DataError
+from finlab.whole_file import write_whole
+
+if TYPE_CHECKING:
+    from finlab.layout import Layout
+
+JSON = "file for one JSON object; it is printed in place of the table where no file is named"
+LAYOUT = "layout file, bundle, or the name of a shipped layout"
+FLOW = "velocity of the robot relative to the water, body frame [m/s, rad/s]; it is at rest by default"
+CLUSTER = "Dask scheduler whose workers run the parts of the work, such as tcp://10.0.0.1:8786"
+STDOUT = Path("-")
+"""What stands for stdout."""
+JsonFile = Annotated[Path | None, arg(metavar="[FILE]", help=JSON)]
+"""Where one JSON object goes."""
+Wrench = tuple[float, float, float, float, float, float]
+Flow = Annotated[Wrench | None, arg(metavar="VX VY VZ WX WY WZ", help=FLOW)]
+Robot = Annotated[Positional[str], arg(metavar="LAYOUT", help=LAYOUT)]
+Names = Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME")]
+Count = Annotated[int, arg(metavar="N")]
+Cluster = Annotated[str | None, arg(metavar="ADDRESS", help=CLUSTER)]
+
+
+def with_json_file(argv: Sequence[str]) -> list[str]:
+    """Arguments in which `--json` without a file is followed by that of stdout."""
+    whole: list[str] = []
+    for word, after in zip(argv, [*argv[1:], None], strict=False):
+        whole.append(word)
+        bare = after is None or (after.startswith("-") and after != str(STDOUT))
+        if word == "--json" and bare:
+            whole.append(str(STDOUT))
+    return whole
+
+
+def check_json_file(path: Path | None, option: str = "json") -> None:
+    """Refuse a file that cannot be written before the work, not after it."""
+    if path is not None and (path.is_dir() or not path.absolute().parent.is_dir()):
+        raise DataError(f"{option}: expected a file in an existing folder, got {path}")
+
+
+def put_json(value: Any, path: Path | None, table: str | None = None) -> None:
+    """Write one JSON object into a file and print a table, where they are given; or print the object."""
+    if path == STDOUT:
+        print(json.dumps(value, allow_nan=False))
+        return
+    if path is not None:
+        write_whole(path, json.dumps(value, indent=1, allow_nan=False) + "\n", DataError)
+    if table is not None:
+        print(table)
+
+
+def open_robot(text: str, failed: tuple[str, ...] = ()) -> tuple[Layout, tuple[str, ...]]:
+    """The layout in a file, or the shipped one of that name, and the names of all actuators that do not work:
+    those that a bundle marks as failed and those named now, each once.
+
+    Raises:
+        LayoutError: neither a readable file nor a shipped layout.
+    """
+    from finlab.assets import shipped_layouts
+    from finlab.files.worker import in_worker
+    from finlab.layout.load import layout_and_failed
+
+    shipped = text in shipped_layouts()
+    layout, lost = layout_and_failed(text) if shipped else in_worker(layout_and_failed, text)
+    return layout, tuple(dict.fromkeys([*lost, *failed]))
+
+
+def check_positive(**counts: int | None) -> None:
+    """Refuse numbers below one, each under the name of its option."""
+    for name, value in counts.items():
+        if value is not None and value < 1:
+            raise CommandError(f"{name.replace('_', '-')}: expected a number of at least 1, got {value}")
