@@ -141,21 +141,20 @@ def _result(client: "Client", future: "Future[Any]") -> Any:
 
     from distributed import KilledWorker, wait
 
-    alone = False
-    while not future.done():
-        try:
-            wait(future, timeout=PATIENCE_S)
-        except TimeoutError:
-            lost, alone = alone, not client.scheduler_info(n_workers=-1)["workers"]
-            if lost and alone:
-                raise FinlabError("cluster: all workers are lost; start others and run it again") from None
-        except CancelledError:
-            break
+    lost = False
     try:
+        while not future.done():
+            try:
+                with client.as_current():
+                    wait(future, timeout=PATIENCE_S)
+            except TimeoutError:
+                before, lost = lost, not client.scheduler_info(n_workers=-1)["workers"]
+                if before and lost:
+                    raise FinlabError(
+                        "cluster: all workers are lost; start others and run it again"
+                    ) from None
         return future.result()
     except KilledWorker:
-        raise FinlabError(
-            "cluster: a part has ended every worker that took it; give them more memory"
-        ) from None
+        raise FinlabError("cluster: a part ended each worker that took it; give them more memory") from None
     except CancelledError:
         raise FinlabError("cluster: its scheduler is lost; start it and run it again") from None
