@@ -83,9 +83,8 @@ def test_rows_are_those_of_one_process(
     killer.start()
     assert main([*WRENCH, str(tmp_path / "cluster.json"), "--cluster", address]) == 0
     killer.join()
-    alone, shared = (
-        json.loads((tmp_path / f"{name}.json").read_text())["rows"] for name in ("alone", "cluster")
-    )
+    files = (tmp_path / f"{name}.json" for name in ("alone", "cluster"))
+    alone, shared = (json.loads(file.read_text())["rows"] for file in files)
     assert len(alone) == 5 and plain(shared) == plain(alone)
 
 

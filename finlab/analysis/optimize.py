@@ -20,7 +20,7 @@ from finlab.layout import Layout
 
 CLEARANCE = 0.10
 """Least distance between two actuators [m], or what there is now if that is less."""
-CHUNK = 64
+CHUNK = 16
 """Variants that are looked at together: places of 64 actuators take much room."""
 PENALTY = 1e3
 """Cost of actuators that are too close or break another rule, per metre; far beyond any goal."""
