@@ -21,6 +21,8 @@ FORMAT = "finlab-bundle"
 VERSION = 8
 """Version of the bundle; a reader knows exactly one."""
 ROBOT, ABOUT = "robot.json", "bundle.json"
+NETWORKS = "checkpoint/"
+"""Folder of a checkpoint that does not come with finlab."""
 TABLES = "tables/"
 """Folder of the fins' force tables, each named by the SHA-256 of its content."""
 README, CHECKSUMS = "README.md", "SHA256SUMS"
@@ -29,6 +31,8 @@ LARGEST = {
     ABOUT: 100_000,
     README: 100_000,
     CHECKSUMS: 10_000,
+    NETWORKS + "config.json": 1_000_000,
+    NETWORKS + "model.safetensors": 50_000_000,
 }
 """All that a bundle may hold beside force tables, and the largest size of each file [bytes]."""
 LARGEST_TABLE = 20_000_000

@@ -10,11 +10,11 @@ from typing import Any
 from finlab.allocation.method import Method
 from finlab.allocation.settings import Settings
 from finlab.assets import checkpoint_path
-from finlab.bundle_files import ABOUT, FORMAT, Files
+from finlab.bundle_files import ABOUT, FORMAT, NETWORKS, Files
 from finlab.errors import AllocationError, DataError
 from finlab.files.guarded import decoded
 from finlab.files.plain_values import parse_json
-from finlab.networks.checkpoint import read_checkpoint, resolve_checkpoint
+from finlab.networks.checkpoint import parse_checkpoint, read_checkpoint, resolve_checkpoint
 from finlab.networks.trained import TrainedWeights
 
 METHODS: dict[str, tuple[str, str]] = {
@@ -31,7 +31,7 @@ METHODS: dict[str, tuple[str, str]] = {
 """Name -> module and class; modules are loaded only when their method is asked for."""
 LEARNED = {"mdn": "default", "paper": "paper"}
 """Methods that need a trained network -> the shipped checkpoint that holds it."""
-METHODS_ON_BOARD = ("dual", "mdn")
+METHODS_ON_BOARD = ("dual", "mdn", "paper")
 """Methods that a bundle can answer with."""
 Checkpoint = str | os.PathLike[str] | TrainedWeights | None
 """A checkpoint folder, the name of a shipped checkpoint, or the contents of one."""
@@ -87,7 +87,7 @@ def bundled_method(files: Files, source: str) -> MethodChoice:
     """The method of a bundle with what its files hold.
 
     Raises:
-        CheckpointError: this finlab has no such networks.
+        CheckpointError: its networks are damaged, or it has none and this finlab has not those that it names.
         DataError: the bundle is of another format, has a method that runs on no robot, or settings that no
             robot should try.
     """
@@ -108,7 +108,10 @@ def bundled_method(files: Files, source: str) -> MethodChoice:
         raise DataError(f"{place}: settings: {error}") from None
     if method not in LEARNED:
         return MethodChoice(kind, settings)
-    networks = read_checkpoint(checkpoint_path(checkpoint or LEARNED[method]))
+    name = checkpoint or LEARNED[method]
+    inside = {key.removeprefix(NETWORKS): part for key, part in files.items() if key.startswith(NETWORKS)}
+    place = f"{source}/{NETWORKS.rstrip('/')}"
+    networks = parse_checkpoint(inside, place, name) if inside else read_checkpoint(checkpoint_path(name))
     return MethodChoice(kind, settings, networks)
 
 

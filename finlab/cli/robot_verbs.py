@@ -87,7 +87,8 @@ def export(
     graph: Annotated[Path | None, arg(metavar="FILE")] = None,
     zip: bool = False,
     failed: Names = (),
-    method: Literal["dual", "mdn"] = "dual",
+    method: Literal["dual", "mdn", "paper"] = "dual",
+    checkpoint: Annotated[str | None, arg(metavar="NAME|FOLDER")] = None,
 ) -> None:
     """Write the deployment bundle (the robot, its actuators' physics, settings, README, checksums), or the
     layout graph file.
@@ -97,8 +98,8 @@ def export(
         graph: file to write the graph of actuators to (JSON, node-link form), for networkx and learners.
         zip: write one archive, DIR.zip, instead of a folder.
         failed: name of a fin that does not work.
-        method: who answers on the robot: dual keeps watts least, mdn the paper's effort, by the networks
-            that come with finlab.
+        method: who answers on the robot: dual keeps watts least, mdn and paper the paper's effort.
+        checkpoint: trained checkpoint of mdn or paper, which travels; the shipped one by default.
     """
 
     if output is None and graph is None:
@@ -115,7 +116,7 @@ def export(
         return
     from finlab.allocation import Allocator
 
-    allocator = Allocator(robot, method)
+    allocator = Allocator(robot, method, checkpoint=checkpoint)
     from finlab.deploy.bundle import make_bundle
 
     bundle = make_bundle(allocator, failed)

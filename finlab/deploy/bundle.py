@@ -4,6 +4,7 @@
 same layout and settings give the same bytes, as a folder and as a zip archive.
 """
 
+import hashlib
 import json
 import os
 from collections.abc import Mapping
@@ -21,6 +22,7 @@ from finlab.bundle_files import (
     FORMAT,
     LARGEST_BUNDLE,
     LARGEST_TABLE,
+    NETWORKS,
     README,
     ROBOT,
     VERSION,
@@ -35,6 +37,8 @@ from finlab.files.archive import packed
 from finlab.layout import Fin, FinModelSpec, Layout
 from finlab.layout.force_table_file import table_bytes
 from finlab.layout.robot_file import Robot, robot_bytes
+from finlab.networks.checkpoint import WEIGHTS_FILE, checkpoint_files, read_checkpoint
+from finlab.networks.trained import TrainedWeights
 from finlab.whole_file import PART, write_together, write_whole
 
 
@@ -87,35 +91,42 @@ def make_bundle(allocator: Allocator, failed: tuple[str, ...] = ()) -> Bundle:
     """Prepare what a robot runs: the robot, method and settings of an allocator.
 
     Args:
-        allocator: of method `dual` or `mdn`.
+        allocator: of method `dual`, `mdn` or `paper`; networks that do not come with finlab travel.
         failed: names of fins that do not work.
 
     Raises:
         LayoutError: an unknown failed fin, or none left.
-        AllocationError: the method cannot run from a bundle, or its networks are not shipped.
-        DataError: a force table cannot be read, or is too large to travel.
+        AllocationError: the method cannot run from a bundle.
+        DataError: a force table cannot be read, or something is too large to travel.
     """
     if allocator.method not in METHODS_ON_BOARD:
         raise AllocationError(
             f"method {allocator.method!r} cannot be exported; a bundle runs {' or '.join(METHODS_ON_BOARD)}"
         )
-    if allocator.checkpoint not in (None, *shipped_checkpoints()):
-        raise AllocationError(
-            f"checkpoint {allocator.checkpoint!r:.60} cannot be exported: a robot has those that come with "
-            "finlab; export method 'dual', or make the allocator on the robot with Allocator(layout, 'mdn')"
-        )
-    layout, weights, cases = allocator.layout, allocator.weights, self_tests(allocator, failed)
+    layout, cases = allocator.layout, self_tests(allocator, failed)
     inside, tables = with_tables_inside(layout)
-    sha256 = None if weights is None else weights.sha256
+    sha256, networks = _networks(allocator.weights)
     files = {
         ROBOT: robot_bytes(Robot(inside, failed, sha256, cases)),
         ABOUT: about_bundle(allocator),
         **tables,
+        **networks,
         README: readme_text(allocator, failed).encode(),
     }
     if sum(map(len, files.values())) > LARGEST_BUNDLE:
         raise DataError(f"layout {layout.name!r}: its bundle would be larger than {LARGEST_BUNDLE:,} bytes")
     return Bundle({**files, CHECKSUMS: checksums(files)})
+
+
+def _networks(weights: TrainedWeights | None) -> tuple[str | None, dict[str, bytes]]:
+    """SHA-256 of networks, and the files of those that do not come with finlab."""
+    if weights is None:
+        return None, {}
+    shipped = shipped_checkpoints().get(weights.name)
+    if shipped is not None and read_checkpoint(shipped).sha256 == weights.sha256:
+        return weights.sha256, {}
+    files = checkpoint_files(weights)
+    return hashlib.sha256(files[WEIGHTS_FILE]).hexdigest(), {NETWORKS + name: files[name] for name in files}
 
 
 def about_bundle(allocator: Allocator) -> bytes:

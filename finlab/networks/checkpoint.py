@@ -36,7 +36,12 @@ _UNFIT = (ArithmeticError, AttributeError, LayoutError, LookupError, TypeError, 
 
 
 def read_checkpoint(folder: Path) -> TrainedWeights:
-    """The contents of a checkpoint folder.
+    """The contents of a checkpoint folder; errors as of `parse_checkpoint`."""
+    return parse_checkpoint(_files(folder), str(folder), folder.name)
+
+
+def parse_checkpoint(files: Mapping[str, bytes], source: str, name: str) -> TrainedWeights:
+    """The contents of a checkpoint by those of its files; errors call it `source`.
 
     Raises:
         CheckpointError: missing, corrupt, of an unknown version, or made by something else.
@@ -44,7 +49,6 @@ def read_checkpoint(folder: Path) -> TrainedWeights:
     from safetensors import SafetensorError
     from safetensors.numpy import load
 
-    files, source = _files(folder), str(folder)
     config = _config(files, source, (CONFIG_FILE, WEIGHTS_FILE))
     sha256 = hashlib.sha256(files[WEIGHTS_FILE]).hexdigest()
     if sha256 != config.get("sha256"):
@@ -60,7 +64,7 @@ def read_checkpoint(folder: Path) -> TrainedWeights:
         if known := {key.split(".")[0] for key in tensors} - {"surrogate", "network"}:
             raise ValueError(f"{min(known)!r:.80} is not expected")
         return TrainedWeights(
-            name=folder.name,
+            name=name,
             normalization=Normalization.parse(config["normalization"]),
             network_sizes=config["network"] and dict(config["network"]),
             network=_part("network", tensors),

@@ -3,6 +3,7 @@
 import hashlib
 import json
 import resource
+import shutil
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -16,6 +17,7 @@ from finlab.allocation import Allocator
 from finlab.bundle_files import (
     ABOUT,
     CHECKSUMS,
+    NETWORKS,
     ROBOT,
     TABLES,
     checksums,
@@ -24,8 +26,9 @@ from finlab.bundle_files import (
 )
 from finlab.cli import main
 from finlab.deploy.bundle import Bundle, make_bundle
+from finlab.deploy.command import main as runtime
 from finlab.deploy.robot import load_robot, parse_robot
-from finlab.errors import AllocationError, DataError, FinlabError
+from finlab.errors import AllocationError, CheckpointError, DataError, FinlabError
 from finlab.layout import Layout
 from tests.any_robot import AnyRobot
 
@@ -70,9 +73,32 @@ def test_the_method_with_networks_answers_with_those_of_this_finlab(of_mdn: Bund
     assert load_robot(tmp_path).allocate(WRENCH) == desk.allocate(WRENCH)
 
 
-def test_networks_of_ones_own_are_not_exported(untrained_mdn: Path) -> None:
-    with pytest.raises(AllocationError, match="checkpoint 'untrained-mdn' cannot be exported"):
-        make_bundle(Allocator(finlab.load_layout("A"), "mdn", checkpoint=untrained_mdn))
+@pytest.mark.parametrize(("method", "fixture"), [("mdn", "untrained_mdn"), ("paper", "untrained_checkpoint")])
+@pytest.mark.parametrize("archive", [False, True])
+def test_networks_of_ones_own_travel(
+    method: str, fixture: str, archive: bool, tmp_path: Path, request: pytest.FixtureRequest
+) -> None:
+    folder = tmp_path / "mine"
+    shutil.copytree(request.getfixturevalue(fixture), folder)
+    desk = Allocator(finlab.load_layout("A"), method, checkpoint=folder)
+    truth = desk.allocate(WRENCH)
+    place = tmp_path / ("A.zip" if archive else "A")
+    line = ["export", "A", "-o", str(place), "--method", method, "--checkpoint", str(folder)]
+    assert main([*line, "--zip"] if archive else line) == 0
+    shutil.rmtree(folder)
+    assert Allocator.from_bundle(place).allocate(WRENCH) == truth == load_robot(place).allocate(WRENCH)
+    assert truth.checkpoint == "mine"
+    again = make_bundle(Allocator.from_bundle(place))
+    assert dict(again.files) == read_bundle_files(place)
+    assert runtime(["check", str(place)]) == 0
+    files = dict(again.files)
+    weights = NETWORKS + "model.safetensors"
+    for damaged in (files[weights][:-4], files[weights][:-4] + bytes(4)):
+        with pytest.raises(CheckpointError, match="checkpoint/model.safetensors: its SHA-256 is not the one"):
+            parse_robot(resealed({**files, weights: damaged}))
+    del files[NETWORKS + "config.json"]
+    with pytest.raises(CheckpointError, match="checkpoint/config.json: no such file"):
+        parse_robot(resealed(files))
 
 
 def test_the_command_line_takes_a_bundle_with_its_lost_fins(
@@ -104,7 +130,7 @@ def test_settings_travel(tmp_path: Path) -> None:
         ({"version": 3}, "is a bundle of version 3, this finlab reads version 8; export it again"),
         ({"version": True}, "is a bundle of version True"),
         ({"format": "other"}, "expected format finlab-bundle"),
-        ({"method": "sqp"}, "method must be one of dual, mdn, got 'sqp'"),
+        ({"method": "sqp"}, "method must be one of dual, mdn, paper, got 'sqp'"),
         ({"method": "mdn", "settings": {}}, "was made with other networks than this finlab's"),
         ({"method": "mdn", "settings": {}, "checkpoint": "mine"}, "'mine' is not among the shipped ones"),
     ],
