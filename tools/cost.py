@@ -14,13 +14,12 @@ from numpy.typing import NDArray
 
 from finlab.arrays import Array
 from finlab.cli.eval_verbs import verb_of
-from finlab.evaluation.experiment import Experiment, check_names
+from finlab.evaluation.bootstrap import ratio_interval
+from finlab.evaluation.document import Column, Row
+from finlab.evaluation.experiment import Experiment, check_names, progress
 from finlab.evaluation.method_specs import PATIENCE_S, MethodSpec, load_method_spec, load_method_specs
-from finlab.evaluation.progress import progress
-from finlab.evaluation.report.document import Column, Row
 from finlab.evaluation.scoring import sigma_of
 from finlab.evaluation.splits import SPLITS, Case, make_split
-from finlab.evaluation.statistics.bootstrap import ratio_interval
 from finlab.layout import Layout
 from finlab.physics import plant_of
 from finlab.physics.objective import Name, cost_meter

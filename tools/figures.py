@@ -16,9 +16,8 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
-from finlab.evaluation.experiment import Experiment, load_experiment
-from finlab.evaluation.progress import begin
-from finlab.evaluation.report.document import Table, to_markdown
+from finlab.evaluation.document import Table, to_markdown
+from finlab.evaluation.experiment import Experiment, begin, load_experiment
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = {path.stem: path for path in sorted((ROOT / "docs").glob("*.md"))}

@@ -39,8 +39,8 @@ def _not_named() -> None:
 
 def verb_of(experiment: Experiment) -> Callable[..., None]:
     """A function whose signature says to the parser which options there are."""
-    from finlab.evaluation.progress import begin
-    from finlab.evaluation.report.document import to_text
+    from finlab.evaluation.document import to_text
+    from finlab.evaluation.experiment import begin
     from finlab.executor import on_cluster
 
     options = experiment.options()
@@ -116,13 +116,13 @@ def report(
 
     Args:
         out: folder for the report.
-        quick: a look on few cases, in minutes; the whole takes half an hour.
+        quick: a look on few cases, in minutes; the whole takes a quarter of an hour.
         sections: run only these experiments.
         seed: of all draws.
     """
     if out.exists() and not out.is_dir():
         raise DataError(f"out: expected a folder, got the file {out}")
-    from finlab.evaluation.report.make import make_report
+    from finlab.evaluation.report_page import make_report
 
     names = [name.strip() for name in sections.split(",") if name.strip()]
     print(make_report(out, size="quick" if quick else "full", seed=seed, names=names))
@@ -152,8 +152,8 @@ def bench(
         seed: of robots and wrenches.
     """
     check_json_file(json)
+    from finlab.evaluation.document import to_text
     from finlab.evaluation.experiments.wrench import HARD, experiment
-    from finlab.evaluation.report.document import to_text
     from finlab.executor import on_cluster
 
     names = tuple(splits.split(",")) if splits else QUICK if quick else HARD

@@ -7,16 +7,20 @@ asked for.
 
 import inspect
 import math
+import shlex
+import sys
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from importlib import import_module
 from importlib.resources import files
 from types import NoneType
-from typing import Any, get_args, get_type_hints
+from typing import Any, TypeVar, get_args, get_type_hints
+
+from tqdm import tqdm
 
 from finlab.errors import DataError
-from finlab.evaluation.report.document import Block, Column, Row, Table
+from finlab.evaluation.document import Block, Column, Row, Table
 
 EXPERIMENTS = (
     *("wrench", "thrusters", "latency", "ablation", "temperature"),
@@ -25,6 +29,7 @@ EXPERIMENTS = (
 """Names, which are those of their modules in `finlab.evaluation.experiments`, in the order of the report."""
 MOST, MOST_SEED = 1_000_000, 2**63 - 1
 """Largest whole number of an option, and of a seed."""
+Item = TypeVar("Item")
 
 
 @dataclass(frozen=True)
@@ -79,6 +84,21 @@ class Experiment:
                     raise DataError(f"{name.replace('_', '-')}: expected a finite number, got {number}")
         return values
 
+    def command(self, options: Mapping[str, Any]) -> str:
+        """The line that prints the table: the verb with those options that are not the defaults."""
+        words = ["finlab", "eval", self.name]
+        for name, option in self.options().items():
+            value = options.get(name, option.default)
+            if value == option.default or value is None:
+                continue
+            dashed = name.replace("_", "-")
+            if isinstance(value, bool):
+                words.append(f"--{dashed}" if value else f"--no-{dashed}")
+            else:
+                text = ",".join(map(str, value)) if isinstance(value, tuple) else str(value)
+                words += [text] if name == "layout" else [f"--{dashed}", text]
+        return shlex.join(words)
+
     def each_row(self, **chosen: Any) -> Iterator[Row]:
         """Run it, row by row; options as in `check`. A number that is not finite becomes None."""
         yield from map(_finite, self.run(**self.check(chosen)))
@@ -110,6 +130,18 @@ def check_names(option: str, names: Sequence[str], known: Collection[str]) -> No
     """
     if unknown := [name for name in names if name not in known]:
         raise DataError(f"{option}: expected some of {', '.join(known)}, got {unknown[0]!r:.60}")
+
+
+def progress(items: Iterable[Item], unit: str, title: str | None = None) -> Iterable[Item]:
+    """The items one by one, with a bar on stderr that is gone at the end; none where that is no terminal."""
+    # disable=None: a bar on a terminal, nothing elsewhere
+    return tqdm(items, title, unit=unit, disable=None, leave=False, file=sys.stderr)
+
+
+def begin(words: str) -> None:
+    """Say on a terminal what has begun, until the first bar stands in its place."""
+    if sys.stderr.isatty():
+        print(f"{words} ...", end="\r", file=sys.stderr, flush=True)
 
 
 def _finite(value: Any) -> Any:

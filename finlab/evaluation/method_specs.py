@@ -1,15 +1,29 @@
-"""Methods as users specify them: a name, or a function of their own."""
+"""Methods as users specify them: a name, or a Python function of their own, wherever an experiment takes one.
 
-from collections.abc import Iterable
+The function is handed what its parameters ask for by name: `targets` (N, 6) [N, N m] in the body frame,
+`layout` (a `finlab.Layout`), `sigma` (6,), what the allocator divides errors by, and `previous`, the command
+(n, 3) of the tick before or None. It returns commands (N, n, 3), as `finlab.Allocation` has them.
+"""
+
+import inspect
+import os
+import runpy
+import sys
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
+
+import numpy as np
 
 from finlab.allocation.allocator import Allocator
+from finlab.allocation.method import Method
 from finlab.allocation.methods import LEARNED, MethodChoice, checked_settings, choose_method, method_class
-from finlab.errors import AllocationError
-from finlab.evaluation.own_method import own_method
+from finlab.allocation.solution import Solution
+from finlab.arrays import Array
+from finlab.errors import AllocationError, DataError
 from finlab.layout import Layout
 from finlab.physics.objective import Name
 
@@ -22,6 +36,10 @@ NEEDS = {"ipopt": "casadi"}
 PATIENCE_S = 60.0
 """Processor time [s] that a target may take where answers count and not times; starts and steps end every
 method long before."""
+KNOWN = ("targets", "layout", "sigma", "previous")
+"""Parameters that a function may have."""
+TOLERANCE = 1e-6
+"""By how much a command may leave its limits, as a share of what they span and of one of its unit."""
 
 
 def installed_methods(layout: Layout) -> list[str]:
@@ -90,7 +108,7 @@ def load_method_spec(
     """The method of a specification.
 
     Args:
-        name: a method, or `file.py:function`, see `own_method`.
+        name: a method, or `file.py:function`, as this module says.
         checkpoint: of learned methods, as for `finlab.Allocator`.
         objective: what the methods that can choose keep least; each one's default where None.
 
@@ -103,3 +121,73 @@ def load_method_spec(
         return MethodSpec(kind.name, MethodChoice(kind, kind.settings_class()))
     spec = MethodSpec(name, choose_method(name, checkpoint if name in LEARNED else None))
     return spec if objective is None else spec.with_settings(objective=objective)
+
+
+def own_method(name: str) -> type[Method]:
+    """The method of a function, given as `module:function` or `file.py:function`.
+
+    Raises:
+        DataError: there is no such function, or one of its parameters is none of `KNOWN`.
+    """
+    function = _function(name)
+    try:
+        wanted = inspect.signature(function).parameters
+    except ValueError:
+        raise DataError(f"{name}: its parameters are not known; wrap it in a function") from None
+    if unknown := [p.name for p in wanted.values() if p.default is p.empty and p.name not in KNOWN]:
+        raise DataError(f"{name}: expected parameters among {', '.join(KNOWN)}, got {unknown[0]!r}")
+    given = {"name": name.rpartition("/")[2], "function": staticmethod(function), "wanted": tuple(wanted)}
+    return type("OwnMethod", (_OwnMethod,), given)
+
+
+class _OwnMethod(Method):
+    """A function as a method; the rest of a method's errors are its own."""
+
+    every_policy = False
+    function: ClassVar[Callable[..., Any]]
+    wanted: ClassVar[tuple[str, ...]]
+
+    def solve(self, targets: Array, *, previous: Array | None = None, **rest: Any) -> Solution:
+        """See `Method`.
+
+        Raises:
+            AllocationError: the function raised, or what it gave are no commands within the limits.
+        """
+        known = {"targets": targets, "layout": self.layout, "sigma": self.scale, "previous": previous}
+        try:
+            given = self.function(**{key: known[key] for key in self.wanted if key in known})
+            command = np.asarray(given, dtype=np.float64)
+        except Exception as error:  # a stranger's function may fail in any way
+            words = f"{type(error).__name__}: {error}"
+            raise AllocationError(f"{self.name}: layout {self.layout.name!r:.60}: {words:.300}") from error
+        shape = (len(targets), self.layout.n, 3)
+        if command.shape != shape or not np.isfinite(command).all():
+            raise AllocationError(
+                f"{self.name}: expected finite commands of shape {shape}, got shape {command.shape}"
+            )
+        within = self.plant.feasible(command)
+        away = np.abs(command - within)
+        away[..., 2] = np.where(self.plant.full_turn, 0.0, away[..., 2])  # these may be any angle
+        if (away > TOLERANCE * np.maximum(self.plant.width, 1.0)).any():
+            part = self.layout.names[int(away.max(axis=(0, 2)).argmax())]
+            raise AllocationError(
+                f"{self.name}: a command of {part!r:.60} is {away.max():.3g} out of its limits"
+            )
+        return Solution(within)
+
+
+def _function(name: str) -> Callable[..., Any]:
+    place, _, attribute = name.rpartition(":")
+    try:
+        if place.endswith(".py"):
+            sys.path.insert(0, str(Path(place).resolve().parent))
+            found = runpy.run_path(place).get(attribute)
+        else:
+            sys.path.insert(0, os.getcwd())
+            found = getattr(import_module(place), attribute, None)
+    except Exception as error:  # a stranger's file may fail in any way
+        raise DataError(f"{place}: cannot be loaded: {type(error).__name__}: {error}") from None
+    if not callable(found):
+        raise DataError(f"{place}: holds no function {attribute!r}")
+    function: Callable[..., Any] = found
+    return function

@@ -3,14 +3,16 @@
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from finlab.arrays import Array
 from finlab.errors import DataError
-from finlab.evaluation.noisy_tables import noisy_table
-from finlab.layout import Layout, random_layout
+from finlab.layout import Fin, FinModelSpec, Layout, random_layout
 from finlab.layout.angles import wrapped
 from finlab.layout.random import TRAINING_BOX
 from finlab.layout.random_actuators import Draw as ActuatorDraw
@@ -22,7 +24,7 @@ from finlab.layout.random_actuators import (
     random_thruster,
     random_tilt,
 )
-from finlab.physics import Plant
+from finlab.physics import Plant, TableLaw, make_law, write_table
 
 OOD_BOX = (0.45, 0.45, 0.20)
 """Largest |x|, |y|, |z| of a fin in split `ood` [m]; at least one fin lies outside the training box."""
@@ -46,6 +48,12 @@ N_SIGMA = 4096
 """Uniform commands from which such a robot's yardstick is computed."""
 LEAST_SIGMA = 0.05
 """Least deviation on an axis, as a share of the largest one among the forces, or among the torques."""
+
+GRID = (8, 9, 12)
+"""Amplitudes, frequencies and zero directions of a table; the first two range over the fin's limits, the last
+over the circle."""
+NOISE = 0.03
+"""Standard deviation of each component of a force, as a share of it."""
 
 
 class Case(NamedTuple):
@@ -159,8 +167,27 @@ def _tables(rng: np.random.Generator, name: str) -> tuple[Layout, tuple[str, ...
     """The same, each fin known by a noisy table."""
     layout, _ = _fins_mixed(rng, name)
     noise = zip(layout.fins, rng.spawn(layout.n_fins), strict=True)
-    fins = (noisy_table(own, fin, f"{name}-{fin.name}") for fin, own in noise)
+    fins = (_noisy_table(own, fin, f"{name}-{fin.name}") for fin, own in noise)
     return replace(layout, actuators=tuple(fins)), ()
+
+
+def _noisy_table(rng: np.random.Generator, fin: Fin, name: str) -> Fin:
+    """A fin with a table of its model in place of the model; the file of that name is written once."""
+    path = Path(_table_folder().name) / f"{name}.csv"
+    if not path.exists():
+        ranges = zip((fin.limits.amplitude, fin.limits.frequency), GRID, strict=False)
+        axes = [np.linspace(*ends, count) for ends, count in ranges]
+        axes.append(np.linspace(-np.pi, np.pi, GRID[2], endpoint=False))
+        force = make_law(fin.model).force(np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1))
+        noisy = np.asarray(force * (1.0 + NOISE * rng.standard_normal(force.shape)))
+        write_table(path, TableLaw(axes, noisy, periodic=True), *axes)
+    return replace(fin, model=FinModelSpec("table", (("path", str(path)),)))
+
+
+@cache
+def _table_folder() -> "TemporaryDirectory[str]":
+    """Where this process keeps its tables; gone when it ends."""
+    return TemporaryDirectory(prefix="finlab-tables-")
 
 
 def _robots(*kinds: ActuatorDraw, count: tuple[int, int], each: bool = False) -> Draw:

@@ -11,9 +11,9 @@ import pytest
 
 from finlab.cli import main
 from finlab.errors import DataError
+from finlab.evaluation.document import to_text
 from finlab.evaluation.experiment import EXPERIMENTS, load_experiment
 from finlab.evaluation.experiments import wrench
-from finlab.evaluation.report.document import to_text
 
 WRENCH = ["eval", "wrench", "--layouts", "2", "--targets", "3", "--methods", "analytic,qp"]
 

@@ -7,13 +7,12 @@ from typing import Any
 import numpy as np
 
 from finlab.allocation.methods import choose_method
-from finlab.evaluation.experiment import Experiment, check_names, paper_figures
+from finlab.evaluation.bootstrap import mean_interval
+from finlab.evaluation.document import Column, Row
+from finlab.evaluation.experiment import Experiment, check_names, paper_figures, progress
 from finlab.evaluation.method_specs import MethodSpec
-from finlab.evaluation.progress import progress
-from finlab.evaluation.report.document import Column, Row
 from finlab.evaluation.scoring import joined, paper_sigma, score
 from finlab.evaluation.splits import make_split
-from finlab.evaluation.statistics.bootstrap import mean_interval
 
 VARIANTS: dict[str, dict[str, Any]] = {
     "mean_only": {"mean_only": True},

@@ -12,7 +12,7 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.errors import DataError
-from finlab.evaluation.report.document import Column, Row
+from finlab.evaluation.document import Column, Row
 from finlab.sim import RunLog
 
 RTE_DELTA_S = 5.0

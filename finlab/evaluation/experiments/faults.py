@@ -6,6 +6,7 @@ from functools import partial
 from itertools import combinations, product
 
 from finlab.control import steers
+from finlab.evaluation.document import Column, Row
 from finlab.evaluation.experiment import Experiment, paper_figures
 from finlab.evaluation.experiments.closed_loop import (
     ABOUT_ERRORS,
@@ -16,7 +17,6 @@ from finlab.evaluation.experiments.closed_loop import (
     over_seeds,
 )
 from finlab.evaluation.method_specs import MethodSpec, load_method_specs
-from finlab.evaluation.report.document import Column, Row
 from finlab.executor import map_parts
 from finlab.layout import Layout, load_layout
 from finlab.sim import ClosedLoop, Trajectory, make_trajectory

@@ -14,10 +14,9 @@ import numpy as np
 from finlab.allocation.allocation import Allocation
 from finlab.arrays import Array
 from finlab.errors import DataError
-from finlab.evaluation.experiment import Experiment, paper_figures
+from finlab.evaluation.document import Column, Row
+from finlab.evaluation.experiment import Experiment, paper_figures, progress
 from finlab.evaluation.method_specs import MethodSpec, can_run, load_method_spec, load_method_specs
-from finlab.evaluation.progress import progress
-from finlab.evaluation.report.document import Column, Row
 from finlab.layout import Layout, random_layout
 from finlab.layout.random_actuators import random_robot, random_thruster
 from finlab.physics import plant_of

@@ -8,11 +8,11 @@ from itertools import product
 import numpy as np
 
 from finlab.control.completion import LEVER_M
+from finlab.evaluation.document import Column, Row
 from finlab.evaluation.experiment import Experiment, check_names
 from finlab.evaluation.experiments.closed_loop import ABOUT_ERRORS, LOST_M, follow_row
 from finlab.evaluation.experiments.hard_days import HARD_DAYS, Case, HardDay
 from finlab.evaluation.method_specs import MethodSpec, load_method_specs
-from finlab.evaluation.report.document import Column, Row
 from finlab.executor import map_parts
 from finlab.layout import load_layout
 from finlab.layout.angles import command_change

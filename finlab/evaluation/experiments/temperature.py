@@ -8,12 +8,11 @@ from finlab.allocation.allocator import Allocator
 from finlab.allocation.methods import choose_method
 from finlab.arrays import Array
 from finlab.errors import DataError
-from finlab.evaluation.experiment import Experiment
-from finlab.evaluation.progress import progress
-from finlab.evaluation.report.document import Column, Row
+from finlab.evaluation.bootstrap import mean_interval
+from finlab.evaluation.document import Column, Row
+from finlab.evaluation.experiment import Experiment, progress
 from finlab.evaluation.scoring import paper_sigma
 from finlab.evaluation.splits import make_split
-from finlab.evaluation.statistics.bootstrap import mean_interval
 from finlab.layout import Layout
 from finlab.layout.angles import is_full_turn
 from finlab.paper.settings import PaperSettings

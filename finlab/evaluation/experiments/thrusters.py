@@ -11,8 +11,8 @@ from finlab.allocation import Allocator, Policy
 from finlab.allocation.baselines.ardusub import ORDER as ARDUSUB_ORDER
 from finlab.allocation.baselines.px4 import ORDER as PX4_ORDER
 from finlab.arrays import Array
+from finlab.evaluation.document import Column, Row
 from finlab.evaluation.experiment import Experiment, check_names
-from finlab.evaluation.report.document import Column, Row
 from finlab.evaluation.splits import make_split
 from finlab.executor import map_parts
 from finlab.layout import Layout, load_layout

@@ -3,11 +3,10 @@
 from collections.abc import Sequence
 from itertools import product
 
-from finlab.evaluation.experiment import Experiment, paper_figures
+from finlab.evaluation.document import Column, Row
+from finlab.evaluation.experiment import Experiment, paper_figures, progress
 from finlab.evaluation.experiments.closed_loop import ABOUT_ERRORS, ERRORS, POWER, follow_row, mean_rows
 from finlab.evaluation.method_specs import load_method_specs
-from finlab.evaluation.progress import progress
-from finlab.evaluation.report.document import Column, Row
 from finlab.layout import load_layout
 from finlab.sim import ClosedLoop, make_trajectory
 

@@ -6,11 +6,10 @@ from itertools import product
 import numpy as np
 
 from finlab.errors import DataError
-from finlab.evaluation.experiment import Experiment, paper_figures
+from finlab.evaluation.document import Column, Row
+from finlab.evaluation.experiment import Experiment, paper_figures, progress
 from finlab.evaluation.experiments.closed_loop import POWER, depth_error, mean_rows, power_row
 from finlab.evaluation.method_specs import load_method_specs
-from finlab.evaluation.progress import progress
-from finlab.evaluation.report.document import Column, Row
 from finlab.layout import load_layout
 from finlab.sim import ClosedLoop, RunLog, straight
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from finlab.cli import main
+from finlab.evaluation.document import to_text
 from finlab.evaluation.experiment import load_experiment
 from finlab.evaluation.experiments.faults import all_faults
-from finlab.evaluation.report.document import to_text
 from finlab.layout import Layout
 
 

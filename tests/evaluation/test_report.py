@@ -2,7 +2,9 @@
 
 import json
 import os
+import re
 import resource
+import shlex
 from collections.abc import Iterator
 from dataclasses import replace
 from importlib import import_module
@@ -13,8 +15,7 @@ import pytest
 
 from finlab.cli import main
 from finlab.errors import DataError
-from finlab.evaluation.report import make
-from finlab.evaluation.report.make import PAGE, TABLES, make_report
+from finlab.evaluation.report_page import PAGE, TABLES, make_report
 
 pytest.importorskip("casadi")
 
@@ -30,7 +31,7 @@ TINY: dict[str, dict[str, Any]] = {
 def tiny() -> Iterator[None]:
     """Experiments with quick sizes that take a second."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(make, "EXPERIMENTS", dict.fromkeys(TINY))
+        patch.setattr(report_page, "EXPERIMENTS", dict.fromkeys(TINY))
         for name, sizes in TINY.items():
             module = import_module(f"finlab.evaluation.experiments.{name}")
             patch.setattr(module, "experiment", replace(module.experiment, quick=sizes))
@@ -63,6 +64,35 @@ def test_page_and_rows_say_the_same(folder: Path) -> None:
     assert [row["split"] for row in tables["wrench"]] == ["id", "id", "tables", "tables"]
 
 
+def test_each_table_has_the_command_that_makes_it_again(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    commands = re.findall(r"^Made by `finlab (.*)` at (?:commit [0-9a-f]{12}|version)", page_of(folder), re.M)
+    assert [command.split()[1] for command in commands] == list(TINY)
+    tables = json.loads((folder / TABLES).read_text("utf-8"))
+    for name, command in zip(TINY, commands, strict=True):
+        assert main([*shlex.split(command), "--json"]) == 0
+        rows = json.loads(capsys.readouterr().out)["rows"]
+        assert without_times(rows) == without_times(tables[name])
+
+
+def test_the_stored_report_knows_all_experiments_and_no_other() -> None:
+    """Each with a command whose options there are, and the commit that it was made at."""
+    text = page_of(Path(report_page.__file__).parents[2] / "docs" / "report")
+    sections = re.findall(r"^## (\w+)$(.*?)(?=^## )", text, re.M | re.S)
+    assert [name.lower() for name, _ in sections] == list(EXPERIMENTS)
+    for name, section in sections:
+        ((command, commit),) = re.findall(r"^Made by `finlab eval (.*)` at commit (.*)\.$", section, re.M)
+        verb, *words = shlex.split(command)
+        known = {option.replace("_", "-") for option in load_experiment(verb).options()}
+        assert verb == name.lower() and re.fullmatch("[0-9a-f]{12}", commit), "of a tree without changes"
+        assert {word[2:].removeprefix("no-") for word in words if word.startswith("--")} <= known
+
+
+def page_of(folder: Path) -> str:
+    return (folder / PAGE).read_text("utf-8")
+
+
 def test_two_reports_of_one_seed_have_the_same_rows(folder: Path, tmp_path: Path) -> None:
     """Of some sections, too."""
     page = make_report(tmp_path, size="quick", seed=3, names=["temperature", "latency"])
@@ -93,7 +123,7 @@ def test_a_full_disk_is_a_sentence_with_the_path(tiny: None, tmp_path: Path) -> 
 def test_bad_input_is_one_sentence(
     arguments: str, message: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.chdir(Path(make.__file__).parents[3])
+    monkeypatch.chdir(Path(report_page.__file__).parents[2])
     assert main(["eval", "report", *arguments.split()]) == 2
     error = capsys.readouterr().err
     assert error.startswith("finlab: error: ") and message in error and error.count("\n") == 1

@@ -1,18 +1,56 @@
-"""A document as a list of blocks, and the same in Markdown, or as plain text for the command line.
+"""A document as a list of blocks, and the same in Markdown or as plain text, with numbers as people read them.
 
 A heading, a paragraph or a list is a string of Markdown; a paragraph *all in italics* is a remark in small.
 """
 
+import math
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from finlab.evaluation.report.numbers import FORMATS
 from finlab.text_table import aligned
 
 Row = dict[str, Any]
 WIDTH = 110  # of plain text
+
+
+def error(value: float) -> str:
+    """Two significant digits: 0.00029, 0.086, 1.8, 3.1e-7."""
+    if 0 < abs(value) < 9.5e-5:
+        mantissa, _, power = f"{value:.1e}".partition("e")
+        return f"{mantissa}e{int(power)}"
+    return three(value, 2)
+
+
+def three(value: float, count: int = 3) -> str:
+    """Three significant digits, or another number of them: 2.86, 0.0857, 178."""
+    if value == 0 or not math.isfinite(value):
+        return "0" if value == 0 else "–"
+    digits = max(0, count - 1 - math.floor(math.log10(abs(value))))
+    return f"{value:.{digits}f}" if digits < 7 else f"{value:.2e}"
+
+
+def share(value: float) -> str:
+    """As a percentage, with more digits the nearer it is to 100: 48.8 %, 99.97 %, 100 %."""
+    if value >= 1.0:
+        return "100 %"
+    missing = 100 * (1 - value)
+    digits = 1 if missing >= 1 else min(4, -math.floor(math.log10(missing)))
+    return f"{100 * value:.{digits}f} %"
+
+
+FORMATS: dict[str, Callable[[Any], str]] = {
+    "error": error,
+    "three": three,
+    "share": share,
+    "count": "{:,}".format,
+    "ratio": "{:.3f}".format,
+    "metres": "{:.4f}".format,
+    "text": str,
+    "code": "`{}`".format,
+}
+"""Name -> how a value is shown."""
 
 
 @dataclass(frozen=True)

@@ -4,8 +4,7 @@ from typing import Any
 
 import pytest
 
-from finlab.evaluation.report.document import Column, Table, to_markdown, to_text
-from finlab.evaluation.report.numbers import FORMATS
+from finlab.evaluation.document import FORMATS, Column, Table, to_markdown, to_text
 
 COLUMNS = (Column("name", "method"), Column("value", "error <", "error", "ends"))
 ROWS: list[dict[str, Any]] = [

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from finlab.evaluation.statistics.bootstrap import (
+from finlab.evaluation.bootstrap import (
     mean_interval,
     ratio_interval,
     share_interval,

@@ -2,6 +2,7 @@
 
 import json
 import platform
+import subprocess
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,9 +14,8 @@ from threadpoolctl import threadpool_limits
 
 import finlab
 from finlab.errors import DataError
-from finlab.evaluation.experiment import EXPERIMENTS, load_experiment
-from finlab.evaluation.progress import progress
-from finlab.evaluation.report.document import Block, Row, to_markdown
+from finlab.evaluation.document import Block, Row, to_markdown
+from finlab.evaluation.experiment import EXPERIMENTS, load_experiment, progress
 from finlab.whole_file import make_folder, write_whole
 
 PAGE, TABLES = "report.md", "tables.json"
@@ -38,7 +38,7 @@ def make_report(out: Path, *, size: Size = "full", seed: int = SEED, names: Sequ
 
     Args:
         out: folder for the report, made if need be.
-        size: how much of everything: minutes, or half an hour.
+        size: how much of everything: minutes, or a quarter of an hour.
         seed: of all draws.
         names: experiments, or all.
 
@@ -52,35 +52,60 @@ def make_report(out: Path, *, size: Size = "full", seed: int = SEED, names: Sequ
         raise DataError(f"sections: expected all or some of {', '.join(EXPERIMENTS)}, got {unknown[0]!r:.60}")
     make_folder(out)
     chosen = [name for name in EXPERIMENTS if "all" in names or name in names]
-    start, rows = time.process_time(), dict[str, list[Row]]()
+    start, rows, blocks = time.process_time(), dict[str, list[Row]](), list[Block]()
+    commit = _commit()
     command = f"finlab eval report -o {out}" + (" --quick" if size == "quick" else "")
     command += "" if "all" in names else f" --sections {','.join(chosen)}"
     command += f" --seed {seed}" if seed != SEED else ""
     for name in progress(chosen, "experiment", "report"):
         experiment = load_experiment(name)
-        options = experiment.check(experiment.quick if size == "quick" else experiment.full)
+        options = dict(experiment.quick if size == "quick" else experiment.full)
+        options |= {"seed": seed} if "seed" in experiment.options() else {}
         with threadpool_limits(1):
-            rows[name] = experiment.rows(**options | ({"seed": seed} if "seed" in options else {}))
+            rows[name] = experiment.rows(**options)
+        blocks += [*experiment.words(), *experiment.results(rows[name])]
+        blocks.append(f"Made by `{experiment.command(options)}` at {commit}.")
         minutes = (time.process_time() - start) / 60.0
-        made = [f"Command `{command}`, seed {seed}, {minutes:.0f} minutes of one core"]
-        write_whole(out / PAGE, to_markdown(*_page(rows, made, size)), DataError)
+        made = f"Command `{command}` at {commit}, {minutes:.0f} minutes of one core"
+        write_whole(out / PAGE, to_markdown(*_head(size), *blocks, *_end(made)), DataError)
         write_whole(out / TABLES, json.dumps(rows, indent=1) + "\n", DataError)
     return out / PAGE
 
 
-def _page(rows: dict[str, list[Row]], made: Sequence[str], size: Size) -> list[Block]:
+def _commit() -> str:
+    """The commit of the source tree, and whether it was changed since; of an installation the version."""
+    version = f"version {finlab.__version__}"
+    tree = Path(finlab.__file__).parents[1]
+    if not (tree / ".git").exists():
+        return version
+    line = [
+        "git",
+        "-C",
+        str(tree),
+        "describe",
+        "--always",
+        "--abbrev=12",
+        "--exclude=*",
+        "--dirty= and changes",
+    ]
+    found = subprocess.run(line, capture_output=True, text=True)
+    return version if found.returncode else f"commit {found.stdout.strip()}"
+
+
+def _head(size: Size) -> list[Block]:
     note = "" if size == "full" else " A quick look on few cases: intervals are wide."
     about = f"Allocation methods and simulated swims, side by side.{note}"
-    blocks: list[Block] = ["# finlab evaluation", about, ABOUT]
-    for name, found in rows.items():
-        experiment = load_experiment(name)
-        blocks += [*experiment.words(), *experiment.results(found)]
+    return ["# finlab evaluation", about, ABOUT]
+
+
+def _end(made: str) -> list[Block]:
+    """How the page was made."""
     versions = {"finlab": finlab, "numpy": np, "scipy": scipy}
     lines = [
-        *made,
+        made,
         f"On {platform.machine()}, python {platform.python_version()}, "
         + ", ".join(f"{name} {module.__version__}" for name, module in versions.items()),
-        "Every section is also printed by `finlab eval NAME`; printed figures are those of Y. Hamamatsu, "
-        "M. Kruusmaa, A. Ristolainen, Layout-independent actuation allocator for fin-actuated marine robots",
+        "Printed figures are those of Y. Hamamatsu, M. Kruusmaa, A. Ristolainen, Layout-independent actuation "
+        "allocator for fin-actuated marine robots",
     ]
-    return [*blocks, "## How this was made", "\n".join(f"- {line}" for line in lines)]
+    return ["## How this was made", "\n".join(f"- {line}" for line in lines)]

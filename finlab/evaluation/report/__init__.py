@@ -1,1 +1,0 @@
-"""The whole evaluation as one page: experiments give rows, rows tables, and those the page."""

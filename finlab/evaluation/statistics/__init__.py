@@ -1,1 +1,0 @@
-"""Records of runs, and what is computed from them: errors, means, intervals, tables. Numpy only."""
