@@ -15,6 +15,8 @@ import pytest
 
 from finlab.cli import main
 from finlab.errors import DataError
+from finlab.evaluation import report_page
+from finlab.evaluation.experiment import EXPERIMENTS, load_experiment
 from finlab.evaluation.report_page import PAGE, TABLES, make_report
 
 pytest.importorskip("casadi")
