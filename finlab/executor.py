@@ -94,7 +94,7 @@ def _connected(address: str) -> "Client":
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise FinlabError(
             f"cluster: no Dask scheduler answers at {address!r:.80} ({reason:.80}); start one with "
-            "`dask scheduler` and name its address, such as tcp://10.0.0.1:8786"
+            "`dask scheduler` and name its address, such as tcp://desk:8786"
         ) from None
     try:
         client.wait_for_workers(1, timeout=PATIENCE_S)

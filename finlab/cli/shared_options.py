@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 JSON = "file for one JSON object; it is printed in place of the table where no file is named"
 LAYOUT = "layout file, bundle, or the name of a shipped layout"
 FLOW = "velocity of the robot relative to the water, body frame [m/s, rad/s]; it is at rest by default"
-CLUSTER = "Dask scheduler whose workers run the parts of the work, such as tcp://10.0.0.1:8786"
+CLUSTER = "Dask scheduler whose workers run the parts of the work, such as tcp://desk:8786"
 STDOUT = Path("-")
 """What stands for stdout."""
 JsonFile = Annotated[Path | None, arg(metavar="[FILE]", help=JSON)]

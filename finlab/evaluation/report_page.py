@@ -105,7 +105,7 @@ def _end(made: str) -> list[Block]:
         made,
         f"On {platform.machine()}, python {platform.python_version()}, "
         + ", ".join(f"{name} {module.__version__}" for name, module in versions.items()),
-        "Printed figures are those of Y. Hamamatsu, M. Kruusmaa, A. Ristolainen, Layout-independent actuation "
-        "allocator for fin-actuated marine robots",
+        "Printed figures are those of Y. Hamamatsu, M. Kruusmaa, A. Ristolainen, Layout-independent "
+        "actuation allocator for fin-actuated marine robots",
     ]
     return ["## How this was made", "\n".join(f"- {line}" for line in lines)]
