@@ -1,16 +1,12 @@
 """Layouts and their score cards as text."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING
+from pathlib import Path
 
+from finlab.analysis import AXES, Authority, Improvement, Loss, ScoreCard
+from finlab.layout import Actuator, Azimuth, Fin, Layout, Rudder
 from finlab.text_table import aligned
-
-if TYPE_CHECKING:
-    from finlab.analysis import Authority, Loss, ScoreCard
-    from finlab.layout import Actuator, Layout
 
 _UNITS = ("N", "N", "N", "N m", "N m", "N m")
 COLUMNS = ("actuator", "type", "x [m]", "y [m]", "z [m]", "direction", "limits")
@@ -28,8 +24,6 @@ def layout_text(layout: Layout) -> str:
 
 def direction_text(part: Actuator) -> str:
     """Where an actuator points: the axes that its file gives, in the body frame."""
-    from finlab.layout import Azimuth, Fin, Rudder
-
     if isinstance(part, Fin) and part.mounting_angle is not None:
         return f"shaft at {math.degrees(part.mounting_angle):.1f} deg"
     first, second, _ = part.frame
@@ -41,9 +35,6 @@ def direction_text(part: Actuator) -> str:
 
 
 def _limits(part: Actuator) -> str:
-    """What an actuator may be commanded, in words."""
-    from finlab.layout import Azimuth, Fin, Rudder
-
     if isinstance(part, Rudder):
         return f"{_arc(*part.deflection)}, {part.area:g} m^2"
     if isinstance(part, Fin):
@@ -56,13 +47,26 @@ def _limits(part: Actuator) -> str:
 
 
 def _arc(low: float, high: float) -> str:
-    """An arc [rad] in degrees."""
     low, high = math.degrees(low), math.degrees(high)
     return "any direction" if high - low >= 360.0 - 1e-6 else f"{low:.0f}..{high:.0f} deg"
 
 
 def _vector(values: Iterable[float]) -> str:
     return f"({', '.join(f'{value:.3g}' for value in values)})"
+
+
+def improvement_text(found: Improvement, output: Path) -> str:
+    """Where the actuators went, the card after it, and where the layout was written."""
+    lines = [f"{found.goal}: {found.value_before:.4g} -> {found.value_after:.4g}", ""]
+    for name in found.moved:
+        part = found.layout.actuators[found.layout.index(name)]
+        place = "  ".join(f"{value:6.3f}" for value in part.position)
+        lines.append(f"{name:<16}  {place} m  {direction_text(part)}")
+    lines += ["", score_card_text(found.card_after), ""]
+    lines.append(
+        f"{output}: written." if found.improved else f"{output}: written unchanged, nothing better was found."
+    )
+    return "\n".join(lines)
 
 
 def score_card_text(card: ScoreCard) -> str:
@@ -72,7 +76,7 @@ def score_card_text(card: ScoreCard) -> str:
         rows = [_loss_row(loss, loss is card.worst_loss) for loss in card.losses]
         what = "fin" if card.counted.endswith(" fins") and " and " not in card.counted else "actuator"
         lines += ["", f"Share of the largest wrench that is left without one {what} (* the worst to lose):"]
-        lines += table(("without", "rank", "weakest [N]", *_axes(), "lost"), rows)
+        lines += table(("without", "rank", "weakest [N]", *AXES, "lost"), rows)
     lines += ["", *card.notes] if card.notes else []
     return "\n".join(lines)
 
@@ -105,20 +109,19 @@ def _axis_table(card: ScoreCard) -> list[str]:
             f"{card.unit_wrench[k]:g} {_UNITS[k]}",
             _number(card.unit_power[k]),
         )
-        for k, axis in enumerate(_axes())
+        for k, axis in enumerate(AXES)
         if axis not in held.free
     ]
     return table(head, rows)
 
 
 def _evenness(held: Authority) -> list[str]:
-    """Weakest direction and conditioning."""
-    parts = sorted(zip(held.weakest_direction, _axes(), strict=True), key=lambda part: -abs(part[0]))
+    parts = sorted(zip(held.weakest_direction, AXES, strict=True), key=lambda part: -abs(part[0]))
     direction = ", ".join(f"{axis} {value:+.2f}" for value, axis in parts if abs(value) > 0.05)
     values = " ".join(f"{value:.2f}" for value in held.singular_values)
     return [
         f"Weakest direction: {held.weakest:.2f} N along {direction} (torques over 0.2 m).",
-        f"Condition {_condition(held.condition)}, singular values {values} N.",
+        f"Condition {_number(held.condition, 'infinite')}, singular values {values} N.",
     ]
 
 
@@ -134,15 +137,5 @@ def table(head: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> list[str]:
     return aligned(head, rows, words).splitlines()
 
 
-def _axes() -> tuple[str, ...]:
-    from finlab.analysis import AXES
-
-    return AXES
-
-
-def _condition(value: float | None) -> str:
-    return "infinite" if value is None else f"{value:.2f}"
-
-
-def _number(value: float | None) -> str:
-    return "-" if value is None else f"{value:.2f}"
+def _number(value: float | None, none: str = "-") -> str:
+    return none if value is None else f"{value:.2f}"

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from tyro.conf import Positional, UseAppendAction, arg
 from tyro.extras import SubcommandApp
 
-from finlab.cli.layout_text import direction_text, layout_text, score_card_text
 from finlab.cli.shared_options import (
     Cluster,
     Count,
@@ -27,7 +26,6 @@ from finlab.cli.shared_options import (
 from finlab.errors import FinlabError, printable
 
 if TYPE_CHECKING:
-    from finlab.analysis import Improvement
     from finlab.exchange import Exchange
     from finlab.layout import Layout
 
@@ -72,6 +70,7 @@ def show(
         failed: name of an actuator that does not work.
     """
     from finlab.analysis import score_card
+    from finlab.cli.layout_text import layout_text, score_card_text
 
     check_json_file(json)
     robot, lost = open_robot(layout, failed)
@@ -159,6 +158,7 @@ def optimize(
 
     from finlab.analysis import Bounds, Progress, optimize_layout
     from finlab.analysis.goals import MISSION
+    from finlab.cli.layout_text import improvement_text
     from finlab.executor import on_cluster
     from finlab.layout import save_layout
 
@@ -193,18 +193,3 @@ def optimize(
         )
     save_layout(found.layout, output)
     print(improvement_text(found, output))
-
-
-def improvement_text(found: Improvement, output: Path) -> str:
-    """Where the actuators went, the card after it, and where the layout was written."""
-
-    lines = [f"{found.goal}: {found.value_before:.4g} -> {found.value_after:.4g}", ""]
-    for name in found.moved:
-        part = found.layout.actuators[found.layout.index(name)]
-        place = "  ".join(f"{value:6.3f}" for value in part.position)
-        lines.append(f"{name:<16}  {place} m  {direction_text(part)}")
-    lines += ["", score_card_text(found.card_after), ""]
-    lines.append(
-        f"{output}: written." if found.improved else f"{output}: written unchanged, nothing better was found."
-    )
-    return "\n".join(lines)

@@ -1,4 +1,4 @@
-"""A document as a list of blocks, and the same in Markdown or as plain text, with numbers as people read them.
+"""A document as a list of blocks, the same in Markdown or as plain text, and numbers as people read them.
 
 A heading, a paragraph or a list is a string of Markdown; a paragraph *all in italics* is a remark in small.
 """

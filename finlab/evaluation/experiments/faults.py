@@ -28,14 +28,12 @@ ALLOWED = 1.15
 
 @dataclass(frozen=True)
 class Fault:
-    """Fins that are lost, and when."""
+    """Names of fins that are lost, when [s], and whether the others still give surge, heave and yaw
+    independently."""
 
     fins: tuple[str, ...]
-    """Their names."""
     time_s: float
-    """When they stop [s]."""
     controllable: bool
-    """Whether the others can still give surge, heave and yaw independently."""
 
     @property
     def label(self) -> str:

@@ -45,52 +45,53 @@ BUILT_OFF = {"askew": math.radians(5.0), "center": (-0.016, 0.012, 0.0)}
 """A robot that is not built as drawn: actuators turned by 5 degrees, the centre of gravity 2 cm off."""
 
 
+class Case(NamedTuple):
+    """One swim of a day: the name of a layout, and those of the fins that are weak or lost."""
+
+    layout: str
+    fins: tuple[str, ...]
+
+
 @dataclass(frozen=True)
 class HardDay:
-    """One scenario."""
+    """One scenario: its name for `--scenarios`, and what is hard, in a sentence.
+
+    `duration_s` None is the trajectory's own time [s]; `scale` is how many times larger the path is than the
+    shipped one. With `mixed_fins` all methods are given fins of split `fins-mixed`, others for each seed.
+    `body` is the true one where it is another than the layout's, `truth` holds options of
+    `finlab.sim.perturbed`, and `current` is the velocity of the water in the world [m/s]. `weak` is the share
+    of its thrust that one fin gives, each in its turn, without an announcement; `lost` is how many fins are
+    lost half-way, each and each pair in its turn, and where this is not `announced`, a `FaultMonitor` has to
+    find it.
+    """
 
     name: str
-    """For `--scenarios`."""
     about: str
-    """What is hard, in a sentence."""
     layouts: tuple[str, ...] = TWO
-    """Names of shipped layouts that swim it."""
     trajectory: str = "lissajous"
-    """Of `finlab.sim.SHIPPED`."""
     duration_s: float | None = None
-    """How long it takes [s]; None for the trajectory's own time."""
     mixed_fins: bool = False
-    """Whether all methods are given fins of split `fins-mixed`, others for each seed, in place of the
-    layout's."""
     scale: float = 1.0
-    """How many times larger the path is than the shipped one."""
     body: Body | None = None
-    """The true body where it is another one than the layout's."""
     truth: Mapping[str, Any] = field(default_factory=dict)
-    """What the body really is: options of `finlab.sim.perturbed`."""
     current: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """Velocity of the water in the world [m/s]."""
     sensors: SensorSettings = SensorSettings()
-    """Noise, bias, delay and losses."""
     weak: float | None = None
-    """Share of its thrust that one fin gives, each in its turn, without an announcement."""
     lost: int = 0
-    """How many fins are lost half-way, each and each pair in its turn."""
     announced: bool = True
-    """Whether a loss is announced to allocator and controller; else a `FaultMonitor` has to find it."""
 
     def path(self) -> Trajectory:
         """What is followed."""
         return make_trajectory(self.trajectory, self.duration_s, self.scale)
 
-    def cases(self) -> list["Case"]:
+    def cases(self) -> list[Case]:
         """Every swim of one seed: each layout, with each fin or pair that is weak or lost."""
-        found = []
-        for name in self.layouts:
-            names = load_layout(name).names
-            affected = 1 if self.weak is not None else self.lost
-            found += [Case(name, fins) for fins in combinations(names, affected)]
-        return found
+        affected = 1 if self.weak is not None else self.lost
+        return [
+            Case(name, fins)
+            for name in self.layouts
+            for fins in combinations(load_layout(name).names, affected)
+        ]
 
     def robot(self, layout: str, seed: int) -> Layout:
         """The robot that methods believe in; the seed draws mixed fins."""
@@ -102,18 +103,12 @@ class HardDay:
         fins = tuple(replace(fin, model=own) for fin, own in zip(robot.fins, models, strict=True))
         return replace(robot, actuators=fins)
 
-    def is_hopeless(self, case: "Case") -> bool:
+    def is_hopeless(self, case: Case) -> bool:
         """Whether what is left of the robot cannot give independently what the controller commands."""
         return self.lost > 0 and not steers(load_layout(case.layout), case.fins)
 
-    def swim(self, case: "Case", method: MethodSpec, seed: int) -> ClosedLoop:
-        """The swim, ready to start.
-
-        Args:
-            case: of `cases()`.
-            method: who allocates.
-            seed: of noise, biases and mixed fins.
-        """
+    def swim(self, case: Case, method: MethodSpec, seed: int) -> ClosedLoop:
+        """A swim of `cases()`, ready to start; the seed is of noise, biases and mixed fins."""
         robot, path = self.robot(case.layout, seed), self.path()
         failures = [FinFault(fin, 0.5 * path.duration_s) for fin in case.fins] if self.lost else []
         loop = ClosedLoop(
@@ -132,15 +127,6 @@ class HardDay:
             for fin in case.fins:
                 loop.fail(fin, "torn", self.weak, announced=False)
         return loop
-
-
-class Case(NamedTuple):
-    """One swim of a day."""
-
-    layout: str
-    """Name of the layout."""
-    fins: tuple[str, ...]
-    """Names of the fins that are weak or lost."""
 
 
 HARD_DAYS = (

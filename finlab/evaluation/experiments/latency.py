@@ -39,12 +39,10 @@ _ROBOT = re.compile(r"(fins|thrusters)-(\d{1,2})")
 
 
 class Timed(NamedTuple):
-    """A robot and what it is asked for."""
+    """A robot, and the largest wrenches (N, 6) [N, N m] that it delivers in drawn directions."""
 
     layout: Layout
-    """The robot."""
     rim: Array
-    """The largest wrenches (N, 6) [N, N m] that it delivers in drawn directions."""
 
 
 def run(
