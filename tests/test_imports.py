@@ -219,6 +219,6 @@ def test_allocating_needs_only_numpy_and_msgspec() -> None:
         "import sys\n"
         "for name in ('torch', 'scipy', 'yaml', 'safetensors', 'threadpoolctl', 'tqdm', 'tyro'):\n"
         "    sys.modules[name] = None\n"
-        "import finlab.allocation.dual.method, finlab.mdn.method, finlab.deploy.robot"
+        "import finlab.allocation.dual.method, finlab.mdn.method, finlab.deploy.deployed_robot"
     )
     subprocess.run([sys.executable, "-c", code], timeout=60, check=True)

@@ -14,11 +14,10 @@ from numpy.typing import NDArray
 
 from finlab.arrays import Array
 from finlab.cli.eval_verbs import verb_of
-from finlab.evaluation.bootstrap import ratio_interval
 from finlab.evaluation.document import Column, Row
 from finlab.evaluation.experiment import Experiment, check_names, progress
 from finlab.evaluation.method_specs import PATIENCE_S, MethodSpec, load_method_spec, load_method_specs
-from finlab.evaluation.scoring import sigma_of
+from finlab.evaluation.scoring import ratio_interval, sigma_of
 from finlab.evaluation.splits import SPLITS, Case, make_split
 from finlab.layout import Layout
 from finlab.physics import plant_of

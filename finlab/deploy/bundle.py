@@ -30,7 +30,7 @@ from finlab.bundle_files import (
     largest,
     table_name,
 )
-from finlab.deploy.self_check import self_tests
+from finlab.deploy.deployed_robot import self_tests
 from finlab.distribution import NAME
 from finlab.errors import AllocationError, DataError
 from finlab.files.archive import packed
@@ -108,10 +108,10 @@ def make_bundle(allocator: Allocator, failed: tuple[str, ...] = ()) -> Bundle:
     sha256, networks = _networks(allocator.weights)
     files = {
         ROBOT: robot_bytes(Robot(inside, failed, sha256, cases)),
-        ABOUT: about_bundle(allocator),
+        ABOUT: _about(allocator),
         **tables,
         **networks,
-        README: readme_text(allocator, failed).encode(),
+        README: _readme(allocator, failed).encode(),
     }
     if sum(map(len, files.values())) > LARGEST_BUNDLE:
         raise DataError(f"layout {layout.name!r}: its bundle would be larger than {LARGEST_BUNDLE:,} bytes")
@@ -129,8 +129,7 @@ def _networks(weights: TrainedWeights | None) -> tuple[str | None, dict[str, byt
     return hashlib.sha256(files[WEIGHTS_FILE]).hexdigest(), {NETWORKS + name: files[name] for name in files}
 
 
-def about_bundle(allocator: Allocator) -> bytes:
-    """The contents of `bundle.json`: the method and what it is made with."""
+def _about(allocator: Allocator) -> bytes:
     document = {
         "format": FORMAT,
         "version": VERSION,
@@ -162,8 +161,7 @@ def with_tables_inside(layout: Layout) -> tuple[Layout, dict[str, bytes]]:
     return replace(layout, actuators=tuple(parts)), tables
 
 
-def readme_text(allocator: Allocator, failed: tuple[str, ...]) -> str:
-    """The README of a bundle: `bundle_readme.md`, beside this module, filled in."""
+def _readme(allocator: Allocator, failed: tuple[str, ...]) -> str:
     template = Path(__file__).with_name("bundle_readme.md").read_text("utf-8")
     return template.format(
         name=allocator.layout.name,

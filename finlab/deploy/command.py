@@ -14,7 +14,7 @@ from finlab.command_end import FAILED, exit_code
 from finlab.errors import FinlabError
 
 if TYPE_CHECKING:
-    from finlab.deploy.robot import DeployedRobot
+    from finlab.deploy.deployed_robot import DeployedRobot
 
 POLICIES = ("closest", "direction", "priority")
 
@@ -38,14 +38,14 @@ def _run(argv: Sequence[str] | None) -> int:
 
 
 def _robot(arguments: argparse.Namespace) -> "DeployedRobot":
-    from finlab.deploy.robot import load_robot
+    from finlab.deploy.deployed_robot import load_robot
 
     return load_robot(arguments.bundle)
 
 
 def check(arguments: argparse.Namespace) -> int:
     """Print each question of the self-test with its answer."""
-    from finlab.deploy.self_check import extremes, self_check
+    from finlab.deploy.deployed_robot import extremes, self_check
 
     robot = _robot(arguments)
     print(
@@ -93,19 +93,15 @@ def serve(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _within(low: float, high: float) -> Callable[[str], float]:
-    """What reads a number of an option, and refuses those outside a range."""
-
-    def read(text: str) -> float:
-        try:
-            value = float(text)
-        except ValueError:
-            value = math.nan
-        if not low <= value <= high:
-            raise argparse.ArgumentTypeError(f"expected a number from {low:g} to {high:g}, got {text!r:.40}")
-        return value
-
-    return read
+def _seconds(text: str) -> float:
+    """What reads the watchdog's time."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0.01 <= value <= 3600.0:
+        raise argparse.ArgumentTypeError(f"expected a number from 0.01 to 3600, got {text!r:.40}")
+    return value
 
 
 class _Parser(argparse.ArgumentParser):
@@ -116,12 +112,13 @@ class _Parser(argparse.ArgumentParser):
 
 
 def _parser() -> argparse.ArgumentParser:
+    program = "finlab-runtime"
     parser = _Parser(
-        "finlab-runtime",
+        program,
         description="Control allocation on board.",
-        epilog="example: finlab-runtime check my_robot",
+        epilog=f"example: {program} check my_robot",
     )
-    parser.add_argument("--version", action="version", version=f"finlab-runtime {__version__}")
+    parser.add_argument("--version", action="version", version=f"{program} {__version__}")
     verbs = parser.add_subparsers(required=True, metavar="check|allocate|serve")
 
     def verb(run: Callable[[argparse.Namespace], int], text: str, example: str) -> argparse.ArgumentParser:
@@ -133,35 +130,28 @@ def _parser() -> argparse.ArgumentParser:
         made.add_argument("bundle", metavar="BUNDLE", help=about)
         return made
 
-    verb(check, "Run the self-test; do this on the robot before first use.", "finlab-runtime check my_robot")
+    verb(check, "Run the self-test; do this on the robot before first use.", f"{program} check my_robot")
     one = verb(
-        allocate, "Commands for one target.", "finlab-runtime allocate my_robot --wrench 1 0 0.5 0 0 0.1"
-    )
+        allocate, "Commands for one target.", f"{program} allocate my_robot --wrench 1 0 0.5 0 0 0.1"
+    ).add_argument
     names = ("FX", "FY", "FZ", "TX", "TY", "TZ")
-    one.add_argument("--wrench", nargs=6, type=float, required=True, metavar=names, help="[N, N m]")
-    one.add_argument("--failed", action="append", default=[], metavar="NAME", help="fin that is lost")
-    one.add_argument("--policy", choices=POLICIES, default="closest", help="what to do out of reach")
+    one("--wrench", nargs=6, type=float, required=True, metavar=names, help="[N, N m]")
+    one("--failed", action="append", default=[], metavar="NAME", help="fin that is lost")
+    one("--policy", choices=POLICIES, default="closest", help="what to do out of reach")
     speeds = ("VX", "VY", "VZ", "WX", "WY", "WZ")
     through = "velocity relative to the water [m/s, rad/s]"
-    one.add_argument("--flow", nargs=6, type=float, metavar=speeds, help=through)
-    one.add_argument("--seed", type=int, default=0, help="seed of the candidates")
-    one.add_argument("--json", action="store_true", help="print one JSON object")
+    one("--flow", nargs=6, type=float, metavar=speeds, help=through)
+    one("--seed", type=int, default=0, help="seed of the candidates")
+    one("--json", action="store_true", help="print one JSON object")
     loop = verb(
         serve,
         "Read targets as JSON lines, write commands as JSON lines.",
-        """echo '{"wrench": [1, 0, 0.5, 0, 0, 0.1]}' | finlab-runtime serve my_robot""",
+        f"""echo '{{"wrench": [1, 0, 0.5, 0, 0, 0.1]}}' | {program} serve my_robot""",
     )
-    silence = loop.add_mutually_exclusive_group()
-    silence.add_argument(
-        "--watchdog-s",
-        type=_within(0.01, 3600.0),
-        default=1.0,
-        metavar="S",
-        help="silence before the fins rest, 1 s if not said",
-    )
-    silence.add_argument(
-        "--no-watchdog", action="store_true", help="keep the last commands however long no target comes"
-    )
+    silence = loop.add_mutually_exclusive_group().add_argument
+    about = "silence before the fins rest, 1 s if not said"
+    silence("--watchdog-s", type=_seconds, default=1.0, metavar="S", help=about)
+    silence("--no-watchdog", action="store_true", help="keep the last commands however long no target comes")
     return parser
 
 

@@ -27,7 +27,7 @@ from finlab.bundle_files import (
 from finlab.cli import main
 from finlab.deploy.bundle import Bundle, make_bundle
 from finlab.deploy.command import main as runtime
-from finlab.deploy.robot import load_robot, parse_robot
+from finlab.deploy.deployed_robot import load_robot, parse_robot
 from finlab.errors import AllocationError, CheckpointError, DataError, FinlabError
 from finlab.layout import Layout
 from tests.any_robot import AnyRobot

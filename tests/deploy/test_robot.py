@@ -8,8 +8,7 @@ import pytest
 
 import finlab
 from finlab.deploy.bundle import Bundle, make_bundle
-from finlab.deploy.robot import DeployedRobot, load_robot, parse_robot
-from finlab.deploy.self_check import extremes, self_check
+from finlab.deploy.deployed_robot import DeployedRobot, extremes, load_robot, parse_robot, self_check
 from finlab.errors import FinlabError
 from finlab.layout import Layout
 from finlab.layout.rudder import Rudder

@@ -17,7 +17,7 @@ import pytest
 from finlab.allocation import Allocator
 from finlab.deploy import serve as serve_module
 from finlab.deploy.bundle import Bundle
-from finlab.deploy.robot import DeployedRobot, parse_robot
+from finlab.deploy.deployed_robot import DeployedRobot, parse_robot
 from finlab.deploy.serve import RECENT_S, Server
 from finlab.deploy.transport import MAX_LINE, SIGNALS, Line, StandardStreams, Unsent
 from finlab.errors import DataError, FinlabError

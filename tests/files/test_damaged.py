@@ -22,7 +22,7 @@ from finlab.actuators.fin.models import read_table
 from finlab.allocation import Allocator
 from finlab.bundle_files import CHECKSUMS, ROBOT, checksums
 from finlab.deploy.bundle import make_bundle
-from finlab.deploy.robot import load_robot
+from finlab.deploy.deployed_robot import load_robot
 from finlab.errors import FinlabError
 from finlab.exchange import Exchange, convert, read_any
 from finlab.fit.measurements import read_measurements

@@ -7,11 +7,10 @@ from typing import Any
 import numpy as np
 
 from finlab.allocation.methods import choose_method
-from finlab.evaluation.bootstrap import mean_interval
 from finlab.evaluation.document import Column, Row
 from finlab.evaluation.experiment import Experiment, check_names, paper_figures, progress
 from finlab.evaluation.method_specs import MethodSpec
-from finlab.evaluation.scoring import joined, paper_sigma, score
+from finlab.evaluation.scoring import joined, mean_interval, paper_sigma, score
 from finlab.evaluation.splits import make_split
 
 VARIANTS: dict[str, dict[str, Any]] = {

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from finlab.evaluation.bootstrap import (
+from finlab.evaluation.scoring import (
     mean_interval,
     ratio_interval,
     share_interval,
