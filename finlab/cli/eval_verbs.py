@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -72,16 +73,15 @@ def verb_of(experiment: Experiment) -> Callable[..., None]:
 
 def _shown(option: inspect.Parameter) -> inspect.Parameter:
     """An option as the parser takes it: lists are texts with commas between."""
-    from finlab.evaluation.experiment import is_list, plain_type
+    from finlab.evaluation.experiment import item_type
 
     kind, default = option.annotation, option.default
-    if is_list(kind):
+    item, several = item_type(kind)
+    if several:
         text = None if default is None else ",".join(map(str, default))
         kind, default = Annotated[str if text else str | None, arg(metavar="A,B,...")], text
-    else:
-        names = {int: "N", float: "X", str: "NAME"}
-        if (word := names.get(plain_type(kind))) is not None:
-            kind = Annotated[kind, arg(metavar=word)]
+    elif (word := {int: "N", float: "X", str: "NAME"}.get(item)) is not None:
+        kind = Annotated[kind, arg(metavar=word)]
     if option.name == "layout":
         kind = Annotated[kind, Positional, arg(metavar="LAYOUT")]
     return option.replace(kind=inspect.Parameter.KEYWORD_ONLY, annotation=kind, default=default)
@@ -89,17 +89,15 @@ def _shown(option: inspect.Parameter) -> inspect.Parameter:
 
 def _parsed(name: str, option: inspect.Parameter, value: Any) -> Any:
     """What `run` gets for what was typed."""
-    from finlab.evaluation.experiment import is_list, plain_type
+    from finlab.evaluation.experiment import item_type
 
-    if not is_list(option.annotation) or value is None:
+    kind, several = item_type(option.annotation)
+    if not several or value is None:
         return value
-    words = [word.strip() for word in value.split(",") if word.strip()]
-    kind = plain_type(option.annotation)
-    try:
+    with suppress(ValueError):
+        words = dict.fromkeys(kind(word) for word in map(str.strip, value.split(",")) if word)
         if words:
-            return tuple(dict.fromkeys(kind(word) for word in words))
-    except ValueError:
-        pass
+            return tuple(words)
     what = "names" if kind is str else "numbers"
     raise DataError(f"{name.replace('_', '-')}: expected {what} with commas between, got {value!r:.60}")
 

@@ -15,7 +15,7 @@ from functools import cache
 from importlib import import_module
 from importlib.resources import files
 from types import NoneType
-from typing import Any, TypeVar, get_args, get_type_hints
+from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 
 from tqdm import tqdm
 
@@ -104,7 +104,7 @@ class Experiment:
         yield from map(_finite, self.run(**self.check(chosen)))
 
     def rows(self, **chosen: Any) -> list[Row]:
-        """Run it to the end, as `each_row`."""
+        """All rows of `each_row`."""
         return list(self.each_row(**chosen))
 
     def table(self, rows: Sequence[Row]) -> Table:
@@ -153,18 +153,13 @@ def _finite(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def is_list(kind: Any) -> bool:
-    """Whether the values of an option of this type are several."""
-    return any(getattr(part, "__origin__", part) is tuple for part in (kind, *get_args(kind)))
-
-
-def plain_type(kind: Any) -> Any:
-    """The type of an option, or of its items, without None."""
-    if is_list(kind):
-        kind = next(part for part in (kind, *get_args(kind)) if getattr(part, "__origin__", part) is tuple)
-        return get_args(kind)[0]
-    parts = [part for part in get_args(kind) if part is not NoneType]
-    return parts[0] if len(parts) == 1 and NoneType in get_args(kind) else kind
+def item_type(kind: Any) -> tuple[Any, bool]:
+    """The type of an option, or of its items, without None; and whether its values are several."""
+    parts = (
+        [part for part in get_args(kind) if part is not NoneType] if NoneType in get_args(kind) else [kind]
+    )
+    several = get_origin(parts[0]) is tuple
+    return get_args(parts[0])[0] if several else parts[0], several
 
 
 def load_experiment(name: str) -> Experiment:

@@ -20,7 +20,14 @@ import numpy as np
 
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.method import Method
-from finlab.allocation.methods import LEARNED, MethodChoice, checked_settings, choose_method, method_class
+from finlab.allocation.methods import (
+    LEARNED,
+    METHODS,
+    MethodChoice,
+    checked_settings,
+    choose_method,
+    method_class,
+)
 from finlab.allocation.solution import Solution
 from finlab.arrays import Array
 from finlab.errors import AllocationError, DataError
@@ -29,8 +36,6 @@ from finlab.physics.objective import Name
 
 SLOW = ("ipopt",)
 """Methods that take a tenth of a second per target, each from several starts; they run on a subsample."""
-QUICK = ("dual", "mdn", "paper", "qp", "sqp", "px4", "ardusub", "analytic")
-"""Methods that run on every target."""
 NEEDS = {"ipopt": "casadi"}
 """Packages without which a method cannot run."""
 PATIENCE_S = 60.0
@@ -44,7 +49,7 @@ TOLERANCE = 1e-6
 
 def installed_methods(layout: Layout) -> list[str]:
     """All methods of the library that can run here and take a robot."""
-    return [name for name in (*QUICK, *SLOW) if can_run(name) and method_class(name).fits(layout)]
+    return [name for name in METHODS if can_run(name) and method_class(name).fits(layout)]
 
 
 def can_run(name: str) -> bool:
@@ -54,12 +59,10 @@ def can_run(name: str) -> bool:
 
 @dataclass(frozen=True)
 class MethodSpec:
-    """A method with its settings and networks, for any robot."""
+    """A method, as the user has written it, with its settings and networks, for any robot."""
 
     name: str
-    """As the user has written it."""
     choice: MethodChoice
-    """What it is."""
 
     def on(self, layout: Layout) -> Allocator:
         """Its allocator for a robot."""
@@ -74,7 +77,7 @@ class MethodSpec:
 
 
 def load_method_specs(
-    names: str | Iterable[str],
+    names: Iterable[str],
     checkpoint: str | Path | None = None,
     objective: Name | None = None,
     *,
@@ -83,23 +86,18 @@ def load_method_specs(
     """Methods by name, in the order of the names.
 
     Args:
-        names: of methods, as in `load_method_spec`; as one text with commas between.
-        checkpoint: as in `load_method_spec`.
-        objective: as in `load_method_spec`.
+        names: of methods; checkpoint and objective as in `load_method_spec`.
         patient: whether methods that stop after a time get `PATIENCE_S` for each target, so that the same
             question has the same answer on a busy machine.
 
     Raises:
-        AllocationError: no name, or as in `load_method_spec`.
+        AllocationError: an unknown method.
+        DataError: a function that is none.
     """
-    listed = names.split(",") if isinstance(names, str) else names
-    each = dict.fromkeys(name.strip() for name in listed if name.strip())
-    if not each:
-        raise AllocationError(f"methods: expected names with commas between (dual,paper), got {names!r}")
-    found = {spec.name: spec for spec in (load_method_spec(name, checkpoint, objective) for name in each)}
-    if not patient:
-        return found
-    return {name: method.with_settings(time_limit_s=PATIENCE_S) for name, method in found.items()}
+    specs = [load_method_spec(name, checkpoint, objective) for name in dict.fromkeys(names)]
+    if patient:
+        specs = [spec.with_settings(time_limit_s=PATIENCE_S) for spec in specs]
+    return {spec.name: spec for spec in specs}
 
 
 def load_method_spec(
@@ -136,8 +134,8 @@ def own_method(name: str) -> type[Method]:
         raise DataError(f"{name}: its parameters are not known; wrap it in a function") from None
     if unknown := [p.name for p in wanted.values() if p.default is p.empty and p.name not in KNOWN]:
         raise DataError(f"{name}: expected parameters among {', '.join(KNOWN)}, got {unknown[0]!r}")
-    given = {"name": name.rpartition("/")[2], "function": staticmethod(function), "wanted": tuple(wanted)}
-    return type("OwnMethod", (_OwnMethod,), given)
+    own = {"name": name.rpartition("/")[2], "function": staticmethod(function), "wanted": tuple(wanted)}
+    return type("OwnMethod", (_OwnMethod,), own)
 
 
 class _OwnMethod(Method):
@@ -155,8 +153,8 @@ class _OwnMethod(Method):
         """
         known = {"targets": targets, "layout": self.layout, "sigma": self.scale, "previous": previous}
         try:
-            given = self.function(**{key: known[key] for key in self.wanted if key in known})
-            command = np.asarray(given, dtype=np.float64)
+            answer = self.function(**{key: known[key] for key in self.wanted if key in known})
+            command = np.asarray(answer, dtype=np.float64)
         except Exception as error:  # a stranger's function may fail in any way
             words = f"{type(error).__name__}: {error}"
             raise AllocationError(f"{self.name}: layout {self.layout.name!r:.60}: {words:.300}") from error
