@@ -155,11 +155,10 @@ def _finite(value: Any) -> Any:
 
 def item_type(kind: Any) -> tuple[Any, bool]:
     """The type of an option, or of its items, without None; and whether its values are several."""
-    parts = (
-        [part for part in get_args(kind) if part is not NoneType] if NoneType in get_args(kind) else [kind]
-    )
-    several = get_origin(parts[0]) is tuple
-    return get_args(parts[0])[0] if several else parts[0], several
+    if NoneType in get_args(kind):
+        kind = next(part for part in get_args(kind) if part is not NoneType)
+    several = get_origin(kind) is tuple
+    return get_args(kind)[0] if several else kind, several
 
 
 def load_experiment(name: str) -> Experiment:

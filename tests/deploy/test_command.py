@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import finlab
-from finlab.deploy import self_check
+from finlab.deploy import deployed_robot
 from finlab.deploy.bundle import Bundle
 from finlab.deploy.command import main
 from finlab.layout import save_layout
@@ -80,9 +80,9 @@ def test_a_layout_file_is_refused_with_the_way_out(
 def test_check_prints_each_finding(
     value: float, code: int, folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any
 ) -> None:
-    finding = self_check.Finding("a question", value, 1.0)
-    monkeypatch.setattr(self_check, "self_check", lambda _: [finding])
-    monkeypatch.setattr(self_check, "extremes", lambda _: finding)
+    finding = deployed_robot.Finding("a question", value, 1.0)
+    monkeypatch.setattr(deployed_robot, "self_check", lambda _: [finding])
+    monkeypatch.setattr(deployed_robot, "extremes", lambda _: finding)
     assert main(["check", str(folder)]) == code
     lines = capsys.readouterr().out.splitlines()
     assert lines[0].startswith(f"{folder}: A, 4 fins, method dual, ready in ")
