@@ -58,12 +58,7 @@ def check(layouts: Annotated[Positional[tuple[str, ...]], arg(metavar="LAYOUT...
 
 
 @verbs.command
-def show(
-    layout: Robot,
-    failed: Names = (),
-    flow: Flow = None,
-    json: JsonFile = None,
-) -> None:
+def show(layout: Robot, failed: Names = (), flow: Flow = None, json: JsonFile = None) -> None:
     """Print the actuators of a layout and its score card: what it can do, what it can lose.
 
     Args:

@@ -114,9 +114,7 @@ class _Parser(argparse.ArgumentParser):
 def _parser() -> argparse.ArgumentParser:
     program = "finlab-runtime"
     parser = _Parser(
-        program,
-        description="Control allocation on board.",
-        epilog=f"example: {program} check my_robot",
+        program, description="Control allocation on board.", epilog=f"example: {program} check my_robot"
     )
     parser.add_argument("--version", action="version", version=f"{program} {__version__}")
     verbs = parser.add_subparsers(required=True, metavar="check|allocate|serve")

@@ -112,13 +112,7 @@ def ratio_interval(numerator: Array, denominator: Array, group: NDArray[np.int64
         return np.asarray(above.sum(axis) / below.sum(axis))
 
     drawn = bootstrap(
-        sums,
-        ratio,
-        paired=True,
-        n_resamples=REPLICATES,
-        confidence_level=LEVEL,
-        method="percentile",
-        rng=0,
+        sums, ratio, paired=True, n_resamples=REPLICATES, confidence_level=LEVEL, method="percentile", rng=0
     )
     low, high = drawn.confidence_interval
     return float(low), float(high)

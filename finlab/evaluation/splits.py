@@ -38,10 +38,7 @@ NEAR_POSITION = 0.005
 """Nearly coincident fins of split `near-singular` lie within this of each other along each axis [m]."""
 DOMAIN = 0x7E57
 """Leads the seed of every test case; training seeds begin otherwise."""
-OWN_SIGMA = (
-    *("fins", "fins-mixed", "tables"),
-    *("thrusters", "azimuths", "mixed-actuators", "any-shaft"),
-)
+OWN_SIGMA = (*("fins", "fins-mixed", "tables"), *("thrusters", "azimuths", "mixed-actuators", "any-shaft"))
 """Splits whose robots are each measured by their own wrenches, which are smaller or larger than those of
 training: errors there are relative to what the robot can do."""
 N_SIGMA = 4096

@@ -88,10 +88,7 @@ def run(
 
 
 def _swim(
-    robot: Layout,
-    path: Trajectory,
-    methods: Mapping[str, MethodSpec],
-    swim: tuple[tuple[Fault, str], int],
+    robot: Layout, path: Trajectory, methods: Mapping[str, MethodSpec], swim: tuple[tuple[Fault, str], int]
 ) -> Row:
     """Errors of one swim: its fault and method, and its seed."""
     (fault, name), seed = swim

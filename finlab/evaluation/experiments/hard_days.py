@@ -15,14 +15,7 @@ from finlab.control import FaultMonitor, steers
 from finlab.evaluation.method_specs import MethodSpec
 from finlab.evaluation.splits import make_split
 from finlab.layout import Body, Layout, load_layout
-from finlab.sim import (
-    ClosedLoop,
-    FinFault,
-    SensorSettings,
-    Trajectory,
-    make_trajectory,
-    perturbed,
-)
+from finlab.sim import ClosedLoop, FinFault, SensorSettings, Trajectory, make_trajectory, perturbed
 
 TWO = ("A", "C")
 """Those that swim most of the days: a symmetric one and one that is not."""

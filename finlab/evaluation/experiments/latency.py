@@ -187,9 +187,6 @@ experiment = Experiment(
         "alone keep to. Power: where both deliver."
     ),
     quick={"robots": ("fins-4", "thrusters-8"), "calls": 20, "budget": 0.5},
-    full={
-        "methods": (REFERENCE, "mdn", "paper", "analytic", "qp", "sqp", "px4", "ipopt"),
-        "budget": 1.0,
-    },
+    full={"methods": (REFERENCE, "mdn", "paper", "analytic", "qp", "sqp", "px4", "ipopt"), "budget": 1.0},
     printed=_printed,
 )
