@@ -163,7 +163,7 @@ experiment = Experiment(
     full={
         "split": HARD,
         "methods": ("dual", "mdn", "paper", "qp", "sqp", "analytic"),
-        "layouts": 40,
+        "layouts": 30,
         "targets": 8,
     },
     printed=_printed,
