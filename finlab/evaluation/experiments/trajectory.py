@@ -1,14 +1,16 @@
 """Several layouts follow a trajectory with one controller and one checkpoint, as in the paper."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from functools import partial
 from itertools import product
 
 from finlab.evaluation.document import Column, Row
-from finlab.evaluation.experiment import Experiment, paper_figures, progress
+from finlab.evaluation.experiment import Experiment, paper_figures
 from finlab.evaluation.experiments.closed_loop import ABOUT_ERRORS, ERRORS, POWER, follow_row, mean_rows
-from finlab.evaluation.method_specs import load_method_specs
-from finlab.layout import load_layout
-from finlab.sim import ClosedLoop, make_trajectory
+from finlab.evaluation.method_specs import MethodSpec, load_method_specs
+from finlab.executor import map_parts
+from finlab.layout import Layout, load_layout
+from finlab.sim import ClosedLoop, Trajectory, make_trajectory
 
 
 def run(
@@ -32,11 +34,18 @@ def run(
     robots, path = [load_layout(name) for name in layouts], make_trajectory(trajectory)
     specs = load_method_specs(methods, checkpoint)
     done: dict[tuple[str, str], list[Row]] = {}
-    for robot, (name, method), k in progress(list(product(robots, specs.items(), range(runs))), "swim"):
-        row = follow_row(ClosedLoop(robot, method.on(robot), path, seed=seed + k).run())
+    swims = list(product(robots, specs, range(seed, seed + runs)))
+    errors = map_parts(partial(_swim, path, specs), swims, "trajectory", "swim")
+    for (robot, name, _), row in zip(swims, errors, strict=True):
         done.setdefault((robot.name, name), []).append(row)
         done.setdefault(("all", name), []).append(row)
     return mean_rows("layout", done, "all")
+
+
+def _swim(path: Trajectory, methods: Mapping[str, MethodSpec], swim: tuple[Layout, str, int]) -> Row:
+    """Errors of one swim: its robot, method and seed."""
+    robot, name, seed = swim
+    return follow_row(ClosedLoop(robot, methods[name].on(robot), path, seed=seed).run())
 
 
 def _printed(rows: Sequence[Row]) -> list[Row]:

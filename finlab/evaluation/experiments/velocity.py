@@ -1,16 +1,18 @@
 """A robot keeps a speed and a depth, for power and error of the speed, as in the paper."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from functools import partial
 from itertools import product
 
 import numpy as np
 
 from finlab.errors import DataError
 from finlab.evaluation.document import Column, Row
-from finlab.evaluation.experiment import Experiment, paper_figures, progress
+from finlab.evaluation.experiment import Experiment, paper_figures
 from finlab.evaluation.experiments.closed_loop import POWER, depth_error, mean_rows, power_row
-from finlab.evaluation.method_specs import load_method_specs
-from finlab.layout import load_layout
+from finlab.evaluation.method_specs import MethodSpec, load_method_specs
+from finlab.executor import map_parts
+from finlab.layout import Layout, load_layout
 from finlab.sim import ClosedLoop, RunLog, straight
 
 SPEEDS = (0.10, 0.15, 0.20)
@@ -41,11 +43,20 @@ def run(
         raise DataError(f"duration: expected more than {SETTLED_S:g} s and at most 3600 s, got {duration:g}")
     robot, specs = load_layout(layout), load_method_specs(methods, checkpoint)
     done: dict[tuple[float | None, str], list[Row]] = {}
-    for speed, (name, method), k in progress(list(product(SPEEDS, specs.items(), range(runs))), "swim"):
-        row = _row(ClosedLoop(robot, method.on(robot), straight(speed, duration), seed=seed + k).run())
+    swims = list(product(SPEEDS, specs, range(seed, seed + runs)))
+    errors = map_parts(partial(_swim, robot, specs, duration), swims, "velocity", "swim")
+    for (speed, name, _), row in zip(swims, errors, strict=True):
         done.setdefault((speed, name), []).append(row)
         done.setdefault((None, name), []).append(row)
     return mean_rows("speed", done, None)
+
+
+def _swim(
+    robot: Layout, methods: Mapping[str, MethodSpec], duration: float, swim: tuple[float, str, int]
+) -> Row:
+    """Errors and power of one swim: its speed, method and seed."""
+    speed, name, seed = swim
+    return _row(ClosedLoop(robot, methods[name].on(robot), straight(speed, duration), seed=seed).run())
 
 
 def _row(log: RunLog) -> Row:
