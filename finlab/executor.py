@@ -68,11 +68,8 @@ def cores() -> int:
 
 @contextmanager
 def on_cluster(address: str | None) -> Iterator[None]:
-    """Let `map_parts` use the workers of a Dask cluster; nothing changes without an address.
-
-    Raises:
-        FinlabError: nobody answers there, there are no workers, or they have another finlab.
-    """
+    """Let `map_parts` use the workers of a Dask cluster; nothing changes without an address. FinlabError:
+    nobody answers there, there are no workers, or they have another finlab."""
     if address is None:
         yield
         return

@@ -101,7 +101,6 @@ def export(
         method: who answers on the robot: dual keeps watts least, mdn and paper the paper's effort.
         checkpoint: trained checkpoint of mdn or paper, which travels; the shipped one by default.
     """
-
     if output is None and graph is None:
         raise FinlabError("nothing to write: expected -o DIR (bundle), --graph FILE, or both")
     if output is not None and output.suffix == ".json":
@@ -115,11 +114,9 @@ def export(
     if output is None:
         return
     from finlab.allocation import Allocator
-
-    allocator = Allocator(robot, method, checkpoint=checkpoint)
     from finlab.deploy.bundle import make_bundle
 
-    bundle = make_bundle(allocator, failed)
+    bundle = make_bundle(Allocator(robot, method, checkpoint=checkpoint), failed)
     if zip:
         output = output if output.suffix == ".zip" else output.with_name(output.name + ".zip")
         bundle.write_zip(output)

@@ -50,11 +50,8 @@ class Bundle:
     """Contents by name."""
 
     def write(self, folder: str | os.PathLike[str]) -> None:
-        """Write the files into a folder, which is made; an earlier bundle there is replaced.
-
-        Raises:
-            DataError: the folder holds something else, or cannot be written.
-        """
+        """Write the files into a folder, which is made; an earlier bundle there is replaced. DataError: the
+        folder holds something else, or cannot be written."""
         path = Path(folder)
         made = not path.exists()
         try:
@@ -142,11 +139,8 @@ def _about(allocator: Allocator) -> bytes:
 
 
 def with_tables_inside(layout: Layout) -> tuple[Layout, dict[str, bytes]]:
-    """A layout whose force tables have the names that they have in a bundle, and their contents by name.
-
-    Raises:
-        DataError: a table cannot be read, or is too large to travel.
-    """
+    """A layout whose force tables have the names that they have in a bundle, and their contents by name;
+    `DataError`: a table cannot be read, or is too large to travel."""
     tables: dict[str, bytes] = {}
     parts = []
     for part in layout.actuators:

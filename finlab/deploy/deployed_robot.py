@@ -82,11 +82,8 @@ class DeployedRobot:
 
 
 def load_robot(path: str | os.PathLike[str]) -> DeployedRobot:
-    """The robot in a bundle, a folder or a zip archive.
-
-    Raises:
-        FinlabError: it is none, was changed, or cannot be run.
-    """
+    """The robot in a bundle, a folder or a zip archive. FinlabError: it is none, was changed, or cannot be
+    run."""
     if not is_bundle(path) and str(path).endswith((".json", ".yaml", ".yml")) and os.path.exists(path):
         raise DataError(f"{path}: is a layout file; run what `finlab export {path} -o DIR` makes of it")
     robot = parse_robot(read_bundle_files(path), str(path))
@@ -149,11 +146,8 @@ def self_tests(allocator: Allocator, failed: tuple[str, ...]) -> tuple[Case, ...
 
 
 def self_check(robot: DeployedRobot) -> list[Finding]:
-    """Ask what the bundle knows the answers of.
-
-    Raises:
-        DataError: the bundle has no self-tests, or a force table cannot be read.
-    """
+    """Ask what the bundle knows the answers of. DataError: the bundle has no self-tests, or a force table
+    cannot be read."""
     if not robot.self_test:
         raise DataError("the bundle has no self-tests; export it again")
     layout, failed = robot.layout, robot.failed

@@ -75,11 +75,8 @@ def graph_text(layout: Layout) -> str:
 
 
 def write_graph(layout: Layout, path: str | os.PathLike[str]) -> None:
-    """Writes a graph file; an existing file is replaced whole.
-
-    Raises:
-        LayoutError: the name does not end in `.json`, or the file cannot be written.
-    """
+    """Writes a graph file; an existing file is replaced whole. LayoutError: the name does not end in
+    `.json`, or the file cannot be written."""
     if Path(path).suffix.lower() != ".json":
         raise LayoutError("expected the name of a file that ends in .json", source=str(path))
     write_whole(path, graph_text(layout))

@@ -65,11 +65,8 @@ class StandardStreams:
         Thread(target=self._read, args=(source, time.monotonic()), daemon=True).start()
 
     def newest(self, timeout: float | None) -> Line | None:
-        """The newest request that waits; None after `timeout` seconds without one.
-
-        Raises:
-            EOFError: the requests have ended, or a signal asks to stop.
-        """
+        """The newest request that waits; None after `timeout` seconds without one. EOFError: the requests
+        have ended, or a signal asks to stop."""
         end = None if timeout is None else time.monotonic() + timeout
         while not (self._stopped or self._line or self._ended):
             try:

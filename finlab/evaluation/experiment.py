@@ -65,11 +65,8 @@ class Experiment:
         return {name: each.replace(annotation=types[name]) for name, each in parameters.items()}
 
     def check(self, chosen: Mapping[str, Any]) -> dict[str, Any]:
-        """All options: those chosen, and the defaults of the others.
-
-        Raises:
-            DataError: an unknown option, or a number out of range.
-        """
+        """All options: those chosen, and the defaults of the others. DataError: an unknown option, or a
+        number out of range."""
         options = self.options()
         if unknown := [name for name in chosen if name not in options]:
             raise DataError(f"{self.name}: expected options among {', '.join(options)}, got {unknown[0]!r}")
@@ -123,11 +120,7 @@ class Experiment:
 
 
 def check_names(option: str, names: Sequence[str], known: Collection[str]) -> None:
-    """Refuse unknown names before the work.
-
-    Raises:
-        DataError: one of the names is not known.
-    """
+    """Refuse unknown names before the work. DataError: one of the names is not known."""
     if unknown := [name for name in names if name not in known]:
         raise DataError(f"{option}: expected some of {', '.join(known)}, got {unknown[0]!r:.60}")
 

@@ -122,11 +122,8 @@ def load_method_spec(
 
 
 def own_method(name: str) -> type[Method]:
-    """The method of a function, given as `module:function` or `file.py:function`.
-
-    Raises:
-        DataError: there is no such function, or one of its parameters is none of `KNOWN`.
-    """
+    """The method of a function, given as `module:function` or `file.py:function`. DataError: there is no
+    such function, or one of its parameters is none of `KNOWN`."""
     function = _function(name)
     try:
         wanted = inspect.signature(function).parameters
@@ -146,11 +143,8 @@ class _OwnMethod(Method):
     wanted: ClassVar[tuple[str, ...]]
 
     def solve(self, targets: Array, *, previous: Array | None = None, **rest: Any) -> Solution:
-        """See `Method`.
-
-        Raises:
-            AllocationError: the function raised, or what it gave are no commands within the limits.
-        """
+        """See `Method`. AllocationError: the function raised, or what it gave are no commands within the
+        limits."""
         known = {"targets": targets, "layout": self.layout, "sigma": self.scale, "previous": previous}
         try:
             answer = self.function(**{key: known[key] for key in self.wanted if key in known})

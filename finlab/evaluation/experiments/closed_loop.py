@@ -27,11 +27,8 @@ def absolute_error(position: Array, reference: Array) -> float:
 
 
 def relative_error(position: Array, reference: Array, delta: int) -> float:
-    """RTE: root mean square difference of the displacements over `delta` samples, all pairs [m].
-
-    Raises:
-        DataError: there are no two samples that far apart.
-    """
+    """RTE: root mean square difference of the displacements over `delta` samples, all pairs [m]. DataError:
+    there are no two samples that far apart."""
     if not 0 < delta < len(position):
         raise DataError(f"relative error: expected a step of 1 to {len(position) - 1} samples, got {delta}")
     error = position - reference
