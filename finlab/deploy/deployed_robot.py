@@ -27,15 +27,13 @@ from finlab.layout.robot_file import Case, robot_of
 from finlab.layout.wrench_axes import AXES
 from finlab.physics import plant_of
 
-N_SELF_TEST = 4
-"""Self-test wrenches in a bundle: enough to notice a wrong file, few enough to read."""
+N_SELF_TEST = 4  # self-test wrenches in a bundle: enough to notice a wrong file, few enough to read
 SELF_TEST_TOLERANCE = 1e-6
 """Allowed normalized error between the wrench of a self-test's command and what another machine computes for
 it; both are written with nine digits."""
 AS_GOOD = 1.5
 """Largest error of own answers over that of the stored ones, where these do not reach their targets."""
-FAR = 10.0
-"""Size of an extreme target in yardsticks: beyond the reach of any robot."""
+FAR = 10.0  # size of an extreme target in yardsticks: beyond the reach of any robot
 
 
 @dataclass(frozen=True)

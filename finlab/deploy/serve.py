@@ -39,11 +39,9 @@ from finlab.files.plain_values import parse_json
 from finlab.files.schema import checked
 from finlab.physics import plant_of
 
-RECENT_S = 0.5
-"""Age [s] up to which the last commands bind the next ones by the servos' rates."""
+RECENT_S = 0.5  # age [s] up to which the last commands bind the next ones by the servos' rates
 
-MAX_ID = 1_000
-"""Longest `id`, as JSON [characters]."""
+MAX_ID = 1_000  # longest `id`, as JSON [characters]
 _REFUSED = (CommandError, LayoutError, AllocationError)
 """What is wrong with a request; anything else is a fault of the robot's files or of ours."""
 

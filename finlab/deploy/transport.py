@@ -17,12 +17,9 @@ from finlab.errors import FinlabError
 
 SIGNALS = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
 """What ends the service; SIGHUP does not where it was ignored before, as `nohup` has it."""
-MAX_LINE = 65_536
-"""Longest request that is read [bytes]."""
-PATIENCE = 1.0
-"""How long [s] a reader that takes nothing is waited for once the service has to stop."""
-CHUNK = 65_536
-"""Bytes that are read at once."""
+MAX_LINE = 65_536  # longest request that is read [bytes]
+PATIENCE = 1.0  # how long [s] a reader that takes nothing is waited for once the service has to stop
+CHUNK = 65_536  # bytes that are read at once
 LOOK_S = 0.02
 """How often the reader looks whether something has come [s]; after a pause of the process, what had come by
 then is as old as the last look."""

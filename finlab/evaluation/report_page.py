@@ -20,8 +20,7 @@ from finlab.whole_file import make_folder, write_whole
 
 PAGE, TABLES = "report.md", "tables.json"
 """What a report's folder holds."""
-SEED = 6143
-"""Of a report, unless another one is given; kept apart from those on which methods were developed."""
+SEED = 6143  # of a report, unless another one is given; kept apart from those on which methods were developed
 ABOUT = (
     "Every answer is scored by the plant: the fins' own laws or tables. All methods but `paper`, which has "
     "learned one fin law from samples, were given these, so errors show how well methods solve, not how "

@@ -22,8 +22,7 @@ from finlab.physics.effort import command_effort
 
 Columns = dict[str, AnyArray]
 """Arrays of N entries by name."""
-LEVEL = 0.994426
-"""Share of a normal variable within sqrt(2) times 1.96 standard deviations."""
+LEVEL = 0.994426  # share of a normal variable within sqrt(2) times 1.96 standard deviations
 REPLICATES = 2000
 Interval = tuple[float, float]
 """Its low and its high end."""

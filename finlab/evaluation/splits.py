@@ -36,21 +36,18 @@ NEAR_ANGLE = math.radians(2.0)
 """Nearly parallel shafts of split `near-singular` differ by at most this; opposite counts as parallel."""
 NEAR_POSITION = 0.005
 """Nearly coincident fins of split `near-singular` lie within this of each other along each axis [m]."""
-DOMAIN = 0x7E57
-"""Leads the seed of every test case; training seeds begin otherwise."""
+DOMAIN = 0x7E57  # leads the seed of every test case; training seeds begin otherwise
 OWN_SIGMA = (*("fins", "fins-mixed", "tables"), *("thrusters", "azimuths", "mixed-actuators", "any-shaft"))
 """Splits whose robots are each measured by their own wrenches, which are smaller or larger than those of
 training: errors there are relative to what the robot can do."""
-N_SIGMA = 4096
-"""Uniform commands from which such a robot's yardstick is computed."""
+N_SIGMA = 4096  # uniform commands from which such a robot's yardstick is computed
 LEAST_SIGMA = 0.05
 """Least deviation on an axis, as a share of the largest one among the forces, or among the torques."""
 
 GRID = (8, 9, 12)
 """Amplitudes, frequencies and zero directions of a table; the first two range over the fin's limits, the last
 over the circle."""
-NOISE = 0.03
-"""Standard deviation of each component of a force, as a share of it."""
+NOISE = 0.03  # standard deviation of each component of a force, as a share of it
 
 
 class Case(NamedTuple):

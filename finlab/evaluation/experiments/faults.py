@@ -22,8 +22,7 @@ from finlab.layout import Layout, load_layout
 from finlab.sim import ClosedLoop, Trajectory, make_trajectory
 
 HEALTHY = "healthy"
-ALLOWED = 1.15
-"""Growth of the error over the healthy robot's that one lost fin should not exceed."""
+ALLOWED = 1.15  # growth of the error over the healthy robot's that one lost fin should not exceed
 
 
 @dataclass(frozen=True)

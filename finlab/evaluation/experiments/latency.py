@@ -21,18 +21,13 @@ from finlab.layout import Layout, random_layout
 from finlab.layout.random_actuators import random_robot, random_thruster
 from finlab.physics import plant_of
 
-DOMAIN = 0xF1257
-"""Leads the seed of every robot."""
+DOMAIN = 0xF1257  # leads the seed of every robot
 REFERENCE = "dual"
 """The method that the others are compared with, where it takes part."""
-LAYOUTS = 5
-"""Robots of each kind whose calls are timed."""
-TARGETS = 40
-"""Directions of wrenches on each of them."""
-WARM_UP = 2
-"""First calls on each robot that are not counted; a robot keeps its layout for long."""
-FAR = 1e3
-"""How many times a wrench lies beyond its robot's reach for certain."""
+LAYOUTS = 5  # robots of each kind whose calls are timed
+TARGETS = 40  # directions of wrenches on each of them
+WARM_UP = 2  # first calls on each robot that are not counted; a robot keeps its layout for long
+FAR = 1e3  # how many times a wrench lies beyond its robot's reach for certain
 TICK, AT = 0.05, 0.6
 """From tick to tick a target goes by this share of the way to the next direction, at this share of reach."""
 _ROBOT = re.compile(r"(fins|thrusters)-(\d{1,2})")
