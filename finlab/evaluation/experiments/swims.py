@@ -3,7 +3,7 @@
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
-from itertools import product
+from itertools import islice, product
 
 import numpy as np
 
@@ -32,9 +32,6 @@ FIGURES = ("ate", "rte", "depth_rmse", "driving_w", "peak_w", "out_of_reach", "c
 LARGEST = ("turn", "peak_w")
 """Those of which a row has the largest of its swims, not the mean."""
 
-Swims = Mapping[tuple[str, tuple[str, ...], int], Row]
-"""(Layout, fins that are weak or lost, seed) -> figures of a swim."""
-
 
 def run(
     scenarios: tuple[str, ...] = tuple(DAYS),
@@ -59,23 +56,29 @@ def run(
     for day in map(DAYS.__getitem__, scenarios):
         robots = [load_layout(name) for name in day.layouts]
         taken = {name: spec for name, spec in specs.items() if all(map(spec.choice.kind.fits, robots))}
-        yield from day_rows(day, swim_day(day, taken, range(seed, seed + seeds)))
+        yield from day_rows(day, taken, range(seed, seed + seeds))
 
 
-def swim_day(day: HardDay, methods: Mapping[str, MethodSpec], seeds: Sequence[int]) -> dict[str, Swims]:
-    """Figures of each method's swims; hopeless cases are left out."""
+def day_rows(day: HardDay, methods: Mapping[str, MethodSpec], seeds: Sequence[int]) -> list[Row]:
+    """One row per method: means over its swims, and the largest steps and peaks; hopeless cases are left
+    out."""
     cases = [case for case in day.cases() if not day.is_hopeless(case)]
-    swims: dict[str, dict[tuple[str, tuple[str, ...], int], Row]] = {name: {} for name in methods}
-    parts = list(product(cases, methods, seeds))
-    done = map_parts(partial(_swim, day, methods), parts, day.name, "swim")
-    for (case, name, seed), row in zip(parts, done, strict=True):
-        swims[name][case.layout, case.fins, seed] = row
-    return dict(swims)
+    parts = list(product(methods, cases, seeds))
+    done, rows = map_parts(partial(_swim, day, methods), parts, day.name, "swim"), list[Row]()
+    for method in methods:
+        swims = list(islice(done, len(parts) // len(methods)))
+        row: Row = {"scenario": day.name, "method": method, "about": day.about, "swims": len(swims)}
+        row["lost"] = sum(figures["max"] > LOST_M for figures in swims)
+        for key in FIGURES:
+            values = np.array([figures[key] for figures in swims])
+            row[key] = float(values.max() if key in LARGEST else values.mean())
+        rows.append(row)
+    return rows
 
 
-def _swim(day: HardDay, methods: Mapping[str, MethodSpec], part: tuple[Case, str, int]) -> Row:
-    """Figures of one swim of a day: its case, method and seed."""
-    case, name, seed = part
+def _swim(day: HardDay, methods: Mapping[str, MethodSpec], part: tuple[str, Case, int]) -> Row:
+    """Figures of one swim of a day: its method, case and seed."""
+    name, case, seed = part
     loop = day.swim(case, methods[name], seed)
     start = time.process_time()
     log = loop.run()
@@ -100,19 +103,6 @@ def swim_figures(log: RunLog, cpu_s: float) -> Row:
         "out_of_reach": float((gap > GAP_N).mean()),
         "cpu_s_per_min": cpu_s / minutes,
     }
-
-
-def day_rows(day: HardDay, done: Mapping[str, Swims]) -> list[Row]:
-    """One row per method: means over its swims, and the largest steps and peaks."""
-    rows = []
-    for method, swims in done.items():
-        row: Row = {"scenario": day.name, "method": method, "about": day.about, "swims": len(swims)}
-        row["lost"] = sum(figures["max"] > LOST_M for figures in swims.values())
-        for key in FIGURES:
-            values = np.array([figures[key] for figures in swims.values()])
-            row[key] = float(values.max() if key in LARGEST else values.mean())
-        rows.append(row)
-    return rows
 
 
 experiment = Experiment(
