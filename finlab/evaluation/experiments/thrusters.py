@@ -13,7 +13,7 @@ from finlab.allocation.baselines.px4 import ORDER as PX4_ORDER
 from finlab.arrays import Array
 from finlab.evaluation.document import Column, Row
 from finlab.evaluation.experiment import Experiment, check_names
-from finlab.evaluation.splits import make_split
+from finlab.evaluation.splits import make_case
 from finlab.executor import map_parts
 from finlab.layout import Layout, load_layout
 from finlab.physics import plant_of
@@ -66,13 +66,9 @@ def run(
             for share in reach:
                 found = list(islice(scores, layouts))
                 for method in METHODS:
-                    about: Row = {
-                        "robot": robot,
-                        "lost": count,
-                        "of_reach": round(100 * share),
-                        "method": method,
-                    }
-                    rows.append(about | _figures([each[method] for each in found]))
+                    about: Row = {"robot": robot, "lost": count, "of_reach": round(100 * share)}
+                    figures = _figures([each[method] for each in found])
+                    rows.append(about | {"method": method} | figures)
     return rows
 
 
@@ -89,7 +85,7 @@ def _draws(robot: str, lost: int, layouts: int, targets: int, seed: int) -> Iter
 
 def _robot(robot: str, rng: np.random.Generator, seed: int, k: int) -> Layout:
     if robot == "random":
-        return make_split("thrusters", k + 1, 1, seed)[k].layout
+        return make_case("thrusters", 1, seed, k).layout
     layout = load_layout("bluerov2" if robot == "surveyed" else "bluerov2_heavy")
     places = layout.position.copy()
     if robot == "surveyed":
@@ -140,11 +136,8 @@ def _figures(found: Sequence[dict[str, Array]]) -> Row:
     fine = (by["missed"] <= DELIVERED) & (by["bound"] > 0.0)
     row: Row = {"n": len(fine), "not_delivered": float((by["missed"] > DELIVERED).mean())}
     if fine.any():
-        ratio = by["power"][fine] / by["bound"][fine]
-        row |= {
-            "watts": float(by["power"][fine].sum() / by["bound"][fine].sum()),
-            "watts_max": float(ratio.max()),
-        }
+        power, bound = by["power"][fine], by["bound"][fine]
+        row |= {"watts": float(power.sum() / bound.sum()), "watts_max": float((power / bound).max())}
     means = ("missed", "first", "dual_first", "dual_more")
     return row | {f"{key}_mean": float(by[key].mean()) for key in means if key in by}
 
