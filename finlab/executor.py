@@ -4,6 +4,7 @@ Results come in the order of the parts, wherever and however often these were co
 one function, whose result depends on its argument alone.
 """
 
+import logging
 import multiprocessing
 import os
 import sys
@@ -85,6 +86,7 @@ def on_cluster(address: str | None) -> Iterator[None]:
 def _connected(address: str) -> "Client":
     from distributed import Client
 
+    logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # what is lost is said in a sentence
     try:
         client = Client(address, timeout=PATIENCE_S, set_as_default=False)
     except (OSError, ValueError) as error:
