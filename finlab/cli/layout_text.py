@@ -55,16 +55,18 @@ def _vector(values: Iterable[float]) -> str:
     return f"({', '.join(f'{value:.3g}' for value in values)})"
 
 
-def improvement_text(found: Improvement, output: Path) -> str:
+def improvement_text(improvement: Improvement, output: Path) -> str:
     """Where the actuators went, the card after it, and where the layout was written."""
-    lines = [f"{found.goal}: {found.value_before:.4g} -> {found.value_after:.4g}", ""]
-    for name in found.moved:
-        part = found.layout.actuators[found.layout.index(name)]
+    lines = [f"{improvement.goal}: {improvement.value_before:.4g} -> {improvement.value_after:.4g}", ""]
+    for name in improvement.moved:
+        part = improvement.layout.actuators[improvement.layout.index(name)]
         place = "  ".join(f"{value:6.3f}" for value in part.position)
         lines.append(f"{name:<16}  {place} m  {direction_text(part)}")
-    lines += ["", score_card_text(found.card_after), ""]
+    lines += ["", score_card_text(improvement.card_after), ""]
     lines.append(
-        f"{output}: written." if found.improved else f"{output}: written unchanged, nothing better was found."
+        f"{output}: written."
+        if improvement.improved
+        else f"{output}: written unchanged, nothing better was found."
     )
     return "\n".join(lines)
 

@@ -173,7 +173,7 @@ def optimize(
         bar.set_postfix_str(f"{progress.before:.4g} -> {progress.best:.4g}")
 
     with bar, on_cluster(cluster):
-        found = optimize_layout(
+        improvement = optimize_layout(
             robot,
             actuators,
             space,
@@ -186,5 +186,5 @@ def optimize(
             flow=flow,
             progress=report,
         )
-    save_layout(found.layout, output)
-    print(improvement_text(found, output))
+    save_layout(improvement.layout, output)
+    print(improvement_text(improvement, output))

@@ -33,13 +33,13 @@ Cluster = Annotated[str | None, arg(metavar="ADDRESS", help=CLUSTER)]
 
 def with_json_file(argv: Sequence[str]) -> list[str]:
     """Arguments in which `--json` without a file is followed by that of stdout."""
-    whole: list[str] = []
+    words: list[str] = []
     for word, after in zip(argv, [*argv[1:], None], strict=False):
-        whole.append(word)
+        words.append(word)
         bare = after is None or (after.startswith("-") and after != str(STDOUT))
         if word == "--json" and bare:
-            whole.append(str(STDOUT))
-    return whole
+            words.append(str(STDOUT))
+    return words
 
 
 def check_json_file(path: Path | None, option: str = "json") -> None:

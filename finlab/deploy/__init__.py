@@ -1,1 +1,1 @@
-"""What the robot runs: the bundle (layout graph, the fins' physics, settings) and the runtime."""
+"""The robot's side: the bundle (layout graph, the fins' physics, settings) and the runtime."""

@@ -1,4 +1,4 @@
-"""How the server's lines travel: over standard input and output, until they end or a signal asks to stop."""
+"""Transport of the server's lines over standard input and output, until they end or a signal asks to stop."""
 
 import fcntl
 import os

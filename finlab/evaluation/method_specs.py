@@ -173,13 +173,13 @@ def _function(name: str) -> Callable[..., Any]:
     try:
         if place.endswith(".py"):
             sys.path.insert(0, str(Path(place).resolve().parent))
-            found = runpy.run_path(place).get(attribute)
+            loaded = runpy.run_path(place).get(attribute)
         else:
             sys.path.insert(0, os.getcwd())
-            found = getattr(import_module(place), attribute, None)
+            loaded = getattr(import_module(place), attribute, None)
     except Exception as error:  # a stranger's file may fail in any way
         raise DataError(f"{place}: cannot be loaded: {type(error).__name__}: {error}") from None
-    if not callable(found):
+    if not callable(loaded):
         raise DataError(f"{place}: holds no function {attribute!r}")
-    function: Callable[..., Any] = found
+    function: Callable[..., Any] = loaded
     return function

@@ -87,8 +87,8 @@ def _commit() -> str:
         "--exclude=*",
         "--dirty= and changes",
     ]
-    found = subprocess.run(line, capture_output=True, text=True)
-    return version if found.returncode else f"commit {found.stdout.strip()}"
+    described = subprocess.run(line, capture_output=True, text=True)
+    return version if described.returncode else f"commit {described.stdout.strip()}"
 
 
 def _head(size: Size) -> list[Block]:

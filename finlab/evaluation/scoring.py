@@ -100,8 +100,8 @@ def mean_interval(values: Array, group: NDArray[np.int64]) -> Interval:
 def ratio_interval(numerator: Array, denominator: Array, group: NDArray[np.int64]) -> Interval:
     """Of the sum of numerators over the sum of denominators, each (N,); a lone layout is split into its
     entries."""
-    found, member = np.unique(group, return_inverse=True)
-    member = member if len(found) > 1 else np.arange(len(group))
+    layouts, member = np.unique(group, return_inverse=True)
+    member = member if len(layouts) > 1 else np.arange(len(group))
     sums = [np.bincount(member, values) for values in (numerator, denominator)]
     if len(sums[0]) < 2:
         lone = float(numerator.sum() / denominator.sum()) if len(group) else float("nan")

@@ -1,4 +1,4 @@
-"""What the closed-loop experiments share: figures of single swims as rows, and means over seeds.
+"""Figures of single swims as rows, and means over seeds, for all closed-loop experiments.
 
 Absolute and relative trajectory error after J. Sturm et al., A Benchmark for the Evaluation of RGB-D SLAM
 Systems, IROS 2012. Robot and reference share one world frame and one clock, so nothing is aligned and samples

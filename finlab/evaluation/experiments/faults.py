@@ -78,10 +78,10 @@ def run(
     for (case, _), row in zip(swims, errors, strict=True):
         done.setdefault(case, []).append(row)
     rows: list[Row] = []
-    for (fault, name), found in done.items():
-        row = {"fault": fault.label, "method": name, "runs": len(found), **over_seeds(found)}
+    for (fault, name), errors_of in done.items():
+        row = {"fault": fault.label, "method": name, "runs": len(errors_of), **over_seeds(errors_of)}
         row["over_healthy"] = row["ate"] / over_seeds(done[faults[0], name])["ate"]
-        row["kept"] = "yes" if max(single["max"] for single in found) < LOST_M else "no"
+        row["kept"] = "yes" if max(single["max"] for single in errors_of) < LOST_M else "no"
         rows.append(row)
     return rows + [{"fault": fault.label, "kept": "not swum"} for fault in faults if not fault.controllable]
 

@@ -1,4 +1,4 @@
-"""How long one call takes: near and far from the limits of robots, out of reach and from tick to tick.
+"""Time of one call: near and far from the limits of robots, out of reach and from tick to tick.
 
 Methods answer the same targets in one run, the default one beside IPOPT. All times are the processor's.
 """

@@ -1,4 +1,4 @@
-"""What the allocation of two autopilots misses and takes, within reach and beyond, on robots of thrusters."""
+"""Errors and power of two autopilots' allocation, within reach and beyond, on robots of thrusters."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -64,10 +64,10 @@ def run(
             parts = [(layout, share * edge) for share in reach for layout, edge in drawn]
             scores = map_parts(_scores, parts, f"{robot}, {count} lost", "draw")
             for share in reach:
-                found = list(islice(scores, layouts))
+                scored = list(islice(scores, layouts))
                 for method in METHODS:
                     about: Row = {"robot": robot, "lost": count, "of_reach": round(100 * share)}
-                    figures = _figures([each[method] for each in found])
+                    figures = _figures([each[method] for each in scored])
                     rows.append(about | {"method": method} | figures)
     return rows
 
@@ -100,7 +100,7 @@ def _scores(part: tuple[Layout, Array]) -> dict[str, dict[str, Array]]:
     """By method arrays (N,): what it misses and takes of targets (N, 6) on a robot, and what `dual` misses in
     its order."""
     layout, targets = part
-    dual, found = Allocator(layout), dict[str, dict[str, Array]]()
+    dual, scored = Allocator(layout), dict[str, dict[str, Array]]()
     bound = dual.allocate_batch(targets).bound
     ranked: dict[Order, Array] = {
         order: dual.allocate_batch(targets, policy=Policy("priority", order=order)).unallocated / dual.scale
@@ -108,12 +108,12 @@ def _scores(part: tuple[Layout, Array]) -> dict[str, dict[str, Array]]:
     }
     for method, (name, settings, order) in METHODS.items():
         answer = Allocator(layout, name, **settings).allocate_batch(targets)
-        found[method] = {"missed": answer.err_norm, "power": answer.power, "bound": np.asarray(bound)}
+        scored[method] = {"missed": answer.err_norm, "power": answer.power, "bound": np.asarray(bound)}
         if order is not None:
             own, ours = (missing_by_group(x, order) for x in (answer.unallocated / dual.scale, ranked[order]))
-            found[method] |= {"first": own[:, 0], "dual_first": ours[:, 0]}
-            found[method]["dual_more"] = np.asarray(misses_more(ours, own), float)
-    return found
+            scored[method] |= {"first": own[:, 0], "dual_first": ours[:, 0]}
+            scored[method]["dual_more"] = np.asarray(misses_more(ours, own), float)
+    return scored
 
 
 def missing_by_group(missing: Array, order: Sequence[Sequence[str]]) -> Array:
@@ -130,9 +130,9 @@ def misses_more(one: Array, other: Array) -> NDArray[np.bool_]:
     return more
 
 
-def _figures(found: Sequence[dict[str, Array]]) -> Row:
+def _figures(scored: Sequence[dict[str, Array]]) -> Row:
     """Means over all targets of all draws."""
-    by = {key: np.concatenate([np.asarray(each[key], float) for each in found]) for key in found[0]}
+    by = {key: np.concatenate([np.asarray(each[key], float) for each in scored]) for key in scored[0]}
     fine = (by["missed"] <= DELIVERED) & (by["bound"] > 0.0)
     row: Row = {"n": len(fine), "not_delivered": float((by["missed"] > DELIVERED).mean())}
     if fine.any():

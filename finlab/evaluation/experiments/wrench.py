@@ -1,4 +1,4 @@
-"""How far off each method is from wrenches that the robot can deliver."""
+"""Errors of each method on wrenches that the robot can deliver."""
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
@@ -57,9 +57,9 @@ def run(
         able = {each: spec for each, spec in specs.items() if len(sets) == 1 or spec.choice.kind.fits(robot)}
         answered = list(map_parts(partial(_scores, able, subsample), list(enumerate(cases)), name, "layout"))
         for method in able:
-            found = joined([scores[method] for scores in answered])
-            about = {"split": name, "method": method, "n": len(found["layout"]), "scored_by": "plant"}
-            rows.append(about | figures(found))
+            scored = joined([scores[method] for scores in answered])
+            about = {"split": name, "method": method, "n": len(scored["layout"]), "scored_by": "plant"}
+            rows.append(about | figures(scored))
     return rows
 
 
@@ -72,24 +72,24 @@ def _scores(
     return {each: run_method(methods[each], made, number=number, first=firsts[each]) for each in methods}
 
 
-def figures(found: Columns) -> Row:
+def figures(scored: Columns) -> Row:
     """Means, quantiles and shares of scores, with their intervals."""
-    error, group = found["err_norm"], found["layout"]
+    error, group = scored["err_norm"], scored["layout"]
     row: Row = {
         "err_norm_mean": error.mean(),
         "err_norm_median": np.median(error),
         "err_norm_p95": np.quantile(error, 0.95),
         "err_norm_max": error.max(),
-        "err_phys_mean": found["err_phys"].mean(),
+        "err_phys_mean": scored["err_phys"].mean(),
         **{f"success_{level}": (error <= level).mean() for level in SUCCESS_LEVELS},
-        "effort_mean": found["effort"].mean(),
-        "power_mean": found["power"].mean(),
-        "solve_ms_p50": np.median(found["solve_ms"]),
-        "solve_ms_p99": np.quantile(found["solve_ms"], 0.99),
+        "effort_mean": scored["effort"].mean(),
+        "power_mean": scored["power"].mean(),
+        "solve_ms_p50": np.median(scored["solve_ms"]),
+        "solve_ms_p99": np.quantile(scored["solve_ms"], 0.99),
     }
     intervals = {
         "err_norm_mean": mean_interval(error, group),
-        "power_mean": mean_interval(found["power"], group),
+        "power_mean": mean_interval(scored["power"], group),
         "success_0.01": share_interval(error <= 0.01, group),
     }
     plain = {key: float(value) for key, value in row.items()}
