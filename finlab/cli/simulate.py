@@ -29,6 +29,7 @@ def simulate(
     monitor: bool = False,
     learn: bool = False,
     method: Annotated[str, arg(metavar="NAME")] = "dual",
+    controller: Annotated[str, arg(metavar="NAME")] = "tracking",
     duration: Annotated[float | None, arg(metavar="SECONDS")] = None,
     truth: Annotated[str | None, arg(metavar="LAYOUT")] = None,
     current: Annotated[tuple[float, float, float], arg(metavar="VX VY VZ")] = (0.0, 0.0, 0.0),
@@ -55,6 +56,7 @@ def simulate(
         learn: every minute fit the actuators' strengths and directions to the last four minutes of the swim,
             and allocate with them from then on; for methods that take any shaft, and fins of a law.
         method: dual, mdn, paper, qp, sqp, px4, ardusub, analytic or ipopt.
+        controller: tracking, or of the paper waypoint, or velocity, which holds the path's speed and depth.
         duration: time for a shipped trajectory.
         truth: the robot that really swims, a layout with the same actuators; the one that is believed by
             default.
@@ -87,7 +89,7 @@ def simulate(
             whole, seconds = robot.without(lost), LONGEST_S if duration is None else duration
             loop = excitation(whole, seconds, truth=true, sensors=sensors, current=current, seed=seed)
         else:
-            from finlab.control import FaultMonitor
+            from finlab.control import FaultMonitor, controller_of
             from finlab.evaluation.method_specs import load_method_spec
             from finlab.vehicle.righting import righting_words
 
@@ -97,6 +99,7 @@ def simulate(
                 robot,
                 allocator,
                 make_trajectory(trajectory, duration, scale),
+                controller_of(controller, robot),
                 truth=true,
                 sensors=sensors,
                 current=current,

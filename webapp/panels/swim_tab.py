@@ -5,6 +5,7 @@ from typing import Any
 
 import viser
 
+from finlab.control import CONTROLLERS
 from finlab.layout import Layout
 from finlab.sim import SHIPPED
 from webapp.handles import add_html
@@ -32,6 +33,8 @@ def add_scenario(page: Page) -> None:
     _bind(page, "scenario", days)
     page.add_html(_about)
     _bind(page, "path", gui.add_dropdown("Path", tuple(SHIPPED), hint="Where to swim."))
+    law = "Follows the path; or as in the paper: steers to waypoints, or holds the path's speed and depth."
+    _bind(page, "controller", gui.add_dropdown("Controller", tuple(CONTROLLERS), hint=law))
 
 
 def _about(swim: SwimSettings, method: str) -> str:

@@ -7,7 +7,7 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from finlab.assets import PAPER_LAYOUTS
-from finlab.control import steers
+from finlab.control import CONTROLLERS, steers
 from finlab.errors import FinlabError
 from finlab.evaluation.experiments.hard_days import CURRENT, HARD_DAYS, TWO, HardDay
 from finlab.layout import Layout
@@ -36,6 +36,7 @@ class SwimSettings:
 
     scenario: str = "nominal"
     path: str = "lissajous"
+    controller: str = "tracking"
     speed: float = 1.0
     """Simulated time per time on the wall."""
     announced: bool = True
@@ -55,8 +56,8 @@ class SwimSettings:
             raise FinlabError(f"announced: expected true or false, got {value!r:.60}")
         if key == "speed":
             value = number(value, key, *SPEEDS)
-        elif key == "path":
-            chosen(value, key, SHIPPED)
+        elif key in ("path", "controller"):
+            chosen(value, key, SHIPPED if key == "path" else CONTROLLERS)
         elif key != "announced":
             raise FinlabError(f"a swim has no setting {key!r:.40}")
         return replace(self, **{key: value})
@@ -88,6 +89,7 @@ class SwimSettings:
             1.0 if day.weak is None else day.weak,
             tuple(FinFault(name, 0.5 * path.duration_s) for name in affected) if day.lost else (),
             self.announced,
+            self.controller,
         )
 
 
@@ -122,3 +124,4 @@ class Plan(NamedTuple):
     """Of their thrust that these give."""
     losses: tuple[FinFault, ...] = ()
     announced: bool = True
+    controller: str = "tracking"

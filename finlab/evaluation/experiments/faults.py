@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations, product
 
-from finlab.control import steers
+from finlab.control import controller_of, steers
 from finlab.evaluation.experiment import Experiment, paper_figures
 from finlab.evaluation.experiments.closed_loop import (
     ABOUT_ERRORS,
@@ -57,6 +57,7 @@ def run(
     layout: str = "A",
     trajectory: str = "circle",
     methods: tuple[str, ...] = ("dual", "analytic"),
+    controller: str = "tracking",
     runs: int = 3,
     checkpoint: str | None = None,
     seed: int = 0,
@@ -67,6 +68,7 @@ def run(
         layout: a layout file or shipped name.
         trajectory: circle, lissajous, square, dive, station, or a CSV file with the columns t, x, y, z.
         methods: names as in eval wrench.
+        controller: tracking, waypoint (the paper's), velocity.
         runs: of each, with other noise.
         checkpoint: of the learned methods, a shipped name or a folder.
         seed: of the first run's noise.
@@ -77,8 +79,9 @@ def run(
     done: dict[tuple[Fault, str], list[Row]] = {}
     for (fault, name), k in progress(list(product(cases, range(runs))), "swim"):
         lost = [(fin, fault.time_s) for fin in fault.fins]
-        log = ClosedLoop(robot, specs[name].on(robot), path, failures=lost, seed=seed + k).run()
-        done.setdefault((fault, name), []).append(follow_row(log))
+        law, method = controller_of(controller, robot), specs[name].on(robot)
+        loop = ClosedLoop(robot, method, path, law, failures=lost, seed=seed + k)
+        done.setdefault((fault, name), []).append(follow_row(loop.run()))
     rows: list[Row] = []
     for (fault, name), found in done.items():
         row = {"fault": fault.label, "method": name, "runs": len(found), **over_seeds(found)}

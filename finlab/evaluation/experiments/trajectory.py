@@ -1,10 +1,19 @@
-"""Several layouts follow a trajectory with one controller and one checkpoint, as in the paper."""
+"""Several layouts follow a trajectory with one checkpoint, by the paper's controller and by ours."""
 
 from collections.abc import Sequence
 from itertools import product
 
+from finlab.control import controller_of
 from finlab.evaluation.experiment import Experiment, paper_figures
-from finlab.evaluation.experiments.closed_loop import ABOUT_ERRORS, ERRORS, POWER, follow_row, mean_rows
+from finlab.evaluation.experiments.closed_loop import (
+    ABOUT_ERRORS,
+    ERRORS,
+    POWER,
+    WHO,
+    first_lost,
+    follow_row,
+    mean_rows,
+)
 from finlab.evaluation.method_specs import load_method_specs
 from finlab.evaluation.progress import progress
 from finlab.evaluation.report.document import Column, Row
@@ -16,34 +25,42 @@ def run(
     layouts: tuple[str, ...] = ("A", "B", "C", "D"),
     trajectory: str = "lissajous",
     methods: tuple[str, ...] = ("dual", "paper"),
+    controllers: tuple[str, ...] = ("tracking", "waypoint"),
+    lost: int = 0,
     runs: int = 3,
     checkpoint: str | None = None,
     seed: int = 0,
 ) -> list[Row]:
-    """One row for each layout and method, and one for each method over all layouts.
+    """One row for each layout, method and controller, and one for each over all layouts.
 
     Args:
         layouts: names or files.
         trajectory: circle, lissajous, square, dive, station, or a CSV file with the columns t, x, y, z.
         methods: names as in eval wrench.
+        controllers: tracking, waypoint (the paper's), velocity.
+        lost: so many fins are lost from the start, the first without which it can still be steered.
         runs: of each, with other noise.
         checkpoint: of the learned methods, a shipped name or a folder.
         seed: of the first run's noise.
     """
     robots, path = [load_layout(name) for name in layouts], make_trajectory(trajectory)
     specs = load_method_specs(methods, checkpoint)
-    done: dict[tuple[str, str], list[Row]] = {}
-    for robot, (name, method), k in progress(list(product(robots, specs.items(), range(runs))), "swim"):
-        row = follow_row(ClosedLoop(robot, method.on(robot), path, seed=seed + k).run())
-        done.setdefault((robot.name, name), []).append(row)
-        done.setdefault(("all", name), []).append(row)
+    done: dict[tuple[str, str, str], list[Row]] = {}
+    cases = list(product(robots, specs.items(), controllers, range(runs)))
+    for robot, (name, method), control, k in progress(cases, "swim"):
+        gone = [(fin, 0.0) for fin in first_lost(robot, lost)]
+        controller = controller_of(control, robot)
+        loop = ClosedLoop(robot, method.on(robot), path, controller, failures=gone, seed=seed + k)
+        row = follow_row(loop.run())
+        for group in (robot.name, "all"):
+            done.setdefault((group, name, control), []).append(row)
     return mean_rows("layout", done, "all")
 
 
 def _printed(rows: Sequence[Row]) -> list[Row]:
     table, swum = paper_figures()["trajectory"], {row["layout"] for row in rows}
     return [
-        {"layout": name, "method": "paper's method, printed", **row}
+        {"layout": name, "method": "paper's method, printed", "controller": "waypoint", **row}
         for name, row in table.items()
         if name in swum
     ]
@@ -51,11 +68,10 @@ def _printed(rows: Sequence[Row]) -> list[Row]:
 
 experiment = Experiment(
     name="trajectory",
-    question="How closely do the paper's layouts follow a path, with one controller for all?",
+    question="How closely do the paper's layouts follow a path, with the same controller for all?",
     columns=(
         Column("layout", "layout"),
-        Column("method", "method", "code"),
-        Column("runs", "runs", "count"),
+        *WHO,
         *ERRORS,
         *POWER,
     ),

@@ -5,9 +5,17 @@ from itertools import product
 
 import numpy as np
 
+from finlab.control import controller_of
 from finlab.errors import DataError
 from finlab.evaluation.experiment import Experiment, paper_figures
-from finlab.evaluation.experiments.closed_loop import POWER, depth_error, mean_rows, power_row
+from finlab.evaluation.experiments.closed_loop import (
+    POWER,
+    WHO,
+    depth_error,
+    first_lost,
+    mean_rows,
+    power_row,
+)
 from finlab.evaluation.method_specs import load_method_specs
 from finlab.evaluation.progress import progress
 from finlab.evaluation.report.document import Column, Row
@@ -23,16 +31,20 @@ SETTLED_S = 10.0
 def run(
     layout: str = "A",
     methods: tuple[str, ...] = ("dual", "mdn", "analytic"),
+    controllers: tuple[str, ...] = ("tracking", "velocity"),
+    lost: int = 0,
     runs: int = 5,
     duration: float = 30.0,
     checkpoint: str | None = None,
     seed: int = 0,
 ) -> list[Row]:
-    """One row for each speed and method, and one for each method over all speeds.
+    """One row for each speed, method and controller, and one for each over all speeds.
 
     Args:
         layout: a layout file or shipped name.
         methods: names as in eval wrench.
+        controllers: tracking, velocity (the paper's).
+        lost: so many fins are lost from the start, the first without which it can still be steered.
         runs: of each, with other noise.
         duration: of a run [s].
         checkpoint: of the learned methods, a shipped name or a folder.
@@ -41,11 +53,15 @@ def run(
     if not SETTLED_S < duration <= 3600.0:
         raise DataError(f"duration: expected more than {SETTLED_S:g} s and at most 3600 s, got {duration:g}")
     robot, specs = load_layout(layout), load_method_specs(methods, checkpoint)
-    done: dict[tuple[float | None, str], list[Row]] = {}
-    for speed, (name, method), k in progress(list(product(SPEEDS, specs.items(), range(runs))), "swim"):
-        row = _row(ClosedLoop(robot, method.on(robot), straight(speed, duration), seed=seed + k).run())
-        done.setdefault((speed, name), []).append(row)
-        done.setdefault((None, name), []).append(row)
+    gone = [(fin, 0.0) for fin in first_lost(robot, lost)]
+    done: dict[tuple[float | None, str, str], list[Row]] = {}
+    cases = list(product(SPEEDS, specs.items(), controllers, range(runs)))
+    for speed, (name, method), control, k in progress(cases, "swim"):
+        path, controller = straight(speed, duration), controller_of(control, robot)
+        loop = ClosedLoop(robot, method.on(robot), path, controller, failures=gone, seed=seed + k)
+        row = _row(loop.run())
+        for group in (speed, None):
+            done.setdefault((group, name, control), []).append(row)
     return mean_rows("speed", done, None)
 
 
@@ -62,7 +78,10 @@ def _row(log: RunLog) -> Row:
 
 def _printed(rows: Sequence[Row]) -> list[Row]:
     names = {"ours": "paper's method, printed", "baseline": "paper's baseline, printed"}
-    return [{"method": names[key], **row} for key, row in paper_figures()["velocity"].items()]
+    return [
+        {"method": names[key], "controller": "velocity", **row}
+        for key, row in paper_figures()["velocity"].items()
+    ]
 
 
 experiment = Experiment(
@@ -70,8 +89,7 @@ experiment = Experiment(
     question="What power does it take to keep a speed and a depth, and how well are they kept?",
     columns=(
         Column("speed", "speed", "ratio", unit="m/s"),
-        Column("method", "method", "code"),
-        Column("runs", "runs", "count"),
+        *WHO,
         Column("mae", "MAE of the speed", "metres", unit="m/s"),
         Column("mae_std", "spread", "error", unit="m/s"),
         Column("mae_settled", "after 10 s", "metres", unit="m/s"),
