@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.actuators.azimuth import AzimuthGroup, AzimuthLaw
-from finlab.actuators.fin.models import stack_laws
-from finlab.actuators.fin.response import FinGroup
+from finlab.actuators.fin.fin_laws import stack_laws
+from finlab.actuators.fin.fin_response import FinGroup
 from finlab.actuators.law import ActuatorLaw
 from finlab.actuators.response import Group
 from finlab.actuators.rudder import RudderGroup, RudderLaw

@@ -9,10 +9,10 @@ from typing import Any, ClassVar, Generic, NamedTuple, Self, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.evaluate import REACHED, judged_effort, judged_power
 from finlab.allocation.policy import CLOSEST, Policy, limits_reached
 from finlab.allocation.solution import Candidates, PlainData, Rows
 from finlab.allocation.tables import allocation_text
+from finlab.allocation.yardstick import REACHED, judged_effort, judged_power
 from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.layout.commands import Command, command_of

@@ -4,7 +4,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from finlab.actuators.fin.models import file_stamps
+from finlab.actuators.fin.fin_laws import file_stamps
 from finlab.allocation.method import Method
 from finlab.arrays import Array
 from finlab.layout import FinModelSpec, Layout, Limits
@@ -14,7 +14,7 @@ from finlab.layout.rudder import Rudder
 from finlab.layout.wrench_axes import axes_in
 from finlab.physics import FinLaw, TableLaw, make_law, plant_of
 from finlab.precision import NEARLY
-from finlab.uncertainty.grid_error import grid_uncertainty
+from finlab.uncertainty.table_error import grid_uncertainty
 
 RESTLESS = 0.05
 """Share of its largest force below which a fin counts as able to rest."""

@@ -1,13 +1,14 @@
-"""What can be set of a method: one frozen dataclass for each, whose fields carry range, unit and meaning.
+"""Settings of methods: one frozen dataclass for each, whose fields carry range, unit and meaning.
 
 All that asks for settings (a call, a bundle, the app) makes such an object, which checks itself.
 """
 
 from dataclasses import Field, dataclass, field, fields
 from numbers import Integral, Real
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 from finlab.errors import AllocationError
+from finlab.physics.objective import Name
 
 MOST_CANDIDATES = 4096
 """Most candidates that may be drawn; more would keep a robot from answering."""
@@ -88,3 +89,17 @@ def _within(setting: "Field[Any]", limits: Range, value: Any) -> float | None:
     if right and limits.low <= value <= limits.high and not (limits.above and value == limits.low):
         return int(value) if whole else float(value)
     raise AllocationError(f"{setting.name}: expected {limits}, got {value!r:.60} ({limits.meaning})")
+
+
+@dataclass(frozen=True)
+class MdnSettings(Settings):
+    """Settings of method `mdn`: how many ways the mixture proposes, and how many of them are refined."""
+
+    objective: ClassVar[Name] = "effort"
+    """What is kept least."""
+    n_candidates: int = number(
+        48, 1, MOST_CANDIDATES, "proposals K: the components' means by falling weight, then samples"
+    )
+    n_refined: int = number(6, 1, 256, "proposals that are refined and offered as candidates")
+    temperature: float = number(1.0, 0.0, 100.0, "what the variances of the samples are multiplied by")
+    period_s: float = number(0.1, 0.0, 1000.0, "time between ticks", "s", above=True)

@@ -15,12 +15,11 @@ import numpy as np
 
 from finlab.allocation.dual.method import Dual
 from finlab.allocation.dual.rates import Rates
-from finlab.allocation.evaluate import costs
-from finlab.allocation.mdn_settings import MdnSettings
 from finlab.allocation.method import Method, Takes
 from finlab.allocation.policy import Policy
-from finlab.allocation.settings import Settings
+from finlab.allocation.settings import MdnSettings, Settings
 from finlab.allocation.solution import Candidates, Solution
+from finlab.allocation.yardstick import costs
 from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.mdn.answers import NOW, OTHER, Answers, Steps, follow, ranked, refined, traced

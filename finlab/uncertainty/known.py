@@ -10,15 +10,13 @@ from functools import lru_cache
 
 import numpy as np
 
-from finlab.actuators.fin.models import file_stamps, make_law
-from finlab.actuators.fin.table import TableLaw
+from finlab.actuators.fin.fin_laws import TableLaw, file_stamps, make_law
 from finlab.arrays import Array
 from finlab.layout.actuator import Actuator
 from finlab.layout.fin import Fin
 from finlab.layout.layout import Layout
 from finlab.layout.thrust_model import PowerTable
-from finlab.uncertainty.grid_error import GridUncertainty, grid_uncertainty
-from finlab.uncertainty.table_error import thrust_table_error
+from finlab.uncertainty.table_error import GridUncertainty, grid_uncertainty, thrust_table_error
 
 OF_ONE_TABLE = 0.5
 """Share of the variance that actuators with one table have together: their errors are alike where their

@@ -17,8 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.actuators.response import CELLS, Line, Plane, RadialTable, price_grid
-from finlab.allocation.dual.gauges import Gauges
-from finlab.allocation.dual.planar import Fan, Planar, blend, end_of, share_of
+from finlab.allocation.dual.planar import Fan, Gauges, Planar, blend, end_of, share_of
 from finlab.allocation.dual.sets import Sets
 from finlab.arrays import Array
 from finlab.precision import CLOSE, FINE, ROUNDING, ROUNDS

@@ -12,8 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.dual.deadline import Deadline
-from finlab.allocation.dual.newton import Prices, dual_value, solve
+from finlab.allocation.dual.newton import Deadline, Prices, dual_value, solve
 from finlab.allocation.dual.robot import DualRobot
 from finlab.allocation.dual.sets import Sets
 from finlab.arrays import Array

@@ -11,6 +11,8 @@ from finlab.allocation.dual.sets import Sets
 from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.physics.plant import Plant
+from finlab.precision import ROUNDING
+from finlab.uncertainty.known import uncertainties
 
 
 class Compiled:
@@ -80,3 +82,37 @@ class Compiled:
         for places, group in self.groups:
             reach[places] = group.reach(lower[places], upper[places])
         return self.robot.restricted(reach[self.robot.order])
+
+
+def price_of_doubt(layout: Layout, scale: Array, robust: float) -> Array | None:
+    """Returns what a squared force of each actuator costs for the squared effectiveness of each axis (n, 6)
+    [W, W/m^2 per N^2]; None where nothing does.
+
+    Args:
+        layout: the robot.
+        scale: yardstick (6,) of the miss [N, N m].
+        robust: what an expected miss of 1 % of the yardstick costs [W]; it grows with the square.
+
+    Raises:
+        DataError: a fin's force table cannot be read.
+    """
+    if robust == 0.0:
+        return None
+    shares = np.array([0.0 if own is None else own.share for own in uncertainties(layout)])
+    return np.multiply.outer(robust * shares**2, (0.01 * scale) ** -2.0) if shares.any() else None
+
+
+def proved_power(compiled: Compiled, wrench: Array, price: Array) -> Array:
+    """Power (N,) [W] that no answer for wrenches (N, 6) undercuts, by prices (N, 6) [W/N, W/(N m)]."""
+    robot = compiled.robot
+    along = np.empty((3, compiled.count, len(wrench)))
+    along[:, robot.order] = robot.answers.worth((price @ robot.effectiveness.T).T, robot.sets)
+    ahead, back, worth = along
+    for places, group in compiled.groups:
+        own = group.worth(price)
+        own = group.radial_worth(ahead[places].T, back[places].T) if own is None else own
+        if own is not None:
+            worth[places] = own.T
+    paid = price * (wrench - compiled.beside)
+    rounding = ROUNDING * (np.abs(paid).sum(axis=1) + np.abs(worth).sum(axis=0))
+    return np.asarray(paid.sum(axis=1) - worth.sum(axis=0) - rounding)

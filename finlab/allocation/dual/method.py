@@ -14,13 +14,10 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.dual.bounds import proved_power
 from finlab.allocation.dual.branch import HOLLOW, STEPS_AT_KINK, gaps, least_power, may_have_gaps
-from finlab.allocation.dual.compiled import Compiled
-from finlab.allocation.dual.deadline import Deadline
-from finlab.allocation.dual.doubt import price_of_doubt
+from finlab.allocation.dual.compiled import Compiled, price_of_doubt, proved_power
 from finlab.allocation.dual.drag import Cost, cheapened, exact_command, prices_at
-from finlab.allocation.dual.newton import MOST_STEPS, Prices, dual_value, solve, start
+from finlab.allocation.dual.newton import MOST_STEPS, Deadline, Prices, dual_value, solve, start
 from finlab.allocation.dual.policies import Nearest, nearest
 from finlab.allocation.dual.rates import Rates, within_tick
 from finlab.allocation.dual.sets import Sets

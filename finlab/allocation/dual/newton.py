@@ -8,17 +8,44 @@ keeps the step finite and is adapted to what a step brought (Levenberg, Marquard
 steps are refused).
 """
 
+from time import thread_time
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.dual.deadline import NEVER, Deadline
 from finlab.allocation.dual.robot import DualRobot
 from finlab.allocation.dual.sets import Sets
 from finlab.arrays import Array
 from finlab.precision import NEARLY, NOTHING, ROUNDING
 from finlab.small_systems import solve as solve_systems
+
+LIMIT_S = 0.15
+"""Processor time [s] of this thread after which a search for one target ends with what it has found."""
+
+
+class Deadline:
+    """When the searches of one call end."""
+
+    def __init__(self, targets: float) -> None:
+        self._end = thread_time() + LIMIT_S * targets
+        self._struck = False
+
+    def passed(self) -> bool:
+        """Whether a search has to end now."""
+        self._struck = self._struck or thread_time() > self._end
+        return self._struck
+
+    @property
+    def notes(self) -> set[str]:
+        """The sentence about a search that has ended so."""
+        ended = "the search for a better answer was ended by its limit of processor time"
+        return {ended} if self._struck else set()
+
+
+NEVER = Deadline(float("inf"))
+"""One that does not come."""
+
 
 TOLERANCE = 1e-10
 """Scaled wrench that may be left of a target."""

@@ -12,9 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from finlab.allocation.dual.branch import halves
-from finlab.allocation.dual.deadline import NEVER, Deadline
 from finlab.allocation.dual.nearest_point import CLOSE_BY, Mixture, farthest_along, nearest_point
-from finlab.allocation.dual.newton import solve
+from finlab.allocation.dual.newton import NEVER, Deadline, solve
 from finlab.allocation.dual.robot import DualRobot
 from finlab.allocation.dual.sets import Sets
 from finlab.allocation.policy import Policy

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from finlab.allocation import Allocator, Policy
-from finlab.allocation.baselines.px4 import ORDER
+from finlab.allocation.baselines.autopilots import PX4_ORDER
 from finlab.evaluation.experiments.thrusters import _draws, misses_more, missing_by_group
 from finlab.layout import load_layout
 from finlab.layout.wrench_axes import AXES
@@ -14,14 +14,16 @@ from finlab.layout.wrench_axes import AXES
 
 @pytest.mark.parametrize("lost", [0, 1, 2])
 def test_on_a_surveyed_frame_a_priority_misses_no_more_than_px4(lost: int) -> None:
-    policy = Policy("priority", order=ORDER)
+    policy = Policy("priority", order=PX4_ORDER)
     for layout, edge in _draws("surveyed", lost, 3, 6, 3):
         for share in (1.2, 2.0):
             ours, theirs = (
                 Allocator(layout, name).allocate_batch(share * edge, **how)
                 for name, how in (("dual", {"policy": policy}), ("px4", {}))
             )
-            mine, own = (missing_by_group(each.unallocated / each.scale, ORDER) for each in (ours, theirs))
+            mine, own = (
+                missing_by_group(each.unallocated / each.scale, PX4_ORDER) for each in (ours, theirs)
+            )
             assert not misses_more(mine, own).any(), np.stack([mine, own], 1)[misses_more(mine, own)]
 
 

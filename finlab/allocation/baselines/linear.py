@@ -1,4 +1,4 @@
-"""Method `qp`: one linear map per layout, one box-constrained least squares per target, as in the paper."""
+"""Methods of one linear map per layout: `qp`, least squares as in the paper, `analytic`, the pseudo-inverse."""
 
 from functools import cached_property
 
@@ -55,3 +55,18 @@ class Qp(ModelBased):
             for i, right in enumerate(wanted):
                 step[i, linear.free] = lsq_linear(matrix, right, (-0.5, 0.5), method="bvls").x
         return linear.reference + step.reshape(-1, plant.n_fins, 3) * plant.width
+
+
+class Analytic(ModelBased):
+    """Pseudo-inverse of the forces; failed actuators have left with their columns.
+
+    Rows are scaled by sigma and columns by each actuator's largest force. An actuator gives its force by the
+    cheapest command there is for that size and direction. What does not fit is clipped one by one, the rest
+    is not redistributed.
+    """
+
+    name = "analytic"
+    takes = "any actuator"
+
+    def _commands(self, targets: Array, seed: int) -> Array:
+        return self._inverse.command(targets)

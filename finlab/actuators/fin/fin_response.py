@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from finlab.actuators.fin.models import file_stamp, make_law, stack_laws
+from finlab.actuators.fin.fin_laws import file_stamp, make_law, stack_laws
 from finlab.actuators.law import FinLaw, PlanarLaw
 from finlab.actuators.response import POINTS, Group, Plane, RadialTable, price_grid
 from finlab.arrays import Array
