@@ -3,7 +3,7 @@
 import numpy as np
 
 from finlab.allocation.notes import fin_notes
-from finlab.allocation.tables import in_words
+from finlab.allocation.report import in_words
 from finlab.layout import Layout, load_layout
 from finlab.layout.commands import AzimuthCommand, FinCommand, RudderCommand, ThrusterCommand
 from finlab.layout.rudder import Rudder

@@ -7,8 +7,8 @@ desaturation (PX4, `ControlAllocationPseudoInverse.cpp` and `ControlAllocationSe
 `ardusub` has a sum of six factors times six demands for each thruster, whatever the geometry. Roll, pitch and
 throttle are one group and yaw, forward and lateral the other; each is scaled down until no output of its own
 exceeds the limits, then the two are added and clipped (ArduSub, `AP_Motors6DOF`, frame VECTORED_6DOF).
-Factors are those of the frame of ArduSub that the thrusters make; of any other robot they are those that its geometry
-suggests: shares of the strongest.
+Factors are those of the frame of ArduSub that the thrusters make; of any other robot they are those that its
+geometry suggests: shares of the strongest.
 
 Both are posed at full strength: thrusters give the newton that are asked of them, each within its own limits
 (PX4's thrust coefficient of each is its largest force), and failed thrusters are taken out.

@@ -1,4 +1,4 @@
-"""Methods of one linear map per layout: `qp`, least squares as in the paper, `analytic`, the pseudo-inverse."""
+"""Methods of one linear map per layout: `qp`, least squares as the paper, `analytic`, the pseudo-inverse."""
 
 from functools import cached_property
 
