@@ -29,8 +29,7 @@ _GRID = np.linspace(0.0, 1.0, CELLS + 1) ** 4
 
 def price_grid(top: float) -> Array:
     """Prices (CELLS + 1,) [W/N] from 0 to `top`, the ends of a table's intervals."""
-    grid: Array = top * _GRID
-    return grid
+    return np.asarray(top * _GRID)
 
 
 @dataclass(frozen=True, eq=False)

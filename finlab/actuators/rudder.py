@@ -191,14 +191,12 @@ class RudderGroup(Group):
 
     @property
     def beside(self) -> Array:
-        least: Array = (self._met.pressure * self._law.drag)[:, None] * self._against
-        return least
+        return np.asarray((self._met.pressure * self._law.drag)[:, None] * self._against)
 
     def beside_of(self, force: Array) -> Array:
         size = np.abs(force[..., 0]) / np.maximum(self._met.pressure, NOTHING)
         drag = [np.interp(size[:, i], lifts, drags) for i, (lifts, _, drags) in enumerate(self._curves)]
-        wrench: Array = (np.stack(drag, axis=-1) * self._met.pressure) @ self._against
-        return wrench
+        return np.asarray((np.stack(drag, axis=-1) * self._met.pressure) @ self._against)
 
     def _lift(self, deflection: Array) -> Array:
         """Least and largest lifts (m, 2) [N] between two deflections (m, 2) [rad], without those that another
@@ -210,8 +208,7 @@ class RudderGroup(Group):
         near = np.where((np.abs(parted) > end)[:, None], parted[:, None], usual)
         most = np.array([lifts[-1] for lifts, _, _ in self._curves])[:, None]
         lift = np.clip(self._law.coefficients(near.T).lift.T, -most, most)
-        found: Array = lift * self._met.pressure[:, None]
-        return found
+        return np.asarray(lift * self._met.pressure[:, None])
 
     def commands(self, force: Array, previous: Array | None = None) -> Array:
         size = np.abs(force[..., 0]) / np.maximum(self._met.pressure, NOTHING)

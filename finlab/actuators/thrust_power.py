@@ -152,8 +152,7 @@ class ThrustPower:
         """Returns the most [W] that forces between `least` and `most` (n,) [N] are worth at prices (..., n)
         [W/N], less their power."""
         force = np.clip(self.answer(price), least, most)
-        worth: Array = price * force - self.watts(force)
-        return worth
+        return np.asarray(price * force - self.watts(force))
 
     def _both(self, force: AnyArray, which: int) -> AnyArray:
         result: AnyArray = np.empty(np.shape(force))
@@ -185,5 +184,4 @@ def radial_table(model: ThrustModel, sign: int, least: float, most: float) -> Ra
 
 def held(force: AnyArray, dead_band: Array) -> AnyArray:
     """Returns the forces (..., n) [N] that come of commanded ones: none within the dead bands (n,) [N]."""
-    result: AnyArray = np.where(np.abs(force) < dead_band * (1.0 - 1e-9), 0.0, force)
-    return result
+    return np.asarray(np.where(np.abs(force) < dead_band * (1.0 - 1e-9), 0.0, force))

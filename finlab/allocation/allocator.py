@@ -221,11 +221,11 @@ class Allocator:
             previous: command (n, 3) of the previous tick: what follows stays within the rates of the
                 actuators. Or the answer that gave it: the search then begins there, which is quicker.
             reference: wrenches (K, 6) that are expected to be asked for at the next K ticks. A method that
-                knows how late its actuators follow answers the one that they will be in time for, which is then
-                the result's target; others answer the present one.
+                knows how late they follow answers the one that they will be in time for, which is then the
+                result's target; others answer the present one.
             policy: what to do when the wrench is out of reach; see `Policy`.
-            health: actuators that are weak, stuck at an angle or running on; the result's layout has the limits
-                that are left.
+            health: actuators that are weak, stuck at an angle or running on; the result's layout has what is
+                left of their limits.
             flow: velocity (6,) of the body relative to the water [m/s, rad/s], body frame; None at rest.
             seed: the same target and seed give the same answer.
 

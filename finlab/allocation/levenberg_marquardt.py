@@ -181,5 +181,4 @@ def _smallest_change(free: AnyArray, right: AnyArray, damping: AnyArray) -> AnyA
     diagonal = gram.reshape(-1, 36)[:, ::7]
     # By the derivatives themselves: no bound holds for fins whose force falls again, or rises from rest.
     diagonal += (damping + RIDGE[0] + RIDGE[1] * np.einsum("ri->r", diagonal))[:, None]
-    change: AnyArray = free @ solve(gram, right)
-    return change
+    return np.asarray(free @ solve(gram, right))

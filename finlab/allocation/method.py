@@ -124,8 +124,7 @@ class Method(ABC):
         before = min(int(late), len(reference))
         after = min(before + 1, len(reference))
         expected = np.concatenate([target[None], reference])
-        result: Array = expected[before] + (late - int(late)) * (expected[after] - expected[before])
-        return result
+        return np.asarray(expected[before] + (late - int(late)) * (expected[after] - expected[before]))
 
     def check_policy(self, policy: Policy) -> None:
         """Raise an `AllocationError` at a policy that the method does not know."""

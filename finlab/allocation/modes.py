@@ -128,8 +128,7 @@ def signature_difference(a: ModeSignature, b: ModeSignature) -> Array:
     """How `b` differs from `a` (3, n) in direction, thrust and style; 1 is what counts as different."""
     turn = wrapped(b.direction - a.direction) / SAME_DIRECTION
     rest = np.array([b.thrust - a.thrust, b.style - a.style]) / SAME_SIZE
-    difference: Array = np.nan_to_num(np.concatenate([turn[None], rest]))
-    return difference
+    return np.asarray(np.nan_to_num(np.concatenate([turn[None], rest])))
 
 
 def same_signature(a: ModeSignature, b: ModeSignature) -> bool:

@@ -134,6 +134,7 @@ def allocation_record(result: Allocation) -> dict[str, object]:
     """The JSON object of an answer."""
     values = {key: getattr(result, "wrench" if key == "wrench_plant" else key) for key in RECORD}
     values["target"] = plain_target(result.target)
+    values |= {key: list(value) for key, value in values.items() if isinstance(value, tuple)}
     plain = to_builtins(values, enc_hook=np.ndarray.tolist)
     return {**command_record(result.layout, result.command, result.forces), **plain}
 

@@ -41,15 +41,13 @@ REACHED = 1e-3
 
 def judged_power(plant: Plant, command: Array) -> Array:
     """Mean mechanical power (N,) [W] of commands (N, n, 3); what has failed (NaN) takes none."""
-    power: Array = np.nansum(plant.power(command), axis=-1)
-    return power
+    return np.asarray(np.nansum(plant.power(command), axis=-1))
 
 
 def judged_effort(layout: Layout, command: Array) -> Array:
     """Effort `J_en` (N,) of commands (N, n, 3), the paper's energy proxy, without what has failed (NaN)."""
     failed = np.isnan(command).any(axis=-1, keepdims=True)
-    effort: Array = _meter(layout)(np.where(failed, 0.0, command) if failed.any() else command)
-    return effort
+    return np.asarray(_meter(layout)(np.where(failed, 0.0, command) if failed.any() else command))
 
 
 def costs(layout: Layout, command: Array) -> tuple[Array, Array]:

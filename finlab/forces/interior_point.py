@@ -236,15 +236,13 @@ def _step(state: _State, tolerance: float) -> tuple[NDArray[np.bool_], Array, _S
 
 
 def _wrench(full: Array, point: Array) -> Array:
-    wrench: Array = (point.reshape(len(point), 1, -1) @ full)[:, 0]
-    return wrench
+    return np.asarray((point.reshape(len(point), 1, -1) @ full)[:, 0])
 
 
 def _way_to_zero(weight: Array, growth: Array) -> Array:
     """The longest step (R,) that keeps the limits' multipliers positive."""
     ways = np.where(growth < 0.0, weight / np.maximum(-growth, 1e-100), np.inf)
-    shortest: Array = ways.min((1, 2))
-    return shortest
+    return np.asarray(ways.min((1, 2)))
 
 
 def _softness(slope: Array, ratio: Array, stiff: Array) -> tuple[Array, Array, Array]:

@@ -194,11 +194,11 @@ def swim_corner(first: Swimmer, shown: Moment, pace: str, newtons: float) -> str
     speed = float(np.linalg.norm(shown.flow))
     if speed >= 5e-4:
         trails.append(_key(_arrow(css(WATER), 0.9), f"water, {speed:.3f} m/s"))
-    alive = len(first.names) - len(shown.lost)
+    alive = len(first.fins) - len(shown.lost)
     off = f"{float(shown.record[-1, ERROR]):.3f}" if len(shown.record) else "–"
     power = "–" if shown.figures is None else f"{shown.figures.now_w:.1f}"
     parts = [
-        html("<span>{} of {} {}</span>", alive, len(first.names), parts_word(first.layout)),
+        html("<span>{} of {} {}</span>", alive, len(first.fins), parts_word(first.layout)),
         html("<span><b>{:.1f}</b> s of {:.0f} s</span>", shown.time, first.duration_s),
         html("<span><span class='dim'>off the path</span> <b>{}</b> m</span>", off),
         html("<span><span class='dim'>power</span> <b>{}</b> W</span>", power),

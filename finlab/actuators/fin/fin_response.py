@@ -102,8 +102,7 @@ class FinGroup(Group):
 
     def _force(self, command: Array) -> Array:
         if len(self._stacked) == 1:
-            alone: Array = self._stacked[0][1].force(command)
-            return alone
+            return np.asarray(self._stacked[0][1].force(command))
         force = np.empty_like(command)
         for places, law in self._stacked:
             force[..., places, :] = law.force(command[..., places, :])
@@ -212,8 +211,7 @@ class _Box:
         command[..., 2] = turns[:, None]
         across = self.law.force(command.reshape(-1, 3)).reshape(command.shape)[..., 1:]
         best = np.hypot(across[..., 0], across[..., 1]).argmax(axis=1)
-        found: Array = across[np.arange(len(turns)), best]
-        return found
+        return np.asarray(across[np.arange(len(turns)), best])
 
     def command(self, beat: Array) -> Array:
         """Commands (..., 3) of amplitude and frequency (..., 2)."""
@@ -221,8 +219,7 @@ class _Box:
 
     def force(self, command: Array) -> Array:
         """Sizes (...) [N] of the force in the fin's plane."""
-        size: Array = np.linalg.norm(self.law.force(command)[..., 1:], axis=-1)
-        return size
+        return np.asarray(np.linalg.norm(self.law.force(command)[..., 1:], axis=-1))
 
     def power(self, command: Array) -> Array:
         """Powers (...) [W]."""

@@ -84,8 +84,7 @@ class HermiteGrids:
         both = weight[..., 0, :, None, :, None] * weight[..., 1, None, :, None, :]
         along = both.reshape(*rows, orders**2, 16) @ grid
         along = weight[..., 2, None, :, :] @ along.reshape(*rows, orders**2, 4, self.columns)
-        found: Array = along.reshape(*rows, orders, orders, orders, self.columns)
-        return found
+        return np.asarray(along.reshape(*rows, orders, orders, orders, self.columns))
 
     def _weights(self, command: Array, orders: int) -> tuple[NDArray[np.intp], Array]:
         """Cells (..., 3) of commands (..., 3), counted through all axes, and on each axis the weights of four

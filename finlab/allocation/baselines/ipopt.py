@@ -79,8 +79,7 @@ class ForceProgram:
         most = self._most[:, None]
         answer = self._solver(x0=(start / most).ravel(), p=target, **self._bounds)
         force = np.array(answer["x"], np.float64).reshape(start.shape) * most
-        command: Array = self._inverse.decoded((force if np.isfinite(force).all() else start)[None])[0]
-        return command
+        return np.asarray(self._inverse.decoded((force if np.isfinite(force).all() else start)[None])[0])
 
     def starts(self, target: Array, n_random: int, seed: int) -> Array:
         """Forces (S, n, 2) [N]: the pseudo-inverse's, and where arcs are wide, random ones."""

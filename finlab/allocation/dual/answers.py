@@ -71,8 +71,7 @@ class Answers:
 
     def sizes(self, force: Array) -> Array:
         """Sizes (p, N) [N] of the planes' forces, of forces (k, N) along all directions."""
-        size: Array = np.hypot(*self.pair(force))
-        return size
+        return np.asarray(np.hypot(*self.pair(force)))
 
     def drag(self, force: Array) -> Array:
         """What the lines that drag drag along (f, N) [N] more than at rest with forces (l, N) [N]."""
@@ -80,8 +79,7 @@ class Answers:
             return np.zeros((0, force.shape[1]))
         own = np.zeros((self.lines + self.planes, force.shape[1]))
         own[self.dragging] = force[self.dragging]
-        rise: Array = (self.marginal(own)[1][self.dragging] - self._rest) / self._speed
-        return rise
+        return np.asarray((self.marginal(own)[1][self.dragging] - self._rest) / self._speed)
 
     def radial(self, price: Array, row: NDArray[np.intp]) -> tuple[Array, Array, Array]:
         """Force [N], its derivative and conjugate [W] (m, N) at prices (m, N) from 0 on in rows (m, 1) or

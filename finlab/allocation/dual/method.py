@@ -57,25 +57,22 @@ class Forces(NamedTuple):
     price: Array
     """Prices (N, 6) of the wrench [W/N, W/(N m)]."""
     within: NDArray[np.bool_]
-    """Which targets are within reach (N,)."""
+    """Targets within reach (N,)."""
     prices: Array
-    """The same (r, N) in the robot's basis [W]."""
+    """The same as `price` (r, N) in the robot's basis [W]."""
     value: Array
     """Power (N,) [W] that branches on gaps have proved to be needed; 0 where there was none."""
     aim: Array
     """The wrenches (N, 6) [N, N m] that they give: the targets, or those that the policy gives."""
     command: Array | None = None
-    """Commands (N, n, 3) that give the targets, drag and all, NaN where there are none; None for robots
-    without drag."""
+    """Commands (N, n, 3) that give the targets, drag and all, NaN where there are none; None without drag."""
 
     @classmethod
     def joined(cls, each: Sequence["Forces"]) -> "Forces":
         """Those of single targets."""
-        parts: list[Any] = list(zip(*each, strict=True))
-        axes = {"force": 1, "prices": 1}
-        return cls(
-            *(np.concatenate(part, axes.get(name, 0)) for name, part in zip(cls._fields, parts, strict=True))
-        )
+        along = [1 if name in ("force", "prices") else 0 for name in cls._fields]
+        columns: Any = zip(zip(*each, strict=True), along, strict=True)
+        return cls(*(np.concatenate(parts, axis) for parts, axis in columns))
 
 
 class Dual(Method):
@@ -137,34 +134,26 @@ class Dual(Method):
     def _solve(
         self, targets: Array, policy: Policy, previous: Array | None, prices: Array | None = None
     ) -> Solution:
-        robot = self.compiled.robot
+        robot, resting = self.compiled.robot, self.compiled.beside
         begin = None if prices is None else robot.basis.T @ (robot.scale * prices)[:, None]
         deadline = Deadline(len(targets))
-        aim, found = self._aimed(targets, policy, deadline, begin)
-        command = self._commands(aim, found, previous)
+        forces = self._forces(targets - resting, policy, deadline, begin)
+        aim = targets if forces.within.all() else forces.aim + resting
+        command = self._commands(aim, forces, previous)
         notes = set()
         if policy.kind == "direction":
-            for row in np.flatnonzero(~found.within):
-                notes.add(self._kept_on_the_ray(targets[row], int(row), aim, found, command, deadline))
+            for row in np.flatnonzero(~forces.within):
+                notes.add(self._kept_on_the_ray(targets[row], int(row), aim, forces, command, deadline))
         if previous is not None and not self._rates.allow(previous, command[0]):
-            command = self._in_a_tick(aim, found, previous)
-        bound: Callable[[Array], Array] = partial(self._bound, aim, found)
-        if len(targets) > 1:
-            bound = partial(self._bound_again, targets, policy)
-        notes |= self._not_held(targets[~found.within]) | deadline.notes
+            command = self._in_a_tick(aim, forces, previous)
+        bound: Callable[[Array], Array] = partial(self._bound, aim, forces.price, forces.value)
+        notes |= self._not_held(targets[~forces.within]) | deadline.notes
         return Solution(
-            command, None if self._unproved else bound, prices=found.price, notes=tuple(sorted(notes - {""}))
+            command, None if self._unproved else bound, prices=forces.price, notes=tuple(sorted(notes - {""}))
         )
 
-    def _aimed(
-        self, targets: Array, policy: Policy, deadline: Deadline, prices: Array | None = None
-    ) -> tuple[Array, Forces]:
-        """What is given for targets (N, 6): themselves, or what the policy asks for; and by which forces."""
-        found = self._forces(targets - self.compiled.beside, policy, deadline, prices)
-        return found.aim + self.compiled.beside, found
-
     def _kept_on_the_ray(
-        self, target: Array, row: int, aim: Array, found: Forces, command: Array, deadline: Deadline
+        self, target: Array, row: int, aim: Array, forces: Forces, command: Array, deadline: Deadline
     ) -> str:
         """Replaces a row of aims (N, 6) and commands (N, n, 3) that are to lie along a target (6,) and do
         not, by the largest share that does; the sentence where there is none."""
@@ -180,11 +169,11 @@ class Dual(Method):
             its = self._commands(tried, one)
             if self._error(its, tried)[0] <= NEARLY:
                 low, kept, command[row], aim[row] = share, True, its[0], tried[0]
-                found.price[row], found.value[row] = one.price[0], one.value[0]
+                forces.price[row], forces.value[row] = one.price[0], one.value[0]
             else:
                 high = share
         if not kept and (rest := self._cancelled) is not None:
-            kept, command[row], aim[row], found.price[row], found.value[row] = True, rest, 0.0, 0.0, 0.0
+            kept, command[row], aim[row], forces.price[row], forces.value[row] = True, rest, 0.0, 0.0, 0.0
         return "" if kept else "no share of the target was found that the actuators can give alone"
 
     @cached_property
@@ -194,8 +183,9 @@ class Dual(Method):
         lower, upper = self.layout.lower, self.layout.upper
         share = np.random.default_rng(0).random((ROUNDS, *lower.shape))
         share[..., :-1] **= 4
-        found = exact_command(self._problem, self._cost, np.zeros(6), lower + share * (upper - lower), EXACT)
-        return None if found is None else found.command
+        start = lower + share * (upper - lower)
+        best = exact_command(self._problem, self._cost, np.zeros(6), start, EXACT)
+        return None if best is None else best.command
 
     def _not_held(self, targets: Array) -> set[str]:
         """The sentence about axes that come together only, and that targets (N, 6) ask for apart."""
@@ -203,9 +193,8 @@ class Dual(Method):
         if not len(targets):
             return set()
         scaled = targets / robot.scale
-        left = np.abs(scaled - (scaled @ robot.basis) @ robot.basis.T) > NEARLY * np.abs(scaled).max(
-            initial=0.0
-        )
+        left = np.abs(scaled - (scaled @ robot.basis) @ robot.basis.T)
+        left = left > NEARLY * np.abs(scaled).max(initial=0.0)
         axes = axes_in(left.any(axis=0) & ~mask_of(self.undriven))
         if not axes:
             return set()
@@ -219,21 +208,14 @@ class Dual(Method):
         size = np.abs(self.compiled.robot.effectiveness).max(axis=0)
         return axes_in(size <= NOTHING * size.max())
 
-    def _bound(self, aim: Array, found: Forces, command: Array) -> Array:
+    def _bound(self, aim: Array, price: Array, value: Array, command: Array) -> Array:
         """Power (N,) [W] that no answer undercuts which gives the wrenches that commands (N, n, 3) give."""
-        given = wrench_of_forces(self.plant.force(command), self.plant.effectiveness)
-        bound = proved_power(self.compiled, given, found.price)
-        bound = np.where(self._error(command, aim) <= NEARLY, np.maximum(bound, found.value), bound)
+        wrench = wrench_of_forces(self.plant.force(command), self.plant.effectiveness)
+        bound = proved_power(self.compiled, wrench, price)
+        bound = np.where(self._error(command, aim) <= NEARLY, np.maximum(bound, value), bound)
         power = self.plant.power(command).sum(axis=-1)
-        rounded = (bound > power) & (
-            bound <= power * (1.0 + NEARLY) + NOTHING * self.compiled.robot.largest_power
-        )
-        return np.where(rounded, power, bound) * (1.0 - ROUNDING)
-
-    def _bound_again(self, targets: Array, policy: Policy, command: Array) -> Array:
-        """The same of answers to many targets (N, 6), whose prices are found again, so that nothing of them
-        is kept."""
-        return self._bound(*self._aimed(targets, policy, Deadline(len(targets))), command)
+        slack = power * (1.0 + NEARLY) + NOTHING * self.compiled.robot.largest_power
+        return np.where((bound > power) & (bound <= slack), power, bound) * (1.0 - ROUNDING)
 
     @property
     def _unproved(self) -> bool:
@@ -265,9 +247,8 @@ class Dual(Method):
         within = root.solved | (~root.beyond & torn)
         if robot.basis.shape[1] < 6:
             rest = targets / robot.scale - (robot.basis @ target).T
-            within &= np.linalg.norm(rest, axis=1) <= NEARLY * (
-                1e-3 + np.linalg.norm(targets / robot.scale, axis=1)
-            )
+            size = np.linalg.norm(targets / robot.scale, axis=1)
+            within &= np.linalg.norm(rest, axis=1) <= NEARLY * (1e-3 + size)
         force, prices, value, aim = root.force, root.prices, np.zeros(len(targets)), targets
         if may_have_gaps(robot, sets, force):
             force, value = self._in_gaps(target, sets, root, within, deadline)
@@ -296,9 +277,7 @@ class Dual(Method):
         aim, prices, begin = wrench + self.compiled.beside, root.prices, self.compiled.commands(force)
         if root.solved[0] and self._error(begin, aim[None])[0] <= EXACT:
             return begin, prices
-        asked, value = aim / self.scale, root.value
-
-        best_of = partial(cheapened, problem, cost, asked, enough=EXACT)
+        value, best_of = root.value, partial(cheapened, problem, cost, aim / self.scale, enough=EXACT)
         best = best_of(np.concatenate([begin, self.compiled.commands(first)]))
         if best is not None:
             if not root.solved[0]:
@@ -314,8 +293,8 @@ class Dual(Method):
             if not group.feels_flow:
                 starts[::2, places] = begin[0, places]
         other = None if root.beyond[0] or deadline.passed() else best_of(starts)
-        found = [each for each in (best, other) if each is not None]
-        command = min(found, key=lambda each: each.cost).command if found else np.full_like(begin[0], np.nan)
+        ways = [way for way in (best, other) if way is not None]
+        command = min(ways, key=lambda way: way.cost).command if ways else np.full_like(begin[0], np.nan)
         return command[None], prices
 
     @property
@@ -331,9 +310,9 @@ class Dual(Method):
         target = robot.target(near.wrench[None])
         root = solve(robot, target, sets, deadline=deadline)
         within = ~root.beyond
-        found, _ = self._in_gaps(target, sets, root, within, deadline)
+        cheaper, _ = self._in_gaps(target, sets, root, within, deadline)
         if within[0]:
-            force[:] = found[:, 0]
+            force[:] = cheaper[:, 0]
 
     def _in_gaps(
         self, target: Array, sets: Sets, root: Prices, within: NDArray[np.bool_], deadline: Deadline
@@ -354,23 +333,23 @@ class Dual(Method):
         value[rows] = np.where(cut.found, cut.value * (1.0 - FINE), 0.0)
         return force, value
 
-    def _commands(self, aim: Array, found: Forces, previous: Array | None = None) -> Array:
+    def _commands(self, aim: Array, forces: Forces, previous: Array | None = None) -> Array:
         """Commands (N, n, 3) that give wrenches (N, 6) exactly, by the plant."""
-        if previous is None and found.command is not None and not np.isnan(found.command).any():
-            return self.plant.rested(found.command)
-        command = self.compiled.commands(found.force, previous)
+        if previous is None and forces.command is not None and not np.isnan(forces.command).any():
+            return self.plant.rested(forces.command)
+        command = self.compiled.commands(forces.force, previous)
         error = self._error(command, aim)
         rough = np.flatnonzero(error > EXACT)
         if not len(rough):
             return self.plant.rested(command)
-        if found.command is not None:
-            own = found.command[rough]
+        if forces.command is not None:
+            own = forces.command[rough]
             command[rough] = np.where(np.isnan(own), command[rough], own)
         # Steps that lead nowhere depend on the last bit: with drag each target goes its way alone.
-        for rows in [rough] if found.command is None else np.split(rough, range(1, len(rough))):
+        for rows in [rough] if forces.command is None else np.split(rough, range(1, len(rough))):
             ends = refine(self._problem, aim[rows] / self.scale, command[rows], ROUNDS, EXACT)
             command[rows] = ends.command
-            for row in rows[(ends.error > NEARLY) & found.within[rows]].tolist():
+            for row in rows[(ends.error > NEARLY) & forces.within[rows]].tolist():
                 # Such as idle fins in line, or a least force: no small change of these commands helps.
                 draw = np.random.default_rng(0).uniform(-1.0, 1.0, (2 * ROUNDS, *command.shape[1:]))
                 shares = np.geomspace(HOLLOW, 1.0, len(draw))[:, None, None]
@@ -380,21 +359,18 @@ class Dual(Method):
         return self.plant.rested(command)
 
     def _error(self, command: Array, aim: Array) -> Array:
-        given = wrench_of_forces(self.plant.force(command), self.plant.effectiveness)
-        missing = (given - aim) / self.scale
-        error: Array = np.sqrt(np.einsum("ni,ni->n", missing, missing))
-        return error
+        wrench = wrench_of_forces(self.plant.force(command), self.plant.effectiveness)
+        missing = (wrench - aim) / self.scale
+        return np.asarray(np.sqrt(np.einsum("ni,ni->n", missing, missing)))
 
-    def _in_a_tick(self, aim: Array, found: Forces, previous: Array) -> Array:
+    def _in_a_tick(self, aim: Array, forces: Forces, previous: Array) -> Array:
         """The command (1, n, 3) that gives a wrench (1, 6) or comes nearest to it among those that may follow
-        a previous one (n, 3); `found` is the answer without limits of that kind."""
+        a previous one (n, 3); `forces` is the answer without limits of that kind."""
         box = self._rates.box(previous)
-        sets, asked = self.compiled.within(box.lower, box.upper), aim - self.compiled.beside
-        problem = replace(
-            self._problem, lower=box.lower, upper=box.upper, full_turn=box.free[:, 2] & self.plant.full_turn
-        )
-
-        force = within_tick(self.compiled.robot, sets, asked, found.prices, 1.0 / self.scale)
+        sets, full = self.compiled.within(box.lower, box.upper), box.free[:, 2] & self.plant.full_turn
+        problem = replace(self._problem, lower=box.lower, upper=box.upper, full_turn=full)
+        wrench = aim - self.compiled.beside
+        force = within_tick(self.compiled.robot, sets, wrench, forces.prices, 1.0 / self.scale)
         command = self.plant.feasible(box.clipped(self.compiled.commands(force, previous)))
         if self._error(command, aim)[0] > EXACT:
             command = refine(problem, aim / self.scale, box.clipped(command), TICK_STEPS, EXACT).command

@@ -39,8 +39,7 @@ class Gauges:
         before, first, last, after = (self._rho[row, (cell + k) % count] for k in (-1, 0, 1, 2))
         m0, m1 = 0.5 * (last - before), 0.5 * (after - first)
         rise = last - first
-        found: Array = first + t * (m0 + t * (3.0 * rise - 2.0 * m0 - m1 + t * (m0 + m1 - 2.0 * rise)))
-        return found
+        return np.asarray(first + t * (m0 + t * (3.0 * rise - 2.0 * m0 - m1 + t * (m0 + m1 - 2.0 * rise))))
 
     def support(self, angle: Array) -> tuple[Array, Array, Array]:
         """Support function and its first two derivatives (g, N) for directions (g, N) of the price."""

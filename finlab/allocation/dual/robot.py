@@ -60,8 +60,7 @@ class DualRobot:
     @cached_property
     def most(self) -> Array:
         """Largest force or size (n, 1) [N] of each actuator."""
-        found: Array = np.abs(self.ends).max(axis=1, keepdims=True) + 1e-12
-        return found
+        return np.asarray(np.abs(self.ends).max(axis=1, keepdims=True) + 1e-12)
 
     @cached_property
     def largest(self) -> Array:
@@ -89,8 +88,7 @@ class DualRobot:
     def first_force(self) -> Array:
         """Forces (k, r) of a scaled wrench at least quadratic cost."""
         hessian = (self.matrix.T * self.gain[:, 0]) @ self.matrix
-        found: Array = (self.matrix * self.gain) @ np.linalg.pinv(hessian, hermitian=True)
-        return found
+        return np.asarray((self.matrix * self.gain) @ np.linalg.pinv(hessian, hermitian=True))
 
     @cached_property
     def trace(self) -> Array:
@@ -163,18 +161,15 @@ class DualRobot:
 
     def target(self, wrench: Array) -> Array:
         """Wrenches (N, 6) in the basis (r, N)."""
-        found: Array = self.basis.T @ (wrench / self.scale).T
-        return found
+        return np.asarray(self.basis.T @ (wrench / self.scale).T)
 
     def price(self, prices: Array) -> Array:
         """Prices (N, 6) [W/N, W/(N m)] of the wrench from those in the basis (r, N) [W]."""
-        found: Array = (self.basis @ prices).T / self.scale
-        return found
+        return np.asarray((self.basis @ prices).T / self.scale)
 
     def wrench(self, force: Array) -> Array:
         """Wrenches (N, 6) [N, N m] of forces (k, N)."""
-        found: Array = force.T @ self.effectiveness
-        return found
+        return np.asarray(force.T @ self.effectiveness)
 
 
 def _products(a: Array, b: Array) -> Array:
