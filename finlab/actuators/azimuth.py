@@ -67,9 +67,8 @@ class AzimuthGroup(Group):
         ]
 
     def commands(self, force: Array, previous: Array | None = None) -> Array:
-        """See `Group`. Where no force is asked for, the angle stays that of the `previous` commands
-        (..., m, 3), or comes as near to 0 as the arc allows. What can be given forward and in reverse is
-        given at the least power."""
+        """See `Group`. Where no force is wanted, the angle stays that of the `previous` commands, or comes as
+        near to 0 as the arc allows. What can be given forward and in reverse is given at the least power."""
         size = np.hypot(force[..., 0], force[..., 1])
         before = np.zeros_like(size) if previous is None else np.nan_to_num(previous[..., 0])
         angle = np.where(size > 0.0, np.arctan2(force[..., 1], force[..., 0]), before)

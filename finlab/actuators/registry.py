@@ -50,11 +50,8 @@ KINDS: dict[str, Kind] = {
 
 
 def laws_of(layout: Layout) -> list[tuple[Places, ActuatorLaw]]:
-    """Returns the laws of a robot's actuators with their places; those of one kind together.
-
-    Raises:
-        DataError: the force table of a fin cannot be read.
-    """
+    """Returns the laws of a robot's actuators with their places; those of one kind together. A `DataError`
+    where a force table cannot be read."""
     groups: list[tuple[Places, ActuatorLaw]] = []
     for places, kind in _kinds(layout):
         found = kind.laws([layout.actuators[i] for i in places])
@@ -63,15 +60,9 @@ def laws_of(layout: Layout) -> list[tuple[Places, ActuatorLaw]]:
 
 
 def groups_of(layout: Layout, effectiveness: Array) -> list[tuple[Places, Group]]:
-    """Returns the answers to prices of a robot's actuators, by kind, with their places.
-
-    Args:
-        layout: the robot.
-        effectiveness: wrench (n, 3, 6) of 1 N along the own axes of each actuator.
-
-    Raises:
-        DataError: a fin's force table cannot be read, or gives no thrust within the limits.
-    """
+    """Returns the answers to prices of a robot's actuators by kind, with their places; `effectiveness` (n, 3,
+    6) is the wrench of 1 N along their own axes. A `DataError` where a force table cannot be read, or gives
+    no thrust within the limits."""
     return [
         (places, kind.group([layout.actuators[i] for i in places], effectiveness[places]))
         for places, kind in _kinds(layout)

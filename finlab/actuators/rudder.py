@@ -199,8 +199,7 @@ class RudderGroup(Group):
         return np.asarray((np.stack(drag, axis=-1) * self._met.pressure) @ self._against)
 
     def _lift(self, deflection: Array) -> Array:
-        """Least and largest lifts (m, 2) [N] between two deflections (m, 2) [rad], without those that another
-        deflection gives with less drag."""
+        """Least and largest lifts (m, 2) [N] between deflections (m, 2) [rad], each at its least drag."""
         angle = deflection - self._turned[:, None]
         end = np.array([angles[-1] for _, angles, _ in self._curves])
         parted = np.clip(0.0, angle[:, 0], angle[:, 1])

@@ -39,10 +39,8 @@ class Curve:
     that rises from 0 at rest without a jump."""
 
     def __init__(self, size: Array, watts: Array) -> None:
-        """Takes points of a convex curve, sizes [N] from 0 on, and meets each of them.
-
-        The knots between are those of Schumaker (1983): quadratic splines that keep the shape.
-        """
+        """Takes points of a convex curve, sizes [N] from 0 on, and meets each of them. The knots between are
+        those of Schumaker (1983): quadratic splines that keep the shape."""
         step = np.diff(size)
         chord = np.diff(watts) / step
         slope = np.zeros_like(size)
@@ -162,14 +160,8 @@ class ThrustPower:
 
 
 def radial_table(model: ThrustModel, sign: int, least: float, most: float) -> RadialTable:
-    """Returns the answer of one side, forward (`sign` 1) or reverse (-1), to a price.
-
-    Args:
-        model: what power the forces take.
-        sign: the side.
-        least: least size of the force [N].
-        most: largest size [N].
-    """
+    """Returns the answer to a price of one side, forward (`sign` 1) or reverse (-1), with sizes of the force
+    from `least` to `most` [N]."""
     own = ThrustPower([model])
     ends = np.array([[sign * least], [sign * most]])
     rest = float(own.watts(ends)[0, 0])

@@ -111,11 +111,8 @@ class ForceSets(NamedTuple):
         return (force.reshape(rows, 1, 2 * n) @ self.effectiveness.reshape(rows, 2 * n, -1))[:, 0]
 
     def farthest(self, normal: Array) -> tuple[Array, Array]:
-        """Returns how far the sets reach along `normal` (R, m), and the planar forces (R, n, 2) that do it.
-
-        The first, (R,), is the support function of the set of all wrenches: exact, or exact for the hull
-        where a sector is wider than half a turn.
-        """
+        """Returns the support function (R,) of all wrenches along `normal` (R, m), and the planar forces (R,
+        n, 2) that reach it; where a sector is wider than half a turn, those of its hull."""
         pull = self.pull(normal)
         size = np.sqrt((pull**2).sum(-1))
         angle = wrapped(np.arctan2(pull[..., 1], pull[..., 0]) - self.middle)
@@ -148,10 +145,8 @@ class ForceSets(NamedTuple):
         return np.asarray(self.corners.any((-1, -2)))
 
     def full_effectiveness(self) -> Array:
-        """Returns the scaled wrenches (R, 2n, m) of each one's largest force along both axes of its plane.
-
-        One that pushes along a line has but one, and zeros for the other.
-        """
+        """Returns the scaled wrenches (R, 2n, m) of each one's largest force along both axes of its plane;
+        one that pushes along a line has zeros for the other."""
         full = self.effectiveness * self.radius[..., None, None]
         fixed = self.half == 0.0
         if fixed.any():
@@ -273,8 +268,8 @@ def _shape(response: Response, is_fin: bool) -> Shape:
 
 
 def _polygon(directions: Array, points: Array, half: float, sides: int) -> Shape:
-    """A polygon of some sides that fills the convex hull of forces (S, 2) [N] in a plane; a line or a point
-    where that has no width."""
+    """A polygon that fills the convex hull of forces (S, 2) [N] in a plane; a line or a point where it has no
+    width."""
     middle = points.mean(axis=0)
     axes = np.linalg.svd(points - middle)[2]
     along = (points - middle) @ axes.T
@@ -297,8 +292,7 @@ def _polygon(directions: Array, points: Array, half: float, sides: int) -> Shape
 
 
 def _boundary(plane: Plane, gauge: Array) -> Array:
-    """How far the convex hull of what an uneven fin can push reaches along evenly spaced directions
-    (BOUNDARY,), as shares of its largest force."""
+    """How far the hull of what an uneven fin can push reaches (BOUNDARY,), as shares of its largest force."""
     angle = plane.middle + plane.half * np.linspace(-1.0, 1.0, POINTS)
     gauge = np.append(gauge, gauge[0])
     reach = np.interp(angle % TURN, TURN / (len(gauge) - 1) * np.arange(len(gauge)), gauge)
@@ -334,11 +328,8 @@ def wide_arcs(sets: ForceSets) -> NDArray[np.intp]:
 
 def convex_parts(sets: ForceSets) -> ForceSets:
     """Returns convex sets of R robots with the same arcs, P of each, one round of robots after the other.
-
-    Wide sectors are cut along their middle. Of the first `MAX_CUT` of them both halves are kept, in all
-    combinations: their union is exactly what each robot can push. Further ones stay what they are, with
-    their hulls.
-    """
+    Wide sectors are cut along their middle, of the first `MAX_CUT` both halves are kept, in all combinations;
+    further ones stay what they are, with their hulls."""
     cut = wide_arcs(sets)[:MAX_CUT]
     signs = np.zeros((2 ** len(cut), 1, sets.radius.shape[1]))
     signs[:, 0, cut] = list(product((-0.5, 0.5), repeat=len(cut)))

@@ -63,19 +63,12 @@ class _State(NamedTuple):
 
 
 def minimize(sets: ForceSets, wanted: Array, c: Array, gap: float) -> tuple[Array, Array]:
-    """Solves R problems.
+    """Solves R problems in m coordinates: the planar forces (R, n, 2) [N] within the sets, hulls of sectors
+    wider than half a turn, whose wrench comes nearest to `wanted` (R, m), squared errors divided by `c` (m,)
+    or (R, m), and the multiplier (R, m) of the wrench.
 
-    Args:
-        sets: what the fins of R robots can do, in m coordinates of a wrench; sectors wider than half a turn
-            count with their convex hulls.
-        wanted: wrenches w (R, m).
-        c: what each coordinate's squared error is divided by (m,) or (R, m), positive.
-        gap: mean product of a limit's multiplier and slack that ends the search, relative to the wrench's
-            error plus one, where the strongest fin's wrench is one.
-
-    Returns:
-        Planar forces (R, n, 2) [N], within the fins' sets, and the multiplier (R, m) of the wrench: what its
-        error would gain from one more of it.
+    The search ends at a `gap`: the mean product of a limit's multiplier and slack relative to the wrench's
+    error plus one, where the strongest actuator's wrench is one.
     """
     state = _outset(sets, wanted - sets.offset, c)
     busy, least = np.arange(len(wanted)), np.full(len(wanted), np.inf)
@@ -139,12 +132,9 @@ def _ahead(sets: ForceSets, vectors: Array) -> Array:
 
 
 def _sides(sets: ForceSets) -> tuple[Array, Array]:
-    """Normals (R, K, 2, n) that point out of each sector, and how far out its sides are (R, K, n).
-
-    A sector has two sides through the origin. The hull of one wider than half a turn has one, the chord
-    between its stops. An uneven fin has those of the polygon around it, and polygons have their own. Where
-    there are none, K is 0.
-    """
+    """Normals (R, K, 2, n) that point out of each sector, and how far out its sides are (R, K, n). A sector
+    has two sides through the origin, the hull of one wider than half a turn the chord between its stops, and
+    uneven fins and polygons those of their polygon."""
     normals, beyond = _stops(sets)
     if sets.corners is not None:
         radius = np.where(sets.radius > 0.0, sets.radius, 1.0)[..., None, None]

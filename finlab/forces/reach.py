@@ -42,17 +42,11 @@ class Largest(NamedTuple):
 def largest(
     sets: ForceSets, origin: Array, basis: Array, held: Array | float = 0.0, tolerance: float = FINE
 ) -> Largest:
-    """Returns the largest wrenches along `origin` (R, 6) whose parts along `basis` (R, 6, k) are as held.
+    """Returns the largest wrenches along unit `origin` (R, 6) whose parts along an orthonormal `basis` (R, 6,
+    k) across it are `held` (R, k).
 
     Each is bracketed: a plane across the solver's multiplier lies outside of the set of all wrenches, and its
-    forces lie inside.
-
-    Args:
-        sets: R robots.
-        origin: unit scaled wrenches.
-        basis: orthonormal, and at right angles to `origin`.
-        held: wanted parts (R, k) along the basis.
-        tolerance: see `FINE`.
+    forces lie inside. `tolerance` is as `FINE`.
     """
     rows, _, k = basis.shape
     frame = np.concatenate([origin[:, :, None], basis], axis=-1)
@@ -90,10 +84,7 @@ def max_wrench_along(sets: ForceSets, direction: Array, tolerance: float = FINE)
 
 def max_wrench_along_exactly(sets: ForceSets, directions: Array) -> tuple[Array, float]:
     """Returns the largest wrenches (P, D) of robots (P) along unit `directions` (D, 6), and the largest gap.
-
-    Sectors wider than half a turn are taken in convex parts, so that the result is theirs and not their
-    hull's; with too many of them some count with their hulls, see `convex_parts`.
-    """
+    Wide sectors count as their convex parts, with too many of them some as hulls, see `convex_parts`."""
     robots, n = len(sets.radius), len(directions)
     parts = convex_parts(sets)
     found = max_wrench_along(parts.repeat(n), np.tile(directions, (len(parts.radius), 1)))
@@ -183,22 +174,18 @@ class Extent(NamedTuple):
 
 
 def singular_values(sets: ForceSets) -> tuple[Array, Array]:
-    """Returns singular values (P, m) [N], falling, and their directions (P, m, m), in columns.
-
-    Each column of the matrix is what one actuator does at its largest force along one axis of its plane.
-    """
+    """Returns singular values (P, m) [N], falling, and their directions (P, m, m), in columns, of the
+    wrenches of each one's largest force along the axes of its plane."""
     matrix = np.swapaxes(sets.full_effectiveness(), -1, -2)
     directions, values, _ = np.linalg.svd(matrix, full_matrices=True)
     return np.pad(values, ((0, 0), (0, directions.shape[-1] - values.shape[-1]))), directions
 
 
 def weakest(sets: ForceSets, n_random: int = N_RANDOM, n_walks: int = N_WALKS, fine: bool = True) -> Extent:
-    """Returns the direction in which the sets of wrenches end soonest, and where.
-
-    Every wrench of that size, in any direction, is within reach. The walk starts from axes, singular vectors
-    and random directions, goes to the face of the set that lies that way, turns to the face's normal and goes
-    again; each step ends nearer. The least end of all walks is returned: an end that truly is there.
-    """
+    """Returns the direction in which the sets of wrenches end soonest, and where: every wrench of that size
+    is within reach. The walk starts from axes, singular vectors and random directions, goes to the face of
+    the set that lies that way, turns to the face's normal and goes again; the least end of all is
+    returned."""
     values, vectors = singular_values(sets)
     size = np.zeros(len(values))
     direction = vectors[:, :, -1].copy()

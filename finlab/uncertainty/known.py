@@ -49,11 +49,8 @@ class Known:
 
 
 def uncertainties(layout: Layout) -> tuple[Known | None, ...]:
-    """Returns what is known of each actuator; None where its law is taken as it is.
-
-    Raises:
-        DataError: a fin's force table cannot be read.
-    """
+    """Returns what is known of each actuator, None where its law is taken as it is; a `DataError` where a
+    table cannot be read."""
     return _known(layout, file_stamps(layout))
 
 

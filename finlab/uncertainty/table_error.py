@@ -37,15 +37,9 @@ class TableError(NamedTuple):
 def line_error(
     count: int, order: int, weights: float, missed: Callable[[int], Array | None]
 ) -> tuple[float, float]:
-    """Returns the errors by spacing and by noise along one axis of a table.
-
-    Args:
-        count: lines of the axis, three or more.
-        order: of the interpolation.
-        weights: sum of the squared weights of the interpolation half way between lines.
-        missed: gives the errors at the lines left out if every second or every fourth one is kept, as shares
-            of the values there; None where none can be left out.
-    """
+    """Returns the errors by spacing and by noise along one axis of `count` lines, three or more, by the order
+    of the interpolation and the sum of its squared weights half way between lines; `missed` gives the errors
+    at the lines left out if every second or every fourth one is kept, as shares, or None."""
     second = _mean_square(missed(2))
     fourth = _mean_square(missed(4)) if count >= FEWEST[1] else 0.0
     far, farther = 4.0**order, 16.0**order
@@ -101,8 +95,8 @@ class GridUncertainty:
 
     @cached_property
     def _variances(self) -> Array:
-        """Variances (a, f, d, 2) [N^2] of the forces across the shaft and along it at the grid's points: what
-        the file says, and the error of the grid."""
+        """Variances (a, f, d, 2) [N^2] of the forces across the shaft and along it, by the file and by the
+        grid."""
         square, error = (self._grid.values[..., :3] ** 2).sum(axis=-1), self.error
         share = error.spacing**2 + (error.noise**2 if self._measured is None else 0.0)
         known = np.zeros(3) if self._measured is None else self._measured
@@ -149,8 +143,8 @@ def grid_error(grid: Grid) -> TableError:
 
 
 def _missed(grid: Grid, axis: int, step: int) -> Array | None:
-    """Errors of forces at the lines of an axis that lie between each two of those kept, over their sizes,
-    each component in turn."""
+    """Errors of forces at the lines of an axis between those kept, over their sizes, each component in
+    turn."""
     lines = grid.axes[axis]
     closed = grid.periodic and axis == 2 and len(lines) % step == 0 and len(lines) > step
     kept = np.arange(0, len(lines), step)

@@ -69,12 +69,9 @@ class TableLaw(GridLaw):
         notes: tuple[str, ...] = (),
         deviation: Array | None = None,
     ) -> None:
-        """Takes the grid's axes [rad, Hz, rad], rising, two points or more each, and what was measured
-        (a, f, d, 3 or 4): forces [N], and power [W] where it is known. The forces' standard deviations
-        (a, f, d, 3) [N] are None or (a, f, d, 0) where nothing is known of them.
-
-        A periodic grid's zero directions cover the circle, without the first one again at the end.
-        """
+        """Takes the grid's axes [rad, Hz, rad], rising, two points or more each, and values (a, f, d, 3 or
+        4): forces [N], and power [W] where it is known. The forces' standard deviations (a, f, d, 3) [N] are
+        None or (a, f, d, 0) where unknown. A periodic grid has no second end of the circle."""
         self.grid = Grid(axes, values, periodic)
         """What was measured."""
         super().__init__([self.grid])
@@ -98,11 +95,7 @@ PLANAR_LAWS: dict[str, type[PlanarLaw]] = {"drag": Drag, "lighthill": Lighthill,
 
 
 def make_law(spec: FinModelSpec) -> FinLaw:
-    """Returns the law of one fin model.
-
-    Raises:
-        DataError: it is a table whose file is missing or wrong.
-    """
+    """Returns the law of one fin model; a `DataError` where it is a table whose file is missing or wrong."""
     values: dict[str, Any] = spec.values()
     if spec.type == "table":
         return _table(values["path"], file_stamp(spec))
@@ -110,12 +103,8 @@ def make_law(spec: FinModelSpec) -> FinLaw:
 
 
 def stack_laws(specs: Sequence[FinModelSpec]) -> list[tuple[NDArray[np.intp], FinLaw]]:
-    """Returns the laws of n fins as (places, law); fins of one formula, and those with tables that tell the
-    same quantities, are evaluated together.
-
-    Raises:
-        DataError: a table's file is missing or wrong.
-    """
+    """Returns the laws of n fins as (places, law); fins of one formula, and those with tables of as many
+    columns, are evaluated together. Errors as for `make_law`."""
     laws = [make_law(spec) for spec in specs]
     kinds = [
         law.has_power if isinstance(law, TableLaw) else spec.type

@@ -61,15 +61,9 @@ class FinGroup(Group):
     """The fins of a robot."""
 
     def __init__(self, fins: Sequence[Fin], effectiveness: Array) -> None:
-        """Compile fins; those of one model and limits are compiled once in a process.
-
-        Args:
-            fins: the fins.
-            effectiveness: wrench (m, 3, 6) per newton along each own axis: shaft, zero, across.
-
-        Raises:
-            DataError: a fin's force table cannot be read, or gives no thrust within the limits.
-        """
+        """Compiles fins with wrenches (m, 3, 6) per newton along each own axis, one model and limits once in
+        a process; a `DataError` where a force table cannot be read, or a fin gives no thrust within its
+        limits."""
         tables = [fin_table(fin) for fin in fins]
         self._tables = tables
         self._laws = [make_law(fin.model) for fin in fins]
@@ -304,8 +298,8 @@ class _Box:
 
 
 def _uphill_steps(beat: Array, slope: Array, curve: Array) -> Array:
-    """Steps (4, K, 2) uphill from amplitudes and frequencies (K, 2): Newton's, and those of its
-    one-dimensional form along the amplitude, the frequency, and both with a constant product."""
+    """Steps (4, K, 2) uphill from amplitudes and frequencies (K, 2): Newton's, and those along the amplitude,
+    the frequency, and both with a constant product."""
     a, b, c = curve[:, 0, 0], curve[:, 0, 1], curve[:, 1, 1]
     det = a * c - b * b
     ways = [np.broadcast_to(way, beat.shape) for way in ([1.0, 0.0], [0.0, 1.0])] + [beat * [1.0, -1.0]]

@@ -72,11 +72,8 @@ class HermiteGrids:
         return rows[0] if len(rows) == 1 else rows
 
     def __call__(self, command: Array, orders: int) -> Array:
-        """All columns at commands (..., 3), or (..., n, 3): values, and with two orders derivatives too.
-
-        Returns:
-            (..., orders, orders, orders, columns): by amplitude, by frequency, by zero direction.
-        """
+        """All columns (..., orders, orders, orders, columns) at commands (..., 3), or (..., n, 3): by
+        amplitude, by frequency, by zero direction; with two orders values and derivatives."""
         cell, weight = self._weights(command, orders)
         corner = (cell * self._stride).sum(-1) + self._start
         grid = self._rows[corner[..., None] + self._around]
@@ -130,10 +127,7 @@ def _with_neighbours(grid: Grid) -> Array:
 
 def _shapes(knots: Array, periodic: bool) -> tuple[Array, Array]:
     """Of each cell between knots (n,): the polynomials (n, 4 powers, 4 neighbours) that weigh its neighbours,
-    where it starts, and one over its width (n, 2). The last row stands for no cell.
-
-    The slope at a knot is that of the line through its neighbours.
-    """
+    its start, and one over its width (n, 2). The last row stands for no cell."""
     gaps = np.diff(knots)
     before, after = (gaps[-1], gaps[0]) if periodic else (0.0, 0.0)
     pair = np.concatenate([[before], gaps]) + np.concatenate([gaps, [after]])

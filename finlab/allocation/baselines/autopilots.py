@@ -114,8 +114,7 @@ def normalised(mix: Array) -> tuple[Array, Array]:
 
 
 def _gain(u: Array, column: Array, low: Array, high: Array) -> Array:
-    """How far (N,) outputs (N, n) have to move along a column (n,) so that their excesses on both sides are
-    alike."""
+    """How far (N,) outputs (N, n) move along a column (n,) until their excesses on both sides are alike."""
     used = np.abs(column) >= LEAST
     over = (np.clip(u, low, high) - u)[:, used] / column[used]
     return np.asarray(over.min(axis=1, initial=0.0) + over.max(axis=1, initial=0.0))
@@ -164,11 +163,8 @@ class ArduSub(LeastErrorMethod):
 
 
 def frame_factors(effectiveness: Array) -> Array:
-    """Factors (n, 6) for thrusters with these wrenches (n, 6) per newton, in ArduSub's columns and signs.
-
-    A frame is known by its thrusters in any order, each of which may be mounted the other way round, and some
-    of which may be lost.
-    """
+    """Factors (n, 6) for thrusters with these wrenches (n, 6) per newton, in ArduSub's columns and signs. A
+    frame is known by its thrusters in any order, some mounted the other way round, some lost."""
     strongest = np.abs(effectiveness).max(axis=0)
     suggested: Array = effectiveness / np.maximum(strongest, 1e-9)
     suggested[np.abs(suggested) < SMALL] = 0.0

@@ -35,14 +35,9 @@ NARROW = 1e-6
 
 
 class ForceProgram:
-    """Power over the forces of one robot, the wrench as a constraint, the target as its parameter.
-
-    Args:
-        casadi: the module.
-        inverse: the robot; where the search starts, and what turns forces into commands.
-        sigma: per-axis standard deviation (6,) of the error.
-        options: of IPOPT.
-    """
+    """Power over the forces of one robot in the module `casadi`, the wrench as a constraint, normalized by
+    `sigma` (6,), the target as its parameter; with `options` of IPOPT. `inverse` gives the start, and
+    commands for forces."""
 
     def __init__(self, casadi: Any, inverse: PseudoInverse, sigma: Array, options: dict[str, Any]) -> None:
         self._inverse, n = inverse, inverse.plant.n
@@ -192,15 +187,11 @@ class IpoptSettings(TimeLimitedSettings):
 
 
 class Ipopt(ModelBased):
-    """IPOPT on power, with the wrench as a constraint.
+    """IPOPT on power, with the wrench as a constraint; an `AllocationError` where CasADi is not installed.
 
-    The program is built once per layout with the target as its parameter. Where one start is not enough it
-    is run from random ones, too. Each end is made exact by the laws; the cheapest that meets the target is
-    the answer, else the one that comes nearest. After the time limit no start begins; each may take half as
-    long.
-
-    Raises:
-        AllocationError: CasADi is not installed.
+    Where one start is not enough it is run from random ones, too. Each end is made exact by the laws; the
+    cheapest that meets the target is the answer, else the nearest. After the time limit no start begins; each
+    may take half as long.
     """
 
     name = "ipopt"

@@ -14,10 +14,8 @@ DIFFERENCE_STEP = 1e-4
 
 
 class LinearMap:
-    """The actuation map of a layout, linearized by central differences at the middle of the limits.
-
-    Commands are positions between the limits, 0 at the lower and 1 at the upper one.
-    """
+    """The actuation map of a layout, linearized by central differences at the middle of the limits. Commands
+    are positions between the limits, from 0 to 1."""
 
     def __init__(self, plant: Plant, sigma: Array) -> None:
         self.reference = (plant.lower + plant.upper) / 2
@@ -58,12 +56,9 @@ class Qp(ModelBased):
 
 
 class Analytic(ModelBased):
-    """Pseudo-inverse of the forces; failed actuators have left with their columns.
-
-    Rows are scaled by sigma and columns by each actuator's largest force. An actuator gives its force by the
-    cheapest command there is for that size and direction. What does not fit is clipped one by one, the rest
-    is not redistributed.
-    """
+    """Pseudo-inverse of the forces, rows scaled by sigma and columns by each actuator's largest force, which
+    each gives by its cheapest command. What does not fit is clipped one by one, the rest is not
+    redistributed."""
 
     name = "analytic"
     takes = "any actuator"

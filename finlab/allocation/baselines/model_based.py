@@ -41,14 +41,11 @@ class ModelBased(LeastErrorMethod):
 
     @abstractmethod
     def _commands(self, targets: Array, seed: int) -> Array:
-        """Commands (N, n, 3) for targets (N, 6).
-
-        Random starts are drawn once and shared by all targets, so that a target gets the same answer alone
-        and among others.
-        """
+        """Commands (N, n, 3) for targets (N, 6). Random starts are drawn once and shared by all targets, so
+        that a target gets the same answer alone and among others."""
 
     def _best(self, target: Array, commands: Array, steps: int) -> Array:
-        """Of commands (S, n, 3), each first brought onto a target (6,) by some Levenberg-Marquardt steps, the
+        """Of commands (S, n, 3), each brought onto a target (6,) by some Levenberg-Marquardt steps, the
         cheapest one (n, 3) that meets it, else the one with the smallest error."""
         problem = CommandProblem.of(self.plant, self.sigma)
         ends = refine(problem, target[None] / self.sigma, commands, steps)

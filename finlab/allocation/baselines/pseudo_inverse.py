@@ -18,14 +18,8 @@ _FULL = 0.0, np.pi
 
 
 class PseudoInverse:
-    """Everything about one layout that does not depend on the target.
-
-    Forces are along each actuator's own two directions; the second one of a line is 0.
-
-    Args:
-        plant: the robot, in the flow that it has.
-        sigma: scales the rows (6,).
-    """
+    """What does not depend on the target, of a robot in the flow that it has, rows scaled by `sigma` (6,).
+    Forces are along each actuator's own two directions; the second one of a line is 0."""
 
     def __init__(self, plant: Plant, sigma: Array) -> None:
         self.plant, inflow = plant, plant.inflow(None)

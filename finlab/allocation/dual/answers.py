@@ -185,8 +185,8 @@ class Answers:
         return self._row + flipped
 
     def _one_way(self, price: Array, sets: Sets, way: int) -> tuple[Planar, Array]:
-        """Answers (q, N) of planes that push either way to prices (k, N), and their conjugates [W], as if
-        they pushed one of both `ways`."""
+        """Answers (q, N) of planes that push either way to prices (k, N), and conjugates [W], by one of both
+        `ways`."""
         places, sets = sets.reversing, sets.ways[way]
         first, second = (values[places] for values in self.pair(price))
         row = self._row[self.lines + places] + sets.flipped.astype(np.intp)
@@ -316,8 +316,8 @@ class Answers:
         )
 
     def _uneven(self, x: Array, y: Array, tangent: Array, size: Array) -> tuple[Array, Array, Array, Array]:
-        """Directions of the force with the gauges' sizes, the weights of their change, and the prices along
-        them, for directions and sizes of the price."""
+        """Directions of the force times the gauges, weights of their change, and prices along them, of those
+        of prices."""
         places = self.gauges.places
         value, slope, bend = self.gauges.support(np.arctan2(y[places], x[places]))
         fan_x, fan_y, tangent, along = x.copy(), y.copy(), tangent.copy(), size.copy()
@@ -339,8 +339,8 @@ class Answers:
         row: NDArray[np.intp],
         gauges: Gauges | None = None,
     ) -> None:
-        """Blend the answers and conjugates (p, N) [W] of planes beyond their arcs with those of the other
-        ends, in place."""
+        """Blends, in place, answers and conjugates (p, N) [W] of planes beyond their arcs with those of the
+        other ends."""
         assert fan.beyond is not None and fan.other is not None
         places, of = sets.forked, len(sets.low) - len(sets.half) + sets.forked
         first, second = price

@@ -228,10 +228,10 @@ def _dive(robot: DualRobot, parts: _Parts, kept: NDArray[np.intp], amount: Array
 
 
 def narrowed(robot: DualRobot, sets: Sets, force: Array, chosen: NDArray[np.bool_], side: Array) -> Sets:
-    """Sets (n, N) of which chosen ones (n, N) are cut, and one side is kept: of an arc the half towards
-    smaller (-1) or larger angles (1), of a full circle the half away from or around the force, of what pushes
-    either way the reverse (-1) or the rest (1), of a dead band rest or the forces beyond it, of what drags
-    the forces below or above, by forces (k, N)."""
+    """Sets (n, N) of which chosen ones (n, N) are cut by forces (k, N), and one side is kept: of an arc the
+    half towards smaller (-1) or larger angles (1), of a full circle that away from or around the force, of
+    either way the reverse or the rest, of a dead band rest or the forces beyond it, of drag the forces below
+    or above."""
     lines, planes = robot.answers.lines, robot.answers.planes
     low, high, low_cost, high_cost, middle, half, reverse, reverse_cost, flipped = map(np.array, sets.parts)
     if planes:

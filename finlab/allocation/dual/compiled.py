@@ -19,16 +19,9 @@ class Compiled:
     """The actuators of one robot, ready for prices."""
 
     def __init__(self, layout: Layout, plant: Plant, doubt: Array | None = None) -> None:
-        """Compile the actuators of a layout.
-
-        Args:
-            layout: the robot.
-            plant: gives their effectiveness and the flow.
-            doubt: what a squared force of each actuator costs beside its power, see `price_of_doubt`.
-
-        Raises:
-            DataError: a fin's force table cannot be read, or gives no thrust within its limits.
-        """
+        """Compiles the actuators of a layout with the effectiveness of a plant; what a squared force costs
+        beside its power is `doubt`, see `price_of_doubt`. A `DataError` where a fin's force table cannot be
+        read, or gives no thrust within its limits."""
         self.count = layout.n
         self.doubt = doubt
         """The same; None where it costs nothing."""
@@ -86,16 +79,8 @@ class Compiled:
 
 def price_of_doubt(layout: Layout, scale: Array, robust: float) -> Array | None:
     """Returns what a squared force of each actuator costs for the squared effectiveness of each axis (n, 6)
-    [W, W/m^2 per N^2]; None where nothing does.
-
-    Args:
-        layout: the robot.
-        scale: yardstick (6,) of the miss [N, N m].
-        robust: what an expected miss of 1 % of the yardstick costs [W]; it grows with the square.
-
-    Raises:
-        DataError: a fin's force table cannot be read.
-    """
+    [W, W/m^2 per N^2] where a miss of 1 % of the yardstick `scale` (6,) costs `robust` [W], growing with the
+    square; None where nothing does. A `DataError` where a force table cannot be read."""
     if robust == 0.0:
         return None
     shares = np.array([0.0 if own is None else own.share for own in uncertainties(layout)])

@@ -52,16 +52,8 @@ class Priced(NamedTuple):
 def exact_command(
     problem: CommandProblem, cost: Cost, wrench: Array, starts: Array, enough: float
 ) -> Priced | None:
-    """Returns what gives a normalized wrench (6,), the first of those found that are hardly
-    dearer than the cheapest; None where there is none.
-
-    Args:
-        problem: the robot.
-        cost: what is kept least.
-        wrench: what is to be given.
-        starts: commands (R, n, 3) to begin with.
-        enough: normalized error at which no further step is taken.
-    """
+    """Returns what gives a normalized wrench (6,), from starts (R, n, 3) to an error of `enough`: the first
+    that is hardly dearer than the cheapest; None where there is none."""
     found = refine(problem, wrench[None], starts, 2 * ROUNDS, enough)
     met = np.flatnonzero(found.error <= NEARLY)
     if not len(met):
@@ -73,8 +65,8 @@ def exact_command(
 
 def prices_at(problem: CommandProblem, cost: Cost, command: Array, directions: Array) -> Array:
     """Returns the prices (r, 1) of normalized `directions` (6, r) at which a command (n, 3) would be the
-    cheapest for what it gives, as near as there are: there, what a command that can change adds to the wrench
-    is worth the power that it adds."""
+    cheapest for what it gives: what a change of it adds to the wrench is worth the power that it adds,
+    nearly."""
     jacobian = problem.fin.force_and_jacobian(command[None])[1][0] @ problem.effectiveness
     low, high = problem.edges
     free = (command > low) & (command < high)
@@ -87,12 +79,11 @@ def prices_at(problem: CommandProblem, cost: Cost, command: Array, directions: A
 def cheapened(
     problem: CommandProblem, cost: Cost, wrench: Array, starts: Array, enough: float
 ) -> Priced | None:
-    """Returns what gives a normalized wrench (6,) at least cost near to the cheapest of some commands
-    (R, n, 3); None where steps from none of these give it.
+    """Returns what gives a normalized wrench (6,) at least cost near to the cheapest of some commands (R, n,
+    3); None where steps from none of these give it.
 
     Each step follows the power's slope along what gives the same wrench (sequential quadratic programming,
-    with the size of the curvature), as far as that lowers the power. The first start, near to giving the
-    wrench, takes such a step at once.
+    with the size of the curvature). The first start, near to giving the wrench, takes such a step at once.
     """
     step, gain = _cheaper_step(problem, cost, starts[0])
     best = exact_command(problem, cost, wrench, np.concatenate([starts[:1] + step, starts[1:]]), enough)
@@ -114,8 +105,7 @@ def cheapened(
 
 
 def _cheaper_step(problem: CommandProblem, cost: Cost, command: Array) -> tuple[Array, float]:
-    """A step (n, 3) of a command along which the wrench stays and the power falls, and by how much it would
-    fall [W]."""
+    """A step (n, 3) of a command along which the wrench stays, and by how much the power would fall [W]."""
     width = np.maximum(problem.width, NOTHING)
     tried = command + np.concatenate([np.zeros((1, 1, 3)), NEARLY * np.eye(3)[:, None]]) * width
     jacobian = width[:, :, None] * (problem.fin.force_and_jacobian(tried)[1] @ problem.effectiveness)

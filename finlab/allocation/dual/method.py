@@ -178,8 +178,8 @@ class Dual(Method):
 
     @cached_property
     def _cancelled(self) -> Array | None:
-        """A command (n, 3) of actuators that cannot rest whose forces cancel each other; None where none is
-        found from some starts near their least forces."""
+        """A command (n, 3) whose forces cancel, of actuators that cannot rest; None where none is near their
+        least ones."""
         lower, upper = self.layout.lower, self.layout.upper
         share = np.random.default_rng(0).random((ROUNDS, *lower.shape))
         share[..., :-1] **= 4

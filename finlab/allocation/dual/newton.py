@@ -134,16 +134,9 @@ def solve(
     most_steps: int = MOST_STEPS,
     deadline: Deadline = NEVER,
 ) -> Prices:
-    """Prices for targets; those that are done are left out of further steps.
-
-    Args:
-        robot: the robot.
-        target: scaled wrenches in its basis (r, N).
-        sets: what its actuators may give; None for all that they can.
-        prices: where to begin (r, N).
-        most_steps: after how many steps a target is given up.
-        deadline: when all are.
-    """
+    """Prices for targets (r, N) in the basis of a robot within sets (None for all that it can), from `prices`
+    (r, N) on, each in at most some steps and all before the deadline; those that are done are left out of
+    further steps."""
     sets = robot.sets if sets is None else sets
     count = target.shape[1]
     ridge = np.full(count, NEARLY)

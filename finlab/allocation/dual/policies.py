@@ -42,18 +42,9 @@ class Nearest(NamedTuple):
 def nearest(
     robot: DualRobot, sets: Sets, wrench: Array, policy: Policy, yardstick: Array, deadline: Deadline
 ) -> Nearest:
-    """Forces for one wrench (6,) [N, N m] that no forces within the sets give.
-
-    Sets with gaps are cut until the best answer of all parts lies in none.
-
-    Args:
-        robot: the robot.
-        sets: what its actuators may give, for one target.
-        wrench: the target.
-        policy: what counts.
-        yardstick: scales (6,) of the missing wrench [N, N m].
-        deadline: when the search in gaps ends.
-    """
+    """What a policy gives for one wrench (6,) [N, N m] that no forces within the sets give; missing wrenches
+    are compared on a yardstick (6,). Sets with gaps are cut until the best answer of all parts lies in
+    none."""
 
     def served(part: Sets) -> tuple[tuple[float, ...], int, Array, Sets]:
         """How badly a part serves the policy, and its forces."""
@@ -131,11 +122,9 @@ def direction(robot: DualRobot, sets: Sets, wrench: Array, policy: Policy, yards
 
 
 def priority(robot: DualRobot, sets: Sets, wrench: Array, policy: Policy, yardstick: Array) -> Array:
-    """Forces (k,) [N] that serve groups of axes of a wrench (6,), each as far as those before it allow.
-
-    A group that asks for more than there is pulls at the axes that are held: it is served again with what it
-    misses shortened to `PULL`, which has the same nearest point.
-    """
+    """Forces (k,) [N] that serve groups of axes of a wrench (6,), each as far as those before it allow. A
+    group that wants more than there is pulls at the held axes: it is served again with its miss cut to
+    `PULL`."""
     held, aim = np.zeros(6), np.array(wrench)
     near: Mixture | None = None
     for group in policy.groups:

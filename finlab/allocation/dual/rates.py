@@ -70,15 +70,8 @@ class Rates:
 
 
 def within_tick(robot: DualRobot, sets: Sets, wrench: Array, prices: Array, weight: Array) -> Array:
-    """Forces (k, 1) [N] within the sets of a tick that give a wrench (1, 6) [N, N m], or come near to it.
-
-    Args:
-        robot: the robot.
-        sets: what may follow the previous command.
-        wrench: the target.
-        prices: where to begin (r, 1), such as those of the answer without limits of a tick.
-        weight: of the missing wrench along each axis (6,) [1/N, 1/(N m)].
-    """
+    """Forces (k, 1) [N] within the sets of a tick that give a wrench (1, 6) [N, N m], or come near to it by
+    weights of the axes (6,) [1/N, 1/(N m)]; the search begins at prices (r, 1)."""
     target = robot.target(wrench)
     if not len(target):  # nothing pushes, such as rudders at rest
         return np.zeros((len(robot.effectiveness), 1))
