@@ -31,11 +31,13 @@ class Kind:
     """Answers to prices of m actuators with an effectiveness (m, 3, 6)."""
     angle: int | None = None
     """Which of its commands is an angle that may turn freely."""
+    feels_flow: bool = False
+    """Whether it gives nothing at rest: its force is that of the flow."""
 
 
-def _kind(law: Callable[[Sequence[Any]], ActuatorLaw], group: Any, angle: int | None = None) -> Kind:
+def _kind(law: type[Any], group: Any, angle: int | None = None) -> Kind:
     """A kind whose actuators have one law together."""
-    return Kind(lambda parts: [(np.arange(len(parts)), law(parts))], group, angle)
+    return Kind(lambda parts: [(np.arange(len(parts)), law(parts))], group, angle, law.feels_flow)
 
 
 _AZIMUTH = _kind(AzimuthLaw, AzimuthGroup, angle=0)
@@ -54,8 +56,8 @@ def laws_of(layout: Layout) -> list[tuple[Places, ActuatorLaw]]:
     where a force table cannot be read."""
     groups: list[tuple[Places, ActuatorLaw]] = []
     for places, kind in _kinds(layout):
-        found = kind.laws([layout.actuators[i] for i in places])
-        groups += [(places[among], law) for among, law in found]
+        laws = kind.laws([layout.actuators[i] for i in places])
+        groups += [(places[among], law) for among, law in laws]
     return groups
 
 
@@ -79,9 +81,5 @@ def _kinds(layout: Layout) -> list[tuple[Places, Kind]]:
 
 def free_angles(layout: Layout) -> NDArray[np.bool_]:
     """Which commands (n, 3) are angles; whether they may turn freely depends on their limits."""
-    found = np.zeros((layout.n, 3), bool)
-    for i, actuator in enumerate(layout.actuators):
-        angle = KINDS[actuator.type].angle
-        if angle is not None:
-            found[i, angle] = True
-    return found
+    angles = [KINDS[actuator.type].angle for actuator in layout.actuators]
+    return np.array([[k == angle for k in range(3)] for angle in angles])

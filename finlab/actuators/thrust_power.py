@@ -1,13 +1,18 @@
-"""Power of a propeller over its force: a power law, or a convex curve through a table of measurements."""
+"""Propellers: the law that thrusters share, and their power over the force, a power law or a convex curve
+through a table of measurements."""
 
 from collections.abc import Sequence
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
+from finlab.actuators.law import ActuatorLaw
 from finlab.actuators.response import RadialTable
-from finlab.arrays import AnyArray, Array
+from finlab.arrays import AnyArray, Array, Values
+from finlab.layout.azimuth import Azimuth
 from finlab.layout.thrust_model import PowerLaw, PowerTable, ThrustModel, lower_hull, side_points
+from finlab.layout.thruster import Thruster
 from finlab.precision import NOTHING
 
 
@@ -172,6 +177,31 @@ def radial_table(model: ThrustModel, sign: int, least: float, most: float) -> Ra
         return np.clip(sign * own.answer(sign * price[:, None])[:, 0], least, most)
 
     return RadialTable.of_price(top, answer, rest)
+
+
+class PropellerLaw(ActuatorLaw):
+    """n propellers, one of whose commands is a force; there is none within the dead band."""
+
+    column: int
+    """Which of the three commands it is."""
+
+    def __init__(self, parts: Sequence[Thruster | Azimuth]) -> None:
+        """Takes n thrusters, or n that turn."""
+        self.power_curve = ThrustPower([part.model for part in parts])
+        self.dead_band = np.array([part.dead_band for part in parts])
+
+    def given(self, command: Values) -> Any:
+        """Returns the forces (..., n) [N] of commands (..., n, 3)."""
+        return held(command[..., self.column], self.dead_band)
+
+    def power(self, command: Values, inflow: Array | None = None) -> Values:
+        """See `ActuatorLaw`. Models have electrical power, with the motor's loss; turning takes none."""
+        return self.power_curve.watts(self.given(command))
+
+    def power_gradient(self, command: Array, inflow: Array | None = None) -> Array:
+        gradient = np.zeros(command.shape)
+        gradient[..., self.column] = self.power_curve.marginal(self.given(command))
+        return gradient
 
 
 def held(force: AnyArray, dead_band: Array) -> AnyArray:

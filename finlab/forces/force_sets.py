@@ -22,10 +22,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from finlab.actuators.fin.fin_response import FinGroup
 from finlab.actuators.registry import groups_of, laws_of
 from finlab.actuators.response import Plane, Response
 from finlab.arrays import Array
-from finlab.layout import Fin, Layout
+from finlab.layout import Layout
 from finlab.layout.angles import TURN, wrapped
 from finlab.layout.arrays import own_effectiveness
 from finlab.physics.plant import plant_of
@@ -234,7 +235,7 @@ def shapes_of(layout: Layout, flow: ArrayLike | None = None) -> list[Shape]:
         own = np.broadcast_to(np.eye(3, 6), (rest.n, 3, 6))
         for places, group in groups_of(rest, own):
             for place, response in zip(places, group.responses, strict=True):
-                shapes[rest.names[place]] = _shape(response, isinstance(rest.actuators[place], Fin))
+                shapes[rest.names[place]] = _shape(response, isinstance(group, FinGroup))
     return [shapes[name] for name in layout.names]
 
 
