@@ -38,7 +38,7 @@ NARROWEST = 1e-6
 
 
 class _State(NamedTuple):
-    """R problems on their way; forces are shares of each fin's largest, components before fins."""
+    """R problems on their way; forces are shares of each one's largest, components before actuators."""
 
     full: Array
     """Wrench (R, 2n, m) of the largest forces."""
@@ -46,18 +46,13 @@ class _State(NamedTuple):
     """Outward normals (R, K, 2, n) of the sectors' sides."""
     beyond: Array
     """How far out those sides are (R, K, n); 1 where there is none."""
-    wanted: Array
-    """(R, m)."""
+    wanted: Array  # (R, m), as c and the multiplier
     c: Array
-    """(R, m)."""
-    point: Array
-    """(R, 2, n)."""
+    point: Array  # (R, 2, n)
     multiplier: Array
-    """(R, m)."""
     slack: Array
-    """Of each limit (R, 1 + K, n): the disc, then the sides."""
+    """Of each limit (R, 1 + K, n): the disc, then the sides; as the limits' multipliers, the weights."""
     weight: Array
-    """The limits' multipliers (R, 1 + K, n)."""
     length: Array
     """Of the last step (R,)."""
 

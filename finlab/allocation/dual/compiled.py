@@ -6,7 +6,7 @@ import numpy as np
 
 from finlab.actuators.registry import groups_of
 from finlab.actuators.response import with_square
-from finlab.allocation.dual.robot import DualRobot, dual_robot
+from finlab.allocation.dual.robot import DualRobot
 from finlab.allocation.dual.sets import Sets
 from finlab.arrays import Array
 from finlab.layout import Layout
@@ -38,7 +38,7 @@ class Compiled:
                     self.weight[place] = (response.effectiveness**2 @ self.doubt[place]).sum()
                 weight = float(self.weight[place])
                 responses[place] = with_square(response, weight) if weight else response
-        self.robot: DualRobot = dual_robot(responses)  # type: ignore[arg-type]
+        self.robot: DualRobot = DualRobot(responses)  # type: ignore[arg-type]
         self.beside = sum((group.beside.sum(axis=0) for _, group in self.groups), np.zeros(6))
         """Wrench (6,) [N, N m] that the actuators give beside their answers' forces, such as the drag of
         rudders without lift."""

@@ -67,7 +67,7 @@ def prices_at(problem: CommandProblem, cost: Cost, command: Array, directions: A
     """Returns the prices (r, 1) of normalized `directions` (6, r) at which a command (n, 3) would be the
     cheapest for what it gives: what a change of it adds to the wrench is worth the power that it adds,
     nearly."""
-    jacobian = problem.fin.force_and_jacobian(command[None])[1][0] @ problem.effectiveness
+    jacobian = problem.forces.force_and_jacobian(command[None])[1][0] @ problem.effectiveness
     low, high = problem.edges
     free = (command > low) & (command < high)
     width = problem.width[free]
@@ -108,7 +108,7 @@ def _cheaper_step(problem: CommandProblem, cost: Cost, command: Array) -> tuple[
     """A step (n, 3) of a command along which the wrench stays, and by how much the power would fall [W]."""
     width = np.maximum(problem.width, NOTHING)
     tried = command + np.concatenate([np.zeros((1, 1, 3)), NEARLY * np.eye(3)[:, None]]) * width
-    jacobian = width[:, :, None] * (problem.fin.force_and_jacobian(tried)[1] @ problem.effectiveness)
+    jacobian = width[:, :, None] * (problem.forces.force_and_jacobian(tried)[1] @ problem.effectiveness)
     slope = width * cost.slope(tried)
     low, high = problem.edges
     free = (command > low) & (command < high)

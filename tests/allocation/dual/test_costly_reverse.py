@@ -4,7 +4,7 @@ import numpy as np
 
 from finlab.actuators.response import Line, RadialTable
 from finlab.allocation.dual.newton import solve
-from finlab.allocation.dual.robot import dual_robot
+from finlab.allocation.dual.robot import DualRobot
 
 
 def _table(watts: float, most: float) -> RadialTable:
@@ -15,7 +15,7 @@ def _table(watts: float, most: float) -> RadialTable:
 
 def test_costly_reverse_is_within_reach() -> None:
     lines = [Line(np.eye(6)[i], _table(1.0, 10.0), _table(5.0, 10.0)) for i in range(3)]
-    robot = dual_robot(lines)
+    robot = DualRobot(lines)
     target = robot.basis.T @ (np.array([-9.0, -9.0, -9.0, 0.0, 0.0, 0.0]) / robot.scale)
     found = solve(robot, target[:, None])
     assert found.solved[0] and not found.beyond[0]
