@@ -65,15 +65,9 @@ class RadialTable:
         if len(force) == 1:
             return cls.of_forces(1e-9, np.full(CELLS + 1, force[0]), float(cost[0]))
         chord = np.diff(cost) / np.diff(force)
-        marginal = np.concatenate(
-            [
-                [max(1.5 * chord[0] - 0.5 * chord[min(1, len(chord) - 1)], 0.0)],
-                0.5 * (chord[1:] + chord[:-1]),
-                [chord[-1]],
-            ]
-        )
-        if len(chord) > 1:
-            marginal[-1] = max(1.5 * chord[-1] - 0.5 * chord[-2], chord[-1])
+        first = max(1.5 * chord[0] - 0.5 * chord[min(1, len(chord) - 1)], 0.0)
+        last = max(1.5 * chord[-1] - 0.5 * chord[-2], chord[-1]) if len(chord) > 1 else chord[-1]
+        marginal = np.concatenate([[first], 0.5 * (chord[1:] + chord[:-1]), [last]])
         marginal = np.maximum.accumulate(marginal) + 1e-12 * chord[-1] * np.arange(len(marginal))
         grid = price_grid(float(marginal[-1]))
         return cls.of_forces(float(marginal[-1]), np.interp(grid, marginal, force), float(cost[0]))

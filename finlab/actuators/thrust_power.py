@@ -84,43 +84,37 @@ class Sides:
     def __init__(self, model: PowerTable) -> None:
         """Makes the curves of the sides that the table has."""
         _, force, power = model.columns
-        rest = float(power.min())
-        curves = []
-        for sign in (1, -1):
-            size, watts = side_points(force, power, sign)
-            watts = np.minimum.accumulate(watts[::-1])[::-1]
-            watts[0] = rest
-            curves.append(Curve(*lower_hull(size, watts)) if len(size) > 1 else None)
-        self.rest = rest
+        self.rest = float(power.min())
         """Power at rest [W]."""
-        self.forward, self.reverse = curves
-        """Curves of positive and of negative forces; None for a side that there is not."""
+        self.curves = []
+        """Curves with the sign of their forces, of the sides that there are."""
+        for sign in (1.0, -1.0):
+            size, watts = side_points(force, power, int(sign))
+            watts = np.minimum.accumulate(watts[::-1])[::-1]
+            watts[0] = self.rest
+            if len(size) > 1:
+                self.curves.append((Curve(*lower_hull(size, watts)), sign))
 
     def at(self, force: AnyArray) -> tuple[Array, Array]:
         """Returns power [W] and marginal cost [W/N] of forces [N]."""
         marginal = 0.0 * force  # NaN of a failed one stays
         watts = self.rest + marginal
-        for curve, sign in ((self.forward, 1.0), (self.reverse, -1.0)):
-            if curve is not None:
-                on = force * sign > 0.0
-                watts[on], slope = curve.at(sign * force[on])
-                marginal[on] = sign * slope
+        for curve, sign in self.curves:
+            on = force * sign > 0.0
+            watts[on], slope = curve.at(sign * force[on])
+            marginal[on] = sign * slope
         return watts, marginal
 
     def answer(self, price: Array) -> Array:
         """Returns the forces [N] that are worth most at prices [W/N]; 0 on a side that there is not."""
         force = np.zeros_like(price)
-        for curve, sign in ((self.forward, 1.0), (self.reverse, -1.0)):
-            if curve is not None:
-                on = price * sign > 0.0
-                force[on] = sign * curve.answer(sign * price[on])
+        for curve, sign in self.curves:
+            on = price * sign > 0.0
+            force[on] = sign * curve.answer(sign * price[on])
         return force
 
 
-@lru_cache(maxsize=256)
-def sides_of(model: PowerTable) -> Sides:
-    """Returns the curves of a table, made once."""
-    return Sides(model)
+_sides_of = lru_cache(maxsize=256)(Sides)
 
 
 class ThrustPower:
@@ -134,7 +128,7 @@ class ThrustPower:
             own = [i for i, other in enumerate(kinds) if other == kind]
             laws = [model for model in models if isinstance(model, PowerLaw)]
             places = slice(None) if len(own) == len(models) else np.array(own)
-            self._groups.append((places, ByPower(laws) if kind is None else sides_of(kind)))
+            self._groups.append((places, ByPower(laws) if kind is None else _sides_of(kind)))
 
     def watts(self, force: AnyArray) -> AnyArray:
         """Returns the power [W] of forces (..., n) [N], negative ones in reverse."""

@@ -1,4 +1,4 @@
-"""What an allocation method is: made once for a layout whose fins are all healthy, it solves for wrenches."""
+"""Base of all allocation methods: made once for a layout of healthy actuators, each solves for wrenches."""
 
 from abc import ABC, abstractmethod
 from copy import copy
@@ -43,13 +43,9 @@ class Method(ABC):
     def __init__(
         self, layout: Layout, settings: Settings, scale: Array, weights: TrainedWeights | None = None
     ) -> None:
-        """Prepare the method for a layout.
-
-        Args:
-            layout: the healthy fins, and the axes that count.
-            settings: a `settings_class`.
-            scale: yardstick (6,) of the error [N, N m], of the whole robot.
-            weights: trained networks, for methods that have any.
+        """Prepares the method for a layout of healthy actuators and the axes that count, with settings of its
+        `settings_class`, the yardstick `scale` (6,) [N, N m] of the whole robot, and trained networks, where
+        it has any.
 
         Raises:
             AllocationError: the method cannot work with these settings.
@@ -142,10 +138,9 @@ class Method(ABC):
             return self
         other = copy(self)
         other.plant = plant
-        for name in [
-            key for key in vars(self) if isinstance(getattr(type(self), key, None), cached_property)
-        ]:
-            del other.__dict__[name]
+        for name in vars(self):
+            if isinstance(getattr(type(self), name, None), cached_property):
+                del other.__dict__[name]
         return other
 
     @property
@@ -176,9 +171,9 @@ class LeastErrorMethod(Method):
     def _solve(self, targets: Array, *, seed: int, previous: Array | None) -> Solution:
         """Solve for targets (N, 6); see `Method.solve`."""
 
-    def solve(self, targets: Array, *, flow: Array | None = None, **asked: Any) -> Solution:
+    def solve(self, targets: Array, *, flow: Array | None = None, **question: Any) -> Solution:
         if len(targets) == 0:
             return Solution(np.empty((0, self.layout.n, 3)))
         if (moved := self.at(flow)) is not self:
-            return moved.solve(targets, **asked)
-        return self._solve(targets, seed=asked.get("seed", 0), previous=asked.get("previous"))
+            return moved.solve(targets, **question)
+        return self._solve(targets, seed=question.get("seed", 0), previous=question.get("previous"))

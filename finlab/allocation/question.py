@@ -140,7 +140,7 @@ def check_flow(flow: ArrayLike | None) -> Array | None:
 
 
 def check_layout(layout: object) -> None:
-    """Refuse what is no layout."""
+    """Refuses what is no layout."""
     if not isinstance(layout, Layout):
         raise AllocationError(
             f"layout: expected a Layout, got {layout!r:.60}; read a file with finlab.load_layout"
@@ -148,7 +148,7 @@ def check_layout(layout: object) -> None:
 
 
 def check_seed(seed: object) -> None:
-    """Refuse seeds that are no whole number from 0."""
+    """Refuses seeds that are no whole number from 0."""
     if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
         raise AllocationError(f"seed: expected a whole number from 0, got {seed!r}")
 

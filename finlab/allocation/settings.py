@@ -67,27 +67,23 @@ class Settings:
 
 def _checked(setting: "Field[Any]", value: Any) -> Any:
     """The value of a field, of the kind that is meant."""
-    name, choices, limits = setting.name, setting.metadata.get("choices"), setting.metadata.get("range")
-    expected = None
-    if choices is not None:
-        expected = None if value in choices else f"one of {', '.join(choices)}"
-    elif limits is not None:
+    choices, limits = setting.metadata.get("choices"), setting.metadata.get("range")
+    if limits is not None:
         return _within(setting, limits, value)
-    elif not isinstance(value, bool):
-        expected = "true or false"
-    if expected is not None:
-        raise AllocationError(f"{name}: expected {expected}, got {value!r:.60}")
-    return value
+    if isinstance(value, bool) if choices is None else value in choices:
+        return value
+    expected = "true or false" if choices is None else f"one of {', '.join(choices)}"
+    raise AllocationError(f"{setting.name}: expected {expected}, got {value!r:.60}")
 
 
 def _within(setting: "Field[Any]", limits: Range, value: Any) -> float | None:
     if value is None and setting.default is None:
         return None
-    whole = isinstance(limits.low, int)
-    kind: Any = Integral if whole else Real
+    integer = isinstance(limits.low, int)
+    kind: Any = Integral if integer else Real
     right = isinstance(value, kind) and not isinstance(value, bool)
     if right and limits.low <= value <= limits.high and not (limits.above and value == limits.low):
-        return int(value) if whole else float(value)
+        return int(value) if integer else float(value)
     raise AllocationError(f"{setting.name}: expected {limits}, got {value!r:.60} ({limits.meaning})")
 
 

@@ -173,17 +173,9 @@ class Shape(NamedTuple):
 
 
 def force_sets(layout: Layout, failed: Collection[str] = (), flow: ArrayLike | None = None) -> ForceSets:
-    """Returns what the actuators of one robot can push along the axes that it commands; those called `failed`
-    push nothing, and nothing counts along the other axes.
-
-    Args:
-        layout: the robot.
-        failed: names of actuators that are lost.
-        flow: velocity (6,) of the body relative to the water [m/s, rad/s], body frame; None at rest.
-
-    Raises:
-        LayoutError: there is no actuator of a name in `failed`.
-    """
+    """Returns what the actuators of one robot can push along the axes that it commands; nothing counts along
+    the others. Those in `failed` push nothing, and the body moves through the water with `flow` (6,) [m/s,
+    rad/s], body frame, None at rest. A `LayoutError` at an unknown name."""
     lost = layout.indices(tuple(failed))
     sets = assembled([shapes_of(layout, flow)], own_effectiveness(layout)[None] * layout.commanded)
     sets.lose(0, list(lost))

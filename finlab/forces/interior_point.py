@@ -97,18 +97,11 @@ def _outset(sets: ForceSets, wanted: Array, c: Array) -> _State:
     limits = 1 + sides.shape[1]
     wanted, c = wanted / unit[:, None], np.broadcast_to(np.asarray(c, np.float64), (rows, m))
     pulled = 1.0 + (np.abs(wanted) / np.maximum(c, 1.0)).max(-1)
-    return _State(
-        full.swapaxes(1, 2).reshape(rows, 2 * n, m),
-        sides,
-        beyond,
-        wanted,
-        c,
-        np.zeros((rows, 2, n)),
-        np.zeros((rows, m)),
-        np.full((rows, limits, n), SLACK),
-        np.tile(WEIGHT * pulled[:, None, None], (1, limits, n)),
-        np.ones(rows),
-    )
+    full = full.swapaxes(1, 2).reshape(rows, 2 * n, m)
+    point, multiplier = np.zeros((rows, 2, n)), np.zeros((rows, m))
+    slack = np.full((rows, limits, n), SLACK)
+    weight = np.tile(WEIGHT * pulled[:, None, None], (1, limits, n))
+    return _State(full, sides, beyond, wanted, c, point, multiplier, slack, weight, np.ones(rows))
 
 
 def _unit(sets: ForceSets) -> Array:
@@ -144,9 +137,8 @@ def _sides(sets: ForceSets) -> tuple[Array, Array]:
         return normals, beyond
     rows, n, count = sets.boundary.shape
     angle = 2.0 * np.pi / count * np.arange(count)
-    around = np.broadcast_to(
-        np.stack([np.cos(angle), np.sin(angle)], axis=1)[:, :, None], (rows, count, 2, n)
-    )
+    around = np.stack([np.cos(angle), np.sin(angle)], axis=1)[:, :, None]
+    around = np.broadcast_to(around, (rows, count, 2, n))
     out = np.concatenate([beyond, np.maximum(sets.boundary.swapaxes(1, 2), THINNEST)], axis=1)
     return np.concatenate([normals, around], axis=1), out
 
@@ -192,9 +184,8 @@ def _step(state: _State, tolerance: float) -> tuple[NDArray[np.bool_], Array, _S
     pull = (full @ multiplier[..., None]).reshape(point.shape) - (aim[:, :, None] * slope).sum(1)
     blocks = full.reshape(rows, 2, n, -1)
     x, y = blocks[:, 0], blocks[:, 1]
-    spread = np.concatenate(
-        [xx[..., None] * x + xy[..., None] * y, xy[..., None] * x + yy[..., None] * y], axis=1
-    )
+    a, b, d = xx[..., None], xy[..., None], yy[..., None]
+    spread = np.concatenate([a * x + b * y, b * x + d * y], axis=1)
     gram = full.swapaxes(1, 2) @ spread
     diagonal = gram.reshape(rows, -1)[:, :: gram.shape[-1] + 1]
     diagonal += c + RIDGE * diagonal.sum(1, keepdims=True)
@@ -206,18 +197,9 @@ def _step(state: _State, tolerance: float) -> tuple[NDArray[np.bool_], Array, _S
     growth = aim - weight + ratio * along
     length = np.minimum(_way_to_zero(slack, -astray - along), _way_to_zero(weight, growth))
     length = np.where(done, 0.0, np.minimum(KEPT * length, 1.0))
-    far = length[:, None, None]
-    return (
-        done,
-        off,
-        state._replace(
-            point=point + far * step,
-            slack=slack - far * (astray + along),
-            weight=weight + far * growth,
-            multiplier=multiplier + length[:, None] * turn,
-            length=length,
-        ),
-    )
+    far, multiplier = length[:, None, None], multiplier + length[:, None] * turn
+    point, slack, weight = point + far * step, slack - far * (astray + along), weight + far * growth
+    return done, off, _State(full, sides, beyond, wanted, c, point, multiplier, slack, weight, length)
 
 
 def _wrench(full: Array, point: Array) -> Array:

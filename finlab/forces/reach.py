@@ -126,30 +126,16 @@ class Ranges(NamedTuple):
 def axis_ranges(
     layout: Layout, wrench: ArrayLike, failed: Collection[str] = (), flow: ArrayLike | None = None
 ) -> Ranges:
-    """Returns the range of each axis with the others as in a wrench, too wide by about a millionth at most.
-
-    Args:
-        layout: the robot.
-        wrench: components (6,) [N, N m] that the others are held at.
-        failed: actuators that push nothing.
-        flow: velocity (6,) of the body relative to the water [m/s, rad/s], body frame; None at rest.
-
-    Raises:
-        LayoutError: there is no actuator of a name in `failed`.
-    """
+    """Returns the range of each axis with the others held as in a wrench (6,) [N, N m], too wide by about a
+    millionth at most; `failed`, `flow` and errors are as for `force_sets`."""
     axes = np.concatenate([np.eye(6), -np.eye(6)])
     parts = convex_parts(force_sets(layout, failed, flow))
     n_parts = len(parts.radius)
     basis = orthogonal_complement(axes)
     held = (np.asarray(wrench, dtype=np.float64) / SCALE) @ basis
-    found = largest(
-        parts.repeat(12),
-        np.tile(axes, (n_parts, 1)),
-        np.tile(basis, (n_parts, 1, 1)),
-        np.tile(held, (n_parts, 1)),
-        TOLERANCE,
-    )
-    size = found.size.reshape(n_parts, 2, 6)
+    origin, bases = np.tile(axes, (n_parts, 1)), np.tile(basis, (n_parts, 1, 1))
+    ends = largest(parts.repeat(12), origin, bases, np.tile(held, (n_parts, 1)), TOLERANCE)
+    size = ends.size.reshape(n_parts, 2, 6)
     # Planes that leave nothing between them prove that the five others cannot be had together.
     there = size.sum(axis=1) >= -NOTHING
     high, low = (np.where(there, size[:, k], -np.inf).max(axis=0) for k in range(2))

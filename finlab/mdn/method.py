@@ -155,7 +155,7 @@ class Mdn(Method):
         """What is found for one target within what the servos allow after a previous command (n, 3): the way
         that the robot moves now is kept, and where another is worth it, all fins go towards that."""
         first, plant = free.answers, self.plant
-        rates = Rates.of(plant, self.layout.rates, self.settings.period_s)
+        rates = Rates(plant, self.layout.rates * self.settings.period_s)
         if rates.allow(previous, first.command[0, 0]):
             return free
         near = self.robot.within(rates.box(previous))

@@ -121,30 +121,24 @@ class GridUncertainty:
         return float(np.sqrt(max((away * variance).sum() / max((away**2).sum(), 1e-300), 0.0)))
 
 
-@lru_cache(maxsize=64)
-def grid_uncertainty(law: TableLaw) -> GridUncertainty:
-    """Returns the uncertainty of a table, kept for later."""
-    return GridUncertainty(law)
+grid_uncertainty = lru_cache(maxsize=64)(GridUncertainty)
+"""The uncertainty of a table, kept for later."""
 
 
 def grid_error(grid: Grid) -> TableError:
     """Returns the errors of a grid of forces over their sizes, those of all axes together."""
-    counts = [len(axis) for axis in grid.axes]
-    told = [
-        line_error(
-            count, ORDER if k == 2 and grid.periodic else OPEN_ORDER, WEIGHTS, partial(_missed, grid, k)
-        )
-        for k, count in enumerate(counts)
-        if count >= FEWEST[0]
-    ]
+    counts, orders = [len(axis) for axis in grid.axes], [OPEN_ORDER, OPEN_ORDER, OPEN_ORDER]
+    if grid.periodic:
+        orders[2] = ORDER
     few = tuple(k for k, count in enumerate(counts) if count < FEWEST[0])
-    spacing = float(np.sqrt(sum(own**2 for own, _ in told)))
-    return TableError(spacing, max((noise for _, noise in told), default=0.0), few)
+    many = [k for k in range(3) if k not in few]
+    errors = [line_error(counts[k], orders[k], WEIGHTS, partial(_missed, grid, k)) for k in many]
+    spacing = float(np.sqrt(sum(own**2 for own, _ in errors)))
+    return TableError(spacing, max((noise for _, noise in errors), default=0.0), few)
 
 
 def _missed(grid: Grid, axis: int, step: int) -> Array | None:
-    """Errors of forces at the lines of an axis between those kept, over their sizes, each component in
-    turn."""
+    """Errors of forces at the lines of an axis between those kept, over their sizes, in each component."""
     lines = grid.axes[axis]
     closed = grid.periodic and axis == 2 and len(lines) % step == 0 and len(lines) > step
     kept = np.arange(0, len(lines), step)

@@ -110,11 +110,7 @@ class HermiteGrids:
 def _closed(grid: Grid) -> list[Array]:
     """The axes, a circle closed."""
     amplitude, frequency, direction = grid.axes
-    return [
-        amplitude,
-        frequency,
-        np.append(direction, direction[0] + TURN) if grid.periodic else direction,
-    ]
+    return [amplitude, frequency, np.append(direction, direction[0] + TURN) if grid.periodic else direction]
 
 
 def _with_neighbours(grid: Grid) -> Array:

@@ -169,13 +169,9 @@ def _spline(casadi: Any, grid: Array, values: Array) -> Any:
 
 POLISH, APPROACH = 3, 30
 """Levenberg-Marquardt steps from where IPOPT ends onto the target, or as near as they come."""
-SOLVER_OPTIONS = {
-    "ipopt.print_level": 0,
-    "ipopt.sb": "yes",
-    "ipopt.max_iter": 200,
-    "ipopt.tol": 1e-9,
-    "print_time": False,
-    "error_on_fail": False,
+SOLVER_OPTIONS = {"print_time": False, "error_on_fail": False} | {
+    f"ipopt.{name}": value
+    for name, value in {"print_level": 0, "sb": "yes", "max_iter": 200, "tol": 1e-9}.items()
 }
 
 

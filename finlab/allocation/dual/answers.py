@@ -303,17 +303,10 @@ class Answers:
         nearer = np.where(second * cos - first * sin < 0.0, -1.0, 1.0)
         angle = sets.middle + nearer * sets.half
         end_x, end_y = end_of(angle, gauges)
-        keep = np.where(beyond, 0.0, 1.0)
-        return Fan(
-            np.where(beyond, first * end_x + second * end_y, along),
-            np.where(beyond, end_x, fan_x),
-            np.where(beyond, end_y, fan_y),
-            xx * keep,
-            xy * keep,
-            yy * keep,
-            beyond,
-            sets.middle - nearer * sets.half,
-        )
+        keep, other = np.where(beyond, 0.0, 1.0), sets.middle - nearer * sets.half
+        along = np.where(beyond, first * end_x + second * end_y, along)
+        fan_x, fan_y = np.where(beyond, end_x, fan_x), np.where(beyond, end_y, fan_y)
+        return Fan(along, fan_x, fan_y, xx * keep, xy * keep, yy * keep, beyond, other)
 
     def _uneven(self, x: Array, y: Array, tangent: Array, size: Array) -> tuple[Array, Array, Array, Array]:
         """Directions of the force times the gauges, weights of their change, and prices along them, of those
@@ -321,10 +314,8 @@ class Answers:
         places = self.gauges.places
         value, slope, bend = self.gauges.support(np.arctan2(y[places], x[places]))
         fan_x, fan_y, tangent, along = x.copy(), y.copy(), tangent.copy(), size.copy()
-        fan_x[places], fan_y[places] = (
-            value * x[places] - slope * y[places],
-            value * y[places] + slope * x[places],
-        )
+        own_x, own_y = x[places], y[places]
+        fan_x[places], fan_y[places] = value * own_x - slope * own_y, value * own_y + slope * own_x
         tangent[places] *= np.maximum(value + bend, 0.0)
         along[places] *= value
         return fan_x, fan_y, tangent, along

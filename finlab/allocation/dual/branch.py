@@ -255,10 +255,8 @@ def narrowed(robot: DualRobot, sets: Sets, force: Array, chosen: NDArray[np.bool
             own = np.pad(force[:lines], ((0, planes), (0, 0)))
             edge[dragging], cost[dragging] = own[dragging], robot.answers.marginal(own)[1][dragging]
             above[dragging] = (cut & beyond)[dragging]
-        low[:lines], low_cost[:lines] = (
-            np.where(above, edge, low[:lines]),
-            np.where(above, cost, low_cost[:lines]),
-        )
+        low[:lines] = np.where(above, edge, low[:lines])
+        low_cost[:lines] = np.where(above, cost, low_cost[:lines])
         below = cut & ~above
         high[:lines] = np.where(below, edge, high[:lines])
         high_cost[:lines] = np.where(below, cost, high_cost[:lines])

@@ -41,7 +41,7 @@ class Compiled:
         self.robot: DualRobot = DualRobot(responses)  # type: ignore[arg-type]
         self.beside = sum((group.beside.sum(axis=0) for _, group in self.groups), np.zeros(6))
         """Wrench (6,) [N, N m] that the actuators give beside their answers' forces, such as the drag of
-        rudders without lift."""
+        foils without lift."""
 
     def at(self, inflow: Array | None) -> "Compiled":
         """The same in another flow: velocities (n, 3) [m/s] of the actuators' places in their own frames."""
@@ -52,17 +52,12 @@ class Compiled:
         other._prepare()
         return other
 
-    def forces(self, force: Array) -> Array:
-        """Forces (N, n, 2) [N] of the actuators along their own directions from those of the dual (k, N)."""
+    def commands(self, force: Array, previous: Array | None = None) -> Array:
+        """Commands (N, n, 3) that give forces (k, N) [N] of the dual at least power."""
         lines, planes, order = self.robot.answers.lines, self.robot.answers.planes, self.robot.order
         own = np.zeros((force.shape[1], self.count, 2))
         own[:, order[: lines + planes], 0] = force[: lines + planes].T
         own[:, order[lines:], 1] = force[lines + planes : lines + 2 * planes].T
-        return own
-
-    def commands(self, force: Array, previous: Array | None = None) -> Array:
-        """Commands (N, n, 3) that give forces (k, N) [N] of the dual at least power."""
-        own = self.forces(force)
         command = np.empty((len(own), self.count, 3))
         for places, group in self.groups:
             before = None if previous is None else previous[places]

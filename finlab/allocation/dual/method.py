@@ -101,7 +101,7 @@ class Dual(Method):
 
     @cached_property
     def _rates(self) -> Rates:
-        return Rates.of(self.plant, self.layout.rates, self.settings.period_s)
+        return Rates(self.plant, self.layout.rates * self.settings.period_s)
 
     def at(self, flow: Array | None) -> Self:
         key = b"" if flow is None else flow.tobytes()

@@ -104,15 +104,9 @@ class Planar(NamedTuple):
     @classmethod
     def of(cls, fan: Fan, size: Array, slope: Array) -> "Planar":
         """The answers along a fan of directions, of sizes and their derivatives (p, N)."""
-        x, y = fan.first, fan.second
-        steep_x = slope * x
-        return cls(
-            size * x,
-            size * y,
-            steep_x * x + size * fan.xx,
-            steep_x * y + size * fan.xy,
-            slope * y * y + size * fan.yy,
-        )
+        x, y, steep_x = fan.first, fan.second, slope * fan.first
+        xx, xy = steep_x * x + size * fan.xx, steep_x * y + size * fan.xy
+        return cls(size * x, size * y, xx, xy, slope * y * y + size * fan.yy)
 
 
 def end_of(angle: Array, gauges: Gauges | None) -> tuple[Array, Array]:

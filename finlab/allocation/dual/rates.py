@@ -1,7 +1,7 @@
 """From tick to tick: commands change no faster than the drives of the actuators allow."""
 
 from dataclasses import dataclass
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,13 +42,7 @@ class Rates:
     plant: Plant
     """The robot."""
     step: Array
-    """Largest changes (n, 3); infinite where nothing limits them."""
-
-    @classmethod
-    def of(cls, plant: Plant, rates: Array, period_s: float) -> Self:
-        """Those of a robot whose commands change no faster than `rates` (n, 3) [per second], in ticks of
-        `period_s` [s]."""
-        return cls(plant, rates * period_s)
+    """Largest changes (n, 3) in a tick; infinite where nothing limits them."""
 
     def allow(self, previous: Array, command: Array) -> bool:
         """Whether a command (n, 3) may follow a previous one (n, 3), of which actuators may be NaN."""

@@ -1,7 +1,9 @@
 """A robot as the dual sees it: scaled effectiveness in the range that its actuators span, and their sets."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,12 +66,8 @@ class DualRobot:
         ends = np.cumsum([lines, planes, planes])
         line, first, second, drag = np.split(self.matrix, ends)
         mixed = _products(first, second)
-        parts = [
-            _products(line, line),
-            _products(first, first),
-            mixed + mixed.swapaxes(1, 2),
-            _products(second, second),
-        ]
+        mixed = mixed + mixed.swapaxes(1, 2)
+        parts = [_products(line, line), _products(first, first), mixed, _products(second, second)]
         if len(drag):
             along = _products(line[self.answers.dragging], drag)
             parts += [along + along.swapaxes(1, 2), _products(drag, drag)]
@@ -143,18 +141,12 @@ class DualRobot:
         within = np.clip(size, sets.low, sets.high)
         within[lines:] *= 1.0 - 2.0 * sets.flipped
         cost = self.answers.marginal(within)[1]
-        planar = fixed[lines:]
-        return Sets(
-            np.where(fixed, size, sets.low),
-            np.where(fixed, size, sets.high),
-            np.where(fixed, cost, sets.low_cost),
-            np.where(fixed, cost, sets.high_cost),
-            np.where(planar, np.arctan2(y, x), sets.middle),
-            np.where(planar, 0.0, sets.half),
-            np.where(planar, 0.0, sets.reverse),
-            sets.reverse_cost,
-            sets.flipped,
-        )
+        cut = {"low": size, "high": size, "low_cost": cost, "high_cost": cost}
+        turned = {"middle": np.arctan2(y, x), "half": 0.0, "reverse": 0.0}
+        changes: list[Any] = [(name, value, fixed) for name, value in cut.items()]
+        changes += [(name, value, fixed[lines:]) for name, value in turned.items()]
+        values = {name: np.where(where, value, getattr(sets, name)) for name, value, where in changes}
+        return replace(sets, **values)
 
     def restricted(self, reach: Array) -> Sets:
         """Sets of actuators that give no more than rows (n, 4) of least and largest force [N], middle and
@@ -169,10 +161,6 @@ class DualRobot:
     def price(self, prices: Array) -> Array:
         """Prices (N, 6) [W/N, W/(N m)] of the wrench from those in the basis (r, N) [W]."""
         return np.asarray((self.basis @ prices).T / self.scale)
-
-    def wrench(self, force: Array) -> Array:
-        """Wrenches (N, 6) [N, N m] of forces (k, N)."""
-        return np.asarray(force.T @ self.effectiveness)
 
 
 def _products(a: Array, b: Array) -> Array:
@@ -199,15 +187,9 @@ def limited_sets(answers: Answers, low: Array, high: Array, arcs: Array) -> Sets
     near = np.where(flipped, high, np.where(back, 0.0, low))
     far = np.where(flipped, low, high)
     cost = answers.marginal(np.concatenate([near, far, low], axis=1))[1]
-    both = back & ~flipped
-    return Sets(
-        np.where(plane, np.abs(near), near),
-        np.where(plane, np.abs(far), far),
-        cost[:, :1],
-        cost[:, 1:2],
-        arcs[:, :1] + np.pi * flipped[lines:],
-        arcs[:, 1:],
-        np.where(both, -low, 0.0)[lines:],
-        cost[lines:, 2:],
-        flipped[lines:].astype(np.float64),
-    )
+    reverse = np.where(back & ~flipped, -low, 0.0)[lines:]
+    near, far = np.where(plane, np.abs(near), near), np.where(plane, np.abs(far), far)
+    turned, (low_cost, high_cost, other) = flipped[lines:], np.split(cost, 3, axis=1)
+    middle, half = arcs[:, :1] + np.pi * turned, arcs[:, 1:]
+    flips = turned.astype(np.float64)
+    return Sets(near, far, low_cost, high_cost, middle, half, reverse, other[lines:], flips)
