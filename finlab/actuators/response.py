@@ -80,10 +80,10 @@ class RadialTable:
     def scaled(self, share: float, cost: float = 1.0) -> "RadialTable":
         """The table with `share` times the force, and `cost` times the power, at each command."""
         per = share / cost
-        found = RadialTable(self.top / per, self.force * share, self.slope * share * per, self.rest * cost)
+        result = RadialTable(self.top / per, self.force * share, self.slope * share * per, self.rest * cost)
         known = self.polynomials * [share, share, share, share, cost]
-        found.__dict__["polynomials"] = known  # of many tables scaled in each new flow
-        return found
+        result.__dict__["polynomials"] = known  # of many tables scaled in each new flow
+        return result
 
     def with_square(self, weight: float) -> "RadialTable":
         """The table where a force T [N] costs `weight` T^2 [W] more: what answered a price v now answers

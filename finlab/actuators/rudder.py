@@ -100,10 +100,10 @@ class RudderLaw(ActuatorLaw):
 
     def force_and_jacobian(self, command: Array, inflow: Array | None = None) -> tuple[Array, Array]:
         met = self.met(np.zeros(command.shape) if inflow is None else inflow)
-        found = self.coefficients(command[..., 0] - met.course)
-        force = met.force(found.lift, found.drag)
+        result = self.coefficients(command[..., 0] - met.course)
+        force = met.force(result.lift, result.drag)
         jacobian = np.zeros((*force.shape, 3))
-        jacobian[..., 0, :] = met.force(found.lift_slope, found.drag_slope)
+        jacobian[..., 0, :] = met.force(result.lift_slope, result.drag_slope)
         return force, jacobian
 
     def power(self, command: Values, inflow: Array | None = None) -> Values:
@@ -130,9 +130,9 @@ class RudderGroup(Group):
         self._law, self._effectiveness = RudderLaw(rudders), effectiveness[:, 1:]
         self._limits = np.array([rudder.deflection for rudder in rudders])
         angle = np.linspace(0.0, 0.3 * np.pi, CELLS)[:, None] + np.zeros(len(rudders))
-        found = self._law.coefficients(angle)
+        result = self._law.coefficients(angle)
         self._curves, self._tables = [], []
-        for lift, drag in zip(found.lift.T, found.drag.T, strict=True):
+        for lift, drag in zip(result.lift.T, result.drag.T, strict=True):
             falls = np.append(np.diff(lift) <= 0.0, True)
             last = int(np.argmax(lift >= PEAK * lift[np.argmax(falls)])) + 1
             self._curves.append((lift[:last], angle[:last, 0], drag[:last]))
@@ -178,8 +178,8 @@ class RudderGroup(Group):
         for count in (POINTS, 16, 16):
             step = (high - low) / count
             angle = low + step * np.arange(count + 1)[:, None, None]
-            found = self._law.coefficients(angle - self._met.course)
-            worth = gain * found.lift - cost * (found.drag - self._law.drag)
+            result = self._law.coefficients(angle - self._met.course)
+            worth = gain * result.lift - cost * (result.drag - self._law.drag)
             best = np.clip(worth.argmax(axis=0)[None], 1, count - 1)
             middle = np.take_along_axis(angle, best, axis=0)[0]
             low, high = middle - step, middle + step

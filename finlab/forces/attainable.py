@@ -121,17 +121,17 @@ def attainable_set(
     points = support(np.concatenate([axes, spread / np.linalg.norm(spread, axis=-1, keepdims=True)]))[0]
     if sets.center is None:  # every actuator may rest
         points = np.concatenate([points, np.zeros((1, 3))])
-    found = _hull_of(points, kind)
+    result = _hull_of(points, kind)
     for round_ in count():
-        new, reach = support(found.normals)
-        beyond = reach - found.offsets
+        new, reach = support(result.normals)
+        beyond = reach - result.offsets
         size = float(np.linalg.norm(points, axis=-1).max())
         far = beyond > tolerance * size
         if round_ == MAX_ROUNDS or not far.any():
             break
-        points = np.concatenate([found.vertices, new[far]])
-        found = _hull_of(points, kind)
-    return replace(found, gap=max(float(beyond.max()), 0.0))
+        points = np.concatenate([result.vertices, new[far]])
+        result = _hull_of(points, kind)
+    return replace(result, gap=max(float(beyond.max()), 0.0))
 
 
 Support = Callable[[Array], tuple[Array, Array]]

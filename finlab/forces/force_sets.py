@@ -1,10 +1,10 @@
-"""What each actuator can push, as a convex set in a plane of its own, and how that adds up to a wrench.
+"""Convex sets of what each actuator can push, in a plane of its own, and how these add up to a wrench.
 
 A fin or an azimuth that may turn a full circle pushes anywhere within a disc whose radius is its largest
 thrust. With stops it pushes within a sector of that disc. A sector wider than half a turn is not convex: here
 it stands for its convex hull, the disc cut off along the chord between the stops, unless `convex_parts` has
 cut it in two. Where a fin pushes harder in some directions than in others, the disc is cut down to its convex
-hull, too. A thruster pushes along a line, one way or both. What feels the flow, such as a rudder, pushes what
+hull, too. A thruster pushes along a line, one way or both. What feels the flow, such as a foil, pushes what
 its law gives between its limits: here the convex hull of that, a polygon. Dead bands, and the tiny thrust
 that a fin cannot go below, are left out; an azimuth that cannot stop has the polygon around what is left, one
 that pushes either way within an arc that around both parts.
@@ -70,7 +70,7 @@ class ForceSets(NamedTuple):
     """Force (R, n, 2) [N] from which an actuator's set is seen; None where all are seen from 0."""
     corners: Array | None = None
     """Corners (R, n, K, 2) [N] of polygons from their centres, counter-clockwise, the last one repeated;
-    0 for other actuators; None where there is none. An actuator of one command, such as a rudder, has a half
+    0 for other actuators; None where there is none. An actuator of one command, such as a foil, has a half
     of 0: it gives only one side of its polygon, and counts as one direction."""
 
     def take(self, rows: NDArray[np.bool_] | NDArray[np.intp]) -> ForceSets:
@@ -195,8 +195,8 @@ def assembled(shapes: Sequence[Sequence[Shape]], effectiveness: Array) -> ForceS
         if name == "corners":
             last = np.arange(most)
             values = [None if own is None else own[np.minimum(last, len(own) - 1)] for own in values]
-        found = np.array([rest if value is None else value for value in values], np.float64)
-        return found.reshape(len(shapes), -1, *found.shape[1:])
+        result = np.array([rest if value is None else value for value in values], np.float64)
+        return result.reshape(len(shapes), -1, *result.shape[1:])
 
     return ForceSets(
         np.ascontiguousarray(gathered("directions") @ effectiveness / SCALE),

@@ -64,10 +64,10 @@ def largest(
     free = seen.farthest(across)[0]
     normal = np.where((free < size)[:, None], across, normal)
     size = np.minimum(size, free)
-    given = seen.wrench(force)
+    actual = seen.wrench(force)
     # A wrench that is not where it was asked for proves nothing.
-    beside = np.abs(given - wanted)[:, 1:].max(-1, initial=0.0)
-    proven = np.where(beside <= BESIDE * full.max(-1), given[:, 0], 0.0)
+    extra = np.abs(actual - wanted)[:, 1:].max(-1, initial=0.0)
+    proven = np.where(extra <= BESIDE * full.max(-1), actual[:, 0], 0.0)
     return Largest(
         size, np.maximum(size - proven, 0.0), force, sets.wrench(force), (frame @ normal[..., None])[..., 0]
     )
@@ -75,11 +75,11 @@ def largest(
 
 def max_wrench_along(sets: ForceSets, direction: Array, tolerance: float = FINE) -> Largest:
     """Returns the largest wrenches that point exactly along unit `direction` (R, m), all else zero."""
-    found = largest(sets, direction, orthogonal_complement(direction), tolerance=tolerance)
+    result = largest(sets, direction, orthogonal_complement(direction), tolerance=tolerance)
     if sets.center is not None:  # where rest is out of reach, a direction may meet nothing at all
-        unmet = (found.size < 0.0) | (found.gap > UNPROVEN * (1.0 + found.size))
-        found.size[unmet] = found.gap[unmet] = 0.0
-    return found
+        unmet = (result.size < 0.0) | (result.gap > UNPROVEN * (1.0 + result.size))
+        result.size[unmet] = result.gap[unmet] = 0.0
+    return result
 
 
 def max_wrench_along_exactly(sets: ForceSets, directions: Array) -> tuple[Array, float]:
@@ -87,8 +87,8 @@ def max_wrench_along_exactly(sets: ForceSets, directions: Array) -> tuple[Array,
     Wide sectors count as their convex parts, with too many of them some as hulls, see `convex_parts`."""
     robots, n = len(sets.radius), len(directions)
     parts = convex_parts(sets)
-    found = max_wrench_along(parts.repeat(n), np.tile(directions, (len(parts.radius), 1)))
-    size, proven = (v.reshape(-1, robots, n).max(axis=0) for v in (found.size, found.size - found.gap))
+    result = max_wrench_along(parts.repeat(n), np.tile(directions, (len(parts.radius), 1)))
+    size, proven = (v.reshape(-1, robots, n).max(axis=0) for v in (result.size, result.size - result.gap))
     return size, float((size - proven).max())
 
 

@@ -1,4 +1,4 @@
-"""What is known of how far the forces of a robot's actuators may be from their laws and tables.
+"""Known uncertainties of a robot's actuators: how far their forces may be from laws and tables.
 
 A layout says it (`uncertainty` of an actuator); where it does not, a table tells by its own standard
 deviations and by the error of its grid.
@@ -56,14 +56,14 @@ def uncertainties(layout: Layout) -> tuple[Known | None, ...]:
 
 @lru_cache(maxsize=256)
 def _known(layout: Layout, stamps: tuple[tuple[int, int] | None, ...]) -> tuple[Known | None, ...]:
-    found = tuple(map(_of, layout.actuators))
-    return tuple(own if own and (own.table or own.share or own.floor) else None for own in found)
+    result = tuple(map(_of, layout.actuators))
+    return tuple(own if own and (own.table or own.share or own.floor) else None for own in result)
 
 
 def _of(part: Actuator) -> Known | None:
-    told = part.uncertainty
-    if told is not None:
-        return Known(told.share, told.floor, told.common, told.correlation)
+    said = part.uncertainty
+    if said is not None:
+        return Known(said.share, said.floor, said.common, said.correlation)
     if isinstance(part, Fin):
         law = make_law(part.model)
         if not isinstance(law, TableLaw):

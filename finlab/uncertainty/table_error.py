@@ -60,8 +60,8 @@ def thrust_table_error(model: PowerTable) -> tuple[float, float]:
     def missed(step: int) -> Array:
         kept = np.arange(0, len(command), step)
         left = np.arange(step // 2, kept[-1], step)
-        found = np.interp(command[left], command[kept], force[kept])
-        return np.asarray((found - force[left]) / np.hypot(force[left], floor))
+        result = np.interp(command[left], command[kept], force[kept])
+        return np.asarray((result - force[left]) / np.hypot(force[left], floor))
 
     share = float(np.hypot(*line_error(len(command), 2, 0.5, missed)))
     return share, share * floor

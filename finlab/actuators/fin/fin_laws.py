@@ -42,8 +42,8 @@ class GridLaw(FinLaw):
 
     def force_and_jacobian(self, command: Array, inflow: Array | None = None) -> tuple[Array, Array]:
         """See `FinLaw`; exact derivatives of the interpolation."""
-        found = self._grids(command, 2)[..., :3]
-        return found[..., 0, 0, 0, :], _jacobian(found)
+        result = self._grids(command, 2)[..., :3]
+        return result[..., 0, 0, 0, :], _jacobian(result)
 
     def power(self, command: Values, inflow: Array | None = None) -> Values:
         if not self.has_power:
@@ -54,8 +54,8 @@ class GridLaw(FinLaw):
     def power_gradient(self, command: Array, inflow: Array | None = None) -> Array:
         if not self.has_power:
             return super().power_gradient(command)
-        found = self._grids(command, 2)[..., 3:]
-        return _jacobian(found)[..., 0] * (found[..., 0, 0, 0, :] > 0.0)
+        result = self._grids(command, 2)[..., 3:]
+        return _jacobian(result)[..., 0] * (result[..., 0, 0, 0, :] > 0.0)
 
 
 class TableLaw(GridLaw):
@@ -84,9 +84,9 @@ class TableLaw(GridLaw):
         """Standard deviations of the forces at the grid's points (a, f, d, 3) [N], where they are known."""
 
 
-def _jacobian(found: Array) -> Array:
+def _jacobian(mixed: Array) -> Array:
     """First derivatives (..., 3 commands, c) of values and mixed derivatives (..., 2, 2, 2, c)."""
-    by = found[..., 1, 0, 0, :], found[..., 0, 1, 0, :], found[..., 0, 0, 1, :]
+    by = mixed[..., 1, 0, 0, :], mixed[..., 0, 1, 0, :], mixed[..., 0, 0, 1, :]
     return np.stack(by, axis=-2)
 
 
@@ -134,10 +134,10 @@ def file_stamp(spec: FinModelSpec) -> tuple[int, int] | None:
         return None
     path = str(spec.values()["path"])
     try:
-        found = os.stat(archive_around(path) or path)
+        result = os.stat(archive_around(path) or path)
     except (OSError, ValueError):
         return 0, 0
-    return found.st_mtime_ns, found.st_size
+    return result.st_mtime_ns, result.st_size
 
 
 def file_stamps(layout: Layout) -> tuple[tuple[int, int] | None, ...]:

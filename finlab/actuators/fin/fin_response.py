@@ -66,7 +66,6 @@ class FinGroup(Group):
         limits."""
         tables = [fin_table(fin) for fin in fins]
         self._tables = tables
-        self._laws = [make_law(fin.model) for fin in fins]
         self._stacked = stack_laws([fin.model for fin in fins])
         self.responses = [
             Plane(matrix[1:], each.table, each.middle, each.half, each.gauge)
@@ -87,12 +86,12 @@ class FinGroup(Group):
         x, y = force[..., 0], force[..., 1]
         angle, size = np.arctan2(y, x), np.hypot(x, y)
         command = self._command(angle, size)
-        given = self._force(command)
-        asked = np.maximum(2.0 * size - np.hypot(given[..., 1], given[..., 2]), 0.0)
+        actual = self._force(command)
+        wanted = np.maximum(2.0 * size - np.hypot(actual[..., 1], actual[..., 2]), 0.0)
         if not self._even:
-            lean = wrapped(angle - np.arctan2(given[..., 2], given[..., 1]))
+            lean = wrapped(angle - np.arctan2(actual[..., 2], actual[..., 1]))
             angle = angle + np.where(size > 0.0, lean, 0.0)
-        return self._command(angle, asked)
+        return self._command(angle, wanted)
 
     def _force(self, command: Array) -> Array:
         if len(self._stacked) == 1:
@@ -125,15 +124,15 @@ class FinGroup(Group):
 
     def radial_worth(self, price: Array, back: Array) -> Array:
         """See `Group`: from the commands of the table on both sides of each price, by the law."""
-        found = np.empty(price.shape)
+        result = np.empty(price.shape)
         for i, table in enumerate(self._tables):
             paid = np.maximum(price[:, i], 0.0)
             place = np.interp(paid, price_grid(table.table.top), table.table.force) / self._largest[i]
             cell = np.minimum((np.sqrt(place) * POINTS).astype(np.intp), POINTS - 1)
             starts = np.stack([table.beat[np.clip(cell + k, 0, POINTS)] for k in (-1, 0, 1, 2)])
             command = table.box.best(paid, starts)
-            found[:, i] = price[:, i] * table.box.force(command) - table.box.power(command)
-        return found
+            result[:, i] = price[:, i] * table.box.force(command) - table.box.power(command)
+        return result
 
     def reach(self, lower: Array, upper: Array) -> Array:
         """See `Group`: sizes are those of a few commands between the limits, at the middle of the arc."""
@@ -148,14 +147,14 @@ class FinGroup(Group):
 
 def fin_table(fin: Fin) -> FinTable:
     """One fin, compiled or kept from the last time; arguments and errors as for `FinGroup`."""
-    found = _compiled(fin.model, fin.limits, file_stamp(fin.model))
-    if found is None:
+    result = _compiled(fin.model, fin.limits, file_stamp(fin.model))
+    if result is None:
         raise DataError(
             f"{fin.name}: gives no thrust within its limits, amplitudes {fin.limits.amplitude[0]:.4g} to "
             f"{fin.limits.amplitude[1]:.4g} rad and frequencies {fin.limits.frequency[0]:.4g} to "
             f"{fin.limits.frequency[1]:.4g} Hz; widen the limits or leave the fin out"
         )
-    return found
+    return result
 
 
 @lru_cache(maxsize=512)
@@ -250,13 +249,13 @@ class _Box:
             step = np.clip(_uphill_steps(beat, slope, curve), -longest, longest)
             trial = np.clip(np.concatenate([step, 0.2 * step]) + beat, low, high)
             command = self.command(trial)
-            found = price * self.force(command) - self.power(command)
-            best = found.argmax(axis=0)
-            better = found[best, row] > value
+            result = price * self.force(command) - self.power(command)
+            best = result.argmax(axis=0)
+            better = result[best, row] > value
             if not better.any():
                 break
             beat = np.where(better[:, None], trial[best, row], beat)
-            value = np.where(better, found[best, row], value)
+            value = np.where(better, result[best, row], value)
         return self.command(beat)
 
     def _worth_derivatives(self, price: Array, beat: Array, probe: Array) -> tuple[Array, Array]:

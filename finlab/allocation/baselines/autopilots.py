@@ -108,9 +108,9 @@ def normalised(mix: Array) -> tuple[Array, Array]:
     thrust = thrust[thrust > 1e-9]
     scale = np.array([max(tilt)] * 2 + [mix[:, YAW].max()] + [thrust.mean() if len(thrust) else 1.0] * 3)
     scale = np.where(scale > 1e-9, scale, 1.0)
-    found = mix / scale
-    found[np.abs(found) < NEGLIGIBLE] = 0.0
-    return found, scale
+    result = mix / scale
+    result[np.abs(result) < NEGLIGIBLE] = 0.0
+    return result, scale
 
 
 def _gain(u: Array, column: Array, low: Array, high: Array) -> Array:
@@ -143,9 +143,9 @@ class ArduSub(LeastErrorMethod):
         effectiveness = self.plant.effectiveness[:, 0, COLUMNS] * SUB_SIGNS
         self.factors = frame_factors(effectiveness)
         """Factors (n, 6)."""
-        given = (effectiveness * self.factors).sum(axis=0)
+        actual = (effectiveness * self.factors).sum(axis=0)
         # Newton per unit of the wrench; an axis that the factors do not serve is left out.
-        self._per = np.divide(self.factors, given, out=np.zeros_like(self.factors), where=given > 1e-9)
+        self._per = np.divide(self.factors, actual, out=np.zeros_like(self.factors), where=actual > 1e-9)
 
     def _solve(self, targets: Array, *, seed: int, previous: Array | None) -> Solution:
         lower, upper = self.plant.lower[:, 0], self.plant.upper[:, 0]
@@ -180,7 +180,7 @@ def frame_factors(effectiveness: Array) -> Array:
         row, own = linear_sum_assignment(distance.min(axis=0))
         if distance.min(axis=0)[row, own].max() <= ALIKE:
             sign = np.where(distance[0, row, own] <= distance[1, row, own], 1.0, -1.0)
-            found: Array = np.empty_like(served)
-            found[own] = sign[:, None] * frame[row]
-            return found
+            result: Array = np.empty_like(served)
+            result[own] = sign[:, None] * frame[row]
+            return result
     return suggested

@@ -105,10 +105,10 @@ class _Line:
         force = np.zeros((len(grid), len(group.responses), 2))
         at_rest = group.beside_of(force)
         force[:, place, 0] = most * grid
-        beside = group.beside_of(force) - at_rest
-        self.beside: Any = _spline(casadi, grid, beside.ravel())(share[0]) if beside.any() else 0.0
+        extra = group.beside_of(force) - at_rest
+        self.beside: Any = _spline(casadi, grid, extra.ravel())(share[0]) if extra.any() else 0.0
         """Wrench (6,) in CasADi that comes on top."""
-        self.convex = not beside.any()
+        self.convex = not extra.any()
         """Whether the wrench is linear in the force."""
 
     def random(self, rng: np.random.Generator) -> Array:

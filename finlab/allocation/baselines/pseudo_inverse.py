@@ -35,7 +35,7 @@ class PseudoInverse:
         self.responses: list[Response] = [self.groups[k][1].responses[j] for _, k, j in self.places]
         """What each offers."""
         self.beside = sum((group.beside.sum(axis=0) for _, group in self.groups), np.zeros(6))
-        """Wrench (6,) [N, N m] of forces of 0, such as the drag of rudders."""
+        """Wrench (6,) [N, N m] of forces of 0, such as the drag of foils."""
         along = [np.reshape(each.effectiveness, (-1, 6)) for each in self.responses]
         both = [np.concatenate([rows, np.zeros((2 - len(rows), 6))]) for rows in along]
         self.effectiveness: Array = np.concatenate(both).T

@@ -5,7 +5,7 @@ first directions of planes, second directions of planes, what lines drag along. 
 of a conjugate: a line's `T(|s|) sign(s)`, a plane's `T(v) g` with `v = s . g` and `g` the direction of the
 force, its size the gauge.
 
-A line that drags, such as a rudder, gives the force T and with it the drag that its power says, U times the
+A line that drags, such as a foil, gives the force T and with it the drag that its power says, U times the
 drag. Where drag is paid `a` [W/N], a force is as dear as r = 1 - a/U times its power: it answers a price v as
 another one answers v/r. Where r < 0, drag is welcome, and is what the dearer end gives: r is softened to a
 positive number s(r), and the conjugate s c*(v/s) has (s - r) times the largest power on top, which is convex.

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from finlab.allocation.dual.branch import HOLLOW, STEPS_AT_KINK, gaps, least_power, may_have_gaps
 from finlab.allocation.dual.compiled import Compiled, price_of_doubt, proved_power
-from finlab.allocation.dual.drag import Cost, cheapened, exact_command, prices_at
+from finlab.allocation.dual.drag import EXACT, Search
 from finlab.allocation.dual.newton import MOST_STEPS, Deadline, Prices, dual_value, solve, start
 from finlab.allocation.dual.policies import Nearest, nearest
 from finlab.allocation.dual.rates import Rates, within_tick
@@ -31,10 +31,8 @@ from finlab.layout.wrench_axes import axes_in, mask_of
 from finlab.physics.wrench import wrench_of_forces
 from finlab.precision import CLOSE, FINE, NEARLY, NOTHING, ROUNDING, ROUNDS
 
-EXACT = 1e-8
-"""Error, on the robot's yardstick, up to which commands need no further step."""
 TICK_STEPS = 5
-"""The same where a command of a tick is not exact."""
+"""Steps of a command of a tick that is not exact."""
 STEPS_WITH_DRAG = 2 * ROUNDS
 """Newton's steps from the prices of commands near to a target."""
 
@@ -92,12 +90,8 @@ class Dual(Method):
         self._last: tuple[bytes, Self] | None = None
 
     @cached_property
-    def _problem(self) -> CommandProblem:
-        return CommandProblem.of(self.plant, self.scale)
-
-    @property
-    def _cost(self) -> Cost:
-        return Cost(self.plant, self.compiled.weight)
+    def _search(self) -> Search:
+        return Search(CommandProblem.of(self.plant, self.scale), self.compiled.weight)
 
     @cached_property
     def _rates(self) -> Rates:
@@ -184,7 +178,7 @@ class Dual(Method):
         share = np.random.default_rng(0).random((ROUNDS, *lower.shape))
         share[..., :-1] **= 4
         start = lower + share * (upper - lower)
-        best = exact_command(self._problem, self._cost, np.zeros(6), start, EXACT)
+        best = self._search.exact(np.zeros(6), start)
         return None if best is None else best.command
 
     def _not_held(self, targets: Array) -> set[str]:
@@ -232,7 +226,7 @@ class Dual(Method):
         target, drags = robot.target(targets), len(robot.answers.dragging) > 0
         if drags and len(targets) > 1:
             return Forces.joined([self._forces(one[None], policy, deadline) for one in targets])
-        if not len(target):  # nothing pushes, such as rudders at rest
+        if not len(target):  # nothing pushes, such as foils at rest
             nothing = np.zeros((len(robot.effectiveness), len(targets)))
             none = np.zeros((len(targets), 6))
             return Forces(nothing, none, np.all(targets == 0.0, axis=1), target, np.zeros(len(targets)), none)
@@ -242,7 +236,7 @@ class Dual(Method):
             first = robot.answers(robot.matrix @ start(robot, target, sets)[0], sets).force
             steps, near = STEPS_WITH_DRAG, self.compiled.commands(first)[0]
             if prices is None:
-                prices = prices_at(self._problem, self._cost, near, self._directions)
+                prices = self._search.prices(near, self._directions)
         root = solve(robot, target, sets, prices, steps)
         within = root.solved | (~root.beyond & torn)
         if robot.basis.shape[1] < 6:
@@ -273,15 +267,15 @@ class Dual(Method):
     ) -> tuple[Array, Array]:
         """A command (1, n, 3) for a wrench (6,) from forces (k, 1) near to it, or the first ones, NaN where
         there is none; and its prices (r, 1)."""
-        robot, problem, cost = self.compiled.robot, self._problem, self._cost
+        robot, search = self.compiled.robot, self._search
         aim, prices, begin = wrench + self.compiled.beside, root.prices, self.compiled.commands(force)
         if root.solved[0] and self._error(begin, aim[None])[0] <= EXACT:
             return begin, prices
-        value, best_of = root.value, partial(cheapened, problem, cost, aim / self.scale, enough=EXACT)
+        value, best_of = root.value, partial(search.cheapest, aim / self.scale)
         best = best_of(np.concatenate([begin, self.compiled.commands(first)]))
         if best is not None:
             if not root.solved[0]:
-                tried = prices_at(problem, cost, best.command, self._directions)
+                tried = search.prices(best.command, self._directions)
                 prices = np.concatenate([prices, tried], axis=1)
                 value = dual_value(robot, robot.target(wrench[None]), robot.sets, prices)
                 prices = prices[:, value.argmax()][:, None]
@@ -329,8 +323,8 @@ class Dual(Method):
         cut = least_power(robot, target[:, rows], sets.take(rows), root.take(rows), deadline)
         force = root.force.copy()
         force[:, rows] = cut.force
-        within[rows[~cut.found]] = False
-        value[rows] = np.where(cut.found, cut.value * (1.0 - FINE), 0.0)
+        within[rows[~cut.met]] = False
+        value[rows] = np.where(cut.met, cut.value * (1.0 - FINE), 0.0)
         return force, value
 
     def _commands(self, aim: Array, forces: Forces, previous: Array | None = None) -> Array:
@@ -347,14 +341,14 @@ class Dual(Method):
             command[rough] = np.where(np.isnan(own), command[rough], own)
         # Steps that lead nowhere depend on the last bit: with drag each target goes its way alone.
         for rows in [rough] if forces.command is None else np.split(rough, range(1, len(rough))):
-            ends = refine(self._problem, aim[rows] / self.scale, command[rows], ROUNDS, EXACT)
+            ends = refine(self._search.problem, aim[rows] / self.scale, command[rows], ROUNDS, EXACT)
             command[rows] = ends.command
             for row in rows[(ends.error > NEARLY) & forces.within[rows]].tolist():
                 # Such as idle fins in line, or a least force: no small change of these commands helps.
                 draw = np.random.default_rng(0).uniform(-1.0, 1.0, (2 * ROUNDS, *command.shape[1:]))
                 shares = np.geomspace(HOLLOW, 1.0, len(draw))[:, None, None]
-                starts = command[row] + shares * draw * self._problem.width
-                other = exact_command(self._problem, self._cost, aim[row] / self.scale, starts, EXACT)
+                starts = command[row] + shares * draw * self._search.problem.width
+                other = self._search.exact(aim[row] / self.scale, starts)
                 command[row] = command[row] if other is None else other.command
         return self.plant.rested(command)
 
@@ -368,7 +362,7 @@ class Dual(Method):
         a previous one (n, 3); `forces` is the answer without limits of that kind."""
         box = self._rates.box(previous)
         sets, full = self.compiled.within(box.lower, box.upper), box.free[:, 2] & self.plant.full_turn
-        problem = replace(self._problem, lower=box.lower, upper=box.upper, full_turn=full)
+        problem = replace(self._search.problem, lower=box.lower, upper=box.upper, full_turn=full)
         wrench = aim - self.compiled.beside
         force = within_tick(self.compiled.robot, sets, wrench, forces.prices, 1.0 / self.scale)
         command = self.plant.feasible(box.clipped(self.compiled.commands(force, previous)))

@@ -99,13 +99,13 @@ def farthest_along(farthest: Farthest, rows: Array, ray: Array) -> Mixture:
     share of the ray is in the set, the point is the nearest one to rest.
     """
     share, normal = 1.0, ray
-    found, last = None, np.inf
+    result, last = None, np.inf
     while True:
         along, price = float(normal @ ray), rows @ normal
         bound = float(farthest(price) @ price) / along if along > 0.0 else 0.0
         share = min(max(bound, 0.0), share)
-        found = nearest_point(farthest, rows, share * ray, found, apart=0.5)
-        normal = -found.miss
+        result = nearest_point(farthest, rows, share * ray, result, apart=0.5)
+        normal = -result.miss
         if share == 0.0 or float(np.linalg.norm(normal)) <= 2.0 * CLOSE_BY or share >= last:
-            return found
+            return result
         last = share

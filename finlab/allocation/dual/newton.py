@@ -78,10 +78,10 @@ class Prices(NamedTuple):
         parts: list[Any] = [values[..., columns] for values in self]
         return Prices(*parts)
 
-    def put(self, columns: NDArray[np.intp], found: "Prices") -> None:
-        """Replaces what was found for some of the targets."""
-        for values, new in zip(self, found, strict=True):
-            values[..., columns] = new
+    def put(self, columns: NDArray[np.intp], new: "Prices") -> None:
+        """Replaces what was known for some of the targets."""
+        for values, own in zip(self, new, strict=True):
+            values[..., columns] = own
 
 
 class _State(NamedTuple):
@@ -144,7 +144,7 @@ def solve(
         prices, saturated = start(robot, target, sets)
         ridge[saturated] = SATURATED_RIDGE
     most = sets.most_cost * (1.0 + 1e-9) + 1e-9 + np.zeros(count)
-    place, growth, found = np.arange(count), np.full(count, 2.0), None
+    place, growth, result = np.arange(count), np.full(count, 2.0), None
     with np.errstate(invalid="ignore"):  # systems without an inverse are told by what is not finite
         state = _state(robot, target, prices, sets)
         for steps in range(most_steps + 1):
@@ -156,12 +156,12 @@ def solve(
             if done.any():
                 taken = np.full(len(place), steps)
                 own = Prices(state.prices, state.force, state.value, solved, beyond, taken)
-                if found is None:
-                    found = own.take(np.arange(count))
+                if result is None:
+                    result = own.take(np.arange(count))
                 if done.all():
-                    found.put(place, own)
+                    result.put(place, own)
                     break
-                found.put(place[done], own.take(np.flatnonzero(done)))
+                result.put(place[done], own.take(np.flatnonzero(done)))
                 left = np.flatnonzero(~done)
                 place, ridge, growth, most = place[left], ridge[left], growth[left], most[left]
                 state, sets = _State(*(values[..., left] for values in state)), sets.take(left)
@@ -179,8 +179,8 @@ def solve(
             elif good.any():
                 both = zip(trial, state, strict=True)
                 state = _State(*(np.where(good, new, old) for new, old in both))
-    assert found is not None  # the last step ends all
-    return found
+    assert result is not None  # the last step ends all
+    return result
 
 
 def dual_value(robot: DualRobot, target: Array, sets: Sets, prices: Array) -> Array:

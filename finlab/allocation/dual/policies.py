@@ -62,8 +62,8 @@ def nearest(
         for each in cut:
             heapq.heappush(parts, served(each))
     inside = np.zeros(6) if policy.kind == "direction" else robot.effectiveness.T @ robot.middle(part)
-    given = robot.effectiveness.T @ force
-    met = np.where(np.abs(given - wrench) <= FINE * yardstick, wrench, given)
+    actual = robot.effectiveness.T @ force
+    met = np.where(np.abs(actual - wrench) <= FINE * yardstick, wrench, actual)
     return cheapest(robot, part, force, inside, met, deadline)
 
 
@@ -101,10 +101,10 @@ def cheapest(
     inwards = (inside - wrench) / max(1.0, float(np.linalg.norm((inside - wrench) / robot.scale)))
     aims = [wrench, wrench + NEARLY * inwards]
     for aim in aims if wanted is None else [wanted, *aims]:
-        found = solve(robot, robot.target(aim[None]), sets, None, STEPS_AT_RIM, deadline)
-        if found.solved[0]:
-            return Nearest(found.force[:, 0], aim, found.prices[:, 0])
-    return Nearest(force, wrench, found.prices[:, 0])
+        result = solve(robot, robot.target(aim[None]), sets, None, STEPS_AT_RIM, deadline)
+        if result.solved[0]:
+            return Nearest(result.force[:, 0], aim, result.prices[:, 0])
+    return Nearest(force, wrench, result.prices[:, 0])
 
 
 def closest(robot: DualRobot, sets: Sets, wrench: Array, policy: Policy, yardstick: Array) -> Array:

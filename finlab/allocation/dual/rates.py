@@ -67,10 +67,10 @@ def within_tick(robot: DualRobot, sets: Sets, wrench: Array, prices: Array, weig
     """Forces (k, 1) [N] within the sets of a tick that give a wrench (1, 6) [N, N m], or come near to it by
     weights of the axes (6,) [1/N, 1/(N m)]; the search begins at prices (r, 1)."""
     target = robot.target(wrench)
-    if not len(target):  # nothing pushes, such as rudders at rest
+    if not len(target):  # nothing pushes, such as foils at rest
         return np.zeros((len(robot.effectiveness), 1))
-    found = solve(robot, target, sets, prices)
-    if found.solved[0]:
-        return found.force
+    result = solve(robot, target, sets, prices)
+    if result.solved[0]:
+        return result.force
     near = nearest_point(robot.farthest(sets), robot.effectiveness * weight, wrench[0] * weight)
     return cheapest(robot, sets, near.force, robot.effectiveness.T @ robot.middle(sets)).force[:, None]
