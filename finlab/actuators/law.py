@@ -62,8 +62,7 @@ class FinLaw(ActuatorLaw):
 
 
 class PlanarLaw(FinLaw):
-    """A fin whose mean force lies in the plane that its tip sweeps: a size and a direction, none along the
-    shaft."""
+    """A fin whose mean force lies in the plane that its tip sweeps: a size and a direction."""
 
     offset: Any = 0.0
     """Angle [rad] from the zero direction to the thrust."""

@@ -52,8 +52,7 @@ KINDS: dict[str, Kind] = {
 
 
 def laws_of(layout: Layout) -> list[tuple[Places, ActuatorLaw]]:
-    """Returns the laws of a robot's actuators with their places; those of one kind together. A `DataError`
-    where a force table cannot be read."""
+    """Returns the laws of a robot's actuators with their places, by kind; a `DataError` at a bad table."""
     groups: list[tuple[Places, ActuatorLaw]] = []
     for places, kind in _kinds(layout):
         laws = kind.laws([layout.actuators[i] for i in places])
@@ -63,8 +62,7 @@ def laws_of(layout: Layout) -> list[tuple[Places, ActuatorLaw]]:
 
 def groups_of(layout: Layout, effectiveness: Array) -> list[tuple[Places, Group]]:
     """Returns the answers to prices of a robot's actuators by kind, with their places; `effectiveness` (n, 3,
-    6) is the wrench of 1 N along their own axes. A `DataError` where a force table cannot be read, or gives
-    no thrust within the limits."""
+    6) is the wrench of 1 N along their own axes. Errors as for `FinGroup`."""
     return [
         (places, kind.group([layout.actuators[i] for i in places], effectiveness[places]))
         for places, kind in _kinds(layout)

@@ -47,8 +47,7 @@ class RadialTable:
 
     @classmethod
     def of_forces(cls, top: float, force: Array, rest: float) -> "RadialTable":
-        """A table from forces (CELLS + 1,) at `price_grid(top)`; slopes are those of a monotone
-        cubic (Fritsch and Carlson, 1980)."""
+        """A table of forces (CELLS + 1,) at `price_grid(top)`, monotone cubic (Fritsch and Carlson, 1980)."""
         force = np.maximum.accumulate(np.asarray(force, np.float64))
         return cls(float(top), force, monotone_slopes(price_grid(top), force), float(rest))
 
@@ -86,8 +85,8 @@ class RadialTable:
         return result
 
     def with_square(self, weight: float) -> "RadialTable":
-        """The table where a force T [N] costs `weight` T^2 [W] more: what answered a price v now answers
-        v + 2 weight T."""
+        """The table where a force T [N] costs `weight` T^2 [W] more: it answers v + 2 weight T as before
+        v."""
         price = price_grid(self.top) + 2.0 * weight * self.force
         top, rest = float(price[-1]), self.rest + weight * float(self.force[0]) ** 2
         return self.of_forces(top, np.interp(price_grid(top), price, self.force), rest)
@@ -95,8 +94,7 @@ class RadialTable:
     @cached_property
     def polynomials(self) -> Array:
         """Coefficients (CELLS + 1, 5): of the force in rising powers of the price, as a share of the largest,
-        from the beginning of each interval on, and the conjugate there [W]; the last are those beyond the
-        table."""
+        from each interval's start on, and the conjugate there [W]; the last ones beyond the table."""
         width = np.diff(price_grid(1.0))
         first, last = self.force[:-1], self.force[1:]
         m0, m1 = self.slope[:-1] * self.top * width, self.slope[1:] * self.top * width
@@ -199,8 +197,8 @@ class Group(ABC):
     """Whether that depends on the water that meets them."""
 
     def at(self, inflow: Array | None) -> "Group":
-        """Returns the group where its places move through the water with velocities (m, 3) [m/s], in own
-        frames; None at rest."""
+        """Returns the group with velocities (m, 3) [m/s] of its places through the water, own frames, or
+        None."""
         return self
 
     @property

@@ -120,8 +120,7 @@ class RudderLaw(ActuatorLaw):
 
 
 class RudderGroup(Group):
-    """What the rudders of a robot offer for prices in one flow: a lift, and the drag that comes with it; what
-    drags without lift comes on top."""
+    """What the rudders of a robot offer for prices in one flow: a lift, and the drag that comes with it."""
 
     feels_flow = True
 

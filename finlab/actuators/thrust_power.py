@@ -40,8 +40,7 @@ class ByPower:
 
 
 class Curve:
-    """Watts over the size of the force of one side: convex, quadratic between knots, with a marginal cost
-    that rises from 0 at rest without a jump."""
+    """Watts over the force's size of one side: convex, quadratic between knots, its slope from 0 at rest."""
 
     def __init__(self, size: Array, watts: Array) -> None:
         """Takes points of a convex curve, sizes [N] from 0 on, and meets each of them. The knots between are
@@ -66,8 +65,7 @@ class Curve:
         """Power [W] there."""
 
     def at(self, size: AnyArray) -> tuple[Array, Array]:
-        """Returns the power [W] and the marginal cost [W/N] of sizes [N]; beyond the last knot the curve goes
-        on with its last slope."""
+        """Returns power [W] and marginal cost [W/N] of sizes [N]; beyond the last knot on with its slope."""
         i = np.clip(np.searchsorted(self.size, size, "right") - 1, 0, len(self.size) - 2)
         step = size - self.size[i]
         bend = (self.marginal[i + 1] - self.marginal[i]) / (self.size[i + 1] - self.size[i])
@@ -146,8 +144,8 @@ class ThrustPower:
         return force
 
     def worth(self, price: Array, least: Array, most: Array) -> Array:
-        """Returns the most [W] that forces between `least` and `most` (n,) [N] are worth at prices (..., n)
-        [W/N], less their power."""
+        """Returns the most [W] that forces from `least` to `most` (n,) [N] are worth at prices (..., n)
+        [W/N]."""
         force = np.clip(self.answer(price), least, most)
         return np.asarray(price * force - self.watts(force))
 
@@ -159,8 +157,8 @@ class ThrustPower:
 
 
 def radial_table(model: ThrustModel, sign: int, least: float, most: float) -> RadialTable:
-    """Returns the answer to a price of one side, forward (`sign` 1) or reverse (-1), with sizes of the force
-    from `least` to `most` [N]."""
+    """Returns the answer to a price forward (`sign` 1) or in reverse (-1), for sizes from `least` to `most`
+    [N]."""
     own = ThrustPower([model])
     ends = np.array([[sign * least], [sign * most]])
     rest = float(own.watts(ends)[0, 0])

@@ -85,8 +85,7 @@ class Answer(PlainData, Generic[Number]):
 
     @property
     def unallocated(self) -> Array:
-        """What the robot does not deliver: target minus delivered wrench (6,) or (N, 6); 0 along axes that do
-        not count."""
+        """Target minus delivered wrench (6,) or (N, 6); 0 along axes that do not count."""
         return np.nan_to_num(self.target - self.wrench)
 
     @cached_property
@@ -115,8 +114,7 @@ class Answer(PlainData, Generic[Number]):
     @cached_property
     def expected_miss(self) -> Array:
         """Standard deviation (6,) or (N, 6) of the wrench [N, N m] by what is uncertain of the actuators:
-        what the layout says, or a table's own; zeros where nothing is known to be. See
-        `finlab.physics.expected_miss`."""
+        what the layout says, or a table's own; zeros where nothing is known to be."""
         return self._by_parts(lambda rows: expected_miss(self._plant, rows))
 
     @cached_property

@@ -110,9 +110,8 @@ class Method(ABC):
 
     def in_time(self, target: Array, reference: Array) -> Array:
         """Which wrench (6,) is answered: a target (6,), or, where the time between ticks is a setting, that
-        of the moment at which the slowest actuator will have followed, among those of the next K ticks
-        (K, 6); after the last, the last. A command that is held for a period is late by half of it besides.
-        """
+        of the moment at which the slowest actuator will have followed, among those of the next K ticks (K,
+        6); after the last, the last. A command held for a period is late by half of it besides."""
         period_s = vars(self.settings).get("period_s")
         if period_s is None:
             return target
@@ -131,8 +130,8 @@ class Method(ABC):
             )
 
     def at(self, flow: Array | None) -> Self:
-        """The same method for a robot that moves through the water with (6,); itself where that is without
-        effect. What does not depend on it is shared."""
+        """The same method for a robot that moves through the water with (6,); itself where it feels
+        nothing."""
         plant = self.plant.at(flow)
         if plant is self.plant:
             return self

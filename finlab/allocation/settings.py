@@ -37,8 +37,7 @@ class Range(NamedTuple):
 def number(
     default: float | None, low: float, high: float, meaning: str, unit: str = "", *, above: bool = False
 ) -> Any:
-    """A field that is a number within a range, a whole one where `low` is; None is allowed where it is the
-    default."""
+    """A field that is a number within a range, a whole one where `low` is; None only as the default."""
     return field(default=default, metadata={"range": Range(low, high, meaning, unit, above)})
 
 

@@ -32,8 +32,7 @@ TOLERANCE = 0.01
 @dataclass(frozen=True, eq=False)
 class AttainableSet:
     """A convex polytope of forces or torques that can be had with all else at zero, body frame [N] or [N m].
-    Every vertex is attained, by the actuators or, where an arc is too wide or a force is that of a flow, by
-    the convex hulls of what they can push."""
+    Every vertex is attained, of wide arcs and forces of a flow by convex hulls."""
 
     kind: Kind
     vertices: Array

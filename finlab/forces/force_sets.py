@@ -38,8 +38,7 @@ SCALE = np.array([1.0, 1.0, 1.0, LEVER, LEVER, LEVER])
 HALF_TURN_TOLERANCE = 1e-9
 """By how much half an arc [rad] may exceed a quarter turn and still be convex."""
 BOUNDARY, POINTS = 48, 193
-"""Sides of the polygon around what an uneven fin can push: at most a fifth of a percent too wide; and
-directions in its arc that are looked at."""
+"""Sides of the polygon around an uneven fin's forces, 0.2 % too wide; directions in its arc."""
 ALONG, SIDES = 193, 24
 """Forces of an actuator along its limits, or its rim, of which a polygon is made; and sides of one for forces
 of the flow: they lie inside by at most 1 % of its width."""
@@ -101,8 +100,7 @@ class ForceSets(NamedTuple):
         return self.take(np.tile(np.arange(len(self.radius)), times))
 
     def pull(self, normal: Array) -> Array:
-        """Returns what each fin feels (R, n, 2) of the direction `normal` (R, m): the columns' dot
-        products."""
+        """Returns the dot products (R, n, 2) of each one's columns with the direction `normal` (R, m)."""
         rows, n = self.radius.shape
         return (self.effectiveness.reshape(rows, 2 * n, -1) @ normal[..., None]).reshape(rows, n, 2)
 
@@ -183,8 +181,7 @@ def force_sets(layout: Layout, failed: Collection[str] = (), flow: ArrayLike | N
 
 
 def assembled(shapes: Sequence[Sequence[Shape]], effectiveness: Array) -> ForceSets:
-    """Returns R robots of n actuators with shapes (R, n) and wrenches (R, n, 3, 6) of 1 N along their own
-    axes."""
+    """Returns R robots with shapes (R, n) and wrenches (R, n, 3, 6) of 1 N along their own axes."""
     every = [shape for robot in shapes for shape in robot]
     most = max((len(shape.corners) for shape in every if shape.corners is not None), default=0)
 
@@ -261,8 +258,7 @@ def _shape(response: Response, is_fin: bool) -> Shape:
 
 
 def _polygon(directions: Array, points: Array, half: float, sides: int) -> Shape:
-    """A polygon that fills the convex hull of forces (S, 2) [N] in a plane; a line or a point where it has no
-    width."""
+    """A polygon that fills the convex hull of forces (S, 2) [N]; a line or a point where it has no width."""
     middle = points.mean(axis=0)
     axes = np.linalg.svd(points - middle)[2]
     along = (points - middle) @ axes.T
@@ -312,8 +308,7 @@ def _along_boundary(boundary: Array, pull: Array, direction: Array) -> tuple[Arr
 
 
 def wide_arcs(sets: ForceSets) -> NDArray[np.intp]:
-    """Returns the places of working actuators whose sets are not convex: wider than half a turn, no full
-    circle."""
+    """Returns the places of working actuators whose arcs are wider than half a turn and no full circle."""
     alive = (sets.radius > 0.0).any(axis=0)
     half = sets.half[0]
     return np.flatnonzero((half > np.pi / 2 + HALF_TURN_TOLERANCE) & (half < np.pi) & alive)

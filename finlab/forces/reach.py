@@ -170,8 +170,7 @@ def singular_values(sets: ForceSets) -> tuple[Array, Array]:
 def weakest(sets: ForceSets, n_random: int = N_RANDOM, n_walks: int = N_WALKS, fine: bool = True) -> Extent:
     """Returns the direction in which the sets of wrenches end soonest, and where: every wrench of that size
     is within reach. The walk starts from axes, singular vectors and random directions, goes to the face of
-    the set that lies that way, turns to the face's normal and goes again; the least end of all is
-    returned."""
+    the set that lies that way, turns to its normal and goes again; the least end of all is returned."""
     values, vectors = singular_values(sets)
     size = np.zeros(len(values))
     direction = vectors[:, :, -1].copy()

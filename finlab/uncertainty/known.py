@@ -19,8 +19,7 @@ from finlab.layout.thrust_model import PowerTable
 from finlab.uncertainty.table_error import GridUncertainty, grid_uncertainty, thrust_table_error
 
 OF_ONE_TABLE = 0.5
-"""Share of the variance that actuators with one table have together: their errors are alike where their
-commands are."""
+"""Share of the variance that actuators with one table have together: alike commands have alike errors."""
 
 
 @dataclass(frozen=True)
@@ -32,8 +31,7 @@ class Known:
     floor: float = 0.0
     """The part of it that is there at any force [N]."""
     common: Hashable = None
-    """What the error comes from, the same for actuators that err together; None for one that errs by
-    itself."""
+    """Source of the error, the same for those that err together; None for one that errs by itself."""
     correlation: float = 1.0
     """Share of the variance that these have together."""
     table: GridUncertainty | None = None
@@ -49,8 +47,7 @@ class Known:
 
 
 def uncertainties(layout: Layout) -> tuple[Known | None, ...]:
-    """Returns what is known of each actuator, None where its law is taken as it is; a `DataError` where a
-    table cannot be read."""
+    """Returns what is known of each actuator, None where its law is exact; a `DataError` at a bad table."""
     return _known(layout, file_stamps(layout))
 
 

@@ -76,8 +76,7 @@ ORDER, OPEN_ORDER = 3, 2
 WEIGHTS = 2 * (9 / 16) ** 2 + 2 * (1 / 16) ** 2
 """Sum of its squared weights half way between two lines."""
 SMALL_FORCE = 0.05
-"""Share of the largest force that counts in full where a force is smaller, so that shares of it are none of
-nothing."""
+"""Share of the largest force that counts in full where a force is smaller."""
 
 
 class GridUncertainty:
@@ -95,8 +94,7 @@ class GridUncertainty:
 
     @cached_property
     def _variances(self) -> Array:
-        """Variances (a, f, d, 2) [N^2] of the forces across the shaft and along it, by the file and by the
-        grid."""
+        """Variances (a, f, d, 2) [N^2] of the forces across the shaft and along it, by file and grid."""
         square, error = (self._grid.values[..., :3] ** 2).sum(axis=-1), self.error
         share = error.spacing**2 + (error.noise**2 if self._measured is None else 0.0)
         known = np.zeros(3) if self._measured is None else self._measured
@@ -108,14 +106,13 @@ class GridUncertainty:
         return HermiteGrids([self._grid._replace(values=self._variances)])
 
     def deviation(self, command: Array) -> Array:
-        """Returns the standard deviation (..., 2) [N] of the force across the shaft, in each of two
-        directions, and along it, at commands (..., 3)."""
+        """Returns standard deviations (..., 2) [N] of forces across the shaft and along it at commands (...,
+        3)."""
         return np.asarray(np.sqrt(np.maximum(self._between(command, 1)[..., 0, 0, 0, :], 0.0)))
 
     @cached_property
     def uncertain_share(self) -> float:
-        """The part of the standard deviation across the shaft that grows with the force, as a share of it,
-        over the grid."""
+        """The part of the standard deviation across the shaft that grows with the force, as a share of it."""
         square, variance = (self._grid.values[..., :3] ** 2).sum(axis=-1), self._variances[..., 0]
         away = square - square.mean()
         return float(np.sqrt(max((away * variance).sum() / max((away**2).sum(), 1e-300), 0.0)))

@@ -41,15 +41,14 @@ class FinTable(NamedTuple):
     half: float
     """Half of it [rad]; pi for a full circle."""
     gauge: Array | None
-    """Share (POINTS,) of the table's force in each direction, from 0 on; None where it is the same all
-    round."""
+    """Share (POINTS,) of the table's force in each direction, from 0 on; None where they are the same."""
     beat: Array
     """Amplitude [rad] and frequency [Hz] (POINTS + 1, 2) that give the force `largest (j / POINTS)^2`."""
     box: "_Box"
     """The law within the limits."""
     deflection: Array
-    """Direction of the force minus zero direction (POINTS,) [rad] around the circle of force directions; one
-    value (1,) where it is the same all round."""
+    """Direction of the force minus zero direction (POINTS,) [rad] around the circle; (1,) where it is the
+    same."""
 
     @property
     def largest(self) -> float:
@@ -61,9 +60,8 @@ class FinGroup(Group):
     """The fins of a robot."""
 
     def __init__(self, fins: Sequence[Fin], effectiveness: Array) -> None:
-        """Compiles fins with wrenches (m, 3, 6) per newton along each own axis, one model and limits once in
-        a process; a `DataError` where a force table cannot be read, or a fin gives no thrust within its
-        limits."""
+        """Compiles fins with wrenches (m, 3, 6) per newton along each own axis, each model once in a process;
+        a `DataError` where a table cannot be read, or a fin gives no thrust."""
         tables = [fin_table(fin) for fin in fins]
         self._tables = tables
         self._stacked = stack_laws([fin.model for fin in fins])
@@ -189,8 +187,8 @@ class _Box:
 
     @cached_property
     def all_round(self) -> tuple[Array, Array]:
-        """Zero directions (POINTS + 1,) [rad] and the largest forces across the shaft (POINTS + 1, 2) [N]
-        that a coarse grid of commands has there."""
+        """Zero directions (POINTS + 1,) [rad] and the largest forces (POINTS + 1, 2) [N] there, by a coarse
+        grid."""
         low, high = self.lower[2], self.upper[2]
         if isinstance(self.law, PlanarLaw):  # a formula holds beyond the limits, too
             low, high = 0.5 * (low + high) - np.pi, 0.5 * (low + high) + np.pi
@@ -198,8 +196,7 @@ class _Box:
         return turns, self.strongest(turns)
 
     def strongest(self, turns: Array) -> Array:
-        """The largest forces across the shaft (K, 2) [N] of a coarse grid of commands at zero directions
-        (K,)."""
+        """The largest forces across the shaft (K, 2) [N] at zero directions (K,), by a coarse grid."""
         command = np.tile(self.grid((GRID[0] // 2 + 1, GRID[1] // 2 + 1)), (len(turns), 1, 1))
         command[..., 2] = turns[:, None]
         across = self.law.force(command.reshape(-1, 3)).reshape(command.shape)[..., 1:]

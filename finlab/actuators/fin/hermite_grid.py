@@ -114,8 +114,7 @@ def _closed(grid: Grid) -> list[Array]:
 
 
 def _with_neighbours(grid: Grid) -> Array:
-    """The values with a rim of neighbours. At an edge the missing one is the edge itself, which makes its
-    slope one-sided."""
+    """The values with a rim of neighbours, at an edge the edge itself, which makes slopes one-sided."""
     values = np.pad(grid.values, ((1, 1), (1, 1), (0, 0), (0, 0)), "edge")
     around, how = ((1, 2), "wrap") if grid.periodic else ((1, 1), "edge")
     return np.pad(values, ((0, 0), (0, 0), around, (0, 0)), how)  # type: ignore[call-overload, no-any-return]

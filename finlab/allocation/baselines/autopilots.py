@@ -33,8 +33,7 @@ ROWS = np.array([3, 4, 5, 0, 1, 2])
 SIGNS = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])
 """From x forward, y left, z up to PX4's x forward, y right, z down."""
 ROUNDS_OFF = float(np.sqrt(6.0 * np.finfo(np.float32).eps))
-"""Singular values below this share of the largest count as 0: PX4 works in single precision, with the square
-of the matrix."""
+"""Share of the largest singular value that counts as 0: PX4 squares the matrix in single precision."""
 NEGLIGIBLE = 1e-3
 """Entries of the normalised mix below this are set to 0, and do not count as used."""
 LEAST = 0.2
@@ -100,8 +99,7 @@ class Px4(LeastErrorMethod):
 
 
 def normalised(mix: Array) -> tuple[Array, Array]:
-    """A mix (n, 6) with its columns divided as PX4 does, and what they were divided by (6,), with which the
-    setpoint is multiplied."""
+    """A mix (n, 6), columns divided as PX4 does, and the divisors (6,), by which it multiplies setpoints."""
     used = np.abs(mix) > NEGLIGIBLE
     tilt = [np.sqrt((mix[:, k] ** 2).sum() / max(used[:, k].sum() / 2.0, 1e-9)) for k in (ROLL, PITCH)]
     thrust = np.linalg.norm(mix[:, SURGE:], axis=1)

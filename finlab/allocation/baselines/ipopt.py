@@ -36,8 +36,7 @@ NARROW = 1e-6
 
 class ForceProgram:
     """Power over the forces of one robot in the module `casadi`, the wrench as a constraint, normalized by
-    `sigma` (6,), the target as its parameter; with `options` of IPOPT. `inverse` gives the start, and
-    commands for forces."""
+    `sigma` (6,), the target as its parameter. `inverse` gives starts and commands."""
 
     def __init__(self, casadi: Any, inverse: PseudoInverse, sigma: Array, options: dict[str, Any]) -> None:
         self._inverse, n = inverse, inverse.plant.n

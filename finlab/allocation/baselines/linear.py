@@ -57,8 +57,7 @@ class Qp(ModelBased):
 
 class Analytic(ModelBased):
     """Pseudo-inverse of the forces, rows scaled by sigma and columns by each actuator's largest force, which
-    each gives by its cheapest command. What does not fit is clipped one by one, the rest is not
-    redistributed."""
+    each gives by its cheapest command. What does not fit is clipped, the rest not redistributed."""
 
     name = "analytic"
     takes = "any actuator"

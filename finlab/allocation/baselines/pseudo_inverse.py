@@ -58,8 +58,8 @@ class PseudoInverse:
         return ((targets - self.beside) @ self.inverse).reshape(len(targets), self.plant.n, 2)
 
     def decoded(self, force: Array) -> Array:
-        """The cheapest commands (N, n, 3) for forces (N, n, 2) [N], by the actuators' own laws; what one
-        cannot give is cut off."""
+        """The cheapest commands (N, n, 3) for forces (N, n, 2) [N]; what an actuator cannot give is cut
+        off."""
         angle = wrapped(np.arctan2(force[..., 1], force[..., 0]) - self._middle)
         held = np.clip(angle, -self._half, self._half)
         excess = np.minimum(np.abs(angle - held), 0.5 * np.pi)
@@ -80,7 +80,6 @@ def _largest(response: Response) -> float:
 
 
 def pushed_axes(effectiveness: Array) -> Array:
-    """Directions (r, 6) of the wrench in which columns (6, k) push at all: no constraint says what another
-    one says."""
+    """Directions (r, 6) of the wrench in which columns (6, k) push at all, each once."""
     axes, size, _ = np.linalg.svd(effectiveness)
     return np.asarray(axes[:, : int((size > SAME_DIRECTION * size[0]).sum())].T)

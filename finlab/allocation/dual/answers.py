@@ -82,8 +82,7 @@ class Answers:
         return np.asarray((self.marginal(own)[1][self.dragging] - self._rest) / self._speed)
 
     def radial(self, price: Array, row: NDArray[np.intp]) -> tuple[Array, Array, Array]:
-        """Force [N], its derivative and conjugate [W] (m, N) at prices (m, N) from 0 on in rows (m, 1) or
-        (m, N) of the tables, two for each actuator."""
+        """Force [N], derivative and conjugate [W] (m, N) at prices (m, N) from 0 on in rows (m, 1 or N)."""
         top = self._top[row]
         share = price / top
         cell = np.minimum((np.sqrt(np.sqrt(share)) * CELLS).astype(np.intp), CELLS)
@@ -185,7 +184,7 @@ class Answers:
         return self._row + flipped
 
     def _one_way(self, price: Array, sets: Sets, way: int) -> tuple[Planar, Array]:
-        """Answers (q, N) of planes that push either way to prices (k, N), and conjugates [W], by one of both
+        """Answers (q, N) of planes that push either way to prices (k, N), with conjugates, by one of
         `ways`."""
         places, sets = sets.reversing, sets.ways[way]
         first, second = (values[places] for values in self.pair(price))
@@ -309,8 +308,7 @@ class Answers:
         return Fan(along, fan_x, fan_y, xx * keep, xy * keep, yy * keep, beyond, other)
 
     def _uneven(self, x: Array, y: Array, tangent: Array, size: Array) -> tuple[Array, Array, Array, Array]:
-        """Directions of the force times the gauges, weights of their change, and prices along them, of those
-        of prices."""
+        """Directions of the force times the gauges, weights of their change, and prices along them."""
         places = self.gauges.places
         value, slope, bend = self.gauges.support(np.arctan2(y[places], x[places]))
         fan_x, fan_y, tangent, along = x.copy(), y.copy(), tangent.copy(), size.copy()
@@ -330,8 +328,8 @@ class Answers:
         row: NDArray[np.intp],
         gauges: Gauges | None = None,
     ) -> None:
-        """Blends, in place, answers and conjugates (p, N) [W] of planes beyond their arcs with those of the
-        other ends."""
+        """Blends, in place, answers and conjugates (p, N) of planes beyond arcs with those of the other
+        ends."""
         assert fan.beyond is not None and fan.other is not None
         places, of = sets.forked, len(sets.low) - len(sets.half) + sets.forked
         first, second = price

@@ -230,8 +230,7 @@ def _dive(robot: DualRobot, parts: _Parts, kept: NDArray[np.intp], amount: Array
 def narrowed(robot: DualRobot, sets: Sets, force: Array, chosen: NDArray[np.bool_], side: Array) -> Sets:
     """Sets (n, N) of which chosen ones (n, N) are cut by forces (k, N), and one side is kept: of an arc the
     half towards smaller (-1) or larger angles (1), of a full circle that away from or around the force, of
-    either way the reverse or the rest, of a dead band rest or the forces beyond it, of drag the forces below
-    or above."""
+    either way reverse or the rest, of a dead band rest or what is beyond, of drag less or more."""
     lines, planes = robot.answers.lines, robot.answers.planes
     low, high, low_cost, high_cost, middle, half, reverse, reverse_cost, flipped = map(np.array, sets.parts)
     if planes:

@@ -20,8 +20,7 @@ class Compiled:
 
     def __init__(self, layout: Layout, plant: Plant, doubt: Array | None = None) -> None:
         """Compiles the actuators of a layout with the effectiveness of a plant; what a squared force costs
-        beside its power is `doubt`, see `price_of_doubt`. A `DataError` where a fin's force table cannot be
-        read, or gives no thrust within its limits."""
+        beside its power is `doubt`, see `price_of_doubt`. Errors as for `FinGroup`."""
         self.count = layout.n
         self.doubt = doubt
         """The same; None where it costs nothing."""
@@ -40,8 +39,7 @@ class Compiled:
                 responses[place] = with_square(response, weight) if weight else response
         self.robot: DualRobot = DualRobot(responses)  # type: ignore[arg-type]
         self.beside = sum((group.beside.sum(axis=0) for _, group in self.groups), np.zeros(6))
-        """Wrench (6,) [N, N m] that the actuators give beside their answers' forces, such as the drag of
-        foils without lift."""
+        """Wrench (6,) [N, N m] beside the answers' forces, such as the drag of foils without lift."""
 
     def at(self, inflow: Array | None) -> "Compiled":
         """The same in another flow: velocities (n, 3) [m/s] of the actuators' places in their own frames."""

@@ -117,8 +117,7 @@ class Dual(Method):
         seed: int = 0,
         prices: Array | None = None,
     ) -> Solution:
-        """See `Method`. For a single target, Newton's method begins at `prices` (6,) [W/N, W/(N m)], where
-        they are given."""
+        """See `Method`. For a single target, Newton's method may begin at `prices` (6,) [W/N, W/(N m)]."""
         if len(targets) == 0:
             return Solution(np.empty((0, self.layout.n, 3)), lambda _: np.empty(0))
         if (moved := self.at(flow)) is not self:
@@ -172,8 +171,8 @@ class Dual(Method):
 
     @cached_property
     def _cancelled(self) -> Array | None:
-        """A command (n, 3) whose forces cancel, of actuators that cannot rest; None where none is near their
-        least ones."""
+        """A command (n, 3) of actuators that cannot rest whose least forces, nearly, cancel; None without
+        any."""
         lower, upper = self.layout.lower, self.layout.upper
         share = np.random.default_rng(0).random((ROUNDS, *lower.shape))
         share[..., :-1] **= 4
@@ -298,8 +297,7 @@ class Dual(Method):
         return np.asarray(self.scale[:, None] * robot.basis / robot.scale[:, None])
 
     def _cheaper_in_gaps(self, sets: Sets, near: Nearest, force: Array, deadline: Deadline) -> None:
-        """Replaces forces (k,) that give a wrench out of reach in one part of sets with gaps by those of
-        least power in all of it, where they are found."""
+        """Replaces forces (k,) of one part of sets with gaps by those of least power in all of it."""
         robot = self.compiled.robot
         target = robot.target(near.wrench[None])
         root = solve(robot, target, sets, deadline=deadline)

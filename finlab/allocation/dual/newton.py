@@ -135,8 +135,7 @@ def solve(
     deadline: Deadline = NEVER,
 ) -> Prices:
     """Prices for targets (r, N) in the basis of a robot within sets (None for all that it can), from `prices`
-    (r, N) on, each in at most some steps and all before the deadline; those that are done are left out of
-    further steps."""
+    (r, N) on, each in at most some steps and all before the deadline; what is done takes no further step."""
     sets = robot.sets if sets is None else sets
     count = target.shape[1]
     ridge = np.full(count, NEARLY)
@@ -209,7 +208,6 @@ def _step(robot: DualRobot, state: _State, ridge: Array) -> Array:
 
 
 def _accepted(state: _State, trial: _State, left: Array) -> NDArray[np.bool_]:
-    """Which steps are kept (N,): the slope left along the step is uphill, or the value rose, or is the same
-    to rounding and the residual fell."""
+    """Steps that are kept (N,): they end uphill, or the value rose, or is the same and the residual fell."""
     rose, slack = trial.value - state.value, ROUNDING * np.abs(state.value)
     return (left >= 0.0) | (rose > 0.0) | ((rose > -slack) & (trial.size < 0.9 * state.size))

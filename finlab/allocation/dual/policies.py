@@ -42,9 +42,8 @@ class Nearest(NamedTuple):
 def nearest(
     robot: DualRobot, sets: Sets, wrench: Array, policy: Policy, yardstick: Array, deadline: Deadline
 ) -> Nearest:
-    """What a policy gives for one wrench (6,) [N, N m] that no forces within the sets give; missing wrenches
-    are compared on a yardstick (6,). Sets with gaps are cut until the best answer of all parts lies in
-    none."""
+    """What a policy gives for one wrench (6,) [N, N m] that no forces within the sets give; its miss counts
+    on a yardstick (6,). Sets with gaps are cut until the best answer of all lies in none."""
 
     def served(part: Sets) -> tuple[tuple[float, ...], int, Array, Sets]:
         """How badly a part serves the policy, and its forces."""
@@ -95,8 +94,7 @@ def cheapest(
     deadline: Deadline = NEVER,
 ) -> Nearest:
     """The least power for the wrench that some forces (k,) give, or for one hardly apart (6,); where Newton's
-    method does not settle at the rim of what can be given, a little towards a wrench inside (6,), and else
-    these forces themselves."""
+    method does not settle, at the rim, a little towards one inside (6,), else these forces."""
     wrench = robot.effectiveness.T @ force
     inwards = (inside - wrench) / max(1.0, float(np.linalg.norm((inside - wrench) / robot.scale)))
     aims = [wrench, wrench + NEARLY * inwards]
@@ -123,8 +121,7 @@ def direction(robot: DualRobot, sets: Sets, wrench: Array, policy: Policy, yards
 
 def priority(robot: DualRobot, sets: Sets, wrench: Array, policy: Policy, yardstick: Array) -> Array:
     """Forces (k,) [N] that serve groups of axes of a wrench (6,), each as far as those before it allow. A
-    group that wants more than there is pulls at the held axes: it is served again with its miss cut to
-    `PULL`."""
+    group that wants more than there is pulls at the held axes: then its miss is cut to `PULL`."""
     held, aim = np.zeros(6), np.array(wrench)
     near: Mixture | None = None
     for group in policy.groups:
