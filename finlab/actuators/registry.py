@@ -63,10 +63,8 @@ def laws_of(layout: Layout) -> list[tuple[Places, ActuatorLaw]]:
 def groups_of(layout: Layout, effectiveness: Array) -> list[tuple[Places, Group]]:
     """Returns the answers to prices of a robot's actuators by kind, with their places; `effectiveness` (n, 3,
     6) is the wrench of 1 N along their own axes. Errors as for `FinGroup`."""
-    return [
-        (places, kind.group([layout.actuators[i] for i in places], effectiveness[places]))
-        for places, kind in _kinds(layout)
-    ]
+    kinds = [(places, kind, [layout.actuators[i] for i in places]) for places, kind in _kinds(layout)]
+    return [(places, kind.group(parts, effectiveness[places])) for places, kind, parts in kinds]
 
 
 def _kinds(layout: Layout) -> list[tuple[Places, Kind]]:

@@ -220,18 +220,15 @@ class Allocator:
             failed: names of actuators that do not work; they leave the graph.
             previous: command (n, 3) of the previous tick: what follows stays within the rates of the
                 actuators. Or the answer that gave it: the search then begins there, which is quicker.
-            reference: wrenches (K, 6) that are expected to be asked for at the next K ticks. A method that
-                knows how late they follow answers the one that they will be in time for, which is then the
-                result's target; others answer the present one.
+            reference: expected wrenches (K, 6) of the next K ticks. A method that knows how late actuators
+                follow answers the one that they will be in time for, which is then the result's target.
             policy: what to do when the wrench is out of reach; see `Policy`.
-            health: actuators that are weak, stuck at an angle or running on; the result's layout has what is
-                left of their limits.
+            health: actuators that work in part; the result's layout has what is left of their limits.
             flow: velocity (6,) of the body relative to the water [m/s, rad/s], body frame; None at rest.
             seed: the same target and seed give the same answer.
 
         Raises:
-            CommandError: the wrench is not six numbers, none of them counts, or `previous`, `reference` or
-                `flow` has another shape.
+            CommandError: the wrench is not six numbers, none counts, or another array has a wrong shape.
             AllocationError: the method does not know the policy.
             LayoutError: an unknown actuator, or none left.
             DataError: a fin's force table cannot be read.

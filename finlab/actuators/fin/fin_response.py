@@ -272,15 +272,12 @@ class _Box:
 
     def top_price(self, strongest: float) -> float:
         """The price [W/N] at which the fin gives its largest force, or nearly so where that has no end."""
-        corner = self.command(self.upper[None, :2])
-        if float(self.force(corner)[0]) >= strongest * (1.0 - ROUNDING):
-            zero = np.zeros(1)
-            marginal_force = self._slope(zero + 1.0, self.upper[None, :2]) - self._slope(
-                zero, self.upper[None, :2]
-            )
-            moves = self.upper[:2] > self.lower[:2]
-            if (marginal_force[0][moves] > 1e-3 * strongest).all():
-                price = -self._slope(zero, self.upper[None, :2])[0][moves] / marginal_force[0][moves]
+        corner, zero = self.upper[None, :2], np.zeros(1)
+        if float(self.force(self.command(corner))[0]) >= strongest * (1.0 - ROUNDING):
+            moves, saving = self.upper[:2] > self.lower[:2], self._slope(zero, corner)
+            marginal_force = (self._slope(zero + 1.0, corner) - saving)[0][moves]
+            if (marginal_force > 1e-3 * strongest).all():
+                price = -saving[0][moves] / marginal_force
                 top = float(price.max()) if len(price) else NOTHING
                 if float(self.force(self.best(np.array([top])))[0]) >= (1.0 - PEAK) * strongest:
                     return top

@@ -128,14 +128,8 @@ def _shapes(knots: Array, periodic: bool) -> tuple[Array, Array]:
     pair = np.concatenate([[before], gaps]) + np.concatenate([gaps, [after]])
     early, late = gaps / pair[:-1], gaps / pair[1:]
     none, one = np.zeros_like(gaps), np.ones_like(gaps)
-    shapes = np.array(
-        [
-            [none, one, none, none],
-            [-early, none, early, none],
-            [2.0 * early, late - 3.0, 3.0 - 2.0 * early, -late],
-            [-early, 2.0 - late, early - 2.0, late],
-        ]
-    )
-    shapes = np.moveaxis(shapes, -1, 0)
+    linear, square = [-early, none, early, none], [2.0 * early, late - 3.0, 3.0 - 2.0 * early, -late]
+    cubic = [-early, 2.0 - late, early - 2.0, late]
+    shapes = np.moveaxis(np.array([[none, one, none, none], linear, square, cubic]), -1, 0)
     places = np.stack([knots[:-1], 1.0 / gaps], axis=-1)
     return np.concatenate([shapes, shapes[-1:]]), np.concatenate([places, places[-1:]])

@@ -150,7 +150,10 @@ class _Best:
 
     def keep(self, parts: _Parts, answer: Prices, amount: Array) -> NDArray[np.bool_]:
         """Remember answers without a gap; which of those that have one (N,) could still be cheaper."""
-        full = answer.solved & ~(amount > 0.0).any(axis=0) & ~self._hollow(answer.force, parts.sets)
+        sets, answers = parts.sets, self._robot.answers
+        # The smoothed dual of a narrow arc may have a force that is smaller than any in it.
+        hollow = (answers.sizes(answer.force) < 0.9 * sets.low[answers.lines :]) & (sets.half <= NARROW)
+        full = answer.solved & ~(amount > 0.0).any(axis=0) & ~hollow.any(axis=0)
         for i in np.flatnonzero(full):
             row = parts.row[i]
             if answer.value[i] < self._value[row]:
@@ -159,23 +162,16 @@ class _Best:
         open_ = answer.solved | (~answer.beyond & (amount > 0.0).any(axis=0))
         return open_ & ~full & (answer.value < self._value[parts.row] * (1.0 - CLOSE))
 
-    def _hollow(self, force: Array, sets: Sets) -> NDArray[np.bool_]:
-        """Where the smoothed dual of a narrow arc has a force (k, N) that is smaller than any in it."""
-        size, low = self._robot.answers.sizes(force), sets.low[self._robot.answers.lines :]
-        return np.asarray(((size < 0.9 * low) & (sets.half <= NARROW)).any(axis=0))
-
 
 def halves(robot: DualRobot, sets: Sets, force: Array) -> list[Sets] | None:
     """Both parts of the sets of one target whose forces (k,) lie in a gap; None where they do not."""
     amount = gaps(robot, force[:, None], sets)
     if not amount.any():
         return None
-    full = _columns(sets, 1)
-    chosen = np.zeros(amount.shape, bool)
+    one, chosen = _columns(sets, 1), np.zeros(amount.shape, bool)
     chosen[amount[:, 0].argmax(), 0] = True
-    return [
-        narrowed(robot, full, force[:, None], chosen, np.full(amount.shape, side)) for side in (-1.0, 1.0)
-    ]
+    sides = (np.full(amount.shape, side) for side in (-1.0, 1.0))
+    return [narrowed(robot, one, force[:, None], chosen, side) for side in sides]
 
 
 def _columns(sets: Sets, count: int) -> Sets:
