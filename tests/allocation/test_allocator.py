@@ -113,7 +113,7 @@ def test_refuses_a_previous_command_that_is_none(method: AnyRobot, previous: obj
 def test_failed_fins_leave_the_graph_and_come_back_as_nan(method: AnyRobot) -> None:
     result = method.allocate(ROBOT, SURGE, failed=["left"])
     assert Drawn.asked[0][0].names == ("bow", "stern")
-    assert result.fins == ("bow", "left", "stern") and result.failed == ("left",)
+    assert result.names == ("bow", "left", "stern") and result.failed == ("left",)
     assert np.isnan(result.command[1]).all()
     expected = method.allocate(ROBOT.without(["left"]), SURGE).command
     np.testing.assert_array_equal(result.command[[0, 2]], expected)

@@ -12,7 +12,7 @@ FILES = [
     *sorted((ROOT / "finlab/allocation/dual").glob("*.py")),
     *(
         ROOT / "finlab/actuators" / f"{name}.py"
-        for name in ("response", "fin/response", "thruster", "azimuth")
+        for name in ("response", "fin/fin_response", "thruster", "azimuth")
     ),
     *(ROOT / "finlab/actuators" / f"{name}.py" for name in ("rudder", "thrust_power", "registry")),
 ]

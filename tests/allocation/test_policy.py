@@ -181,9 +181,9 @@ def test_scale_of_nothing_is_one(search: AnyRobot) -> None:
 
 def test_binding_limits_are_named(search: AnyRobot) -> None:
     strong = search.allocate(shipped("A"), (60.0, 0.0, 0.0, 0.0, 0.0, 0.0))
-    assert set(strong.binding) == {f"{name} at full thrust" for name in strong.fins}
+    assert set(strong.binding) == {f"{name} at full thrust" for name in strong.names}
     stopped = search.allocate(shipped("restricted"), (-40.0, 0.0, 0.0, 0.0, 0.0, 0.0))
-    assert {f"{name} at the end of its arc" for name in stopped.fins} <= set(stopped.binding)
+    assert {f"{name} at the end of its arc" for name in stopped.names} <= set(stopped.binding)
 
 
 def test_nothing_binds_where_the_target_is_delivered(search: AnyRobot) -> None:
