@@ -1,18 +1,20 @@
 """What every method has in common: problems are checked, failed fins left out, answers judge themselves."""
 
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import ClassVar
 
 import numpy as np
 import pytest
 
+import finlab
 from finlab.actuators.fin.blade import Blade
 from finlab.allocation import METHODS, Allocation, Allocator, Candidates, Solution, allocator
 from finlab.allocation.method import LeastErrorMethod
 from finlab.cli.allocate import allocate
 from finlab.errors import AllocationError, CommandError, LayoutError
-from finlab.layout import Fin, Layout
+from finlab.layout import Fin, Layout, load_layout
 from tests.any_robot import AnyRobot
 
 ROBOT = Layout(
@@ -207,3 +209,24 @@ def test_the_time_is_that_of_the_solver_shared_by_its_targets(
     assert method.allocate_batch(ROBOT, [SURGE] * 3).solve_ms.tolist() == [10_000.0] * 3
     monkeypatch.setattr(allocator, "time", clock())
     assert method.allocate_batch(ROBOT, np.empty((0, 6))).solve_ms.tolist() == []
+
+
+@pytest.mark.parametrize("method", ["mdn", "paper", "qp", "sqp"])
+def test_a_thruster_is_named_with_its_type(method: str) -> None:
+    with pytest.raises(LayoutError, match=f"method {method} works for .* 'lift_left' .* is of type thruster"):
+        finlab.Allocator(load_layout("turtle_hybrid"), method)
+
+
+def test_the_papers_method_names_the_fin_whose_shaft_it_does_not_know() -> None:
+    layout = load_layout("A")
+    tail = Fin("tail", (-0.4, 0.0, 0.0), shaft=(0.0, 0.0, 1.0), zero=(1.0, 0.0, 0.0))
+    with pytest.raises(LayoutError, match="method paper works for .* 'tail' .* a shaft of its own"):
+        finlab.Allocator(replace(layout, actuators=(*layout.fins, tail)), "paper")
+
+
+@pytest.mark.parametrize("method", ["mdn", "qp", "sqp", "analytic"])
+def test_other_methods_take_shafts_in_any_direction(method: str) -> None:
+    layout = load_layout("A")
+    tail = Fin("tail", (-0.4, 0.0, 0.0), shaft=(0.0, 0.0, 1.0), zero=(1.0, 0.0, 0.0))
+    allocator = finlab.Allocator(replace(layout, actuators=(*layout.fins, tail)), method)
+    assert allocator.allocate([0.5, 0.3, 0.2, 0.0, 0.0, 0.1]).err_norm < 0.05
