@@ -82,34 +82,22 @@ def test_refuses_many_wrenches_that_are_none(method: AnyRobot, wrenches: object)
         method.allocate_batch(ROBOT, wrenches)  # type: ignore[arg-type]
 
 
-def test_refuses_unknown_fins_and_names_those_there_are(method: AnyRobot) -> None:
-    with pytest.raises(LayoutError, match="robot has no fin 'keel', it has bow, left, stern"):
-        method.allocate(ROBOT, SURGE, failed=["bow", "keel"])
-
-
-def test_refuses_a_robot_without_a_working_fin(method: AnyRobot) -> None:
-    with pytest.raises(LayoutError, match="no fin left once all are lost"):
-        method.allocate(ROBOT, SURGE, failed=["bow", "left", "stern"])
-
-
-def test_refuses_a_bare_name_in_place_of_a_list(method: AnyRobot) -> None:
-    with pytest.raises(
-        AllocationError, match=r"expected a list of fin names, got the text 'bow'; write \['bow'\]"
-    ):
-        method.allocate(ROBOT, SURGE, failed="bow")
-
-
-def test_refuses_a_previous_command_of_another_robot(method: AnyRobot) -> None:
-    with pytest.raises(
-        CommandError, match=r"previous: expected a command of shape \(3, 3\) for layout 'robot'"
-    ):
-        method.allocate(ROBOT, SURGE, previous=np.zeros((4, 3)))
-
-
-@pytest.mark.parametrize("previous", ["rest", [[math.inf] * 3] * 3])
-def test_refuses_a_previous_command_that_is_none(method: AnyRobot, previous: object) -> None:
-    with pytest.raises(CommandError, match="previous: "):
-        method.allocate(ROBOT, SURGE, previous=previous)  # type: ignore[arg-type]
+@pytest.mark.parametrize(
+    ("options", "kind", "sentence"),
+    [
+        ({"failed": ["bow", "keel"]}, LayoutError, "robot has no fin 'keel', it has bow, left, stern"),
+        ({"failed": ["bow", "left", "stern"]}, LayoutError, "no fin left once all are lost"),
+        ({"failed": "bow"}, AllocationError, r"expected a list of fin names, got the text 'bow'; write"),
+        ({"previous": np.zeros((4, 3))}, CommandError, r"previous: expected a command of shape \(3, 3\) for"),
+        ({"previous": "rest"}, CommandError, "previous: "),
+        ({"previous": [[math.inf] * 3] * 3}, CommandError, "previous: "),
+    ],
+)
+def test_refuses_what_is_no_question(
+    method: AnyRobot, options: dict[str, object], kind: type[Exception], sentence: str
+) -> None:
+    with pytest.raises(kind, match=sentence):
+        method.allocate(ROBOT, SURGE, **options)  # type: ignore[arg-type]
 
 
 def test_failed_fins_leave_the_graph_and_come_back_as_nan(method: AnyRobot) -> None:

@@ -218,6 +218,10 @@ def test_methods_without_weights_say_so() -> None:
         ({"axis_weights": (np.nan,) * 6}, "axis weights: expected six numbers from 0"),
         ({"order": (("Fq",),)}, "priority: expected axes among Fx, Fy, Fz, Tx, Ty, Tz, got 'Fq'"),
         ({"order": (("Fx",), ("Fz", "Fx"))}, "priority: every axis may be named once"),
+        ({"axis_weights": "abc"}, "axis weights: "),
+        ({"axis_weights": None}, "axis weights: "),
+        ({"order": 5}, "priority: expected groups of axes"),
+        ({"order": ("Fz",)}, "priority: expected groups of axes"),
     ],
 )
 def test_bad_policies_are_refused(options: dict[str, object], sentence: str) -> None:
@@ -241,14 +245,6 @@ def test_policies_from_words() -> None:
 def test_groups_end_with_the_axes_that_are_not_named() -> None:
     groups = Policy("priority", order=(("Fz",), ("Tx", "Ty"))).groups
     assert [tuple(np.array(AXES)[group]) for group in groups] == [("Fz",), ("Tx", "Ty"), ("Fx", "Fy", "Tz")]
-
-
-@pytest.mark.parametrize(
-    "wrong", [{"axis_weights": "abc"}, {"axis_weights": None}, {"order": 5}, {"order": ("Fz",)}]
-)
-def test_policies_of_the_wrong_type_are_refused_in_a_sentence(wrong: dict[str, object]) -> None:
-    with pytest.raises(CommandError, match=r"axis weights|groups of axes"):
-        Policy("priority", **wrong)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
