@@ -150,14 +150,10 @@ class Method(ABC):
     @property
     def unknown_fins(self) -> tuple[str, ...]:
         """Names of the fins whose model the networks have not learned; answers for them are wrong."""
-        known = self.fin_model
-        if known is None:
+        if self.fin_model is None:
             return ()
-        return tuple(
-            fin.name
-            for fin in self.layout.fins
-            if fin.model.type != known.type or fin.model.values() != known.values()
-        )
+        known, fins = (self.fin_model.type, self.fin_model.values()), self.layout.fins
+        return tuple(fin.name for fin in fins if (fin.model.type, fin.model.values()) != known)
 
 
 class LeastErrorMethod(Method):

@@ -77,10 +77,9 @@ def choose_method(method: str, checkpoint: Checkpoint = None, **settings: Any) -
                 "leave it out"
             )
         return MethodChoice(kind, checked_settings(kind, settings))
-    if isinstance(checkpoint, TrainedWeights):
-        return MethodChoice(kind, checked_settings(kind, settings), checkpoint)
-    weights = read_checkpoint(resolve_checkpoint(checkpoint or LEARNED[method]))
-    return MethodChoice(kind, checked_settings(kind, settings), weights)
+    if not isinstance(checkpoint, TrainedWeights):
+        checkpoint = read_checkpoint(resolve_checkpoint(checkpoint or LEARNED[method]))
+    return MethodChoice(kind, checked_settings(kind, settings), checkpoint)
 
 
 def bundled_method(files: Files, source: str) -> MethodChoice:
@@ -106,9 +105,8 @@ def bundled_method(files: Files, source: str) -> MethodChoice:
         settings = checked_settings(kind, values)
     except AllocationError as error:
         raise DataError(f"{place}: settings: {error}") from None
-    if method not in LEARNED:
-        return MethodChoice(kind, settings)
-    networks = read_checkpoint(checkpoint_path(checkpoint or LEARNED[method]))
+    name = checkpoint or LEARNED.get(method)
+    networks = read_checkpoint(checkpoint_path(name)) if name and method in LEARNED else None
     return MethodChoice(kind, settings, networks)
 
 

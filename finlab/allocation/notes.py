@@ -88,12 +88,10 @@ def fin_notes(layout: Layout, flow: Array | None = None) -> tuple[str, ...]:
 @lru_cache(maxsize=256)
 def _made(layout: Layout, stamps: tuple[tuple[int, int] | None, ...]) -> tuple[str, ...]:
     first = layout.description.partition("\n")[0]
-    head = (f"layout {layout.name} is {first}",) if first.startswith(DOUBT) else ()
-    return head + tuple(
-        note.replace("{name}", fin.name)
-        for fin, stamp in zip(layout.fins, stamps, strict=True)
-        for note in _notes_of(fin.model, fin.limits, stamp)
-    )
+    notes = [f"layout {layout.name} is {first}"] if first.startswith(DOUBT) else []
+    for fin, stamp in zip(layout.fins, stamps, strict=True):
+        notes += [note.replace("{name}", fin.name) for note in _notes_of(fin.model, fin.limits, stamp)]
+    return tuple(notes)
 
 
 @lru_cache(maxsize=1024)
