@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from finlab.allocation import Allocator
-from finlab.allocation.evaluate import REACHED
+from finlab.allocation.yardstick import REACHED
 from finlab.analysis.authority import AXES, authority, commanded_axes, named_axes
 from finlab.arrays import Array
 from finlab.errors import LayoutError
-from finlab.forces.extent import weakest
 from finlab.forces.force_sets import ForceSets, force_sets
+from finlab.forces.reach import weakest
 from finlab.layout import Layout
 from finlab.layout.wrench_axes import AXES as WRENCH
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from finlab.allocation import Allocator
-from finlab.allocation.evaluate import REACHED
+from finlab.allocation.yardstick import REACHED
 from finlab.arrays import Array
 from finlab.layout import Layout
 

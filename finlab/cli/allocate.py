@@ -55,8 +55,8 @@ def allocate(
     """
     from finlab.allocation import Allocator, Health
     from finlab.allocation.policy import policy_from
+    from finlab.allocation.report import allocation_record
     from finlab.cli.inputs import open_robot
-    from finlab.deploy.record import allocation_record
     from finlab.errors import FinlabError
 
     check_json_file(json)

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from finlab.actuators.fin.response import fin_table
+from finlab.actuators.fin.fin_response import fin_table
 from finlab.arrays import Array
 from finlab.control.measurement import Measurement
 from finlab.layout import Body, Fin, Layout, Rudder

@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from finlab.allocation.allocator import Allocator
-from finlab.allocation.evaluate import REACHED
 from finlab.allocation.policy import KINDS
+from finlab.allocation.yardstick import REACHED
 from finlab.arrays import Array
 from finlab.deploy.robot import DeployedRobot
 from finlab.errors import DataError

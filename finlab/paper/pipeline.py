@@ -4,11 +4,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from finlab.allocation.evaluate import costs
 from finlab.allocation.levenberg_marquardt import CommandProblem
 from finlab.allocation.method import LeastErrorMethod, Takes
 from finlab.allocation.settings import Settings
 from finlab.allocation.solution import Candidates, Solution
+from finlab.allocation.yardstick import costs
 from finlab.arrays import AnyArray, Array
 from finlab.layout import FinModelSpec, Layout
 from finlab.networks.normalization import to_command, to_normalized

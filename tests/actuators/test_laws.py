@@ -110,7 +110,7 @@ def test_power_laws_of_the_t200_meet_its_tables(
 
 
 def test_a_table_answers_a_price_with_the_force_whose_marginal_cost_it_is() -> None:
-    curve = Sides(TABLE).forward
+    curve = Sides(TABLE).curves[0][0]
     assert curve is not None
     price = np.linspace(0.0, 13.0, 300)
     size = curve.answer(price)

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from finlab.analysis import authority, losses
-from finlab.forces.extent import weakest
 from finlab.forces.force_sets import force_sets
+from finlab.forces.reach import weakest
 from finlab.layout import Layout
 from finlab.layout.wrench_axes import AXES
 from tests.forces.conftest import THRUST

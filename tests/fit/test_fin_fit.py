@@ -9,7 +9,7 @@ import pytest
 from threadpoolctl import threadpool_info
 
 from finlab import load_layout
-from finlab.actuators.fin.models import read_table
+from finlab.actuators.fin.fin_laws import read_table
 from finlab.allocation import Allocator
 from finlab.arrays import Array
 from finlab.errors import DataError

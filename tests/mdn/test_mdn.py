@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from finlab.allocation.mdn_settings import MdnSettings
+from finlab.allocation.settings import MdnSettings
 from finlab.assets import checkpoint_path
 from finlab.errors import AllocationError, CheckpointError
 from finlab.layout import FinModelSpec, Layout, load_layout, random_layout

@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from finlab.allocation.report import allocation_record
 from finlab.assets import shipped_checkpoints
 from finlab.deploy.bundle import make_bundle
-from finlab.deploy.record import allocation_record
 from finlab.errors import LayoutError
 from finlab.files.plain_values import yaml_text
 from finlab.layout import FinModelSpec, Layout, layout_to_dict, load_layout

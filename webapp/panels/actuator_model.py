@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import viser
 
-from finlab.actuators.fin.table import TableLaw
+from finlab.actuators.fin.fin_laws import TableLaw
 from finlab.arrays import Array
 from finlab.errors import DataError, FinlabError
 from finlab.layout import Actuator, Fin, Layout, Rudder

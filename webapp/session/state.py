@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from finlab.allocation.mdn_settings import MdnSettings
 from finlab.allocation.methods import METHODS, method_class
 from finlab.allocation.policy import AXES, KINDS
+from finlab.allocation.settings import MdnSettings
 from finlab.errors import FinlabError
 from finlab.layout import Layout
 from finlab.layout.damage import FAULTS, Health

@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from finlab.actuators.fin.models import read_table
+from finlab.actuators.fin.fin_laws import read_table
 from finlab.deploy.design_files import stored_table
 from finlab.errors import DataError, FinlabError, LayoutError
 from finlab.files.worker import in_worker

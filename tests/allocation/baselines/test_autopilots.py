@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from finlab import Allocator, load_layout
-from finlab.allocation.baselines.ardusub import ArduSub, frame_factors
-from finlab.allocation.baselines.px4 import Px4, Px4Settings, normalised
+from finlab.allocation.baselines.autopilots import ArduSub, Px4, Px4Settings, frame_factors, normalised
 from finlab.allocation.yardstick import yardstick
 from finlab.arrays import Array
 from finlab.errors import AllocationError, LayoutError

@@ -1,4 +1,4 @@
-"""Method `qp`: one linear map per layout, one box-constrained least squares per target, as in the paper."""
+"""Methods of one linear map per layout: `qp`, least squares as the paper, `analytic`, the pseudo-inverse."""
 
 from functools import cached_property
 
@@ -14,10 +14,8 @@ DIFFERENCE_STEP = 1e-4
 
 
 class LinearMap:
-    """The actuation map of a layout, linearized by central differences at the middle of the limits.
-
-    Commands are positions between the limits, 0 at the lower and 1 at the upper one.
-    """
+    """The actuation map of a layout, linearized by central differences at the middle of the limits. Commands
+    are positions between the limits, from 0 to 1."""
 
     def __init__(self, plant: Plant, sigma: Array) -> None:
         self.reference = (plant.lower + plant.upper) / 2
@@ -55,3 +53,14 @@ class Qp(ModelBased):
             for i, right in enumerate(wanted):
                 step[i, linear.free] = lsq_linear(matrix, right, (-0.5, 0.5), method="bvls").x
         return linear.reference + step.reshape(-1, plant.n_fins, 3) * plant.width
+
+
+class Analytic(ModelBased):
+    """Pseudo-inverse of the forces, rows scaled by sigma and columns by each actuator's largest force, which
+    each gives by its cheapest command. What does not fit is clipped, the rest not redistributed."""
+
+    name = "analytic"
+    takes = "any actuator"
+
+    def _commands(self, targets: Array, seed: int) -> Array:
+        return self._inverse.command(targets)

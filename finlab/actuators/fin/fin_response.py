@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from finlab.actuators.fin.models import file_stamp, make_law, stack_laws
+from finlab.actuators.fin.fin_laws import file_stamp, make_law, stack_laws
 from finlab.actuators.law import FinLaw, PlanarLaw
 from finlab.actuators.response import POINTS, Group, Plane, RadialTable, price_grid
 from finlab.arrays import Array
@@ -41,15 +41,14 @@ class FinTable(NamedTuple):
     half: float
     """Half of it [rad]; pi for a full circle."""
     gauge: Array | None
-    """Share (POINTS,) of the table's force in each direction, from 0 on; None where it is the same all
-    round."""
+    """Share (POINTS,) of the table's force in each direction, from 0 on; None where they are the same."""
     beat: Array
     """Amplitude [rad] and frequency [Hz] (POINTS + 1, 2) that give the force `largest (j / POINTS)^2`."""
     box: "_Box"
     """The law within the limits."""
     deflection: Array
-    """Direction of the force minus zero direction (POINTS,) [rad] around the circle of force directions; one
-    value (1,) where it is the same all round."""
+    """Direction of the force minus zero direction (POINTS,) [rad] around the circle; (1,) where it is the
+    same."""
 
     @property
     def largest(self) -> float:
@@ -61,18 +60,10 @@ class FinGroup(Group):
     """The fins of a robot."""
 
     def __init__(self, fins: Sequence[Fin], effectiveness: Array) -> None:
-        """Compile fins; those of one model and limits are compiled once in a process.
-
-        Args:
-            fins: the fins.
-            effectiveness: wrench (m, 3, 6) per newton along each own axis: shaft, zero, across.
-
-        Raises:
-            DataError: a fin's force table cannot be read, or gives no thrust within the limits.
-        """
+        """Compiles fins with wrenches (m, 3, 6) per newton along each own axis, each model once in a process;
+        a `DataError` where a table cannot be read, or a fin gives no thrust."""
         tables = [fin_table(fin) for fin in fins]
         self._tables = tables
-        self._laws = [make_law(fin.model) for fin in fins]
         self._stacked = stack_laws([fin.model for fin in fins])
         self.responses = [
             Plane(matrix[1:], each.table, each.middle, each.half, each.gauge)
@@ -93,17 +84,16 @@ class FinGroup(Group):
         x, y = force[..., 0], force[..., 1]
         angle, size = np.arctan2(y, x), np.hypot(x, y)
         command = self._command(angle, size)
-        given = self._force(command)
-        asked = np.maximum(2.0 * size - np.hypot(given[..., 1], given[..., 2]), 0.0)
+        actual = self._force(command)
+        wanted = np.maximum(2.0 * size - np.hypot(actual[..., 1], actual[..., 2]), 0.0)
         if not self._even:
-            lean = wrapped(angle - np.arctan2(given[..., 2], given[..., 1]))
+            lean = wrapped(angle - np.arctan2(actual[..., 2], actual[..., 1]))
             angle = angle + np.where(size > 0.0, lean, 0.0)
-        return self._command(angle, asked)
+        return self._command(angle, wanted)
 
     def _force(self, command: Array) -> Array:
         if len(self._stacked) == 1:
-            alone: Array = self._stacked[0][1].force(command)
-            return alone
+            return np.asarray(self._stacked[0][1].force(command))
         force = np.empty_like(command)
         for places, law in self._stacked:
             force[..., places, :] = law.force(command[..., places, :])
@@ -132,15 +122,15 @@ class FinGroup(Group):
 
     def radial_worth(self, price: Array, back: Array) -> Array:
         """See `Group`: from the commands of the table on both sides of each price, by the law."""
-        found = np.empty(price.shape)
+        result = np.empty(price.shape)
         for i, table in enumerate(self._tables):
             paid = np.maximum(price[:, i], 0.0)
             place = np.interp(paid, price_grid(table.table.top), table.table.force) / self._largest[i]
             cell = np.minimum((np.sqrt(place) * POINTS).astype(np.intp), POINTS - 1)
             starts = np.stack([table.beat[np.clip(cell + k, 0, POINTS)] for k in (-1, 0, 1, 2)])
             command = table.box.best(paid, starts)
-            found[:, i] = price[:, i] * table.box.force(command) - table.box.power(command)
-        return found
+            result[:, i] = price[:, i] * table.box.force(command) - table.box.power(command)
+        return result
 
     def reach(self, lower: Array, upper: Array) -> Array:
         """See `Group`: sizes are those of a few commands between the limits, at the middle of the arc."""
@@ -155,14 +145,14 @@ class FinGroup(Group):
 
 def fin_table(fin: Fin) -> FinTable:
     """One fin, compiled or kept from the last time; arguments and errors as for `FinGroup`."""
-    found = _compiled(fin.model, fin.limits, file_stamp(fin.model))
-    if found is None:
+    result = _compiled(fin.model, fin.limits, file_stamp(fin.model))
+    if result is None:
         raise DataError(
             f"{fin.name}: gives no thrust within its limits, amplitudes {fin.limits.amplitude[0]:.4g} to "
             f"{fin.limits.amplitude[1]:.4g} rad and frequencies {fin.limits.frequency[0]:.4g} to "
             f"{fin.limits.frequency[1]:.4g} Hz; widen the limits or leave the fin out"
         )
-    return found
+    return result
 
 
 @lru_cache(maxsize=512)
@@ -197,8 +187,8 @@ class _Box:
 
     @cached_property
     def all_round(self) -> tuple[Array, Array]:
-        """Zero directions (POINTS + 1,) [rad] and the largest forces across the shaft (POINTS + 1, 2) [N]
-        that a coarse grid of commands has there."""
+        """Zero directions (POINTS + 1,) [rad] and the largest forces (POINTS + 1, 2) [N] there, by a coarse
+        grid."""
         low, high = self.lower[2], self.upper[2]
         if isinstance(self.law, PlanarLaw):  # a formula holds beyond the limits, too
             low, high = 0.5 * (low + high) - np.pi, 0.5 * (low + high) + np.pi
@@ -206,14 +196,12 @@ class _Box:
         return turns, self.strongest(turns)
 
     def strongest(self, turns: Array) -> Array:
-        """The largest forces across the shaft (K, 2) [N] of a coarse grid of commands at zero directions
-        (K,)."""
+        """The largest forces across the shaft (K, 2) [N] at zero directions (K,), by a coarse grid."""
         command = np.tile(self.grid((GRID[0] // 2 + 1, GRID[1] // 2 + 1)), (len(turns), 1, 1))
         command[..., 2] = turns[:, None]
         across = self.law.force(command.reshape(-1, 3)).reshape(command.shape)[..., 1:]
         best = np.hypot(across[..., 0], across[..., 1]).argmax(axis=1)
-        found: Array = across[np.arange(len(turns)), best]
-        return found
+        return np.asarray(across[np.arange(len(turns)), best])
 
     def command(self, beat: Array) -> Array:
         """Commands (..., 3) of amplitude and frequency (..., 2)."""
@@ -221,8 +209,7 @@ class _Box:
 
     def force(self, command: Array) -> Array:
         """Sizes (...) [N] of the force in the fin's plane."""
-        size: Array = np.linalg.norm(self.law.force(command)[..., 1:], axis=-1)
-        return size
+        return np.asarray(np.linalg.norm(self.law.force(command)[..., 1:], axis=-1))
 
     def power(self, command: Array) -> Array:
         """Powers (...) [W]."""
@@ -259,13 +246,13 @@ class _Box:
             step = np.clip(_uphill_steps(beat, slope, curve), -longest, longest)
             trial = np.clip(np.concatenate([step, 0.2 * step]) + beat, low, high)
             command = self.command(trial)
-            found = price * self.force(command) - self.power(command)
-            best = found.argmax(axis=0)
-            better = found[best, row] > value
+            result = price * self.force(command) - self.power(command)
+            best = result.argmax(axis=0)
+            better = result[best, row] > value
             if not better.any():
                 break
             beat = np.where(better[:, None], trial[best, row], beat)
-            value = np.where(better, found[best, row], value)
+            value = np.where(better, result[best, row], value)
         return self.command(beat)
 
     def _worth_derivatives(self, price: Array, beat: Array, probe: Array) -> tuple[Array, Array]:
@@ -285,15 +272,12 @@ class _Box:
 
     def top_price(self, strongest: float) -> float:
         """The price [W/N] at which the fin gives its largest force, or nearly so where that has no end."""
-        corner = self.command(self.upper[None, :2])
-        if float(self.force(corner)[0]) >= strongest * (1.0 - ROUNDING):
-            zero = np.zeros(1)
-            marginal_force = self._slope(zero + 1.0, self.upper[None, :2]) - self._slope(
-                zero, self.upper[None, :2]
-            )
-            moves = self.upper[:2] > self.lower[:2]
-            if (marginal_force[0][moves] > 1e-3 * strongest).all():
-                price = -self._slope(zero, self.upper[None, :2])[0][moves] / marginal_force[0][moves]
+        corner, zero = self.upper[None, :2], np.zeros(1)
+        if float(self.force(self.command(corner))[0]) >= strongest * (1.0 - ROUNDING):
+            moves, saving = self.upper[:2] > self.lower[:2], self._slope(zero, corner)
+            marginal_force = (self._slope(zero + 1.0, corner) - saving)[0][moves]
+            if (marginal_force > 1e-3 * strongest).all():
+                price = -saving[0][moves] / marginal_force
                 top = float(price.max()) if len(price) else NOTHING
                 if float(self.force(self.best(np.array([top])))[0]) >= (1.0 - PEAK) * strongest:
                     return top
@@ -307,8 +291,8 @@ class _Box:
 
 
 def _uphill_steps(beat: Array, slope: Array, curve: Array) -> Array:
-    """Steps (4, K, 2) uphill from amplitudes and frequencies (K, 2): Newton's, and those of its
-    one-dimensional form along the amplitude, the frequency, and both with a constant product."""
+    """Steps (4, K, 2) uphill from amplitudes and frequencies (K, 2): Newton's, and those along the amplitude,
+    the frequency, and both with a constant product."""
     a, b, c = curve[:, 0, 0], curve[:, 0, 1], curve[:, 1, 1]
     det = a * c - b * b
     ways = [np.broadcast_to(way, beat.shape) for way in ([1.0, 0.0], [0.0, 1.0])] + [beat * [1.0, -1.0]]
