@@ -1,9 +1,28 @@
-"""Where shipped layouts, checkpoints and the web app lie: at the top of a source tree, in a wheel inside the
-package."""
+"""What is installed: shipped layouts, checkpoints and the web app, and the extras that bring more.
+
+Shipped folders lie at the top of a source tree, in a wheel inside the package.
+"""
 
 from pathlib import Path
 
 from finlab.errors import CheckpointError
+
+NAME = "finlab-marine"
+"""Name of the distribution; the package that is imported is called `finlab`."""
+EXTRAS = {
+    "torch": "train",
+    "matplotlib": "plot",
+    "viser": "app",
+    "trimesh": "app",
+    "casadi": "ipopt",
+}
+"""Packages that some parts need beside the base install, and the extra that brings each."""
+
+
+def install(extra: str) -> str:
+    """The command that installs an extra."""
+    return f"pip install '{NAME}[{extra}]'"
+
 
 _PACKAGE = Path(__file__).resolve().parent
 

@@ -12,8 +12,8 @@ from finlab.actuators.law import ActuatorLaw
 from finlab.actuators.response import Group, Plane
 from finlab.actuators.thrust_power import ThrustPower, held, radial_table
 from finlab.arrays import Array, Values
-from finlab.layout.angles import TURN, is_full_turn, wrapped
-from finlab.layout.azimuth import Azimuth
+from finlab.layout.axes import TURN, is_full_turn, wrapped
+from finlab.layout.propellers import Azimuth
 from finlab.precision import NEARLY
 
 

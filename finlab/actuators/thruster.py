@@ -12,7 +12,7 @@ from finlab.actuators.law import ActuatorLaw
 from finlab.actuators.response import Group, Line
 from finlab.actuators.thrust_power import ThrustPower, held, radial_table
 from finlab.arrays import Array, Values
-from finlab.layout.thruster import Thruster
+from finlab.layout.propellers import Thruster
 
 
 class ThrusterLaw(ActuatorLaw):

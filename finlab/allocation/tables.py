@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from finlab.command_end import aligned
+from finlab.layout.axes import AXES
 from finlab.layout.commands import AzimuthCommand, Command, FinCommand, RudderCommand
-from finlab.layout.wrench_axes import AXES
-from finlab.text_table import aligned
 
 if TYPE_CHECKING:
     from finlab.allocation.allocation import Allocation

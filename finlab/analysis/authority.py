@@ -12,8 +12,8 @@ from finlab.forces.extent import RANK_TOLERANCE, singular_values, weakest
 from finlab.forces.force_sets import SCALE, ForceSets, force_sets
 from finlab.forces.reach import max_wrench_along_exactly
 from finlab.layout import Layout
-from finlab.layout.wrench_axes import AXES as WRENCH
-from finlab.layout.wrench_axes import Axis
+from finlab.layout.axes import AXES as WRENCH
+from finlab.layout.axes import Axis
 
 AXES = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 NOTHING = 1e-4

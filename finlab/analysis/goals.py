@@ -18,7 +18,7 @@ from finlab.errors import LayoutError
 from finlab.forces.extent import weakest
 from finlab.forces.force_sets import ForceSets, force_sets
 from finlab.layout import Layout
-from finlab.layout.wrench_axes import AXES as WRENCH
+from finlab.layout.axes import AXES as WRENCH
 
 GoalName = Literal["weakest_direction", "mission_power", "worst_single_failure"]
 GOALS: tuple[GoalName, ...] = get_args(GoalName)

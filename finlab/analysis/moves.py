@@ -18,9 +18,9 @@ from finlab.arrays import Array
 from finlab.errors import LayoutError
 from finlab.forces.force_sets import ForceSets, assembled, shapes_of
 from finlab.layout import Layout
-from finlab.layout.actuator import Actuator
-from finlab.layout.arrays import moved_effectiveness
 from finlab.layout.directions import MIRROR, replaced, with_axes
+from finlab.layout.effectiveness import moved_effectiveness
+from finlab.layout.layout import Actuator
 
 MIRROR_TOLERANCE = 1e-3
 """How far [m, rad] two actuators may be from each other's mirror image and still count as a pair."""

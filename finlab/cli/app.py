@@ -20,8 +20,7 @@ def app(
         host: address to listen on; the default is reachable from this machine only.
         port: port to listen on.
     """
-    from finlab.assets import webapp_dir
-    from finlab.distribution import install
+    from finlab.assets import install, webapp_dir
     from finlab.errors import FinlabError
 
     # In a wheel it travels inside this package: an installation has no top-level package of so plain a name.

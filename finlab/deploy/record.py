@@ -7,7 +7,7 @@ from finlab.allocation.allocation import Allocation
 from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.layout.commands import command_of
-from finlab.layout.thruster import Thruster
+from finlab.layout.propellers import Thruster
 
 
 def allocation_record(result: Allocation) -> dict[str, object]:

@@ -12,9 +12,8 @@ from trimesh.triangles import closest_point
 from finlab.arrays import Array
 from finlab.errors import FinlabError
 from finlab.files.guarded import read_file
-from finlab.hull.mesh import Mesh
 from finlab.hull.mesh_file import MAX_BYTES, MeshReport, read_mesh, simplified
-from finlab.hull.shapes import Three, shape_mesh
+from finlab.hull.shapes import Mesh, Three, shape_mesh
 from finlab.layout import Fin, Layout
 
 COARSE_FACES = 400

@@ -17,13 +17,11 @@ from msgspec import Meta
 
 from finlab.errors import AllocationError
 from finlab.files.schema import checked
-from finlab.layout.actuator import Actuator
-from finlab.layout.angles import TURN
-from finlab.layout.azimuth import Azimuth
+from finlab.layout.axes import TURN
 from finlab.layout.fin import Amplitude, Frequency, Limits
-from finlab.layout.layout import Layout
+from finlab.layout.layout import Actuator, Layout
+from finlab.layout.propellers import Azimuth, Thruster
 from finlab.layout.rudder import Rudder
-from finlab.layout.thruster import Thruster
 
 Kind = Literal["lost", "weak", "torn", "stuck", "running", "whole"]
 """What may be true of a fin."""

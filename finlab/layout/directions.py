@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from finlab.arrays import Array
 from finlab.errors import FinlabError
 from finlab.layout import Actuator, Fin, Layout, Rudder, Thruster
-from finlab.layout.angles import is_full_turn, wrapped
+from finlab.layout.axes import is_full_turn, wrapped
 
 Vector = tuple[float, float, float]
 MIRROR = np.array([1.0, -1.0, 1.0])

@@ -19,11 +19,11 @@ from msgspec import Meta, Struct, to_builtins
 from finlab.errors import LayoutError
 from finlab.files.plain_values import yaml_text
 from finlab.files.schema import checked, shown
+from finlab.layout.axes import AXES
 from finlab.layout.checked import form
 from finlab.layout.file_form import ACTUATOR, BODY, HORIZONTAL_FIN, Reader, plain, under
 from finlab.layout.fin import Fin
 from finlab.layout.layout import MAX_ACTUATORS, Layout
-from finlab.layout.wrench_axes import AXES
 from finlab.whole_file import write_whole
 
 FORMAT = "finlab-layout"

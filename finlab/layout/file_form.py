@@ -15,15 +15,14 @@ from typing import Annotated, Any, Union
 from msgspec import Meta, Struct, structs
 
 from finlab.errors import LayoutError
-from finlab.layout.azimuth import Azimuth, Tilt
 from finlab.layout.body import Body, Hull
 from finlab.layout.checked import Checked, form
-from finlab.layout.fin import Fin, FinModelSpec, Limits, Model
+from finlab.layout.commanded import Uncertainty
+from finlab.layout.fin import Fin, Limits, Servo
+from finlab.layout.fin_model import FinModelSpec, Model
+from finlab.layout.propellers import Azimuth, Thruster, Tilt
 from finlab.layout.rudder import Rudder
-from finlab.layout.servo import Servo
 from finlab.layout.thrust_model import MAX_ROWS, PowerLaw, PowerTable, Row
-from finlab.layout.thruster import Thruster
-from finlab.layout.uncertainty import Uncertainty
 
 
 class TableForm(Struct, tag="table", tag_field="type", forbid_unknown_fields=True):

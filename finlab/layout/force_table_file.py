@@ -22,7 +22,7 @@ from finlab.bundle_files import TABLES, archive_around, read_bundle_files
 from finlab.errors import DataError
 from finlab.files.csv_table import CsvTable
 from finlab.files.guarded import read_file
-from finlab.layout.angles import FILE_TURN_TOLERANCE, TURN
+from finlab.layout.axes import FILE_TURN_TOLERANCE, TURN
 from finlab.layout.fin import MAX_AMPLITUDE, MAX_FREQUENCY
 
 COLUMNS = ("A", "f", "phi", "Fx", "Fy", "Fz")

@@ -1,4 +1,4 @@
-"""A layout: the actuators of one robot, in order, and optionally its body."""
+"""Layouts: the actuators of one robot, in order, and optionally its body."""
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
@@ -12,11 +12,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from finlab.arrays import Array
 from finlab.errors import LayoutError
-from finlab.layout.actuator import Actuator
+from finlab.layout.axes import AXES, CommandedAxes, mask_of
 from finlab.layout.body import Body
 from finlab.layout.checked import Checked, Name
 from finlab.layout.fin import Fin
-from finlab.layout.wrench_axes import AXES, CommandedAxes, mask_of
+from finlab.layout.propellers import Azimuth, Thruster
+from finlab.layout.rudder import Rudder
+
+Actuator = Fin | Thruster | Azimuth | Rudder
+"""An actuator of a robot: `name`, `type`, `position` [m], `frame` (3 x 3, rows in the body frame), and
+`lower` and `upper`, the limits of its command (3,)."""
+
 
 MAX_ACTUATORS = 64
 """Most actuators a layout may have."""

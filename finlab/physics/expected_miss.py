@@ -12,8 +12,8 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.layout.layout import Layout
+from finlab.layout.propellers import Thruster
 from finlab.layout.rudder import Rudder
-from finlab.layout.thruster import Thruster
 from finlab.physics.plant import Plant
 from finlab.uncertainty.known import Known, uncertainties
 

@@ -35,8 +35,8 @@ from finlab.sim.sensors import Sensors, SensorSettings
 from finlab.sim.task import Trajectory
 from finlab.vehicle.actuator_motion import ActuatorMotion
 from finlab.vehicle.attitude import quaternion_of_yaw
-from finlab.vehicle.body import complete_body
 from finlab.vehicle.fin_motion import FinMotion
+from finlab.vehicle.fossen import complete_body
 from finlab.vehicle.vehicle import STATE_SIZE, Vehicle
 
 AHEAD = 10

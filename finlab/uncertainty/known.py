@@ -13,9 +13,8 @@ import numpy as np
 from finlab.actuators.fin.models import file_stamps, make_law
 from finlab.actuators.fin.table import TableLaw
 from finlab.arrays import Array
-from finlab.layout.actuator import Actuator
 from finlab.layout.fin import Fin
-from finlab.layout.layout import Layout
+from finlab.layout.layout import Actuator, Layout
 from finlab.layout.thrust_model import PowerTable
 from finlab.uncertainty.grid_error import GridUncertainty, grid_uncertainty
 from finlab.uncertainty.table_error import thrust_table_error

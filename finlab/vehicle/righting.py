@@ -9,8 +9,7 @@ import numpy as np
 
 from finlab.layout import Layout
 from finlab.physics import plant_of
-from finlab.vehicle.body import complete_body, dynamics_of
-from finlab.vehicle.fossen import jacobian
+from finlab.vehicle.fossen import complete_body, dynamics_of, jacobian
 
 FASTEST, STEP = 3.0, 0.05
 """Speeds that are tried [m/s]."""

@@ -11,7 +11,7 @@ from finlab.arrays import Array
 from finlab.errors import CommandError
 from finlab.evaluation.method_specs import load_method_spec
 from finlab.layout import Layout, Servo
-from finlab.vehicle.fin_lag import LagStep
+from finlab.vehicle.fin_motion import LagStep
 
 PERIOD_S = 0.1
 RISING = np.outer(np.arange(1.0, 41.0), [1.0, 0.0, 0.5, 0.0, 0.0, 0.1])

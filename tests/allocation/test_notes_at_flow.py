@@ -6,9 +6,9 @@ from finlab.allocation.notes import fin_notes
 from finlab.allocation.tables import in_words
 from finlab.layout import Layout, load_layout
 from finlab.layout.commands import AzimuthCommand, FinCommand, RudderCommand, ThrusterCommand
+from finlab.layout.propellers import Thruster
 from finlab.layout.rudder import Rudder
 from finlab.layout.thrust_model import PowerTable
-from finlab.layout.thruster import Thruster
 
 
 def test_rudders_at_rest_are_told() -> None:

@@ -9,7 +9,7 @@ from finlab.control.observer import MotionObserver
 from finlab.evaluation.method_specs import load_method_spec
 from finlab.sim import ClosedLoop, make_trajectory
 from finlab.vehicle.attitude import quaternion_of_yaw
-from finlab.vehicle.body import complete_body
+from finlab.vehicle.fossen import complete_body
 from finlab.vehicle.vehicle import Vehicle
 
 

@@ -43,7 +43,7 @@ def test_surge_heave_and_yaw_stay_controllable_after_any_single_loss(name):
 
 def test_read_as_printed_in_the_body_frame_layouts_b_and_d_could_not_do_what_the_paper_shows():
     """Why a conversion is needed at all: yaw of B and surge of D would be missing."""
-    from finlab.layout.arrays import force_effectiveness
+    from finlab.layout.effectiveness import force_effectiveness
 
     def rows(name, thrust_axis_offset_deg):
         numbers = np.array(AS_PRINTED[name], dtype=float)

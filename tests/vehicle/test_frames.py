@@ -4,7 +4,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from finlab.vehicle.attitude import euler, quaternion_of_yaw
-from finlab.vehicle.body import ucat_body
+from finlab.vehicle.fossen import ucat_body
 
 # Signed derivatives as published for U-CAT: CAD inertia and added mass from its on-board dynamics, damping
 # from the simulator's set of September 2024, whose centre of buoyancy is 0.05 m above the centre of gravity.

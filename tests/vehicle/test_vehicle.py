@@ -9,7 +9,7 @@ import pytest
 from finlab.errors import LayoutError
 from finlab.layout import Body, Layout
 from finlab.vehicle.attitude import quaternion_of_yaw
-from finlab.vehicle.body import complete_body
+from finlab.vehicle.fossen import complete_body
 from finlab.vehicle.vehicle import STATE_SIZE, Vehicle
 
 STILL = (0.0,) * 6

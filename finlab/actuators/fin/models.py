@@ -14,7 +14,7 @@ from finlab.actuators.fin.soft import Soft
 from finlab.actuators.fin.table import GridLaw, TableLaw
 from finlab.actuators.law import FinLaw, PlanarLaw
 from finlab.bundle_files import archive_around
-from finlab.layout.fin import FinModelSpec
+from finlab.layout.fin_model import FinModelSpec
 from finlab.layout.force_table_file import read_force_table
 from finlab.layout.layout import Layout
 

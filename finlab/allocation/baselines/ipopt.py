@@ -13,7 +13,7 @@ from finlab.allocation.baselines.ipopt_forces import ForceProgram
 from finlab.allocation.baselines.model_based import SOLVED, ModelBased, TimeLimitedSettings
 from finlab.allocation.settings import number
 from finlab.arrays import Array
-from finlab.distribution import install
+from finlab.assets import install
 from finlab.errors import AllocationError
 
 POLISH, APPROACH = 3, 30

@@ -8,7 +8,7 @@ import numpy as np
 
 from finlab.actuators.response import POINTS
 from finlab.arrays import Array
-from finlab.layout.angles import TURN
+from finlab.layout.axes import TURN
 
 
 class Gauges:

@@ -17,8 +17,8 @@ from finlab.allocation.dual.deadline import NEVER, Deadline
 from finlab.allocation.dual.robot import DualRobot
 from finlab.allocation.dual.sets import Sets
 from finlab.arrays import Array
+from finlab.arrays import solve as solve_systems
 from finlab.precision import NEARLY, NOTHING, ROUNDING
-from finlab.small_systems import solve as solve_systems
 
 TOLERANCE = 1e-10
 """Scaled wrench that may be left of a target."""

@@ -9,7 +9,7 @@ from finlab.allocation import Allocator, Policy
 from finlab.allocation.baselines.px4 import ORDER
 from finlab.evaluation.experiments.thrusters import _draws, misses_more, missing_by_group
 from finlab.layout import load_layout
-from finlab.layout.wrench_axes import AXES
+from finlab.layout.axes import AXES
 
 
 @pytest.mark.parametrize("lost", [0, 1, 2])

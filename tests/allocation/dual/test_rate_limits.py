@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from finlab.layout import Layout, load_layout
-from finlab.layout.angles import wrapped
+from finlab.layout.axes import wrapped
 from finlab.physics import Plant
 from tests.any_robot import AnyRobot
 

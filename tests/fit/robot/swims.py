@@ -9,8 +9,8 @@ from finlab.fit.robot.swim import STEP_S
 from finlab.layout import Layout
 from finlab.physics import plant_of
 from finlab.vehicle.attitude import euler, quaternion_of_yaw
-from finlab.vehicle.body import complete_body
 from finlab.vehicle.fin_motion import FinMotion
+from finlab.vehicle.fossen import complete_body
 from finlab.vehicle.vehicle import Vehicle
 
 NOISE = np.array([0.01] * 3 + [0.005] * 6 + [0.005] * 3)
