@@ -123,20 +123,15 @@ def pressure_damping(half: Three, density: float = WATER) -> Six:
     flow (T. I. Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control, 2nd ed., section 6.4): 1/2
     rho C int |x|^3 2 h(x) dx. The round core, which turns without pushing water aside, is left out, so that a
     sphere has none."""
-    along = []
-    for axis in range(3):
-        across = np.delete(half, axis)
-        coefficient = min(DISC, BLUNT * math.sqrt(across.prod()) / half[axis])
-        along.append(coefficient)
-    areas = [math.pi * math.prod(np.delete(half, axis)) for axis in range(3)]
+    areas = [math.prod(np.delete(half, axis)) for axis in range(3)]
+    along = [min(DISC, BLUNT * math.sqrt(areas[axis]) / half[axis]) for axis in range(3)]
     about = []
     for axis in range(3):
-        ends = [k for k in range(3) if k != axis]
-        far, near = sorted(ends, key=lambda k: -half[k])
+        far, near = sorted({0, 1, 2} - {axis}, key=lambda k: -half[k])
         # int over the strip of |x|^3 2 h sqrt(1 - x^2 / a^2) dx = 8/15 h a^4
         strips = 8.0 / 15.0 * half[axis] * (half[far] ** 4 - half[near] ** 4)
         about.append(0.5 * density * along[near] * strips)
-    u, v, w = (0.5 * density * c * area for c, area in zip(along, areas, strict=True))
+    u, v, w = (0.5 * density * c * (math.pi * area) for c, area in zip(along, areas, strict=True))
     k, m, n = about
     return u, v, w, k, m, n
 

@@ -21,11 +21,7 @@ FREE_TRIANGLES = 100_000
 BYTES_PER_TRIANGLE = 6
 """Of a larger one each takes at least so many: corners and indices take 18."""
 _PARTS = re.compile(rb"(?m)^[ \t]*(?:usemtl|mtllib|o|g|s)(?:[ \t].*)?$")
-
-
-def in_one_part(content: bytes) -> bytes:
-    """An OBJ file without materials and groups, each of which would become a mesh of its own."""
-    return _PARTS.sub(b"", content)
+"""Materials and groups of an OBJ file, each of which would become a mesh of its own."""
 
 
 def check_glb(name: str, content: bytes) -> None:
@@ -125,7 +121,7 @@ def _loaded(name: str, content: bytes) -> trimesh.Trimesh:
     if kind == ".glb":
         check_glb(name, content)
     try:
-        content = in_one_part(content) if kind == ".obj" else content
+        content = _PARTS.sub(b"", content) if kind == ".obj" else content
         # Without a resolver nothing beside this file is read: no textures, no materials. Without processing,
         # corners that are no numbers are not quietly left out.
         mesh = trimesh.load_mesh(BytesIO(content), file_type=kind[1:], process=False)
@@ -168,9 +164,9 @@ def simplified(mesh: Mesh, faces: int) -> Mesh:
     """About the same shape with at most so many triangles, by quadric error metrics."""
     if len(mesh.faces) <= faces:
         return mesh
-    whole = trimesh.Trimesh(mesh.vertices, mesh.faces, process=True)
-    found = whole.simplify_quadric_decimation(face_count=faces)
-    return Mesh(np.asarray(found.vertices, dtype=float), np.asarray(found.faces, dtype=np.int32))
+    joined = trimesh.Trimesh(mesh.vertices, mesh.faces, process=True)
+    fewer = joined.simplify_quadric_decimation(face_count=faces)
+    return Mesh(np.asarray(fewer.vertices, dtype=float), np.asarray(fewer.faces, dtype=np.int32))
 
 
 def turned(mesh: Mesh, rotation: Array) -> Mesh:

@@ -104,16 +104,14 @@ class Surface:
 
     def anchor(self, point: Array) -> Array:
         """Where a strut from a point (3,) meets the surface; the point itself if inside."""
-        x, y, z = np.asarray(point).tolist()
-        return np.array(_anchor(self, (x, y, z)))
+        return _anchor(self, tuple(np.asarray(point).tolist())).copy()
 
 
 @lru_cache(maxsize=256)
-def _anchor(surface: Surface, point: Three) -> Three:
-    """Asked for again and again while nothing moves."""
-    inside = bool(surface.contains(np.array(point)))
-    x, y, z = point if inside else surface.nearest(np.array(point))[0].tolist()
-    return x, y, z
+def _anchor(surface: Surface, place: tuple[float, ...]) -> Array:
+    """The same, kept: it is asked for again and again while nothing moves."""
+    point = np.array(place)
+    return point if surface.contains(point) else surface.nearest(point)[0]
 
 
 def hull_of(layout: Layout) -> Surface:

@@ -102,7 +102,7 @@ class FinMotion(FinLag):
     """Angles of the fins of one layout over time, in steps much shorter than a beat; all arrays are (n,)."""
 
     def __init__(self, layout: Layout) -> None:
-        """Starts at rest: no amplitude, no frequency, zero directions at the middle of their arcs."""
+        """Starts at rest, as `FinLag`."""
         super().__init__(layout)
         self._speed_limit = layout.speed_limit
         self._creep = CREEP * self._speed_limit
@@ -112,7 +112,7 @@ class FinMotion(FinLag):
         """Phase of the flapping [rad]."""
 
     def step(self, command: Array, dt: float) -> None:
-        """Follows a command (n, 3) for `dt` [s]; a fin whose row is NaN stops at once and hangs still."""
+        """Follows a command as `FinLag`, within the beat."""
         before, rate_before = self.value, self.rate
         lost = self._follow(command, dt)
         value, rate = self.value, self.rate
@@ -137,11 +137,6 @@ class FinMotion(FinLag):
     def angle(self) -> Array:
         """The fins' angles [rad]: theta = A sin(phase) + zero direction."""
         return np.asarray(self.value[0] * np.sin(self.phase) + self.value[2])
-
-    @property
-    def speed(self) -> Array:
-        """The fins' angular speeds [rad/s]."""
-        return self.speed_and_acceleration()[0]
 
     def speed_and_acceleration(self) -> tuple[Array, Array]:
         """The fins' angular speeds [rad/s] and accelerations [rad/s^2], those of servos that change their aim

@@ -168,16 +168,16 @@ def derivative(state: Array, wrench: Array, body: Bodies, current: Array) -> Arr
 def integrate(state: Array, wrench: Array, body: Bodies, current: Array, dt: float) -> Array:
     """States (L, 12, ...) at the beginnings of L steps of `dt` [s], from the first one (12, ...), under
     wrenches (L, 6, ...) that the body carries along: Runge-Kutta of order 4."""
-    found = np.empty((len(wrench), *np.broadcast_shapes(state.shape, (12, *wrench.shape[2:]))))
-    found[0] = state
+    states = np.empty((len(wrench), *np.broadcast_shapes(state.shape, (12, *wrench.shape[2:]))))
+    states[0] = state
     for k in range(len(wrench) - 1):
-        y, tau = found[k], wrench[k]
+        y, tau = states[k], wrench[k]
         k1 = derivative(y, tau, body, current)
         k2 = derivative(y + 0.5 * dt * k1, tau, body, current)
         k3 = derivative(y + 0.5 * dt * k2, tau, body, current)
         k4 = derivative(y + dt * k3, tau, body, current)
-        found[k + 1] = y + dt / 6.0 * (k1 + 2.0 * (k2 + k3) + k4)
-    return found
+        states[k + 1] = y + dt / 6.0 * (k1 + 2.0 * (k2 + k3) + k4)
+    return states
 
 
 def body_rates(angles: Array, pace: Array) -> Array:
