@@ -1,4 +1,4 @@
-"""What is installed: shipped layouts, checkpoints and the web app, and the extras that bring more.
+"""Installed things: shipped layouts, checkpoints and the web app, and the extras that bring more.
 
 Shipped folders lie at the top of a source tree, in a wheel inside the package.
 """

@@ -1,4 +1,4 @@
-"""What a layout can do, and how to improve it: authority, attainable sets, power, score cards, optimization.
+"""Abilities of a layout, and their improvement: authority, attainable sets, power, score cards, optimization.
 
 It works from the actuators' own laws with numpy and scipy.
 """

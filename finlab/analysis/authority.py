@@ -1,4 +1,4 @@
-"""Which axes the actuators hold, how evenly, and what the loss of each single one costs."""
+"""Axes that the actuators hold, how evenly, and what the loss of each single one costs."""
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""What a layout can do, for one glance, and what of it is computed in a millisecond."""
+"""Score card of a layout, for one glance, and what of it is computed in a millisecond."""
 
 from collections.abc import Collection
 from dataclasses import asdict, dataclass

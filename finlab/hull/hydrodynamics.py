@@ -162,8 +162,8 @@ DOUBTFUL = 0.1
 
 def water_density(layout: Layout) -> float:
     """Density of the water that the fins count with [kg/m^3]; fresh water where none says it."""
-    given = (fin.model.values().get("density") for fin in layout.fins)
-    return next((float(value) for value in given if value is not None), WATER)
+    densities = (fin.model.values().get("density") for fin in layout.fins)
+    return next((float(value) for value in densities if value is not None), WATER)
 
 
 @lru_cache(maxsize=8)

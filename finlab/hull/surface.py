@@ -73,13 +73,13 @@ class Surface:
     def nearest(self, point: Array) -> tuple[Array, Array]:
         """The point (3,) of the surface nearest to `point`, and the outward normal (3,) there."""
         corners, normals = self._triangles
-        found = closest_point(corners, np.broadcast_to(np.asarray(point, dtype=float), (len(corners), 3)))
-        gap = np.linalg.norm(found - point, axis=1)
+        nearest = closest_point(corners, np.broadcast_to(np.asarray(point, dtype=float), (len(corners), 3)))
+        gap = np.linalg.norm(nearest - point, axis=1)
         best = int(np.argmin(gap))
         # On an edge several triangles are as near; their mean is what a hand would call the normal there.
         normal = normals[gap < gap[best] + 1e-6].sum(axis=0)
         size = float(np.linalg.norm(normal))
-        return np.asarray(found[best]), normals[best] if size < 1e-9 else normal / size
+        return np.asarray(nearest[best]), normals[best] if size < 1e-9 else normal / size
 
     def contains(self, points: Array) -> NDArray[np.bool_]:
         """Which of the points (..., 3) lie inside.

@@ -56,7 +56,7 @@ class Commanded(Checked):
 
     @property
     def lower(self) -> Vector:
-        """Least command, in radians and newtons; what the actuator does not have is 0."""
+        """Least command (3,), in radians and newtons; what the actuator does not have is 0."""
         return _three([getattr(self, name)[0] for name in self.LIMITS], 0.0)
 
     @property

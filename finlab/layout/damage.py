@@ -90,10 +90,10 @@ class Health:
     def __post_init__(self) -> None:
         for kind, value in _VALUES.items():
             known = getattr(self, kind)
-            told = (
+            each = [
                 (name, checked(own, value, AllocationError, f"health: {kind} {name}")) for name, own in known
-            )
-            object.__setattr__(self, kind, tuple(told))
+            ]
+            object.__setattr__(self, kind, tuple(each))
         named = [name for name, _ in (*self.stuck, *self.running)]
         if len(set(named)) < len(named):
             raise AllocationError(f"health: a fin is stuck or running once, got {', '.join(named)}")

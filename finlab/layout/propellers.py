@@ -72,8 +72,8 @@ class Thruster(Commanded):
         across[min(range(3), key=lambda i: abs(first[i]))] = 1.0
         x, y, z = cross(first, (across[0], across[1], across[2]))
         size = math.hypot(x, y, z)
-        beside = x / size, y / size, z / size
-        return first, beside, cross(first, beside)
+        second = x / size, y / size, z / size
+        return first, second, cross(first, second)
 
 
 Angle = Annotated[float, Meta(ge=-TURN - 1e-9, le=TURN + 1e-9)]

@@ -1,4 +1,4 @@
-"""How far a robot's wrench may be from what its plant says, by what is uncertain of its actuators.
+"""Distance of a robot's wrench from what its plant says, by what is uncertain of its actuators.
 
 Each actuator errs along its force; fins and turning thrusters by as much across it, and fins along their
 shafts where their table tells. With d the wrench of one standard deviation of such an error, the variance of

@@ -12,7 +12,7 @@ Numbers may be plain floats, which for one body are several times faster than ar
 broadcast; vectors are sequences of them.
 """
 
-from dataclasses import fields, replace
+from dataclasses import replace
 from functools import cache
 from typing import Any, Generic, NamedTuple, TypeVar
 
@@ -113,9 +113,8 @@ def complete_body(layout: Layout) -> Body:
     """The body of a robot; what its layout leaves out is U-CAT's, but for buoyancy, which is then neutral."""
     if layout.body is None:
         return ucat_body()
-    said = {field.name: getattr(layout.body, field.name) for field in fields(Body)}
-    given = {name: value for name, value in said.items() if value is not None}
-    return replace(ucat_body(), **{"buoyancy_n": None, **given})
+    said = {name: value for name, value in vars(layout.body).items() if value is not None}
+    return replace(ucat_body(), **{"buoyancy_n": None, **said})
 
 
 def dynamics_of(body: Body) -> Dynamics[tuple[float, ...], float]:

@@ -1,4 +1,4 @@
-"""Whether a robot stays upright by itself: its righting moment, and from which speed the water overturns it.
+"""Righting moment of a robot, and the speed from which the water overturns it.
 
 Surge, heave and pitch are linearized about straight motion ahead (T. I. Fossen, Handbook of Marine Craft
 Hydrodynamics and Motion Control, chapter 7): the moment of the added mass (Munk's) grows with the squared

@@ -130,7 +130,8 @@ def test_what_is_imported_is_required(package: str, extra: str) -> None:
 
 
 def test_installed_package_finds_its_own_files(bare: Path, tmp_path: Path) -> None:
-    code = "from finlab.assets import *; print(shipped('layouts'), checkpoint_path(), shipped('webapp'), sep='\\n')"
+    code = "from finlab.assets import *; "
+    code += "print(shipped('layouts'), checkpoint_path(), shipped('webapp'), sep='\\n')"
     done = bare_run(bare, tmp_path, "-c", code)
     assert done.returncode == 0, done.stderr
     site = next(bare.parents[1].glob("lib/python3*/site-packages"))
