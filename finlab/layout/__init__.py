@@ -1,4 +1,4 @@
-"""Description of a robot: actuators, limits and body, as frozen values, files and padded arrays. numpy and msgspec."""
+"""Description of a robot: actuators, limits and body, as frozen values, files and padded arrays."""
 
 from finlab.layout.body import Body as Body
 from finlab.layout.body import Hull as Hull
