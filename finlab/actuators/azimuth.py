@@ -11,8 +11,8 @@ import numpy as np
 from finlab.actuators.response import Group, Plane
 from finlab.actuators.thrust_power import PropellerLaw, ThrustPower, radial_table
 from finlab.arrays import Array, Values
-from finlab.layout.angles import TURN, is_full_turn, wrapped
-from finlab.layout.azimuth import Azimuth
+from finlab.layout.axes import TURN, is_full_turn, wrapped
+from finlab.layout.propellers import Azimuth
 from finlab.precision import NEARLY
 
 

@@ -10,9 +10,8 @@ import numpy as np
 from finlab.actuators.law import ActuatorLaw
 from finlab.actuators.response import RadialTable
 from finlab.arrays import AnyArray, Array, Values
-from finlab.layout.azimuth import Azimuth
+from finlab.layout.propellers import Azimuth, Thruster
 from finlab.layout.thrust_model import PowerLaw, PowerTable, ThrustModel, lower_hull, side_points
-from finlab.layout.thruster import Thruster
 from finlab.precision import NOTHING
 
 

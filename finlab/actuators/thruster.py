@@ -11,7 +11,7 @@ import numpy as np
 from finlab.actuators.response import Group, Line
 from finlab.actuators.thrust_power import PropellerLaw, ThrustPower, radial_table
 from finlab.arrays import Array, Values
-from finlab.layout.thruster import Thruster
+from finlab.layout.propellers import Thruster
 
 
 class ThrusterLaw(PropellerLaw):

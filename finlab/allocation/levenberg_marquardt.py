@@ -11,11 +11,10 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.arrays import AnyArray, Array
+from finlab.arrays import AnyArray, Array, solve
 from finlab.least_squares import Damping, levenberg_marquardt
 from finlab.physics.plant import Plant
 from finlab.precision import NOTHING
-from finlab.small_systems import solve
 
 RIDGE = (1e-9, 1e-14)
 """Regularization of the 6 x 6 systems: absolute, and relative to their trace. Without the latter those of

@@ -67,7 +67,7 @@ class Method(ABC):
         if cls.takes == "thrusters":
             layout.only(f"method {cls.name}", "thruster")
         elif cls.takes != "any actuator":
-            layout.only_fins(f"method {cls.name}", horizontal=cls.takes == "horizontal fins")
+            layout.only(f"method {cls.name}", horizontal=cls.takes == "horizontal fins")
 
     @classmethod
     def fits(cls, layout: Layout) -> bool:

@@ -13,7 +13,7 @@ import numpy as np
 from finlab.allocation.solution import Candidates, PlainData
 from finlab.arrays import Array
 from finlab.layout import Layout
-from finlab.layout.angles import wrapped
+from finlab.layout.axes import wrapped
 from finlab.physics import plant_of
 
 RESTING, STILL = 0.15, 0.01

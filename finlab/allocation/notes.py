@@ -9,9 +9,8 @@ from finlab.actuators.registry import KINDS
 from finlab.allocation.method import Method
 from finlab.arrays import Array
 from finlab.layout import FinModelSpec, Layout, Limits
-from finlab.layout.angles import wrapped
+from finlab.layout.axes import axes_in, wrapped
 from finlab.layout.force_table_file import DOUBT
-from finlab.layout.wrench_axes import axes_in
 from finlab.physics import FinLaw, TableLaw, make_law
 from finlab.precision import NEARLY
 from finlab.uncertainty.table_error import grid_uncertainty

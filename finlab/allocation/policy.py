@@ -11,9 +11,8 @@ from finlab.actuators.registry import KINDS as ACTUATORS
 from finlab.arrays import Array
 from finlab.errors import CommandError
 from finlab.layout import Layout
-from finlab.layout.angles import is_full_turn
-from finlab.layout.wrench_axes import AXES as AXES
-from finlab.layout.wrench_axes import mask_of
+from finlab.layout.axes import AXES as AXES
+from finlab.layout.axes import is_full_turn, mask_of
 
 KINDS = ("closest", "direction", "priority")
 """`closest`: least weighted error. `direction`: the same direction, scaled down. `priority`: groups of axes,

@@ -10,8 +10,8 @@ from finlab.allocation.solution import among_all
 from finlab.arrays import Array
 from finlab.errors import AllocationError, CommandError
 from finlab.layout import Layout
+from finlab.layout.axes import AXES, Axis, axes_in
 from finlab.layout.damage import Health
-from finlab.layout.wrench_axes import AXES, Axis, axes_in
 
 MAX_WRENCH = 1e6
 """Largest magnitude of a target component [N, N m]; beyond it something is wrong upstream."""

@@ -10,12 +10,12 @@ from msgspec import to_builtins
 
 from finlab.allocation.yardstick import REACHED
 from finlab.arrays import Array
+from finlab.command_end import aligned
 from finlab.layout import Layout
+from finlab.layout.axes import AXES
 from finlab.layout.commands import AzimuthCommand, Command, FinCommand, RudderCommand, command_of
-from finlab.layout.wrench_axes import AXES
 from finlab.physics.expected_miss import sources_of_miss
 from finlab.physics.plant import Plant
-from finlab.text_table import aligned
 
 if TYPE_CHECKING:
     from finlab.allocation.allocation import Allocation

@@ -6,7 +6,7 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.layout import Layout
-from finlab.physics.effort import EffortMeter
+from finlab.physics.objective import EffortMeter
 from finlab.physics.plant import Plant, plant_of
 
 STEPS = (9, 9, 17)

@@ -12,10 +12,10 @@ from collections.abc import Sequence
 from tyro.extras import SubcommandApp
 
 from finlab import __version__
+from finlab.assets import EXTRAS, install
 from finlab.cli.help_page import asks_for_help, help_page
 from finlab.cli.json_file import with_json_file
 from finlab.command_end import FAILED, exit_code
-from finlab.distribution import EXTRAS, install
 from finlab.errors import FinlabError
 
 

@@ -20,12 +20,11 @@ def app(
         host: address to listen on; the default is reachable from this machine only.
         port: port to listen on.
     """
-    from finlab.assets import webapp_dir
-    from finlab.distribution import install
+    from finlab.assets import install, shipped
     from finlab.errors import FinlabError
 
     # In a wheel it travels inside this package: an installation has no top-level package of so plain a name.
-    if (home := str(webapp_dir().parent)) not in sys.path:
+    if (home := str(shipped("webapp").parent)) not in sys.path:
         sys.path.insert(0, home)
     try:
         from webapp.serving import serve

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from finlab.text_table import aligned
+from finlab.command_end import aligned
 
 if TYPE_CHECKING:
     from finlab.analysis import Authority, Loss, ScoreCard

@@ -15,7 +15,7 @@ from finlab.control.observer import AXES, MotionObserver
 from finlab.control.tracking_controller import TrackingController, axes_of, gains_for
 from finlab.errors import FinlabError
 from finlab.layout import Layout
-from finlab.layout.angles import wrapped
+from finlab.layout.axes import wrapped
 
 LEAD_S = 2.0
 """How far ahead on the path the waypoint runs [s]; surge that balances the damping over it leaves no lag."""

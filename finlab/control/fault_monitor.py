@@ -14,7 +14,7 @@ from finlab.control.monitor_settings import MonitorSettings
 from finlab.control.motion_model import MotionModel
 from finlab.control.probe import Probe
 from finlab.layout import Body, Layout
-from finlab.layout.angles import TURN
+from finlab.layout.axes import TURN
 from finlab.layout.damage import Damage
 from finlab.physics import plant_of
 

@@ -18,11 +18,10 @@ from finlab.actuators.fin.fin_response import fin_table
 from finlab.arrays import Array
 from finlab.control.measurement import Measurement
 from finlab.layout import Body, Fin, Layout, Rudder
-from finlab.layout.angles import wrapped
+from finlab.layout.axes import wrapped
 from finlab.physics import plant_of
 from finlab.vehicle.attitude import in_world, quaternion_of
-from finlab.vehicle.body import complete_body
-from finlab.vehicle.fossen import damping_jacobian, damping_rates
+from finlab.vehicle.fossen import complete_body, damping_jacobian, damping_rates
 from finlab.vehicle.vehicle import Vehicle
 
 AXES = [0, 1, 2, 5]

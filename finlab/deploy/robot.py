@@ -16,7 +16,7 @@ from finlab.bundle_files import Files, check_bundle_files, is_bundle, read_bundl
 from finlab.errors import DataError
 from finlab.layout import Layout
 from finlab.layout.commands import neutral_row
-from finlab.layout.robot_file import Case, robot_of
+from finlab.layout.load import Case, robot_of
 
 
 @dataclass(frozen=True)

@@ -15,8 +15,8 @@ from finlab.allocation.yardstick import REACHED
 from finlab.arrays import Array
 from finlab.deploy.robot import DeployedRobot
 from finlab.errors import DataError
-from finlab.layout.robot_file import Case
-from finlab.layout.wrench_axes import AXES
+from finlab.layout.axes import AXES
+from finlab.layout.load import Case
 from finlab.physics import plant_of
 
 N_SELF_TEST = 4

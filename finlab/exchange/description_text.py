@@ -11,8 +11,7 @@ from xml.etree import ElementTree
 from finlab.exchange.description_body import DERIVATIVES
 from finlab.exchange.exchange import Exchange
 from finlab.layout import Actuator, Azimuth, Body, Layout, Rudder, Thruster
-from finlab.layout.angles import is_full_turn
-from finlab.layout.axes import Vector
+from finlab.layout.axes import Vector, is_full_turn
 
 ROOT = "base_link"
 MASS, MOMENT = 1e-11, 1e-4

@@ -19,7 +19,7 @@ from finlab.exchange.models import listed
 from finlab.exchange.propellers import driven, drives, force_of, is_plugin
 from finlab.exchange.xml_text import root_of
 from finlab.layout import MAX_ACTUATORS, Actuator, Azimuth, Fin, Layout
-from finlab.layout.angles import TURN
+from finlab.layout.axes import TURN
 
 MAX_TILT = math.radians(5.0)
 """Most that a fin's shaft may leave the horizontal plane [rad] and still be taken for horizontal."""

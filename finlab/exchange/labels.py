@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any, Literal
 
 from finlab.errors import LayoutError
-from finlab.layout.wrench_axes import AXES, Axis
+from finlab.layout.axes import AXES, Axis
 
 Frame = Literal["FLU", "FRD"]
 FRAMES: dict[Frame, str] = {"FLU": "x forward, y left, z up", "FRD": "x forward, y right, z down"}

@@ -15,7 +15,7 @@ from finlab.exchange.records import UNIT, Found, Row, found_in, is_unit
 from finlab.exchange.walk import Path, nodes, numbers_in, unread
 from finlab.files.plain_values import yaml_text
 from finlab.layout import MAX_ACTUATORS, Layout, Thruster, own_effectiveness
-from finlab.layout.wrench_axes import AXES
+from finlab.layout.axes import AXES
 
 Ends = tuple[float, float]
 

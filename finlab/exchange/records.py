@@ -12,7 +12,7 @@ from finlab.exchange import labels
 from finlab.exchange.exchange import Exchange
 from finlab.exchange.labels import axis_of, lookup, plain
 from finlab.exchange.walk import Node, nodes, numbers_in
-from finlab.layout.wrench_axes import AXES, Axis
+from finlab.layout.axes import AXES, Axis
 
 UNIT = 0.05
 """A vector whose length is this close to 1 is a direction, or a force per newton."""

@@ -12,7 +12,7 @@ import numpy as np
 from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.files.csv_table import CsvTable, read_table
-from finlab.layout.angles import TURN
+from finlab.layout.axes import TURN
 
 MAX_BYTES = 200_000_000
 """Largest file that is read [bytes]; a swim of an hour at 50 Hz has half of it."""

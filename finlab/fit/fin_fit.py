@@ -12,7 +12,7 @@ from finlab.errors import DataError
 from finlab.fit.gaussian_process import Component
 from finlab.fit.measurements import MIN_SAMPLES, Measurements
 from finlab.fit.outliers import find_outliers
-from finlab.layout.angles import TURN
+from finlab.layout.axes import TURN
 from finlab.layout.fin import MAX_AMPLITUDE, MAX_FREQUENCY
 
 MOST_SAMPLES = 1500

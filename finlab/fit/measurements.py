@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.fit.columns import Columns, read_columns, together
-from finlab.layout.angles import FILE_TURN_TOLERANCE, TURN
+from finlab.layout.axes import FILE_TURN_TOLERANCE, TURN
 from finlab.layout.fin import MAX_AMPLITUDE, MAX_FREQUENCY
 
 NEEDED = ("A", "f", "Fy", "Fz")

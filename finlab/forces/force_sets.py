@@ -27,8 +27,8 @@ from finlab.actuators.registry import groups_of, laws_of
 from finlab.actuators.response import Plane, Response
 from finlab.arrays import Array
 from finlab.layout import Layout
-from finlab.layout.angles import TURN, wrapped
-from finlab.layout.arrays import own_effectiveness
+from finlab.layout.axes import TURN, wrapped
+from finlab.layout.effectiveness import own_effectiveness
 from finlab.physics.plant import plant_of
 
 LEVER = 0.2

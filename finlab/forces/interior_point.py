@@ -12,9 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.arrays import Array
+from finlab.arrays import Array, solve
 from finlab.forces.force_sets import THINNEST, ForceSets
-from finlab.small_systems import solve
 
 ITERATIONS = 40
 UNMET = 1e-8

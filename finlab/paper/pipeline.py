@@ -18,7 +18,7 @@ from finlab.paper.features import raw_features
 from finlab.paper.network import Mixture, NetworkConfig
 from finlab.paper.settings import PaperSettings
 from finlab.paper.surrogate import LayoutSurrogate, blocks_of
-from finlab.physics.effort import EffortMeter
+from finlab.physics.objective import EffortMeter
 
 CHUNK = 250
 """Targets that are solved together; keeps memory flat for any number of targets."""

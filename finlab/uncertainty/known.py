@@ -12,9 +12,8 @@ import numpy as np
 
 from finlab.actuators.fin.fin_laws import TableLaw, file_stamps, make_law
 from finlab.arrays import Array
-from finlab.layout.actuator import Actuator
 from finlab.layout.fin import Fin
-from finlab.layout.layout import Layout
+from finlab.layout.layout import Actuator, Layout
 from finlab.layout.thrust_model import PowerTable
 from finlab.uncertainty.table_error import GridUncertainty, grid_uncertainty, thrust_table_error
 

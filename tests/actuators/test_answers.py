@@ -13,13 +13,12 @@ from finlab.actuators.rudder import RudderGroup, RudderLaw
 from finlab.actuators.thruster import ThrusterGroup, ThrusterLaw
 from finlab.allocation.dual.robot import DualRobot
 from finlab.arrays import Array
-from finlab.layout.arrays import own_effectiveness
-from finlab.layout.azimuth import Azimuth
+from finlab.layout.effectiveness import own_effectiveness
 from finlab.layout.fin import Fin
 from finlab.layout.layout import Layout
+from finlab.layout.propellers import Azimuth, Thruster
 from finlab.layout.rudder import Rudder
 from finlab.layout.thrust_model import PowerLaw, PowerTable
-from finlab.layout.thruster import Thruster
 from finlab.physics.plant import Plant
 from tests.t200 import t200_rows
 

@@ -12,12 +12,11 @@ from finlab.actuators.rudder import RudderLaw
 from finlab.actuators.thrust_power import ByPower, Sides
 from finlab.actuators.thruster import ThrusterLaw
 from finlab.arrays import Array
-from finlab.layout.azimuth import Azimuth
 from finlab.layout.fin import Fin
 from finlab.layout.layout import Layout
+from finlab.layout.propellers import Azimuth, Thruster
 from finlab.layout.rudder import Rudder
 from finlab.layout.thrust_model import PowerLaw, PowerTable
-from finlab.layout.thruster import Thruster
 from finlab.physics.plant import Plant
 from tests.t200 import t200_rows
 

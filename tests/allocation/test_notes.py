@@ -14,9 +14,9 @@ from finlab.assets import shipped_checkpoints
 from finlab.errors import DataError
 from finlab.layout import Fin, FinModelSpec, Layout, Limits, load_layout
 from finlab.layout.commands import AzimuthCommand, FinCommand, RudderCommand, ThrusterCommand
+from finlab.layout.propellers import Thruster
 from finlab.layout.rudder import Rudder
 from finlab.layout.thrust_model import PowerTable
-from finlab.layout.thruster import Thruster
 from finlab.physics import make_law, write_table
 from tests.allocation.quick import OF_FINS, quick_allocator
 from tests.fin_robots import FIN_ROBOTS

@@ -18,7 +18,7 @@ from finlab.allocation.policy import (
 from finlab.assets import shipped_layouts
 from finlab.errors import AllocationError, CommandError
 from finlab.layout import Fin, Layout, Limits, load_layout
-from finlab.layout.arrays import layout_effectiveness
+from finlab.layout.effectiveness import layout_effectiveness
 from finlab.physics import Plant
 from tests.allocation.quick import OF_FINS
 from tests.any_robot import AnyRobot, normalized_error

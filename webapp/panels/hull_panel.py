@@ -15,7 +15,7 @@ from finlab.hull.mesh_file import LARGEST, MAX_BYTES, MAX_FACES, turned
 from finlab.hull.surface import UNITS
 from finlab.layout import Layout
 from finlab.layout.body import HULL_SHAPES, MESH_SUFFIXES, Hull
-from finlab.vehicle.body import GRAVITY
+from finlab.vehicle.fossen import GRAVITY
 from webapp.markup.html import html
 from webapp.markup.words import three_digits
 from webapp.page import Page

@@ -6,7 +6,7 @@ import numpy as np
 import viser
 
 from finlab.arrays import Array
-from finlab.hull.mesh import Mesh
+from finlab.hull.shapes import Mesh
 from webapp.handles import put
 from webapp.scene.meshes.mesh import NOTHING, force_arrow, joined, tube
 from webapp.scene.proportions import view_size

@@ -6,7 +6,7 @@ from typing import Any
 
 from finlab.errors import FinlabError
 from finlab.layout import Actuator, Azimuth, Fin, FinModelSpec, Layout, Rudder, Thruster
-from finlab.layout.fin import FIN_MODELS
+from finlab.layout.fin_model import FIN_MODELS
 from finlab.layout.thrust_model import PowerLaw, PowerTable
 from webapp.session.state import chosen
 

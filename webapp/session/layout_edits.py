@@ -10,7 +10,7 @@ import numpy as np
 from finlab.errors import FinlabError
 from finlab.hull import hull_of
 from finlab.layout import Actuator, Azimuth, Body, Fin, Layout, Rudder, Thruster, Tilt
-from finlab.layout.angles import wrapped
+from finlab.layout.axes import wrapped
 from finlab.layout.body import HULL_SHAPES, Hull
 from finlab.layout.directions import Vector, facing, image, part_of, replaced, rotated
 from finlab.layout.layout import MAX_ACTUATORS

@@ -13,7 +13,7 @@ from finlab.actuators.fin.hermite_grid import Grid, HermiteGrids
 from finlab.actuators.law import FinLaw, PlanarLaw
 from finlab.arrays import Array, Values, library_of
 from finlab.bundle_files import archive_around
-from finlab.layout.fin import FinModelSpec
+from finlab.layout.fin_model import FinModelSpec
 from finlab.layout.force_table_file import read_force_table
 from finlab.layout.layout import Layout
 

@@ -18,7 +18,7 @@ from finlab.actuators.response import POINTS, Group, Plane, RadialTable, price_g
 from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.layout import Fin, FinModelSpec, Limits
-from finlab.layout.angles import TURN, is_full_turn, wrapped
+from finlab.layout.axes import TURN, is_full_turn, wrapped
 from finlab.precision import NEARLY, NOTHING, ROUNDING, ROUNDS
 
 GRID = 17, 33

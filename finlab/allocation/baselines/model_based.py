@@ -31,7 +31,7 @@ class ModelBased(LeastErrorMethod):
         self.aim: Name = getattr(self.settings, "objective", "power")
         """What is kept least."""
         if self.aim == "effort":
-            self.layout.only_fins("objective 'effort'")
+            self.layout.only("objective 'effort'")
         self.sigma = USUAL_SHARE * self.scale
         """What wrenches (6,) are divided by: what a robot is mostly asked for."""
 

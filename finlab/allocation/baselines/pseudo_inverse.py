@@ -5,7 +5,7 @@ import numpy as np
 from finlab.actuators.registry import groups_of
 from finlab.actuators.response import Line, Plane, Response
 from finlab.arrays import Array
-from finlab.layout.angles import wrapped
+from finlab.layout.axes import wrapped
 from finlab.physics import Plant
 
 RCOND = 1e-3

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from finlab.allocation.dual.robot import DualRobot
 from finlab.allocation.dual.sets import Sets
 from finlab.arrays import Array
+from finlab.arrays import solve as solve_systems
 from finlab.precision import NEARLY, NOTHING, ROUNDING
-from finlab.small_systems import solve as solve_systems
 
 LIMIT_S = 0.15
 """Processor time [s] of this thread after which a search for one target ends with what it has found."""

@@ -12,7 +12,7 @@ from finlab.allocation.dual.policies import cheapest
 from finlab.allocation.dual.robot import DualRobot
 from finlab.allocation.dual.sets import Sets
 from finlab.arrays import Array
-from finlab.layout.angles import wrapped
+from finlab.layout.axes import wrapped
 from finlab.physics.plant import Plant
 
 

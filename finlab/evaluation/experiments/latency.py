@@ -19,7 +19,7 @@ from finlab.evaluation.method_specs import MethodSpec, can_run, load_method_spec
 from finlab.evaluation.progress import progress
 from finlab.evaluation.report.document import Column, Row
 from finlab.layout import Layout, random_layout
-from finlab.layout.random_actuators import random_robot, random_thruster
+from finlab.layout.random_layouts import random_robot, random_thruster
 from finlab.physics import plant_of
 
 DOMAIN = 0xF1257

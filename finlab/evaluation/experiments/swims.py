@@ -14,7 +14,7 @@ from finlab.evaluation.method_specs import MethodSpec, load_method_specs
 from finlab.evaluation.progress import progress
 from finlab.evaluation.report.document import Column, Row
 from finlab.layout import load_layout
-from finlab.layout.angles import command_change
+from finlab.layout.axes import command_change
 from finlab.sim import RunLog
 
 DAYS = {day.name: day for day in HARD_DAYS}

@@ -15,7 +15,7 @@ from finlab.evaluation.scoring import paper_sigma
 from finlab.evaluation.splits import make_split
 from finlab.evaluation.statistics.bootstrap import mean_interval
 from finlab.layout import Layout
-from finlab.layout.angles import is_full_turn
+from finlab.layout.axes import is_full_turn
 from finlab.paper.settings import PaperSettings
 
 PAPER_TEMPERATURE = 0.02

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from finlab.command_end import aligned
 from finlab.evaluation.report.numbers import FORMATS
-from finlab.text_table import aligned
 
 Row = dict[str, Any]
 WIDTH = 110  # of plain text

@@ -17,10 +17,10 @@ from finlab.arrays import Array
 from finlab.fit.robot.model import RobotModel
 from finlab.fit.robot.swim import ANGLES, STEP_S
 from finlab.fit.robot.unknowns import BASE, Unknowns
-from finlab.layout.angles import wrapped
+from finlab.layout.axes import wrapped
 from finlab.least_squares import Damping, levenberg_marquardt
 from finlab.vehicle.fossen import Dynamics
-from finlab.vehicle.many_bodies import integrate
+from finlab.vehicle.vehicle import integrate
 
 WINDOW = 80
 """Steps of a window."""

@@ -8,10 +8,10 @@ from finlab.arrays import Array
 from finlab.fit.robot.model import turned_frames
 from finlab.fit.robot.robot_fit import RobotFit
 from finlab.layout import Azimuth, Fin, Layout, Rudder, Thruster
-from finlab.layout.actuator import Actuator
+from finlab.layout.commanded import Uncertainty
 from finlab.layout.directions import with_axes
+from finlab.layout.layout import Actuator
 from finlab.layout.thrust_model import PowerLaw, PowerTable, ThrustModel
-from finlab.layout.uncertainty import Uncertainty
 
 
 def learned(fit: RobotFit, lean: Array) -> tuple[Actuator, ...]:

@@ -10,11 +10,10 @@ from finlab.arrays import Array
 from finlab.fit.robot.swim import STEP_S, Swim
 from finlab.fit.robot.unknowns import SENSORS, SHAPE, Unknowns, blocks_of
 from finlab.layout import Layout, Rudder, Thruster
-from finlab.layout.arrays import moved_effectiveness
+from finlab.layout.effectiveness import moved_effectiveness
 from finlab.physics import plant_of
-from finlab.vehicle.body import complete_body, dynamics_of
-from finlab.vehicle.fossen import Dynamics
-from finlab.vehicle.many_bodies import Bodies
+from finlab.vehicle.fossen import Dynamics, complete_body, dynamics_of
+from finlab.vehicle.vehicle import Bodies
 
 TYPICAL_SPEED = np.array([0.2, 0.2, 0.2, 0.5, 0.5, 0.5])
 """At which linear and quadratic damping are compared [m/s, rad/s]."""

@@ -15,8 +15,8 @@ from finlab.arrays import Array
 from finlab.fit.robot.model import RobotModel
 from finlab.fit.robot.swim import SMOOTHED, STEP_S, Swim
 from finlab.layout import Layout, Rudder, Thruster
-from finlab.layout.arrays import own_effectiveness
 from finlab.layout.directions import with_axes
+from finlab.layout.effectiveness import own_effectiveness
 from finlab.vehicle.attitude import rotation_of_angles
 from finlab.vehicle.fossen import accelerations
 

@@ -8,7 +8,7 @@ from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.vehicle.actuator_motion import ActuatorMotion
 from finlab.vehicle.fin_motion import FinMotion
-from finlab.vehicle.many_bodies import body_rates, body_velocity
+from finlab.vehicle.vehicle import body_rates, body_velocity
 
 STEP_S = 0.1
 """Spacing of the grid [s]."""

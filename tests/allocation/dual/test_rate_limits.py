@@ -12,9 +12,9 @@ from finlab.arrays import Array
 from finlab.errors import CommandError
 from finlab.evaluation.method_specs import load_method_spec
 from finlab.layout import Layout, Servo, load_layout
-from finlab.layout.angles import wrapped
+from finlab.layout.axes import wrapped
 from finlab.physics import Plant
-from finlab.vehicle.fin_lag import LagStep
+from finlab.vehicle.fin_motion import LagStep
 from tests.any_robot import AnyRobot
 
 TICKS = np.arange(150) * 0.1

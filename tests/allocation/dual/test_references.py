@@ -13,7 +13,7 @@ from finlab.allocation.dual.newton import solve
 from finlab.allocation.dual.robot import DualRobot
 from finlab.evaluation.experiments.thrusters import _draws, misses_more, missing_by_group
 from finlab.layout import load_layout
-from finlab.layout.wrench_axes import AXES
+from finlab.layout.axes import AXES
 from tests.least_power import conic_optimum, farthest, least_known, least_miss, lower_bound
 from tests.mixed_robots import KINDS, bluerov2_heavy, random_plant, within
 from tests.own_plant import OwnPlant

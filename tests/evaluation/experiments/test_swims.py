@@ -15,7 +15,7 @@ from finlab.evaluation.experiments.swims import (
     swim_figures,
 )
 from finlab.sim import RunLog
-from finlab.vehicle.body import complete_body
+from finlab.vehicle.fossen import complete_body
 from finlab.vehicle.vehicle import Vehicle
 from tests.any_robot import AnyRobot
 

@@ -13,7 +13,7 @@ from finlab.fit.robot.robot_fit import RobotFit, fit_robot
 from finlab.fit.robot.swim import Swim, only_new, replay
 from finlab.fit.robot.swim_file import read_swim
 from finlab.layout import Fin, FinModelSpec, Layout, Thruster, load_layout, save_layout
-from finlab.layout.angles import wrapped
+from finlab.layout.axes import wrapped
 from finlab.physics import plant_of
 from finlab.sim.excite import excitation
 from tests.any_robot import AnyRobot

@@ -1,4 +1,4 @@
-"""A thruster whose axis turns in a plane: a full turn (azimuth) or an arc (tilt)."""
+"""Thrusters: with an axis fixed in the robot, or with one that turns (azimuth, tilt)."""
 
 import math
 from collections.abc import Mapping
@@ -8,13 +8,73 @@ from typing import Annotated, Any, ClassVar
 from msgspec import Meta
 
 from finlab.errors import LayoutError
-from finlab.layout.angles import FILE_TURN_TOLERANCE, TURN, is_full_turn
-from finlab.layout.axes import Direction3
+from finlab.layout.axes import FILE_TURN_TOLERANCE, TURN, Direction3, Vector, cross, is_full_turn, unit_vector
 from finlab.layout.checked import Name
-from finlab.layout.commanded import Commanded
-from finlab.layout.thrust_model import KEYS, Newtons, ThrustModel, check_force
-from finlab.layout.thruster import ForceRate, Metres, Place, Seconds, Threshold
-from finlab.layout.uncertainty import Uncertainty
+from finlab.layout.commanded import Commanded, Uncertainty
+from finlab.layout.thrust_model import KEYS, MAX_FORCE, Newtons, ThrustModel, check_force
+
+Metres = Annotated[float, Meta(ge=-100.0, le=100.0)]
+"""A coordinate of a place on a robot, or an arm of torque [m]."""
+Place = tuple[Metres, Metres, Metres]
+Seconds = Annotated[float, Meta(ge=0.0, le=1000.0)]
+ForceRate = Annotated[float, Meta(ge=1e-6, le=1e9)]
+Threshold = Annotated[float, Meta(ge=0.0, le=MAX_FORCE)]
+
+
+@dataclass(frozen=True)
+class Thruster(Commanded):
+    """A thruster with a fixed axis; its command is the force. Checked on construction."""
+
+    KEYS: ClassVar[Mapping[str, str]] = KEYS
+    LIMITS, RATES, PUSHES = ("force",), ("rate",), (0,)
+    type: ClassVar[str] = "thruster"
+
+    name: Name
+    """Unique within its layout."""
+    position: Place
+    """Where the force acts, body frame [m]."""
+    axis: Direction3
+    """Unit vector, body frame: direction of the force on the robot for a positive force."""
+    force: tuple[Newtons, Newtons]
+    """Least and most force [N]; one of them is 0 where the thruster pushes one way only."""
+    model: ThrustModel
+    """What power it takes."""
+    dead_band: Threshold = 0.0
+    """Forces smaller than this, other than 0, cannot be held [N]."""
+    torque_per_newton: Metres = 0.0
+    """Reaction torque about the axis per force, signed [m]."""
+    time_constant: Seconds = 0.1
+    """Time in which the force comes to 63 % of a new one [s]."""
+    rate: ForceRate | None = None
+    """How fast the commanded force changes at most [N/s]; None where nothing limits it."""
+    uncertainty: Uncertainty | None = None
+    """How far its force may be from that; None where nothing is known of it."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "axis", unit_vector("axis", self.axis))
+        least, most = self.force
+        if not least <= 0.0 <= most or least == most:
+            raise LayoutError(
+                f"must include 0, and more than that, got {least:g} and {most:g}",
+                "force_n",
+            )
+        if self.dead_band > max(-least, most):
+            raise LayoutError(
+                f"leaves no force, got {self.dead_band:g} beside {least:g} .. {most:g} N", "dead_band_n"
+            )
+        check_force(self.model, self.force)
+
+    @property
+    def frame(self) -> tuple[Vector, Vector, Vector]:
+        """Own axes in the body frame: the axis, and two across it."""
+        first, across = self.axis, [0.0, 0.0, 0.0]
+        across[min(range(3), key=lambda i: abs(first[i]))] = 1.0
+        x, y, z = cross(first, (across[0], across[1], across[2]))
+        size = math.hypot(x, y, z)
+        second = x / size, y / size, z / size
+        return first, second, cross(first, second)
+
 
 Angle = Annotated[float, Meta(ge=-TURN - 1e-9, le=TURN + 1e-9)]
 TurnRate = Annotated[float, Meta(ge=1e-3, le=1000.0)]
