@@ -167,7 +167,7 @@ def _learner(allocator: Allocator) -> OnlineFit:
     """Who learns a robot on the way; a `FinlabError` where the method takes no actuators that lean."""
     import numpy as np
 
-    from finlab.fit.robot.learned_actuators import leaned
+    from finlab.fit.robot.fitted_robot import leaned
     from finlab.fit.robot.online import OnlineFit
 
     learner, layout = OnlineFit(allocator.layout), allocator.layout

@@ -6,15 +6,14 @@ from pathlib import Path
 
 from finlab.assets import shipped_layouts
 from finlab.errors import CommandError, LayoutError
-from finlab.exchange.ardusub import OF_ARDUPILOT, of_motors, read_parameters_of_ardusub, write_ardusub
 from finlab.exchange.ardusub_rows import called, tabled
 from finlab.exchange.csv_table import plain_of, table_of
 from finlab.exchange.description_text import SDF, URDF, description_text
 from finlab.exchange.exchange import Exchange
 from finlab.exchange.gazebo import read_description
-from finlab.exchange.parameters import read_parameters
+from finlab.exchange.motor_factors import OF_ARDUPILOT, of_motors, read_parameters_of_ardusub, write_ardusub
+from finlab.exchange.parameters import read_parameters, read_px4, write_px4
 from finlab.exchange.plain_robot import read_plain, write_matrix
-from finlab.exchange.px4 import read_px4, write_px4
 from finlab.files.guarded import is_regular, read_text
 from finlab.files.plain_values import parse_json, parse_yaml
 from finlab.layout import Layout, load_layout, save_layout

@@ -16,8 +16,7 @@ from scipy.spatial.transform import Rotation
 from finlab.arrays import Array
 from finlab.errors import LayoutError
 from finlab.exchange.exchange import Exchange
-from finlab.exchange.models import Drives, Named, chosen, parts_of
-from finlab.exchange.xml_text import expanded, is_xacro, root_of
+from finlab.exchange.xml_models import Drives, Named, chosen, expanded, is_xacro, parts_of, root_of
 
 ADDED = ("xx", "yy", "zz", "pp", "qq", "rr")
 """Diagonal of SDF's <fluid_added_mass>."""

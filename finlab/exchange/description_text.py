@@ -8,8 +8,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from html import escape
 from xml.etree import ElementTree
 
-from finlab.exchange.description_body import DERIVATIVES
 from finlab.exchange.exchange import Exchange
+from finlab.exchange.simulator_plugins import DERIVATIVES
 from finlab.layout import Actuator, Azimuth, Body, Layout, Rudder, Thruster
 from finlab.layout.angles import is_full_turn
 from finlab.layout.axes import Vector

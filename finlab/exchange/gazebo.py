@@ -13,11 +13,9 @@ import numpy as np
 from finlab.arrays import Array
 from finlab.errors import LayoutError
 from finlab.exchange.description import TURNING, Description, Joint, number, parse_description
-from finlab.exchange.description_body import UUV, body_of
 from finlab.exchange.exchange import T200_POWER, Exchange, vector
-from finlab.exchange.models import listed
-from finlab.exchange.propellers import driven, drives, force_of, is_plugin
-from finlab.exchange.xml_text import root_of
+from finlab.exchange.simulator_plugins import UUV, body_of, driven, drives, force_of, is_plugin
+from finlab.exchange.xml_models import listed, root_of
 from finlab.layout import MAX_ACTUATORS, Actuator, Azimuth, Fin, Layout
 from finlab.layout.angles import TURN
 

@@ -10,9 +10,8 @@ from finlab.arrays import Array
 from finlab.errors import LayoutError
 from finlab.exchange import labels
 from finlab.exchange.exchange import TO_FRD, Exchange
-from finlab.exchange.labels import FRAMES, frame_said, lookup
+from finlab.exchange.labels import FRAMES, Path, frame_said, lookup, nodes, numbers_in, unread
 from finlab.exchange.records import UNIT, Found, Row, found_in, is_unit
-from finlab.exchange.walk import Path, nodes, numbers_in, unread
 from finlab.files.plain_values import yaml_text
 from finlab.layout import MAX_ACTUATORS, Layout, Thruster, own_effectiveness
 from finlab.layout.wrench_axes import AXES

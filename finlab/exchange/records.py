@@ -10,8 +10,7 @@ from finlab.arrays import Array
 from finlab.errors import LayoutError
 from finlab.exchange import labels
 from finlab.exchange.exchange import Exchange
-from finlab.exchange.labels import axis_of, lookup, plain
-from finlab.exchange.walk import Node, nodes, numbers_in
+from finlab.exchange.labels import Node, axis_of, lookup, nodes, numbers_in, plain
 from finlab.layout.wrench_axes import AXES, Axis
 
 UNIT = 0.05

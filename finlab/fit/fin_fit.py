@@ -1,19 +1,43 @@
-"""A fin from measurements: smooth forces and power with their uncertainty, and whether to trust them."""
+"""A fin from measurements: smooth forces and power with their uncertainty, and the file of them."""
 
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.fit.gaussian_process import Component
 from finlab.fit.measurements import MIN_SAMPLES, Measurements
-from finlab.fit.outliers import find_outliers
 from finlab.layout.angles import TURN
 from finlab.layout.fin import MAX_AMPLITUDE, MAX_FREQUENCY
+from finlab.layout.force_table_file import COLUMNS, DEVIATIONS, DOUBT, POWER_COLUMN, table_text
+from finlab.whole_file import write_whole
+
+OUTLIER = 5.0
+"""Error, over the usual one, beyond which a sample is left out."""
+
+
+def find_outliers(measurements: Measurements, tell: Callable[[str], None]) -> NDArray[np.bool_]:
+    """Returns which samples (n,) lie far off a fit to the others, in which such samples count for little.
+
+    `tell` is called before each step.
+    """
+    turned, _ = measurements.thrust()
+    sizes = np.linalg.norm(measurements.force, axis=-1)
+    values = turned / (float(np.quantile(sizes, 0.98)) or float(sizes.max()))
+    inputs = measurements.scaled(measurements.command)
+    tell("looking for samples that contradict the others")
+    along = Component(inputs, values[:, 0], wild=True)
+    tell("looking for such samples across the thrust")
+    across = Component(inputs, values[:, 1], size=along.mean, wild=True)
+    return np.asarray((along.strange > OUTLIER) | (across.strange > OUTLIER))
+
 
 MOST_SAMPLES = 1500
 """Samples beyond this number are thinned: the time grows with their cube."""
@@ -186,4 +210,55 @@ def _fitted(
         power = Component(inputs, np.sqrt(np.maximum(measurements.power, 0.0) / largest_power))
     return FinFit(
         measurements, outliers, (along, across, sideways), power, deflection, largest, largest_power, notes
+    )
+
+
+GRID = (13, 13, 18)
+"""Amplitudes, frequencies and zero directions of the table, from rest to the largest that was measured."""
+
+
+def fin_csv(fit: FinFit) -> str:
+    """Returns the file's text: lines that begin with # and say what the fit is worth, a header, a grid."""
+    command = fit.grid(GRID).reshape(-1, 3)
+    force, deviation = fit.predict(command)
+    power = fit.predict_power(command)
+    table = np.hstack([command, force, *([power[:, None]] if power is not None else []), deviation])
+    header = [*COLUMNS, *([POWER_COLUMN] if power is not None else []), *DEVIATIONS]
+    return table_text(summary(fit), header, table, 6)
+
+
+def write_fin(fit: FinFit, path: str | os.PathLike[str]) -> None:
+    """Writes a fitted fin to a CSV file that a layout names: `model: {type: table, path: FILE}`.
+
+    Raises:
+        DataError: the file cannot be written, or is not called .csv.
+    """
+    check_table_path(path)
+    write_whole(path, fin_csv(fit), DataError)
+
+
+def check_table_path(path: str | os.PathLike[str]) -> None:
+    """Refuse a name that no layout would take for a table; before a fit, which takes seconds.
+
+    Raises:
+        DataError: it does not end in .csv.
+    """
+    if Path(path).suffix.lower() != ".csv":
+        raise DataError(f"{path}: a table is a CSV file, expected a name that ends in .csv")
+
+
+def summary(fit: FinFit) -> tuple[str, ...]:
+    """Returns what the fit is worth, a line each; the first says why it should not be trusted, if so."""
+    doubts = fit.doubts
+    head = (f"{DOUBT}: {'; '.join(doubts)}",) if doubts else ()
+    amplitude, frequency = fit.measurements.reach
+    deflection = float(np.degrees(fit.deflection))
+    return (
+        *head,
+        f"fitted to {len(fit.measurements)} samples, amplitudes up to {amplitude:.3g} rad, frequencies up to "
+        f"{frequency:.3g} Hz, forces up to {fit.largest:.3g} N",
+        f"cross-validated error {fit.error():.1%} of the largest force, noise of a sample {fit.noise():.1%}; "
+        f"{fit.coverage():.0%} of the samples lie in the 95 % band of the fit to the others",
+        f"thrust leans {deflection:+.1f} deg off the zero direction",
+        *fit.notes,
     )

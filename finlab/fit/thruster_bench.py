@@ -10,9 +10,8 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.errors import DataError
-from finlab.fit.columns import Columns, named_column, read_columns
+from finlab.fit.columns import Columns, named_column, read_columns, sheets
 from finlab.fit.voltages import Rows, at_voltage, by_voltage
-from finlab.fit.workbook import sheets
 
 _WORDS = {
     "PWM": "pwm pulse pulse_width pulsewidth pwm_signal pwm_value pwm_input pwm_width signal servo_signal "

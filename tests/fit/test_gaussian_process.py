@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from finlab.fit.gaussian_process import GaussianProcess
-from finlab.fit.thrust_kernel import ThrustKernel
+from finlab.fit.gaussian_process import GaussianProcess, ThrustKernel
 from tests.fit.cell import commands
 
 KERNEL = ThrustKernel(even=0.7, uneven=0.2, amplitude=0.5, frequency=0.8, turn=1.3)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import approx_fprime
 
-from finlab.fit.thrust_kernel import Pairs, ThrustKernel
+from finlab.fit.gaussian_process import Pairs, ThrustKernel
 from tests.fit.cell import commands
 
 INPUTS = commands(12) / [0.6, 2.1, 1.0]

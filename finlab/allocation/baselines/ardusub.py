@@ -17,7 +17,7 @@ from finlab.allocation.method import LeastErrorMethod
 from finlab.allocation.policy import AXES as WRENCH_AXES
 from finlab.allocation.solution import Solution
 from finlab.arrays import Array
-from finlab.exchange.ardusub_frames import AXES, FRAMES, SIGNS
+from finlab.exchange.motor_factors import AXES, FRAMES, SIGNS
 
 COLUMNS = np.array([WRENCH_AXES.index(axis) for axis in AXES])
 """Axis of the wrench for each column of factors."""

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.arrays import Array
-from finlab.fit.robot.model import RobotModel
+from finlab.fit.robot.robot_model import RobotModel
 from finlab.fit.robot.swim import ANGLES, STEP_S
 from finlab.fit.robot.unknowns import BASE, Unknowns
 from finlab.layout.angles import wrapped

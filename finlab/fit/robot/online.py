@@ -8,7 +8,7 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.errors import FinlabError
-from finlab.fit.robot.learned_actuators import asked_more, learned
+from finlab.fit.robot.fitted_robot import asked_more, learned
 from finlab.fit.robot.robot_fit import SOUND, fit_robot
 from finlab.fit.robot.swim import STEP_S, Swim, followed, motion_of, only_new
 from finlab.layout import Layout

@@ -14,8 +14,7 @@ from threadpoolctl import threadpool_limits
 from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.fit.robot.estimate import DEVIATION, Fitted, Windows, cut, fit_windows, unseen_gain
-from finlab.fit.robot.model import RobotModel
-from finlab.fit.robot.signs import opposed_in, pushing_back
+from finlab.fit.robot.robot_model import RobotModel, opposed_in, pushing_back
 from finlab.fit.robot.swim import STEP_S, Swim, smoothed
 from finlab.fit.robot.unknowns import BASE, SHAPE, Unknowns
 from finlab.layout import Layout

@@ -1,7 +1,8 @@
-"""Motor factors of ArduSub, and its parameters that name a frame.
+"""Motor factors of ArduSub, and the frames that it knows: roll, pitch, yaw, throttle, forward and lateral.
 
-Factors hold directions of forces and signs of torques, no lengths and no newtons; `ardusub_frames` has their
-columns and signs.
+Factors hold directions of forces and signs of torques, no lengths and no newtons. Forward, right and up are
+positive, and so are roll to the right, pitch up and yaw clockwise seen from above (ArduSub,
+`AP_Motors6DOF::setup_motors`, commit of 2026).
 """
 
 import re
@@ -10,11 +11,41 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.errors import LayoutError
-from finlab.exchange.ardusub_frames import AXES, FRAMES, SIGNS
 from finlab.exchange.ardusub_rows import MotorRow
 from finlab.exchange.exchange import Exchange
 from finlab.exchange.parameters import read_parameters
 from finlab.layout import Layout, own_effectiveness
+
+AXES = ("Tx", "Ty", "Tz", "Fz", "Fx", "Fy")
+"""Axis of the body frame (x forward, y left, z up) for each column."""
+SIGNS = np.array([1.0, -1.0, -1.0, 1.0, 1.0, -1.0])
+"""Sign of that axis for a positive factor."""
+_PLANAR = ((0, 0, 1, 0, -1, 1), (0, 0, -1, 0, -1, -1), (0, 0, -1, 0, 1, 1), (0, 0, 1, 0, 1, -1))
+_SIMPLE = ((0, 0, -1, 0, 1, 0), (0, 0, 1, 0, 1, 0))
+_TWO = ((1, 0, 0, -1, 0, 0), (-1, 0, 0, -1, 0, 0))
+FRAMES: dict[str, Array] = {
+    name: np.array(rows, np.float64)
+    for name, rows in {
+        "BLUEROV1": (
+            *((0, 0, -1, 0, 1, 0), (0, 0, 1, 0, 1, 0), (-0.5, 0.5, 0, 0.45, 0, 0)),
+            *((0.5, 0.5, 0, 0.45, 0, 0), (0, -1, 0, 1, 0, 0), (-0.25, 0, 0, 0, 0, 1)),
+        ),
+        "VECTORED": (*_PLANAR, *_TWO),
+        "VECTORED_6DOF": (
+            *_PLANAR,
+            *((1, -1, 0, -1, 0, 0), (-1, -1, 0, -1, 0, 0), (1, 1, 0, -1, 0, 0), (-1, 1, 0, -1, 0, 0)),
+        ),
+        "VECTORED_6DOF_90DEG": (
+            *((1, 1, 0, 1, 0, 0), (0, 0, 1, 0, 1, 0), (1, -1, 0, 1, 0, 0), (0, 0, 0, 0, 0, 1)),
+            *((0, 0, 0, 0, 0, 1), (-1, 1, 0, 1, 0, 0), (0, 0, -1, 0, 1, 0), (-1, -1, 0, 1, 0, 0)),
+        ),
+        "SIMPLEROV_3": (*_SIMPLE, (0, 0, 0, -1, 0, 0)),
+        "SIMPLEROV_4": (*_SIMPLE, *_TWO),
+        "SIMPLEROV_5": (*_SIMPLE, *_TWO, (0, 0, 0, 0, 0, 1)),
+    }.items()
+}
+"""Name of a frame -> factors (n, 6), in the order of FRAME_CONFIG."""
+
 
 ARM = 0.2
 """Arm of a factor of 1 [m]; the file has none."""
