@@ -8,6 +8,7 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.errors import LayoutError
+from finlab.files.units import FORCES, LENGTHS, TURNS
 from finlab.layout.wrench_axes import AXES, Axis
 
 Frame = Literal["FLU", "FRD"]
@@ -42,9 +43,6 @@ PAIR = "bounds limits range forcelimits thrustlimits forcebounds thrustbounds th
 LEAST = "least min lower minimum minforce minthrust forcemin thrustmin lowerlimit lowerbound fmin tmin"
 MOST = "most max upper maximum maxforce maxthrust forcemax thrustmax upperlimit upperbound fmax tmax"
 LIMIT_KEYS = f"{PAIR} {LEAST} {MOST} {COUNT} {ROWS_OF}"
-LENGTHS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
-FORCES = {"n": 1.0, "kn": 1000.0, "kgf": 9.80665, "lbf": 4.4482216}
-DEGREES = {"rad": 1.0, "deg": 57.29577951308232}
 ROW = f"{NAME} {POSITION} {DIRECTION} {ANGLES} {LIMIT_KEYS} x y z "
 ROW += "px py pz posx posy posz dx dy dz ax ay az nx ny nz ux uy uz dirx diry dirz"
 """Keys of a thruster that are read."""
@@ -80,7 +78,7 @@ def lookup(
 def unknown_in(rows: Iterable[Mapping[str, Any]]) -> str:
     """Returns the keys of thrusters that are not read, with commas between."""
     keys = dict.fromkeys(str(key) for row in rows for key in row)
-    units = {**LENGTHS, **FORCES, **DEGREES}
+    units = {**LENGTHS, **FORCES, **TURNS}
     return ", ".join(key for key in keys if not axis_of(key) and not lookup({key: 0}, ROW, units)[0])[:300]
 
 

@@ -13,6 +13,7 @@ from finlab.exchange.exchange import TO_FRD, Exchange
 from finlab.exchange.labels import FRAMES, Path, frame_said, lookup, nodes, numbers_in, unread
 from finlab.exchange.records import UNIT, Found, Row, found_in, is_unit
 from finlab.files.plain_values import yaml_text
+from finlab.files.units import FORCES, LENGTHS, TURNS
 from finlab.layout import MAX_ACTUATORS, Layout, Thruster, own_effectiveness
 from finlab.layout.wrench_axes import AXES
 
@@ -35,7 +36,7 @@ def read_plain(
     for path, scope in found.node.scopes:
         near = labels.LIMIT_KEYS if path in [path for path, _ in found.node.scopes[:2]] else ""
         words = f"{labels.FRAME_KEYS} {labels.NAMES} {near}"
-        used |= {(*path, key) for key in scope if lookup({key: 0}, words, labels.FORCES)[0]}
+        used |= {(*path, key) for key in scope if lookup({key: 0}, words, FORCES)[0]}
     left = labels.unknown_in(found.rows.values())
     if left:
         exchange.note(f"Not read of each thruster: {left}.")
@@ -70,7 +71,7 @@ def _of_places(
     exchange.note(f"{found.node.words} was read: places in m, directions, limits in N.")
     sign, parts = TO_FRD[:3, 0] if frd else np.ones(3), []
     for (key, row), ends in zip(found.rows.items(), _ends(found, data, used, exchange), strict=True):
-        place_key, place, size = lookup(row, labels.POSITION, labels.LENGTHS)
+        place_key, place, size = lookup(row, labels.POSITION, LENGTHS)
         at = _three(place, f"{key}.{place_key}") * size - center
         axis = _direction(key, row, exchange)
         parts.append(exchange.thruster(_name(key, row), at * sign, axis * sign, ends))
@@ -90,8 +91,8 @@ def _direction(key: str, row: Row, exchange: Exchange) -> Array:
     if axis_key:
         axis = _three(value, f"{key}.{axis_key}")
     else:
-        axis_key, value, size = lookup(row, labels.ANGLES, labels.DEGREES)
-        turn = _three(value, f"{key}.{axis_key}") / size
+        axis_key, value, size = lookup(row, labels.ANGLES, TURNS)
+        turn = _three(value, f"{key}.{axis_key}") * size
         if np.abs(turn).max() > 2 * np.pi:
             raise LayoutError("is more than a turn; are these degrees? call it rpy_deg", f"{key}.{axis_key}")
         exchange.note(f"{axis_key} turns the axis x of a thruster, along which it pushes.")
@@ -163,15 +164,15 @@ def _limits_in(values: Mapping[str, Any], n: int, exchange: Exchange) -> list[En
 
     One pair, or one number of each, is for all. A most alone is for both ways.
     """
-    key, pair, size = lookup(values, labels.PAIR, labels.FORCES)
+    key, pair, size = lookup(values, labels.PAIR, FORCES)
     ends = numbers_in(pair)
     if key and pair is not None:
         if ends is None or ends.shape not in ((2,), (n, 2), (2, n)):
             raise LayoutError(f"expected least and most, or both of each of {n} thrusters", key)
         ends = np.broadcast_to(ends if ends.shape in ((n, 2), (2,)) else ends.T, (n, 2)) * size
         return [(low, high) for low, high in ends.tolist()]
-    low_key, low, low_size = lookup(values, labels.LEAST, labels.FORCES)
-    high_key, high, high_size = lookup(values, labels.MOST, labels.FORCES)
+    low_key, low, low_size = lookup(values, labels.LEAST, FORCES)
+    high_key, high, high_size = lookup(values, labels.MOST, FORCES)
     if high is None:
         return [None] * n
     most, least = numbers_in(high), numbers_in(low if low is not None else high)

@@ -11,6 +11,7 @@ from finlab.errors import LayoutError
 from finlab.exchange import labels
 from finlab.exchange.exchange import Exchange
 from finlab.exchange.labels import Node, axis_of, lookup, nodes, numbers_in, plain
+from finlab.files.units import LENGTHS, TURNS
 from finlab.layout.wrench_axes import AXES, Axis
 
 UNIT = 0.05
@@ -75,8 +76,7 @@ def _placed(node: Node, exchange: Exchange) -> Found | None:
     """Thrusters by place and direction: mappings below a node, or lists of all in one."""
     rows = {key: _joined(row) for key, row in _held(node.value).items()}
     says = {
-        key: (_short(lookup(row, labels.POSITION, labels.LENGTHS)[1]), _points(row))
-        for key, row in rows.items()
+        key: (_short(lookup(row, labels.POSITION, LENGTHS)[1]), _points(row)) for key, row in rows.items()
     }
     if not any(map(all, says.values())):
         lists = _lists(node, exchange)
@@ -111,10 +111,10 @@ def _short(value: Any) -> bool:
 def _points(row: Row) -> bool:
     """Whether a mapping says where its thruster points. Raises LayoutError: it may be a direction as well as
     angles."""
-    places = (lookup(row, labels.DIRECTION), lookup(row, labels.ANGLES, labels.DEGREES))
+    places = (lookup(row, labels.DIRECTION), lookup(row, labels.ANGLES, TURNS))
     points = any(_short(value) for _, value, _ in places)
     key, value, _ = lookup(row, labels.UNCLEAR)
-    if key and not points and _short(value) and lookup(row, labels.POSITION, labels.LENGTHS)[0]:
+    if key and not points and _short(value) and lookup(row, labels.POSITION, LENGTHS)[0]:
         raise LayoutError(
             "may be a direction, or roll, pitch and yaw; call it `direction`, or `rpy` in radians", key
         )
@@ -124,7 +124,7 @@ def _points(row: Row) -> bool:
 def _lists(node: Node, exchange: Exchange) -> dict[str, Row]:
     """The thrusters of a mapping that holds the places of all, and all directions, as lists."""
     value = node.value if isinstance(node.value, Mapping) else {}
-    place_key, places, size = lookup(value, labels.POSITION, labels.LENGTHS)
+    place_key, places, size = lookup(value, labels.POSITION, LENGTHS)
     key, directions, _ = lookup(value, labels.DIRECTION)
     axes, at = numbers_in(directions), numbers_in(places)
     if axes is None or at is None or axes.size < 6 or axes.size % 3 or axes.ndim > 2:

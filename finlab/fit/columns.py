@@ -2,7 +2,6 @@
 
 import csv
 import io
-import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -18,7 +17,7 @@ from finlab.errors import DataError
 from finlab.files.archive import unpacked
 from finlab.files.csv_table import CsvTable, read_table
 from finlab.files.guarded import read_file
-from finlab.layout.angles import TURN
+from finlab.files.units import UNITS
 
 MOST_PACKED, MOST_UNPACKED = 10_000_000, 20_000_000
 """Largest workbook, and what is in it without its pictures [bytes]."""
@@ -35,13 +34,8 @@ IsHeader = Callable[[Sequence[str]], bool]
 def sheets(path: Path, is_header: IsHeader) -> tuple[dict[str, CsvTable], tuple[str, ...]]:
     """Returns the sheets of a workbook that hold a table, by name, and the names of those that do not.
 
-    Args:
-        path: the workbook; of formulas the values count that were saved with them.
-        is_header: whether a row is the header of a table.
-
-    Raises:
-        DataError: it cannot be read, is too large, or openpyxl is missing.
-    """
+    A table begins at a row that `is_header`; of formulas the values count that were saved with them. Raises
+    DataError: the workbook cannot be read, is too large, or openpyxl is missing."""
     content = read_file(path, MOST_PACKED, "a workbook (.xlsx)")
     try:
         import openpyxl
@@ -52,17 +46,17 @@ def sheets(path: Path, is_header: IsHeader) -> tuple[dict[str, CsvTable], tuple[
         ) from None
     most = MOST_UNPACKED
     unpacked(content, str(path), lambda name: most if name.endswith((".xml", ".rels")) else None, most)
-    found: dict[str, CsvTable | None] = {}
+    tables: dict[str, CsvTable | None] = {}
     try:
         book = openpyxl.load_workbook(io.BytesIO(content), read_only=True, data_only=True)
         if len(book.worksheets) > MOST_SHEETS:
             raise DataError(f"{path}: has {len(book.worksheets)} sheets, expected at most {MOST_SHEETS}")
         for sheet in book.worksheets:
-            found[sheet.title] = _table(sheet, f"{path}, sheet {sheet.title}", is_header)
+            tables[sheet.title] = _table(sheet, f"{path}, sheet {sheet.title}", is_header)
     except DAMAGED as problem:
         raise DataError(f"{path}: cannot be read as a workbook (.xlsx): {problem!r:.80}") from None
-    other = tuple(title for title, table in found.items() if table is None)
-    return {title: table for title, table in found.items() if table is not None}, other
+    other = tuple(title for title, table in tables.items() if table is None)
+    return {title: table for title, table in tables.items() if table is not None}, other
 
 
 def _table(sheet: Any, source: str, is_header: IsHeader) -> CsvTable | None:
@@ -98,22 +92,6 @@ LONGEST, MOST_BLANKS = 120, 10_000
 """Characters of a header that count, without and with its blanks."""
 ALIKE = 0.01
 """Share of the largest value by which two columns of one quantity may differ."""
-_SAME_UNIT = {
-    "newton newtons": 1.0, "gf g grams gram-force": 9.80665e-3, "kgf kg kgs kg-f kilograms": 9.80665,
-    "lbf lb lbs lbsf lb-f pounds": 4.44822, "ozf oz": 0.278014, "watts volts amps": 1.0,
-    "us µs μs usec microseconds": 1.0, "ms msec milliseconds": 1e3, "nm n-m": 1.0, "ncm": 0.01,
-    "kgfm kgm": 9.80665, "kgcm kgfcm": 0.0980665, "gcm gfcm": 9.80665e-5, "ozin ozfin": 7.06155e-3,
-    "inlb inlbf lbin lbfin": 0.112985, "ftlb ftlbf lbft lbfft": 1.35582,
-}  # fmt: skip
-"""Spellings of units that the header of a bench may name."""
-UNITS = {
-    "rad": 1.0, "deg": math.pi / 180.0, "°": math.pi / 180.0,
-    "hz": 1.0, "rpm": 1.0 / 60.0, "bpm": 1.0 / 60.0, "rev/min": 1.0 / 60.0, "rad/s": 1.0 / TURN,
-    "n": 1.0, "mn": 1e-3, "kn": 1e3, "w": 1.0, "mw": 1e-3, "kw": 1e3, "v": 1.0, "mv": 1e-3,
-    "a": 1.0, "ma": 1e-3, "mnm": 1e-3, "%": 0.01, "-": 1.0,
-    **{unit: scale for units, scale in _SAME_UNIT.items() for unit in units.split()},
-}  # fmt: skip
-"""Units that a header may name, in SI (frequencies in Hz, pulses in us)."""
 
 
 @dataclass(frozen=True)
@@ -143,22 +121,18 @@ class Header(NamedTuple):
 def named_column(header: str, names: Mapping[str, str], units: Mapping[str, float] = UNITS) -> Header:
     """Returns what a header cell stands for: `A [deg]`, `amplitude_deg`, `Force (Kg f)`,
     `Fx`; "" for what no fit reads. With units of its own a name counts as it stands, else in lower case. A
-    `stroke` is the angle from end to end, twice the amplitude.
-
-    Raises:
-        DataError: the unit is not known.
-    """
+    `stroke` is the angle from end to end, twice the amplitude. Raises DataError: the unit is not known."""
     behind = "deg|rad|hz|rpm|us|nm|mN|kgf|lbf|N|W|mW|V|A"
     short = " ".join(header[:MOST_BLANKS].split())[:LONGEST]
     parts = re.fullmatch(rf"(.+?) ?(?:[\[(](.*)[\])]|_({behind}))?", short, flags=re.IGNORECASE)
-    told = parts[1] if parts else ""
-    name = names.get(told.lower().replace(" ", "_") if units is UNITS else told, "")
+    word = parts[1] if parts else ""
+    name = names.get(word.lower().replace(" ", "_") if units is UNITS else word, "")
     if parts is None or not name:
         return Header("", 1.0, "")
     unit = re.sub(r"[\s.*·]", "", (parts[2] or parts[3] or "")).lower()
     if unit and unit not in units:
         raise DataError(f"column {short}: unit {unit!r:.20} is not known, expected {', '.join(units)}")
-    return Header(name, (0.5 if told.lower() == "stroke" else 1.0) * units.get(unit, 1.0), unit)
+    return Header(name, (0.5 if word.lower() == "stroke" else 1.0) * units.get(unit, 1.0), unit)
 
 
 def read_columns(
@@ -184,23 +158,18 @@ def read_columns(
     Raises:
         DataError: the file cannot be read, or lacks a column.
     """
-    table = file
-    if not isinstance(table, CsvTable):
-        table = read_table(table, MAX_BYTES, "a CSV file of measurements", gaps)
+    what = "a CSV file of measurements"
+    table = file if isinstance(file, CsvTable) else read_table(file, MAX_BYTES, what, gaps)
     path = table.source
     try:
         named = [named_column(cell, names, units) for cell in table.header]
     except DataError as error:
         raise DataError(f"{path}: {error}") from None
     used = [i for i, column in enumerate(named) if column.name]
-    found = [named[i].name for i in used]
     for name in needed:
-        if not set(name.split("|")) & set(found):
-            told = ", ".join(table.header)
-            raise DataError(
-                f"{path}: column {name.replace('|', ' or ')} is missing, found {told:.200}; "
-                f"expected {expected}"
-            )
+        if not set(name.split("|")) & {named[i].name for i in used}:
+            missing, header = name.replace("|", " or "), ", ".join(table.header)
+            raise DataError(f"{path}: column {missing} is missing, found {header:.200}; expected {expected}")
     numbers, lines = table.numbers(used)
     values: dict[str, Array] = {}
     first: dict[str, int] = {}

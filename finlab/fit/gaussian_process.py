@@ -14,6 +14,19 @@ from scipy.optimize import minimize
 
 from finlab.arrays import Array
 
+TUNED_ON = 250
+"""Most samples on which the kernel's numbers are fitted; the time grows with their cube."""
+NOISE, FIRST_NOISE = (1e-8, 1.0), 1e-3
+"""Ends of the fitted variance of the noise, over the largest force squared, and where the fit begins."""
+LEAST_NOISE = 1e-10
+"""Added to every variance, so that samples at the same command leave the covariance regular."""
+NOISE_ROUNDS = 2
+"""Times that the noise is found from the errors of the fit before."""
+TAILS = 5.0
+"""Degrees of freedom of the noise while wild values are looked for."""
+BOUNDS = ((1e-3, 1e4), (1e-7, 1e2), (0.15, 20.0), (0.15, 20.0), (0.4, 30.0))
+"""Ends between which each number of the kernel is fitted."""
+
 
 class ThrustKernel(NamedTuple):
     """Covariance of a force in the frame that turns with the zero direction.
@@ -43,10 +56,6 @@ class ThrustKernel(NamedTuple):
         return np.asarray((inputs[:, 0] * inputs[:, 1]) ** 2 * (self.even + self.uneven))
 
 
-BOUNDS = ((1e-3, 1e4), (1e-7, 1e2), (0.15, 20.0), (0.15, 20.0), (0.4, 30.0))
-"""Ends between which each number of the kernel is fitted."""
-
-
 class Pairs:
     """Pairs of inputs (n, 3) and others (m, 3), which many kernels are asked about."""
 
@@ -74,19 +83,6 @@ class Pairs:
             return np.array([*sums, np.vdot(by_distance, f), np.vdot(by_uneven, phi)])
 
         return near * share, gradient
-
-
-TUNED_ON = 250
-"""Most samples on which the kernel's numbers are fitted; the time grows with their cube."""
-NOISE = (1e-8, 1.0)
-"""Ends of the fitted variance of the noise, over the largest force squared."""
-FIRST_NOISE = 1e-3
-LEAST_NOISE = 1e-10
-"""Added to every variance, so that samples at the same command leave the covariance regular."""
-NOISE_ROUNDS = 2
-"""Times that the noise is found from the errors of the fit before."""
-TAILS = 5.0
-"""Degrees of freedom of the noise while wild values are looked for."""
 
 
 class GaussianProcess:
@@ -130,9 +126,9 @@ class Component:
         self._process = _tuned(inputs, values, None)
         for _ in range(NOISE_ROUNDS):
             error, _ = self._process.left_out()
-            found = np.asarray(values - error) if size is None else size
-            even, grown = _noise_of(error, found, wild)
-            usual = even + grown * found**2
+            force = np.asarray(values - error) if size is None else size
+            even, grown = _noise_of(error, force, wild)
+            usual = even + grown * force**2
             self.variance = usual * (TAILS + error**2 / usual) / (TAILS + 1.0) if wild else usual
             """Of the noise of each value (n,)."""
             self._process = _tuned(inputs, values, self.variance)

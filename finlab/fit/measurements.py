@@ -87,12 +87,9 @@ def read_measurements(paths: Sequence[str | os.PathLike[str]]) -> Measurements:
     """Returns the samples of all files together.
 
     Each file has a header; columns come in any order, units may stand behind names (`A [deg]`), else
-    they are SI. They are cycle means: A (or stroke), f, Fy, Fz and perhaps phi, Fx, P.
-
-    Raises:
-        DataError: a file is missing, too large, lacks a column or holds what no fin can do; or there are too
-            few samples, or only one amplitude or frequency.
-    """
+    they are SI. They are cycle means: A (or stroke), f, Fy, Fz and perhaps phi, Fx, P. Raises DataError: a
+    file is missing, too large, lacks a column or holds what no fin can do; or there are too few samples, or
+    only one amplitude or frequency."""
     read = [read_columns(Path(path), NAMES, NEEDED, "A, f, phi, Fx, Fy, Fz in any order") for path in paths]
     if not read:
         raise DataError("expected at least one CSV file of measurements, got none")
@@ -102,20 +99,16 @@ def read_measurements(paths: Sequence[str | os.PathLike[str]]) -> Measurements:
 
 
 def _check_units(values: dict[str, Array], source: str) -> None:
-    """Refuses amplitudes [rad] and frequencies [Hz] that no fin has, as in a file in other units.
-
-    Raises:
-        DataError: there is such a value; the sentence says how to name the unit.
-    """
-    for name, most, unit, told in (("A", MAX_AMPLITUDE, "rad", "deg"), ("f", MAX_FREQUENCY, "Hz", "rpm")):
+    """Refuses amplitudes [rad] and frequencies [Hz] that no fin has, as in a file in other units."""
+    for name, what, most, unit, hint in (
+        ("A", "half amplitudes", MAX_AMPLITUDE, "rad", "`A [deg]`, and call whole strokes `stroke`"),
+        ("f", "frequencies", MAX_FREQUENCY, "Hz", "`f [rpm]`"),
+    ):
         low, high = float(values[name].min()), float(values[name].max())
         if high > most + 1e-9 or low < 0.0:
-            what = "half amplitudes" if name == "A" else "frequencies"
             raise DataError(
                 f"{source}: {what} from {low:.4g} to {high:.4g} {unit}, expected 0 to {most:.4g}; name "
-                f"another unit in the header, `{name} [{told}]`"
-                + ", and call whole strokes `stroke`"
-                * (name == "A")
+                f"another unit in the header, {hint}"
             )
 
 
@@ -145,8 +138,8 @@ def _checked(read: list[Columns], source: str) -> Measurements:
     power = columns.get("P")
     for name in ("Fx", "Fy", "Fz", "P"):
         if name in columns and columns[name][0] and np.ptp(columns[name]) == 0.0:
-            told = f"column {name} is {columns[name][0]:.4g} throughout"
-            raise DataError(f"{source}: {told}; is the sensor connected?")
+            value = f"{columns[name][0]:.4g}"
+            raise DataError(f"{source}: column {name} is {value} throughout; is the sensor connected?")
     if power is not None and power.min() < -0.02 * np.abs(power).max():
         raise DataError(
             f"{source}: column P has {power.min():.4g} W, expected the mean power that drives the fin"
@@ -165,7 +158,5 @@ def _directions(columns: dict[str, Array], source: str, notes: list[str]) -> tup
     if phi is not None and np.ptp(phi) >= SAME_DIRECTION:
         return phi, True
     said = "there is no column phi" if phi is None else f"phi is {phi[0]:.3f} rad throughout"
-    notes.append(
-        f"{said}: the other zero directions are filled by symmetry, as a fin that is the same all round"
-    )
+    notes.append(f"{said}: the other directions are filled by symmetry, as a fin that is the same all round")
     return np.zeros(len(columns["A"])) if phi is None else phi, False

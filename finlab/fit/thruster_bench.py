@@ -3,8 +3,8 @@
 import os
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -43,8 +43,7 @@ NEGATIVE = 0.02
 """Share of the largest power by which a power may lie below 0, as noise."""
 
 
-@dataclass(frozen=True)
-class Bench:
+class Bench(NamedTuple):
     """Rows of one thruster in the order of the command."""
 
     command: Array
@@ -56,7 +55,6 @@ class Bench:
     torque: Array | None
     """Torque on the thruster about its axis [N m], (n,), where the file tells it."""
     unit: str
-    """Unit of the command."""
     source: str
     """Names of the files."""
     notes: tuple[str, ...]
@@ -66,14 +64,9 @@ class Bench:
 def read_bench(paths: Sequence[str | os.PathLike[str]], voltage: float | None = None) -> Bench:
     """Returns the rows of all files together.
 
-    Args:
-        paths: CSV files, and workbooks (.xlsx) with a table in a sheet.
-        voltage: which counts where there are several [V]; between two of them forces are interpolated.
-
-    Raises:
-        DataError: a file is missing, lacks a column or holds what no thruster does, or there are several
-            voltages and none was asked for.
-    """
+    Paths are those of CSV files, and of workbooks (.xlsx) with a table in a sheet. Of several voltages the
+    one named counts [V]; between two of them forces are interpolated. Raises DataError: a file is missing,
+    lacks a column or holds what no thruster does, or there are several voltages and none is named."""
     read = [_tables(Path(path)) for path in paths]
     files, source = [table for tables, _ in read for table in tables], ", ".join(str(path) for path in paths)
     shared = [name for name in COMMANDS if all(name in file.values for file in files)]
@@ -95,11 +88,11 @@ def _tables(path: Path) -> tuple[list[Columns], tuple[str, ...]]:
     """The tables of a file, and notes on what was passed over."""
     if path.suffix.lower() not in (".xlsx", ".xlsm"):
         return [_renamed(read_columns(path, NAMES, NEEDED, EXPECTED))], ()
-    found, other = sheets(path, _is_header)
-    if not found:
+    held, other = sheets(path, _is_header)
+    if not held:
         raise DataError(f"{path}: no sheet holds a table ({', '.join(other):.200}), expected {EXPECTED}")
     tables = []
-    for title, table in found.items():
+    for title, table in held.items():
         columns = _renamed(read_columns(table, NAMES, NEEDED, EXPECTED))
         volts = re.search(r"(\d+(?:[.,]\d+)?) ?v(?:olts?)?\b", title, flags=re.IGNORECASE)
         if volts and "voltage" not in columns.values:
@@ -137,9 +130,8 @@ def _rows(file: Columns, kind: str, notes: list[str]) -> list[Rows]:
     power = values["power"] if "power" in values else np.abs(values["voltage"] * values["current"])
     if power.min() < -NEGATIVE * np.abs(power).max():
         place = file.places[int(np.argmin(power))]
-        raise DataError(
-            f"{place}: the power is {power.min():.4g} W, expected what the thruster takes, 0 or more"
-        )
+        least = f"{power.min():.4g} W, expected what the thruster takes, 0 or more"
+        raise DataError(f"{place}: the power is {least}")
     rows = {"command": command, "force": force, "power": power}
     rows |= {name: values[name] for name in values if name in ("voltage", "torque")}
     apart = by_voltage(rows, command) if "voltage" in rows else [rows]

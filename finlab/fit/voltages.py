@@ -35,16 +35,11 @@ def by_voltage(rows: Rows, command: Array) -> list[Rows]:
 
 
 def at_voltage(tables: Sequence[Rows], voltage: float | None, source: str) -> tuple[Rows, tuple[str, ...]]:
-    """Returns the rows of one voltage, and notes on what was done, a sentence each.
+    """Returns the rows of one voltage [V], None where there is only one, and notes on what was done.
 
-    Args:
-        tables: of one voltage each, by its middle in column `voltage`; without that column of any.
-        voltage: which is asked for [V]; None where there is only one.
-        source: names of the files, for errors.
-
-    Raises:
-        DataError: there are several and none was asked for, or that one does not lie among them.
-    """
+    Each table is of one voltage, by its middle in column `voltage`; without that column of any. Raises
+    DataError: there are several and none is named, or that one does not lie among them; `source` has the
+    names of the files."""
     known = np.array([np.median(np.abs(rows["voltage"])) if "voltage" in rows else np.nan for rows in tables])
     groups = _levels(known)
     if np.isnan(known).any() and (voltage is not None or len(groups) > 1):

@@ -7,18 +7,19 @@ A CSV file has a header and columns in any order: t [s]; of x, y, z [m], roll, p
 cells are empty where it was lost. Other columns are passed over.
 """
 
-import math
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import binned_statistic
 
 from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.files.archive import check_shapes, json_of, read_arrays
+from finlab.files.units import TURNS
 from finlab.fit.columns import MAX_BYTES, read_columns
 from finlab.layout import Fin, Layout
 from finlab.layout.fin import MAX_AMPLITUDE, MAX_FREQUENCY
@@ -57,13 +58,8 @@ class Swim:
 def replay(layout: Layout, command: Array) -> Array:
     """What actuators that follow as they should do (N, SUBSTEPS, n, 3) under commands (N, n, 3), one per
     step, NaN for a lost one."""
-    moving = motion_of(layout)
+    moving = ActuatorMotion(layout, FinMotion(layout))
     return np.array([followed(moving, row) for row in command])
-
-
-def motion_of(layout: Layout) -> ActuatorMotion:
-    """Actuators at rest, fins no faster than their servos."""
-    return ActuatorMotion(layout, FinMotion(layout))
 
 
 def followed(moving: ActuatorMotion, command: Array) -> Array:
@@ -88,22 +84,24 @@ def smoothed(measured: Array) -> Array:
     say nothing are made of the others, or zero."""
     from scipy.signal import savgol_filter
 
-    grid = np.arange(len(measured))
-    full = np.zeros(measured.shape)
-    known = np.asarray(np.isfinite(measured))
-    said = np.asarray(known.any(axis=0))
-    for k in np.flatnonzero(said):
-        fresh = known[:, k]
-        values = measured[fresh, k]
-        values = np.unwrap(values) if ANGLES.start <= k < ANGLES.stop else values
+    grid, full = np.arange(len(measured)), np.zeros(measured.shape)
+    for k, fresh, values in _channels(measured):
         full[:, k] = np.interp(grid, grid[fresh], values)
+    said = np.asarray(np.isfinite(measured).any(axis=0))
     full[:, said] = savgol_filter(full[:, said], *SMOOTHED, axis=0)
-    pace = np.gradient(full, STEP_S, axis=0)
-    rates = body_rates(full[:, ANGLES], pace[:, ANGLES])
-    velocity = body_velocity(full[:, ANGLES], pace[:, :3])
-    made = np.concatenate([velocity, rates], axis=1)
+    pace, angles = np.gradient(full, STEP_S, axis=0), full[:, ANGLES]
+    made = np.concatenate([body_velocity(angles, pace[:, :3]), body_rates(angles, pace[:, ANGLES])], axis=1)
     full[:, 6:] = np.where(said[6:], full[:, 6:], made)
     return full
+
+
+def _channels(measured: Array) -> Iterator[tuple[int, NDArray[np.bool_], Array]]:
+    """Channels of samples (N, 12) that say something, with the rows (N,) where they do and the values there,
+    angles without jumps."""
+    for k, column in enumerate(measured.T):
+        fresh = np.isfinite(column)
+        if fresh.any():
+            yield k, fresh, np.unwrap(column[fresh]) if ANGLES.start <= k < ANGLES.stop else column[fresh]
 
 
 SHORTEST_S = 30.0
@@ -119,62 +117,51 @@ PARTS = {
 }
 """What is commanded of each type of actuator: half amplitude [rad], frequency [Hz] and zero direction [rad];
 force [N]; angle [rad]."""
-UNITS = {
-    **dict.fromkeys(("s", "m", "m/s", "rad", "rad/s", "hz", "n"), 1.0),
-    **dict.fromkeys(("deg", "degrees", "°", "deg/s", "°/s"), math.radians(1.0)),
-}
+UNITS = dict.fromkeys(("s", "m", "m/s", "rad/s", "hz", "n"), 1.0)
+UNITS |= {**TURNS, "deg/s": TURNS["deg"], "°/s": TURNS["deg"]}
 """Units that a header may name, in SI."""
 UNIT_OF = {"A": "half amplitudes in rad", "f": "Hz", "force": "N", "deflection": "rad"}
 """What is expected of commands that have an end."""
 
 
 def read_swim(path: str | os.PathLike[str], layout: Layout) -> Swim:
-    """Returns the swim in a file.
-
-    Raises:
-        DataError: the file is missing, too large or too short, belongs to another robot, lacks a column, or
-            holds what cannot be; where it is a row or a column, the sentence names it.
-    """
+    """Returns the swim in a file. Raises DataError: the file is missing, too large or too short, belongs to
+    another robot, lacks a column, or holds what cannot be; the sentence names the row or the column."""
     place = Path(path)
     return _log(place, layout) if place.suffix.lower() == ".npz" else _csv(place, layout)
 
 
 def _log(path: Path, layout: Layout) -> Swim:
-    """A log of `finlab simulate`."""
     names = ("time", "measured", "command")
     arrays = read_arrays(path, ("meta", *names), MAX_BYTES, "a swim log written by finlab simulate")
     meta = json_of(arrays["meta"], f"{path}: meta")
     said = meta.get("fins") if isinstance(meta, dict) else None
-    fins = [str(name) for name in said] if isinstance(said, list) else []
-    if sorted(fins) != sorted(layout.names):
+    own = [str(name) for name in said] if isinstance(said, list) else []
+    if sorted(own) != sorted(layout.names):
         raise DataError(
-            f"{path}: is of a robot with the actuators {', '.join(fins)}, layout {layout.name} has "
+            f"{path}: is of a robot with the actuators {', '.join(own)}, layout {layout.name} has "
             f"{', '.join(layout.names)}"
         )
     n = arrays["time"].size
-    check_shapes(arrays, {"time": (n,), "measured": (n, 12), "command": (n, len(fins), 3)}, str(path))
+    check_shapes(arrays, {"time": (n,), "measured": (n, 12), "command": (n, len(own), 3)}, str(path))
     time, measured, command = (np.asarray(arrays[name], np.float64) for name in names)
     if not np.isfinite(time).all():
         raise DataError(f"{path}: expected finite numbers in time")
-    order = [fins.index(name) for name in layout.names]
     if len(time) > 1 and not np.allclose(np.diff(time), STEP_S):
         raise DataError(f"{path}: expected a row every {STEP_S:g} s, as finlab simulate writes them")
     _check_duration(len(time) * STEP_S, path)
-    command = command[:, order]
+    command = command[:, [own.index(name) for name in layout.names]]
     _check_commands(command, [f"{path}: row {k}" for k in range(1, n + 1)], layout)
     return Swim(path.name, replay(layout, command), only_new(measured))
 
 
 def _check_duration(seconds: float, path: Path) -> None:
     if seconds < SHORTEST_S:
-        raise DataError(
-            f"{path}: lasts {seconds:.1f} s, expected at least {SHORTEST_S:g} s; five minutes are a good "
-            "length"
-        )
+        least = f"expected at least {SHORTEST_S:g} s; five minutes are a good length"
+        raise DataError(f"{path}: lasts {seconds:.1f} s, {least}")
 
 
 def _csv(path: Path, layout: Layout) -> Swim:
-    """A CSV file."""
     commands = [f"{one.name}.{part}" for one in layout.actuators for part in PARTS[one.type]]
     names = {name: name for name in ("t", *CHANNELS, *commands)}
     pairs = [f"{pose}|{rate}" for pose, rate in zip(CHANNELS[:6], CHANNELS[6:], strict=True)]
@@ -201,9 +188,7 @@ def _csv(path: Path, layout: Layout) -> Swim:
 def _check_time(time: Array, places: Sequence[str]) -> None:
     """Time (n,) must rise, without gaps."""
     steps = np.diff(time)
-    wrong = np.flatnonzero(~((steps > 0.0) & (steps <= LONGEST_GAP_S)))
-    if len(wrong):
-        k = int(wrong[0])
+    for k in np.flatnonzero(~((steps > 0.0) & (steps <= LONGEST_GAP_S))):
         raise DataError(
             f"{places[k + 1]}, column t: {time[k + 1]:g} s after {time[k]:g} s, expected times that rise by "
             f"{LONGEST_GAP_S:g} s at most; sort the rows, or cut the file there and name both parts"
@@ -224,13 +209,10 @@ def _rows(values: Array, layout: Layout) -> Array:
 def _check_commands(command: Array, places: Sequence[str], layout: Layout) -> None:
     """An actuator is commanded by numbers that it can do, or by none."""
     known = np.isfinite(command)
-    half = np.argwhere(known.any(axis=2) & ~known.all(axis=2))
-    if len(half):
-        k, i = half[0]
-        name, parts = layout.names[i], PARTS[layout.actuators[i].type]
+    for k, i in np.argwhere(known.any(axis=2) & ~known.all(axis=2)):
+        columns = ", ".join(f"{layout.names[i]}.{part}" for part in PARTS[layout.actuators[i].type])
         raise DataError(
-            f"{places[k]}: of {', '.join(f'{name}.{part}' for part in parts)} some are empty; fill all, "
-            "or none for an actuator that was lost"
+            f"{places[k]}: of {columns} some are empty; fill all, or none for an actuator that was lost"
         )
     for i, one in enumerate(layout.actuators):
         for part, name in enumerate(PARTS[one.type]):
@@ -251,11 +233,7 @@ def _check_commands(command: Array, places: Sequence[str], layout: Layout) -> No
 def _on_grid(time: Array, measured: Array, grid: Array) -> Array:
     """New samples (N, 12) at times (N,) as means within half a step of the grid's times (M,), (M, 12)."""
     edges = np.append(grid, grid[-1] + STEP_S) - 0.5 * STEP_S
-    found = np.full((len(grid), measured.shape[1]), np.nan)
-    for k in range(measured.shape[1]):
-        fresh = np.isfinite(measured[:, k])
-        if fresh.any():
-            values = measured[fresh, k]
-            values = np.unwrap(values) if ANGLES.start <= k < ANGLES.stop else values
-            found[:, k] = binned_statistic(time[fresh], values, "mean", edges).statistic
-    return found
+    means = np.full((len(grid), measured.shape[1]), np.nan)
+    for k, fresh, values in _channels(measured):
+        means[:, k] = binned_statistic(time[fresh], values, "mean", edges).statistic
+    return means
