@@ -93,12 +93,11 @@ def cut(n_steps: list[int], measured: Array, smooth: Array) -> Windows:
     steps, begin = [], 0
     for count in n_steps:
         n = max(1, round(count / WINDOW))
-        length = count // n
-        steps += [begin + k * length + np.arange(length) for k in range(n)]
+        steps += [begin + count // n * k + np.arange(count // n) for k in range(n)]
         begin += count
-    longest = max(len(one) for one in steps)
-    padded = np.array([np.concatenate([one, np.full(longest - len(one), one[-1])]) for one in steps])
     own = np.array([len(one) for one in steps])
+    longest = own.max()
+    padded = np.array([np.pad(one, (0, longest - len(one)), "edge") for one in steps])
     values = np.where((np.arange(longest) < own[:, None])[..., None], measured[padded], np.nan)
     return Windows(padded, np.moveaxis(values, 0, -1), smooth[padded[:, 0]].T.copy())
 
@@ -109,27 +108,18 @@ def fit_windows(
     windows: Windows,
     deviation: Array,
     vector: Array,
-    start: Array | None = None,
+    start: Array,
 ) -> Fitted:
-    """Unknowns from windows.
-
-    Args:
-        model: the robot and its swims.
-        unknowns: what is looked for.
-        windows: what was measured.
-        deviation: standard deviation of each channel (12,).
-        vector: where to begin (size,).
-        start: states of the windows to begin with, instead of the smoothed ones.
-    """
+    """Unknowns from windows, by the standard deviation of each channel (12,), from a vector (size,) on and
+    from the beginnings of the windows `start` (12, W)."""
     problem = _Problem(model, unknowns, windows, deviation)
-    begin = windows.start if start is None else start
 
     def moved(at: Fitted, damping: Array, last: bool) -> Fitted:
         change, shift = at.step(float(damping[0]))
         with np.errstate(all="ignore"):  # a step too far may make a robot take off
             return problem.at(at.vector + change, at.start + shift)
 
-    return levenberg_marquardt(problem.at(vector, begin), moved, MOST_STEPS, DAMPING, SETTLED)
+    return levenberg_marquardt(problem.at(vector, start), moved, MOST_STEPS, DAMPING, SETTLED)
 
 
 def unseen_gain(model: RobotModel, fitted: Fitted, windows: Windows, deviation: Array, name: str) -> Array:
@@ -138,25 +128,24 @@ def unseen_gain(model: RobotModel, fitted: Fitted, windows: Windows, deviation: 
     Cross-validation to second order about the fit: the windows are dealt to some folds, and the normal
     equations of all windows but those of a fold tell the change of the unknowns, with the block and without.
     """
-    whole = Unknowns(model.blocks, (*BASE, name))
-    vector = np.pad(fitted.vector, (0, whole.size - len(fitted.vector)))
-    at, believed = _Problem(model, whole, windows, deviation).at(vector, fitted.start), whole.believed
+    more = Unknowns(model.blocks, (*BASE, name))
+    vector = np.pad(fitted.vector, (0, more.size - len(fitted.vector)))
+    at, believed = _Problem(model, more, windows, deviation).at(vector, fitted.start), more.believed
     fold = np.arange(windows.start.shape[1]) % FOLDS
-    known = np.ones(whole.size, bool)
-    known[whole.place(name)] = False
+    known = np.ones(more.size, bool)
+    known[more.place(name)] = False
 
     def gain(chosen: NDArray[np.bool_]) -> Array:
         """What windows gain by changes of the chosen unknowns that the others ask for (W,)."""
-        found = np.empty(len(fold))
-        here = np.flatnonzero(chosen)
+        gains, here = np.empty(len(fold)), np.flatnonzero(chosen)
         for k in range(FOLDS):
             seen, unseen = fold != k, np.flatnonzero(fold == k)
             information = at.own_information[seen].sum(axis=0) + believed
             pull = at.scores[seen].sum(axis=0) - believed @ vector
             change = np.linalg.solve(information[np.ix_(here, here)], pull[here])
             own = at.own_information[np.ix_(unseen, here, here)]
-            found[unseen] = at.scores[np.ix_(unseen, here)] @ change - 0.5 * (own @ change) @ change
-        return found
+            gains[unseen] = at.scores[np.ix_(unseen, here)] @ change - 0.5 * (own @ change) @ change
+        return gains
 
     return gain(np.ones_like(known)) - gain(known)
 
@@ -194,25 +183,14 @@ class _Problem:
         inner = np.asarray(np.linalg.inv(scaled @ scaled.swapaxes(1, 2) + np.eye(12)), np.float64)
         mixed = scaled @ by[:, :n].swapaxes(1, 2)
         own = by[:, :n] @ by[:, :n].swapaxes(1, 2)
-        whole = own - mixed.swapaxes(1, 2) @ inner @ mixed
+        own -= mixed.swapaxes(1, 2) @ inner @ mixed
         scores = np.einsum("wkm,wm->wk", by[:, :n], r) - np.einsum("wkn,wkl,wl->wn", mixed, inner, pull)
         believed = unknowns.believed
         cost = 0.5 * float((left**2).sum() + (begun**2).sum() + vector @ believed @ vector)
-        return Fitted(
-            unknowns=unknowns,
-            cost=np.array([cost if np.isfinite(sensed).all() else np.inf]),
-            vector=vector,
-            start=start,
-            gradient=scores.sum(axis=0) - believed @ vector,
-            information=whole.sum(axis=0) + believed,
-            own_information=whole,
-            scores=scores,
-            residual=residual,
-            state=state[:, :, 0],
-            inner=inner,
-            mixed=mixed,
-            pull=pull,
-        )
+        cost_of_all = np.array([cost if np.isfinite(sensed).all() else np.inf])
+        slopes_of_all, information = scores.sum(axis=0) - believed @ vector, own.sum(axis=0) + believed
+        solved = (cost_of_all, slopes_of_all, information, own, scores)
+        return Fitted(unknowns, vector, start, *solved, residual, state[:, :, 0], inner, mixed, pull)
 
     def _simulated(self, vectors: Array, wrench: Array, start: Array) -> tuple[Array, Array]:
         """States (L, 12, B, W) of B vectors (B, size) under wrenches (L, 6, B, W) from beginnings (12, B, W),

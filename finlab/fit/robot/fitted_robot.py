@@ -26,29 +26,23 @@ OTHER_LAW = "thrust that grows otherwise with amplitude and frequency"
 
 def summary(fit: RobotFit) -> tuple[str, ...]:
     """Returns what the fit is worth, a line each; the first says why it should not be trusted, if so."""
-    doubts = fit.doubts()
-    head = (f"{DOUBT}: {'; '.join(doubts)}",) if doubts else ()
-    seconds = 0.1 * len(fit.model.motion)
-    lines = [
-        f"fitted to {seconds:.0f} s of swimming, of whose motion simulated swims explain {fit.explained:.1%}",
-        *(
-            f"{name} pushes the other way than the layout says; in the layout that is written it is turned"
-            for name in fit.opposed
-        ),
-        *([f"used, since it helps on parts not seen: {OTHER_LAW}"] if fit.other_law else []),
-        *([f"tried, and no help: {OTHER_LAW}"] if fit.other_law is False else []),
+    doubts, unknown, seconds = fit.doubts(), fit.untold(), 0.1 * len(fit.model.motion)
+    thrusters = any(isinstance(part, Thruster | Azimuth) for part in fit.model.layout.actuators)
+    turned = "pushes the other way than the layout says; in the layout that is written it is turned"
+    lines = {
+        f"{DOUBT}: {'; '.join(doubts)}": bool(doubts),
+        f"fitted to {seconds:.0f} s of swimming, of whose motion simulated swims explain "
+        f"{fit.explained:.1%}": True,
+        **{f"{name} {turned}": True for name in fit.opposed},
+        f"used, since it helps on parts not seen: {OTHER_LAW}": fit.other_law,
+        f"tried, and no help: {OTHER_LAW}": fit.other_law is False,
         "a common scale of all forces, damping and inertia does not follow from motion; it rests on the mass "
-        "and added mass that the layout gave",
-    ]
-    if any(isinstance(part, Thruster | Azimuth) for part in fit.model.layout.actuators):
-        lines.append(
-            "a force in the layout is what a thruster gives: divide it by the strength that was found for "
-            "what the thruster is to be sent"
-        )
-    untold = fit.untold()
-    if untold:
-        lines.append(f"the data cannot tell {', '.join(untold)}: there the layout's own values stand")
-    return (*head, *lines)
+        "and added mass that the layout gave": True,
+        "a force in the layout is what a thruster gives: divide it by the strength that was found for "
+        "what the thruster is to be sent": thrusters,
+        f"the data cannot tell {', '.join(unknown)}: there the layout's own values stand": bool(unknown),
+    }
+    return tuple(line for line, holds in lines.items() if holds)
 
 
 def table(fit: RobotFit) -> str:
@@ -66,12 +60,8 @@ def table(fit: RobotFit) -> str:
 
 
 def learned(fit: RobotFit, lean: Array) -> tuple[Actuator, ...]:
-    """Returns the actuators of a fit, by the laws that they had before.
-
-    Args:
-        fit: what was found.
-        lean: of each actuator (n,) [rad]; see `turned_frames`.
-    """
+    """Returns the actuators of a fit that lean by angles (n,) [rad], see `turned_frames`, by the laws that
+    they had before."""
     parts, center, unsure = [], fit.found("center"), uncertainties(fit)
     layout, share = fit.model.layout, np.exp(fit.found("strength"))
     frames = turned_frames(layout, fit.found("mounting"), lean)
@@ -109,7 +99,7 @@ def scaled(part: Actuator, share: float) -> Actuator:
 
 def _thrust(model: ThrustModel, share: float) -> ThrustModel:
     if isinstance(model, PowerTable):
-        return replace(model, rows=tuple((told, share * force, watts) for told, force, watts in model.rows))
+        return replace(model, rows=tuple((sent, share * force, watts) for sent, force, watts in model.rows))
     more = share**-model.exponent
     reverse = None if model.reverse is None else more * model.reverse
     return PowerLaw(more * model.forward, reverse, model.exponent)
@@ -149,12 +139,8 @@ smaller one."""
 
 
 def write_robot(fit: RobotFit, path: str | os.PathLike[str]) -> Layout:
-    """Writes the layout that a fit gives, and tables beside it where its fins follow another law.
-
-    Raises:
-        DataError: a table cannot be written.
-        LayoutError: the layout cannot be written.
-    """
+    """Writes the layout that a fit gives, and tables beside it where its fins follow another law. Raises
+    DataError or LayoutError: a table or the layout cannot be written."""
     layout, place = fit.model.layout, Path(path)
     lean = fit.found("lean")
     certain = np.abs(lean) > np.maximum(DEFLECTIONS[0] * fit.found_error("lean"), DEFLECTIONS[1])
@@ -188,20 +174,19 @@ def _table(fit: RobotFit, i: int, fin: Fin) -> str:
 
 
 def _body(fit: RobotFit) -> Body:
-    """The body as it was found."""
     model, unknowns, vector = fit.model, fit.fitted.unknowns, fit.fitted.vector
-    found = model.bodies(unknowns, vector[None])
+    fitted = model.bodies(unknowns, vector[None])
     hull = None if model.layout.body is None else model.layout.body.hull
     if hull is not None:
         hull = replace(hull, center_m=tuple(np.array(hull.center_m) - fit.found("center")))
     own = model.dynamics.inertia - np.array(model.body.added_mass or (0.0,) * 6)
-    added = np.maximum(found.inertia[:, 0] - own, 0.0)
+    added = np.maximum(fitted.inertia[:, 0] - own, 0.0)
     return replace(
         model.body,
         hull=hull,
         added_mass=tuple(added.tolist()),
-        linear_damping=tuple(found.linear[:, 0].tolist()),
-        quadratic_damping=tuple(found.quadratic[:, 0].tolist()),
-        center_of_buoyancy_m=tuple(found.center[:, 0].tolist()),
-        buoyancy_n=max(float(found.lift[0]), 0.0),
+        linear_damping=tuple(fitted.linear[:, 0].tolist()),
+        quadratic_damping=tuple(fitted.quadratic[:, 0].tolist()),
+        center_of_buoyancy_m=tuple(fitted.center[:, 0].tolist()),
+        buoyancy_n=max(float(fitted.lift[0]), 0.0),
     )

@@ -131,14 +131,9 @@ class RobotModel:
 
 
 def turned_frames(layout: Layout, mounting: Array, lean: Array) -> Array:
-    """Returns own axes (n, 3, 3), rows in the body frame, of actuators that are not as drawn.
-
-    Args:
-        layout: as it was drawn.
-        mounting: angles (n,) about the third of the axes [rad], of a fin's horizontal shaft about z.
-        lean: then angles (n,) about the first [rad], a shaft; of thrusters, which push along it, about the
-            second.
-    """
+    """Returns own axes (n, 3, 3), rows in the body frame, of actuators that are not as drawn: turned by angles
+    (n,) of their mounting about the third of the axes [rad], of a fin's horizontal shaft about z, and then by
+    those of their lean about the first, a shaft; of thrusters, which push along it, about the second."""
     first, second, third = np.moveaxis(layout.frames, 1, 0)
     cos, sin = np.cos(mounting)[:, None], np.sin(mounting)[:, None]
     first, second = cos * first + sin * second, cos * second - sin * first
@@ -175,10 +170,8 @@ def opposed_in(layout: Layout, names: Sequence[str]) -> Layout:
 
 
 def pushing_back(model: RobotModel, swims: Sequence[Swim], smooth: Array) -> tuple[str, ...]:
-    """Returns the names of the actuators that push the other way, by smoothed measurements (M, 12).
-
-    One that the swims do not tell apart from others counts as drawn.
-    """
+    """Returns the names of the actuators that push the other way, by smoothed measurements (M, 12). One that
+    the swims do not tell apart from others counts as drawn."""
     share, error = _shares(model, [len(swim) for swim in swims], smooth)
     backwards = (share < BACKWARDS) & (share < -SURE * error)
     return tuple(np.array(model.layout.names)[backwards].tolist())
@@ -195,12 +188,12 @@ def _shares(model: RobotModel, lengths: Sequence[int], smooth: Array) -> tuple[A
 
     n, flow, body = model.layout.n, smooth[:, 6:], model.dynamics
     model.meet(flow)
-    given = filtered(np.einsum("mnk,nkw->mwn", model.alone.mean(axis=1), own_effectiveness(model.layout)))
+    drawn = filtered(np.einsum("mnk,nkw->mwn", model.alone.mean(axis=1), own_effectiveness(model.layout)))
     up = rotation_of_angles(smooth[:, 3:6].T)[2::3]
     alone = np.stack(accelerations(body, flow.T, up, np.zeros(6)), axis=-1)
-    missing = (filtered(flow, 1) - alone) * body.inertia - given.sum(axis=-1)
+    missing = (filtered(flow, 1) - alone) * body.inertia - drawn.sum(axis=-1)
     damped = -np.stack([flow, flow * np.abs(flow), np.ones_like(flow)], axis=-1)  # (M, 6, 3)
-    by = np.concatenate([given, (np.eye(6)[:, :, None] * damped[:, :, None]).reshape(-1, 6, 18)], axis=-1)
+    by = np.concatenate([drawn, (np.eye(6)[:, :, None] * damped[:, :, None]).reshape(-1, 6, 18)], axis=-1)
     wide = [model.blocks["linear"].scale, model.blocks["quadratic"].scale, missing.std(axis=0) + 1e-9]
     believed = np.diag(np.concatenate([np.ones(n), np.stack(wide, axis=-1).ravel()]) ** -2.0)
     left = missing
@@ -209,6 +202,6 @@ def _shares(model: RobotModel, lengths: Sequence[int], smooth: Array) -> tuple[A
         rows, wanted = (by / noise[:, None]).reshape(-1, n + 18), (missing / noise).ravel()
         # The filter leaves one independent sample in as many as it is long.
         information = rows.T @ rows / SMOOTHED[0] + believed
-        found = np.linalg.solve(information, rows.T @ wanted / SMOOTHED[0])
-        left = missing - by @ found
-    return 1.0 + found[:n], np.sqrt(np.diag(np.linalg.inv(information)))[:n]
+        change = np.linalg.solve(information, rows.T @ wanted / SMOOTHED[0])
+        left = missing - by @ change
+    return 1.0 + change[:n], np.sqrt(np.diag(np.linalg.inv(information)))[:n]

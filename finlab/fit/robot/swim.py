@@ -188,7 +188,7 @@ def _csv(path: Path, layout: Layout) -> Swim:
 def _check_time(time: Array, places: Sequence[str]) -> None:
     """Time (n,) must rise, without gaps."""
     steps = np.diff(time)
-    for k in np.flatnonzero(~((steps > 0.0) & (steps <= LONGEST_GAP_S))):
+    for k in np.flatnonzero(~((steps > 0.0) & (steps <= LONGEST_GAP_S))).tolist():
         raise DataError(
             f"{places[k + 1]}, column t: {time[k + 1]:g} s after {time[k]:g} s, expected times that rise by "
             f"{LONGEST_GAP_S:g} s at most; sort the rows, or cut the file there and name both parts"
