@@ -4,8 +4,8 @@ import ast
 import math
 import re
 from collections.abc import Mapping
+from contextlib import suppress
 from itertools import islice
-from typing import Any
 
 from finlab.errors import LayoutError
 from finlab.exchange import labels
@@ -20,19 +20,11 @@ _WHOLE = re.compile(r"(?<![\w.])\d+[ \t]*/[ \t]*\d+(?![\w.])")
 _DECLARED = re.compile(r"^\s*(?:const\s+)?(?:float|double|int|u?int8_t|auto)\b")
 MOST, MOST_CONSTANTS = 200, 2000
 """Most characters of an expression, and most constants of a program."""
-_NAMES: dict[str, Any] = {
-    name: getattr(math, name) for name in ("sin", "cos", "tan", "sqrt", "radians", "pi")
-}
+_NAMES = {name: getattr(math, name) for name in ("sin", "cos", "tan", "sqrt", "radians", "pi")}
 _NAMES |= {f"{name}f": value for name, value in _NAMES.items()}
-_NAMES |= {
-    "rad": math.radians,
-    "abs": abs,
-    "fabsf": abs,
-    "M_PI": math.pi,
-    "PI": math.pi,
-    "M_PI_2": math.pi / 2,
-}
-_NAMES |= {"M_PI_4": math.pi / 4, "M_SQRT2": math.sqrt(2), "M_SQRT1_2": math.sqrt(0.5)}
+_NAMES |= {"rad": math.radians, "abs": abs, "fabsf": abs, "M_PI": math.pi, "PI": math.pi}
+_NAMES |= {"M_PI_2": math.pi / 2, "M_PI_4": math.pi / 4}
+_NAMES |= {"M_SQRT2": math.sqrt(2), "M_SQRT1_2": math.sqrt(0.5)}
 _ALLOWED = (
     *(ast.Expression, ast.BinOp, ast.UnaryOp, ast.Add, ast.Sub, ast.Mult, ast.Div, ast.USub, ast.UAdd),
     *(ast.Constant, ast.Name, ast.Load, ast.Call),
@@ -54,10 +46,10 @@ def called(text: str) -> list[MotorRow]:
     lua = "motors:" in text or re.search(r"^\s{0,20}local ", text, re.MULTILINE) is not None
     code, rows = _without_comments(text, lua), list[MotorRow]()
     constants, line, seen = constants_in(code), 1, 0
-    for found in _CALL.finditer(code):
-        line, seen = line + code.count("\n", seen, found.start()), found.start()
-        cells = _arguments(code[found.end() : found.end() + LONGEST])
-        before = code[max(0, found.start() - 40) : found.start()].rpartition("\n")[2]
+    for call in _CALL.finditer(code):
+        line, seen = line + code.count("\n", seen, call.start()), call.start()
+        cells = _arguments(code[call.end() : call.end() + LONGEST])
+        before = code[max(0, call.start() - 40) : call.start()].rpartition("\n")[2]
         if re.search(r"\b(?:void|function)\b", before) or any(map(_DECLARED.match, cells)):
             continue
         if len(cells) not in (7, 8):
@@ -138,11 +130,9 @@ def constants_in(text: str) -> dict[str, float]:
     """Returns the constants that a program of C++ or Lua defines once, by name; others are left out."""
     values: dict[str, float] = {}
     twice: set[str] = set()
-    for found in islice(_DEFINED.finditer(text), MOST_CONSTANTS):
-        name = found[1] or found[2]
+    for define, declared, value in islice(map(re.Match.groups, _DEFINED.finditer(text)), MOST_CONSTANTS):
+        name = define or declared
         twice |= {name} & values.keys()
-        try:
-            values[name] = value_of(found[3], values)
-        except ValueError:
-            continue
+        with suppress(ValueError):
+            values[name] = value_of(value, values)
     return {name: value for name, value in values.items() if name not in twice}

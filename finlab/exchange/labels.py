@@ -18,9 +18,8 @@ _FRAME_WORDS: dict[Frame, set[str]] = {
     "FRD": {"frd", "ned", "sname", "fsd"},
 }
 _SIDES: dict[Frame, set[str]] = {"FLU": {"left", "port", "up"}, "FRD": {"right", "starboard", "down"}}
-FRAME_KEYS = (
-    "frame bodyframe convention coordinateframe coordinatesystem referenceframe axesconvention frameid"
-)
+FRAME_KEYS = "frame bodyframe convention coordinateframe coordinatesystem referenceframe axesconvention "
+FRAME_KEYS += "frameid"
 _AXIS_WORDS = {
     "Fx": "fx x surge forcex xforce",
     "Fy": "fy y sway forcey yforce",
@@ -66,9 +65,9 @@ def lookup(
     known = words.split()
     for key, value in values.items():
         label, size = str(key)[:100], 1.0
-        found = re.search(r"[_ (\[]+([a-z]+)[)\]]?$", label, re.IGNORECASE)
-        if found and units and found[1].lower() in units:
-            label, size = label[: found.start()], units[found[1].lower()]
+        unit = re.search(r"[_ (\[]+([a-z]+)[)\]]?$", label, re.IGNORECASE) if units else None
+        if unit and units and unit[1].lower() in units:
+            label, size = label[: unit.start()], units[unit[1].lower()]
         word = plain(label)
         if word in known or word.removeprefix("thruster").removeprefix("s") in known:
             return str(key), value, size
@@ -156,15 +155,16 @@ def nodes(data: Any) -> Iterator[Node]:
 
 def unread(data: Any, used: set[Path]) -> str:
     """Returns the keys of values that lie below none that were used, with commas between."""
-    keys = [
-        node.words
-        for node in nodes(data)
-        if not isinstance(node.value, Mapping)
-        and not (node.path and node.path[-1].startswith("["))
-        and not any(node.path[:i] in used for i in range(len(node.path) + 1))
-    ]
-    text = ", ".join(keys)
-    return text if len(text) <= LONGEST_LIST else text[:LONGEST_LIST].rpartition(",")[0] + ", ..."
+    values = (node for node in nodes(data) if not isinstance(node.value, Mapping))
+    named = [node for node in values if not (node.path and node.path[-1].startswith("["))]
+    left = [node.words for node in named if not any(node.path[:i] in used for i in range(len(node.path) + 1))]
+    return listed(left) if left else ""
+
+
+def listed(names: Iterable[str]) -> str:
+    """Returns names as a sentence has them, the first of many."""
+    text = ", ".join(names) or "none"
+    return text if len(text) <= LONGEST_LIST else f"{text[:LONGEST_LIST].rpartition(',')[0]}, ..."
 
 
 def numbers_in(values: Any) -> Array | None:

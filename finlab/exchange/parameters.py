@@ -64,8 +64,8 @@ def read_px4(text: str, name: str, exchange: Exchange) -> Layout:
         if lacking:
             which = ", ".join(lacking) if len(lacking) < count else "all"
             exchange.note(f"No CA_ROTORi_{key} of rotors {which}: {usual:g} is taken, the default of PX4.")
-    rotors = {key: found for key in values if (found := re.match(r"CA_ROTOR(\d{1,3})_", key))}
-    beyond = sorted(key for key, found in rotors.items() if int(found[1]) >= count)
+    rotors = {key: int(own[1]) for key in values if (own := re.match(r"CA_ROTOR(\d{1,3})_", key))}
+    beyond = sorted(key for key, rotor in rotors.items() if rotor >= count)
     if beyond:
         exchange.note(f"CA_ROTOR_COUNT is {count}; not read: {', '.join(beyond[:12])}.")
     if exchange.force is None:

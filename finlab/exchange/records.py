@@ -18,8 +18,24 @@ UNIT = 0.05
 """A vector whose length is this close to 1 is a direction, or a force per newton."""
 WORDS = {*"tam tcm allocation allocator alloc mixer mixing mix effectiveness".split()}  # noqa: SIM905
 """Words of a key that holds an allocation matrix."""
-BESIDE = "matrix thruster thrusters thrust force forces b t configuration config control motor motors"
-"""Words that may stand beside `matrix` in such a key."""
+NEAR = {
+    *[
+        "matrix",
+        "thruster",
+        "thrusters",
+        "thrust",
+        "force",
+        "forces",
+        "b",
+        "t",
+        "configuration",
+        "config",
+        "control",
+        "motor",
+        "motors",
+    ]
+}
+"""Words that may stand with `matrix` in such a key."""
 OTHER = "mass inertia damping drag added coriolis covariance weight weights gain gains rotation "
 OTHER += "inverse inv pinv pseudo pseudoinverse"
 """Words of a key that holds another matrix."""
@@ -66,9 +82,8 @@ def found_in(data: Any, exchange: Exchange, table: bool) -> Found:
 
 def _held(value: Any) -> dict[str, Mapping[str, Any]]:
     """The mappings right below a value, by their keys or places."""
-    if isinstance(value, list):
-        value = {f"[{i}]": each for i, each in enumerate(value)}
-    pairs = value.items() if isinstance(value, Mapping) else ()
+    pairs = ((f"[{i}]", each) for i, each in enumerate(value)) if isinstance(value, list) else ()
+    pairs = value.items() if isinstance(value, Mapping) else pairs
     return {str(key): each for key, each in pairs if isinstance(each, Mapping)}
 
 
@@ -81,8 +96,8 @@ def _placed(node: Node, exchange: Exchange) -> Found | None:
     if not any(map(all, says.values())):
         lists = _lists(node, exchange)
         return Found(node, lists) if lists else None
-    for key, (place, _) in says.items():
-        if any(says[key]) and not all(says[key]):
+    for key, (place, points) in says.items():
+        if place != points:
             lacks = "direction" if place else "position"
             raise LayoutError(f"has no {lacks}, and others beside it have one", f"{node.words}.{key}")
     return Found(node, {key: row for key, row in rows.items() if all(says[key])})
@@ -91,14 +106,14 @@ def _placed(node: Node, exchange: Exchange) -> Found | None:
 def _joined(row: Mapping[str, Any]) -> Row:
     """A mapping; `x`, `y`, `z` become one position, `dx`, `dy`, `dz` or the like one direction, unless it has
     torques or angles: a wrench is for others to read."""
-    whole, short = {**row}, {str(key).lower().strip().replace("_", ""): value for key, value in row.items()}
+    joined, short = {**row}, {str(key).lower().strip().replace("_", ""): value for key, value in row.items()}
     if any(axis_of(key) in ("Tx", "Ty", "Tz") for key in short):
-        return whole
+        return joined
     for what, starts in (("position", ("", "p", "pos")), ("direction", ("d", "a", "n", "u", "dir", "f"))):
         for start in starts:
             if {f"{start}x", f"{start}y"} <= set(short):
-                whole.setdefault(what, [short.get(f"{start}{axis}", 0.0) for axis in "xyz"])
-    return whole
+                joined.setdefault(what, [short.get(f"{start}{axis}", 0.0) for axis in "xyz"])
+    return joined
 
 
 def _short(value: Any) -> bool:
@@ -109,10 +124,8 @@ def _short(value: Any) -> bool:
 
 
 def _points(row: Row) -> bool:
-    """Whether a mapping says where its thruster points. Raises LayoutError: it may be a direction as well as
-    angles."""
-    places = (lookup(row, labels.DIRECTION), lookup(row, labels.ANGLES, TURNS))
-    points = any(_short(value) for _, value, _ in places)
+    """Whether a mapping says where its thruster points; an error where that may be angles as well."""
+    points = any(_short(lookup(row, words, TURNS)[1]) for words in (labels.DIRECTION, labels.ANGLES))
     key, value, _ = lookup(row, labels.UNCLEAR)
     if key and not points and _short(value) and lookup(row, labels.POSITION, LENGTHS)[0]:
         raise LayoutError(
@@ -156,7 +169,7 @@ def is_allocation(node: Node) -> bool:
     """Whether a node's key is that of an allocation matrix."""
     around = [re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])", key[:100]) for key in ("", *node.path[-3:])]
     words = {word.lower() for word in around[-1]}
-    known = bool(words & WORDS) or ("matrix" in words and words <= {*BESIDE.split()})
+    known = bool(words & WORDS) or ("matrix" in words and words <= NEAR)
     return known and not {word.lower() for each in around for word in each} & {*OTHER.split()}
 
 
@@ -178,10 +191,11 @@ def _wrenches(node: Node, exchange: Exchange, table: bool) -> Found | None:
             names, value = [*map(str, value)], [*value.values()]
     if not sure or not isinstance(value, list) or not value:
         return None
-    if isinstance(value[0], list):
-        return _of_array(_array(value, node), names, node, exchange, table)
-    array = numbers_in(value)
-    return _of_array(_unfolded(array, node), names, node, exchange, table) if array is not None else None
+    array = _array(value, node) if isinstance(value[0], list) else numbers_in(value)
+    if array is None:
+        return None
+    array = array if isinstance(value[0], list) else _unfolded(array, node)
+    return _of_array(array, names, node, exchange, table)
 
 
 def _array(rows: Sequence[Any], node: Node) -> Array:
@@ -193,10 +207,11 @@ def _array(rows: Sequence[Any], node: Node) -> Array:
 
 def _of_records(node: Node, rows: Mapping[str, Mapping[str, Any]]) -> Found | None:
     """A mapping for each thruster that holds its wrench."""
-    first, *others = (
+    keyed = [
         {axis: key for key in row if (axis := axis_of(key)) and np.ndim(row[key]) == 0}
         for row in rows.values()
-    )
+    ]
+    first = keyed[0]
     if len(first) < 2 or not set(first) & {"Fx", "Fy", "Fz"}:
         return None
     keys = {plain(key) for key in first.values()}
@@ -206,9 +221,9 @@ def _of_records(node: Node, rows: Mapping[str, Mapping[str, Any]]) -> Found | No
             "place and angles; call them Fx to Tz, or x, y, z and dx, dy, dz",
             node.words,
         )
-    pairs = zip(rows.values(), (first, *others), strict=True)
+    pairs = zip(rows.values(), keyed, strict=True)
     columns = numbers_in([[row.get(own.get(axis, "")) for axis in first] for row, own in pairs])
-    if columns is None or any(set(own) != set(first) for own in others):
+    if columns is None or any(set(own) != set(first) for own in keyed):
         raise LayoutError(f"expected numbers {', '.join(first)} of each thruster", node.words)
     named = {key: {**row} for key, row in rows.items()}
     return Found(node, named, tuple(first), columns.T, "a row per thruster")
@@ -228,9 +243,10 @@ def _names(node: Node, n: int) -> list[str]:
 def _unfolded(array: Array, node: Node) -> Array:
     """A matrix in one list, row by row, of as many columns as there are names, or as is said."""
     for _, scope in node.scopes:
-        names, count = (lookup(scope, words)[1] for words in (labels.NAMES, f"cols columns {labels.COUNT}"))
-        n = len(names) if isinstance(names, list) else count
-        rows = lookup(scope, "rows")[1]
+        names, n, rows = (
+            lookup(scope, words)[1] for words in (labels.NAMES, f"cols columns {labels.COUNT}", "rows")
+        )
+        n = len(names) if isinstance(names, list) else n
         fits = isinstance(n, int) and n > 0 and array.size % n == 0
         if fits and (rows is None or isinstance(rows, list) or rows == array.size // n):
             return array.reshape(-1, n)

@@ -31,18 +31,15 @@ def is_plugin(plugin: Element, kind: str) -> bool:
 
 def drives(plugin: Element) -> bool:
     """Whether a plugin drives a thruster, so that it can be read."""
-    return is_plugin(plugin, "Thruster") or _is_uuv(plugin)
-
-
-def _is_uuv(plugin: Element) -> bool:
-    return "uuv_thruster" in plugin.get("filename", "")
+    return is_plugin(plugin, "Thruster") or UUV_THRUSTER in plugin.get("filename", "")
 
 
 def driven(robot: Description, scope: str, plugin: Element) -> Joint:
     """Returns the joint that a thruster's plugin drives. Raises LayoutError: it moves no link."""
     name, link = said(plugin, "joint_name jointName"), said(plugin, "linkName")
     joint = robot.joints.get(f"{scope}{name}") or robot.joints.get(name)
-    joint = robot.movers.get(link) if joint is None and not name and _is_uuv(plugin) else joint
+    if joint is None and not name and UUV_THRUSTER in plugin.get("filename", ""):
+        joint = robot.movers.get(link)
     if joint is None:
         inside = ", ".join(robot.included)[:200]
         where = f", or stands in what is included: {inside}" if inside else ""
@@ -53,7 +50,7 @@ def driven(robot: Description, scope: str, plugin: Element) -> Joint:
 def force_of(plugin: Element, name: str, exchange: Exchange) -> tuple[float, float] | None:
     """Returns least and most force [N] of a plugin; None where it has no limits. Raises LayoutError: a value
     of it is no number."""
-    if _is_uuv(plugin):
+    if UUV_THRUSTER in plugin.get("filename", ""):
         return _uuv_force(plugin, name, exchange)
     if not said(plugin, "min_thrust_cmd max_thrust_cmd"):
         return None
@@ -88,7 +85,8 @@ DERIVATIVES = {
 """Fields of a body, and their tags in the plugin Hydrodynamics."""
 OLD = "xUU yVV zWW kPP mQQ nRR"
 """Tags of quadratic damping before gz-sim 7."""
-UUV = "uuv_underwater_object"
+UUV, UUV_THRUSTER = "uuv_underwater_object", "uuv_thruster"
+"""Words in the names of uuv_simulator's plugins."""
 Known = dict[str, tuple[float, ...]]
 
 
@@ -100,11 +98,11 @@ def body_of(robot: Description, exchange: Exchange) -> Body:
     water = [plugin for _, plugin in robot.plugins if is_plugin(plugin, "Hydrodynamics")]
     objects = [plugin for _, plugin in robot.plugins if UUV in plugin.get("filename", "")]
     models = [model for plugin in objects for model in plugin.findall("link/hydrodynamic_model")]
-    for read, found, what in ((_of_gz, water, "Hydrodynamics"), (_of_uuv, models, "hydrodynamic_model")):
-        for plugin in found[:1]:
+    for read, plugins, what in ((_of_gz, water, "Hydrodynamics"), (_of_uuv, models, "hydrodynamic_model")):
+        for plugin in plugins[:1]:
             read(plugin, known, exchange)
-        if len(found) > 1:
-            exchange.note(f"It has {len(found)} plugins with {what}: the first was read.")
+        if len(plugins) > 1:
+            exchange.note(f"It has {len(plugins)} plugins with {what}: the first was read.")
     if water or objects:
         exchange.note("Its buoyancy is not read: it is taken for the weight, at the centre of gravity.")
     moments: Vector | None = None
@@ -118,20 +116,19 @@ def body_of(robot: Description, exchange: Exchange) -> Body:
     return Body(mass_kg=robot.mass, inertia_kgm2=moments if moments and min(moments) > 0 else None, **values)
 
 
-def _keep(known: Known, field: str, told: dict[str, str], exchange: Exchange) -> None:
+def _keep(known: Known, field: str, tags: dict[str, str], exchange: Exchange) -> None:
     """Keeps the values of six tags where all are said."""
-    values = numbers_in([*told.values()])
-    if len(told) == 6 and values is not None:
+    values = numbers_in([*tags.values()])
+    if len(tags) == 6 and values is not None:
         known[field] = tuple(np.abs(values).tolist())
-        exchange.note(f"{field} was read from {', '.join(told)}.")
-        wrong = [tag for tag, value in zip(told, values, strict=True) if value > 0 and tag not in ADDED]
+        exchange.note(f"{field} was read from {', '.join(tags)}.")
+        wrong = [tag for tag, value in zip(tags, values, strict=True) if value > 0 and tag not in ADDED]
         if wrong:
-            exchange.note(
-                f"{', '.join(wrong)} > 0, against the sign of a derivative: the magnitude is taken."
-            )
-    elif told:
-        words = ", ".join(f"{tag} {value:.20}" for tag, value in told.items())
-        why = "is not six numbers" if len(told) == 6 else "says these alone of six"
+            why = "against the sign of a derivative: the magnitude is taken"
+            exchange.note(f"{', '.join(wrong)} > 0, {why}.")
+    elif tags:
+        words = ", ".join(f"{tag} {value:.20}" for tag, value in tags.items())
+        why = "is not six numbers" if len(tags) == 6 else "says these alone of six"
         exchange.note(f"{field} is left out: the file {why}: {words}.")
 
 
@@ -160,8 +157,8 @@ def _of_uuv(model: Element, known: Known, exchange: Exchange) -> None:
             words = words[::7]
             if np.count_nonzero(table) > np.count_nonzero(table[::7]):
                 exchange.note(f"Of {field} the diagonal was read.")
-        whole = {"all": " ".join(words)} if words else {}
-        _keep(known, field, dict(zip(ADDED, words, strict=True)) if len(words) == 6 else whole, exchange)
+        tags = dict(zip(ADDED, words, strict=True)) if len(words) == 6 else {"all": " ".join(words)}
+        _keep(known, field, tags if words else {}, exchange)
     if kind != "fossen":
         exchange.note(f"hydrodynamic_model of type {kind!r:.40} is not read: the water's forces are unknown.")
     if said(model, "linear_damping_forward_speed"):

@@ -2,7 +2,7 @@
 
 import subprocess
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
 from xml.etree.ElementTree import Element, TreeBuilder
@@ -10,6 +10,7 @@ from xml.parsers import expat
 
 from finlab.errors import LayoutError
 from finlab.exchange.exchange import Exchange
+from finlab.exchange.labels import listed
 
 MAX_DEPTH, MAX_ELEMENTS = 100, 200_000
 """Deepest nesting and most elements that are read."""
@@ -135,9 +136,3 @@ def _include_name(include: Element) -> str:
     address = include.findtext("uri") or include.findtext("url") or "without a name"
     name = include.findtext("name") or address.strip().rstrip("/").rpartition("/")[2]
     return " ".join(name.split())[:60]
-
-
-def listed(names: Iterable[str]) -> str:
-    """Returns names as a sentence has them, the first of many."""
-    text = ", ".join(names) or "none"
-    return text if len(text) < 300 else f"{text[:300].rpartition(',')[0]}, ..."

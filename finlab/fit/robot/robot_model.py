@@ -131,7 +131,7 @@ class RobotModel:
 
 
 def turned_frames(layout: Layout, mounting: Array, lean: Array) -> Array:
-    """Returns own axes (n, 3, 3), rows in the body frame, of actuators that are not as drawn: turned by angles
+    """Returns own axes (n, 3, 3), rows in the body frame, of actuators not as drawn: turned by angles
     (n,) of their mounting about the third of the axes [rad], of a fin's horizontal shaft about z, and then by
     those of their lean about the first, a shaft; of thrusters, which push along it, about the second."""
     first, second, third = np.moveaxis(layout.frames, 1, 0)

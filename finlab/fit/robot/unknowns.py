@@ -98,7 +98,7 @@ class Unknowns:
     def of(self, name: str, vector: Array) -> Array:
         """`part` of a block that every fit looks for."""
         where = self._where[name]
-        return np.asarray(vector[..., where] * self.scale[where])
+        return np.asarray(vector[..., where] * self.scale[where], np.float64)
 
     def place(self, name: str) -> slice:
         """Where a block stands."""
