@@ -82,9 +82,9 @@ def read_robot(text: str, file: str, exchange: Exchange) -> Layout:
     if text.lstrip().startswith("<"):
         return read_description(text, name, exchange)
     if FORM_OF.get(suffix) != "layout":
-        found = _read_lines(text, name, suffix, exchange)
-        if found is not None:
-            return found
+        layout = _read_lines(text, name, suffix, exchange)
+        if layout is not None:
+            return layout
     data = (parse_json if suffix == ".json" else parse_yaml)(text, "", LayoutError)
     parts = data.get("actuators") if isinstance(data, dict) else None
     typed = isinstance(parts, list) and any(isinstance(part, dict) and "type" in part for part in parts)

@@ -78,11 +78,8 @@ def parse_description(root: Element, name: str, drives: Drives, exchange: Exchan
     movers = {said(part, "child@link"): key for key, (_, part) in named.items() if part.tag == "joint"}
     poses = _placed({key: _hung(*each, named, movers) for key, each in named.items()}, included)
     old = root.tag == "sdf" and root.get("version", "") in ("1.0", "1.1", "1.2", "1.3", "1.4")
-    moving = [
-        _joint(*each, named, poses, old)
-        for key, each in named.items()
-        if each[1].tag == "joint" and key in poses
-    ]
+    known = [each for key, each in named.items() if each[1].tag == "joint" and key in poses]
+    moving = [_joint(*each, named, poses, old) for each in known]
     joints = {joint.name: joint for joint in moving if f"link {joint.child}" in named}
     if included:
         exchange.note(f"What it includes is left out, with its mass: {', '.join(included)[:300]}.")
@@ -94,9 +91,9 @@ def said(element: Element, paths: str, usual: str = "") -> str:
     """Returns the first text among some paths below an element, an attribute behind @; else what is usual."""
     for path in paths.split():
         place, _, attribute = path.partition("@")
-        found = element.find(place)
-        if found is not None:
-            text = found.get(attribute) if attribute else found.text
+        part = element.find(place)
+        if part is not None:
+            text = part.get(attribute) if attribute else part.text
             if text and text.strip():
                 return text.strip()
     return usual

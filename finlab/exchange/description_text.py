@@ -77,9 +77,7 @@ def description_text(layout: Layout, exchange: Exchange, form: Mapping[str, str]
         exchange.note("The layout has no mass: no link has one, and simulators want one.")
     exchange.note("A robot description has no place for power, reaction torques, rates and buoyancy.")
     if any(not isinstance(part, Thruster | Azimuth) for part in layout.actuators):
-        exchange.note(
-            "Fins and rudders are joints that push nothing; --fins names the fins among them again."
-        )
+        exchange.note("Fins and rudders are joints that push nothing; --fins names the fins among them.")
     text = form["robot"].format(name=escape(layout.name), parts="".join(parts))
     root = ElementTree.fromstring(text)
     ElementTree.indent(root)

@@ -18,23 +18,7 @@ UNIT = 0.05
 """A vector whose length is this close to 1 is a direction, or a force per newton."""
 WORDS = {*"tam tcm allocation allocator alloc mixer mixing mix effectiveness".split()}  # noqa: SIM905
 """Words of a key that holds an allocation matrix."""
-NEAR = {
-    *[
-        "matrix",
-        "thruster",
-        "thrusters",
-        "thrust",
-        "force",
-        "forces",
-        "b",
-        "t",
-        "configuration",
-        "config",
-        "control",
-        "motor",
-        "motors",
-    ]
-}
+NEAR = "matrix thruster thrusters thrust force forces b t configuration config control motor motors"
 """Words that may stand with `matrix` in such a key."""
 OTHER = "mass inertia damping drag added coriolis covariance weight weights gain gains rotation "
 OTHER += "inverse inv pinv pseudo pseudoinverse"
@@ -82,8 +66,9 @@ def found_in(data: Any, exchange: Exchange, table: bool) -> Found:
 
 def _held(value: Any) -> dict[str, Mapping[str, Any]]:
     """The mappings right below a value, by their keys or places."""
-    pairs = ((f"[{i}]", each) for i, each in enumerate(value)) if isinstance(value, list) else ()
-    pairs = value.items() if isinstance(value, Mapping) else pairs
+    if isinstance(value, list):
+        value = {f"[{i}]": each for i, each in enumerate(value)}
+    pairs = value.items() if isinstance(value, Mapping) else ()
     return {str(key): each for key, each in pairs if isinstance(each, Mapping)}
 
 
@@ -169,7 +154,7 @@ def is_allocation(node: Node) -> bool:
     """Whether a node's key is that of an allocation matrix."""
     around = [re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])", key[:100]) for key in ("", *node.path[-3:])]
     words = {word.lower() for word in around[-1]}
-    known = bool(words & WORDS) or ("matrix" in words and words <= NEAR)
+    known = bool(words & WORDS) or ("matrix" in words and words <= {*NEAR.split()})
     return known and not {word.lower() for each in around for word in each} & {*OTHER.split()}
 
 

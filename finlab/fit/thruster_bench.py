@@ -3,8 +3,8 @@
 import os
 import re
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
@@ -43,7 +43,8 @@ NEGATIVE = 0.02
 """Share of the largest power by which a power may lie below 0, as noise."""
 
 
-class Bench(NamedTuple):
+@dataclass(frozen=True)
+class Bench:
     """Rows of one thruster in the order of the command."""
 
     command: Array

@@ -73,7 +73,7 @@ class Unknowns:
         ends = np.cumsum([0, *(len(block.labels) for block in self.blocks)]).tolist()
         places = zip(self.blocks, ends, ends[1:], strict=False)
         self._where = {block.name: slice(begin, end) for block, begin, end in places}
-        self.size = ends[-1]
+        self.size: int = ends[-1]
         self.scale = np.concatenate([block.scale for block in self.blocks])
         """(size,)."""
         self.labels = tuple(label for block in self.blocks for label in block.labels)
@@ -98,7 +98,8 @@ class Unknowns:
     def of(self, name: str, vector: Array) -> Array:
         """`part` of a block that every fit looks for."""
         where = self._where[name]
-        return np.asarray(vector[..., where] * self.scale[where], np.float64)
+        own: Array = vector[..., where] * self.scale[where]
+        return own
 
     def place(self, name: str) -> slice:
         """Where a block stands."""
