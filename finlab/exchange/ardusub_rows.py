@@ -9,8 +9,8 @@ from itertools import islice
 
 from finlab.errors import LayoutError
 from finlab.exchange import labels
-from finlab.exchange.csv_table import FACTORS, Table, records_of
 from finlab.exchange.labels import lookup, plain
+from finlab.exchange.matrix_table import FACTORS, Table, records_of
 from finlab.layout import MAX_ACTUATORS
 
 LONGEST = 500

@@ -7,10 +7,10 @@ from pathlib import Path
 from finlab.assets import shipped_layouts
 from finlab.errors import CommandError, LayoutError
 from finlab.exchange.ardusub_rows import called, tabled
-from finlab.exchange.csv_table import plain_of, table_of
 from finlab.exchange.description_text import SDF, URDF, description_text
 from finlab.exchange.exchange import Exchange
 from finlab.exchange.gazebo import read_description
+from finlab.exchange.matrix_table import plain_of, table_of
 from finlab.exchange.motor_factors import OF_ARDUPILOT, of_motors, read_parameters_of_ardusub, write_ardusub
 from finlab.exchange.parameters import read_parameters, read_px4, write_px4
 from finlab.exchange.plain_robot import read_plain, write_matrix

@@ -11,8 +11,8 @@ import re
 import numpy as np
 
 from finlab.errors import LayoutError
-from finlab.exchange.csv_table import is_number
 from finlab.exchange.exchange import TO_FRD, Exchange
+from finlab.exchange.matrix_table import is_number
 from finlab.layout import Layout, Thruster
 
 LONGEST = 500

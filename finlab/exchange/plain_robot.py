@@ -17,7 +17,8 @@ from finlab.files.units import FORCES, LENGTHS, TURNS
 from finlab.layout import MAX_ACTUATORS, Layout, Thruster, own_effectiveness
 from finlab.layout.wrench_axes import AXES
 
-Ends, Parts = tuple[float, float], tuple[Thruster, ...]
+Ends = tuple[float, float]
+Parts = tuple[Thruster, ...]
 
 
 def read_plain(

@@ -3,6 +3,7 @@
 import csv
 import math
 from collections.abc import Sequence
+from contextlib import suppress
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,11 +17,8 @@ class CsvTable:
     """A CSV file whose header has been read."""
 
     def __init__(self, content: bytes, source: str, gaps: bool = False) -> None:
-        """Takes a file's content, what errors call it, and whether cells may be empty.
-
-        Raises:
-            DataError: it is no text.
-        """
+        """Takes a file's content, what errors call it, and whether cells may be empty. Raises DataError: it
+        is no text."""
         self.source, self._gaps = source, gaps
         lines = decoded(content, source, "CSV text").splitlines()
         above = next((i for i, line in enumerate(lines) if not line.startswith("#")), len(lines))
@@ -35,11 +33,8 @@ class CsvTable:
     def numbers(self, places: Sequence[int]) -> tuple[Array, NDArray[np.intp]]:
         """Returns the columns at some places (rows, len(places)), and the line of each row (rows,).
 
-        Empty lines, and those that begin with #, are passed over. A cell that may be empty is NaN.
-
-        Raises:
-            DataError: there is no row, or a row or a cell is wrong; the sentence names line and column.
-        """
+        Empty lines, and those that begin with #, are passed over. A cell that may be empty is NaN. Raises
+        DataError: there is no row, or a row or a cell is wrong; the sentence names line and column."""
         rows = [
             (line, row)
             for line, row in enumerate(self._rows, self._first)
@@ -55,12 +50,10 @@ class CsvTable:
         cells = self._cells(row, where)
         if len(cells) != len(self.header):
             raise DataError(f"{where} has {len(cells)} values, the header has {len(self.header)}")
-        try:
-            found = [float(cells[i]) for i in places]
-            if "_" not in row and all(map(math.isfinite, found)):
-                return found
-        except ValueError:
-            pass
+        with suppress(ValueError):
+            values = [float(cells[i]) for i in places]
+            if "_" not in row and all(map(math.isfinite, values)):
+                return values
         return [self._number(cells[i].strip(), f"{where}, column {self.header[i]},") for i in places]
 
     def _cells(self, row: str, where: str) -> list[str]:
@@ -74,15 +67,20 @@ class CsvTable:
             return math.nan
         if not cell:
             raise DataError(f"{where} is empty; leave no gaps")
-        try:
-            value = float(cell) if "_" not in cell else None
-        except ValueError:
-            value = None
-        if value is None:
-            raise DataError(f"{where} holds {cell!r:.40}, which is not a number")
-        if not math.isfinite(value):
-            raise DataError(f"{where} holds {cell!r:.40}, which is not finite")
+        value = number_in(cell)
+        if value is None or not math.isfinite(value):
+            raise DataError(
+                f"{where} holds {cell!r:.40}, which is not {'a number' if value is None else 'finite'}"
+            )
         return value
+
+
+def number_in(cell: str) -> float | None:
+    """Returns the number in a cell, which may not be finite; None where it holds none."""
+    try:
+        return None if "_" in cell else float(cell)
+    except ValueError:
+        return None
 
 
 def read_table(path: Name, most: int, what: str, gaps: bool = False) -> CsvTable:

@@ -35,15 +35,9 @@ def in_worker(read: Callable[..., Result], *arguments: Any) -> Result:
     """Returns what `read(*arguments)` gives, which runs in a process of its own.
 
     What it changes in its arguments stays there. A program of one thread is copied; any other one has a
-    process that is copied, so that its main module must be guarded by `if __name__ == "__main__"`.
-
-    Args:
-        read: a function of a module; reads the files that the arguments are (bytes) or name (paths).
-        arguments: can be pickled; the limits grow with the size of the files.
-
-    Raises:
-        FinlabError: so did `read`; or it took too much time or memory, or failed.
-    """
+    process that is copied, so that its main module must be guarded by `if __name__ == "__main__"`. `read` is
+    a function of a module, for the files that the arguments are (bytes) or name (paths); with their size the
+    limits grow. Raises FinlabError: so did `read`; or it took too much time or memory, or failed."""
     size = sum(map(_size, arguments))
     limits = _Limits(max(CPU_S, CPU_S_PER_BYTE * size), max(ROOM, ROOM_PER_BYTE * size))
     context: Any = _context()
@@ -112,9 +106,8 @@ def _size(argument: Any) -> int:
 
 def _child(connection: Connection, limits: _Limits, read: Callable[..., Any], arguments: Any) -> None:
     """In the process: read, and send what came of it."""
-    with suppress(
-        BaseException
-    ):  # memory may not even suffice to say so; whoever interrupts, interrupts both
+    # Memory may not even suffice to say so; whoever interrupts, interrupts both.
+    with suppress(BaseException):
         _limit(limits)
         connection.send(_answer(read, arguments))
     os._exit(1)
