@@ -27,18 +27,16 @@ TURNING = ("revolute", "continuous")
 
 
 class Joint(NamedTuple):
-    """A joint, in the frame of its description."""
+    """A joint, in the frame of its description: its place (3,) [m], the axis (3,) that it turns about, of
+    length 1 unless it is fixed, and least and greatest angle [rad], infinite where nothing limits it."""
 
     name: str
     kind: str
     parent: str
     child: str
     place: Array
-    """Where it is (3,) [m]."""
     axis: Array
-    """What it turns about (3,), of length 1; of any length for a fixed joint."""
     ends: tuple[float, float]
-    """Least and greatest angle [rad]; infinite where nothing limits it."""
 
 
 @dataclass(frozen=True)
@@ -47,21 +45,18 @@ class Description:
 
     name: str
     joints: dict[str, Joint]
-    """Those that move a link, by their own names."""
+    """Those that move a link, by their own names, and by the names of the links."""
     movers: dict[str, Joint]
-    """The same by the names of the links."""
     mass: float
-    """[kg]; 0 where no link has one."""
+    """[kg], 0 where no link has one, and centre of gravity (3,) [m]."""
     center: Array
-    """Centre of gravity (3,) [m]."""
     inertia: Array | None
     """(3, 3) about the centre of gravity [kg m^2]; None where a link with a mass has none."""
     added: dict[str, float]
     """Added mass by the name of its entry (`xx`), all links together [kg, kg m^2]."""
     plugins: list[tuple[str, Element]]
-    """With the scope of the names in them."""
+    """With the scope of the names in them; what the description includes is named, and not read."""
     included: list[str]
-    """Names of what it includes, which is not read."""
 
 
 def parse_description(root: Element, name: str, drives: Drives, exchange: Exchange) -> Description:

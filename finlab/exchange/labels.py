@@ -114,13 +114,12 @@ Path = tuple[str, ...]
 
 
 class Node(NamedTuple):
-    """A value in plain values."""
+    """A value in plain values, the keys that lead to it, and the mappings around it with their paths, the
+    innermost first; a mapping itself is the first."""
 
     path: Path
-    """The keys that lead to it."""
     value: Any
     scopes: tuple[tuple[Path, Mapping[str, Any]], ...]
-    """The mappings around it and their paths, the innermost first; a mapping itself is the first."""
 
     @property
     def key(self) -> str:

@@ -29,17 +29,16 @@ Row = dict[str, Any]
 
 
 class Found(NamedTuple):
-    """Thrusters at one place of the values."""
+    """Thrusters at one place of the values, each by name, as the file has it.
+
+    Thrusters without places and directions have wrenches (axes, n); `order` is how a note says that their
+    matrix was read."""
 
     node: Node
     rows: dict[str, Row]
-    """Each thruster by name, as the file has it; what a list of all holds has names of its own."""
     axes: tuple[Axis, ...] = ()
-    """Axes of the wrenches; none where thrusters have places and directions."""
     columns: Array = np.zeros((0, 0))
-    """Wrenches (len(axes), n)."""
     order: str = ""
-    """How a matrix was read, as a note says it."""
 
 
 def found_in(data: Any, exchange: Exchange, table: bool) -> Found:

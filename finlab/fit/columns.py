@@ -96,26 +96,21 @@ ALIKE = 0.01
 
 @dataclass(frozen=True)
 class Columns:
-    """Columns that a fit reads, one number for each of n rows."""
+    """Columns that a fit reads, in SI, (n,) each, and headers by name; the names of those whose header names
+    no unit; and where each of n rows stands, file and line."""
 
     values: dict[str, Array]
-    """In SI, by name, (n,) each."""
     headers: dict[str, str]
-    """What stands above each of them in the file."""
     bare: tuple[str, ...]
-    """Names of those whose header names no unit."""
     places: tuple[str, ...]
-    """Where each row stands, file and line."""
 
 
 class Header(NamedTuple):
-    """What a header cell stands for."""
+    """What a header cell stands for, and its unit in SI and as it stands there, in lower case."""
 
     name: str
     scale: float
-    """Its unit in SI."""
     unit: str
-    """The unit as it stands there, in lower case; empty where there is none."""
 
 
 def named_column(header: str, names: Mapping[str, str], units: Mapping[str, float] = UNITS) -> Header:
@@ -143,21 +138,13 @@ def read_columns(
     units: Mapping[str, float] = UNITS,
     gaps: bool = False,
 ) -> Columns:
-    """Returns the columns of a file that have a name.
+    """Returns the columns of a CSV file, or of a table, that have a name.
 
-    Of several columns for one quantity that agree, such as a force in kgf and in N, the first is taken.
-
-    Args:
-        file: a CSV file with a header, whose lines that begin with # are passed over, or a table.
-        names: what words in the header stand for, as `named_column` takes them.
-        needed: names of columns without which the file is refused; of `a|b` one is enough.
-        expected: what the error then says of the columns.
-        units: that the header may name.
-        gaps: whether cells of a file may be empty, which makes them NaN.
-
-    Raises:
-        DataError: the file cannot be read, or lacks a column.
-    """
+    Of several columns for one quantity that agree, such as a force in kgf and in N, the first is taken. Names
+    are what words in the header stand for, as `named_column` takes them, with its units; a file without those
+    `needed` is refused, of `a|b` one is enough, with what the error says is `expected`. With `gaps` cells of
+    a file may be empty, which makes them NaN. Raises DataError: the file cannot be read, or lacks a
+    column."""
     what = "a CSV file of measurements"
     table = file if isinstance(file, CsvTable) else read_table(file, MAX_BYTES, what, gaps)
     path = table.source

@@ -35,10 +35,9 @@ FALL = 0.12
 
 @dataclass(frozen=True)
 class ThrusterFit:
-    """A thruster as its bench shows it."""
+    """A thruster as its bench shows it, by command, force [N] and power [W]."""
 
     table: PowerTable
-    """Command, force [N] and power [W]."""
     still: tuple[float, float] | None
     """Commands between which there is no force, as far as there are such rows."""
     dead_band: float

@@ -40,45 +40,38 @@ CLIP = 4.0
 
 
 class Windows(NamedTuple):
-    """W windows of L steps; what a swim does not fill is NaN in the measurements."""
+    """W windows of L steps: which of all swims each step is (W, L), measurements (L, 12, W), NaN where a swim
+    does not fill them, and the smoothed state at the beginning (12, W)."""
 
     step: NDArray[np.intp]
-    """Which step of all swims each is (W, L)."""
     measured: Array
-    """(L, 12, W)."""
     start: Array
-    """Smoothed state at the beginning (12, W)."""
 
 
 @dataclass(frozen=True)
 class Fitted:
-    """Unknowns, and the problem near them, the windows' beginnings eliminated."""
+    """Unknowns, a vector (size,) in scales, and the problem near them, the windows' beginnings eliminated."""
 
     unknowns: Unknowns
     vector: Array
-    """(size,), in scales."""
     start: Array
     """States in which the windows begin (12, W)."""
     cost: Array
-    """Half the sum of squares (1,)."""
+    """Half the sum of squares (1,), whose gradient (size,), downwards, and second derivatives by the unknowns
+    (size, size), with what was believed before, are next."""
     gradient: Array
-    """Its slopes by the unknowns (size,), downwards."""
     information: Array
-    """Its second derivatives (size, size), with what was believed before."""
     own_information: Array
-    """What each window brings to them (W, size, size)."""
+    """What each window brings to the second derivatives (W, size, size), and to the gradient (W, size)."""
     scores: Array
-    """And to the slopes (W, size)."""
     residual: Array
-    """Measured less simulated, in deviations (L, 12, W); NaN where nothing was measured."""
+    """Measured less simulated, in deviations (L, 12, W), NaN where nothing was measured; simulated states."""
     state: Array
-    """Simulated states (L, 12, W)."""
     inner: Array
-    """Inverse second derivatives by the beginnings (W, 12, 12)."""
+    """Inverse second derivatives by the beginnings (W, 12, 12), those by beginnings and unknowns (W, 12,
+    size), and the gradient by the beginnings (W, 12), downwards."""
     mixed: Array
-    """By beginnings and unknowns (W, 12, size)."""
     pull: Array
-    """Slopes by the beginnings (W, 12), downwards."""
 
     def step(self, damping: float) -> tuple[Array, Array]:
         """Changes of the unknowns (size,) and of the beginnings (12, W)."""

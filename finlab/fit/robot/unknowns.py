@@ -29,15 +29,14 @@ SAME_SCALE = 0.003
 
 @dataclass(frozen=True)
 class Block:
-    """Unknowns of one kind."""
+    """Unknowns of one kind: how far each may be off, one standard deviation of what is believed before a
+    swim, and whether the wrench of the actuators depends on them."""
 
     name: str
     labels: tuple[str, ...]
     unit: str
     scale: Array
-    """How far each may be off: one standard deviation of what is believed before a swim."""
     force: bool
-    """Whether the wrench of the actuators depends on them."""
 
 
 def blocks_of(names: Sequence[str], damping: Array) -> dict[str, Block]:
