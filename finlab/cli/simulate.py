@@ -11,6 +11,7 @@ from tyro.conf import Positional, UseAppendAction, arg
 
 from finlab.cli.inputs import open_robot
 from finlab.errors import FinlabError
+from finlab.files.worker import in_worker
 from finlab.whole_file import make_folder
 
 if TYPE_CHECKING:
@@ -96,7 +97,7 @@ def simulate(
             loop = ClosedLoop(
                 robot,
                 allocator,
-                make_trajectory(trajectory, duration, scale),
+                in_worker(make_trajectory, trajectory, duration, scale),
                 truth=true,
                 sensors=sensors,
                 current=current,

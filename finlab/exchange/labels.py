@@ -8,7 +8,7 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.errors import LayoutError
-from finlab.files.units import FORCES, LENGTHS, TURNS
+from finlab.files.csv_table import FORCES, LENGTHS, TURNS
 from finlab.layout.wrench_axes import AXES, Axis
 
 Frame = Literal["FLU", "FRD"]

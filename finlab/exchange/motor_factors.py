@@ -36,8 +36,6 @@ FRAMES: dict[str, Array] = {
     name: np.array([row.split() for row in rows.split(",")], np.float64) for name, rows in _FRAMES.items()
 }
 """Name of a frame -> factors (n, 6), in the order of FRAME_CONFIG."""
-
-
 ARM = 0.2
 """Arm of a factor of 1 [m]; the file has none."""
 ORDER = [AXES.index(axis) for axis in ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")]

@@ -11,7 +11,7 @@ from finlab.errors import LayoutError
 from finlab.exchange import labels
 from finlab.exchange.exchange import Exchange
 from finlab.exchange.labels import Node, axis_of, lookup, nodes, numbers_in, plain
-from finlab.files.units import LENGTHS, TURNS
+from finlab.files.csv_table import LENGTHS, TURNS
 from finlab.layout.wrench_axes import AXES, Axis
 
 UNIT = 0.05

@@ -11,6 +11,7 @@ from finlab.evaluation.experiments.closed_loop import POWER, depth_error, mean_r
 from finlab.evaluation.method_specs import load_method_specs
 from finlab.evaluation.progress import progress
 from finlab.evaluation.report.document import Column, Row
+from finlab.files.worker import in_worker
 from finlab.layout import load_layout
 from finlab.sim import ClosedLoop, RunLog, straight
 
@@ -40,7 +41,7 @@ def run(
     """
     if not SETTLED_S < duration <= 3600.0:
         raise DataError(f"duration: expected more than {SETTLED_S:g} s and at most 3600 s, got {duration:g}")
-    robot, specs = load_layout(layout), load_method_specs(methods, checkpoint)
+    robot, specs = in_worker(load_layout, layout), load_method_specs(methods, checkpoint)
     done: dict[tuple[float | None, str], list[Row]] = {}
     for speed, (name, method), k in progress(list(product(SPEEDS, specs.items(), range(runs))), "swim"):
         row = _row(ClosedLoop(robot, method.on(robot), straight(speed, duration), seed=seed + k).run())

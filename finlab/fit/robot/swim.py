@@ -19,7 +19,7 @@ from scipy.stats import binned_statistic
 from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.files.archive import check_shapes, json_of, read_arrays
-from finlab.files.units import TURNS
+from finlab.files.csv_table import TURNS
 from finlab.fit.columns import MAX_BYTES, read_columns
 from finlab.layout import Fin, Layout
 from finlab.layout.fin import MAX_AMPLITUDE, MAX_FREQUENCY
