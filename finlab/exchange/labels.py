@@ -45,6 +45,9 @@ LIMIT_KEYS = f"{PAIR} {LEAST} {MOST} {COUNT} {ROWS_OF}"
 ROW = f"{NAME} {POSITION} {DIRECTION} {ANGLES} {LIMIT_KEYS} x y z "
 ROW += "px py pz posx posy posz dx dy dz ax ay az nx ny nz ux uy uz dirx diry dirz"
 """Keys of a thruster that are read."""
+LONGEST_LIST, MAX_NODES = 300, 30_000
+"""Most characters of a list of keys, and most values that are looked at."""
+Path = tuple[str, ...]
 
 
 def plain(label: object) -> str:
@@ -106,11 +109,6 @@ def frame_said(scopes: Iterable[Mapping[str, Any]], comments: Iterable[str]) -> 
         if re.search(r"\b(?:FLU|FRD|NED|ENU|SNAME|frame)\b", comment) and (frame := frame_in(comment)):
             return frame, "its comment"
     return None, ""
-
-
-LONGEST_LIST, MAX_NODES = 300, 30_000
-"""Most characters of a list of keys, and most values that are looked at."""
-Path = tuple[str, ...]
 
 
 class Node(NamedTuple):

@@ -20,6 +20,10 @@ LONGEST = 500
 _NAME = re.compile(r"[A-Z][A-Z0-9]*_\w+\Z")
 _ASKING = {"compare", "greater", "show", "echo", "if", "reset", "touch"}
 """Words of a script before a name that sets nothing."""
+MAX_ROTORS = 12
+FRD = TO_FRD[:3, 0]
+USUAL = {"PX": 0.0, "PY": 0.0, "PZ": 0.0, "AX": 0.0, "AY": 0.0, "AZ": -1.0, "CT": 6.5, "KM": 0.05}
+"""Keys of a rotor, and their defaults."""
 
 
 def read_parameters(text: str, wanted: str) -> dict[str, float]:
@@ -39,12 +43,6 @@ def read_parameters(text: str, wanted: str) -> dict[str, float]:
         elif name.startswith(begins):
             raise LayoutError(f"line {number}: {name} is {value!r:.40}, expected a number of ordinary size")
     return values
-
-
-MAX_ROTORS = 12
-FRD = TO_FRD[:3, 0]
-USUAL = {"PX": 0.0, "PY": 0.0, "PZ": 0.0, "AX": 0.0, "AY": 0.0, "AZ": -1.0, "CT": 6.5, "KM": 0.05}
-"""Keys of a rotor, and their defaults."""
 
 
 def read_px4(text: str, name: str, exchange: Exchange) -> Layout:

@@ -21,6 +21,17 @@ from finlab.layout.axes import Vector
 
 MOST = 1000.0
 """What gz-sim takes for a limit of a thruster that is left out [N]."""
+DERIVATIVES = {
+    "added_mass": "xDotU yDotV zDotW kDotP mDotQ nDotR",
+    "linear_damping": "xU yV zW kP mQ nR",
+    "quadratic_damping": "xUabsU yVabsV zWabsW kPabsP mQabsQ nRabsR",
+}
+"""Fields of a body, and their tags in the plugin Hydrodynamics."""
+OLD = "xUU yVV zWW kPP mQQ nRR"
+"""Tags of quadratic damping before gz-sim 7."""
+UUV, UUV_THRUSTER = "uuv_underwater_object", "uuv_thruster"
+"""Words in the names of uuv_simulator's plugins."""
+Known = dict[str, tuple[float, ...]]
 
 
 def is_plugin(plugin: Element, kind: str) -> bool:
@@ -75,19 +86,6 @@ def _uuv_force(plugin: Element, name: str, exchange: Exchange) -> tuple[float, f
     if said(plugin, "thrustMin") and said(plugin, "thrustMax"):
         low, high = max(low, number(plugin, "thrustMin")), min(high, number(plugin, "thrustMax"))
     return (low, high) if math.isfinite(low) else None
-
-
-DERIVATIVES = {
-    "added_mass": "xDotU yDotV zDotW kDotP mDotQ nDotR",
-    "linear_damping": "xU yV zW kP mQ nR",
-    "quadratic_damping": "xUabsU yVabsV zWabsW kPabsP mQabsQ nRabsR",
-}
-"""Fields of a body, and their tags in the plugin Hydrodynamics."""
-OLD = "xUU yVV zWW kPP mQQ nRR"
-"""Tags of quadratic damping before gz-sim 7."""
-UUV, UUV_THRUSTER = "uuv_underwater_object", "uuv_thruster"
-"""Words in the names of uuv_simulator's plugins."""
-Known = dict[str, tuple[float, ...]]
 
 
 def body_of(robot: Description, exchange: Exchange) -> Body:

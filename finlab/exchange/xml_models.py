@@ -17,6 +17,10 @@ MAX_DEPTH, MAX_ELEMENTS = 100, 200_000
 SECONDS, BYTES = 20, 1_000_000_000
 """Most time and memory that it may take."""
 _PROGRAM = f"import resource, xacro; resource.setrlimit(resource.RLIMIT_AS, ({BYTES},) * 2); xacro.main()"
+Drives = Callable[[Element], bool]
+"""Whether a plugin drives a thruster."""
+Named = dict[str, tuple[str, Element]]
+"""Links, joints, frames and models inside by `link arm::NAME` and so on, with the scope `arm::` of names."""
 
 
 def root_of(text: str) -> Element:
@@ -73,12 +77,6 @@ def expanded(path: Path | None) -> str:
         words = done.stderr.decode(errors="replace").split()
         raise LayoutError(f"is a xacro file that xacro refuses: {' '.join(words)[:300] or 'it says nothing'}")
     return done.stdout.decode(errors="replace")
-
-
-Drives = Callable[[Element], bool]
-"""Whether a plugin drives a thruster."""
-Named = dict[str, tuple[str, Element]]
-"""Links, joints, frames and models inside by `link arm::NAME` and so on, with the scope `arm::` of names."""
 
 
 def chosen(root: Element, drives: Drives, exchange: Exchange) -> Element:

@@ -28,6 +28,12 @@ DAMAGED = (ParseError, ArithmeticError, AttributeError, LookupError, OSError, Ty
 """What openpyxl ends with on files that are no workbooks."""
 
 IsHeader = Callable[[Sequence[str]], bool]
+MAX_BYTES = 200_000_000
+"""Largest file that is read [bytes]; a swim of an hour at 50 Hz has half of it."""
+LONGEST, MOST_BLANKS = 120, 10_000
+"""Characters of a header that count, without and with its blanks."""
+ALIKE = 0.01
+"""Share of the largest value by which two columns of one quantity may differ."""
 
 
 def sheets(path: Path, is_header: IsHeader) -> tuple[dict[str, CsvTable], tuple[str, ...]]:
@@ -83,14 +89,6 @@ def _words(row: Sequence[object]) -> list[str]:
     while cells and not cells[-1]:
         cells.pop()
     return cells
-
-
-MAX_BYTES = 200_000_000
-"""Largest file that is read [bytes]; a swim of an hour at 50 Hz has half of it."""
-LONGEST, MOST_BLANKS = 120, 10_000
-"""Characters of a header that count, without and with its blanks."""
-ALIKE = 0.01
-"""Share of the largest value by which two columns of one quantity may differ."""
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,11 @@ from finlab.physics import make_law
 from finlab.whole_file import write_whole
 
 OTHER_LAW = "thrust that grows otherwise with amplitude and frequency"
+GRID = (17, 17, 16)
+"""Amplitudes, frequencies and zero directions of a fin that becomes a table."""
+DEFLECTIONS = (3.0, 0.03)
+"""Standard errors, and angle [rad], from which a fin's lean counts; an IMU that is mounted askew looks like a
+smaller one."""
 
 
 def summary(fit: RobotFit) -> tuple[str, ...]:
@@ -129,13 +134,6 @@ def uncertainties(fit: RobotFit) -> tuple[Uncertainty, ...]:
         Uncertainty(share, common=f"swim of {fit.model.layout.name}"[:64].strip(), correlation=together)
         for share in shares
     )
-
-
-GRID = (17, 17, 16)
-"""Amplitudes, frequencies and zero directions of a fin that becomes a table."""
-DEFLECTIONS = (3.0, 0.03)
-"""Standard errors, and angle [rad], from which a fin's lean counts; an IMU that is mounted askew looks like a
-smaller one."""
 
 
 def write_robot(fit: RobotFit, path: str | os.PathLike[str]) -> Layout:

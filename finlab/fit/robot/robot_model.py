@@ -28,6 +28,12 @@ TYPICAL_SPEED = np.array([0.2, 0.2, 0.2, 0.5, 0.5, 0.5])
 """At which linear and quadratic damping are compared [m/s, rad/s]."""
 DAMPING_DOUBT = 0.5
 """How far damping may be off, as a share of what the layout says."""
+BACKWARDS = -0.25
+"""A share of its law's force below which an actuator pushes the other way, and not hardly."""
+SURE = 4.0
+"""Standard errors by which that share lies below 0."""
+ROUNDS = 4
+"""Times that the noise of each axis is estimated."""
 
 
 class RobotModel:
@@ -148,14 +154,6 @@ def shape_factor(terms: Array, shape: Array) -> Array:
     """What thrust is multiplied by, from terms (..., 5) and their coefficients (5,)."""
     result: Array = np.exp(np.clip(terms @ shape, -2.0, 2.0))
     return result
-
-
-BACKWARDS = -0.25
-"""A share of its law's force below which an actuator pushes the other way, and not hardly."""
-SURE = 4.0
-"""Standard errors by which that share lies below 0."""
-ROUNDS = 4
-"""Times that the noise of each axis is estimated."""
 
 
 def opposed_in(layout: Layout, names: Sequence[str]) -> Layout:

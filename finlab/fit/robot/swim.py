@@ -37,6 +37,24 @@ in the body frame."""
 ANGLES = slice(3, 6)
 SMOOTHED = (11, 2)
 """Samples and order of the filter by Savitzky and Golay."""
+SHORTEST_S = 30.0
+"""Least duration [s]."""
+LONGEST_GAP_S = 1.0
+"""Longest time [s] between two rows; what the actuators did meanwhile is not known."""
+PARTS = {
+    "fin": ("A", "f", "phi"),
+    "thruster": ("force",),
+    "azimuth": ("angle", "force"),
+    "tilt": ("angle", "force"),
+    "rudder": ("deflection",),
+}
+"""What is commanded of each type of actuator: half amplitude [rad], frequency [Hz] and zero direction [rad];
+force [N]; angle [rad]."""
+UNITS = dict.fromkeys(("s", "m", "m/s", "rad/s", "hz", "n"), 1.0)
+UNITS |= {**TURNS, "deg/s": TURNS["deg"], "°/s": TURNS["deg"]}
+"""Units that a header may name, in SI."""
+UNIT_OF = {"A": "half amplitudes in rad", "f": "Hz", "force": "N", "deflection": "rad"}
+"""What is expected of commands that have an end."""
 
 
 @dataclass(frozen=True)
@@ -102,26 +120,6 @@ def _channels(measured: Array) -> Iterator[tuple[int, NDArray[np.bool_], Array]]
         fresh = np.isfinite(column)
         if fresh.any():
             yield k, fresh, np.unwrap(column[fresh]) if ANGLES.start <= k < ANGLES.stop else column[fresh]
-
-
-SHORTEST_S = 30.0
-"""Least duration [s]."""
-LONGEST_GAP_S = 1.0
-"""Longest time [s] between two rows; what the actuators did meanwhile is not known."""
-PARTS = {
-    "fin": ("A", "f", "phi"),
-    "thruster": ("force",),
-    "azimuth": ("angle", "force"),
-    "tilt": ("angle", "force"),
-    "rudder": ("deflection",),
-}
-"""What is commanded of each type of actuator: half amplitude [rad], frequency [Hz] and zero direction [rad];
-force [N]; angle [rad]."""
-UNITS = dict.fromkeys(("s", "m", "m/s", "rad/s", "hz", "n"), 1.0)
-UNITS |= {**TURNS, "deg/s": TURNS["deg"], "°/s": TURNS["deg"]}
-"""Units that a header may name, in SI."""
-UNIT_OF = {"A": "half amplitudes in rad", "f": "Hz", "force": "N", "deflection": "rad"}
-"""What is expected of commands that have an end."""
 
 
 def read_swim(path: str | os.PathLike[str], layout: Layout) -> Swim:
