@@ -1,4 +1,4 @@
-"""Which file holds which form, told by its end and content, and one form made into another."""
+"""Forms of files by their end and content, and one form made into another."""
 
 import os
 from collections.abc import Callable

@@ -52,9 +52,9 @@ def of_motors(name: str, rows: list[MotorRow], exchange: Exchange) -> Layout:
     names = [motor for motor, _ in rows]
     if not rows:
         raise LayoutError("has no rows of factors, a motor and its six factors in each")
-    twice = next((motor for i, motor in enumerate(names) if motor in names[:i]), None)
-    if twice is not None:
-        raise LayoutError(f"adds a motor twice, {twice}; keep the lines of one frame")
+    for i, motor in enumerate(names):
+        if motor in names[:i]:
+            raise LayoutError(f"adds a motor twice, {motor}; keep the lines of one frame")
     exchange.note(f"Factors hold no lengths: one of 1 is taken for an arm of {ARM} m; correct `position_m`.")
     columns = (np.array([factors for _, factors in rows]) * SIGNS)[:, ORDER]
     columns[:, 3:] *= ARM * np.linalg.norm(columns[:, :3], axis=1, keepdims=True)
@@ -70,16 +70,12 @@ def read_parameters_of_ardusub(text: str, name: str, exchange: Exchange) -> Layo
     config, frames = values.get("FRAME_CONFIG"), [*FRAMES]
     if config is None:
         other = " of another vehicle (FRAME_CLASS)" if "FRAME_CLASS" in values else ""
-        raise LayoutError(
-            f"holds {len(values)} parameters of ArduPilot{other}, but no FRAME_CONFIG, by which ArduSub "
-            "names the motors of a robot"
-        )
+        lacks = "no FRAME_CONFIG, by which ArduSub names the motors of a robot"
+        raise LayoutError(f"holds {len(values)} parameters of ArduPilot{other}, but {lacks}")
     if config not in range(len(frames)):
-        raise LayoutError(
-            f"is {config:g}, a frame of one's own, which parameters do not hold; give the script (.lua) or "
-            f"source with its motors; finlab knows 0 to 6: {', '.join(frames)}",
-            "FRAME_CONFIG",
-        )
+        why = "a frame of one's own, which parameters do not hold; give the script (.lua) or source with its"
+        known = f"finlab knows 0 to 6: {', '.join(frames)}"
+        raise LayoutError(f"is {config:g}, {why} motors; {known}", "FRAME_CONFIG")
     frame = frames[int(config)]
     exchange.note(f"FRAME_CONFIG {config:g} was read: ArduSub's frame {frame}.")
     signs = {i: values.get(f"MOT_{i}_DIRECTION", 1.0) for i in range(1, len(FRAMES[frame]) + 1)}

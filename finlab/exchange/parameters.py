@@ -31,7 +31,6 @@ def read_parameters(text: str, wanted: str) -> dict[str, float]:
     1 NAME VALUE TYPE`. What follows # is a comment; the last value counts. Raises LayoutError: a name that
     begins with one of the words in `wanted` has no number behind it."""
     values: dict[str, float] = {}
-    begins = tuple(wanted.split())
     for number, line in enumerate(text.splitlines(), 1):
         cells = re.split(r"[\s,=]+", line[:LONGEST].partition("#")[0].strip())
         place = next((i for i, cell in enumerate(cells) if _NAME.match(cell)), None)
@@ -40,7 +39,7 @@ def read_parameters(text: str, wanted: str) -> dict[str, float]:
         name, value = cells[place], (cells[place + 1 : place + 2] or [""])[0]
         if is_number(value) and abs(float(value)) < 1e9:
             values[name] = float(value)
-        elif name.startswith(begins):
+        elif name.startswith(tuple(wanted.split())):
             raise LayoutError(f"line {number}: {name} is {value!r:.40}, expected a number of ordinary size")
     return values
 
@@ -58,13 +57,11 @@ def read_px4(text: str, name: str, exchange: Exchange) -> Layout:
     if values.get("CA_SV_CS_COUNT", 0.0) or values.get("CA_SV_TL_COUNT", 0.0):
         exchange.note("Its surfaces and tilting servos (CA_SV_*) are left out: they hold no forces.")
     for key, usual in USUAL.items():
-        lacking = [str(i) for i in range(count) if f"CA_ROTOR{i}_{key}" not in values]
-        if lacking:
+        if lacking := [str(i) for i in range(count) if f"CA_ROTOR{i}_{key}" not in values]:
             which = ", ".join(lacking) if len(lacking) < count else "all"
             exchange.note(f"No CA_ROTORi_{key} of rotors {which}: {usual:g} is taken, the default of PX4.")
     rotors = {key: int(own[1]) for key in values if (own := re.match(r"CA_ROTOR(\d{1,3})_", key))}
-    beyond = sorted(key for key, rotor in rotors.items() if rotor >= count)
-    if beyond:
+    if beyond := sorted(key for key, rotor in rotors.items() if rotor >= count):
         exchange.note(f"CA_ROTOR_COUNT is {count}; not read: {', '.join(beyond[:12])}.")
     if exchange.force is None:
         exchange.note("CA_ROTORi_CT is taken for the newtons at full output; correct `force_n` if not.")

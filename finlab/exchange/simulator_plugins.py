@@ -140,8 +140,7 @@ def _of_gz(plugin: Element, known: Known, exchange: Exchange) -> None:
             read |= set(values)
     if len(read) == 2:
         exchange.note("Hydrodynamics holds no derivatives by known tags: added mass and damping are unknown.")
-    others = dict.fromkeys(each.tag for each in plugin if each.tag not in read)
-    if others:
+    if others := dict.fromkeys(each.tag for each in plugin if each.tag not in read):
         exchange.note(f"Not read of Hydrodynamics: {', '.join(others)[:300]}.")
 
 

@@ -55,11 +55,8 @@ class CsvTable:
 
         Empty lines, and those that begin with #, are passed over. A cell that may be empty is NaN. Raises
         DataError: there is no row, or a row or a cell is wrong; the sentence names line and column."""
-        rows = [
-            (line, row)
-            for line, row in enumerate(self._rows, self._first)
-            if row.strip(" ,;\t") and not row.startswith("#")
-        ]
+        every = enumerate(self._rows, self._first)
+        rows = [(line, row) for line, row in every if row.strip(" ,;\t") and not row.startswith("#")]
         if not rows:
             raise DataError(f"{self.source}: has no rows below its header")
         return np.array([self._row(row, places, line) for line, row in rows]), np.array([n for n, _ in rows])

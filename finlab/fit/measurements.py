@@ -1,4 +1,4 @@
-"""What a load cell measured of one fin, cycle means, read from CSV files."""
+"""Samples of one fin on a load cell, cycle means, read from CSV files."""
 
 import os
 from collections.abc import Sequence
@@ -74,13 +74,9 @@ class Measurements:
     def without(self, places: NDArray[np.bool_]) -> "Measurements":
         """The samples but those (n,) that are marked."""
         keep = ~places
-        return replace(
-            self,
-            command=self.command[keep],
-            force=self.force[keep],
-            power=None if self.power is None else self.power[keep],
-            places=tuple(place for place, kept in zip(self.places, keep, strict=True) if kept),
-        )
+        power = None if self.power is None else self.power[keep]
+        named = tuple(np.array(self.places)[keep].tolist())
+        return replace(self, command=self.command[keep], force=self.force[keep], power=power, places=named)
 
 
 def read_measurements(paths: Sequence[str | os.PathLike[str]]) -> Measurements:
@@ -113,13 +109,10 @@ def _check_units(values: dict[str, Array], source: str) -> None:
 
 
 def _checked(read: list[Columns], source: str) -> Measurements:
-    """The samples of all files, with what is wrong with them as a whole said in a sentence."""
-    places = tuple(place for file in read for place in file.places)
-    notes: list[str] = []
-    if len(places) < MIN_SAMPLES:
-        raise DataError(
-            f"{source}: {len(places)} samples, expected at least {MIN_SAMPLES}; 300 are a good number"
-        )
+    """The samples of all files, with what is wrong with all together said in a sentence."""
+    places, notes = tuple(place for file in read for place in file.places), list[str]()
+    if (n := len(places)) < MIN_SAMPLES:
+        raise DataError(f"{source}: {n} samples, expected at least {MIN_SAMPLES}; 300 are a good number")
     columns = together([file.values for file in read])
     for name, unit in (("A", "rad"), ("f", "Hz")):
         if np.ptp(columns[name]) < SAME:
@@ -141,9 +134,8 @@ def _checked(read: list[Columns], source: str) -> Measurements:
             value = f"{columns[name][0]:.4g}"
             raise DataError(f"{source}: column {name} is {value} throughout; is the sensor connected?")
     if power is not None and power.min() < -0.02 * np.abs(power).max():
-        raise DataError(
-            f"{source}: column P has {power.min():.4g} W, expected the mean power that drives the fin"
-        )
+        least = f"{power.min():.4g} W, expected the mean power that drives the fin"
+        raise DataError(f"{source}: column P has {least}")
     return Measurements(command, force, power, places, tuple(notes), turned)
 
 
@@ -151,10 +143,8 @@ def _directions(columns: dict[str, Array], source: str, notes: list[str]) -> tup
     """Zero directions (n,) [rad], and whether there are several; a note where there are not."""
     phi = columns.get("phi")
     if phi is not None and np.ptp(phi) > TURN + FILE_TURN_TOLERANCE:
-        raise DataError(
-            f"{source}: the zero directions span {np.ptp(phi):.4g} rad; name their unit in the header, "
-            "`phi [deg]`"
-        )
+        span = f"{np.ptp(phi):.4g} rad; name their unit in the header, `phi [deg]`"
+        raise DataError(f"{source}: the zero directions span {span}")
     if phi is not None and np.ptp(phi) >= SAME_DIRECTION:
         return phi, True
     said = "there is no column phi" if phi is None else f"phi is {phi[0]:.3f} rad throughout"

@@ -110,10 +110,8 @@ def _convex(size: Array, watts: Array, idle: float) -> Array:
     curve = idle + beyond @ rise
     missed = np.sqrt(np.mean((curve - watts) ** 2))
     if missed > NOT_CONVEX * watts.max():
-        raise DataError(
-            f"the power does not grow ever faster with the force: the nearest curve that does misses it by "
-            f"{missed:.3g} W of {watts.max():.4g} W; are force and power of the same rows?"
-        )
+        why = f"misses it by {missed:.3g} W of {watts.max():.4g} W; are force and power of the same rows?"
+        raise DataError(f"the power does not grow ever faster with force: the nearest curve that does {why}")
     return np.asarray(curve)
 
 

@@ -1,4 +1,4 @@
-"""What a fit looks for, with what is believed before: each unknown in units of how far it may be off."""
+"""Unknowns of a fit, with what is believed before: each in units of how far it may be off."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
