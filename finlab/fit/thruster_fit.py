@@ -111,7 +111,7 @@ def _convex(size: Array, watts: Array, idle: float) -> Array:
     missed = np.sqrt(np.mean((curve - watts) ** 2))
     if missed > NOT_CONVEX * watts.max():
         why = f"misses it by {missed:.3g} W of {watts.max():.4g} W; are force and power of the same rows?"
-        raise DataError(f"the power does not grow ever faster with force: the nearest curve that does {why}")
+        raise DataError(f"the power does not grow ever faster with the force: the nearest such curve {why}")
     return np.asarray(curve)
 
 
