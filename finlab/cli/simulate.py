@@ -69,7 +69,8 @@ def simulate(
 
     if output is not None:
         make_folder(output)
-    with tqdm(desc="swim", unit="s", disable=None, leave=False, file=sys.stderr) as bar:
+    tqdm.monitor_interval = 0  # a process of one thread is copied to read files, without room on a disk
+    with tqdm(desc="swim", unit="s", disable=None, leave=False, miniters=0.1, file=sys.stderr) as bar:
         from finlab.sim import NO_NOISE, ClosedLoop, FinFault, make_trajectory
 
         sensors = None if noise else NO_NOISE

@@ -125,16 +125,10 @@ def fit_fin(
 ) -> FinFit:
     """Returns the fin that explains samples, leaving out those that contradict all others.
 
-    The linear algebra runs on one thread: on matrices of this size several wait for each other.
-
-    Args:
-        measurements: at least `MIN_SAMPLES` of a fin that beats.
-        seed: draws the samples that are kept where there are more than `MOST_SAMPLES`.
-        progress: told before each step what comes next; what it raises ends the fit.
-
-    Raises:
-        DataError: there are fewer.
-    """
+    The linear algebra runs on one thread: on matrices of this size several wait for each other. The seed
+    draws the samples that are kept where there are more than `MOST_SAMPLES`; `progress` is called before each
+    step, and what it raises ends the fit. Raises DataError: fewer than `MIN_SAMPLES` are of a fin that
+    beats."""
     notes = list(measurements.notes)
     rest = measurements.command[:, 0] * measurements.command[:, 1] == 0.0
     if rest.any():

@@ -163,8 +163,12 @@ class _Problem:
         begin = np.repeat(start[:, None], n_all, axis=1)
         for k in range(12):
             begin[k, 1 + n + k] += DIFFERENCE * START_DEVIATION[k]
-        state, sensed = self._simulated(vectors, wrench, begin)
-        residual = self._residual(sensed[:, :, 0])
+        bodies = Dynamics(*(part[..., None] for part in self.model.bodies(unknowns, vectors)))
+        state = integrate(begin, wrench, bodies, unknowns.of("current", vectors).T[..., None], STEP_S)
+        sensed = self.model.sensed(unknowns, vectors, state)
+        away = windows.measured - sensed[:, :, 0]
+        away[:, ANGLES] = wrapped(away[:, ANGLES])
+        residual = np.asarray(away / self.deviation[:, None])
         left, weight = _huber(residual)
         slopes = (sensed[:, :, 1:] - sensed[:, :, :1]) / DIFFERENCE
         slopes *= (weight / self.deviation[:, None])[:, :, None]
@@ -185,14 +189,6 @@ class _Problem:
         solved = (cost_of_all, slopes_of_all, information, own, scores)
         return Fitted(unknowns, vector, start, *solved, residual, state[:, :, 0], inner, mixed, pull)
 
-    def _simulated(self, vectors: Array, wrench: Array, start: Array) -> tuple[Array, Array]:
-        """States (L, 12, B, W) of B vectors (B, size) under wrenches (L, 6, B, W) from beginnings (12, B, W),
-        and what sensors see of them."""
-        bodies = Dynamics(*(part[..., None] for part in self.model.bodies(self.unknowns, vectors)))
-        current = self.unknowns.of("current", vectors).T[..., None]
-        state = integrate(start, wrench, bodies, current, STEP_S)
-        return state, self.model.sensed(self.unknowns, vectors, state)
-
     def _wrenches(self, vectors: Array) -> Array:
         """Wrenches (L, 6, B, W) of B vectors (B, size) that differ from the first in one entry each."""
         first = self.model.wrench(self.unknowns, vectors[0])[self.windows.step]
@@ -202,12 +198,6 @@ class _Problem:
             if self.unknowns.force[np.argmax(vector != vectors[0])]:
                 wrench[..., k] = self.model.wrench(self.unknowns, vector)[self.windows.step]
         return np.ascontiguousarray(wrench.transpose(1, 2, 3, 0))
-
-    def _residual(self, sensed: Array) -> Array:
-        """Measured less simulated (L, 12, W), in deviations."""
-        away = self.windows.measured - sensed
-        away[:, ANGLES] = wrapped(away[:, ANGLES])
-        return np.asarray(away / self.deviation[:, None])
 
 
 def _huber(residual: Array) -> tuple[Array, Array]:

@@ -91,9 +91,8 @@ class RobotFit:
         """Why the fit should not be trusted; empty where it may."""
         clauses = []
         if self.explained < SOUND:
-            clauses.append(
-                f"simulated swims explain {self.explained:.0%} of the motion, expected at least {SOUND:.0%}"
-            )
+            share = f"{self.explained:.0%} of the motion, expected at least {SOUND:.0%}"
+            clauses.append(f"simulated swims explain {share}")
         names = self.model.layout.names
         place, n = self.fitted.unknowns.place("strength"), len(names)
         centered = self.fitted.unknowns.scale[place] * (np.eye(n) - (1.0 / n if n > 1 else 0.0))
