@@ -28,10 +28,9 @@ _ESCAPED_SURROGATE = re.compile(r"\\u[dD][89a-fA-F]")
 def parse_json(content: str, source: str, error: type[FinlabError] = DataError) -> Any:
     """Returns the values of a JSON document. Raises FinlabError of the kind `error`: it is no JSON, or holds
     a key twice or a number that is not finite; the message calls the document `source`."""
+    numbers: Any = dict.fromkeys(("parse_float", "parse_constant", "parse_int"), _number)
     try:
-        values = json.loads(
-            content, object_pairs_hook=_once, parse_float=_number, parse_constant=_number, parse_int=_number
-        )
+        values = json.loads(content, object_pairs_hook=_once, **numbers)
         if _ESCAPED_SURROGATE.search(content):  # half of a pair is no character, and cannot be written
             json.dumps(values, ensure_ascii=False).encode()
         return values
@@ -78,7 +77,6 @@ def _number(text: str) -> int | float:
 
 
 def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """A mapping whose keys are given once each."""
     values: dict[str, Any] = {}
     for key, value in pairs:
         if key in values:

@@ -87,7 +87,6 @@ def prepare(modules: Sequence[str]) -> None:
 
 
 def _context() -> Any:
-    """How the process is made."""
     alone = threading.active_count() == 1 and sys.platform == "linux"
     methods = multiprocessing.get_all_start_methods()
     return multiprocessing.get_context("fork" if alone else "forkserver" if "forkserver" in methods else None)
@@ -95,10 +94,8 @@ def _context() -> Any:
 
 def _size(argument: Any) -> int:
     """Bytes of a file, or of some."""
-    if isinstance(argument, bytes):
-        return len(argument)
-    if isinstance(argument, (list, tuple)):
-        return sum(map(_size, argument))
+    if isinstance(argument, (bytes, list, tuple)):
+        return len(argument) if isinstance(argument, bytes) else sum(map(_size, argument))
     with suppress(OSError, TypeError, ValueError):
         return os.path.getsize(argument)
     return 0
