@@ -101,7 +101,6 @@ def _propeller(
 
 
 def _fin(joint: Joint, start: Array, exchange: Exchange) -> Fin:
-    """The fin that a joint moves."""
     if joint.kind not in TURNING:
         kinds = " or ".join(TURNING)
         raise LayoutError(f"joint {joint.name!r:.60} is {joint.kind}; a fin's joint is {kinds}")

@@ -84,7 +84,6 @@ def _name(key: str, row: Row) -> str:
 
 
 def _direction(key: str, row: Row, exchange: Exchange) -> Array:
-    """The direction (3,) of length 1 in which a thruster pushes."""
     axis_key, value, _ = lookup(row, labels.DIRECTION)
     if axis_key:
         axis = _three(value, f"{key}.{axis_key}")

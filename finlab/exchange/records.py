@@ -190,7 +190,6 @@ def _array(rows: Sequence[Any], node: Node) -> Array:
 
 
 def _of_records(node: Node, rows: Mapping[str, Mapping[str, Any]]) -> Found | None:
-    """A mapping for each thruster that holds its wrench."""
     keyed = [
         {axis: key for key in row if (axis := axis_of(key)) and np.ndim(row[key]) == 0}
         for row in rows.values()

@@ -131,7 +131,6 @@ def _keep(known: Known, field: str, tags: dict[str, str], exchange: Exchange) ->
 
 
 def _of_gz(plugin: Element, known: Known, exchange: Exchange) -> None:
-    """Derivatives of the plugin of gz-sim."""
     read = {"link_name", "water_density"}
     for field, tags in (*DERIVATIVES.items(), ("quadratic_damping", OLD)):
         values = {tag: value for tag in tags.split() if (value := said(plugin, tag))}

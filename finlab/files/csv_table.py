@@ -62,7 +62,6 @@ class CsvTable:
         return np.array([self._row(row, places, line) for line, row in rows]), np.array([n for n, _ in rows])
 
     def _row(self, row: str, places: Sequence[int], line: int) -> list[float]:
-        """One row, or a sentence on what is wrong in it."""
         where = f"{self.source}: line {line}"
         cells = self._cells(row, where)
         if len(cells) != len(self.header):

@@ -93,7 +93,6 @@ def _context() -> Any:
 
 
 def _size(argument: Any) -> int:
-    """Bytes of a file, or of some."""
     if isinstance(argument, (bytes, list, tuple)):
         return len(argument) if isinstance(argument, bytes) else sum(map(_size, argument))
     with suppress(OSError, TypeError, ValueError):
@@ -102,7 +101,6 @@ def _size(argument: Any) -> int:
 
 
 def _child(connection: Connection, limits: _Limits, read: Callable[..., Any], arguments: Any) -> None:
-    """In the process: read, and send what came of it."""
     # Memory may not even suffice to say so; whoever interrupts, interrupts both.
     with suppress(BaseException):
         _limit(limits)

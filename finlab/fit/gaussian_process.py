@@ -182,7 +182,6 @@ def _factor(covariance: Array, variance: Array) -> Array:
 
 
 def _inverse(lower: Array) -> Array:
-    """The inverse (n, n) of a matrix from its Cholesky factor."""
     half, _ = dpotri(lower, lower=True)
     half = np.tril(half)
     return np.asarray(half + half.T - np.diag(np.diag(half)))

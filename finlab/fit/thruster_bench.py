@@ -178,7 +178,6 @@ def _tables(path: Path) -> tuple[list[Columns], tuple[str, ...]]:
 
 
 def _is_header(cells: Sequence[str]) -> bool:
-    """Whether cells stand above a table of a thruster."""
     try:
         names = {named_column(cell, NAMES).name for cell in cells}
     except DataError:  # a header whose unit is not known, which is said when it is read
@@ -187,7 +186,6 @@ def _is_header(cells: Sequence[str]) -> bool:
 
 
 def _renamed(columns: Columns) -> Columns:
-    """A throttle in units of a pulse is one."""
     header = columns.headers.get("input", "")
     if "PWM" not in columns.values and re.match("[uµμm]", named_column(header, NAMES).unit):
         columns.values["PWM"], columns.headers["PWM"] = columns.values.pop("input"), header
@@ -233,7 +231,6 @@ def _signed(rows: Rows, unit: str, notes: list[str]) -> Rows:
 
 
 def _checked(values: Rows, kind: str, source: str, notes: tuple[str, ...]) -> Bench:
-    """The bench of rows of one voltage, if they can be one."""
     command, force, power = values["command"], values["force"], values["power"]
     if not force.any() or not power.any():
         raise DataError(f"{source}: {'power' if force.any() else 'force'} is 0 throughout; is it connected?")

@@ -191,7 +191,6 @@ def _deviation(fitted: Fitted, deviation: Array) -> Array:
 
 
 def _keep_delays(model: RobotModel, fitted: Fitted) -> None:
-    """Tells the model how late sensors are."""
     model.late = [round(float(delay) / STEP_S) for delay in fitted.unknowns.of("delay", fitted.vector)]
 
 

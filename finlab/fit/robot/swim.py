@@ -184,7 +184,6 @@ def _csv(path: Path, layout: Layout) -> Swim:
 
 
 def _check_time(time: Array, places: Sequence[str]) -> None:
-    """Time (n,) must rise, without gaps."""
     steps = np.diff(time)
     for k in np.flatnonzero(~((steps > 0.0) & (steps <= LONGEST_GAP_S))).tolist():
         raise DataError(
@@ -205,7 +204,6 @@ def _rows(values: Array, layout: Layout) -> Array:
 
 
 def _check_commands(command: Array, places: Sequence[str], layout: Layout) -> None:
-    """An actuator is commanded by numbers that it can do, or by none."""
     known = np.isfinite(command)
     for k, i in np.argwhere(known.any(axis=2) & ~known.all(axis=2)):
         columns = ", ".join(f"{layout.names[i]}.{part}" for part in PARTS[layout.actuators[i].type])
