@@ -7,7 +7,7 @@ import threading
 from pathlib import Path
 
 from finlab.errors import FinlabError
-from finlab.files.worker import prepare
+from finlab.files.worker import in_worker, prepare
 from finlab.layout import load_layout
 from webapp.app import App
 from webapp.guard import Guard
@@ -35,7 +35,7 @@ def serve(
         FinlabError: the port is taken, or layout or checkpoint cannot be read.
     """
     prepare(["webapp.session.files", "webapp.tasks.fitting"])
-    first = load_layout(layout or FIRST_LAYOUT)
+    first = in_worker(load_layout, layout or FIRST_LAYOUT)
     _check_port(host, port)
     solver = Solver(checkpoint)
     # A missing checkpoint is reported now, not in the browser; and the first page finds a warm solver.

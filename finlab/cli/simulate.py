@@ -11,6 +11,7 @@ from tyro.conf import Positional, UseAppendAction, arg
 
 from finlab.cli.inputs import open_robot
 from finlab.errors import FinlabError
+from finlab.files.worker import in_worker
 from finlab.whole_file import make_folder
 
 if TYPE_CHECKING:
@@ -70,7 +71,8 @@ def simulate(
 
     if output is not None:
         make_folder(output)
-    with tqdm(desc="swim", unit="s", disable=None, leave=False, file=sys.stderr) as bar:
+    tqdm.monitor_interval = 0  # a process of one thread is copied to read files, without room on a disk
+    with tqdm(desc="swim", unit="s", disable=None, leave=False, miniters=0.1, file=sys.stderr) as bar:
         from finlab.sim import NO_NOISE, ClosedLoop, FinFault, make_trajectory
 
         sensors = None if noise else NO_NOISE
@@ -98,7 +100,7 @@ def simulate(
             loop = ClosedLoop(
                 robot,
                 allocator,
-                make_trajectory(trajectory, duration, scale),
+                in_worker(make_trajectory, trajectory, duration, scale),
                 controller_of(controller, robot),
                 truth=true,
                 sensors=sensors,
@@ -170,7 +172,7 @@ def _learner(allocator: Allocator) -> OnlineFit:
     """Who learns a robot on the way; a `FinlabError` where the method takes no actuators that lean."""
     import numpy as np
 
-    from finlab.fit.robot.learned_actuators import leaned
+    from finlab.fit.robot.fitted_robot import leaned
     from finlab.fit.robot.online import OnlineFit
 
     learner, layout = OnlineFit(allocator.layout), allocator.layout

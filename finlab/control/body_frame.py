@@ -44,7 +44,7 @@ class _BodyFrame:
             text = f"{layout.name!r:.60} dives by its pitch, which controller {self.name} does not command"
             raise FinlabError(f"controller: {text}; take tracking")
         self.layout = layout
-        self.axes = tuple(axis for axis in ("Fx", "Fz", "Tz") if axis in own)
+        self.axes: tuple[str, ...] = tuple(axis for axis in ("Fx", "Fz", "Tz") if axis in own)
         self.free: tuple[str, ...] = () if "Fy" in own else ("Fy",)
         self.most = np.array(gains.max_wrench)
         """Largest wrench that is asked for (6,) [N, N m]."""
@@ -159,5 +159,4 @@ def controller_of(name: str, layout: Layout) -> Controller:
     """A controller by its name. Raises FinlabError: there is none of that name, or not for this robot."""
     if name not in CONTROLLERS:
         raise FinlabError(f"controller: expected one of {', '.join(CONTROLLERS)}, got {name!r:.40}")
-    law: Controller = CONTROLLERS[name](layout)
-    return law
+    return CONTROLLERS[name](layout)

@@ -15,7 +15,7 @@ from finlab.allocation import Allocator
 from finlab.deploy.design_files import read_archive, stored_table
 from finlab.errors import DataError, FinlabError, LayoutError
 from finlab.files.archive import packed
-from finlab.fit import outliers
+from finlab.fit import fin_fit
 from finlab.layout import Layout, Thruster, load_layout
 from finlab.layout.force_table_file import DOUBT, table_bytes
 from finlab.layout.thrust_model import PowerTable
@@ -204,7 +204,7 @@ def test_a_cancelled_fit_ends_at_its_next_step(
 ) -> None:
     opened, begun, gate = Opened(worker), threading.Event(), threading.Event()
     steps: list[int] = []
-    component = outliers.Component
+    component = fin_fit.Component
 
     def held(*args: Any, **options: Any) -> object:
         steps.append(len(steps))
@@ -212,7 +212,7 @@ def test_a_cancelled_fit_ends_at_its_next_step(
         assert gate.wait(30)
         return component(*args, **options)
 
-    monkeypatch.setattr(outliers, "Component", held)
+    monkeypatch.setattr(fin_fit, "Component", held)
     opened.fitting.start("back_left", "cell.csv", cell(tmp_path))
     assert begun.wait(30)
     opened.fitting.forget()

@@ -167,7 +167,8 @@ class Opening:
             FinlabError: it is of no kind that is opened, or whoever takes it refuses it.
         """
         suffix = PurePath(name).suffix.lower()
-        take = self._takers.get(".yaml" if suffix in TABLES and is_robot_table(content) else suffix)
+        robot = suffix in TABLES and in_worker(is_robot_table, content)
+        take = self._takers.get(".yaml" if robot else suffix)
         if take is None:
             raise FinlabError(f"{PurePath(name).name[-60:]!r} cannot be opened; expected {KINDS}")
         take(name, content)

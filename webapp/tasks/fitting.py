@@ -127,8 +127,7 @@ class Fitting(Newest[Upload, Fitted]):
                 raise type(error)(str(error).replace(f"{folder}/", "")) from None
 
     def _fit_measurements(self, path: Path, upload: Upload, done: Upload) -> Fitted:
-        from finlab.fit.fin_file import fin_csv
-        from finlab.fit.fin_fit import fit_fin
+        from finlab.fit.fin_fit import fin_csv, fit_fin
         from finlab.fit.measurements import read_measurements
 
         tell = partial(self._tell, upload)

@@ -24,8 +24,8 @@ from finlab.allocation.policy import AXES as WRENCH_AXES
 from finlab.allocation.settings import Settings, choice
 from finlab.allocation.solution import Solution
 from finlab.arrays import Array
-from finlab.exchange.ardusub_frames import AXES, FRAMES
-from finlab.exchange.ardusub_frames import SIGNS as SUB_SIGNS
+from finlab.exchange.motor_factors import AXES, FRAMES
+from finlab.exchange.motor_factors import SIGNS as SUB_SIGNS
 
 ROLL, PITCH, YAW, SURGE, SWAY, HEAVE = range(6)
 ROWS = np.array([3, 4, 5, 0, 1, 2])

@@ -17,6 +17,7 @@ from finlab.evaluation.experiments.closed_loop import (
 from finlab.evaluation.method_specs import load_method_specs
 from finlab.evaluation.progress import progress
 from finlab.evaluation.report.document import Column, Row
+from finlab.files.worker import in_worker
 from finlab.layout import Layout, load_layout
 from finlab.sim import ClosedLoop, make_trajectory
 
@@ -73,7 +74,7 @@ def run(
         checkpoint: of the learned methods, a shipped name or a folder.
         seed: of the first run's noise.
     """
-    robot, path = load_layout(layout), make_trajectory(trajectory)
+    robot, path = in_worker(load_layout, layout), in_worker(make_trajectory, trajectory)
     faults, specs = all_faults(robot, path.duration_s / 2), load_method_specs(methods, checkpoint)
     cases = [(fault, name) for fault, name in product(faults, specs) if fault.controllable]
     done: dict[tuple[Fault, str], list[Row]] = {}

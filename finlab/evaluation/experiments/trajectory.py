@@ -17,6 +17,7 @@ from finlab.evaluation.experiments.closed_loop import (
 from finlab.evaluation.method_specs import load_method_specs
 from finlab.evaluation.progress import progress
 from finlab.evaluation.report.document import Column, Row
+from finlab.files.worker import in_worker
 from finlab.layout import load_layout
 from finlab.sim import ClosedLoop, make_trajectory
 
@@ -43,7 +44,8 @@ def run(
         checkpoint: of the learned methods, a shipped name or a folder.
         seed: of the first run's noise.
     """
-    robots, path = [load_layout(name) for name in layouts], make_trajectory(trajectory)
+    robots = [in_worker(load_layout, name) for name in layouts]
+    path = in_worker(make_trajectory, trajectory)
     specs = load_method_specs(methods, checkpoint)
     done: dict[tuple[str, str, str], list[Row]] = {}
     cases = list(product(robots, specs.items(), controllers, range(runs)))

@@ -19,6 +19,7 @@ from finlab.evaluation.experiments.closed_loop import (
 from finlab.evaluation.method_specs import load_method_specs
 from finlab.evaluation.progress import progress
 from finlab.evaluation.report.document import Column, Row
+from finlab.files.worker import in_worker
 from finlab.layout import load_layout
 from finlab.sim import ClosedLoop, RunLog, straight
 
@@ -52,7 +53,7 @@ def run(
     """
     if not SETTLED_S < duration <= 3600.0:
         raise DataError(f"duration: expected more than {SETTLED_S:g} s and at most 3600 s, got {duration:g}")
-    robot, specs = load_layout(layout), load_method_specs(methods, checkpoint)
+    robot, specs = in_worker(load_layout, layout), load_method_specs(methods, checkpoint)
     gone = [(fin, 0.0) for fin in first_lost(robot, lost)]
     done: dict[tuple[float | None, str, str], list[Row]] = {}
     cases = list(product(SPEEDS, specs.items(), controllers, range(runs)))

@@ -11,7 +11,8 @@ from finlab.evaluation.report.document import Column, Row
 from finlab.evaluation.scoring import Columns, run_method
 from finlab.evaluation.splits import SPLITS, Case, make_split, own_sigma
 from finlab.evaluation.statistics.bootstrap import mean_interval, share_interval
-from finlab.layout import Layout
+from finlab.files.worker import in_worker
+from finlab.layout import Layout, load_layout
 from finlab.layout.load import layout_and_failed
 from finlab.physics import plant_of
 
@@ -59,7 +60,7 @@ def run(
         seed: of all draws.
     """
     sets = _cases(layout, split, layouts, targets, seed)
-    usual = ("dual", "paper") if layout is None else installed_methods(layout_and_failed(layout)[0])
+    usual = ("dual", "paper") if layout is None else installed_methods(in_worker(load_layout, layout))
     specs = load_method_specs(methods or usual, checkpoint, patient=True)
     return [
         {"split": name, "method": method, "n": len(found["layout"]), "scored_by": "plant", **figures(found)}
@@ -105,7 +106,7 @@ def _cases(
         raise DataError(
             f"split: a layout has none, got {','.join(split)!r} beside {layout!r:.60}; leave one of them out"
         )
-    own = own_case(*layout_and_failed(layout), targets, seed)
+    own = own_case(*in_worker(layout_and_failed, layout), targets, seed)
     return {f"layout {own.layout.name}": [own]}
 
 

@@ -11,7 +11,7 @@ from finlab.allocation.yardstick import yardstick
 from finlab.arrays import Array
 from finlab.errors import AllocationError, LayoutError
 from finlab.evaluation.splits import make_split
-from finlab.exchange.ardusub_frames import FRAMES, SIGNS
+from finlab.exchange.motor_factors import FRAMES, SIGNS
 from finlab.layout import Layout
 from finlab.physics import plant_of
 

@@ -1,4 +1,10 @@
-"""From unknowns to what a robot does: wrenches of its actuators over a swim, and the body that they move."""
+"""From unknowns to what a robot does: wrenches of its actuators over a swim, and the body that they move.
+
+Which actuators push the other way than drawn is found before a fit, whose strengths are logarithms: what the
+measured accelerations need besides what the body does by itself is linear in the shares that actuators give
+of their laws' forces, and in errors of the damping. That is one weighted least-squares problem of both sides
+after the same low-pass filter (equation error; V. Klein and E. Morelli, Aircraft System Identification).
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -7,18 +13,26 @@ from functools import cached_property
 import numpy as np
 
 from finlab.arrays import Array
-from finlab.fit.robot.swim import STEP_S, Swim
+from finlab.fit.robot.swim import SMOOTHED, STEP_S, Swim
 from finlab.fit.robot.unknowns import SENSORS, SHAPE, Unknowns, blocks_of
 from finlab.layout import Layout, Rudder, Thruster
-from finlab.layout.effectiveness import moved_effectiveness
+from finlab.layout.directions import with_axes
+from finlab.layout.effectiveness import moved_effectiveness, own_effectiveness
 from finlab.physics import plant_of
-from finlab.vehicle.fossen import Dynamics, complete_body, dynamics_of
+from finlab.vehicle.attitude import rotation_of_angles
+from finlab.vehicle.fossen import Dynamics, accelerations, complete_body, dynamics_of
 from finlab.vehicle.vehicle import Bodies
 
 TYPICAL_SPEED = np.array([0.2, 0.2, 0.2, 0.5, 0.5, 0.5])
 """At which linear and quadratic damping are compared [m/s, rad/s]."""
 DAMPING_DOUBT = 0.5
 """How far damping may be off, as a share of what the layout says."""
+BACKWARDS = -0.25
+"""A share of its law's force below which an actuator pushes the other way, and not hardly."""
+SURE = 4.0
+"""Standard errors by which that share lies below 0."""
+ROUNDS = 4
+"""Times that the noise of each axis is estimated."""
 
 
 class RobotModel:
@@ -122,14 +136,9 @@ class RobotModel:
 
 
 def turned_frames(layout: Layout, mounting: Array, lean: Array) -> Array:
-    """Returns own axes (n, 3, 3), rows in the body frame, of actuators that are not as drawn.
-
-    Args:
-        layout: as it was drawn.
-        mounting: angles (n,) about the third of the axes [rad], of a fin's horizontal shaft about z.
-        lean: then angles (n,) about the first [rad], a shaft; of thrusters, which push along it, about the
-            second.
-    """
+    """Returns own axes (n, 3, 3), rows in the body frame, of actuators not as drawn: turned by angles
+    (n,) of their mounting about the third of the axes [rad], of a fin's horizontal shaft about z, and then by
+    those of their lean about the first, a shaft; of thrusters, which push along it, about the second."""
     first, second, third = np.moveaxis(layout.frames, 1, 0)
     cos, sin = np.cos(mounting)[:, None], np.sin(mounting)[:, None]
     first, second = cos * first + sin * second, cos * second - sin * first
@@ -144,3 +153,52 @@ def shape_factor(terms: Array, shape: Array) -> Array:
     """What thrust is multiplied by, from terms (..., 5) and their coefficients (5,)."""
     result: Array = np.exp(np.clip(terms @ shape, -2.0, 2.0))
     return result
+
+
+def opposed_in(layout: Layout, names: Sequence[str]) -> Layout:
+    """Returns a robot of which some actuators push the other way at every command: of fins and azimuths zero
+    is turned about, of thrusters and rudders the first axis."""
+    parts = list(layout.actuators)
+    for k in layout.indices(names):
+        part = parts[k]
+        first = isinstance(part, Thruster | Rudder)
+        parts[k] = with_axes(part, np.array(part.frame) * ([[-1], [1], [-1]] if first else [[1], [-1], [-1]]))
+    return replace(layout, actuators=tuple(parts))
+
+
+def pushing_back(model: RobotModel, swims: Sequence[Swim], smooth: Array) -> tuple[str, ...]:
+    """Returns the names of the actuators that push the other way, by smoothed measurements (M, 12). One that
+    the swims do not tell apart from others counts as drawn."""
+    share, error = _shares(model, [len(swim) for swim in swims], smooth)
+    backwards = (share < BACKWARDS) & (share < -SURE * error)
+    return tuple(np.array(model.layout.names)[backwards].tolist())
+
+
+def _shares(model: RobotModel, lengths: Sequence[int], smooth: Array) -> tuple[Array, Array]:
+    """Shares (n,) of their laws' forces that actuators give, and standard errors; believed to be 1 +- 1."""
+    from scipy.signal import savgol_filter
+
+    def filtered(values: Array, order: int = 0) -> Array:
+        parts = np.split(values, np.cumsum(lengths)[:-1])
+        kept = [savgol_filter(part, *SMOOTHED, deriv=order, delta=STEP_S, axis=0) for part in parts]
+        return np.concatenate(kept)
+
+    n, flow, body = model.layout.n, smooth[:, 6:], model.dynamics
+    model.meet(flow)
+    drawn = filtered(np.einsum("mnk,nkw->mwn", model.alone.mean(axis=1), own_effectiveness(model.layout)))
+    up = rotation_of_angles(smooth[:, 3:6].T)[2::3]
+    alone = np.stack(accelerations(body, flow.T, up, np.zeros(6)), axis=-1)
+    missing = (filtered(flow, 1) - alone) * body.inertia - drawn.sum(axis=-1)
+    damped = -np.stack([flow, flow * np.abs(flow), np.ones_like(flow)], axis=-1)  # (M, 6, 3)
+    by = np.concatenate([drawn, (np.eye(6)[:, :, None] * damped[:, :, None]).reshape(-1, 6, 18)], axis=-1)
+    wide = [model.blocks["linear"].scale, model.blocks["quadratic"].scale, missing.std(axis=0) + 1e-9]
+    believed = np.diag(np.concatenate([np.ones(n), np.stack(wide, axis=-1).ravel()]) ** -2.0)
+    left = missing
+    for _ in range(ROUNDS):
+        noise = left.std(axis=0) + 1e-9
+        rows, wanted = (by / noise[:, None]).reshape(-1, n + 18), (missing / noise).ravel()
+        # The filter leaves one independent sample in as many as it is long.
+        information = rows.T @ rows / SMOOTHED[0] + believed
+        change = np.linalg.solve(information, rows.T @ wanted / SMOOTHED[0])
+        left = missing - by @ change
+    return 1.0 + change[:n], np.sqrt(np.diag(np.linalg.inv(information)))[:n]

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 from finlab.errors import LayoutError
 from finlab.exchange import labels
 from finlab.exchange.labels import axis_of, plain
+from finlab.files.csv_table import number_in
 
 FACTORS = ("roll", "pitch", "yaw", "throttle", "forward", "lateral")
 """Columns of motor factors of ArduSub, in the order of its calls."""
@@ -122,15 +123,13 @@ def _by_axis(header: list[str], rows: Sequence[Row], width: int) -> dict[str, An
 def _numbers(row: Row, cells: Sequence[str], width: int) -> list[float]:
     if len(cells) != width:
         raise LayoutError(f"row {row[0]} has {len(cells)} numbers, expected {width}")
-    wrong = next((cell for cell in cells if not is_number(cell)), None)
-    if wrong is not None:
-        raise LayoutError(f"row {row[0]}: {wrong!r:.40} is no number")
+    for cell in cells:
+        if not is_number(cell):
+            raise LayoutError(f"row {row[0]}: {cell!r:.40} is no number")
     return [float(cell) for cell in cells]
 
 
 def is_number(cell: str) -> bool:
     """Whether a cell is a finite number."""
-    try:
-        return "_" not in cell and math.isfinite(float(cell))
-    except ValueError:
-        return False
+    value = number_in(cell)
+    return value is not None and math.isfinite(value)
