@@ -220,7 +220,7 @@ class Page(ABC):
         with self.client.atomic():
             try:
                 if self.shown is not None and not self.busy:
-                    self.session.take(self.shown)
+                    self.session.guide.take(self.shown)
                 self.scenery.follow_guide()
                 facts = self._facts()
             except Exception as error:

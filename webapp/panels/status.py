@@ -14,7 +14,7 @@ from webapp.markup.words import error_digits, parts_word, three_digits
 from webapp.page import Page
 from webapp.scene.proportions import arrow_size
 from webapp.scene.wrench_nodes import Scale, set_scale
-from webapp.session.display import Display
+from webapp.session.looking import Display
 from webapp.session.state import AXIS_UNITS, LEAST, State
 from webapp.tasks.analyst import Findings
 from webapp.tasks.mode_names import Modes

@@ -23,7 +23,7 @@ from webapp.scene.direction_handle import DirectionHandle
 from webapp.scene.proportions import arrow_size, part_size, view_size
 from webapp.scene.stage import Shape, Stage, aim_camera
 from webapp.scene.wrench_nodes import LENGTH, AttainableNodes, Scale, WrenchNodes
-from webapp.session.display import Display
+from webapp.session.looking import Display
 from webapp.session.state import chosen
 from webapp.session.swim_plan import SwimSettings
 from webapp.tasks.analyst import Findings

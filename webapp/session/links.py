@@ -31,11 +31,6 @@ def unlinked(links: Links, name: str) -> Links:
     return tuple(pair for pair in links if name not in pair)
 
 
-def kept(links: Links, layout: Layout) -> Links:
-    """The links whose actuators both exist."""
-    return tuple(pair for pair in links if set(pair) <= set(layout.names))
-
-
 def followed(before: Layout, layout: Layout, links: Links, name: str) -> Layout:
     """The layout after the twin of `name`, if it has one, has taken its mirrored place.
 

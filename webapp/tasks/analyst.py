@@ -6,7 +6,7 @@ from functools import lru_cache
 from finlab.analysis import AttainableSet, ScoreCard, attainable_set, score_card
 from finlab.forces.reach import Ranges, axis_ranges
 from finlab.layout import Layout
-from webapp.session.display import DRAWN
+from webapp.session.looking import DRAWN
 from webapp.session.state import Flow, State
 
 REST_S = 0.12

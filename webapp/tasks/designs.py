@@ -129,7 +129,7 @@ class Designs:
 
     def _send(self, layout: Layout, file: tuple[str, bytes]) -> None:
         self._exports.download(*file)
-        self._session.note_saved(layout)
+        self._session.saved = layout
 
     def share(self) -> None:
         """Show the link that carries the design, and take it to the clipboard where the browser lets us."""
