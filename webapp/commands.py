@@ -63,7 +63,7 @@ def commands(page: Page) -> list[Command]:
         Command("Freeze or move the fins", partial(session.toggle, "frozen"), "P"),
         Command("Dark or light theme", partial(session.toggle, "dark")),
         Command("Tour: start, or next stop", session.guide.tour, "T"),
-        Command("Export the bundle for the robot", page.jobs.exports.bundle),
+        Command("Export the bundle for the robot", page.designs.bundle),
     ]
 
 

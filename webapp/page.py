@@ -27,7 +27,6 @@ from webapp.tasks.background import EventLoop, Workers
 from webapp.tasks.context import Context
 from webapp.tasks.designs import Designs, Opening
 from webapp.tasks.jobs import Jobs
-from webapp.tasks.reading import Reading
 from webapp.tasks.solver import Solver
 from webapp.theme import BLUE, VERMILLION
 from webapp.viser_internals import hold_uploads, run_script, uuid_of
@@ -58,16 +57,14 @@ class Page(ABC):
         self._faults: set[str] = set()
         self._soon: asyncio.TimerHandle | None = None
         self._note: viser.NotificationHandle | None = None
-        reading = Reading(workers.readers, page, self.do, partial(self.notify, "Not possible"))
-        context = Context(
-            client, session, solver, workers, page, reading, self.do, self._refresh, self.notify
-        )
-        self.reading, self.jobs = reading, Jobs(context)
+        context = Context(client, session, solver, workers, page, self.do, self._refresh, self.notify)
+        self.context, self.jobs = context, Jobs(context)
         self.board = Board()
         self.scenery = Scenery(context, self.jobs.swimming, self.board, self.fault)
         self.presses = Presses(client.gui, self.do)
         self.ask = Asking(client.gui, self.presses).ask
-        self.designs = Designs(context, self.jobs.exports, self.presses)
+        self.designs = Designs(context)
+        self.presses.on("design-link", lambda _, text: self.designs.open_link(text))
         self.opening = Opening(client.gui, self.presses)
         hold_uploads(client.gui, MAX_UPLOAD, partial(self.notify, "Not possible"))
         self._build()

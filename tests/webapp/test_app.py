@@ -134,10 +134,10 @@ def test_names_are_escaped(server: viser.ViserServer, view: View) -> None:
 
 def test_a_bundle_that_cannot_be_made_is_told(server: viser.ViserServer, view: View) -> None:
     until(lambda: not view.busy)
-    on_loop(server, lambda: view.do(view.jobs.exports.bundle))
+    on_loop(server, lambda: view.do(view.designs.bundle))
     until(lambda: "ucat_bundle.zip" in view.client.files)
     on_loop(server, lambda: view.do(lambda: view.session.set_setting("method", "sqp")))
-    on_loop(server, lambda: view.do(view.jobs.exports.bundle))
+    on_loop(server, lambda: view.do(view.designs.bundle))
     until(lambda: any("Not possible" in note for note in view.client.notes))
     assert "cannot be exported" in view.client.notes[-1]
 

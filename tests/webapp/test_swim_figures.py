@@ -17,7 +17,7 @@ from webapp.markup.swim_card import pace_words, swim_card
 from webapp.markup.words import righting_sentences
 from webapp.session.swim_plan import Plan
 from webapp.tasks.background import Worker
-from webapp.tasks.designs import Exports
+from webapp.tasks.designs import Designs
 from webapp.tasks.moment import POWER, Figures
 from webapp.tasks.swimmer import Swimmer
 from webapp.tasks.swimming import Swimming
@@ -35,7 +35,7 @@ class Shelf:
             self.worker, client=client, notify=lambda _, text, calm=False: self.notes.append(text)
         )
         self.swimming = Swimming(context)
-        self.files = Exports(context)
+        self.files = Designs(context)
 
     def begun(self) -> Swimmer:
         assert self.swimming.swimmer is not None

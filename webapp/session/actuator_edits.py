@@ -5,7 +5,7 @@ from dataclasses import fields, replace
 from typing import Any
 
 from finlab.errors import FinlabError
-from finlab.layout import Actuator, Azimuth, Fin, FinModelSpec, Layout, Rudder, Thruster
+from finlab.layout import Actuator, Azimuth, Fin, FinModelSpec, Rudder, Thruster
 from finlab.layout.fin import FIN_MODELS
 from finlab.layout.thrust_model import PowerLaw, PowerTable
 from webapp.session.state import chosen
@@ -21,25 +21,10 @@ def words(key: str) -> str:
     return text if len(text) <= 2 or text == "phi e" else text[0].upper() + text[1:]
 
 
-def checked_name(layout: Layout, name: str, wanted: str) -> str:
-    """A name that the actuator called `name` may have, without outer spaces.
-
-    Raises:
-        FinlabError: another one has it. Whether it is a name at all, the layout says.
-    """
-    stripped = wanted.strip()
-    if stripped != name and stripped in layout.names:
-        raise FinlabError(f"there is an actuator {stripped!r:.70} already; give another name")
-    return stripped
-
-
 def with_value(part: Actuator, key: str, value: Any) -> Actuator:
     """The actuator with another value of what `key` names: a field of it, of its limits or of its model; as
-    it is where it has no such field. None forgets what may be left unsaid.
-
-    Raises:
-        LayoutError: the value is none that it may have.
-    """
+    it is where it has no such field. None forgets what may be left unsaid. LayoutError: it may not have that
+    value."""
     if isinstance(value, (tuple, list)):
         value = tuple(float(end) if isinstance(end, int) else end for end in value)
     if isinstance(part, Fin) and key in QUANTITIES:
@@ -54,10 +39,7 @@ def with_value(part: Actuator, key: str, value: Any) -> Actuator:
 
 def modelled(part: Actuator, kind: str) -> Actuator:
     """The actuator with another kind of model; what both models know, such as the water's density, stays.
-
-    Raises:
-        FinlabError: there is no such model, or it needs a file.
-    """
+    FinlabError: there is no such model, or it needs a file."""
     if isinstance(part, Rudder) or kind == part.model.type:
         return part
     if kind == "table":
@@ -85,13 +67,8 @@ def _law_of(table: PowerTable) -> PowerLaw:
 
 
 def _with_parameter(fin: Fin, key: str, value: Any) -> Fin:
-    """The fin with another number in its model.
-
-    Raises:
-        LayoutError: the value is none that the parameter may have.
-    """
     usual = FIN_MODELS[fin.model.type][key].default
-    given = {**dict(fin.model.parameters), key: value}
+    parameters = {**dict(fin.model.parameters), key: value}
     if value is None or math.isclose(value, usual, rel_tol=1e-12, abs_tol=0.0):
-        del given[key]  # files say only what is not usual
-    return replace(fin, model=FinModelSpec(fin.model.type, tuple(given.items())))
+        del parameters[key]  # files say only what is not usual
+    return replace(fin, model=FinModelSpec(fin.model.type, tuple(parameters.items())))

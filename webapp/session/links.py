@@ -2,15 +2,11 @@
 
 import numpy as np
 
-from finlab.analysis.moves import is_mirrored
 from finlab.layout import Layout
 from finlab.layout.directions import axis_names, image, part_of, replaced, with_axes
 
 Links = tuple[tuple[str, str], ...]
 """Pairs of names; an actuator is in at most one of them."""
-
-CLOSE = 0.005
-"""How far [m, rad] an actuator may be from another one's mirror image to count as it."""
 
 
 def partner(links: Links, name: str) -> str | None:
@@ -44,10 +40,3 @@ def followed(before: Layout, layout: Layout, links: Links, name: str) -> Layout:
     past = np.sum(np.array(image(part_of(before, name)).frame) * part_of(before, twin).frame, axis=1)
     frame = np.array(wanted.frame) * np.where(past < 0.0, -1.0, 1.0)[:, None]
     return replaced(layout, with_axes(old, frame[:count], wanted.position))
-
-
-def existing_image(layout: Layout, name: str) -> str | None:
-    """The actuator that already stands where the mirror image of `name` would."""
-    part = part_of(layout, name)
-    others = (other for other in layout.actuators if other.name != name)
-    return next((other.name for other in others if is_mirrored(part, other, CLOSE)), None)

@@ -1,7 +1,7 @@
 """The state that a browser works on: one immutable, checked value that undo can put back."""
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from types import MappingProxyType
 from typing import Any
@@ -203,3 +203,10 @@ def number(value: Any, name: str, low: float, high: float) -> float:
     if not low <= value <= high:  # a NaN compares false as well
         raise FinlabError(f"{name}: expected a number from {low:g} to {high:g}, got {value:g}")
     return float(value)
+
+
+def numbers(
+    values: Sequence[Any], of: str, low: float, high: float, words: Sequence[str] = "xyz"
+) -> tuple[float, ...]:
+    """Some numbers within limits, by the words that they are called in a sentence."""
+    return tuple(number(v, f"{word} {of}", low, high) for v, word in zip(values, words, strict=True))

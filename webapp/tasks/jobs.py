@@ -4,14 +4,12 @@ import asyncio
 
 from webapp.session.state import State
 from webapp.tasks.analyst import REST_S, Question, find, find_ranges
-from webapp.tasks.answering import Answering
+from webapp.tasks.answering import Answering, Refining
 from webapp.tasks.background import Newest
 from webapp.tasks.comparison import Comparison
 from webapp.tasks.context import Context
-from webapp.tasks.designs import Exports
 from webapp.tasks.fitting import Fitting
 from webapp.tasks.improving import Improver
-from webapp.tasks.refining import Refining
 from webapp.tasks.swimming import Swimming
 
 CARD_REST_S = 0.35
@@ -39,7 +37,6 @@ class Jobs:
         self.fitting = Fitting(context)
         self.comparison = Comparison(context)
         self.swimming = Swimming(context)
-        self.exports = Exports(context)
 
     def ask(self) -> None:
         """Have the workers answer the present state, unless they were asked already."""

@@ -11,19 +11,23 @@ from finlab.allocation.allocation import Allocation
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.methods import MethodChoice, choose_method
 from finlab.allocation.solution import Candidates
+from finlab.errors import FinlabError
 from finlab.layout import Layout
-from finlab.networks.checkpoint import resolve_checkpoint
+from finlab.networks.checkpoint import network_features, resolve_checkpoint
+from finlab.paper.network import NetworkConfig
 from finlab.physics import plant_of
 from webapp.markup.verdict import is_proved
 from webapp.session.state import DRAWING, State, chosen
 from webapp.tasks.mode_names import NO_MODES, OWN, Modes, modes_of
-from webapp.tasks.networks import SHIPPED, is_papers, paper_networks
 
 Load = Callable[..., MethodChoice]
 KEPT = 24
 """Allocators that are kept: to make one takes as long as a hundred answers."""
 ALTERNATIVE_ERROR = 1e-4
 """Normalized error up to which another answer is an alternative."""
+SHIPPED = NetworkConfig.shipped
+RUNS = "runs"
+"""Folder in the one where the app was started, whose folders are looked at."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,6 +152,27 @@ class Solver:
             flow=state.flow,
             seed=0,
         )
+
+
+def paper_networks(checkpoint: str | Path | None = None) -> dict[str, Path]:
+    """Folders of checkpoints by name, the shipped one first; `checkpoint` is one more, which may be of
+    another method."""
+    folders = [resolve_checkpoint(SHIPPED), *sorted(path.parent for path in Path(RUNS).glob("*/config.json"))]
+    if checkpoint is not None:
+        folders.append(resolve_checkpoint(checkpoint))
+    return {
+        SHIPPED if place == 0 else str(folder): folder
+        for place, folder in enumerate(folders)
+        if is_papers(folder)
+    }
+
+
+def is_papers(folder: Path) -> bool:
+    """Whether a folder holds a network of the paper's kind."""
+    try:
+        return network_features(folder) == NetworkConfig.features
+    except FinlabError:  # a folder of something else is no choice
+        return False
 
 
 def judged(answer: Allocation) -> Allocation:
