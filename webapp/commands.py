@@ -1,10 +1,8 @@
-"""Everything that can be done by a key or from the list of commands (Ctrl+K): one table of both."""
+"""The table of all that can be done by a key or from the list of commands (Ctrl+K)."""
 
 from collections.abc import Callable
 from functools import partial
 from typing import Any, NamedTuple
-
-import viser
 
 from webapp.page import Page
 from webapp.session.looking import TASKS
@@ -67,12 +65,12 @@ def commands(page: Page) -> list[Command]:
     ]
 
 
-def register(gui: viser.GuiApi, page: Page, table: list[Command]) -> None:
+def add_commands(page: Page) -> None:
     """Let a browser have the commands."""
-    for command in table:
+    for command in commands(page):
         key: Any = command.key or None
         modifier: Any = command.modifier or None
-        handle = gui.add_command(command.label, hotkey=key, modifier=modifier)
+        handle = page.gui.add_command(command.label, hotkey=key, modifier=modifier)
 
         @handle.on_trigger
         async def _triggered(_event: Any, act: Callable[[], object] = command.act) -> None:

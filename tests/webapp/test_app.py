@@ -21,11 +21,10 @@ from finlab.errors import FinlabError
 from finlab.layout import load_layout
 from tests.webapp.silent_client import SilentClient
 from tests.webapp.stand_in import load_stand_in
-from webapp.app import App, _session_keys
+from webapp.app import App, SessionStore, _session_keys
 from webapp.panels.frame import View
 from webapp.serving import serve
 from webapp.session import Session
-from webapp.session.store import SessionStore
 from webapp.tasks.solver import Solver
 
 

@@ -13,7 +13,7 @@ from importlib.resources import files
 from markupsafe import Markup
 
 from finlab.layout import Layout
-from webapp.commands import commands, register
+from webapp.commands import add_commands
 from webapp.handles import add_html, put
 from webapp.markup.html import html, marker
 from webapp.page import Page
@@ -210,5 +210,5 @@ class View(Page):
     def _build(self) -> None:
         self.gui.main_panel.dock_right()
         self.gui.set_panel_label("finlab")
-        register(self.gui, self, commands(self))
+        add_commands(self)
         self.frame = Frame(self)

@@ -230,7 +230,7 @@ class RobotScene:
 
     def _clicked(self, index: int, also: bool) -> None:
         select = self._session.select_also if also else self._session.select
-        self._do(lambda: select(self._board.facts.drawn.names[index]) if self._board.facts else None)
+        self._do(lambda: select(self._board.facts["drawn"].names[index]) if self._board.facts else None)
 
     def _drag(self, index: int, phase: str, position: tuple[float, float, float]) -> None:
         session = self._session
