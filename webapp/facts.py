@@ -43,7 +43,7 @@ def facts_of(session: Session, jobs: Jobs, dragged: int | None, scale: Scale, be
         "improving": improver.busy,
         "better_error": improver.error,
         "fitted": fitting.findings,
-        "fitting": fitting.progress if fitting.busy else None,  # what is being done
+        "fitting": fitting.progress,
         "fitted_error": fitting.error,
         "swims": swimming.active,
         "swimmer": swimmer,

@@ -1,4 +1,4 @@
-"""What a layout can do, the set that is drawn of it, and how far each component of a target can go."""
+"""Score cards of a layout, the set that is drawn of it, and ranges of each component of a target."""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -19,7 +19,8 @@ class Question:
 
     layout: Layout
     failed: tuple[str, ...]
-    beside: Layout
+    saved: Layout
+    """Another one to compare with."""
     drawn: str
     flow: Flow | None = None
 
@@ -41,29 +42,23 @@ class Findings:
 
 @lru_cache(maxsize=32)
 def find(question: Question) -> Findings:
-    """Answer a question; takes about a second, but all first pages ask the same.
-
-    Raises:
-        FinlabError: the layout cannot be analysed.
-    """
-    layout, failed, beside, flow = question.layout, question.failed, question.beside, question.flow
-    other = beside != layout
-    # A fin that the other layout does not have cannot have failed there.
-    lost = tuple(name for name in failed if name in beside.names)
+    """Answer a question; takes about a second, but all first pages ask the same."""
+    layout, failed, saved, flow = question.layout, question.failed, question.saved, question.flow
+    other = saved != layout
+    # An actuator that the other layout does not have cannot have failed there.
+    lost = tuple(name for name in failed if name in saved.names)
     kind = DRAWN[question.drawn]
     now = whole = None
     if kind is not None:
         now = attainable_set(layout, kind, failed=failed, flow=flow)
-        if failed:
-            whole = attainable_set(layout, kind, flow=flow)
-        elif other:
-            whole = attainable_set(beside, kind, flow=flow)
+        if failed or other:
+            whole = attainable_set(layout if failed else saved, kind, flow=flow)
     card = score_card(layout, failed, flow)
-    before = score_card(beside, lost, flow) if other and len(lost) < beside.n else None
+    before = score_card(saved, lost, flow) if other and len(lost) < saved.n else None
     return Findings(question, card, before, now, whole)
 
 
 @lru_cache(maxsize=32)
 def find_ranges(question: State) -> Ranges:
-    """The range of each component of the target."""
+    """The range of each component of a state's target."""
     return axis_ranges(question.layout, question.target, question.failed, question.flow)

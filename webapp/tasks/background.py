@@ -1,4 +1,4 @@
-"""What takes time: threads that compute, viser's event loop, and questions of which the newest wins."""
+"""Threads that compute, viser's event loop, and questions of which the newest wins."""
 
 import asyncio
 import threading
@@ -6,7 +6,7 @@ import traceback
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 from finlab.errors import FinlabError
 
@@ -48,10 +48,8 @@ class EventLoop:
 
 
 class Worker:
-    """Runs jobs on a thread of its own. A job that waits is replaced by a newer one with the same key.
-
-    Askers take turns in the order in which they began to wait, so that nothing queues up.
-    """
+    """Runs jobs on a thread of its own. A job that waits is replaced by a newer one with the same key; keys
+    take turns in the order in which they began to wait, so that nothing queues up."""
 
     def __init__(self) -> None:
         """Start the thread."""
@@ -62,13 +60,8 @@ class Worker:
         self._thread.start()
 
     def submit(self, key: Hashable, job: Job, failed: Failed) -> None:
-        """Run `job` soon, instead of a job with the same key that has not begun yet.
-
-        Args:
-            key: who asks, and what for.
-            job: what to do, on the worker's thread.
-            failed: called there with a sentence that says why the job failed.
-        """
+        """Run `job` soon on the worker's thread, instead of a job with the same key that has not begun yet;
+        `failed` is called there with a sentence that says why it failed."""
         with self._wake:
             self._jobs[key] = (job, failed)
             self._wake.notify()
@@ -128,10 +121,8 @@ class Workers:
 
 
 class Newest(Generic[Question, Found]):
-    """Answers one kind of question for one page; one that waits gives way to a newer one.
-
-    All methods are called on the event loop; only `work` runs on the worker's thread.
-    """
+    """Answers one kind of question for one page; one that waits gives way to a newer one. All methods are
+    called on the event loop; only `work`, and what it reports, runs on the worker's thread."""
 
     def __init__(
         self,
@@ -141,15 +132,8 @@ class Newest(Generic[Question, Found]):
         changed: Callable[[], None],
         rest_s: float = 0.0,
     ) -> None:
-        """Prepare.
-
-        Args:
-            loop: where everything else runs.
-            worker: whose thread computes.
-            work: answers a question there.
-            changed: called on the loop when there are findings, or an error.
-            rest_s: how long the question may not change before work begins [s].
-        """
+        """`work` answers a question on the thread of a worker once it has not changed for `rest_s` [s];
+        `changed` is called on the loop when there are findings, an error, or progress."""
         self._loop, self._worker, self._work, self._changed = loop, worker, work, changed
         self._rest_s = rest_s
         self._timer: asyncio.TimerHandle | None = None
@@ -160,6 +144,8 @@ class Newest(Generic[Question, Found]):
         self.findings: Found | None = None
         """What came of it; None where nothing did."""
         self.error: str | None = None
+        self.progress: Any = None
+        """How far the work is, where it reports that; None when it is done."""
 
     @property
     def busy(self) -> bool:
@@ -184,7 +170,16 @@ class Newest(Generic[Question, Found]):
             self._timer.cancel()
         self._worker.forget(id(self))
         self._round = object()
-        self.question = self.answered = self.findings = self.error = None
+        self.question = self.answered = self.findings = self.error = self.progress = None
+
+    def report(self, question: Question, progress: Any) -> None:
+        """How far the work on a question is; called by the work."""
+        self._loop.post(partial(self._note, question, progress))
+
+    def _note(self, question: Question, progress: Any) -> None:
+        if question is self.question and self.busy:  # else nobody waits for it
+            self.progress = progress
+            self._changed()
 
     def _start(self, question: Question) -> None:
         take = partial(self._take, self._round, question)
@@ -197,5 +192,5 @@ class Newest(Generic[Question, Found]):
 
     def _take(self, begun: object, question: Question, found: Found | None, error: str | None) -> None:
         if begun is self._round:
-            self.answered, self.findings, self.error = question, found, error
+            self.answered, self.findings, self.error, self.progress = question, found, error, None
             self._changed()

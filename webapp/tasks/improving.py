@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from finlab.analysis import Bounds, Improvement, Progress, optimize_layout
+from finlab.analysis import Bounds, Improvement, optimize_layout
 from finlab.arrays import Array
 from finlab.errors import FinlabError
 from finlab.hull import hull_of
@@ -37,11 +37,8 @@ class Room:
 
     def __init__(self, layout: Layout, apart: float) -> None:
         """Blades, and what stands outside of the layout's hull now, stay outside; what two actuators sweep is
-        `apart` [m].
-
-        A fin sweeps a cylinder about its shaft, any other one a ball. What is closer already, or overlaps,
-        need not part, but comes no closer.
-        """
+        `apart` [m]: a cylinder about a fin's shaft, else a ball. What is closer already, or overlaps, need
+        not part, but comes no closer."""
         self._hull = hull_of(layout).coarse()
         fins = np.array([isinstance(part, Fin) for part in layout.actuators])
         self._along = np.where(fins[:, None], ALONG, 0.0)
@@ -90,14 +87,10 @@ class Improver(Newest[Search, Improvement]):
     def __init__(self, context: Context) -> None:
         """The page is rendered when there is progress."""
         super().__init__(context.loop, context.workers.searches, self._improve, context.changed)
-        self.progress: Progress | None = None
 
     def start(self, state: State, request: SearchRequest) -> None:
-        """Search from a layout for places of what works; mirror pairs stay mirror pairs.
-
-        Raises:
-            FinlabError: a search is running, nothing works, or nothing may move.
-        """
+        """Search from a layout for places of what works; mirror pairs stay mirror pairs. FinlabError: a
+        search is running, nothing works, or nothing may move."""
         if self.busy:
             raise FinlabError("a search is running already; cancel it first")
         left = state.layout.without(state.failed)
@@ -115,7 +108,6 @@ class Improver(Newest[Search, Improvement]):
         """The result has been taken or left, or the page has gone."""
         self.cancel()
         super().forget()
-        self.progress = None
 
     def _improve(self, search: Search) -> Improvement:
         """On the worker's thread."""
@@ -127,15 +119,10 @@ class Improver(Newest[Search, Improvement]):
             rule=search.room.broken,
             grid=GRID,
             flow=search.flow,
-            progress=lambda progress: self._loop.post(partial(self._note, search, progress)),
+            progress=partial(self.report, search),
             cancelled=search.stop.is_set,
         )
         layout = search.layout
         for part in found.layout.actuators:
             layout = replaced(layout, part)
         return replace(found, layout=layout)
-
-    def _note(self, search: Search, progress: Progress) -> None:
-        if search is self.question:  # else it was forgotten
-            self.progress = progress
-            self._changed()

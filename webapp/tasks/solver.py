@@ -64,19 +64,11 @@ class Solver:
         return paper_networks(self._checkpoint)
 
     def shipped(self, layout: Layout, method: str) -> Allocator:
-        """The allocator of a robot by a method as it is shipped, whose networks are loaded once.
-
-        Raises:
-            FinlabError: it cannot be made.
-        """
+        """The allocator of a robot by a method as it is shipped. FinlabError: it cannot be made."""
         return self._on(layout, method, None, "")
 
     def allocator(self, state: State) -> Allocator:
-        """The allocator for the state's robot and method with the state's settings.
-
-        Raises:
-            FinlabError: it cannot be made.
-        """
+        """The allocator for a state's robot, method and settings. FinlabError: it cannot be made."""
         temperature = state.temperature if state.method in DRAWING else None
         return self._on(state.layout, state.method, temperature, state.network)
 
@@ -106,11 +98,7 @@ class Solver:
         return self._choices[method, network]
 
     def reply(self, state: State) -> Reply:
-        """The answer to a state with all that a page shows of it, computed to the end.
-
-        Raises:
-            FinlabError: the method cannot be loaded or cannot answer.
-        """
+        """The answer to a state with all that a page shows of it, computed to the end. Fails as `solve`."""
         answer = judged(self.solve(state))
         _ = answer.forces, answer.power, answer.effort  # told here, not where the page is written
         in_reach = answer.reachable
@@ -139,11 +127,7 @@ class Solver:
         return modes_of(answer, own.beside(ways[-1].exact(ALTERNATIVE_ERROR)), badge, ways)
 
     def solve(self, state: State) -> Allocation:
-        """The answer to a state.
-
-        Raises:
-            FinlabError: the method cannot be loaded or cannot answer.
-        """
+        """The answer to a state. FinlabError: the method cannot be loaded or cannot answer."""
         return self.allocator(state).allocate(
             state.target,
             failed=state.failed,
@@ -176,19 +160,16 @@ def is_papers(folder: Path) -> bool:
 
 
 def judged(answer: Allocation) -> Allocation:
-    """An answer whose candidates and samples tell what the fins' own laws make of them, as it does itself.
-
-    A method with a learned model ranks them by what that believes.
-    """
+    """An answer whose candidates and samples have the wrench by the fins' own laws, as it has itself. A
+    method with a learned model ranks them by what that believes."""
     if answer.wrench_expected is None:
         return answer
-    told = (
-        None if found is None else _judged(answer, found) for found in (answer.candidates, answer.samples)
-    )
-    return answer.with_candidates(*told)
 
+    def corrected(drawn: Candidates | None) -> Candidates | None:
+        if drawn is None:
+            return None
+        wrench = plant_of(answer.layout).wrench(drawn.command)
+        error = np.linalg.norm(np.nan_to_num(wrench - answer.target) / answer.scale, axis=-1)
+        return replace(drawn, wrench=wrench, err_norm=error)
 
-def _judged(answer: Allocation, found: Candidates) -> Candidates:
-    wrench = plant_of(answer.layout).wrench(found.command)
-    error = np.linalg.norm(np.nan_to_num(wrench - answer.target) / answer.scale, axis=-1)
-    return replace(found, wrench=wrench, err_norm=error)
+    return answer.with_candidates(corrected(answer.candidates), corrected(answer.samples))
