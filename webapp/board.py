@@ -19,7 +19,6 @@ UNKNOWN = object()
 
 
 def _named(make: Callable[..., Any]) -> list[str]:
-    """The facts that a function is made of."""
     return [p.name for p in inspect.signature(make).parameters.values() if p.default is p.empty]
 
 

@@ -6,7 +6,6 @@ Everything here runs on viser's event loop; what takes time is handed to the wor
 import asyncio
 import json
 import traceback
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from functools import partial, wraps
 from typing import Any, TypeVar
@@ -39,7 +38,7 @@ MAX_UPLOAD = LARGEST_BUNDLE
 Input = TypeVar("Input")
 
 
-class Page(ABC):
+class Page:
     """The scene of one client around its session, and what the panels beside it may ask for."""
 
     def __init__(
@@ -71,9 +70,9 @@ class Page(ABC):
         self._refresh()
         self.jobs.ask()
 
-    @abstractmethod
     def _build(self) -> None:
         """Build everything in the panel beside the view."""
+        raise NotImplementedError
 
     # What panels and scene may ask for.
 
@@ -88,12 +87,8 @@ class Page(ABC):
         return self.jobs.answering.busy
 
     def do(self, act: Callable[[], object], handle: Any = None) -> None:
-        """Carry out an intent; a refusal becomes a note, and the page goes back to what the session holds.
-
-        Args:
-            act: the intent.
-            handle: the input that the user has changed, if any.
-        """
+        """Carry out an intent, by the input `handle` that the user has changed, if any; a refusal becomes a
+        note, and the page goes back to what the session holds."""
         self._faults.clear()
         before = self.session.revision
         try:
@@ -134,13 +129,12 @@ class Page(ABC):
                 return tuple([round(v, digits) + 0.0 for v in now])
             return round(float(now), digits) + 0.0
 
-        def meant(asked: Any) -> None:
-            if isinstance(asked, (tuple, list)):
+        def meant(typed: Any) -> None:
+            if isinstance(typed, (tuple, list)):
                 exact = self.board.value_of(value, self._facts())
-                asked = tuple(
-                    old if new == round(old, digits) else new for new, old in zip(asked, exact, strict=True)
-                )
-            act(asked)
+                both = zip(typed, exact, strict=True)
+                typed = tuple(old if new == round(old, digits) else new for new, old in both)
+            act(typed)
 
         handle.precision = digits  # type: ignore[attr-defined]
         return self.bind(handle, meant, shown)
@@ -159,13 +153,7 @@ class Page(ABC):
     def add_button(self, label: str, act: Callable[[], object], **options: Any) -> viser.GuiButtonHandle:
         """A button that carries out an intent; `options` as viser has them."""
         button = self.gui.add_button(label, **options)
-        self._hint(button)
-
-        @button.on_click
-        async def _clicked(event: Any) -> None:
-            if event.client is not None:
-                self.do(act)
-
+        self._hear(button, button.on_click, lambda _: act())
         return button
 
     def add_upload(
@@ -173,20 +161,20 @@ class Page(ABC):
     ) -> viser.GuiUploadButtonHandle:
         """A button that carries out `act(name, content)` when the user has chosen a file."""
         button = self.gui.add_upload_button(label, **options)
-        self._hint(button)
-
-        @button.on_upload
-        async def _uploaded(event: Any) -> None:
-            if event.client is not None:
-                file = event.target.value
-                self.do(partial(act, file.name[-80:], file.content))
-
+        self._hear(button, button.on_upload, lambda file: act(file.name[-80:], file.content))
         return button
 
-    def _hint(self, button: Any) -> None:
-        """Let the page show the hint of a button: viser takes it, and shows those of other inputs alone."""
-        told = json.dumps([uuid_of(button), button.hint or ""])
-        run_script(self.gui, f"(window.finlabHints ??= new Map()).set(...{told});")
+    def _hear(self, button: Any, listen: Callable[..., object], act: Callable[[Any], object]) -> None:
+        """Carry out `act(value)` when a button is pressed, and let the page show its hint: viser shows those
+        of other inputs alone."""
+
+        async def pressed(event: Any) -> None:
+            if event.client is not None:
+                self.do(partial(act, event.target.value))
+
+        listen(pressed)
+        hint = json.dumps([uuid_of(button), button.hint or ""])
+        run_script(self.gui, f"(window.finlabHints ??= new Map()).set(...{hint});")
 
     def add_buttons(
         self, label: str, acts: Mapping[str, Callable[[], object]], **options: Any

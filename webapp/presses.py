@@ -80,7 +80,6 @@ class Asking:
     its place."""
 
     def __init__(self, gui: viser.GuiApi, presses: Presses) -> None:
-        """Hear the answers."""
         self._gui = gui
         self._acts: list[Callable[[], object]] = []
         presses.on("answer", self._answer)

@@ -84,7 +84,7 @@ def test_closing_gives_back_what_was_there_and_next_goes_on_to_the_end() -> None
     session.set_display("dark", False)
     stops = [session.guide.stop]
     while session.guide.stop is not None:
-        session.guide.go_on()
+        session.guide.go(1)
         stops.append(session.guide.stop)
     assert stops == [*LESSONS, None] and all_there_is() == before
 

@@ -230,7 +230,7 @@ def test_every_stop_of_the_tour_stands() -> None:
     for step in TOUR:
         session.guide.tour()
         assert session.drawer == step.drawer and session.selected is None
-    session.guide.go_back()
+    session.guide.go(-1)
     assert session.guide.stop is TOUR[-2]
     session.guide.tour()
     session.guide.tour()

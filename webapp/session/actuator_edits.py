@@ -1,14 +1,17 @@
-"""Changes of what a layout says of one actuator. Each takes an actuator and returns another one."""
+"""Changes of one actuator, each of which returns another one, and of its twin in a mirror pair."""
 
 import math
 from dataclasses import fields, replace
 from typing import Any
 
+import numpy as np
+
 from finlab.errors import FinlabError
-from finlab.layout import Actuator, Azimuth, Fin, FinModelSpec, Rudder, Thruster
+from finlab.layout import Actuator, Azimuth, Fin, FinModelSpec, Layout, Rudder, Thruster
+from finlab.layout.directions import axis_names, image, part_of, replaced, with_axes
 from finlab.layout.fin import FIN_MODELS
 from finlab.layout.thrust_model import PowerLaw, PowerTable
-from webapp.session.state import chosen
+from webapp.session.state import Links, chosen
 
 QUANTITIES = ("amplitude", "frequency", "zero_direction")
 FORMULAS = tuple(name for name, parameters in FIN_MODELS.items() if parameters)
@@ -57,7 +60,6 @@ def modelled(part: Actuator, kind: str) -> Actuator:
 
 
 def _law_of(table: PowerTable) -> PowerLaw:
-    """The power law through the ends of a table."""
     _, force, power = table.columns
     least, most = (
         float(f"{max(power[k] / max(abs(force[k]), 1e-9) ** 1.5, 1e-6):.4g}") if force[k] else None
@@ -72,3 +74,36 @@ def _with_parameter(fin: Fin, key: str, value: Any) -> Fin:
     if value is None or math.isclose(value, usual, rel_tol=1e-12, abs_tol=0.0):
         del parameters[key]  # files say only what is not usual
     return replace(fin, model=FinModelSpec(fin.model.type, tuple(parameters.items())))
+
+
+def partner(links: Links, name: str) -> str | None:
+    """The actuator that `name` is linked to, if any."""
+    for pair in links:
+        if name in pair:
+            return pair[1 - pair.index(name)]
+    return None
+
+
+def linked(links: Links, a: str, b: str) -> Links:
+    """The links with one more pair."""
+    return (*unlinked(unlinked(links, a), b), (a, b))
+
+
+def unlinked(links: Links, name: str) -> Links:
+    """The links without the pair of an actuator."""
+    return tuple(pair for pair in links if name not in pair)
+
+
+def followed(before: Layout, layout: Layout, links: Links, name: str) -> Layout:
+    """The layout after the twin of `name`, if it has one, has taken its mirrored place.
+
+    Axes that pointed the other way than the image's `before` stay so.
+    """
+    twin = partner(links, name)
+    if twin is None or twin not in layout.names:
+        return layout
+    wanted, old = image(part_of(layout, name)), part_of(layout, twin)
+    count = len(axis_names(old))
+    past = np.sum(np.array(image(part_of(before, name)).frame) * part_of(before, twin).frame, axis=1)
+    frame = np.array(wanted.frame) * np.where(past < 0.0, -1.0, 1.0)[:, None]
+    return replaced(layout, with_axes(old, frame[:count], wanted.position))

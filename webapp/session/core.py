@@ -4,11 +4,14 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from finlab.allocation.policy import AXES
 from finlab.errors import FinlabError
 from finlab.layout import Layout
 from finlab.layout.damage import FAULTS
 from finlab.layout.directions import part_of
+from finlab.layout.wrench_axes import axes_in
 from webapp.session.history import History, Steps
 from webapp.session.looking import DRAWERS, TASKS, Desk, Display
 from webapp.session.search_request import SearchRequest
@@ -156,8 +159,12 @@ class Core:
 
     def toggle_axis(self, axis: int) -> None:
         """An axis of the wrench counts, or is free."""
-        verb = "Free" if self.state.layout.commanded[axis] else "Command"
-        self._commit(f"{verb} {AXES[axis]}", self.state.with_axis_toggled(axis))
+        layout = self.state.layout
+        counts = layout.commanded ^ (np.arange(6) == axis)
+        if not counts.any():
+            raise FinlabError("a robot commands at least one axis; switch another one on first")
+        state = replace(self.state, layout=replace(layout, axes=axes_in(counts)))
+        self._commit(f"{'Command' if counts[axis] else 'Free'} {AXES[axis]}", state)
 
     def toggle_failure(self, name: str) -> None:
         """An actuator fails, or is repaired."""

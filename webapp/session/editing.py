@@ -11,9 +11,9 @@ from finlab.layout import Actuator, Layout
 from finlab.layout.body import Hull
 from finlab.layout.directions import Vector, part_of, replaced, turned_about
 from webapp.session import actuator_edits, layout_edits
+from webapp.session.actuator_edits import followed, linked, partner, unlinked
 from webapp.session.core import Core
 from webapp.session.guide import Guide
-from webapp.session.links import followed, linked, partner, unlinked
 from webapp.session.looking import Display
 from webapp.session.state import method_for
 
@@ -24,7 +24,6 @@ class Session(Core):
     """What one browser has made so far."""
 
     def __init__(self, layout: Layout, display: Display | None = None) -> None:
-        """Start with a layout."""
         super().__init__(layout, display)
         self.guide = Guide(self)
 

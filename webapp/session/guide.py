@@ -6,7 +6,7 @@ from typing import Any
 from finlab.allocation.allocation import Allocation
 from webapp.session.core import Core
 from webapp.session.history import History
-from webapp.session.lessons import LESSONS, TOUR, Seen, Stop
+from webapp.session.lessons import LESSONS, TOUR, Stop
 from webapp.session.looking import Desk
 from webapp.session.state import chosen
 
@@ -19,7 +19,6 @@ class Guide:
     """A stop of the tour, or a lesson, that is open; the scene brings its camera back with the work."""
 
     def __init__(self, session: Core) -> None:
-        """Nothing is open yet."""
         self._session = session
         self.stop: Stop | None = None
         self.solved = False
@@ -44,15 +43,8 @@ class Guide:
         before, self._session.history = self._session.state, history
         self._session.settle(before)
 
-    def go_on(self) -> None:
-        """The stop after this one; after the last one the work comes back."""
-        self._go(1)
-
-    def go_back(self) -> None:
-        """The stop before this one."""
-        self._go(-1)
-
-    def _go(self, steps: int) -> None:
+    def go(self, steps: int) -> None:
+        """The stop so many after this one; after the last one the work comes back."""
         if self.stop is not None:
             course = TOUR if self.stop in TOUR else LESSONS
             place = max(course.index(self.stop) + steps, 0)
@@ -64,7 +56,7 @@ class Guide:
     def tour(self) -> None:
         """The tour's first stop, or the one after this."""
         if self.stop in TOUR:
-            self.go_on()
+            self.go(1)
         else:
             self.open(TOUR[0].name)
 
@@ -81,5 +73,4 @@ class Guide:
         """See what the fins do now; an exercise that is done stays so until another stop is opened."""
         session = self._session
         if self.stop is not None and answer.layout == session.state.able:
-            seen = Seen(session.state, answer, session.mode, session.step)
-            self.solved = self.solved or self.stop.done(seen)
+            self.solved = self.solved or self.stop.done(session, answer)

@@ -157,17 +157,10 @@ def deleted(layout: Layout, names: Sequence[str]) -> Layout:
 def _added(layout: Layout, part: Actuator, wanted: str) -> tuple[Layout, str]:
     if layout.n >= MAX_ACTUATORS:
         raise FinlabError(f"the layout has {layout.n} actuators already; expected at most {MAX_ACTUATORS}")
-    name = _free_name(layout, wanted)
+    stem = wanted[:56]
+    names = (stem, *(f"{stem}_{k}" for k in range(2, MAX_ACTUATORS + 2)))
+    name = next(name for name in names if name not in layout.names)
     return replace(layout, actuators=(*layout.actuators, replace(part, name=name))), name
-
-
-def _free_name(layout: Layout, wanted: str) -> str:
-    """`wanted`, or `wanted_2`, `wanted_3`, ... if it is taken."""
-    names, k = set(layout.names), 2
-    name = wanted[:56]
-    while name in names:
-        name, k = f"{wanted[:56]}_{k}", k + 1
-    return name
 
 
 def _mirror_name(name: str) -> str:

@@ -6,8 +6,6 @@ from dataclasses import dataclass, fields, replace
 from types import MappingProxyType
 from typing import Any
 
-import numpy as np
-
 from finlab.allocation.mdn_settings import MdnSettings
 from finlab.allocation.methods import METHODS, method_class
 from finlab.allocation.policy import AXES, KINDS
@@ -15,14 +13,14 @@ from finlab.errors import FinlabError
 from finlab.layout import Layout
 from finlab.layout.damage import FAULTS, Health
 from finlab.layout.fin import MAX_AMPLITUDE, MAX_FREQUENCY
-from finlab.layout.wrench_axes import axes_in
 from finlab.paper.settings import PaperSettings
 from finlab.physics import plant_of
-from webapp.session.links import Links
 
 AXIS_WORDS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 AXIS_UNITS = ("N", "N", "N", "N m", "N m", "N m")
 
+Links = tuple[tuple[str, str], ...]
+"""Mirror pairs by name; an actuator is in at most one of them."""
 MAX_TARGET = 1000.0
 """Largest target component that the page may ask for [N, N m]."""
 Flow = tuple[float, float, float, float, float, float]
@@ -86,13 +84,6 @@ class State:
         target[axis] = number(value, f"{AXES[axis]} [{AXIS_UNITS[axis]}]", -MAX_TARGET, MAX_TARGET)
         fx, fy, fz, tx, ty, tz = target
         return replace(self, target=(fx, fy, fz, tx, ty, tz))
-
-    def with_axis_toggled(self, axis: int) -> "State":
-        """One axis commanded, or free."""
-        counts = self.layout.commanded ^ (np.arange(6) == axis)
-        if not counts.any():
-            raise FinlabError("a robot commands at least one axis; switch another one on first")
-        return replace(self, layout=replace(self.layout, axes=axes_in(counts)))
 
     def with_failure_toggled(self, name: str) -> "State":
         """One actuator failed or repaired."""

@@ -114,7 +114,6 @@ class Refining:
     """Plays the refinement of what the network proposes: in the plot, on the robot, and in what is said."""
 
     def __init__(self, context: Context, answering: Answering) -> None:
-        """Nothing is played yet; `answering` knows the steps."""
         self._session, self._loop, self._changed = context.session, context.loop, context.changed
         self._answering = answering
         self._timer: asyncio.TimerHandle | None = None

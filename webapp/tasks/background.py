@@ -52,7 +52,6 @@ class Worker:
     take turns in the order in which they began to wait, so that nothing queues up."""
 
     def __init__(self) -> None:
-        """Start the thread."""
         self._jobs: dict[Hashable, tuple[Job, Failed]] = {}
         self._wake = threading.Condition()
         self._stopped = False

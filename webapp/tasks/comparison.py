@@ -38,7 +38,6 @@ class Comparison:
     """The runs of one page."""
 
     def __init__(self, context: Context) -> None:
-        """The page is rendered after every answer."""
         self._solver, self._changed = context.solver, context.changed
         # One question per method: those of this and other pages are answered in between.
         self._asked = Newest(context.loop, context.workers.answers, self._quickest, self._take)

@@ -38,7 +38,6 @@ class Designs:
     """What one page does with its design; files are made beside the event loop."""
 
     def __init__(self, context: Context) -> None:
-        """Work for the page's session."""
         self._context, self._session = context, context.session
 
     def new(self) -> None:
@@ -125,7 +124,6 @@ class Designs:
         self._context.make(make, partial(self._download, name), name)
 
     def _download(self, name: str, content: bytes) -> None:
-        """Send a file that is there already, and say where it went."""
         self._context.client.send_file_download(name, content, save_immediately=True)
         self._context.notify("Saved", f"{name}, among the downloads of this browser", calm=True)
 
@@ -134,7 +132,6 @@ class Opening:
     """The kinds of files that one page opens, and who takes each."""
 
     def __init__(self, gui: viser.GuiApi, presses: Presses) -> None:
-        """Let the page take what is dropped on it."""
         self._takers: dict[str, Take] = {}
         presses.on("dropped", _refuse)
         run_file(gui, "dropping.js")

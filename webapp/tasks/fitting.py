@@ -52,7 +52,6 @@ class Fitting(Newest[Upload, Fitted]):
     """One file at a time for one page; what came of it goes on the fin at once, and undo takes it off."""
 
     def __init__(self, context: Context) -> None:
-        """The page is rendered when there is progress."""
         super().__init__(context.loop, context.workers.fits, self._fit, self._put_on)
         self._context = context
 

@@ -85,7 +85,6 @@ class Improver(Newest[Search, Improvement]):
     """One search at a time for one page."""
 
     def __init__(self, context: Context) -> None:
-        """The page is rendered when there is progress."""
         super().__init__(context.loop, context.workers.searches, self._improve, context.changed)
 
     def start(self, state: State, request: SearchRequest) -> None:

@@ -1,6 +1,7 @@
-"""All that works for one page beside the event loop."""
+"""The jobs of one page, which work for it beside the event loop."""
 
 import asyncio
+from typing import Any
 
 from webapp.session.state import State
 from webapp.tasks.analyst import REST_S, Question, find, find_ranges
@@ -23,16 +24,15 @@ class Jobs:
     """Questions under way, and what came of them."""
 
     def __init__(self, context: Context) -> None:
-        """Nothing has been asked yet."""
         self._session = context.session
         self._robot: tuple[str, tuple[str, ...]] | None = None
         self._loop, self._changed = context.loop, context.changed
         self._late: asyncio.TimerHandle | None = None
-        loop, workers, changed = context.loop, context.workers, context.changed
+        loop, workers = context.loop, context.workers
         self.answering = Answering(context, self._beside)
         self.refining = Refining(context, self.answering)
         self.ranging = Newest(loop, workers.marks, find_ranges, self._beside, REST_S)
-        self.analyst = Newest(loop, workers.cards, find, changed, CARD_REST_S)
+        self.analyst = Newest(loop, workers.cards, find, context.changed, CARD_REST_S)
         self.improver = Improver(context)
         self.fitting = Fitting(context)
         self.comparison = Comparison(context)
@@ -69,7 +69,6 @@ class Jobs:
         """The page has gone."""
         self.swimming.stop()
         self.refining.stop()
-        for task in (self.comparison, self.improver, self.fitting, self.answering):
+        tasks: tuple[Any, ...] = self.comparison, self.improver, self.fitting, self.answering, self.analyst
+        for task in (*tasks, self.ranging):
             task.forget()
-        for worked in (self.analyst, self.ranging):
-            worked.forget()

@@ -1,4 +1,4 @@
-"""From a state to an answer with all that a page shows of it: picks the allocator and keeps it."""
+"""The solver: from a state to an answer with all that a page shows of it, by allocators that it keeps."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -50,7 +50,7 @@ class Solver:
         self._load = load
         self._choices: dict[tuple[str, str], MethodChoice] = {}
         self._made: dict[tuple[Layout, str, float | None, str], Allocator] = {}
-        own = checkpoint is not None and is_papers(resolve_checkpoint(checkpoint))
+        own = checkpoint is not None and _is_papers(resolve_checkpoint(checkpoint))
         self.first_network = str(resolve_checkpoint(checkpoint)) if own and checkpoint else SHIPPED
         """The network that method `paper` begins with."""
 
@@ -60,8 +60,14 @@ class Solver:
         return Solver(self._checkpoint, self._load)
 
     def networks(self) -> dict[str, Path]:
-        """The networks that method `paper` may answer with now, by name."""
-        return paper_networks(self._checkpoint)
+        """The networks that method `paper` may answer with now, by name: the shipped one, those that were
+        trained here, and the checkpoint, which may be of another method."""
+        folders = [resolve_checkpoint(SHIPPED)]
+        folders += sorted(path.parent for path in Path(RUNS).glob("*/config.json"))
+        if self._checkpoint is not None:
+            folders.append(resolve_checkpoint(self._checkpoint))
+        names = [SHIPPED, *map(str, folders[1:])]
+        return {n: folder for n, folder in zip(names, folders, strict=True) if _is_papers(folder)}
 
     def shipped(self, layout: Layout, method: str) -> Allocator:
         """The allocator of a robot by a method as it is shipped. FinlabError: it cannot be made."""
@@ -138,21 +144,7 @@ class Solver:
         )
 
 
-def paper_networks(checkpoint: str | Path | None = None) -> dict[str, Path]:
-    """Folders of checkpoints by name, the shipped one first; `checkpoint` is one more, which may be of
-    another method."""
-    folders = [resolve_checkpoint(SHIPPED), *sorted(path.parent for path in Path(RUNS).glob("*/config.json"))]
-    if checkpoint is not None:
-        folders.append(resolve_checkpoint(checkpoint))
-    return {
-        SHIPPED if place == 0 else str(folder): folder
-        for place, folder in enumerate(folders)
-        if is_papers(folder)
-    }
-
-
-def is_papers(folder: Path) -> bool:
-    """Whether a folder holds a network of the paper's kind."""
+def _is_papers(folder: Path) -> bool:
     try:
         return network_features(folder) == NetworkConfig.features
     except FinlabError:  # a folder of something else is no choice
