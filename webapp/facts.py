@@ -27,7 +27,7 @@ def facts_of(session: Session, jobs: Jobs, dragged: int | None, scale: Scale, be
         "redo": session.history.redo_name,
         **_of(session.guide, "stop solved"),
         # The newest answer, which may be older than the state, and what of it is on the robot.
-        **_of(answering, "best shown busy error modes searching"),
+        **_of(answering, "best shown busy error modes searching proving"),
         "in_reach": answering.reply is not None and answering.reply.in_reach,
         "mode": min(session.mode, max(len(modes.shown) - 1, 0)),
         "step": session.step if not answering.searching and modes.steps else None,

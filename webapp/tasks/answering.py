@@ -31,9 +31,9 @@ class Answering:
         self._changed, self._found, self._notify = context.changed, found, context.notify
         self._noted: str | None = None
         self._shown: tuple[Allocation, Array, Allocation] | None = None
-        loop, worker, solver = context.loop, context.workers.answers, context.solver
-        self._answer = Newest(loop, worker, solver.reply, self._take)
-        self._search = Newest(loop, worker, solver.modes, self._take_modes, SEARCH_REST_S)
+        self._solver, loop, worker = context.solver, context.loop, context.workers.answers
+        self._answer = Newest(loop, worker, self._solver.reply, self._take)
+        self._search = Newest(loop, worker, self._modes, self._take_modes, SEARCH_REST_S)
 
     @property
     def reply(self) -> Reply | None:
@@ -62,6 +62,11 @@ class Answering:
         return self.busy or self._search.busy
 
     @property
+    def proving(self) -> bool:
+        """True until what is proved of the newest answer is known."""
+        return self.busy or self._search.answered is None or self._search.answered[0] is not self.reply
+
+    @property
     def error(self) -> str | None:
         """Why the present state has no answer."""
         return None if self.busy else self._answer.error
@@ -87,16 +92,29 @@ class Answering:
     def ask(self) -> None:
         """Have the worker answer the present state, unless it was asked already."""
         self._answer.ask(self._session.state)
+        if not self.busy:
+            self._look(at_once=True)
+
+    def _look(self, at_once: bool) -> None:
+        """Prove the newest answer, and search for its modes once these can be seen."""
+        reply, session = self.reply, self._session
+        if reply is not None and self._search.question != (reply, True):
+            seen = session.drawer == "Candidates" or session.mode > 0
+            self._search.ask((reply, seen), at_once)
 
     def forget(self) -> None:
         """Nothing is known of the robot any more: another one was opened, or the page has gone."""
         for task in (self._answer, self._search):
             task.forget()
 
+    def _modes(self, question: tuple[Reply, bool]) -> Modes:
+        """On the worker's thread."""
+        return self._solver.modes(*question)
+
     def _take(self) -> None:
         error = self._answer.error
         if self.reply is not None:
-            self._search.ask(self.reply)
+            self._look(at_once=False)
         else:
             self._search.forget()
             if error is not None and error != self._noted:

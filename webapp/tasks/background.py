@@ -151,17 +151,17 @@ class Newest(Generic[Question, Found]):
         """True while the newest question has no answer."""
         return self.answered is not self.question
 
-    def ask(self, question: Question) -> None:
-        """Have a question answered, unless it is the one that was asked last."""
+    def ask(self, question: Question, at_once: bool = False) -> None:
+        """Have a question answered, unless it is the one that was asked last; `at_once` without a rest."""
         if self.question is not None and question == self.question:
             return
         self.question = question
-        if self._rest_s == 0.0:
-            self._start(question)
-            return
         if self._timer is not None:
             self._timer.cancel()
-        self._timer = self._loop.later(self._rest_s, partial(self._start, question))
+        if at_once or self._rest_s == 0.0:
+            self._start(question)
+        else:
+            self._timer = self._loop.later(self._rest_s, partial(self._start, question))
 
     def forget(self) -> None:
         """Drop question and findings; what is still under way counts no more."""

@@ -112,11 +112,13 @@ class Solver:
             in_reach = self.solve(replace(state, method="dual")).reachable
         return Reply(state, answer, in_reach)
 
-    def modes(self, reply: Reply) -> Modes:
+    def modes(self, reply: Reply, seen: bool = True) -> Modes:
         """The answer, and beside it all distinct ways to do the same that the network proposes: tens of
-        milliseconds. Method `paper` has a network of its own."""
+        milliseconds. Method `paper` has a network of its own. Where they are not `seen` it is only proved."""
         answer, state = reply.answer, reply.state
         _ = answer.bound, answer.notes  # to prove what is least takes longer than to find it
+        if not seen:
+            return NO_MODES
         if answer.samples is not None and answer.candidates is not None and state.method == "paper":
             return modes_of(answer, answer.candidates, "network", (answer.samples,))
         asks = np.nan_to_num(answer.target).any()
