@@ -32,9 +32,6 @@ from webapp.viser_internals import hold_uploads, run_script, uuid_of
 PATIENCE_S = 0.025
 """How long a change waits for its answer before the page is written without it [s]."""
 
-MAX_UPLOAD = LARGEST_BUNDLE
-"""Largest size of files on their way from a page [bytes]; each kind has a limit of its own below it."""
-
 Input = TypeVar("Input")
 
 
@@ -64,7 +61,7 @@ class Page:
         self.designs = Designs(context)
         self.presses.on("design-link", lambda _, text: self.designs.open_link(text))
         self.opening = Opening(client.gui, self.presses)
-        hold_uploads(client.gui, MAX_UPLOAD, partial(self.notify, "Not possible"))
+        hold_uploads(client.gui, LARGEST_BUNDLE, partial(self.notify, "Not possible"))
         self._build()
         self.presses.start()
         self._refresh()

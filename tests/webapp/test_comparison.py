@@ -124,13 +124,16 @@ def test_beside_the_one_answer_of_dual_stands_what_the_network_proposes() -> Non
 
 def test_what_a_page_tries_out_stays_with_its_own_answers() -> None:
     solver, target = Solver(load=load_stand_in), PRESETS["Turn"]
-    shipped = solver.shipped(UCAT, "mdn")
+    shipped = solver.allocator(State(UCAT, method="mdn"))
     state = State(UCAT, target=target, method="mdn", temperature=1.5)
     few = solver.allocator(state)
     assert vars(few.settings)["temperature"] == 1.5
-    assert solver.shipped(UCAT, "mdn") is shipped and vars(shipped.settings)["temperature"] != 1.5
+    assert (
+        solver.allocator(State(UCAT, method="mdn")) is shipped
+        and vars(shipped.settings)["temperature"] != 1.5
+    )
     assert solver.allocator(replace(state, temperature=None)) is shipped
-    assert solver.allocator(replace(state, method="sqp")) is solver.shipped(UCAT, "sqp")
+    assert solver.allocator(replace(state, method="sqp")) is solver.allocator(State(UCAT, method="sqp"))
 
 
 def test_an_allocator_is_kept_until_its_robot_changes() -> None:

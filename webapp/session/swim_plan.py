@@ -1,4 +1,4 @@
-"""What is to be swum: what the user has set so far, and the plan that comes of it when the swim starts."""
+"""Settings of swims, and the plan that comes of them when a swim starts."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace

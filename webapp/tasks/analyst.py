@@ -48,14 +48,14 @@ def find(question: Question) -> Findings:
     # An actuator that the other layout does not have cannot have failed there.
     lost = tuple(name for name in failed if name in saved.names)
     kind = DRAWN[question.drawn]
-    now = whole = None
+    now = reference = None
     if kind is not None:
         now = attainable_set(layout, kind, failed=failed, flow=flow)
         if failed or other:
-            whole = attainable_set(layout if failed else saved, kind, flow=flow)
+            reference = attainable_set(layout if failed else saved, kind, flow=flow)
     card = score_card(layout, failed, flow)
     before = score_card(saved, lost, flow) if other and len(lost) < saved.n else None
-    return Findings(question, card, before, now, whole)
+    return Findings(question, card, before, now, reference)
 
 
 @lru_cache(maxsize=32)

@@ -25,10 +25,10 @@ HOLD = 5
 class Answering:
     """The newest answer, its modes, and the part of it that is on the robot."""
 
-    def __init__(self, context: Context, found: Callable[[], None]) -> None:
-        """Answer what the page's session asks; `found` is called when its candidates are known."""
+    def __init__(self, context: Context, known: Callable[[], None]) -> None:
+        """Answer what the page's session asks; `known` is called when its candidates are."""
         self._session = context.session
-        self._changed, self._found, self._notify = context.changed, found, context.notify
+        self._changed, self._known, self._notify = context.changed, known, context.notify
         self._noted: str | None = None
         self._shown: tuple[Allocation, Array, Allocation] | None = None
         self._solver, loop, worker = context.solver, context.loop, context.workers.answers
@@ -125,7 +125,7 @@ class Answering:
     def _take_modes(self) -> None:
         if self._search.error is not None:
             self._notify("No candidates", self._search.error)
-        self._found()
+        self._known()
 
 
 class Refining:

@@ -184,12 +184,12 @@ class Newest(Generic[Question, Found]):
         take = partial(self._take, self._round, question)
 
         def job() -> None:
-            found = self._work(question)
-            self._loop.post(partial(take, found, None))
+            findings = self._work(question)
+            self._loop.post(partial(take, findings, None))
 
         self._worker.submit(id(self), job, lambda text: self._loop.post(partial(take, None, text)))
 
-    def _take(self, begun: object, question: Question, found: Found | None, error: str | None) -> None:
+    def _take(self, begun: object, question: Question, findings: Found | None, error: str | None) -> None:
         if begun is self._round:
-            self.answered, self.findings, self.error, self.progress = question, found, error, None
+            self.answered, self.findings, self.error, self.progress = question, findings, error, None
             self._changed()

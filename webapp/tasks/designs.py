@@ -18,6 +18,7 @@ from finlab.hull import hull_of
 from webapp.presses import Presses
 from webapp.session import files
 from webapp.session.files import FRAGMENT, WRENCH, file_stem, packed, unpacked
+from webapp.session.state import State
 from webapp.tasks.context import Context
 from webapp.tasks.swimming import Swimming
 from webapp.viser_internals import run_file, run_script
@@ -101,10 +102,11 @@ class Designs:
     def bundle(self) -> None:
         """Send the bundle for the robot: the same bytes as `finlab export --zip`. What was tried out on the
         page does not go to the robot."""
-        state, shipped = self._session.state, self._context.solver.shipped
+        now, solver = self._session.state, self._context.solver
+        shipped = State(now.layout, method=now.method)
         self._export(
-            files.bundle_name(state.layout),
-            lambda: make_bundle(shipped(state.layout, state.method), state.failed).zip_bytes(),
+            files.bundle_name(now.layout),
+            lambda: make_bundle(solver.allocator(shipped), now.failed).zip_bytes(),
         )
 
     def graph(self) -> None:

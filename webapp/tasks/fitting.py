@@ -75,13 +75,13 @@ class Fitting(Newest[Upload, Fitted]):
 
     def put_on_all(self) -> None:
         """What was found for all that still have the model that this one had."""
-        found, session = self.findings, self._context.session
-        if found is not None:
-            old = found.upload.part
+        fitted, session = self.findings, self._context.session
+        if fitted is not None:
+            old = fitted.upload.part
             alike = [part.name for part in session.state.layout.actuators if _model(part) == _model(old)]
             if not alike:
                 raise FinlabError("no other actuator has the model that this one had")
-            session.set_model(alike, **found.found)
+            session.set_model(alike, **fitted.found)
 
     def _put_on(self) -> None:
         """On the loop, when there is progress, and when the worker is done."""
@@ -93,13 +93,13 @@ class Fitting(Newest[Upload, Fitted]):
             context.notify("Not fitted", self.error)
         context.changed()
 
-    def _take_over(self, found: Fitted) -> None:
-        upload, session = found.upload, self._context.session
+    def _take_over(self, fitted: Fitted) -> None:
+        upload, session = fitted.upload, self._context.session
         name, layout = upload.part.name, session.state.layout
         if name not in layout.names or _model(part_of(layout, name)) != _model(upload.part):
             self.forget()
             raise FinlabError(f"{name} is no longer what {upload.name} was for; upload it again")
-        session.set_model([name], **found.found)
+        session.set_model([name], **fitted.found)
 
     def _fit(self, upload: Upload) -> Fitted:
         """On the worker's thread."""
@@ -153,8 +153,8 @@ def _bench(path: Path, done: Upload) -> Fitted:
     with suppress(LayoutError):
         return Fitted(done, within(in_worker(PowerTable.read, path)))
     fit = fit_thruster(in_worker(read_bench, [path]))
-    beside = {"dead_band": fit.dead_band, "torque_per_newton": fit.torque_per_newton}
-    return Fitted(done, {**within(fit.table), **beside, "uncertainty": None}, fit)
+    more = {"dead_band": fit.dead_band, "torque_per_newton": fit.torque_per_newton}
+    return Fitted(done, {**within(fit.table), **more, "uncertainty": None}, fit)
 
 
 def _is_table(path: Path) -> bool:

@@ -16,7 +16,7 @@ from finlab.layout import Fin, Layout
 from finlab.layout.directions import replaced
 from webapp.scene.meshes.blades import CHORD, ROOT, SPAN
 from webapp.session.search_request import GOAL_WORDS, SearchRequest
-from webapp.session.state import Flow, State
+from webapp.session.state import State
 from webapp.tasks.background import Newest
 from webapp.tasks.context import Context
 
@@ -69,11 +69,8 @@ class Room:
 class Search:
     """One search."""
 
-    layout: Layout
-    """Where it begins."""
-    failed: tuple[str, ...]
-    """Those that are lost, which stay where they are."""
-    flow: Flow | None
+    state: State
+    """Where it begins; what has failed stays where it is."""
     goal: str
     """What to raise, as `optimize_layout` calls it."""
     bounds: Mapping[str, Bounds]
@@ -94,9 +91,9 @@ class Improver(Newest[Search, Improvement]):
             raise FinlabError("a search is running already; cancel it first")
         left = state.layout.without(state.failed)
         room, goal = Room(left, APART_M), GOAL_WORDS[request.goal]
-        search = Search(state.layout, state.failed, state.flow, goal, request.bounds(left), room)
+        bounds = request.bounds(left)
         self.forget()
-        self.ask(search)
+        self.ask(Search(state, goal, bounds, room))
 
     def cancel(self) -> None:
         """Stop soon; what has been found by then is offered."""
@@ -110,18 +107,18 @@ class Improver(Newest[Search, Improvement]):
 
     def _improve(self, search: Search) -> Improvement:
         """On the worker's thread."""
-        found = optimize_layout(
-            search.layout.without(search.failed),
+        layout, flow = search.state.layout, search.state.flow
+        improvement = optimize_layout(
+            layout.without(search.state.failed),
             tuple(search.bounds),
             search.bounds,
             search.goal,
             rule=search.room.broken,
             grid=GRID,
-            flow=search.flow,
+            flow=flow,
             progress=partial(self.report, search),
             cancelled=search.stop.is_set,
         )
-        layout = search.layout
-        for part in found.layout.actuators:
+        for part in improvement.layout.actuators:
             layout = replaced(layout, part)
-        return replace(found, layout=layout)
+        return replace(improvement, layout=layout)

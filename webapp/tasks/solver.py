@@ -69,30 +69,24 @@ class Solver:
         names = [SHIPPED, *map(str, folders[1:])]
         return {n: folder for n, folder in zip(names, folders, strict=True) if _is_papers(folder)}
 
-    def shipped(self, layout: Layout, method: str) -> Allocator:
-        """The allocator of a robot by a method as it is shipped. FinlabError: it cannot be made."""
-        return self._on(layout, method, None, "")
-
     def allocator(self, state: State) -> Allocator:
-        """The allocator for a state's robot, method and settings. FinlabError: it cannot be made."""
-        temperature = state.temperature if state.method in DRAWING else None
-        return self._on(state.layout, state.method, temperature, state.network)
-
-    def _on(self, layout: Layout, method: str, temperature: float | None, network: str) -> Allocator:
-        """An allocator, one of the last few or made now."""
-        network = (network or self.first_network) if method == "paper" else ""
+        """The allocator for a state's robot, method and settings, one of the last few or made now; fails
+        where it cannot be made."""
+        layout, method = state.layout, state.method
+        temperature = state.temperature if method in DRAWING else None
+        network = (state.network or self.first_network) if method == "paper" else ""
         key = layout, method, temperature, network
-        found = self._made.pop(key, None)
-        if found is None:
+        allocator = self._made.pop(key, None)
+        if allocator is None:
             choice = self._choice(method, network)
             settings = choice.settings
             if temperature is not None and "temperature" in choice.kind.option_names():
                 settings = replace(settings, **{"temperature": temperature})
-            found = Allocator.of_choice(layout, replace(choice, settings=settings))
-        self._made[key] = found  # the newest is last
+            allocator = Allocator.of_choice(layout, replace(choice, settings=settings))
+        self._made[key] = allocator  # the newest is last
         while len(self._made) > KEPT:
             self._made.pop(next(iter(self._made)))
-        return found
+        return allocator
 
     def _choice(self, method: str, network: str) -> MethodChoice:
         """A method with its networks, loaded once."""
@@ -106,7 +100,7 @@ class Solver:
     def reply(self, state: State) -> Reply:
         """The answer to a state with all that a page shows of it, computed to the end. Fails as `solve`."""
         answer = judged(self.solve(state))
-        _ = answer.forces, answer.power, answer.effort  # told here, not where the page is written
+        _ = answer.forces, answer.power, answer.effort  # here, not where the page is written
         in_reach = answer.reachable
         if not in_reach and state.method != "dual":  # which misses nothing that can be reached
             in_reach = self.solve(replace(state, method="dual")).reachable
