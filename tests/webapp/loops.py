@@ -2,6 +2,7 @@
 
 import asyncio
 import functools
+import time
 from collections.abc import Callable, Coroutine
 from types import SimpleNamespace
 from typing import Any
@@ -59,6 +60,14 @@ def page_of(worker: Any, session: Any = None, **options: Any) -> Context:
         "notify": lambda title, text, calm=False: None,
     }
     return AloneContext(session=session, workers=workers, **{**silent, **options})
+
+
+def until(condition: Callable[[], bool]) -> None:
+    """Wait for something."""
+    end = time.monotonic() + 60
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.005)
 
 
 def in_loop(test: Callable[..., Coroutine[Any, Any, None]]) -> Callable[..., None]:

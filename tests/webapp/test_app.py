@@ -7,7 +7,6 @@ import socket
 import subprocess
 import sys
 import threading
-import time
 import urllib.request
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -19,6 +18,7 @@ from viser import _messages
 from finlab.assets import shipped_layouts
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
+from tests.webapp.loops import until
 from tests.webapp.silent_client import SilentClient
 from tests.webapp.stand_in import load_stand_in
 from webapp.app import App, SessionStore, _session_keys
@@ -60,13 +60,6 @@ def on_loop(server: viser.ViserServer, act: Callable[[], Any]) -> Any:
         return act()
 
     return asyncio.run_coroutine_threadsafe(run(), server.get_event_loop()).result(30)
-
-
-def until(condition: Callable[[], bool]) -> None:
-    end = time.monotonic() + 30
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.01)
 
 
 def test_newest_question_is_answered(server: viser.ViserServer, view: View) -> None:

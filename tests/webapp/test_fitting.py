@@ -2,9 +2,8 @@
 
 import io
 import threading
-import time
 import zipfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -21,7 +20,7 @@ from finlab.layout.force_table_file import DOUBT, table_bytes
 from finlab.layout.thrust_model import PowerTable
 from tests.fit.cell import columns_of, commands, measured, soft, write
 from tests.fit.test_thruster_fit import T200
-from tests.webapp.loops import page_of
+from tests.webapp.loops import page_of, until
 from webapp.markup.fit_card import fit_card
 from webapp.panels.actuator_model import model_card
 from webapp.session import Session, files
@@ -39,26 +38,12 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "cache" / "finlab" / "tables"
 
 
-@pytest.fixture
-def worker() -> Iterator[Worker]:
-    worker = Worker()
-    yield worker
-    worker.stop()
-
-
 def cell(tmp_path: Path, n: int = 70) -> bytes:
     """A file of noisy measurements, one of which is wild."""
     command = commands(n)
     force = measured(LAW, command)
     force[5, 1] += 4.0
     return write(tmp_path / "cell.csv", columns_of(command, force)).read_bytes()
-
-
-def until(condition: Callable[[], bool]) -> None:
-    end = time.monotonic() + 60
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.01)
 
 
 class Opened:

@@ -17,7 +17,7 @@ from webapp.page import Page
 from webapp.panels.damage import add_fin_buttons
 from webapp.session.looking import DRAWN
 from webapp.session.search_request import GOAL_UNITS, GOAL_WORDS, WAY, SearchRequest
-from webapp.tasks.analyst import Findings
+from webapp.tasks.jobs import Findings
 
 
 def add_reach(page: Page) -> None:

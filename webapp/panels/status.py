@@ -16,7 +16,7 @@ from webapp.scene.proportions import arrow_size
 from webapp.scene.wrench_nodes import Scale, set_scale
 from webapp.session.looking import Display
 from webapp.session.state import AXIS_UNITS, LEAST, State
-from webapp.tasks.analyst import Findings
+from webapp.tasks.jobs import Findings
 from webapp.tasks.mode_names import Modes
 from webapp.tasks.moment import ERROR, Moment
 from webapp.tasks.swimmer import Swimmer

@@ -26,8 +26,8 @@ from webapp.scene.wrench_nodes import LENGTH, AttainableNodes, Scale, WrenchNode
 from webapp.session.looking import Display
 from webapp.session.state import chosen
 from webapp.session.swim_plan import SwimSettings
-from webapp.tasks.analyst import Findings
 from webapp.tasks.context import Context
+from webapp.tasks.jobs import Findings
 from webapp.tasks.moment import Moment
 from webapp.tasks.swimmer import Swimmer
 from webapp.theme import HALF_TURN, LIGHT, fin_color

@@ -9,7 +9,7 @@ from finlab.allocation.allocation import Allocation
 from webapp.session.core import Core
 from webapp.session.files import shipped
 from webapp.session.state import State, least_of
-from webapp.session.targets import PRESETS
+from webapp.session.targets import FIRST
 
 ALIGNED = 0.999
 """Cosine from which what is delivered points where it was asked."""
@@ -22,8 +22,8 @@ class Stop:
     name: str
     title: str
     text: str
-    layout: str
-    target: tuple[float, float, float, float, float, float]
+    layout: str = "ucat"
+    target: tuple[float, float, float, float, float, float] = FIRST
     """Wrench that is asked for [N, N m]."""
     mode: int = 0
     method: str = "dual"
@@ -54,8 +54,6 @@ TOUR = (
         "A wrench becomes flapping",
         "The blue arrow and ring above the hull are what is asked: forward, and a turn to the left. Each fin "
         "answers with amplitude, frequency and direction; its arrow is its mean force. Green is the sum.",
-        "ucat",
-        PRESETS["Turn"],
     ),
     Stop(
         "many-ways",
@@ -63,8 +61,6 @@ TOUR = (
         "Four fins have twelve numbers, the wrench only six. Here a network proposes ways, each is made "
         "exact, and this is the second best. In the plot below each numbered ring is one. Press some: the "
         "fins change, the green sum stays.",
-        "ucat",
-        PRESETS["Turn"],
         mode=1,
         method="mdn",
     ),
@@ -73,8 +69,6 @@ TOUR = (
         "It swims",
         "Ten times a second the controller asks for a wrench and the fins answer. The blue ball is where "
         "the robot should be. Break a fin by its number, and watch the others take over.",
-        "ucat",
-        PRESETS["Turn"],
         swims=True,
         drawer="Swim over time",
     ),
@@ -96,8 +90,6 @@ LESSONS = (
         "Four fins have twelve numbers, a wrench has six: many commands do the same. In the plot below, "
         "small dots are what a network proposes, and thin lines lead from each to the numbered ring where it "
         "ends. The filled ring is on the robot: the answer, number 1.",
-        "ucat",
-        PRESETS["Turn"],
         exercise="Press a row with the badge network, or its ring. Which fins change, and what stays?",
         praise="The fins changed, the green arrows did not: the robot feels the same force and torque.",
         done=lambda session, answer: session.mode > 0 and answer.reachable,
@@ -108,8 +100,6 @@ LESSONS = (
         "A sample is nearly right: its error is some hundredths of what the robot can push. It is followed "
         "to the least effort near it, first by descent in forces; then its commands are made exact by the "
         "fins' own laws. The plot's error goes up in powers of ten.",
-        "ucat",
-        PRESETS["Turn"],
         mode=1,
         exercise="Press Play below the plot. Watch the dots, the fins, and the error below the robot.",
         praise="Now drag Step: at each place stands what the robot would do there. With Loop it begins anew.",
@@ -121,8 +111,6 @@ LESSONS = (
         "The network gives a mixture: components, each with a mean and a spread, for different ways to share "
         "the wrench. First come the means; the other samples are drawn about them, with variances times the "
         "temperature.",
-        "ucat",
-        PRESETS["Turn"],
         exercise="Set Temperature to 0, beside the plot, then to 2. What becomes of dots and rings?",
         praise=(
             "At 0 dots lie on the means, at 2 they stray far; the rings stay. The minima belong to the "
@@ -150,8 +138,6 @@ LESSONS = (
         "A fin is lost",
         "Nothing has to be built or trained for it: the fin is left out, and the wrench is divided among the "
         "others, as long as they can give it.",
-        "ucat",
-        PRESETS["Turn"],
         exercise="At Fail, on the left, press the number of a fin, so that nothing is left undone.",
         praise="Three fins are enough for this turn. Fail a second one: which axis is missing then?",
         done=lambda session, answer: bool(session.state.failed) and answer.reachable,
