@@ -139,7 +139,7 @@ def corner(
         in_reach: whether any command of the working fins gives what is asked.
         refined: which step of its refinement is on the robot, in place of a verdict; nothing at its end.
     """
-    fins = f"{len(state.healthy)} of {state.layout.n} {parts_word(state.layout)}"
+    fins = f"{state.layout.n - len(state.failed)} of {state.layout.n} {parts_word(state.layout)}"
     parts = [html("<span class='aside'>{}</span>", fins)]
     if error is not None:
         parts.append(html("<span class='missing'>{}</span>", error))

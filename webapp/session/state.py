@@ -64,11 +64,6 @@ class State:
         return (self.speed, 0.0, 0.0, 0.0, 0.0, 0.0) if felt else None
 
     @property
-    def healthy(self) -> tuple[str, ...]:
-        """Names of the fins that work."""
-        return tuple(name for name in self.layout.names if name not in self.failed)
-
-    @property
     def able(self) -> Layout:
         """The layout with the limits that are left to damaged fins."""
         return self.layout if self.health is None else self.health.applied_to(self.layout)

@@ -74,7 +74,6 @@ class Search:
     goal: str
     """What to raise, as `optimize_layout` calls it."""
     bounds: Mapping[str, Bounds]
-    room: Room
     stop: threading.Event = field(default_factory=threading.Event)
 
 
@@ -89,11 +88,9 @@ class Improver(Newest[Search, Improvement]):
         search is running, nothing works, or nothing may move."""
         if self.busy:
             raise FinlabError("a search is running already; cancel it first")
-        left = state.layout.without(state.failed)
-        room, goal = Room(left, APART_M), GOAL_WORDS[request.goal]
-        bounds = request.bounds(left)
+        bounds = request.bounds(state.layout.without(state.failed))
         self.forget()
-        self.ask(Search(state, goal, bounds, room))
+        self.ask(Search(state, GOAL_WORDS[request.goal], bounds))
 
     def cancel(self) -> None:
         """Stop soon; what has been found by then is offered."""
@@ -107,15 +104,16 @@ class Improver(Newest[Search, Improvement]):
 
     def _improve(self, search: Search) -> Improvement:
         """On the worker's thread."""
-        layout, flow = search.state.layout, search.state.flow
+        layout, state = search.state.layout, search.state
+        left = layout.without(state.failed)
         improvement = optimize_layout(
-            layout.without(search.state.failed),
+            left,
             tuple(search.bounds),
             search.bounds,
             search.goal,
-            rule=search.room.broken,
+            rule=Room(left, APART_M).broken,
             grid=GRID,
-            flow=flow,
+            flow=state.flow,
             progress=partial(self.report, search),
             cancelled=search.stop.is_set,
         )

@@ -8,7 +8,6 @@ from typing import NamedTuple
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.modes import Mode, find_modes, force_sizes, mode_signature, same_signature
 from finlab.allocation.solution import Candidates
-from webapp.markup.words import OWN as OWN
 from webapp.markup.words import fins_words
 from webapp.theme import MODE_COLORS
 

@@ -17,8 +17,9 @@ from finlab.networks.checkpoint import network_features, resolve_checkpoint
 from finlab.paper.network import NetworkConfig
 from finlab.physics import plant_of
 from webapp.markup.verdict import is_proved
+from webapp.markup.words import OWN
 from webapp.session.state import DRAWING, State, chosen
-from webapp.tasks.mode_names import NO_MODES, OWN, Modes, modes_of
+from webapp.tasks.mode_names import NO_MODES, Modes, modes_of
 
 Load = Callable[..., MethodChoice]
 KEPT = 24
