@@ -14,13 +14,10 @@ CTRL, CTRL_SHIFT, ALT = "cmd/ctrl", "cmd/ctrl+shift", "alt"
 
 def add_commands(page: Page) -> None:
     """Let a browser have all commands of one page. The camera owns W A S D Q E and the arrow keys."""
-    session, robot = page.session, page.scenery.robot
+    session, robot, swimming = page.session, page.scenery.robot, page.jobs.swimming
 
     def fail_selected() -> None:
         session.toggle_failure(session.selected or session.state.layout.names[0])
-
-    def swim_on() -> None:
-        page.jobs.swimming.set_running(not page.jobs.swimming.running)
 
     # What it is called and does and, if any, its key as viser calls that, and a modifier.
     table: list[tuple[Any, ...]] = [
@@ -42,7 +39,7 @@ def add_commands(page: Page) -> None:
         ("Fail or repair the selected fin", fail_selected, "X"),
         *((f"Ask for: {name}", partial(session.set_preset, name)) for name in PRESETS),
         *((f"Keep {word} least", partial(session.keep_least, word)) for word in LEAST),
-        ("Swim: pause or go on", swim_on, "B"),
+        ("Swim: pause or go on", lambda: swimming.set_running(not swimming.running), "B"),
         ("Swim: back to the design", page.scenery.end_swim),
         ("Frame what is selected", robot.frame, "F"),
         *(

@@ -22,7 +22,8 @@ def facts_of(session: Session, jobs: Jobs, dragged: int | None, scale: Scale, be
         **_of(state, "layout failed health target flow method policy network"),
         # The layout with the limits that are left to damaged actuators.
         "able": before["able"] if same and before is not None else state.able,
-        **_of(session, "saved selected selection desk task display draft swim loops"),
+        **_of(session, "saved selected selection desk display draft swim loops"),
+        "task": session.desk.task,
         "undo": session.history.undo_name,
         "redo": session.history.redo_name,
         **_of(session.guide, "stop solved"),

@@ -44,7 +44,7 @@ SOLVED: dict[str, Callable[[Session], object]] = {
 def test_a_lesson_is_unsolved_until_its_exercise_is_done(lesson: Stop) -> None:
     session = Session(load_layout("penta"))
     session.guide.open(lesson.name)
-    assert session.guide.stop is lesson and lesson.drawer in DRAWERS[session.task]
+    assert session.guide.stop is lesson and lesson.drawer in DRAWERS[session.desk.task]
     session.guide.take(_answer(session.state))
     assert not session.guide.solved
     SOLVED[lesson.name](session)

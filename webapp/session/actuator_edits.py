@@ -84,11 +84,6 @@ def partner(links: Links, name: str) -> str | None:
     return None
 
 
-def linked(links: Links, a: str, b: str) -> Links:
-    """The links with one more pair."""
-    return (*unlinked(unlinked(links, a), b), (a, b))
-
-
 def unlinked(links: Links, name: str) -> Links:
     """The links without the pair of an actuator."""
     return tuple(pair for pair in links if name not in pair)

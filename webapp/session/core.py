@@ -191,14 +191,9 @@ class Core:
     # What is looked at; none of it is part of undo.
 
     @property
-    def task(self) -> str:
-        """Which of `TASKS` is open."""
-        return self.desk.task
-
-    @property
     def drawer(self) -> str | None:
         """What of the drawer is seen; None where it is folded, or the task has none."""
-        return None if self.desk.folded else self.desk.opened[self.task] or None
+        return None if self.desk.folded else self.desk.opened[self.desk.task] or None
 
     def show_task(self, name: str) -> None:
         """Open a task."""
@@ -207,7 +202,7 @@ class Core:
 
     def show_drawer(self, name: str) -> None:
         """Open the drawer at one of its tabs, and the task to which it belongs."""
-        task = next((task for task, names in DRAWERS.items() if name in names), self.task)
+        task = next((task for task, names in DRAWERS.items() if name in names), self.desk.task)
         chosen(name, "drawer", DRAWERS[task])
         others = tuple(pair for pair in self.desk.drawers if pair[0] != task)
         self.desk = Desk(task, (*others, (task, name)))

@@ -11,7 +11,7 @@ from finlab.layout import Actuator, Layout
 from finlab.layout.body import Hull
 from finlab.layout.directions import Vector, part_of, replaced, turned_about
 from webapp.session import actuator_edits, layout_edits
-from webapp.session.actuator_edits import followed, linked, partner, unlinked
+from webapp.session.actuator_edits import followed, partner, unlinked
 from webapp.session.core import Core
 from webapp.session.guide import Guide
 from webapp.session.looking import Display
@@ -137,7 +137,8 @@ class Session(Core):
         source = self._chosen()[-1]
         layout, name = layout_edits.mirrored(self.state.layout, source)
         state = self.state.with_layout(layout)
-        self._commit(f"Mirror {source}", replace(state, links=linked(state.links, source, name)))
+        links = (*unlinked(unlinked(state.links, source), name), (source, name))
+        self._commit(f"Mirror {source}", replace(state, links=links))
         self.chosen = (name,)
 
     def unlink(self) -> None:

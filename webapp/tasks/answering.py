@@ -172,7 +172,7 @@ class Refining:
 
     def _go_on(self) -> None:
         session, steps, self._timer = self._session, self._answering.modes.steps, None
-        looked_at = session.desk.opened[session.task] == "Candidates"
+        looked_at = session.desk.opened[session.desk.task] == "Candidates"
         if self._answering.searching or not steps or not looked_at:
             session.step = None
         else:
