@@ -83,10 +83,8 @@ def test_a_noisy_file_becomes_the_fins_model_and_undo_takes_it_off(tmp_path: Pat
     until(lambda: fitting.findings is not None)
     until(lambda: opened.session.state != before)
     assert "looking for samples that contradict the others" in opened.stages
-    assert (
-        opened.models == ["drag", "drag", "table", "drag"]
-        and opened.session.history.undo_name == "Fit back_left"
-    )
+    assert opened.models == ["drag", "drag", "table", "drag"]
+    assert opened.session.history.undo_name == "Fit back_left"
     found = fitting.findings
     assert found is not None and found.fit is not None and found.upload.content == b""
     card = fit_card(found)
@@ -224,12 +222,8 @@ def test_two_pages_fit_at_once_each_its_own(tmp_path: Path, worker: Worker) -> N
     one.fitting.start("back_left", "one.csv", content)
     other.fitting.start("front_left", "other.csv", content)
     until(lambda: "table" in other.models)
-    assert one.models == ["drag", "drag", "table", "drag"] and other.models == [
-        "drag",
-        "table",
-        "drag",
-        "drag",
-    ]
+    assert one.models == ["drag", "drag", "table", "drag"]
+    assert other.models == ["drag", "table", "drag", "drag"]
     assert one.fitting.findings is not None and one.fitting.findings.upload.name == "one.csv"
 
 
