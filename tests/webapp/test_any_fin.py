@@ -85,7 +85,7 @@ def test_a_table_fin_goes_through_the_whole_app(
     while session.history.redo_name is not None:
         session.redo()
     assert session.state == state
-    allocator = SOLVER.shipped(tabled, "dual")
+    allocator = SOLVER.allocator(State(tabled))
     assert any(name.startswith("tables/") for name in make_bundle(allocator).files)
     assert command_line(session.state).startswith("finlab allocate tabled_bundle.zip --wrench")
 

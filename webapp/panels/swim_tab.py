@@ -89,7 +89,7 @@ def add_figures(page: Page) -> None:
     """What the swim took, and what can be downloaded of it."""
     page.add_html(swim_card)
     page.add_html(_trim)
-    log = {"Log (NPZ)": partial(page.jobs.exports.swim, page.jobs.swimming)}
+    log = {"Log (NPZ)": partial(page.designs.swim, page.jobs.swimming)}
     save = page.add_buttons("Save", log, visible=False, hint="For numpy and `fit robot`.")
     page.board.show(save, visible=lambda swims: swims)
 

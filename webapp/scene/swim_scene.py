@@ -11,7 +11,7 @@ from webapp.handles import put
 from webapp.scene.meshes.mesh import NOTHING, force_arrow, joined, tube
 from webapp.scene.proportions import view_size
 from webapp.scene.stage import Shape, add_floor, aim_camera, paint_floor
-from webapp.session.display import Display
+from webapp.session.looking import Display
 from webapp.tasks.moment import PLACE, Moment
 from webapp.tasks.swimmer import Swimmer
 from webapp.tasks.swimming import Swimming

@@ -87,12 +87,8 @@ def graph_name(layout: Layout) -> str:
 
 def read_layout(name: str, content: bytes) -> Opened:
     """The layout in an uploaded layout file, bundle, archive of a layout with its files, or description.
-
-    Raises:
-        LayoutError: the file is too large, no text or no layout, or names a force table that did not come
-            along; the message names file and key.
-        DataError: a table cannot be read.
-    """
+    LayoutError: the file is too large, no text or no layout, or names a force table that did not come along;
+    the message names file and key. DataError: a table cannot be read."""
     source = Path(str(name)).name[:80] or "upload"
     if source.lower().endswith(".zip"):
         opened = read_archive(source, content, cache_folder())

@@ -1,4 +1,4 @@
-"""What is to be swum: what the user has set so far, and the plan that comes of it when the swim starts."""
+"""Settings of swims, and the plan that comes of them when a swim starts."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -43,11 +43,7 @@ class SwimSettings:
     """Whether breaking and mending is announced to the allocator; else the monitor has to detect it."""
 
     def with_value(self, key: str, value: Any) -> "SwimSettings":
-        """One field changed; the page may send anything.
-
-        Raises:
-            FinlabError: there is no such field, or not with this value.
-        """
+        """One field changed. FinlabError: there is no such field, or not with this value."""
         if key == "scenario":
             day = SCENARIOS[chosen(value, key, tuple(SCENARIOS))]
             said = replace(self, announced=day.announced, path=day.trajectory)
@@ -68,11 +64,7 @@ class SwimSettings:
         return SCENARIOS[self.scenario]
 
     def plan(self, state: State) -> "Plan":
-        """The plan for the robot as it is now.
-
-        Raises:
-            FinlabError: the scenario takes more fins away than the robot has.
-        """
+        """The plan for the robot as it is now. FinlabError: the scenario takes away more than it has."""
         day, layout = self.day, state.able
         path = make_trajectory(self.path, day.duration_s if self.path == day.trajectory else None)
         affected = _affected(layout, state.failed, day)
