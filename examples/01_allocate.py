@@ -15,7 +15,7 @@ def main() -> None:
     result = allocator.allocate([1, 0, 0.5, 0, 0, 0.1], seed=0)
 
     print("fin           A [rad]  f [Hz]  zero direction [deg]")
-    for name, (amplitude, frequency, direction) in zip(result.fins, result.command, strict=True):
+    for name, (amplitude, frequency, direction) in zip(result.names, result.command, strict=True):
         print(f"{name:<12}  {amplitude:7.3f}  {frequency:6.3f}  {np.degrees(direction):20.1f}")
     print("delivered [N, N m]:", np.round(result.wrench, 3) + 0.0)
     print(f"error {result.err_norm:.1e} of what the robot can push")

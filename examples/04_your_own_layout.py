@@ -28,7 +28,7 @@ def main() -> None:
         print(path.read_text())
         layout = finlab.load_layout(path)
     result = finlab.Allocator(layout).allocate([0, 0, 2, 0, 0, 0])
-    for name, (amplitude, frequency, direction) in zip(result.fins, result.command, strict=True):
+    for name, (amplitude, frequency, direction) in zip(result.names, result.command, strict=True):
         print(f"{name:<10} A {amplitude:.3f} rad  f {frequency:.3f} Hz  zero direction {direction:+.3f} rad")
     print(f"heave delivered: {result.wrench[2]:.3f} N of 2 N")
 

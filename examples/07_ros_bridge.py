@@ -24,7 +24,7 @@ class Bridge:
         force, torque = message.wrench.force, message.wrench.torque
         wrench = [force.x, force.y, force.z, torque.x, torque.y, torque.z]
         answer = self.allocator.allocate(wrench)
-        self.publish(Message(flippers=[*map(flipper, answer.fins, answer.command)]))
+        self.publish(Message(flippers=[*map(flipper, answer.names, answer.command)]))
 
 
 def flipper(name: str, beat: tuple[float, float, float]) -> dict[str, float]:

@@ -9,7 +9,7 @@ from tempfile import TemporaryDirectory
 
 import finlab
 from finlab.fit import fit_fin, read_measurements, write_fin
-from finlab.fit.fin_file import summary
+from finlab.fit.fin_fit import summary
 from finlab.layout import FinModelSpec
 
 DATA = Path(__file__).with_name("soft_fin.csv")

@@ -8,10 +8,9 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import finlab
-from finlab.fit.robot.fitted_layout import write_robot
-from finlab.fit.robot.report import summary
+from finlab.fit.robot.fitted_robot import summary, write_robot
 from finlab.fit.robot.robot_fit import fit_robot
-from finlab.fit.robot.swim_file import read_swim
+from finlab.fit.robot.swim import read_swim
 from finlab.sim import perturbed
 from finlab.sim.excite import excitation
 

@@ -17,28 +17,22 @@ if TYPE_CHECKING:
     from finlab.allocation.allocator import Allocator as Allocator
     from finlab.allocation.policy import Policy as Policy
     from finlab.errors import FinlabError as FinlabError
-    from finlab.layout.body import Body as Body
-    from finlab.layout.damage import Health as Health
-    from finlab.layout.file import save_layout as save_layout
-    from finlab.layout.fin import Fin as Fin
-    from finlab.layout.fin import Limits as Limits
-    from finlab.layout.layout import Layout as Layout
-    from finlab.layout.load import load_layout as load_layout
+    from finlab.layout import Body as Body
+    from finlab.layout import Fin as Fin
+    from finlab.layout import Health as Health
+    from finlab.layout import Layout as Layout
+    from finlab.layout import Limits as Limits
+    from finlab.layout import load_layout as load_layout
+    from finlab.layout import save_layout as save_layout
 
 __version__ = "0.1.0"
 
-_HOME = {
+_OF_LAYOUTS = ("Body", "Fin", "Health", "Layout", "Limits", "load_layout", "save_layout")
+_HOME = dict.fromkeys(_OF_LAYOUTS, "finlab.layout") | {
     "Allocation": "finlab.allocation.allocation",
     "Allocator": "finlab.allocation.allocator",
-    "Health": "finlab.layout.damage",
     "Policy": "finlab.allocation.policy",
     "FinlabError": "finlab.errors",
-    "load_layout": "finlab.layout.load",
-    "save_layout": "finlab.layout.file",
-    "Body": "finlab.layout.body",
-    "Fin": "finlab.layout.fin",
-    "Layout": "finlab.layout.layout",
-    "Limits": "finlab.layout.fin",
 }
 
 

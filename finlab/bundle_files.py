@@ -60,9 +60,7 @@ def table_name(content: bytes) -> str:
 def is_bundle(path: str | os.PathLike[str]) -> bool:
     """Whether a path looks like a bundle, of whatever version: a zip archive, or a folder with its files."""
     place = Path(path)
-    if place.suffix == ".zip" and is_regular(place):
-        return True
-    return is_regular(place / ABOUT)
+    return (place.suffix == ".zip" and is_regular(place)) or is_regular(place / ABOUT)
 
 
 def archive_around(path: str | os.PathLike[str]) -> str | None:
@@ -83,14 +81,13 @@ def read_bundle_files(path: str | os.PathLike[str]) -> dict[str, bytes]:
         DataError: it cannot be read, is of another version, was changed, or holds what no bundle holds.
     """
     source = str(path)
-    if os.path.isdir(path):
-        folder = Path(path)
-        names = [*LARGEST, *(f"{TABLES}{file.name}" for file in sorted((folder / TABLES).glob("*.csv")))]
-        there = [name for name in names if largest(name) > 0 and (folder / name).exists()]
-        files = {name: read_file(folder / name, largest(name), "a bundle's file") for name in there}
-    else:
+    if not os.path.isdir(path):
         content = read_file(source, LARGEST_BUNDLE + 100_000, "a bundle's folder or its zip archive")
         return bundle_files_of(content, source)
+    folder = Path(path)
+    names = [*LARGEST, *(f"{TABLES}{file.name}" for file in sorted((folder / TABLES).glob("*.csv")))]
+    there = [name for name in names if largest(name) > 0 and (folder / name).exists()]
+    files = {name: read_file(folder / name, largest(name), "a bundle's file") for name in there}
     check_bundle_files(files, source)
     return files
 
@@ -138,9 +135,7 @@ def _check_version(about: bytes | None, source: str) -> None:
         document = parse_json((about or b"null").decode("utf-8", "replace"), source)
     except DataError:
         return
-    if not isinstance(document, dict):
-        return
-    version = document.get("version")
+    version = document.get("version") if isinstance(document, dict) else VERSION
     if type(version) is not int or version != VERSION:
         raise DataError(
             f"{source}: is a bundle of version {version!r:.40}, this finlab reads version {VERSION}; "

@@ -1,11 +1,25 @@
-"""How a command ends: with its exit code, and with one sentence on stderr where something is wrong."""
+"""Output of a command: tables as plain text, its exit code, and one sentence on stderr where it fails."""
 
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 
 from finlab.errors import FinlabError
+
+
+def aligned(head: Sequence[str], rows: Sequence[Sequence[str]], words: Sequence[bool]) -> str:
+    """Cells under a head, padded with spaces: columns of words to the left, others to the right."""
+    widths = [max(map(len, column)) for column in zip(head, *rows, strict=True)]
+
+    def line(cells: Sequence[str]) -> str:
+        each = zip(cells, widths, words, strict=True)
+        return "  ".join(
+            cell.ljust(width) if left else cell.rjust(width) for cell, width, left in each
+        ).rstrip()
+
+    return "\n".join(map(line, [head, *rows]))
+
 
 FAILED = 2
 """Exit code after an error that is printed in one sentence."""

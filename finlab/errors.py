@@ -1,4 +1,4 @@
-"""Every error a user can cause, under one base class.
+"""Errors that a user can cause, under one base class.
 
 A message is one plain sentence that says what was got, what was expected, where, and what to do. The command
 line prints it behind `finlab: error: ` and exits with status 2; the app shows it as a notification.
@@ -36,9 +36,7 @@ class LayoutError(FinlabError):
     def __init__(self, problem: str, key: str = "", source: str = "") -> None:
         """Joins the parts to `source: key: problem`, leaving out empty ones."""
         super().__init__(": ".join(part for part in (source, key, problem) if part))
-        self.problem = problem
-        self.key = key
-        self.source = source
+        self.problem, self.key, self.source = problem, key, source
 
     @classmethod
     def at(cls, source: str, problem: str, key: str = "") -> "LayoutError":

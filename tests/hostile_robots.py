@@ -7,7 +7,8 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.layout import Fin, FinModelSpec, Layout, Limits
-from finlab.layout.fin import FIN_MODELS, LEAST, LEAST_WIDTH, MAX_AMPLITUDE, MAX_FREQUENCY, MAX_POSITION
+from finlab.layout.fin import LEAST, LEAST_WIDTH, MAX_AMPLITUDE, MAX_FREQUENCY, MAX_POSITION
+from finlab.layout.fin_model import FIN_MODELS
 from finlab.physics import Plant
 
 DOMAIN = 0xF022

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from finlab.allocation.baselines.ipopt import SOLVER_OPTIONS, import_casadi
 from finlab.arrays import Array
 from finlab.layout import Layout
-from finlab.layout.angles import is_full_turn
-from finlab.layout.arrays import layout_effectiveness
+from finlab.layout.axes import is_full_turn
+from finlab.layout.effectiveness import layout_effectiveness
 from finlab.physics import plant_of
 
 BESIDE = 1e-6

@@ -13,17 +13,8 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 
 LEVELS = (
-    ("errors", "arrays", "distribution"),
-    (
-        "files",
-        "assets",
-        "command_end",
-        "least_squares",
-        "precision",
-        "small_systems",
-        "text_table",
-        "whole_file",
-    ),
+    ("errors", "arrays"),
+    ("files", "assets", "command_end", "least_squares", "precision", "whole_file"),
     ("bundle_files", "executor"),
     ("layout",),
     ("actuators",),

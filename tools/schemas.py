@@ -7,7 +7,7 @@ from pathlib import Path
 import msgspec
 
 from finlab.layout.file import ANY_LAYOUT
-from finlab.layout.graph_form import Graph
+from finlab.layout.load import Graph
 
 PACKAGE = Path(__file__).parents[1] / "finlab"
 

@@ -1,18 +1,19 @@
-"""The server: one `View` for each browser that connects, and the clock of those that swim."""
+"""The server: sessions by key, one `View` for each browser, and the clock of robots that swim."""
 
 import asyncio
 import contextlib
 import ctypes
 import gc
 import json
+import secrets
 import time
+from collections.abc import Callable, Iterable
 
 import viser
 
 from finlab.layout import Layout
 from webapp.panels.frame import View
 from webapp.session import Display, Session
-from webapp.session.store import SessionStore
 from webapp.tasks.background import Workers
 from webapp.tasks.solver import Solver
 from webapp.viser_internals import disable_sharing, stored
@@ -27,6 +28,51 @@ REST_S = 3.0
 PRESENT_S = (1.0, 1.0)
 """The same for a page whose work another one asks for: it may be gone without a word."""
 MAX_KEYS = 8
+MOST_WAITING, LONGEST_S = 32, 3600.0
+"""Sessions that are kept after their page has gone, and for how long [s]."""
+
+
+class SessionStore:
+    """All sessions of this server, each shown in one tab at a time. Belongs to the event loop."""
+
+    def __init__(self, make: Callable[[], Session]) -> None:
+        """`make` gives a fresh session."""
+        self._make = make
+        self._sessions: dict[str, Session] = {}
+        self._open: set[str] = set()
+        self._left: dict[str, float] = {}
+
+    def enter(self, keys: Iterable[str]) -> tuple[str, Session]:
+        """The session for a tab, and its key. Of the `keys` that this browser remembers, and that no other
+        tab shows, the one left last is taken: a reload finds its work again, a second tab gets its own."""
+        self._forget()
+        free = [k for k in keys if k in self._sessions and k not in self._open]
+        key = max(free, key=lambda k: self._left.get(k, 0.0), default="")
+        if not key:
+            key = secrets.token_urlsafe(12)
+            self._sessions[key] = self._make()
+        self._open.add(key)
+        self._left.pop(key, None)
+        return key, self._sessions[key]
+
+    def leave(self, key: str) -> None:
+        """The tab has gone; its session waits for the next one."""
+        self._open.discard(key)
+        self._left[key] = time.monotonic()
+        self._forget()
+
+    def _forget(self) -> None:
+        """Of the sessions without a page, those left longest ago are forgotten: too many, or too old."""
+        now = time.monotonic()
+        waiting = sorted(
+            (key for key in self._sessions if key not in self._open),
+            key=lambda key: self._left.get(key, now),
+            reverse=True,
+        )
+        for place, key in enumerate(waiting):
+            if place >= MOST_WAITING or now - self._left.get(key, now) > LONGEST_S:
+                del self._sessions[key]
+                self._left.pop(key, None)
 
 
 class App:
@@ -35,14 +81,7 @@ class App:
     def __init__(
         self, server: viser.ViserServer, solver: Solver, layout: Layout, display: Display | None = None
     ) -> None:
-        """Take over a server.
-
-        Args:
-            server: where browsers connect.
-            solver: answers their questions.
-            layout: what a new session opens.
-            display: how a new session looks.
-        """
+        """Take over a server; a new session opens a `layout`, and looks as `display` says."""
         self._server = server
         self._solver = solver
         self._workers = Workers()

@@ -1,9 +1,10 @@
-"""What shows the facts: properties of handles are declared as functions of facts, and made when these change.
+"""The board of a page: properties of handles are declared as functions of facts, made when these change.
 
 A function names the facts that it is made of as its parameters: `lambda layout, saved: ...`.
 """
 
 import inspect
+from collections import defaultdict
 from collections.abc import Callable
 from typing import Any
 
@@ -17,10 +18,8 @@ UNKNOWN = object()
 """In place of what was made last, where that is not known."""
 
 
-def _places(make: Callable[..., Any]) -> list[int]:
-    """Which facts a function is made of."""
-    names = [p.name for p in inspect.signature(make).parameters.values() if p.default is p.empty]
-    return [Facts._fields.index(name) for name in names]
+def _named(make: Callable[..., Any]) -> list[str]:
+    return [p.name for p in inspect.signature(make).parameters.values() if p.default is p.empty]
 
 
 class Rule:
@@ -29,12 +28,12 @@ class Rule:
     def __init__(self, group: "Group", make: Callable[..., Any], handle: Any = None, key: str = "") -> None:
         """`make` gives the value of the property `key`; where there is no handle, it does all itself."""
         self.group, self.make, self.handle, self.key = group, make, handle, key
-        self.places = _places(make)
+        self.names = _named(make)
         self.is_due, self.last = True, UNKNOWN
 
     def write(self, facts: Facts) -> None:
         """Make it again, and send what has changed."""
-        made = self.make(*[facts[place] for place in self.places])
+        made = self.make(*[facts[name] for name in self.names])
         if self.handle is not None:
             if self.key == "content" and type(made) is not Markup:
                 made = escape(made)  # content that is not marked as markup is text
@@ -81,7 +80,7 @@ class Board:
 
     def __init__(self) -> None:
         self.groups: list[Group] = []
-        self._of_fact: list[list[Rule]] = [[] for _ in Facts._fields]
+        self._of_fact: dict[str, list[Rule]] = defaultdict(list)
         self._of_handle: dict[int, list[Rule]] = {}
         self.facts: Facts | None = None
         """What is shown; None where nothing is trusted to be."""
@@ -104,14 +103,14 @@ class Board:
     def _declare(self, make: Callable[..., Any], handle: Any = None, key: str = "") -> Rule:
         rule = Rule(self.groups[-1], make, handle, key)
         rule.group.rules.append(rule)
-        for place in rule.places:
-            self._of_fact[place].append(rule)
+        for name in rule.names:
+            self._of_fact[name].append(rule)
         return rule
 
     @staticmethod
     def value_of(make: Callable[..., Any], facts: Facts) -> Any:
         """What a function makes of facts."""
-        return make(*[facts[place] for place in _places(make)])
+        return make(*[facts[name] for name in _named(make)])
 
     def doubt(self, handle: Any) -> None:
         """A user has changed a handle, and the session may have refused it."""
@@ -134,7 +133,8 @@ class Board:
                 for rule in group.rules:
                     rule.last, rule.is_due, group.is_due = UNKNOWN, True, True
         else:
-            for old, new, rules in zip(before, facts, self._of_fact, strict=True):
+            for name, rules in self._of_fact.items():
+                old, new = before[name], facts[name]
                 if old is not new and not (type(old) in PLAIN and old == new):
                     self._due(rules)
         for group in self.groups:

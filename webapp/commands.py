@@ -1,10 +1,8 @@
-"""Everything that can be done by a key or from the list of commands (Ctrl+K): one table of both."""
+"""The table of all that can be done by a key or from the list of commands (Ctrl+K)."""
 
 from collections.abc import Callable
 from functools import partial
-from typing import Any, NamedTuple
-
-import viser
+from typing import Any
 
 from webapp.page import Page
 from webapp.session.looking import TASKS
@@ -14,66 +12,49 @@ from webapp.session.targets import PRESETS
 CTRL, CTRL_SHIFT, ALT = "cmd/ctrl", "cmd/ctrl+shift", "alt"
 
 
-class Command(NamedTuple):
-    """One thing to do."""
-
-    label: str
-    act: Callable[[], object]
-    key: str = ""
-    """As viser calls it; none where it is done from the list alone."""
-    modifier: str = ""
-
-
-def commands(page: Page) -> list[Command]:
-    """All commands of one page. The camera owns W A S D Q E and the arrow keys."""
-    session, robot = page.session, page.scenery.robot
+def add_commands(page: Page) -> None:
+    """Let a browser have all commands of one page. The camera owns W A S D Q E and the arrow keys."""
+    session, robot, swimming = page.session, page.scenery.robot, page.jobs.swimming
 
     def fail_selected() -> None:
         session.toggle_failure(session.selected or session.state.layout.names[0])
 
-    def swim_on() -> None:
-        page.jobs.swimming.set_running(not page.jobs.swimming.running)
-
-    return [
-        *(Command(task, partial(session.show_task, task), str(k + 1), ALT) for k, task in enumerate(TASKS)),
-        Command("Fold or open the drawer", session.fold_drawer, "J", CTRL),
-        Command("Undo", session.undo, "Z", CTRL),
-        Command("Redo", session.redo, "Z", CTRL_SHIFT),
-        Command("Select the next fin", session.select_next, "N"),
-        Command("Select nothing", partial(session.select, None), "escape"),
-        Command("Duplicate the selected fin", session.duplicate, "D", CTRL),
-        Command("Mirror the selected fin", session.mirror, "M"),
-        Command("Delete the selected fin", session.delete, "delete"),
-        Command("Add a fin", partial(session.add, "fin"), "I"),
-        Command("New design", page.designs.new),
-        Command("Save the design", page.designs.save, "S", CTRL),
-        Command("Share the design by a link", page.designs.share),
-        Command("Unlink the selected fin from its mirror image", session.unlink),
-        Command("Start over", session.start_over),
-        Command("Fail or repair the selected fin", fail_selected, "X"),
-        *(Command(f"Ask for: {name}", partial(session.set_preset, name)) for name in PRESETS),
-        *(Command(f"Keep {word} least", partial(session.keep_least, word)) for word in LEAST),
-        Command("Swim: pause or go on", swim_on, "B"),
-        Command("Swim: back to the design", page.scenery.end_swim),
-        Command("Frame what is selected", robot.frame, "F"),
+    # What it is called and does and, if any, its key as viser calls that, and a modifier.
+    table: list[tuple[Any, ...]] = [
+        *((task, partial(session.show_task, task), str(k + 1), ALT) for k, task in enumerate(TASKS)),
+        ("Fold or open the drawer", session.fold_drawer, "J", CTRL),
+        ("Undo", session.undo, "Z", CTRL),
+        ("Redo", session.redo, "Z", CTRL_SHIFT),
+        ("Select the next fin", session.select_next, "N"),
+        ("Select nothing", partial(session.select, None), "escape"),
+        ("Duplicate the selected fin", session.duplicate, "D", CTRL),
+        ("Mirror the selected fin", session.mirror, "M"),
+        ("Delete the selected fin", session.delete, "delete"),
+        ("Add a fin", partial(session.add, "fin"), "I"),
+        ("New design", page.designs.new),
+        ("Save the design", page.designs.save, "S", CTRL),
+        ("Share the design by a link", page.designs.share),
+        ("Unlink the selected fin from its mirror image", session.unlink),
+        ("Start over", session.start_over),
+        ("Fail or repair the selected fin", fail_selected, "X"),
+        *((f"Ask for: {name}", partial(session.set_preset, name)) for name in PRESETS),
+        *((f"Keep {word} least", partial(session.keep_least, word)) for word in LEAST),
+        ("Swim: pause or go on", lambda: swimming.set_running(not swimming.running), "B"),
+        ("Swim: back to the design", page.scenery.end_swim),
+        ("Frame what is selected", robot.frame, "F"),
         *(
-            Command(f"Camera: {view}", partial(robot.look_from, view), key)
+            (f"Camera: {view}", partial(robot.look_from, view), key)
             for view, key in (("3D", "1"), ("Top", "2"), ("Side", "3"), ("Front", "4"))
         ),
-        Command("Freeze or move the fins", partial(session.toggle, "frozen"), "P"),
-        Command("Dark or light theme", partial(session.toggle, "dark")),
-        Command("Tour: start, or next stop", session.tour, "T"),
-        Command("Export the bundle for the robot", page.jobs.exports.bundle),
+        ("Freeze or move the fins", partial(session.toggle, "frozen"), "P"),
+        ("Dark or light theme", partial(session.toggle, "dark")),
+        ("Tour: start, or next stop", session.guide.tour, "T"),
+        ("Export the bundle for the robot", page.designs.bundle),
     ]
-
-
-def register(gui: viser.GuiApi, page: Page, table: list[Command]) -> None:
-    """Let a browser have the commands."""
-    for command in table:
-        key: Any = command.key or None
-        modifier: Any = command.modifier or None
-        handle = gui.add_command(command.label, hotkey=key, modifier=modifier)
+    for label, act, *key_and_modifier in table:
+        key, modifier = (*key_and_modifier, None, None)[:2]
+        handle = page.gui.add_command(label, hotkey=key, modifier=modifier)
 
         @handle.on_trigger
-        async def _triggered(_event: Any, act: Callable[[], object] = command.act) -> None:
+        async def _triggered(_event: Any, act: Callable[[], object] = act) -> None:
             page.do(act)

@@ -1,4 +1,4 @@
-"""Who may talk to the server: pages that it served itself, and beyond this machine only with the token."""
+"""The guard of the server: it lets in pages of its own, from beyond this machine only with the token."""
 
 import hmac
 import secrets
@@ -56,11 +56,7 @@ class Guard:
 
     def check(self, path: str, headers: dict[str, str]) -> Response | None:
         """What to answer a request that is not let through, or that brings the token along; else None.
-
-        Args:
-            path: path and query of the request.
-            headers: its headers, names in lower case.
-        """
+        `path` has the query, `headers` names in lower case."""
         host, origin = headers.get("host", "").lower(), headers.get("origin")
         if is_loopback(self.host) and not is_loopback(_name(host)):
             # Another site's name that was made to point at this machine.
@@ -85,8 +81,8 @@ class Guard:
 def answer(status: HTTPStatus, text: str, headers: Mapping[str, str] = MappingProxyType({})) -> Response:
     """A page of plain text."""
     body = text.encode()
-    told = {"Content-Type": "text/plain; charset=utf-8", "Content-Length": str(len(body)), **headers}
-    return Response(status.value, status.phrase, Headers({**told, "Connection": "close"}), body)
+    own = {"Content-Type": "text/plain; charset=utf-8", "Content-Length": str(len(body)), **headers}
+    return Response(status.value, status.phrase, Headers({**own, "Connection": "close"}), body)
 
 
 def _name(host: str) -> str:
@@ -99,7 +95,7 @@ def _name(host: str) -> str:
 
 def _cookie(text: str) -> str:
     try:
-        found = SimpleCookie(text).get(COOKIE)
+        morsel = SimpleCookie(text).get(COOKIE)
     except CookieError:
         return ""
-    return "" if found is None else found.value
+    return "" if morsel is None else morsel.value

@@ -6,7 +6,6 @@ Everything here runs on viser's event loop; what takes time is handed to the wor
 import asyncio
 import json
 import traceback
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from functools import partial, wraps
 from typing import Any, TypeVar
@@ -16,18 +15,16 @@ import viser
 from finlab.allocation.allocation import Allocation
 from finlab.bundle_files import LARGEST_BUNDLE
 from finlab.errors import FinlabError
-from webapp.asking import Asking
 from webapp.board import Board
 from webapp.facts import Facts, facts_of
 from webapp.handles import on_user_change
-from webapp.presses import Presses
+from webapp.presses import Asking, Presses
 from webapp.scene.scenery import Scenery
 from webapp.session import Session
 from webapp.tasks.background import EventLoop, Workers
 from webapp.tasks.context import Context
 from webapp.tasks.designs import Designs, Opening
 from webapp.tasks.jobs import Jobs
-from webapp.tasks.reading import Reading
 from webapp.tasks.solver import Solver
 from webapp.theme import BLUE, VERMILLION
 from webapp.viser_internals import hold_uploads, run_script, uuid_of
@@ -35,13 +32,10 @@ from webapp.viser_internals import hold_uploads, run_script, uuid_of
 PATIENCE_S = 0.025
 """How long a change waits for its answer before the page is written without it [s]."""
 
-MAX_UPLOAD = LARGEST_BUNDLE
-"""Largest size of files on their way from a page [bytes]; each kind has a limit of its own below it."""
-
 Input = TypeVar("Input")
 
 
-class Page(ABC):
+class Page:
     """The scene of one client around its session, and what the panels beside it may ask for."""
 
     def __init__(
@@ -58,26 +52,24 @@ class Page(ABC):
         self._faults: set[str] = set()
         self._soon: asyncio.TimerHandle | None = None
         self._note: viser.NotificationHandle | None = None
-        reading = Reading(workers.readers, page, self.do, partial(self.notify, "Not possible"))
-        context = Context(
-            client, session, solver, workers, page, reading, self.do, self._refresh, self.notify
-        )
-        self.reading, self.jobs = reading, Jobs(context)
+        context = Context(client, session, solver, workers, page, self.do, self._refresh, self.notify)
+        self.context, self.jobs = context, Jobs(context)
         self.board = Board()
         self.scenery = Scenery(context, self.jobs.swimming, self.board, self.fault)
         self.presses = Presses(client.gui, self.do)
         self.ask = Asking(client.gui, self.presses).ask
-        self.designs = Designs(context, self.jobs.exports, self.presses)
+        self.designs = Designs(context)
+        self.presses.on("design-link", lambda _, text: self.designs.open_link(text))
         self.opening = Opening(client.gui, self.presses)
-        hold_uploads(client.gui, MAX_UPLOAD, partial(self.notify, "Not possible"))
+        hold_uploads(client.gui, LARGEST_BUNDLE, partial(self.notify, "Not possible"))
         self._build()
         self.presses.start()
         self._refresh()
         self.jobs.ask()
 
-    @abstractmethod
     def _build(self) -> None:
         """Build everything in the panel beside the view."""
+        raise NotImplementedError
 
     # What panels and scene may ask for.
 
@@ -92,12 +84,8 @@ class Page(ABC):
         return self.jobs.answering.busy
 
     def do(self, act: Callable[[], object], handle: Any = None) -> None:
-        """Carry out an intent; a refusal becomes a note, and the page goes back to what the session holds.
-
-        Args:
-            act: the intent.
-            handle: the input that the user has changed, if any.
-        """
+        """Carry out an intent, by the input `handle` that the user has changed, if any; a refusal becomes a
+        note, and the page goes back to what the session holds."""
         self._faults.clear()
         before = self.session.revision
         try:
@@ -138,13 +126,12 @@ class Page(ABC):
                 return tuple([round(v, digits) + 0.0 for v in now])
             return round(float(now), digits) + 0.0
 
-        def meant(asked: Any) -> None:
-            if isinstance(asked, (tuple, list)):
+        def meant(typed: Any) -> None:
+            if isinstance(typed, (tuple, list)):
                 exact = self.board.value_of(value, self._facts())
-                asked = tuple(
-                    old if new == round(old, digits) else new for new, old in zip(asked, exact, strict=True)
-                )
-            act(asked)
+                both = zip(typed, exact, strict=True)
+                typed = tuple(old if new == round(old, digits) else new for new, old in both)
+            act(typed)
 
         handle.precision = digits  # type: ignore[attr-defined]
         return self.bind(handle, meant, shown)
@@ -163,13 +150,7 @@ class Page(ABC):
     def add_button(self, label: str, act: Callable[[], object], **options: Any) -> viser.GuiButtonHandle:
         """A button that carries out an intent; `options` as viser has them."""
         button = self.gui.add_button(label, **options)
-        self._hint(button)
-
-        @button.on_click
-        async def _clicked(event: Any) -> None:
-            if event.client is not None:
-                self.do(act)
-
+        self._hear(button, button.on_click, lambda _: act())
         return button
 
     def add_upload(
@@ -177,20 +158,20 @@ class Page(ABC):
     ) -> viser.GuiUploadButtonHandle:
         """A button that carries out `act(name, content)` when the user has chosen a file."""
         button = self.gui.add_upload_button(label, **options)
-        self._hint(button)
-
-        @button.on_upload
-        async def _uploaded(event: Any) -> None:
-            if event.client is not None:
-                file = event.target.value
-                self.do(partial(act, file.name[-80:], file.content))
-
+        self._hear(button, button.on_upload, lambda file: act(file.name[-80:], file.content))
         return button
 
-    def _hint(self, button: Any) -> None:
-        """Let the page show the hint of a button: viser takes it, and shows those of other inputs alone."""
-        told = json.dumps([uuid_of(button), button.hint or ""])
-        run_script(self.gui, f"(window.finlabHints ??= new Map()).set(...{told});")
+    def _hear(self, button: Any, listen: Callable[..., object], act: Callable[[Any], object]) -> None:
+        """Carry out `act(value)` when a button is pressed, and let the page show its hint: viser shows those
+        of other inputs alone."""
+
+        async def pressed(event: Any) -> None:
+            if event.client is not None:
+                self.do(partial(act, event.target.value))
+
+        listen(pressed)
+        hint = json.dumps([uuid_of(button), button.hint or ""])
+        run_script(self.gui, f"(window.finlabHints ??= new Map()).set(...{hint});")
 
     def add_buttons(
         self, label: str, acts: Mapping[str, Callable[[], object]], **options: Any
@@ -220,7 +201,7 @@ class Page(ABC):
         with self.client.atomic():
             try:
                 if self.shown is not None and not self.busy:
-                    self.session.take(self.shown)
+                    self.session.guide.take(self.shown)
                 self.scenery.follow_guide()
                 facts = self._facts()
             except Exception as error:

@@ -4,7 +4,7 @@ The other half is `presses.js`. Each word is numbered, sent until it is heard, a
 """
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 
 import viser
@@ -29,11 +29,7 @@ def press(kind: str, key: str) -> str:
 
 
 def placed(key: str, count: int) -> int:
-    """The place that a page names, of `count`.
-
-    Raises:
-        FinlabError: there is no such place.
-    """
+    """The place that a page names, of `count`. FinlabError: there is no such place."""
     if not key.isdecimal() or len(key) > 6 or int(key) >= count:
         raise FinlabError("that one is gone")
     return int(key)
@@ -77,3 +73,26 @@ class Presses:
                 if kind in self._acts:
                     self._do(partial(self._acts[kind], key, text))
         run_script(self._gui, f"finlabPresses.heard({self._last});")
+
+
+class Asking:
+    """The question of one page to its user, on a card over the view that `cards.js` draws; a newer one takes
+    its place."""
+
+    def __init__(self, gui: viser.GuiApi, presses: Presses) -> None:
+        self._gui = gui
+        self._acts: list[Callable[[], object]] = []
+        presses.on("answer", self._answer)
+        run_file(gui, "cards.js")
+
+    def ask(self, title: str, text: str, answers: Mapping[str, Callable[[], object]]) -> None:
+        """Show a title, a sentence, and a button for each answer that does something; another one leaves all
+        as it is."""
+        self._acts = list(answers.values())
+        card = json.dumps([title, text, [*answers, "Cancel"]])
+        run_script(self._gui, f"finlabCards.ask(...{card});")
+
+    def _answer(self, key: str, _text: str) -> None:
+        acts, self._acts = self._acts, []
+        if key.isdecimal() and int(key) < len(acts):
+            acts[int(key)]()

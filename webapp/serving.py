@@ -1,4 +1,4 @@
-"""Serves the app: opens the port, warms the solver up, and serves until it is stopped."""
+"""The app as a process: a port is opened, the solver warmed up, and pages served until it is stopped."""
 
 import gc
 import signal
@@ -7,7 +7,7 @@ import threading
 from pathlib import Path
 
 from finlab.errors import FinlabError
-from finlab.files.worker import prepare
+from finlab.files.worker import in_worker, prepare
 from finlab.layout import load_layout
 from webapp.app import App
 from webapp.guard import Guard
@@ -35,7 +35,7 @@ def serve(
         FinlabError: the port is taken, or layout or checkpoint cannot be read.
     """
     prepare(["webapp.session.files", "webapp.tasks.fitting"])
-    first = load_layout(layout or FIRST_LAYOUT)
+    first = in_worker(load_layout, layout or FIRST_LAYOUT)
     _check_port(host, port)
     solver = Solver(checkpoint)
     # A missing checkpoint is reported now, not in the browser; and the first page finds a warm solver.
@@ -47,7 +47,9 @@ def serve(
         if port not in (0, server.get_port()):
             raise FinlabError(f"port {port} was taken while the app started; choose another --port")
         gc.freeze()  # what is there now stays: pages that go are found in less time
-        stop = _signalled()  # whoever knows the address may send one
+        stop = threading.Event()
+        for number in (signal.SIGTERM, signal.SIGINT):  # whoever knows the address may send one
+            signal.signal(number, lambda *_: stop.set())
         secret = "" if guard.token is None else f"/?token={guard.token}"
         print(f"finlab app: http://{host}:{server.get_port()}{secret}  (Ctrl-C stops it)", flush=True)
         while not stop.wait(0.5):  # a plain wait would keep Python from seeing the signal
@@ -71,11 +73,3 @@ def _check_port(host: str, port: int) -> None:
         raise FinlabError(
             f"cannot listen on {host}:{port}: {reason}; choose another --port or --host"
         ) from None
-
-
-def _signalled() -> threading.Event:
-    """What SIGTERM and Ctrl-C set from now on."""
-    stop = threading.Event()
-    for number in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(number, lambda *_: stop.set())
-    return stop

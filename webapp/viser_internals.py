@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import gzip
 import io
 import logging
 import secrets
@@ -21,7 +22,6 @@ from viser import _icons, _messages
 from viser._assignable_props_api import AssignablePropsBase
 from websockets.http11 import Request, Response
 
-from webapp.first_page import name_page
 from webapp.guard import SECURE, Guard
 from webapp.guard import answer as status_page
 
@@ -55,7 +55,7 @@ def _guarded(guard: Guard) -> Iterator[None]:
                 answer: Response | None = verdict or process_request(connection, request)
             except OSError:  # viser looks for a file of that name, which may be too long for one
                 answer = status_page(HTTPStatus.NOT_FOUND, "There is no such page.\n")
-            return answer if verdict is not None or answer is None else name_page(answer)
+            return answer if verdict is not None or answer is None else _name_page(answer)
 
         def secured(connection: Any, request: Request, response: Response) -> None:
             for name, value in SECURE.items():
@@ -74,28 +74,41 @@ def _guarded(guard: Guard) -> Iterator[None]:
         yield
 
 
+def _name_page(answer: Response) -> Response:
+    """Let an answer of viser's bring our first page: with our name and icon, and without its panel."""
+    if answer.headers.get("Content-Type", "").startswith("text/html"):
+        answer.body = _named(bytes(answer.body), answer.headers.get("Content-Encoding") == "gzip")
+        del answer.headers["Content-Length"]
+        answer.headers["Content-Length"] = str(len(answer.body))
+    return answer
+
+
+@cache
+def _named(body: bytes, zipped: bool) -> bytes:
+    ours = files("webapp.markup").joinpath("first_page.html").read_bytes()
+    plain = gzip.decompress(body) if zipped else body
+    plain = plain.replace(b'rel="icon"', b'rel="alternate"', 1).replace(b"<title>Viser</title>", ours, 1)
+    return gzip.compress(plain) if zipped else plain
+
+
 async def stored(client: viser.ClientHandle, key: str, patience: Sequence[float]) -> str | None:
     """What a browser keeps for us; `client.local_storage` would hold a thread until it answers.
 
-    A page that is just reconnecting may drop the question, so it is asked again, after each time [s] of
-    `patience` but the last one.
-
-    Raises:
-        TimeoutError: it did not answer at all.
-        RuntimeError: it forbids storage.
+    A page that is just reconnecting may drop the question, so it is repeated, after each time [s] of
+    `patience` but the last one. TimeoutError: it did not answer at all. RuntimeError: it forbids storage.
     """
-    connection, asked = client._websock_connection, f"finlab-{secrets.token_hex(8)}"
+    connection, question = client._websock_connection, f"finlab-{secrets.token_hex(8)}"
     answer: asyncio.Future[Any] = asyncio.get_running_loop().create_future()
 
     def hear(client_id: int, message: Any) -> None:
-        if message.request_uuid == asked and not answer.done():
+        if message.request_uuid == question and not answer.done():
             answer.set_result(message)
 
     kind = _messages.LocalStorageGetItemResponseMessage
     connection.register_handler(kind, hear)
     try:
         for seconds in patience:
-            connection.queue_message(_messages.LocalStorageGetItemRequestMessage(key, asked))
+            connection.queue_message(_messages.LocalStorageGetItemRequestMessage(key, question))
             client.flush()
             if (await asyncio.wait([answer], timeout=seconds))[0]:
                 break

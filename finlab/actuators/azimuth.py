@@ -8,26 +8,22 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from finlab.actuators.law import ActuatorLaw
 from finlab.actuators.response import Group, Plane
-from finlab.actuators.thrust_power import ThrustPower, held, radial_table
+from finlab.actuators.thrust_power import PropellerLaw, ThrustPower, radial_table
 from finlab.arrays import Array, Values
-from finlab.layout.angles import TURN, is_full_turn, wrapped
-from finlab.layout.azimuth import Azimuth
+from finlab.layout.axes import TURN, is_full_turn, wrapped
+from finlab.layout.propellers import Azimuth
 from finlab.precision import NEARLY
 
 
-class AzimuthLaw(ActuatorLaw):
+class AzimuthLaw(PropellerLaw):
     """n turning thrusters."""
 
-    def __init__(self, azimuths: Sequence[Azimuth]) -> None:
-        """Takes n turning thrusters."""
-        self.power_curve = ThrustPower([azimuth.model for azimuth in azimuths])
-        self.dead_band = np.array([azimuth.dead_band for azimuth in azimuths])
+    column = 1
 
     def force(self, command: Values, inflow: Array | None = None) -> Values:
         force = np.zeros_like(command)
-        size = held(command[..., 1], self.dead_band)
+        size = self.given(command)
         force[..., 1], force[..., 2] = size * np.cos(command[..., 0]), size * np.sin(command[..., 0])
         return force
 
@@ -35,21 +31,9 @@ class AzimuthLaw(ActuatorLaw):
         force = self.force(command)
         jacobian = np.zeros((*command.shape, 3))
         jacobian[..., 0, 1], jacobian[..., 0, 2] = -force[..., 2], force[..., 1]
-        free = held(command[..., 1], self.dead_band) == command[..., 1]
-        jacobian[..., 1, 1], jacobian[..., 1, 2] = (
-            np.cos(command[..., 0]) * free,
-            np.sin(command[..., 0]) * free,
-        )
+        angle, free = command[..., 0], self.given(command) == command[..., 1]
+        jacobian[..., 1, 1], jacobian[..., 1, 2] = np.cos(angle) * free, np.sin(angle) * free
         return force, jacobian
-
-    def power(self, command: Values, inflow: Array | None = None) -> Values:
-        """See `ActuatorLaw`. Turning takes none."""
-        return self.power_curve.watts(held(command[..., 1], self.dead_band))
-
-    def power_gradient(self, command: Array, inflow: Array | None = None) -> Array:
-        gradient = np.zeros(command.shape)
-        gradient[..., 1] = self.power_curve.marginal(held(command[..., 1], self.dead_band))
-        return gradient
 
 
 class AzimuthGroup(Group):
@@ -67,20 +51,19 @@ class AzimuthGroup(Group):
         ]
 
     def commands(self, force: Array, previous: Array | None = None) -> Array:
-        """See `Group`. Where no force is asked for, the angle stays that of the `previous` commands
-        (..., m, 3), or comes as near to 0 as the arc allows. What can be given forward and in reverse is
-        given at the least power."""
+        """See `Group`. Where no force is wanted, the angle stays that of the `previous` commands, or comes as
+        near to 0 as the arc allows. What can be given forward and in reverse is given at the least power."""
         size = np.hypot(force[..., 0], force[..., 1])
         before = np.zeros_like(size) if previous is None else np.nan_to_num(previous[..., 0])
         angle = np.where(size > 0.0, np.arctan2(force[..., 1], force[..., 0]), before)
         ahead, back = self._pushed(angle, size), self._pushed(angle + np.pi, -size)
         if (self._lower[:, 1] >= 0.0).all():
             return ahead
-        asked, least = np.stack([size * np.cos(angle), size * np.sin(angle)]), NEARLY * self._upper[:, 1]
+        wanted, least = np.stack([size * np.cos(angle), size * np.sin(angle)]), NEARLY * self._upper[:, 1]
         missing, watts = [], []
         for way in (ahead, back):
-            given = way[..., 1] * np.stack([np.cos(way[..., 0]), np.sin(way[..., 0])])
-            missing.append(np.linalg.norm(given - asked, axis=0))
+            force = way[..., 1] * np.stack([np.cos(way[..., 0]), np.sin(way[..., 0])])
+            missing.append(np.linalg.norm(force - wanted, axis=0))
             watts.append(self._power.watts(way[..., 1]))
         cheaper = (missing[1] <= missing[0] + least) & (watts[1] < watts[0] * (1.0 - NEARLY))
         return np.where(((missing[1] < missing[0] - least) | cheaper)[..., None], back, ahead)

@@ -1,4 +1,4 @@
-"""What an actuator's law is: command to force in its own frame, and to power, with derivatives.
+"""Base of the laws of actuators: command to force in its own frame, and to power, with derivatives.
 
 Own frames are those of `finlab.layout`, of a fin: shaft, zero, shaft x zero. A law's parameters are numbers,
 or arrays (n,) where it speaks for n actuators at once. Laws of fins are written once, for numpy's arrays,
@@ -62,8 +62,7 @@ class FinLaw(ActuatorLaw):
 
 
 class PlanarLaw(FinLaw):
-    """A fin whose mean force lies in the plane that its tip sweeps: a size and a direction, none along the
-    shaft."""
+    """A fin whose mean force lies in the plane that its tip sweeps: a size and a direction."""
 
     offset: Any = 0.0
     """Angle [rad] from the zero direction to the thrust."""

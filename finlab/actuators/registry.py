@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.actuators.azimuth import AzimuthGroup, AzimuthLaw
-from finlab.actuators.fin.models import stack_laws
-from finlab.actuators.fin.response import FinGroup
+from finlab.actuators.fin.fin_laws import stack_laws
+from finlab.actuators.fin.fin_response import FinGroup
 from finlab.actuators.law import ActuatorLaw
 from finlab.actuators.response import Group
 from finlab.actuators.rudder import RudderGroup, RudderLaw
@@ -31,11 +31,13 @@ class Kind:
     """Answers to prices of m actuators with an effectiveness (m, 3, 6)."""
     angle: int | None = None
     """Which of its commands is an angle that may turn freely."""
+    feels_flow: bool = False
+    """Whether it gives nothing at rest: its force is that of the flow."""
 
 
-def _kind(law: Callable[[Sequence[Any]], ActuatorLaw], group: Any, angle: int | None = None) -> Kind:
+def _kind(law: type[Any], group: Any, angle: int | None = None) -> Kind:
     """A kind whose actuators have one law together."""
-    return Kind(lambda parts: [(np.arange(len(parts)), law(parts))], group, angle)
+    return Kind(lambda parts: [(np.arange(len(parts)), law(parts))], group, angle, law.feels_flow)
 
 
 _AZIMUTH = _kind(AzimuthLaw, AzimuthGroup, angle=0)
@@ -50,32 +52,19 @@ KINDS: dict[str, Kind] = {
 
 
 def laws_of(layout: Layout) -> list[tuple[Places, ActuatorLaw]]:
-    """Returns the laws of a robot's actuators with their places; those of one kind together.
-
-    Raises:
-        DataError: the force table of a fin cannot be read.
-    """
+    """Returns the laws of a robot's actuators with their places, by kind; a `DataError` at a bad table."""
     groups: list[tuple[Places, ActuatorLaw]] = []
     for places, kind in _kinds(layout):
-        found = kind.laws([layout.actuators[i] for i in places])
-        groups += [(places[among], law) for among, law in found]
+        laws = kind.laws([layout.actuators[i] for i in places])
+        groups += [(places[among], law) for among, law in laws]
     return groups
 
 
 def groups_of(layout: Layout, effectiveness: Array) -> list[tuple[Places, Group]]:
-    """Returns the answers to prices of a robot's actuators, by kind, with their places.
-
-    Args:
-        layout: the robot.
-        effectiveness: wrench (n, 3, 6) of 1 N along the own axes of each actuator.
-
-    Raises:
-        DataError: a fin's force table cannot be read, or gives no thrust within the limits.
-    """
-    return [
-        (places, kind.group([layout.actuators[i] for i in places], effectiveness[places]))
-        for places, kind in _kinds(layout)
-    ]
+    """Returns the answers to prices of a robot's actuators by kind, with their places; `effectiveness` (n, 3,
+    6) is the wrench of 1 N along their own axes. Errors as for `FinGroup`."""
+    kinds = [(places, kind, [layout.actuators[i] for i in places]) for places, kind in _kinds(layout)]
+    return [(places, kind.group(parts, effectiveness[places])) for places, kind, parts in kinds]
 
 
 def _kinds(layout: Layout) -> list[tuple[Places, Kind]]:
@@ -88,9 +77,5 @@ def _kinds(layout: Layout) -> list[tuple[Places, Kind]]:
 
 def free_angles(layout: Layout) -> NDArray[np.bool_]:
     """Which commands (n, 3) are angles; whether they may turn freely depends on their limits."""
-    found = np.zeros((layout.n, 3), bool)
-    for i, actuator in enumerate(layout.actuators):
-        angle = KINDS[actuator.type].angle
-        if angle is not None:
-            found[i, angle] = True
-    return found
+    angles = [KINDS[actuator.type].angle for actuator in layout.actuators]
+    return np.array([[k == angle for k in range(3)] for angle in angles])

@@ -29,8 +29,7 @@ _GRID = np.linspace(0.0, 1.0, CELLS + 1) ** 4
 
 def price_grid(top: float) -> Array:
     """Prices (CELLS + 1,) [W/N] from 0 to `top`, the ends of a table's intervals."""
-    grid: Array = top * _GRID
-    return grid
+    return np.asarray(top * _GRID)
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,8 +47,7 @@ class RadialTable:
 
     @classmethod
     def of_forces(cls, top: float, force: Array, rest: float) -> "RadialTable":
-        """A table from forces (CELLS + 1,) at `price_grid(top)`; slopes are those of a monotone
-        cubic (Fritsch and Carlson, 1980)."""
+        """A table of forces (CELLS + 1,) at `price_grid(top)`, monotone cubic (Fritsch and Carlson, 1980)."""
         force = np.maximum.accumulate(np.asarray(force, np.float64))
         return cls(float(top), force, monotone_slopes(price_grid(top), force), float(rest))
 
@@ -66,15 +64,9 @@ class RadialTable:
         if len(force) == 1:
             return cls.of_forces(1e-9, np.full(CELLS + 1, force[0]), float(cost[0]))
         chord = np.diff(cost) / np.diff(force)
-        marginal = np.concatenate(
-            [
-                [max(1.5 * chord[0] - 0.5 * chord[min(1, len(chord) - 1)], 0.0)],
-                0.5 * (chord[1:] + chord[:-1]),
-                [chord[-1]],
-            ]
-        )
-        if len(chord) > 1:
-            marginal[-1] = max(1.5 * chord[-1] - 0.5 * chord[-2], chord[-1])
+        first = max(1.5 * chord[0] - 0.5 * chord[min(1, len(chord) - 1)], 0.0)
+        last = max(1.5 * chord[-1] - 0.5 * chord[-2], chord[-1]) if len(chord) > 1 else chord[-1]
+        marginal = np.concatenate([[first], 0.5 * (chord[1:] + chord[:-1]), [last]])
         marginal = np.maximum.accumulate(marginal) + 1e-12 * chord[-1] * np.arange(len(marginal))
         grid = price_grid(float(marginal[-1]))
         return cls.of_forces(float(marginal[-1]), np.interp(grid, marginal, force), float(cost[0]))
@@ -87,14 +79,14 @@ class RadialTable:
     def scaled(self, share: float, cost: float = 1.0) -> "RadialTable":
         """The table with `share` times the force, and `cost` times the power, at each command."""
         per = share / cost
-        found = RadialTable(self.top / per, self.force * share, self.slope * share * per, self.rest * cost)
+        result = RadialTable(self.top / per, self.force * share, self.slope * share * per, self.rest * cost)
         known = self.polynomials * [share, share, share, share, cost]
-        found.__dict__["polynomials"] = known  # of many tables scaled in each new flow
-        return found
+        result.__dict__["polynomials"] = known  # of many tables scaled in each new flow
+        return result
 
     def with_square(self, weight: float) -> "RadialTable":
-        """The table where a force T [N] costs `weight` T^2 [W] more: what answered a price v now answers
-        v + 2 weight T."""
+        """The table where a force T [N] costs `weight` T^2 [W] more: it answers v + 2 weight T as before
+        v."""
         price = price_grid(self.top) + 2.0 * weight * self.force
         top, rest = float(price[-1]), self.rest + weight * float(self.force[0]) ** 2
         return self.of_forces(top, np.interp(price_grid(top), price, self.force), rest)
@@ -102,8 +94,7 @@ class RadialTable:
     @cached_property
     def polynomials(self) -> Array:
         """Coefficients (CELLS + 1, 5): of the force in rising powers of the price, as a share of the largest,
-        from the beginning of each interval on, and the conjugate there [W]; the last are those beyond the
-        table."""
+        from each interval's start on, and the conjugate there [W]; the last ones beyond the table."""
         width = np.diff(price_grid(1.0))
         first, last = self.force[:-1], self.force[1:]
         m0, m1 = self.slope[:-1] * self.top * width, self.slope[1:] * self.top * width
@@ -206,8 +197,8 @@ class Group(ABC):
     """Whether that depends on the water that meets them."""
 
     def at(self, inflow: Array | None) -> "Group":
-        """Returns the group where its places move through the water with velocities (m, 3) [m/s], in own
-        frames; None at rest."""
+        """Returns the group with velocities (m, 3) [m/s] of its places through the water, own frames, or
+        None."""
         return self
 
     @property

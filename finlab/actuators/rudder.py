@@ -100,10 +100,10 @@ class RudderLaw(ActuatorLaw):
 
     def force_and_jacobian(self, command: Array, inflow: Array | None = None) -> tuple[Array, Array]:
         met = self.met(np.zeros(command.shape) if inflow is None else inflow)
-        found = self.coefficients(command[..., 0] - met.course)
-        force = met.force(found.lift, found.drag)
+        result = self.coefficients(command[..., 0] - met.course)
+        force = met.force(result.lift, result.drag)
         jacobian = np.zeros((*force.shape, 3))
-        jacobian[..., 0, :] = met.force(found.lift_slope, found.drag_slope)
+        jacobian[..., 0, :] = met.force(result.lift_slope, result.drag_slope)
         return force, jacobian
 
     def power(self, command: Values, inflow: Array | None = None) -> Values:
@@ -120,8 +120,7 @@ class RudderLaw(ActuatorLaw):
 
 
 class RudderGroup(Group):
-    """What the rudders of a robot offer for prices in one flow: a lift, and the drag that comes with it; what
-    drags without lift comes on top."""
+    """What the rudders of a robot offer for prices in one flow: a lift, and the drag that comes with it."""
 
     feels_flow = True
 
@@ -130,9 +129,9 @@ class RudderGroup(Group):
         self._law, self._effectiveness = RudderLaw(rudders), effectiveness[:, 1:]
         self._limits = np.array([rudder.deflection for rudder in rudders])
         angle = np.linspace(0.0, 0.3 * np.pi, CELLS)[:, None] + np.zeros(len(rudders))
-        found = self._law.coefficients(angle)
+        result = self._law.coefficients(angle)
         self._curves, self._tables = [], []
-        for lift, drag in zip(found.lift.T, found.drag.T, strict=True):
+        for lift, drag in zip(result.lift.T, result.drag.T, strict=True):
             falls = np.append(np.diff(lift) <= 0.0, True)
             last = int(np.argmax(lift >= PEAK * lift[np.argmax(falls)])) + 1
             self._curves.append((lift[:last], angle[:last, 0], drag[:last]))
@@ -178,8 +177,8 @@ class RudderGroup(Group):
         for count in (POINTS, 16, 16):
             step = (high - low) / count
             angle = low + step * np.arange(count + 1)[:, None, None]
-            found = self._law.coefficients(angle - self._met.course)
-            worth = gain * found.lift - cost * (found.drag - self._law.drag)
+            result = self._law.coefficients(angle - self._met.course)
+            worth = gain * result.lift - cost * (result.drag - self._law.drag)
             best = np.clip(worth.argmax(axis=0)[None], 1, count - 1)
             middle = np.take_along_axis(angle, best, axis=0)[0]
             low, high = middle - step, middle + step
@@ -191,18 +190,15 @@ class RudderGroup(Group):
 
     @property
     def beside(self) -> Array:
-        least: Array = (self._met.pressure * self._law.drag)[:, None] * self._against
-        return least
+        return np.asarray((self._met.pressure * self._law.drag)[:, None] * self._against)
 
     def beside_of(self, force: Array) -> Array:
         size = np.abs(force[..., 0]) / np.maximum(self._met.pressure, NOTHING)
         drag = [np.interp(size[:, i], lifts, drags) for i, (lifts, _, drags) in enumerate(self._curves)]
-        wrench: Array = (np.stack(drag, axis=-1) * self._met.pressure) @ self._against
-        return wrench
+        return np.asarray((np.stack(drag, axis=-1) * self._met.pressure) @ self._against)
 
     def _lift(self, deflection: Array) -> Array:
-        """Least and largest lifts (m, 2) [N] between two deflections (m, 2) [rad], without those that another
-        deflection gives with less drag."""
+        """Least and largest lifts (m, 2) [N] between deflections (m, 2) [rad], each at its least drag."""
         angle = deflection - self._turned[:, None]
         end = np.array([angles[-1] for _, angles, _ in self._curves])
         parted = np.clip(0.0, angle[:, 0], angle[:, 1])
@@ -210,8 +206,7 @@ class RudderGroup(Group):
         near = np.where((np.abs(parted) > end)[:, None], parted[:, None], usual)
         most = np.array([lifts[-1] for lifts, _, _ in self._curves])[:, None]
         lift = np.clip(self._law.coefficients(near.T).lift.T, -most, most)
-        found: Array = lift * self._met.pressure[:, None]
-        return found
+        return np.asarray(lift * self._met.pressure[:, None])
 
     def commands(self, force: Array, previous: Array | None = None) -> Array:
         size = np.abs(force[..., 0]) / np.maximum(self._met.pressure, NOTHING)

@@ -1,12 +1,16 @@
-"""Power of a propeller over its force: a power law, or a convex curve through a table of measurements."""
+"""Propellers: the law that thrusters share, and their power over the force, a power law or a convex curve
+through a table of measurements."""
 
 from collections.abc import Sequence
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
+from finlab.actuators.law import ActuatorLaw
 from finlab.actuators.response import RadialTable
-from finlab.arrays import AnyArray, Array
+from finlab.arrays import AnyArray, Array, Values
+from finlab.layout.propellers import Azimuth, Thruster
 from finlab.layout.thrust_model import PowerLaw, PowerTable, ThrustModel, lower_hull, side_points
 from finlab.precision import NOTHING
 
@@ -35,14 +39,11 @@ class ByPower:
 
 
 class Curve:
-    """Watts over the size of the force of one side: convex, quadratic between knots, with a marginal cost
-    that rises from 0 at rest without a jump."""
+    """Watts over the force's size of one side: convex, quadratic between knots, its slope from 0 at rest."""
 
     def __init__(self, size: Array, watts: Array) -> None:
-        """Takes points of a convex curve, sizes [N] from 0 on, and meets each of them.
-
-        The knots between are those of Schumaker (1983): quadratic splines that keep the shape.
-        """
+        """Takes points of a convex curve, sizes [N] from 0 on, and meets each of them. The knots between are
+        those of Schumaker (1983): quadratic splines that keep the shape."""
         step = np.diff(size)
         chord = np.diff(watts) / step
         slope = np.zeros_like(size)
@@ -63,8 +64,7 @@ class Curve:
         """Power [W] there."""
 
     def at(self, size: AnyArray) -> tuple[Array, Array]:
-        """Returns the power [W] and the marginal cost [W/N] of sizes [N]; beyond the last knot the curve goes
-        on with its last slope."""
+        """Returns power [W] and marginal cost [W/N] of sizes [N]; beyond the last knot on with its slope."""
         i = np.clip(np.searchsorted(self.size, size, "right") - 1, 0, len(self.size) - 2)
         step = size - self.size[i]
         bend = (self.marginal[i + 1] - self.marginal[i]) / (self.size[i + 1] - self.size[i])
@@ -81,43 +81,37 @@ class Sides:
     def __init__(self, model: PowerTable) -> None:
         """Makes the curves of the sides that the table has."""
         _, force, power = model.columns
-        rest = float(power.min())
-        curves = []
-        for sign in (1, -1):
-            size, watts = side_points(force, power, sign)
-            watts = np.minimum.accumulate(watts[::-1])[::-1]
-            watts[0] = rest
-            curves.append(Curve(*lower_hull(size, watts)) if len(size) > 1 else None)
-        self.rest = rest
+        self.rest = float(power.min())
         """Power at rest [W]."""
-        self.forward, self.reverse = curves
-        """Curves of positive and of negative forces; None for a side that there is not."""
+        self.curves = []
+        """Curves with the sign of their forces, of the sides that there are."""
+        for sign in (1.0, -1.0):
+            size, watts = side_points(force, power, int(sign))
+            watts = np.minimum.accumulate(watts[::-1])[::-1]
+            watts[0] = self.rest
+            if len(size) > 1:
+                self.curves.append((Curve(*lower_hull(size, watts)), sign))
 
     def at(self, force: AnyArray) -> tuple[Array, Array]:
         """Returns power [W] and marginal cost [W/N] of forces [N]."""
         marginal = 0.0 * force  # NaN of a failed one stays
         watts = self.rest + marginal
-        for curve, sign in ((self.forward, 1.0), (self.reverse, -1.0)):
-            if curve is not None:
-                on = force * sign > 0.0
-                watts[on], slope = curve.at(sign * force[on])
-                marginal[on] = sign * slope
+        for curve, sign in self.curves:
+            on = force * sign > 0.0
+            watts[on], slope = curve.at(sign * force[on])
+            marginal[on] = sign * slope
         return watts, marginal
 
     def answer(self, price: Array) -> Array:
         """Returns the forces [N] that are worth most at prices [W/N]; 0 on a side that there is not."""
         force = np.zeros_like(price)
-        for curve, sign in ((self.forward, 1.0), (self.reverse, -1.0)):
-            if curve is not None:
-                on = price * sign > 0.0
-                force[on] = sign * curve.answer(sign * price[on])
+        for curve, sign in self.curves:
+            on = price * sign > 0.0
+            force[on] = sign * curve.answer(sign * price[on])
         return force
 
 
-@lru_cache(maxsize=256)
-def sides_of(model: PowerTable) -> Sides:
-    """Returns the curves of a table, made once."""
-    return Sides(model)
+_sides_of = lru_cache(maxsize=256)(Sides)
 
 
 class ThrustPower:
@@ -131,7 +125,7 @@ class ThrustPower:
             own = [i for i, other in enumerate(kinds) if other == kind]
             laws = [model for model in models if isinstance(model, PowerLaw)]
             places = slice(None) if len(own) == len(models) else np.array(own)
-            self._groups.append((places, ByPower(laws) if kind is None else sides_of(kind)))
+            self._groups.append((places, ByPower(laws) if kind is None else _sides_of(kind)))
 
     def watts(self, force: AnyArray) -> AnyArray:
         """Returns the power [W] of forces (..., n) [N], negative ones in reverse."""
@@ -149,11 +143,10 @@ class ThrustPower:
         return force
 
     def worth(self, price: Array, least: Array, most: Array) -> Array:
-        """Returns the most [W] that forces between `least` and `most` (n,) [N] are worth at prices (..., n)
-        [W/N], less their power."""
+        """Returns the most [W] that forces from `least` to `most` (n,) [N] are worth at prices (..., n)
+        [W/N]."""
         force = np.clip(self.answer(price), least, most)
-        worth: Array = price * force - self.watts(force)
-        return worth
+        return np.asarray(price * force - self.watts(force))
 
     def _both(self, force: AnyArray, which: int) -> AnyArray:
         result: AnyArray = np.empty(np.shape(force))
@@ -163,14 +156,8 @@ class ThrustPower:
 
 
 def radial_table(model: ThrustModel, sign: int, least: float, most: float) -> RadialTable:
-    """Returns the answer of one side, forward (`sign` 1) or reverse (-1), to a price.
-
-    Args:
-        model: what power the forces take.
-        sign: the side.
-        least: least size of the force [N].
-        most: largest size [N].
-    """
+    """Returns the answer to a price forward (`sign` 1) or in reverse (-1), for sizes from `least` to `most`
+    [N]."""
     own = ThrustPower([model])
     ends = np.array([[sign * least], [sign * most]])
     rest = float(own.watts(ends)[0, 0])
@@ -183,7 +170,31 @@ def radial_table(model: ThrustModel, sign: int, least: float, most: float) -> Ra
     return RadialTable.of_price(top, answer, rest)
 
 
+class PropellerLaw(ActuatorLaw):
+    """n propellers, one of whose commands is a force; there is none within the dead band."""
+
+    column: int
+    """Which of the three commands it is."""
+
+    def __init__(self, parts: Sequence[Thruster | Azimuth]) -> None:
+        """Takes n thrusters, or n that turn."""
+        self.power_curve = ThrustPower([part.model for part in parts])
+        self.dead_band = np.array([part.dead_band for part in parts])
+
+    def given(self, command: Values) -> Any:
+        """Returns the forces (..., n) [N] of commands (..., n, 3)."""
+        return held(command[..., self.column], self.dead_band)
+
+    def power(self, command: Values, inflow: Array | None = None) -> Values:
+        """See `ActuatorLaw`. Models have electrical power, with the motor's loss; turning takes none."""
+        return self.power_curve.watts(self.given(command))
+
+    def power_gradient(self, command: Array, inflow: Array | None = None) -> Array:
+        gradient = np.zeros(command.shape)
+        gradient[..., self.column] = self.power_curve.marginal(self.given(command))
+        return gradient
+
+
 def held(force: AnyArray, dead_band: Array) -> AnyArray:
     """Returns the forces (..., n) [N] that come of commanded ones: none within the dead bands (n,) [N]."""
-    result: AnyArray = np.where(np.abs(force) < dead_band * (1.0 - 1e-9), 0.0, force)
-    return result
+    return np.asarray(np.where(np.abs(force) < dead_band * (1.0 - 1e-9), 0.0, force))

@@ -8,24 +8,20 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from finlab.actuators.law import ActuatorLaw
 from finlab.actuators.response import Group, Line
-from finlab.actuators.thrust_power import ThrustPower, held, radial_table
+from finlab.actuators.thrust_power import PropellerLaw, ThrustPower, radial_table
 from finlab.arrays import Array, Values
-from finlab.layout.thruster import Thruster
+from finlab.layout.propellers import Thruster
 
 
-class ThrusterLaw(ActuatorLaw):
+class ThrusterLaw(PropellerLaw):
     """n thrusters."""
 
-    def __init__(self, thrusters: Sequence[Thruster]) -> None:
-        """Takes n thrusters."""
-        self.power_curve = ThrustPower([thruster.model for thruster in thrusters])
-        self.dead_band = np.array([thruster.dead_band for thruster in thrusters])
+    column = 0
 
     def force(self, command: Values, inflow: Array | None = None) -> Values:
         force = np.zeros_like(command)
-        force[..., 0] = held(command[..., 0], self.dead_band)
+        force[..., 0] = self.given(command)
         return force
 
     def force_and_jacobian(self, command: Array, inflow: Array | None = None) -> tuple[Array, Array]:
@@ -33,15 +29,6 @@ class ThrusterLaw(ActuatorLaw):
         force = self.force(command)
         jacobian[..., 0, 0] = force[..., 0] == command[..., 0]
         return force, jacobian
-
-    def power(self, command: Values, inflow: Array | None = None) -> Values:
-        """See `ActuatorLaw`. The models tell electrical power, in which the motor's loss is included."""
-        return self.power_curve.watts(held(command[..., 0], self.dead_band))
-
-    def power_gradient(self, command: Array, inflow: Array | None = None) -> Array:
-        gradient = np.zeros(command.shape)
-        gradient[..., 0] = self.power_curve.marginal(held(command[..., 0], self.dead_band))
-        return gradient
 
 
 class ThrusterGroup(Group):

@@ -16,19 +16,12 @@ if TYPE_CHECKING:
     from finlab.allocation.solution import Solution as Solution
     from finlab.layout.damage import Health as Health
 
-_HOME = {
-    "Allocation": "finlab.allocation.allocation",
-    "BatchAllocation": "finlab.allocation.allocation",
-    "Allocator": "finlab.allocation.allocator",
-    "METHODS": "finlab.allocation.methods",
-    "Policy": "finlab.allocation.policy",
-    "Candidates": "finlab.allocation.solution",
-    "Solution": "finlab.allocation.solution",
-    "Health": "finlab.layout.damage",
-}
+_HOME = {"Allocation": "allocation", "BatchAllocation": "allocation", "Allocator": "allocator"}
+_HOME |= {"METHODS": "methods", "Policy": "policy", "Candidates": "solution", "Solution": "solution"}
 
 
 def __getattr__(name: str) -> object:
-    if name not in _HOME:
+    home = "finlab.layout.damage" if name == "Health" else f"finlab.allocation.{_HOME.get(name)}"
+    if home.endswith(".None"):
         raise AttributeError(f"module 'finlab.allocation' has no attribute {name!r}")
-    return getattr(import_module(_HOME[name]), name)
+    return getattr(import_module(home), name)

@@ -1,4 +1,4 @@
-"""What every allocation method answers: commands, what they give, and what is left undone."""
+"""The answer of an allocation method: commands, what they give, and what is left undone."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
@@ -9,63 +9,56 @@ from typing import Any, ClassVar, Generic, NamedTuple, Self, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.evaluate import REACHED, judged_effort, judged_power
 from finlab.allocation.policy import CLOSEST, Policy, limits_reached
+from finlab.allocation.report import allocation_text, doubts, next_measurement
 from finlab.allocation.solution import Candidates, PlainData, Rows
-from finlab.allocation.tables import allocation_text
+from finlab.allocation.yardstick import REACHED, judged_effort, judged_power
 from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.layout.commands import Command, command_of
 from finlab.layout.damage import Health
-from finlab.physics.expected_miss import expected_miss, sources_of_miss
+from finlab.physics.expected_miss import expected_miss
 from finlab.physics.plant import Plant, plant_of
 
 Number = TypeVar("Number", float, Array)
-"""What is told of one answer, or of each of many (N,)."""
-TOLD_GAP = 0.01
-"""Share by which the power may exceed its bound untold."""
+"""A figure of one answer, or of each of many (N,)."""
 CHUNK = 1024
 """Answers that are judged together; keeps memory flat for any number of targets."""
 
 
 class Later(NamedTuple):
-    """What is told of an answer only when it is asked for."""
+    """What an answer computes when it is first read."""
 
     plant: Plant
-    """Who judges: the laws and tables of all actuators, failed ones included, at the flow of the question."""
+    """Judge of commands: the laws of all actuators, failed ones included, in the question's flow."""
     notes: Callable[[], tuple[str, ...]]
-    """Gives the notes."""
     candidates: Callable[[], Candidates | None] = lambda: None
-    """Gives the refined candidates."""
     samples: Callable[[], Candidates | None] = lambda: None
-    """Gives the raw candidates."""
     bound: Callable[[], Array | None] = lambda: None
-    """Gives the power (N,) [W] that no answer can undercut."""
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Answer(PlainData, Generic[Number]):
     """What answers to one target and to many share, as plain data; many have N rows of each array.
 
-    What is dear to tell is told when it is first asked for, and kept; copies have all of it.
+    Properties that take time are computed when they are first read, and kept; copies have all of them.
     """
 
-    TOLD: ClassVar[tuple[str, ...]] = (
+    LAZY: ClassVar[tuple[str, ...]] = (
         *("forces", "wrench", "err_norm", "power", "effort", "bound", "expected_miss", "notes"),
     )
-    """What is told when it is asked for."""
+    """Properties that are computed when they are first read."""
 
     layout: Layout
-    """The whole layout, failed fins included, with the limits that damage has left."""
+    """The whole layout, failed actuators included, with the limits that damage has left."""
     failed: tuple[str, ...]
-    """Names of the fins that were left out."""
+    """Names of the actuators that were left out."""
     health: Health | None = None
-    """What was known of fins that work in part."""
+    """What was known of actuators that work in part."""
     target: Array
     """Desired wrench (6,) or (N, 6), [N, N m], body frame; NaN along axes that do not count."""
     command: Array
-    """Command (n, 3) or (N, n, 3) of every fin: amplitude [rad], frequency [Hz], zero direction [rad]; NaN if
-    failed."""
+    """Command (n, 3) or (N, n, 3) of every actuator, as its law takes it; NaN if failed."""
     scale: Array
     """Yardstick (6,) of the error [N, N m]; see `finlab.allocation.yardstick`."""
     method: str
@@ -83,43 +76,45 @@ class Answer(PlainData, Generic[Number]):
     unknown_fins: tuple[str, ...] = ()
     """Names of fins whose model the method's networks have not learned; answers for them are wrong."""
     later: Later | None = field(default=None, compare=False)
-    """Tells what is told later; None in copies, which have it all."""
+    """Gives the lazy properties; None in copies, which have them all."""
 
     @property
-    def fins(self) -> tuple[str, ...]:
-        """Names of the fins, in the order of `command`."""
+    def names(self) -> tuple[str, ...]:
+        """Names of the actuators, in the order of `command`."""
         return self.layout.names
 
     @property
     def unallocated(self) -> Array:
-        """What the robot does not deliver: target minus delivered wrench (6,) or (N, 6); 0 along axes that do
-        not count."""
+        """Target minus delivered wrench (6,) or (N, 6); 0 along axes that do not count."""
         return np.nan_to_num(self.target - self.wrench)
 
     @cached_property
     def forces(self) -> Array:
-        """Force (n, 3) or (N, n, 3) of each fin [N], body frame, by its own law or table; zero if failed."""
+        """Force (n, 3) or (N, n, 3) of each actuator [N], body frame, by its own law; 0 if failed."""
         return self._by_parts(self._plant.fin_forces)
 
     @cached_property
     def wrench(self) -> Array:
-        """Delivered wrench (6,) or (N, 6) [N, N m] by the fins' own laws and tables."""
+        """Delivered wrench (6,) or (N, 6) [N, N m] by the actuators' own laws and tables."""
         return self._by_parts(self._plant.wrench)
 
     @cached_property
     def notes(self) -> tuple[str, ...]:
-        """Sentences that the user should read, such as a fin model that the checkpoint never saw."""
-        return () if self.later is None else self.later.notes() + self._doubts()
+        """Sentences that the user should read, such as about a fin model that the checkpoint never saw."""
+        return self._general_notes + self._doubts()
+
+    @cached_property
+    def _general_notes(self) -> tuple[str, ...]:
+        return () if self.later is None else self.later.notes()
 
     def _doubts(self) -> tuple[str, ...]:
-        """Sentences about this answer."""
+        """Sentences about this very answer."""
         return ()
 
     @cached_property
     def expected_miss(self) -> Array:
         """Standard deviation (6,) or (N, 6) of the wrench [N, N m] by what is uncertain of the actuators:
-        what the layout says, or a table's own; zeros where nothing is known to be. See
-        `finlab.physics.expected_miss`."""
+        what the layout says, or a table's own; zeros where nothing is known to be."""
         return self._by_parts(lambda rows: expected_miss(self._plant, rows))
 
     @cached_property
@@ -148,31 +143,30 @@ class Answer(PlainData, Generic[Number]):
     @cached_property
     def bound(self) -> Number | None:
         """Power [W] that no answer for the same wrench can undercut; None for methods that prove none."""
-        found = None if self.later is None else self.later.bound()
-        return None if found is None else self._number(found)
+        bound = None if self.later is None else self.later.bound()
+        return None if bound is None else self._number(bound)
 
     def _number(self, values: Array) -> Number:
-        """Values of each row: an array, or of one answer a number."""
-        raise NotImplementedError
+        """A figure of each row; of one answer a plain number."""
+        return values if self.command.ndim == 3 else float(np.ravel(values)[0])  # type: ignore[return-value]
 
     @property
     def _plant(self) -> Plant:
         return plant_of(self.layout).at(self.flow) if self.later is None else self.later.plant
 
     def _by_parts(self, judge: Callable[[Array], Array]) -> Array:
-        """What is told of commands, a few at a time."""
+        """Figures of commands, a few at a time."""
         if self.command.ndim == 2:
-            one: Array = judge(self.command[None])[0]
-            return one
+            return np.asarray(judge(self.command[None])[0])
         if len(self.command) <= CHUNK:
             return judge(self.command)
         return np.concatenate([judge(self.command[rows]) for rows in chunks(len(self.command))])
 
     def _equal_names(self) -> list[str]:
-        return [*super()._equal_names(), *self.TOLD]
+        return [*super()._equal_names(), *self.LAZY]
 
     def __getstate__(self) -> dict[str, Any]:
-        for name in self.TOLD:
+        for name in (*self.LAZY, "_general_notes"):
             getattr(self, name)
         return {**self.__dict__, "later": None}
 
@@ -187,9 +181,6 @@ class BatchAllocation(Answer[Array]):
     solve_ms: Array = field(compare=False)
     """Time per target (N,) [ms]: the whole time divided by N."""
 
-    def _number(self, values: Array) -> Array:
-        return np.asarray(values)
-
     @property
     def reachable(self) -> NDArray[np.bool_]:
         """Which targets are delivered (N,): an `err_norm` of at most 0.001."""
@@ -202,7 +193,7 @@ class BatchAllocation(Answer[Array]):
         worst = f"{self.err_norm.max():.2e}" if len(self) else "none"
         return (
             f"BatchAllocation({len(self)} targets, layout={self.layout.name!r:.60}, "
-            f"actuators={len(self.fins)}, method={self.method!r}, delivered={int(self.reachable.sum())}, "
+            f"actuators={len(self.names)}, method={self.method!r}, delivered={int(self.reachable.sum())}, "
             f"largest err_norm={worst})"
         )
 
@@ -214,7 +205,7 @@ class Allocation(Answer[float]):
     `print(result)` shows it as a table.
     """
 
-    TOLD: ClassVar[tuple[str, ...]] = (*Answer.TOLD, "candidates", "samples")
+    LAZY: ClassVar[tuple[str, ...]] = (*Answer.LAZY, "candidates", "samples")
 
     solve_ms: float = field(compare=False)
     """Time spent solving [ms], judging not included."""
@@ -223,16 +214,13 @@ class Allocation(Answer[float]):
     previous: Array | None = None
     """Command (n, 3) of the previous tick, if it was given."""
     prices: Array | None = field(default=None, compare=False)
-    """What one more unit of each axis of the wrench costs (6,) [W/N, W/(N m)], where the method tells."""
+    """What one more unit of each axis of the wrench costs (6,) [W/N, W/(N m)], where the method says."""
 
     @property
     def commands(self) -> dict[str, Command | None]:
-        """What each actuator is told, by its name, in a type of its own; None for a failed one."""
+        """Command of each actuator by its name, in a type of its own; None for a failed one."""
         parts = zip(self.layout.actuators, self.command, strict=True)
         return {part.name: command_of(part, row) for part, row in parts}
-
-    def _number(self, values: Array) -> float:
-        return float(np.ravel(values)[0])
 
     @cached_property
     def candidates(self) -> Candidates | None:
@@ -245,29 +233,12 @@ class Allocation(Answer[float]):
         return self.later.samples() if self.later is not None else None
 
     def _doubts(self) -> tuple[str, ...]:
-        doubt = (self.measure_next,) if self.measure_next else ()
-        if self.bound is None or self.power <= (1.0 + TOLD_GAP) * self.bound:
-            return doubt
-        gap = 100.0 * (1.0 - self.bound / self.power)
-        return (
-            *doubt,
-            f"of its power, {gap:.2g} % may be more than needed: where an actuator cannot rest, or has a "
-            "wide arc, a dead band or drag, the least is not proved",
-        )
+        return doubts(self)
 
     @cached_property
     def measure_next(self) -> str:
         """The sentence about what adds most to `expected_error`; empty where that is at most 0.001."""
-        if self.expected_error <= REACHED:
-            return ""
-        sources = sources_of_miss(self._plant, self.command[None])
-        parts = np.array([(source.variance[0] / self.scale**2).sum() for source in sources])
-        most = int(parts.argmax())
-        left = float(np.sqrt(parts.sum() - parts[most]))
-        return (
-            f"the true wrench is expected to be off by {self.expected_error:.2g}; measure "
-            f"{sources[most].words} next, without whose uncertainty {left:.2g} would be left"
-        )
+        return next_measurement(self, self._plant)
 
     @property
     def reachable(self) -> bool:
@@ -277,15 +248,15 @@ class Allocation(Answer[float]):
     @property
     def share(self) -> float:
         """Share of the target that is delivered in its own direction; 1 where nothing is asked."""
-        asked, given = np.nan_to_num(self.target / self.scale), self.wrench / self.scale
-        size = float(asked @ asked)
-        return 1.0 if size < 1e-14 else float(asked @ given) / size
+        target, wrench = np.nan_to_num(self.target / self.scale), self.wrench / self.scale
+        size = float(target @ target)
+        return 1.0 if size < 1e-14 else float(target @ wrench) / size
 
     @property
     def binding(self) -> tuple[str, ...]:
         """Sentences about the limits that keep the robot from delivering the target.
 
-        None where it does, nor where the method does not know the fins: then limits are not what keeps it.
+        None where it does, nor where its networks do not know the fins: then limits are not what keeps it.
         """
         if self.reachable or self.unknown_fins:
             return ()
@@ -293,33 +264,22 @@ class Allocation(Answer[float]):
 
     def with_command(self, command: Array) -> Self:
         """The same question with another command (n, 3) in place of the answer, judged by the plant."""
-        return replace(self._open(), command=command, wrench_expected=None)
+        other = replace(self, command=command, wrench_expected=None)
+        kept = ("bound", "candidates", "samples", "_general_notes") if self.later is None else ()
+        other.__dict__.update({name: getattr(self, name) for name in kept})
+        return other
 
     def with_candidates(self, candidates: Candidates | None, samples: Candidates | None) -> Self:
-        """The same answer beside other candidates."""
-        whole = self._open()
-        assert whole.later is not None
-        told = whole.later._replace(candidates=lambda: candidates, samples=lambda: samples)
-        return replace(whole, later=told)
-
-    def _open(self) -> Self:
-        """The same answer, even a copy, that can tell again what is told later."""
-        if self.later is not None:
-            return self
-        told = Later(
-            self._plant,
-            lambda: self.notes,
-            lambda: self.candidates,
-            lambda: self.samples,
-            lambda: None if self.bound is None else np.array([self.bound]),
-        )
-        return replace(self, later=told)
+        """The same answer with other candidates."""
+        other = object.__new__(type(self))
+        other.__dict__.update(self.__dict__, candidates=candidates, samples=samples)
+        return other
 
     def __repr__(self) -> str:
         failed = f", failed={', '.join(self.failed)!r:.60}" if self.failed else ""
         effort = "" if self.effort is None else f", effort={self.effort:.3f}"
         return (
-            f"Allocation(layout={self.layout.name!r:.60}, actuators={len(self.fins)}{failed}, "
+            f"Allocation(layout={self.layout.name!r:.60}, actuators={len(self.names)}{failed}, "
             f"method={self.method!r}, err_norm={self.err_norm:.2e}, "
             f"power={self.power:.3g} W{effort}, reachable={self.reachable}, "
             f"solve_ms={self.solve_ms:.1f})"

@@ -25,7 +25,7 @@ from finlab.allocation.notes import answer_notes
 from finlab.allocation.policy import CLOSEST, Policy, as_policy
 from finlab.allocation.question import (
     Axes,
-    Fins,
+    Usable,
     axes_of,
     check_flow,
     check_layout,
@@ -33,7 +33,7 @@ from finlab.allocation.question import (
     check_seed,
     check_wrenches,
     same_axes,
-    usable_fins,
+    usable,
 )
 from finlab.allocation.settings import Settings
 from finlab.allocation.solution import Candidates, Rows, Solution, joined
@@ -54,20 +54,39 @@ MOST_PREPARED = 32
 class Ready(NamedTuple):
     """A state of the robot that is ready for questions."""
 
-    fins: Fins
-    """Which fins may be used."""
+    robot: Usable
+    """Which actuators may be used."""
     method: Method
     """Made for these."""
     plant: Plant
-    """Of all fins; judges."""
+    """Of all actuators; judges."""
+
+
+class Question(NamedTuple):
+    """A checked question but for its wrenches."""
+
+    ready: Ready
+    policy: Policy
+    health: Health | None
+    flow: Array | None
+    seed: int
+
+    def solution(self, method: Method, targets: Array, offset: int = 0, **options: Any) -> Solution:
+        """The answer of a method to targets (N, 6), with rest for actuators that have nothing to do."""
+        solution = method.solve(
+            targets, policy=self.policy, flow=self.flow, seed=self.seed + offset, **options
+        )
+        if options.get("previous") is not None:
+            return solution
+        return solution._replace(command=method.plant.rested(solution.command))
 
 
 class Allocator:
-    """Turns a target wrench into one command per fin, for one robot.
+    """Turns a target wrench into one command per actuator, for one robot.
 
     All that a method needs of the robot is prepared when the allocator is made. A damaged robot is prepared
-    when it is first asked about; failed fins are removed before a method solves and put back (as NaN) after,
-    so no method can use one. Force tables are read once. An allocator can be copied and pickled.
+    when it is first asked about; failed actuators are removed before a method solves and put back (as NaN)
+    after, so no method can use one. Force tables are read once. An allocator can be copied and pickled.
     """
 
     def __init__(
@@ -198,57 +217,45 @@ class Allocator:
         Args:
             wrench: desired wrench (6,) [N, N m] in the body frame; NaN for an axis that is free here: it
                 takes what the cheapest answer gives it, as those do that the layout does not command.
-            failed: names of fins that do not work; they leave the graph.
+            failed: names of actuators that do not work; they leave the graph.
             previous: command (n, 3) of the previous tick: what follows stays within the rates of the
                 actuators. Or the answer that gave it: the search then begins there, which is quicker.
-            reference: wrenches (K, 6) that are expected to be asked for at the next K ticks. A method that
-                knows how late its fins follow answers the one that they will be in time for, which is then
-                the result's target; others answer the present one.
+            reference: expected wrenches (K, 6) of the next K ticks. A method that knows how late actuators
+                follow answers the one that they will be in time for, which is then the result's target.
             policy: what to do when the wrench is out of reach; see `Policy`.
-            health: fins that are weak, stuck at an angle or running on; the result's layout has the limits
-                that are left.
+            health: actuators that work in part; the result's layout has what is left of their limits.
             flow: velocity (6,) of the body relative to the water [m/s, rad/s], body frame; None at rest.
             seed: the same target and seed give the same answer.
 
         Raises:
-            CommandError: the wrench is not six numbers, none of them counts, or `previous`, `reference` or
-                `flow` has another shape.
+            CommandError: the wrench is not six numbers, none counts, or another array has a wrong shape.
             AllocationError: the method does not know the policy.
-            LayoutError: an unknown fin, or none left.
+            LayoutError: an unknown actuator, or none left.
             DataError: a fin's force table cannot be read.
         """
-        asked, policy = check_wrenches(wrench, single=True), as_policy(policy)
-        check_seed(seed)
-        water = check_flow(flow)
-        ready = self._ready(failed, health, axes_of(self._layout, asked))
-        fins, method = ready.fins, ready.method
-        method.check_policy(policy)
+        values = check_wrenches(wrench, single=True)
+        question = self._question(failed, policy, health, flow, seed, axes_of(self._layout, values))
+        robot, method = question.ready.robot, question.ready.method
         options: dict[str, Any] = {}
         if isinstance(previous, Allocation):
             if method.begins_at_prices and previous.prices is not None:
                 options["prices"] = previous.prices
             previous = previous.command
-        before = None if previous is None else check_previous(previous, fins.layout)[fins.alive]
+        before = None if previous is None else check_previous(previous, robot.layout)[robot.alive]
         start = time.perf_counter()
         counts = method.layout.commanded
-        target = np.where(counts, asked, 0.0)
+        target = np.where(counts, values, 0.0)
         if reference is not None:
             later = np.where(counts, check_wrenches(reference, single=False, name="reference"), 0.0)
             target = method.in_time(target, np.nan_to_num(later))
-        solution = method.solve(
-            target[None], policy=policy, previous=before, flow=water, seed=seed, **options
-        )
-        if before is None:
-            solution = solution._replace(command=method.plant.rested(solution.command))
+        solution = question.solution(method, target[None], previous=before, **options)
         solve_ms = (time.perf_counter() - start) * 1e3
         return Allocation(
-            **self._about(
-                np.where(counts, target, np.nan), asked, ready, solution, policy, health, water, seed
-            ),
-            command=fins.among_all(solution.command)[0].copy(),
+            **self._about(question, np.where(counts, target, np.nan), values, solution),
+            command=robot.among_all(solution.command)[0].copy(),
             solve_ms=solve_ms,
             settings=vars(self.settings).copy(),
-            previous=None if before is None else fins.among_all(before),
+            previous=None if before is None else robot.among_all(before),
             wrench_expected=None if solution.wrench is None else solution.wrench[0],
             prices=None if solution.prices is None else solution.prices[0],
         )
@@ -262,7 +269,7 @@ class Allocator:
         """
         ready = self._ready_for(result)
         ways = ready.method.refinement(np.nan_to_num(result.target), flow=result.flow, seed=result.seed)
-        return tuple(replace(way, command=ready.fins.among_all(way.command)) for way in ways)
+        return tuple(replace(way, command=ready.robot.among_all(way.command)) for way in ways)
 
     def allocate_batch(
         self,
@@ -279,73 +286,65 @@ class Allocator:
         The answer keeps the targets as they are, not a copy, and the commands; what else there is to tell is
         computed when it is asked for.
         """
-        asked, policy = check_wrenches(wrenches, single=False), as_policy(policy)
-        check_seed(seed)
-        water = check_flow(flow)
-        ready = self._ready(failed, health)
-        fins = ready.fins
-        ready.method.check_policy(policy)
+        values = check_wrenches(wrenches, single=False)
+        question = self._question(failed, policy, health, flow, seed)
         start = time.perf_counter()
 
         def parts() -> Iterator[tuple[Rows, Solution]]:
-            for axes, places in same_axes(self._layout, asked):
-                one = self._ready(failed, health, axes)
-                for rows in chunks_of(places, len(asked)):
-                    counts = one.method.layout.commanded
-                    target = asked[rows] if counts.all() else np.where(counts, asked[rows], 0.0)
-                    part = one.method.solve(target, policy=policy, flow=water, seed=seed + first_of(rows))
-                    yield rows, part._replace(command=one.method.plant.rested(part.command))
+            for axes, places in same_axes(self._layout, values):
+                method = self._ready(failed, health, axes).method
+                for rows in chunks_of(places, len(values)):
+                    counts = method.layout.commanded
+                    targets = values[rows] if counts.all() else np.where(counts, values[rows], 0.0)
+                    yield rows, question.solution(method, targets, first_of(rows))
 
-        solution = joined(parts(), len(asked), fins.alive)
+        solution = joined(parts(), len(values), question.ready.robot.alive)
         counts = self._layout.commanded
-        targets = asked if counts.all() else np.where(counts, asked, np.nan)
+        targets = values if counts.all() else np.where(counts, values, np.nan)
         elapsed_ms = (time.perf_counter() - start) * 1e3
         return BatchAllocation(
-            **self._about(targets, asked, ready, solution, policy, health, water, seed),
+            **self._about(question, targets, values, solution),
             command=solution.command,
             solve_ms=np.broadcast_to(elapsed_ms / max(len(targets), 1), len(targets)),
             wrench_expected=solution.wrench,
         )
 
-    def _about(
+    def _question(
         self,
-        target: Array,
-        asked: Array,
-        ready: Ready,
-        solution: Solution,
-        policy: Policy,
+        failed: Sequence[str],
+        policy: Policy | str,
         health: Health | None,
-        flow: Array | None,
+        flow: ArrayLike | None,
         seed: int,
-    ) -> dict[str, Any]:
-        """What answers to one target and to many tell of the question and the robot."""
-        fins = ready.fins
+        axes: Axes | None = None,
+    ) -> Question:
+        policy = as_policy(policy)
+        check_seed(seed)
+        water = check_flow(flow)
+        ready = self._ready(failed, health, axes)
+        ready.method.check_policy(policy)
+        return Question(ready, policy, health, water, int(seed))
+
+    def _about(self, question: Question, target: Array, values: Array, solution: Solution) -> dict[str, Any]:
+        """Fields that answers to one target and to many share; `values` are the wrenches as they came."""
+        (robot, method, plant), policy, health, flow, seed = question
         later = Later(
-            ready.plant.at(flow),
-            partial(answer_notes, fins.healthy, ready.method, self.checkpoint, flow, asked, solution.notes),
-            partial(_among_all, solution.candidates, fins),
-            partial(_among_all, solution.samples, fins),
+            plant.at(flow),
+            partial(answer_notes, robot.healthy, method, self.checkpoint, flow, values, solution.notes),
+            partial(_among_all, solution.candidates, robot),
+            partial(_among_all, solution.samples, robot),
             *(() if solution.bound is None else (partial(solution.bound, solution.command),)),
         )
         return {
-            "target": target,
-            "layout": fins.layout,
-            "failed": fins.failed,
-            "health": health,
-            "scale": self._scale,
-            "method": self.method,
-            "checkpoint": self.checkpoint,
-            "policy": policy,
-            "flow": flow,
-            "seed": int(seed),
-            "unknown_fins": ready.method.unknown_fins,
-            "later": later,
+            **{"target": target, "layout": robot.layout, "failed": robot.failed, "health": health},
+            **{"scale": self._scale, "method": self.method, "checkpoint": self.checkpoint, "policy": policy},
+            **{"flow": flow, "seed": seed, "unknown_fins": method.unknown_fins, "later": later},
         }
 
     def _ready_for(self, result: Allocation) -> Ready:
         """The robot as it was when it was asked."""
         ready = self._ready(result.failed, result.health)
-        if ready.fins.layout != result.layout:
+        if ready.robot.layout != result.layout:
             raise AllocationError(
                 f"this answer is of layout {result.layout.name!r:.60}, and this allocator is for "
                 f"{self._layout.name!r:.60} as it was made; ask the allocator that answered"
@@ -356,26 +355,26 @@ class Allocator:
         """The robot in a state, asked for some axes, prepared now or kept from an earlier question."""
         if axes is None and health is None and (failed == () or failed == []):
             return self._whole
-        key = usable_fins(self._layout, failed).failed, health, axes
-        found = self._prepared.pop(key, None) or self._make(failed, health, axes)
-        self._prepared[key] = found  # the newest is last
+        key = usable(self._layout, failed).failed, health, axes
+        ready = self._prepared.pop(key, None) or self._make(failed, health, axes)
+        self._prepared[key] = ready  # the newest is last
         while len(self._prepared) > MOST_PREPARED:
             self._prepared.pop(next(iter(self._prepared)), None)
-        return found
+        return ready
 
     def _make(self, failed: Sequence[str], health: Health | None, axes: Axes | None = None) -> Ready:
-        fins, choice = usable_fins(self._layout, failed, health), self._choice
-        layout = fins.healthy if axes is None else replace(fins.healthy, axes=axes)
+        robot, choice = usable(self._layout, failed, health), self._choice
+        layout = robot.healthy if axes is None else replace(robot.healthy, axes=axes)
         method = choice.kind(layout, choice.settings, self._scale, choice.weights)
-        return Ready(fins, method, plant_of(fins.layout))
+        return Ready(robot, method, plant_of(robot.layout))
 
     def __repr__(self) -> str:
         return f"Allocator({self._layout.name!r:.60}, method={self.method!r})"
 
 
-def _among_all(make: Callable[[], Candidates] | None, fins: Fins) -> Candidates | None:
-    """Candidates of the healthy fins, put among all."""
+def _among_all(make: Callable[[], Candidates] | None, robot: Usable) -> Candidates | None:
+    """Candidates of the healthy actuators, put among all."""
     if make is None:
         return None
-    found = make()
-    return found if len(fins.failed) == 0 else replace(found, command=fins.among_all(found.command))
+    own = make()
+    return own if len(robot.failed) == 0 else replace(own, command=robot.among_all(own.command))

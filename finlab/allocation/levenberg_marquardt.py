@@ -1,47 +1,35 @@
-"""Levenberg-Marquardt on the commands, through closed-form Jacobians of the fins' forces, inside the limits.
+"""Levenberg-Marquardt on the commands, through closed-form Jacobians of the forces, inside the limits.
 
-The last stage of a search: it works in commands, not forces, and with the fins' own laws, so it removes the
-error that the compiled fins' tables leave. The paper's method uses it with its surrogate.
+The last stage of a search: it works in commands, not forces, and with the actuators' own laws, so it removes
+the error that compiled tables leave. The paper's method uses it with its surrogate.
 """
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple, Protocol, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.arrays import AnyArray, Array
+from finlab.arrays import AnyArray, Array, solve
 from finlab.least_squares import Damping, levenberg_marquardt
 from finlab.physics.plant import Plant
 from finlab.precision import NOTHING
-from finlab.small_systems import solve
 
 RIDGE = (1e-9, 1e-14)
 """Regularization of the 6 x 6 systems: absolute, and relative to their trace. Without the latter those of
 strong fins on long levers are singular to rounding."""
 
 
-class FinForces(Protocol):
-    """The forces of one robot's fins, each in a frame of its own choice."""
-
-    def force(self, command: AnyArray) -> AnyArray:
-        """Forces (..., n, 3) [N] of commands (..., n, 3)."""
-        ...
-
-    def force_and_jacobian(self, command: AnyArray) -> tuple[AnyArray, AnyArray]:
-        """Forces and, for each of the three commands in turn, their derivative by it (..., n, 3, 3)."""
-        ...
-
-
 @dataclass(frozen=True, eq=False)
 class CommandProblem:
     """One layout as the refinement sees it."""
 
-    fin: FinForces
-    """What commands give: the fins' own laws, or a surrogate."""
+    forces: Any
+    """Gives forces (..., n, 3) [N] of commands by `force`, with derivatives by `force_and_jacobian`, as a
+    `Plant` does, each in a frame of its own choice: the actuators' own laws, or a surrogate."""
     effectiveness: AnyArray
-    """Normalized wrench (n, 3, 6) per newton of each fin's force along the axes in which `fin` gives it."""
+    """Normalized wrench (n, 3, 6) per newton along the axes of each force."""
     lower: AnyArray
     """Lower limits (n, 3)."""
     upper: AnyArray
@@ -51,7 +39,7 @@ class CommandProblem:
 
     @classmethod
     def of(cls, plant: Plant, sigma: Array) -> Self:
-        """A robot as its fins' own laws say, wrenches normalized by `sigma` (6,)."""
+        """A robot as its actuators' own laws say, wrenches normalized by `sigma` (6,)."""
         return cls(plant, plant.effectiveness / sigma, plant.lower, plant.upper, plant.full_turn)
 
     @cached_property
@@ -69,7 +57,8 @@ class CommandProblem:
     def wrench(self, command: AnyArray) -> AnyArray:
         """Normalized wrenches (R, 6) of commands (R, n, 3)."""
         effectiveness = self.effectiveness.reshape(-1, 6)
-        return self.fin.force(command).reshape(len(command), len(effectiveness)) @ effectiveness
+        force: AnyArray = self.forces.force(command)
+        return force.reshape(len(command), len(effectiveness)) @ effectiveness
 
     def feasible(self, command: AnyArray) -> AnyArray:
         """Commands (..., n, 3) inside the limits, zero directions wrapped first."""
@@ -94,17 +83,11 @@ class Refined(NamedTuple):
 def refine(
     problem: CommandProblem, target: AnyArray, command: AnyArray, steps: int, enough: float = 0.0
 ) -> Refined:
-    """Reduce the tracking error of commands (R, n, 3) towards normalized targets (R, 6).
+    """Reduces the error of commands (R, n, 3) towards normalized targets (R, 6), or one (1, 6), in some
+    steps; a row whose error is `enough` takes no more.
 
-    Each step is the smallest change, in units of the limit ranges, that cancels the error to first
-    order; commands at a limit that would leave it are held.
-
-    Args:
-        problem: the layout.
-        target: normalized wrenches (R, 6), or one for all rows (1, 6).
-        command: where to start (R, n, 3).
-        steps: number of steps.
-        enough: error at or below which a row takes no further step.
+    Each step is the smallest change, in units of the limit ranges, that cancels the error to first order;
+    commands at a limit that would leave it are held.
     """
 
     def moved(at: _Evaluated, damping: AnyArray, last: bool) -> _Evaluated:
@@ -123,18 +106,14 @@ def refine(
 
 
 class _Evaluated(NamedTuple):
-    """R commands and their errors."""
+    """R commands, normalized wrenches (R, 6), targets minus these, squared sizes of that (R,), and the
+    derivatives of each force by each command (R, n, 3 commands, 3)."""
 
     command: AnyArray
-    """(R, n, 3)."""
     wrench: AnyArray
-    """(R, 6)."""
     residual: AnyArray
-    """Target minus wrench (R, 6)."""
     cost: AnyArray
-    """Its squared size (R,)."""
     jacobian: AnyArray
-    """Derivatives of each fin's force by each of its commands (R, n, 3 commands, 3)."""
 
 
 _NO_GRADIENT = np.empty((1, 1, 1, 1))
@@ -146,9 +125,9 @@ def _evaluated(
     """Errors of commands; slopes that are given are not computed again."""
     rows, n, _ = command.shape
     if jacobian is None:
-        force, jacobian = problem.fin.force_and_jacobian(command)
+        force, jacobian = problem.forces.force_and_jacobian(command)
     else:
-        force = problem.fin.force(command)
+        force = problem.forces.force(command)
     effectiveness = problem.effectiveness.reshape(-1, 6)
     wrench = force.reshape(rows, len(effectiveness)).dot(effectiveness)
     residual = target - wrench
@@ -181,5 +160,4 @@ def _smallest_change(free: AnyArray, right: AnyArray, damping: AnyArray) -> AnyA
     diagonal = gram.reshape(-1, 36)[:, ::7]
     # By the derivatives themselves: no bound holds for fins whose force falls again, or rises from rest.
     diagonal += (damping + RIDGE[0] + RIDGE[1] * np.einsum("ri->r", diagonal))[:, None]
-    change: AnyArray = free @ solve(gram, right)
-    return change
+    return np.asarray(free @ solve(gram, right))

@@ -1,4 +1,4 @@
-"""What an allocation method is: made once for a layout whose fins are all healthy, it solves for wrenches."""
+"""Base of all allocation methods: made once for a layout of healthy actuators, each solves for wrenches."""
 
 from abc import ABC, abstractmethod
 from copy import copy
@@ -43,13 +43,9 @@ class Method(ABC):
     def __init__(
         self, layout: Layout, settings: Settings, scale: Array, weights: TrainedWeights | None = None
     ) -> None:
-        """Prepare the method for a layout.
-
-        Args:
-            layout: the healthy fins, and the axes that count.
-            settings: a `settings_class`.
-            scale: yardstick (6,) of the error [N, N m], of the whole robot.
-            weights: trained networks, for methods that have any.
+        """Prepares the method for a layout of healthy actuators and the axes that count, with settings of its
+        `settings_class`, the yardstick `scale` (6,) [N, N m] of the whole robot, and trained networks, where
+        it has any.
 
         Raises:
             AllocationError: the method cannot work with these settings.
@@ -71,7 +67,7 @@ class Method(ABC):
         if cls.takes == "thrusters":
             layout.only(f"method {cls.name}", "thruster")
         elif cls.takes != "any actuator":
-            layout.only_fins(f"method {cls.name}", horizontal=cls.takes == "horizontal fins")
+            layout.only(f"method {cls.name}", horizontal=cls.takes == "horizontal fins")
 
     @classmethod
     def fits(cls, layout: Layout) -> bool:
@@ -114,9 +110,8 @@ class Method(ABC):
 
     def in_time(self, target: Array, reference: Array) -> Array:
         """Which wrench (6,) is answered: a target (6,), or, where the time between ticks is a setting, that
-        of the moment at which the slowest actuator will have followed, among those of the next K ticks
-        (K, 6); after the last, the last. A command that is held for a period is late by half of it besides.
-        """
+        of the moment at which the slowest actuator will have followed, among those of the next K ticks (K,
+        6); after the last, the last. A command held for a period is late by half of it besides."""
         period_s = vars(self.settings).get("period_s")
         if period_s is None:
             return target
@@ -124,8 +119,7 @@ class Method(ABC):
         before = min(int(late), len(reference))
         after = min(before + 1, len(reference))
         expected = np.concatenate([target[None], reference])
-        result: Array = expected[before] + (late - int(late)) * (expected[after] - expected[before])
-        return result
+        return np.asarray(expected[before] + (late - int(late)) * (expected[after] - expected[before]))
 
     def check_policy(self, policy: Policy) -> None:
         """Raise an `AllocationError` at a policy that the method does not know."""
@@ -136,17 +130,16 @@ class Method(ABC):
             )
 
     def at(self, flow: Array | None) -> Self:
-        """The same method for a robot that moves through the water with (6,); itself where that is without
-        effect. What does not depend on it is shared."""
+        """The same method for a robot that moves through the water with (6,); itself where it feels
+        nothing."""
         plant = self.plant.at(flow)
         if plant is self.plant:
             return self
         other = copy(self)
         other.plant = plant
-        for name in [
-            key for key in vars(self) if isinstance(getattr(type(self), key, None), cached_property)
-        ]:
-            del other.__dict__[name]
+        for name in vars(self):
+            if isinstance(getattr(type(self), name, None), cached_property):
+                del other.__dict__[name]
         return other
 
     @property
@@ -157,14 +150,10 @@ class Method(ABC):
     @property
     def unknown_fins(self) -> tuple[str, ...]:
         """Names of the fins whose model the networks have not learned; answers for them are wrong."""
-        known = self.fin_model
-        if known is None:
+        if self.fin_model is None:
             return ()
-        return tuple(
-            fin.name
-            for fin in self.layout.fins
-            if fin.model.type != known.type or fin.model.values() != known.values()
-        )
+        known, fins = (self.fin_model.type, self.fin_model.values()), self.layout.fins
+        return tuple(fin.name for fin in fins if (fin.model.type, fin.model.values()) != known)
 
 
 class LeastErrorMethod(Method):
@@ -177,9 +166,9 @@ class LeastErrorMethod(Method):
     def _solve(self, targets: Array, *, seed: int, previous: Array | None) -> Solution:
         """Solve for targets (N, 6); see `Method.solve`."""
 
-    def solve(self, targets: Array, *, flow: Array | None = None, **asked: Any) -> Solution:
+    def solve(self, targets: Array, *, flow: Array | None = None, **question: Any) -> Solution:
         if len(targets) == 0:
             return Solution(np.empty((0, self.layout.n, 3)))
         if (moved := self.at(flow)) is not self:
-            return moved.solve(targets, **asked)
-        return self._solve(targets, seed=asked.get("seed", 0), previous=asked.get("previous"))
+            return moved.solve(targets, **question)
+        return self._solve(targets, seed=question.get("seed", 0), previous=question.get("previous"))

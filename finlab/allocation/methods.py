@@ -21,11 +21,11 @@ METHODS: dict[str, tuple[str, str]] = {
     "dual": ("finlab.allocation.dual.method", "Dual"),
     "mdn": ("finlab.mdn.method", "Mdn"),
     "paper": ("finlab.paper.pipeline", "Paper"),
-    "qp": ("finlab.allocation.baselines.qp", "Qp"),
+    "qp": ("finlab.allocation.baselines.linear", "Qp"),
     "sqp": ("finlab.allocation.baselines.sqp", "Sqp"),
-    "px4": ("finlab.allocation.baselines.px4", "Px4"),
-    "ardusub": ("finlab.allocation.baselines.ardusub", "ArduSub"),
-    "analytic": ("finlab.allocation.baselines.analytic", "Analytic"),
+    "px4": ("finlab.allocation.baselines.autopilots", "Px4"),
+    "ardusub": ("finlab.allocation.baselines.autopilots", "ArduSub"),
+    "analytic": ("finlab.allocation.baselines.linear", "Analytic"),
     "ipopt": ("finlab.allocation.baselines.ipopt", "Ipopt"),
 }
 """Name -> module and class; modules are loaded only when their method is asked for."""
@@ -77,10 +77,9 @@ def choose_method(method: str, checkpoint: Checkpoint = None, **settings: Any) -
                 "leave it out"
             )
         return MethodChoice(kind, checked_settings(kind, settings))
-    if isinstance(checkpoint, TrainedWeights):
-        return MethodChoice(kind, checked_settings(kind, settings), checkpoint)
-    weights = read_checkpoint(resolve_checkpoint(checkpoint or LEARNED[method]))
-    return MethodChoice(kind, checked_settings(kind, settings), weights)
+    if not isinstance(checkpoint, TrainedWeights):
+        checkpoint = read_checkpoint(resolve_checkpoint(checkpoint or LEARNED[method]))
+    return MethodChoice(kind, checked_settings(kind, settings), checkpoint)
 
 
 def bundled_method(files: Files, source: str) -> MethodChoice:

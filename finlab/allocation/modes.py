@@ -13,7 +13,7 @@ import numpy as np
 from finlab.allocation.solution import Candidates, PlainData
 from finlab.arrays import Array
 from finlab.layout import Layout
-from finlab.layout.angles import wrapped
+from finlab.layout.axes import wrapped
 from finlab.physics import plant_of
 
 RESTING, STILL = 0.15, 0.01
@@ -65,33 +65,20 @@ class Mode(PlainData):
 
 
 def find_modes(candidates: Candidates, force: Array, lower: Array, upper: Array) -> tuple[Mode, ...]:
-    """The modes among candidates, in their order.
-
-    Args:
-        candidates: K alternatives, best first.
-        force: size of each fin's force (K, n) [N] by its own law, as `force_sizes` tells.
-        lower: lower limits (n, 3).
-        upper: upper limits (n, 3).
-    """
-    modes = []
+    """The modes among K candidates, best first, in their order, by the size of each fin's force (K, n) [N] as
+    `force_sizes` has it, and the lower and upper limits (n, 3)."""
+    modes, span = [], np.maximum(upper - lower, 1e-9)
     signatures = [mode_signature(*each) for each in zip(candidates.command, force, strict=True)]
     for members in cluster(signatures):
         first = members[0]
-        command = candidates.command[first]
-        span = np.maximum(upper - lower, 1e-9)
-        used = ((command - lower) / span)[:, :2]
-        modes.append(
-            Mode(
-                command=command,
-                err_norm=float(candidates.err_norm[first]),
-                effort=float(candidates.effort[first]),
-                power=float(candidates.power[first]),
-                saturation=float(np.clip(np.nanmax(used), 0.0, 1.0)),
-                still=tuple(np.flatnonzero(force[first] < STILL * force[first].max()).tolist()),
-                signature=signatures[first],
-                sources=tuple(dict.fromkeys(candidates.source[k] for k in members)),
-            )
-        )
+        figures = candidates.err_norm, candidates.effort, candidates.power
+        err_norm, effort, power = (float(row[first]) for row in figures)
+        command, own = candidates.command[first], force[first]
+        saturation = float(np.clip(np.nanmax(((command - lower) / span)[:, :2]), 0.0, 1.0))
+        still = tuple(np.flatnonzero(own < STILL * own.max()).tolist())
+        sources = tuple(dict.fromkeys(candidates.source[k] for k in members))
+        signature = signatures[first]
+        modes.append(Mode(command, err_norm, effort, power, saturation, still, signature, sources))
     return tuple(modes)
 
 
@@ -128,8 +115,7 @@ def signature_difference(a: ModeSignature, b: ModeSignature) -> Array:
     """How `b` differs from `a` (3, n) in direction, thrust and style; 1 is what counts as different."""
     turn = wrapped(b.direction - a.direction) / SAME_DIRECTION
     rest = np.array([b.thrust - a.thrust, b.style - a.style]) / SAME_SIZE
-    difference: Array = np.nan_to_num(np.concatenate([turn[None], rest]))
-    return difference
+    return np.asarray(np.nan_to_num(np.concatenate([turn[None], rest])))
 
 
 def same_signature(a: ModeSignature, b: ModeSignature) -> bool:

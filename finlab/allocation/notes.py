@@ -1,20 +1,19 @@
-"""What the user should know of a robot's fins before trusting any answer, whatever the method."""
+"""Sentences that the user should read of a robot before trusting any answer, whatever the method."""
 
 from functools import lru_cache
 
 import numpy as np
 
-from finlab.actuators.fin.models import file_stamps
+from finlab.actuators.fin.fin_laws import file_stamps
+from finlab.actuators.registry import KINDS
 from finlab.allocation.method import Method
 from finlab.arrays import Array
 from finlab.layout import FinModelSpec, Layout, Limits
-from finlab.layout.angles import wrapped
+from finlab.layout.axes import axes_in, wrapped
 from finlab.layout.force_table_file import DOUBT
-from finlab.layout.rudder import Rudder
-from finlab.layout.wrench_axes import axes_in
-from finlab.physics import FinLaw, TableLaw, make_law, plant_of
+from finlab.physics import FinLaw, TableLaw, make_law
 from finlab.precision import NEARLY
-from finlab.uncertainty.grid_error import grid_uncertainty
+from finlab.uncertainty.table_error import grid_uncertainty
 
 RESTLESS = 0.05
 """Share of its largest force below which a fin counts as able to rest."""
@@ -37,8 +36,8 @@ def answer_notes(
     of the method's `own`, what is asked of axes that nothing drives or that do not count, and fins that the
     networks of a checkpoint do not know."""
     notes = fin_notes(layout, flow) + own
-    asked = np.asarray((np.abs(target) > NEARLY * method.scale).reshape(-1, 6).any(axis=0))
-    named = axes_in(asked)
+    wanted = np.asarray((np.abs(target) > NEARLY * method.scale).reshape(-1, 6).any(axis=0))
+    named = axes_in(wanted)
     if left := [axis for axis in named if axis in method.undriven]:
         notes = (*notes, f"no actuator gives {' or '.join(left)}: what is asked of it is left out")
     if left := [axis for axis in named if axis not in layout.axes]:
@@ -58,60 +57,48 @@ def answer_notes(
 
 def fin_notes(layout: Layout, flow: Array | None = None) -> tuple[str, ...]:
     """Returns a sentence for each fin that cannot rest, and for each that may leave its table; before them,
-    why the layout itself is not to be trusted, where its description begins so. After them, what rudders give
-    at rest, or that a flow (6,) is given which no actuator feels.
+    why the layout itself is not to be trusted, where its description begins so. After them, what needs the
+    flow and has none, what a flow (6,) leaves unknown, or that no actuator feels it.
 
-    Neither is an error: a servo may be stuck, or a fin may have been damaged so that it runs on.
+    None is an error: a servo may be stuck, or a fin may have been damaged so that it runs on.
     """
-    notes = _made(layout, file_stamps(layout))
+    notes, kinds = _made(layout, file_stamps(layout)), [KINDS[part.type] for part in layout.actuators]
+    parts = list(zip(layout.actuators, kinds, strict=True))
+    foils = [part for part, kind in parts if kind.feels_flow]
+    if flow is None and not foils:
+        return notes
     if flow is None:
-        return notes + _at_rest(layout)
-    if plant_of(layout).feels_flow:
-        return notes + _not_at_speed(layout)
-    return (
-        *notes,
-        f"the flow is without effect: layout {layout.name} has no rudder, and what speed through the water "
-        "takes from other actuators is not known",
-    )
-
-
-def _at_rest(layout: Layout) -> tuple[str, ...]:
-    """The sentence about rudders, which need water that flows past them."""
-    if layout.is_of_fins:
-        return ()
-    names = [part.name for part in layout.actuators if isinstance(part, Rudder)]
-    if not names:
-        return ()
-    them = f"rudder {names[0]} gives" if len(names) == 1 else f"rudders {', '.join(names)} give"
-    return (f"{them} nothing at rest; tell how the robot moves through the water (flow)",)
-
-
-def _not_at_speed(layout: Layout) -> tuple[str, ...]:
-    """The sentence about tables, which tell forces at rest."""
-    others = [part for part in layout.actuators if not isinstance(part, Rudder)]
-    names = [part.name for part in others if part.model.type == "table"]
-    if not names:
-        return ()
-    return (f"the tables of {', '.join(names)} hold forces at rest; what speed changes is not known",)
+        names, one = ", ".join(part.name for part in foils), len(foils) == 1
+        them = f"{foils[0].type}{'' if one else 's'} {names} {'gives' if one else 'give'}"
+        return (*notes, f"{them} nothing at rest; tell how the robot moves through the water (flow)")
+    if not foils:
+        kind = next(name for name, kind in KINDS.items() if kind.feels_flow)
+        return (
+            *notes,
+            f"the flow is without effect: layout {layout.name} has no {kind}, and what speed through the "
+            "water takes from other actuators is not known",
+        )
+    models = {part.name: getattr(part, "model", None) for part, kind in parts if not kind.feels_flow}
+    tables = ", ".join(name for name, model in models.items() if model and model.type == "table")
+    speed = (f"the tables of {tables} hold forces at rest; what speed changes is not known",)
+    return notes + (speed if tables else ())
 
 
 @lru_cache(maxsize=256)
 def _made(layout: Layout, stamps: tuple[tuple[int, int] | None, ...]) -> tuple[str, ...]:
     first = layout.description.partition("\n")[0]
-    head = (f"layout {layout.name} is {first}",) if first.startswith(DOUBT) else ()
-    return head + tuple(
-        note.replace("{name}", fin.name)
-        for fin, stamp in zip(layout.fins, stamps, strict=True)
-        for note in _notes_of(fin.model, fin.limits, stamp)
-    )
+    notes = [f"layout {layout.name} is {first}"] if first.startswith(DOUBT) else []
+    for fin, stamp in zip(layout.fins, stamps, strict=True):
+        notes += [note.replace("{name}", fin.name) for note in _notes_of(fin.model, fin.limits, stamp)]
+    return tuple(notes)
 
 
 @lru_cache(maxsize=1024)
 def _notes_of(model: FinModelSpec, limits: Limits, stamp: tuple[int, int] | None) -> tuple[str, ...]:
     """The sentences about any fin of a model within limits, with a place for its name."""
     law = make_law(model)
-    told = law.notes if isinstance(law, TableLaw) else ()
-    doubts = [f"the model of fin {{name}} is {note}" for note in told if note.startswith(DOUBT)]
+    known = law.notes if isinstance(law, TableLaw) else ()
+    doubts = [f"the model of fin {{name}} is {note}" for note in known if note.startswith(DOUBT)]
     return (*doubts, *_restless(law, limits), *_beyond_table(law, limits))
 
 
@@ -131,17 +118,17 @@ def _restless(law: FinLaw, limits: Limits) -> list[str]:
 def _beyond_table(law: FinLaw, limits: Limits) -> list[str]:
     if not isinstance(law, TableLaw):
         return []
-    asked = [("half amplitudes", "rad", limits.amplitude), ("frequencies", "Hz", limits.frequency)]
+    ends = [("half amplitudes", "rad", limits.amplitude), ("frequencies", "Hz", limits.frequency)]
     if not law.periodic:
         middle = 0.5 * sum(law.covers[2])
         turn = 0.5 * sum(limits.zero_direction) - middle
         shift = float(wrapped(turn)) - turn
         low, high = (end + shift for end in limits.zero_direction)
-        asked.append(("zero directions", "rad", (low, high)))
+        ends.append(("zero directions", "rad", (low, high)))
     notes = [
         f"fin {{name}} may be asked for {name} of {low:.3g} to {high:.3g} {unit}, "
         f"its table holds {covered[0]:.3g} to {covered[1]:.3g}: beyond, its edge is taken"
-        for (name, unit, (low, high)), covered in zip(asked, law.covers, strict=False)
+        for (name, unit, (low, high)), covered in zip(ends, law.covers, strict=False)
         if low < covered[0] - BEYOND or high > covered[1] + BEYOND
     ]
     if few := [AXES_OF_TABLES[k] for k in grid_uncertainty(law).error.few]:

@@ -1,4 +1,4 @@
-"""What to do when a robot cannot deliver the wrench it is asked for."""
+"""Policies for wrenches that a robot cannot deliver."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,18 +7,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from finlab.actuators.registry import KINDS as ACTUATORS
 from finlab.arrays import Array
 from finlab.errors import CommandError
 from finlab.layout import Layout
-from finlab.layout.angles import is_full_turn
-from finlab.layout.wrench_axes import AXES as AXES
-from finlab.layout.wrench_axes import mask_of
+from finlab.layout.axes import AXES as AXES
+from finlab.layout.axes import is_full_turn, mask_of
 
 KINDS = ("closest", "direction", "priority")
 """`closest`: least weighted error. `direction`: the same direction, scaled down. `priority`: groups of axes,
 each served as far as those before it allow."""
-ANGLES = {"fin": 2, "thruster": -1, "azimuth": 0, "tilt": 0, "rudder": 0}
-"""Which of an actuator's commands is an angle, by its type; -1 for none."""
 
 
 @dataclass(frozen=True)
@@ -89,14 +87,15 @@ def limits_reached(layout: Layout, command: Array) -> tuple[str, ...]:
     for part, row in zip(layout.actuators, command, strict=True):
         if np.isnan(row).any():
             continue
-        low, high = np.array(part.lower), np.array(part.upper)
+        low, high, kind = np.array(part.lower), np.array(part.upper), ACTUATORS[part.type]
+        pushes, angle = not kind.feels_flow, -1 if kind.angle is None else kind.angle
+        angle = angle if pushes else 0  # all that a foil is told
         slack = 1e-3 * (high - low) + 1e-9
         at_low, at_high = row <= low + slack, row >= high - slack
-        angle = ANGLES[part.type]
         sizes = np.arange(3) != angle
-        if part.type != "rudder" and (at_high | (at_low & (low < 0.0)))[sizes].all():
+        if pushes and (at_high | (at_low & (low < 0.0)))[sizes].all():
             sentences.append(f"{part.name} at full thrust")
-        rests = part.type != "rudder" and at_low[sizes].all()
+        rests = pushes and at_low[sizes].all()
         stops = angle >= 0 and not is_full_turn(high[angle] - low[angle])
         if stops and not rests and (at_low | at_high)[angle]:
             sentences.append(f"{part.name} at the end of its arc")

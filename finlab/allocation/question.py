@@ -1,4 +1,4 @@
-"""What an allocator is asked: checked wrenches, previous commands, failed and damaged fins."""
+"""Checks of a question: wrenches, previous commands, flow, failed and damaged actuators."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -10,8 +10,8 @@ from finlab.allocation.solution import among_all
 from finlab.arrays import Array
 from finlab.errors import AllocationError, CommandError
 from finlab.layout import Layout
+from finlab.layout.axes import AXES, Axis, axes_in
 from finlab.layout.damage import Health
-from finlab.layout.wrench_axes import AXES, Axis, axes_in
 
 MAX_WRENCH = 1e6
 """Largest magnitude of a target component [N, N m]; beyond it something is wrong upstream."""
@@ -24,11 +24,11 @@ Axes = tuple[Axis, ...]
 """Axes that a question asks for."""
 
 
-class Fins(NamedTuple):
-    """Which fins there are, and which of them an allocator may use."""
+class Usable(NamedTuple):
+    """The actuators of a robot, and which of them an allocator may use."""
 
     layout: Layout
-    """All fins, with the limits that damage has left."""
+    """All of them, with the limits that damage has left."""
     failed: tuple[str, ...]
     """Names of those that are left out."""
     healthy: Layout
@@ -37,31 +37,30 @@ class Fins(NamedTuple):
     """Mask (n,) of the others."""
 
     def among_all(self, command: Array) -> Array:
-        """Commands (..., m, 3) of the healthy fins put among all n; the failed ones hold NaN."""
+        """Commands (..., m, 3) of the healthy ones put among all n; the failed ones hold NaN."""
         return among_all(command, self.alive)
 
 
-def usable_fins(layout: Layout, failed: Sequence[str], health: Health | None = None) -> Fins:
-    """The fins of a robot some of which are lost or damaged.
+def usable(layout: Layout, failed: Sequence[str], health: Health | None = None) -> Usable:
+    """A robot some of whose actuators are lost or damaged.
 
     Raises:
         AllocationError: `failed` is no list of names, `health` no `Health`.
-        LayoutError: an unknown fin, or none left.
+        LayoutError: an unknown actuator, or none left.
     """
     if health is not None:
         if not isinstance(health, Health):
             raise AllocationError(f"health: expected a Health, got {health!r}; make one with Health.of")
         layout = health.applied_to(layout)
     if failed == () or failed == []:
-        return Fins(layout, (), layout, np.ones(layout.n, dtype=bool))
-    if isinstance(failed, str):
-        raise AllocationError(
-            f"failed: expected a list of fin names, got the text {failed!r}; write [{failed!r}]"
-        )
-    if not isinstance(failed, Sequence) or not all(isinstance(name, str) for name in failed):
-        raise AllocationError(f"failed: expected a list of fin names, got {failed!r}")
+        return Usable(layout, (), layout, np.ones(layout.n, dtype=bool))
+    if isinstance(failed, str) or not (
+        isinstance(failed, Sequence) and all(isinstance(name, str) for name in failed)
+    ):
+        hint = f"the text {failed!r}; write [{failed!r}]" if isinstance(failed, str) else repr(failed)
+        raise AllocationError(f"failed: expected a list of fin names, got {hint}")
     alive = np.array([name not in set(failed) for name in layout.names])
-    return Fins(layout, tuple(failed), layout.without(failed), alive)
+    return Usable(layout, tuple(failed), layout.without(failed), alive)
 
 
 def _numbers(values: ArrayLike, name: str, expected: str, copy: bool = True) -> Array:
@@ -98,15 +97,15 @@ def axes_of(layout: Layout, wrench: Array) -> Axes | None:
     Raises:
         CommandError: there is none.
     """
-    asked = layout.commanded & ~np.isnan(wrench)
-    if (asked == layout.commanded).all():
+    counts = layout.commanded & ~np.isnan(wrench)
+    if (counts == layout.commanded).all():
         return None
-    if not asked.any():
+    if not counts.any():
         raise CommandError(
             f"wrench: NaN on each axis that layout {layout.name} commands ({', '.join(layout.axes)}), "
             "expected a number on one of them"
         )
-    return axes_in(asked)
+    return axes_in(counts)
 
 
 def same_axes(layout: Layout, wrenches: Array) -> list[tuple[Axes | None, NDArray[np.intp] | None]]:
@@ -141,7 +140,7 @@ def check_flow(flow: ArrayLike | None) -> Array | None:
 
 
 def check_layout(layout: object) -> None:
-    """Refuse what is no layout."""
+    """Refuses what is no layout."""
     if not isinstance(layout, Layout):
         raise AllocationError(
             f"layout: expected a Layout, got {layout!r:.60}; read a file with finlab.load_layout"
@@ -149,13 +148,13 @@ def check_layout(layout: object) -> None:
 
 
 def check_seed(seed: object) -> None:
-    """Refuse seeds that are no whole number from 0."""
+    """Refuses seeds that are no whole number from 0."""
     if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
         raise AllocationError(f"seed: expected a whole number from 0, got {seed!r}")
 
 
 def check_previous(previous: ArrayLike, layout: Layout) -> Array:
-    """The previous command (n, 3), failed fins may hold NaN."""
+    """The previous command (n, 3), in which failed actuators may hold NaN."""
     array = _numbers(previous, "previous", f"a command of shape ({layout.n}, 3)")
     if np.isinf(array).any():
         raise CommandError("previous: expected finite commands (NaN only for failed fins), got infinity")

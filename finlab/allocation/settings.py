@@ -1,13 +1,14 @@
-"""What can be set of a method: one frozen dataclass for each, whose fields carry range, unit and meaning.
+"""Settings of methods: one frozen dataclass for each, whose fields carry range, unit and meaning.
 
 All that asks for settings (a call, a bundle, the app) makes such an object, which checks itself.
 """
 
 from dataclasses import Field, dataclass, field, fields
 from numbers import Integral, Real
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 from finlab.errors import AllocationError
+from finlab.physics.objective import Name
 
 MOST_CANDIDATES = 4096
 """Most candidates that may be drawn; more would keep a robot from answering."""
@@ -36,8 +37,7 @@ class Range(NamedTuple):
 def number(
     default: float | None, low: float, high: float, meaning: str, unit: str = "", *, above: bool = False
 ) -> Any:
-    """A field that is a number within a range, a whole one where `low` is; None is allowed where it is the
-    default."""
+    """A field that is a number within a range, a whole one where `low` is; None only as the default."""
     return field(default=default, metadata={"range": Range(low, high, meaning, unit, above)})
 
 
@@ -66,25 +66,35 @@ class Settings:
 
 def _checked(setting: "Field[Any]", value: Any) -> Any:
     """The value of a field, of the kind that is meant."""
-    name, choices, limits = setting.name, setting.metadata.get("choices"), setting.metadata.get("range")
-    expected = None
-    if choices is not None:
-        expected = None if value in choices else f"one of {', '.join(choices)}"
-    elif limits is not None:
+    choices, limits = setting.metadata.get("choices"), setting.metadata.get("range")
+    if limits is not None:
         return _within(setting, limits, value)
-    elif not isinstance(value, bool):
-        expected = "true or false"
-    if expected is not None:
-        raise AllocationError(f"{name}: expected {expected}, got {value!r:.60}")
-    return value
+    if isinstance(value, bool) if choices is None else value in choices:
+        return value
+    expected = "true or false" if choices is None else f"one of {', '.join(choices)}"
+    raise AllocationError(f"{setting.name}: expected {expected}, got {value!r:.60}")
 
 
 def _within(setting: "Field[Any]", limits: Range, value: Any) -> float | None:
     if value is None and setting.default is None:
         return None
-    whole = isinstance(limits.low, int)
-    kind: Any = Integral if whole else Real
+    integer = isinstance(limits.low, int)
+    kind: Any = Integral if integer else Real
     right = isinstance(value, kind) and not isinstance(value, bool)
     if right and limits.low <= value <= limits.high and not (limits.above and value == limits.low):
-        return int(value) if whole else float(value)
+        return int(value) if integer else float(value)
     raise AllocationError(f"{setting.name}: expected {limits}, got {value!r:.60} ({limits.meaning})")
+
+
+@dataclass(frozen=True)
+class MdnSettings(Settings):
+    """Settings of method `mdn`: how many ways the mixture proposes, and how many of them are refined."""
+
+    objective: ClassVar[Name] = "effort"
+    """What is kept least."""
+    n_candidates: int = number(
+        48, 1, MOST_CANDIDATES, "proposals K: the components' means by falling weight, then samples"
+    )
+    n_refined: int = number(6, 1, 256, "proposals that are refined and offered as candidates")
+    temperature: float = number(1.0, 0.0, 100.0, "what the variances of the samples are multiplied by")
+    period_s: float = number(0.1, 0.0, 1000.0, "time between ticks", "s", above=True)

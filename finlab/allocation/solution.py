@@ -1,4 +1,4 @@
-"""What a method hands over before it has been evaluated, and what makes a result plain data."""
+"""Solutions that methods hand over before they are judged, and the base of plain data."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields
@@ -128,9 +128,9 @@ def joined(parts: Iterable[tuple[Rows, Solution]], count: int, alive: NDArray[np
             wrench[rows] = part.wrench
 
     def bound(command: Array) -> Array:
-        found = np.empty(count)
+        result = np.empty(count)
         for rows, part in bounds:
-            found[rows] = part(command[rows][:, places])
-        return found
+            result[rows] = part(command[rows][:, places])
+        return result
 
     return Solution(command, bound if bounds else None, wrench, notes=tuple(notes))

@@ -1,11 +1,13 @@
-"""The yardstick of a robot: what an error in its wrench is compared with, forces and torques each by one
-number."""
+"""The yardstick of a robot, with which errors are compared, and the figures by which methods are judged."""
+
+from functools import lru_cache
 
 import numpy as np
 
 from finlab.arrays import Array
 from finlab.layout import Layout
-from finlab.physics.plant import Plant
+from finlab.physics.objective import EffortMeter
+from finlab.physics.plant import Plant, plant_of
 
 STEPS = (9, 9, 17)
 """Values of each of its three numbers that an actuator is tried with, evenly spread over its limits."""
@@ -31,3 +33,28 @@ def yardstick(layout: Layout) -> Array:
     scale = np.repeat([force, max(torque, LEAST_LEVER * force)], 3)
     scale.setflags(write=False)
     return scale
+
+
+REACHED = 1e-3
+"""Share of the yardstick up to which an error is none: the wrench counts as delivered."""
+
+
+def judged_power(plant: Plant, command: Array) -> Array:
+    """Mean mechanical power (N,) [W] of commands (N, n, 3); what has failed (NaN) takes none."""
+    return np.asarray(np.nansum(plant.power(command), axis=-1))
+
+
+def judged_effort(layout: Layout, command: Array) -> Array:
+    """Effort `J_en` (N,) of commands (N, n, 3), the paper's energy proxy, without what has failed (NaN)."""
+    failed = np.isnan(command).any(axis=-1, keepdims=True)
+    return np.asarray(_meter(layout)(np.where(failed, 0.0, command) if failed.any() else command))
+
+
+def costs(layout: Layout, command: Array) -> tuple[Array, Array]:
+    """Effort (K,) and power (K,) [W] of commands (K, n, 3) of fins that all work."""
+    return _meter(layout)(command), judged_power(plant_of(layout), command)
+
+
+@lru_cache(maxsize=256)
+def _meter(layout: Layout) -> EffortMeter:
+    return EffortMeter(layout.upper)

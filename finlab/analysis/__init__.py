@@ -1,4 +1,4 @@
-"""What a layout can do, and how to improve it: authority, attainable sets, power, score cards, optimization.
+"""Abilities of a layout, and their improvement: authority, attainable sets, power, score cards, optimization.
 
 It works from the actuators' own laws with numpy and scipy.
 """
@@ -9,13 +9,13 @@ from finlab.analysis.authority import Loss as Loss
 from finlab.analysis.authority import authority as authority
 from finlab.analysis.authority import losses as losses
 from finlab.analysis.goals import GOALS as GOALS
-from finlab.analysis.least_power import least_power as least_power
 from finlab.analysis.moves import Bounds as Bounds
 from finlab.analysis.moves import mirror_pairs as mirror_pairs
 from finlab.analysis.optimize import Improvement as Improvement
 from finlab.analysis.optimize import Progress as Progress
 from finlab.analysis.optimize import optimize_layout as optimize_layout
 from finlab.analysis.score_card import ScoreCard as ScoreCard
+from finlab.analysis.score_card import least_power as least_power
 from finlab.analysis.score_card import score_card as score_card
 from finlab.forces.attainable import AttainableSet as AttainableSet
 from finlab.forces.attainable import attainable_set as attainable_set

@@ -1,4 +1,4 @@
-"""Which axes the actuators hold, how evenly, and what the loss of each single one costs."""
+"""Axes that the actuators hold, how evenly, and what the loss of each single one costs."""
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
@@ -8,12 +8,11 @@ from numpy.typing import ArrayLike
 
 from finlab.arrays import Array
 from finlab.errors import LayoutError
-from finlab.forces.extent import RANK_TOLERANCE, singular_values, weakest
 from finlab.forces.force_sets import SCALE, ForceSets, force_sets
-from finlab.forces.reach import max_wrench_along_exactly
+from finlab.forces.reach import RANK_TOLERANCE, max_wrench_along_exactly, singular_values, weakest
 from finlab.layout import Layout
-from finlab.layout.wrench_axes import AXES as WRENCH
-from finlab.layout.wrench_axes import Axis
+from finlab.layout.axes import AXES as WRENCH
+from finlab.layout.axes import Axis
 
 AXES = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 NOTHING = 1e-4

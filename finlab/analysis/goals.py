@@ -1,4 +1,4 @@
-"""What a layout may be improved towards, measured for many variants of one layout at once.
+"""Goals of improving a layout, measured for many variants of one layout at once.
 
 A search asks for quick measures, which are within about a percent of the fine ones on the score card.
 Actuators whose arc is wider than half a turn count with the convex hull of what they can push.
@@ -11,14 +11,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from finlab.allocation import Allocator
-from finlab.allocation.evaluate import REACHED
+from finlab.allocation.yardstick import REACHED
 from finlab.analysis.authority import AXES, authority, commanded_axes, named_axes
 from finlab.arrays import Array
 from finlab.errors import LayoutError
-from finlab.forces.extent import weakest
 from finlab.forces.force_sets import ForceSets, force_sets
+from finlab.forces.reach import weakest
 from finlab.layout import Layout
-from finlab.layout.wrench_axes import AXES as WRENCH
+from finlab.layout.axes import AXES as WRENCH
 
 GoalName = Literal["weakest_direction", "mission_power", "worst_single_failure"]
 GOALS: tuple[GoalName, ...] = get_args(GoalName)
@@ -103,9 +103,9 @@ def axes_to_raise(layout: Layout, flow: Array | None = None) -> tuple[str, ...]:
     back = 0.0 if sets.back is None else sets.back[0]
     one_way = (sets.half[0] <= 0.5 * np.pi) & ~sets.cornered[0] & (back == 0.0)
     # What pushes one way only has to be one more than there are axes.
-    asked = commanded_axes(layout)
-    if _directions(sets).sum() > len(asked) - (not one_way.any()):
-        return asked
+    commanded = commanded_axes(layout)
+    if _directions(sets).sum() > len(commanded) - (not one_way.any()):
+        return commanded
     held = authority(layout, flow=flow).reachable
     if not held:
         raise LayoutError(

@@ -1,4 +1,4 @@
-"""Which actuators may move, how far, and which one is the mirror image of which.
+"""Moves of actuators: which may move, how far, and which one is the mirror image of which.
 
 An actuator goes along x, y and z, turns about the vertical, and tilts about the horizontal line across its
 main axis: shaft, axis of a thruster, or turn_axis.
@@ -18,9 +18,9 @@ from finlab.arrays import Array
 from finlab.errors import LayoutError
 from finlab.forces.force_sets import ForceSets, assembled, shapes_of
 from finlab.layout import Layout
-from finlab.layout.actuator import Actuator
-from finlab.layout.arrays import moved_effectiveness
 from finlab.layout.directions import MIRROR, replaced, with_axes
+from finlab.layout.effectiveness import moved_effectiveness
+from finlab.layout.layout import Actuator
 
 MIRROR_TOLERANCE = 1e-3
 """How far [m, rad] two actuators may be from each other's mirror image and still count as a pair."""
@@ -141,14 +141,14 @@ class Moves:
         self._angle = np.array([azimuth(part) for part in layout.actuators])
         box = np.concatenate([bounds[name].pairs for name in leaders])  # (5 leaders, 2)
         held = np.concatenate([[*self.start_position[i], self._angle[i], 0.0] for i in self._lead])
-        self._whole = np.clip(held, box[:, 0], box[:, 1])
+        self._held = np.clip(held, box[:, 0], box[:, 1])
         self._free = box[:, 1] - box[:, 0] > 0.0
         if not self._free.any():
             raise LayoutError("the bounds leave nothing free to move; widen them")
         self.lower, self.upper = box[self._free].T
         """Bounds of the free numbers (D,)."""
         self._step = np.tile([grid[0]] * 3 + [grid[1]] * 2, len(leaders))[self._free]
-        self.start = self._whole[self._free]
+        self.start = self._held[self._free]
         """Where the actuators are now, brought within bounds (D,)."""
 
     def keep_alone(self, axes: Sequence[str]) -> None:
@@ -165,9 +165,9 @@ class Moves:
 
     def geometry(self, vectors: Array) -> tuple[Array, Array]:
         """Returns positions (P, n, 3) [m] and own axes (P, n, 3, 3) of vectors (P, D)."""
-        whole = np.tile(self._whole, (len(vectors), 1))
-        whole[:, self._free] = self._on_grid(vectors)
-        moved = whole.reshape(len(vectors), len(self._lead), 5)
+        numbers = np.tile(self._held, (len(vectors), 1))
+        numbers[:, self._free] = self._on_grid(vectors)
+        moved = numbers.reshape(len(vectors), len(self._lead), 5)
         position = np.tile(self.start_position, (len(vectors), 1, 1))
         frames = np.tile(self.layout.frames, (len(vectors), 1, 1, 1))
         for k, (lead, twin) in enumerate(zip(self._lead, self._twin, strict=True)):

@@ -95,7 +95,7 @@ def optimize_layout(
         seed: of its random numbers.
         clearance: least distance between actuators [m]; those that are closer already need not part.
         rule: another one that they have to keep, such as to stand outside of a hull.
-        grid: steps [m], [rad] of the coordinates and angles that are found; 0 for any number.
+        grid: steps [m], [rad] of the coordinates and angles that are tried; 0 for any number.
         axes: axes whose directions count for the two goals of directions, with anything on the others; all
             that the layout commands when None, or, with too few actuators for them, those that are pushed
             alone now, of which no move of a single coordinate costs one.
@@ -126,8 +126,8 @@ def optimize_layout(
         return float(measure(force_sets(robot, flow=water), lambda _: robot)[0])
 
     before = measured(layout)
-    found, stopped = _search(moves, quick, before, clearance, broken, rounds, seed, progress, cancelled)
-    best = moves.moved(found)
+    best_vector, stopped = _search(moves, quick, before, clearance, broken, rounds, seed, progress, cancelled)
+    best = moves.moved(best_vector)
     after = measured(best)
     best = replace(best, axes=start.axes)
     wrong = [float(broken(robot.position[None], robot.frames[None])[0]) for robot in (layout, best)]
@@ -161,7 +161,7 @@ def _search(
 ) -> tuple[Array, bool]:
     """The best vector (D,), and whether the search was stopped."""
     needed = np.minimum(_gaps(moves.start_position[None])[0], clearance)
-    best, least, found, done, stopped = before, np.inf, moves.start, 0, False
+    best, least, best_vector, done, stopped = before, np.inf, moves.start, 0, False
 
     def chunk_cost(effectiveness: Array) -> tuple[Array, float]:
         """Costs (P,), and the best measure of a variant that keeps all rules."""
@@ -171,7 +171,7 @@ def _search(
         return np.asarray(-value + PENALTY * close), float(value[close <= 0.0].max(initial=-np.inf))
 
     def cost(vectors: Array) -> Array:
-        nonlocal best, least, found
+        nonlocal best, least, best_vector
         rows, costs = vectors.reshape(len(moves.start), -1).T, list[Array]()
         chunks = [rows[k : k + CHUNK] for k in range(0, len(rows), CHUNK)]
         valued = map_parts(chunk_cost, chunks)
@@ -182,7 +182,7 @@ def _search(
             costs.append(some)
             best = max(best, fine)
             if some.min() < least:
-                least, found = some.min(), chunk[np.argmin(some)]
+                least, best_vector = some.min(), chunk[np.argmin(some)]
         return np.concatenate(costs)
 
     def after_round(vector: Array, convergence: float) -> bool:
@@ -206,7 +206,7 @@ def _search(
         updating="deferred",
         callback=after_round,  # type: ignore[arg-type]  # True stops it
     )
-    return found, stopped  # rows that were not looked at any more count as bad, so not scipy's own
+    return best_vector, stopped  # rows that were not looked at any more count as bad, so not scipy's own
 
 
 def _gaps(position: Array) -> Array:

@@ -1,4 +1,4 @@
-"""What a layout can do, for one glance, and what of it is computed in a millisecond."""
+"""Score card of a layout, for one glance, and what of it is computed in a millisecond."""
 
 from collections.abc import Collection
 from dataclasses import asdict, dataclass
@@ -7,7 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from finlab.allocation import Allocator
 from finlab.allocation.question import check_flow
+from finlab.allocation.yardstick import REACHED
 from finlab.analysis.authority import (
     AXES,
     Authority,
@@ -17,10 +19,30 @@ from finlab.analysis.authority import (
     held_axes,
     losses,
 )
-from finlab.analysis.least_power import least_power
 from finlab.arrays import Array
 from finlab.forces.force_sets import MAX_CUT, force_sets, wide_arcs
 from finlab.layout import Layout
+
+
+def least_power(
+    layout: Layout,
+    wrenches: ArrayLike,
+    *,
+    failed: Collection[str] = (),
+    flow: ArrayLike | None = None,
+) -> Array:
+    """Returns the least power [W] for each wrench (N, 6) [N, N m]: (N,), NaN where it is out of reach; `flow`
+    as for an allocator.
+
+    Raises:
+        LayoutError: there is no actuator of a name in `failed`.
+    """
+    wanted = np.asarray(wrenches, dtype=np.float64).reshape(-1, 6)
+    if len(set(layout.indices(tuple(failed)))) == layout.n:
+        return np.where((wanted == 0.0).all(-1), 0.0, np.nan)
+    answer = Allocator(layout).allocate_batch(wanted, failed=tuple(failed), flow=flow)
+    return np.where(answer.err_norm <= REACHED, answer.power, np.nan)
+
 
 UNIT = (1.0, 1.0, 1.0, 0.1, 0.1, 0.1)
 """Wrench along each axis whose least power is given [N, N m]."""

@@ -13,9 +13,9 @@ from contextlib import redirect_stdout
 from tyro.extras import SubcommandApp
 
 from finlab import __version__
+from finlab.assets import EXTRAS, install
 from finlab.cli.shared_options import with_json_file
 from finlab.command_end import FAILED, exit_code
-from finlab.distribution import EXTRAS, install
 from finlab.errors import FinlabError
 
 EXAMPLES = {

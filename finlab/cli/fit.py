@@ -30,8 +30,7 @@ def fin(
         seed: draws samples where there are too many.
     """
     from finlab.files.worker import in_worker
-    from finlab.fit.fin_file import check_table_path, summary, write_fin
-    from finlab.fit.fin_fit import fit_fin
+    from finlab.fit.fin_fit import check_table_path, fit_fin, summary, write_fin
     from finlab.fit.measurements import read_measurements
 
     check_table_path(output)
@@ -61,10 +60,9 @@ def actuator(
     """
     from finlab.errors import DataError
     from finlab.files.worker import in_worker
-    from finlab.fit.fin_file import check_table_path
+    from finlab.fit.fin_fit import check_table_path
     from finlab.fit.thruster_bench import read_bench
-    from finlab.fit.thruster_file import layout_lines, summary, thruster_csv
-    from finlab.fit.thruster_fit import fit_thruster
+    from finlab.fit.thruster_fit import fit_thruster, layout_lines, summary, thruster_csv
     from finlab.whole_file import write_whole
 
     check_table_path(output)
@@ -97,10 +95,9 @@ def robot(
     """
     from finlab.errors import DataError
     from finlab.files.worker import in_worker
-    from finlab.fit.robot.fitted_layout import write_robot
-    from finlab.fit.robot.report import summary, table
+    from finlab.fit.robot.fitted_robot import summary, table, write_robot
     from finlab.fit.robot.robot_fit import fit_robot
-    from finlab.fit.robot.swim_file import read_swim
+    from finlab.fit.robot.swim import read_swim
 
     if output.suffix.lower() not in (".yaml", ".yml", ".json"):
         raise DataError(

@@ -5,8 +5,8 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from finlab.analysis import AXES, Authority, Improvement, Loss, ScoreCard
+from finlab.command_end import aligned
 from finlab.layout import Actuator, Azimuth, Fin, Layout, Rudder
-from finlab.text_table import aligned
 
 _UNITS = ("N", "N", "N", "N m", "N m", "N m")
 COLUMNS = ("actuator", "type", "x [m]", "y [m]", "z [m]", "direction", "limits")

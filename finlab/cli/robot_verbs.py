@@ -62,7 +62,7 @@ def allocate(
     """
     from finlab.allocation import Allocator, Health
     from finlab.allocation.policy import policy_from
-    from finlab.deploy.record import allocation_record
+    from finlab.allocation.report import allocation_record
 
     check_json_file(json)
     if any(map(isnan, wrench)) and not any(value for value in wrench if not isnan(value)):
@@ -141,11 +141,10 @@ def app(
         host: address to listen on; the default is reachable from this machine only.
         port: port to listen on.
     """
-    from finlab.assets import webapp_dir
-    from finlab.distribution import install
+    from finlab.assets import install, shipped
 
     # In a wheel it travels inside this package: an installation has no top-level package of so plain a name.
-    if (home := str(webapp_dir().parent)) not in sys.path:
+    if (home := str(shipped("webapp").parent)) not in sys.path:
         sys.path.insert(0, home)
     try:
         from webapp.serving import serve

@@ -11,6 +11,7 @@ from tyro.conf import Positional, UseAppendAction, arg
 
 from finlab.cli.shared_options import open_robot
 from finlab.errors import FinlabError
+from finlab.files.worker import in_worker
 from finlab.whole_file import make_folder
 
 if TYPE_CHECKING:
@@ -29,6 +30,7 @@ def simulate(
     monitor: bool = False,
     learn: bool = False,
     method: Annotated[str, arg(metavar="NAME")] = "dual",
+    controller: Annotated[str, arg(metavar="NAME")] = "tracking",
     duration: Annotated[float | None, arg(metavar="SECONDS")] = None,
     truth: Annotated[str | None, arg(metavar="LAYOUT")] = None,
     current: Annotated[tuple[float, float, float], arg(metavar="VX VY VZ")] = (0.0, 0.0, 0.0),
@@ -55,6 +57,7 @@ def simulate(
         learn: every minute fit the actuators' strengths and directions to the last four minutes of the swim,
             and allocate with them from then on; for methods that take any shaft, and fins of a law.
         method: dual, mdn, paper, qp, sqp, px4, ardusub, analytic or ipopt.
+        controller: tracking, or of the paper waypoint, or velocity, which holds the path's speed and depth.
         duration: time for a shipped trajectory.
         truth: the robot that really swims, a layout with the same actuators; the one that is believed by
             default.
@@ -68,7 +71,8 @@ def simulate(
 
     if output is not None:
         make_folder(output)
-    with tqdm(desc="swim", unit="s", disable=None, leave=False, file=sys.stderr) as bar:
+    tqdm.monitor_interval = 0  # a process of one thread is copied to read files, without room on a disk
+    with tqdm(desc="swim", unit="s", disable=None, leave=False, miniters=0.1, file=sys.stderr) as bar:
         from finlab.sim import NO_NOISE, ClosedLoop, FinFault, make_trajectory
 
         sensors = None if noise else NO_NOISE
@@ -87,7 +91,7 @@ def simulate(
             whole, seconds = robot.without(lost), LONGEST_S if duration is None else duration
             loop = excitation(whole, seconds, truth=true, sensors=sensors, current=current, seed=seed)
         else:
-            from finlab.control import FaultMonitor
+            from finlab.control import FaultMonitor, controller_of
             from finlab.evaluation.method_specs import load_method_spec
             from finlab.vehicle.righting import righting_words
 
@@ -96,7 +100,8 @@ def simulate(
             loop = ClosedLoop(
                 robot,
                 allocator,
-                make_trajectory(trajectory, duration, scale),
+                in_worker(make_trajectory, trajectory, duration, scale),
+                controller_of(controller, robot),
                 truth=true,
                 sensors=sensors,
                 current=current,
@@ -167,7 +172,7 @@ def _learner(allocator: Allocator) -> OnlineFit:
     """Who learns a robot on the way; a `FinlabError` where the method takes no actuators that lean."""
     import numpy as np
 
-    from finlab.fit.robot.learned_actuators import leaned
+    from finlab.fit.robot.fitted_robot import leaned
     from finlab.fit.robot.online import OnlineFit
 
     learner, layout = OnlineFit(allocator.layout), allocator.layout

@@ -3,6 +3,8 @@
 Any object with the shape of `Controller` plugs into `finlab.sim.ClosedLoop`.
 """
 
+from finlab.control.body_frame import CONTROLLERS as CONTROLLERS
+from finlab.control.body_frame import controller_of as controller_of
 from finlab.control.completion import Completion as Completion
 from finlab.control.fault_monitor import Diagnosis as Diagnosis
 from finlab.control.fault_monitor import FaultMonitor as FaultMonitor

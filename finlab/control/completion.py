@@ -12,8 +12,8 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.layout import Layout
-from finlab.layout.arrays import layout_effectiveness
-from finlab.layout.wrench_axes import mask_of
+from finlab.layout.axes import mask_of
+from finlab.layout.effectiveness import layout_effectiveness
 
 LEVER_M = 0.25
 """Torques count as forces at this lever when open axes are traded against each other [m]; about U-CAT's."""

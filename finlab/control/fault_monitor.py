@@ -14,7 +14,7 @@ from finlab.control.monitor_settings import MonitorSettings
 from finlab.control.motion_model import MotionModel
 from finlab.control.probe import Probe
 from finlab.layout import Body, Layout
-from finlab.layout.angles import TURN
+from finlab.layout.axes import TURN
 from finlab.layout.damage import Damage
 from finlab.physics import plant_of
 
@@ -86,7 +86,7 @@ class FaultMonitor:
         self._lost = np.zeros(n, dtype=bool)
         self._told = np.zeros(n, dtype=bool)
         self._back = np.zeros(n, dtype=bool)
-        self._rates = Rates.of(plant_of(layout), layout.rates, period_s)
+        self._rates = Rates(plant_of(layout), layout.rates * period_s)
         self._sent, self._coming_back = np.full((n, 3), np.nan), np.zeros(n, dtype=bool)
         self._suspect, self._sure = 0, 0
         self._held = np.full(n, np.nan)
@@ -151,7 +151,7 @@ class FaultMonitor:
         """Takes the robot for another one with the same body: what is not lost is as that layout says."""
         self.layout = layout
         self._model.adopt(layout)
-        self._rates = Rates.of(plant_of(layout), layout.rates, self.period_s)
+        self._rates = Rates(plant_of(layout), layout.rates * self.period_s)
         self._torn[:] = False
         self._lost &= ~self._back
         self._back[:] = False

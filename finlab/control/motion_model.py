@@ -16,8 +16,7 @@ from finlab.layout import Body, Layout
 from finlab.physics import plant_of
 from finlab.vehicle.actuator_motion import ActuatorMotion
 from finlab.vehicle.attitude import quaternion_of, rotation_of_quaternion, tilt_of, to_body
-from finlab.vehicle.body import complete_body
-from finlab.vehicle.fossen import jacobian
+from finlab.vehicle.fossen import complete_body, jacobian
 from finlab.vehicle.vehicle import Vehicle
 
 MOTION, TILT, CURRENT, TORQUE = slice(0, 6), slice(6, 8), slice(8, 11), slice(11, 14)

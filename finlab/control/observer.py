@@ -14,15 +14,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from finlab.actuators.fin.response import fin_table
+from finlab.actuators.fin.fin_response import fin_table
 from finlab.arrays import Array
 from finlab.control.measurement import Measurement
 from finlab.layout import Body, Fin, Layout, Rudder
-from finlab.layout.angles import wrapped
+from finlab.layout.axes import wrapped
 from finlab.physics import plant_of
 from finlab.vehicle.attitude import in_world, quaternion_of
-from finlab.vehicle.body import complete_body
-from finlab.vehicle.fossen import damping_jacobian, damping_rates
+from finlab.vehicle.fossen import complete_body, damping_jacobian, damping_rates
 from finlab.vehicle.vehicle import Vehicle
 
 AXES = [0, 1, 2, 5]
@@ -90,7 +89,7 @@ class MotionObserver:
         U-CAT's."""
         body = complete_body(layout) if body is None else body
         self._vehicle, self._dt = Vehicle(body), period_s
-        self._dynamics = self._vehicle.dynamics
+        self.dynamics = self._vehicle.dynamics
         self.inertia = np.array(self._vehicle.inertia)[AXES]
         """Mass and moment (4,) with those of the water that goes along [kg, kg m^2]."""
         strength = strongest_wrench(layout)[AXES] / self.inertia
@@ -159,7 +158,7 @@ class MotionObserver:
     def swayed(self, sway: float, surge: float, yaw_rate: float) -> float:
         """Sideways speed [m/s] a period after `sway` [m/s] by the model, in a turn [rad/s] at a speed through
         the water [m/s]."""
-        damping = damping_rates(self._dynamics, (0.0, sway, 0.0, 0.0, 0.0, 0.0))[1]
+        damping = damping_rates(self.dynamics, (0.0, sway, 0.0, 0.0, 0.0, 0.0))[1]
         pushed = float(self.inertia[0] / self.inertia[1]) * surge * yaw_rate
         return math.exp(-self._dt * damping) * sway - self._dt * pushed
 
@@ -167,7 +166,7 @@ class MotionObserver:
         """Decelerations (..., 4) that the water gives motions (..., 4) through it, along surge, sway, heave
         and yaw [m/s^2, rad/s^2]."""
         surge, sway, heave, yaw = np.moveaxis(motion, -1, 0)
-        rates = damping_rates(self._dynamics, (surge, sway, heave, 0.0, 0.0, yaw))
+        rates = damping_rates(self.dynamics, (surge, sway, heave, 0.0, 0.0, yaw))
         return np.stack([rates[k] for k in AXES], axis=-1) * motion
 
     def _seen(self, m: Measurement) -> Array:
@@ -181,7 +180,7 @@ class MotionObserver:
         flow = state[MOTION].copy()
         flow[:2] -= cosine * c + sine * d, cosine * d - sine * c
         surge, sway, heave, yaw = flow.tolist()
-        jacobian = damping_jacobian(self._dynamics, (surge, sway, heave, 0.0, 0.0, yaw))
+        jacobian = damping_jacobian(self.dynamics, (surge, sway, heave, 0.0, 0.0, yaw))
         kept = np.exp(-dt * np.array([jacobian[k] for k in AXES]))
         transition[range(4), range(4)] = kept
         carried = 1.0 - kept[:2]

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from finlab.arrays import Array
 from finlab.control.monitor_settings import MonitorSettings
 from finlab.layout import Azimuth, Fin, Layout, Rudder
-from finlab.layout.angles import is_full_turn
+from finlab.layout.axes import is_full_turn
 from finlab.physics import plant_of
 
 FORCE_N = 0.6

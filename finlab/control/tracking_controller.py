@@ -19,9 +19,9 @@ from finlab.control.feed_forward import wrenches_along
 from finlab.control.measurement import Measurement, Setpoint
 from finlab.control.observer import AXES, CRUISE, Estimate, MotionObserver, strongest_wrench
 from finlab.layout import Layout, Rudder
-from finlab.layout.angles import wrapped
+from finlab.layout.axes import wrapped
 from finlab.vehicle.actuator_motion import following_delay
-from finlab.vehicle.body import complete_body, dynamics_of
+from finlab.vehicle.fossen import complete_body, dynamics_of
 
 BY_FORCES, BY_RUDDERS = (1.0, 0.756, 0.38), (0.75, 0.24, 0.045)
 """Bandwidths of velocities, heading and path times the delay; a robot that rudders steer has to turn before

@@ -15,7 +15,7 @@ from shutil import rmtree
 import finlab
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.methods import METHODS_ON_BOARD
-from finlab.assets import shipped_checkpoints
+from finlab.assets import NAME, shipped_checkpoints
 from finlab.bundle_files import (
     ABOUT,
     CHECKSUMS,
@@ -31,12 +31,11 @@ from finlab.bundle_files import (
     table_name,
 )
 from finlab.deploy.deployed_robot import self_tests
-from finlab.distribution import NAME
 from finlab.errors import AllocationError, DataError
 from finlab.files.archive import packed
 from finlab.layout import Fin, FinModelSpec, Layout
 from finlab.layout.force_table_file import table_bytes
-from finlab.layout.robot_file import Robot, robot_bytes
+from finlab.layout.load import Robot, robot_bytes
 from finlab.networks.checkpoint import WEIGHTS_FILE, checkpoint_files, read_checkpoint
 from finlab.networks.trained import TrainedWeights
 from finlab.whole_file import PART, write_together, write_whole

@@ -65,7 +65,7 @@ def check(arguments: argparse.Namespace) -> int:
 
 def allocate(arguments: argparse.Namespace) -> int:
     """Print the commands for one target."""
-    from finlab.deploy.record import allocation_record
+    from finlab.allocation.report import allocation_record
 
     answer = _robot(arguments).allocate(
         arguments.wrench,

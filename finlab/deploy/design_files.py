@@ -21,8 +21,7 @@ from finlab.hull.mesh_file import MAX_FACES, read_mesh, simplified, stl_of
 from finlab.layout import Fin, FinModelSpec, Layout
 from finlab.layout.body import MESH_SUFFIXES
 from finlab.layout.file_form import under
-from finlab.layout.load import A_LAYOUT, MAX_BYTES, layout_in
-from finlab.layout.robot_file import robot_of
+from finlab.layout.load import A_LAYOUT, MAX_BYTES, layout_in, robot_of
 from finlab.whole_file import make_folder, write_whole
 
 LAYOUTS = (".yaml", ".yml", ".json")

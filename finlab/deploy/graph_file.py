@@ -14,10 +14,10 @@ from msgspec import to_builtins
 from finlab.allocation.yardstick import yardstick
 from finlab.errors import LayoutError
 from finlab.layout import Actuator, Fin, Layout
+from finlab.layout.axes import AXES
 from finlab.layout.file import FORMAT, layout_to_dict
 from finlab.layout.file_form import plain
-from finlab.layout.graph_form import Data, Edge, Graph, Normalization, edges_of
-from finlab.layout.wrench_axes import AXES
+from finlab.layout.load import Data, Edge, Graph, Normalization, edges_of
 from finlab.paper.features import POSITION_SCALE, SCALES
 from finlab.whole_file import write_whole
 

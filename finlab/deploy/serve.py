@@ -29,9 +29,9 @@ from typing import Any
 from msgspec import Struct
 
 from finlab.allocation import Allocation
+from finlab.allocation.report import command_record, plain_target
 from finlab.arrays import Array
 from finlab.deploy.deployed_robot import DeployedRobot
-from finlab.deploy.record import command_record, plain_target
 from finlab.deploy.transport import MAX_LINE, StandardStreams, Unsent
 from finlab.errors import AllocationError, CommandError, LayoutError
 from finlab.files.guarded import decoded

@@ -18,7 +18,7 @@ from finlab.evaluation.method_specs import MethodSpec
 from finlab.evaluation.splits import Case
 from finlab.networks.checkpoint import read_normalization, resolve_checkpoint
 from finlab.physics import plant_of
-from finlab.physics.effort import command_effort
+from finlab.physics.objective import command_effort
 
 Columns = dict[str, AnyArray]
 """Arrays of N entries by name."""

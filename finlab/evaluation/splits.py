@@ -13,10 +13,9 @@ import numpy as np
 from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.layout import Fin, FinModelSpec, Layout, random_layout
-from finlab.layout.angles import wrapped
-from finlab.layout.random import TRAINING_BOX
-from finlab.layout.random_actuators import Draw as ActuatorDraw
-from finlab.layout.random_actuators import (
+from finlab.layout.axes import wrapped
+from finlab.layout.random_layouts import (
+    TRAINING_BOX,
     random_azimuth,
     random_fin_model,
     random_robot,
@@ -24,6 +23,7 @@ from finlab.layout.random_actuators import (
     random_thruster,
     random_tilt,
 )
+from finlab.layout.random_layouts import Draw as ActuatorDraw
 from finlab.physics import Plant, TableLaw, make_law, write_table
 
 OOD_BOX = (0.45, 0.45, 0.20)

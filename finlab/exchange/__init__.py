@@ -4,5 +4,5 @@ from finlab.exchange.convert import FOREIGN as FOREIGN
 from finlab.exchange.convert import convert as convert
 from finlab.exchange.convert import read_any as read_any
 from finlab.exchange.convert import read_robot as read_robot
-from finlab.exchange.csv_table import is_robot_table as is_robot_table
 from finlab.exchange.exchange import Exchange as Exchange
+from finlab.exchange.matrix_table import is_robot_table as is_robot_table

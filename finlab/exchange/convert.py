@@ -1,4 +1,4 @@
-"""Which file holds which form, told by its end and content, and one form made into another."""
+"""Forms of files by their end and content, and one form made into another."""
 
 import os
 from collections.abc import Callable
@@ -6,15 +6,20 @@ from pathlib import Path
 
 from finlab.assets import shipped_layouts
 from finlab.errors import CommandError, LayoutError
-from finlab.exchange.ardusub import OF_ARDUPILOT, of_motors, read_parameters_of_ardusub, write_ardusub
-from finlab.exchange.ardusub_rows import called, tabled
-from finlab.exchange.csv_table import plain_of, table_of
 from finlab.exchange.description_text import SDF, URDF, description_text
 from finlab.exchange.exchange import Exchange
 from finlab.exchange.gazebo import read_description
-from finlab.exchange.parameters import read_parameters
+from finlab.exchange.matrix_table import plain_of, table_of
+from finlab.exchange.motor_factors import (
+    OF_ARDUPILOT,
+    called,
+    of_motors,
+    read_parameters_of_ardusub,
+    tabled,
+    write_ardusub,
+)
+from finlab.exchange.parameters import read_parameters, read_px4, write_px4
 from finlab.exchange.plain_robot import read_plain, write_matrix
-from finlab.exchange.px4 import read_px4, write_px4
 from finlab.files.guarded import is_regular, read_text
 from finlab.files.plain_values import parse_json, parse_yaml
 from finlab.layout import Layout, load_layout, save_layout
@@ -83,9 +88,9 @@ def read_robot(text: str, file: str, exchange: Exchange) -> Layout:
     if text.lstrip().startswith("<"):
         return read_description(text, name, exchange)
     if FORM_OF.get(suffix) != "layout":
-        found = _read_lines(text, name, suffix, exchange)
-        if found is not None:
-            return found
+        layout = _read_lines(text, name, suffix, exchange)
+        if layout is not None:
+            return layout
     data = (parse_json if suffix == ".json" else parse_yaml)(text, "", LayoutError)
     parts = data.get("actuators") if isinstance(data, dict) else None
     typed = isinstance(parts, list) and any(isinstance(part, dict) and "type" in part for part in parts)
@@ -111,11 +116,9 @@ def _read_lines(text: str, name: str, suffix: str, exchange: Exchange) -> Layout
         if table.of_factors:
             return of_motors(name, tabled(table), exchange)
         return read_plain(plain_of(table), name, exchange, table.comments, table=True)
-    if suffix in PARAMETERS and (values := read_parameters(text, "")):
-        raise LayoutError(
-            f"holds {len(values)} parameters of an autopilot, but neither CA_ROTOR_COUNT (PX4) nor "
-            "FRAME_CONFIG (ArduSub), by which they name thrusters"
-        )
+    if suffix in PARAMETERS and (n := len(read_parameters(text, ""))):
+        names = "neither CA_ROTOR_COUNT (PX4) nor FRAME_CONFIG (ArduSub), by which they name thrusters"
+        raise LayoutError(f"holds {n} parameters of an autopilot, but {names}")
     if suffix in PROGRAMS:
         raise LayoutError("is a program without a call of add_motor_raw_6dof, by which ArduSub adds motors")
     return None

@@ -16,8 +16,7 @@ from scipy.spatial.transform import Rotation
 from finlab.arrays import Array
 from finlab.errors import LayoutError
 from finlab.exchange.exchange import Exchange
-from finlab.exchange.models import Drives, Named, chosen, parts_of
-from finlab.exchange.xml_text import expanded, is_xacro, root_of
+from finlab.exchange.xml_models import Drives, Named, chosen, expanded, is_xacro, parts_of, root_of
 
 ADDED = ("xx", "yy", "zz", "pp", "qq", "rr")
 """Diagonal of SDF's <fluid_added_mass>."""
@@ -28,18 +27,16 @@ TURNING = ("revolute", "continuous")
 
 
 class Joint(NamedTuple):
-    """A joint, in the frame of its description."""
+    """A joint, in the frame of its description: its place (3,) [m], the axis (3,) that it turns about, of
+    length 1 unless it is fixed, and least and greatest angle [rad], infinite where nothing limits it."""
 
     name: str
     kind: str
     parent: str
     child: str
     place: Array
-    """Where it is (3,) [m]."""
     axis: Array
-    """What it turns about (3,), of length 1; of any length for a fixed joint."""
     ends: tuple[float, float]
-    """Least and greatest angle [rad]; infinite where nothing limits it."""
 
 
 @dataclass(frozen=True)
@@ -48,21 +45,18 @@ class Description:
 
     name: str
     joints: dict[str, Joint]
-    """Those that move a link, by their own names."""
+    """Those that move a link, by their own names, and by the names of the links."""
     movers: dict[str, Joint]
-    """The same by the names of the links."""
     mass: float
-    """[kg]; 0 where no link has one."""
+    """[kg], 0 where no link has one, and centre of gravity (3,) [m]."""
     center: Array
-    """Centre of gravity (3,) [m]."""
     inertia: Array | None
     """(3, 3) about the centre of gravity [kg m^2]; None where a link with a mass has none."""
     added: dict[str, float]
     """Added mass by the name of its entry (`xx`), all links together [kg, kg m^2]."""
     plugins: list[tuple[str, Element]]
-    """With the scope of the names in them."""
+    """With the scope of the names in them; what the description includes is named, and not read."""
     included: list[str]
-    """Names of what it includes, which is not read."""
 
 
 def parse_description(root: Element, name: str, drives: Drives, exchange: Exchange) -> Description:
@@ -79,11 +73,8 @@ def parse_description(root: Element, name: str, drives: Drives, exchange: Exchan
     movers = {said(part, "child@link"): key for key, (_, part) in named.items() if part.tag == "joint"}
     poses = _placed({key: _hung(*each, named, movers) for key, each in named.items()}, included)
     old = root.tag == "sdf" and root.get("version", "") in ("1.0", "1.1", "1.2", "1.3", "1.4")
-    moving = [
-        _joint(*each, named, poses, old)
-        for key, each in named.items()
-        if each[1].tag == "joint" and key in poses
-    ]
+    known = [each for key, each in named.items() if each[1].tag == "joint" and key in poses]
+    moving = [_joint(*each, named, poses, old) for each in known]
     joints = {joint.name: joint for joint in moving if f"link {joint.child}" in named}
     if included:
         exchange.note(f"What it includes is left out, with its mass: {', '.join(included)[:300]}.")
@@ -95,9 +86,9 @@ def said(element: Element, paths: str, usual: str = "") -> str:
     """Returns the first text among some paths below an element, an attribute behind @; else what is usual."""
     for path in paths.split():
         place, _, attribute = path.partition("@")
-        found = element.find(place)
-        if found is not None:
-            text = found.get(attribute) if attribute else found.text
+        part = element.find(place)
+        if part is not None:
+            text = part.get(attribute) if attribute else part.text
             if text and text.strip():
                 return text.strip()
     return usual

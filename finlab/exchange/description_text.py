@@ -8,11 +8,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from html import escape
 from xml.etree import ElementTree
 
-from finlab.exchange.description_body import DERIVATIVES
 from finlab.exchange.exchange import Exchange
+from finlab.exchange.simulator_plugins import DERIVATIVES
 from finlab.layout import Actuator, Azimuth, Body, Layout, Rudder, Thruster
-from finlab.layout.angles import is_full_turn
-from finlab.layout.axes import Vector
+from finlab.layout.axes import Vector, is_full_turn
 
 ROOT = "base_link"
 MASS, MOMENT = 1e-11, 1e-4
@@ -58,11 +57,11 @@ def description_text(layout: Layout, exchange: Exchange, form: Mapping[str, str]
     parts = [form["base"].format(name=ROOT, inertial=inertial, hull=hull)]
     inertial = _inertial(form, mass and mass * MASS / len(links), (share,) * 3)
     for name, parent, place, axis, ends in links:
-        told = {"name": escape(name), "parent": escape(parent), "place": _text(place)}
+        own = {"name": escape(name), "parent": escape(parent), "place": _text(place)}
         limit = "" if ends is None else form["limit"].format(least=ends[0], most=ends[1])
         kind = "continuous" if ends is None else "revolute"
-        parts.append(form["link"].format(**told, inertial=inertial))
-        parts.append(form["joint"].format(**told, kind=kind, axis=_text(axis), limit=limit))
+        parts.append(form["link"].format(**own, inertial=inertial))
+        parts.append(form["joint"].format(**own, kind=kind, axis=_text(axis), limit=limit))
     for part in layout.actuators:
         if isinstance(part, Thruster | Azimuth):
             limits = {"min_thrust_cmd": part.force[0], "max_thrust_cmd": part.force[1]}
@@ -77,9 +76,7 @@ def description_text(layout: Layout, exchange: Exchange, form: Mapping[str, str]
         exchange.note("The layout has no mass: no link has one, and simulators want one.")
     exchange.note("A robot description has no place for power, reaction torques, rates and buoyancy.")
     if any(not isinstance(part, Thruster | Azimuth) for part in layout.actuators):
-        exchange.note(
-            "Fins and rudders are joints that push nothing; --fins names the fins among them again."
-        )
+        exchange.note("Fins and rudders are joints that push nothing; --fins names the fins among them.")
     text = form["robot"].format(name=escape(layout.name), parts="".join(parts))
     root = ElementTree.fromstring(text)
     ElementTree.indent(root)
@@ -104,9 +101,9 @@ def _inertial(form: Mapping[str, str], mass: float | None, moments: Sequence[flo
 
 
 def _plugin(form: Mapping[str, str], kind: str, values: Mapping[str, str | float]) -> str:
-    told = "".join(f"<{key}>{escape(str(value))}</{key}>" for key, value in values.items())
+    tags = "".join(f"<{key}>{escape(str(value))}</{key}>" for key, value in values.items())
     names = f'filename="gz-sim-{kind.lower()}-system" name="gz::sim::systems::{kind}"'
-    return form["plugin"].format(plugin=f"<plugin {names}>{told}</plugin>")
+    return form["plugin"].format(plugin=f"<plugin {names}>{tags}</plugin>")
 
 
 def _text(values: Sequence[float]) -> str:

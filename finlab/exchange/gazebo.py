@@ -13,19 +13,18 @@ import numpy as np
 from finlab.arrays import Array
 from finlab.errors import LayoutError
 from finlab.exchange.description import TURNING, Description, Joint, number, parse_description
-from finlab.exchange.description_body import UUV, body_of
 from finlab.exchange.exchange import T200_POWER, Exchange, vector
-from finlab.exchange.models import listed
-from finlab.exchange.propellers import driven, drives, force_of, is_plugin
-from finlab.exchange.xml_text import root_of
+from finlab.exchange.labels import listed
+from finlab.exchange.simulator_plugins import UUV, body_of, driven, drives, force_of, is_plugin
+from finlab.exchange.xml_models import root_of
 from finlab.layout import MAX_ACTUATORS, Actuator, Azimuth, Fin, Layout
-from finlab.layout.angles import TURN
+from finlab.layout.axes import TURN
 
 MAX_TILT = math.radians(5.0)
 """Most that a fin's shaft may leave the horizontal plane [rad] and still be taken for horizontal."""
 MAX_LEAN = 0.02
 """Most that the thrust of an azimuth may lean out of the plane in which it turns [rad]."""
-BESIDE = 0.01
+OFF_AXIS = 0.01
 """Most that the line of an azimuth's thrust may pass by its turning axis and count as through it [m]."""
 
 
@@ -35,17 +34,15 @@ def read_description(text: str, name: str, exchange: Exchange) -> Layout:
     root = root_of(text)
     at_gravity = exchange.origin == "gravity"
     if root.tag == "scenario":
-        raise LayoutError(
-            "is a scenario of Stonefish, which is not read; give thrusters by place and direction, in YAML"
-        )
+        hint = "give thrusters by place and direction, in YAML"
+        raise LayoutError(f"is a scenario of Stonefish, which is not read; {hint}")
     robot = parse_description(root, name, drives, exchange)
     if at_gravity and robot.mass <= 0:
-        inside = ", ".join(robot.included)[:300]
-        raise LayoutError(
-            f"has no masses but in <include> {inside}, which is not opened: give its model.sdf"
-            if inside
-            else "has no masses, so its centre of gravity is unknown; use --origin base if that is at it"
-        )
+        if inside := ", ".join(robot.included)[:300]:
+            raise LayoutError(
+                f"has no masses but in <include> {inside}, which is not opened: give its model.sdf"
+            )
+        raise LayoutError("has no masses, so no centre of gravity; use --origin base if its origin is there")
     start = robot.center if at_gravity else np.zeros(3)
     plugins = [each for each in robot.plugins if drives(each[1])][: MAX_ACTUATORS + 1]
     pushing = [(driven(robot, scope, plugin), plugin) for scope, plugin in plugins]
@@ -95,10 +92,8 @@ def _propeller(
         raise LayoutError(f"the thrust of {joint.child!r:.60} leans out of the plane in which it turns")
     zero = (joint.axis - along * mount.axis) / math.sqrt(1.0 - along * along)
     arm = joint.place - mount.place
-    if abs(arm @ np.cross(mount.axis, zero)) > BESIDE:
-        exchange.note(
-            f"{joint.child} sits beside the axis about which it turns: its place at angle 0 is taken."
-        )
+    if abs(arm @ np.cross(mount.axis, zero)) > OFF_AXIS:
+        exchange.note(f"{joint.child} sits off the axis about which it turns: its place at angle 0 is taken.")
     arc = mount.ends if mount.ends[1] - mount.ends[0] < TURN else (-math.pi, math.pi)
     # Where it sits along its thrust changes nothing, but for what turns with it.
     position, turn = vector(place - (arm @ zero) * zero), (vector(mount.axis), vector(zero))
@@ -106,11 +101,9 @@ def _propeller(
 
 
 def _fin(joint: Joint, start: Array, exchange: Exchange) -> Fin:
-    """The fin that a joint moves."""
     if joint.kind not in TURNING:
-        raise LayoutError(
-            f"joint {joint.name!r:.60} is {joint.kind}; a fin's joint is {' or '.join(TURNING)}"
-        )
+        kinds = " or ".join(TURNING)
+        raise LayoutError(f"joint {joint.name!r:.60} is {joint.kind}; a fin's joint is {kinds}")
     axis, place = joint.axis, joint.place - start
     if abs(axis[2]) <= math.sin(MAX_TILT):
         # A joint may turn about the same line the other way round; finlab's shafts point out of the hull.

@@ -1,11 +1,15 @@
-"""Words of others for axes of a wrench, frames, places, directions and limits."""
+"""Words of others for axes, frames, places and limits, and all places in plain values that they name."""
 
 import re
-from collections.abc import Iterable, Mapping
-from typing import Any, Literal
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any, Literal, NamedTuple
 
+import numpy as np
+
+from finlab.arrays import Array
 from finlab.errors import LayoutError
-from finlab.layout.wrench_axes import AXES, Axis
+from finlab.files.csv_table import FORCES, LENGTHS, TURNS
+from finlab.layout.axes import AXES, Axis
 
 Frame = Literal["FLU", "FRD"]
 FRAMES: dict[Frame, str] = {"FLU": "x forward, y left, z up", "FRD": "x forward, y right, z down"}
@@ -14,9 +18,8 @@ _FRAME_WORDS: dict[Frame, set[str]] = {
     "FRD": {"frd", "ned", "sname", "fsd"},
 }
 _SIDES: dict[Frame, set[str]] = {"FLU": {"left", "port", "up"}, "FRD": {"right", "starboard", "down"}}
-FRAME_KEYS = (
-    "frame bodyframe convention coordinateframe coordinatesystem referenceframe axesconvention frameid"
-)
+FRAME_KEYS = "frame bodyframe convention coordinateframe coordinatesystem referenceframe axesconvention "
+FRAME_KEYS += "frameid"
 _AXIS_WORDS = {
     "Fx": "fx x surge forcex xforce",
     "Fy": "fy y sway forcey yforce",
@@ -39,12 +42,12 @@ PAIR = "bounds limits range forcelimits thrustlimits forcebounds thrustbounds th
 LEAST = "least min lower minimum minforce minthrust forcemin thrustmin lowerlimit lowerbound fmin tmin"
 MOST = "most max upper maximum maxforce maxthrust forcemax thrustmax upperlimit upperbound fmax tmax"
 LIMIT_KEYS = f"{PAIR} {LEAST} {MOST} {COUNT} {ROWS_OF}"
-LENGTHS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
-FORCES = {"n": 1.0, "kn": 1000.0, "kgf": 9.80665, "lbf": 4.4482216}
-DEGREES = {"rad": 1.0, "deg": 57.29577951308232}
 ROW = f"{NAME} {POSITION} {DIRECTION} {ANGLES} {LIMIT_KEYS} x y z "
 ROW += "px py pz posx posy posz dx dy dz ax ay az nx ny nz ux uy uz dirx diry dirz"
 """Keys of a thruster that are read."""
+LONGEST_LIST, MAX_NODES = 300, 30_000
+"""Most characters of a list of keys, and most values that are looked at."""
+Path = tuple[str, ...]
 
 
 def plain(label: object) -> str:
@@ -65,9 +68,9 @@ def lookup(
     known = words.split()
     for key, value in values.items():
         label, size = str(key)[:100], 1.0
-        found = re.search(r"[_ (\[]+([a-z]+)[)\]]?$", label, re.IGNORECASE)
-        if found and units and found[1].lower() in units:
-            label, size = label[: found.start()], units[found[1].lower()]
+        unit = re.search(r"[_ (\[]+([a-z]+)[)\]]?$", label, re.IGNORECASE) if units else None
+        if unit and units and unit[1].lower() in units:
+            label, size = label[: unit.start()], units[unit[1].lower()]
         word = plain(label)
         if word in known or word.removeprefix("thruster").removeprefix("s") in known:
             return str(key), value, size
@@ -77,7 +80,7 @@ def lookup(
 def unknown_in(rows: Iterable[Mapping[str, Any]]) -> str:
     """Returns the keys of thrusters that are not read, with commas between."""
     keys = dict.fromkeys(str(key) for row in rows for key in row)
-    units = {**LENGTHS, **FORCES, **DEGREES}
+    units = {**LENGTHS, **FORCES, **TURNS}
     return ", ".join(key for key in keys if not axis_of(key) and not lookup({key: 0}, ROW, units)[0])[:300]
 
 
@@ -106,3 +109,65 @@ def frame_said(scopes: Iterable[Mapping[str, Any]], comments: Iterable[str]) -> 
         if re.search(r"\b(?:FLU|FRD|NED|ENU|SNAME|frame)\b", comment) and (frame := frame_in(comment)):
             return frame, "its comment"
     return None, ""
+
+
+class Node(NamedTuple):
+    """A value in plain values, the keys that lead to it, and the mappings around it with their paths, the
+    innermost first; a mapping itself is the first."""
+
+    path: Path
+    value: Any
+    scopes: tuple[tuple[Path, Mapping[str, Any]], ...]
+
+    @property
+    def key(self) -> str:
+        """Its last key, without places in lists."""
+        return next((key for key in reversed(self.path) if not key.startswith("[")), "")
+
+    @property
+    def words(self) -> str:
+        """Its keys as a sentence has them."""
+        return (".".join(self.path).replace(".[", "[") or "the file")[:100]
+
+
+def nodes(data: Any) -> Iterator[Node]:
+    """Yields all mappings, lists and values in plain values, outer ones first, but no numbers in lists.
+    Raises LayoutError: there are too many."""
+    waiting: list[Node] = [Node((), data, ())]
+    count = 0
+    while waiting:
+        path, value, scopes = node = waiting.pop()
+        count += len(value) if isinstance(value, Mapping | list) else 0
+        if count > MAX_NODES:
+            raise LayoutError(f"has more than {MAX_NODES:,} entries, too many to be read")
+        inner: Iterable[tuple[str, Any]] = ()
+        if isinstance(value, Mapping):
+            scopes, inner = ((path, value), *scopes), value.items()
+            node = Node(path, value, scopes)
+        elif isinstance(value, list):
+            inner = ((f"[{i}]", each) for i, each in enumerate(value) if isinstance(each, Mapping | list))
+        yield node
+        waiting += [Node((*path, key), each, scopes) for key, each in [*inner][::-1]]
+
+
+def unread(data: Any, used: set[Path]) -> str:
+    """Returns the keys of values that lie below none that were used, with commas between."""
+    values = (node for node in nodes(data) if not isinstance(node.value, Mapping))
+    named = [node for node in values if not (node.path and node.path[-1].startswith("["))]
+    left = [node.words for node in named if not any(node.path[:i] in used for i in range(len(node.path) + 1))]
+    return listed(left) if left else ""
+
+
+def listed(names: Iterable[str]) -> str:
+    """Returns names as a sentence has them, the first of many."""
+    text = ", ".join(names) or "none"
+    return text if len(text) <= LONGEST_LIST else f"{text[:LONGEST_LIST].rpartition(',')[0]}, ..."
+
+
+def numbers_in(values: Any) -> Array | None:
+    """Returns numbers, or text that stands for them, as an array; None where some are none."""
+    try:
+        array = np.array(values, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        return None
+    return array if array.size and (np.abs(array) < 1e9).all() else None

@@ -10,14 +10,15 @@ from finlab.arrays import Array
 from finlab.errors import LayoutError
 from finlab.exchange import labels
 from finlab.exchange.exchange import TO_FRD, Exchange
-from finlab.exchange.labels import FRAMES, frame_said, lookup
+from finlab.exchange.labels import FRAMES, Path, frame_said, lookup, nodes, numbers_in, unread
 from finlab.exchange.records import UNIT, Found, Row, found_in, is_unit
-from finlab.exchange.walk import Path, nodes, numbers_in, unread
+from finlab.files.csv_table import FORCES, LENGTHS, TURNS
 from finlab.files.plain_values import yaml_text
 from finlab.layout import MAX_ACTUATORS, Layout, Thruster, own_effectiveness
-from finlab.layout.wrench_axes import AXES
+from finlab.layout.axes import AXES
 
 Ends = tuple[float, float]
+Parts = tuple[Thruster, ...]
 
 
 def read_plain(
@@ -27,27 +28,25 @@ def read_plain(
 
     `comments` of the file may name the frame; a `table` has rows that nothing but their labels names. Raises
     LayoutError: none are there, or several times, or they may be read in two ways."""
-    found = found_in(data, exchange, table)
-    if len(found.rows) > MAX_ACTUATORS:
-        what = "columns" if found.axes else "thrusters"
-        raise LayoutError(f"expected up to {MAX_ACTUATORS} {what}, got {len(found.rows)}", found.node.words)
-    frd, used = _frd(found, exchange, comments), {found.node.path}
-    parts = (_of_matrix if found.axes else _of_places)(found, data, frd, used, exchange)
-    for path, scope in found.node.scopes:
-        near = labels.LIMIT_KEYS if path in [path for path, _ in found.node.scopes[:2]] else ""
-        words = f"{labels.FRAME_KEYS} {labels.NAMES} {near}"
-        used |= {(*path, key) for key in scope if lookup({key: 0}, words, labels.FORCES)[0]}
-    left = labels.unknown_in(found.rows.values())
-    if left:
+    held = found_in(data, exchange, table)
+    if len(held.rows) > MAX_ACTUATORS:
+        what = "columns" if held.axes else "thrusters"
+        raise LayoutError(f"expected up to {MAX_ACTUATORS} {what}, got {len(held.rows)}", held.node.words)
+    frd, used = _frd(held, exchange, comments), {held.node.path}
+    parts = (_of_matrix if held.axes else _of_places)(held, data, frd, used, exchange)
+    for k, (path, scope) in enumerate(held.node.scopes):
+        words = f"{labels.FRAME_KEYS} {labels.NAMES} {labels.LIMIT_KEYS if k < 2 else ''}"
+        used |= {(*path, key) for key in scope if lookup({key: 0}, words, FORCES)[0]}
+    if left := labels.unknown_in(held.rows.values()):
         exchange.note(f"Not read of each thruster: {left}.")
     if keys := unread(data, used):
         exchange.note(f"Not read: {keys}.")
-    return Layout(name, parts, axes=tuple(axis for axis in AXES if axis in found.axes or not found.axes))
+    return Layout(name, parts, axes=tuple(axis for axis in AXES if axis in held.axes or not held.axes))
 
 
-def _frd(found: Found, exchange: Exchange, comments: Sequence[str]) -> bool:
+def _frd(held: Found, exchange: Exchange, comments: Sequence[str]) -> bool:
     """Whether the file is in x forward, y right, z down; the note says why."""
-    frame, where = frame_said([scope for _, scope in found.node.scopes], comments)
+    frame, where = frame_said([scope for _, scope in held.node.scopes], comments)
     if exchange.frame and frame and exchange.frame != frame:
         exchange.note(f"It says {where}; --frame {exchange.frame} was taken in its stead.")
     elif exchange.frame is None and frame:
@@ -58,9 +57,8 @@ def _frd(found: Found, exchange: Exchange, comments: Sequence[str]) -> bool:
 
 
 def _of_places(
-    found: Found, data: Any, frd: bool, used: set[Path], exchange: Exchange
+    held: Found, data: Any, frd: bool, used: set[Path], exchange: Exchange
 ) -> tuple[Thruster, ...]:
-    """Thrusters by place and direction."""
     center = np.zeros(3)
     for each in nodes(data) if exchange.origin == "gravity" else ():
         at = numbers_in(each.value) if lookup({each.key: 0}, labels.CENTER)[0] else None
@@ -68,10 +66,10 @@ def _of_places(
             center = at
             used.add(each.path)
             exchange.note(f"The origin is at {each.words}, {at[0]:g} {at[1]:g} {at[2]:g} m.")
-    exchange.note(f"{found.node.words} was read: places in m, directions, limits in N.")
+    exchange.note(f"{held.node.words} was read: places in m, directions, limits in N.")
     sign, parts = TO_FRD[:3, 0] if frd else np.ones(3), []
-    for (key, row), ends in zip(found.rows.items(), _ends(found, data, used, exchange), strict=True):
-        place_key, place, size = lookup(row, labels.POSITION, labels.LENGTHS)
+    for (key, row), ends in zip(held.rows.items(), _ends(held, data, used, exchange), strict=True):
+        place_key, place, size = lookup(row, labels.POSITION, LENGTHS)
         at = _three(place, f"{key}.{place_key}") * size - center
         axis = _direction(key, row, exchange)
         parts.append(exchange.thruster(_name(key, row), at * sign, axis * sign, ends))
@@ -86,13 +84,12 @@ def _name(key: str, row: Row) -> str:
 
 
 def _direction(key: str, row: Row, exchange: Exchange) -> Array:
-    """The direction (3,) of length 1 in which a thruster pushes."""
     axis_key, value, _ = lookup(row, labels.DIRECTION)
     if axis_key:
         axis = _three(value, f"{key}.{axis_key}")
     else:
-        axis_key, value, size = lookup(row, labels.ANGLES, labels.DEGREES)
-        turn = _three(value, f"{key}.{axis_key}") / size
+        axis_key, value, size = lookup(row, labels.ANGLES, TURNS)
+        turn = _three(value, f"{key}.{axis_key}") * size
         if np.abs(turn).max() > 2 * np.pi:
             raise LayoutError("is more than a turn; are these degrees? call it rpy_deg", f"{key}.{axis_key}")
         exchange.note(f"{axis_key} turns the axis x of a thruster, along which it pushes.")
@@ -113,31 +110,29 @@ def _three(value: Any, what: str) -> Array:
 
 
 def _of_matrix(
-    found: Found, data: Any, frd: bool, used: set[Path], exchange: Exchange
+    held: Found, data: Any, frd: bool, used: set[Path], exchange: Exchange
 ) -> tuple[Thruster, ...]:
-    """Thrusters by the columns of a matrix."""
-    columns = np.zeros((6, len(found.rows)))
-    columns[[AXES.index(axis) for axis in found.axes]] = found.columns
+    columns = np.zeros((6, len(held.rows)))
+    columns[[AXES.index(axis) for axis in held.axes]] = held.columns
     per_newton = is_unit(columns[:3])
     unit = "N and N m" if per_newton else "N and N m at a command of 1"
-    exchange.note(f"{found.node.words} was read, {found.order}, in {unit}.")
-    missing = [axis for axis in AXES if axis not in found.axes]
-    if missing:
-        exchange.note(f"It has no row {', '.join(missing)}: 0 is taken there, and not commanded (`axes`).")
-    ends = _ends(found, data, used, exchange)
+    exchange.note(f"{held.node.words} was read, {held.order}, in {unit}.")
+    if missing := ", ".join(axis for axis in AXES if axis not in held.axes):
+        exchange.note(f"It has no row {missing}: 0 is taken there, and not commanded (`axes`).")
+    ends = _ends(held, data, used, exchange)
     if not any(ends) and not per_newton:
         exchange.note("It has no limits: commands are taken to go from -1 to 1 (--force LEAST MOST).")
         ends = [(-1.0, 1.0)] * len(ends)
     columns = columns * (TO_FRD if frd else 1.0)
-    names = [_name(key, row) for key, row in found.rows.items()]
+    names = [_name(key, row) for key, row in held.rows.items()]
     return tuple(exchange.of_column(*each) for each in zip(names, columns.T, ends, strict=True))
 
 
-def _ends(found: Found, data: Any, used: set[Path], exchange: Exchange) -> list[Ends | None]:
+def _ends(held: Found, data: Any, used: set[Path], exchange: Exchange) -> list[Ends | None]:
     """Least and most of each thruster: its own, those around, or in any mapping that names it."""
-    keys = [_name(key, row) for key, row in found.rows.items()]
-    ends = [_limits_in(row, 1, exchange)[0] for row in found.rows.values()]
-    for _, scope in found.node.scopes[:2]:
+    keys = [_name(key, row) for key, row in held.rows.items()]
+    ends = [_limits_in(row, 1, exchange)[0] for row in held.rows.values()]
+    for _, scope in held.node.scopes[:2]:
         shared = _limits_in(scope, len(keys), exchange)
         ends = [own or other for own, other in zip(ends, shared, strict=True)]
     if any(ends):
@@ -147,32 +142,26 @@ def _ends(found: Found, data: Any, used: set[Path], exchange: Exchange) -> list[
         if isinstance(each.value, Mapping):
             key, named, _ = lookup(each.value, labels.NAME)
             named = named if key else each.key
-            pair = (
-                _limits_in(each.value, 1, exchange)[0] if isinstance(named, str) and named in keys else None
-            )
-            if pair is not None:
+            if isinstance(named, str) and named in keys and (pair := _limits_in(each.value, 1, exchange)[0]):
                 known[named] = pair
                 used.add(each.path)
-    without = [key for key in keys if key not in known]
-    if known and without:
-        exchange.note(f"It has no limits of {', '.join(without)}.")
+    if known and (without := ", ".join(key for key in keys if key not in known)):
+        exchange.note(f"It has no limits of {without}.")
     return [known.get(key) for key in keys]
 
 
 def _limits_in(values: Mapping[str, Any], n: int, exchange: Exchange) -> list[Ends | None]:
-    """Least and most [N, or of a command] of each of n thrusters in a mapping; None where unsaid.
-
-    One pair, or one number of each, is for all. A most alone is for both ways.
-    """
-    key, pair, size = lookup(values, labels.PAIR, labels.FORCES)
+    """Least and most [N, or of a command] of each of n thrusters in a mapping; None where unsaid. One pair,
+    or one number of each, is for all. A most alone is for both ways."""
+    key, pair, size = lookup(values, labels.PAIR, FORCES)
     ends = numbers_in(pair)
     if key and pair is not None:
         if ends is None or ends.shape not in ((2,), (n, 2), (2, n)):
             raise LayoutError(f"expected least and most, or both of each of {n} thrusters", key)
         ends = np.broadcast_to(ends if ends.shape in ((n, 2), (2,)) else ends.T, (n, 2)) * size
         return [(low, high) for low, high in ends.tolist()]
-    low_key, low, low_size = lookup(values, labels.LEAST, labels.FORCES)
-    high_key, high, high_size = lookup(values, labels.MOST, labels.FORCES)
+    low_key, low, low_size = lookup(values, labels.LEAST, FORCES)
+    high_key, high, high_size = lookup(values, labels.MOST, FORCES)
     if high is None:
         return [None] * n
     most, least = numbers_in(high), numbers_in(low if low is not None else high)
@@ -181,9 +170,7 @@ def _limits_in(values: Mapping[str, Any], n: int, exchange: Exchange) -> list[En
     if low is None:
         exchange.note(f"{high_key} says nothing of reverse: as much is taken for it.")
         least, low_size = -least, high_size
-    lows, highs = (
-        np.broadcast_to(side.ravel() * by, n) for side, by in ((least, low_size), (most, high_size))
-    )
+    lows, highs = np.broadcast_to(least.ravel() * low_size, n), np.broadcast_to(most.ravel() * high_size, n)
     return [*zip(lows.tolist(), highs.tolist(), strict=True)]
 
 

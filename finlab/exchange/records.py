@@ -10,16 +10,16 @@ from finlab.arrays import Array
 from finlab.errors import LayoutError
 from finlab.exchange import labels
 from finlab.exchange.exchange import Exchange
-from finlab.exchange.labels import axis_of, lookup, plain
-from finlab.exchange.walk import Node, nodes, numbers_in
-from finlab.layout.wrench_axes import AXES, Axis
+from finlab.exchange.labels import Node, axis_of, lookup, nodes, numbers_in, plain
+from finlab.files.csv_table import LENGTHS, TURNS
+from finlab.layout.axes import AXES, Axis
 
 UNIT = 0.05
 """A vector whose length is this close to 1 is a direction, or a force per newton."""
 WORDS = {*"tam tcm allocation allocator alloc mixer mixing mix effectiveness".split()}  # noqa: SIM905
 """Words of a key that holds an allocation matrix."""
-BESIDE = "matrix thruster thrusters thrust force forces b t configuration config control motor motors"
-"""Words that may stand beside `matrix` in such a key."""
+NEAR = "matrix thruster thrusters thrust force forces b t configuration config control motor motors"
+"""Words that may stand with `matrix` in such a key."""
 OTHER = "mass inertia damping drag added coriolis covariance weight weights gain gains rotation "
 OTHER += "inverse inv pinv pseudo pseudoinverse"
 """Words of a key that holds another matrix."""
@@ -29,17 +29,16 @@ Row = dict[str, Any]
 
 
 class Found(NamedTuple):
-    """Thrusters at one place of the values."""
+    """Thrusters at one place of the values, each by name, as the file has it.
+
+    Thrusters without places and directions have wrenches (axes, n); `order` is how a note says that their
+    matrix was read."""
 
     node: Node
     rows: dict[str, Row]
-    """Each thruster by name, as the file has it; what a list of all holds has names of its own."""
     axes: tuple[Axis, ...] = ()
-    """Axes of the wrenches; none where thrusters have places and directions."""
     columns: Array = np.zeros((0, 0))
-    """Wrenches (len(axes), n)."""
     order: str = ""
-    """How a matrix was read, as a note says it."""
 
 
 def found_in(data: Any, exchange: Exchange, table: bool) -> Found:
@@ -76,14 +75,13 @@ def _placed(node: Node, exchange: Exchange) -> Found | None:
     """Thrusters by place and direction: mappings below a node, or lists of all in one."""
     rows = {key: _joined(row) for key, row in _held(node.value).items()}
     says = {
-        key: (_short(lookup(row, labels.POSITION, labels.LENGTHS)[1]), _points(row))
-        for key, row in rows.items()
+        key: (_short(lookup(row, labels.POSITION, LENGTHS)[1]), _points(row)) for key, row in rows.items()
     }
     if not any(map(all, says.values())):
         lists = _lists(node, exchange)
         return Found(node, lists) if lists else None
-    for key, (place, _) in says.items():
-        if any(says[key]) and not all(says[key]):
+    for key, (place, points) in says.items():
+        if place != points:
             lacks = "direction" if place else "position"
             raise LayoutError(f"has no {lacks}, and others beside it have one", f"{node.words}.{key}")
     return Found(node, {key: row for key, row in rows.items() if all(says[key])})
@@ -92,14 +90,14 @@ def _placed(node: Node, exchange: Exchange) -> Found | None:
 def _joined(row: Mapping[str, Any]) -> Row:
     """A mapping; `x`, `y`, `z` become one position, `dx`, `dy`, `dz` or the like one direction, unless it has
     torques or angles: a wrench is for others to read."""
-    whole, short = {**row}, {str(key).lower().strip().replace("_", ""): value for key, value in row.items()}
+    joined, short = {**row}, {str(key).lower().strip().replace("_", ""): value for key, value in row.items()}
     if any(axis_of(key) in ("Tx", "Ty", "Tz") for key in short):
-        return whole
+        return joined
     for what, starts in (("position", ("", "p", "pos")), ("direction", ("d", "a", "n", "u", "dir", "f"))):
         for start in starts:
             if {f"{start}x", f"{start}y"} <= set(short):
-                whole.setdefault(what, [short.get(f"{start}{axis}", 0.0) for axis in "xyz"])
-    return whole
+                joined.setdefault(what, [short.get(f"{start}{axis}", 0.0) for axis in "xyz"])
+    return joined
 
 
 def _short(value: Any) -> bool:
@@ -110,12 +108,10 @@ def _short(value: Any) -> bool:
 
 
 def _points(row: Row) -> bool:
-    """Whether a mapping says where its thruster points. Raises LayoutError: it may be a direction as well as
-    angles."""
-    places = (lookup(row, labels.DIRECTION), lookup(row, labels.ANGLES, labels.DEGREES))
-    points = any(_short(value) for _, value, _ in places)
+    """Whether a mapping says where its thruster points; an error where that may be angles as well."""
+    points = any(_short(lookup(row, words, TURNS)[1]) for words in (labels.DIRECTION, labels.ANGLES))
     key, value, _ = lookup(row, labels.UNCLEAR)
-    if key and not points and _short(value) and lookup(row, labels.POSITION, labels.LENGTHS)[0]:
+    if key and not points and _short(value) and lookup(row, labels.POSITION, LENGTHS)[0]:
         raise LayoutError(
             "may be a direction, or roll, pitch and yaw; call it `direction`, or `rpy` in radians", key
         )
@@ -125,7 +121,7 @@ def _points(row: Row) -> bool:
 def _lists(node: Node, exchange: Exchange) -> dict[str, Row]:
     """The thrusters of a mapping that holds the places of all, and all directions, as lists."""
     value = node.value if isinstance(node.value, Mapping) else {}
-    place_key, places, size = lookup(value, labels.POSITION, labels.LENGTHS)
+    place_key, places, size = lookup(value, labels.POSITION, LENGTHS)
     key, directions, _ = lookup(value, labels.DIRECTION)
     axes, at = numbers_in(directions), numbers_in(places)
     if axes is None or at is None or axes.size < 6 or axes.size % 3 or axes.ndim > 2:
@@ -157,7 +153,7 @@ def is_allocation(node: Node) -> bool:
     """Whether a node's key is that of an allocation matrix."""
     around = [re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])", key[:100]) for key in ("", *node.path[-3:])]
     words = {word.lower() for word in around[-1]}
-    known = bool(words & WORDS) or ("matrix" in words and words <= {*BESIDE.split()})
+    known = bool(words & WORDS) or ("matrix" in words and words <= {*NEAR.split()})
     return known and not {word.lower() for each in around for word in each} & {*OTHER.split()}
 
 
@@ -179,10 +175,11 @@ def _wrenches(node: Node, exchange: Exchange, table: bool) -> Found | None:
             names, value = [*map(str, value)], [*value.values()]
     if not sure or not isinstance(value, list) or not value:
         return None
-    if isinstance(value[0], list):
-        return _of_array(_array(value, node), names, node, exchange, table)
-    array = numbers_in(value)
-    return _of_array(_unfolded(array, node), names, node, exchange, table) if array is not None else None
+    array = _array(value, node) if isinstance(value[0], list) else numbers_in(value)
+    if array is None:
+        return None
+    array = array if isinstance(value[0], list) else _unfolded(array, node)
+    return _of_array(array, names, node, exchange, table)
 
 
 def _array(rows: Sequence[Any], node: Node) -> Array:
@@ -193,11 +190,11 @@ def _array(rows: Sequence[Any], node: Node) -> Array:
 
 
 def _of_records(node: Node, rows: Mapping[str, Mapping[str, Any]]) -> Found | None:
-    """A mapping for each thruster that holds its wrench."""
-    first, *others = (
+    keyed = [
         {axis: key for key in row if (axis := axis_of(key)) and np.ndim(row[key]) == 0}
         for row in rows.values()
-    )
+    ]
+    first = keyed[0]
     if len(first) < 2 or not set(first) & {"Fx", "Fy", "Fz"}:
         return None
     keys = {plain(key) for key in first.values()}
@@ -207,9 +204,9 @@ def _of_records(node: Node, rows: Mapping[str, Mapping[str, Any]]) -> Found | No
             "place and angles; call them Fx to Tz, or x, y, z and dx, dy, dz",
             node.words,
         )
-    pairs = zip(rows.values(), (first, *others), strict=True)
+    pairs = zip(rows.values(), keyed, strict=True)
     columns = numbers_in([[row.get(own.get(axis, "")) for axis in first] for row, own in pairs])
-    if columns is None or any(set(own) != set(first) for own in others):
+    if columns is None or any(set(own) != set(first) for own in keyed):
         raise LayoutError(f"expected numbers {', '.join(first)} of each thruster", node.words)
     named = {key: {**row} for key, row in rows.items()}
     return Found(node, named, tuple(first), columns.T, "a row per thruster")
@@ -229,9 +226,10 @@ def _names(node: Node, n: int) -> list[str]:
 def _unfolded(array: Array, node: Node) -> Array:
     """A matrix in one list, row by row, of as many columns as there are names, or as is said."""
     for _, scope in node.scopes:
-        names, count = (lookup(scope, words)[1] for words in (labels.NAMES, f"cols columns {labels.COUNT}"))
-        n = len(names) if isinstance(names, list) else count
-        rows = lookup(scope, "rows")[1]
+        names, n, rows = (
+            lookup(scope, words)[1] for words in (labels.NAMES, f"cols columns {labels.COUNT}", "rows")
+        )
+        n = len(names) if isinstance(names, list) else n
         fits = isinstance(n, int) and n > 0 and array.size % n == 0
         if fits and (rows is None or isinstance(rows, list) or rows == array.size // n):
             return array.reshape(-1, n)

@@ -16,18 +16,8 @@ from finlab.files.guarded import Name, read_file
 from finlab.files.plain_values import parse_json
 
 _DAMAGED = (
-    zipfile.BadZipFile,
-    zlib.error,
-    struct.error,
-    ArithmeticError,
-    EOFError,
-    LookupError,
-    MemoryError,
-    OSError,
-    RuntimeError,
-    TypeError,
-    ValueError,
-    tokenize.TokenError,
+    *(zipfile.BadZipFile, zlib.error, struct.error, tokenize.TokenError, ArithmeticError, EOFError),
+    *(LookupError, MemoryError, OSError, RuntimeError, TypeError, ValueError),
 )
 """What reading a damaged or locked archive ends with."""
 _PACKED = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
@@ -46,17 +36,10 @@ def unpacked(
 ) -> dict[str, bytes]:
     """Returns files in a zip archive by name.
 
-    Args:
-        content: the archive.
-        source: what to call it in the sentence.
-        largest: the largest size [bytes] of the file of a name; None for one that is passed over. May raise.
-        most: largest size of all of them together [bytes].
-        error: the kind of error.
-
-    Raises:
-        FinlabError: of the kind `error`; the archive is damaged, holds a name twice, or a file is too large.
-    """
-    found: dict[str, bytes] = {}
+    `largest` says the largest size [bytes] of the file of a name, None for one that is passed over, and may
+    raise; `most` is that of all of them together. Raises FinlabError of the kind `error`, whose sentence
+    calls the archive `source`: it is damaged, holds a name twice, or a file is too large."""
+    files: dict[str, bytes] = {}
     if content.count(_ENTRY) > MOST_FILES:  # before a list of them is made
         raise error.at(source, f"holds more than {MOST_FILES} files; pack it again")
     try:
@@ -72,13 +55,14 @@ def unpacked(
                     raise ValueError(f"{name!r:.60} is compressed in another way than deflate")
                 if entry.file_size <= room:
                     with archive.open(entry) as stream:
-                        found[name] = stream.read(room + 1)
-                if entry.file_size > room or len(found[name]) > room:
+                        files[name] = stream.read(room + 1)
+                if entry.file_size > room or len(files[name]) > room:
                     raise error.at(source, f"{name[-60:]} in it is larger than {room:,} bytes")
-                most -= len(found[name])
+                most -= len(files[name])
     except _DAMAGED as problem:
-        raise error.at(source, f"cannot be read as a zip archive ({_reason(problem)})") from None
-    return found
+        reason = str(problem).splitlines()[0][:80] if str(problem) else type(problem).__name__
+        raise error.at(source, f"cannot be read as a zip archive ({reason})") from None
+    return files
 
 
 def packed(files: Mapping[str, bytes]) -> bytes:
@@ -93,17 +77,11 @@ def packed(files: Mapping[str, bytes]) -> bytes:
 
 
 def read_arrays(path: Name, names: Iterable[str] | None, most: int, what: str) -> dict[str, AnyArray]:
-    """Returns arrays of an NPZ file by name.
+    """Returns arrays of an NPZ file by name, those of some names or, for None, all.
 
-    Args:
-        path: the file.
-        names: the arrays that are wanted; None for all.
-        most: largest size of the file, and of all arrays that are wanted together [bytes].
-        what: what is expected, for the sentence, such as "a swim log".
-
-    Raises:
-        DataError: the file cannot be read, is damaged or too large, or lacks an array.
-    """
+    `most` is the largest size of the file, and of all arrays that are wanted together [bytes]. Raises
+    DataError: the file cannot be read, is damaged or too large, or lacks an array; the sentence says `what`
+    is expected, such as "a swim log"."""
 
     def largest(member: str) -> int | None:
         name = member.removesuffix(".npy")
@@ -111,10 +89,10 @@ def read_arrays(path: Name, names: Iterable[str] | None, most: int, what: str) -
 
     wanted = set(names or ())
     parts = unpacked(read_file(path, most, what), f"{path}: expected {what}", largest, most)
-    found = {name.removesuffix(".npy"): content for name, content in parts.items()}
-    if missing := sorted(wanted - set(found)):
+    named = {name.removesuffix(".npy"): content for name, content in parts.items()}
+    if missing := sorted(wanted - set(named)):
         raise DataError(f"{path}: expected {what}, but it holds no {missing[0]}")
-    return {name: _array(content, name, str(path)) for name, content in found.items()}
+    return {name: _array(content, name, str(path)) for name, content in named.items()}
 
 
 def json_of(array: AnyArray, source: str) -> Any:
@@ -143,7 +121,3 @@ def _array(content: bytes, name: str, source: str) -> AnyArray:
     except _DAMAGED:
         plain = f"{name!r:.60} in it is damaged, or no array of numbers or text"
         raise DataError(f"{source}: {plain}") from None
-
-
-def _reason(problem: Exception) -> str:
-    return str(problem).splitlines()[0][:80] if str(problem) else type(problem).__name__

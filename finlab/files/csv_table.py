@@ -1,8 +1,10 @@
-"""CSV files of numbers under a header, with line and column where one is wrong."""
+"""CSV files of numbers under a header, with line and column where one is wrong, and units in SI."""
 
 import csv
 import math
 from collections.abc import Sequence
+from contextlib import suppress
+from math import pi
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,16 +13,32 @@ from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.files.guarded import Name, decoded, read_file
 
+LENGTHS = {"m": 1.0, "cm": 0.01, "mm": 1e-3}
+TURNS = {"rad": 1.0, "deg": pi / 180.0, "degrees": pi / 180.0, "°": pi / 180.0}
+FORCES = {"n": 1.0, "kn": 1e3, "kgf": 9.80665, "lbf": 4.4482216}
+_BENCH = {
+    "newton newtons": 1.0, "gf g grams gram-force": 9.80665e-3, "kg kgs kg-f kilograms": FORCES["kgf"],
+    "lb lbs lbsf lb-f pounds": FORCES["lbf"], "ozf oz": 0.278014, "watts volts amps": 1.0,
+    "us µs μs usec microseconds": 1.0, "ms msec milliseconds": 1e3, "nm n-m": 1.0, "ncm": 0.01,
+    "kgfm kgm": 9.80665, "kgcm kgfcm": 0.0980665, "gcm gfcm": 9.80665e-5, "ozin ozfin": 7.06155e-3,
+    "inlb inlbf lbin lbfin": 0.112985, "ftlb ftlbf lbft lbfft": 1.35582,
+}  # fmt: skip
+UNITS = {
+    "rad": 1.0, "deg": TURNS["deg"], "°": TURNS["deg"],
+    "hz": 1.0, "rpm": 1.0 / 60.0, "bpm": 1.0 / 60.0, "rev/min": 1.0 / 60.0, "rad/s": 0.5 / pi,
+    **FORCES, "mn": 1e-3, "w": 1.0, "mw": 1e-3, "kw": 1e3, "v": 1.0, "mv": 1e-3,
+    "a": 1.0, "ma": 1e-3, "mnm": 1e-3, "%": 0.01, "-": 1.0,
+    **{unit: scale for units, scale in _BENCH.items() for unit in units.split()},
+}  # fmt: skip
+"""Units that the header of a bench may name (frequencies in Hz, pulses in us)."""
+
 
 class CsvTable:
     """A CSV file whose header has been read."""
 
     def __init__(self, content: bytes, source: str, gaps: bool = False) -> None:
-        """Takes a file's content, what errors call it, and whether cells may be empty.
-
-        Raises:
-            DataError: it is no text.
-        """
+        """Takes a file's content, what errors call it, and whether cells may be empty. Raises DataError: it
+        is no text."""
         self.source, self._gaps = source, gaps
         lines = decoded(content, source, "CSV text").splitlines()
         above = next((i for i, line in enumerate(lines) if not line.startswith("#")), len(lines))
@@ -35,32 +53,23 @@ class CsvTable:
     def numbers(self, places: Sequence[int]) -> tuple[Array, NDArray[np.intp]]:
         """Returns the columns at some places (rows, len(places)), and the line of each row (rows,).
 
-        Empty lines, and those that begin with #, are passed over. A cell that may be empty is NaN.
-
-        Raises:
-            DataError: there is no row, or a row or a cell is wrong; the sentence names line and column.
-        """
-        rows = [
-            (line, row)
-            for line, row in enumerate(self._rows, self._first)
-            if row.strip(" ,;\t") and not row.startswith("#")
-        ]
+        Empty lines, and those that begin with #, are passed over. A cell that may be empty is NaN. Raises
+        DataError: there is no row, or a row or a cell is wrong; the sentence names line and column."""
+        every = enumerate(self._rows, self._first)
+        rows = [(line, row) for line, row in every if row.strip(" ,;\t") and not row.startswith("#")]
         if not rows:
             raise DataError(f"{self.source}: has no rows below its header")
         return np.array([self._row(row, places, line) for line, row in rows]), np.array([n for n, _ in rows])
 
     def _row(self, row: str, places: Sequence[int], line: int) -> list[float]:
-        """One row, or a sentence on what is wrong in it."""
         where = f"{self.source}: line {line}"
         cells = self._cells(row, where)
         if len(cells) != len(self.header):
             raise DataError(f"{where} has {len(cells)} values, the header has {len(self.header)}")
-        try:
-            found = [float(cells[i]) for i in places]
-            if "_" not in row and all(map(math.isfinite, found)):
-                return found
-        except ValueError:
-            pass
+        with suppress(ValueError):
+            values = [float(cells[i]) for i in places]
+            if "_" not in row and all(map(math.isfinite, values)):
+                return values
         return [self._number(cells[i].strip(), f"{where}, column {self.header[i]},") for i in places]
 
     def _cells(self, row: str, where: str) -> list[str]:
@@ -74,15 +83,20 @@ class CsvTable:
             return math.nan
         if not cell:
             raise DataError(f"{where} is empty; leave no gaps")
-        try:
-            value = float(cell) if "_" not in cell else None
-        except ValueError:
-            value = None
-        if value is None:
-            raise DataError(f"{where} holds {cell!r:.40}, which is not a number")
-        if not math.isfinite(value):
-            raise DataError(f"{where} holds {cell!r:.40}, which is not finite")
+        value = number_in(cell)
+        if value is None or not math.isfinite(value):
+            raise DataError(
+                f"{where} holds {cell!r:.40}, which is not {'a number' if value is None else 'finite'}"
+            )
         return value
+
+
+def number_in(cell: str) -> float | None:
+    """Returns the number in a cell, which may not be finite; None where it holds none."""
+    try:
+        return None if "_" in cell else float(cell)
+    except ValueError:
+        return None
 
 
 def read_table(path: Name, most: int, what: str, gaps: bool = False) -> CsvTable:

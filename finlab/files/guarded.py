@@ -14,19 +14,11 @@ PART = 1 << 20
 
 
 def read_file(path: Name, most: int, what: str, error: type[FinlabError] = DataError) -> bytes:
-    """Returns the content of a regular file.
+    """Returns the content of a regular file of up to `most` bytes.
 
-    A pipe, a socket and a device are refused without waiting for them.
-
-    Args:
-        path: the file.
-        most: largest size that is read [bytes].
-        what: what is expected, for the sentence, such as "a layout file".
-        error: the kind of error.
-
-    Raises:
-        FinlabError: of the kind `error`; the file is missing, not regular, too large or not readable.
-    """
+    A pipe, a socket and a device are refused without waiting for them. Raises FinlabError of the kind
+    `error`: the file is missing, not regular, too large or not readable; the sentence says `what` is
+    expected, such as "a layout file"."""
     try:
         with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC), "rb") as file:
             about = os.fstat(file.fileno())
@@ -62,11 +54,8 @@ def read_text(path: Name, most: int, what: str, error: type[FinlabError] = DataE
 
 
 def decoded(content: bytes, source: str, what: str, error: type[FinlabError] = DataError) -> str:
-    """Returns UTF-8 text, without a byte order mark.
-
-    Raises:
-        FinlabError: of the kind `error`; the bytes are no UTF-8 text. The message calls them `source`.
-    """
+    """Returns UTF-8 text, without a byte order mark. Raises FinlabError of the kind `error`: the bytes are no
+    UTF-8 text; the message calls them `source`."""
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError:

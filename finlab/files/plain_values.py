@@ -26,16 +26,11 @@ _ESCAPED_SURROGATE = re.compile(r"\\u[dD][89a-fA-F]")
 
 
 def parse_json(content: str, source: str, error: type[FinlabError] = DataError) -> Any:
-    """Returns the values of a JSON document.
-
-    Raises:
-        FinlabError: of the kind `error`; it is no JSON, or holds a key twice or a number that is not finite.
-            The message calls the document `source`.
-    """
+    """Returns the values of a JSON document. Raises FinlabError of the kind `error`: it is no JSON, or holds
+    a key twice or a number that is not finite; the message calls the document `source`."""
+    numbers: Any = dict.fromkeys(("parse_float", "parse_constant", "parse_int"), _number)
     try:
-        values = json.loads(
-            content, object_pairs_hook=_once, parse_float=_number, parse_constant=_number, parse_int=_number
-        )
+        values = json.loads(content, object_pairs_hook=_once, **numbers)
         if _ESCAPED_SURROGATE.search(content):  # half of a pair is no character, and cannot be written
             json.dumps(values, ensure_ascii=False).encode()
         return values
@@ -48,12 +43,8 @@ def parse_json(content: str, source: str, error: type[FinlabError] = DataError) 
 
 
 def parse_yaml(content: str, source: str, error: type[FinlabError] = DataError) -> Any:
-    """Returns the values of one YAML document; aliases and tags are refused.
-
-    Raises:
-        FinlabError: of the kind `error`; it is no YAML, or holds what is refused. The message calls the
-            document `source`.
-    """
+    """Returns the values of one YAML document; aliases and tags are refused. Raises FinlabError of the kind
+    `error`: it is no YAML, or holds what is refused; the message calls the document `source`."""
     import yaml  # a robot's computer reads JSON and may lack PyYAML
 
     try:
@@ -86,7 +77,6 @@ def _number(text: str) -> int | float:
 
 
 def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """A mapping whose keys are given once each."""
     values: dict[str, Any] = {}
     for key, value in pairs:
         if key in values:
@@ -105,9 +95,7 @@ def _document(content: str) -> Any:
         if count > MAX_EVENTS:
             raise ValueError(f"line {line}: has more than {MAX_EVENTS} entries, too many to be read")
         if isinstance(event, yaml.AliasEvent) or getattr(event, "anchor", None):
-            raise ValueError(
-                f"line {line}: anchors and aliases (& and *) are not allowed; write the value out"
-            )
+            raise ValueError(f"line {line}: anchors and aliases (&, *) are not allowed; write the value out")
         if getattr(event, "tag", None):
             raise ValueError(f"line {line}: tags (!) are not allowed; write plain keys and values")
         depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)

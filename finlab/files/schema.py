@@ -13,15 +13,8 @@ Kind = TypeVar("Kind")
 
 _PLACE = re.compile(r"(?s)(.*) - at `(?:key` in `)?\$(.*)`")
 _STEP = re.compile(r"\.([^.\[\]]+)|\[(\d+)\]|\[(\.\.\.)\]")
-_TYPES = {
-    "float": "a number",
-    "int": "a whole number",
-    "str": "text",
-    "bool": "true or false",
-    "array": "a list",
-    "object": "keys and values",
-    "null": "null",
-}
+_TYPES = {"float": "a number", "int": "a whole number", "str": "text", "bool": "true or false"}
+_TYPES |= {"array": "a list", "object": "keys and values", "null": "null"}
 _BOUNDS = {">=": "at least", "<=": "at most", ">": "more than", "<": "less than"}
 
 
@@ -34,18 +27,11 @@ def shown(value: Any) -> str:
 def checked(
     values: Any, kind: type[Kind], error: type[FinlabError] = LayoutError, source: str = "", key: str = ""
 ) -> Kind:
-    """Returns plain values, such as those of a file, in a type.
+    """Returns plain values, such as those of a file, in a type: a `msgspec.Struct`, or any that msgspec
+    knows.
 
-    Args:
-        values: mappings, lists, text and numbers; arrays count as lists.
-        kind: a `msgspec.Struct` or any type that msgspec knows, with its limits.
-        error: the kind of error.
-        source: what to call the whole in the sentence; nothing where its reader adds that.
-        key: the place of `values` in it.
-
-    Raises:
-        FinlabError: of the kind `error`; the sentence says where, what was expected, and what was got.
-    """
+    Arrays count as lists. Raises FinlabError of the kind `error`: the sentence says where, by the `source` of
+    all, unless its reader adds that, and the `key` of these in it, what was expected, and what was got."""
     try:
         values = msgspec.to_builtins(values, enc_hook=_plain)
         return msgspec.convert(values, kind)
@@ -53,8 +39,8 @@ def checked(
         said, place = str(problem), ""
     except (RecursionError, TypeError, ValueError, OverflowError):
         said, place = "Expected `object`", ""
-    if found := _PLACE.fullmatch(said):
-        said, place = found[1], found[2]
+    if parts := _PLACE.fullmatch(said):
+        said, place = parts[1], parts[2]
     sentence, inner = _sentence(said, place, values, kind)
     place = ".".join(part for part in (place.lstrip("."), inner) if part)
     if key and place:
@@ -70,27 +56,27 @@ def _plain(value: Any) -> Any:
 def _sentence(said: str, place: str, values: Any, kind: Any) -> tuple[str, str]:
     """What is wrong, and the key below `place` that it is about, if any."""
     value, known = _at(place, values, inspect.type_info(kind))
-    if found := re.fullmatch(r"Object missing required field `(.*)`", said):
-        return "required key is missing", found[1]
-    if found := re.fullmatch(r"(?s)Object contains unknown field `(.*)`", said):
-        name = found[1] if found[1].isprintable() and len(found[1]) <= 40 else shown(found[1])
+    if parts := re.fullmatch(r"Object missing required field `(.*)`", said):
+        return "required key is missing", parts[1]
+    if parts := re.fullmatch(r"(?s)Object contains unknown field `(.*)`", said):
+        name = parts[1] if parts[1].isprintable() and len(parts[1]) <= 40 else shown(parts[1])
         return f"unknown key, expected one of {', '.join(_keys(known))}", name
-    if found := re.fullmatch(r"Expected `(\w+)` of length (>=|<=)? ?(\d+)(?:, got \d+)?", said):
-        unit = "characters" if found[1] == "str" else "values"
+    if parts := re.fullmatch(r"Expected `(\w+)` of length (>=|<=)? ?(\d+)(?:, got \d+)?", said):
+        unit = "characters" if parts[1] == "str" else "values"
         few, many = getattr(known, "min_length", None), getattr(known, "max_length", None)
         if few is None or many is None:
-            few = many = int(found[3])
+            few = many = int(parts[3])
         number = f"{few} to {many}" if few < many else f"{many}"
-        return f"expected {_TYPES[found[1]]} of {number} {unit}, got {len(value)}", ""
+        return f"expected {_TYPES[parts[1]]} of {number} {unit}, got {len(value)}", ""
     if said.startswith("Expected `str` matching regex"):
         return f"expected text on one line, without spaces around it, got {shown(value)}", ""
     least, most = getattr(known, "ge", None), getattr(known, "le", None)
     if re.fullmatch(r"Expected `\w+` [<>]=? \S+|Number out of range", said) and None not in (least, most):
         return f"must lie within {least:g} .. {most:g}, got {shown(value)}", ""
-    if found := re.fullmatch(r"Expected `\w+` ([<>]=?) (\S+)", said):
-        return f"expected a number of {_BOUNDS[found[1]]} {float(found[2]):g}, got {shown(value)}", ""
-    if found := re.fullmatch(r"Expected `([\w| ]+)`(, got .*)?", said):
-        wanted = " or ".join(_TYPES.get(name, name) for name in found[1].split(" | ") if name != "null")
+    if parts := re.fullmatch(r"Expected `\w+` ([<>]=?) (\S+)", said):
+        return f"expected a number of {_BOUNDS[parts[1]]} {float(parts[2]):g}, got {shown(value)}", ""
+    if parts := re.fullmatch(r"Expected `([\w| ]+)`(, got .*)?", said):
+        wanted = " or ".join(_TYPES.get(name, name) for name in parts[1].split(" | ") if name != "null")
         return f"expected {wanted}, got {shown(value)}", ""
     if choices := _choices(known):
         return f"expected {'one of ' * (len(choices) > 1)}{', '.join(choices)}, got {shown(value)}", ""

@@ -35,15 +35,9 @@ def in_worker(read: Callable[..., Result], *arguments: Any) -> Result:
     """Returns what `read(*arguments)` gives, which runs in a process of its own.
 
     What it changes in its arguments stays there. A program of one thread is copied; any other one has a
-    process that is copied, so that its main module must be guarded by `if __name__ == "__main__"`.
-
-    Args:
-        read: a function of a module; reads the files that the arguments are (bytes) or name (paths).
-        arguments: can be pickled; the limits grow with the size of the files.
-
-    Raises:
-        FinlabError: so did `read`; or it took too much time or memory, or failed.
-    """
+    process that is copied, so that its main module must be guarded by `if __name__ == "__main__"`. `read` is
+    a function of a module, for the files that the arguments are (bytes) or name (paths); with their size the
+    limits grow. Raises FinlabError: so did `read`; or it took too much time or memory, or failed."""
     size = sum(map(_size, arguments))
     limits = _Limits(max(CPU_S, CPU_S_PER_BYTE * size), max(ROOM, ROOM_PER_BYTE * size))
     context: Any = _context()
@@ -93,28 +87,22 @@ def prepare(modules: Sequence[str]) -> None:
 
 
 def _context() -> Any:
-    """How the process is made."""
     alone = threading.active_count() == 1 and sys.platform == "linux"
     methods = multiprocessing.get_all_start_methods()
     return multiprocessing.get_context("fork" if alone else "forkserver" if "forkserver" in methods else None)
 
 
 def _size(argument: Any) -> int:
-    """Bytes of a file, or of some."""
-    if isinstance(argument, bytes):
-        return len(argument)
-    if isinstance(argument, (list, tuple)):
-        return sum(map(_size, argument))
+    if isinstance(argument, (bytes, list, tuple)):
+        return len(argument) if isinstance(argument, bytes) else sum(map(_size, argument))
     with suppress(OSError, TypeError, ValueError):
         return os.path.getsize(argument)
     return 0
 
 
 def _child(connection: Connection, limits: _Limits, read: Callable[..., Any], arguments: Any) -> None:
-    """In the process: read, and send what came of it."""
-    with suppress(
-        BaseException
-    ):  # memory may not even suffice to say so; whoever interrupts, interrupts both
+    # Memory may not even suffice to say so; whoever interrupts, interrupts both.
+    with suppress(BaseException):
         _limit(limits)
         connection.send(_answer(read, arguments))
     os._exit(1)

@@ -1,32 +1,39 @@
-"""A fin from measurements: smooth forces and power with their uncertainty, and whether to trust them."""
+"""A fin from measurements: smooth forces and power with their uncertainty, and the file of them."""
 
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.fit.gaussian_process import Component
 from finlab.fit.measurements import MIN_SAMPLES, Measurements
-from finlab.fit.outliers import find_outliers
-from finlab.layout.angles import TURN
+from finlab.layout.axes import TURN
 from finlab.layout.fin import MAX_AMPLITUDE, MAX_FREQUENCY
+from finlab.layout.force_table_file import COLUMNS, DEVIATIONS, DOUBT, POWER_COLUMN, table_text
+from finlab.whole_file import write_whole
 
 MOST_SAMPLES = 1500
 """Samples beyond this number are thinned: the time grows with their cube."""
+OUTLIER = 5.0
+"""Error, over the usual one, beyond which a sample is left out."""
 BAND = 1.96
 """Standard deviations of a band that holds 95 % of a normal distribution."""
-GOOD_ERROR = 0.05
-"""Uncertainty of a force over the largest one, on average, up to which a fit is trusted."""
-GOOD_BAND = 0.85
-"""Share of samples left out that must lie within their band."""
+GOOD_ERROR, GOOD_BAND = 0.05, 0.85
+"""Mean uncertainty of a force over the largest one up to which a fit is trusted, and least share of samples
+left out that must lie within their band."""
 ROUND = (0.01, 0.05)
 """Steps of amplitude [rad] and frequency [Hz] to whose next multiple a table goes."""
 COVERED = 0.75 * TURN
 """Zero directions from which a table goes all round; fewer make a table of their arc."""
+GRID = (13, 13, 18)
+"""Amplitudes, frequencies and zero directions of the table, from rest to the largest that was measured."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +43,7 @@ class FinFit:
     measurements: Measurements
     outliers: tuple[str, ...]
     """Where the samples stand that were left out."""
-    components: tuple[Component, Component, Component]
+    components: tuple[Component, ...]
     """Force along the thrust's mean direction, across it, and along the shaft, over `largest`."""
     power: Component | None
     """Root of the power over its largest, where it was measured: power grows faster than force does."""
@@ -52,16 +59,14 @@ class FinFit:
     def predict(self, command: Array) -> tuple[Array, Array]:
         """Returns forces [N] in the fin frame and their standard deviations (..., 3) at commands (..., 3)."""
         inputs = self.measurements.scaled(command)
-        found = np.array([component.predict(inputs) for component in self.components])
-        thrust, unsure = self.largest * found.transpose(1, 0, 2).reshape(2, 3, *command.shape[:-1])
+        predicted = np.array([component.predict(inputs) for component in self.components])
+        thrust, unsure = self.largest * predicted.transpose(1, 0, 2).reshape(2, 3, *command.shape[:-1])
         angle = command[..., 2] + self.deflection
         cos, sin = np.cos(angle), np.sin(angle)
-        along, across, sideways = thrust
-        by_along, by_across, by_sideways = unsure
+        (along, across, sideways), (by_along, by_across, by_sideways) = thrust, unsure
         force = [sideways, along * cos - across * sin, along * sin + across * cos]
-        deviation = [by_sideways, np.hypot(by_along * cos, by_across * sin)]
-        deviation += [np.hypot(by_along * sin, by_across * cos)]
-        return np.stack(force, axis=-1), np.stack(deviation, axis=-1)
+        y, z = np.hypot(by_along * cos, by_across * sin), np.hypot(by_along * sin, by_across * cos)
+        return np.stack(force, axis=-1), np.stack([by_sideways, y, z], axis=-1)
 
     def predict_power(self, command: Array) -> Array | None:
         """Returns the power [W], (...), at commands (..., 3); None where none was measured."""
@@ -91,37 +96,28 @@ class FinFit:
     @cached_property
     def doubts(self) -> tuple[str, ...]:
         """Why the fit should not be trusted, a clause each; nothing where it may be."""
-        grid = self.grid()
-        doubtful = []
-        usual = float(np.sqrt(np.mean(self.uncertainty(grid) ** 2)))
-        if usual > GOOD_ERROR:
-            doubtful.append(f"forces are uncertain by {usual:.0%} of the largest one")
-        if self.coverage() < GOOD_BAND:
-            doubtful.append(f"only {self.coverage():.0%} of the samples lie in their 95 % band")
-        lost = len(self.outliers)
-        if lost > 0.1 * (lost + len(self.measurements)):
-            doubtful.append(f"{lost} of {lost + len(self.measurements)} samples contradict the others")
-        if len(self.measurements) < 3 * MIN_SAMPLES:
-            doubtful.append(f"{len(self.measurements)} samples are few, 300 are a good number")
-        return tuple(doubtful)
+        usual = float(np.sqrt(np.mean(self.uncertainty(self.grid()) ** 2)))
+        lost, n = len(self.outliers), len(self.measurements)
+        clauses = {
+            f"forces are uncertain by {usual:.0%} of the largest one": usual > GOOD_ERROR,
+            f"only {self.coverage():.0%} of the samples lie in their 95 % band": self.coverage() < GOOD_BAND,
+            f"{lost} of {lost + n} samples contradict the others": lost > 0.1 * (lost + n),
+            f"{n} samples are few, 300 are a good number": n < 3 * MIN_SAMPLES,
+        }
+        return tuple(clause for clause, holds in clauses.items() if holds)
 
     def grid(self, shape: tuple[int, int, int] = (7, 7, 12)) -> Array:
-        """Returns commands on a grid (*shape, 3) over what was measured, from rest on, to round numbers."""
-        amplitude, frequency = np.minimum(
-            np.ceil(np.divide(self.measurements.reach, ROUND) - 1e-9) * ROUND, (MAX_AMPLITUDE, MAX_FREQUENCY)
-        )
-        axes = [
-            np.linspace(0.0, most, count) for most, count in ((amplitude, shape[0]), (frequency, shape[1]))
-        ]
-        axes.append(self.directions(shape[2]))
+        """Returns commands on a grid (*shape, 3) over what was measured, from rest on, to round numbers; zero
+        directions go all round, or over the arc where samples are."""
+        ends = np.ceil(np.divide(self.measurements.reach, ROUND) - 1e-9) * ROUND
+        ends = np.minimum(ends, (MAX_AMPLITUDE, MAX_FREQUENCY))
+        axes = [np.linspace(0.0, most, count) for most, count in zip(ends, shape, strict=False)]
+        phi = self.measurements.command[:, 2]
+        if not self.measurements.turned or np.ptp(phi) >= COVERED:
+            axes.append(np.linspace(-0.5 * TURN, 0.5 * TURN, shape[2], endpoint=False))
+        else:
+            axes.append(np.linspace(phi.min(), phi.max(), shape[2]))
         return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-
-    def directions(self, count: int) -> Array:
-        """Returns zero directions [rad] of a table: all round, or the arc where samples are."""
-        measured = self.measurements.command[:, 2]
-        if not self.measurements.turned or np.ptp(measured) >= COVERED:
-            return np.linspace(-0.5 * TURN, 0.5 * TURN, count, endpoint=False)
-        return np.linspace(measured.min(), measured.max(), count)
 
 
 def fit_fin(
@@ -129,32 +125,25 @@ def fit_fin(
 ) -> FinFit:
     """Returns the fin that explains samples, leaving out those that contradict all others.
 
-    The linear algebra runs on one thread: on matrices of this size several wait for each other.
-
-    Args:
-        measurements: at least `MIN_SAMPLES` of a fin that beats.
-        seed: draws the samples that are kept where there are more than `MOST_SAMPLES`.
-        progress: told before each step what comes next; what it raises ends the fit.
-
-    Raises:
-        DataError: there are fewer.
-    """
+    The linear algebra runs on one thread: on matrices of this size several wait for each other. The seed
+    draws the samples that are kept where there are more than `MOST_SAMPLES`; `progress` is called before each
+    step, and what it raises ends the fit. Raises DataError: fewer than `MIN_SAMPLES` are of a fin that
+    beats."""
     notes = list(measurements.notes)
     rest = measurements.command[:, 0] * measurements.command[:, 1] == 0.0
     if rest.any():
         notes.append(f"{rest.sum()} samples at rest tell nothing and are left out")
         measurements = measurements.without(rest)
-    if len(measurements) < MIN_SAMPLES:
+    n = len(measurements)
+    if n < MIN_SAMPLES:
         raise DataError(
-            f"{len(measurements)} samples of a fin that beats, expected at least {MIN_SAMPLES}; 300 are "
-            "a good number"
+            f"{n} samples of a fin that beats, expected at least {MIN_SAMPLES}; 300 are a good number"
         )
-    if len(measurements) > MOST_SAMPLES:
-        drawn = np.random.default_rng(seed).permutation(len(measurements)) >= MOST_SAMPLES
-        notes.append(f"{MOST_SAMPLES} of {len(measurements)} samples, drawn at random, are used")
-        measurements = measurements.without(drawn)
+    if n > MOST_SAMPLES:
+        notes.append(f"{MOST_SAMPLES} of {n} samples, drawn at random, are used")
+        measurements = measurements.without(np.random.default_rng(seed).permutation(n) >= MOST_SAMPLES)
     with threadpool_limits(limits=1, user_api="blas"):
-        bad = find_outliers(measurements, progress)
+        bad = _outliers(measurements, progress)
         if not measurements.force[~bad].any():  # a fin that hardly ever pushes: what it gives is no outlier
             bad[:] = False
         outliers = tuple(place for place, out in zip(measurements.places, bad, strict=True) if out)
@@ -167,23 +156,71 @@ def fit_fin(
         return _fitted(measurements, outliers, tuple(notes), progress)
 
 
+def _outliers(measurements: Measurements, tell: Callable[[str], None]) -> NDArray[np.bool_]:
+    """Which samples (n,) lie far off a fit to the others, in which such samples count for little: a wrong
+    unit, a bump of the rig, a cell that slipped."""
+    turned, _ = measurements.thrust()
+    sizes = np.linalg.norm(measurements.force, axis=-1)
+    values = turned / (float(np.quantile(sizes, 0.98)) or float(sizes.max()))
+    inputs = measurements.scaled(measurements.command)
+    tell("looking for samples that contradict the others")
+    along = Component(inputs, values[:, 0], wild=True)
+    tell("looking for such samples across the thrust")
+    across = Component(inputs, values[:, 1], size=along.mean, wild=True)
+    return np.asarray((along.strange > OUTLIER) | (across.strange > OUTLIER))
+
+
 def _fitted(
     measurements: Measurements, outliers: tuple[str, ...], notes: tuple[str, ...], tell: Callable[[str], None]
 ) -> FinFit:
     turned, deflection = measurements.thrust()
     largest = float(np.linalg.norm(measurements.force, axis=-1).max())
     inputs = measurements.scaled(measurements.command)
-    tell("fitting the thrust")
-    along = Component(inputs, turned[:, 0] / largest)
-    tell("fitting the force across the thrust")
-    across = Component(inputs, turned[:, 1] / largest, along.mean)
-    tell("fitting the force along the shaft")
-    sideways = Component(inputs, turned[:, 2] / largest, along.mean)
+    parts: list[Component] = []
+    for values, what in zip(
+        turned.T, ("thrust", "force across the thrust", "force along the shaft"), strict=True
+    ):
+        tell(f"fitting the {what}")
+        parts.append(Component(inputs, values / largest, parts[0].mean if parts else None))
     power, largest_power = None, 1.0
     if measurements.power is not None:
         tell("fitting power")
         largest_power = float(measurements.power.max())
         power = Component(inputs, np.sqrt(np.maximum(measurements.power, 0.0) / largest_power))
-    return FinFit(
-        measurements, outliers, (along, across, sideways), power, deflection, largest, largest_power, notes
+    return FinFit(measurements, outliers, tuple(parts), power, deflection, largest, largest_power, notes)
+
+
+def fin_csv(fit: FinFit) -> str:
+    """Returns the file's text: lines that begin with # and say what the fit is worth, a header, a grid."""
+    command = fit.grid(GRID).reshape(-1, 3)
+    (force, deviation), power = fit.predict(command), fit.predict_power(command)
+    table = np.hstack([command, force, *([] if power is None else [power[:, None]]), deviation])
+    header = [*COLUMNS, *([] if power is None else [POWER_COLUMN]), *DEVIATIONS]
+    return table_text(summary(fit), header, table, 6)
+
+
+def write_fin(fit: FinFit, path: str | os.PathLike[str]) -> None:
+    """Writes a fitted fin to a CSV file that a layout names: `model: {type: table, path: FILE}`. Raises
+    DataError: the file cannot be written, or is not called .csv."""
+    check_table_path(path)
+    write_whole(path, fin_csv(fit), DataError)
+
+
+def check_table_path(path: str | os.PathLike[str]) -> None:
+    """Raises DataError for a name that no layout takes for a table, before a fit, which takes seconds."""
+    if Path(path).suffix.lower() != ".csv":
+        raise DataError(f"{path}: a table is a CSV file, expected a name that ends in .csv")
+
+
+def summary(fit: FinFit) -> tuple[str, ...]:
+    """Returns what the fit is worth, a line each; the first says why it should not be trusted, if so."""
+    amplitude, frequency = fit.measurements.reach
+    return (
+        *((f"{DOUBT}: {'; '.join(fit.doubts)}",) if fit.doubts else ()),
+        f"fitted to {len(fit.measurements)} samples, amplitudes up to {amplitude:.3g} rad, frequencies up to "
+        f"{frequency:.3g} Hz, forces up to {fit.largest:.3g} N",
+        f"cross-validated error {fit.error():.1%} of the largest force, noise of a sample {fit.noise():.1%}; "
+        f"{fit.coverage():.0%} of the samples lie in the 95 % band of the fit to the others",
+        f"thrust leans {float(np.degrees(fit.deflection)):+.1f} deg off the zero direction",
+        *fit.notes,
     )

@@ -1,8 +1,11 @@
-"""A Gaussian process over a fin's commands, and one component of its force as such a process.
+"""A Gaussian process over a fin's commands, its kernel, and one component of a force as such a process.
 
 See C. E. Rasmussen and C. K. I. Williams, Gaussian Processes for Machine Learning, 2006: the predictions are
 their equations 2.25 and 2.26, the likelihood 2.30 and 5.9, the errors of samples left out 5.12.
 """
+
+from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import cho_solve, cholesky, solve_triangular
@@ -10,19 +13,76 @@ from scipy.linalg.lapack import dpotri
 from scipy.optimize import minimize
 
 from finlab.arrays import Array
-from finlab.fit.thrust_kernel import BOUNDS, Pairs, ThrustKernel
 
 TUNED_ON = 250
 """Most samples on which the kernel's numbers are fitted; the time grows with their cube."""
-NOISE = (1e-8, 1.0)
-"""Ends of the fitted variance of the noise, over the largest force squared."""
-FIRST_NOISE = 1e-3
+NOISE, FIRST_NOISE = (1e-8, 1.0), 1e-3
+"""Ends of the fitted variance of the noise, over the largest force squared, and where the fit begins."""
 LEAST_NOISE = 1e-10
 """Added to every variance, so that samples at the same command leave the covariance regular."""
 NOISE_ROUNDS = 2
 """Times that the noise is found from the errors of the fit before."""
 TAILS = 5.0
 """Degrees of freedom of the noise while wild values are looked for."""
+BOUNDS = ((1e-3, 1e4), (1e-7, 1e2), (0.15, 20.0), (0.15, 20.0), (0.4, 30.0))
+"""Ends between which each number of the kernel is fitted."""
+
+
+class ThrustKernel(NamedTuple):
+    """Covariance of a force in the frame that turns with the zero direction.
+
+    k = s s' E (even + uneven D), where s = A f makes the force vanish at rest and grow from there, E falls
+    with the distance of amplitudes and of frequencies, and D with the angle between the zero directions, so
+    that a fin which is the same all round needs no more data than one direction. E is Matern's with 5/2: a
+    smoother one believes that it knows a fin which saturates better than it does. Inputs (n, 3) are amplitude
+    and frequency over their largest values, and the zero direction [rad].
+    """
+
+    even: float = 1.0
+    uneven: float = 0.05
+    amplitude: float = 1.0
+    """Length scale of amplitudes over the largest one."""
+    frequency: float = 1.0
+    """Length scale of frequencies over the largest one."""
+    turn: float = 1.5
+    """Length scale of zero directions [rad]."""
+
+    def covariance(self, inputs: Array, others: Array) -> Array:
+        """Returns k (n, m) between inputs (n, 3) and others (m, 3)."""
+        return Pairs(inputs, others).covariance(self)[0]
+
+    def variance(self, inputs: Array) -> Array:
+        """Returns the variances (n,) at inputs (n, 3)."""
+        return np.asarray((inputs[:, 0] * inputs[:, 1]) ** 2 * (self.even + self.uneven))
+
+
+class Pairs:
+    """Pairs of inputs (n, 3) and others (m, 3), which many kernels are asked about."""
+
+    def __init__(self, inputs: Array, others: Array) -> None:
+        self._grown = np.multiply.outer(inputs[:, 0] * inputs[:, 1], others[:, 0] * others[:, 1])
+        amplitude, frequency, turn = (inputs[:, None, k] - others[None, :, k] for k in range(3))
+        self._apart = amplitude**2, frequency**2, 2.0 * (1.0 - np.cos(turn))
+
+    def covariance(self, kernel: ThrustKernel) -> tuple[Array, Callable[[Array], Array]]:
+        """Returns k (n, m), and a function from weights (n, m) to the derivatives (5,) of the sum of weights
+        times k by the logarithms of the kernel's numbers."""
+        scales = kernel.amplitude, kernel.frequency, kernel.turn
+        a, f, phi = (apart / scale**2 for apart, scale in zip(self._apart, scales, strict=True))
+        distance = np.sqrt(5.0 * (a + f))
+        bare = self._grown * np.exp(-distance)
+        near = bare * (1.0 + distance + distance**2 / 3.0)
+        uneven = kernel.uneven * np.exp(-0.5 * phi)
+        share = kernel.even + uneven
+
+        def gradient(weights: Array) -> Array:
+            by_near = weights * near
+            by_distance = weights * bare * (1.0 + distance) * (5.0 / 3.0) * share
+            by_uneven = by_near * uneven
+            sums = by_near.sum() * kernel.even, by_uneven.sum(), np.vdot(by_distance, a)
+            return np.array([*sums, np.vdot(by_distance, f), np.vdot(by_uneven, phi)])
+
+        return near * share, gradient
 
 
 class GaussianProcess:
@@ -66,9 +126,9 @@ class Component:
         self._process = _tuned(inputs, values, None)
         for _ in range(NOISE_ROUNDS):
             error, _ = self._process.left_out()
-            found = np.asarray(values - error) if size is None else size
-            even, grown = _noise_of(error, found, wild)
-            usual = even + grown * found**2
+            force = np.asarray(values - error) if size is None else size
+            even, grown = _noise_of(error, force, wild)
+            usual = even + grown * force**2
             self.variance = usual * (TAILS + error**2 / usual) / (TAILS + 1.0) if wild else usual
             """Of the noise of each value (n,)."""
             self._process = _tuned(inputs, values, self.variance)
@@ -122,7 +182,6 @@ def _factor(covariance: Array, variance: Array) -> Array:
 
 
 def _inverse(lower: Array) -> Array:
-    """The inverse (n, n) of a matrix from its Cholesky factor."""
     half, _ = dpotri(lower, lower=True)
     half = np.tril(half)
     return np.asarray(half + half.T - np.diag(np.diag(half)))

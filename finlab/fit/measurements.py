@@ -1,4 +1,4 @@
-"""What a load cell measured of one fin, cycle means, read from CSV files."""
+"""Samples of one fin on a load cell, cycle means, read from CSV files."""
 
 import os
 from collections.abc import Sequence
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.fit.columns import Columns, read_columns, together
-from finlab.layout.angles import FILE_TURN_TOLERANCE, TURN
+from finlab.layout.axes import FILE_TURN_TOLERANCE, TURN
 from finlab.layout.fin import MAX_AMPLITUDE, MAX_FREQUENCY
 
 NEEDED = ("A", "f", "Fy", "Fz")
@@ -74,25 +74,18 @@ class Measurements:
     def without(self, places: NDArray[np.bool_]) -> "Measurements":
         """The samples but those (n,) that are marked."""
         keep = ~places
-        return replace(
-            self,
-            command=self.command[keep],
-            force=self.force[keep],
-            power=None if self.power is None else self.power[keep],
-            places=tuple(place for place, kept in zip(self.places, keep, strict=True) if kept),
-        )
+        power = None if self.power is None else self.power[keep]
+        named = tuple(np.array(self.places)[keep].tolist())
+        return replace(self, command=self.command[keep], force=self.force[keep], power=power, places=named)
 
 
 def read_measurements(paths: Sequence[str | os.PathLike[str]]) -> Measurements:
     """Returns the samples of all files together.
 
     Each file has a header; columns come in any order, units may stand behind names (`A [deg]`), else
-    they are SI. They are cycle means: A (or stroke), f, Fy, Fz and perhaps phi, Fx, P.
-
-    Raises:
-        DataError: a file is missing, too large, lacks a column or holds what no fin can do; or there are too
-            few samples, or only one amplitude or frequency.
-    """
+    they are SI. They are cycle means: A (or stroke), f, Fy, Fz and perhaps phi, Fx, P. Raises DataError: a
+    file is missing, too large, lacks a column or holds what no fin can do; or there are too few samples, or
+    only one amplitude or frequency."""
     read = [read_columns(Path(path), NAMES, NEEDED, "A, f, phi, Fx, Fy, Fz in any order") for path in paths]
     if not read:
         raise DataError("expected at least one CSV file of measurements, got none")
@@ -102,31 +95,24 @@ def read_measurements(paths: Sequence[str | os.PathLike[str]]) -> Measurements:
 
 
 def _check_units(values: dict[str, Array], source: str) -> None:
-    """Refuses amplitudes [rad] and frequencies [Hz] that no fin has, as in a file in other units.
-
-    Raises:
-        DataError: there is such a value; the sentence says how to name the unit.
-    """
-    for name, most, unit, told in (("A", MAX_AMPLITUDE, "rad", "deg"), ("f", MAX_FREQUENCY, "Hz", "rpm")):
+    """Refuses amplitudes [rad] and frequencies [Hz] that no fin has, as in a file in other units."""
+    for name, what, most, unit, hint in (
+        ("A", "half amplitudes", MAX_AMPLITUDE, "rad", "`A [deg]`, and call whole strokes `stroke`"),
+        ("f", "frequencies", MAX_FREQUENCY, "Hz", "`f [rpm]`"),
+    ):
         low, high = float(values[name].min()), float(values[name].max())
         if high > most + 1e-9 or low < 0.0:
-            what = "half amplitudes" if name == "A" else "frequencies"
             raise DataError(
                 f"{source}: {what} from {low:.4g} to {high:.4g} {unit}, expected 0 to {most:.4g}; name "
-                f"another unit in the header, `{name} [{told}]`"
-                + ", and call whole strokes `stroke`"
-                * (name == "A")
+                f"another unit in the header, {hint}"
             )
 
 
 def _checked(read: list[Columns], source: str) -> Measurements:
-    """The samples of all files, with what is wrong with them as a whole said in a sentence."""
-    places = tuple(place for file in read for place in file.places)
-    notes: list[str] = []
-    if len(places) < MIN_SAMPLES:
-        raise DataError(
-            f"{source}: {len(places)} samples, expected at least {MIN_SAMPLES}; 300 are a good number"
-        )
+    """The samples of all files, with what is wrong with all together said in a sentence."""
+    places, notes = tuple(place for file in read for place in file.places), list[str]()
+    if (n := len(places)) < MIN_SAMPLES:
+        raise DataError(f"{source}: {n} samples, expected at least {MIN_SAMPLES}; 300 are a good number")
     columns = together([file.values for file in read])
     for name, unit in (("A", "rad"), ("f", "Hz")):
         if np.ptp(columns[name]) < SAME:
@@ -145,12 +131,11 @@ def _checked(read: list[Columns], source: str) -> Measurements:
     power = columns.get("P")
     for name in ("Fx", "Fy", "Fz", "P"):
         if name in columns and columns[name][0] and np.ptp(columns[name]) == 0.0:
-            told = f"column {name} is {columns[name][0]:.4g} throughout"
-            raise DataError(f"{source}: {told}; is the sensor connected?")
+            value = f"{columns[name][0]:.4g}"
+            raise DataError(f"{source}: column {name} is {value} throughout; is the sensor connected?")
     if power is not None and power.min() < -0.02 * np.abs(power).max():
-        raise DataError(
-            f"{source}: column P has {power.min():.4g} W, expected the mean power that drives the fin"
-        )
+        least = f"{power.min():.4g} W, expected the mean power that drives the fin"
+        raise DataError(f"{source}: column P has {least}")
     return Measurements(command, force, power, places, tuple(notes), turned)
 
 
@@ -158,14 +143,10 @@ def _directions(columns: dict[str, Array], source: str, notes: list[str]) -> tup
     """Zero directions (n,) [rad], and whether there are several; a note where there are not."""
     phi = columns.get("phi")
     if phi is not None and np.ptp(phi) > TURN + FILE_TURN_TOLERANCE:
-        raise DataError(
-            f"{source}: the zero directions span {np.ptp(phi):.4g} rad; name their unit in the header, "
-            "`phi [deg]`"
-        )
+        span = f"{np.ptp(phi):.4g} rad; name their unit in the header, `phi [deg]`"
+        raise DataError(f"{source}: the zero directions span {span}")
     if phi is not None and np.ptp(phi) >= SAME_DIRECTION:
         return phi, True
     said = "there is no column phi" if phi is None else f"phi is {phi[0]:.3f} rad throughout"
-    notes.append(
-        f"{said}: the other zero directions are filled by symmetry, as a fin that is the same all round"
-    )
+    notes.append(f"{said}: the other directions are filled by symmetry, as a fin that is the same all round")
     return np.zeros(len(columns["A"])) if phi is None else phi, False

@@ -1,18 +1,20 @@
-"""What a bench measured of one thruster in still water: force and power over its command, from CSV files."""
+"""Benches of one thruster in still water, from CSV files and workbooks: force and power over its command.
+
+At several voltages it is known which rows are of one voltage, and what lies between two of them.
+"""
 
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finlab.arrays import Array
 from finlab.errors import DataError
-from finlab.fit.columns import Columns, named_column, read_columns
-from finlab.fit.voltages import Rows, at_voltage, by_voltage
-from finlab.fit.workbook import sheets
+from finlab.fit.columns import Columns, named_column, read_columns, sheets, together
 
 _WORDS = {
     "PWM": "pwm pulse pulse_width pulsewidth pwm_signal pwm_value pwm_input pwm_width signal servo_signal "
@@ -42,6 +44,79 @@ MIN_COMMANDS = 5
 """Fewest different commands."""
 NEGATIVE = 0.02
 """Share of the largest power by which a power may lie below 0, as noise."""
+Rows = Mapping[str, Array]
+"""Columns of a bench by name (n,), with `command`, `force` and `power`."""
+NEAR = 0.05
+"""Share by which voltages of one supply may differ."""
+WITHIN = 0.3
+"""Share of the commands at a voltage within those at a higher one, from which on the two are two tables."""
+
+
+def by_voltage(rows: Rows, command: Array) -> list[Rows]:
+    """Returns the rows of one table, apart where it was measured at several voltages, commands (n,).
+
+    A supply that sags under load is one: there commands of a lower voltage lie beyond those of a higher one.
+    """
+    volts = np.abs(rows["voltage"])
+    parts = _levels(volts)
+    tables = [parts[-1]]
+    for part in parts[-2::-1]:
+        higher = command[tables[-1]]
+        if np.mean((command[part] >= higher.min()) & (command[part] <= higher.max())) > WITHIN:
+            tables.append(part)
+        else:
+            tables[-1] = np.concatenate([part, tables[-1]])
+    return [{name: values[np.sort(table)] for name, values in rows.items()} for table in tables]
+
+
+def at_voltage(tables: Sequence[Rows], voltage: float | None, source: str) -> tuple[Rows, tuple[str, ...]]:
+    """Returns the rows of one voltage [V], None where there is only one, and notes on what was done.
+
+    Each table is of one voltage, by its middle in column `voltage`; without that column of any. Raises
+    DataError: there are several and none is named, or that one does not lie among them; `source` has the
+    names of the files."""
+    known = np.array([np.median(np.abs(rows["voltage"])) if "voltage" in rows else np.nan for rows in tables])
+    groups = _levels(known)
+    if np.isnan(known).any() and (voltage is not None or len(groups) > 1):
+        raise DataError(f"{source}: does not tell at which voltage all rows were measured")
+    levels = np.array([np.median(known[own]) for own in groups])
+    named = f"measured at {', '.join(f'{level:.4g}' for level in levels)} V"
+    if voltage is None and len(groups) > 1:
+        raise DataError(f"{source}: {named}; say which counts, --voltage {levels[-1]:.4g}")
+    within = [together([tables[k] for k in own]) for own in groups]
+    if voltage is None:
+        return within[0], ()
+    near = int(np.argmin(np.abs(levels - voltage)))
+    if abs(voltage - levels[near]) <= 0.5 * NEAR * levels[near]:
+        return within[near], (f"{named}: the rows at {levels[near]:.4g} V are taken",) * (len(groups) > 1)
+    if not levels[0] < voltage < levels[-1]:
+        raise DataError(f"{source}: {named}, which tells nothing of {voltage:g} V")
+    upper = int(np.searchsorted(levels, voltage))
+    low, high = levels[upper - 1 : upper + 1].tolist()
+    rows = _between(within[upper - 1], within[upper], (voltage - low) / (high - low))
+    return rows, (f"interpolated between the rows at {low:.4g} V and at {high:.4g} V",)
+
+
+def _levels(volts: Array) -> list[NDArray[np.intp]]:
+    """Places of voltages (n,) that are one, the lowest first."""
+    order = np.argsort(volts, kind="stable")
+    steps = np.diff(volts[order]) > NEAR * volts[order][1:]
+    return np.split(order, np.flatnonzero(steps) + 1)
+
+
+def _between(low: Rows, high: Rows, share: float) -> Rows:
+    """The table at a share of the way from one to the other, over commands that both reach."""
+    ends = [(rows["command"].min(), rows["command"].max()) for rows in (low, high)]
+    first, last = max(own[0] for own in ends), min(own[1] for own in ends)
+    places = np.unique(np.concatenate([low["command"], high["command"]]))
+    places = places[(places >= first) & (places <= last)]
+
+    def means(rows: Rows, name: str) -> Array:
+        at, where, count = np.unique(rows["command"], return_inverse=True, return_counts=True)
+        return np.asarray(np.interp(places, at, np.bincount(where, rows[name]) / count))
+
+    names = [name for name in low if name in high]
+    return {name: (1.0 - share) * means(low, name) + share * means(high, name) for name in names}
 
 
 @dataclass(frozen=True)
@@ -57,7 +132,6 @@ class Bench:
     torque: Array | None
     """Torque on the thruster about its axis [N m], (n,), where the file tells it."""
     unit: str
-    """Unit of the command."""
     source: str
     """Names of the files."""
     notes: tuple[str, ...]
@@ -67,24 +141,18 @@ class Bench:
 def read_bench(paths: Sequence[str | os.PathLike[str]], voltage: float | None = None) -> Bench:
     """Returns the rows of all files together.
 
-    Args:
-        paths: CSV files, and workbooks (.xlsx) with a table in a sheet.
-        voltage: which counts where there are several [V]; between two of them forces are interpolated.
-
-    Raises:
-        DataError: a file is missing, lacks a column or holds what no thruster does, or there are several
-            voltages and none was asked for.
-    """
+    Paths are those of CSV files, and of workbooks (.xlsx) with a table in a sheet. Of several voltages the
+    one named counts [V]; between two of them forces are interpolated. Raises DataError: a file is missing,
+    lacks a column or holds what no thruster does, or there are several voltages and none is named."""
     read = [_tables(Path(path)) for path in paths]
     files, source = [table for tables, _ in read for table in tables], ", ".join(str(path) for path in paths)
-    shared = [name for name in COMMANDS if all(name in file.values for file in files)]
-    if not shared:
+    kind, *others = [name for name in COMMANDS if all(name in file.values for file in files)] or [""]
+    if not kind:
         raise DataError(f"{source}: no command stands in all files, expected {EXPECTED}")
-    kind, notes = shared[0], [note for _, said in read for note in said]
-    if shared[1:]:
-        notes.append(f"commands are those of column {kind}; {' and '.join(shared[1:])} is left aside")
-    bare = {name: file.headers[name] for file in files for name in file.bare if name in TAKEN}
-    if bare:
+    notes = [note for _, said in read for note in said]
+    if others:
+        notes.append(f"commands are those of column {kind}; {' and '.join(others)} is left aside")
+    if bare := {name: file.headers[name] for file in files for name in file.bare if name in TAKEN}:
         units = ", ".join(TAKEN[name] for name in bare)
         notes.append(f"no unit stands at {', '.join(bare.values())}: taken for {units}")
     tables = [rows for file in files for rows in _rows(file, kind, notes)]
@@ -96,11 +164,11 @@ def _tables(path: Path) -> tuple[list[Columns], tuple[str, ...]]:
     """The tables of a file, and notes on what was passed over."""
     if path.suffix.lower() not in (".xlsx", ".xlsm"):
         return [_renamed(read_columns(path, NAMES, NEEDED, EXPECTED))], ()
-    found, other = sheets(path, _is_header)
-    if not found:
+    held, other = sheets(path, _is_header)
+    if not held:
         raise DataError(f"{path}: no sheet holds a table ({', '.join(other):.200}), expected {EXPECTED}")
     tables = []
-    for title, table in found.items():
+    for title, table in held.items():
         columns = _renamed(read_columns(table, NAMES, NEEDED, EXPECTED))
         volts = re.search(r"(\d+(?:[.,]\d+)?) ?v(?:olts?)?\b", title, flags=re.IGNORECASE)
         if volts and "voltage" not in columns.values:
@@ -110,7 +178,6 @@ def _tables(path: Path) -> tuple[list[Columns], tuple[str, ...]]:
 
 
 def _is_header(cells: Sequence[str]) -> bool:
-    """Whether cells stand above a table of a thruster."""
     try:
         names = {named_column(cell, NAMES).name for cell in cells}
     except DataError:  # a header whose unit is not known, which is said when it is read
@@ -119,7 +186,6 @@ def _is_header(cells: Sequence[str]) -> bool:
 
 
 def _renamed(columns: Columns) -> Columns:
-    """A throttle that is told as a pulse is one."""
     header = columns.headers.get("input", "")
     if "PWM" not in columns.values and re.match("[uµμm]", named_column(header, NAMES).unit):
         columns.values["PWM"], columns.headers["PWM"] = columns.values.pop("input"), header
@@ -138,9 +204,8 @@ def _rows(file: Columns, kind: str, notes: list[str]) -> list[Rows]:
     power = values["power"] if "power" in values else np.abs(values["voltage"] * values["current"])
     if power.min() < -NEGATIVE * np.abs(power).max():
         place = file.places[int(np.argmin(power))]
-        raise DataError(
-            f"{place}: the power is {power.min():.4g} W, expected what the thruster takes, 0 or more"
-        )
+        least = f"{power.min():.4g} W, expected what the thruster takes, 0 or more"
+        raise DataError(f"{place}: the power is {least}")
     rows = {"command": command, "force": force, "power": power}
     rows |= {name: values[name] for name in values if name in ("voltage", "torque")}
     apart = by_voltage(rows, command) if "voltage" in rows else [rows]
@@ -166,7 +231,6 @@ def _signed(rows: Rows, unit: str, notes: list[str]) -> Rows:
 
 
 def _checked(values: Rows, kind: str, source: str, notes: tuple[str, ...]) -> Bench:
-    """The bench of rows of one voltage, if they can be one."""
     command, force, power = values["command"], values["force"], values["power"]
     if not force.any() or not power.any():
         raise DataError(f"{source}: {'power' if force.any() else 'force'} is 0 throughout; is it connected?")

@@ -1,10 +1,12 @@
-"""A thruster from its bench table: rising force and convex power over the command.
+"""A thruster from its bench table, rising force and convex power over the command, and the file of it.
 
 Rows of one command are averaged, and neighbours where there are very many. How sure the force is, the table's
 own rows tell (`finlab.uncertainty`).
 """
 
+import json
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from scipy.optimize import isotonic_regression, nnls
@@ -12,7 +14,8 @@ from scipy.optimize import isotonic_regression, nnls
 from finlab.arrays import Array
 from finlab.errors import DataError, LayoutError
 from finlab.fit.thruster_bench import Bench
-from finlab.layout.thrust_model import PowerTable
+from finlab.layout.force_table_file import table_text
+from finlab.layout.thrust_model import COLUMNS, PowerTable
 
 NO_FORCE = 0.002
 """Share of the largest force up to which a command counts as at rest, or ..."""
@@ -32,10 +35,9 @@ FALL = 0.12
 
 @dataclass(frozen=True)
 class ThrusterFit:
-    """A thruster as its bench shows it."""
+    """A thruster as its bench shows it, by command, force [N] and power [W]."""
 
     table: PowerTable
-    """Command, force [N] and power [W]."""
     still: tuple[float, float] | None
     """Commands between which there is no force, as far as there are such rows."""
     dead_band: float
@@ -52,11 +54,8 @@ class ThrusterFit:
 
 
 def fit_thruster(bench: Bench) -> ThrusterFit:
-    """Returns the thruster that explains the rows.
-
-    Raises:
-        DataError: the force falls with the command, is nowhere near 0, or takes a power that is not convex.
-    """
+    """Returns the thruster that explains the rows. Raises DataError: the force falls with the command, is
+    nowhere near 0, or takes a power that is not convex."""
     try:
         return _fitted(bench)
     except (DataError, LayoutError) as error:
@@ -76,38 +75,31 @@ def _fitted(bench: Bench) -> ThrusterFit:
     side, notes = _sides(command, force, rising, bench.unit), list(bench.notes)
     idle = float(power[side == 0].min()) if (side == 0).any() else 0.0
     least = NO_FORCE * float(np.abs(force).max())
-    found = np.where(side == 0, 0.0, side * np.maximum(side * rising, least))
-    watts = np.full(len(found), idle)
+    thrust = np.where(side == 0, 0.0, side * np.maximum(side * rising, least))
+    watts = np.full(len(thrust), idle)
     for sign, name in ((-1.0, "negative"), (1.0, "positive")):
         own = side == sign
         if own.any():
-            watts[own] = _convex(np.abs(found[own]), power[own], idle)
+            watts[own] = _convex(np.abs(thrust[own]), power[own], idle)
         else:
             notes.append(f"no {name} forces were measured: the thruster pushes one way")
-    table = np.stack([command, found, watts], axis=1)
-    rows = np.array(
-        [[float(f"{value:.{n}g}") for value, n in zip(row, DIGITS, strict=True)] for row in table]
-    )
+    columns = zip((command, thrust, watts), DIGITS, strict=True)
+    rows = np.array([[float(f"{value:.{n}g}") for value in column] for column, n in columns]).T
     nearest = (*rows[rows[:, 1] < 0.0][-1:], *rows[rows[:, 1] > 0.0][:1])
     still = rows[rows[:, 1] == 0.0, 0]
+    arm = 0.0 if bench.torque is None else float(bench.torque @ bench.force / (bench.force @ bench.force))
     return ThrusterFit(
         table=PowerTable(tuple(map(tuple, rows.tolist())), bench.unit),
         still=(float(still[0]), float(still[-1])) if len(still) else None,
         dead_band=min(abs(float(row[1])) for row in nearest) if len(still) > 1 else 0.0,
-        torque_per_newton=(
-            0.0 if bench.torque is None else float(bench.torque @ bench.force / (bench.force @ bench.force))
-        ),
+        torque_per_newton=arm,
         notes=tuple(notes),
     )
 
 
 def _convex(size: Array, watts: Array, idle: float) -> Array:
-    """Returns powers (k,) [W]: the convex curve from `idle` at rest on that is nearest to powers (k,) of
-    forces (k,) [N], relative to their size.
-
-    Raises:
-        DataError: no convex curve is near.
-    """
+    """The powers (k,) [W] of the convex curve from `idle` at rest on that is nearest to powers (k,) of forces
+    (k,) [N], relative to their size. Raises DataError: no convex curve is near."""
     bends = np.concatenate([[0.0], np.unique(size)[:-1]])
     beyond = np.maximum(size[:, None] - bends, 0.0)
     order = np.argsort(size, kind="stable")
@@ -115,22 +107,17 @@ def _convex(size: Array, watts: Array, idle: float) -> Array:
     level[order] = isotonic_regression(watts[order]).x
     weight = 1.0 / (np.maximum(level, 0.0) + LEVEL * level.max())
     rise, _ = nnls(beyond * weight[:, None], (watts - idle) * weight)
-    found = idle + beyond @ rise
-    missed = np.sqrt(np.mean((found - watts) ** 2))
+    curve = idle + beyond @ rise
+    missed = np.sqrt(np.mean((curve - watts) ** 2))
     if missed > NOT_CONVEX * watts.max():
-        raise DataError(
-            f"the power does not grow ever faster with the force: the nearest curve that does misses it by "
-            f"{missed:.3g} W of {watts.max():.4g} W; are force and power of the same rows?"
-        )
-    return np.asarray(found)
+        why = f"misses it by {missed:.3g} W of {watts.max():.4g} W; are force and power of the same rows?"
+        raise DataError(f"the power does not grow ever faster with the force: the nearest such curve {why}")
+    return np.asarray(curve)
 
 
 def _sides(command: Array, force: Array, rising: Array, unit: str) -> Array:
-    """Returns the side of each command, -1, 0 at rest or 1 (k,), by forces and rising means (k,) [N].
-
-    Raises:
-        DataError: forces lie far off their rising means, or none is near 0.
-    """
+    """The side of each command, -1, 0 at rest or 1 (k,), by forces and rising means (k,) [N]. Raises
+    DataError: forces lie far off their rising means, or none is near 0."""
     largest = float(np.abs(force).max())
     if force[-1] <= force[0]:
         raise DataError(
@@ -155,3 +142,30 @@ def _sides(command: Array, force: Array, rising: Array, unit: str) -> Array:
             "largest force"
         )
     return side
+
+
+def layout_lines(fit: ThrusterFit, path: Path) -> tuple[str, ...]:
+    """Returns the keys of a thruster in a layout beside a table at a path."""
+    least, most = fit.force
+    torque = fit.torque_per_newton
+    unit = f", unit: {fit.table.unit}" if fit.table.unit else ""
+    name = json.dumps(path.name, ensure_ascii=False)  # text to YAML, whatever it is made of
+    return (
+        f"force_n: [{least:g}, {most:g}]",
+        *([f"dead_band_n: {fit.dead_band:g}"] if fit.dead_band > 0.0 else []),
+        *([f"torque_per_newton_m: {torque:.4g}"] if torque != 0.0 else []),
+        f"model: {{type: table, path: {name}{unit}}}",
+    )
+
+
+def thruster_csv(fit: ThrusterFit, path: Path) -> str:
+    """Returns the file's text: lines that begin with # and say what the fit found, a header, the rows."""
+    return table_text((*summary(fit), *layout_lines(fit, path)), COLUMNS, fit.table.rows, 12)
+
+
+def summary(fit: ThrusterFit) -> tuple[str, ...]:
+    """Returns what was found, a line each."""
+    unit = f" {fit.table.unit}" if fit.table.unit else ""
+    least, most = fit.force
+    still = f"; none from {fit.still[0]:g} to {fit.still[1]:g}{unit}" if fit.still else ""
+    return (f"force {least:.4g} to {most:.4g} N{still}", *fit.notes)

@@ -1,1 +1,1 @@
-"""What each actuator can push, as a convex set, and how that adds up. numpy and scipy."""
+"""Convex sets of what actuators can push, and how these add up. numpy and scipy."""

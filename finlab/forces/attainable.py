@@ -32,8 +32,7 @@ TOLERANCE = 0.01
 @dataclass(frozen=True, eq=False)
 class AttainableSet:
     """A convex polytope of forces or torques that can be had with all else at zero, body frame [N] or [N m].
-    Every vertex is attained, by the actuators or, where an arc is too wide or a force is that of a flow, by
-    the convex hulls of what they can push."""
+    Every vertex is attained, of wide arcs and forces of a flow by convex hulls."""
 
     kind: Kind
     vertices: Array
@@ -74,17 +73,11 @@ def _hull_of(points: Array, kind: Kind) -> AttainableSet:
         offsets = (points[corners] * normals).sum(-1)
     else:
         corners, normals, offsets = np.array([0]), np.zeros((0, 3)), np.zeros(0)
-    sides = np.concatenate([flat, -flat])
-    vertices = points[corners]
-    return AttainableSet(
-        kind,
-        vertices,
-        np.zeros((0, 3), dtype=np.intp),
-        np.arange(len(corners)) if dimension else np.zeros(0, dtype=np.intp),
-        dimension,
-        np.concatenate([normals, sides]),
-        np.concatenate([offsets, (points @ sides.T).max(axis=0)]),
-    )
+    sides, none = np.concatenate([flat, -flat]), np.zeros((0, 3), dtype=np.intp)
+    outline = np.arange(len(corners)) if dimension else none[:, 0]
+    normals = np.concatenate([normals, sides])
+    offsets = np.concatenate([offsets, (points @ sides.T).max(axis=0)])
+    return AttainableSet(kind, points[corners], none, outline, dimension, normals, offsets)
 
 
 def _body(points: Array, kind: Kind) -> AttainableSet:
@@ -109,20 +102,13 @@ def attainable_set(
     tolerance: float = TOLERANCE,
     flow: ArrayLike | None = None,
 ) -> AttainableSet:
-    """Returns what forces or torques the actuators can give with all else at zero.
+    """Returns what forces or torques (by `kind`) the actuators can give with all else at zero; those in
+    `failed` push nothing, and the body moves through the water with `flow` (6,) [m/s, rad/s], body frame,
+    None at rest. A `LayoutError` at an unknown name.
 
     Directions are sent out from the origin. In each, the farthest attainable point is a vertex; where a face
-    still lies further than `tolerance` inside the plane that touches the set, its normal is sent out too.
-
-    Args:
-        layout: the robot.
-        kind: `force` or `torque`.
-        failed: names of actuators that push nothing.
-        tolerance: when to stop, as a share of the farthest vertex.
-        flow: velocity (6,) of the body relative to the water [m/s, rad/s], body frame; None at rest.
-
-    Raises:
-        LayoutError: there is no actuator of a name in `failed`.
+    still lies further than `tolerance`, a share of the farthest vertex, inside the plane that touches the
+    set, its normal is sent out too.
     """
     sets = force_sets(layout, failed, flow)
     support = _support(sets, kind)
@@ -134,17 +120,17 @@ def attainable_set(
     points = support(np.concatenate([axes, spread / np.linalg.norm(spread, axis=-1, keepdims=True)]))[0]
     if sets.center is None:  # every actuator may rest
         points = np.concatenate([points, np.zeros((1, 3))])
-    found = _hull_of(points, kind)
+    result = _hull_of(points, kind)
     for round_ in count():
-        new, reach = support(found.normals)
-        beyond = reach - found.offsets
+        new, reach = support(result.normals)
+        beyond = reach - result.offsets
         size = float(np.linalg.norm(points, axis=-1).max())
         far = beyond > tolerance * size
         if round_ == MAX_ROUNDS or not far.any():
             break
-        points = np.concatenate([found.vertices, new[far]])
-        found = _hull_of(points, kind)
-    return replace(found, gap=max(float(beyond.max()), 0.0))
+        points = np.concatenate([result.vertices, new[far]])
+        result = _hull_of(points, kind)
+    return replace(result, gap=max(float(beyond.max()), 0.0))
 
 
 Support = Callable[[Array], tuple[Array, Array]]

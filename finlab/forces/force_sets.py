@@ -1,10 +1,10 @@
-"""What each actuator can push, as a convex set in a plane of its own, and how that adds up to a wrench.
+"""Convex sets of what each actuator can push, in a plane of its own, and how these add up to a wrench.
 
 A fin or an azimuth that may turn a full circle pushes anywhere within a disc whose radius is its largest
 thrust. With stops it pushes within a sector of that disc. A sector wider than half a turn is not convex: here
 it stands for its convex hull, the disc cut off along the chord between the stops, unless `convex_parts` has
 cut it in two. Where a fin pushes harder in some directions than in others, the disc is cut down to its convex
-hull, too. A thruster pushes along a line, one way or both. What feels the flow, such as a rudder, pushes what
+hull, too. A thruster pushes along a line, one way or both. What feels the flow, such as a foil, pushes what
 its law gives between its limits: here the convex hull of that, a polygon. Dead bands, and the tiny thrust
 that a fin cannot go below, are left out; an azimuth that cannot stop has the polygon around what is left, one
 that pushes either way within an arc that around both parts.
@@ -22,12 +22,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from finlab.actuators.fin.fin_response import FinGroup
 from finlab.actuators.registry import groups_of, laws_of
 from finlab.actuators.response import Plane, Response
 from finlab.arrays import Array
-from finlab.layout import Fin, Layout
-from finlab.layout.angles import TURN, wrapped
-from finlab.layout.arrays import own_effectiveness
+from finlab.layout import Layout
+from finlab.layout.axes import TURN, wrapped
+from finlab.layout.effectiveness import own_effectiveness
 from finlab.physics.plant import plant_of
 
 LEVER = 0.2
@@ -37,8 +38,7 @@ SCALE = np.array([1.0, 1.0, 1.0, LEVER, LEVER, LEVER])
 HALF_TURN_TOLERANCE = 1e-9
 """By how much half an arc [rad] may exceed a quarter turn and still be convex."""
 BOUNDARY, POINTS = 48, 193
-"""Sides of the polygon around what an uneven fin can push: at most a fifth of a percent too wide; and
-directions in its arc that are looked at."""
+"""Sides of the polygon around an uneven fin's forces, 0.2 % too wide; directions in its arc."""
 ALONG, SIDES = 193, 24
 """Forces of an actuator along its limits, or its rim, of which a polygon is made; and sides of one for forces
 of the flow: they lie inside by at most 1 % of its width."""
@@ -69,7 +69,7 @@ class ForceSets(NamedTuple):
     """Force (R, n, 2) [N] from which an actuator's set is seen; None where all are seen from 0."""
     corners: Array | None = None
     """Corners (R, n, K, 2) [N] of polygons from their centres, counter-clockwise, the last one repeated;
-    0 for other actuators; None where there is none. An actuator of one command, such as a rudder, has a half
+    0 for other actuators; None where there is none. An actuator of one command, such as a foil, has a half
     of 0: it gives only one side of its polygon, and counts as one direction."""
 
     def take(self, rows: NDArray[np.bool_] | NDArray[np.intp]) -> ForceSets:
@@ -100,8 +100,7 @@ class ForceSets(NamedTuple):
         return self.take(np.tile(np.arange(len(self.radius)), times))
 
     def pull(self, normal: Array) -> Array:
-        """Returns what each fin feels (R, n, 2) of the direction `normal` (R, m): the columns' dot
-        products."""
+        """Returns the dot products (R, n, 2) of each one's columns with the direction `normal` (R, m)."""
         rows, n = self.radius.shape
         return (self.effectiveness.reshape(rows, 2 * n, -1) @ normal[..., None]).reshape(rows, n, 2)
 
@@ -111,11 +110,8 @@ class ForceSets(NamedTuple):
         return (force.reshape(rows, 1, 2 * n) @ self.effectiveness.reshape(rows, 2 * n, -1))[:, 0]
 
     def farthest(self, normal: Array) -> tuple[Array, Array]:
-        """Returns how far the sets reach along `normal` (R, m), and the planar forces (R, n, 2) that do it.
-
-        The first, (R,), is the support function of the set of all wrenches: exact, or exact for the hull
-        where a sector is wider than half a turn.
-        """
+        """Returns the support function (R,) of all wrenches along `normal` (R, m), and the planar forces (R,
+        n, 2) that reach it; where a sector is wider than half a turn, those of its hull."""
         pull = self.pull(normal)
         size = np.sqrt((pull**2).sum(-1))
         angle = wrapped(np.arctan2(pull[..., 1], pull[..., 0]) - self.middle)
@@ -148,10 +144,8 @@ class ForceSets(NamedTuple):
         return np.asarray(self.corners.any((-1, -2)))
 
     def full_effectiveness(self) -> Array:
-        """Returns the scaled wrenches (R, 2n, m) of each one's largest force along both axes of its plane.
-
-        One that pushes along a line has but one, and zeros for the other.
-        """
+        """Returns the scaled wrenches (R, 2n, m) of each one's largest force along both axes of its plane;
+        one that pushes along a line has zeros for the other."""
         full = self.effectiveness * self.radius[..., None, None]
         fixed = self.half == 0.0
         if fixed.any():
@@ -177,17 +171,9 @@ class Shape(NamedTuple):
 
 
 def force_sets(layout: Layout, failed: Collection[str] = (), flow: ArrayLike | None = None) -> ForceSets:
-    """Returns what the actuators of one robot can push along the axes that it commands; those called `failed`
-    push nothing, and nothing counts along the other axes.
-
-    Args:
-        layout: the robot.
-        failed: names of actuators that are lost.
-        flow: velocity (6,) of the body relative to the water [m/s, rad/s], body frame; None at rest.
-
-    Raises:
-        LayoutError: there is no actuator of a name in `failed`.
-    """
+    """Returns what the actuators of one robot can push along the axes that it commands; nothing counts along
+    the others. Those in `failed` push nothing, and the body moves through the water with `flow` (6,) [m/s,
+    rad/s], body frame, None at rest. A `LayoutError` at an unknown name."""
     lost = layout.indices(tuple(failed))
     sets = assembled([shapes_of(layout, flow)], own_effectiveness(layout)[None] * layout.commanded)
     sets.lose(0, list(lost))
@@ -195,8 +181,7 @@ def force_sets(layout: Layout, failed: Collection[str] = (), flow: ArrayLike | N
 
 
 def assembled(shapes: Sequence[Sequence[Shape]], effectiveness: Array) -> ForceSets:
-    """Returns R robots of n actuators with shapes (R, n) and wrenches (R, n, 3, 6) of 1 N along their own
-    axes."""
+    """Returns R robots with shapes (R, n) and wrenches (R, n, 3, 6) of 1 N along their own axes."""
     every = [shape for robot in shapes for shape in robot]
     most = max((len(shape.corners) for shape in every if shape.corners is not None), default=0)
 
@@ -207,8 +192,8 @@ def assembled(shapes: Sequence[Sequence[Shape]], effectiveness: Array) -> ForceS
         if name == "corners":
             last = np.arange(most)
             values = [None if own is None else own[np.minimum(last, len(own) - 1)] for own in values]
-        found = np.array([rest if value is None else value for value in values], np.float64)
-        return found.reshape(len(shapes), -1, *found.shape[1:])
+        result = np.array([rest if value is None else value for value in values], np.float64)
+        return result.reshape(len(shapes), -1, *result.shape[1:])
 
     return ForceSets(
         np.ascontiguousarray(gathered("directions") @ effectiveness / SCALE),
@@ -239,7 +224,7 @@ def shapes_of(layout: Layout, flow: ArrayLike | None = None) -> list[Shape]:
         own = np.broadcast_to(np.eye(3, 6), (rest.n, 3, 6))
         for places, group in groups_of(rest, own):
             for place, response in zip(places, group.responses, strict=True):
-                shapes[rest.names[place]] = _shape(response, isinstance(rest.actuators[place], Fin))
+                shapes[rest.names[place]] = _shape(response, isinstance(group, FinGroup))
     return [shapes[name] for name in layout.names]
 
 
@@ -273,8 +258,7 @@ def _shape(response: Response, is_fin: bool) -> Shape:
 
 
 def _polygon(directions: Array, points: Array, half: float, sides: int) -> Shape:
-    """A polygon of some sides that fills the convex hull of forces (S, 2) [N] in a plane; a line or a point
-    where that has no width."""
+    """A polygon that fills the convex hull of forces (S, 2) [N]; a line or a point where it has no width."""
     middle = points.mean(axis=0)
     axes = np.linalg.svd(points - middle)[2]
     along = (points - middle) @ axes.T
@@ -297,8 +281,7 @@ def _polygon(directions: Array, points: Array, half: float, sides: int) -> Shape
 
 
 def _boundary(plane: Plane, gauge: Array) -> Array:
-    """How far the convex hull of what an uneven fin can push reaches along evenly spaced directions
-    (BOUNDARY,), as shares of its largest force."""
+    """How far the hull of what an uneven fin can push reaches (BOUNDARY,), as shares of its largest force."""
     angle = plane.middle + plane.half * np.linspace(-1.0, 1.0, POINTS)
     gauge = np.append(gauge, gauge[0])
     reach = np.interp(angle % TURN, TURN / (len(gauge) - 1) * np.arange(len(gauge)), gauge)
@@ -325,8 +308,7 @@ def _along_boundary(boundary: Array, pull: Array, direction: Array) -> tuple[Arr
 
 
 def wide_arcs(sets: ForceSets) -> NDArray[np.intp]:
-    """Returns the places of working actuators whose sets are not convex: wider than half a turn, no full
-    circle."""
+    """Returns the places of working actuators whose arcs are wider than half a turn and no full circle."""
     alive = (sets.radius > 0.0).any(axis=0)
     half = sets.half[0]
     return np.flatnonzero((half > np.pi / 2 + HALF_TURN_TOLERANCE) & (half < np.pi) & alive)
@@ -334,11 +316,8 @@ def wide_arcs(sets: ForceSets) -> NDArray[np.intp]:
 
 def convex_parts(sets: ForceSets) -> ForceSets:
     """Returns convex sets of R robots with the same arcs, P of each, one round of robots after the other.
-
-    Wide sectors are cut along their middle. Of the first `MAX_CUT` of them both halves are kept, in all
-    combinations: their union is exactly what each robot can push. Further ones stay what they are, with
-    their hulls.
-    """
+    Wide sectors are cut along their middle, of the first `MAX_CUT` both halves are kept, in all combinations;
+    further ones stay what they are, with their hulls."""
     cut = wide_arcs(sets)[:MAX_CUT]
     signs = np.zeros((2 ** len(cut), 1, sets.radius.shape[1]))
     signs[:, 0, cut] = list(product((-0.5, 0.5), repeat=len(cut)))

@@ -12,9 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.arrays import Array
+from finlab.arrays import Array, solve
 from finlab.forces.force_sets import THINNEST, ForceSets
-from finlab.small_systems import solve
 
 ITERATIONS = 40
 UNMET = 1e-8
@@ -38,7 +37,7 @@ NARROWEST = 1e-6
 
 
 class _State(NamedTuple):
-    """R problems on their way; forces are shares of each fin's largest, components before fins."""
+    """R problems on their way; forces are shares of each one's largest, components before actuators."""
 
     full: Array
     """Wrench (R, 2n, m) of the largest forces."""
@@ -46,36 +45,24 @@ class _State(NamedTuple):
     """Outward normals (R, K, 2, n) of the sectors' sides."""
     beyond: Array
     """How far out those sides are (R, K, n); 1 where there is none."""
-    wanted: Array
-    """(R, m)."""
+    wanted: Array  # (R, m), as c and the multiplier
     c: Array
-    """(R, m)."""
-    point: Array
-    """(R, 2, n)."""
+    point: Array  # (R, 2, n)
     multiplier: Array
-    """(R, m)."""
     slack: Array
-    """Of each limit (R, 1 + K, n): the disc, then the sides."""
+    """Of each limit (R, 1 + K, n): the disc, then the sides; as the limits' multipliers, the weights."""
     weight: Array
-    """The limits' multipliers (R, 1 + K, n)."""
     length: Array
     """Of the last step (R,)."""
 
 
 def minimize(sets: ForceSets, wanted: Array, c: Array, gap: float) -> tuple[Array, Array]:
-    """Solves R problems.
+    """Solves R problems in m coordinates: the planar forces (R, n, 2) [N] within the sets, hulls of sectors
+    wider than half a turn, whose wrench comes nearest to `wanted` (R, m), squared errors divided by `c` (m,)
+    or (R, m), and the multiplier (R, m) of the wrench.
 
-    Args:
-        sets: what the fins of R robots can do, in m coordinates of a wrench; sectors wider than half a turn
-            count with their convex hulls.
-        wanted: wrenches w (R, m).
-        c: what each coordinate's squared error is divided by (m,) or (R, m), positive.
-        gap: mean product of a limit's multiplier and slack that ends the search, relative to the wrench's
-            error plus one, where the strongest fin's wrench is one.
-
-    Returns:
-        Planar forces (R, n, 2) [N], within the fins' sets, and the multiplier (R, m) of the wrench: what its
-        error would gain from one more of it.
+    The search ends at a `gap`: the mean product of a limit's multiplier and slack relative to the wrench's
+    error plus one, where the strongest actuator's wrench is one.
     """
     state = _outset(sets, wanted - sets.offset, c)
     busy, least = np.arange(len(wanted)), np.full(len(wanted), np.inf)
@@ -109,18 +96,11 @@ def _outset(sets: ForceSets, wanted: Array, c: Array) -> _State:
     limits = 1 + sides.shape[1]
     wanted, c = wanted / unit[:, None], np.broadcast_to(np.asarray(c, np.float64), (rows, m))
     pulled = 1.0 + (np.abs(wanted) / np.maximum(c, 1.0)).max(-1)
-    return _State(
-        full.swapaxes(1, 2).reshape(rows, 2 * n, m),
-        sides,
-        beyond,
-        wanted,
-        c,
-        np.zeros((rows, 2, n)),
-        np.zeros((rows, m)),
-        np.full((rows, limits, n), SLACK),
-        np.tile(WEIGHT * pulled[:, None, None], (1, limits, n)),
-        np.ones(rows),
-    )
+    full = full.swapaxes(1, 2).reshape(rows, 2 * n, m)
+    point, multiplier = np.zeros((rows, 2, n)), np.zeros((rows, m))
+    slack = np.full((rows, limits, n), SLACK)
+    weight = np.tile(WEIGHT * pulled[:, None, None], (1, limits, n))
+    return _State(full, sides, beyond, wanted, c, point, multiplier, slack, weight, np.ones(rows))
 
 
 def _unit(sets: ForceSets) -> Array:
@@ -139,12 +119,9 @@ def _ahead(sets: ForceSets, vectors: Array) -> Array:
 
 
 def _sides(sets: ForceSets) -> tuple[Array, Array]:
-    """Normals (R, K, 2, n) that point out of each sector, and how far out its sides are (R, K, n).
-
-    A sector has two sides through the origin. The hull of one wider than half a turn has one, the chord
-    between its stops. An uneven fin has those of the polygon around it, and polygons have their own. Where
-    there are none, K is 0.
-    """
+    """Normals (R, K, 2, n) that point out of each sector, and how far out its sides are (R, K, n). A sector
+    has two sides through the origin, the hull of one wider than half a turn the chord between its stops, and
+    uneven fins and polygons those of their polygon."""
     normals, beyond = _stops(sets)
     if sets.corners is not None:
         radius = np.where(sets.radius > 0.0, sets.radius, 1.0)[..., None, None]
@@ -159,9 +136,8 @@ def _sides(sets: ForceSets) -> tuple[Array, Array]:
         return normals, beyond
     rows, n, count = sets.boundary.shape
     angle = 2.0 * np.pi / count * np.arange(count)
-    around = np.broadcast_to(
-        np.stack([np.cos(angle), np.sin(angle)], axis=1)[:, :, None], (rows, count, 2, n)
-    )
+    around = np.stack([np.cos(angle), np.sin(angle)], axis=1)[:, :, None]
+    around = np.broadcast_to(around, (rows, count, 2, n))
     out = np.concatenate([beyond, np.maximum(sets.boundary.swapaxes(1, 2), THINNEST)], axis=1)
     return np.concatenate([normals, around], axis=1), out
 
@@ -207,9 +183,8 @@ def _step(state: _State, tolerance: float) -> tuple[NDArray[np.bool_], Array, _S
     pull = (full @ multiplier[..., None]).reshape(point.shape) - (aim[:, :, None] * slope).sum(1)
     blocks = full.reshape(rows, 2, n, -1)
     x, y = blocks[:, 0], blocks[:, 1]
-    spread = np.concatenate(
-        [xx[..., None] * x + xy[..., None] * y, xy[..., None] * x + yy[..., None] * y], axis=1
-    )
+    a, b, d = xx[..., None], xy[..., None], yy[..., None]
+    spread = np.concatenate([a * x + b * y, b * x + d * y], axis=1)
     gram = full.swapaxes(1, 2) @ spread
     diagonal = gram.reshape(rows, -1)[:, :: gram.shape[-1] + 1]
     diagonal += c + RIDGE * diagonal.sum(1, keepdims=True)
@@ -221,30 +196,19 @@ def _step(state: _State, tolerance: float) -> tuple[NDArray[np.bool_], Array, _S
     growth = aim - weight + ratio * along
     length = np.minimum(_way_to_zero(slack, -astray - along), _way_to_zero(weight, growth))
     length = np.where(done, 0.0, np.minimum(KEPT * length, 1.0))
-    far = length[:, None, None]
-    return (
-        done,
-        off,
-        state._replace(
-            point=point + far * step,
-            slack=slack - far * (astray + along),
-            weight=weight + far * growth,
-            multiplier=multiplier + length[:, None] * turn,
-            length=length,
-        ),
-    )
+    far, multiplier = length[:, None, None], multiplier + length[:, None] * turn
+    point, slack, weight = point + far * step, slack - far * (astray + along), weight + far * growth
+    return done, off, _State(full, sides, beyond, wanted, c, point, multiplier, slack, weight, length)
 
 
 def _wrench(full: Array, point: Array) -> Array:
-    wrench: Array = (point.reshape(len(point), 1, -1) @ full)[:, 0]
-    return wrench
+    return np.asarray((point.reshape(len(point), 1, -1) @ full)[:, 0])
 
 
 def _way_to_zero(weight: Array, growth: Array) -> Array:
     """The longest step (R,) that keeps the limits' multipliers positive."""
     ways = np.where(growth < 0.0, weight / np.maximum(-growth, 1e-100), np.inf)
-    shortest: Array = ways.min((1, 2))
-    return shortest
+    return np.asarray(ways.min((1, 2)))
 
 
 def _softness(slope: Array, ratio: Array, stiff: Array) -> tuple[Array, Array, Array]:

@@ -1,4 +1,5 @@
-"""The largest wrench in a given direction with nothing beside it, or with the other axes as they are."""
+"""The largest wrench in a given direction with nothing beside it, or with the other axes as they are, and the
+weakest direction of all."""
 
 from collections.abc import Collection
 from typing import NamedTuple
@@ -41,17 +42,11 @@ class Largest(NamedTuple):
 def largest(
     sets: ForceSets, origin: Array, basis: Array, held: Array | float = 0.0, tolerance: float = FINE
 ) -> Largest:
-    """Returns the largest wrenches along `origin` (R, 6) whose parts along `basis` (R, 6, k) are as held.
+    """Returns the largest wrenches along unit `origin` (R, 6) whose parts along an orthonormal `basis` (R, 6,
+    k) across it are `held` (R, k).
 
     Each is bracketed: a plane across the solver's multiplier lies outside of the set of all wrenches, and its
-    forces lie inside.
-
-    Args:
-        sets: R robots.
-        origin: unit scaled wrenches.
-        basis: orthonormal, and at right angles to `origin`.
-        held: wanted parts (R, k) along the basis.
-        tolerance: see `FINE`.
+    forces lie inside. `tolerance` is as `FINE`.
     """
     rows, _, k = basis.shape
     frame = np.concatenate([origin[:, :, None], basis], axis=-1)
@@ -69,10 +64,10 @@ def largest(
     free = seen.farthest(across)[0]
     normal = np.where((free < size)[:, None], across, normal)
     size = np.minimum(size, free)
-    given = seen.wrench(force)
+    actual = seen.wrench(force)
     # A wrench that is not where it was asked for proves nothing.
-    beside = np.abs(given - wanted)[:, 1:].max(-1, initial=0.0)
-    proven = np.where(beside <= BESIDE * full.max(-1), given[:, 0], 0.0)
+    extra = np.abs(actual - wanted)[:, 1:].max(-1, initial=0.0)
+    proven = np.where(extra <= BESIDE * full.max(-1), actual[:, 0], 0.0)
     return Largest(
         size, np.maximum(size - proven, 0.0), force, sets.wrench(force), (frame @ normal[..., None])[..., 0]
     )
@@ -80,23 +75,20 @@ def largest(
 
 def max_wrench_along(sets: ForceSets, direction: Array, tolerance: float = FINE) -> Largest:
     """Returns the largest wrenches that point exactly along unit `direction` (R, m), all else zero."""
-    found = largest(sets, direction, orthogonal_complement(direction), tolerance=tolerance)
+    result = largest(sets, direction, orthogonal_complement(direction), tolerance=tolerance)
     if sets.center is not None:  # where rest is out of reach, a direction may meet nothing at all
-        unmet = (found.size < 0.0) | (found.gap > UNPROVEN * (1.0 + found.size))
-        found.size[unmet] = found.gap[unmet] = 0.0
-    return found
+        unmet = (result.size < 0.0) | (result.gap > UNPROVEN * (1.0 + result.size))
+        result.size[unmet] = result.gap[unmet] = 0.0
+    return result
 
 
 def max_wrench_along_exactly(sets: ForceSets, directions: Array) -> tuple[Array, float]:
     """Returns the largest wrenches (P, D) of robots (P) along unit `directions` (D, 6), and the largest gap.
-
-    Sectors wider than half a turn are taken in convex parts, so that the result is theirs and not their
-    hull's; with too many of them some count with their hulls, see `convex_parts`.
-    """
+    Wide sectors count as their convex parts, with too many of them some as hulls, see `convex_parts`."""
     robots, n = len(sets.radius), len(directions)
     parts = convex_parts(sets)
-    found = max_wrench_along(parts.repeat(n), np.tile(directions, (len(parts.radius), 1)))
-    size, proven = (v.reshape(-1, robots, n).max(axis=0) for v in (found.size, found.size - found.gap))
+    result = max_wrench_along(parts.repeat(n), np.tile(directions, (len(parts.radius), 1)))
+    size, proven = (v.reshape(-1, robots, n).max(axis=0) for v in (result.size, result.size - result.gap))
     return size, float((size - proven).max())
 
 
@@ -134,31 +126,75 @@ class Ranges(NamedTuple):
 def axis_ranges(
     layout: Layout, wrench: ArrayLike, failed: Collection[str] = (), flow: ArrayLike | None = None
 ) -> Ranges:
-    """Returns the range of each axis with the others as in a wrench, too wide by about a millionth at most.
-
-    Args:
-        layout: the robot.
-        wrench: components (6,) [N, N m] that the others are held at.
-        failed: actuators that push nothing.
-        flow: velocity (6,) of the body relative to the water [m/s, rad/s], body frame; None at rest.
-
-    Raises:
-        LayoutError: there is no actuator of a name in `failed`.
-    """
+    """Returns the range of each axis with the others held as in a wrench (6,) [N, N m], too wide by about a
+    millionth at most; `failed`, `flow` and errors are as for `force_sets`."""
     axes = np.concatenate([np.eye(6), -np.eye(6)])
     parts = convex_parts(force_sets(layout, failed, flow))
     n_parts = len(parts.radius)
     basis = orthogonal_complement(axes)
     held = (np.asarray(wrench, dtype=np.float64) / SCALE) @ basis
-    found = largest(
-        parts.repeat(12),
-        np.tile(axes, (n_parts, 1)),
-        np.tile(basis, (n_parts, 1, 1)),
-        np.tile(held, (n_parts, 1)),
-        TOLERANCE,
-    )
-    size = found.size.reshape(n_parts, 2, 6)
+    origin, bases = np.tile(axes, (n_parts, 1)), np.tile(basis, (n_parts, 1, 1))
+    ends = largest(parts.repeat(12), origin, bases, np.tile(held, (n_parts, 1)), TOLERANCE)
+    size = ends.size.reshape(n_parts, 2, 6)
     # Planes that leave nothing between them prove that the five others cannot be had together.
     there = size.sum(axis=1) >= -NOTHING
     high, low = (np.where(there, size[:, k], -np.inf).max(axis=0) for k in range(2))
     return Ranges(*(np.where(there.any(axis=0), value * SCALE, np.nan) + 0.0 for value in (-low, high)))
+
+
+RANK_TOLERANCE = 1e-6
+"""Share of the largest singular value below which another counts as zero."""
+N_RANDOM = 24
+"""Random directions from which the weakest one is sought, beside axes and singular vectors."""
+N_WALKS = 6
+"""Steps from face to face of the set of wrenches."""
+
+
+class Extent(NamedTuple):
+    """The weakest direction of the sets of wrenches of P robots, in scaled wrenches."""
+
+    size: Array
+    """(P,) [N]."""
+    direction: Array
+    """Unit scaled wrench (P, m)."""
+
+
+def singular_values(sets: ForceSets) -> tuple[Array, Array]:
+    """Returns singular values (P, m) [N], falling, and their directions (P, m, m), in columns, of the
+    wrenches of each one's largest force along the axes of its plane."""
+    matrix = np.swapaxes(sets.full_effectiveness(), -1, -2)
+    directions, values, _ = np.linalg.svd(matrix, full_matrices=True)
+    return np.pad(values, ((0, 0), (0, directions.shape[-1] - values.shape[-1]))), directions
+
+
+def weakest(sets: ForceSets, n_random: int = N_RANDOM, n_walks: int = N_WALKS, fine: bool = True) -> Extent:
+    """Returns the direction in which the sets of wrenches end soonest, and where: every wrench of that size
+    is within reach. The walk starts from axes, singular vectors and random directions, goes to the face of
+    the set that lies that way, turns to its normal and goes again; the least end of all is returned."""
+    values, vectors = singular_values(sets)
+    size = np.zeros(len(values))
+    direction = vectors[:, :, -1].copy()
+    full = np.flatnonzero(values[:, -1] > RANK_TOLERANCE * np.maximum(values[:, 0], 1e-9))
+    if not len(full):
+        return Extent(size, direction)
+    rng = np.random.default_rng(0)
+    axes = values.shape[1]
+    drawn = rng.standard_normal((n_random, axes))
+    drawn /= np.linalg.norm(drawn, axis=-1, keepdims=True)
+    common = np.concatenate([np.eye(axes), drawn])
+    of_robot = np.swapaxes(vectors[full], -1, -2)
+    starts = np.concatenate([np.broadcast_to(common, (len(full), *common.shape)), of_robot], axis=1)
+    if (sets.half[full] < np.pi).any() or sets.center is not None:  # else opposite directions are alike
+        starts = np.concatenate([starts, -starts], axis=1)
+    n_starts = starts.shape[1]
+    rows = sets.take(np.repeat(full, n_starts))
+    ends = starts.reshape(-1, axes)
+    for walk in range(n_walks):
+        last = fine and walk == n_walks - 1
+        normal = max_wrench_along(rows, ends, FINE if last else COARSE).normal
+        ends = normal / np.linalg.norm(normal, axis=-1, keepdims=True)
+    reach = rows.farthest(ends)[0].reshape(len(full), n_starts)
+    best = reach.argmin(axis=1)
+    size[full] = np.maximum(reach[np.arange(len(full)), best], 0.0)
+    direction[full] = ends.reshape(len(full), n_starts, axes)[np.arange(len(full)), best]
+    return Extent(size, direction)

@@ -1,4 +1,4 @@
-"""What a hull's shape says of a robot's dynamics: volume, inertia, added mass, damping; first estimates.
+"""First estimates of a robot's dynamics from its hull: mass, inertia, added mass, damping, buoyancy.
 
 Every figure is that of a simple body: a solid of one density, or the ellipsoid that stands for the hull. They
 are where a design starts; a swim (`finlab fit robot`) tells the truth. Order of six: surge, sway, heave,
@@ -6,7 +6,8 @@ roll, pitch, yaw.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,6 +15,9 @@ from scipy.special import elliprd
 
 from finlab.arrays import Array
 from finlab.errors import FinlabError
+from finlab.hull.surface import Surface, hull_of
+from finlab.layout import Body, Layout
+from finlab.vehicle.fossen import GRAVITY
 
 WATER = 1000.0
 """Density of fresh water [kg/m^3]."""
@@ -119,20 +123,15 @@ def pressure_damping(half: Three, density: float = WATER) -> Six:
     flow (T. I. Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control, 2nd ed., section 6.4): 1/2
     rho C int |x|^3 2 h(x) dx. The round core, which turns without pushing water aside, is left out, so that a
     sphere has none."""
-    along = []
-    for axis in range(3):
-        across = np.delete(half, axis)
-        coefficient = min(DISC, BLUNT * math.sqrt(across.prod()) / half[axis])
-        along.append(coefficient)
-    areas = [math.pi * math.prod(np.delete(half, axis)) for axis in range(3)]
+    areas = [math.prod(np.delete(half, axis)) for axis in range(3)]
+    along = [min(DISC, BLUNT * math.sqrt(areas[axis]) / half[axis]) for axis in range(3)]
     about = []
     for axis in range(3):
-        ends = [k for k in range(3) if k != axis]
-        far, near = sorted(ends, key=lambda k: -half[k])
+        far, near = sorted({0, 1, 2} - {axis}, key=lambda k: -half[k])
         # int over the strip of |x|^3 2 h sqrt(1 - x^2 / a^2) dx = 8/15 h a^4
         strips = 8.0 / 15.0 * half[axis] * (half[far] ** 4 - half[near] ** 4)
         about.append(0.5 * density * along[near] * strips)
-    u, v, w = (0.5 * density * c * area for c, area in zip(along, areas, strict=True))
+    u, v, w = (0.5 * density * c * (math.pi * area) for c, area in zip(along, areas, strict=True))
     k, m, n = about
     return u, v, w, k, m, n
 
@@ -153,3 +152,67 @@ def friction_damping(solid: HullSolid, speed: float = DESIGN_SPEED, density: flo
 def _three(values: Array) -> Three:
     x, y, z = (float(value) for value in values)
     return x, y, z
+
+
+DIGITS = 4
+"""Digits that an estimate deserves."""
+DOUBTFUL = 0.1
+"""Share of the water in the hull's place by which a body may be heavier or lighter."""
+
+
+def water_density(layout: Layout) -> float:
+    """Density of the water that the fins count with [kg/m^3]; fresh water where none says it."""
+    densities = (fin.model.values().get("density") for fin in layout.fins)
+    return next((float(value) for value in densities if value is not None), WATER)
+
+
+@lru_cache(maxsize=8)
+def solid_of(hull: Surface) -> HullSolid:
+    """The body that a hull encloses, body frame.
+
+    Raises:
+        FinlabError: it encloses nothing.
+    """
+    return HullSolid.of(hull.mesh.vertices[hull.mesh.faces])
+
+
+def displaced(layout: Layout) -> float:
+    """Water in the hull's place [kg]."""
+    return water_density(layout) * solid_of(hull_of(layout)).volume
+
+
+def lift_of(body: Body) -> float:
+    """The buoyant force [N]; that of a neutral robot where none is given."""
+    return (body.mass_kg or 0.0) * GRAVITY if body.buoyancy_n is None else body.buoyancy_n
+
+
+def contradicts(layout: Layout) -> bool:
+    """Whether the body's mass is known, and its buoyancy is not that of the hull."""
+    body, water = layout.body or Body(), displaced(layout)
+    return body.mass_kg is not None and abs(lift_of(body) / GRAVITY - water) > DOUBTFUL * water
+
+
+def estimated(layout: Layout) -> Layout:
+    """The layout with what its hull says of the body; a mass that is known stays.
+
+    Raises:
+        FinlabError: the hull encloses nothing.
+    """
+    solid, density, body = solid_of(hull_of(layout)), water_density(layout), layout.body or Body()
+    mass = body.mass_kg if body.mass_kg is not None else _rounded(density * solid.volume)
+    changed = replace(
+        body,
+        mass_kg=mass,
+        inertia_kgm2=tuple(map(_rounded, solid.inertia(mass))),
+        added_mass=tuple(map(_rounded, ellipsoid_added_mass(solid.ellipsoid(), density))),
+        linear_damping=tuple(map(_rounded, friction_damping(solid, density=density))),
+        quadratic_damping=tuple(map(_rounded, pressure_damping(solid.ellipsoid(), density))),
+        # Neutral where the mass is that of the water, whatever the last digit.
+        buoyancy_n=None if body.mass_kg is None else _rounded(density * GRAVITY * solid.volume),
+        center_of_buoyancy_m=tuple(round(value, 4) + 0.0 for value in solid.center),
+    )
+    return replace(layout, body=changed)
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.{DIGITS}g}")

@@ -1,17 +1,60 @@
 """Mesh files (STL, OBJ, GLB, PLY) as hulls: what is read of one, what is mended, what is refused, and why."""
 
+import json
+import re
+import struct
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import trimesh
 
 from finlab.arrays import Array
 from finlab.errors import FinlabError
-from finlab.hull.mesh import Mesh
-from finlab.hull.mesh_size import check_glb, in_one_part
+from finlab.hull.shapes import Mesh
 from finlab.layout.body import MESH_SUFFIXES
+
+FREE_TRIANGLES = 100_000
+"""Triangles, instances counted, that a GLB may have however small it is."""
+BYTES_PER_TRIANGLE = 6
+"""Of a larger one each takes at least so many: corners and indices take 18."""
+_PARTS = re.compile(rb"(?m)^[ \t]*(?:usemtl|mtllib|o|g|s)(?:[ \t].*)?$")
+"""Materials and groups of an OBJ file, each of which would become a mesh of its own."""
+
+
+def check_glb(name: str, content: bytes) -> None:
+    """Refuse a GLB whose accessors or instances ask for far more than it holds; what is no GLB passes.
+
+    Raises:
+        FinlabError: the sentence says how much, and calls the file `name`.
+    """
+    try:
+        length, kind = struct.unpack("<I4s", content[12:20])
+        document = json.loads(content[20 : 20 + length]) if kind == b"JSON" else {}
+        counts = [accessor.get("count", 0) for accessor in document.get("accessors", [])]
+        meshes = [_triangles(mesh, counts) for mesh in document.get("meshes", [])]
+        nodes = document.get("nodes", [])
+        triangles = sum(meshes[node["mesh"]] for node in nodes if "mesh" in node)
+        values = sum(counts)
+    except (struct.error, ValueError, RecursionError, LookupError, TypeError, AttributeError):
+        return  # whoever reads it says what is wrong
+    if values > len(content):
+        raise FinlabError(
+            f"{name}: asks for {values:,} values in its {len(content):,} bytes; export it again"
+        )
+    if triangles > (most := max(FREE_TRIANGLES, len(content) // BYTES_PER_TRIANGLE)):
+        raise FinlabError(
+            f"{name}: has {triangles:,} triangles with its instances, expected at most {most:,}; simplify it"
+        )
+
+
+def _triangles(mesh: Any, counts: list[int]) -> int:
+    """Triangles in a mesh of a GLB document, by the counts of its accessors."""
+    parts = mesh.get("primitives", [])
+    return sum(counts[part.get("indices", part["attributes"]["POSITION"])] // 3 for part in parts)
+
 
 MAX_BYTES = 20_000_000
 MAX_FACES = 60_000
@@ -78,7 +121,7 @@ def _loaded(name: str, content: bytes) -> trimesh.Trimesh:
     if kind == ".glb":
         check_glb(name, content)
     try:
-        content = in_one_part(content) if kind == ".obj" else content
+        content = _PARTS.sub(b"", content) if kind == ".obj" else content
         # Without a resolver nothing beside this file is read: no textures, no materials. Without processing,
         # corners that are no numbers are not quietly left out.
         mesh = trimesh.load_mesh(BytesIO(content), file_type=kind[1:], process=False)
@@ -121,9 +164,9 @@ def simplified(mesh: Mesh, faces: int) -> Mesh:
     """About the same shape with at most so many triangles, by quadric error metrics."""
     if len(mesh.faces) <= faces:
         return mesh
-    whole = trimesh.Trimesh(mesh.vertices, mesh.faces, process=True)
-    found = whole.simplify_quadric_decimation(face_count=faces)
-    return Mesh(np.asarray(found.vertices, dtype=float), np.asarray(found.faces, dtype=np.int32))
+    joined = trimesh.Trimesh(mesh.vertices, mesh.faces, process=True)
+    fewer = joined.simplify_quadric_decimation(face_count=faces)
+    return Mesh(np.asarray(fewer.vertices, dtype=float), np.asarray(fewer.faces, dtype=np.int32))
 
 
 def turned(mesh: Mesh, rotation: Array) -> Mesh:

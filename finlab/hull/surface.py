@@ -12,9 +12,8 @@ from trimesh.triangles import closest_point
 from finlab.arrays import Array
 from finlab.errors import FinlabError
 from finlab.files.guarded import read_file
-from finlab.hull.mesh import Mesh
 from finlab.hull.mesh_file import MAX_BYTES, MeshReport, read_mesh, simplified
-from finlab.hull.shapes import Three, shape_mesh
+from finlab.hull.shapes import Mesh, Three, shape_mesh
 from finlab.layout import Fin, Layout
 
 COARSE_FACES = 400
@@ -74,13 +73,13 @@ class Surface:
     def nearest(self, point: Array) -> tuple[Array, Array]:
         """The point (3,) of the surface nearest to `point`, and the outward normal (3,) there."""
         corners, normals = self._triangles
-        found = closest_point(corners, np.broadcast_to(np.asarray(point, dtype=float), (len(corners), 3)))
-        gap = np.linalg.norm(found - point, axis=1)
+        nearest = closest_point(corners, np.broadcast_to(np.asarray(point, dtype=float), (len(corners), 3)))
+        gap = np.linalg.norm(nearest - point, axis=1)
         best = int(np.argmin(gap))
         # On an edge several triangles are as near; their mean is what a hand would call the normal there.
         normal = normals[gap < gap[best] + 1e-6].sum(axis=0)
         size = float(np.linalg.norm(normal))
-        return np.asarray(found[best]), normals[best] if size < 1e-9 else normal / size
+        return np.asarray(nearest[best]), normals[best] if size < 1e-9 else normal / size
 
     def contains(self, points: Array) -> NDArray[np.bool_]:
         """Which of the points (..., 3) lie inside.
@@ -105,16 +104,14 @@ class Surface:
 
     def anchor(self, point: Array) -> Array:
         """Where a strut from a point (3,) meets the surface; the point itself if inside."""
-        x, y, z = np.asarray(point).tolist()
-        return np.array(_anchor(self, (x, y, z)))
+        return _anchor(self, tuple(np.asarray(point).tolist())).copy()
 
 
 @lru_cache(maxsize=256)
-def _anchor(surface: Surface, point: Three) -> Three:
-    """Asked for again and again while nothing moves."""
-    inside = bool(surface.contains(np.array(point)))
-    x, y, z = point if inside else surface.nearest(np.array(point))[0].tolist()
-    return x, y, z
+def _anchor(surface: Surface, place: tuple[float, ...]) -> Array:
+    """The same, kept: it is asked for again and again while nothing moves."""
+    point = np.array(place)
+    return point if surface.contains(point) else surface.nearest(point)[0]
 
 
 def hull_of(layout: Layout) -> Surface:

@@ -1,11 +1,43 @@
-"""Directions on a robot, as files give them: unit vectors in the body frame, rounded to some decimals."""
+"""Angles, directions on a robot as files give them, and the axes of a wrench."""
 
 import math
-from typing import Annotated
+from collections.abc import Sequence
+from typing import Annotated, Any, Literal
 
+import numpy as np
 from msgspec import Meta
+from numpy.typing import ArrayLike, NDArray
 
+from finlab.arrays import Array
 from finlab.errors import LayoutError
+
+TURN = 2.0 * math.pi
+"""A full turn [rad]."""
+FULL_TURN_TOLERANCE = 1e-6
+"""By how much [rad] an arc may fall short of a full turn and still be one."""
+FILE_TURN_TOLERANCE = 1e-3
+"""By how much [rad] zero directions in a file, which are rounded, may miss a full turn or exceed it."""
+
+
+def is_full_turn(arc: Any) -> Any:
+    """Says whether arcs [rad] cover the circle, for a number, an array or a tensor."""
+    return arc >= TURN - FULL_TURN_TOLERANCE
+
+
+def wrapped(angle: ArrayLike) -> Array:
+    """Returns the same angles within [-pi, pi) [rad]."""
+    return np.asarray(np.mod(np.asarray(angle) + math.pi, TURN) - math.pi)
+
+
+def command_change(command: ArrayLike) -> Array:
+    """Changes from each command to the next, without their sign: (T, n, 3) to (T - 1, n, 3).
+
+    Amplitude [rad], frequency [Hz], and the zero direction the short way round [rad]; NaN stays NaN.
+    """
+    change = np.abs(np.diff(np.asarray(command), axis=0))
+    change[..., 2] = np.abs(wrapped(change[..., 2]))
+    return change
+
 
 Vector = tuple[float, float, float]
 Component = Annotated[float, Meta(ge=-1.001, le=1.001)]
@@ -55,3 +87,22 @@ def axes_across(first: tuple[str, Vector | None], second: tuple[str, Vector | No
 def cross(a: Vector, b: Vector) -> Vector:
     """Returns the vector product."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+Axis = Literal["Fx", "Fy", "Fz", "Tx", "Ty", "Tz"]
+AXES: tuple[Axis, ...] = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
+"""The axes of a wrench, in order: forces [N] and torques [N m] along x forward, y left, z up."""
+CommandedAxes = Annotated[
+    tuple[Axis, ...],
+    Meta(min_length=1, max_length=6, description="axes of the wrench that the robot commands"),
+]
+
+
+def mask_of(axes: Sequence[str]) -> NDArray[np.bool_]:
+    """Returns a mask (6,) of some axes."""
+    return np.array([axis in axes for axis in AXES])
+
+
+def axes_in(mask: NDArray[np.bool_]) -> tuple[Axis, ...]:
+    """Returns the axes of a mask (6,)."""
+    return tuple(axis for axis, one in zip(AXES, mask, strict=True) if one)

@@ -4,7 +4,7 @@ One declaration serves three: construction in code is checked by it, files are r
 JSON Schemas are made of it.
 """
 
-from collections.abc import Collection, Hashable, Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import MISSING, fields
 from functools import cache
 from typing import Annotated, Any, ClassVar, cast, get_args, get_type_hints
@@ -36,10 +36,9 @@ class Checked:
     """What a file calls it under the key `type`, where it may hold one of several."""
 
     def __post_init__(self) -> None:
-        shape = _plain_fields(cast(Hashable, type(self)))
-        given = {key: getattr(self, name) for name, key in shape.keys.items()}
-        values = checked(given, shape.kind)
-        for name, key in shape.keys.items():
+        keys, kind = _plain_fields(cast(Any, type(self)))
+        values = checked({key: getattr(self, name) for name, key in keys.items()}, kind)
+        for name, key in keys.items():
             value = getattr(values, name)
             lines = _LINES if name == "description" else {}
             if isinstance(value, str) and not value.translate(lines).isprintable():
@@ -50,18 +49,13 @@ class Checked:
 _LINES = {ord("\n"): " ", ord("\t"): " "}
 
 
-class _Shape:
-    """The fields of a dataclass that hold plain values."""
-
-    def __init__(self, cls: type) -> None:
-        hints = get_type_hints(cls, include_extras=True)
-        known = getattr(cls, "KEYS", {})
-        names = [field.name for field in fields(cls) if not _holds_checked(hints[field.name])]
-        self.keys = {name: known.get(name, name) for name in names}
-        self.kind = msgspec.defstruct(cls.__name__, [(name, hints[name]) for name in names], rename=self.keys)
-
-
-_plain_fields = cache(_Shape)
+@cache
+def _plain_fields(cls: Any) -> tuple[dict[str, str], Any]:
+    """Fields of a dataclass that hold plain values -> their keys, and the form of these."""
+    hints = get_type_hints(cls, include_extras=True)
+    names = [field.name for field in fields(cls) if not _holds_checked(hints[field.name])]
+    keys = {name: cls.KEYS.get(name, name) for name in names}
+    return keys, msgspec.defstruct(cls.__name__, [(name, hints[name]) for name in names], rename=keys)
 
 
 def _holds_checked(kind: Any) -> bool:
@@ -94,18 +88,19 @@ def form(
             a field that no file has.
     """
     own = {field.name for field in fields(cls)}
-    told_of = get_type_hints(cls, include_extras=True).items()
-    hints = {**{name: kind for name, kind in told_of if name in own}, **kinds}
+    annotated = get_type_hints(cls, include_extras=True).items()
+    hints = {**{name: kind for name, kind in annotated if name in own}, **kinds}
     usual = {field.name for field in fields(cls) if field.default is not MISSING}
     free = (usual - set(required)) | set(optional)
-    told = [(name, kind) for name, kind in hints.items() if kind is not None]
-    parts = [(name, kind | None, None) if name in free else (name, kind) for name, kind in told]
+    parts = [
+        (name, kind | None, None) if name in free else (name, kind)
+        for name, kind in hints.items()
+        if kind is not None
+    ]
     parts.sort(key=len)
     rename = cls.KEYS if keys is None and issubclass(cls, Checked) else dict(keys or {})
-    about: dict[str, Any] = {
-        "__doc__": (cls.__doc__ or "").split("\n")[0].replace(" Checked on construction.", "")
-    }
-    about |= {"stands_for": cls}
+    line = (cls.__doc__ or "").split("\n")[0].replace(" Checked on construction.", "")
+    about: dict[str, Any] = {"__doc__": line, "stands_for": cls}
     if tag is None and issubclass(cls, Checked) and cls.type:
         tag = ("type", cls.type)
     key, value = tag or (None, None)

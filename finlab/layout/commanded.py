@@ -1,10 +1,34 @@
-"""What thrusters, azimuths and rudders have in common: limits, rates and axes in fields of their own."""
+"""Limits, rates, axes and uncertainty of actuators, in fields of their own."""
 
 import math
-from typing import Any, ClassVar
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar
+
+from msgspec import Meta
 
 from finlab.layout.axes import Vector, axes_across, cross
-from finlab.layout.checked import Checked
+from finlab.layout.checked import Checked, Name
+
+
+@dataclass(frozen=True)
+class Uncertainty(Checked):
+    """Standard deviation of an actuator's force. Checked on construction.
+
+    Along each own direction of the actuator it is the root of (share |F|)^2 + floor^2 at a force F.
+    """
+
+    KEYS: ClassVar[Mapping[str, str]] = {"floor": "floor_n"}
+
+    share: Annotated[float, Meta(ge=0.0, le=10.0)] = 0.0
+    """Its part that grows with the force, as a share of the force."""
+    floor: Annotated[float, Meta(ge=0.0, le=1e6)] = 0.0
+    """Its part that is there at any force [N]."""
+    common: Name | None = None
+    """Name of what the error comes from, such as a fit or a measurement; actuators of one name err together,
+    by the same share along and across their forces. None for an actuator that errs by itself."""
+    correlation: Annotated[float, Meta(ge=0.0, le=1.0)] = 1.0
+    """Share of the error's variance that actuators of one `common` have together."""
 
 
 class Commanded(Checked):
@@ -32,7 +56,7 @@ class Commanded(Checked):
 
     @property
     def lower(self) -> Vector:
-        """Least command, in radians and newtons; what the actuator does not have is 0."""
+        """Least command (3,), in radians and newtons; what the actuator does not have is 0."""
         return _three([getattr(self, name)[0] for name in self.LIMITS], 0.0)
 
     @property

@@ -6,11 +6,10 @@ import numpy as np
 from msgspec import Struct
 
 from finlab.arrays import Array
-from finlab.layout.actuator import Actuator
-from finlab.layout.azimuth import Azimuth
 from finlab.layout.fin import Fin
+from finlab.layout.layout import Actuator
+from finlab.layout.propellers import Azimuth, Thruster
 from finlab.layout.thrust_model import PowerTable, ThrustModel
-from finlab.layout.thruster import Thruster
 
 KEYS: Mapping[str, str] = {
     "amplitude": "amplitude_rad",

@@ -17,13 +17,11 @@ from msgspec import Meta
 
 from finlab.errors import AllocationError
 from finlab.files.schema import checked
-from finlab.layout.actuator import Actuator
-from finlab.layout.angles import TURN
-from finlab.layout.azimuth import Azimuth
+from finlab.layout.axes import TURN
 from finlab.layout.fin import Amplitude, Frequency, Limits
-from finlab.layout.layout import Layout
+from finlab.layout.layout import Actuator, Layout
+from finlab.layout.propellers import Azimuth, Thruster
 from finlab.layout.rudder import Rudder
-from finlab.layout.thruster import Thruster
 
 Kind = Literal["lost", "weak", "torn", "stuck", "running", "whole"]
 """What may be true of a fin."""
@@ -92,10 +90,10 @@ class Health:
     def __post_init__(self) -> None:
         for kind, value in _VALUES.items():
             known = getattr(self, kind)
-            told = (
+            each = [
                 (name, checked(own, value, AllocationError, f"health: {kind} {name}")) for name, own in known
-            )
-            object.__setattr__(self, kind, tuple(told))
+            ]
+            object.__setattr__(self, kind, tuple(each))
         named = [name for name, _ in (*self.stuck, *self.running)]
         if len(set(named)) < len(named):
             raise AllocationError(f"health: a fin is stuck or running once, got {', '.join(named)}")

@@ -1,4 +1,4 @@
-"""Where actuators point: their own axes, turned, mirrored, and pointed along a direction."""
+"""Directions in which actuators point: their own axes, turned, mirrored, and pointed along a direction."""
 
 import math
 from dataclasses import replace
@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from finlab.arrays import Array
 from finlab.errors import FinlabError
 from finlab.layout import Actuator, Fin, Layout, Rudder, Thruster
-from finlab.layout.angles import is_full_turn, wrapped
+from finlab.layout.axes import is_full_turn, wrapped
 
 Vector = tuple[float, float, float]
 MIRROR = np.array([1.0, -1.0, 1.0])
@@ -23,9 +23,7 @@ DIGITS = 12
 
 def axis_names(part: Actuator) -> tuple[str, ...]:
     """Fields of an actuator's own axes, as the rows of its frame."""
-    return (
-        ("axis",) if isinstance(part, Thruster) else ("shaft", "zero") if isinstance(part, Fin) else part.AXES
-    )
+    return ("shaft", "zero") if isinstance(part, Fin) else part.AXES or ("axis",)
 
 
 def arc_name(part: Actuator) -> str:

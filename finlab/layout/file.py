@@ -19,11 +19,11 @@ from msgspec import Meta, Struct, to_builtins
 from finlab.errors import LayoutError
 from finlab.files.plain_values import yaml_text
 from finlab.files.schema import checked, shown
+from finlab.layout.axes import AXES
 from finlab.layout.checked import form
 from finlab.layout.file_form import ACTUATOR, BODY, HORIZONTAL_FIN, Reader, plain, under
 from finlab.layout.fin import Fin
 from finlab.layout.layout import MAX_ACTUATORS, Layout
-from finlab.layout.wrench_axes import AXES
 from finlab.whole_file import write_whole
 
 FORMAT = "finlab-layout"
@@ -82,13 +82,13 @@ def parse_layout(
         file = checked(data, ANY_LAYOUT)
         key = VERSIONS[data["version"]]
         reader = Reader(folder, may_open)
-        told = {}
+        values = {}
         for name in (key, "body"):
             with under(name):
-                told[name] = reader.value(getattr(file, name))
+                values[name] = reader.value(getattr(file, name))
         axes = getattr(file, "axes", None) or AXES
         try:
-            return Layout(file.name, told[key], file.description or "", told["body"], tuple(axes))
+            return Layout(file.name, values[key], file.description or "", values["body"], tuple(axes))
         except LayoutError as error:
             raise LayoutError(error.problem, error.key.replace("actuators[", f"{key}[")) from None
 
@@ -99,10 +99,10 @@ def check_version(data: Any, form: str, *versions: int) -> None:
         raise LayoutError(f"expected keys and values, got {shown(data)}")
     if data.get("format", form) != form:
         raise LayoutError(f"expected {form}, got {shown(data['format'])}", "format")
-    found = data.get("version", versions[0])
-    if type(found) is not int or found not in versions:
+    version = data.get("version", versions[0])
+    if type(version) is not int or version not in versions:
         known = " and ".join(map(str, versions))
-        raise LayoutError(f"this finlab reads version {known}, got {shown(found)}", "version")
+        raise LayoutError(f"this finlab reads version {known}, got {shown(version)}", "version")
 
 
 def layout_to_dict(layout: Layout) -> dict[str, Any]:

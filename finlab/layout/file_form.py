@@ -15,15 +15,14 @@ from typing import Annotated, Any, Union
 from msgspec import Meta, Struct, structs
 
 from finlab.errors import LayoutError
-from finlab.layout.azimuth import Azimuth, Tilt
 from finlab.layout.body import Body, Hull
 from finlab.layout.checked import Checked, form
-from finlab.layout.fin import Fin, FinModelSpec, Limits, Model
+from finlab.layout.commanded import Uncertainty
+from finlab.layout.fin import Fin, Limits, Servo
+from finlab.layout.fin_model import FinModelSpec, Model
+from finlab.layout.propellers import Azimuth, Thruster, Tilt
 from finlab.layout.rudder import Rudder
-from finlab.layout.servo import Servo
 from finlab.layout.thrust_model import MAX_ROWS, PowerLaw, PowerTable, Row
-from finlab.layout.thruster import Thruster
-from finlab.layout.uncertainty import Uncertainty
 
 
 class TableForm(Struct, tag="table", tag_field="type", forbid_unknown_fields=True):
@@ -87,39 +86,41 @@ class Reader:
             LayoutError: something does not fit; the message names the key in the part.
         """
         if isinstance(part, list | tuple):
-            values = []
+            items = []
             for i, item in enumerate(part):
                 with under(f"[{i}]"):
-                    values.append(self.value(item))
-            return tuple(values)
+                    items.append(self.value(item))
+            return tuple(items)
         if not isinstance(part, Struct):
             return part
-        told = {}
+        values = {}
         for field in structs.fields(part):
             value = getattr(part, field.name)
             if value is not None:
                 with under(field.encode_name):
-                    told[field.name] = self.value(value)
-        for key in {"path", "mesh"} & set(told):
-            told[key] = os.path.normpath((self.folder or Path.cwd()) / told[key])
+                    values[field.name] = self.value(value)
+        for key in {"path", "mesh"} & set(values):
+            values[key] = os.path.normpath((self.folder or Path.cwd()) / values[key])
         if isinstance(part, TableForm):
-            return self._table(told)
+            return self._table(values)
         cls: Any = getattr(type(part), "stands_for", None)
         if cls is None:
-            return FinModelSpec(str(part.__struct_config__.tag), tuple(told.items()))
-        for name in set(cls.DEGREES) & set(told):
-            value = told[name]
-            told[name] = tuple(map(math.radians, value)) if isinstance(value, tuple) else math.radians(value)
-        return cls(**told)
+            return FinModelSpec(str(part.__struct_config__.tag), tuple(values.items()))
+        for name in set(cls.DEGREES) & set(values):
+            value = values[name]
+            values[name] = (
+                tuple(map(math.radians, value)) if isinstance(value, tuple) else math.radians(value)
+            )
+        return cls(**values)
 
-    def _table(self, told: dict[str, Any]) -> PowerTable:
-        if ("rows" in told) == ("path" in told):
+    def _table(self, values: dict[str, Any]) -> PowerTable:
+        if ("rows" in values) == ("path" in values):
             raise LayoutError("give either rows, or the path of a CSV file, not both or neither", "rows")
-        if "rows" in told:
-            return PowerTable(**told)
+        if "rows" in values:
+            return PowerTable(**values)
         if not self.may_open:
             raise LayoutError("names a file, which is not opened here; write its rows", "path")
-        return PowerTable.read(told["path"], told.get("unit", ""))
+        return PowerTable.read(values["path"], values.get("unit", ""))
 
 
 def plain(value: Any) -> Any:

@@ -1,128 +1,17 @@
-"""Which fin model a fin follows, by name and numbers; the formulas live in `finlab.physics`."""
+"""Fins: what one may be commanded, how fast it comes to that, and how it sits on the hull."""
 
 import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar, Union
+from typing import Annotated, Any, ClassVar
 
-from msgspec import Meta, Struct, defstruct
+from msgspec import Meta
 
 from finlab.errors import LayoutError
-from finlab.files.schema import checked
-from finlab.layout.angles import FULL_TURN_TOLERANCE, TURN
-from finlab.layout.axes import Direction3, Vector, axes_across, cross
-from finlab.layout.checked import Checked, Name, given
-from finlab.layout.servo import Servo
-from finlab.layout.uncertainty import Uncertainty
-
-
-@dataclass(frozen=True)
-class Parameter:
-    """One number of a fin model."""
-
-    default: float
-    """Its value where a layout file leaves it out."""
-    meaning: str
-    """What it is, in a few words."""
-    unit: str = ""
-    """Its unit; empty where it has none."""
-    low: float = 0.001
-    """Least value that a robot's fin may have."""
-    high: float = 10.0
-    """Greatest value."""
-
-
-_DENSITY = Parameter(1000.0, "density of the water", "kg/m^3", 500.0, 2000.0)
-
-FIN_MODELS: Mapping[str, Mapping[str, Parameter]] = {
-    "drag": {
-        "density": _DENSITY,
-        "drag_coefficient": Parameter(0.15, "drag coefficient of the blade", "", 0.01),
-        "area": Parameter(0.02, "area of the blade", "m^2", 1e-5),
-        "lever": Parameter(0.1, "distance of the blade's centre from the shaft", "m"),
-    },
-    "lighthill": {
-        "density": _DENSITY,
-        "length": Parameter(0.20, "length of the fin from the shaft", "m"),
-        "width": Parameter(0.10, "width of the trailing edge", "m"),
-    },
-    "soft": {
-        "k": Parameter(3.6, "thrust at A f = 1 rad Hz, before it saturates", "N", 1e-4, 1e5),
-        "p": Parameter(1.0, "exponent with which thrust grows with A f", low=0.5, high=4.0),
-        "x0": Parameter(1.3, "A f from which thrust saturates and falls", "rad Hz", 0.01, 100.0),
-        "q": Parameter(5.0, "exponent of that fall", low=0.1, high=20.0),
-        "e": Parameter(0.0, "share by which thrust differs with direction", low=0.0, high=0.99),
-        "phi_e": Parameter(0.0, "zero direction of the largest thrust", "rad", -10.0, 10.0),
-        "d": Parameter(0.0, "angle from zero direction to thrust", "rad", -1.5, 1.5),
-    },
-    # Its one parameter, `path`, is the text that names a CSV file of forces; it has no default.
-    "table": {},
-}
-"""The fin models there are, by name, with their numeric parameters."""
-
-SCALES_THRUST: Mapping[str, tuple[str, float]] = {
-    "drag": ("area", 1.0),
-    "lighthill": ("width", 0.5),
-    "soft": ("k", 1.0),
-}
-"""The parameter by which a model's thrust is made larger or smaller, and its exponent."""
-
-
-def _form(name: str, parameters: Mapping[str, Parameter]) -> type[Struct]:
-    """The part of a file that gives the parameters of a model."""
-    path = Annotated[str, Meta(min_length=1, max_length=4096, description="a CSV file of forces")]
-    keys: list[Any] = [("path", path)] if name == "table" else []
-    for key, rule in parameters.items():
-        about = f"{rule.meaning}{rule.unit and f' [{rule.unit}]'}; {rule.default:g} when left out"
-        kind = Annotated[float, Meta(ge=rule.low, le=rule.high, description=about)]
-        keys.append((key, kind | None, None))
-    return defstruct(f"{name.title()}Model", keys, tag=name, tag_field="type", forbid_unknown_fields=True)
-
-
-Model: Any = Union[tuple(_form(name, parameters) for name, parameters in FIN_MODELS.items())]  # noqa: UP007
-"""A fin model in a file: keys and values, among them its `type`."""
-
-
-@dataclass(frozen=True)
-class FinModelSpec:
-    """Name and parameters of a fin model, as a layout file gives them. Checked on construction."""
-
-    type: str = "drag"
-    """One of `FIN_MODELS`."""
-    parameters: tuple[tuple[str, float | str], ...] = ()
-    """Parameters that differ from the model's defaults, as (name, value), sorted by name."""
-
-    def __post_init__(self) -> None:
-        model: Any = checked({**dict(self.parameters), "type": self.type}, Model)
-        object.__setattr__(self, "parameters", tuple(sorted(given(model).items())))
-
-    @classmethod
-    def from_values(cls, values: Mapping[str, float | str]) -> "FinModelSpec":
-        """The spec of a mapping with the model's name under `type` and its parameters beside it.
-
-        Raises:
-            LayoutError: unknown model, unknown parameter, or a value that is none.
-        """
-        return cls(str(values["type"]), tuple((k, v) for k, v in values.items() if k != "type"))
-
-    def scaled(self, share: float) -> "FinModelSpec":
-        """The model of a fin that gives a share of the thrust at every command.
-
-        Raises:
-            LayoutError: the fin is a table, whose file would have to be another one.
-        """
-        if self.type not in SCALES_THRUST:
-            raise LayoutError("the thrust of a table cannot be scaled; name another CSV file", "type")
-        name, exponent = SCALES_THRUST[self.type]
-        rule = FIN_MODELS[self.type][name]
-        value = min(max(float(self.values()[name]) * share**exponent, rule.low), rule.high)
-        return FinModelSpec(self.type, tuple({**dict(self.parameters), name: value}.items()))
-
-    def values(self) -> dict[str, float | str]:
-        """Returns all parameters of the model, those given and those left at their defaults."""
-        defaults = {name: rule.default for name, rule in FIN_MODELS[self.type].items()}
-        return {**defaults, **dict(self.parameters)}
-
+from finlab.layout.axes import FULL_TURN_TOLERANCE, TURN, Direction3, Vector, axes_across, cross
+from finlab.layout.checked import Checked, Name
+from finlab.layout.commanded import Uncertainty
+from finlab.layout.fin_model import FinModelSpec
 
 MAX_AMPLITUDE = math.pi / 2
 """Largest half amplitude a layout may allow [rad]; beyond it the fin would beat through the hull."""
@@ -192,6 +81,52 @@ class Limits(Checked):
     def upper(self) -> tuple[float, float, float]:
         """Greatest (amplitude [rad], frequency [Hz], zero direction [rad])."""
         return self.amplitude[1], self.frequency[1], self.zero_direction[1]
+
+
+Rate = Annotated[float, Meta(ge=1e-3, le=1000.0)]
+"""A pole, a speed or a rate [per second]; at most a hundred times what such servos reach."""
+
+
+@dataclass(frozen=True)
+class Servo(Checked):
+    """The drive of one fin; what is left out is U-CAT's. Checked on construction.
+
+    Amplitude, frequency and zero direction each follow their command through a critically damped filter with
+    a double pole p, x'' = p (p (x* - x) - 2 x'): half of the way is done after 1.7 / p, nine tenths after
+    3.9 / p. The defaults are U-CAT's, as far as something is known of them.
+    """
+
+    KEYS: ClassVar[Mapping[str, str]] = {
+        "amplitude_pole": "amplitude_pole_rad_s",
+        "frequency_pole": "frequency_pole_rad_s",
+        "direction_pole": "direction_pole_rad_s",
+        "speed_limit": "speed_limit_rad_s",
+        "amplitude_rate": "amplitude_rate_rad_s",
+        "frequency_rate": "frequency_rate_hz_s",
+        "direction_rate": "direction_rate_rad_s",
+    }
+
+    amplitude_pole: Rate = 7.5
+    """Double pole of the amplitude [rad/s]; the oscillators that drive the fins in U-CAT's open simulator
+    (eeUVsim) have k_amp = 15, twice the pole."""
+    frequency_pole: Rate = 7.5
+    """Double pole of the frequency [rad/s]. Our choice: nothing is published, and eeUVsim's oscillators take
+    a new frequency at once; but a drive that is to beat faster must gather speed as one that is to beat wider
+    must, so it has the pole of the amplitude."""
+    direction_pole: Rate = 3.5
+    """Double pole of the zero direction [rad/s]; eeUVsim's k_zd = 7."""
+    speed_limit: Rate = 4 * math.pi
+    """Fastest that the fin turns [rad/s]; two turns a second in U-CAT's UWSim plug-in. It cuts the amplitude
+    of fast flapping and slows the turning of a fin that flaps."""
+
+    amplitude_rate: Rate = 1.0
+    """How fast the commanded amplitude changes at most from tick to tick [rad/s]: what the filter above
+    follows with a delay of two tenths of the amplitude."""
+    frequency_rate: Rate = 3.0
+    """The same of the commanded frequency [Hz/s]."""
+    direction_rate: Rate = 5.0
+    """The same of the commanded zero direction [rad/s]. A fin that is commanded to turn back at once pushes
+    wherever it points meanwhile; one that is commanded step by step gives the others time to compensate."""
 
 
 @dataclass(frozen=True)

@@ -8,10 +8,10 @@ any order but must fill a grid: every amplitude with every frequency with every 
 free. Lines that begin with # say what to know of the table; other columns are passed over.
 """
 
-import csv
 import math
 import os
 from collections.abc import Iterable, Sequence
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,7 +22,7 @@ from finlab.bundle_files import TABLES, archive_around, read_bundle_files
 from finlab.errors import DataError
 from finlab.files.csv_table import CsvTable
 from finlab.files.guarded import read_file
-from finlab.layout.angles import FILE_TURN_TOLERANCE, TURN
+from finlab.layout.axes import FILE_TURN_TOLERANCE, TURN
 from finlab.layout.fin import MAX_AMPLITUDE, MAX_FREQUENCY
 
 COLUMNS = ("A", "f", "phi", "Fx", "Fy", "Fz")
@@ -88,10 +88,8 @@ def write_table(
     axes = [np.asarray(axis, dtype=np.float64) for axis in (amplitude, frequency, zero_direction)]
     command = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     force = law.force(command)
-    with open(path, "w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(COLUMNS)
-        writer.writerows([f"{value:.10g}" for value in row] for row in np.hstack([command, force + 0.0]))
+    text = table_text((), COLUMNS, np.hstack([command, force]), digits=10)
+    Path(path).write_text(text, encoding="utf-8")
 
 
 def table_text(notes: Iterable[str], header: Sequence[str], rows: Iterable[Any], digits: int) -> str:
@@ -172,10 +170,10 @@ def _check_units(rows: Array, source: str) -> None:
 def _grid(rows: Array, lines: NDArray[np.intp], source: str) -> tuple[list[Array], Array]:
     """Returns the three axes and the values (n_A, n_f, n_phi, columns behind them) of rows that fill a
     grid."""
-    found = [np.unique(rows[:, i], return_inverse=True) for i in range(3)]
-    axes = [values for values, _ in found]
+    uniques = [np.unique(rows[:, i], return_inverse=True) for i in range(3)]
+    axes = [values for values, _ in uniques]
     shape = tuple(len(axis) for axis in axes)
-    place = np.ravel_multi_index(tuple(inverse.ravel() for _, inverse in found), shape)
+    place = np.ravel_multi_index(tuple(inverse.ravel() for _, inverse in uniques), shape)
     order = place.argsort(kind="stable")
     repeated = np.flatnonzero(np.diff(place[order]) == 0)
     if len(repeated):

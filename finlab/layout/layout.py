@@ -1,10 +1,10 @@
-"""A layout: the actuators of one robot, in order, and optionally its body."""
+"""Layouts: the actuators of one robot, in order, and optionally its body."""
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import Annotated, Any, NoReturn
+from typing import Annotated, Any
 
 import numpy as np
 from msgspec import Meta
@@ -12,11 +12,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from finlab.arrays import Array
 from finlab.errors import LayoutError
-from finlab.layout.actuator import Actuator
+from finlab.layout.axes import AXES, CommandedAxes, mask_of
 from finlab.layout.body import Body
 from finlab.layout.checked import Checked, Name
 from finlab.layout.fin import Fin
-from finlab.layout.wrench_axes import AXES, CommandedAxes, mask_of
+from finlab.layout.propellers import Azimuth, Thruster
+from finlab.layout.rudder import Rudder
+
+Actuator = Fin | Thruster | Azimuth | Rudder
+"""An actuator of a robot: `name`, `type`, `position` [m], `frame` (3 x 3, rows in the body frame), and
+`lower` and `upper`, the limits of its command (3,)."""
+
 
 MAX_ACTUATORS = 64
 """Most actuators a layout may have."""
@@ -77,32 +83,28 @@ class Layout(Checked):
         """Whether all actuators are fins."""
         return self.n_fins == self.n
 
-    def only_fins(self, what: str, horizontal: bool = False) -> None:
-        """Refuses a robot that is not of fins alone, for what is made for fins.
+    def only(self, what: str, kind: str = "fin", horizontal: bool = False) -> None:
+        """Refuses a robot whose actuators are not all of one type, for what is made for that.
 
         Args:
             what: what was asked for, as the sentence begins.
+            kind: the type.
             horizontal: whether the fins' shafts have to be horizontal, too, with a mounting angle.
 
         Raises:
             LayoutError: the sentence names `what` and the first actuator that it does not take.
         """
-        self.only(what, "fin")
-        for fin in self.fins if horizontal else ():
-            if fin.mounting_angle is None:
-                self._refuse(what, "fins with a mounting angle", fin, "has a shaft of its own direction")
-
-    def only(self, what: str, kind: str) -> None:
-        """Refuses a robot whose actuators are not all of one type, as `only_fins` does."""
         for part in self.actuators:
             if part.type != kind:
-                self._refuse(what, f"robots of {kind}s", part, f"is of type {part.type}")
-
-    def _refuse(self, what: str, wanted: str, part: Actuator, found: str) -> NoReturn:
-        raise LayoutError(
-            f"{what} works for {wanted} only, and {part.name!r} of layout {self.name} {found}; "
-            "method dual of `finlab allocate` takes any actuator"
-        )
+                wanted, problem = f"robots of {kind}s", f"is of type {part.type}"
+            elif horizontal and getattr(part, "mounting_angle", None) is None:
+                wanted, problem = "fins with a mounting angle", "has a shaft of its own direction"
+            else:
+                continue
+            raise LayoutError(
+                f"{what} works for {wanted} only, and {part.name!r} of layout {self.name} {problem}; "
+                "method dual of `finlab allocate` takes any actuator"
+            )
 
     @cached_property
     def commanded(self) -> NDArray[np.bool_]:
@@ -129,7 +131,7 @@ class Layout(Checked):
         Raises:
             LayoutError: an actuator is no fin, or its shaft is not horizontal.
         """
-        self.only_fins("what asks for mounting angles", horizontal=True)
+        self.only("what asks for mounting angles", horizontal=True)
         return _read_only([fin.mounting_angle or 0.0 for fin in self.fins])
 
     @cached_property

@@ -1,18 +1,146 @@
-"""Opens what a user may name as a layout: a shipped one, a layout file, or a bundle."""
+"""Layouts in what a user may name: a shipped layout, a layout or graph file, a bundle's `robot.json`."""
 
+import json
 import os
 from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from msgspec import Meta, Struct, to_builtins
 
 from finlab.assets import shipped_layouts
-from finlab.bundle_files import is_bundle, read_bundle_files
+from finlab.bundle_files import ROBOT, TABLES, Files, is_bundle, read_bundle_files
 from finlab.errors import LayoutError
-from finlab.files.guarded import read_text
+from finlab.files.guarded import decoded, read_text
 from finlab.files.plain_values import parse_json, parse_yaml
-from finlab.layout.file import parse_layout
+from finlab.files.schema import checked
+from finlab.layout.checked import Name
+from finlab.layout.file import layout_to_dict, parse_layout
 from finlab.layout.file_form import under
-from finlab.layout.graph_form import is_graph, layout_in_graph
-from finlab.layout.layout import Layout
-from finlab.layout.robot_file import robot_of
+from finlab.layout.layout import MAX_ACTUATORS, Layout
+
+
+class Edge(Struct, forbid_unknown_fields=True):
+    """Two actuators, or one twice."""
+
+    source: Name
+    target: Name
+
+
+class Normalization(Struct, forbid_unknown_fields=True):
+    """What numbers are divided by to be of order one."""
+
+    features: dict[str, float]
+    """Of the features of fins with horizontal shafts, by name, as the paper's network takes them."""
+    wrench: dict[str, float]
+    """Of each axis of a wrench [N, N m]: the robot's own yardstick, in which errors are measured."""
+
+
+class Data(Struct, forbid_unknown_fields=True):
+    """What holds for the whole graph."""
+
+    layout: dict[str, Any]
+    """A layout file of version 2 without its actuators, which are the nodes."""
+    normalization: Normalization
+    format: Literal["finlab-graph"] = "finlab-graph"
+    version: Literal[4] = 4
+
+
+class Graph(Struct, forbid_unknown_fields=True):
+    """A robot's actuators as nodes, each joined with every other one and with itself; node-link form.
+
+    A node has the actuator's name as `id`, what a layout file says of it, and `features`: numbers by name and
+    unit.
+    """
+
+    directed: Literal[False]
+    multigraph: Literal[False]
+    graph: Data
+    nodes: Annotated[list[dict[str, Any]], Meta(min_length=1, max_length=MAX_ACTUATORS)]
+    edges: list[Edge]
+
+
+def is_graph(data: Any) -> bool:
+    """Whether plain values are those of a layout graph file."""
+    about = data.get("graph") if isinstance(data, dict) else None
+    return isinstance(about, dict) and about.get("format") == "finlab-graph"
+
+
+def layout_in_graph(data: Any) -> dict[str, Any]:
+    """Returns the plain values of the layout file that a graph file holds.
+
+    Raises:
+        LayoutError: a part of the graph is missing, unknown or not what it has to be.
+    """
+    graph = checked(data, Graph)
+    names = [node.get("id") for node in graph.nodes]
+    if [(edge.source, edge.target) for edge in graph.edges] != edges_of(names):
+        raise LayoutError("expected each actuator with itself and with those after it, in order", "edges")
+    parts = [
+        {"name": node.get("id")} | {key: node[key] for key in node if key not in ("id", "features")}
+        for node in graph.nodes
+    ]
+    return {**graph.graph.layout, "actuators": parts}
+
+
+def edges_of(names: list[Any]) -> list[tuple[Any, Any]]:
+    """Returns all pairs of names, each with itself too."""
+    return [(a, b) for k, a in enumerate(names) for b in names[k:]]
+
+
+Wrench = tuple[float, float, float, float, float, float]
+
+
+class Case(Struct, frozen=True, forbid_unknown_fields=True):
+    """A target [N, N m], a command per actuator in SI and radians (null for a failed one), and its wrench."""
+
+    wrench: Wrench
+    command: tuple[tuple[float, float, float] | None, ...]
+    delivered_wrench: Wrench
+
+
+class Robot(Struct, forbid_unknown_fields=True):
+    """What a bundle holds beside the method's settings."""
+
+    layout: Any
+    """The `Layout`, failed actuators included; in the file as a layout file has it."""
+    failed: tuple[Name, ...]
+    """Actuators that do not work."""
+    weights_sha256: Annotated[str, Meta(pattern="^[0-9a-f]{64}$")] | None
+    """SHA-256 of the weights of the method's networks, hexadecimal; None for methods without."""
+    self_test: tuple[Case, ...]
+    """Targets with their answers."""
+
+
+def robot_bytes(robot: Robot) -> bytes:
+    """Returns the contents of the file."""
+    values = {**to_builtins(robot, builtin_types=(Layout,)), "layout": layout_to_dict(robot.layout)}
+    return (json.dumps(values, indent=1, allow_nan=False, ensure_ascii=False) + "\n").encode()
+
+
+def robot_of(files: Files, source: str) -> Robot:
+    """Returns the robot among the files of a bundle, a folder or archive at the path `source`.
+
+    Raises:
+        LayoutError: it holds no layout, or one that names a force table outside the bundle.
+    """
+    place, folder = f"{source}/{ROBOT}", Path(os.path.abspath(source))
+    values = parse_json(decoded(files[ROBOT], place, "JSON", LayoutError), place, LayoutError)
+    robot = checked(values, Robot, source=place)
+    layout: Layout = parse_layout(robot.layout, f"{place}: layout", folder, may_open=False)
+    tables = {str(folder / name) for name in files if name.startswith(TABLES)}
+    with under(source=place):
+        layout.indices(robot.failed)
+        for fin in layout.fins:
+            if fin.model.values().get("path", "") not in {"", *tables}:
+                problem = "names a force table that is not in the bundle; export it again"
+                raise LayoutError(problem, f"layout, fin {fin.name!r}, model.path")
+        for i, case in enumerate(robot.self_test):
+            if len(case.command) != layout.n:
+                problem = f"expected {layout.n} rows, one for each actuator, got {len(case.command)}"
+                raise LayoutError(problem, f"self_test[{i}].command")
+    robot.layout = layout
+    return robot
+
 
 MAX_BYTES = 1_000_000
 """Largest layout file that is read [bytes]; a real one has a few thousand."""

@@ -9,11 +9,9 @@ from msgspec import Meta
 
 from finlab.errors import LayoutError
 from finlab.layout.axes import Direction3
-from finlab.layout.azimuth import TurnRate, TurnRateDegrees
 from finlab.layout.checked import Name
-from finlab.layout.commanded import Commanded
-from finlab.layout.thruster import Place, Seconds
-from finlab.layout.uncertainty import Uncertainty
+from finlab.layout.commanded import Commanded, Uncertainty
+from finlab.layout.propellers import Place, Seconds, TurnRate, TurnRateDegrees
 
 EFFICIENCY = 0.9
 """Induced drag of an elliptic wing over that of such a foil (Whicker and Fehlner, 1958)."""

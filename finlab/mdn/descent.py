@@ -21,8 +21,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from finlab.arrays import AnyArray, Array
-from finlab.layout.angles import wrapped
+from finlab.arrays import AnyArray, Array, solve
+from finlab.layout.axes import wrapped
 from finlab.mdn.effort_fins import (
     AMPLITUDE,
     EFFORT,
@@ -33,7 +33,6 @@ from finlab.mdn.effort_fins import (
     EffortFins,
     Projected,
 )
-from finlab.small_systems import solve
 
 RIDGE = 1e-9
 """Relative regularization of the 6 x 6 systems."""

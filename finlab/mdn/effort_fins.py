@@ -15,13 +15,13 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.actuators.fin.models import file_stamp
-from finlab.actuators.fin.response import fin_table
+from finlab.actuators.fin.fin_laws import file_stamp
+from finlab.actuators.fin.fin_response import fin_table
 from finlab.actuators.response import POINTS
 from finlab.arrays import AnyArray, Array
 from finlab.layout import Fin, Layout
-from finlab.layout.angles import TURN
-from finlab.physics.effort import effort_of_shares, effort_scale
+from finlab.layout.axes import TURN
+from finlab.physics.objective import effort_of_shares, effort_scale
 
 LEVELS = 49
 """Sizes of force."""

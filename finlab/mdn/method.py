@@ -15,12 +15,11 @@ import numpy as np
 
 from finlab.allocation.dual.method import Dual
 from finlab.allocation.dual.rates import Rates
-from finlab.allocation.evaluate import costs
-from finlab.allocation.mdn_settings import MdnSettings
 from finlab.allocation.method import Method, Takes
 from finlab.allocation.policy import Policy
-from finlab.allocation.settings import Settings
+from finlab.allocation.settings import MdnSettings, Settings
 from finlab.allocation.solution import Candidates, Solution
+from finlab.allocation.yardstick import costs
 from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.mdn.answers import NOW, OTHER, Answers, Steps, follow, ranked, refined, traced
@@ -156,7 +155,7 @@ class Mdn(Method):
         """What is found for one target within what the servos allow after a previous command (n, 3): the way
         that the robot moves now is kept, and where another is worth it, all fins go towards that."""
         first, plant = free.answers, self.plant
-        rates = Rates.of(plant, self.layout.rates, self.settings.period_s)
+        rates = Rates(plant, self.layout.rates * self.settings.period_s)
         if rates.allow(previous, first.command[0, 0]):
             return free
         near = self.robot.within(rates.box(previous))

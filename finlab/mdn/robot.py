@@ -11,7 +11,7 @@ from finlab.arrays import Array
 from finlab.mdn.descent import EffortProblem, effort_problem
 from finlab.mdn.effort_fins import EffortFins
 from finlab.mdn.features import RobotView, robot_view
-from finlab.physics.effort import ZERO_DIRECTION, EffortMeter, effort_scale
+from finlab.physics.objective import ZERO_DIRECTION, EffortMeter, effort_scale
 from finlab.physics.plant import Plant
 
 EXACT = 1e-5

@@ -4,11 +4,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from finlab.allocation.evaluate import costs
 from finlab.allocation.levenberg_marquardt import CommandProblem
 from finlab.allocation.method import LeastErrorMethod, Takes
 from finlab.allocation.settings import Settings
 from finlab.allocation.solution import Candidates, Solution
+from finlab.allocation.yardstick import costs
 from finlab.arrays import AnyArray, Array
 from finlab.layout import FinModelSpec, Layout
 from finlab.networks.normalization import to_command, to_normalized
@@ -18,7 +18,7 @@ from finlab.paper.features import raw_features
 from finlab.paper.network import Mixture, NetworkConfig
 from finlab.paper.settings import PaperSettings
 from finlab.paper.surrogate import LayoutSurrogate, blocks_of
-from finlab.physics.effort import EffortMeter
+from finlab.physics.objective import EffortMeter
 
 CHUNK = 250
 """Targets that are solved together; keeps memory flat for any number of targets."""

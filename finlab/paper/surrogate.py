@@ -15,7 +15,7 @@ import numpy as np
 from finlab.arrays import AnyArray, Values, library_of
 from finlab.errors import CheckpointError
 from finlab.layout import Layout
-from finlab.layout.arrays import force_effectiveness
+from finlab.layout.effectiveness import force_effectiveness
 from finlab.networks import layers
 from finlab.networks.layers import Weights
 from finlab.networks.normalization import to_normalized

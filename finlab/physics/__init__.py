@@ -1,8 +1,8 @@
 """Command to force to wrench, and what it costs: the fins' laws, the plant, power and effort."""
 
-from finlab.actuators.fin.models import make_law as make_law
-from finlab.actuators.fin.models import read_table as read_table
-from finlab.actuators.fin.table import TableLaw as TableLaw
+from finlab.actuators.fin.fin_laws import TableLaw as TableLaw
+from finlab.actuators.fin.fin_laws import make_law as make_law
+from finlab.actuators.fin.fin_laws import read_table as read_table
 from finlab.actuators.law import FinLaw as FinLaw
 from finlab.layout.force_table_file import write_table as write_table
 from finlab.physics.plant import Plant as Plant

@@ -1,4 +1,4 @@
-"""How far a robot's wrench may be from what its plant says, by what is uncertain of its actuators.
+"""Distance of a robot's wrench from what its plant says, by what is uncertain of its actuators.
 
 Each actuator errs along its force; fins and turning thrusters by as much across it, and fins along their
 shafts where their table tells. With d the wrench of one standard deviation of such an error, the variance of
@@ -12,8 +12,8 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.layout.layout import Layout
+from finlab.layout.propellers import Thruster
 from finlab.layout.rudder import Rudder
-from finlab.layout.thruster import Thruster
 from finlab.physics.plant import Plant
 from finlab.uncertainty.known import Known, uncertainties
 

@@ -1,13 +1,78 @@
-"""What an allocation keeps least: mean power in watts, or the paper's effort `J_en`.
+"""Costs that an allocation keeps least: mean power in watts, or the paper's effort `J_en`.
 
-Both are sums over the fins of a cost of amplitude and frequency; effort adds a little for the zero direction.
+`J_en` is a sum of squares and one product of normalized commands.
 """
 
 from typing import Literal
 
-from finlab.arrays import Array
-from finlab.physics.effort import EffortMeter
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.arrays import AnyArray, Array, Values
 from finlab.physics.plant import Plant
+
+AMPLITUDE, FREQUENCY, ZERO_DIRECTION, PRODUCT = 1.0, 1.0, 0.1, 1.0
+"""Weights of the squares of normalized amplitude, frequency and zero direction, and of amplitude times
+frequency; the paper prints none."""
+
+
+def effort_scale(upper: Values) -> Values:
+    """What each command is divided by: its own fin's upper limit.
+
+    A fin whose upper limit is zero or negative (an arc of zero directions below zero, say) would
+    blow up or change sign, so the magnitude is taken and floored.
+
+    Args:
+        upper: upper limits (..., 3), an array or a tensor.
+    """
+    return abs(upper).clip(1e-3)
+
+
+def effort_of_shares(amplitude: Values, frequency: Values, zero_direction: Values) -> Values:
+    """One fin's summand of `J_en`, from commands over their scale: arrays, tensors or symbols."""
+    a, f, d = amplitude, frequency, zero_direction
+    return AMPLITUDE * a * a + FREQUENCY * f * f + ZERO_DIRECTION * d * d + PRODUCT * a * f
+
+
+def fin_effort(command: Values, upper: Values) -> Values:
+    """Energy (...,) of each fin: commands (..., 3) and upper limits (..., 3), arrays or tensors."""
+    scaled = command / effort_scale(upper)
+    return effort_of_shares(scaled[..., 0], scaled[..., 1], scaled[..., 2])
+
+
+def command_effort(command: NDArray[np.floating], upper: NDArray[np.floating]) -> AnyArray:
+    """`J_en` of whole robots: commands (..., n, 3) to energies (...,). Failed fins (NaN) count nothing."""
+    effort = fin_effort(command, upper)
+    return np.asarray(np.where(np.isnan(effort), 0.0, effort).sum(-1))
+
+
+class EffortMeter:
+    """The energy proxy of one robot whose fins are all healthy, ready for many commands."""
+
+    def __init__(self, upper: Array) -> None:
+        """Make it for upper limits (n, 3)."""
+        self.upper, self._scale = upper, effort_scale(upper)
+        squares = np.array([AMPLITUDE, FREQUENCY, ZERO_DIRECTION])
+        self._twice = 2.0 * squares / self._scale**2
+        self._product = PRODUCT / (self._scale[:, 0] * self._scale[:, 1])
+
+    def __call__(self, command: NDArray[np.floating]) -> AnyArray:
+        """Energies (R,) of commands (R, n, 3)."""
+        return self.with_gradient(command)[0]
+
+    def gradient(self, command: NDArray[np.floating]) -> AnyArray:
+        """Derivatives (R, n, 3) of the energies by commands (R, n, 3)."""
+        gradient: AnyArray = command * self._twice
+        gradient[..., 0] += self._product * command[..., 1]
+        gradient[..., 1] += self._product * command[..., 0]
+        return gradient
+
+    def with_gradient(self, command: NDArray[np.floating]) -> tuple[AnyArray, AnyArray]:
+        """Both, for little more than the price of one."""
+        gradient = self.gradient(command)
+        # Of a quadratic form, half the slopes times the commands.
+        return 0.5 * np.einsum("rni,rni->r", gradient, command), gradient
+
 
 Name = Literal["power", "effort"]
 """`power`: mean mechanical watts by each fin's own model. `effort`: the paper's energy proxy `J_en`."""

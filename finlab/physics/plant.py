@@ -13,16 +13,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from finlab.actuators.fin.blade import Blade
-from finlab.actuators.fin.models import file_stamps, make_law
+from finlab.actuators.fin.fin_laws import file_stamps, make_law
 from finlab.actuators.law import ActuatorLaw
 from finlab.actuators.registry import free_angles, laws_of
 from finlab.actuators.thrust_power import held
 from finlab.arrays import Array
 from finlab.errors import CommandError
-from finlab.layout.angles import TURN, is_full_turn
-from finlab.layout.arrays import own_effectiveness
+from finlab.layout.axes import TURN, is_full_turn
+from finlab.layout.effectiveness import body_force, own_effectiveness, wrench_of_forces
 from finlab.layout.layout import Layout
-from finlab.physics.wrench import body_force, wrench_of_forces
 
 
 class Plant:

@@ -7,8 +7,8 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.layout import Layout
-from finlab.layout.angles import wrapped
-from finlab.layout.arrays import own_effectiveness
+from finlab.layout.axes import wrapped
+from finlab.layout.effectiveness import own_effectiveness
 from finlab.physics import plant_of
 from finlab.vehicle.actuator_motion import ActuatorMotion
 from finlab.vehicle.fin_motion import FinMotion, fin_power

@@ -34,9 +34,9 @@ from finlab.sim.perturbed import checked_truth
 from finlab.sim.sensors import Sensors, SensorSettings
 from finlab.sim.task import Trajectory
 from finlab.vehicle.actuator_motion import ActuatorMotion
-from finlab.vehicle.attitude import quaternion_of_yaw
-from finlab.vehicle.body import complete_body
+from finlab.vehicle.attitude import quaternion_of
 from finlab.vehicle.fin_motion import FinMotion
+from finlab.vehicle.fossen import complete_body
 from finlab.vehicle.vehicle import STATE_SIZE, Vehicle
 
 AHEAD = 10
@@ -142,7 +142,7 @@ class ClosedLoop:
         start, heading = task.start()
         self.state = np.zeros(STATE_SIZE)
         """State (13,): position (world), quaternion (w, x, y, z), velocity and rates (body); SI."""
-        self.state[:3], self.state[3:7] = start, quaternion_of_yaw(heading)
+        self.state[:3], self.state[3:7] = start, quaternion_of(0.0, 0.0, heading)
         self.controller.reset()
 
     @property

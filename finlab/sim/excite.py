@@ -22,14 +22,14 @@ from finlab.arrays import Array
 from finlab.control import Measurement, Setpoint
 from finlab.errors import DataError, FinlabError
 from finlab.layout import Azimuth, Fin, Layout, Rudder, Thruster
-from finlab.layout.angles import wrapped
-from finlab.layout.arrays import layout_effectiveness
+from finlab.layout.axes import wrapped
+from finlab.layout.effectiveness import layout_effectiveness
 from finlab.networks.trained import TrainedWeights
 from finlab.physics import plant_of
 from finlab.sim.closed_loop import ClosedLoop
 from finlab.sim.sensors import SensorSettings
 from finlab.sim.task import station
-from finlab.vehicle.body import complete_body, dynamics_of
+from finlab.vehicle.fossen import complete_body, dynamics_of
 
 LONGEST_S = 300.0
 """Longest swim [s]."""

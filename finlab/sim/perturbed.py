@@ -16,7 +16,7 @@ from finlab.errors import LayoutError
 from finlab.files.schema import checked
 from finlab.layout import Layout
 from finlab.layout.directions import rotation, with_axes
-from finlab.vehicle.body import complete_body
+from finlab.vehicle.fossen import complete_body
 from finlab.vehicle.vehicle import Vehicle
 
 Factor = Annotated[float, Meta(gt=0.0, le=100.0)]

@@ -1,1 +1,1 @@
-"""How far the forces of actuators may be from their laws and tables."""
+"""Errors of the laws and tables of actuators."""

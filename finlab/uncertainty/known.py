@@ -1,4 +1,4 @@
-"""What is known of how far the forces of a robot's actuators may be from their laws and tables.
+"""Known uncertainties of a robot's actuators: how far their forces may be from laws and tables.
 
 A layout says it (`uncertainty` of an actuator); where it does not, a table tells by its own standard
 deviations and by the error of its grid.
@@ -10,19 +10,15 @@ from functools import lru_cache
 
 import numpy as np
 
-from finlab.actuators.fin.models import file_stamps, make_law
-from finlab.actuators.fin.table import TableLaw
+from finlab.actuators.fin.fin_laws import TableLaw, file_stamps, make_law
 from finlab.arrays import Array
-from finlab.layout.actuator import Actuator
 from finlab.layout.fin import Fin
-from finlab.layout.layout import Layout
+from finlab.layout.layout import Actuator, Layout
 from finlab.layout.thrust_model import PowerTable
-from finlab.uncertainty.grid_error import GridUncertainty, grid_uncertainty
-from finlab.uncertainty.table_error import thrust_table_error
+from finlab.uncertainty.table_error import GridUncertainty, grid_uncertainty, thrust_table_error
 
 OF_ONE_TABLE = 0.5
-"""Share of the variance that actuators with one table have together: their errors are alike where their
-commands are."""
+"""Share of the variance that actuators with one table have together: alike commands have alike errors."""
 
 
 @dataclass(frozen=True)
@@ -34,8 +30,7 @@ class Known:
     floor: float = 0.0
     """The part of it that is there at any force [N]."""
     common: Hashable = None
-    """What the error comes from, the same for actuators that err together; None for one that errs by
-    itself."""
+    """Source of the error, the same for those that err together; None for one that errs by itself."""
     correlation: float = 1.0
     """Share of the variance that these have together."""
     table: GridUncertainty | None = None
@@ -51,24 +46,20 @@ class Known:
 
 
 def uncertainties(layout: Layout) -> tuple[Known | None, ...]:
-    """Returns what is known of each actuator; None where its law is taken as it is.
-
-    Raises:
-        DataError: a fin's force table cannot be read.
-    """
+    """Returns what is known of each actuator, None where its law is exact; a `DataError` at a bad table."""
     return _known(layout, file_stamps(layout))
 
 
 @lru_cache(maxsize=256)
 def _known(layout: Layout, stamps: tuple[tuple[int, int] | None, ...]) -> tuple[Known | None, ...]:
-    found = tuple(map(_of, layout.actuators))
-    return tuple(own if own and (own.table or own.share or own.floor) else None for own in found)
+    result = tuple(map(_of, layout.actuators))
+    return tuple(own if own and (own.table or own.share or own.floor) else None for own in result)
 
 
 def _of(part: Actuator) -> Known | None:
-    told = part.uncertainty
-    if told is not None:
-        return Known(told.share, told.floor, told.common, told.correlation)
+    said = part.uncertainty
+    if said is not None:
+        return Known(said.share, said.floor, said.common, said.correlation)
     if isinstance(part, Fin):
         law = make_law(part.model)
         if not isinstance(law, TableLaw):

@@ -3,7 +3,7 @@
 The equations stand once, in `fossen.py`: simulation, control and fits all use them.
 """
 
-from finlab.vehicle.body import GRAVITY, complete_body, ucat_body
+from finlab.vehicle.fossen import GRAVITY, complete_body, ucat_body
 from finlab.vehicle.vehicle import STATE_SIZE, Vehicle
 
 __all__ = ["GRAVITY", "STATE_SIZE", "Vehicle", "complete_body", "ucat_body"]

@@ -13,11 +13,6 @@ from numpy.typing import ArrayLike
 from finlab.arrays import Array
 
 
-def quaternion_of_yaw(yaw: float) -> tuple[float, float, float, float]:
-    """The attitude of a level robot that heads `yaw` [rad] from the world's x, counter-clockwise."""
-    return (math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2))
-
-
 def quaternion_of(roll: float, pitch: float, yaw: float) -> tuple[float, float, float, float]:
     """The attitude (w, x, y, z) after turns about z, then y, then x [rad]."""
     cr, sr = math.cos(0.5 * roll), math.sin(0.5 * roll)

@@ -12,7 +12,12 @@ Numbers may be plain floats, which for one body are several times faster than ar
 broadcast; vectors are sequences of them.
 """
 
+from dataclasses import replace
+from functools import cache
 from typing import Any, Generic, NamedTuple, TypeVar
+
+from finlab.errors import LayoutError
+from finlab.layout import Body, Layout, load_layout
 
 Vector = TypeVar("Vector")
 """A sequence of numbers: a tuple of floats, or an array whose first axis it is."""
@@ -90,3 +95,44 @@ def damping_jacobian(body: Dynamics[Any, Any], flow: Any) -> list[Any]:
     """Returns the derivatives (6) of those decelerations, each by its own speed [1/s]: minus the diagonal of
     the Jacobian. The quadratic part counts twice, as at twice the speed."""
     return damping_rates(body, [2.0 * speed for speed in flow])
+
+
+GRAVITY = 9.81
+"""Acceleration of gravity [m/s^2]."""
+
+
+@cache
+def ucat_body() -> Body:
+    """The body of the shipped layout `ucat`, where U-CAT's numbers stand, each with its source."""
+    body = load_layout("ucat").body
+    assert body is not None
+    return body
+
+
+def complete_body(layout: Layout) -> Body:
+    """The body of a robot; what its layout leaves out is U-CAT's, but for buoyancy, which is then neutral."""
+    if layout.body is None:
+        return ucat_body()
+    said = {name: value for name, value in vars(layout.body).items() if value is not None}
+    return replace(ucat_body(), **{"buoyancy_n": None, **said})
+
+
+def dynamics_of(body: Body) -> Dynamics[tuple[float, ...], float]:
+    """The numbers of a body in the equations of motion; what it does not say is zero, buoyancy the weight.
+
+    Raises:
+        LayoutError: the body has no mass or no inertia.
+    """
+    if body.mass_kg is None or body.inertia_kgm2 is None:
+        raise LayoutError("a vehicle needs a body with mass_kg and inertia_kgm2")
+    zeros = (0.0,) * 6
+    own = (*(body.mass_kg,) * 3, *body.inertia_kgm2)
+    weight = body.mass_kg * GRAVITY
+    return Dynamics(
+        inertia=tuple(a + b for a, b in zip(own, body.added_mass or zeros, strict=True)),
+        linear=tuple(body.linear_damping or zeros),
+        quadratic=tuple(body.quadratic_damping or zeros),
+        weight=weight,
+        lift=weight if body.buoyancy_n is None else body.buoyancy_n,
+        center=tuple(body.center_of_buoyancy_m or (0.0, 0.0, 0.0)),
+    )

@@ -1,4 +1,4 @@
-"""Whether a robot stays upright by itself: its righting moment, and from which speed the water overturns it.
+"""Righting moment of a robot, and the speed from which the water overturns it.
 
 Surge, heave and pitch are linearized about straight motion ahead (T. I. Fossen, Handbook of Marine Craft
 Hydrodynamics and Motion Control, chapter 7): the moment of the added mass (Munk's) grows with the squared
@@ -9,8 +9,7 @@ import numpy as np
 
 from finlab.layout import Layout
 from finlab.physics import plant_of
-from finlab.vehicle.body import complete_body, dynamics_of
-from finlab.vehicle.fossen import jacobian
+from finlab.vehicle.fossen import complete_body, dynamics_of, jacobian
 
 FASTEST, STEP = 3.0, 0.05
 """Speeds that are tried [m/s]."""

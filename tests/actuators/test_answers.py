@@ -11,15 +11,14 @@ from finlab.actuators.registry import groups_of
 from finlab.actuators.response import Group, Line
 from finlab.actuators.rudder import RudderGroup, RudderLaw
 from finlab.actuators.thruster import ThrusterGroup, ThrusterLaw
-from finlab.allocation.dual.robot import dual_robot
+from finlab.allocation.dual.robot import DualRobot
 from finlab.arrays import Array
-from finlab.layout.arrays import own_effectiveness
-from finlab.layout.azimuth import Azimuth
+from finlab.layout.effectiveness import own_effectiveness
 from finlab.layout.fin import Fin
 from finlab.layout.layout import Layout
+from finlab.layout.propellers import Azimuth, Thruster
 from finlab.layout.rudder import Rudder
 from finlab.layout.thrust_model import PowerLaw, PowerTable
-from finlab.layout.thruster import Thruster
 from finlab.physics.plant import Plant
 from tests.t200 import t200_rows
 
@@ -63,7 +62,7 @@ def check(
     group: Group, law: Any, wrench: Array, low: Array, high: Array, inflow: Array | None = None
 ) -> None:
     """No command is worth more at random multipliers (6, N) than the answer, and its own command gives it."""
-    robot = dual_robot(group.responses)
+    robot = DualRobot(group.responses)
     multipliers = prices_of(group, 5.0)
     answer = robot.answers(robot.effectiveness @ multipliers, robot.sets)
     m = len(group.responses)
@@ -134,7 +133,7 @@ def test_a_rudder_answers_a_price_with_the_lift_whose_drag_it_pays() -> None:
     part = RUDDERS[0]
     inflow = np.array([[0.0, 1.5, 0.1]])
     wrench, law = columns([part]), RudderLaw([part])
-    robot = dual_robot(RudderGroup([part], wrench).at(inflow).responses)
+    robot = DualRobot(RudderGroup([part], wrench).at(inflow).responses)
     price = np.stack([np.linspace(-3.0, 3.0, 31), np.zeros(31)])
     answer = robot.answers(price, robot.sets)
     delta = np.linspace(-0.5, 0.5, 4001)[:, None, None] * [1.0, 0.0, 0.0]
@@ -150,7 +149,7 @@ def test_a_price_of_drag_counts_in_the_answer_of_a_rudder() -> None:
     wrench, law = columns([part]), RudderLaw([part])
     multipliers = np.array([2.0, 3.0, 0.0, 0.0, 0.0, 0.5])
     group = RudderGroup([part], wrench).at(inflow)
-    robot = dual_robot(group.responses)
+    robot = DualRobot(group.responses)
     lift = robot.answers((robot.effectiveness @ multipliers)[:, None], robot.sets).force
     command = group.commands(np.array([[[lift[0, 0], 0.0]]]))
     tried = np.linspace(-0.5, 0.5, 4001)[:, None, None] * [1.0, 0.0, 0.0]

@@ -12,12 +12,11 @@ from finlab.actuators.rudder import RudderLaw
 from finlab.actuators.thrust_power import ByPower, Sides
 from finlab.actuators.thruster import ThrusterLaw
 from finlab.arrays import Array
-from finlab.layout.azimuth import Azimuth
 from finlab.layout.fin import Fin
 from finlab.layout.layout import Layout
+from finlab.layout.propellers import Azimuth, Thruster
 from finlab.layout.rudder import Rudder
 from finlab.layout.thrust_model import PowerLaw, PowerTable
-from finlab.layout.thruster import Thruster
 from finlab.physics.plant import Plant
 from tests.t200 import t200_rows
 
@@ -110,7 +109,7 @@ def test_power_laws_of_the_t200_meet_its_tables(
 
 
 def test_a_table_answers_a_price_with_the_force_whose_marginal_cost_it_is() -> None:
-    curve = Sides(TABLE).forward
+    curve = Sides(TABLE).curves[0][0]
     assert curve is not None
     price = np.linspace(0.0, 13.0, 300)
     size = curve.answer(price)

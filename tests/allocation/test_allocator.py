@@ -1,18 +1,20 @@
 """What every method has in common: problems are checked, failed fins left out, answers judge themselves."""
 
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import ClassVar
 
 import numpy as np
 import pytest
 
+import finlab
 from finlab.actuators.fin.blade import Blade
 from finlab.allocation import METHODS, Allocation, Allocator, Candidates, Solution, allocator
 from finlab.allocation.method import LeastErrorMethod
 from finlab.cli.robot_verbs import allocate
 from finlab.errors import AllocationError, CommandError, LayoutError
-from finlab.layout import Fin, Layout
+from finlab.layout import Fin, Layout, load_layout
 from tests.any_robot import AnyRobot
 
 ROBOT = Layout(
@@ -80,40 +82,28 @@ def test_refuses_many_wrenches_that_are_none(method: AnyRobot, wrenches: object)
         method.allocate_batch(ROBOT, wrenches)  # type: ignore[arg-type]
 
 
-def test_refuses_unknown_fins_and_names_those_there_are(method: AnyRobot) -> None:
-    with pytest.raises(LayoutError, match="robot has no fin 'keel', it has bow, left, stern"):
-        method.allocate(ROBOT, SURGE, failed=["bow", "keel"])
-
-
-def test_refuses_a_robot_without_a_working_fin(method: AnyRobot) -> None:
-    with pytest.raises(LayoutError, match="no fin left once all are lost"):
-        method.allocate(ROBOT, SURGE, failed=["bow", "left", "stern"])
-
-
-def test_refuses_a_bare_name_in_place_of_a_list(method: AnyRobot) -> None:
-    with pytest.raises(
-        AllocationError, match=r"expected a list of fin names, got the text 'bow'; write \['bow'\]"
-    ):
-        method.allocate(ROBOT, SURGE, failed="bow")
-
-
-def test_refuses_a_previous_command_of_another_robot(method: AnyRobot) -> None:
-    with pytest.raises(
-        CommandError, match=r"previous: expected a command of shape \(3, 3\) for layout 'robot'"
-    ):
-        method.allocate(ROBOT, SURGE, previous=np.zeros((4, 3)))
-
-
-@pytest.mark.parametrize("previous", ["rest", [[math.inf] * 3] * 3])
-def test_refuses_a_previous_command_that_is_none(method: AnyRobot, previous: object) -> None:
-    with pytest.raises(CommandError, match="previous: "):
-        method.allocate(ROBOT, SURGE, previous=previous)  # type: ignore[arg-type]
+@pytest.mark.parametrize(
+    ("options", "kind", "sentence"),
+    [
+        ({"failed": ["bow", "keel"]}, LayoutError, "robot has no fin 'keel', it has bow, left, stern"),
+        ({"failed": ["bow", "left", "stern"]}, LayoutError, "no fin left once all are lost"),
+        ({"failed": "bow"}, AllocationError, r"expected a list of fin names, got the text 'bow'; write"),
+        ({"previous": np.zeros((4, 3))}, CommandError, r"previous: expected a command of shape \(3, 3\) for"),
+        ({"previous": "rest"}, CommandError, "previous: "),
+        ({"previous": [[math.inf] * 3] * 3}, CommandError, "previous: "),
+    ],
+)
+def test_refuses_what_is_no_question(
+    method: AnyRobot, options: dict[str, object], kind: type[Exception], sentence: str
+) -> None:
+    with pytest.raises(kind, match=sentence):
+        method.allocate(ROBOT, SURGE, **options)  # type: ignore[arg-type]
 
 
 def test_failed_fins_leave_the_graph_and_come_back_as_nan(method: AnyRobot) -> None:
     result = method.allocate(ROBOT, SURGE, failed=["left"])
     assert Drawn.asked[0][0].names == ("bow", "stern")
-    assert result.fins == ("bow", "left", "stern") and result.failed == ("left",)
+    assert result.names == ("bow", "left", "stern") and result.failed == ("left",)
     assert np.isnan(result.command[1]).all()
     expected = method.allocate(ROBOT.without(["left"]), SURGE).command
     np.testing.assert_array_equal(result.command[[0, 2]], expected)
@@ -207,3 +197,24 @@ def test_the_time_is_that_of_the_solver_shared_by_its_targets(
     assert method.allocate_batch(ROBOT, [SURGE] * 3).solve_ms.tolist() == [10_000.0] * 3
     monkeypatch.setattr(allocator, "time", clock())
     assert method.allocate_batch(ROBOT, np.empty((0, 6))).solve_ms.tolist() == []
+
+
+@pytest.mark.parametrize("method", ["mdn", "paper", "qp", "sqp"])
+def test_a_thruster_is_named_with_its_type(method: str) -> None:
+    with pytest.raises(LayoutError, match=f"method {method} works for .* 'lift_left' .* is of type thruster"):
+        finlab.Allocator(load_layout("turtle_hybrid"), method)
+
+
+def test_the_papers_method_names_the_fin_whose_shaft_it_does_not_know() -> None:
+    layout = load_layout("A")
+    tail = Fin("tail", (-0.4, 0.0, 0.0), shaft=(0.0, 0.0, 1.0), zero=(1.0, 0.0, 0.0))
+    with pytest.raises(LayoutError, match="method paper works for .* 'tail' .* a shaft of its own"):
+        finlab.Allocator(replace(layout, actuators=(*layout.fins, tail)), "paper")
+
+
+@pytest.mark.parametrize("method", ["mdn", "qp", "sqp", "analytic"])
+def test_other_methods_take_shafts_in_any_direction(method: str) -> None:
+    layout = load_layout("A")
+    tail = Fin("tail", (-0.4, 0.0, 0.0), shaft=(0.0, 0.0, 1.0), zero=(1.0, 0.0, 0.0))
+    allocator = finlab.Allocator(replace(layout, actuators=(*layout.fins, tail)), method)
+    assert allocator.allocate([0.5, 0.3, 0.2, 0.0, 0.0, 0.1]).err_norm < 0.05

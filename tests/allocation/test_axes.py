@@ -10,8 +10,8 @@ from finlab.allocation import Allocator, Policy
 from finlab.cli import main
 from finlab.errors import CommandError, LayoutError
 from finlab.layout import Layout, load_layout
+from finlab.layout.axes import AXES
 from finlab.layout.file import layout_to_dict, parse_layout
-from finlab.layout.wrench_axes import AXES
 from tests.least_power import lower_bound
 from tests.mixed_robots import layout_of
 from tests.own_plant import OwnPlant

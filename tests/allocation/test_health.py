@@ -11,7 +11,7 @@ from finlab.assets import shipped_layouts
 from finlab.cli import main
 from finlab.errors import AllocationError, FinlabError, LayoutError
 from finlab.layout import Layout, Limits, load_layout
-from finlab.layout.fin import FinModelSpec
+from finlab.layout.fin_model import FinModelSpec
 from finlab.physics import Plant
 from tests.any_robot import AnyRobot
 

@@ -1,6 +1,7 @@
-"""What is said of a robot's fins: those that cannot rest, and those whose limits leave their table."""
+"""Sentences about a robot: restless fins, limits beyond tables, rudders at rest, fins that nobody learned."""
 
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,10 +9,22 @@ import pytest
 
 from finlab.allocation import Allocator
 from finlab.allocation.notes import fin_notes
+from finlab.allocation.report import in_words
+from finlab.assets import shipped_checkpoints
 from finlab.errors import DataError
 from finlab.layout import Fin, FinModelSpec, Layout, Limits, load_layout
+from finlab.layout.commands import AzimuthCommand, FinCommand, RudderCommand, ThrusterCommand
+from finlab.layout.propellers import Thruster
+from finlab.layout.rudder import Rudder
+from finlab.layout.thrust_model import PowerTable
 from finlab.physics import make_law, write_table
+from tests.allocation.quick import OF_FINS, quick_allocator
 from tests.fin_robots import FIN_ROBOTS
+
+pytestmark = pytest.mark.skipif(
+    not {"default", "paper"} <= set(shipped_checkpoints()), reason="no trained checkpoints in the tree"
+)
+
 
 DRAG = make_law(FinModelSpec("drag"))
 CIRCLE = np.linspace(-np.pi, np.pi, 25)
@@ -91,3 +104,61 @@ def test_a_layout_whose_fit_is_doubtful_says_so_with_every_answer() -> None:
     doubted = replace(plain, description="not to be trusted: it hardly moved\nfitted to 40 s of swimming")
     assert fin_notes(doubted) == ("layout two is not to be trusted: it hardly moved",)
     assert fin_notes(replace(plain, description="fitted to 40 s of swimming")) == ()
+
+
+def test_rudders_at_rest_are_told() -> None:
+    rudder = Rudder("tail", (-1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0), 0.03, (-0.5, 0.5), 3.0)
+    robot = Layout("torpedo", (*load_layout("turtle_hybrid").actuators, rudder))
+    assert fin_notes(robot) == (
+        "rudder tail gives nothing at rest; tell how the robot moves through the water (flow)",
+    )
+    assert fin_notes(robot, np.array([1.0, 0, 0, 0, 0, 0])) == ()
+    assert fin_notes(load_layout("turtle_hybrid")) == ()
+    assert "the flow is without effect" in fin_notes(load_layout("turtle_hybrid"), np.ones(6))[-1]
+
+
+def test_commands_in_words() -> None:
+    assert in_words(FinCommand(0.5, 1.0, np.pi / 2)) == "0.500 rad, 1.000 Hz, 90.0 deg"
+    assert in_words(ThrusterCommand(10.0, 1700.0)) == "10.000 N, input 1700"
+    assert in_words(AzimuthCommand(np.pi, 10.0)) == "10.000 N at 180.0 deg"
+    assert in_words(RudderCommand(-0.5)) == "-28.6 deg"
+
+
+def test_tables_hold_forces_at_rest() -> None:
+    rudder = Rudder("tail", (-1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0), 0.03, (-0.5, 0.5), 3.0)
+    rows = tuple((float(u), float(u), float(abs(u) ** 1.5)) for u in range(-20, 21))
+    pusher = Thruster("stern", (-1.0, 0.0, 0.0), (1.0, 0.0, 0.0), (-20.0, 20.0), PowerTable(rows))
+    robot = Layout("torpedo", (pusher, rudder))
+    assert fin_notes(robot, np.array([1.0, 0, 0, 0, 0, 0])) == (
+        "the tables of stern hold forces at rest; what speed changes is not known",
+    )
+
+
+SURGE = [1.0, 0.0, 0.5, 0.0, 0.0, 0.1]
+
+
+def with_models(**models: FinModelSpec) -> Layout:
+    layout = load_layout("A")
+    return replace(
+        layout, actuators=tuple(replace(f, model=models.get(f.name, f.model)) for f in layout.fins)
+    )
+
+
+@pytest.mark.parametrize("method", OF_FINS)
+def test_fins_that_no_network_learned_are_named(method: str) -> None:
+    allocator = quick_allocator(method)
+    wide = FinModelSpec("drag", (("area", 0.03),))
+    layout = with_models(front_left=FinModelSpec("lighthill"), back_right=wide)
+    expected = ("front_left", "back_right") if method == "paper" else ()
+    assert allocator.on(layout).unknown_fins == expected
+    assert allocator.on(load_layout("A")).unknown_fins == ()
+
+
+@pytest.mark.parametrize("method", OF_FINS)
+def test_the_note_names_the_fins_that_work(method: str) -> None:
+    layout = with_models(front_left=FinModelSpec("lighthill"))
+    allocator = quick_allocator(method)
+    notes = allocator.allocate(layout, SURGE).notes
+    assert len(notes) == (method == "paper")
+    assert all("front_left" in note and "drag" in note for note in notes)
+    assert allocator.allocate(layout, SURGE, failed=["front_left"]).notes == ()

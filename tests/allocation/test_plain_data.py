@@ -1,6 +1,8 @@
-"""What these rooms tell and are told is plain data: it never changes, and comparing it never raises."""
+"""Values are plain data that never change; the page of the default method has every number set by hand."""
 
+import ast
 import dataclasses
+import re
 import runpy
 from pathlib import Path
 from typing import Any, is_typeddict
@@ -43,3 +45,43 @@ def test_values_do_not_change_and_no_option_is_required(room: str) -> None:
     # Methods are no values: each is itself alone, and its caches are nothing to print.
     for name, each in methods.items():
         assert not each.__dataclass_params__.eq and not each.__dataclass_params__.repr, name
+
+
+ROOT = Path(__file__).resolve().parents[2]
+ROW = re.compile(r"^\| `(\w+)` \| ([^|]+) \| `([^`|]+)` \| ([^|]+) \|$", re.MULTILINE)
+FILES = [
+    ROOT / "finlab/precision.py",
+    ROOT / "finlab/allocation/levenberg_marquardt.py",
+    *sorted((ROOT / "finlab/allocation/dual").glob("*.py")),
+    *(
+        ROOT / "finlab/actuators" / f"{name}.py"
+        for name in ("response", "fin/fin_response", "thruster", "azimuth")
+    ),
+    *(ROOT / "finlab/actuators" / f"{name}.py" for name in ("rudder", "thrust_power", "registry")),
+]
+
+
+def numbers(path: Path) -> dict[str, object]:
+    """The public constants of a file that are numbers, or tuples of them."""
+    found = {}
+    for line in ast.parse(path.read_text()).body:
+        if not (isinstance(line, ast.Assign) and isinstance(line.targets[0], ast.Name)):
+            continue
+        name = line.targets[0].id
+        if name.isupper() and not name.startswith("_"):
+            try:
+                found[name] = ast.literal_eval(line.value)
+            except ValueError:
+                continue
+    return found
+
+
+def test_the_page_has_every_number_with_a_reason() -> None:
+    rows = ROW.findall((ROOT / "docs" / "method.md").read_text())
+    told = {(where, name): ast.literal_eval(value) for name, value, where, _ in rows}
+    known = {
+        (str(path.relative_to(ROOT)), name): value for path in FILES for name, value in numbers(path).items()
+    }
+    assert told == known
+    assert len(rows) == len(told) <= 30
+    assert all(len(reason.split()) > 3 for *_, reason in rows)

@@ -13,7 +13,7 @@ from finlab.allocation.question import (
     check_previous,
     check_seed,
     check_wrenches,
-    usable_fins,
+    usable,
 )
 from finlab.errors import AllocationError, CommandError
 from finlab.layout import Fin, Layout, Limits
@@ -23,12 +23,12 @@ ROBOT = Layout("robot", tuple(Fin(name, (0.1 * i, 0.0, 0.0), 0.0) for i, name in
 
 def test_commands_of_all_fins_are_handed_through() -> None:
     command = np.ones((2, 3, 3))
-    assert usable_fins(ROBOT, ()).among_all(command) is command
-    assert usable_fins(ROBOT, []).among_all(command) is command
+    assert usable(ROBOT, ()).among_all(command) is command
+    assert usable(ROBOT, []).among_all(command) is command
 
 
 def test_commands_of_the_working_fins_are_put_in_their_places() -> None:
-    fins = usable_fins(ROBOT, ["b"])
+    fins = usable(ROBOT, ["b"])
     assert fins.failed == ("b",) and fins.healthy.names == ("a", "c") and fins.layout is ROBOT
     assert fins.alive.tolist() == [True, False, True]
     command = np.arange(12.0).reshape(2, 2, 3)
@@ -39,7 +39,7 @@ def test_commands_of_the_working_fins_are_put_in_their_places() -> None:
 
 
 def test_damage_changes_the_limits_of_all_and_of_the_working_fins() -> None:
-    fins = usable_fins(ROBOT, ("a",), Health.of(running={"c": (0.2, 1.0, 0.5)}))
+    fins = usable(ROBOT, ("a",), Health.of(running={"c": (0.2, 1.0, 0.5)}))
     kept = Limits((0.2, 0.2), (1.0, 1.0), (0.5, 0.5))
     assert fins.layout.fins[2].limits == fins.healthy.fins[1].limits == kept
     assert fins.layout.fins[1] == ROBOT.fins[1]
@@ -55,12 +55,12 @@ def test_damage_changes_the_limits_of_all_and_of_the_working_fins() -> None:
 )
 def test_failed_fins_are_a_list_of_names(failed: object, sentence: str) -> None:
     with pytest.raises(AllocationError, match=f"^{re.escape(sentence)}$"):
-        usable_fins(ROBOT, failed)  # type: ignore[arg-type]
+        usable(ROBOT, failed)  # type: ignore[arg-type]
 
 
 def test_health_is_made_with_health_of() -> None:
     with pytest.raises(AllocationError, match="health: expected a Health, got 'weak'; make one with"):
-        usable_fins(ROBOT, (), "weak")  # type: ignore[arg-type]
+        usable(ROBOT, (), "weak")  # type: ignore[arg-type]
 
 
 def test_the_largest_wrench_is_still_taken() -> None:

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from finlab.actuators.fin.blade import Blade
-from finlab.analysis.least_power import least_power
+from finlab.analysis.score_card import least_power
 from finlab.layout import FinModelSpec, load_layout
-from finlab.layout.wrench_axes import AXES
+from finlab.layout.axes import AXES
 
 WRENCHES = np.concatenate([np.diag([1, 1, 1, 0.1, 0.1, 0.1]), [[1.2, 0, 0.5, 0, 0, 0.15]]])
 

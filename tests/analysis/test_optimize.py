@@ -19,7 +19,7 @@ from finlab.analysis.optimize import CHUNK
 from finlab.arrays import Array
 from finlab.errors import FinlabError, LayoutError
 from finlab.layout import Layout
-from finlab.layout.wrench_axes import AXES as WRENCH
+from finlab.layout.axes import AXES as WRENCH
 
 Layouts = Callable[[str], Layout]
 

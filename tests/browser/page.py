@@ -135,9 +135,9 @@ class Page:
     def tab(self, name: str) -> None:
         """Open a task, something in the drawer, or a folder that is there."""
         task = next((task for task, names in DRAWERS.items() if name in names), name)
-        if task in TASKS and self.session.task != task:
+        if task in TASKS and self.session.desk.task != task:
             self.page.locator(".fl-tasks button", has_text=task).click()
-            self.until(lambda: self.session.task == task)
+            self.until(lambda: self.session.desk.task == task)
             self.catch_up()
         if name in TASKS:
             return

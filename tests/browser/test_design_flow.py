@@ -219,5 +219,5 @@ def test_what_would_be_lost_is_asked_about_and_typed_values_are_steps(page: Any)
     page.press("End")
     page.page.wait_for_function(drops.format("false"))
     page.press("New")
-    page.until(lambda: session.task == "Design")
+    page.until(lambda: session.desk.task == "Design")
     assert page.problems == []

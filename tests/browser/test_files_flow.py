@@ -60,7 +60,7 @@ def test_what_is_dropped_is_opened(page: Any, tmp_path: Path) -> None:
     assert session.selected == "back_left", "the fin on whose row it was dropped"
     page.tab("Export")
     drop(page, "body", {"box.STL": trimesh.creation.box((0.4, 0.3, 0.2)).export(file_type="stl")})
-    page.until(lambda: session.history.undo_name == "Import hull" and session.task == "Design")
+    page.until(lambda: session.history.undo_name == "Import hull" and session.desk.task == "Design")
     assert page.problems == []
 
 

@@ -101,7 +101,7 @@ def test_the_drawer_is_folded(page: Any) -> None:
 def test_keys_do_what_the_list_of_commands_says(page: Any) -> None:
     session = page.session
     page.key("Alt+1")
-    page.until(lambda: session.task == "Design")
+    page.until(lambda: session.desk.task == "Design")
     for key, n_fins in (("n", 4), ("Control+d", 5), ("Control+z", 4), ("Control+y", 5), ("Control+z", 4)):
         page.key(key)
         page.until(lambda n_fins=n_fins: session.state.layout.n_fins == n_fins)

@@ -36,7 +36,7 @@ def test_the_tour_sets_each_stop_and_brings_the_work_back(page: Any) -> None:
     page.visible("/floor")
     page.until(lambda: "6 of 6 actuators" in page.text(".fl-status"))
     page.press("Finish")
-    page.until(lambda: page.session.state == mine and page.session.stop is None)
+    page.until(lambda: page.session.state == mine and page.session.guide.stop is None)
     assert page.session.drawer == "Improve" and page.session.history.undo_name == undo
     back = page.view.scenery.robot.camera
     page.until(lambda: np.allclose(back, camera, atol=1e-3))
@@ -67,7 +67,7 @@ def test_a_lesson_sees_when_its_task_is_done(page: Any) -> None:
     page.choose("Least", "watts")
     page.until(lambda: "✓" in page.text(".fl-lesson"))
     page.press("Close")
-    page.until(lambda: page.session.stop is None and page.session.state == mine)
+    page.until(lambda: page.session.guide.stop is None and page.session.state == mine)
     assert page.session.desk == desk and page.problems == []
 
 

@@ -14,6 +14,7 @@ from tyro.extras import SubcommandApp
 import finlab
 from finlab.cli import EXAMPLES, _command_line, main
 from finlab.cli.shared_options import with_json_file
+from finlab.files.guarded import read_file
 from tests.fit.cell import columns_of, commands, measured, soft, write
 
 FINLAB = [sys.executable, "-m", "finlab"]
@@ -166,3 +167,36 @@ def keys(value: Any) -> Any:
     if isinstance(value, dict):
         return {key: keys(part) for key, part in value.items()}
     return type(value)
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "eval wrench R",
+        "eval faults R",
+        "eval velocity R",
+        "eval trajectory --layouts R",
+        "app --layout R",
+    ]
+    + [
+        "eval faults --trajectory T",
+        "eval trajectory --trajectory T",
+        "simulate R",
+        "simulate A --trajectory T",
+    ],
+)
+def test_named_files_are_read_in_the_process_with_limits(
+    line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    own, places = os.getpid(), {"R": tmp_path / "a.yaml", "T": tmp_path / "a.csv"}
+
+    def elsewhere(path: Any, *rest: Any) -> bytes:
+        assert os.getpid() != own or Path(path) not in places.values(), "read in this process"
+        return read_file(path, *rest)
+
+    for place in places.values():
+        place.write_text("t,x: [", encoding="utf-8")
+    for module in ("finlab.files.guarded", "finlab.files.csv_table"):
+        monkeypatch.setattr(f"{module}.read_file", elsewhere)
+    assert main([str(places.get(word, word)) for word in line.split()]) == 2
+    assert f"error: {tmp_path}/a." in capsys.readouterr().err

@@ -6,7 +6,7 @@ import pytest
 from finlab.assets import shipped_layouts
 from finlab.control import Completion
 from finlab.layout import Layout, load_layout
-from finlab.layout.arrays import layout_effectiveness
+from finlab.layout.effectiveness import layout_effectiveness
 
 AXES = ("Fx", "Fz", "Tz")
 WANTED = [0, 2, 5]

@@ -8,8 +8,8 @@ from finlab.control.feed_forward import wrenches_along
 from finlab.control.observer import MotionObserver
 from finlab.evaluation.method_specs import load_method_spec
 from finlab.sim import ClosedLoop, make_trajectory
-from finlab.vehicle.attitude import quaternion_of_yaw
-from finlab.vehicle.body import complete_body
+from finlab.vehicle.attitude import quaternion_of
+from finlab.vehicle.fossen import complete_body
 from finlab.vehicle.vehicle import Vehicle
 
 
@@ -23,7 +23,7 @@ def test_a_body_that_is_given_it_follows_a_path_of_changing_speed() -> None:
     ]
     along = wrenches_along(MotionObserver(robot, 0.1), flat, np.zeros(2), 0.08, 0.1)
     vehicle, state = Vehicle(complete_body(robot)), np.zeros(13)
-    state[3:7] = quaternion_of_yaw(0.0)
+    state[3:7] = quaternion_of(0.0, 0.0, 0.0)
     for wrench in along:
         for _ in range(5):
             state = vehicle.step(state, wrench.tolist(), 0.02)

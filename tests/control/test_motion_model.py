@@ -5,7 +5,7 @@ import numpy as np
 from finlab.control.motion_model import FIRST_FIN, MotionModel
 from finlab.layout import Layout
 from finlab.vehicle.attitude import euler
-from finlab.vehicle.body import complete_body
+from finlab.vehicle.fossen import complete_body
 from finlab.vehicle.vehicle import Vehicle
 
 

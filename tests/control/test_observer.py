@@ -11,7 +11,7 @@ from finlab.control.observer import Estimate
 from finlab.layout import Layout
 from finlab.sim.perturbed import perturbed
 from finlab.vehicle.attitude import euler
-from finlab.vehicle.body import complete_body
+from finlab.vehicle.fossen import complete_body
 from finlab.vehicle.vehicle import Vehicle
 
 PERIOD_S = 0.1

@@ -30,7 +30,7 @@ def bad(robot: DeployedRobot) -> list[str]:
 
 def test_answer_says_what_is_missing(robot: DeployedRobot) -> None:
     answer = robot.allocate([1, 0, 0.5, 0, 0, 0.1], failed=["front_right"])
-    assert answer.fins == finlab.load_layout("A").names
+    assert answer.names == finlab.load_layout("A").names
     assert np.isnan(answer.command[0]).all() and not np.isnan(answer.command[1:]).any()
     np.testing.assert_allclose(answer.wrench + answer.unallocated, [1, 0, 0.5, 0, 0, 0.1], atol=1e-12)
     far = robot.allocate([90, 0, 0, 0, 0, 0], policy="direction")

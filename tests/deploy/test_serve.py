@@ -75,7 +75,7 @@ def served(robot: DeployedRobot, *requests: Any, watchdog: float | None = 1.0) -
 def test_answers_like_the_library(robot: DeployedRobot) -> None:
     first, end = served(robot, {**GOOD, "id": 7, "failed": ["back_left"]})
     truth = robot.allocate(GOOD["wrench"], failed=["back_left"])
-    assert (first["id"], first["status"]) == (7, "ok") and first["fins"] == list(truth.fins)
+    assert (first["id"], first["status"]) == (7, "ok") and first["fins"] == list(truth.names)
     assert first["command"][2] is None
     np.testing.assert_array_equal(first["command"][0], truth.command[0])
     assert [first[key] for key in ("err_norm", "power")] == [truth.err_norm, truth.power]

@@ -12,8 +12,7 @@ from rosbags import rosbag1, rosbag2
 from rosbags.typesys import Stores, get_typestore
 from scipy.spatial.transform import Rotation
 
-from finlab.fit.robot.swim import STEP_S, replay
-from finlab.fit.robot.swim_file import read_swim
+from finlab.fit.robot.swim import STEP_S, read_swim, replay
 from finlab.layout import load_layout
 from tests.fit.robot.swims import swim
 

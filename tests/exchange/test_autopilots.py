@@ -10,8 +10,7 @@ import finlab
 from finlab.arrays import Array
 from finlab.errors import FinlabError, LayoutError
 from finlab.exchange import Exchange, convert, read_any
-from finlab.exchange.ardusub import factors_of
-from finlab.exchange.ardusub_frames import FRAMES
+from finlab.exchange.motor_factors import FRAMES, factors_of
 from finlab.layout import Layout, Thruster, own_effectiveness, save_layout
 from finlab.layout.thrust_model import PowerLaw
 from tests.mixed_robots import load, random_robot

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from finlab.actuators.fin.models import read_table
+from finlab.actuators.fin.fin_laws import read_table
 from finlab.allocation import Allocator
 from finlab.bundle_files import CHECKSUMS, ROBOT, checksums
 from finlab.deploy.bundle import make_bundle
@@ -26,7 +26,7 @@ from finlab.deploy.deployed_robot import load_robot
 from finlab.errors import FinlabError
 from finlab.exchange import Exchange, convert, read_any
 from finlab.fit.measurements import read_measurements
-from finlab.fit.robot.swim_file import read_swim
+from finlab.fit.robot.swim import read_swim
 from finlab.hull import Surface
 from finlab.layout import FinModelSpec, load_layout, save_layout
 from finlab.networks.checkpoint import read_checkpoint

@@ -13,8 +13,7 @@ from finlab.arrays import Array
 from finlab.cli import main
 from finlab.errors import DataError
 from finlab.fit.thruster_bench import Bench, read_bench
-from finlab.fit.thruster_file import layout_lines
-from finlab.fit.thruster_fit import ThrusterFit, fit_thruster
+from finlab.fit.thruster_fit import ThrusterFit, fit_thruster, layout_lines
 from finlab.uncertainty.table_error import thrust_table_error
 from tests.fit.cell import write
 

@@ -7,7 +7,6 @@ import pytest
 from msgspec import to_builtins
 
 from finlab.layout import Fin
-from finlab.layout.azimuth import Azimuth, Tilt
 from finlab.layout.commands import (
     AzimuthCommand,
     FinCommand,
@@ -17,9 +16,9 @@ from finlab.layout.commands import (
     input_of,
     neutral_row,
 )
+from finlab.layout.propellers import Azimuth, Thruster, Tilt
 from finlab.layout.rudder import Rudder
 from finlab.layout.thrust_model import PowerLaw, PowerTable
-from finlab.layout.thruster import Thruster
 
 AHEAD, UP, LAW = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0), PowerLaw(2.0)
 ROWS = ((1100, -40, 390), (1470, 0, 0), (1480, 0, 0), (1530, 0, 0), (1700, 10, 30), (1900, 50, 380))

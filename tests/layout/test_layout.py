@@ -13,8 +13,8 @@ from finlab.layout import (
     layout_effectiveness,
     random_layout,
 )
-from finlab.layout.arrays import force_effectiveness
-from finlab.layout.random import TRAINING_BOX
+from finlab.layout.effectiveness import force_effectiveness
+from finlab.layout.random_layouts import TRAINING_BOX
 
 THREE = Layout(
     "three", tuple(Fin(name, (0.1 * i, 0.2, -0.1), 0.5 * i) for i, name in enumerate(["a", "b", "c"]))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from finlab.assets import layouts_dir
+from finlab.assets import shipped
 from finlab.layout import layout_effectiveness, load_layout
 
 # The paper's table of layouts: x, y, z [m], alpha [deg] of each fin, in the paper's own axes.
@@ -23,7 +23,7 @@ SURGE_HEAVE_YAW = [0, 2, 5]
 
 @pytest.mark.parametrize("name", AS_PRINTED)
 def test_the_file_is_the_printed_layout_with_y_forward_and_alpha_the_shaft(name):
-    layout = load_layout(layouts_dir() / f"{name}.yaml")
+    layout = load_layout(shipped("layouts") / f"{name}.yaml")
     assert layout.name == name
     assert layout.n_fins == len(AS_PRINTED[name])
     for fin, (x, y, z, alpha) in zip(layout.fins, AS_PRINTED[name], strict=True):
@@ -35,7 +35,7 @@ def test_the_file_is_the_printed_layout_with_y_forward_and_alpha_the_shaft(name)
 
 @pytest.mark.parametrize("name", AS_PRINTED)
 def test_surge_heave_and_yaw_stay_controllable_after_any_single_loss(name):
-    layout = load_layout(layouts_dir() / f"{name}.yaml")
+    layout = load_layout(shipped("layouts") / f"{name}.yaml")
     for robot in [layout, *(layout.without([fin]) for fin in layout.names)]:
         rows = layout_effectiveness(robot)[SURGE_HEAVE_YAW]
         assert np.linalg.matrix_rank(rows, tol=1e-6) == 3, robot.names
@@ -43,7 +43,7 @@ def test_surge_heave_and_yaw_stay_controllable_after_any_single_loss(name):
 
 def test_read_as_printed_in_the_body_frame_layouts_b_and_d_could_not_do_what_the_paper_shows():
     """Why a conversion is needed at all: yaw of B and surge of D would be missing."""
-    from finlab.layout.arrays import force_effectiveness
+    from finlab.layout.effectiveness import force_effectiveness
 
     def rows(name, thrust_axis_offset_deg):
         numbers = np.array(AS_PRINTED[name], dtype=float)

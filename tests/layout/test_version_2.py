@@ -226,11 +226,11 @@ def test_as_many_actuators_as_are_allowed():
 def test_what_works_for_fins_only_says_so():
     layout = parse_layout(GOOD)
     with pytest.raises(LayoutError, match="simulate works for .* 'lift' of .* is of type thruster"):
-        layout.only_fins("simulate")
+        layout.only("simulate")
     tail = layout.without(["side", "lift", "pod", "nose", "rudder"])
-    tail.only_fins("simulate")
+    tail.only("simulate")
     with pytest.raises(LayoutError, match="the app works for .* 'tail' .* has a shaft of its own direction"):
-        tail.only_fins("the app", horizontal=True)
+        tail.only("the app", horizontal=True)
     with pytest.raises(LayoutError, match="'tail'"):
         _ = tail.mounting_angle
 

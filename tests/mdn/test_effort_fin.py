@@ -7,7 +7,7 @@ from finlab.layout import Fin, FinModelSpec, Layout, Limits
 from finlab.mdn.descent import EffortProblem, realize
 from finlab.mdn.robot import effort_robot
 from finlab.physics import plant_of
-from finlab.physics.effort import effort_of_shares
+from finlab.physics.objective import effort_of_shares
 
 ARC = Limits(zero_direction=(-0.6, 1.4))
 UNEVEN = FinModelSpec("soft", (("e", 0.2), ("d", 0.15), ("phi_e", 1.0)))

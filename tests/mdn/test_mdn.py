@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from finlab.allocation.mdn_settings import MdnSettings
+from finlab.allocation.settings import MdnSettings
 from finlab.assets import checkpoint_path
 from finlab.errors import AllocationError, CheckpointError
 from finlab.layout import FinModelSpec, Layout, load_layout, random_layout
@@ -17,7 +17,7 @@ from finlab.mdn.method import STEPS, Mdn
 from finlab.mdn.proposal import shares
 from finlab.networks.checkpoint import read_checkpoint
 from finlab.physics import Plant
-from finlab.physics.effort import command_effort
+from finlab.physics.objective import command_effort
 from tests.any_robot import AnyRobot
 
 TARGET = [0.5, -0.3, 1.0, 0.05, -0.02, 0.1]

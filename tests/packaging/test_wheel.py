@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 from packaging.requirements import Requirement
 
-from finlab.distribution import EXTRAS, NAME
+from finlab.assets import EXTRAS, NAME
 
 ROOT = Path(__file__).resolve().parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
@@ -130,7 +130,8 @@ def test_what_is_imported_is_required(package: str, extra: str) -> None:
 
 
 def test_installed_package_finds_its_own_files(bare: Path, tmp_path: Path) -> None:
-    code = "from finlab.assets import *; print(layouts_dir(), checkpoint_path(), webapp_dir(), sep='\\n')"
+    code = "from finlab.assets import *; "
+    code += "print(shipped('layouts'), checkpoint_path(), shipped('webapp'), sep='\\n')"
     done = bare_run(bare, tmp_path, "-c", code)
     assert done.returncode == 0, done.stderr
     site = next(bare.parents[1].glob("lib/python3*/site-packages"))

@@ -11,7 +11,7 @@ import torch
 from finlab.assets import shipped_layouts
 from finlab.errors import AllocationError, CheckpointError
 from finlab.layout import Fin, Layout, Limits, load_layout
-from finlab.layout.angles import is_full_turn
+from finlab.layout.axes import is_full_turn
 from finlab.mdn.training.first_weights import first_weights
 from finlab.networks.normalization import Normalization, to_command, to_normalized
 from finlab.networks.trained import TrainedWeights, sizes_for_file
@@ -19,7 +19,7 @@ from finlab.paper.network import NetworkConfig
 from finlab.paper.pipeline import ADAM_RATE, CHUNK
 from finlab.paper.surrogate import SurrogateConfig
 from finlab.physics import Plant
-from finlab.physics.effort import command_effort
+from finlab.physics.objective import command_effort
 from tests.any_robot import AnyRobot, normalized_error
 from tests.paper.asked_in_torch import wrench_in_torch
 from tests.torch_weights import arrays_of

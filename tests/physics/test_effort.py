@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from finlab.physics.effort import EffortMeter, command_effort, effort_scale, fin_effort
+from finlab.physics.objective import EffortMeter, command_effort, effort_scale, fin_effort
 
 UPPER = np.array([[0.6, 2.1, np.pi], [0.4, 3.0, -0.5], [0.5, 1.0, 0.0]])
 

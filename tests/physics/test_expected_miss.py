@@ -6,17 +6,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from finlab.actuators.fin.table import TableLaw
+from finlab.actuators.fin.fin_laws import TableLaw
 from finlab.allocation import Allocator
 from finlab.arrays import Array
 from finlab.layout import FinModelSpec, Layout, Uncertainty, load_layout
+from finlab.layout.propellers import Thruster
 from finlab.layout.rudder import Rudder
 from finlab.layout.thrust_model import PowerTable
-from finlab.layout.thruster import Thruster
 from finlab.physics import make_law, plant_of, write_table
 from finlab.physics.expected_miss import expected_miss
-from finlab.uncertainty.grid_error import grid_uncertainty
-from finlab.uncertainty.table_error import thrust_table_error
+from finlab.uncertainty.table_error import grid_uncertainty, thrust_table_error
 from tests.mixed_robots import load, random_flow, random_robot
 
 DRAWS = 20_000

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from finlab.physics import Plant
-from finlab.physics.effort import command_effort
-from finlab.physics.objective import Name, cost_meter
+from finlab.physics.objective import Name, command_effort, cost_meter
 from tests.random_fins import KINDS, random_robot
 
 OBJECTIVES = [

@@ -7,9 +7,8 @@ import pytest
 import torch
 
 from finlab.layout import FinModelSpec
-from finlab.layout.arrays import force_effectiveness
+from finlab.layout.effectiveness import body_force, force_effectiveness, wrench_of_forces
 from finlab.physics import make_law
-from finlab.physics.wrench import body_force, wrench_of_forces
 
 F64 = torch.float64
 DRAG = make_law(FinModelSpec())

@@ -23,7 +23,7 @@ from finlab.sim import (
     straight,
 )
 from finlab.sim.log import log_of_ticks
-from finlab.vehicle.body import ucat_body
+from finlab.vehicle.fossen import ucat_body
 from tests.any_robot import AnyRobot
 from tests.ripple import rippled
 

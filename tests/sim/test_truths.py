@@ -5,7 +5,7 @@ import pytest
 
 from finlab.evaluation.experiments.hard_days import BUILT_OFF
 from finlab.layout import Layout, load_layout
-from finlab.layout.arrays import own_effectiveness
+from finlab.layout.effectiveness import own_effectiveness
 from finlab.sim import ClosedLoop, make_trajectory, perturbed
 from finlab.vehicle.attitude import euler
 from tests.any_robot import AnyRobot

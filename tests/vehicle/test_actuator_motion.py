@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from finlab.layout import Azimuth, Layout, Rudder, Thruster, load_layout
 from finlab.layout.thrust_model import PowerLaw
 from finlab.vehicle.actuator_motion import ActuatorMotion, following_delay
-from finlab.vehicle.fin_lag import FinLag
+from finlab.vehicle.fin_motion import FinLag
 
 LAW = PowerLaw(1.0)
 THRUSTER = Thruster("t", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (-20.0, 30.0), LAW, time_constant=0.3, rate=25.0)

@@ -3,8 +3,7 @@
 import numpy as np
 
 from finlab.layout import Layout, Servo
-from finlab.vehicle.fin_lag import FinLag
-from finlab.vehicle.fin_motion import FinMotion
+from finlab.vehicle.fin_motion import FinLag, FinMotion
 
 
 def test_it_follows_as_the_simulated_servo_does(layout_a: Layout) -> None:

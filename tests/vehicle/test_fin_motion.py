@@ -88,7 +88,6 @@ def test_accelerations_are_those_of_the_speed(pair: Layout) -> None:
     for _ in range(3000):
         motion.step(command, dt)
         speed, acceleration = motion.speed_and_acceleration()
-        np.testing.assert_allclose(speed, motion.speed)
         angles.append(motion.angle), speeds.append(speed), found.append(acceleration)
     np.testing.assert_allclose(np.diff(angles, axis=0)[5:] / dt, speeds[6:], atol=0.02)
     np.testing.assert_allclose(np.diff(speeds, axis=0)[5:] / dt, found[6:], atol=0.1)

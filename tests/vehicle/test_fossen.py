@@ -11,8 +11,14 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from finlab.layout import Body, Layout
-from finlab.vehicle.body import complete_body, dynamics_of
-from finlab.vehicle.fossen import accelerations, damping_jacobian, damping_rates, jacobian
+from finlab.vehicle.fossen import (
+    accelerations,
+    complete_body,
+    damping_jacobian,
+    damping_rates,
+    dynamics_of,
+    jacobian,
+)
 from finlab.vehicle.vehicle import Vehicle
 
 SIGNS = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])

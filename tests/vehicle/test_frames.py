@@ -3,8 +3,8 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from finlab.vehicle.attitude import euler, quaternion_of_yaw
-from finlab.vehicle.body import ucat_body
+from finlab.vehicle.attitude import euler, quaternion_of
+from finlab.vehicle.fossen import ucat_body
 
 # Signed derivatives as published for U-CAT: CAD inertia and added mass from its on-board dynamics, damping
 # from the simulator's set of September 2024, whose centre of buoyancy is 0.05 m above the centre of gravity.
@@ -36,7 +36,7 @@ def forward(quaternion: tuple[float, ...]) -> np.ndarray:
 
 
 def test_attitude_by_hand() -> None:
-    np.testing.assert_allclose(forward(quaternion_of_yaw(np.pi / 2)), [0, 1, 0], atol=1e-12)
+    np.testing.assert_allclose(forward(quaternion_of(0.0, 0.0, np.pi / 2)), [0, 1, 0], atol=1e-12)
     nose_down = (np.cos(0.1), 0.0, np.sin(0.1), 0.0)
     np.testing.assert_allclose(euler(nose_down), [0, 0.2, 0], atol=1e-12)
     assert forward(nose_down)[2] < 0

@@ -5,10 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from finlab.vehicle.attitude import euler, quaternion_of
-from finlab.vehicle.body import GRAVITY, dynamics_of, ucat_body
-from finlab.vehicle.fossen import Dynamics
-from finlab.vehicle.many_bodies import Bodies, body_rates, body_velocity, derivative, integrate
-from finlab.vehicle.vehicle import Vehicle
+from finlab.vehicle.fossen import GRAVITY, Dynamics, dynamics_of, ucat_body
+from finlab.vehicle.vehicle import Bodies, Vehicle, body_rates, body_velocity, derivative, integrate
 
 CURRENT = (0.07, -0.04)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from finlab.layout import load_layout
-from finlab.vehicle.body import complete_body
+from finlab.vehicle.fossen import complete_body
 from finlab.vehicle.righting import overturning_speed, righting_words
 from finlab.vehicle.vehicle import Vehicle
 

@@ -8,8 +8,8 @@ import pytest
 
 from finlab.errors import LayoutError
 from finlab.layout import Body, Layout
-from finlab.vehicle.attitude import quaternion_of_yaw
-from finlab.vehicle.body import complete_body
+from finlab.vehicle.attitude import quaternion_of
+from finlab.vehicle.fossen import complete_body
 from finlab.vehicle.vehicle import STATE_SIZE, Vehicle
 
 STILL = (0.0,) * 6
@@ -49,7 +49,7 @@ def test_surge_under_quadratic_drag_is_a_hyperbolic_tangent(ucat: Body) -> None:
 def test_a_robot_without_thrust_ends_up_drifting_with_the_water(ucat: Body) -> None:
     current = (0.15, -0.1, 0.0)
     state = at_rest()
-    state[3:7] = quaternion_of_yaw(0.7)
+    state[3:7] = quaternion_of(0.0, 0.0, 0.7)
     vehicle = Vehicle(ucat, current)
     state = swim(vehicle, state, STILL, 150.0, 0.1)
     after = vehicle.step(state, STILL, 0.1)

@@ -2,6 +2,7 @@
 
 import asyncio
 import functools
+import time
 from collections.abc import Callable, Coroutine
 from types import SimpleNamespace
 from typing import Any
@@ -9,7 +10,6 @@ from typing import Any
 from tests.webapp.stand_in import load_stand_in
 from webapp.tasks.background import EventLoop
 from webapp.tasks.context import Context
-from webapp.tasks.reading import Reading
 from webapp.tasks.solver import Solver
 
 
@@ -40,20 +40,12 @@ def running() -> EventLoop:
     return EventLoop(asyncio.get_running_loop(), raised)
 
 
-class ReadAtOnce(Reading):
-    """Reads and makes everything where it is asked to."""
+class AloneContext(Context):
+    """Makes everything where it is asked to."""
 
-    def __init__(self, do: Callable[[Callable[[], object]], Any]) -> None:
-        """`do` carries out what comes of it."""
-        self._do = do
-
-    def read(self, read: Any, use: Callable[[Any], object], prepare: Any = None) -> None:
-        """Read it now."""
-        self._do(lambda: use(read()))
-
-    def make(self, work: Any, use: Callable[[Any], object], kind: str = "") -> None:
+    def make(self, work: Any, use: Callable[[Any], object], kind: Any = "") -> None:
         """Make it now."""
-        self._do(lambda: use(work()))
+        self.do(lambda: use(work()))
 
 
 def page_of(worker: Any, session: Any = None, **options: Any) -> Context:
@@ -64,11 +56,18 @@ def page_of(worker: Any, session: Any = None, **options: Any) -> Context:
         "solver": Solver(load=load_stand_in),
         "loop": AtOnce(),
         "do": lambda act: act(),
-        "reading": ReadAtOnce(options.get("do", lambda act: act())),
         "changed": lambda: None,
         "notify": lambda title, text, calm=False: None,
     }
-    return Context(session=session, workers=workers, **{**silent, **options})
+    return AloneContext(session=session, workers=workers, **{**silent, **options})
+
+
+def until(condition: Callable[[], bool]) -> None:
+    """Wait for something."""
+    end = time.monotonic() + 60
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.005)
 
 
 def in_loop(test: Callable[..., Coroutine[Any, Any, None]]) -> Callable[..., None]:

@@ -7,11 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.baselines.sqp import Sqp, SqpSettings
-from finlab.allocation.evaluate import costs
 from finlab.allocation.method import LeastErrorMethod
 from finlab.allocation.methods import METHODS, MethodChoice
 from finlab.allocation.settings import Settings, number
 from finlab.allocation.solution import Candidates, Solution
+from finlab.allocation.yardstick import costs
 from finlab.errors import AllocationError
 from finlab.layout import Layout
 from finlab.networks.trained import TrainedWeights

@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from finlab.allocation.report import allocation_record
 from finlab.assets import shipped_checkpoints
 from finlab.deploy.bundle import make_bundle
-from finlab.deploy.record import allocation_record
 from finlab.errors import LayoutError
 from finlab.files.plain_values import yaml_text
 from finlab.layout import FinModelSpec, Layout, layout_to_dict, load_layout
@@ -85,7 +85,7 @@ def test_a_table_fin_goes_through_the_whole_app(
     while session.history.redo_name is not None:
         session.redo()
     assert session.state == state
-    allocator = SOLVER.shipped(tabled, "dual")
+    allocator = SOLVER.allocator(State(tabled))
     assert any(name.startswith("tables/") for name in make_bundle(allocator).files)
     assert command_line(session.state).startswith("finlab allocate tabled_bundle.zip --wrench")
 

@@ -7,7 +7,6 @@ import socket
 import subprocess
 import sys
 import threading
-import time
 import urllib.request
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -19,13 +18,13 @@ from viser import _messages
 from finlab.assets import shipped_layouts
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
+from tests.webapp.loops import until
 from tests.webapp.silent_client import SilentClient
 from tests.webapp.stand_in import load_stand_in
-from webapp.app import App, _session_keys
+from webapp.app import App, SessionStore, _session_keys
 from webapp.panels.frame import View
 from webapp.serving import serve
 from webapp.session import Session
-from webapp.session.store import SessionStore
 from webapp.tasks.solver import Solver
 
 
@@ -61,13 +60,6 @@ def on_loop(server: viser.ViserServer, act: Callable[[], Any]) -> Any:
         return act()
 
     return asyncio.run_coroutine_threadsafe(run(), server.get_event_loop()).result(30)
-
-
-def until(condition: Callable[[], bool]) -> None:
-    end = time.monotonic() + 30
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.01)
 
 
 def test_newest_question_is_answered(server: viser.ViserServer, view: View) -> None:
@@ -134,10 +126,10 @@ def test_names_are_escaped(server: viser.ViserServer, view: View) -> None:
 
 def test_a_bundle_that_cannot_be_made_is_told(server: viser.ViserServer, view: View) -> None:
     until(lambda: not view.busy)
-    on_loop(server, lambda: view.do(view.jobs.exports.bundle))
+    on_loop(server, lambda: view.do(view.designs.bundle))
     until(lambda: "ucat_bundle.zip" in view.client.files)
     on_loop(server, lambda: view.do(lambda: view.session.set_setting("method", "sqp")))
-    on_loop(server, lambda: view.do(view.jobs.exports.bundle))
+    on_loop(server, lambda: view.do(view.designs.bundle))
     until(lambda: any("Not possible" in note for note in view.client.notes))
     assert "cannot be exported" in view.client.notes[-1]
 

@@ -8,10 +8,10 @@ import pytest
 from finlab.assets import shipped_layouts
 from finlab.errors import FinlabError
 from finlab.hull import contradicts, displaced, estimated, hull_of
-from finlab.hull.body import solid_of, water_density
+from finlab.hull.hydrodynamics import solid_of, water_density
 from finlab.layout import Body, load_layout
 from finlab.layout.body import Hull
-from finlab.vehicle.body import GRAVITY
+from finlab.vehicle.fossen import GRAVITY
 from webapp.session import Session
 from webapp.session.layout_edits import DYNAMICS, with_dynamics
 

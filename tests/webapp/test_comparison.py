@@ -29,13 +29,12 @@ from webapp.tasks.solver import Solver
 UCAT = load_layout(shipped_layouts()["ucat"])
 
 
-def test_all_methods_answer_one_after_the_other() -> None:
-    worker, done = Worker(), threading.Event()
+def test_all_methods_answer_one_after_the_other(worker: Worker) -> None:
+    done = threading.Event()
     comparison = Comparison(page_of(worker, changed=lambda: comparison.run.running or done.set()))
     assert "side by side" in comparison_table(comparison.run, False)
     comparison.start(State(UCAT, target=PRESETS["Turn"]))
     assert done.wait(60)
-    worker.stop()
     answers = dict(comparison.run.answers)
     assert tuple(answers) == COMPARED
     assert all(isinstance(answer, Allocation) for answer in answers.values())
@@ -59,16 +58,15 @@ def test_a_comparison_that_is_cancelled_keeps_its_answers(robot: str) -> None:
     assert "…" not in table and table.count("<tr") == 1 + len(compared(state.layout))
 
 
-def test_a_method_that_fails_keeps_nobody_else_waiting() -> None:
+def test_a_method_that_fails_keeps_nobody_else_waiting(worker: Worker) -> None:
     def load(method: str = "dual", checkpoint: object = None) -> object:
         return load_stand_in("ipopt" if method == "paper" else method)
 
-    worker, done = Worker(), threading.Event()
+    done = threading.Event()
     context = page_of(worker, solver=Solver(load=load), changed=lambda: comparison.run.running or done.set())
     comparison = Comparison(context)
     comparison.start(State(UCAT, target=PRESETS["Turn"]))
     assert done.wait(60)
-    worker.stop()
     answers = dict(comparison.run.answers)
     assert answers["paper"] == "ipopt is out of order in this test"
     assert isinstance(answers["sqp"], Allocation)
@@ -124,13 +122,13 @@ def test_beside_the_one_answer_of_dual_stands_what_the_network_proposes() -> Non
 
 def test_what_a_page_tries_out_stays_with_its_own_answers() -> None:
     solver, target = Solver(load=load_stand_in), PRESETS["Turn"]
-    shipped = solver.shipped(UCAT, "mdn")
+    shipped = solver.allocator(State(UCAT, method="mdn"))
     state = State(UCAT, target=target, method="mdn", temperature=1.5)
     few = solver.allocator(state)
     assert vars(few.settings)["temperature"] == 1.5
-    assert solver.shipped(UCAT, "mdn") is shipped and vars(shipped.settings)["temperature"] != 1.5
     assert solver.allocator(replace(state, temperature=None)) is shipped
-    assert solver.allocator(replace(state, method="sqp")) is solver.shipped(UCAT, "sqp")
+    assert vars(shipped.settings)["temperature"] != 1.5
+    assert solver.allocator(replace(state, method="sqp")) is solver.allocator(State(UCAT, method="sqp"))
 
 
 def test_an_allocator_is_kept_until_its_robot_changes() -> None:

@@ -4,7 +4,6 @@ import math
 
 import pytest
 
-from finlab.assets import shipped_layouts
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
 from finlab.layout.damage import FAULTS, Health
@@ -18,12 +17,7 @@ from webapp.session.swim_plan import SwimSettings
 from webapp.session.targets import axis_reach, full_thrust
 from webapp.tasks.solver import Solver
 
-UCAT = load_layout(shipped_layouts()["ucat"])
-
-
-@pytest.fixture
-def session() -> Session:
-    return Session(UCAT)
+UCAT = load_layout("ucat")
 
 
 def test_a_weak_and_a_stuck_fin_keep_to_what_is_left(session: Session) -> None:
@@ -105,8 +99,11 @@ def test_the_page_may_send_anything(session: Session) -> None:
             session.damage("front_left", "stuck", angle)
     with pytest.raises(FinlabError, match="nobody"):
         session.damage("nobody", "weak", 0.5)
-    for key, value in (("path", "nowhere"), ("speed", math.nan), ("method", "nobody"), ("color", "red")):
-        with pytest.raises(FinlabError):
+    for key, value in (
+        *(("path", "nowhere"), ("scenario", "hexa"), ("announced", "no"), ("method", "nobody")),
+        *(("speed", wrong) for wrong in (math.nan, 0.0, "2", 99.0)),
+    ):
+        with pytest.raises(FinlabError, match=key):
             session.set_swim(key, value)
     draft = session.draft
     for change in (

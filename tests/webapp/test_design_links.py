@@ -5,7 +5,6 @@ import re
 import zlib
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -19,7 +18,7 @@ from finlab.layout import FinModelSpec, layout_to_dict, load_layout
 from finlab.layout.force_table_file import write_table
 from finlab.layout.load import MAX_BYTES
 from finlab.physics import make_law
-from tests.webapp.loops import ReadAtOnce
+from tests.webapp.loops import page_of
 from webapp.session import Session
 from webapp.session.files import (
     ARCHIVE,
@@ -101,19 +100,15 @@ class Browser:
     def __init__(self) -> None:
         self.sent: list[str] = []
         self.notes: list[str] = []
-        self.heard: dict[str, Any] = {}
 
 
 def designs_of(session: Session, browser: Browser) -> Designs:
-    context: Any = SimpleNamespace(
-        session=session,
-        notify=lambda _, text, calm=False: browser.notes.append(text),
-        reading=ReadAtOnce(lambda act: act()),
-        client=SimpleNamespace(gui=None),
-    )
-    exports: Any = SimpleNamespace(download=lambda name, _: browser.sent.append(name))
-    presses: Any = SimpleNamespace(on=browser.heard.__setitem__)
-    return Designs(context, exports, presses)
+    def notify(title: str, text: str, calm: bool = False) -> None:
+        if title != "Saved":
+            browser.notes.append(text)
+
+    client = SimpleNamespace(gui=None, send_file_download=lambda name, *_, **__: browser.sent.append(name))
+    return Designs(page_of(None, session, client=client, notify=notify))
 
 
 def test_a_new_design_is_whole_and_can_be_taken_back() -> None:

@@ -22,11 +22,6 @@ from webapp.session.files import reshaped_hull, stored_hull
 from webapp.session.targets import axis_reach
 
 
-@pytest.fixture
-def session() -> Session:
-    return Session(load_layout(shipped_layouts()["ucat"]))
-
-
 def test_linked_twins_move_together_until_unlinked(session: Session) -> None:
     session.select("front_left")
     session.mirror()

@@ -22,7 +22,7 @@ from tests.webapp.stand_in import load_stand_in
 from webapp.panels.frame import View
 from webapp.session import Display, Session
 from webapp.session.looking import DRAWERS
-from webapp.tasks import analyst
+from webapp.tasks import jobs
 from webapp.tasks.background import Workers
 from webapp.tasks.solver import Solver
 from webapp.viser_internals import start_server, stop_server
@@ -34,9 +34,9 @@ WORDS = "out of order"
 COMPUTED = (
     "webapp.tasks.solver.Solver.solve",
     "webapp.tasks.solver.modes_of",
-    "webapp.tasks.analyst.score_card",
-    "webapp.tasks.analyst.attainable_set",
-    "webapp.tasks.analyst.axis_ranges",
+    "webapp.tasks.jobs.score_card",
+    "webapp.tasks.jobs.attainable_set",
+    "webapp.tasks.jobs.axis_ranges",
 )
 """Where a fault meets a worker's thread."""
 DRAWN = (
@@ -176,7 +176,7 @@ def test_no_figure_of_the_robot_before_stays(
     whole = tab.figures()
     with monkeypatch.context() as patch:
         patch.setattr(place, broken)
-        for known in (analyst.find, analyst.find_ranges):
+        for known in (jobs.find, jobs.find_ranges):
             known.cache_clear()
         tab.open(OPENED)
         shown = tab.figures()

@@ -14,7 +14,8 @@ from tests.webapp.test_app import app, on_loop, server, until, view
 from webapp.app import App
 from webapp.panels.frame import View
 from webapp.session import Session
-from webapp.tasks.designs import Exports
+from webapp.session.guide import Guide
+from webapp.tasks.designs import Designs
 from webapp.tasks.fitting import Fitting
 from webapp.tasks.improving import Improver
 from webapp.tasks.swimming import Swimming
@@ -22,7 +23,7 @@ from webapp.tasks.swimming import Swimming
 __all__ = ["app", "server", "view"]
 
 WORDS = "out of order"
-ACTING = (Session, Exports, Fitting, Improver, Swimming)
+ACTING = (Session, Guide, Designs, Fitting, Improver, Swimming)
 """Whose methods the handlers of the widgets call."""
 ASKED = ("ask", "tick", "resume")
 """Methods that are called to write the page, not by its widgets."""

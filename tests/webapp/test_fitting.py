@@ -2,9 +2,8 @@
 
 import io
 import threading
-import time
 import zipfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,13 +14,13 @@ from finlab.allocation import Allocator
 from finlab.deploy.design_files import read_archive, stored_table
 from finlab.errors import DataError, FinlabError, LayoutError
 from finlab.files.archive import packed
-from finlab.fit import outliers
+from finlab.fit import fin_fit
 from finlab.layout import Layout, Thruster, load_layout
 from finlab.layout.force_table_file import DOUBT, table_bytes
 from finlab.layout.thrust_model import PowerTable
 from tests.fit.cell import columns_of, commands, measured, soft, write
 from tests.fit.test_thruster_fit import T200
-from tests.webapp.loops import page_of
+from tests.webapp.loops import page_of, until
 from webapp.markup.fit_card import fit_card
 from webapp.panels.actuator_model import model_card
 from webapp.session import Session, files
@@ -39,26 +38,12 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "cache" / "finlab" / "tables"
 
 
-@pytest.fixture
-def worker() -> Iterator[Worker]:
-    worker = Worker()
-    yield worker
-    worker.stop()
-
-
 def cell(tmp_path: Path, n: int = 70) -> bytes:
     """A file of noisy measurements, one of which is wild."""
     command = commands(n)
     force = measured(LAW, command)
     force[5, 1] += 4.0
     return write(tmp_path / "cell.csv", columns_of(command, force)).read_bytes()
-
-
-def until(condition: Callable[[], bool]) -> None:
-    end = time.monotonic() + 60
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.01)
 
 
 class Opened:
@@ -98,10 +83,8 @@ def test_a_noisy_file_becomes_the_fins_model_and_undo_takes_it_off(tmp_path: Pat
     until(lambda: fitting.findings is not None)
     until(lambda: opened.session.state != before)
     assert "looking for samples that contradict the others" in opened.stages
-    assert (
-        opened.models == ["drag", "drag", "table", "drag"]
-        and opened.session.history.undo_name == "Fit back_left"
-    )
+    assert opened.models == ["drag", "drag", "table", "drag"]
+    assert opened.session.history.undo_name == "Fit back_left"
     found = fitting.findings
     assert found is not None and found.fit is not None and found.upload.content == b""
     card = fit_card(found)
@@ -204,7 +187,7 @@ def test_a_cancelled_fit_ends_at_its_next_step(
 ) -> None:
     opened, begun, gate = Opened(worker), threading.Event(), threading.Event()
     steps: list[int] = []
-    component = outliers.Component
+    component = fin_fit.Component
 
     def held(*args: Any, **options: Any) -> object:
         steps.append(len(steps))
@@ -212,7 +195,7 @@ def test_a_cancelled_fit_ends_at_its_next_step(
         assert gate.wait(30)
         return component(*args, **options)
 
-    monkeypatch.setattr(outliers, "Component", held)
+    monkeypatch.setattr(fin_fit, "Component", held)
     opened.fitting.start("back_left", "cell.csv", cell(tmp_path))
     assert begun.wait(30)
     opened.fitting.forget()
@@ -239,12 +222,8 @@ def test_two_pages_fit_at_once_each_its_own(tmp_path: Path, worker: Worker) -> N
     one.fitting.start("back_left", "one.csv", content)
     other.fitting.start("front_left", "other.csv", content)
     until(lambda: "table" in other.models)
-    assert one.models == ["drag", "drag", "table", "drag"] and other.models == [
-        "drag",
-        "table",
-        "drag",
-        "drag",
-    ]
+    assert one.models == ["drag", "drag", "table", "drag"]
+    assert other.models == ["drag", "table", "drag", "drag"]
     assert one.fitting.findings is not None and one.fitting.findings.upload.name == "one.csv"
 
 

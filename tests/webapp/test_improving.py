@@ -3,8 +3,6 @@
 import asyncio
 import math
 import threading
-import time
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -14,27 +12,19 @@ from finlab.analysis import mirror_pairs
 from finlab.assets import shipped_layouts
 from finlab.errors import FinlabError
 from finlab.layout import Fin, load_layout
-from tests.webapp.loops import page_of, running
+from tests.webapp.loops import page_of, running, until
 from webapp.markup.score_card import warnings
 from webapp.session import Session
 from webapp.session.search_request import SearchRequest
 from webapp.session.state import State
-from webapp.tasks.analyst import Findings, Question, find
 from webapp.tasks.background import Newest, Worker
 from webapp.tasks.improving import Improver, Room
+from webapp.tasks.jobs import Findings, Question, find
 
 NO_YAW = load_layout(shipped_layouts()["no_yaw"])
 
 
-def until(condition: Callable[[], bool]) -> None:
-    end = time.monotonic() + 60
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.01)
-
-
-def test_search_is_cancelled_and_what_it_found_is_offered() -> None:
-    worker = Worker()
+def test_search_is_cancelled_and_what_it_found_is_offered(worker: Worker) -> None:
     improver = Improver(page_of(worker))
     request = SearchRequest("weakest direction")
     improver.start(State(NO_YAW), request)
@@ -51,7 +41,6 @@ def test_search_is_cancelled_and_what_it_found_is_offered() -> None:
     assert session.state.layout == NO_YAW
     improver.forget()
     assert improver.findings is None and not improver.busy
-    worker.stop()
 
 
 def test_bad_searches_are_refused() -> None:
@@ -65,8 +54,7 @@ def test_bad_searches_are_refused() -> None:
             request.with_way(way)
 
 
-def test_fins_move_within_bounds_for_the_power_of_a_mission() -> None:
-    worker = Worker()
+def test_fins_move_within_bounds_for_the_power_of_a_mission(worker: Worker) -> None:
     improver = Improver(page_of(worker))
     first, second = NO_YAW.names[:2]
     request = replace(SearchRequest("power for a mission"), held=NO_YAW.names[2:])
@@ -81,11 +69,10 @@ def test_fins_move_within_bounds_for_the_power_of_a_mission() -> None:
     until(lambda: improver.findings is not None)
     assert improver.findings is not None and improver.findings.goal == "mission_power"
     assert improver.findings.moved == (first, second)
-    worker.stop()
 
 
-def test_analyst_answers_only_the_question_that_stays() -> None:
-    worker, asked = Worker(), threading.Event()
+def test_analyst_answers_only_the_question_that_stays(worker: Worker) -> None:
+    asked = threading.Event()
     layout = load_layout(shipped_layouts()["pair"])
 
     async def run() -> Newest[Question, Findings]:
@@ -99,13 +86,12 @@ def test_analyst_answers_only_the_question_that_stays() -> None:
         return analyst
 
     analyst = asyncio.run(run())
-    worker.stop()
     assert analyst.findings is not None
     assert analyst.findings.question.layout.fins[0].position[0] == pytest.approx(0.19)
     assert analyst.findings.before is not None
 
 
-def test_what_is_proposed_can_be_built() -> None:
+def test_what_is_proposed_can_be_built(worker: Worker) -> None:
     """Outside of the hull, apart, symmetric, in whole millimetres and degrees; with figures that stay."""
     ucat = load_layout(shipped_layouts()["ucat"])
     inside = replace(ucat, actuators=(*ucat.fins, Fin("tail", (-0.25753, 0.0, 0.0), math.pi)))
@@ -116,7 +102,6 @@ def test_what_is_proposed_can_be_built() -> None:
     assert any("tail beats inside" in text for text in warnings(stuck))
     room = Room(stuck, 0.02)
     assert room.broken(stuck.position[None], stuck.frames[None])[0] > 0.0
-    worker = Worker()
     improver = Improver(page_of(worker))
     request = SearchRequest().with_way((0.15, 0.05, 0.05, 60.0))
     improver.start(State(stuck), request)
@@ -137,16 +122,14 @@ def test_what_is_proposed_can_be_built() -> None:
     afterwards = find(Question(layout, (), layout, "none")).card
     assert afterwards.authority.weakest == found.card_after.authority.weakest
     assert [loss.weakest for loss in afterwards.losses] == [loss.weakest for loss in found.card_after.losses]
-    worker.stop()
 
 
 @pytest.mark.parametrize(
     ("robot", "lost"), [("bluerov2", 1), ("catamaran", 1), ("turtle_hybrid", 1), ("torpedo", 0)]
 )
-def test_any_robot_is_improved_without_what_is_lost(robot: str, lost: int) -> None:
+def test_any_robot_is_improved_without_what_is_lost(robot: str, lost: int, worker: Worker) -> None:
     layout = load_layout(robot)
     state = State(layout, failed=layout.names[:lost], speed=1.0)
-    worker = Worker()
     improver = Improver(page_of(worker))
     improver.start(state, SearchRequest())
     until(lambda: improver.progress is not None or improver.error is not None)
@@ -159,4 +142,3 @@ def test_any_robot_is_improved_without_what_is_lost(robot: str, lost: int) -> No
     room, left = Room(layout.without(state.failed), 0.02), found.layout.without(state.failed)
     assert room.broken(left.position[None], left.frames[None])[0] == 0.0
     assert mirror_pairs(left) == mirror_pairs(layout.without(state.failed))
-    worker.stop()

@@ -4,7 +4,6 @@ import math
 
 import pytest
 
-from finlab.assets import shipped_layouts
 from finlab.errors import FinlabError
 from finlab.layout import FinModelSpec, load_layout
 from webapp.panels.actuator_list import actuator_list
@@ -12,11 +11,6 @@ from webapp.session import Session
 from webapp.session.actuator_edits import modelled
 
 FRONT = ("front_right", "front_left")
-
-
-@pytest.fixture
-def session() -> Session:
-    return Session(load_layout(shipped_layouts()["ucat"]))
 
 
 def fin(session: Session, name: str):  # type: ignore[no-untyped-def]

@@ -43,30 +43,30 @@ SOLVED: dict[str, Callable[[Session], object]] = {
 @pytest.mark.parametrize("lesson", LESSONS, ids=lambda lesson: lesson.name)
 def test_a_lesson_is_unsolved_until_its_exercise_is_done(lesson: Stop) -> None:
     session = Session(load_layout("penta"))
-    session.open_stop(lesson.name)
-    assert session.stop is lesson and lesson.drawer in DRAWERS[session.task]
-    session.take(_answer(session.state))
-    assert not session.solved
+    session.guide.open(lesson.name)
+    assert session.guide.stop is lesson and lesson.drawer in DRAWERS[session.desk.task]
+    session.guide.take(_answer(session.state))
+    assert not session.guide.solved
     SOLVED[lesson.name](session)
-    session.take(_answer(session.state))
-    assert session.solved
+    session.guide.take(_answer(session.state))
+    assert session.guide.solved
     session.show_mode(0)
     session.step = None
-    session.take(_answer(session.state))
-    assert session.solved, "once done, done"
+    session.guide.take(_answer(session.state))
+    assert session.guide.solved, "once done, done"
 
 
 def test_wrong_ways_do_not_count() -> None:
     session = Session(load_layout("penta"))
-    session.open_stop("lost-fin")
+    session.guide.open("lost-fin")
     for fin in ("front_left", "back_right", "front_right"):  # one fin alone turns nothing
         session.toggle_failure(fin)
-    session.take(_answer(session.state))
-    assert not session.solved
-    session.open_stop("out-of-reach")
+    session.guide.take(_answer(session.state))
+    assert not session.guide.solved
+    session.guide.open("out-of-reach")
     session.set_setting("policy", "direction")
-    session.take(_answer(replace(session.state, target=(1.0, 0.0, 0.0, 0.0, 0.0, 0.0))))
-    assert not session.solved
+    session.guide.take(_answer(replace(session.state, target=(1.0, 0.0, 0.0, 0.0, 0.0, 0.0))))
+    assert not session.guide.solved
 
 
 def test_closing_gives_back_what_was_there_and_next_goes_on_to_the_end() -> None:
@@ -80,30 +80,30 @@ def test_closing_gives_back_what_was_there_and_next_goes_on_to_the_end() -> None
         return session.state, session.display, session.desk, session.selected, session.history.undo_name
 
     before = all_there_is()
-    session.open_stop(LESSONS[0].name)
+    session.guide.open(LESSONS[0].name)
     session.set_display("dark", False)
-    stops = [session.stop]
-    while session.stop is not None:
-        session.go_on()
-        stops.append(session.stop)
+    stops = [session.guide.stop]
+    while session.guide.stop is not None:
+        session.guide.go(1)
+        stops.append(session.guide.stop)
     assert stops == [*LESSONS, None] and all_there_is() == before
 
 
 def test_tour_and_lesson_end_each_other() -> None:
     session = Session(load_layout("penta"))
     before = session.state
-    session.tour()
-    session.open_stop("two-ways")
-    assert session.stop is LESSONS[0]
-    session.tour()
-    assert session.stop is TOUR[0]
-    session.end_guide()
+    session.guide.tour()
+    session.guide.open("two-ways")
+    assert session.guide.stop is LESSONS[0]
+    session.guide.tour()
+    assert session.guide.stop is TOUR[0]
+    session.guide.end()
     assert session.state == before
 
 
 def test_unknown_lessons_are_refused() -> None:
     with pytest.raises(FinlabError, match="lesson: expected one of wrench, .*got 'sailing'"):
-        Session(load_layout("A")).open_stop("sailing")
+        Session(load_layout("A")).guide.open("sailing")
 
 
 def test_the_card_says_what_to_do_and_praises_what_is_done() -> None:

@@ -20,9 +20,8 @@ from webapp.panels.modes_tab import mode_table, step_words
 from webapp.session import Session
 from webapp.session.state import State
 from webapp.session.targets import PRESETS
-from webapp.tasks.answering import Answering
+from webapp.tasks.answering import HOLD, Answering, Refining
 from webapp.tasks.mode_names import MAX_SHOWN, NO_MODES, Modes, NamedMode, named_modes
-from webapp.tasks.refining import HOLD, Refining
 from webapp.tasks.solver import Solver
 
 PUSH, REST = (0.3, 1.1, 0.0), (0.05, 0.1, 0.0)

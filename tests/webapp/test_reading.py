@@ -41,9 +41,9 @@ def test_what_waits_gives_way_to_a_newer_one_of_its_kind(server: viser.ViserServ
     found: list[int] = []
 
     def ask() -> None:
-        view.do(lambda: view.reading.make(partial(time.sleep, 0.05), lambda _: found.append(0), "open"))
+        view.do(lambda: view.context.make(partial(time.sleep, 0.05), lambda _: found.append(0), "open"))
         for count in range(1, 9):
-            view.do(lambda count=count: view.reading.make(lambda: count, found.append, "save"))
+            view.do(lambda count=count: view.context.make(lambda: count, found.append, "save"))
 
     on_loop(server, ask)
     until(lambda: found == [0, 8])

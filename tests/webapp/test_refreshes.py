@@ -44,4 +44,7 @@ def test_a_change_of_a_slider_writes_the_page_twice_with_few_calls(
         tab.on_loop(lambda: sys.setprofile(None))
         least.append((written[0], calls[0]))
     assert 1 < min(least)[0] <= MOST_WRITTEN and 100 < min(least)[1] <= MOST_CALLS
+    assert tab.view.jobs.answering.modes.steps == 0, "nobody sees candidates"
+    tab.on_loop(lambda: tab.view.do(lambda: tab.view.session.show_drawer("Candidates")))
+    tab.settle()
     assert tab.view.jobs.answering.modes.steps > 0

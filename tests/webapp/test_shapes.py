@@ -8,7 +8,7 @@ import trimesh
 
 from finlab.assets import shipped_layouts
 from finlab.hull import Surface, hull_of
-from finlab.hull.mesh import Mesh
+from finlab.hull.shapes import Mesh
 from finlab.layout import Azimuth, Fin, Rudder, Thruster, load_layout
 from webapp.scene.actuator_node import TURNS_PER_S, motion
 from webapp.scene.direction_handle import on_sphere, snapped

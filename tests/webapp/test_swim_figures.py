@@ -11,13 +11,13 @@ import pytest
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
 from finlab.sim import make_trajectory
-from tests.webapp.loops import page_of
-from tests.webapp.test_swimming import now, until
+from tests.webapp.loops import page_of, until
+from tests.webapp.test_swimming import now
 from webapp.markup.swim_card import pace_words, swim_card
 from webapp.markup.words import righting_sentences
 from webapp.session.swim_plan import Plan
 from webapp.tasks.background import Worker
-from webapp.tasks.designs import Exports
+from webapp.tasks.designs import Designs
 from webapp.tasks.moment import POWER, Figures
 from webapp.tasks.swimmer import Swimmer
 from webapp.tasks.swimming import Swimming
@@ -28,14 +28,12 @@ UCAT = load_layout("ucat")
 class Shelf:
     """A page's tasks, and what was sent to its browser."""
 
-    def __init__(self) -> None:
-        self.worker, self.sent, self.notes = Worker(), {}, []  # type: ignore[var-annotated]
+    def __init__(self, worker: Worker) -> None:
+        self.sent: dict[str, bytes] = {}
         client = SimpleNamespace(send_file_download=lambda name, data, **_: self.sent.update({name: data}))
-        context = page_of(
-            self.worker, client=client, notify=lambda _, text, calm=False: self.notes.append(text)
-        )
+        context = page_of(worker, client=client)
         self.swimming = Swimming(context)
-        self.files = Exports(context)
+        self.files = Designs(context)
 
     def begun(self) -> Swimmer:
         assert self.swimming.swimmer is not None
@@ -52,11 +50,10 @@ class Shelf:
 
 
 @pytest.fixture
-def shelf() -> Iterator[Shelf]:
-    shelf = Shelf()
+def shelf(worker: Worker) -> Iterator[Shelf]:
+    shelf = Shelf(worker)
     yield shelf
     shelf.swimming.stop()
-    shelf.worker.stop()
 
 
 def test_what_a_swim_comes_to(shelf: Shelf) -> None:

@@ -9,11 +9,10 @@ from finlab.errors import FinlabError
 from finlab.evaluation.experiments.hard_days import HARD_DAYS
 from finlab.layout import Layout, load_layout
 from finlab.sim import FinFault
-from tests.webapp.loops import page_of
-from tests.webapp.test_swimming import SHORT, until
+from tests.webapp.loops import until
+from tests.webapp.test_swimming import SHORT
 from webapp.session.state import State
 from webapp.session.swim_plan import SCENARIOS, SwimSettings
-from webapp.tasks.background import Worker
 from webapp.tasks.swimmer import Swimmer, closed_loop
 from webapp.tasks.swimming import Swimming
 
@@ -54,26 +53,6 @@ def test_a_fin_is_lost_without_which_an_own_robot_can_be_steered(layout: str) ->
         return
     (loss,) = chosen("lost-in-current").plan(State(robot, failed=(robot.names[0],))).losses
     assert loss.fin in robot.names[1:]
-
-
-@pytest.mark.parametrize(
-    ("key", "wrong"),
-    [
-        ("scenario", "hexa"),
-    ],
-)
-def test_settings_of_swims_are_checked(key: str, wrong: Any) -> None:
-    with pytest.raises(FinlabError):
-        SwimSettings().with_value(key, wrong)
-
-
-@pytest.fixture
-def swimming() -> Any:
-    worker = Worker()
-    swim = Swimming(page_of(worker))
-    yield swim
-    swim.stop()
-    worker.stop()
 
 
 def test_what_is_true_is_not_what_is_believed(swimming: Swimming) -> None:

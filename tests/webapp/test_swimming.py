@@ -1,7 +1,6 @@
 """A robot swims on the page: at the pace of the clock, never behind it by more than a moment."""
 
 import time
-from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -12,37 +11,18 @@ from finlab.assets import shipped_layouts
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
 from finlab.sim import Trajectory, make_trajectory
-from tests.webapp.loops import page_of
+from tests.webapp.loops import until
 from tests.webapp.stand_in import load_stand_in
 from webapp.markup.swim_card import findings_words, pace_words, swim_card
 from webapp.panels.status import swim_corner
 from webapp.session.state import State
 from webapp.session.swim_plan import Plan, SwimSettings
-from webapp.tasks.background import Worker
 from webapp.tasks.moment import ERROR, FORCES, POINTS, TIME
 from webapp.tasks.solver import Solver
 from webapp.tasks.swimming import LAG_S, Swimming
 
 UCAT = load_layout(shipped_layouts()["ucat"])
 SHORT = Trajectory("short", np.array([0.0, 2.0]), np.array([[0.0, 0.0, -1.0], [0.2, 0.0, -1.0]]))
-
-
-def until(condition: Callable[[], bool]) -> None:
-    end = time.monotonic() + 60
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.005)
-
-
-@pytest.fixture
-def swimming() -> Iterator[Swimming]:
-    worker = Worker()
-    notes: list[str] = []
-    swim = Swimming(page_of(worker, notify=lambda _, text: notes.append(text)))
-    swim.notes = notes  # type: ignore[attr-defined]
-    yield swim
-    swim.stop()
-    worker.stop()
 
 
 def now(swimming: Swimming) -> tuple[Any, ...]:
@@ -93,9 +73,6 @@ def test_pause_step_and_speed(swimming: Swimming) -> None:
     swimming.step()
     until(lambda: swimming.time == pytest.approx(0.1))
     swimming.pace.set_speed(8.0)
-    for wrong in (float("nan"), 0.0, "2", 99.0):
-        with pytest.raises(FinlabError):
-            SwimSettings().with_value("speed", wrong)
     assert "paused" in pace_words(swimming)
 
 
@@ -130,9 +107,6 @@ def test_a_robot_that_no_fins_can_steer_is_told_with_all_its_fins(swimming: Swim
 def test_bad_plans_and_methods_out_of_order(swimming: Swimming) -> None:
     settings = SwimSettings()
     assert settings.plan(State(UCAT, method="qp")).method == "qp", "that of the bar"
-    for key, wrong in (("path", "moon"), ("method", "method")):
-        with pytest.raises(FinlabError, match=wrong):
-            settings.with_value(key, wrong)
     swimming._solver = Solver(load=lambda *_, **__: load_stand_in("ipopt"))
     swimming.start(Plan(UCAT, (), make_trajectory("circle"), "qp"))
     until(lambda: bool(swimming.notes))  # type: ignore[attr-defined]
@@ -176,10 +150,3 @@ def test_a_fin_that_breaks_without_a_word_is_found(swimming: Swimming) -> None:
     swimming.toggle("front_left", announced=False)
     until(lambda: swimming.swimmer.shown.lost == ())
     assert "front_left works, but the allocator takes it for lost" in swim_card(*now(swimming))
-
-
-def test_whether_the_allocator_is_told_is_a_setting() -> None:
-    settings = SwimSettings().with_value("announced", False)
-    assert not settings.announced and SwimSettings().announced
-    with pytest.raises(FinlabError, match="announced: expected true or false"):
-        settings.with_value("announced", "no")

@@ -13,9 +13,8 @@ from finlab.layout import load_layout
 from tests.webapp.stand_in import load_stand_in
 from tests.webapp.visitor import visit, visitor
 from webapp import app as app_module
-from webapp.app import App
-from webapp.session import Session, store
-from webapp.session.store import SessionStore
+from webapp.app import App, SessionStore
+from webapp.session import Session
 from webapp.tasks.solver import Solver
 from webapp.viser_internals import start_server, stop_server
 
@@ -90,14 +89,14 @@ def test_two_hundred_pages_one_after_the_other_and_at_once(app: App, monkeypatch
     assert all(one_by_one) and all(at_once)
     assert longest < 200 * Blank.BUILDING_S / 4, "others are heard while pages are built"
     until(lambda: not app.views)
-    assert len(app._store._sessions) <= store.MOST_WAITING and not app._keys
+    assert len(app._store._sessions) <= app_module.MOST_WAITING and not app._keys
 
 
 def test_no_more_sessions_than_are_kept() -> None:
     sessions = SessionStore(lambda: Session(load_layout("A")))
     for _ in range(100):
         sessions.leave(sessions.enter([])[0])
-    assert len(sessions._sessions) == store.MOST_WAITING
+    assert len(sessions._sessions) == app_module.MOST_WAITING
     opened = [sessions.enter([])[1] for _ in range(100)]
     assert len({id(session) for session in opened}) == 100, "as many as have a page"
 
@@ -108,7 +107,7 @@ def test_sessions_are_forgotten_after_a_time(monkeypatch: pytest.MonkeyPatch) ->
     sessions.leave(key)
     assert sessions.enter([key]) == (key, session)
     sessions.leave(key)
-    monkeypatch.setattr(store, "LONGEST_S", 0.0)
+    monkeypatch.setattr(app_module, "LONGEST_S", 0.0)
     time.sleep(0.01)
     assert sessions.enter([key])[1] is not session
 

@@ -14,8 +14,8 @@ from finlab.analysis.score_card import quick_check
 from finlab.assets import shipped_layouts
 from finlab.errors import LayoutError
 from finlab.layout import FinModelSpec, Uncertainty, load_layout
-from finlab.layout.wrench_axes import AXES
-from finlab.vehicle.body import GRAVITY
+from finlab.layout.axes import AXES
+from finlab.vehicle.fossen import GRAVITY
 from tests.webapp.stand_in import StandIn
 from webapp.markup.score_card import check_card, score_table, warnings
 from webapp.markup.verdict import (
@@ -35,8 +35,8 @@ from webapp.session import Session, files
 from webapp.session.lessons import TOUR
 from webapp.session.state import AXIS_WORDS, State
 from webapp.session.targets import PRESETS, axis_reach, full_thrust
-from webapp.tasks.analyst import Question, find
 from webapp.tasks.comparison import Run
+from webapp.tasks.jobs import Question, find
 from webapp.tasks.solver import Solver
 from webapp.theme import DELIVERED, UNLEARNED, css
 
@@ -228,20 +228,20 @@ def test_every_stop_of_the_tour_stands() -> None:
 
     before = all_there_is()
     for step in TOUR:
-        session.tour()
+        session.guide.tour()
         assert session.drawer == step.drawer and session.selected is None
-    session.go_back()
-    assert session.stop is TOUR[-2]
-    session.tour()
-    session.tour()
-    assert session.stop is None and all_there_is() == before
+    session.guide.go(-1)
+    assert session.guide.stop is TOUR[-2]
+    session.guide.tour()
+    session.guide.tour()
+    assert session.guide.stop is None and all_there_is() == before
 
 
 def test_the_best_mode_is_shown_again_after_a_tour() -> None:
     session = Session(load_layout("ucat"))
-    for leave in (session.end_guide, session.start_over):
-        session.tour()
-        session.tour()
+    for leave in (session.guide.end, session.start_over):
+        session.guide.tour()
+        session.guide.tour()
         assert session.mode == TOUR[1].mode == 1 and session.state == TOUR[1].state
         leave()
         assert session.mode == 0, "although the stop asked just what was asked before"

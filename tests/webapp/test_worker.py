@@ -12,8 +12,8 @@ def shout(text: str) -> None:
     raise AssertionError(text)
 
 
-def test_only_the_newest_waits() -> None:
-    worker, gate, done = Worker(), threading.Event(), threading.Event()
+def test_only_the_newest_waits(worker: Worker) -> None:
+    gate, done = threading.Event(), threading.Event()
     ran: list[int] = []
     worker.submit("block", lambda: gate.wait(10) and None, shout)
     for k in range(100):
@@ -22,11 +22,10 @@ def test_only_the_newest_waits() -> None:
     gate.set()
     assert done.wait(10)
     assert ran == [99]
-    worker.stop()
 
 
-def test_askers_take_turns() -> None:
-    worker, gate, done = Worker(), threading.Event(), threading.Event()
+def test_askers_take_turns(worker: Worker) -> None:
+    gate, done = threading.Event(), threading.Event()
     ran: list[str] = []
     worker.submit("block", lambda: gate.wait(10) and None, shout)
     for key in ("a", "b", "c", "a"):
@@ -36,11 +35,10 @@ def test_askers_take_turns() -> None:
     gate.set()
     assert done.wait(10)
     assert ran == ["a", "c"]
-    worker.stop()
 
 
-def test_a_fault_does_not_end_the_thread(capsys: pytest.CaptureFixture[str]) -> None:
-    worker, done = Worker(), threading.Event()
+def test_a_fault_does_not_end_the_thread(worker: Worker, capsys: pytest.CaptureFixture[str]) -> None:
+    done = threading.Event()
     told: list[str] = []
 
     def refuse() -> None:
@@ -50,7 +48,6 @@ def test_a_fault_does_not_end_the_thread(capsys: pytest.CaptureFixture[str]) -> 
     worker.submit("refused", refuse, told.append)
     worker.submit("good", done.set, shout)
     assert done.wait(10)
-    worker.stop()
     assert told == ["it failed: division by zero", "not so"]
     printed = capsys.readouterr().err
     assert "ZeroDivisionError" in printed and "FinlabError" not in printed, "a refusal is no fault"

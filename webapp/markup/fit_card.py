@@ -3,8 +3,7 @@
 from markupsafe import Markup
 
 from finlab.fit.fin_fit import FinFit
-from finlab.fit.thruster_file import summary
-from finlab.fit.thruster_fit import ThrusterFit
+from finlab.fit.thruster_fit import ThrusterFit, summary
 from webapp.markup.html import html, row
 from webapp.markup.words import three_digits
 from webapp.tasks.fitting import Fitted

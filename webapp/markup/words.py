@@ -10,7 +10,7 @@ from finlab.allocation.allocation import Allocation
 from finlab.arrays import Array
 from finlab.layout import Azimuth, Fin, Layout
 from finlab.layout.damage import Health
-from finlab.vehicle.body import complete_body
+from finlab.vehicle.fossen import complete_body
 from finlab.vehicle.righting import righting_words
 from finlab.vehicle.vehicle import Vehicle
 from webapp.session.state import AXIS_WORDS

@@ -14,8 +14,8 @@ from webapp.markup.answer import swatch
 from webapp.markup.html import html, marker
 from webapp.page import Page
 from webapp.presses import placed, press
+from webapp.session.actuator_edits import partner
 from webapp.session.layout_edits import NEW
-from webapp.session.links import partner
 from webapp.session.state import State
 
 HULL = Markup(

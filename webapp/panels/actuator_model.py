@@ -8,11 +8,11 @@ from typing import Any, NamedTuple
 import numpy as np
 import viser
 
-from finlab.actuators.fin.table import TableLaw
+from finlab.actuators.fin.fin_laws import TableLaw
 from finlab.arrays import Array
 from finlab.errors import DataError, FinlabError
 from finlab.layout import Actuator, Fin, Layout, Rudder
-from finlab.layout.fin import FIN_MODELS
+from finlab.layout.fin_model import FIN_MODELS
 from finlab.layout.force_table_file import DOUBT
 from finlab.layout.thrust_model import PowerTable
 from finlab.physics import make_law, plant_of

@@ -71,8 +71,8 @@ def _bars(shown: Allocation | None, target: tuple[float, ...], layout: Layout, b
     return wrench_bars(asked, None if shown is None else shown.wrench)
 
 
-def _said(shown: Allocation | None, state: State, busy: bool, searching: bool, step: int | None) -> str:
-    said = answer_sentence(state, shown, busy, searching or step is not None)
+def _said(shown: Allocation | None, state: State, busy: bool, proving: bool, step: int | None) -> str:
+    said = answer_sentence(state, shown, busy, proving or step is not None)
     return html("<div class='fl'><div class='said'>{}</div></div>", said)
 
 

@@ -4,7 +4,7 @@ import viser
 from markupsafe import Markup
 
 from finlab.allocation.allocation import Allocation
-from finlab.allocation.evaluate import REACHED
+from finlab.allocation.yardstick import REACHED
 from webapp.handles import add_html
 from webapp.markup.html import html, marker
 from webapp.markup.verdict import Verdict, verdict_of

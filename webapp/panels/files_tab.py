@@ -17,9 +17,9 @@ def add_files(page: Page) -> None:
     """A button for each file, what it is for, and commands that take it."""
     add_html(page.gui, marker("fl-primary"))
     icon = viser.Icon.PACKAGE_EXPORT
-    page.add_button("Export the bundle (ZIP)", page.jobs.exports.bundle, icon=icon)
+    page.add_button("Export the bundle (ZIP)", page.designs.bundle, icon=icon)
     page.add_html(_bundle)
-    page.add_button("Export the graph (JSON)", page.jobs.exports.graph, icon=viser.Icon.TOPOLOGY_COMPLEX)
+    page.add_button("Export the graph (JSON)", page.designs.graph, icon=viser.Icon.TOPOLOGY_COMPLEX)
     page.add_html(_graph)
     page.add_button("Save the design", page.designs.save, icon=viser.Icon.DEVICE_FLOPPY)
     page.add_html(_design)

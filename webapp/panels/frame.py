@@ -13,7 +13,7 @@ from importlib.resources import files
 from markupsafe import Markup
 
 from finlab.layout import Layout
-from webapp.commands import commands, register
+from webapp.commands import add_commands
 from webapp.handles import add_html, put
 from webapp.markup.html import html, marker
 from webapp.page import Page
@@ -164,10 +164,10 @@ class Frame:
             "task": session.show_task,
             "drawer": session.show_drawer,
             "fold": lambda _: session.fold_drawer(),
-            "stop": session.open_stop,
-            "on": lambda _: session.go_on(),
-            "back": lambda _: session.go_back(),
-            "end": lambda _: session.end_guide(),
+            "stop": session.guide.open,
+            "on": lambda _: session.guide.go(1),
+            "back": lambda _: session.guide.go(-1),
+            "end": lambda _: session.guide.end(),
             "look": robot.look_from,
             "frame": lambda _: robot.frame(),
             "typed": lambda _: session.history.end_merge(),
@@ -210,5 +210,5 @@ class View(Page):
     def _build(self) -> None:
         self.gui.main_panel.dock_right()
         self.gui.set_panel_label("finlab")
-        register(self.gui, self, commands(self))
+        add_commands(self)
         self.frame = Frame(self)

@@ -15,7 +15,7 @@ from finlab.hull.mesh_file import LARGEST, MAX_BYTES, MAX_FACES, turned
 from finlab.hull.surface import UNITS
 from finlab.layout import Layout
 from finlab.layout.body import HULL_SHAPES, MESH_SUFFIXES, Hull
-from finlab.vehicle.body import GRAVITY
+from finlab.vehicle.fossen import GRAVITY
 from webapp.markup.html import html
 from webapp.markup.words import three_digits
 from webapp.page import Page
@@ -33,7 +33,7 @@ def add_hull(page: Page) -> None:
     session, gui = page.session, page.gui
 
     def load(name: str, content: bytes) -> None:
-        page.reading.make(lambda: _drawn(page, in_worker(stored_hull, name, content)), take, "hull")
+        page.context.make(lambda: _drawn(page, in_worker(stored_hull, name, content)), take, "hull")
 
     def take(hull: Hull) -> None:
         """Mesh files do not say in which unit they are: where it need not be metres, the user says it."""
@@ -97,7 +97,7 @@ def _add_turns(page: Page) -> None:
         if hull is None:
             raise FinlabError("the hull is drawn from a shape; import a mesh first")
         matrix, name = rotation.as_matrix(), f"Turn the hull about {axis}"
-        page.reading.make(
+        page.context.make(
             lambda: _drawn(page, reshaped_hull(hull, lambda mesh: turned(mesh, matrix))),
             partial(put_on, name, hull),
             "hull",

@@ -15,9 +15,9 @@ from webapp.markup.score_card import score_table
 from webapp.markup.words import fins_words, listed, three_digits
 from webapp.page import Page
 from webapp.panels.damage import add_fin_buttons
-from webapp.session.display import DRAWN
+from webapp.session.looking import DRAWN
 from webapp.session.search_request import GOAL_UNITS, GOAL_WORDS, WAY, SearchRequest
-from webapp.tasks.analyst import Findings
+from webapp.tasks.jobs import Findings
 
 
 def add_reach(page: Page) -> None:
@@ -47,7 +47,7 @@ def add_improving(page: Page) -> None:
     session, gui, board, improver = page.session, page.gui, page.board, page.jobs.improver
 
     def change(how: Callable[..., SearchRequest], *values: Any) -> None:
-        session.set_draft(how(session.draft, *values))
+        session.draft = how(session.draft, *values)
 
     def bound(way: tuple[float, ...]) -> None:
         change(SearchRequest.with_way, way)

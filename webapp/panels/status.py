@@ -14,9 +14,9 @@ from webapp.markup.words import error_digits, parts_word, three_digits
 from webapp.page import Page
 from webapp.scene.proportions import arrow_size
 from webapp.scene.wrench_nodes import Scale, set_scale
-from webapp.session.display import Display
+from webapp.session.looking import Display
 from webapp.session.state import AXIS_UNITS, LEAST, State
-from webapp.tasks.analyst import Findings
+from webapp.tasks.jobs import Findings
 from webapp.tasks.mode_names import Modes
 from webapp.tasks.moment import ERROR, Moment
 from webapp.tasks.swimmer import Swimmer
@@ -139,7 +139,7 @@ def corner(
         in_reach: whether any command of the working fins gives what is asked.
         refined: which step of its refinement is on the robot, in place of a verdict; nothing at its end.
     """
-    fins = f"{len(state.healthy)} of {state.layout.n} {parts_word(state.layout)}"
+    fins = f"{state.layout.n - len(state.failed)} of {state.layout.n} {parts_word(state.layout)}"
     parts = [html("<span class='aside'>{}</span>", fins)]
     if error is not None:
         parts.append(html("<span class='missing'>{}</span>", error))

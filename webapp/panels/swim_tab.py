@@ -5,6 +5,7 @@ from typing import Any
 
 import viser
 
+from finlab.control import CONTROLLERS
 from finlab.layout import Layout
 from finlab.sim import SHIPPED
 from webapp.handles import add_html
@@ -32,6 +33,8 @@ def add_scenario(page: Page) -> None:
     _bind(page, "scenario", days)
     page.add_html(_about)
     _bind(page, "path", gui.add_dropdown("Path", tuple(SHIPPED), hint="Where to swim."))
+    law = "Follows the path; or as in the paper: steers to waypoints, or holds the path's speed and depth."
+    _bind(page, "controller", gui.add_dropdown("Controller", tuple(CONTROLLERS), hint=law))
 
 
 def _about(swim: SwimSettings, method: str) -> str:
@@ -86,7 +89,7 @@ def add_figures(page: Page) -> None:
     """What the swim took, and what can be downloaded of it."""
     page.add_html(swim_card)
     page.add_html(_trim)
-    log = {"Log (NPZ)": partial(page.jobs.exports.swim, page.jobs.swimming)}
+    log = {"Log (NPZ)": partial(page.designs.swim, page.jobs.swimming)}
     save = page.add_buttons("Save", log, visible=False, hint="For numpy and `fit robot`.")
     page.board.show(save, visible=lambda swims: swims)
 

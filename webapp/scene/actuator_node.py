@@ -13,7 +13,7 @@ from viser.transforms import SO3
 
 from finlab.arrays import Array
 from finlab.hull import Surface
-from finlab.hull.mesh import Mesh
+from finlab.hull.shapes import Mesh
 from finlab.layout import Actuator, Azimuth, Fin, Rudder, Thruster
 from webapp.handles import put
 from webapp.scene.meshes import blades, thrusters

@@ -23,11 +23,11 @@ from webapp.scene.direction_handle import DirectionHandle
 from webapp.scene.proportions import arrow_size, part_size, view_size
 from webapp.scene.stage import Shape, Stage, aim_camera
 from webapp.scene.wrench_nodes import LENGTH, AttainableNodes, Scale, WrenchNodes
-from webapp.session.display import Display
+from webapp.session.looking import Display
 from webapp.session.state import chosen
 from webapp.session.swim_plan import SwimSettings
-from webapp.tasks.analyst import Findings
 from webapp.tasks.context import Context
+from webapp.tasks.jobs import Findings
 from webapp.tasks.moment import Moment
 from webapp.tasks.swimmer import Swimmer
 from webapp.theme import HALF_TURN, LIGHT, fin_color
@@ -230,7 +230,7 @@ class RobotScene:
 
     def _clicked(self, index: int, also: bool) -> None:
         select = self._session.select_also if also else self._session.select
-        self._do(lambda: select(self._board.facts.drawn.names[index]) if self._board.facts else None)
+        self._do(lambda: select(self._board.facts["drawn"].names[index]) if self._board.facts else None)
 
     def _drag(self, index: int, phase: str, position: tuple[float, float, float]) -> None:
         session = self._session

@@ -9,8 +9,8 @@ from webapp.board import Board
 from webapp.scene.robot_scene import RobotScene
 from webapp.scene.swim_scene import SwimScene
 from webapp.scene.wrench_nodes import Scale, fitting_scale, swim_scale
-from webapp.session.display import Display
 from webapp.session.lessons import Stop
+from webapp.session.looking import Display
 from webapp.session.swim_plan import SwimSettings
 from webapp.tasks.context import Context
 from webapp.tasks.swimmer import Swimmer
@@ -89,7 +89,7 @@ class Scenery:
         """The robot fills the view at each stop of the tour and in each lesson, and swims at some; to come to
         one, or to leave, ends a swim. At its end the camera stands where it stood before."""
         session, before = self._session, self._stop
-        stop = self._stop = session.stop
+        stop = self._stop = session.guide.stop
         if stop is before:
             return
         self.end_swim()

@@ -9,8 +9,7 @@ import viser
 
 from finlab.arrays import Array
 from finlab.hull import Surface
-from finlab.hull.mesh import Mesh
-from finlab.hull.shapes import STATIONS, shape_mesh
+from finlab.hull.shapes import STATIONS, Mesh, shape_mesh
 from webapp.handles import put
 from webapp.scene.meshes.mesh import NOTHING
 from webapp.theme import LIGHT, Look, Rgb, look

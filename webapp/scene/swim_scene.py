@@ -6,12 +6,12 @@ import numpy as np
 import viser
 
 from finlab.arrays import Array
-from finlab.hull.mesh import Mesh
+from finlab.hull.shapes import Mesh
 from webapp.handles import put
 from webapp.scene.meshes.mesh import NOTHING, force_arrow, joined, tube
 from webapp.scene.proportions import view_size
 from webapp.scene.stage import Shape, add_floor, aim_camera, paint_floor
-from webapp.session.display import Display
+from webapp.session.looking import Display
 from webapp.tasks.moment import PLACE, Moment
 from webapp.tasks.swimmer import Swimmer
 from webapp.tasks.swimming import Swimming

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from finlab.allocation.allocation import Allocation
 from finlab.analysis import AttainableSet
 from finlab.arrays import Array
-from finlab.hull.mesh import Mesh
+from finlab.hull.shapes import Mesh
 from webapp.handles import put
 from webapp.markup.words import missing_part
 from webapp.scene.meshes.mesh import LONGEST_TURN, NOTHING, RING_RADIUS, force_arrow, torque_ring, tube
 from webapp.scene.stage import Shape
-from webapp.tasks.analyst import Findings
+from webapp.tasks.jobs import Findings
 from webapp.tasks.swimmer import Swimmer
 from webapp.theme import ASKED, DEAD, DELIVERED, HALF_TURN, LIGHT, MISSING, REACH
 

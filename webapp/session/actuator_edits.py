@@ -1,14 +1,17 @@
-"""Changes of what a layout says of one actuator. Each takes an actuator and returns another one."""
+"""Changes of one actuator, each of which returns another one, and of its twin in a mirror pair."""
 
 import math
 from dataclasses import fields, replace
 from typing import Any
 
+import numpy as np
+
 from finlab.errors import FinlabError
 from finlab.layout import Actuator, Azimuth, Fin, FinModelSpec, Layout, Rudder, Thruster
-from finlab.layout.fin import FIN_MODELS
+from finlab.layout.directions import axis_names, image, part_of, replaced, with_axes
+from finlab.layout.fin_model import FIN_MODELS
 from finlab.layout.thrust_model import PowerLaw, PowerTable
-from webapp.session.state import chosen
+from webapp.session.state import Links, chosen
 
 QUANTITIES = ("amplitude", "frequency", "zero_direction")
 FORMULAS = tuple(name for name, parameters in FIN_MODELS.items() if parameters)
@@ -21,25 +24,10 @@ def words(key: str) -> str:
     return text if len(text) <= 2 or text == "phi e" else text[0].upper() + text[1:]
 
 
-def checked_name(layout: Layout, name: str, wanted: str) -> str:
-    """A name that the actuator called `name` may have, without outer spaces.
-
-    Raises:
-        FinlabError: another one has it. Whether it is a name at all, the layout says.
-    """
-    stripped = wanted.strip()
-    if stripped != name and stripped in layout.names:
-        raise FinlabError(f"there is an actuator {stripped!r:.70} already; give another name")
-    return stripped
-
-
 def with_value(part: Actuator, key: str, value: Any) -> Actuator:
     """The actuator with another value of what `key` names: a field of it, of its limits or of its model; as
-    it is where it has no such field. None forgets what may be left unsaid.
-
-    Raises:
-        LayoutError: the value is none that it may have.
-    """
+    it is where it has no such field. None forgets what may be left unsaid. LayoutError: it may not have that
+    value."""
     if isinstance(value, (tuple, list)):
         value = tuple(float(end) if isinstance(end, int) else end for end in value)
     if isinstance(part, Fin) and key in QUANTITIES:
@@ -54,10 +42,7 @@ def with_value(part: Actuator, key: str, value: Any) -> Actuator:
 
 def modelled(part: Actuator, kind: str) -> Actuator:
     """The actuator with another kind of model; what both models know, such as the water's density, stays.
-
-    Raises:
-        FinlabError: there is no such model, or it needs a file.
-    """
+    FinlabError: there is no such model, or it needs a file."""
     if isinstance(part, Rudder) or kind == part.model.type:
         return part
     if kind == "table":
@@ -75,7 +60,6 @@ def modelled(part: Actuator, kind: str) -> Actuator:
 
 
 def _law_of(table: PowerTable) -> PowerLaw:
-    """The power law through the ends of a table."""
     _, force, power = table.columns
     least, most = (
         float(f"{max(power[k] / max(abs(force[k]), 1e-9) ** 1.5, 1e-6):.4g}") if force[k] else None
@@ -85,13 +69,36 @@ def _law_of(table: PowerTable) -> PowerLaw:
 
 
 def _with_parameter(fin: Fin, key: str, value: Any) -> Fin:
-    """The fin with another number in its model.
-
-    Raises:
-        LayoutError: the value is none that the parameter may have.
-    """
     usual = FIN_MODELS[fin.model.type][key].default
-    given = {**dict(fin.model.parameters), key: value}
+    parameters = {**dict(fin.model.parameters), key: value}
     if value is None or math.isclose(value, usual, rel_tol=1e-12, abs_tol=0.0):
-        del given[key]  # files say only what is not usual
-    return replace(fin, model=FinModelSpec(fin.model.type, tuple(given.items())))
+        del parameters[key]  # files say only what is not usual
+    return replace(fin, model=FinModelSpec(fin.model.type, tuple(parameters.items())))
+
+
+def partner(links: Links, name: str) -> str | None:
+    """The actuator that `name` is linked to, if any."""
+    for pair in links:
+        if name in pair:
+            return pair[1 - pair.index(name)]
+    return None
+
+
+def unlinked(links: Links, name: str) -> Links:
+    """The links without the pair of an actuator."""
+    return tuple(pair for pair in links if name not in pair)
+
+
+def followed(before: Layout, layout: Layout, links: Links, name: str) -> Layout:
+    """The layout after the twin of `name`, if it has one, has taken its mirrored place.
+
+    Axes that pointed the other way than the image's `before` stay so.
+    """
+    twin = partner(links, name)
+    if twin is None or twin not in layout.names:
+        return layout
+    wanted, old = image(part_of(layout, name)), part_of(layout, twin)
+    count = len(axis_names(old))
+    past = np.sum(np.array(image(part_of(before, name)).frame) * part_of(before, twin).frame, axis=1)
+    frame = np.array(wanted.frame) * np.where(past < 0.0, -1.0, 1.0)[:, None]
+    return replaced(layout, with_axes(old, frame[:count], wanted.position))

@@ -1,115 +1,43 @@
-"""What all intents of a session share: its state with undo, and what is selected and shown."""
+"""State with undo, selection, question and looks of a session; what is special about a layout is not here."""
 
-import time
-from collections.abc import Callable, Sequence
-from typing import Generic, TypeVar
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
 
+import numpy as np
+
+from finlab.allocation.policy import AXES
 from finlab.errors import FinlabError
 from finlab.layout import Layout
-from webapp.session.display import Display
+from finlab.layout.axes import axes_in
+from finlab.layout.damage import FAULTS
+from finlab.layout.directions import part_of
+from webapp.session.history import History, Steps
+from webapp.session.looking import DRAWERS, TASKS, Desk, Display
 from webapp.session.search_request import SearchRequest
-from webapp.session.state import State
+from webapp.session.state import LEAST, MAX_SPEED, State, chosen, number
 from webapp.session.swim_plan import SwimSettings
-from webapp.session.targets import FIRST
+from webapp.session.targets import FIRST, PRESETS
 
-Snapshot = TypeVar("Snapshot")
-
-MERGE_WINDOW_S = 1.0
-"""Changes of the same kind that follow each other faster than this are one step of undo."""
-MAX_STEPS = 200
-
-
-class History(Generic[Snapshot]):
-    """Snapshots before and after the present one."""
-
-    def __init__(self, state: Snapshot, clock: Callable[[], float] = time.monotonic) -> None:
-        """Start with one state; `clock` gives seconds and is replaced in tests."""
-        self.state = state
-        self._clock = clock
-        self.past: list[tuple[str, Snapshot]] = []
-        """Steps that can be undone, oldest first: names, and the states before them."""
-        self.future: list[tuple[str, Snapshot]] = []
-        """Steps that can be redone, last one first: names, and the states after them."""
-        self.merge_key: str | None = None
-        """Key of the step that is still being merged into, if any."""
-        self._merge_time = 0.0
-
-    def commit(self, name: str, state: Snapshot, merge_key: str | None = None, timed: bool = True) -> None:
-        """Make `state` the present one.
-
-        Args:
-            name: what was done, in words, such as "Move front_left".
-            state: the new state.
-            merge_key: changes with the same key in quick succession (one slider being dragged) share a step.
-            timed: False lets them share it however slow they are, until `end_merge`.
-        """
-        if state == self.state:
-            return
-        now = self._clock()
-        same = merge_key is not None and merge_key == self.merge_key
-        if not (same and self.past and (not timed or now - self._merge_time < MERGE_WINDOW_S)):
-            self.past.append((name, self.state))
-            self.past, self.future = self.past[-MAX_STEPS:], []
-        self.merge_key, self._merge_time = merge_key, now
-        self.state = state
-
-    def replace(self, state: Snapshot) -> None:
-        """Let the present state be another one, without a step."""
-        self.state = state
-        self.merge_key = None
-
-    def resume(
-        self, state: Snapshot, past: Sequence[tuple[str, Snapshot]], future: Sequence[tuple[str, Snapshot]]
-    ) -> None:
-        """Be again as at an earlier moment, with what could be undone and redone then."""
-        self.state, self.past, self.future = state, list(past), list(future)
-        self.merge_key = None
-
-    def end_merge(self) -> None:
-        """The next change starts a step of its own."""
-        self.merge_key = None
-
-    @property
-    def undo_name(self) -> str | None:
-        """Name of the step that undo takes back, if any."""
-        return self.past[-1][0] if self.past else None
-
-    @property
-    def redo_name(self) -> str | None:
-        """Name of the step that redo brings back, if any."""
-        return self.future[-1][0] if self.future else None
-
-    def undo(self) -> str | None:
-        """Go back one step; returns its name, None when there is none."""
-        return self._step(self.past, self.future)
-
-    def redo(self) -> str | None:
-        """Go forward one step; returns its name, None when there is none."""
-        return self._step(self.future, self.past)
-
-    def _step(self, source: list[tuple[str, Snapshot]], sink: list[tuple[str, Snapshot]]) -> str | None:
-        if not source:
-            return None
-        name, state = source.pop()
-        sink.append((name, self.state))
-        self.state = state
-        self.merge_key = None
-        return name
+FAULT_VERBS = {"weak": "Weaken", "thrust": "Tear", "stuck": "Jam", "running": "Let run"}
 
 
 class Core:
-    """State, history and selection."""
+    """All of a session but changes of its layout. Undo is of the robot and its damage; wrench, method and
+    policy stay as they are."""
 
     def __init__(self, layout: Layout, display: Display | None = None) -> None:
         """Start with a layout, no failures, and a gentle wrench forward and to the left."""
         self._first = State(layout, target=FIRST)
-        self.history: History[State] = History(self._first)
+        self.history = History(self._first)
         self.display = display or Display()
-        self._chosen: tuple[str, ...] = ()
-        self._names = layout.names
+        self.desk = Desk()
+        self.chosen: tuple[str, ...] = ()
+        """The selected actuators, in the order in which they were chosen."""
         self.saved = layout
         """The layout as it was opened or saved last."""
         self.draft = SearchRequest()
+        """What the next search for a better layout is to do."""
         self.swim = SwimSettings()
         self.mode = 0
         """Which of the answer's modes is shown; 0 is the best one."""
@@ -125,53 +53,70 @@ class Core:
         """The present state."""
         return self.history.state
 
+    # The state and its undo.
+
+    def _commit(self, name: str, state: State, merge_key: str | None = None, timed: bool = True) -> None:
+        """Another state; a step of undo where the robot is another one."""
+        before = self.state
+        if state == before:
+            return
+        if state.asking(before) == before:  # about the same robot
+            self.history.replace(state)
+        else:
+            self.history.commit(name, state, merge_key, timed)
+        self.settle(before)
+
+    def settle(self, before: State) -> None:
+        """After any change of the state: a choice of mode is void, an actuator that is gone is not selected;
+        one that is called otherwise now stays so."""
+        self.revision += 1
+        self.mode, self.step = 0, None
+        old, names = before.layout.names, self.state.layout.names
+        called = dict(zip(old, names, strict=True)) if len(old) == len(names) else {}
+        now = (name if name in names else called.get(name) for name in self.chosen)
+        self.chosen = tuple(name for name in now if name is not None)
+
+    def undo(self) -> str:
+        """Take back the last step; returns its name."""
+        return self._step("undo", self.history.past, self.history.future)
+
+    def redo(self) -> str:
+        """Bring back the step taken back last; returns its name."""
+        return self._step("redo", self.history.future, self.history.past)
+
+    def _step(self, verb: str, source: Steps, sink: Steps) -> str:
+        if not source:
+            raise FinlabError(f"there is nothing to {verb}")
+        before, (name, state) = self.state, source.pop()
+        sink.append((name, before))
+        self.history.replace(state.asking(before))
+        self.settle(before)
+        return name
+
+    # The selection.
+
     @property
     def selected(self) -> str | None:
         """The selected actuator; of several the one that was chosen last."""
-        return self._chosen[-1] if self._chosen else None
-
-    @selected.setter
-    def selected(self, name: str | None) -> None:
-        self._chosen = () if name is None else (name,)
+        return self.chosen[-1] if self.chosen else None
 
     @property
     def selection(self) -> tuple[str, ...]:
         """All selected actuators, in the order of the layout."""
-        return tuple(name for name in self.state.layout.names if name in self._chosen)
-
-    def _commit(self, name: str, state: State, merge_key: str | None = None, timed: bool = True) -> None:
-        """Another state; a step of undo where the robot is another one."""
-        if state == self.state:
-            return
-        if state.asking(self.state) == self.state:  # about the same robot
-            self.history.replace(state)
-        else:
-            self.history.commit(name, state, merge_key, timed)
-        self._settled()
-
-    def _settled(self) -> None:
-        """After any change of the state: a choice of mode is void, one that is gone is not selected."""
-        self.revision += 1
-        self.mode, self.step = 0, None
-        names, before = self.state.layout.names, self._names
-        self._names = names
-        if len(names) == len(before):  # one that is called otherwise now stays selected
-            called = {old: new for old, new in zip(before, names, strict=True) if old not in names}
-            self._chosen = tuple(called.get(name, name) for name in self._chosen)
-        self._chosen = tuple(name for name in self._chosen if name in names)
+        return tuple(name for name in self.state.layout.names if name in self.chosen)
 
     def select(self, name: str | None) -> None:
         """Select an actuator, or none."""
         if name is not None:
             self.state.layout.index(name)
-        self.selected = name
+        self.chosen = () if name is None else (name,)
         self.history.end_merge()
 
     def select_also(self, name: str) -> None:
         """One more actuator beside those that are selected; one of them is let go."""
         self.state.layout.index(name)
-        others = tuple(other for other in self._chosen if other != name)
-        self._chosen = others if name in self._chosen else (*others, name)
+        others = tuple(other for other in self.chosen if other != name)
+        self.chosen = others if name in self.chosen else (*others, name)
         self.history.end_merge()
 
     def select_next(self) -> None:
@@ -179,29 +124,114 @@ class Core:
         names = self.state.layout.names
         self.select(names[(names.index(self.selected) + 1) % len(names)] if self.selected else names[0])
 
-    def _selected_name(self) -> str:
-        if self.selected is None:
-            raise FinlabError("no actuator is selected; click one, or choose it in the list")
-        return self.selected
+    # The question: wrench, settings, damage.
 
-    def start_over(self) -> None:
-        """Everything as at first sight; the way here can be undone."""
-        self._commit("Start over", self._first)
-        self.saved = self._first.layout
-        self.selected, self.mode = None, 0
+    def set_target(self, axis: int, value: Any) -> None:
+        """One component of the target wrench [N or N m]."""
+        self._commit("", self.state.with_target(axis, value))
 
-    def undo(self) -> str:
-        """Take back the last step; returns its name."""
-        return self._stepped(self.history.undo, "undo")
+    def ask_for(self, values: Sequence[str]) -> None:
+        """All six components, as text that may be anything."""
+        state = self.state
+        try:
+            for axis, value in zip(range(len(AXES)), values, strict=True):
+                state = state.with_target(axis, float(value))
+        except ValueError:
+            raise FinlabError(f"wrench: expected six numbers, got {','.join(values)!r:.60}") from None
+        self._commit("", state)
 
-    def redo(self) -> str:
-        """Bring back the step taken back last; returns its name."""
-        return self._stepped(self.history.redo, "redo")
+    def set_preset(self, name: str) -> None:
+        """The target wrench of a preset."""
+        self._commit("", replace(self.state, target=PRESETS[chosen(name, "preset", PRESETS)]))
 
-    def _stepped(self, step: Callable[[], str | None], verb: str) -> str:
-        asked, name = self.state, step()
-        self.history.replace(self.state.asking(asked))
-        if name is None:
-            raise FinlabError(f"there is nothing to {verb}")
-        self._settled()
-        return name
+    def set_speed(self, value: Any) -> None:
+        """The speed ahead through the water [m/s]."""
+        checked = number(value, "speed through the water [m/s]", 0.0, MAX_SPEED)
+        self._commit("", replace(self.state, speed=checked))
+
+    def set_setting(self, key: str, value: Any) -> None:
+        """The temperature, the method, the policy or the network; `key` is the field of `State`."""
+        self._commit("", self.state.with_setting(key, value))
+
+    def keep_least(self, word: str) -> None:
+        """Watts or effort, by the method that keeps them least."""
+        self.set_setting("method", LEAST[chosen(word, "least", LEAST)])
+
+    def toggle_axis(self, axis: int) -> None:
+        """An axis of the wrench counts, or is free."""
+        layout = self.state.layout
+        counts = layout.commanded ^ (np.arange(6) == axis)
+        if not counts.any():
+            raise FinlabError("a robot commands at least one axis; switch another one on first")
+        state = replace(self.state, layout=replace(layout, axes=axes_in(counts)))
+        self._commit(f"{'Command' if counts[axis] else 'Free'} {AXES[axis]}", state)
+
+    def toggle_failure(self, name: str) -> None:
+        """An actuator fails, or is repaired."""
+        verb = "Repair" if name in self.state.failed else "Fail"
+        self._commit(f"{verb} {name}", self.state.with_failure_toggled(name))
+
+    def damage(self, name: str, kind: str, value: Any) -> None:
+        """An actuator has a fault of a kind, one of `Health`: a share, an angle [rad], a command; None mends
+        that."""
+        verb = "Mend" if value is None else FAULT_VERBS.get(kind, "Damage")
+        self._commit(f"{verb} {name}", self.state.with_fault(name, kind, value), f"{kind} {name}")
+
+    def mend(self, name: str) -> None:
+        """An actuator is whole again."""
+        state = self.state
+        for kind in FAULTS[part_of(state.layout, name).type]:
+            state = state.with_fault(name, kind, None)
+        self._commit(f"Mend {name}", state.with_failure_toggled(name) if name in state.failed else state)
+
+    def mend_all(self) -> None:
+        """All actuators are whole again."""
+        self._commit("Mend all", replace(self.state, failed=(), health=None))
+
+    # What is looked at; none of it is part of undo.
+
+    @property
+    def drawer(self) -> str | None:
+        """What of the drawer is seen; None where it is folded, or the task has none."""
+        return None if self.desk.folded else self.desk.opened[self.desk.task] or None
+
+    def show_task(self, name: str) -> None:
+        """Open a task."""
+        self.desk = replace(self.desk, task=chosen(name, "task", TASKS))
+        self.step = None
+
+    def show_drawer(self, name: str) -> None:
+        """Open the drawer at one of its tabs, and the task to which it belongs."""
+        task = next((task for task, names in DRAWERS.items() if name in names), self.desk.task)
+        chosen(name, "drawer", DRAWERS[task])
+        others = tuple(pair for pair in self.desk.drawers if pair[0] != task)
+        self.desk = Desk(task, (*others, (task, name)))
+        self.step = None
+
+    def fold_drawer(self) -> None:
+        """Leave only the tabs of the drawer, or open it again."""
+        self.desk = replace(self.desk, folded=not self.desk.folded)
+
+    def show_mode(self, index: int) -> None:
+        """Show one of the answer's modes on the robot."""
+        self.mode = max(0, int(index))
+
+    def show_step(self, step: int, steps: int) -> None:
+        """Show the network's proposals after some steps of their refinement, of as many as there are."""
+        self.step = max(step, 0) if step < steps else None
+
+    def set_loop(self, value: Any) -> None:
+        """Whether the refinement begins anew at its end."""
+        self.loops = bool(value)
+
+    def set_display(self, key: str, value: Any) -> None:
+        """One field of `Display`."""
+        self.display = self.display.with_value(key, value)
+
+    def toggle(self, key: str) -> None:
+        """Turn one switch of `Display` on or off."""
+        self.set_display(key, not getattr(self.display, key))
+
+    def set_swim(self, key: str, value: Any) -> None:
+        """One field of `SwimSettings`."""
+        self.swim = self.swim.with_value(key, value)

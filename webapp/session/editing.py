@@ -1,44 +1,100 @@
-"""Intents about the layout: place, turn, copy and remove actuators, shape the hull."""
+"""Changes of a session's layout: place, turn, copy, remove and describe actuators, shape the hull."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
+from typing import Any
 
 from finlab.errors import FinlabError
-from finlab.layout import Layout
+from finlab.hull import estimated
+from finlab.layout import Actuator, Layout
 from finlab.layout.body import Hull
-from finlab.layout.directions import Vector
-from webapp.session import layout_edits
+from finlab.layout.directions import Vector, part_of, replaced, turned_about
+from webapp.session import actuator_edits, layout_edits
+from webapp.session.actuator_edits import followed, partner, unlinked
 from webapp.session.core import Core
-from webapp.session.links import followed, partner, unlinked
+from webapp.session.guide import Guide
+from webapp.session.looking import Display
 from webapp.session.state import method_for
 
+UNITS = ("kg", "kgm2", "m", "n")
 
-class Editing(Core):
-    """Changes of the layout."""
+
+class Session(Core):
+    """What one browser has made so far."""
+
+    def __init__(self, layout: Layout, display: Display | None = None) -> None:
+        super().__init__(layout, display)
+        self.guide = Guide(self)
+
+    def start_over(self) -> None:
+        """Everything as at first sight, outside of tour and lessons; the way here can be undone."""
+        self.guide.stop = None  # nothing comes back
+        self._commit("Start over", self._first)
+        self.saved = self._first.layout
+        self.chosen, self.mode = (), 0
+
+    # Robots.
 
     def open_layout(self, layout: Layout, step: str = "", failed: tuple[str, ...] = ()) -> None:
         """Another layout, of which some may have failed; the target stays, damage and links are forgotten.
         `step` is what undo calls it."""
         method = method_for(layout, self.state.method)
-        whole = replace(self.state, layout=layout, failed=failed, health=None, links=(), method=method)
-        self._commit(step or f"Open {layout.name}", whole)
+        anew = replace(self.state, layout=layout, failed=failed, health=None, links=(), method=method)
+        self._commit(step or f"Open {layout.name}", anew)
         self.saved = layout
 
     def new_layout(self) -> None:
         """A robot to begin with: one hull and one fin."""
         self.open_layout(layout_edits.blank(), "New design")
-        self.selected = self.state.layout.names[0]
+        self.chosen = self.state.layout.names
 
     def accept_layout(self, layout: Layout) -> None:
         """A better layout that was found for this one."""
         self._edit("Improve the layout", layout)
 
-    def note_saved(self, layout: Layout) -> None:
-        """A layout has been saved as it is."""
-        self.saved = layout
+    def rename_robot(self, wanted: str) -> None:
+        """Another name of the robot."""
+        named = replace(self.state.layout, name=wanted.strip())
+        self._edit(f"Rename the robot to {named.name}", named)
+
+    def describe_robot(self, text: str) -> None:
+        """Another description of the robot."""
+        self._edit("Describe the robot", replace(self.state.layout, description=text.strip()))
+
+    def set_hull(self, shape: str, size: Vector) -> None:
+        """A parametric hull of a size [m]."""
+        self._edit(f"Hull {shape}", layout_edits.shaped(self.state.layout, shape, size), f"hull {shape}")
+
+    def import_hull(self, hull: Hull, name: str = "Import hull") -> None:
+        """A hull from a mesh file; `name` is that of the step."""
+        self._edit(name, layout_edits.with_hull(self.state.layout, hull))
+
+    def set_center_of_gravity(self, center: Vector) -> None:
+        """The centre of gravity at another place in the hull [m]."""
+        self._edit("Move the centre of gravity", layout_edits.balanced(self.state.layout, center), "center")
+
+    def set_dynamics(self, key: str, value: Any) -> None:
+        """Another field of the body, one of `DYNAMICS`; None forgets it."""
+        changed = layout_edits.with_dynamics(self.state.layout, **{key: value})
+        word = actuator_edits.words(key.rsplit("_", 1)[0] if key.rsplit("_", 1)[-1] in UNITS else key)
+        self._edit(f"{word} of the robot", changed)
+
+    def forget_dynamics(self) -> None:
+        """Nothing is said of mass, damping and buoyancy."""
+        nothing: dict[str, Any] = dict.fromkeys(layout_edits.DYNAMICS)
+        self._edit("Forget mass and damping", layout_edits.with_dynamics(self.state.layout, **nothing))
+
+    def estimate(self, anew: bool = False) -> None:
+        """What the hull says of the body; a mass that is known stays, unless all is estimated `anew`."""
+        layout = self.state.layout
+        known = layout_edits.with_dynamics(layout, mass_kg=None) if anew else layout
+        self._edit("Estimate mass and damping from the hull", estimated(known))
+
+    # One actuator.
 
     def drag(self, name: str, position: Vector) -> None:
-        """An actuator on its way in the user's hand: one step of undo for the whole drag."""
+        """An actuator on its way in the user's hand: one step of undo for the drag from end to end."""
         layout = layout_edits.moved(self.state.layout, name, position)
         self._follow(f"Move {name}", name, layout, f"drag {name}", timed=False)
 
@@ -54,68 +110,139 @@ class Editing(Core):
         layout = layout_edits.pointed(self.state.layout, name, direction)
         self._follow(f"Point {name}", name, layout, f"point {name}", timed=not held)
 
-    def _follow(
-        self, step: str, name: str, layout: Layout, merge_key: str | None = None, timed: bool = True
-    ) -> None:
-        """A layout in which one actuator has moved; its twin moves along."""
-        layout = followed(self.state.layout, layout, self.state.links, name)
-        self._edit(step, layout, merge_key, timed)
+    def rename(self, name: str, wanted: str) -> None:
+        """An actuator with another name; whatever is known of it goes on under that."""
+        wanted, layout = wanted.strip(), self.state.layout
+        if wanted != name:
+            if wanted in layout.names:
+                raise FinlabError(f"there is an actuator {wanted!r:.70} already; give another name")
+            renamed = layout.replace_actuator(name, name=wanted)
+            self._commit(f"Rename {name} to {wanted}", self.state.with_layout(renamed, {name: wanted}))
 
     def add(self, kind: str) -> None:
         """One more actuator of a type; it is selected."""
         layout, name = layout_edits.added(self.state.layout, kind)
         self._edit(f"Add {name}", layout)
-        self.selected = name
+        self.chosen = (name,)
 
     def duplicate(self) -> None:
         """A copy of the selected actuator; it is selected."""
-        source = self._selected_name()
+        source = self._chosen()[-1]
         layout, name = layout_edits.duplicated(self.state.layout, source)
         self._edit(f"Duplicate {source}", layout)
-        self.selected = name
+        self.chosen = (name,)
 
     def mirror(self) -> None:
         """The selected actuator's image on the other side, which is selected; they move together."""
-        source = self._selected_name()
+        source = self._chosen()[-1]
         layout, name = layout_edits.mirrored(self.state.layout, source)
         state = self.state.with_layout(layout)
-        self._commit(f"Mirror {source}", state.with_link(source, name))
-        self.selected = name
+        links = (*unlinked(unlinked(state.links, source), name), (source, name))
+        self._commit(f"Mirror {source}", replace(state, links=links))
+        self.chosen = (name,)
 
     def unlink(self) -> None:
         """The selected actuator and its mirror image go their own ways."""
-        name = self._selected_name()
+        name = self._chosen()[-1]
         if partner(self.state.links, name) is None:
             raise FinlabError(f"{name} is not linked to another one; Mirror links it to its image")
         self._commit(f"Unlink {name}", replace(self.state, links=unlinked(self.state.links, name)))
 
     def ring(self, count: int, around: str = "z") -> None:
         """Copies of the selected actuator, so that `count` stand evenly around a body axis."""
-        name = self._selected_name()
+        name = self._chosen()[-1]
         self._edit(f"{count} copies of {name}", layout_edits.ring(self.state.layout, name, count, around))
+
+    # All selected actuators.
 
     def delete(self) -> None:
         """The selected actuators go."""
-        self._selected_name()
-        self._edit(f"Delete {which(self.selection)}", layout_edits.deleted(self.state.layout, self.selection))
+        names = self._chosen() and self.selection
+        self._edit(f"Delete {_words(names)}", layout_edits.deleted(self.state.layout, names))
 
-    def set_hull(self, shape: str, size: Vector) -> None:
-        """A parametric hull of a size [m]."""
-        self._edit(f"Hull {shape}", layout_edits.shaped(self.state.layout, shape, size), f"hull {shape}")
+    def place_selected(self, position: Vector) -> None:
+        """The selected actuator at another place [m]; others that are selected take what has changed."""
+        names = self._chosen()
+        before = part_of(self.state.layout, names[-1]).position
+        changed = [abs(new - old) > layout_edits.UNTOUCHED for new, old in zip(position, before, strict=True)]
 
-    def import_hull(self, hull: Hull, name: str = "Import hull") -> None:
-        """A hull from a mesh file; `name` is that of the step."""
-        self._edit(name, layout_edits.with_hull(self.state.layout, hull))
+        def placed(layout: Layout, name: str) -> Layout:
+            own = part_of(layout, name).position
+            x, y, z = (new if c else old for new, old, c in zip(position, own, changed, strict=True))
+            return layout_edits.moved(layout, name, (x, y, z))
 
-    def set_center_of_gravity(self, center: Vector) -> None:
-        """The centre of gravity at another place in the hull [m]."""
-        self._edit("Move the centre of gravity", layout_edits.balanced(self.state.layout, center), "center")
+        self._for_each("Move", names, placed, f"move {names}")
+
+    def turn_selected(self, angle: float) -> None:
+        """All selected fins with one mounting angle [rad]; actuators without one stay."""
+        parts = [part_of(self.state.layout, name) for name in self._chosen()]
+        names = tuple(part.name for part in parts if getattr(part, "mounting_angle", None) is not None)
+        self._for_each("Turn", names, partial(layout_edits.turned, angle=angle), f"turn {names}")
+
+    def point_selected(self, direction: Vector) -> None:
+        """All selected actuators along one direction of any length, see `point`."""
+        names = self._chosen()
+        pointed = partial(layout_edits.pointed, direction=direction)
+        self._for_each("Point", names, pointed, f"point {names}")
+
+    def turn_about(self, direction: Vector) -> None:
+        """Another second axis of all selected actuators that have one, see `turned_about`."""
+        self._change("Turn", lambda part: turned_about(part, direction))
+
+    def set_value(self, key: str, value: Any) -> None:
+        """A field of all selected actuators that have it, see `with_value`, in SI units and radians."""
+        what = f"{actuator_edits.words(key)} of"
+        self._change(what, lambda part: actuator_edits.with_value(part, key, value))
+
+    def choose_model(self, kind: str) -> None:
+        """Another kind of model for all selected actuators that may have it."""
+        self._change(f"Model {kind} for", lambda part: actuator_edits.modelled(part, kind))
+
+    def set_model(self, names: Sequence[str], **fields: Any) -> None:
+        """Another model for some actuators, and other fields that came with it."""
+        layout = self.state.layout
+        for name in names:
+            layout = layout.replace_actuator(name, **fields)
+        self._edit(f"Fit {_words(names)}", layout)
+
+    # What these share.
+
+    def _chosen(self) -> tuple[str, ...]:
+        """The selected actuators, the one that was chosen last at the end."""
+        if not self.chosen:
+            raise FinlabError("no actuator is selected; click one, or choose it in the list")
+        return self.chosen
 
     def _edit(self, name: str, layout: Layout, merge_key: str | None = None, timed: bool = True) -> None:
-        whole = layout_edits.keeping_hull(self.state.layout, layout)
-        self._commit(name, self.state.with_layout(whole), merge_key, timed)
+        layout = layout_edits.keeping_hull(self.state.layout, layout)
+        self._commit(name, self.state.with_layout(layout), merge_key, timed)
+
+    def _follow(self, step: str, name: str, layout: Layout, merge_key: str, timed: bool) -> None:
+        """A layout in which one actuator has moved; its twin moves along."""
+        self._edit(step, followed(self.state.layout, layout, self.state.links, name), merge_key, timed)
+
+    def _change(self, what: str, change: Callable[[Actuator], Actuator]) -> None:
+        def changed(layout: Layout, name: str) -> Layout:
+            return replaced(layout, change(part_of(layout, name)))
+
+        self._for_each(what, self._chosen(), changed)
+
+    def _for_each(
+        self,
+        what: str,
+        names: tuple[str, ...],
+        change: Callable[[Layout, str], Layout],
+        merge_key: str | None = None,
+    ) -> None:
+        """One step for several actuators; twins follow unless they are among them already."""
+        before, links = self.state.layout, self.state.links
+        layout, done = before, set[str]()
+        for name in reversed(names):  # the one that was chosen last leads its twin
+            if partner(links, name) not in done:
+                layout = followed(before, change(layout, name), links, name)
+                done.add(name)
+        self._edit(f"{what} {_words(names)}", layout, merge_key)
 
 
-def which(names: Sequence[str]) -> str:
-    """Some actuators in a few words."""
+def _words(names: Sequence[str]) -> str:
     return names[0] if len(names) == 1 else f"{len(names)} actuators"

@@ -28,8 +28,8 @@ from finlab.deploy.design_files import (
 from finlab.errors import FinlabError, LayoutError
 from finlab.files.archive import packed as pack
 from finlab.files.plain_values import yaml_text
-from finlab.hull.mesh import Mesh
 from finlab.hull.mesh_file import SizeError, stl_of
+from finlab.hull.shapes import Mesh
 from finlab.hull.surface import UNITS, Surface
 from finlab.layout import Layout, layout_to_dict, load_layout
 from finlab.layout.body import Hull
@@ -87,12 +87,8 @@ def graph_name(layout: Layout) -> str:
 
 def read_layout(name: str, content: bytes) -> Opened:
     """The layout in an uploaded layout file, bundle, archive of a layout with its files, or description.
-
-    Raises:
-        LayoutError: the file is too large, no text or no layout, or names a force table that did not come
-            along; the message names file and key.
-        DataError: a table cannot be read.
-    """
+    LayoutError: the file is too large, no text or no layout, or names a force table that did not come along;
+    the message names file and key. DataError: a table cannot be read."""
     source = Path(str(name)).name[:80] or "upload"
     if source.lower().endswith(".zip"):
         opened = read_archive(source, content, cache_folder())

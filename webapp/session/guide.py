@@ -4,88 +4,73 @@ from dataclasses import replace
 from typing import Any
 
 from finlab.allocation.allocation import Allocation
-from webapp.session.lessons import LESSONS, TOUR, Seen, Stop
-from webapp.session.looking import Desk, Looking
-from webapp.session.state import State, chosen
+from webapp.session.core import Core
+from webapp.session.history import History
+from webapp.session.lessons import LESSONS, TOUR, Stop
+from webapp.session.looking import Desk
+from webapp.session.state import chosen
 
 BY_NAME = {stop.name: stop for stop in (*TOUR, *LESSONS)}
+KEPT = ("history", "saved", "display", "chosen", "mode", "desk")
+"""What of a session comes back at the end."""
 
 
-Steps = tuple[tuple[str, State], ...]
-KEPT = ("saved", "display", "_chosen", "mode", "desk")
-"""What of a session comes back beside its history."""
-
-
-class Guiding(Looking):
+class Guide:
     """A stop of the tour, or a lesson, that is open; the scene brings its camera back with the work."""
 
-    stop: Stop | None = None
-    solved = False
-    """Whether its exercise has been done since it was opened."""
-    _left: tuple[State, Steps, Steps, dict[str, Any]] | None = None
-    """The work as it was: state, what could be undone and redone, and what is `KEPT`."""
+    def __init__(self, session: Core) -> None:
+        self._session = session
+        self.stop: Stop | None = None
+        self.solved = False
+        """Whether its exercise has been done since it was opened."""
+        self._left: dict[str, Any] = {}
+        """The work as it was."""
 
-    @property
-    def course(self) -> tuple[Stop, ...]:
-        """What the stop is one of: the tour, or the lessons."""
-        return TOUR if self.stop in TOUR else LESSONS
+    def open(self, name: str) -> None:
+        """Prepare the state of a stop; what was there before comes back at the end. FinlabError: there is no
+        such stop."""
+        stop, session = BY_NAME[chosen(name, "lesson", BY_NAME)], self._session
+        if self.stop is None:
+            self._left = {key: getattr(session, key) for key in KEPT}
+        self._enter(History(stop.state))  # what can be undone is what is done here
+        self.stop, self.solved = stop, False
+        session.saved, session.chosen, session.mode = stop.state.layout, (), stop.mode
+        session.desk = Desk()
+        session.show_drawer(stop.drawer)
+        session.display = replace(session.display, drawn="none")
 
-    def open_stop(self, name: str) -> None:
-        """Prepare the state of a stop; what was there before comes back at the end.
+    def _enter(self, history: History) -> None:
+        before, self._session.history = self._session.state, history
+        self._session.settle(before)
 
-        Raises:
-            FinlabError: there is no such stop.
-        """
-        stop = BY_NAME[chosen(name, "lesson", BY_NAME)]
-        if self._left is None:
-            past, future = tuple(self.history.past), tuple(self.history.future)
-            self._left = self.state, past, future, {key: getattr(self, key) for key in KEPT}
-        self.history.resume(stop.state, (), ())  # what can be undone is what is done here
-        self._settled()
-        self.saved = stop.state.layout
-        self.stop, self.solved, self.mode, self.step, self.selected = stop, False, stop.mode, None, None
-        self.desk = Desk()
-        self.show_drawer(stop.drawer)
-        self.display = replace(self.display, drawn="none")
-
-    def go_on(self) -> None:
-        """The stop after this one; after the last one the work comes back."""
-        self._go(1)
-
-    def go_back(self) -> None:
-        """The stop before this one."""
-        self._go(-1)
-
-    def _go(self, steps: int) -> None:
+    def go(self, steps: int) -> None:
+        """The stop so many after this one; after the last one the work comes back."""
         if self.stop is not None:
-            place = max(self.course.index(self.stop) + steps, 0)
-            if place == len(self.course):
-                self.end_guide()
+            course = TOUR if self.stop in TOUR else LESSONS
+            place = max(course.index(self.stop) + steps, 0)
+            if place == len(course):
+                self.end()
             else:
-                self.open_stop(self.course[place].name)
+                self.open(course[place].name)
 
     def tour(self) -> None:
         """The tour's first stop, or the one after this."""
         if self.stop in TOUR:
-            self.go_on()
+            self.go(1)
         else:
-            self.open_stop(TOUR[0].name)
+            self.open(TOUR[0].name)
 
-    def end_guide(self) -> None:
+    def end(self) -> None:
         """All is as it was left, and what could be undone then can be undone now."""
-        left, self._left, self.stop = self._left, None, None
-        if left is not None:
-            self.history.resume(*left[:3])
-            self._settled()
-            for key, value in left[3].items():
-                setattr(self, key, value)
+        if self.stop is not None:
+            self.stop = None
+            self._enter(self._left["history"])
+            self._session.history.end_merge()
+            for key, value in self._left.items():
+                setattr(self._session, key, value)
 
     def take(self, answer: Allocation) -> None:
         """See what the fins do now; an exercise that is done stays so until another stop is opened."""
-        if self.stop is not None and answer.layout == self.state.able:
-            self.solved = self.solved or self.stop.done(Seen(self.state, answer, self.mode, self.step))
-
-    def start_over(self) -> None:
-        """Everything as at first sight, outside of tour and lessons; nothing comes back."""
-        self.stop, self._left = None, None
-        super().start_over()
+        session = self._session
+        if self.stop is not None and answer.layout == session.state.able:
+            self.solved = self.solved or self.stop.done(session, answer)

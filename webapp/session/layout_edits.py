@@ -7,21 +7,23 @@ from typing import Any
 
 import numpy as np
 
+from finlab.analysis.moves import is_mirrored
 from finlab.errors import FinlabError
 from finlab.hull import hull_of
 from finlab.layout import Actuator, Azimuth, Body, Fin, Layout, Rudder, Thruster, Tilt
-from finlab.layout.angles import wrapped
+from finlab.layout.axes import wrapped
 from finlab.layout.body import HULL_SHAPES, Hull
 from finlab.layout.directions import Vector, facing, image, part_of, replaced, rotated
 from finlab.layout.layout import MAX_ACTUATORS
 from finlab.layout.thrust_model import PowerLaw
-from webapp.session.links import existing_image
-from webapp.session.state import chosen, number
+from webapp.session.state import chosen, number, numbers
 
 UNTOUCHED = 1e-6
 """Change [m], [rad] up to which a coordinate or an angle counts as left alone: a page's own rounding."""
 MAX_COORDINATE = 10.0
 """How far out an actuator may be placed in the browser [m]."""
+CLOSE = 0.005
+"""How far [m, rad] an actuator may be from another one's mirror image to count as it."""
 CLEAR, STEP_UP = 0.12, 0.05
 """How far a new fin, and a copy, stands from all others if there is room [m]."""
 ROUND = (180, 150, -150, 120, -120, 90, -90, 60, -60, 30, -30, 0)
@@ -50,11 +52,8 @@ DYNAMICS = tuple(field.name for field in fields(Body) if field.name != "hull")
 
 def moved(layout: Layout, name: str, position: Vector) -> Layout:
     """An actuator at another place [m]."""
-    checked = [
-        number(value, f"{axis} of {name} [m]", -MAX_COORDINATE, MAX_COORDINATE)
-        for value, axis in zip(position, "xyz", strict=True)
-    ]
-    return layout.replace_actuator(name, position=tuple(checked))
+    place = numbers(position, f"of {name} [m]", -MAX_COORDINATE, MAX_COORDINATE)
+    return layout.replace_actuator(name, position=place)
 
 
 def turned(layout: Layout, name: str, angle: float) -> Layout:
@@ -74,43 +73,33 @@ def pointed(layout: Layout, name: str, direction: Vector) -> Layout:
 
 
 def keeping_hull(before: Layout, after: Layout) -> Layout:
-    """A layout after an edit, with the hull that was drawn before where none is described.
-
-    One that is made to fit the fins would stretch with each of them.
-    """
-    if after.body is not None and after.body.hull is not None:
+    """A layout after an edit, with the hull that was drawn before where none is described: one that is made
+    to fit the fins would stretch with each of them."""
+    if any(layout.body is not None and layout.body.hull is not None for layout in (after, before)):
         return after
-    if before.body is not None and before.body.hull is not None:
-        return after
-    drawn = hull_of(before)
-    x, y, z = drawn.half
-    return with_hull(after, Hull(shape=drawn.shape, size_m=(2 * x, 2 * y, 2 * z), center_m=drawn.center))
+    return with_hull(after, _drawn_hull(before))
 
 
 def mirrored(layout: Layout, name: str) -> tuple[Layout, str]:
-    """The layout with an actuator's image on the other side of the robot, and the image's name.
-
-    One that already stands there is taken for the image, and nothing is added.
-    """
+    """The layout with an actuator's image on the other side of the robot, and the image's name. One that
+    already stands there is taken for the image, and nothing is added."""
     part = part_of(layout, name)
     if abs(part.position[1]) < 1e-3:
         raise FinlabError(f"{name} sits on the mirror plane (y = 0), so its mirror image is itself")
-    there = existing_image(layout, name)
+    others = (other for other in layout.actuators if other.name != name)
+    there = next((other.name for other in others if is_mirrored(part, other, CLOSE)), None)
     return (layout, there) if there is not None else _added(layout, image(part), _mirror_name(name))
 
 
 def ring(layout: Layout, name: str, count: int, around: str) -> Layout:
     """The layout with copies of an actuator, so that `count` of them stand evenly around a body axis.
-
-    Raises:
-        FinlabError: the actuator stands on the axis, or there is no such axis.
-    """
+    FinlabError: the actuator stands on the axis, or there is no such axis."""
     part, axis = part_of(layout, name), np.eye(3)["xyz".index(chosen(around, "axis", tuple("xyz")))]
     if np.linalg.norm(np.cross(axis, part.position)) < 1e-3:
         raise FinlabError(f"{name} stands on the {around} axis, so its copies would all be in one place")
-    whole = round(number(count, "copies around the axis", 2, MAX_ACTUATORS))
-    for k in range(1, whole):
-        layout, _ = _added(layout, rotated(part, axis, math.tau * k / whole), name)
+    all_of_them = round(number(count, "copies around the axis", 2, MAX_ACTUATORS))
+    for k in range(1, all_of_them):
+        layout, _ = _added(layout, rotated(part, axis, math.tau * k / all_of_them), name)
     return layout
 
 
@@ -125,10 +114,8 @@ def duplicated(layout: Layout, name: str) -> tuple[Layout, str]:
 
 
 def added(layout: Layout, kind: str) -> tuple[Layout, str]:
-    """The layout with one more actuator on the hull, and its name: at the stern, or where there is room.
-
-    A fin's shaft points away from the hull; the others push or steer ahead.
-    """
+    """The layout with one more actuator on the hull, and its name: at the stern, or where there is room. A
+    fin's shaft points away from the hull; the others push or steer ahead."""
     part = NEW[chosen(kind, "actuator", NEW)]
     hull = hull_of(layout)
     far = 4.0 * max(hull.half)
@@ -170,17 +157,10 @@ def deleted(layout: Layout, names: Sequence[str]) -> Layout:
 def _added(layout: Layout, part: Actuator, wanted: str) -> tuple[Layout, str]:
     if layout.n >= MAX_ACTUATORS:
         raise FinlabError(f"the layout has {layout.n} actuators already; expected at most {MAX_ACTUATORS}")
-    name = _free_name(layout, wanted)
+    stem = wanted[:56]
+    names = (stem, *(f"{stem}_{k}" for k in range(2, MAX_ACTUATORS + 2)))
+    name = next(name for name in names if name not in layout.names)
     return replace(layout, actuators=(*layout.actuators, replace(part, name=name))), name
-
-
-def _free_name(layout: Layout, wanted: str) -> str:
-    """`wanted`, or `wanted_2`, `wanted_3`, ... if it is taken."""
-    names, k = set(layout.names), 2
-    name = wanted[:56]
-    while name in names:
-        name, k = f"{wanted[:56]}_{k}", k + 1
-    return name
 
 
 def _mirror_name(name: str) -> str:
@@ -195,16 +175,19 @@ def _mirror_name(name: str) -> str:
 def shaped(layout: Layout, shape: str, size: Vector) -> Layout:
     """The layout with a parametric hull of a size [m]; its centre stays where it is."""
     chosen(shape, "hull", HULL_SHAPES)
-    checked = tuple(
-        number(v, f"{word} of the hull [m]", 0.02, 5.0)
-        for v, word in zip(size, ("length", "width", "height"), strict=True)
-    )
+    checked = numbers(size, "of the hull [m]", 0.02, 5.0, ("length", "width", "height"))
     return with_hull(layout, Hull(shape=shape, size_m=checked, center_m=hull_of(layout).center))
 
 
 def with_hull(layout: Layout, hull: Hull) -> Layout:
     """The layout with a hull; everything else about its body stays."""
     return replace(layout, body=replace(layout.body or Body(), hull=hull))
+
+
+def _drawn_hull(layout: Layout) -> Hull:
+    """The hull that is drawn where none is described."""
+    drawn = hull_of(layout)
+    return Hull(shape=drawn.shape, size_m=tuple(2 * v for v in drawn.half), center_m=drawn.center)
 
 
 def center_of_gravity(layout: Layout) -> Vector:
@@ -214,23 +197,16 @@ def center_of_gravity(layout: Layout) -> Vector:
 
 
 def balanced(layout: Layout, center: Vector) -> Layout:
-    """The layout with the centre of gravity at a place in the hull [m].
-
-    The body frame has its origin there, so hull, fins and the centre of buoyancy move the other way.
-    """
-    checked = [
-        number(v, f"{axis} of the centre of gravity [m]", -2.0, 2.0)
-        for v, axis in zip(center, "xyz", strict=True)
-    ]
+    """The layout with the centre of gravity at a place in the hull [m]. The body frame has its origin there,
+    so hull, actuators and the centre of buoyancy move the other way."""
+    checked = numbers(center, "of the centre of gravity [m]", -2.0, 2.0)
     x, y, z = np.subtract(center_of_gravity(layout), checked).tolist()
 
     def moved(point: tuple[float, ...]) -> Vector:
         return point[0] + x, point[1] + y, point[2] + z
 
-    drawn = hull_of(layout)
     body = layout.body or Body()
-    described = body.hull or Hull(shape=drawn.shape, size_m=tuple(2 * v for v in drawn.half))
-    hull = replace(described, center_m=moved(drawn.center))
+    hull = replace(body.hull or _drawn_hull(layout), center_m=moved(hull_of(layout).center))
     buoyancy = body.center_of_buoyancy_m
     body = replace(body, hull=hull, center_of_buoyancy_m=None if buoyancy is None else moved(buoyancy))
     parts = tuple(replace(part, position=moved(part.position)) for part in layout.actuators)
@@ -238,11 +214,7 @@ def balanced(layout: Layout, center: Vector) -> Layout:
 
 
 def with_dynamics(layout: Layout, **values: Any) -> Layout:
-    """The layout with other fields of `DYNAMICS` of its body; None forgets one.
-
-    Raises:
-        FinlabError: there is no such field, or not with this value.
-    """
+    """The layout with other fields of `DYNAMICS` of its body; None forgets one."""
     for key in values:
         chosen(key, "field of the body", DYNAMICS)
     return replace(layout, body=replace(layout.body or Body(), **values))

@@ -2,33 +2,17 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
 from finlab.allocation.allocation import Allocation
+from webapp.session.core import Core
 from webapp.session.files import shipped
 from webapp.session.state import State, least_of
-from webapp.session.targets import PRESETS
+from webapp.session.targets import FIRST
 
 ALIGNED = 0.999
 """Cosine from which what is delivered points where it was asked."""
-
-
-class Seen(NamedTuple):
-    """What a check is given."""
-
-    state: State
-    answer: Allocation
-    """What is on the robot."""
-    mode: int
-    step: int | None
-    """Steps of refinement that are shown; None where all are."""
-
-    @property
-    def delivered(self) -> bool:
-        """Whether the wrench is what was asked for."""
-        return self.answer.reachable
 
 
 @dataclass(frozen=True)
@@ -38,8 +22,8 @@ class Stop:
     name: str
     title: str
     text: str
-    layout: str
-    target: tuple[float, float, float, float, float, float]
+    layout: str = "ucat"
+    target: tuple[float, float, float, float, float, float] = FIRST
     """Wrench that is asked for [N, N m]."""
     mode: int = 0
     method: str = "dual"
@@ -48,7 +32,8 @@ class Stop:
     """What lies uppermost in the drawer; its task is open."""
     exercise: str = ""
     praise: str = ""
-    done: Callable[[Seen], bool] = lambda seen: False
+    done: Callable[[Core, Allocation], bool] = lambda session, answer: False
+    """Whether the exercise is, by a session and what is on its robot."""
 
     @property
     def state(self) -> State:
@@ -56,12 +41,11 @@ class Stop:
         return State(shipped()[self.layout], target=self.target, method=self.method)
 
 
-def _aligned(seen: Seen) -> bool:
+def _aligned(answer: Allocation) -> bool:
     """Whether something is delivered, and in the direction that was asked for."""
-    both = seen.answer.wrench, np.nan_to_num(seen.answer.target)
-    given, asked = (wrench / seen.answer.scale for wrench in both)
-    size = float(np.linalg.norm(given) * np.linalg.norm(asked))
-    return size > 0.0 and float(given @ asked) / size > ALIGNED
+    delivered, target = (wrench / answer.scale for wrench in (answer.wrench, np.nan_to_num(answer.target)))
+    size = float(np.linalg.norm(delivered) * np.linalg.norm(target))
+    return size > 0.0 and float(delivered @ target) / size > ALIGNED
 
 
 TOUR = (
@@ -70,8 +54,6 @@ TOUR = (
         "A wrench becomes flapping",
         "The blue arrow and ring above the hull are what is asked: forward, and a turn to the left. Each fin "
         "answers with amplitude, frequency and direction; its arrow is its mean force. Green is the sum.",
-        "ucat",
-        PRESETS["Turn"],
     ),
     Stop(
         "many-ways",
@@ -79,8 +61,6 @@ TOUR = (
         "Four fins have twelve numbers, the wrench only six. Here a network proposes ways, each is made "
         "exact, and this is the second best. In the plot below each numbered ring is one. Press some: the "
         "fins change, the green sum stays.",
-        "ucat",
-        PRESETS["Turn"],
         mode=1,
         method="mdn",
     ),
@@ -89,8 +69,6 @@ TOUR = (
         "It swims",
         "Ten times a second the controller asks for a wrench and the fins answer. The blue ball is where "
         "the robot should be. Break a fin by its number, and watch the others take over.",
-        "ucat",
-        PRESETS["Turn"],
         swims=True,
         drawer="Swim over time",
     ),
@@ -112,11 +90,9 @@ LESSONS = (
         "Four fins have twelve numbers, a wrench has six: many commands do the same. In the plot below, "
         "small dots are what a network proposes, and thin lines lead from each to the numbered ring where it "
         "ends. The filled ring is on the robot: the answer, number 1.",
-        "ucat",
-        PRESETS["Turn"],
         exercise="Press a row with the badge network, or its ring. Which fins change, and what stays?",
         praise="The fins changed, the green arrows did not: the robot feels the same force and torque.",
-        done=lambda seen: seen.mode > 0 and seen.delivered,
+        done=lambda session, answer: session.mode > 0 and answer.reachable,
     ),
     Stop(
         "refinement",
@@ -124,12 +100,10 @@ LESSONS = (
         "A sample is nearly right: its error is some hundredths of what the robot can push. It is followed "
         "to the least effort near it, first by descent in forces; then its commands are made exact by the "
         "fins' own laws. The plot's error goes up in powers of ten.",
-        "ucat",
-        PRESETS["Turn"],
         mode=1,
         exercise="Press Play below the plot. Watch the dots, the fins, and the error below the robot.",
         praise="Now drag Step: at each place stands what the robot would do there. With Loop it begins anew.",
-        done=lambda seen: seen.step is not None and seen.step > 0,
+        done=lambda session, _: session.step is not None and session.step > 0,
     ),
     Stop(
         "temperature",
@@ -137,14 +111,12 @@ LESSONS = (
         "The network gives a mixture: components, each with a mean and a spread, for different ways to share "
         "the wrench. First come the means; the other samples are drawn about them, with variances times the "
         "temperature.",
-        "ucat",
-        PRESETS["Turn"],
         exercise="Set Temperature to 0, beside the plot, then to 2. What becomes of dots and rings?",
         praise=(
             "At 0 dots lie on the means, at 2 they stray far; the rings stay. The minima belong to the "
             "robot: the network only says where to begin."
         ),
-        done=lambda seen: seen.state.temperature is not None and seen.state.temperature > 1.9,
+        done=lambda session, _: (session.state.temperature or 0.0) > 1.9,
     ),
     Stop(
         "watts-or-effort",
@@ -158,7 +130,7 @@ LESSONS = (
             "More fins work, each a little, and the robot needs fewer watts. The answer has the badge "
             "optimum: its watts are proved least. What the network proposes stands beside it."
         ),
-        done=lambda seen: least_of(seen.state.method) == "watts" and seen.delivered,
+        done=lambda session, answer: least_of(session.state.method) == "watts" and answer.reachable,
         method="mdn",
     ),
     Stop(
@@ -166,11 +138,9 @@ LESSONS = (
         "A fin is lost",
         "Nothing has to be built or trained for it: the fin is left out, and the wrench is divided among the "
         "others, as long as they can give it.",
-        "ucat",
-        PRESETS["Turn"],
         exercise="At Fail, on the left, press the number of a fin, so that nothing is left undone.",
         praise="Three fins are enough for this turn. Fail a second one: which axis is missing then?",
-        done=lambda seen: bool(seen.state.failed) and seen.delivered,
+        done=lambda session, answer: bool(session.state.failed) and answer.reachable,
     ),
     Stop(
         "no-yaw",
@@ -181,7 +151,9 @@ LESSONS = (
         (1.0, 0.0, 0.0, 0.0, 0.0, 0.2),
         exercise="Press a fin in the list, and move Shaft on the right, until below the robot stands Exact.",
         praise="One turned shaft gave the robot an axis. Reach, below, has before and now side by side.",
-        done=lambda seen: seen.state.layout.fins != shipped()["no_yaw"].fins and seen.delivered,
+        done=lambda session, answer: (
+            session.state.layout.fins != shipped()["no_yaw"].fins and answer.reachable
+        ),
         drawer="Reach",
     ),
     Stop(
@@ -196,7 +168,9 @@ LESSONS = (
             "Less is delivered, in the asked proportions: a robot that is asked for too much still goes "
             "where it should."
         ),
-        done=lambda seen: seen.state.policy == "direction" and not seen.delivered and _aligned(seen),
+        done=lambda session, answer: (
+            session.state.policy == "direction" and not answer.reachable and _aligned(answer)
+        ),
     ),
     Stop(
         "learned-physics",
@@ -211,6 +185,6 @@ LESSONS = (
             "on this wrench, with its error, costs and time."
         ),
         drawer="Comparison",
-        done=lambda seen: seen.state.method == "paper" and seen.answer.method == "paper",
+        done=lambda session, answer: session.state.method == answer.method == "paper",
     ),
 )

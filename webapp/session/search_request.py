@@ -1,4 +1,4 @@
-"""What a search for a better layout may do: what moves, and how far."""
+"""A request for a better layout: what may move, and how far."""
 
 import math
 from dataclasses import dataclass, replace
@@ -33,11 +33,7 @@ class SearchRequest:
     """How far they may go along x, y, z [m] and turn [deg]."""
 
     def with_goal(self, goal: Any) -> "SearchRequest":
-        """Another goal.
-
-        Raises:
-            FinlabError: there is no such goal.
-        """
+        """Another goal."""
         return replace(self, goal=chosen(goal, "goal", GOAL_WORDS))
 
     def with_held_toggled(self, name: str) -> "SearchRequest":
@@ -46,22 +42,14 @@ class SearchRequest:
         return replace(self, held=held if name in self.held else (*held, name))
 
     def with_way(self, way: tuple[Any, ...]) -> "SearchRequest":
-        """Other bounds of all.
-
-        Raises:
-            FinlabError: they are too far, or no numbers.
-        """
+        """Other bounds of all."""
         x, y, z = (
             number(v, f"reach along {axis} [m]", 0.0, 0.5) for v, axis in zip(way, "xyz", strict=False)
         )
         return replace(self, way=(x, y, z, number(way[3], "turn [°]", 0.0, 180.0)))
 
     def bounds(self, layout: Layout) -> dict[str, Bounds]:
-        """Where each that may move may go from where it is.
-
-        Raises:
-            FinlabError: none may.
-        """
+        """Where each that may move may go from where it is. FinlabError: none may."""
         bounds = {}
         for part in layout.actuators:
             if part.name not in self.held:

@@ -1,27 +1,26 @@
-"""What a browser works on: one immutable, checked value that undo can put back."""
+"""The state that a browser works on: one immutable, checked value that undo can put back."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
+from types import MappingProxyType
 from typing import Any
 
-import numpy as np
-
-from finlab.allocation.mdn_settings import MdnSettings
 from finlab.allocation.methods import METHODS, method_class
 from finlab.allocation.policy import AXES, KINDS
+from finlab.allocation.settings import MdnSettings
 from finlab.errors import FinlabError
 from finlab.layout import Layout
 from finlab.layout.damage import FAULTS, Health
 from finlab.layout.fin import MAX_AMPLITUDE, MAX_FREQUENCY
-from finlab.layout.wrench_axes import axes_in
 from finlab.paper.settings import PaperSettings
 from finlab.physics import plant_of
-from webapp.session.links import Links, kept, linked
 
 AXIS_WORDS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 AXIS_UNITS = ("N", "N", "N", "N m", "N m", "N m")
 
+Links = tuple[tuple[str, str], ...]
+"""Mirror pairs by name; an actuator is in at most one of them."""
 MAX_TARGET = 1000.0
 """Largest target component that the page may ask for [N, N m]."""
 Flow = tuple[float, float, float, float, float, float]
@@ -65,41 +64,21 @@ class State:
         return (self.speed, 0.0, 0.0, 0.0, 0.0, 0.0) if felt else None
 
     @property
-    def healthy(self) -> tuple[str, ...]:
-        """Names of the fins that work."""
-        return tuple(name for name in self.layout.names if name not in self.failed)
-
-    @property
     def able(self) -> Layout:
         """The layout with the limits that are left to damaged fins."""
         return self.layout if self.health is None else self.health.applied_to(self.layout)
 
     def asking(self, other: "State") -> "State":
         """The same robot with the question of another state: what is asked for, of whom, and how."""
-        return replace(
-            self,
-            target=other.target,
-            temperature=other.temperature,
-            method=method_for(self.layout, other.method),
-            network=other.network,
-            policy=other.policy,
-            speed=other.speed,
-        )
+        robot = {key: getattr(self, key) for key in ("layout", "failed", "health", "links")}
+        return replace(other, **robot, method=method_for(self.layout, other.method))
 
     def with_target(self, axis: int, value: Any) -> "State":
         """One component of the target changed."""
-        checked = number(value, f"{AXES[axis]} [{AXIS_UNITS[axis]}]", -MAX_TARGET, MAX_TARGET)
         target = list(self.target)
-        target[axis] = checked
+        target[axis] = number(value, f"{AXES[axis]} [{AXIS_UNITS[axis]}]", -MAX_TARGET, MAX_TARGET)
         fx, fy, fz, tx, ty, tz = target
         return replace(self, target=(fx, fy, fz, tx, ty, tz))
-
-    def with_axis_toggled(self, axis: int) -> "State":
-        """One axis commanded, or free."""
-        counts = self.layout.commanded ^ (np.arange(6) == axis)
-        if not counts.any():
-            raise FinlabError("a robot commands at least one axis; switch another one on first")
-        return replace(self, layout=replace(self.layout, axes=axes_in(counts)))
 
     def with_failure_toggled(self, name: str) -> "State":
         """One actuator failed or repaired."""
@@ -108,11 +87,7 @@ class State:
         return replace(self, failed=tuple(n for n in self.layout.names if n in lost))
 
     def with_fault(self, name: str, kind: str, value: Any) -> "State":
-        """An actuator with a fault that its type may have, see `FAULTS`; None, and a share of 1, mend that.
-
-        Raises:
-            FinlabError: it cannot have this fault, or not with this value.
-        """
+        """An actuator with a fault of its type, see `FAULTS`; None, and a share of 1, mend that."""
         part = self.layout.actuators[self.layout.index(name)]
         chosen(kind, f"fault of {name}, a {part.type}", FAULTS[part.type])
         checked = None if value is None else _checked_fault(name, kind, value)
@@ -120,11 +95,15 @@ class State:
         out = held if kind in held and checked is not None else (kind,)
         kinds = {
             word: tuple(pair for pair in pairs if pair[0] != name or word not in out)
-            for word, pairs in _faults(self.health).items()
+            for word, pairs in self._faults()
         }
         if checked is not None:
             kinds[kind] += ((name, checked),)
         return self._with_faults(kinds)
+
+    def _faults(self) -> list[tuple[str, tuple[Any, ...]]]:
+        """What is damaged how: names and values by field of `Health`."""
+        return [(field.name, getattr(self.health, field.name, ())) for field in fields(Health)]
 
     def _with_faults(self, kinds: dict[str, tuple[Any, ...]]) -> "State":
         health = Health(**kinds) if any(kinds.values()) else None
@@ -132,47 +111,21 @@ class State:
             health.applied_to(self.layout)  # says what cannot be
         return replace(self, health=health)
 
-    def with_layout(self, layout: Layout) -> "State":
-        """Another layout; damage of actuators that still exist stays.
-
-        Raises:
-            FinlabError: one of them cannot have its damage any more.
-        """
-        names = layout.names
-        changed = replace(
-            self,
-            layout=layout,
-            failed=tuple(name for name in names if name in self.failed),
-            links=kept(self.links, layout),
-            method=method_for(layout, self.method),
-        )
-        faults = _faults(self.health).items()
-        return changed._with_faults({k: tuple(p for p in pairs if p[0] in names) for k, pairs in faults})
-
-    def with_renamed(self, name: str, wanted: str) -> "State":
-        """A fin with another name; its damage and its link go on with it.
-
-        Raises:
-            LayoutError: there is no such fin, the name is none, or another fin has it.
-        """
-
-        def new(old: str) -> str:
-            return wanted if old == name else old
-
+    def with_layout(self, layout: Layout, renamed: Mapping[str, str] = MappingProxyType({})) -> "State":
+        """Another layout; damage and links of actuators that still exist stay, also of those that are
+        `renamed` (old and new names). FinlabError: one of them cannot have its damage any more."""
+        names = {old: renamed.get(old, old) for old in self.layout.names}
+        now = {old: new for old, new in names.items() if new in layout.names}
+        lost = {now.get(name) for name in self.failed}
         return replace(
             self,
-            layout=self.layout.replace_actuator(name, name=wanted),
-            failed=tuple(new(old) for old in self.failed),
-            links=tuple((new(a), new(b)) for a, b in self.links),
+            layout=layout,
+            failed=tuple(name for name in layout.names if name in lost),
+            links=tuple((now[a], now[b]) for a, b in self.links if a in now and b in now),
+            method=method_for(layout, self.method),
         )._with_faults(
-            {kind: tuple((new(old), v) for old, v in pairs) for kind, pairs in _faults(self.health).items()}
+            {kind: tuple((now[old], v) for old, v in pairs if old in now) for kind, pairs in self._faults()}
         )
-
-    def with_link(self, a: str, b: str) -> "State":
-        """Two fins become a mirror pair that moves together."""
-        for name in (a, b):
-            self.layout.index(name)
-        return replace(self, links=linked(self.links, a, b))
 
     def with_setting(self, key: str, value: Any) -> "State":
         """The temperature, the method, the policy or the network changed."""
@@ -183,11 +136,6 @@ class State:
             return replace(self, **{key: chosen(value, key, CHOICES[key])})
         settings = DRAWING.get(self.method, DRAWING["mdn"])  # they say what is wrong with a number
         return replace(self, temperature=replace(settings, temperature=value).temperature)
-
-
-def _faults(health: Health | None) -> dict[str, tuple[Any, ...]]:
-    """What is damaged how: names and values by field of `Health`."""
-    return {field.name: getattr(health, field.name, ()) for field in fields(Health)}
 
 
 def _checked_fault(name: str, kind: str, value: Any) -> Any:
@@ -205,7 +153,7 @@ def _checked_fault(name: str, kind: str, value: Any) -> Any:
 
 
 def _angle(value: Any, name: str, low: float, high: float) -> float:
-    """An angle [rad] within bounds [rad]; people are told of it in degrees."""
+    """An angle [rad] within bounds [rad]; people read of it in degrees."""
     if not isinstance(value, bool) and isinstance(value, (int, float)):
         number(math.degrees(value), name, *(math.degrees(end) for end in (low - 1e-6, high + 1e-6)))
     return number(value, name, -math.inf, math.inf)
@@ -227,11 +175,7 @@ def least_of(method: str) -> str:
 
 
 def chosen(value: Any, name: str, choices: Iterable[str]) -> Any:
-    """One of some words, or a sentence that says which there are; the page may send anything.
-
-    Raises:
-        FinlabError: `value` is none of them.
-    """
+    """One of some words. FinlabError: it is none of them, and which there are."""
     words = tuple(choices)
     if value not in words:
         raise FinlabError(f"{name}: expected one of {', '.join(words)}, got {value!r:.60}")
@@ -239,13 +183,16 @@ def chosen(value: Any, name: str, choices: Iterable[str]) -> Any:
 
 
 def number(value: Any, name: str, low: float, high: float) -> float:
-    """A finite number within limits, or a sentence that says what is wrong; the page may send anything.
-
-    Raises:
-        FinlabError: `value` is not such a number.
-    """
+    """A finite number within limits. FinlabError: `value` is not such a number."""
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise FinlabError(f"{name}: expected a number, got {value!r:.60}")
     if not low <= value <= high:  # a NaN compares false as well
         raise FinlabError(f"{name}: expected a number from {low:g} to {high:g}, got {value:g}")
     return float(value)
+
+
+def numbers(
+    values: Sequence[Any], of: str, low: float, high: float, words: Sequence[str] = "xyz"
+) -> tuple[float, ...]:
+    """Some numbers within limits, by the words that they are called in a sentence."""
+    return tuple(number(v, f"{word} {of}", low, high) for v, word in zip(values, words, strict=True))

@@ -1,4 +1,4 @@
-"""What is to be swum: what the user has set so far, and the plan that comes of it when the swim starts."""
+"""Settings of swims, and the plan that comes of them when a swim starts."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -7,7 +7,7 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from finlab.assets import PAPER_LAYOUTS
-from finlab.control import steers
+from finlab.control import CONTROLLERS, steers
 from finlab.errors import FinlabError
 from finlab.evaluation.experiments.hard_days import CURRENT, HARD_DAYS, TWO, HardDay
 from finlab.layout import Layout
@@ -36,17 +36,14 @@ class SwimSettings:
 
     scenario: str = "nominal"
     path: str = "lissajous"
+    controller: str = "tracking"
     speed: float = 1.0
     """Simulated time per time on the wall."""
     announced: bool = True
     """Whether breaking and mending is announced to the allocator; else the monitor has to detect it."""
 
     def with_value(self, key: str, value: Any) -> "SwimSettings":
-        """One field changed; the page may send anything.
-
-        Raises:
-            FinlabError: there is no such field, or not with this value.
-        """
+        """One field changed. FinlabError: there is no such field, or not with this value."""
         if key == "scenario":
             day = SCENARIOS[chosen(value, key, tuple(SCENARIOS))]
             said = replace(self, announced=day.announced, path=day.trajectory)
@@ -55,8 +52,8 @@ class SwimSettings:
             raise FinlabError(f"announced: expected true or false, got {value!r:.60}")
         if key == "speed":
             value = number(value, key, *SPEEDS)
-        elif key == "path":
-            chosen(value, key, SHIPPED)
+        elif key in ("path", "controller"):
+            chosen(value, key, SHIPPED if key == "path" else CONTROLLERS)
         elif key != "announced":
             raise FinlabError(f"a swim has no setting {key!r:.40}")
         return replace(self, **{key: value})
@@ -67,11 +64,7 @@ class SwimSettings:
         return SCENARIOS[self.scenario]
 
     def plan(self, state: State) -> "Plan":
-        """The plan for the robot as it is now.
-
-        Raises:
-            FinlabError: the scenario takes more fins away than the robot has.
-        """
+        """The plan for the robot as it is now. FinlabError: the scenario takes away more than it has."""
         day, layout = self.day, state.able
         path = make_trajectory(self.path, day.duration_s if self.path == day.trajectory else None)
         affected = _affected(layout, state.failed, day)
@@ -88,6 +81,7 @@ class SwimSettings:
             1.0 if day.weak is None else day.weak,
             tuple(FinFault(name, 0.5 * path.duration_s) for name in affected) if day.lost else (),
             self.announced,
+            self.controller,
         )
 
 
@@ -122,3 +116,4 @@ class Plan(NamedTuple):
     """Of their thrust that these give."""
     losses: tuple[FinFault, ...] = ()
     announced: bool = True
+    controller: str = "tracking"

@@ -1,1 +1,1 @@
-"""What takes time, away from the event loop: answers, searches, swims, and the threads they run on."""
+"""Work away from the event loop: answers, searches, swims, and the threads they run on."""

@@ -1,11 +1,14 @@
-"""Keeps one page's answer up to date: asks for the newest state, and knows what of the answer is shown."""
+"""The newest answer of one page, its modes and their refinement, and what of them is shown."""
 
+import asyncio
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
 from finlab.allocation.allocation import Allocation
 from finlab.arrays import Array
+from finlab.errors import FinlabError
 from webapp.tasks.background import Newest
 from webapp.tasks.context import Context
 from webapp.tasks.mode_names import NO_MODES, Modes
@@ -13,20 +16,24 @@ from webapp.tasks.solver import Reply
 
 SEARCH_REST_S = 0.2
 """How long there must be no newer answer before all its modes are searched for [s]: that takes a while."""
+STEP_S = 0.2
+"""Time between two steps [s]."""
+HOLD = 5
+"""Steps for which the end is seen before it begins anew."""
 
 
 class Answering:
     """The newest answer, its modes, and the part of it that is on the robot."""
 
-    def __init__(self, context: Context, found: Callable[[], None]) -> None:
-        """Answer what the page's session asks; `found` is called when its candidates are known."""
+    def __init__(self, context: Context, known: Callable[[], None]) -> None:
+        """Answer what the page's session asks; `known` is called when its candidates are."""
         self._session = context.session
-        self._changed, self._found, self._notify = context.changed, found, context.notify
-        self._told: str | None = None
+        self._changed, self._known, self._notify = context.changed, known, context.notify
+        self._noted: str | None = None
         self._shown: tuple[Allocation, Array, Allocation] | None = None
-        loop, worker, solver = context.loop, context.workers.answers, context.solver
-        self._answer = Newest(loop, worker, solver.reply, self._take)
-        self._search = Newest(loop, worker, solver.modes, self._take_modes, SEARCH_REST_S)
+        self._solver, loop, worker = context.solver, context.loop, context.workers.answers
+        self._answer = Newest(loop, worker, self._solver.reply, self._take)
+        self._search = Newest(loop, worker, self._modes, self._take_modes, SEARCH_REST_S)
 
     @property
     def reply(self) -> Reply | None:
@@ -55,6 +62,11 @@ class Answering:
         return self.busy or self._search.busy
 
     @property
+    def proving(self) -> bool:
+        """True until what is proved of the newest answer is known."""
+        return self.busy or self._search.answered is None or self._search.answered[0] is not self.reply
+
+    @property
     def error(self) -> str | None:
         """Why the present state has no answer."""
         return None if self.busy else self._answer.error
@@ -80,24 +92,96 @@ class Answering:
     def ask(self) -> None:
         """Have the worker answer the present state, unless it was asked already."""
         self._answer.ask(self._session.state)
+        if not self.busy:
+            self._look(at_once=True)
+
+    def _look(self, at_once: bool) -> None:
+        """Prove the newest answer, and search for its modes once these can be seen."""
+        reply, session = self.reply, self._session
+        if reply is not None and self._search.question != (reply, True):
+            seen = session.drawer == "Candidates" or session.mode > 0
+            self._search.ask((reply, seen), at_once)
 
     def forget(self) -> None:
         """Nothing is known of the robot any more: another one was opened, or the page has gone."""
         for task in (self._answer, self._search):
             task.forget()
 
+    def _modes(self, question: tuple[Reply, bool]) -> Modes:
+        """On the worker's thread."""
+        return self._solver.modes(*question)
+
     def _take(self) -> None:
         error = self._answer.error
         if self.reply is not None:
-            self._search.ask(self.reply)
+            self._look(at_once=False)
         else:
             self._search.forget()
-            if error is not None and error != self._told:
+            if error is not None and error != self._noted:
                 self._notify("No answer", error)
-        self._told = error
+        self._noted = error
         self._changed()
 
     def _take_modes(self) -> None:
         if self._search.error is not None:
             self._notify("No candidates", self._search.error)
-        self._found()
+        self._known()
+
+
+class Refining:
+    """Plays the refinement of what the network proposes: in the plot, on the robot, and in what is said."""
+
+    def __init__(self, context: Context, answering: Answering) -> None:
+        self._session, self._loop, self._changed = context.session, context.loop, context.changed
+        self._answering = answering
+        self._timer: asyncio.TimerHandle | None = None
+        self._held = 0
+
+    @property
+    def running(self) -> bool:
+        """Whether it goes on by itself."""
+        return self._timer is not None
+
+    def toggle(self) -> None:
+        """Play, from the proposals where the end is shown, or pause. FinlabError: nothing can be played."""
+        if self.running:
+            self.stop()
+            return
+        session, modes = self._session, self._answering.modes
+        if self._answering.searching or not modes.steps:
+            raise FinlabError("the network proposes nothing here whose refinement could be shown")
+        if modes.proposal_of(session.mode) is None:  # the answer of another method: then the network's best
+            session.mode = min(place for place in modes.ends if place >= 0)
+        if session.step is None:
+            session.step = 0
+        self._wait()
+
+    def stop(self) -> None:
+        """Stay where it is."""
+        if self._timer is not None:
+            self._timer.cancel()
+        self._timer = None
+
+    def hold(self, step: Any) -> None:
+        """Stay at a step."""
+        self.stop()
+        self._session.show_step(int(step), self._answering.modes.steps)
+
+    def _wait(self) -> None:
+        self._timer = self._loop.later(STEP_S, self._go_on)
+
+    def _go_on(self) -> None:
+        session, steps, self._timer = self._session, self._answering.modes.steps, None
+        looked_at = session.desk.opened[session.desk.task] == "Candidates"
+        if self._answering.searching or not steps or not looked_at:
+            session.step = None
+        else:
+            if session.step is not None:
+                session.show_step(session.step + 1, steps)
+                self._held = 0
+            else:
+                self._held += 1
+                session.step = 0 if self._held >= HOLD else None
+            if session.step is not None or session.loops:
+                self._wait()
+        self._changed()

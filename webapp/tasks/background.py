@@ -1,4 +1,4 @@
-"""What takes time: threads that compute, viser's event loop, and questions of which the newest wins."""
+"""Threads that compute, viser's event loop, and questions of which the newest wins."""
 
 import asyncio
 import threading
@@ -6,7 +6,7 @@ import traceback
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 from finlab.errors import FinlabError
 
@@ -48,13 +48,10 @@ class EventLoop:
 
 
 class Worker:
-    """Runs jobs on a thread of its own. A job that waits is replaced by a newer one with the same key.
-
-    Askers take turns in the order in which they began to wait, so that nothing queues up.
-    """
+    """Runs jobs on a thread of its own. A job that waits is replaced by a newer one with the same key; keys
+    take turns in the order in which they began to wait, so that nothing queues up."""
 
     def __init__(self) -> None:
-        """Start the thread."""
         self._jobs: dict[Hashable, tuple[Job, Failed]] = {}
         self._wake = threading.Condition()
         self._stopped = False
@@ -62,13 +59,8 @@ class Worker:
         self._thread.start()
 
     def submit(self, key: Hashable, job: Job, failed: Failed) -> None:
-        """Run `job` soon, instead of a job with the same key that has not begun yet.
-
-        Args:
-            key: who asks, and what for.
-            job: what to do, on the worker's thread.
-            failed: called there with a sentence that says why the job failed.
-        """
+        """Run `job` soon on the worker's thread, instead of a job with the same key that has not begun yet;
+        `failed` is called there with a sentence that says why it failed."""
         with self._wake:
             self._jobs[key] = (job, failed)
             self._wake.notify()
@@ -128,10 +120,8 @@ class Workers:
 
 
 class Newest(Generic[Question, Found]):
-    """Answers one kind of question for one page; one that waits gives way to a newer one.
-
-    All methods are called on the event loop; only `work` runs on the worker's thread.
-    """
+    """Answers one kind of question for one page; one that waits gives way to a newer one. All methods are
+    called on the event loop; only `work`, and what it reports, runs on the worker's thread."""
 
     def __init__(
         self,
@@ -141,15 +131,8 @@ class Newest(Generic[Question, Found]):
         changed: Callable[[], None],
         rest_s: float = 0.0,
     ) -> None:
-        """Prepare.
-
-        Args:
-            loop: where everything else runs.
-            worker: whose thread computes.
-            work: answers a question there.
-            changed: called on the loop when there are findings, or an error.
-            rest_s: how long the question may not change before work begins [s].
-        """
+        """`work` answers a question on the thread of a worker once it has not changed for `rest_s` [s];
+        `changed` is called on the loop when there are findings, an error, or progress."""
         self._loop, self._worker, self._work, self._changed = loop, worker, work, changed
         self._rest_s = rest_s
         self._timer: asyncio.TimerHandle | None = None
@@ -160,23 +143,25 @@ class Newest(Generic[Question, Found]):
         self.findings: Found | None = None
         """What came of it; None where nothing did."""
         self.error: str | None = None
+        self.progress: Any = None
+        """How far the work is, where it reports that; None when it is done."""
 
     @property
     def busy(self) -> bool:
         """True while the newest question has no answer."""
         return self.answered is not self.question
 
-    def ask(self, question: Question) -> None:
-        """Have a question answered, unless it is the one that was asked last."""
+    def ask(self, question: Question, at_once: bool = False) -> None:
+        """Have a question answered, unless it is the one that was asked last; `at_once` without a rest."""
         if self.question is not None and question == self.question:
             return
         self.question = question
-        if self._rest_s == 0.0:
-            self._start(question)
-            return
         if self._timer is not None:
             self._timer.cancel()
-        self._timer = self._loop.later(self._rest_s, partial(self._start, question))
+        if at_once or self._rest_s == 0.0:
+            self._start(question)
+        else:
+            self._timer = self._loop.later(self._rest_s, partial(self._start, question))
 
     def forget(self) -> None:
         """Drop question and findings; what is still under way counts no more."""
@@ -184,18 +169,27 @@ class Newest(Generic[Question, Found]):
             self._timer.cancel()
         self._worker.forget(id(self))
         self._round = object()
-        self.question = self.answered = self.findings = self.error = None
+        self.question = self.answered = self.findings = self.error = self.progress = None
+
+    def report(self, question: Question, progress: Any) -> None:
+        """How far the work on a question is; called by the work."""
+        self._loop.post(partial(self._note, question, progress))
+
+    def _note(self, question: Question, progress: Any) -> None:
+        if question is self.question and self.busy:  # else nobody waits for it
+            self.progress = progress
+            self._changed()
 
     def _start(self, question: Question) -> None:
         take = partial(self._take, self._round, question)
 
         def job() -> None:
-            found = self._work(question)
-            self._loop.post(partial(take, found, None))
+            findings = self._work(question)
+            self._loop.post(partial(take, findings, None))
 
         self._worker.submit(id(self), job, lambda text: self._loop.post(partial(take, None, text)))
 
-    def _take(self, begun: object, question: Question, found: Found | None, error: str | None) -> None:
+    def _take(self, begun: object, question: Question, findings: Found | None, error: str | None) -> None:
         if begun is self._round:
-            self.answered, self.findings, self.error = question, found, error
+            self.answered, self.findings, self.error, self.progress = question, findings, error, None
             self._changed()

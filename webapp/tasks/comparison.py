@@ -25,7 +25,7 @@ class Run(NamedTuple):
 
     @property
     def methods(self) -> tuple[str, ...]:
-        """Those that are asked, in their order."""
+        """All of them, in their order."""
         return () if self.state is None else compared(self.state.layout)
 
     @property
@@ -34,45 +34,40 @@ class Run(NamedTuple):
         return len(self.answers) < len(self.methods) and not self.cancelled
 
 
-class Comparison:
-    """The runs of one page."""
+class Comparison(Newest[State, Allocation]):
+    """The runs of one page: one question per method, so that those of other pages are answered in between."""
 
     def __init__(self, context: Context) -> None:
-        """The page is rendered after every answer."""
-        self._solver, self._changed = context.solver, context.changed
-        # One question per method: those of this and other pages are answered in between.
-        self._asked = Newest(context.loop, context.workers.answers, self._quickest, self._take)
+        super().__init__(context.loop, context.workers.answers, self._quickest, self._hear)
+        self._solver, self._render = context.solver, context.changed
         self.run = Run()
 
     def start(self, state: State) -> None:
         """Ask all methods about a state; a run that is still going on is given up."""
-        self.forget()
+        super().forget()
         self.run = Run(state)
-        self._next()
+        self._next(state)
 
     def cancel(self) -> None:
         """Ask no more; the answers so far stay."""
-        self._asked.forget()
+        super().forget()
         self.run = self.run._replace(cancelled=True)
 
     def forget(self) -> None:
         """Give up and forget."""
-        self._asked.forget()
+        super().forget()
         self.run = Run()
 
-    def _next(self) -> None:
-        if self.run.state is not None and self.run.running:
-            method = self.run.methods[len(self.run.answers)]
-            self._asked.ask(replace(self.run.state, method=method))
+    def _next(self, state: State) -> None:
+        if self.run.running:
+            self.ask(replace(state, method=self.run.methods[len(self.run.answers)]))
 
     def _quickest(self, state: State) -> Allocation:
         return min((self._solver.solve(state) for _ in range(TRIES)), key=lambda answer: answer.solve_ms)
 
-    def _take(self) -> None:
-        asked = self._asked
-        if self.run.state is not None and asked.answered is not None:
-            answer = asked.error if asked.findings is None else asked.findings
-            answers = (*self.run.answers, (asked.answered.method, answer or "no answer"))
-            self.run = Run(self.run.state, answers)
-            self._changed()
-            self._next()
+    def _hear(self) -> None:
+        if self.answered is not None:
+            answer = self.findings or self.error or "no answer"
+            self.run = self.run._replace(answers=(*self.run.answers, (self.answered.method, answer)))
+            self._render()
+            self._next(self.answered)

@@ -15,7 +15,6 @@ from finlab.exchange import is_robot_table
 from finlab.exchange.convert import TABLES
 from finlab.files.worker import in_worker
 from finlab.hull import hull_of
-from finlab.layout import Layout
 from webapp.presses import Presses
 from webapp.session import files
 from webapp.session.files import FRAGMENT, WRENCH, file_stem, packed, unpacked
@@ -36,54 +35,11 @@ SHARED = (
 Take = Callable[[str, bytes], object]
 
 
-class Exports:
-    """Makes files beside the event loop and sends them to one browser."""
+class Designs:
+    """What one page does with its design; files are made beside the event loop."""
 
     def __init__(self, context: Context) -> None:
-        """Send what the page's session holds to its browser."""
         self._context, self._session = context, context.session
-
-    def bundle(self) -> None:
-        """Send the bundle for the robot: the same bytes as `finlab export --zip`.
-
-        What was tried out with K and T on the page does not go to the robot.
-        """
-        state, shipped = self._session.state, self._context.solver.shipped
-        self._send(
-            files.bundle_name(state.layout),
-            lambda: make_bundle(shipped(state.layout, state.method), state.failed).zip_bytes(),
-        )
-
-    def graph(self) -> None:
-        """Send the graph of the robot's actuators: the same text as `finlab export --graph`."""
-        layout = self._session.state.layout
-        self._send(files.graph_name(layout), lambda: graph_text(layout).encode())
-
-    def swim(self, swimming: Swimming) -> None:
-        """Send the log of the robot that swims as NPZ."""
-        log = swimming.log()
-        swimmer = swimming.swimmer
-        assert swimmer is not None
-        name = file_stem(f"{swimmer.layout.name}_{swimmer.method}_{swimmer.about}")
-        self._send(f"{name}.npz", log.npz)
-
-    def _send(self, name: str, make: Callable[[], bytes]) -> None:
-        """Have a file made, and send it."""
-        self._context.reading.make(make, partial(self.download, name), name)
-
-    def download(self, name: str, content: bytes) -> None:
-        """Send a file that is there already, and say where it went."""
-        self._context.client.send_file_download(name, content, save_immediately=True)
-        self._context.notify("Saved", f"{name}, among the downloads of this browser", calm=True)
-
-
-class Designs:
-    """What one page does with whole designs."""
-
-    def __init__(self, context: Context, exports: Exports, presses: Presses) -> None:
-        """Hear from the page which link it was opened with."""
-        self._context, self._session, self._exports = context, context.session, exports
-        presses.on("design-link", lambda _, text: self.open_link(text))
 
     def new(self) -> None:
         """A robot with one hull and one fin."""
@@ -100,16 +56,16 @@ class Designs:
         self._read(partial(in_worker, unpacked, design), wrench)
 
     def _read(self, read: Callable[[], Opened], wrench: str | None = None) -> None:
+        """`wrench` is that of a link; there is none with a file."""
 
         def ready() -> Opened:
             opened = read()
             hull_of(opened.layout)  # what is drawn of it takes its time
             return opened
 
-        self._context.reading.make(ready, partial(self._take, wrench), "open")
+        self._context.make(ready, partial(self._take, wrench), "open")
 
     def _take(self, wrench: str | None, opened: Opened) -> None:
-        """`wrench` is that of a link; there is none with a file."""
         self._session.open_layout(opened.layout, failed=opened.failed)
         if wrench is not None:
             text = f"{opened.layout.name} is a copy; whoever shared it does not see what you change"
@@ -125,28 +81,59 @@ class Designs:
     def save(self) -> None:
         """Send the design's file to the browser."""
         layout = self._session.state.layout
-        self._context.reading.make(partial(files.layout_file, layout), partial(self._send, layout), "save")
 
-    def _send(self, layout: Layout, file: tuple[str, bytes]) -> None:
-        self._exports.download(*file)
-        self._session.note_saved(layout)
+        def send(file: tuple[str, bytes]) -> None:
+            self._download(*file)
+            self._session.saved = layout
+
+        self._context.make(partial(files.layout_file, layout), send, "save")
 
     def share(self) -> None:
         """Show the link that carries the design, and take it to the clipboard where the browser lets us."""
-        state = self._session.state
-        self._context.reading.make(partial(packed, state.layout), partial(self._show, state), "share")
+        layout, target = self._session.state.layout, self._session.state.target
 
-    def _show(self, state: State, text: str) -> None:
-        wrench = WRENCH + ",".join(f"{value:.6g}" for value in state.target)
-        card = json.dumps([f"Share {state.layout.name}", SHARED, FRAGMENT + text + wrench])
-        run_script(self._context.client.gui, f"finlabCards.share(...{card});")
+        def show(text: str) -> None:
+            wrench = WRENCH + ",".join(f"{value:.6g}" for value in target)
+            card = json.dumps([f"Share {layout.name}", SHARED, FRAGMENT + text + wrench])
+            run_script(self._context.client.gui, f"finlabCards.share(...{card});")
+
+        self._context.make(partial(packed, layout), show, "share")
+
+    def bundle(self) -> None:
+        """Send the bundle for the robot: the same bytes as `finlab export --zip`. What was tried out on the
+        page does not go to the robot."""
+        now, solver = self._session.state, self._context.solver
+        shipped = State(now.layout, method=now.method)
+        self._export(
+            files.bundle_name(now.layout),
+            lambda: make_bundle(solver.allocator(shipped), now.failed).zip_bytes(),
+        )
+
+    def graph(self) -> None:
+        """Send the graph of the robot's actuators: the same text as `finlab export --graph`."""
+        layout = self._session.state.layout
+        self._export(files.graph_name(layout), lambda: graph_text(layout).encode())
+
+    def swim(self, swimming: Swimming) -> None:
+        """Send the log of the robot that swims as NPZ."""
+        log = swimming.log()
+        swimmer = swimming.swimmer
+        assert swimmer is not None
+        name = file_stem(f"{swimmer.layout.name}_{swimmer.method}_{swimmer.about}")
+        self._export(f"{name}.npz", log.npz)
+
+    def _export(self, name: str, make: Callable[[], bytes]) -> None:
+        self._context.make(make, partial(self._download, name), name)
+
+    def _download(self, name: str, content: bytes) -> None:
+        self._context.client.send_file_download(name, content, save_immediately=True)
+        self._context.notify("Saved", f"{name}, among the downloads of this browser", calm=True)
 
 
 class Opening:
-    """What files are for."""
+    """The kinds of files that one page opens, and who takes each."""
 
     def __init__(self, gui: viser.GuiApi, presses: Presses) -> None:
-        """Let the page take what is dropped on it."""
         self._takers: dict[str, Take] = {}
         presses.on("dropped", _refuse)
         run_file(gui, "dropping.js")
@@ -161,22 +148,16 @@ class Opening:
         self._takers |= dict.fromkeys(suffixes.split(","), take)
 
     def open(self, name: str, content: bytes) -> None:
-        """A file that the browser has sent.
-
-        Raises:
-            FinlabError: it is of no kind that is opened, or whoever takes it refuses it.
-        """
+        """A file that the browser has sent. FinlabError: it is of no kind that is opened, or whoever takes it
+        refuses it."""
         suffix = PurePath(name).suffix.lower()
-        take = self._takers.get(".yaml" if suffix in TABLES and is_robot_table(content) else suffix)
+        robot = suffix in TABLES and in_worker(is_robot_table, content)
+        take = self._takers.get(".yaml" if robot else suffix)
         if take is None:
             raise FinlabError(f"{PurePath(name).name[-60:]!r} cannot be opened; expected {KINDS}")
         take(name, content)
 
 
 def _refuse(_key: str, _text: str) -> None:
-    """What several files, or a folder, are told.
-
-    Raises:
-        FinlabError: always.
-    """
+    """What several files, or a folder, get for an answer."""
     raise FinlabError("one file can be dropped at a time; put a design and its files into one ZIP archive")

@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from finlab.actuators.fin.models import read_table
+from finlab.actuators.fin.fin_laws import read_table
 from finlab.deploy.design_files import stored_table
 from finlab.errors import DataError, FinlabError, LayoutError
 from finlab.files.worker import in_worker
@@ -52,17 +52,12 @@ class Fitting(Newest[Upload, Fitted]):
     """One file at a time for one page; what came of it goes on the fin at once, and undo takes it off."""
 
     def __init__(self, context: Context) -> None:
-        """The page is rendered when there is progress."""
         super().__init__(context.loop, context.workers.fits, self._fit, self._put_on)
         self._context = context
-        self.progress = ""
 
     def start(self, actuator: str, name: str, content: bytes) -> None:
-        """Begin with a file for an actuator.
-
-        Raises:
-            FinlabError: another file is under way, the file is too large, or it is for a rudder.
-        """
+        """Begin with a file for an actuator. FinlabError: another file is under way, the file is too large,
+        or it is for a rudder."""
         if self.busy:
             raise FinlabError("a fit is under way already; wait for it, or cancel it")
         short = re.sub(r"[^\w .()+-]", "_", Path(str(name)).name)[-60:].lstrip(". ") or "upload.csv"
@@ -78,38 +73,33 @@ class Fitting(Newest[Upload, Fitted]):
         self.progress = "reading the file"
         self.ask(Upload(part, short, content))
 
-    def forget(self) -> None:
-        """Cancel what is under way, and put away what came of the last file; all keep their models."""
-        super().forget()
-        self.progress = ""
-
     def put_on_all(self) -> None:
         """What was found for all that still have the model that this one had."""
-        found, session = self.findings, self._context.session
-        if found is not None:
-            old = found.upload.part
+        fitted, session = self.findings, self._context.session
+        if fitted is not None:
+            old = fitted.upload.part
             alike = [part.name for part in session.state.layout.actuators if _model(part) == _model(old)]
             if not alike:
                 raise FinlabError("no other actuator has the model that this one had")
-            session.set_model(alike, **found.found)
+            session.set_model(alike, **fitted.found)
 
     def _put_on(self) -> None:
-        """On the loop, when the worker is done."""
-        self.progress = ""
-        found, context = self.findings, self._context
-        if found is None:
-            context.notify("Not fitted", self.error or "nothing came of it")
-            context.changed()
-        else:
-            context.do(partial(self._take_over, found))
+        """On the loop, when there is progress, and when the worker is done."""
+        context = self._context
+        if self.findings is not None:
+            context.do(partial(self._take_over, self.findings))
+            return
+        if self.error is not None:
+            context.notify("Not fitted", self.error)
+        context.changed()
 
-    def _take_over(self, found: Fitted) -> None:
-        upload, session = found.upload, self._context.session
+    def _take_over(self, fitted: Fitted) -> None:
+        upload, session = fitted.upload, self._context.session
         name, layout = upload.part.name, session.state.layout
         if name not in layout.names or _model(part_of(layout, name)) != _model(upload.part):
             self.forget()
             raise FinlabError(f"{name} is no longer what {upload.name} was for; upload it again")
-        session.set_model([name], **found.found)
+        session.set_model([name], **fitted.found)
 
     def _fit(self, upload: Upload) -> Fitted:
         """On the worker's thread."""
@@ -127,8 +117,7 @@ class Fitting(Newest[Upload, Fitted]):
                 raise type(error)(str(error).replace(f"{folder}/", "")) from None
 
     def _fit_measurements(self, path: Path, upload: Upload, done: Upload) -> Fitted:
-        from finlab.fit.fin_file import fin_csv
-        from finlab.fit.fin_fit import fit_fin
+        from finlab.fit.fin_fit import fin_csv, fit_fin
         from finlab.fit.measurements import read_measurements
 
         tell = partial(self._tell, upload)
@@ -141,12 +130,7 @@ class Fitting(Newest[Upload, Fitted]):
         """On the worker's thread, before each step: a fit whose result is not waited for ends here."""
         if upload is not self.question:
             raise FinlabError("cancelled")
-        self._loop.post(partial(self._note, upload, words))
-
-    def _note(self, upload: Upload, words: str) -> None:
-        if upload is self.question and self.busy:
-            self.progress = words
-            self._context.changed()
+        self.report(upload, words)
 
 
 def _model(part: Actuator) -> object:
@@ -168,8 +152,8 @@ def _bench(path: Path, done: Upload) -> Fitted:
     with suppress(LayoutError):
         return Fitted(done, within(in_worker(PowerTable.read, path)))
     fit = fit_thruster(in_worker(read_bench, [path]))
-    beside = {"dead_band": fit.dead_band, "torque_per_newton": fit.torque_per_newton}
-    return Fitted(done, {**within(fit.table), **beside, "uncertainty": None}, fit)
+    more = {"dead_band": fit.dead_band, "torque_per_newton": fit.torque_per_newton}
+    return Fitted(done, {**within(fit.table), **more, "uncertainty": None}, fit)
 
 
 def _is_table(path: Path) -> bool:

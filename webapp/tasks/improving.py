@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from finlab.analysis import Bounds, Improvement, Progress, optimize_layout
+from finlab.analysis import Bounds, Improvement, optimize_layout
 from finlab.arrays import Array
 from finlab.errors import FinlabError
 from finlab.hull import hull_of
@@ -16,7 +16,7 @@ from finlab.layout import Fin, Layout
 from finlab.layout.directions import replaced
 from webapp.scene.meshes.blades import CHORD, ROOT, SPAN
 from webapp.session.search_request import GOAL_WORDS, SearchRequest
-from webapp.session.state import Flow, State
+from webapp.session.state import State
 from webapp.tasks.background import Newest
 from webapp.tasks.context import Context
 
@@ -37,11 +37,8 @@ class Room:
 
     def __init__(self, layout: Layout, apart: float) -> None:
         """Blades, and what stands outside of the layout's hull now, stay outside; what two actuators sweep is
-        `apart` [m].
-
-        A fin sweeps a cylinder about its shaft, any other one a ball. What is closer already, or overlaps,
-        need not part, but comes no closer.
-        """
+        `apart` [m]: a cylinder about a fin's shaft, else a ball. What is closer already, or overlaps, need
+        not part, but comes no closer."""
         self._hull = hull_of(layout).coarse()
         fins = np.array([isinstance(part, Fin) for part in layout.actuators])
         self._along = np.where(fins[:, None], ALONG, 0.0)
@@ -72,15 +69,11 @@ class Room:
 class Search:
     """One search."""
 
-    layout: Layout
-    """Where it begins."""
-    failed: tuple[str, ...]
-    """Those that are lost, which stay where they are."""
-    flow: Flow | None
+    state: State
+    """Where it begins; what has failed stays where it is."""
     goal: str
     """What to raise, as `optimize_layout` calls it."""
     bounds: Mapping[str, Bounds]
-    room: Room
     stop: threading.Event = field(default_factory=threading.Event)
 
 
@@ -88,23 +81,16 @@ class Improver(Newest[Search, Improvement]):
     """One search at a time for one page."""
 
     def __init__(self, context: Context) -> None:
-        """The page is rendered when there is progress."""
         super().__init__(context.loop, context.workers.searches, self._improve, context.changed)
-        self.progress: Progress | None = None
 
     def start(self, state: State, request: SearchRequest) -> None:
-        """Search from a layout for places of what works; mirror pairs stay mirror pairs.
-
-        Raises:
-            FinlabError: a search is running, nothing works, or nothing may move.
-        """
+        """Search from a layout for places of what works; mirror pairs stay mirror pairs. FinlabError: a
+        search is running, nothing works, or nothing may move."""
         if self.busy:
             raise FinlabError("a search is running already; cancel it first")
-        left = state.layout.without(state.failed)
-        room, goal = Room(left, APART_M), GOAL_WORDS[request.goal]
-        search = Search(state.layout, state.failed, state.flow, goal, request.bounds(left), room)
+        bounds = request.bounds(state.layout.without(state.failed))
         self.forget()
-        self.ask(search)
+        self.ask(Search(state, GOAL_WORDS[request.goal], bounds))
 
     def cancel(self) -> None:
         """Stop soon; what has been found by then is offered."""
@@ -115,27 +101,22 @@ class Improver(Newest[Search, Improvement]):
         """The result has been taken or left, or the page has gone."""
         self.cancel()
         super().forget()
-        self.progress = None
 
     def _improve(self, search: Search) -> Improvement:
         """On the worker's thread."""
-        found = optimize_layout(
-            search.layout.without(search.failed),
+        layout, state = search.state.layout, search.state
+        left = layout.without(state.failed)
+        improvement = optimize_layout(
+            left,
             tuple(search.bounds),
             search.bounds,
             search.goal,
-            rule=search.room.broken,
+            rule=Room(left, APART_M).broken,
             grid=GRID,
-            flow=search.flow,
-            progress=lambda progress: self._loop.post(partial(self._note, search, progress)),
+            flow=state.flow,
+            progress=partial(self.report, search),
             cancelled=search.stop.is_set,
         )
-        layout = search.layout
-        for part in found.layout.actuators:
+        for part in improvement.layout.actuators:
             layout = replaced(layout, part)
-        return replace(found, layout=layout)
-
-    def _note(self, search: Search, progress: Progress) -> None:
-        if search is self.question:  # else it was forgotten
-            self.progress = progress
-            self._changed()
+        return replace(improvement, layout=layout)

@@ -6,15 +6,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from finlab.allocation.allocation import Allocation
-from finlab.allocation.modes import (
-    Mode,
-    find_modes,
-    force_sizes,
-    mode_signature,
-    same_signature,
-)
+from finlab.allocation.modes import Mode, find_modes, force_sizes, mode_signature, same_signature
 from finlab.allocation.solution import Candidates
-from webapp.markup.words import OWN as OWN
 from webapp.markup.words import fins_words
 from webapp.theme import MODE_COLORS
 
@@ -57,17 +50,11 @@ class Modes:
 NO_MODES = Modes((), 0)
 
 
-def modes_of(answer: Allocation, found: Candidates, badge: str, ways: tuple[Candidates, ...]) -> Modes:
-    """The modes of an answer.
-
-    Args:
-        answer: the answer.
-        found: itself as a candidate, then others.
-        badge: whose it is.
-        ways: what a network proposed for it, and its refinement.
-    """
+def modes_of(answer: Allocation, candidates: Candidates, badge: str, ways: tuple[Candidates, ...]) -> Modes:
+    """The modes of an answer, of itself as a candidate and others; `badge` says whose it is, `ways` are what
+    a network proposed for it, and its refinement."""
     layout = answer.layout
-    modes = find_modes(found, force_sizes(layout, found.command), layout.lower, layout.upper)
+    modes = find_modes(candidates, force_sizes(layout, candidates.command), layout.lower, layout.upper)
     shown, last = named_modes(modes, badge), ways[-1]
     signatures = map(mode_signature, last.command, force_sizes(layout, last.command))
     ends = tuple(
@@ -86,14 +73,14 @@ def named_modes(modes: Sequence[Mode], badge: str) -> tuple[NamedMode, ...]:
 
 def _names(modes: Sequence[Mode]) -> list[str]:
     """Who rests; modes of the same name are numbered."""
-    told = [_resting_words(mode) for mode in modes]
-    places = [told[:k].count(name) + 1 for k, name in enumerate(told)]
-    return [f"{name} ({place})" if place > 1 else name for name, place in zip(told, places, strict=True)]
+    names = [_resting_words(mode) for mode in modes]
+    places = [names[:k].count(name) + 1 for k, name in enumerate(names)]
+    return [f"{name} ({place})" if place > 1 else name for name, place in zip(names, places, strict=True)]
 
 
 def _resting_words(mode: Mode) -> str:
     still = [k for k in mode.resting if k in mode.still]
     hardly = [k for k in mode.resting if k not in still]
-    told = ((still, "rest", "rests"), (hardly, "hardly push", "hardly pushes"))
-    parts = [f"{fins_words(fins)} {many if len(fins) > 1 else one}" for fins, many, one in told if fins]
+    both = ((still, "rest", "rests"), (hardly, "hardly push", "hardly pushes"))
+    parts = [f"{fins_words(fins)} {many if len(fins) > 1 else one}" for fins, many, one in both if fins]
     return ", ".join(parts) or "all fins push"

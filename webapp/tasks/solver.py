@@ -1,4 +1,4 @@
-"""From a state to an answer with all that a page shows of it: picks the allocator and keeps it."""
+"""The solver: from a state to an answer with all that a page shows of it, by allocators that it keeps."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -11,19 +11,24 @@ from finlab.allocation.allocation import Allocation
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.methods import MethodChoice, choose_method
 from finlab.allocation.solution import Candidates
+from finlab.errors import FinlabError
 from finlab.layout import Layout
-from finlab.networks.checkpoint import resolve_checkpoint
+from finlab.networks.checkpoint import network_features, resolve_checkpoint
+from finlab.paper.network import NetworkConfig
 from finlab.physics import plant_of
 from webapp.markup.verdict import is_proved
+from webapp.markup.words import OWN
 from webapp.session.state import DRAWING, State, chosen
-from webapp.tasks.mode_names import NO_MODES, OWN, Modes, modes_of
-from webapp.tasks.networks import SHIPPED, is_papers, paper_networks
+from webapp.tasks.mode_names import NO_MODES, Modes, modes_of
 
 Load = Callable[..., MethodChoice]
 KEPT = 24
 """Allocators that are kept: to make one takes as long as a hundred answers."""
 ALTERNATIVE_ERROR = 1e-4
 """Normalized error up to which another answer is an alternative."""
+SHIPPED = NetworkConfig.shipped
+RUNS = "runs"
+"""Folder in the one where the app was started, whose folders are looked at."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +51,7 @@ class Solver:
         self._load = load
         self._choices: dict[tuple[str, str], MethodChoice] = {}
         self._made: dict[tuple[Layout, str, float | None, str], Allocator] = {}
-        own = checkpoint is not None and is_papers(resolve_checkpoint(checkpoint))
+        own = checkpoint is not None and _is_papers(resolve_checkpoint(checkpoint))
         self.first_network = str(resolve_checkpoint(checkpoint)) if own and checkpoint else SHIPPED
         """The network that method `paper` begins with."""
 
@@ -56,41 +61,33 @@ class Solver:
         return Solver(self._checkpoint, self._load)
 
     def networks(self) -> dict[str, Path]:
-        """The networks that method `paper` may answer with now, by name."""
-        return paper_networks(self._checkpoint)
-
-    def shipped(self, layout: Layout, method: str) -> Allocator:
-        """The allocator of a robot by a method as it is shipped, whose networks are loaded once.
-
-        Raises:
-            FinlabError: it cannot be made.
-        """
-        return self._on(layout, method, None, "")
+        """The networks that method `paper` may answer with now, by name: the shipped one, those that were
+        trained here, and the checkpoint, which may be of another method."""
+        folders = [resolve_checkpoint(SHIPPED)]
+        folders += sorted(path.parent for path in Path(RUNS).glob("*/config.json"))
+        if self._checkpoint is not None:
+            folders.append(resolve_checkpoint(self._checkpoint))
+        names = [SHIPPED, *map(str, folders[1:])]
+        return {n: folder for n, folder in zip(names, folders, strict=True) if _is_papers(folder)}
 
     def allocator(self, state: State) -> Allocator:
-        """The allocator for the state's robot and method with the state's settings.
-
-        Raises:
-            FinlabError: it cannot be made.
-        """
-        temperature = state.temperature if state.method in DRAWING else None
-        return self._on(state.layout, state.method, temperature, state.network)
-
-    def _on(self, layout: Layout, method: str, temperature: float | None, network: str) -> Allocator:
-        """An allocator, one of the last few or made now."""
-        network = (network or self.first_network) if method == "paper" else ""
+        """The allocator for a state's robot, method and settings, one of the last few or made now; fails
+        where it cannot be made."""
+        layout, method = state.layout, state.method
+        temperature = state.temperature if method in DRAWING else None
+        network = (state.network or self.first_network) if method == "paper" else ""
         key = layout, method, temperature, network
-        found = self._made.pop(key, None)
-        if found is None:
+        allocator = self._made.pop(key, None)
+        if allocator is None:
             choice = self._choice(method, network)
             settings = choice.settings
             if temperature is not None and "temperature" in choice.kind.option_names():
                 settings = replace(settings, **{"temperature": temperature})
-            found = Allocator.of_choice(layout, replace(choice, settings=settings))
-        self._made[key] = found  # the newest is last
+            allocator = Allocator.of_choice(layout, replace(choice, settings=settings))
+        self._made[key] = allocator  # the newest is last
         while len(self._made) > KEPT:
             self._made.pop(next(iter(self._made)))
-        return found
+        return allocator
 
     def _choice(self, method: str, network: str) -> MethodChoice:
         """A method with its networks, loaded once."""
@@ -102,23 +99,21 @@ class Solver:
         return self._choices[method, network]
 
     def reply(self, state: State) -> Reply:
-        """The answer to a state with all that a page shows of it, computed to the end.
-
-        Raises:
-            FinlabError: the method cannot be loaded or cannot answer.
-        """
+        """The answer to a state with all that a page shows of it, computed to the end. Fails as `solve`."""
         answer = judged(self.solve(state))
-        _ = answer.forces, answer.power, answer.effort  # told here, not where the page is written
+        _ = answer.forces, answer.power, answer.effort  # here, not where the page is written
         in_reach = answer.reachable
         if not in_reach and state.method != "dual":  # which misses nothing that can be reached
             in_reach = self.solve(replace(state, method="dual")).reachable
         return Reply(state, answer, in_reach)
 
-    def modes(self, reply: Reply) -> Modes:
+    def modes(self, reply: Reply, seen: bool = True) -> Modes:
         """The answer, and beside it all distinct ways to do the same that the network proposes: tens of
-        milliseconds. Method `paper` has a network of its own."""
+        milliseconds. Method `paper` has a network of its own. Where they are not `seen` it is only proved."""
         answer, state = reply.answer, reply.state
         _ = answer.bound, answer.notes  # to prove what is least takes longer than to find it
+        if not seen:
+            return NO_MODES
         if answer.samples is not None and answer.candidates is not None and state.method == "paper":
             return modes_of(answer, answer.candidates, "network", (answer.samples,))
         asks = np.nan_to_num(answer.target).any()
@@ -135,11 +130,7 @@ class Solver:
         return modes_of(answer, own.beside(ways[-1].exact(ALTERNATIVE_ERROR)), badge, ways)
 
     def solve(self, state: State) -> Allocation:
-        """The answer to a state.
-
-        Raises:
-            FinlabError: the method cannot be loaded or cannot answer.
-        """
+        """The answer to a state. FinlabError: the method cannot be loaded or cannot answer."""
         return self.allocator(state).allocate(
             state.target,
             failed=state.failed,
@@ -150,20 +141,24 @@ class Solver:
         )
 
 
-def judged(answer: Allocation) -> Allocation:
-    """An answer whose candidates and samples tell what the fins' own laws make of them, as it does itself.
+def _is_papers(folder: Path) -> bool:
+    try:
+        return network_features(folder) == NetworkConfig.features
+    except FinlabError:  # a folder of something else is no choice
+        return False
 
-    A method with a learned model ranks them by what that believes.
-    """
+
+def judged(answer: Allocation) -> Allocation:
+    """An answer whose candidates and samples have the wrench by the fins' own laws, as it has itself. A
+    method with a learned model ranks them by what that believes."""
     if answer.wrench_expected is None:
         return answer
-    told = (
-        None if found is None else _judged(answer, found) for found in (answer.candidates, answer.samples)
-    )
-    return answer.with_candidates(*told)
 
+    def corrected(drawn: Candidates | None) -> Candidates | None:
+        if drawn is None:
+            return None
+        wrench = plant_of(answer.layout).wrench(drawn.command)
+        error = np.linalg.norm(np.nan_to_num(wrench - answer.target) / answer.scale, axis=-1)
+        return replace(drawn, wrench=wrench, err_norm=error)
 
-def _judged(answer: Allocation, found: Candidates) -> Candidates:
-    wrench = plant_of(answer.layout).wrench(found.command)
-    error = np.linalg.norm(np.nan_to_num(wrench - answer.target) / answer.scale, axis=-1)
-    return replace(found, wrench=wrench, err_norm=error)
+    return answer.with_candidates(corrected(answer.candidates), corrected(answer.samples))

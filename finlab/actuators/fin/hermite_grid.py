@@ -10,7 +10,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from finlab.arrays import AnyArray, Array
-from finlab.layout.angles import TURN
+from finlab.layout.axes import TURN
 
 ROUNDING = 1e-12
 """How far [rad, Hz, rad] outside a grid a value may lie that is meant to be at its edge."""
@@ -72,11 +72,8 @@ class HermiteGrids:
         return rows[0] if len(rows) == 1 else rows
 
     def __call__(self, command: Array, orders: int) -> Array:
-        """All columns at commands (..., 3), or (..., n, 3): values, and with two orders derivatives too.
-
-        Returns:
-            (..., orders, orders, orders, columns): by amplitude, by frequency, by zero direction.
-        """
+        """All columns (..., orders, orders, orders, columns) at commands (..., 3), or (..., n, 3): by
+        amplitude, by frequency, by zero direction; with two orders values and derivatives."""
         cell, weight = self._weights(command, orders)
         corner = (cell * self._stride).sum(-1) + self._start
         grid = self._rows[corner[..., None] + self._around]
@@ -84,8 +81,7 @@ class HermiteGrids:
         both = weight[..., 0, :, None, :, None] * weight[..., 1, None, :, None, :]
         along = both.reshape(*rows, orders**2, 16) @ grid
         along = weight[..., 2, None, :, :] @ along.reshape(*rows, orders**2, 4, self.columns)
-        found: Array = along.reshape(*rows, orders, orders, orders, self.columns)
-        return found
+        return np.asarray(along.reshape(*rows, orders, orders, orders, self.columns))
 
     def _weights(self, command: Array, orders: int) -> tuple[NDArray[np.intp], Array]:
         """Cells (..., 3) of commands (..., 3), counted through all axes, and on each axis the weights of four
@@ -114,16 +110,11 @@ class HermiteGrids:
 def _closed(grid: Grid) -> list[Array]:
     """The axes, a circle closed."""
     amplitude, frequency, direction = grid.axes
-    return [
-        amplitude,
-        frequency,
-        np.append(direction, direction[0] + TURN) if grid.periodic else direction,
-    ]
+    return [amplitude, frequency, np.append(direction, direction[0] + TURN) if grid.periodic else direction]
 
 
 def _with_neighbours(grid: Grid) -> Array:
-    """The values with a rim of neighbours. At an edge the missing one is the edge itself, which makes its
-    slope one-sided."""
+    """The values with a rim of neighbours, at an edge the edge itself, which makes slopes one-sided."""
     values = np.pad(grid.values, ((1, 1), (1, 1), (0, 0), (0, 0)), "edge")
     around, how = ((1, 2), "wrap") if grid.periodic else ((1, 1), "edge")
     return np.pad(values, ((0, 0), (0, 0), around, (0, 0)), how)  # type: ignore[call-overload, no-any-return]
@@ -131,23 +122,14 @@ def _with_neighbours(grid: Grid) -> Array:
 
 def _shapes(knots: Array, periodic: bool) -> tuple[Array, Array]:
     """Of each cell between knots (n,): the polynomials (n, 4 powers, 4 neighbours) that weigh its neighbours,
-    where it starts, and one over its width (n, 2). The last row stands for no cell.
-
-    The slope at a knot is that of the line through its neighbours.
-    """
+    its start, and one over its width (n, 2). The last row stands for no cell."""
     gaps = np.diff(knots)
     before, after = (gaps[-1], gaps[0]) if periodic else (0.0, 0.0)
     pair = np.concatenate([[before], gaps]) + np.concatenate([gaps, [after]])
     early, late = gaps / pair[:-1], gaps / pair[1:]
     none, one = np.zeros_like(gaps), np.ones_like(gaps)
-    shapes = np.array(
-        [
-            [none, one, none, none],
-            [-early, none, early, none],
-            [2.0 * early, late - 3.0, 3.0 - 2.0 * early, -late],
-            [-early, 2.0 - late, early - 2.0, late],
-        ]
-    )
-    shapes = np.moveaxis(shapes, -1, 0)
+    linear, square = [-early, none, early, none], [2.0 * early, late - 3.0, 3.0 - 2.0 * early, -late]
+    cubic = [-early, 2.0 - late, early - 2.0, late]
+    shapes = np.moveaxis(np.array([[none, one, none, none], linear, square, cubic]), -1, 0)
     places = np.stack([knots[:-1], 1.0 / gaps], axis=-1)
     return np.concatenate([shapes, shapes[-1:]]), np.concatenate([places, places[-1:]])

@@ -1,6 +1,9 @@
-"""Method `ipopt`: CasADi and IPOPT over the forces of the actuators; needs the extra `ipopt`."""
+"""Method `ipopt`: CasADi and IPOPT over the forces of the actuators; needs the extra `ipopt`.
 
-from __future__ import annotations
+The wrench is linear in the forces, but for the drag of foils, and what a force costs is known from the
+compiled actuators: one or two variables for each remain. One start finds the least where no arc is wider
+than half a turn but no full circle, and no fin is uneven. Dead bands are passed over.
+"""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -9,22 +12,165 @@ from typing import Any
 
 import numpy as np
 
-from finlab.allocation.baselines.ipopt_forces import ForceProgram
+from finlab.actuators.response import Group, Line, Plane
 from finlab.allocation.baselines.model_based import SOLVED, ModelBased, TimeLimitedSettings
+from finlab.allocation.baselines.pseudo_inverse import PseudoInverse, pushed_axes
+from finlab.allocation.dual.answers import Answers
 from finlab.allocation.settings import number
 from finlab.arrays import Array
-from finlab.distribution import install
+from finlab.assets import install
 from finlab.errors import AllocationError
+from finlab.layout.axes import TURN
+
+LEVELS = np.sin(0.5 * np.pi * np.linspace(0.0, 1.0, 65)) ** 4
+"""Shares of the range of sizes at which a cost is looked up: dense at both ends, where costs bend."""
+DIRECTIONS = np.linspace(-1.0, 1.0, 97)
+"""Places in an arc at which an uneven fin is looked up, from end to end."""
+SMOOTH = 1e-4
+"""Share of its largest force below which the size of a force is rounded off: it has slopes at rest, too."""
+REST = 1e-3
+"""Share of its largest force up to which an actuator that cannot rest is taken for one that can."""
+NARROW = 1e-6
+"""Half of an arc [rad] below which an actuator pushes along one line."""
+
+
+class ForceProgram:
+    """Power over the forces of one robot in the module `casadi`, the wrench as a constraint, normalized by
+    `sigma` (6,), the target as its parameter. `inverse` gives starts and commands."""
+
+    def __init__(self, casadi: Any, inverse: PseudoInverse, sigma: Array, options: dict[str, Any]) -> None:
+        self._inverse, n = inverse, inverse.plant.n
+        self._most = np.maximum(inverse.largest, 1e-9)
+        share, target = casadi.MX.sym("share", 2 * n), casadi.MX.sym("target", 6)
+        per = np.repeat(self._most, 2)
+        wrench = casadi.DM(inverse.effectiveness * per) @ share + casadi.DM(inverse.beside)
+        self._parts: list[_Line | _Plane] = []
+        for response, (i, group, place) in zip(inverse.responses, inverse.places, strict=True):
+            own, most = share[2 * i : 2 * i + 2], float(self._most[i])
+            if isinstance(response, Plane):
+                self._parts.append(_Plane(casadi, response, own))
+            else:
+                line = _Line(casadi, response, own, most, inverse.groups[group][1], place)
+                self._parts.append(line)
+                wrench += line.beside
+        self.convex = all(part.convex for part in self._parts)
+        """Whether one start is enough, as far as actuators can rest."""
+        cost: Any = sum(part.cost for part in self._parts)
+        limits = [limit for part in self._parts for limit in part.limits]
+        residual = (wrench - target) / casadi.DM(sigma)
+        pushed = casadi.DM(pushed_axes(inverse.effectiveness * per / sigma[:, None])) @ residual
+        limits += [(axis, 0.0, 0.0) for axis in casadi.vertsplit(pushed)]
+        objective = cost / max(sum(part.full_cost for part in self._parts), 1e-300)
+        conditions = casadi.vertcat(*(value for value, _, _ in limits))
+        program = {"x": share, "p": target, "f": objective, "g": conditions}
+        self._solver = casadi.nlpsol("forces", "ipopt", program, options)
+        between = np.array([(low, high) for _, low, high in limits]).reshape(-1, 2).T
+        ends = np.array([part.ends for part in self._parts]).reshape(-1, 2).T
+        self._bounds = dict(zip(("lbg", "ubg", "lbx", "ubx"), (*between, *ends), strict=True))
+
+    def command(self, target: Array, start: Array) -> Array:
+        """The command (n, 3) for a target (6,) where IPOPT ends from forces (n, 2) [N]."""
+        most = self._most[:, None]
+        answer = self._solver(x0=(start / most).ravel(), p=target, **self._bounds)
+        force = np.array(answer["x"], np.float64).reshape(start.shape) * most
+        return np.asarray(self._inverse.decoded((force if np.isfinite(force).all() else start)[None])[0])
+
+    def starts(self, target: Array, n_random: int, seed: int) -> Array:
+        """Forces (S, n, 2) [N]: the pseudo-inverse's, and where arcs are wide, random ones."""
+        first = self._inverse.force(target[None])
+        if self.convex:
+            return first
+        rng = np.random.default_rng(seed)
+        drawn = np.array([[part.random(rng) for part in self._parts] for _ in range(n_random)])
+        return np.concatenate([first, drawn.reshape(-1, *first.shape[1:]) * self._most[:, None]])
+
+
+class _Line:
+    """One actuator of one direction in CasADi; `share` (2,) is its force over the largest one, and 0."""
+
+    limits = ()
+
+    def __init__(self, casadi: Any, line: Line, share: Any, most: float, group: Group, place: int) -> None:
+        reverse = 0.0 if line.reverse is None else line.reverse.largest
+        low, high = max(line.low, -reverse) / most, min(line.high, line.forward.largest) / most
+        self.ends = [(low, high), (0.0, 0.0)]
+        """Least and largest value of both variables."""
+        grid = np.unique(np.concatenate([-LEVELS * reverse, LEVELS * line.forward.largest])) / most
+        if grid[0] == grid[-1]:
+            grid = np.linspace(-1.0, 1.0, 5)
+        cost = Answers([line], []).marginal(most * grid[None])[1][0]
+        self.cost, self.full_cost = _spline(casadi, grid, cost)(share[0]), float(cost.max())
+        """Power [W] in CasADi, and at full load."""
+        force = np.zeros((len(grid), len(group.responses), 2))
+        at_rest = group.beside_of(force)
+        force[:, place, 0] = most * grid
+        extra = group.beside_of(force) - at_rest
+        self.beside: Any = _spline(casadi, grid, extra.ravel())(share[0]) if extra.any() else 0.0
+        """Wrench (6,) in CasADi that comes on top."""
+        self.convex = not extra.any()
+        """Whether the wrench is linear in the force."""
+
+    def random(self, rng: np.random.Generator) -> Array:
+        """Shares (2,) within the limits."""
+        return np.array([rng.uniform(*self.ends[0]), 0.0])
+
+
+class _Plane:
+    """One actuator of two directions in CasADi; `share` (2,) is its force over the largest one."""
+
+    def __init__(self, casadi: Any, plane: Plane, share: Any) -> None:
+        middle, half, table = plane.middle, plane.half, plane.table
+        self._middle, self._half = middle, half
+        self.ends = [(-np.inf, np.inf)] * 2
+        """See `_Line`."""
+        self.convex = plane.gauge is None and (half <= 0.5 * np.pi or half >= np.pi)
+        """Whether the set of forces has no gap, and no bulge."""
+        strongest = 1.0 if plane.gauge is None else float(plane.gauge.max())
+        ahead = strongest * (np.cos(middle) * share[0] + np.sin(middle) * share[1])
+        aside = strongest * (np.cos(middle) * share[1] - np.sin(middle) * share[0])
+        size = casadi.sqrt(ahead * ahead + aside * aside + SMOOTH**2)
+        low, high = float(table.force[0]) / table.largest, 1.0
+        if plane.gauge is not None:
+            end = max(half, NARROW)
+            turn = casadi.atan2(aside, ahead + SMOOTH)  # at rest it has a slope, too
+            turn = casadi.fmin(casadi.fmax(turn, -end), end)
+            count, along = len(plane.gauge), end * DIRECTIONS
+            known = np.append(plane.gauge, plane.gauge[0])
+            gauge = np.interp((middle + along) % TURN, TURN / count * np.arange(count + 1), known)
+            high = _spline(casadi, along, gauge)(turn)
+        force = table.largest * (low + (1.0 - low) * LEVELS)
+        watts = Answers([], [plane]).marginal(force[None])[1][0]
+        cost = _spline(casadi, LEVELS, watts)
+        self.cost, self.full_cost = cost((size / high - low) / max(1.0 - low, 1e-9)), float(watts[-1])
+        """See `_Line`."""
+        self.limits: list[tuple[Any, float, float]] = [(size - high, -np.inf, 0.0)]
+        """Values in CasADi, and between which two numbers they must lie."""
+        if low > REST:
+            self.limits.append((size - low * high, 0.0, np.inf))
+        if half < NARROW:
+            self.limits += [(aside, 0.0, 0.0), (ahead, 0.0, np.inf)]
+        elif half <= 0.5 * np.pi:
+            sides = (ahead * np.sin(half) + sign * aside * np.cos(half) for sign in (-1.0, 1.0))
+            self.limits += [(side, 0.0, np.inf) for side in sides]
+        elif half < np.pi:
+            self.limits.append((ahead - size * np.cos(half), 0.0, np.inf))
+
+    def random(self, rng: np.random.Generator) -> Array:
+        """Shares (2,) within the arc."""
+        angle = self._middle + rng.uniform(-1.0, 1.0) * self._half
+        return rng.uniform() * np.array([np.cos(angle), np.sin(angle)])
+
+
+def _spline(casadi: Any, grid: Array, values: Array) -> Any:
+    """A function through values (K,) or (K * m,) at K points."""
+    return casadi.interpolant("spline", "bspline", [grid.tolist()], values)
+
 
 POLISH, APPROACH = 3, 30
 """Levenberg-Marquardt steps from where IPOPT ends onto the target, or as near as they come."""
-SOLVER_OPTIONS = {
-    "ipopt.print_level": 0,
-    "ipopt.sb": "yes",
-    "ipopt.max_iter": 200,
-    "ipopt.tol": 1e-9,
-    "print_time": False,
-    "error_on_fail": False,
+SOLVER_OPTIONS = {"print_time": False, "error_on_fail": False} | {
+    f"ipopt.{name}": value
+    for name, value in {"print_level": 0, "sb": "yes", "max_iter": 200, "tol": 1e-9}.items()
 }
 
 
@@ -36,15 +182,11 @@ class IpoptSettings(TimeLimitedSettings):
 
 
 class Ipopt(ModelBased):
-    """IPOPT on power, with the wrench as a constraint.
+    """IPOPT on power, with the wrench as a constraint; an `AllocationError` where CasADi is not installed.
 
-    The program is built once per layout with the target as its parameter. Where one start is not enough it
-    is run from random ones, too. Each end is made exact by the laws; the cheapest that meets the target is
-    the answer, else the one that comes nearest. After the time limit no start begins; each may take half as
-    long.
-
-    Raises:
-        AllocationError: CasADi is not installed.
+    Where one start is not enough it is run from random ones, too. Each end is made exact by the laws; the
+    cheapest that meets the target is the answer, else the nearest. After the time limit no start begins; each
+    may take half as long.
     """
 
     name = "ipopt"

@@ -1,4 +1,4 @@
-"""What the methods that know the fin model share: limits, starts, the objective by which starts compete."""
+"""Base of the methods that know the laws: starts, and the objective by which they compete."""
 
 from abc import abstractmethod
 from dataclasses import dataclass
@@ -17,6 +17,7 @@ from finlab.physics.objective import Name, cost_meter
 
 SOLVED = 1e-5
 """Normalized error up to which an answer is exact."""
+LIMIT = "processor time per target after which the best command so far is the answer"
 USUAL_SHARE = 0.1
 """What a robot is mostly asked for, as a share of its yardstick."""
 
@@ -30,7 +31,7 @@ class ModelBased(LeastErrorMethod):
         self.aim: Name = getattr(self.settings, "objective", "power")
         """What is kept least."""
         if self.aim == "effort":
-            self.layout.only_fins("objective 'effort'")
+            self.layout.only("objective 'effort'")
         self.sigma = USUAL_SHARE * self.scale
         """What wrenches (6,) are divided by: what a robot is mostly asked for."""
 
@@ -41,14 +42,11 @@ class ModelBased(LeastErrorMethod):
 
     @abstractmethod
     def _commands(self, targets: Array, seed: int) -> Array:
-        """Commands (N, n, 3) for targets (N, 6).
-
-        Random starts are drawn once and shared by all targets, so that a target gets the same answer alone
-        and among others.
-        """
+        """Commands (N, n, 3) for targets (N, 6). Random starts are drawn once and shared by all targets, so
+        that a target gets the same answer alone and among others."""
 
     def _best(self, target: Array, commands: Array, steps: int) -> Array:
-        """Of commands (S, n, 3), each first brought onto a target (6,) by some Levenberg-Marquardt steps, the
+        """Of commands (S, n, 3), each brought onto a target (6,) by some Levenberg-Marquardt steps, the
         cheapest one (n, 3) that meets it, else the one with the smallest error."""
         problem = CommandProblem.of(self.plant, self.sigma)
         ends = refine(problem, target[None] / self.sigma, commands, steps)
@@ -64,11 +62,4 @@ class ModelBased(LeastErrorMethod):
 class TimeLimitedSettings(Settings):
     """Settings of a slow method, which ends in time."""
 
-    time_limit_s: float = number(
-        0.6,
-        0.0,
-        3600.0,
-        "processor time per target after which the best command so far is the answer",
-        "s",
-        above=True,
-    )
+    time_limit_s: float = number(0.6, 0.0, 3600.0, LIMIT, "s", above=True)

@@ -5,7 +5,7 @@ import numpy as np
 from finlab.actuators.registry import groups_of
 from finlab.actuators.response import Line, Plane, Response
 from finlab.arrays import Array
-from finlab.layout.angles import wrapped
+from finlab.layout.axes import wrapped
 from finlab.physics import Plant
 
 RCOND = 1e-3
@@ -18,14 +18,8 @@ _FULL = 0.0, np.pi
 
 
 class PseudoInverse:
-    """Everything about one layout that does not depend on the target.
-
-    Forces are along each actuator's own two directions; the second one of a line is 0.
-
-    Args:
-        plant: the robot, in the flow that it has.
-        sigma: scales the rows (6,).
-    """
+    """What does not depend on the target, of a robot in the flow that it has, rows scaled by `sigma` (6,).
+    Forces are along each actuator's own two directions; the second one of a line is 0."""
 
     def __init__(self, plant: Plant, sigma: Array) -> None:
         self.plant, inflow = plant, plant.inflow(None)
@@ -41,7 +35,7 @@ class PseudoInverse:
         self.responses: list[Response] = [self.groups[k][1].responses[j] for _, k, j in self.places]
         """What each offers."""
         self.beside = sum((group.beside.sum(axis=0) for _, group in self.groups), np.zeros(6))
-        """Wrench (6,) [N, N m] of forces of 0, such as the drag of rudders."""
+        """Wrench (6,) [N, N m] of forces of 0, such as the drag of foils."""
         along = [np.reshape(each.effectiveness, (-1, 6)) for each in self.responses]
         both = [np.concatenate([rows, np.zeros((2 - len(rows), 6))]) for rows in along]
         self.effectiveness: Array = np.concatenate(both).T
@@ -64,8 +58,8 @@ class PseudoInverse:
         return ((targets - self.beside) @ self.inverse).reshape(len(targets), self.plant.n, 2)
 
     def decoded(self, force: Array) -> Array:
-        """The cheapest commands (N, n, 3) for forces (N, n, 2) [N], by the actuators' own laws; what one
-        cannot give is cut off."""
+        """The cheapest commands (N, n, 3) for forces (N, n, 2) [N]; what an actuator cannot give is cut
+        off."""
         angle = wrapped(np.arctan2(force[..., 1], force[..., 0]) - self._middle)
         held = np.clip(angle, -self._half, self._half)
         excess = np.minimum(np.abs(angle - held), 0.5 * np.pi)
@@ -86,7 +80,6 @@ def _largest(response: Response) -> float:
 
 
 def pushed_axes(effectiveness: Array) -> Array:
-    """Directions (r, 6) of the wrench in which columns (6, k) push at all: no constraint says what another
-    one says."""
+    """Directions (r, 6) of the wrench in which columns (6, k) push at all, each once."""
     axes, size, _ = np.linalg.svd(effectiveness)
     return np.asarray(axes[:, : int((size > SAME_DIRECTION * size[0]).sum())].T)

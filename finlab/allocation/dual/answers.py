@@ -5,7 +5,7 @@ first directions of planes, second directions of planes, what lines drag along. 
 of a conjugate: a line's `T(|s|) sign(s)`, a plane's `T(v) g` with `v = s . g` and `g` the direction of the
 force, its size the gauge.
 
-A line that drags, such as a rudder, gives the force T and with it the drag that its power says, U times the
+A line that drags, such as a foil, gives the force T and with it the drag that its power says, U times the
 drag. Where drag is paid `a` [W/N], a force is as dear as r = 1 - a/U times its power: it answers a price v as
 another one answers v/r. Where r < 0, drag is welcome, and is what the dearer end gives: r is softened to a
 positive number s(r), and the conjugate s c*(v/s) has (s - r) times the largest power on top, which is convex.
@@ -17,8 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.actuators.response import CELLS, Line, Plane, RadialTable, price_grid
-from finlab.allocation.dual.gauges import Gauges
-from finlab.allocation.dual.planar import Fan, Planar, blend, end_of, share_of
+from finlab.allocation.dual.planar import Fan, Gauges, Planar, blend, end_of, share_of
 from finlab.allocation.dual.sets import Sets
 from finlab.arrays import Array
 from finlab.precision import CLOSE, FINE, ROUNDING, ROUNDS
@@ -72,8 +71,7 @@ class Answers:
 
     def sizes(self, force: Array) -> Array:
         """Sizes (p, N) [N] of the planes' forces, of forces (k, N) along all directions."""
-        size: Array = np.hypot(*self.pair(force))
-        return size
+        return np.asarray(np.hypot(*self.pair(force)))
 
     def drag(self, force: Array) -> Array:
         """What the lines that drag drag along (f, N) [N] more than at rest with forces (l, N) [N]."""
@@ -81,12 +79,10 @@ class Answers:
             return np.zeros((0, force.shape[1]))
         own = np.zeros((self.lines + self.planes, force.shape[1]))
         own[self.dragging] = force[self.dragging]
-        rise: Array = (self.marginal(own)[1][self.dragging] - self._rest) / self._speed
-        return rise
+        return np.asarray((self.marginal(own)[1][self.dragging] - self._rest) / self._speed)
 
     def radial(self, price: Array, row: NDArray[np.intp]) -> tuple[Array, Array, Array]:
-        """Force [N], its derivative and conjugate [W] (m, N) at prices (m, N) from 0 on in rows (m, 1) or
-        (m, N) of the tables, two for each actuator."""
+        """Force [N], derivative and conjugate [W] (m, N) at prices (m, N) from 0 on in rows (m, 1 or N)."""
         top = self._top[row]
         share = price / top
         cell = np.minimum((np.sqrt(np.sqrt(share)) * CELLS).astype(np.intp), CELLS)
@@ -188,8 +184,8 @@ class Answers:
         return self._row + flipped
 
     def _one_way(self, price: Array, sets: Sets, way: int) -> tuple[Planar, Array]:
-        """Answers (q, N) of planes that push either way to prices (k, N), and their conjugates [W], as if
-        they pushed one of both `ways`."""
+        """Answers (q, N) of planes that push either way to prices (k, N), with conjugates, by one of
+        `ways`."""
         places, sets = sets.reversing, sets.ways[way]
         first, second = (values[places] for values in self.pair(price))
         row = self._row[self.lines + places] + sets.flipped.astype(np.intp)
@@ -306,28 +302,18 @@ class Answers:
         nearer = np.where(second * cos - first * sin < 0.0, -1.0, 1.0)
         angle = sets.middle + nearer * sets.half
         end_x, end_y = end_of(angle, gauges)
-        keep = np.where(beyond, 0.0, 1.0)
-        return Fan(
-            np.where(beyond, first * end_x + second * end_y, along),
-            np.where(beyond, end_x, fan_x),
-            np.where(beyond, end_y, fan_y),
-            xx * keep,
-            xy * keep,
-            yy * keep,
-            beyond,
-            sets.middle - nearer * sets.half,
-        )
+        keep, other = np.where(beyond, 0.0, 1.0), sets.middle - nearer * sets.half
+        along = np.where(beyond, first * end_x + second * end_y, along)
+        fan_x, fan_y = np.where(beyond, end_x, fan_x), np.where(beyond, end_y, fan_y)
+        return Fan(along, fan_x, fan_y, xx * keep, xy * keep, yy * keep, beyond, other)
 
     def _uneven(self, x: Array, y: Array, tangent: Array, size: Array) -> tuple[Array, Array, Array, Array]:
-        """Directions of the force with the gauges' sizes, the weights of their change, and the prices along
-        them, for directions and sizes of the price."""
+        """Directions of the force times the gauges, weights of their change, and prices along them."""
         places = self.gauges.places
         value, slope, bend = self.gauges.support(np.arctan2(y[places], x[places]))
         fan_x, fan_y, tangent, along = x.copy(), y.copy(), tangent.copy(), size.copy()
-        fan_x[places], fan_y[places] = (
-            value * x[places] - slope * y[places],
-            value * y[places] + slope * x[places],
-        )
+        own_x, own_y = x[places], y[places]
+        fan_x[places], fan_y[places] = value * own_x - slope * own_y, value * own_y + slope * own_x
         tangent[places] *= np.maximum(value + bend, 0.0)
         along[places] *= value
         return fan_x, fan_y, tangent, along
@@ -342,8 +328,8 @@ class Answers:
         row: NDArray[np.intp],
         gauges: Gauges | None = None,
     ) -> None:
-        """Blend the answers and conjugates (p, N) [W] of planes beyond their arcs with those of the other
-        ends, in place."""
+        """Blends, in place, answers and conjugates (p, N) of planes beyond arcs with those of the other
+        ends."""
         assert fan.beyond is not None and fan.other is not None
         places, of = sets.forked, len(sets.low) - len(sets.half) + sets.forked
         first, second = price

@@ -12,12 +12,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.dual.deadline import Deadline
-from finlab.allocation.dual.newton import Prices, dual_value, solve
+from finlab.allocation.dual.newton import Deadline, Prices, dual_value, solve
 from finlab.allocation.dual.robot import DualRobot
 from finlab.allocation.dual.sets import Sets
 from finlab.arrays import Array
-from finlab.layout.angles import wrapped
+from finlab.layout.axes import wrapped
 from finlab.precision import CLOSE, NEARLY, NOTHING, ROUNDS
 
 MOST_PARTS = 48
@@ -35,7 +34,7 @@ class Branched(NamedTuple):
 
     force: Array
     """Forces (k, N) [N]."""
-    found: NDArray[np.bool_]
+    met: NDArray[np.bool_]
     """Which targets are met by forces in the sets (N,)."""
     value: Array
     """Power (N,) [W] that no forces in the sets undercut, by the tables."""
@@ -57,25 +56,25 @@ def gaps(robot: DualRobot, force: Array, sets: Sets, prices: Array | None = None
     lines, planes = robot.answers.lines, robot.answers.planes
     x, y = robot.answers.pair(force)
     size = np.concatenate([np.abs(force[:lines]), np.hypot(x, y)])
-    found = np.zeros(size.shape)
+    result = np.zeros(size.shape)
     if lines:
         band = robot.band[:lines]
         inside = (size[:lines] < band * (1.0 - NOTHING)) & (size[:lines] > NOTHING * robot.most[:lines])
-        found[:lines] = np.where(inside & (sets.low[:lines] < sets.high[:lines]), 1.0, 0.0)
+        result[:lines] = np.where(inside & (sets.low[:lines] < sets.high[:lines]), 1.0, 0.0)
     if prices is None and len(dragging := robot.answers.dragging):
         over = (force[lines + 2 * planes :] - robot.answers.drag(force[:lines])) / robot.most_drag
-        found[dragging] = np.where(over > HOLLOW, over, 0.0)
+        result[dragging] = np.where(over > HOLLOW, over, 0.0)
     if planes:
         low, radial = sets.low[lines:], size[lines:]
         off = np.abs(wrapped(np.arctan2(y, x) - sets.middle)) - sets.half
         aside = (off > CLOSE) & (radial > NEARLY * robot.most[lines:])
         hole = (low > HOLLOW * size.max(axis=0)) & (radial < 0.98 * low)
         wide = sets.half > NARROW
-        found[lines:] = np.where(aside & wide, off, 0.0)
-        found[lines:] += np.where(hole & wide, 1.0 - radial / np.maximum(low, 1e-300), 0.0)
+        result[lines:] = np.where(aside & wide, off, 0.0)
+        result[lines:] += np.where(hole & wide, 1.0 - radial / np.maximum(low, 1e-300), 0.0)
     if len(places := sets.reversing):
-        found[lines + places] = _between_ways(robot, force, sets, prices, found[lines + places])
-    return found
+        result[lines + places] = _between_ways(robot, force, sets, prices, result[lines + places])
+    return result
 
 
 def _between_ways(robot: DualRobot, force: Array, sets: Sets, prices: Array | None, amount: Array) -> Array:
@@ -130,7 +129,7 @@ def least_power(robot: DualRobot, target: Array, sets: Sets, root: Prices, deadl
             break
         parts = _cut(robot, parts, kept, amount[:, kept], answer)
         answer = _solved(robot, target, parts, deadline)
-    return Branched(best.force, best.found, value)
+    return Branched(best.force, best.met, value)
 
 
 def _solved(robot: DualRobot, target: Array, parts: _Parts, deadline: Deadline) -> Prices:
@@ -146,24 +145,22 @@ class _Best:
         self._robot, self._value = robot, np.full(len(root.value), np.inf)
         self.force = root.force.copy()
         """Forces (k, N) [N]; those of the hulls where there is no answer yet."""
-        self.found = np.zeros(len(root.value), bool)
+        self.met = np.zeros(len(root.value), bool)
         """Where there is one (N,)."""
 
     def keep(self, parts: _Parts, answer: Prices, amount: Array) -> NDArray[np.bool_]:
         """Remember answers without a gap; which of those that have one (N,) could still be cheaper."""
-        whole = answer.solved & ~(amount > 0.0).any(axis=0) & ~self._hollow(answer.force, parts.sets)
-        for i in np.flatnonzero(whole):
+        sets, answers = parts.sets, self._robot.answers
+        # The smoothed dual of a narrow arc may have a force that is smaller than any in it.
+        hollow = (answers.sizes(answer.force) < 0.9 * sets.low[answers.lines :]) & (sets.half <= NARROW)
+        full = answer.solved & ~(amount > 0.0).any(axis=0) & ~hollow.any(axis=0)
+        for i in np.flatnonzero(full):
             row = parts.row[i]
             if answer.value[i] < self._value[row]:
-                self._value[row], self.found[row] = answer.value[i], True
+                self._value[row], self.met[row] = answer.value[i], True
                 self.force[:, row] = answer.force[:, i]
         open_ = answer.solved | (~answer.beyond & (amount > 0.0).any(axis=0))
-        return open_ & ~whole & (answer.value < self._value[parts.row] * (1.0 - CLOSE))
-
-    def _hollow(self, force: Array, sets: Sets) -> NDArray[np.bool_]:
-        """Where the smoothed dual of a narrow arc has a force (k, N) that is smaller than any in it."""
-        size, low = self._robot.answers.sizes(force), sets.low[self._robot.answers.lines :]
-        return np.asarray(((size < 0.9 * low) & (sets.half <= NARROW)).any(axis=0))
+        return open_ & ~full & (answer.value < self._value[parts.row] * (1.0 - CLOSE))
 
 
 def halves(robot: DualRobot, sets: Sets, force: Array) -> list[Sets] | None:
@@ -171,12 +168,10 @@ def halves(robot: DualRobot, sets: Sets, force: Array) -> list[Sets] | None:
     amount = gaps(robot, force[:, None], sets)
     if not amount.any():
         return None
-    whole = _columns(sets, 1)
-    chosen = np.zeros(amount.shape, bool)
+    one, chosen = _columns(sets, 1), np.zeros(amount.shape, bool)
     chosen[amount[:, 0].argmax(), 0] = True
-    return [
-        narrowed(robot, whole, force[:, None], chosen, np.full(amount.shape, side)) for side in (-1.0, 1.0)
-    ]
+    sides = (np.full(amount.shape, side) for side in (-1.0, 1.0))
+    return [narrowed(robot, one, force[:, None], chosen, side) for side in sides]
 
 
 def _columns(sets: Sets, count: int) -> Sets:
@@ -229,10 +224,9 @@ def _dive(robot: DualRobot, parts: _Parts, kept: NDArray[np.intp], amount: Array
 
 
 def narrowed(robot: DualRobot, sets: Sets, force: Array, chosen: NDArray[np.bool_], side: Array) -> Sets:
-    """Sets (n, N) of which chosen ones (n, N) are cut, and one side is kept: of an arc the half towards
-    smaller (-1) or larger angles (1), of a full circle the half away from or around the force, of what pushes
-    either way the reverse (-1) or the rest (1), of a dead band rest or the forces beyond it, of what drags
-    the forces below or above, by forces (k, N)."""
+    """Sets (n, N) of which chosen ones (n, N) are cut by forces (k, N), and one side is kept: of an arc the
+    half towards smaller (-1) or larger angles (1), of a full circle that away from or around the force, of
+    either way reverse or the rest, of a dead band rest or what is beyond, of drag less or more."""
     lines, planes = robot.answers.lines, robot.answers.planes
     low, high, low_cost, high_cost, middle, half, reverse, reverse_cost, flipped = map(np.array, sets.parts)
     if planes:
@@ -256,10 +250,8 @@ def narrowed(robot: DualRobot, sets: Sets, force: Array, chosen: NDArray[np.bool
             own = np.pad(force[:lines], ((0, planes), (0, 0)))
             edge[dragging], cost[dragging] = own[dragging], robot.answers.marginal(own)[1][dragging]
             above[dragging] = (cut & beyond)[dragging]
-        low[:lines], low_cost[:lines] = (
-            np.where(above, edge, low[:lines]),
-            np.where(above, cost, low_cost[:lines]),
-        )
+        low[:lines] = np.where(above, edge, low[:lines])
+        low_cost[:lines] = np.where(above, cost, low_cost[:lines])
         below = cut & ~above
         high[:lines] = np.where(below, edge, high[:lines])
         high_cost[:lines] = np.where(below, cost, high_cost[:lines])

@@ -6,27 +6,21 @@ import numpy as np
 
 from finlab.actuators.registry import groups_of
 from finlab.actuators.response import with_square
-from finlab.allocation.dual.robot import DualRobot, dual_robot
+from finlab.allocation.dual.robot import DualRobot
 from finlab.allocation.dual.sets import Sets
 from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.physics.plant import Plant
+from finlab.precision import ROUNDING
+from finlab.uncertainty.known import uncertainties
 
 
 class Compiled:
     """The actuators of one robot, ready for prices."""
 
     def __init__(self, layout: Layout, plant: Plant, doubt: Array | None = None) -> None:
-        """Compile the actuators of a layout.
-
-        Args:
-            layout: the robot.
-            plant: gives their effectiveness and the flow.
-            doubt: what a squared force of each actuator costs beside its power, see `price_of_doubt`.
-
-        Raises:
-            DataError: a fin's force table cannot be read, or gives no thrust within its limits.
-        """
+        """Compiles the actuators of a layout with the effectiveness of a plant; what a squared force costs
+        beside its power is `doubt`, see `price_of_doubt`. Errors as for `FinGroup`."""
         self.count = layout.n
         self.doubt = doubt
         """The same; None where it costs nothing."""
@@ -43,10 +37,9 @@ class Compiled:
                     self.weight[place] = (response.effectiveness**2 @ self.doubt[place]).sum()
                 weight = float(self.weight[place])
                 responses[place] = with_square(response, weight) if weight else response
-        self.robot: DualRobot = dual_robot(responses)  # type: ignore[arg-type]
+        self.robot: DualRobot = DualRobot(responses)  # type: ignore[arg-type]
         self.beside = sum((group.beside.sum(axis=0) for _, group in self.groups), np.zeros(6))
-        """Wrench (6,) [N, N m] that the actuators give beside their answers' forces, such as the drag of
-        rudders without lift."""
+        """Wrench (6,) [N, N m] beside the answers' forces, such as the drag of foils without lift."""
 
     def at(self, inflow: Array | None) -> "Compiled":
         """The same in another flow: velocities (n, 3) [m/s] of the actuators' places in their own frames."""
@@ -57,17 +50,12 @@ class Compiled:
         other._prepare()
         return other
 
-    def forces(self, force: Array) -> Array:
-        """Forces (N, n, 2) [N] of the actuators along their own directions from those of the dual (k, N)."""
+    def commands(self, force: Array, previous: Array | None = None) -> Array:
+        """Commands (N, n, 3) that give forces (k, N) [N] of the dual at least power."""
         lines, planes, order = self.robot.answers.lines, self.robot.answers.planes, self.robot.order
         own = np.zeros((force.shape[1], self.count, 2))
         own[:, order[: lines + planes], 0] = force[: lines + planes].T
         own[:, order[lines:], 1] = force[lines + planes : lines + 2 * planes].T
-        return own
-
-    def commands(self, force: Array, previous: Array | None = None) -> Array:
-        """Commands (N, n, 3) that give forces (k, N) [N] of the dual at least power."""
-        own = self.forces(force)
         command = np.empty((len(own), self.count, 3))
         for places, group in self.groups:
             before = None if previous is None else previous[places]
@@ -80,3 +68,29 @@ class Compiled:
         for places, group in self.groups:
             reach[places] = group.reach(lower[places], upper[places])
         return self.robot.restricted(reach[self.robot.order])
+
+
+def price_of_doubt(layout: Layout, scale: Array, robust: float) -> Array | None:
+    """Returns what a squared force of each actuator costs for the squared effectiveness of each axis (n, 6)
+    [W, W/m^2 per N^2] where a miss of 1 % of the yardstick `scale` (6,) costs `robust` [W], growing with the
+    square; None where nothing does. A `DataError` where a force table cannot be read."""
+    if robust == 0.0:
+        return None
+    shares = np.array([0.0 if own is None else own.share for own in uncertainties(layout)])
+    return np.multiply.outer(robust * shares**2, (0.01 * scale) ** -2.0) if shares.any() else None
+
+
+def proved_power(compiled: Compiled, wrench: Array, price: Array) -> Array:
+    """Power (N,) [W] that no answer for wrenches (N, 6) undercuts, by prices (N, 6) [W/N, W/(N m)]."""
+    robot = compiled.robot
+    along = np.empty((3, compiled.count, len(wrench)))
+    along[:, robot.order] = robot.answers.worth((price @ robot.effectiveness.T).T, robot.sets)
+    ahead, back, worth = along
+    for places, group in compiled.groups:
+        own = group.worth(price)
+        own = group.radial_worth(ahead[places].T, back[places].T) if own is None else own
+        if own is not None:
+            worth[places] = own.T
+    paid = price * (wrench - compiled.beside)
+    rounding = ROUNDING * (np.abs(paid).sum(axis=1) + np.abs(worth).sum(axis=0))
+    return np.asarray(paid.sum(axis=1) - worth.sum(axis=0) - rounding)

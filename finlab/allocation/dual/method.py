@@ -14,13 +14,10 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.dual.bounds import proved_power
 from finlab.allocation.dual.branch import HOLLOW, STEPS_AT_KINK, gaps, least_power, may_have_gaps
-from finlab.allocation.dual.compiled import Compiled
-from finlab.allocation.dual.deadline import Deadline
-from finlab.allocation.dual.doubt import price_of_doubt
-from finlab.allocation.dual.drag import Cost, cheapened, exact_command, prices_at
-from finlab.allocation.dual.newton import MOST_STEPS, Prices, dual_value, solve, start
+from finlab.allocation.dual.compiled import Compiled, price_of_doubt, proved_power
+from finlab.allocation.dual.drag import EXACT, Search
+from finlab.allocation.dual.newton import MOST_STEPS, Deadline, Prices, dual_value, solve, start
 from finlab.allocation.dual.policies import Nearest, nearest
 from finlab.allocation.dual.rates import Rates, within_tick
 from finlab.allocation.dual.sets import Sets
@@ -30,14 +27,12 @@ from finlab.allocation.policy import Policy
 from finlab.allocation.settings import Settings, number
 from finlab.allocation.solution import Solution
 from finlab.arrays import Array
-from finlab.layout.wrench_axes import axes_in, mask_of
-from finlab.physics.wrench import wrench_of_forces
+from finlab.layout.axes import axes_in, mask_of
+from finlab.layout.effectiveness import wrench_of_forces
 from finlab.precision import CLOSE, FINE, NEARLY, NOTHING, ROUNDING, ROUNDS
 
-EXACT = 1e-8
-"""Error, on the robot's yardstick, up to which commands need no further step."""
 TICK_STEPS = 5
-"""The same where a command of a tick is not exact."""
+"""Steps of a command of a tick that is not exact."""
 STEPS_WITH_DRAG = 2 * ROUNDS
 """Newton's steps from the prices of commands near to a target."""
 
@@ -60,25 +55,22 @@ class Forces(NamedTuple):
     price: Array
     """Prices (N, 6) of the wrench [W/N, W/(N m)]."""
     within: NDArray[np.bool_]
-    """Which targets are within reach (N,)."""
+    """Targets within reach (N,)."""
     prices: Array
-    """The same (r, N) in the robot's basis [W]."""
+    """The same as `price` (r, N) in the robot's basis [W]."""
     value: Array
     """Power (N,) [W] that branches on gaps have proved to be needed; 0 where there was none."""
     aim: Array
     """The wrenches (N, 6) [N, N m] that they give: the targets, or those that the policy gives."""
     command: Array | None = None
-    """Commands (N, n, 3) that give the targets, drag and all, NaN where there are none; None for robots
-    without drag."""
+    """Commands (N, n, 3) that give the targets, drag and all, NaN where there are none; None without drag."""
 
     @classmethod
     def joined(cls, each: Sequence["Forces"]) -> "Forces":
         """Those of single targets."""
-        parts: list[Any] = list(zip(*each, strict=True))
-        axes = {"force": 1, "prices": 1}
-        return cls(
-            *(np.concatenate(part, axes.get(name, 0)) for name, part in zip(cls._fields, parts, strict=True))
-        )
+        along = [1 if name in ("force", "prices") else 0 for name in cls._fields]
+        columns: Any = zip(zip(*each, strict=True), along, strict=True)
+        return cls(*(np.concatenate(parts, axis) for parts, axis in columns))
 
 
 class Dual(Method):
@@ -98,16 +90,12 @@ class Dual(Method):
         self._last: tuple[bytes, Self] | None = None
 
     @cached_property
-    def _problem(self) -> CommandProblem:
-        return CommandProblem.of(self.plant, self.scale)
-
-    @property
-    def _cost(self) -> Cost:
-        return Cost(self.plant, self.compiled.weight)
+    def _search(self) -> Search:
+        return Search(CommandProblem.of(self.plant, self.scale), self.compiled.weight)
 
     @cached_property
     def _rates(self) -> Rates:
-        return Rates.of(self.plant, self.layout.rates, self.settings.period_s)
+        return Rates(self.plant, self.layout.rates * self.settings.period_s)
 
     def at(self, flow: Array | None) -> Self:
         key = b"" if flow is None else flow.tobytes()
@@ -129,8 +117,7 @@ class Dual(Method):
         seed: int = 0,
         prices: Array | None = None,
     ) -> Solution:
-        """See `Method`. For a single target, Newton's method begins at `prices` (6,) [W/N, W/(N m)], where
-        they are given."""
+        """See `Method`. For a single target, Newton's method may begin at `prices` (6,) [W/N, W/(N m)]."""
         if len(targets) == 0:
             return Solution(np.empty((0, self.layout.n, 3)), lambda _: np.empty(0))
         if (moved := self.at(flow)) is not self:
@@ -140,34 +127,26 @@ class Dual(Method):
     def _solve(
         self, targets: Array, policy: Policy, previous: Array | None, prices: Array | None = None
     ) -> Solution:
-        robot = self.compiled.robot
+        robot, resting = self.compiled.robot, self.compiled.beside
         begin = None if prices is None else robot.basis.T @ (robot.scale * prices)[:, None]
         deadline = Deadline(len(targets))
-        aim, found = self._aimed(targets, policy, deadline, begin)
-        command = self._commands(aim, found, previous)
+        forces = self._forces(targets - resting, policy, deadline, begin)
+        aim = targets if forces.within.all() else forces.aim + resting
+        command = self._commands(aim, forces, previous)
         notes = set()
         if policy.kind == "direction":
-            for row in np.flatnonzero(~found.within):
-                notes.add(self._kept_on_the_ray(targets[row], int(row), aim, found, command, deadline))
+            for row in np.flatnonzero(~forces.within):
+                notes.add(self._kept_on_the_ray(targets[row], int(row), aim, forces, command, deadline))
         if previous is not None and not self._rates.allow(previous, command[0]):
-            command = self._in_a_tick(aim, found, previous)
-        bound: Callable[[Array], Array] = partial(self._bound, aim, found)
-        if len(targets) > 1:
-            bound = partial(self._bound_again, targets, policy)
-        notes |= self._not_held(targets[~found.within]) | deadline.notes
+            command = self._in_a_tick(aim, forces, previous)
+        bound: Callable[[Array], Array] = partial(self._bound, aim, forces.price, forces.value)
+        notes |= self._not_held(targets[~forces.within]) | deadline.notes
         return Solution(
-            command, None if self._unproved else bound, prices=found.price, notes=tuple(sorted(notes - {""}))
+            command, None if self._unproved else bound, prices=forces.price, notes=tuple(sorted(notes - {""}))
         )
 
-    def _aimed(
-        self, targets: Array, policy: Policy, deadline: Deadline, prices: Array | None = None
-    ) -> tuple[Array, Forces]:
-        """What is given for targets (N, 6): themselves, or what the policy asks for; and by which forces."""
-        found = self._forces(targets - self.compiled.beside, policy, deadline, prices)
-        return found.aim + self.compiled.beside, found
-
     def _kept_on_the_ray(
-        self, target: Array, row: int, aim: Array, found: Forces, command: Array, deadline: Deadline
+        self, target: Array, row: int, aim: Array, forces: Forces, command: Array, deadline: Deadline
     ) -> str:
         """Replaces a row of aims (N, 6) and commands (N, n, 3) that are to lie along a target (6,) and do
         not, by the largest share that does; the sentence where there is none."""
@@ -183,22 +162,23 @@ class Dual(Method):
             its = self._commands(tried, one)
             if self._error(its, tried)[0] <= NEARLY:
                 low, kept, command[row], aim[row] = share, True, its[0], tried[0]
-                found.price[row], found.value[row] = one.price[0], one.value[0]
+                forces.price[row], forces.value[row] = one.price[0], one.value[0]
             else:
                 high = share
         if not kept and (rest := self._cancelled) is not None:
-            kept, command[row], aim[row], found.price[row], found.value[row] = True, rest, 0.0, 0.0, 0.0
+            kept, command[row], aim[row], forces.price[row], forces.value[row] = True, rest, 0.0, 0.0, 0.0
         return "" if kept else "no share of the target was found that the actuators can give alone"
 
     @cached_property
     def _cancelled(self) -> Array | None:
-        """A command (n, 3) of actuators that cannot rest whose forces cancel each other; None where none is
-        found from some starts near their least forces."""
+        """A command (n, 3) of actuators that cannot rest whose least forces, nearly, cancel; None without
+        any."""
         lower, upper = self.layout.lower, self.layout.upper
         share = np.random.default_rng(0).random((ROUNDS, *lower.shape))
         share[..., :-1] **= 4
-        found = exact_command(self._problem, self._cost, np.zeros(6), lower + share * (upper - lower), EXACT)
-        return None if found is None else found.command
+        start = lower + share * (upper - lower)
+        best = self._search.exact(np.zeros(6), start)
+        return None if best is None else best.command
 
     def _not_held(self, targets: Array) -> set[str]:
         """The sentence about axes that come together only, and that targets (N, 6) ask for apart."""
@@ -206,9 +186,8 @@ class Dual(Method):
         if not len(targets):
             return set()
         scaled = targets / robot.scale
-        left = np.abs(scaled - (scaled @ robot.basis) @ robot.basis.T) > NEARLY * np.abs(scaled).max(
-            initial=0.0
-        )
+        left = np.abs(scaled - (scaled @ robot.basis) @ robot.basis.T)
+        left = left > NEARLY * np.abs(scaled).max(initial=0.0)
         axes = axes_in(left.any(axis=0) & ~mask_of(self.undriven))
         if not axes:
             return set()
@@ -222,21 +201,14 @@ class Dual(Method):
         size = np.abs(self.compiled.robot.effectiveness).max(axis=0)
         return axes_in(size <= NOTHING * size.max())
 
-    def _bound(self, aim: Array, found: Forces, command: Array) -> Array:
+    def _bound(self, aim: Array, price: Array, value: Array, command: Array) -> Array:
         """Power (N,) [W] that no answer undercuts which gives the wrenches that commands (N, n, 3) give."""
-        given = wrench_of_forces(self.plant.force(command), self.plant.effectiveness)
-        bound = proved_power(self.compiled, given, found.price)
-        bound = np.where(self._error(command, aim) <= NEARLY, np.maximum(bound, found.value), bound)
+        wrench = wrench_of_forces(self.plant.force(command), self.plant.effectiveness)
+        bound = proved_power(self.compiled, wrench, price)
+        bound = np.where(self._error(command, aim) <= NEARLY, np.maximum(bound, value), bound)
         power = self.plant.power(command).sum(axis=-1)
-        rounded = (bound > power) & (
-            bound <= power * (1.0 + NEARLY) + NOTHING * self.compiled.robot.largest_power
-        )
-        return np.where(rounded, power, bound) * (1.0 - ROUNDING)
-
-    def _bound_again(self, targets: Array, policy: Policy, command: Array) -> Array:
-        """The same of answers to many targets (N, 6), whose prices are found again, so that nothing of them
-        is kept."""
-        return self._bound(*self._aimed(targets, policy, Deadline(len(targets))), command)
+        slack = power * (1.0 + NEARLY) + NOTHING * self.compiled.robot.largest_power
+        return np.where((bound > power) & (bound <= slack), power, bound) * (1.0 - ROUNDING)
 
     @property
     def _unproved(self) -> bool:
@@ -253,7 +225,7 @@ class Dual(Method):
         target, drags = robot.target(targets), len(robot.answers.dragging) > 0
         if drags and len(targets) > 1:
             return Forces.joined([self._forces(one[None], policy, deadline) for one in targets])
-        if not len(target):  # nothing pushes, such as rudders at rest
+        if not len(target):  # nothing pushes, such as foils at rest
             nothing = np.zeros((len(robot.effectiveness), len(targets)))
             none = np.zeros((len(targets), 6))
             return Forces(nothing, none, np.all(targets == 0.0, axis=1), target, np.zeros(len(targets)), none)
@@ -263,14 +235,13 @@ class Dual(Method):
             first = robot.answers(robot.matrix @ start(robot, target, sets)[0], sets).force
             steps, near = STEPS_WITH_DRAG, self.compiled.commands(first)[0]
             if prices is None:
-                prices = prices_at(self._problem, self._cost, near, self._directions)
+                prices = self._search.prices(near, self._directions)
         root = solve(robot, target, sets, prices, steps)
         within = root.solved | (~root.beyond & torn)
         if robot.basis.shape[1] < 6:
             rest = targets / robot.scale - (robot.basis @ target).T
-            within &= np.linalg.norm(rest, axis=1) <= NEARLY * (
-                1e-3 + np.linalg.norm(targets / robot.scale, axis=1)
-            )
+            size = np.linalg.norm(targets / robot.scale, axis=1)
+            within &= np.linalg.norm(rest, axis=1) <= NEARLY * (1e-3 + size)
         force, prices, value, aim = root.force, root.prices, np.zeros(len(targets)), targets
         if may_have_gaps(robot, sets, force):
             force, value = self._in_gaps(target, sets, root, within, deadline)
@@ -295,17 +266,15 @@ class Dual(Method):
     ) -> tuple[Array, Array]:
         """A command (1, n, 3) for a wrench (6,) from forces (k, 1) near to it, or the first ones, NaN where
         there is none; and its prices (r, 1)."""
-        robot, problem, cost = self.compiled.robot, self._problem, self._cost
+        robot, search = self.compiled.robot, self._search
         aim, prices, begin = wrench + self.compiled.beside, root.prices, self.compiled.commands(force)
         if root.solved[0] and self._error(begin, aim[None])[0] <= EXACT:
             return begin, prices
-        asked, value = aim / self.scale, root.value
-
-        best_of = partial(cheapened, problem, cost, asked, enough=EXACT)
+        value, best_of = root.value, partial(search.cheapest, aim / self.scale)
         best = best_of(np.concatenate([begin, self.compiled.commands(first)]))
         if best is not None:
             if not root.solved[0]:
-                tried = prices_at(problem, cost, best.command, self._directions)
+                tried = search.prices(best.command, self._directions)
                 prices = np.concatenate([prices, tried], axis=1)
                 value = dual_value(robot, robot.target(wrench[None]), robot.sets, prices)
                 prices = prices[:, value.argmax()][:, None]
@@ -317,8 +286,8 @@ class Dual(Method):
             if not group.feels_flow:
                 starts[::2, places] = begin[0, places]
         other = None if root.beyond[0] or deadline.passed() else best_of(starts)
-        found = [each for each in (best, other) if each is not None]
-        command = min(found, key=lambda each: each.cost).command if found else np.full_like(begin[0], np.nan)
+        ways = [way for way in (best, other) if way is not None]
+        command = min(ways, key=lambda way: way.cost).command if ways else np.full_like(begin[0], np.nan)
         return command[None], prices
 
     @property
@@ -328,15 +297,14 @@ class Dual(Method):
         return np.asarray(self.scale[:, None] * robot.basis / robot.scale[:, None])
 
     def _cheaper_in_gaps(self, sets: Sets, near: Nearest, force: Array, deadline: Deadline) -> None:
-        """Replaces forces (k,) that give a wrench out of reach in one part of sets with gaps by those of
-        least power in all of it, where they are found."""
+        """Replaces forces (k,) of one part of sets with gaps by those of least power in all of it."""
         robot = self.compiled.robot
         target = robot.target(near.wrench[None])
         root = solve(robot, target, sets, deadline=deadline)
         within = ~root.beyond
-        found, _ = self._in_gaps(target, sets, root, within, deadline)
+        cheaper, _ = self._in_gaps(target, sets, root, within, deadline)
         if within[0]:
-            force[:] = found[:, 0]
+            force[:] = cheaper[:, 0]
 
     def _in_gaps(
         self, target: Array, sets: Sets, root: Prices, within: NDArray[np.bool_], deadline: Deadline
@@ -353,51 +321,48 @@ class Dual(Method):
         cut = least_power(robot, target[:, rows], sets.take(rows), root.take(rows), deadline)
         force = root.force.copy()
         force[:, rows] = cut.force
-        within[rows[~cut.found]] = False
-        value[rows] = np.where(cut.found, cut.value * (1.0 - FINE), 0.0)
+        within[rows[~cut.met]] = False
+        value[rows] = np.where(cut.met, cut.value * (1.0 - FINE), 0.0)
         return force, value
 
-    def _commands(self, aim: Array, found: Forces, previous: Array | None = None) -> Array:
+    def _commands(self, aim: Array, forces: Forces, previous: Array | None = None) -> Array:
         """Commands (N, n, 3) that give wrenches (N, 6) exactly, by the plant."""
-        if previous is None and found.command is not None and not np.isnan(found.command).any():
-            return self.plant.rested(found.command)
-        command = self.compiled.commands(found.force, previous)
+        if previous is None and forces.command is not None and not np.isnan(forces.command).any():
+            return self.plant.rested(forces.command)
+        command = self.compiled.commands(forces.force, previous)
         error = self._error(command, aim)
         rough = np.flatnonzero(error > EXACT)
         if not len(rough):
             return self.plant.rested(command)
-        if found.command is not None:
-            own = found.command[rough]
+        if forces.command is not None:
+            own = forces.command[rough]
             command[rough] = np.where(np.isnan(own), command[rough], own)
         # Steps that lead nowhere depend on the last bit: with drag each target goes its way alone.
-        for rows in [rough] if found.command is None else np.split(rough, range(1, len(rough))):
-            ends = refine(self._problem, aim[rows] / self.scale, command[rows], ROUNDS, EXACT)
+        for rows in [rough] if forces.command is None else np.split(rough, range(1, len(rough))):
+            ends = refine(self._search.problem, aim[rows] / self.scale, command[rows], ROUNDS, EXACT)
             command[rows] = ends.command
-            for row in rows[(ends.error > NEARLY) & found.within[rows]].tolist():
+            for row in rows[(ends.error > NEARLY) & forces.within[rows]].tolist():
                 # Such as idle fins in line, or a least force: no small change of these commands helps.
                 draw = np.random.default_rng(0).uniform(-1.0, 1.0, (2 * ROUNDS, *command.shape[1:]))
                 shares = np.geomspace(HOLLOW, 1.0, len(draw))[:, None, None]
-                starts = command[row] + shares * draw * self._problem.width
-                other = exact_command(self._problem, self._cost, aim[row] / self.scale, starts, EXACT)
+                starts = command[row] + shares * draw * self._search.problem.width
+                other = self._search.exact(aim[row] / self.scale, starts)
                 command[row] = command[row] if other is None else other.command
         return self.plant.rested(command)
 
     def _error(self, command: Array, aim: Array) -> Array:
-        given = wrench_of_forces(self.plant.force(command), self.plant.effectiveness)
-        missing = (given - aim) / self.scale
-        error: Array = np.sqrt(np.einsum("ni,ni->n", missing, missing))
-        return error
+        wrench = wrench_of_forces(self.plant.force(command), self.plant.effectiveness)
+        missing = (wrench - aim) / self.scale
+        return np.asarray(np.sqrt(np.einsum("ni,ni->n", missing, missing)))
 
-    def _in_a_tick(self, aim: Array, found: Forces, previous: Array) -> Array:
+    def _in_a_tick(self, aim: Array, forces: Forces, previous: Array) -> Array:
         """The command (1, n, 3) that gives a wrench (1, 6) or comes nearest to it among those that may follow
-        a previous one (n, 3); `found` is the answer without limits of that kind."""
+        a previous one (n, 3); `forces` is the answer without limits of that kind."""
         box = self._rates.box(previous)
-        sets, asked = self.compiled.within(box.lower, box.upper), aim - self.compiled.beside
-        problem = replace(
-            self._problem, lower=box.lower, upper=box.upper, full_turn=box.free[:, 2] & self.plant.full_turn
-        )
-
-        force = within_tick(self.compiled.robot, sets, asked, found.prices, 1.0 / self.scale)
+        sets, full = self.compiled.within(box.lower, box.upper), box.free[:, 2] & self.plant.full_turn
+        problem = replace(self._search.problem, lower=box.lower, upper=box.upper, full_turn=full)
+        wrench = aim - self.compiled.beside
+        force = within_tick(self.compiled.robot, sets, wrench, forces.prices, 1.0 / self.scale)
         command = self.plant.feasible(box.clipped(self.compiled.commands(force, previous)))
         if self._error(command, aim)[0] > EXACT:
             command = refine(problem, aim / self.scale, box.clipped(command), TICK_STEPS, EXACT).command

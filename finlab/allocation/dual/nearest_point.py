@@ -48,16 +48,9 @@ def nearest_point(
     close: float = CLOSE_BY,
     apart: float = 0.0,
 ) -> Mixture:
-    """Returns the point of a set nearest to a target.
-
-    Args:
-        farthest: the support of the set of forces.
-        rows: coordinates (k, d) of a point per newton.
-        target: (d,), in the coordinates' metric.
-        begin: a mixture to begin with.
-        close: distance up to which a point is the nearest one.
-        apart: share of the miss, with its direction, that needs to be proved of a target outside the set.
-    """
+    """Returns the point of a set nearest to a target (d,), from the support `farthest` of its forces and its
+    coordinates `rows` (k, d) per newton; it begins at a mixture, where there is one. Up to the distance
+    `close` a point is the nearest one; of targets outside, `apart` is the share of the miss to be proved."""
     if begin is None:
         forces, shares = farthest(rows @ target)[:, None], np.ones(1)
     else:
@@ -99,24 +92,20 @@ def _mixed(points: Array, shares: Array, target: Array) -> tuple[Array, NDArray[
 
 
 def farthest_along(farthest: Farthest, rows: Array, ray: Array) -> Mixture:
-    """Returns the point of a set that is the largest share, from 0 to 1, of a ray (d,).
+    """Returns the point of a set, given as in `nearest_point`, that is the largest share, from 0 to 1, of a
+    ray (d,).
 
     A plane across the miss of a share bounds it from above; the next try is that bound (Dinkelbach). Where no
     share of the ray is in the set, the point is the nearest one to rest.
-
-    Args:
-        farthest: the support of the set of forces.
-        rows: coordinates (k, d) of a point per newton.
-        ray: its end (d,).
     """
     share, normal = 1.0, ray
-    found, last = None, np.inf
+    result, last = None, np.inf
     while True:
         along, price = float(normal @ ray), rows @ normal
         bound = float(farthest(price) @ price) / along if along > 0.0 else 0.0
         share = min(max(bound, 0.0), share)
-        found = nearest_point(farthest, rows, share * ray, found, apart=0.5)
-        normal = -found.miss
+        result = nearest_point(farthest, rows, share * ray, result, apart=0.5)
+        normal = -result.miss
         if share == 0.0 or float(np.linalg.norm(normal)) <= 2.0 * CLOSE_BY or share >= last:
-            return found
+            return result
         last = share

@@ -8,17 +8,44 @@ keeps the step finite and is adapted to what a step brought (Levenberg, Marquard
 steps are refused).
 """
 
+from time import thread_time
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.dual.deadline import NEVER, Deadline
 from finlab.allocation.dual.robot import DualRobot
 from finlab.allocation.dual.sets import Sets
 from finlab.arrays import Array
+from finlab.arrays import solve as solve_systems
 from finlab.precision import NEARLY, NOTHING, ROUNDING
-from finlab.small_systems import solve as solve_systems
+
+LIMIT_S = 0.15
+"""Processor time [s] of this thread after which a search for one target ends with what it has found."""
+
+
+class Deadline:
+    """When the searches of one call end."""
+
+    def __init__(self, targets: float) -> None:
+        self._end = thread_time() + LIMIT_S * targets
+        self._struck = False
+
+    def passed(self) -> bool:
+        """Whether a search has to end now."""
+        self._struck = self._struck or thread_time() > self._end
+        return self._struck
+
+    @property
+    def notes(self) -> set[str]:
+        """The sentence about a search that has ended so."""
+        ended = "the search for a better answer was ended by its limit of processor time"
+        return {ended} if self._struck else set()
+
+
+NEVER = Deadline(float("inf"))
+"""One that does not come."""
+
 
 TOLERANCE = 1e-10
 """Scaled wrench that may be left of a target."""
@@ -51,10 +78,10 @@ class Prices(NamedTuple):
         parts: list[Any] = [values[..., columns] for values in self]
         return Prices(*parts)
 
-    def put(self, columns: NDArray[np.intp], found: "Prices") -> None:
-        """Replaces what was found for some of the targets."""
-        for values, new in zip(self, found, strict=True):
-            values[..., columns] = new
+    def put(self, columns: NDArray[np.intp], new: "Prices") -> None:
+        """Replaces what was known for some of the targets."""
+        for values, own in zip(self, new, strict=True):
+            values[..., columns] = own
 
 
 class _State(NamedTuple):
@@ -107,16 +134,8 @@ def solve(
     most_steps: int = MOST_STEPS,
     deadline: Deadline = NEVER,
 ) -> Prices:
-    """Prices for targets; those that are done are left out of further steps.
-
-    Args:
-        robot: the robot.
-        target: scaled wrenches in its basis (r, N).
-        sets: what its actuators may give; None for all that they can.
-        prices: where to begin (r, N).
-        most_steps: after how many steps a target is given up.
-        deadline: when all are.
-    """
+    """Prices for targets (r, N) in the basis of a robot within sets (None for all that it can), from `prices`
+    (r, N) on, each in at most some steps and all before the deadline; what is done takes no further step."""
     sets = robot.sets if sets is None else sets
     count = target.shape[1]
     ridge = np.full(count, NEARLY)
@@ -124,7 +143,7 @@ def solve(
         prices, saturated = start(robot, target, sets)
         ridge[saturated] = SATURATED_RIDGE
     most = sets.most_cost * (1.0 + 1e-9) + 1e-9 + np.zeros(count)
-    place, growth, found = np.arange(count), np.full(count, 2.0), None
+    place, growth, result = np.arange(count), np.full(count, 2.0), None
     with np.errstate(invalid="ignore"):  # systems without an inverse are told by what is not finite
         state = _state(robot, target, prices, sets)
         for steps in range(most_steps + 1):
@@ -136,12 +155,12 @@ def solve(
             if done.any():
                 taken = np.full(len(place), steps)
                 own = Prices(state.prices, state.force, state.value, solved, beyond, taken)
-                if found is None:
-                    found = own.take(np.arange(count))
+                if result is None:
+                    result = own.take(np.arange(count))
                 if done.all():
-                    found.put(place, own)
+                    result.put(place, own)
                     break
-                found.put(place[done], own.take(np.flatnonzero(done)))
+                result.put(place[done], own.take(np.flatnonzero(done)))
                 left = np.flatnonzero(~done)
                 place, ridge, growth, most = place[left], ridge[left], growth[left], most[left]
                 state, sets = _State(*(values[..., left] for values in state)), sets.take(left)
@@ -159,8 +178,8 @@ def solve(
             elif good.any():
                 both = zip(trial, state, strict=True)
                 state = _State(*(np.where(good, new, old) for new, old in both))
-    assert found is not None  # the last step ends all
-    return found
+    assert result is not None  # the last step ends all
+    return result
 
 
 def dual_value(robot: DualRobot, target: Array, sets: Sets, prices: Array) -> Array:
@@ -189,7 +208,6 @@ def _step(robot: DualRobot, state: _State, ridge: Array) -> Array:
 
 
 def _accepted(state: _State, trial: _State, left: Array) -> NDArray[np.bool_]:
-    """Which steps are kept (N,): the slope left along the step is uphill, or the value rose, or is the same
-    to rounding and the residual fell."""
+    """Steps that are kept (N,): they end uphill, or the value rose, or is the same and the residual fell."""
     rose, slack = trial.value - state.value, ROUNDING * np.abs(state.value)
     return (left >= 0.0) | (rose > 0.0) | ((rose > -slack) & (trial.size < 0.9 * state.size))

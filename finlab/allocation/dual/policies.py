@@ -12,9 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from finlab.allocation.dual.branch import halves
-from finlab.allocation.dual.deadline import NEVER, Deadline
 from finlab.allocation.dual.nearest_point import CLOSE_BY, Mixture, farthest_along, nearest_point
-from finlab.allocation.dual.newton import solve
+from finlab.allocation.dual.newton import NEVER, Deadline, solve
 from finlab.allocation.dual.robot import DualRobot
 from finlab.allocation.dual.sets import Sets
 from finlab.allocation.policy import Policy
@@ -43,18 +42,8 @@ class Nearest(NamedTuple):
 def nearest(
     robot: DualRobot, sets: Sets, wrench: Array, policy: Policy, yardstick: Array, deadline: Deadline
 ) -> Nearest:
-    """Forces for one wrench (6,) [N, N m] that no forces within the sets give.
-
-    Sets with gaps are cut until the best answer of all parts lies in none.
-
-    Args:
-        robot: the robot.
-        sets: what its actuators may give, for one target.
-        wrench: the target.
-        policy: what counts.
-        yardstick: scales (6,) of the missing wrench [N, N m].
-        deadline: when the search in gaps ends.
-    """
+    """What a policy gives for one wrench (6,) [N, N m] that no forces within the sets give; its miss counts
+    on a yardstick (6,). Sets with gaps are cut until the best answer of all lies in none."""
 
     def served(part: Sets) -> tuple[tuple[float, ...], int, Array, Sets]:
         """How badly a part serves the policy, and its forces."""
@@ -72,8 +61,8 @@ def nearest(
         for each in cut:
             heapq.heappush(parts, served(each))
     inside = np.zeros(6) if policy.kind == "direction" else robot.effectiveness.T @ robot.middle(part)
-    given = robot.effectiveness.T @ force
-    met = np.where(np.abs(given - wrench) <= FINE * yardstick, wrench, given)
+    actual = robot.effectiveness.T @ force
+    met = np.where(np.abs(actual - wrench) <= FINE * yardstick, wrench, actual)
     return cheapest(robot, part, force, inside, met, deadline)
 
 
@@ -105,16 +94,15 @@ def cheapest(
     deadline: Deadline = NEVER,
 ) -> Nearest:
     """The least power for the wrench that some forces (k,) give, or for one hardly apart (6,); where Newton's
-    method does not settle at the rim of what can be given, a little towards a wrench inside (6,), and else
-    these forces themselves."""
+    method does not settle, at the rim, a little towards one inside (6,), else these forces."""
     wrench = robot.effectiveness.T @ force
     inwards = (inside - wrench) / max(1.0, float(np.linalg.norm((inside - wrench) / robot.scale)))
     aims = [wrench, wrench + NEARLY * inwards]
     for aim in aims if wanted is None else [wanted, *aims]:
-        found = solve(robot, robot.target(aim[None]), sets, None, STEPS_AT_RIM, deadline)
-        if found.solved[0]:
-            return Nearest(found.force[:, 0], aim, found.prices[:, 0])
-    return Nearest(force, wrench, found.prices[:, 0])
+        result = solve(robot, robot.target(aim[None]), sets, None, STEPS_AT_RIM, deadline)
+        if result.solved[0]:
+            return Nearest(result.force[:, 0], aim, result.prices[:, 0])
+    return Nearest(force, wrench, result.prices[:, 0])
 
 
 def closest(robot: DualRobot, sets: Sets, wrench: Array, policy: Policy, yardstick: Array) -> Array:
@@ -132,11 +120,8 @@ def direction(robot: DualRobot, sets: Sets, wrench: Array, policy: Policy, yards
 
 
 def priority(robot: DualRobot, sets: Sets, wrench: Array, policy: Policy, yardstick: Array) -> Array:
-    """Forces (k,) [N] that serve groups of axes of a wrench (6,), each as far as those before it allow.
-
-    A group that asks for more than there is pulls at the axes that are held: it is served again with what it
-    misses shortened to `PULL`, which has the same nearest point.
-    """
+    """Forces (k,) [N] that serve groups of axes of a wrench (6,), each as far as those before it allow. A
+    group that wants more than there is pulls at the held axes: then its miss is cut to `PULL`."""
     held, aim = np.zeros(6), np.array(wrench)
     near: Mixture | None = None
     for group in policy.groups:

@@ -1,7 +1,7 @@
 """From tick to tick: commands change no faster than the drives of the actuators allow."""
 
 from dataclasses import dataclass
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from finlab.allocation.dual.policies import cheapest
 from finlab.allocation.dual.robot import DualRobot
 from finlab.allocation.dual.sets import Sets
 from finlab.arrays import Array
-from finlab.layout.angles import wrapped
+from finlab.layout.axes import wrapped
 from finlab.physics.plant import Plant
 
 
@@ -42,13 +42,7 @@ class Rates:
     plant: Plant
     """The robot."""
     step: Array
-    """Largest changes (n, 3); infinite where nothing limits them."""
-
-    @classmethod
-    def of(cls, plant: Plant, rates: Array, period_s: float) -> Self:
-        """Those of a robot whose commands change no faster than `rates` (n, 3) [per second], in ticks of
-        `period_s` [s]."""
-        return cls(plant, rates * period_s)
+    """Largest changes (n, 3) in a tick; infinite where nothing limits them."""
 
     def allow(self, previous: Array, command: Array) -> bool:
         """Whether a command (n, 3) may follow a previous one (n, 3), of which actuators may be NaN."""
@@ -70,20 +64,13 @@ class Rates:
 
 
 def within_tick(robot: DualRobot, sets: Sets, wrench: Array, prices: Array, weight: Array) -> Array:
-    """Forces (k, 1) [N] within the sets of a tick that give a wrench (1, 6) [N, N m], or come near to it.
-
-    Args:
-        robot: the robot.
-        sets: what may follow the previous command.
-        wrench: the target.
-        prices: where to begin (r, 1), such as those of the answer without limits of a tick.
-        weight: of the missing wrench along each axis (6,) [1/N, 1/(N m)].
-    """
+    """Forces (k, 1) [N] within the sets of a tick that give a wrench (1, 6) [N, N m], or come near to it by
+    weights of the axes (6,) [1/N, 1/(N m)]; the search begins at prices (r, 1)."""
     target = robot.target(wrench)
-    if not len(target):  # nothing pushes, such as rudders at rest
+    if not len(target):  # nothing pushes, such as foils at rest
         return np.zeros((len(robot.effectiveness), 1))
-    found = solve(robot, target, sets, prices)
-    if found.solved[0]:
-        return found.force
+    result = solve(robot, target, sets, prices)
+    if result.solved[0]:
+        return result.force
     near = nearest_point(robot.farthest(sets), robot.effectiveness * weight, wrench[0] * weight)
     return cheapest(robot, sets, near.force, robot.effectiveness.T @ robot.middle(sets)).force[:, None]

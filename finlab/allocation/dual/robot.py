@@ -1,8 +1,9 @@
 """A robot as the dual sees it: scaled effectiveness in the range that its actuators span, and their sets."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,30 +15,49 @@ from finlab.arrays import Array
 from finlab.precision import NEARLY, NOTHING
 
 
-@dataclass(frozen=True, eq=False)
 class DualRobot:
-    """One robot, prepared."""
+    """One robot, prepared of the responses of its n actuators; lines come first."""
 
-    order: Array
-    """Places (n,) of the actuators in the layout, lines first."""
-    answers: Answers
-    """Their answers to prices."""
-    sets: Sets
-    """What each may give."""
-    ends: Array
-    """Least and largest forces (n, 2) [N], of planes sizes, below 0 in reverse."""
-    band: Array
-    """Dead bands (n, 1) [N]: smaller forces, other than 0, cannot be held."""
-    band_cost: Array
-    """Power (n, 3) [W] at the negative end of the band, at rest, and at its positive end."""
-    effectiveness: Array
-    """Wrench (k, 6) per newton along each direction, lines, first directions, second directions."""
-    scale: Array
-    """Size (6,) of what the robot can push along each axis [N, N m]; 1 where it cannot."""
-    basis: Array
-    """Directions (6, r) of scaled wrenches that the actuators span, orthonormal."""
-    matrix: Array
-    """Effectiveness (k, r) in that basis."""
+    def __init__(self, responses: list[Response]) -> None:
+        lines = [each for each in responses if isinstance(each, Line)]
+        planes = [each for each in responses if isinstance(each, Plane)]
+        self.order = np.argsort([isinstance(each, Plane) for each in responses], kind="stable")
+        """Places (n,) of the actuators in the layout."""
+        self.answers = Answers(lines, planes)
+        both: list[Response] = [*lines, *planes]
+        self.ends = np.array([each.ends for each in both])
+        """Least and largest forces (n, 2) [N], of planes sizes, below 0 in reverse."""
+        low, high = self.ends[:, :1], self.ends[:, 1:]
+        self.most = np.abs(self.ends).max(axis=1, keepdims=True) + 1e-12
+        """Largest force or size (n, 1) [N] of each actuator."""
+        self.band = np.array([each.band for each in both])[:, None]
+        """Dead bands (n, 1) [N]: smaller forces, other than 0, cannot be held."""
+        at_band = [sign * np.minimum(self.band, high) for sign in (-1.0, 0.0, 1.0)]
+        self.band_cost = self.answers.marginal(np.concatenate(at_band, axis=1))[1]
+        """Power (n, 3) [W] at the negative end of the band, at rest, and at its positive end."""
+        arcs = np.array([(plane.middle, plane.half) for plane in planes]).reshape(-1, 2)
+        idle = np.array([_needs_no_reverse(plane) for plane in planes], bool)
+        least = np.where(np.pad(idle, (len(lines), 0))[:, None], 0.0, low)
+        self.sets = limited_sets(self.answers, least, high, arcs)
+        """What each may give."""
+        rows = [line.effectiveness for line in lines]
+        rows += [plane.effectiveness[k] for k in range(2) for plane in planes]
+        rows += [line.drag for line in lines if line.drag is not None]
+        self.effectiveness = np.array(rows)
+        """Wrench (k, 6) per newton along each direction, lines, first directions, second directions, drag."""
+        sizes = np.abs(self.ends).max(axis=1, keepdims=True)
+        self.most_drag = self.answers.drag(self.most) + 1e-12
+        """Drag (f, 1) [N] of the largest forces of the lines that drag."""
+        largest = np.concatenate([sizes, sizes[len(lines) :], self.answers.drag(sizes) + 1e-12])
+        scaled = self.effectiveness * largest
+        size = np.sqrt((scaled**2).sum(axis=0))
+        self.scale = np.where(size > NOTHING * max(size.max(), 1e-300), size, 1.0)
+        """Size (6,) of what the robot can push along each axis [N, N m]; 1 where it cannot."""
+        left, values, _ = np.linalg.svd((scaled / self.scale).T, full_matrices=False)
+        self.basis = left[:, values > NOTHING * max(values[0], 1e-300)]
+        """Directions (6, r) of scaled wrenches that the actuators span, orthonormal."""
+        self.matrix = (self.effectiveness / self.scale) @ self.basis
+        """Effectiveness (k, r) in that basis."""
 
     @cached_property
     def outer(self) -> Array:
@@ -46,27 +66,12 @@ class DualRobot:
         ends = np.cumsum([lines, planes, planes])
         line, first, second, drag = np.split(self.matrix, ends)
         mixed = _products(first, second)
-        parts = [
-            _products(line, line),
-            _products(first, first),
-            mixed + mixed.swapaxes(1, 2),
-            _products(second, second),
-        ]
+        mixed = mixed + mixed.swapaxes(1, 2)
+        parts = [_products(line, line), _products(first, first), mixed, _products(second, second)]
         if len(drag):
             along = _products(line[self.answers.dragging], drag)
             parts += [along + along.swapaxes(1, 2), _products(drag, drag)]
         return np.concatenate(parts).reshape(-1, self.shape[0] * self.shape[1]).T.copy()
-
-    @cached_property
-    def most(self) -> Array:
-        """Largest force or size (n, 1) [N] of each actuator."""
-        found: Array = np.abs(self.ends).max(axis=1, keepdims=True) + 1e-12
-        return found
-
-    @cached_property
-    def largest(self) -> Array:
-        """The same (k, 1) [N] for each direction."""
-        return np.concatenate([self.most, self.most[self.answers.lines :], self.most_drag])
 
     @cached_property
     def largest_power(self) -> float:
@@ -89,8 +94,7 @@ class DualRobot:
     def first_force(self) -> Array:
         """Forces (k, r) of a scaled wrench at least quadratic cost."""
         hessian = (self.matrix.T * self.gain[:, 0]) @ self.matrix
-        found: Array = (self.matrix * self.gain) @ np.linalg.pinv(hessian, hermitian=True)
-        return found
+        return np.asarray((self.matrix * self.gain) @ np.linalg.pinv(hessian, hermitian=True))
 
     @cached_property
     def trace(self) -> Array:
@@ -109,11 +113,6 @@ class DualRobot:
         hessian = (self.squares @ self.gain).reshape(self.shape)
         mean = float(hessian.trace()) / max(len(hessian), 1)
         return np.asarray(hessian / mean + NEARLY * np.eye(len(hessian)))
-
-    @cached_property
-    def most_drag(self) -> Array:
-        """Drag (f, 1) [N] of the largest forces of the lines that drag."""
-        return _most_drag(self.answers, self.most)
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -142,18 +141,12 @@ class DualRobot:
         within = np.clip(size, sets.low, sets.high)
         within[lines:] *= 1.0 - 2.0 * sets.flipped
         cost = self.answers.marginal(within)[1]
-        planar = fixed[lines:]
-        return Sets(
-            np.where(fixed, size, sets.low),
-            np.where(fixed, size, sets.high),
-            np.where(fixed, cost, sets.low_cost),
-            np.where(fixed, cost, sets.high_cost),
-            np.where(planar, np.arctan2(y, x), sets.middle),
-            np.where(planar, 0.0, sets.half),
-            np.where(planar, 0.0, sets.reverse),
-            sets.reverse_cost,
-            sets.flipped,
-        )
+        cut = {"low": size, "high": size, "low_cost": cost, "high_cost": cost}
+        turned = {"middle": np.arctan2(y, x), "half": 0.0, "reverse": 0.0}
+        changes: list[Any] = [(name, value, fixed) for name, value in cut.items()]
+        changes += [(name, value, fixed[lines:]) for name, value in turned.items()]
+        values = {name: np.where(where, value, getattr(sets, name)) for name, value, where in changes}
+        return replace(sets, **values)
 
     def restricted(self, reach: Array) -> Sets:
         """Sets of actuators that give no more than rows (n, 4) of least and largest force [N], middle and
@@ -163,36 +156,16 @@ class DualRobot:
 
     def target(self, wrench: Array) -> Array:
         """Wrenches (N, 6) in the basis (r, N)."""
-        found: Array = self.basis.T @ (wrench / self.scale).T
-        return found
+        return np.asarray(self.basis.T @ (wrench / self.scale).T)
 
     def price(self, prices: Array) -> Array:
         """Prices (N, 6) [W/N, W/(N m)] of the wrench from those in the basis (r, N) [W]."""
-        found: Array = (self.basis @ prices).T / self.scale
-        return found
-
-    def wrench(self, force: Array) -> Array:
-        """Wrenches (N, 6) [N, N m] of forces (k, N)."""
-        found: Array = force.T @ self.effectiveness
-        return found
+        return np.asarray((self.basis @ prices).T / self.scale)
 
 
 def _products(a: Array, b: Array) -> Array:
     """Outer products (m, r, r) of rows (m, r)."""
     return np.asarray(a[:, :, None] * b[:, None, :])
-
-
-def _range(effectiveness: Array, most: Array) -> tuple[Array, Array]:
-    """Scale and basis, as in `DualRobot`, of directions (k, 6) whose largest forces are `most` (k, 1)."""
-    size = np.sqrt(((effectiveness * most) ** 2).sum(axis=0))
-    scale = np.where(size > NOTHING * max(size.max(), 1e-300), size, 1.0)
-    left, values, _ = np.linalg.svd((effectiveness * most / scale).T, full_matrices=False)
-    return scale, left[:, values > NOTHING * max(values[0], 1e-300)]
-
-
-def _most_drag(answers: Answers, most: Array) -> Array:
-    """Drag (f, 1) [N] of the largest forces (n, 1) [N]."""
-    return answers.drag(most) + 1e-12
 
 
 def _needs_no_reverse(plane: Plane) -> bool:
@@ -214,51 +187,9 @@ def limited_sets(answers: Answers, low: Array, high: Array, arcs: Array) -> Sets
     near = np.where(flipped, high, np.where(back, 0.0, low))
     far = np.where(flipped, low, high)
     cost = answers.marginal(np.concatenate([near, far, low], axis=1))[1]
-    both = back & ~flipped
-    return Sets(
-        np.where(plane, np.abs(near), near),
-        np.where(plane, np.abs(far), far),
-        cost[:, :1],
-        cost[:, 1:2],
-        arcs[:, :1] + np.pi * flipped[lines:],
-        arcs[:, 1:],
-        np.where(both, -low, 0.0)[lines:],
-        cost[lines:, 2:],
-        flipped[lines:].astype(np.float64),
-    )
-
-
-def dual_robot(responses: list[Response]) -> DualRobot:
-    """Prepare a robot of the responses of its actuators."""
-    line_places = [i for i, each in enumerate(responses) if isinstance(each, Line)]
-    plane_places = [i for i, each in enumerate(responses) if isinstance(each, Plane)]
-    lines = [each for each in responses if isinstance(each, Line)]
-    planes = [each for each in responses if isinstance(each, Plane)]
-    answers = Answers(lines, planes)
-    ends = np.array([line.ends for line in lines] + [plane.ends for plane in planes])
-    low, high = ends[:, :1], ends[:, 1:]
-    band = np.array([line.band for line in lines] + [plane.band for plane in planes])[:, None]
-    at_band = [sign * np.minimum(band, high) for sign in (-1.0, 0.0, 1.0)]
-    arcs = np.array([(plane.middle, plane.half) for plane in planes]).reshape(-1, 2)
-    idle = np.array([_needs_no_reverse(plane) for plane in planes], bool)
-    least = np.where(np.pad(idle, (len(lines), 0))[:, None], 0.0, low)
-    sets = limited_sets(answers, least, high, arcs)
-    rows = [line.effectiveness for line in lines]
-    rows += [plane.effectiveness[0] for plane in planes] + [plane.effectiveness[1] for plane in planes]
-    rows += [line.drag for line in lines if line.drag is not None]
-    effectiveness = np.array(rows)
-    most = np.abs(ends).max(axis=1, keepdims=True)
-    most = np.concatenate([most, most[len(lines) :], _most_drag(answers, most)])
-    scale, basis = _range(effectiveness, most)
-    return DualRobot(
-        np.array(line_places + plane_places),
-        answers,
-        sets,
-        ends,
-        band,
-        answers.marginal(np.concatenate(at_band, axis=1))[1],
-        effectiveness,
-        scale,
-        basis,
-        (effectiveness / scale) @ basis,
-    )
+    reverse = np.where(back & ~flipped, -low, 0.0)[lines:]
+    near, far = np.where(plane, np.abs(near), near), np.where(plane, np.abs(far), far)
+    turned, (low_cost, high_cost, other) = flipped[lines:], np.split(cost, 3, axis=1)
+    middle, half = arcs[:, :1] + np.pi * turned, arcs[:, 1:]
+    flips = turned.astype(np.float64)
+    return Sets(near, far, low_cost, high_cost, middle, half, reverse, other[lines:], flips)

@@ -1,6 +1,6 @@
-"""What the actuators of a robot may give, for one target or many: limits of forces and their directions."""
+"""Limits of the forces of a robot's actuators and of their directions, for one target or many."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 
 import numpy as np
@@ -44,25 +44,26 @@ class Sets:
     @cached_property
     def rests(self) -> bool:
         """Whether all planes can rest."""
-        return not (self.low[len(self.low) - len(self.half) :] > 0.0).any()
+        return not (self.low[self._planes] > 0.0).any()
+
+    @property
+    def _planes(self) -> slice:
+        return slice(len(self.low) - len(self.half), None)
 
     @cached_property
     def squared_gap(self) -> Array:
         """Squares of the prices (p, 1) or (p, N) [W^2/N^2] below which a plane's direction is undecided."""
-        planes = slice(len(self.low) - len(self.half), None)
-        low, least = (
-            self.low[planes],
-            NOTHING * self.high_cost[planes] / np.maximum(self.high[planes], 1e-300),
-        )
+        planes = self._planes
+        low, high = self.low[planes], self.high[planes]
+        least = NOTHING * self.high_cost[planes] / np.maximum(high, 1e-300)
         turning = TURNING * self.low_cost[planes] / np.maximum(low, 1e-300)
         return np.asarray(np.where(low > 0.0, np.maximum(turning, least), least) ** 2 + 1e-300)
 
     @cached_property
     def forked(self) -> NDArray[np.intp]:
         """Places of the planes whose set has a gap: wide arcs, and arcs of forces that cannot rest."""
-        arc = self.half < np.pi
-        low = self.low[len(self.low) - len(self.half) :]
-        wide = arc & ((self.half > 0.5 * np.pi) | ((low > 0.0) & (self.half > 0.0)))
+        restless = (self.low[self._planes] > 0.0) & (self.half > 0.0)
+        wide = (self.half < np.pi) & ((self.half > 0.5 * np.pi) | restless)
         return np.flatnonzero(wide.any(axis=1))
 
     @cached_property
@@ -86,18 +87,16 @@ class Sets:
     @cached_property
     def most_cost(self) -> Array:
         """Power (1,) or (N,) [W] of all actuators at the dearer ends of their sets."""
-        found: Array = np.maximum(self.low_cost, self.high_cost)
+        most = np.maximum(self.low_cost, self.high_cost)
         if len(self.reversing):
-            planes = slice(len(self.low) - len(self.half), None)
-            found = found + np.zeros(max(found.shape[1], self.reverse_cost.shape[1]))
-            found[planes] = np.maximum(found[planes], self.reverse_cost)
-        return np.asarray(found.sum(axis=0))
+            most = most + np.zeros(max(most.shape[1], self.reverse_cost.shape[1]))
+            most[self._planes] = np.maximum(most[self._planes], self.reverse_cost)
+        return np.asarray(most.sum(axis=0))
 
     @property
     def parts(self) -> tuple[Array, ...]:
         """All arrays, in order."""
-        ends = self.low, self.high, self.low_cost, self.high_cost
-        return *ends, self.middle, self.half, self.reverse, self.reverse_cost, self.flipped
+        return tuple(getattr(self, field.name) for field in fields(self))
 
     def take(self, columns: NDArray[np.intp]) -> "Sets":
         """The same for some of the targets."""

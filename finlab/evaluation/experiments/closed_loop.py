@@ -6,13 +6,16 @@ are paired by time. Only positions count: the reference prescribes no attitude.
 """
 
 from collections.abc import Mapping, Sequence
+from itertools import combinations
 from typing import Any
 
 import numpy as np
 
 from finlab.arrays import Array
+from finlab.control import steers
 from finlab.errors import DataError
 from finlab.evaluation.document import Column, Row
+from finlab.layout import Layout
 from finlab.sim import RunLog
 
 RTE_DELTA_S = 5.0
@@ -54,6 +57,18 @@ def follow_row(log: RunLog) -> Row:
     }
 
 
+def first_lost(layout: Layout, count: int) -> tuple[str, ...]:
+    """The first `count` actuators in order without which the others still give surge, heave and yaw.
+
+    Raises:
+        DataError: none such are there.
+    """
+    for names in combinations(layout.names, count):
+        if count == 0 or (count < layout.n and steers(layout, names)):
+            return names
+    raise DataError(f"lost: without {count} of its {layout.n} actuators {layout.name} cannot be steered")
+
+
 def power_row(log: RunLog) -> Row:
     """Mean power of all fins [W] by both measures, and the median time of an allocation."""
     return {
@@ -72,15 +87,23 @@ def over_seeds(rows: Sequence[Row]) -> Row:
     return means
 
 
-def mean_rows(key: str, done: Mapping[tuple[Any, str], Sequence[Row]], last: Any) -> list[Row]:
-    """One row for each value under `key` and method, of the rows of its runs; the value `last` at the end."""
-    order = sorted(done, key=lambda pair: pair[0] == last)
+def mean_rows(key: str, done: Mapping[tuple[Any, str, str], Sequence[Row]], last: Any) -> list[Row]:
+    """One row for each value under `key`, method and controller, of the rows of its runs; the value `last` at
+    the end."""
+    order = sorted(done, key=lambda case: case[0] == last)
     return [
-        {key: value, "method": name, "runs": len(done[value, name]), **over_seeds(done[value, name])}
-        for value, name in order
+        {key: case[0], "method": case[1], "controller": case[2]}
+        | {"runs": len(done[case]), **over_seeds(done[case])}
+        for case in order
     ]
 
 
+WHO = (
+    Column("method", "method", "code"),
+    Column("controller", "controller", "code"),
+    Column("runs", "runs", "count"),
+)
+"""Columns of who swam: what allocates, and what asks for the wrench."""
 POWER = (
     Column("inertial_w", "inertial power", "three", unit="W"),
     Column("driving_w", "with motor losses", "three", unit="W"),

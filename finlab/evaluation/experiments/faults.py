@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import partial
 from itertools import combinations, product
 
-from finlab.control import steers
+from finlab.control import controller_of, steers
 from finlab.evaluation.document import Column, Row
 from finlab.evaluation.experiment import Experiment, paper_figures
 from finlab.evaluation.experiments.closed_loop import (
@@ -18,6 +18,7 @@ from finlab.evaluation.experiments.closed_loop import (
 )
 from finlab.evaluation.method_specs import MethodSpec, load_method_specs
 from finlab.executor import map_parts
+from finlab.files.worker import in_worker
 from finlab.layout import Layout, load_layout
 from finlab.sim import ClosedLoop, Trajectory, make_trajectory
 
@@ -55,6 +56,7 @@ def run(
     layout: str = "A",
     trajectory: str = "circle",
     methods: tuple[str, ...] = ("dual", "analytic"),
+    controller: str = "tracking",
     runs: int = 3,
     checkpoint: str | None = None,
     seed: int = 0,
@@ -65,16 +67,17 @@ def run(
         layout: a layout file or shipped name.
         trajectory: circle, lissajous, square, dive, station, or a CSV file with the columns t, x, y, z.
         methods: names as in eval wrench.
+        controller: tracking, waypoint (the paper's), velocity.
         runs: of each, with other noise.
         checkpoint: of the learned methods, a shipped name or a folder.
         seed: of the first run's noise.
     """
-    robot, path = load_layout(layout), make_trajectory(trajectory)
+    robot, path = in_worker(load_layout, layout), in_worker(make_trajectory, trajectory)
     faults, specs = all_faults(robot, path.duration_s / 2), load_method_specs(methods, checkpoint)
     cases = [(fault, name) for fault, name in product(faults, specs) if fault.controllable]
     done: dict[tuple[Fault, str], list[Row]] = {}
     swims = list(product(cases, range(seed, seed + runs)))
-    errors = map_parts(partial(_swim, robot, path, specs), swims, "faults", "swim")
+    errors = map_parts(partial(_swim, robot, path, specs, controller), swims, "faults", "swim")
     for (case, _), row in zip(swims, errors, strict=True):
         done.setdefault(case, []).append(row)
     rows: list[Row] = []
@@ -87,12 +90,17 @@ def run(
 
 
 def _swim(
-    robot: Layout, path: Trajectory, methods: Mapping[str, MethodSpec], swim: tuple[tuple[Fault, str], int]
+    robot: Layout,
+    path: Trajectory,
+    methods: Mapping[str, MethodSpec],
+    controller: str,
+    swim: tuple[tuple[Fault, str], int],
 ) -> Row:
     """Errors of one swim: its fault and method, and its seed."""
     (fault, name), seed = swim
     lost = [(fin, fault.time_s) for fin in fault.fins]
-    return follow_row(ClosedLoop(robot, methods[name].on(robot), path, failures=lost, seed=seed).run())
+    law, method = controller_of(controller, robot), methods[name].on(robot)
+    return follow_row(ClosedLoop(robot, method, path, law, failures=lost, seed=seed).run())
 
 
 def _printed(rows: Sequence[Row]) -> list[Row]:

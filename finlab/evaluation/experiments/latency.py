@@ -18,7 +18,7 @@ from finlab.evaluation.document import Column, Row
 from finlab.evaluation.experiment import Experiment, paper_figures, progress
 from finlab.evaluation.method_specs import MethodSpec, can_run, load_method_spec, load_method_specs
 from finlab.layout import Layout, random_layout
-from finlab.layout.random_actuators import random_robot, random_thruster
+from finlab.layout.random_layouts import random_robot, random_thruster
 from finlab.physics import plant_of
 
 DOMAIN = 0xF1257  # leads the seed of every robot

@@ -15,7 +15,7 @@ from finlab.evaluation.experiments.hard_days import HARD_DAYS, Case, HardDay
 from finlab.evaluation.method_specs import MethodSpec, load_method_specs
 from finlab.executor import map_parts
 from finlab.layout import load_layout
-from finlab.layout.angles import command_change
+from finlab.layout.axes import command_change
 from finlab.sim import RunLog
 
 DAYS = {day.name: day for day in HARD_DAYS}

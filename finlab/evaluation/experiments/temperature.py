@@ -13,7 +13,7 @@ from finlab.evaluation.experiment import Experiment, progress
 from finlab.evaluation.scoring import mean_interval, paper_sigma
 from finlab.evaluation.splits import make_split
 from finlab.layout import Layout
-from finlab.layout.angles import is_full_turn
+from finlab.layout.axes import is_full_turn
 from finlab.paper.settings import PaperSettings
 
 PAPER_TEMPERATURE = 0.02

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation import Allocator, Policy
-from finlab.allocation.baselines.ardusub import ORDER as ARDUSUB_ORDER
-from finlab.allocation.baselines.px4 import ORDER as PX4_ORDER
+from finlab.allocation.baselines.autopilots import ARDUSUB_ORDER, PX4_ORDER
 from finlab.arrays import Array
 from finlab.evaluation.document import Column, Row
 from finlab.evaluation.experiment import Experiment, check_names

@@ -6,12 +6,21 @@ from itertools import product
 
 import numpy as np
 
+from finlab.control import controller_of
 from finlab.errors import DataError
 from finlab.evaluation.document import Column, Row
 from finlab.evaluation.experiment import Experiment, paper_figures
-from finlab.evaluation.experiments.closed_loop import POWER, depth_error, mean_rows, power_row
+from finlab.evaluation.experiments.closed_loop import (
+    POWER,
+    WHO,
+    depth_error,
+    first_lost,
+    mean_rows,
+    power_row,
+)
 from finlab.evaluation.method_specs import MethodSpec, load_method_specs
 from finlab.executor import map_parts
+from finlab.files.worker import in_worker
 from finlab.layout import Layout, load_layout
 from finlab.sim import ClosedLoop, RunLog, straight
 
@@ -24,16 +33,20 @@ SETTLED_S = 10.0
 def run(
     layout: str = "A",
     methods: tuple[str, ...] = ("dual", "mdn", "analytic"),
+    controllers: tuple[str, ...] = ("tracking", "velocity"),
+    lost: int = 0,
     runs: int = 5,
     duration: float = 30.0,
     checkpoint: str | None = None,
     seed: int = 0,
 ) -> list[Row]:
-    """One row for each speed and method, and one for each method over all speeds.
+    """One row for each speed, method and controller, and one for each over all speeds.
 
     Args:
         layout: a layout file or shipped name.
         methods: names as in eval wrench.
+        controllers: tracking, velocity (the paper's).
+        lost: so many fins are lost from the start, the first without which it can still be steered.
         runs: of each, with other noise.
         duration: of a run [s].
         checkpoint: of the learned methods, a shipped name or a folder.
@@ -41,22 +54,29 @@ def run(
     """
     if not SETTLED_S < duration <= 3600.0:
         raise DataError(f"duration: expected more than {SETTLED_S:g} s and at most 3600 s, got {duration:g}")
-    robot, specs = load_layout(layout), load_method_specs(methods, checkpoint)
-    done: dict[tuple[float | None, str], list[Row]] = {}
-    swims = list(product(SPEEDS, specs, range(seed, seed + runs)))
-    errors = map_parts(partial(_swim, robot, specs, duration), swims, "velocity", "swim")
-    for (speed, name, _), row in zip(swims, errors, strict=True):
-        done.setdefault((speed, name), []).append(row)
-        done.setdefault((None, name), []).append(row)
+    robot, specs = in_worker(load_layout, layout), load_method_specs(methods, checkpoint)
+    done: dict[tuple[float | None, str, str], list[Row]] = {}
+    swims = list(product(SPEEDS, specs, controllers, range(seed, seed + runs)))
+    errors = map_parts(partial(_swim, robot, specs, duration, lost), swims, "velocity", "swim")
+    for (speed, name, control, _), row in zip(swims, errors, strict=True):
+        for group in (speed, None):
+            done.setdefault((group, name, control), []).append(row)
     return mean_rows("speed", done, None)
 
 
 def _swim(
-    robot: Layout, methods: Mapping[str, MethodSpec], duration: float, swim: tuple[float, str, int]
+    robot: Layout,
+    methods: Mapping[str, MethodSpec],
+    duration: float,
+    lost: int,
+    swim: tuple[float, str, str, int],
 ) -> Row:
-    """Errors and power of one swim: its speed, method and seed."""
-    speed, name, seed = swim
-    return _row(ClosedLoop(robot, methods[name].on(robot), straight(speed, duration), seed=seed).run())
+    """Errors and power of one swim: its speed, method, controller and seed."""
+    speed, name, control, seed = swim
+    gone = [(fin, 0.0) for fin in first_lost(robot, lost)]
+    path, controller = straight(speed, duration), controller_of(control, robot)
+    loop = ClosedLoop(robot, methods[name].on(robot), path, controller, failures=gone, seed=seed)
+    return _row(loop.run())
 
 
 def _row(log: RunLog) -> Row:
@@ -72,7 +92,10 @@ def _row(log: RunLog) -> Row:
 
 def _printed(rows: Sequence[Row]) -> list[Row]:
     names = {"ours": "paper's method, printed", "baseline": "paper's baseline, printed"}
-    return [{"method": names[key], **row} for key, row in paper_figures()["velocity"].items()]
+    return [
+        {"method": names[key], "controller": "velocity", **row}
+        for key, row in paper_figures()["velocity"].items()
+    ]
 
 
 experiment = Experiment(
@@ -80,8 +103,7 @@ experiment = Experiment(
     question="What power does it take to keep a speed and a depth, and how well are they kept?",
     columns=(
         Column("speed", "speed", "ratio", unit="m/s"),
-        Column("method", "method", "code"),
-        Column("runs", "runs", "count"),
+        *WHO,
         Column("mae", "MAE of the speed", "metres", unit="m/s"),
         Column("mae_std", "spread", "error", unit="m/s"),
         Column("mae_settled", "after 10 s", "metres", unit="m/s"),

@@ -12,7 +12,8 @@ from finlab.evaluation.method_specs import SLOW, MethodSpec, installed_methods, 
 from finlab.evaluation.scoring import Columns, joined, mean_interval, run_method, share_interval
 from finlab.evaluation.splits import SPLITS, Case, make_case, make_split, own_sigma
 from finlab.executor import map_parts
-from finlab.layout import Layout
+from finlab.files.worker import in_worker
+from finlab.layout import Layout, load_layout
 from finlab.layout.load import layout_and_failed
 from finlab.physics import plant_of
 
@@ -49,7 +50,7 @@ def run(
         seed: of all draws.
     """
     sets = _cases(layout, split, layouts, targets, seed)
-    usual = ("dual", "paper") if layout is None else installed_methods(layout_and_failed(layout)[0])
+    usual = ("dual", "paper") if layout is None else installed_methods(in_worker(load_layout, layout))
     specs = load_method_specs(methods or usual, checkpoint, patient=True)
     rows: list[Row] = []
     for name, cases in sets.items():
@@ -109,7 +110,7 @@ def _cases(
         raise DataError(
             f"split: a layout has none, got {','.join(split)!r} beside {layout!r:.60}; leave one of them out"
         )
-    robot, failed = layout_and_failed(layout)
+    robot, failed = in_worker(layout_and_failed, layout)
     return {f"layout {robot.name}": [partial(own_case, robot, failed, targets, seed)]}
 
 

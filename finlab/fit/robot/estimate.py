@@ -14,13 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.arrays import Array
-from finlab.fit.robot.model import RobotModel
+from finlab.fit.robot.robot_model import RobotModel
 from finlab.fit.robot.swim import ANGLES, STEP_S
 from finlab.fit.robot.unknowns import BASE, Unknowns
-from finlab.layout.angles import wrapped
+from finlab.layout.axes import wrapped
 from finlab.least_squares import Damping, levenberg_marquardt
 from finlab.vehicle.fossen import Dynamics
-from finlab.vehicle.many_bodies import integrate
+from finlab.vehicle.vehicle import integrate
 
 WINDOW = 80
 """Steps of a window."""
@@ -40,45 +40,38 @@ CLIP = 4.0
 
 
 class Windows(NamedTuple):
-    """W windows of L steps; what a swim does not fill is NaN in the measurements."""
+    """W windows of L steps: which of all swims each step is (W, L), measurements (L, 12, W), NaN where a swim
+    does not fill them, and the smoothed state at the beginning (12, W)."""
 
     step: NDArray[np.intp]
-    """Which step of all swims each is (W, L)."""
     measured: Array
-    """(L, 12, W)."""
     start: Array
-    """Smoothed state at the beginning (12, W)."""
 
 
 @dataclass(frozen=True)
 class Fitted:
-    """Unknowns, and the problem near them, the windows' beginnings eliminated."""
+    """Unknowns, a vector (size,) in scales, and the problem near them, the windows' beginnings eliminated."""
 
     unknowns: Unknowns
     vector: Array
-    """(size,), in scales."""
     start: Array
     """States in which the windows begin (12, W)."""
     cost: Array
-    """Half the sum of squares (1,)."""
+    """Half the sum of squares (1,), whose gradient (size,), downwards, and second derivatives by the unknowns
+    (size, size), with what was believed before, are next."""
     gradient: Array
-    """Its slopes by the unknowns (size,), downwards."""
     information: Array
-    """Its second derivatives (size, size), with what was believed before."""
     own_information: Array
-    """What each window brings to them (W, size, size)."""
+    """What each window brings to the second derivatives (W, size, size), and to the gradient (W, size)."""
     scores: Array
-    """And to the slopes (W, size)."""
     residual: Array
-    """Measured less simulated, in deviations (L, 12, W); NaN where nothing was measured."""
+    """Measured less simulated, in deviations (L, 12, W), NaN where nothing was measured; simulated states."""
     state: Array
-    """Simulated states (L, 12, W)."""
     inner: Array
-    """Inverse second derivatives by the beginnings (W, 12, 12)."""
+    """Inverse second derivatives by the beginnings (W, 12, 12), those by beginnings and unknowns (W, 12,
+    size), and the gradient by the beginnings (W, 12), downwards."""
     mixed: Array
-    """By beginnings and unknowns (W, 12, size)."""
     pull: Array
-    """Slopes by the beginnings (W, 12), downwards."""
 
     def step(self, damping: float) -> tuple[Array, Array]:
         """Changes of the unknowns (size,) and of the beginnings (12, W)."""
@@ -93,12 +86,11 @@ def cut(n_steps: list[int], measured: Array, smooth: Array) -> Windows:
     steps, begin = [], 0
     for count in n_steps:
         n = max(1, round(count / WINDOW))
-        length = count // n
-        steps += [begin + k * length + np.arange(length) for k in range(n)]
+        steps += [begin + count // n * k + np.arange(count // n) for k in range(n)]
         begin += count
-    longest = max(len(one) for one in steps)
-    padded = np.array([np.concatenate([one, np.full(longest - len(one), one[-1])]) for one in steps])
     own = np.array([len(one) for one in steps])
+    longest = own.max()
+    padded = np.array([np.pad(one, (0, longest - len(one)), "edge") for one in steps])
     values = np.where((np.arange(longest) < own[:, None])[..., None], measured[padded], np.nan)
     return Windows(padded, np.moveaxis(values, 0, -1), smooth[padded[:, 0]].T.copy())
 
@@ -109,27 +101,18 @@ def fit_windows(
     windows: Windows,
     deviation: Array,
     vector: Array,
-    start: Array | None = None,
+    start: Array,
 ) -> Fitted:
-    """Unknowns from windows.
-
-    Args:
-        model: the robot and its swims.
-        unknowns: what is looked for.
-        windows: what was measured.
-        deviation: standard deviation of each channel (12,).
-        vector: where to begin (size,).
-        start: states of the windows to begin with, instead of the smoothed ones.
-    """
+    """Unknowns from windows, by the standard deviation of each channel (12,), from a vector (size,) on and
+    from the beginnings of the windows `start` (12, W)."""
     problem = _Problem(model, unknowns, windows, deviation)
-    begin = windows.start if start is None else start
 
     def moved(at: Fitted, damping: Array, last: bool) -> Fitted:
         change, shift = at.step(float(damping[0]))
         with np.errstate(all="ignore"):  # a step too far may make a robot take off
             return problem.at(at.vector + change, at.start + shift)
 
-    return levenberg_marquardt(problem.at(vector, begin), moved, MOST_STEPS, DAMPING, SETTLED)
+    return levenberg_marquardt(problem.at(vector, start), moved, MOST_STEPS, DAMPING, SETTLED)
 
 
 def unseen_gain(model: RobotModel, fitted: Fitted, windows: Windows, deviation: Array, name: str) -> Array:
@@ -138,25 +121,24 @@ def unseen_gain(model: RobotModel, fitted: Fitted, windows: Windows, deviation: 
     Cross-validation to second order about the fit: the windows are dealt to some folds, and the normal
     equations of all windows but those of a fold tell the change of the unknowns, with the block and without.
     """
-    whole = Unknowns(model.blocks, (*BASE, name))
-    vector = np.pad(fitted.vector, (0, whole.size - len(fitted.vector)))
-    at, believed = _Problem(model, whole, windows, deviation).at(vector, fitted.start), whole.believed
+    more = Unknowns(model.blocks, (*BASE, name))
+    vector = np.pad(fitted.vector, (0, more.size - len(fitted.vector)))
+    at, believed = _Problem(model, more, windows, deviation).at(vector, fitted.start), more.believed
     fold = np.arange(windows.start.shape[1]) % FOLDS
-    known = np.ones(whole.size, bool)
-    known[whole.place(name)] = False
+    known = np.ones(more.size, bool)
+    known[more.place(name)] = False
 
     def gain(chosen: NDArray[np.bool_]) -> Array:
         """What windows gain by changes of the chosen unknowns that the others ask for (W,)."""
-        found = np.empty(len(fold))
-        here = np.flatnonzero(chosen)
+        gains, here = np.empty(len(fold)), np.flatnonzero(chosen)
         for k in range(FOLDS):
             seen, unseen = fold != k, np.flatnonzero(fold == k)
             information = at.own_information[seen].sum(axis=0) + believed
             pull = at.scores[seen].sum(axis=0) - believed @ vector
             change = np.linalg.solve(information[np.ix_(here, here)], pull[here])
             own = at.own_information[np.ix_(unseen, here, here)]
-            found[unseen] = at.scores[np.ix_(unseen, here)] @ change - 0.5 * (own @ change) @ change
-        return found
+            gains[unseen] = at.scores[np.ix_(unseen, here)] @ change - 0.5 * (own @ change) @ change
+        return gains
 
     return gain(np.ones_like(known)) - gain(known)
 
@@ -181,8 +163,12 @@ class _Problem:
         begin = np.repeat(start[:, None], n_all, axis=1)
         for k in range(12):
             begin[k, 1 + n + k] += DIFFERENCE * START_DEVIATION[k]
-        state, sensed = self._simulated(vectors, wrench, begin)
-        residual = self._residual(sensed[:, :, 0])
+        bodies = Dynamics(*(part[..., None] for part in self.model.bodies(unknowns, vectors)))
+        state = integrate(begin, wrench, bodies, unknowns.of("current", vectors).T[..., None], STEP_S)
+        sensed = self.model.sensed(unknowns, vectors, state)
+        away = windows.measured - sensed[:, :, 0]
+        away[:, ANGLES] = wrapped(away[:, ANGLES])
+        residual = np.asarray(away / self.deviation[:, None])
         left, weight = _huber(residual)
         slopes = (sensed[:, :, 1:] - sensed[:, :, :1]) / DIFFERENCE
         slopes *= (weight / self.deviation[:, None])[:, :, None]
@@ -194,33 +180,14 @@ class _Problem:
         inner = np.asarray(np.linalg.inv(scaled @ scaled.swapaxes(1, 2) + np.eye(12)), np.float64)
         mixed = scaled @ by[:, :n].swapaxes(1, 2)
         own = by[:, :n] @ by[:, :n].swapaxes(1, 2)
-        whole = own - mixed.swapaxes(1, 2) @ inner @ mixed
+        own -= mixed.swapaxes(1, 2) @ inner @ mixed
         scores = np.einsum("wkm,wm->wk", by[:, :n], r) - np.einsum("wkn,wkl,wl->wn", mixed, inner, pull)
         believed = unknowns.believed
         cost = 0.5 * float((left**2).sum() + (begun**2).sum() + vector @ believed @ vector)
-        return Fitted(
-            unknowns=unknowns,
-            cost=np.array([cost if np.isfinite(sensed).all() else np.inf]),
-            vector=vector,
-            start=start,
-            gradient=scores.sum(axis=0) - believed @ vector,
-            information=whole.sum(axis=0) + believed,
-            own_information=whole,
-            scores=scores,
-            residual=residual,
-            state=state[:, :, 0],
-            inner=inner,
-            mixed=mixed,
-            pull=pull,
-        )
-
-    def _simulated(self, vectors: Array, wrench: Array, start: Array) -> tuple[Array, Array]:
-        """States (L, 12, B, W) of B vectors (B, size) under wrenches (L, 6, B, W) from beginnings (12, B, W),
-        and what sensors see of them."""
-        bodies = Dynamics(*(part[..., None] for part in self.model.bodies(self.unknowns, vectors)))
-        current = self.unknowns.of("current", vectors).T[..., None]
-        state = integrate(start, wrench, bodies, current, STEP_S)
-        return state, self.model.sensed(self.unknowns, vectors, state)
+        cost_of_all = np.array([cost if np.isfinite(sensed).all() else np.inf])
+        slopes_of_all, information = scores.sum(axis=0) - believed @ vector, own.sum(axis=0) + believed
+        solved = (cost_of_all, slopes_of_all, information, own, scores)
+        return Fitted(unknowns, vector, start, *solved, residual, state[:, :, 0], inner, mixed, pull)
 
     def _wrenches(self, vectors: Array) -> Array:
         """Wrenches (L, 6, B, W) of B vectors (B, size) that differ from the first in one entry each."""
@@ -231,12 +198,6 @@ class _Problem:
             if self.unknowns.force[np.argmax(vector != vectors[0])]:
                 wrench[..., k] = self.model.wrench(self.unknowns, vector)[self.windows.step]
         return np.ascontiguousarray(wrench.transpose(1, 2, 3, 0))
-
-    def _residual(self, sensed: Array) -> Array:
-        """Measured less simulated (L, 12, W), in deviations."""
-        away = self.windows.measured - sensed
-        away[:, ANGLES] = wrapped(away[:, ANGLES])
-        return np.asarray(away / self.deviation[:, None])
 
 
 def _huber(residual: Array) -> tuple[Array, Array]:

@@ -8,10 +8,12 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.errors import FinlabError
-from finlab.fit.robot.learned_actuators import asked_more, learned
+from finlab.fit.robot.fitted_robot import asked_more, learned
 from finlab.fit.robot.robot_fit import SOUND, fit_robot
-from finlab.fit.robot.swim import STEP_S, Swim, followed, motion_of, only_new
+from finlab.fit.robot.swim import STEP_S, Swim, followed, only_new
 from finlab.layout import Layout
+from finlab.vehicle.actuator_motion import ActuatorMotion
+from finlab.vehicle.fin_motion import FinMotion
 
 EVERY_S, LAST_S = 60.0, 240.0
 """Time between fits [s], and how much of the swim each takes."""
@@ -24,33 +26,26 @@ class OnlineFit:
     """What a robot's actuators are, by its own swim; to be called every `STEP_S` seconds."""
 
     def __init__(self, layout: Layout) -> None:
-        """Takes the robot as it is believed to be.
-
-        Raises:
-            FinlabError: a fin is a table, whose strength is no number of the layout.
-        """
+        """Takes the robot as it is believed to be. Raises FinlabError: a fin is a table, whose strength is no
+        number of the layout."""
         for fin in layout.fins:
             if fin.model.type == "table":
-                raise FinlabError(
-                    f"fin {fin.name} is a table, expected a law: the strength of a table is fixed"
-                )
+                why = "expected a law: the strength of a table is fixed"
+                raise FinlabError(f"fin {fin.name} is a table, {why}")
         self.layout = layout
         """As it was believed to be before."""
         self.notes: list[str] = []
         """What each fit has found, a sentence each."""
         self.factor = np.ones((layout.n, 3))
         """By what commands to the robot as it was learned are multiplied for its drives (n, 3)."""
-        self._moving = motion_of(layout)
+        self._moving = ActuatorMotion(layout, FinMotion(layout))
         self._last: deque[tuple[Array, Array]] = deque(maxlen=round(LAST_S / STEP_S))
         self._steps = 0
 
     def step(self, measured: Array, command: Array) -> Layout | None:
-        """Returns the robot as the last minutes show it, whenever they have been fitted.
-
-        Args:
-            measured: what the sensors said last (12,), in the order of `CHANNELS`.
-            command: of the drives for this step (n, 3), NaN for those at rest.
-        """
+        """Returns the robot as the last minutes show it, whenever they have been fitted, by what the sensors
+        said last (12,), in the order of `CHANNELS`, and the drives' command for this step (n, 3), NaN for
+        those at rest."""
         self._last.append((followed(self._moving, command), measured))
         self._steps += 1
         if self._steps % round(EVERY_S / STEP_S):
@@ -65,11 +60,9 @@ class OnlineFit:
             )
             return None
         strength, error = np.exp(fit.found("strength")), fit.found_error("strength")
-        told = (
-            f"{name} {own:.2f} +- {own * unsure:.2f}"
-            for name, own, unsure in zip(self.layout.names, strength, error, strict=True)
-        )
+        rows = zip(self.layout.names, strength, error, strict=True)
+        words = ", ".join(f"{name} {own:.2f} +- {own * unsure:.2f}" for name, own, unsure in rows)
         turned = "".join(f"; {name} pushes the other way" for name in fit.opposed)
-        self.notes.append(f"{self._steps * STEP_S:.0f} s: learned strengths {', '.join(told)}{turned}")
+        self.notes.append(f"{self._steps * STEP_S:.0f} s: learned strengths {words}{turned}")
         self.factor = asked_more(self.layout, strength)
         return replace(self.layout, actuators=learned(fit, fit.found("lean")))

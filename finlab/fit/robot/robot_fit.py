@@ -14,8 +14,7 @@ from threadpoolctl import threadpool_limits
 from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.fit.robot.estimate import DEVIATION, Fitted, Windows, cut, fit_windows, unseen_gain
-from finlab.fit.robot.model import RobotModel
-from finlab.fit.robot.signs import opposed_in, pushing_back
+from finlab.fit.robot.robot_model import RobotModel, opposed_in, pushing_back
 from finlab.fit.robot.swim import STEP_S, Swim, smoothed
 from finlab.fit.robot.unknowns import BASE, SHAPE, Unknowns
 from finlab.layout import Layout
@@ -90,20 +89,18 @@ class RobotFit:
 
     def doubts(self) -> tuple[str, ...]:
         """Why the fit should not be trusted; empty where it may."""
-        found = []
+        clauses = []
         if self.explained < SOUND:
-            found.append(
-                f"simulated swims explain {self.explained:.0%} of the motion, expected at least {SOUND:.0%}"
-            )
-        unknowns, names = self.fitted.unknowns, self.model.layout.names
-        place, n = unknowns.place("strength"), len(names)
-        scale = unknowns.scale[place]
-        beside = np.eye(n) - 1.0 / n if n > 1 else np.eye(1)
-        covariance = beside @ (self.covariance[place, place] * np.outer(scale, scale)) @ beside.T
+            share = f"{self.explained:.0%} of the motion, expected at least {SOUND:.0%}"
+            clauses.append(f"simulated swims explain {share}")
+        names = self.model.layout.names
+        place, n = self.fitted.unknowns.place("strength"), len(names)
+        centered = self.fitted.unknowns.scale[place] * (np.eye(n) - (1.0 / n if n > 1 else 0.0))
+        covariance = centered @ self.covariance[place, place] @ centered.T
         for name, error in zip(names, np.sqrt(np.diag(covariance)), strict=True):
             if error > WEAKLY_KNOWN:
-                found.append(f"the strength of {name} is known to {error:.0%} only; swim with it at work")
-        return tuple(found)
+                clauses.append(f"the strength of {name} is known to {error:.0%} only; swim with it at work")
+        return tuple(clauses)
 
 
 def fit_robot(
@@ -113,18 +110,12 @@ def fit_robot(
     progress: Callable[[str], None] = lambda words: None,
     doubts: Mapping[str, float] = NO_DOUBTS,
 ) -> RobotFit:
-    """Learns a robot. The linear algebra runs on one thread.
+    """Learns a robot from swims. The linear algebra runs on one thread.
 
-    Args:
-        layout: the robot as it is believed to be; what its body does not say is U-CAT's.
-        swims: what was measured.
-        other_law: whether robots of fins are tried with another law of thrust, too.
-        progress: told before each step what comes next.
-        doubts: factors of how far some blocks of unknowns may be off, by name.
-
-    Raises:
-        DataError: there is no swim, or the fit goes astray.
-    """
+    The layout is what the robot is believed to be; what its body does not say is U-CAT's. With `other_law`
+    robots of fins are tried with another law of thrust, too. `progress` is called before each step; `doubts`
+    are factors of how far some blocks of unknowns may be off, by name. Raises DataError: there is no swim, or
+    the fit goes astray."""
     if not swims:
         raise DataError("expected at least one swim, got none")
     smooth = np.concatenate([smoothed(swim.measured) for swim in swims])
@@ -190,18 +181,16 @@ def _fit(
 
 def _deviation(fitted: Fitted, deviation: Array) -> Array:
     """Deviations (12,) of the channels by what is left over, outliers aside."""
-    left = np.abs(fitted.residual)
-    found = DEVIATION.copy()
+    left, scale = np.abs(fitted.residual), DEVIATION.copy()
     for k in range(12):
         said = left[:, k][np.isfinite(left[:, k])]
         if len(said):
             usual = said[said <= 5.0 * 1.4826 * max(float(np.median(said)), 1e-6)]
-            found[k] = deviation[k] * float(np.sqrt(np.mean(usual**2)))
-    return np.asarray(np.clip(found, DEVIATION_RANGE[0] * DEVIATION, DEVIATION_RANGE[1] * DEVIATION))
+            scale[k] = deviation[k] * float(np.sqrt(np.mean(usual**2)))
+    return np.asarray(np.clip(scale, DEVIATION_RANGE[0] * DEVIATION, DEVIATION_RANGE[1] * DEVIATION))
 
 
 def _keep_delays(model: RobotModel, fitted: Fitted) -> None:
-    """Tells the model how late sensors are."""
     model.late = [round(float(delay) / STEP_S) for delay in fitted.unknowns.of("delay", fitted.vector)]
 
 
@@ -214,7 +203,7 @@ def _explained(fitted: Fitted, windows: Windows) -> float:
     for k in channels:
         said = windows.measured[:, k]
         away = np.nanmean((said - fitted.state[:, k]) ** 2)
-        whole = np.nanvar(said - np.nanmean(said, axis=0))
-        if whole > (MOVES * DEVIATION[k]) ** 2:
-            shares.append(max(0.0, 1.0 - float(away) / float(whole)))
+        variance = np.nanvar(said - np.nanmean(said, axis=0))
+        if variance > (MOVES * DEVIATION[k]) ** 2:
+            shares.append(max(0.0, 1.0 - float(away) / float(variance)))
     return float(np.mean(shares)) if shares else 0.0

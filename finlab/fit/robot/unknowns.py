@@ -1,4 +1,4 @@
-"""What a fit looks for, with what is believed before: each unknown in units of how far it may be off."""
+"""Unknowns of a fit, with what is believed before: each in units of how far it may be off."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,10 +10,8 @@ from numpy.typing import ArrayLike
 from finlab.arrays import Array
 
 AXES = ("surge", "sway", "heave", "roll", "pitch", "yaw")
-BASE = (
-    *("strength", "mounting", "lean", "center", "bias"),
-    *("buoyancy", "lift", "current", "inertia", "linear", "quadratic", "delay"),
-)
+BASE = tuple("strength mounting lean center bias buoyancy lift current".split())  # noqa: SIM905
+BASE += ("inertia", "linear", "quadratic", "delay")
 SHAPE = "shape"
 """What is looked for besides in robots of fins, where it helps: another law of thrust."""
 
@@ -31,15 +29,14 @@ SAME_SCALE = 0.003
 
 @dataclass(frozen=True)
 class Block:
-    """Unknowns of one kind."""
+    """Unknowns of one kind: how far each may be off, one standard deviation of what is believed before a
+    swim, and whether the wrench of the actuators depends on them."""
 
     name: str
     labels: tuple[str, ...]
     unit: str
     scale: Array
-    """How far each may be off: one standard deviation of what is believed before a swim."""
     force: bool
-    """Whether the wrench of the actuators depends on them."""
 
 
 def blocks_of(names: Sequence[str], damping: Array) -> dict[str, Block]:
@@ -72,13 +69,10 @@ class Unknowns:
 
     def __init__(self, blocks: dict[str, Block], chosen: Sequence[str]) -> None:
         self.blocks = [blocks[name] for name in chosen]
-        sizes = [len(block.labels) for block in self.blocks]
-        ends = np.cumsum(sizes)
-        self._where = {
-            block.name: slice(int(end) - size, int(end))
-            for block, end, size in zip(self.blocks, ends, sizes, strict=True)
-        }
-        self.size = int(ends[-1])
+        ends = np.cumsum([0, *(len(block.labels) for block in self.blocks)]).tolist()
+        places = zip(self.blocks, ends, ends[1:], strict=False)
+        self._where = {block.name: slice(begin, end) for block, begin, end in places}
+        self.size: int = ends[-1]
         self.scale = np.concatenate([block.scale for block in self.blocks])
         """(size,)."""
         self.labels = tuple(label for block in self.blocks for label in block.labels)
@@ -98,17 +92,13 @@ class Unknowns:
     def part(self, name: str, vector: Array) -> Array | None:
         """The unknowns (..., k) of one block in its own units, from vectors (..., size); None where it is not
         looked for."""
-        if name not in self._where:
-            return None
-        where = self._where[name]
-        result: Array = vector[..., where] * self.scale[where]
-        return result
+        return self.of(name, vector) if name in self._where else None
 
     def of(self, name: str, vector: Array) -> Array:
         """`part` of a block that every fit looks for."""
-        found = self.part(name, vector)
-        assert found is not None, name
-        return found
+        where = self._where[name]
+        own: Array = vector[..., where] * self.scale[where]
+        return own
 
     def place(self, name: str) -> slice:
         """Where a block stands."""

@@ -9,9 +9,8 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.layout import Fin, FinModelSpec, Layout, Limits
-from finlab.layout.angles import wrapped
-from finlab.layout.random import TRAINING_BOX, random_layout
-from finlab.layout.random_actuators import Numbers, random_fin_model
+from finlab.layout.axes import wrapped
+from finlab.layout.random_layouts import TRAINING_BOX, Numbers, random_fin_model, random_layout
 from finlab.mdn.robot import EffortRobot
 
 FIN_COUNTS = dict(zip(range(2, 13), (1, 2, 8, 9, 9, 8, 8, 7, 7, 7, 7), strict=True))

@@ -20,7 +20,7 @@ from finlab.executor import cores, map_parts
 from finlab.files.guarded import decoded, read_file
 from finlab.files.plain_values import parse_json
 from finlab.layout import FinModelSpec, Layout, random_layout
-from finlab.layout.random import TRAINING_FINS
+from finlab.layout.random_layouts import TRAINING_FINS
 from finlab.networks.normalization import Normalization
 from finlab.physics import Plant
 from finlab.whole_file import make_folder, sweep_parts, write_whole

@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 
 from finlab import Allocator, load_layout
-from finlab.allocation.baselines.ardusub import ArduSub, frame_factors
-from finlab.allocation.baselines.px4 import Px4, Px4Settings, normalised
+from finlab.allocation.baselines.autopilots import ArduSub, Px4, Px4Settings, frame_factors, normalised
 from finlab.allocation.yardstick import yardstick
 from finlab.arrays import Array
 from finlab.errors import AllocationError, LayoutError
 from finlab.evaluation.splits import make_split
-from finlab.exchange.ardusub_frames import FRAMES, SIGNS
+from finlab.exchange.motor_factors import FRAMES, SIGNS
 from finlab.layout import Layout
 from finlab.physics import plant_of
 

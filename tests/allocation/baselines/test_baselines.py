@@ -11,7 +11,7 @@ from finlab.allocation.yardstick import yardstick
 from finlab.errors import LayoutError
 from finlab.layout import Fin, FinModelSpec, Layout, Limits, random_layout
 from finlab.networks.normalization import Normalization
-from finlab.physics import Plant
+from finlab.physics import Plant, plant_of
 from tests.any_robot import AnyRobot, normalized_error
 
 NORMALIZATION = Normalization(np.zeros(6), np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.35]))
@@ -158,3 +158,18 @@ def test_sqp_needs_hardly_more_than_the_default() -> None:
     cost, best = answer.power, least.power
     exact = (answer.err_norm < 1e-3) & (least.err_norm < 1e-3)
     assert exact.sum() >= 15 and cost[exact].sum() < 1.06 * best[exact].sum()
+
+
+SIGMA = np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.35])
+
+
+def test_feasible_wraps_full_turns_and_clips_the_rest() -> None:
+    rng = np.random.default_rng(1)
+    layout = random_layout(rng, n_fins=5, limits="varied")
+    plant = plant_of(layout)
+    wild = rng.normal(scale=20.0, size=(100, 5, 3))
+    tame = plant.feasible(wild)
+    assert (tame >= plant.lower).all() and (tame <= plant.upper).all()
+    turns = (tame - wild)[:, plant.full_turn, 2] / (2 * np.pi)
+    np.testing.assert_allclose(turns, np.round(turns), atol=1e-9)
+    np.testing.assert_array_equal(plant.feasible(tame), tame)

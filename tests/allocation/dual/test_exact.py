@@ -11,8 +11,9 @@ import pytest
 from finlab.allocation import Allocator
 from finlab.allocation.allocation import CHUNK
 from finlab.assets import shipped_layouts
-from finlab.layout import Fin, FinModelSpec, Layout, Limits, load_layout, random_layout
+from finlab.layout import Fin, FinModelSpec, Layout, load_layout, random_layout
 from finlab.physics import Plant, make_law, write_table
+from tests.allocation.test_levenberg_marquardt import HOSTILE as SIMPLE
 from tests.any_robot import AnyRobot, normalized_error
 
 GOOD = 1e-5
@@ -21,21 +22,14 @@ GOOD = 1e-5
 
 def reachable(layout: Layout, n: int, seed: int = 0) -> np.ndarray:
     """Wrenches (n, 6) of random commands, by the plant."""
-    lower, upper = bounds(layout)
+    lower, upper = layout.lower, layout.upper
     share = np.random.default_rng(seed).uniform(size=(n, layout.n, 3))
     return Plant(layout).wrench(lower + share * (upper - lower))
 
 
-def bounds(layout: Layout) -> tuple[np.ndarray, np.ndarray]:
-    return (
-        layout.lower,
-        layout.upper,
-    )
-
-
 def keeps_limits(layout: Layout, command: np.ndarray) -> bool:
-    lower, upper = bounds(layout)
-    return bool(np.isfinite(command).all() and (command >= lower).all() and (command <= upper).all())
+    within = (command >= layout.lower).all() and (command <= layout.upper).all()
+    return bool(np.isfinite(command).all() and within)
 
 
 def errors(method: Allocator, layout: Layout, targets: np.ndarray) -> np.ndarray:
@@ -77,22 +71,8 @@ def test_exact_after_the_loss_of_any_fin(name: str, search: AnyRobot) -> None:
             assert np.isnan(result.command[layout.index(fin)]).all()
 
 
-SHARED = (0.1, 0.05, 0.0)
 HOSTILE = {
-    "one fin": Layout("one", (Fin("a", (0.0, 0.0, 0.0), 0.0),)),
-    "two at one place": Layout("twins", (Fin("a", SHARED, 0.3), Fin("b", SHARED, 0.3))),
-    "all parallel": Layout("rake", tuple(Fin(f"f{i}", (0.1 * i, 0.0, 0.0), 0.5) for i in range(4))),
-    "no width": Layout(
-        "stiff",
-        (
-            Fin("a", (0.1, 0.0, 0.0), 0.0, Limits((0.3, 0.3), (1.0, 1.0), (0.5, 0.5))),
-            Fin("b", (-0.1, 0.0, 0.0), 1.0, Limits((0.05, 0.6), (2.0, 2.0), (-1.0, 1.0))),
-            Fin("c", (0.0, 0.1, 0.0), 2.0),
-        ),
-    ),
-    "may rest": Layout(
-        "rest", (Fin("a", SHARED, 0.0, Limits((0.0, 0.6), (0.0, 2.1))), Fin("b", (0, 0, 0), 2.0))
-    ),
+    **SIMPLE,
     "far out": Layout("far", (Fin("a", (10.0, 10.0, 10.0), 0.0), Fin("b", (-10.0, 0.0, 0.0), 1.0))),
     "sixteen": Layout("many", tuple(Fin(f"f{i}", (0.1, 0.02 * i, 0.0), 0.4 * i) for i in range(16))),
 }

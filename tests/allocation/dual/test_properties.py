@@ -27,17 +27,10 @@ def few(examples: int) -> settings:
     return settings(derandomize=True, max_examples=examples, deadline=None, database=None)
 
 
-def bounds(layout: Layout) -> tuple[np.ndarray, np.ndarray]:
-    return (
-        layout.lower,
-        layout.upper,
-    )
-
-
 def inside(layout: Layout, command: np.ndarray) -> bool:
     """To the last bit."""
-    lower, upper = bounds(layout)
-    return bool(np.isfinite(command).all() and (command >= lower).all() and (command <= upper).all())
+    within = (command >= layout.lower).all() and (command <= layout.upper).all()
+    return bool(np.isfinite(command).all() and within)
 
 
 def drawn(seed: int, limits: str = "nominal") -> tuple[Layout, np.ndarray]:
@@ -48,7 +41,7 @@ def drawn(seed: int, limits: str = "nominal") -> tuple[Layout, np.ndarray]:
 
 
 def reachable(layout: Layout, rng: np.random.Generator) -> np.ndarray:
-    lower, upper = bounds(layout)
+    lower, upper = (layout.lower, layout.upper)
     return Plant(layout).wrench(lower + rng.uniform(size=lower.shape) * (upper - lower))
 
 
@@ -142,7 +135,8 @@ def test_failed_is_removed(search: AnyRobot, seed: int, limits: str, lost: int) 
         np.testing.assert_allclose(failed.command[alive], removed.command, atol=1e-6)
     assert np.isnan(failed.command[layout.index(name)]).all()
     np.testing.assert_allclose(failed.wrench, removed.wrench, atol=1e-3)
-    assert failed.power == pytest.approx(removed.power, rel=1e-4)
+    # Where next to nothing of a target can be had, so is the power.
+    assert failed.power == pytest.approx(removed.power, rel=1e-4, abs=1e-5)
 
 
 @few(10)

@@ -1,9 +1,19 @@
 """The judges of least watts agree with each other and with published figures of a BlueROV2 Heavy."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
+from finlab.actuators.response import Line, RadialTable
+from finlab.allocation import Allocator, Policy
+from finlab.allocation.baselines.autopilots import PX4_ORDER
+from finlab.allocation.dual.newton import solve
+from finlab.allocation.dual.robot import DualRobot
+from finlab.evaluation.experiments.thrusters import _draws, misses_more, missing_by_group
+from finlab.layout import load_layout
+from finlab.layout.axes import AXES
 from tests.least_power import conic_optimum, farthest, least_known, least_miss, lower_bound
 from tests.mixed_robots import KINDS, bluerov2_heavy, random_plant, within
 from tests.own_plant import OwnPlant
@@ -78,3 +88,42 @@ def test_least_miss_of_a_heavy() -> None:
         HEAVY.effectiveness / HEAVY.scales[:, None], wrench / HEAVY.scales, (low, high), tol=1e-14
     )
     assert least_miss(HEAVY, wrench) == pytest.approx(np.sqrt(2.0 * ends.cost), rel=1e-5)
+
+
+def _table(watts: float, most: float) -> RadialTable:
+    """Power `watts` F^1.5 up to a largest force [N]."""
+    top = 1.5 * watts * np.sqrt(most)
+    return RadialTable.of_price(top, lambda price: np.minimum((price / (1.5 * watts)) ** 2, most))
+
+
+def test_costly_reverse_is_within_reach() -> None:
+    lines = [Line(np.eye(6)[i], _table(1.0, 10.0), _table(5.0, 10.0)) for i in range(3)]
+    robot = DualRobot(lines)
+    target = robot.basis.T @ (np.array([-9.0, -9.0, -9.0, 0.0, 0.0, 0.0]) / robot.scale)
+    found = solve(robot, target[:, None])
+    assert found.solved[0] and not found.beyond[0]
+    np.testing.assert_allclose(found.value, 3 * 5.0 * 9.0**1.5, rtol=1e-9)
+
+
+@pytest.mark.parametrize("lost", [0, 1, 2])
+def test_on_a_surveyed_frame_a_priority_misses_no_more_than_px4(lost: int) -> None:
+    policy = Policy("priority", order=PX4_ORDER)
+    for layout, edge in _draws("surveyed", lost, 3, 6, 3):
+        for share in (1.2, 2.0):
+            ours, theirs = (
+                Allocator(layout, name).allocate_batch(share * edge, **how)
+                for name, how in (("dual", {"policy": policy}), ("px4", {}))
+            )
+            mine, own = (
+                missing_by_group(each.unallocated / each.scale, PX4_ORDER) for each in (ours, theirs)
+            )
+            assert not misses_more(mine, own).any(), np.stack([mine, own], 1)[misses_more(mine, own)]
+
+
+@pytest.mark.parametrize(
+    "order", [Policy.order, (("Tz",), ("Fx", "Fz")), (("Fx", "Tz"), ("Fz",)), (("Fz", "Fx"), ("Tz",))]
+)
+def test_an_axis_that_nothing_drives_holds_up_no_other(order: tuple[tuple[str, ...], ...]) -> None:
+    allocator = Allocator(replace(load_layout("no_yaw"), axes=AXES))
+    answer = allocator.allocate([1.0, 0.0, 0.5, 0.0, 0.0, 0.2], policy=Policy("priority", order=order))
+    np.testing.assert_allclose(answer.unallocated, [0.0, 0.0, 0.0, 0.0, 0.0, 0.2], atol=1e-4)

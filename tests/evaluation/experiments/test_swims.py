@@ -10,7 +10,7 @@ import pytest
 from finlab.evaluation.experiments.hard_days import HARD_DAYS, Case, HardDay
 from finlab.evaluation.experiments.swims import DAYS, day_rows, swim_figures
 from finlab.sim import RunLog
-from finlab.vehicle.body import complete_body
+from finlab.vehicle.fossen import complete_body
 from finlab.vehicle.vehicle import Vehicle
 from tests.any_robot import AnyRobot
 

@@ -2,14 +2,14 @@
 
 import numpy as np
 
-from finlab.allocation.baselines.px4 import ORDER
+from finlab.allocation.baselines.autopilots import PX4_ORDER
 from finlab.evaluation.experiment import load_experiment
 from finlab.evaluation.experiments.thrusters import misses_more, missing_by_group
 
 
 def test_groups_are_compared_in_order() -> None:
     missing = np.array([[3.0, 4.0, 0.5, 0.0, 0.2, 0.1], [0.0, 0.0, 0.5, 0.0, 0.2, 0.1]])
-    sizes = missing_by_group(missing, ORDER)
+    sizes = missing_by_group(missing, PX4_ORDER)
     np.testing.assert_allclose(sizes, [[0.2, 0.5, 0.1, 5.0], [0.2, 0.5, 0.1, 0.0]])
     more = np.array([[0.1, 9.0, 0.0, 0.0], [0.2, 0.5, 0.2, 0.0]])
     assert misses_more(more, sizes).tolist() == [False, True]

@@ -8,9 +8,9 @@ import numpy as np
 from finlab.fit.robot.swim import STEP_S
 from finlab.layout import Layout
 from finlab.physics import plant_of
-from finlab.vehicle.attitude import euler, quaternion_of_yaw
-from finlab.vehicle.body import complete_body
+from finlab.vehicle.attitude import euler, quaternion_of
 from finlab.vehicle.fin_motion import FinMotion
+from finlab.vehicle.fossen import complete_body
 from finlab.vehicle.vehicle import Vehicle
 
 NOISE = np.array([0.01] * 3 + [0.005] * 6 + [0.005] * 3)
@@ -22,7 +22,7 @@ def swim(truth: Layout, seconds: float, seed: int, noise: float = 1.0) -> tuple[
     n, steps = truth.n_fins, round(seconds / STEP_S)
     vehicle, fins, plant = Vehicle(complete_body(truth)), FinMotion(truth), plant_of(truth)
     state = np.zeros(13)
-    state[3:7] = quaternion_of_yaw(0.3)
+    state[3:7] = quaternion_of(0.0, 0.0, 0.3)
     commands, measured = np.empty((steps, n, 3)), np.empty((steps, 12))
     command = plant.sample(rng, ())
     for k in range(steps):

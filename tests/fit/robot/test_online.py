@@ -9,7 +9,7 @@ from finlab import Allocator, load_layout
 from finlab.cli import main
 from finlab.control import FaultMonitor
 from finlab.errors import FinlabError
-from finlab.fit.robot.learned_actuators import leaned
+from finlab.fit.robot.fitted_robot import leaned
 from finlab.fit.robot.online import OnlineFit
 from finlab.layout import FinModelSpec
 from finlab.physics import plant_of

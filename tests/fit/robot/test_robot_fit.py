@@ -7,13 +7,11 @@ import numpy as np
 import pytest
 
 from finlab.cli import main
-from finlab.fit.robot.fitted_layout import write_robot
-from finlab.fit.robot.report import summary, table
+from finlab.fit.robot.fitted_robot import summary, table, write_robot
 from finlab.fit.robot.robot_fit import RobotFit, fit_robot
-from finlab.fit.robot.swim import Swim, only_new, replay
-from finlab.fit.robot.swim_file import read_swim
+from finlab.fit.robot.swim import Swim, only_new, read_swim, replay
 from finlab.layout import Fin, FinModelSpec, Layout, Thruster, load_layout, save_layout
-from finlab.layout.angles import wrapped
+from finlab.layout.axes import wrapped
 from finlab.physics import plant_of
 from finlab.sim.excite import excitation
 from tests.any_robot import AnyRobot

@@ -10,8 +10,8 @@ from finlab.cli import main
 from finlab.control import FaultMonitor
 from finlab.fit.robot.online import OnlineFit
 from finlab.fit.robot.robot_fit import RobotFit, fit_robot
-from finlab.fit.robot.signs import opposed_in
-from finlab.fit.robot.swim_file import read_swim
+from finlab.fit.robot.robot_model import opposed_in
+from finlab.fit.robot.swim import read_swim
 from finlab.layout import Layout
 from finlab.sim import ClosedLoop, make_trajectory
 from finlab.sim.excite import excitation

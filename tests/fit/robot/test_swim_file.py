@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from finlab.errors import DataError
-from finlab.fit.robot.swim import smoothed
-from finlab.fit.robot.swim_file import read_swim
+from finlab.fit.robot.swim import read_swim, smoothed
 from finlab.layout import Layout, load_layout
 from tests.fit.robot.swims import write_csv
 

@@ -6,7 +6,7 @@ A fin that points aft pushes forward, so the blade lies opposite to its thrust.
 import numpy as np
 from trimesh.convex import convex_hull
 
-from finlab.hull.mesh import Mesh, revolved, triangles
+from finlab.hull.shapes import Mesh, revolved, triangles
 from webapp.scene.meshes.mesh import joined, tube
 
 CHORD = 0.18

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.arrays import Array
-from finlab.hull.mesh import Mesh, grid_faces, triangles
+from finlab.hull.shapes import Mesh, grid_faces, triangles
 
 SHORTEST = 1e-3
 """Arrows shorter than this are not drawn [m]."""

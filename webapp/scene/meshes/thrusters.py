@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 
 from finlab.arrays import Array
-from finlab.hull.mesh import Mesh, revolved, triangles
+from finlab.hull.shapes import Mesh, revolved, triangles
 from webapp.scene.meshes.mesh import joined, tube
 
 RADIUS = 0.046

@@ -1,0 +1,333 @@
+"""The answer of a fin to a price: for each price the command that is worth most, by the fin's own law.
+
+The fin's amplitude and frequency maximize `v T(A, f) - P(A, f)` within its limits. That is found on a grid of
+commands and made exact by finer and finer grids around the best place: it needs no derivatives and holds for
+any law, convex or not. A fin whose force differs from one direction to the next has a gauge: the share of the
+force that the same cost gives in each direction.
+"""
+
+from collections.abc import Sequence
+from functools import cached_property, lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from finlab.actuators.fin.fin_laws import file_stamp, make_law, stack_laws
+from finlab.actuators.law import FinLaw, PlanarLaw
+from finlab.actuators.response import POINTS, Group, Plane, RadialTable, price_grid
+from finlab.arrays import Array
+from finlab.errors import DataError
+from finlab.layout import Fin, FinModelSpec, Limits
+from finlab.layout.axes import TURN, is_full_turn, wrapped
+from finlab.precision import NEARLY, NOTHING, ROUNDING, ROUNDS
+
+GRID = 17, 33
+"""Amplitudes and frequencies of the first grid; half as many where directions are compared."""
+PEAK = 5e-4
+"""Share of the largest force that is given up where the price of the last newton has no end."""
+
+
+_SHARES = np.array([[[a, f, 0.5]] for a in np.linspace(0.0, 1.0, 5) for f in np.linspace(0.0, 1.0, 5)])
+"""Commands (25, 1, 3) between limits, as shares, at the middle of an arc."""
+
+
+class FinTable(NamedTuple):
+    """How a fin answers a price, and by which commands."""
+
+    table: RadialTable
+    """Force over price in its strongest direction."""
+    middle: float
+    """Middle of the arc of force directions [rad]."""
+    half: float
+    """Half of it [rad]; pi for a full circle."""
+    gauge: Array | None
+    """Share (POINTS,) of the table's force in each direction, from 0 on; None where they are the same."""
+    beat: Array
+    """Amplitude [rad] and frequency [Hz] (POINTS + 1, 2) that give the force `largest (j / POINTS)^2`."""
+    box: "_Box"
+    """The law within the limits."""
+    deflection: Array
+    """Direction of the force minus zero direction (POINTS,) [rad] around the circle; (1,) where it is the
+    same."""
+
+    @property
+    def largest(self) -> float:
+        """The largest force in any direction [N]."""
+        return self.table.largest * (1.0 if self.gauge is None else float(self.gauge.max()))
+
+
+class FinGroup(Group):
+    """The fins of a robot."""
+
+    def __init__(self, fins: Sequence[Fin], effectiveness: Array) -> None:
+        """Compiles fins with wrenches (m, 3, 6) per newton along each own axis, each model once in a process;
+        a `DataError` where a table cannot be read, or a fin gives no thrust."""
+        tables = [fin_table(fin) for fin in fins]
+        self._tables = tables
+        self._stacked = stack_laws([fin.model for fin in fins])
+        self.responses = [
+            Plane(matrix[1:], each.table, each.middle, each.half, each.gauge)
+            for each, matrix in zip(tables, effectiveness, strict=True)
+        ]
+        self._largest = np.array([each.table.largest for each in tables])
+        self._beat = np.array([each.beat for each in tables])
+        self._deflection = np.array([np.broadcast_to(each.deflection, POINTS) for each in tables])
+        self._gauge = np.array([np.ones(POINTS) if each.gauge is None else each.gauge for each in tables])
+        self._row = np.arange(len(fins))
+        limits = np.array([fin.limits.zero_direction for fin in fins])
+        self._lower, self._upper = limits.T
+        self._middle = limits.mean(axis=1)
+        self._even = all(each.gauge is None for each in tables)
+
+    def commands(self, force: Array, previous: Array | None = None) -> Array:
+        """See `Group`. What the table leaves undone, by the laws, is asked for on top."""
+        x, y = force[..., 0], force[..., 1]
+        angle, size = np.arctan2(y, x), np.hypot(x, y)
+        command = self._command(angle, size)
+        actual = self._force(command)
+        wanted = np.maximum(2.0 * size - np.hypot(actual[..., 1], actual[..., 2]), 0.0)
+        if not self._even:
+            lean = wrapped(angle - np.arctan2(actual[..., 2], actual[..., 1]))
+            angle = angle + np.where(size > 0.0, lean, 0.0)
+        return self._command(angle, wanted)
+
+    def _force(self, command: Array) -> Array:
+        if len(self._stacked) == 1:
+            return np.asarray(self._stacked[0][1].force(command))
+        force = np.empty_like(command)
+        for places, law in self._stacked:
+            force[..., places, :] = law.force(command[..., places, :])
+        return force
+
+    def _command(self, angle: Array, size: Array) -> Array:
+        """Commands (N, m, 3) from the tables for directions and sizes (N, m) of the force."""
+        row = self._row
+        if self._even:
+            deflection = self._deflection[:, 0]
+        else:
+            place = (angle / TURN) % 1.0 * POINTS
+            cell = place.astype(np.intp) % POINTS
+            part, after = place - np.floor(place), (cell + 1) % POINTS
+            deflection = self._deflection[row, cell] * (1.0 - part) + self._deflection[row, after] * part
+            size = size / (self._gauge[row, cell] * (1.0 - part) + self._gauge[row, after] * part)
+        place = np.sqrt(np.minimum(size / self._largest, 1.0)) * POINTS
+        cell = np.minimum(place.astype(np.intp), POINTS - 1)
+        part = (place - cell)[..., None]
+        command = np.empty((*size.shape, 3))
+        beat = self._beat[row, cell]
+        command[..., :2] = beat + (self._beat[row, cell + 1] - beat) * part
+        turn = angle - deflection
+        command[..., 2] = np.clip(self._middle + wrapped(turn - self._middle), self._lower, self._upper)
+        return command
+
+    def radial_worth(self, price: Array, back: Array) -> Array:
+        """See `Group`: from the commands of the table on both sides of each price, by the law."""
+        result = np.empty(price.shape)
+        for i, table in enumerate(self._tables):
+            paid = np.maximum(price[:, i], 0.0)
+            place = np.interp(paid, price_grid(table.table.top), table.table.force) / self._largest[i]
+            cell = np.minimum((np.sqrt(place) * POINTS).astype(np.intp), POINTS - 1)
+            starts = np.stack([table.beat[np.clip(cell + k, 0, POINTS)] for k in (-1, 0, 1, 2)])
+            command = table.box.best(paid, starts)
+            result[:, i] = price[:, i] * table.box.force(command) - table.box.power(command)
+        return result
+
+    def reach(self, lower: Array, upper: Array) -> Array:
+        """See `Group`: sizes are those of a few commands between the limits, at the middle of the arc."""
+        command = lower + _SHARES * (upper - lower)
+        force = self._force(command)
+        size, row = np.hypot(force[..., 1], force[..., 2]), self._row
+        middle, most = command[0, :, 2], size.argmax(axis=0)
+        angle = middle + wrapped(np.arctan2(force[most, row, 2], force[most, row, 1]) - middle)
+        size = size / self._gauge[row, np.rint(angle / TURN * POINTS).astype(np.intp) % POINTS]
+        return np.stack([size.min(axis=0), size.max(axis=0), angle, 0.5 * (upper - lower)[:, 2]], axis=-1)
+
+
+def fin_table(fin: Fin) -> FinTable:
+    """One fin, compiled or kept from the last time; arguments and errors as for `FinGroup`."""
+    result = _compiled(fin.model, fin.limits, file_stamp(fin.model))
+    if result is None:
+        raise DataError(
+            f"{fin.name}: gives no thrust within its limits, amplitudes {fin.limits.amplitude[0]:.4g} to "
+            f"{fin.limits.amplitude[1]:.4g} rad and frequencies {fin.limits.frequency[0]:.4g} to "
+            f"{fin.limits.frequency[1]:.4g} Hz; widen the limits or leave the fin out"
+        )
+    return result
+
+
+@lru_cache(maxsize=512)
+def _compiled(model: FinModelSpec, limits: Limits, stamp: tuple[int, int] | None) -> FinTable | None:
+    """The table of a fin, None where it gives no thrust; one whose file has changed is read again."""
+    law = make_law(model)
+    box = _Box(law, np.array(limits.lower), np.array(limits.upper))
+    strongest = box.largest()
+    if strongest <= 0.0:
+        return None
+    top = box.top_price(strongest)
+    command = box.best(price_grid(top))
+    force = np.maximum.accumulate(box.force(command))
+    table = RadialTable.of_forces(top, force, float(box.power(command[:1])[0]))
+    size = force[-1] * np.linspace(0.0, 1.0, POINTS + 1) ** 2
+    beat = np.stack([np.interp(size, force, command[:, k]) for k in range(2)], axis=-1)
+    middle, half, gauge, deflection = _directions(law, box)
+    return FinTable(table, middle, half, gauge, beat, box, deflection)
+
+
+class _Box:
+    """One fin's law within the limits of amplitude and frequency, in its strongest direction."""
+
+    def __init__(self, law: FinLaw, lower: Array, upper: Array) -> None:
+        self.law, self.lower, self.upper = law, lower, upper
+        self.turn = float(np.clip(0.0, lower[2], upper[2]))
+        if not law.uniform:
+            turns, across = self.all_round
+            within = (turns >= lower[2] - NOTHING) & (turns <= upper[2] + NOTHING)
+            size = np.where(within, np.hypot(*across.T), -1.0)
+            self.turn = float(turns[size.argmax()]) if within.any() else self.turn
+
+    @cached_property
+    def all_round(self) -> tuple[Array, Array]:
+        """Zero directions (POINTS + 1,) [rad] and the largest forces (POINTS + 1, 2) [N] there, by a coarse
+        grid."""
+        low, high = self.lower[2], self.upper[2]
+        if isinstance(self.law, PlanarLaw):  # a formula holds beyond the limits, too
+            low, high = 0.5 * (low + high) - np.pi, 0.5 * (low + high) + np.pi
+        turns = np.linspace(low, high, POINTS + 1)
+        return turns, self.strongest(turns)
+
+    def strongest(self, turns: Array) -> Array:
+        """The largest forces across the shaft (K, 2) [N] at zero directions (K,), by a coarse grid."""
+        command = np.tile(self.grid((GRID[0] // 2 + 1, GRID[1] // 2 + 1)), (len(turns), 1, 1))
+        command[..., 2] = turns[:, None]
+        across = self.law.force(command.reshape(-1, 3)).reshape(command.shape)[..., 1:]
+        best = np.hypot(across[..., 0], across[..., 1]).argmax(axis=1)
+        return np.asarray(across[np.arange(len(turns)), best])
+
+    def command(self, beat: Array) -> Array:
+        """Commands (..., 3) of amplitude and frequency (..., 2)."""
+        return np.concatenate([beat, np.full((*beat.shape[:-1], 1), self.turn)], axis=-1)
+
+    def force(self, command: Array) -> Array:
+        """Sizes (...) [N] of the force in the fin's plane."""
+        return np.asarray(np.linalg.norm(self.law.force(command)[..., 1:], axis=-1))
+
+    def power(self, command: Array) -> Array:
+        """Powers (...) [W]."""
+        return np.asarray(self.law.power(command))
+
+    def largest(self) -> float:
+        """The largest force [N] within the limits."""
+        return float(self.force(self.best(np.array([1e12])))[0])
+
+    def grid(self, shape: tuple[int, int] = GRID) -> Array:
+        """Commands (G, 3) on a grid of amplitudes and frequencies."""
+        axes = [np.linspace(a, b, n) for a, b, n in zip(self.lower, self.upper, shape, strict=False)]
+        beat = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
+        return self.command(beat)
+
+    def best(self, price: Array, starts: Array | None = None) -> Array:
+        """Commands (K, 3) that are worth most at prices (K,) [W/N]: from the best of starts (S, K, 2), or of
+        a grid, by Newton's method within the limits."""
+        row = np.arange(len(price))
+        if starts is None:
+            grid = self.grid()
+            worth = price[:, None] * self.force(grid) - self.power(grid)
+            beat = grid[worth.argmax(axis=1), :2]
+        else:
+            command = self.command(starts)
+            worth = (price * self.force(command) - self.power(command)).T
+            beat = starts[worth.argmax(axis=1), row]
+        low, high = self.lower[:2], self.upper[:2]
+        span = high - low
+        longest = 2.0 * span / (np.array(GRID) - 1.0)
+        value = worth.max(axis=1)
+        for _ in range(ROUNDS):
+            slope, curve = self._worth_derivatives(price, beat, NEARLY * span + 1e-15)
+            step = np.clip(_uphill_steps(beat, slope, curve), -longest, longest)
+            trial = np.clip(np.concatenate([step, 0.2 * step]) + beat, low, high)
+            command = self.command(trial)
+            result = price * self.force(command) - self.power(command)
+            best = result.argmax(axis=0)
+            better = result[best, row] > value
+            if not better.any():
+                break
+            beat = np.where(better[:, None], trial[best, row], beat)
+            value = np.where(better, result[best, row], value)
+        return self.command(beat)
+
+    def _worth_derivatives(self, price: Array, beat: Array, probe: Array) -> tuple[Array, Array]:
+        """Gradient (K, 2) and Hessian (K, 2, 2) of what commands are worth, by amplitude and frequency."""
+        at = np.where(beat + probe > self.upper[:2], beat - probe, beat)
+        slopes = [self._slope(price, at + shift) for shift in (0.0 * probe, probe * [1, 0], probe * [0, 1])]
+        with np.errstate(invalid="ignore", divide="ignore"):
+            curve = np.stack([slopes[1] - slopes[0], slopes[2] - slopes[0]], axis=-1) / probe
+        return self._slope(price, beat), 0.5 * (curve + curve.swapaxes(-1, -2))
+
+    def _slope(self, price: Array, beat: Array) -> Array:
+        command = self.command(beat)
+        force, jacobian = self.law.force_and_jacobian(command)
+        size = np.maximum(np.linalg.norm(force[:, 1:], axis=-1), 1e-300)
+        along = np.einsum("kci,ki->kc", jacobian[:, :2, 1:], force[:, 1:]) / size[:, None]
+        return np.asarray(price[:, None] * along - self.law.power_gradient(command)[:, :2])
+
+    def top_price(self, strongest: float) -> float:
+        """The price [W/N] at which the fin gives its largest force, or nearly so where that has no end."""
+        corner, zero = self.upper[None, :2], np.zeros(1)
+        if float(self.force(self.command(corner))[0]) >= strongest * (1.0 - ROUNDING):
+            moves, saving = self.upper[:2] > self.lower[:2], self._slope(zero, corner)
+            marginal_force = (self._slope(zero + 1.0, corner) - saving)[0][moves]
+            if (marginal_force > 1e-3 * strongest).all():
+                price = -saving[0][moves] / marginal_force
+                top = float(price.max()) if len(price) else NOTHING
+                if float(self.force(self.best(np.array([top])))[0]) >= (1.0 - PEAK) * strongest:
+                    return top
+        low, high = NOTHING, 1.0 / NOTHING
+        for _ in range(5):
+            prices = np.geomspace(low, high, 33)
+            enough = self.force(self.best(prices)) >= (1.0 - PEAK) * strongest
+            first = int(enough.argmax()) if enough.any() else len(prices) - 1
+            low, high = float(prices[max(first - 1, 0)]), float(prices[first])
+        return high
+
+
+def _uphill_steps(beat: Array, slope: Array, curve: Array) -> Array:
+    """Steps (4, K, 2) uphill from amplitudes and frequencies (K, 2): Newton's, and those along the amplitude,
+    the frequency, and both with a constant product."""
+    a, b, c = curve[:, 0, 0], curve[:, 0, 1], curve[:, 1, 1]
+    det = a * c - b * b
+    ways = [np.broadcast_to(way, beat.shape) for way in ([1.0, 0.0], [0.0, 1.0])] + [beat * [1.0, -1.0]]
+    steps = []
+    with np.errstate(all="ignore"):
+        newton = np.stack([b * slope[:, 1] - c * slope[:, 0], b * slope[:, 0] - a * slope[:, 1]], axis=-1)
+        steps.append(np.where(((a < 0.0) & (det > 0.0))[:, None], newton / det[:, None], 0.0))
+        for way in ways:
+            up = np.einsum("ki,ki->k", way, slope)
+            bend = np.einsum("ki,kij,kj->k", way, curve, way)
+            steps.append(way * (up / np.where(bend < 0.0, -bend, np.abs(up) + 1e-300))[:, None])
+    return np.asarray(np.nan_to_num(np.stack(steps), posinf=0.0, neginf=0.0))
+
+
+def _directions(law: FinLaw, box: _Box) -> tuple[float, float, Array | None, Array]:
+    """Middle and half of the arc of force directions [rad], gauge (POINTS,) or None, and deflection."""
+    lower, upper = box.lower, box.upper
+    full = bool(is_full_turn(upper[2] - lower[2]))
+    middle, half = 0.5 * float(lower[2] + upper[2]), np.pi if full else 0.5 * float(upper[2] - lower[2])
+    if law.uniform:
+        force = law.force(np.append(upper[:2], box.turn))
+        lean = float(wrapped(np.arctan2(force[2], force[1]) - box.turn))
+        return middle + lean, half, None, np.array([lean])
+    turns, across = box.all_round
+    direction = np.arctan2(across[:, 1], across[:, 0])
+    direction = turns + np.unwrap(wrapped(direction - turns))
+    if not full:
+        ends = np.interp([lower[2], upper[2]], turns, direction)
+        middle, half = 0.5 * float(ends.sum()), 0.5 * float(np.diff(ends)[0])
+    angle = np.arange(POINTS) * (TURN / POINTS)
+    place, width = (angle - direction[0]) % TURN, float(direction[-1] - direction[0])
+    # Beyond what its law knows a fin is taken to be as at the nearer end.
+    place = np.where(place > 0.5 * (width + TURN), 0.0, np.minimum(place, width))
+    turn = np.interp(place, direction - direction[0], turns)
+    across = box.strongest(turn)
+    reference = float(np.linalg.norm(box.strongest(np.array([box.turn]))))
+    gauge = np.hypot(across[:, 0], across[:, 1]) / reference
+    return middle, half, gauge, wrapped(np.arctan2(across[:, 1], across[:, 0]) - turn)

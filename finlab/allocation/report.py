@@ -1,0 +1,164 @@
+"""Report of an answer: two small tables and sentences for people, a JSON object for programs."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from msgspec import to_builtins
+
+from finlab.allocation.yardstick import REACHED
+from finlab.arrays import Array
+from finlab.command_end import aligned
+from finlab.layout import Layout
+from finlab.layout.axes import AXES
+from finlab.layout.commands import AzimuthCommand, Command, FinCommand, RudderCommand, command_of
+from finlab.physics.expected_miss import sources_of_miss
+from finlab.physics.plant import Plant
+
+if TYPE_CHECKING:
+    from finlab.allocation.allocation import Allocation
+
+PLAIN_GAP = 0.01
+"""Share by which the power may exceed its bound without a sentence."""
+
+NEARLY_ALL = 0.995
+"""Share of a wrench from which on it is printed as all of it."""
+COLUMNS = ("actuator", "type", "command", "force [N]")
+"""Columns of the table of actuators."""
+WRENCH_COLUMNS = ("", *(f"{axis} [{'N' if axis.startswith('F') else 'N m'}]" for axis in AXES))
+"""Columns of the table of wrenches."""
+
+
+def in_words(command: Command) -> str:
+    """A command with its units."""
+    if isinstance(command, FinCommand):
+        return (
+            f"{command.amplitude:.3f} rad, {command.frequency:.3f} Hz, "
+            f"{math.degrees(command.zero_direction):.1f} deg"
+        )
+    if isinstance(command, RudderCommand):
+        return f"{math.degrees(command.deflection):.1f} deg"
+    angle = f" at {math.degrees(command.angle):.1f} deg" if isinstance(command, AzimuthCommand) else ""
+    sent = "" if command.input is None else f", input {command.input:.5g}"
+    return f"{round(command.force, 3) + 0.0:.3f} N{angle}{sent}"
+
+
+def summary(result: Allocation) -> str:
+    """The figures of an answer in one line."""
+    source = f", checkpoint {result.checkpoint}" if result.checkpoint else ""
+    effort = "" if result.effort is None else f"effort {result.effort:.3f}   "
+    expected = f"expected_error {result.expected_error:.2e}   " if result.expected_error else ""
+    return (
+        f"err_norm {result.err_norm:.2e}   {expected}power {result.power:.3f} W   {effort}"
+        f"{result.solve_ms:.1f} ms   method {result.method}{source}"
+    )
+
+
+def remarks(result: Allocation) -> list[str]:
+    """Sentences about a wrench that is not delivered, and what else the user should read."""
+    words = list(result.notes)
+    if result.reachable or result.unknown_fins:
+        # With fins that the method does not know, what is missing says nothing about the robot.
+        return words
+    limits = f"; {', '.join(result.binding)}" if result.binding else ""
+    return [f"not reached: {_short_of(result)}{limits}", *words]
+
+
+def _short_of(result: Allocation) -> str:
+    """What is missing, in words: the share that is there, or where that is nearly all, the worst axis."""
+    if result.share < NEARLY_ALL:
+        return f"{100 * result.share:.0f} % of the wrench is delivered"
+    worst = int(np.argmax(np.abs(result.unallocated / result.scale)))
+    unit = "N" if worst < 3 else "N m"
+    return f"{AXES[worst]} is off by {abs(result.unallocated[worst]):.3g} {unit}"
+
+
+def allocation_text(result: Allocation) -> str:
+    """The answer as plain text."""
+    rows: list[tuple[str, ...]] = []
+    for part, force in zip(result.layout.actuators, result.forces, strict=True):
+        command = result.commands[part.name]
+        cells = ("failed", "") if command is None else (in_words(command), f"{math.hypot(*force):.3f}")
+        rows.append((part.name, part.type, *cells))
+    wrenches = {"asked": result.target, "delivered": result.wrench, "missing": result.unallocated}
+    if result.expected_error:
+        wrenches["uncertain"] = result.expected_miss
+    # `+ 0.0` turns a rounded -0.0 into 0.0.
+    table = [
+        (name, *("free" if math.isnan(v) else f"{round(v, 3) + 0.0:.3f}" for v in row))
+        for name, row in wrenches.items()
+    ]
+    actuators = aligned(COLUMNS, rows, (True, True, True, False))
+    wrench = aligned(WRENCH_COLUMNS, table, (True, *(False,) * 6))
+    return "\n".join([actuators, "", wrench, "", summary(result), *remarks(result)])
+
+
+def doubts(result: Allocation) -> tuple[str, ...]:
+    """Sentences about what is not certain of an answer: its forces, and that no other takes less power."""
+    doubt = (result.measure_next,) if result.measure_next else ()
+    if result.bound is None or result.power <= (1.0 + PLAIN_GAP) * result.bound:
+        return doubt
+    gap = 100.0 * (1.0 - result.bound / result.power)
+    return (
+        *doubt,
+        f"of its power, {gap:.2g} % may be more than needed: where an actuator cannot rest, or has a "
+        "wide arc, a dead band or drag, the least is not proved",
+    )
+
+
+def next_measurement(result: Allocation, plant: Plant) -> str:
+    """The sentence about what adds most to the expected error of an answer; empty where that is none."""
+    if result.expected_error <= REACHED:
+        return ""
+    sources = sources_of_miss(plant, result.command[None])
+    parts = np.array([(source.variance[0] / result.scale**2).sum() for source in sources])
+    most = int(parts.argmax())
+    left = float(np.sqrt(parts.sum() - parts[most]))
+    return (
+        f"the true wrench is expected to be off by {result.expected_error:.2g}; measure "
+        f"{sources[most].words} next, without whose uncertainty {left:.2g} would be left"
+    )
+
+
+RECORD = (
+    *("failed", "target", "flow", "wrench_expected", "wrench_plant", "unallocated", "err_norm"),
+    *("expected_error", "expected_miss", "effort", "power", "bound", "scale", "solve_ms", "method"),
+    *("checkpoint", "reachable", "share", "binding", "unknown_fins", "notes"),
+)
+"""Keys of the JSON object, beside those of the commands; they are a contract."""
+
+
+def allocation_record(result: Allocation) -> dict[str, object]:
+    """The JSON object of an answer."""
+    values = {key: getattr(result, "wrench" if key == "wrench_plant" else key) for key in RECORD}
+    values["target"] = plain_target(result.target)
+    values |= {key: list(value) for key, value in values.items() if isinstance(value, tuple)}
+    plain = to_builtins(values, enc_hook=np.ndarray.tolist)
+    return {**command_record(result.layout, result.command, result.forces), **plain}
+
+
+def plain_target(target: Array) -> list[float | None]:
+    """A target (6,) as plain values, None for an axis that is free."""
+    return [None if np.isnan(value) else value for value in target.tolist()]
+
+
+def command_record(layout: Layout, command: Array, forces: Array) -> dict[str, object]:
+    """Commands with their forces as plain values; None for a failed actuator, whose row is NaN.
+
+    Args:
+        layout: the robot.
+        command: (n, 3).
+        forces: (n, 3) [N], body frame; along an axis of its own the signed one.
+    """
+    values: list[dict[str, object]] = []
+    for part, row, force in zip(layout.actuators, command, forces, strict=True):
+        own, axis = command_of(part, row), getattr(part, "axis", None)
+        along = force.tolist() if axis is None else float(force @ np.array(axis))
+        plain = None if own is None else to_builtins(own)
+        values.append({"name": part.name, "type": part.type, "force_n": along, "command": plain})
+    if not layout.is_of_fins:
+        return {"actuators": values}
+    rows = [None if np.isnan(row).any() else row.tolist() for row in command]
+    return {"actuators": values, "fins": list(layout.names), "command": rows}

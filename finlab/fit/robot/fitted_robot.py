@@ -1,0 +1,189 @@
+"""A fitted robot: its actuators and how sure they are, its layout with tables of fins, and words on it."""
+
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from finlab.arrays import Array
+from finlab.errors import DataError
+from finlab.fit.robot.robot_fit import UNTOLD, RobotFit
+from finlab.fit.robot.robot_model import shape_factor, turned_frames
+from finlab.fit.robot.unknowns import SHAPE
+from finlab.layout import Azimuth, Body, Fin, FinModelSpec, Layout, Rudder, Thruster, load_layout, save_layout
+from finlab.layout.commanded import Uncertainty
+from finlab.layout.directions import with_axes
+from finlab.layout.force_table_file import COLUMNS, DOUBT, POWER_COLUMN, table_text
+from finlab.layout.layout import MAX_DESCRIPTION_LENGTH, Actuator
+from finlab.layout.thrust_model import PowerLaw, PowerTable, ThrustModel
+from finlab.physics import make_law
+from finlab.whole_file import write_whole
+
+OTHER_LAW = "thrust that grows otherwise with amplitude and frequency"
+GRID = (17, 17, 16)
+"""Amplitudes, frequencies and zero directions of a fin that becomes a table."""
+DEFLECTIONS = (3.0, 0.03)
+"""Standard errors, and angle [rad], from which a fin's lean counts; an IMU that is mounted askew looks like a
+smaller one."""
+
+
+def summary(fit: RobotFit) -> tuple[str, ...]:
+    """Returns what the fit is worth, a line each; the first says why it should not be trusted, if so."""
+    doubts, unknown, seconds = fit.doubts(), fit.untold(), 0.1 * len(fit.model.motion)
+    thrusters = any(isinstance(part, Thruster | Azimuth) for part in fit.model.layout.actuators)
+    turned = "pushes the other way than the layout says; in the layout that is written it is turned"
+    lines = {
+        f"{DOUBT}: {'; '.join(doubts)}": bool(doubts),
+        f"fitted to {seconds:.0f} s of swimming, of whose motion simulated swims explain "
+        f"{fit.explained:.1%}": True,
+        **{f"{name} {turned}": True for name in fit.opposed},
+        f"used, since it helps on parts not seen: {OTHER_LAW}": fit.other_law,
+        f"tried, and no help: {OTHER_LAW}": fit.other_law is False,
+        "a common scale of all forces, damping and inertia does not follow from motion; it rests on the mass "
+        "and added mass that the layout gave": True,
+        "a force in the layout is what a thruster gives: divide it by the strength that was found for "
+        "what the thruster is to be sent": thrusters,
+        f"the data cannot tell {', '.join(unknown)}: there the layout's own values stand": bool(unknown),
+    }
+    return tuple(line for line, holds in lines.items() if holds)
+
+
+def table(fit: RobotFit) -> str:
+    """Every unknown with its standard error, and how much of what was doubtful before is left."""
+    unknowns, vector, error = fit.fitted.unknowns, fit.fitted.vector, fit.error
+    width = max(len(label) for label in unknowns.labels)
+    lines = [f"{'':{width}}  {'found':>10}  {'+-':>9}  doubt left"]
+    rows = zip(unknowns.labels, unknowns.units, vector, error, unknowns.scale, strict=True)
+    for label, unit, value, own, scale in rows:
+        said = "  not determined by the data" if own > UNTOLD else ""
+        lines.append(
+            f"{label:{width}}  {value * scale:10.4f}  {own * scale:9.4f}  {min(own, 1.0):9.0%} {unit}{said}"
+        )
+    return "\n".join(lines)
+
+
+def learned(fit: RobotFit, lean: Array) -> tuple[Actuator, ...]:
+    """Returns the actuators of a fit that lean by angles (n,) [rad], see `turned_frames`, by the laws that
+    they had before."""
+    parts, center, unsure = [], fit.found("center"), uncertainties(fit)
+    layout, share = fit.model.layout, np.exp(fit.found("strength"))
+    frames = turned_frames(layout, fit.found("mounting"), lean)
+    for i, part in enumerate(layout.actuators):
+        moved = with_axes(part, frames[i], np.array(part.position) - center)
+        parts.append(scaled(replace(moved, uncertainty=unsure[i]), float(share[i])))
+    return tuple(parts)
+
+
+def leaned(layout: Layout, lean: Array) -> Layout:
+    """Returns a robot whose actuators lean by angles (n,) [rad]; see `turned_frames`."""
+    frames = turned_frames(layout, np.zeros(layout.n), lean)
+    pairs = zip(layout.actuators, frames, strict=True)
+    return replace(layout, actuators=tuple(with_axes(part, frame) for part, frame in pairs))
+
+
+def scaled(part: Actuator, share: float) -> Actuator:
+    """Returns an actuator that gives a share of the force at every command.
+
+    The command of a thruster is the force that it gives: one of 0.8 has limits of 0.8 as much, and takes the
+    power of force / 0.8. A fin that is a table stays as it is.
+    """
+    if isinstance(part, Fin):
+        return part if part.model.type == "table" else replace(part, model=part.model.scaled(share))
+    if isinstance(part, Rudder):
+        return replace(part, area=share * part.area)
+    return replace(
+        part,
+        force=(share * part.force[0], share * part.force[1]),
+        dead_band=share * part.dead_band,
+        rate=None if part.rate is None else share * part.rate,
+        model=_thrust(part.model, share),
+    )
+
+
+def _thrust(model: ThrustModel, share: float) -> ThrustModel:
+    if isinstance(model, PowerTable):
+        return replace(model, rows=tuple((sent, share * force, watts) for sent, force, watts in model.rows))
+    more = share**-model.exponent
+    reverse = None if model.reverse is None else more * model.reverse
+    return PowerLaw(more * model.forward, reverse, model.exponent)
+
+
+def asked_more(layout: Layout, share: Array) -> Array:
+    """Returns factors (n, 3) of commands to a robot of shares (n,) of the layout's strengths, by which the
+    drives of the layout's thrusters and azimuths give what is to be given."""
+    factor = np.ones((layout.n, 3))
+    for i, part in enumerate(layout.actuators):
+        if isinstance(part, Thruster | Azimuth):
+            factor[i, part.LIMITS.index("force")] = 1.0 / share[i]
+    return factor
+
+
+def uncertainties(fit: RobotFit) -> tuple[Uncertainty, ...]:
+    """Returns how far each actuator's force may be from what was found: the mean over strength and lean, with
+    the share of it that all strengths have together."""
+    place = fit.fitted.unknowns.place("strength")
+    covariance = fit.covariance[place, place]
+    own = np.sqrt(np.diag(covariance))
+    n = len(own)
+    alike = (covariance / np.outer(own, own)).sum() / n if n > 1 else 1.0
+    together = float(np.clip((alike - 1.0) / max(n - 1, 1), 0.0, 1.0))
+    shares = np.sqrt(0.5 * (fit.found_error("strength") ** 2 + fit.found_error("lean") ** 2)).tolist()
+    return tuple(
+        Uncertainty(share, common=f"swim of {fit.model.layout.name}"[:64].strip(), correlation=together)
+        for share in shares
+    )
+
+
+def write_robot(fit: RobotFit, path: str | os.PathLike[str]) -> Layout:
+    """Writes the layout that a fit gives, and tables beside it where its fins follow another law. Raises
+    DataError or LayoutError: a table or the layout cannot be written."""
+    layout, place = fit.model.layout, Path(path)
+    lean = fit.found("lean")
+    certain = np.abs(lean) > np.maximum(DEFLECTIONS[0] * fit.found_error("lean"), DEFLECTIONS[1])
+    parts = list(learned(fit, np.where(certain, lean, 0.0)))
+    for i, (drawn, part) in enumerate(zip(layout.actuators, parts, strict=True)):
+        if isinstance(drawn, Fin) and isinstance(part, Fin) and (fit.other_law or part.model.type == "table"):
+            table = place.with_name(f"{place.stem}-fin{i + 1}.csv")
+            write_whole(table, _table(fit, i, drawn), DataError)
+            parts[i] = replace(part, model=FinModelSpec("table", (("path", table.name),)))
+    notes = "\n".join(summary(fit))
+    text = f"{notes}\n{layout.description}".strip()[:MAX_DESCRIPTION_LENGTH]
+    name = layout.name if place.stem == layout.name else place.stem[:64].strip() or layout.name
+    save_layout(Layout(name, tuple(parts), text, _body(fit)), place)
+    return load_layout(place)
+
+
+def _table(fit: RobotFit, i: int, fin: Fin) -> str:
+    """The law of the i-th actuator, a fin, as a table, from rest to its limits."""
+    law = make_law(fin.model)
+    ends = fin.limits.amplitude[1], fin.limits.frequency[1]
+    axes = [np.linspace(0.0, end, count) for end, count in zip(ends, GRID, strict=False)]
+    axes.append(np.linspace(-np.pi, np.pi, GRID[2], endpoint=False))
+    command = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    force = float(np.exp(fit.found("strength")[i])) * np.asarray(law.force(command))
+    shape = fit.part(SHAPE)
+    if shape is not None:
+        force = force * shape_factor(fit.model.shape_terms(command), shape)[:, None]
+    power = np.asarray(law.power(command))
+    notes = [f"fin {fin.name}, fitted to a swim of the whole robot"]
+    return table_text(notes, [*COLUMNS, POWER_COLUMN], np.hstack([command, force, power[:, None]]), 8)
+
+
+def _body(fit: RobotFit) -> Body:
+    model, unknowns, vector = fit.model, fit.fitted.unknowns, fit.fitted.vector
+    fitted = model.bodies(unknowns, vector[None])
+    hull = None if model.layout.body is None else model.layout.body.hull
+    if hull is not None:
+        hull = replace(hull, center_m=tuple(np.array(hull.center_m) - fit.found("center")))
+    own = model.dynamics.inertia - np.array(model.body.added_mass or (0.0,) * 6)
+    added = np.maximum(fitted.inertia[:, 0] - own, 0.0)
+    return replace(
+        model.body,
+        hull=hull,
+        added_mass=tuple(added.tolist()),
+        linear_damping=tuple(fitted.linear[:, 0].tolist()),
+        quadratic_damping=tuple(fitted.quadratic[:, 0].tolist()),
+        center_of_buoyancy_m=tuple(fitted.center[:, 0].tolist()),
+        buoyancy_n=max(float(fitted.lift[0]), 0.0),
+    )

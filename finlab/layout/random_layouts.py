@@ -1,0 +1,232 @@
+"""Random layouts: of fins, as in training, and of actuators of each kind, for held-out splits.
+
+The numbers that define the training distribution (box, fin counts, spread of limits) are here and nowhere
+else.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Literal
+
+import numpy as np
+
+from finlab.arrays import Array
+from finlab.errors import DataError
+from finlab.layout.fin import Fin, Limits
+from finlab.layout.fin_model import FinModelSpec
+from finlab.layout.layout import Actuator, Layout
+from finlab.layout.propellers import Azimuth, Thruster, Tilt
+from finlab.layout.thrust_model import PowerLaw
+
+TRAINING_BOX = (0.3, 0.3, 0.1)
+"""Largest |x|, |y|, |z| of a fin in training and in split `id` [m]."""
+TRAINING_FINS = (2, 5)
+"""Least and most fins of a layout in training and in split `id`."""
+AMPLITUDE_MAX_RANGE = (0.3, 0.8)
+"""Where a varied amplitude maximum is drawn from [rad]."""
+FREQUENCY_MAX_RANGE = (1.0, 3.0)
+"""Where a varied frequency maximum is drawn from [Hz]."""
+ARC_SHARE = 1.0 / 3.0
+"""Share of fins with varied limits whose zero direction is confined to an arc."""
+ARC_RANGE = (math.pi / 2, 1.5 * math.pi)
+"""Where the width of such an arc is drawn from [rad]; the arc lies within [-pi, pi]."""
+
+
+def random_layout(
+    rng: np.random.Generator,
+    name: str = "random",
+    n_fins: int | tuple[int, int] = TRAINING_FINS,
+    box: tuple[float, float, float] = TRAINING_BOX,
+    limits: Literal["nominal", "varied"] = "nominal",
+    outside: tuple[float, float, float] | None = None,
+) -> Layout:
+    """Returns a random layout with fins `fin_1`, `fin_2`, ...
+
+    Positions are uniform in the box and angles in [-pi, pi). With `limits="varied"` every fin gets its own
+    limits as in split `limits`.
+
+    Args:
+        rng: source of randomness.
+        name: of the layout.
+        n_fins: the fin count, or its least and most (uniform).
+        box: largest |x|, |y|, |z| [m].
+        limits: see above.
+        outside: when given, at least one fin lies outside this smaller box.
+
+    Raises:
+        DataError: `outside` is not smaller than `box` in any direction, so no such layout exists.
+    """
+    least, most = (n_fins, n_fins) if isinstance(n_fins, int) else n_fins
+    extent = np.array(box)
+    if outside is not None and not np.any(extent > np.array(outside)):
+        raise DataError(f"no fin within {box} can lie outside {outside}; make the first box larger")
+    # As many fins are drawn as there could be, so that a seed's layouts stay what they are.
+    count = int(rng.integers(least, most + 1, size=1)[0])
+    while True:
+        position = rng.uniform(-1.0, 1.0, (most, 3)) * extent
+        if outside is None or (np.abs(position[:count]) > np.array(outside)).any():
+            break
+    angle = rng.uniform(-math.pi, math.pi, most)
+    own = _varied_limits(rng, most) if limits == "varied" else [Limits()] * most
+    fins = [Fin(f"fin_{i + 1}", tuple(position[i].tolist()), float(angle[i]), own[i]) for i in range(count)]
+    return Layout(name=name, actuators=tuple(fins))
+
+
+def _varied_limits(rng: np.random.Generator, count: int) -> list[Limits]:
+    amplitude, frequency = rng.uniform(*AMPLITUDE_MAX_RANGE, count), rng.uniform(*FREQUENCY_MAX_RANGE, count)
+    width = rng.uniform(*ARC_RANGE, count)
+    center = rng.uniform(-1.0, 1.0, count) * (math.pi - width / 2)
+    arc = rng.uniform(size=count) < ARC_SHARE
+    nominal = Limits()
+    return [
+        Limits(
+            (nominal.amplitude[0], float(amplitude[i])),
+            (nominal.frequency[0], float(frequency[i])),
+            (float(center[i] - width[i] / 2), float(center[i] + width[i] / 2))
+            if arc[i]
+            else nominal.zero_direction,
+        )
+        for i in range(count)
+    ]
+
+
+EXTENT = (0.3, 0.3, 0.15)
+"""Largest |x|, |y|, |z| of an actuator [m]."""
+STRENGTH = (4.0, 30.0)
+"""Largest force of a thruster [N], times the robot's size from `SIZE`."""
+SIZE = (0.3, 3.0)
+ONE_WAY, SYMMETRIC = 0.1, 0.1
+"""Shares of thrusters that push one way only, and as much in reverse as ahead."""
+REACTION = 0.03
+"""Largest reaction torque of a propeller per newton [m]; half of them have one."""
+ARC = (math.radians(20.0), math.radians(300.0))
+"""Width of the arc of an azimuth [rad], where it has one, as half of them do."""
+TILT = (math.radians(20.0), math.radians(120.0))
+"""Width of the arc of a tilt [rad]."""
+
+Numbers = dict[str, tuple[float, float]]
+"""Names of a fin model's numbers, and from where each is drawn."""
+LOGARITHMIC = ("area", "lever", "length", "width", "k")
+"""Numbers whose logarithm is uniform; the others are uniform themselves."""
+FAMILIES: dict[str, Numbers] = {
+    "drag": {"area": (0.005, 0.04), "lever": (0.05, 0.15)},
+    "lighthill": {"length": (0.1, 0.3), "width": (0.05, 0.15)},
+    "soft": {
+        "k": (1.0, 8.0),
+        "p": (1.0, 2.0),
+        "x0": (0.6, 1.5),
+        "q": (3.0, 6.0),
+        "e": (0.0, 0.2),
+        "phi_e": (-math.pi, math.pi),
+        "d": (-0.15, 0.15),
+    },
+}
+"""Fin model -> its numbers; what is not named stays as it is by default."""
+
+Draw = Callable[[np.random.Generator, str, float], Actuator]
+"""From a generator, a name and the robot's size to an actuator."""
+
+
+def random_robot(
+    rng: np.random.Generator, name: str, count: tuple[int, int], kinds: Sequence[Draw], each: bool = False
+) -> Layout:
+    """Returns a robot of random actuators `a1`, `a2`, ...
+
+    Args:
+        rng: source of randomness.
+        name: of the layout.
+        count: least and most actuators.
+        kinds: what they are drawn of, each kind as often.
+        each: whether there is at least one of each kind.
+    """
+    n, size = int(rng.integers(count[0], count[1] + 1)), log_uniform(rng, *SIZE)
+    chosen = [kinds[k] for k in rng.integers(len(kinds), size=n)]
+    if each:
+        chosen[: len(kinds)] = kinds
+    return Layout(name, tuple(make(rng, f"a{i + 1}", size) for i, make in enumerate(chosen)))
+
+
+def random_thruster(rng: np.random.Generator, name: str, size: float) -> Thruster:
+    """Returns a thruster in any direction, with forces and a power law of its own."""
+    most = size * rng.uniform(*STRENGTH)
+    reverse = rng.choice([0.0, 1.0, rng.uniform(0.2, 1.2)], p=[ONE_WAY, SYMMETRIC, 1.0 - ONE_WAY - SYMMETRIC])
+    reaction = rng.uniform(-REACTION, REACTION) * rng.integers(2)
+    return Thruster(
+        name,
+        _position(rng),
+        _vector(_unit(rng)),
+        (-float(reverse * most), most),
+        _law(rng),
+        torque_per_newton=float(reaction),
+    )
+
+
+def random_azimuth(rng: np.random.Generator, name: str, size: float) -> Azimuth:
+    """Returns an azimuth about any axis, half of them within an arc."""
+    arc = _arc(rng, *ARC) if rng.integers(2) else (-math.pi, math.pi)
+    return Azimuth(
+        name, _position(rng), *_across(rng), (0.0, size * rng.uniform(*STRENGTH)), _law(rng), arc=arc
+    )
+
+
+def random_tilt(rng: np.random.Generator, name: str, size: float) -> Tilt:
+    """Returns a tilt about any axis."""
+    force = 0.0, size * rng.uniform(*STRENGTH)
+    return Tilt(name, _position(rng), *_across(rng), force, _law(rng), arc=_arc(rng, *TILT))
+
+
+def random_shaft_fin(rng: np.random.Generator, name: str, size: float) -> Fin:
+    """Returns a fin of a random model with a shaft in any direction; its size is its own."""
+    shaft, zero = _across(rng)
+    return Fin(name, _position(rng), model=random_fin_model(rng), shaft=shaft, zero=zero)
+
+
+def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
+    """A number whose logarithm is uniform."""
+    return math.exp(rng.uniform(math.log(low), math.log(high)))
+
+
+def random_fin_model(
+    rng: np.random.Generator, kind: str | None = None, families: dict[str, Numbers] = FAMILIES
+) -> FinModelSpec:
+    """A fin with random numbers, of one kind or of each equally often."""
+    kind = kind or str(rng.choice(list(families)))
+    drawn = {
+        name: log_uniform(rng, *ends) if name in LOGARITHMIC else float(rng.uniform(*ends))
+        for name, ends in families[kind].items()
+    }
+    return FinModelSpec(kind, tuple(drawn.items()))
+
+
+def _position(rng: np.random.Generator) -> tuple[float, float, float]:
+    return _vector(rng.uniform(-1.0, 1.0, 3) * EXTENT)
+
+
+def _vector(values: Array) -> tuple[float, float, float]:
+    x, y, z = values.tolist()
+    return x, y, z
+
+
+def _unit(rng: np.random.Generator) -> Array:
+    drawn = rng.normal(size=3)
+    return np.asarray(drawn / np.linalg.norm(drawn))
+
+
+def _across(rng: np.random.Generator) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+    """A unit vector, and one across it."""
+    axis = _unit(rng)
+    across = np.cross(axis, _unit(rng))
+    return _vector(axis), _vector(across / np.linalg.norm(across))
+
+
+def _arc(rng: np.random.Generator, least: float, most: float) -> tuple[float, float]:
+    width = rng.uniform(least, most)
+    start = rng.uniform(-math.pi, math.pi - width)
+    return start, start + width
+
+
+def _law(rng: np.random.Generator) -> PowerLaw:
+    """Half of the laws are those of an ideal propeller at rest."""
+    exponent = float(rng.choice([1.5, rng.uniform(1.2, 2.5)]))
+    forward = log_uniform(rng, 0.3, 3.0) * 20.0 ** (1.5 - exponent)
+    return PowerLaw(forward, forward * rng.uniform(0.8, 3.0), exponent)
