@@ -17,8 +17,8 @@ from tests.webapp.loops import AtOnce, page_of
 from tests.webapp.stand_in import StandIn, load_stand_in
 from webapp.markup.mode_plot import mode_plot
 from webapp.markup.words import source_words, three_digits
-from webapp.panels.compare_tab import comparison_table
 from webapp.panels.files_tab import command_line
+from webapp.panels.modes_tab import comparison_table
 from webapp.panels.status import corner
 from webapp.session.state import COMPARED, LEAST, State, compared
 from webapp.session.targets import PRESETS

@@ -52,7 +52,7 @@ DRAWN = (
     "webapp.panels.modes_tab.mode_plot",
     "webapp.panels.modes_tab.source_words",
     "webapp.panels.limits_tab.score_table",
-    "webapp.panels.compare_tab.comparison_table",
+    "webapp.panels.modes_tab.comparison_table",
     "webapp.panels.files_tab.command_line",
     "webapp.scene.stage.Stage.refresh",
     "webapp.scene.wrench_nodes.fitting",

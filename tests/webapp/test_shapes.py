@@ -10,10 +10,10 @@ from finlab.assets import shipped_layouts
 from finlab.hull import Surface, hull_of
 from finlab.hull.mesh import Mesh
 from finlab.layout import Azimuth, Fin, Rudder, Thruster, load_layout
+from webapp.scene import actuator_shapes as shapes
 from webapp.scene.actuator_node import TURNS_PER_S, motion
+from webapp.scene.arrows import NOTHING, force_arrow, torque_ring
 from webapp.scene.direction_handle import on_sphere, snapped
-from webapp.scene.meshes import blades
-from webapp.scene.meshes.mesh import NOTHING, force_arrow, torque_ring
 
 
 def solid(mesh: Mesh) -> trimesh.Trimesh:
@@ -23,8 +23,8 @@ def solid(mesh: Mesh) -> trimesh.Trimesh:
 @pytest.mark.parametrize(
     "mesh",
     [
-        blades.blade(),
-        blades.shaft(),
+        shapes.blade(),
+        shapes.shaft(),
         force_arrow(np.array([0.1, -0.2, 0.05]), np.zeros(3), 0.01),
         torque_ring(np.array([0.0, 0.1, 0.3]), np.zeros(3), 0.01),
     ],
@@ -38,7 +38,7 @@ def test_closed_and_outward(mesh: Mesh) -> None:
 
 def test_blade_trails_behind_its_thrust() -> None:
     # Zero direction zero pushes along +y' of the fin's frame, so the blade lies along -y'.
-    blade = blades.blade()
+    blade = shapes.blade()
     assert blade.vertices[:, 1].min() < -0.15 and blade.vertices[:, 1].max() < 0.02
     extent = np.ptp(blade.vertices, axis=0)
     assert extent[:2] == pytest.approx([0.10, 0.18], abs=0.02)

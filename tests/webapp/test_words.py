@@ -28,7 +28,7 @@ from webapp.markup.verdict import (
     verdict_sentence,
 )
 from webapp.markup.words import authority_sentence, trim_sentence
-from webapp.panels.compare_tab import comparison_table
+from webapp.panels.modes_tab import comparison_table
 from webapp.panels.status import corner
 from webapp.scene.wrench_nodes import LENGTH, LONGEST, NEWTONS, SHORTEST, fitting
 from webapp.session import Session, files

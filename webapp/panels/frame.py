@@ -110,7 +110,7 @@ class Frame:
                     for index, place in enumerate(PLACES)
                     if place.region == region
                 ]
-        for name in ("habits.js", "frames.js", "names.js"):
+        for name in ("habits.js", "frames.js"):
             run_file(gui, name)
 
     def _fail(self, error: Exception | None) -> None:

@@ -12,7 +12,7 @@ from webapp.markup.html import html
 from webapp.markup.verdict import WORKING, verdict_of, verdict_sentence
 from webapp.markup.words import error_digits, parts_word, three_digits
 from webapp.page import Page
-from webapp.scene.proportions import arrow_size
+from webapp.scene.stage import arrow_size
 from webapp.scene.wrench_nodes import Scale, set_scale
 from webapp.session.display import Display
 from webapp.session.state import AXIS_UNITS, LEAST, State

@@ -8,7 +8,7 @@ import viser
 
 from finlab.arrays import Array
 from webapp.handles import put
-from webapp.scene.meshes.mesh import tube
+from webapp.scene.arrows import tube
 from webapp.scene.stage import Shape
 from webapp.theme import LIGHT, Rgb
 

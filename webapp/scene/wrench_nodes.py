@@ -14,7 +14,7 @@ from finlab.arrays import Array
 from finlab.hull.mesh import Mesh
 from webapp.handles import put
 from webapp.markup.words import missing_part
-from webapp.scene.meshes.mesh import LONGEST_TURN, NOTHING, RING_RADIUS, force_arrow, torque_ring, tube
+from webapp.scene.arrows import LONGEST_TURN, NOTHING, RING_RADIUS, force_arrow, torque_ring, tube
 from webapp.scene.stage import Shape
 from webapp.tasks.analyst import Findings
 from webapp.tasks.swimmer import Swimmer

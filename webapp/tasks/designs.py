@@ -149,7 +149,7 @@ class Opening:
         """Let the page take what is dropped on it."""
         self._takers: dict[str, Take] = {}
         presses.on("dropped", _refuse)
-        run_file(gui, "dropping.js")
+        run_file(gui, "opening.js")
 
     @property
     def suffixes(self) -> str:
