@@ -1,4 +1,4 @@
-"""Shapes of actuators in their own frame [m]; a fin's or rudder's shaft is along x', its blade trails along -y'.
+"""Shapes of actuators in their own frame [m]: the shaft of a fin or rudder along x', its blade along -y'.
 
 A fin that points aft pushes forward. A propeller of size 1 moves water along x', or along y' for a pod.
 """
