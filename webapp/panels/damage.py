@@ -149,7 +149,6 @@ def _may(kind: str) -> Callable[[str | None, Layout], bool]:
 
 
 def _is(kind: str) -> Callable[[str | None, Layout, Health | None], bool]:
-    """Whether it has it."""
     return lambda selected, layout, health: _part(selected, layout).name in dict(getattr(health, kind, ()))
 
 

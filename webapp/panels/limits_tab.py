@@ -28,7 +28,6 @@ def add_reach(page: Page) -> None:
 
 
 def _findings(found: Findings | None, finding: bool, found_error: str | None) -> str:
-    """The card, and what to know about the drawn set."""
     if found_error is not None:
         return Markup("<div class='fl missing'>This layout cannot be analysed.</div>")
     if found is None:
@@ -109,7 +108,6 @@ def _searched(
     better_error: str | None,
     draft: SearchRequest,
 ) -> str:
-    """How far a search is, or what came of it."""
     text = "Searching …" if improving else ""
     if better_error is not None:
         text = html("<div class='missing'>{}</div>", better_error)

@@ -71,13 +71,11 @@ def add_candidates(page: Page) -> None:
 
 
 def _temperature(state: State) -> float:
-    """That in force."""
     own = DRAWING.get(state.method, DRAWING["mdn"]).temperature
     return own if state.temperature is None else state.temperature
 
 
 def _player(modes: Modes, step: int | None, playing: bool, loops: bool) -> str:
-    """Buttons, and what is done in the step that is shown."""
     if not modes.steps:
         return ""
     play = ("❚❚", "Pause") if playing else ("▶", "Play")

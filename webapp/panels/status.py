@@ -152,7 +152,6 @@ def corner(
 
 
 def _figures(allocation: Allocation, least: bool, in_reach: bool, refined: str) -> list[str]:
-    """Error, costs, time and verdict of what is on the robot."""
     color, verdict = verdict_of(allocation, in_reach).color, verdict_sentence(allocation, in_reach)
     if refined:
         color, verdict = DEAD, refined

@@ -28,7 +28,6 @@ from webapp.theme import ASKED, DELIVERED, Rgb, fin_color
 
 
 def _bind(page: Page, key: str, widget: Any) -> None:
-    """A widget for a setting of swims."""
     page.bind(widget, partial(page.session.set_swim, key), lambda swim: getattr(swim, key))
 
 

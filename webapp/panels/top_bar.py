@@ -74,7 +74,6 @@ def add_answering(page: Page) -> None:
 
 
 def _options(layout: Layout) -> tuple[str, ...]:
-    """The methods that take a robot's actuators, with a line about each."""
     return tuple(_option(name) for name in METHODS if method_class(name).fits(layout))
 
 

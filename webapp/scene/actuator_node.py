@@ -209,7 +209,6 @@ class ActuatorNode:
 
 
 def _strut(end: Array, hull: Surface, radius: float) -> Mesh:
-    """A rod from an end to the hull, nothing where that already lies in it."""
     anchor = hull.anchor(end)
     if np.linalg.norm(anchor - end) < 5e-3:
         return NOTHING

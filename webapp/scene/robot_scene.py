@@ -135,7 +135,6 @@ class RobotScene:
         dragged: int | None,
         swims: bool,
     ) -> None:
-        """Actuators where they are, with their numbers and gizmos."""
         hull, sizes = hull_of(drawn), (part_size(drawn), arrow_size(drawn))
         while len(self._fins) < drawn.n:
             self._fins.append(ActuatorNode(self._client.scene, len(self._fins), self._clicked, self._drag))
@@ -165,7 +164,6 @@ class RobotScene:
         scale: Scale,
         moment: Moment | None,
     ) -> None:
-        """What actuators do, and their forces."""
         lost = failed if moment is None else moment.lost
         if moment is not None:
             commands, forces, frames = moment.motion, moment.force, drawn.frames
@@ -269,5 +267,4 @@ class Offered:
 
 
 def _named(part: Actuator) -> str:
-    """Name and place of an actuator."""
     return f"{part.name}, {', '.join(f'{value:.3f}' for value in part.position)} m".replace("-", "−")

@@ -178,21 +178,18 @@ class SwimScene:
         run_script(self._client.gui, f"finlabFrames.follow({start[:3].tolist()});")
 
     def _draw_water(self, swimmer: Swimmer) -> None:
-        """An arrow for the velocity of the water, beyond the path."""
         path, flow = swimmer.path, swimmer.shown.flow
         place = np.array([path[:, 0].min() - BEYOND_M, path[:, 1].max() + BEYOND_M, path[:, 2].mean()])
         self._water.show(force_arrow, np.round(FLOW_S * flow, 2), place, 0.03)
 
     def _look(self, path: Array, start: Array, size: float) -> None:
-        """Let the camera stand where the robot, of a size, can be seen well, and much of the path (N, 3); it
-        goes along with it (`frames.js`)."""
+        """Show the robot, of a size, and much of the path (N, 3); `frames.js` lets the camera go along."""
         extent = float(np.linalg.norm(np.ptp(path, axis=0)[:2]))
         distance = max(0.18 * extent, 0.9 * size)
         place = start + distance * np.array([-0.6, -0.75, 0.8])
         aim_camera(self._client, place, start + distance * np.array([0.1, 0.0, -0.05]))
 
     def _pose(self, pose: Array) -> None:
-        """Put the robot to a place, with a quaternion (7,)."""
         put(self._root, position=pose[:3], wxyz=pose[3:] / np.linalg.norm(pose[3:]))
 
     def animate(self, elapsed: float) -> None:
@@ -214,7 +211,6 @@ class SwimScene:
 
 
 def _goal(path: Array) -> Mesh:
-    """The way to go as a thin tube."""
     steps = np.linalg.norm(np.diff(path, axis=0), axis=1)
     kept = path[np.concatenate([[True], steps > 1e-6])]
     return joined(tube(kept, 0.006, 8)) if len(kept) > 1 else NOTHING

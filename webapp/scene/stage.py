@@ -140,8 +140,7 @@ class Shape:
 
 
 def _bow(hull: Surface) -> Mesh:
-    """A dark window over the foremost part of a shape, a little proud of it: it shows which end is the bow. A
-    mesh from a file shows that by itself."""
+    """A dark window over the foremost part of a shape; a mesh from a file shows its bow by itself."""
     if hull.file is not None:
         return NOTHING
     stations = np.concatenate([[BOW], STATIONS[STATIONS > BOW]])
