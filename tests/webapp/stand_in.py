@@ -1,9 +1,11 @@
-"""An allocator that needs no trained network, with candidates and samples as method `mdn` has them."""
+"""Stand-ins: an allocator without a trained network, a page that takes everything, a hand in the 3D view."""
 
 from dataclasses import dataclass
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import viser
 from numpy.typing import NDArray
 
 from finlab.allocation.baselines.sqp import Sqp, SqpSettings
@@ -16,6 +18,7 @@ from finlab.errors import AllocationError
 from finlab.layout import Layout
 from finlab.networks.trained import TrainedWeights
 from finlab.physics import Plant
+from webapp.session import Session
 
 N_REFINED = 4
 Array = NDArray[np.float64]
@@ -91,3 +94,37 @@ def load_stand_in(method: str = "dual", *, checkpoint: Any = None) -> MethodChoi
     if method in ("dual", "mdn"):
         return MethodChoice(StandIn, StandInSettings())
     return MethodChoice(Sqp, SqpSettings())
+
+
+class SilentClient:
+    """Stands for a browser: the server's own scene and panel, and a camera that takes everything."""
+
+    def __init__(self, server: viser.ViserServer) -> None:
+        self.scene, self.gui, self.atomic = server.scene, server.gui, server.atomic
+        self.camera = type("Camera", (), {})()
+        self.kept: dict[str, str] = {}
+        self.local_storage = SimpleNamespace(set_item=self.kept.__setitem__, get_item=self.kept.get)
+        self.notes: list[str] = []
+        self.files: dict[str, bytes] = {}
+
+    def add_notification(self, title: str, body: str, **_: Any) -> None:
+        """Note what the user would have been told."""
+        self.notes.append(f"{title}: {body}")
+
+    def send_file_download(self, name: str, content: bytes, **_: Any) -> None:
+        """Keep what the user would have saved."""
+        self.files[name] = content
+
+
+Vector = tuple[float, float, float]
+
+
+def move_fin(session: Session, name: str, position: Vector) -> None:
+    """Drag a fin to a place [m] and let it go."""
+    session.end_drag(name, position)
+
+
+def turn_fin(session: Session, name: str, angle: float) -> None:
+    """Select a fin and turn it to an angle [rad]."""
+    session.select(name)
+    session.turn_selected(angle)

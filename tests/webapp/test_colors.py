@@ -1,4 +1,4 @@
-"""Blue, green and vermillion are reserved: no fin comes near what is asked, delivered and missing."""
+"""Reserved hues that no fin comes near, and marks on sliders that do not lie on each other."""
 
 import math
 import re
@@ -7,6 +7,7 @@ from importlib.resources import files
 import numpy as np
 import pytest
 
+from webapp.panels.wrench_tab import reach_marks
 from webapp.theme import ASKED, DELIVERED, FIN_COLORS, MISSING, Rgb, ink
 
 LMS = np.array(
@@ -67,3 +68,24 @@ def test_fins_differ_and_their_numbers_can_be_read() -> None:
 def _rgb(color: str) -> Rgb:
     digit = int(color[1], 16) * 17
     return digit, digit, digit
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "marks"),
+    [
+        (-12.04, 11.0, ((-12.04, "−12"), (11.0, "11"))),
+        (-1.9, 1.9, ((-1.9, ""), (1.9, "±1.9"))),
+        (3.1234, 5.0, ((3.123, ""), (5.0, "3.1 … 5.0"))),
+        (-0.04, 2.0, ((-0.04, ""), (2.0, "0 … 2.0"))),
+        (2.0, 2.0, ((2.0, "2.0"),)),
+        (math.nan, math.nan, ()),
+    ],
+)
+def test_marks_of_a_slider_that_is_forty_long(
+    low: float, high: float, marks: tuple[tuple[float, str], ...]
+) -> None:
+    assert reach_marks(low, high, 40.0) == marks
+
+
+def test_marks_of_a_short_slider_have_more_digits() -> None:
+    assert reach_marks(-0.04, 0.06, 0.15) == ((-0.04, "−0.040"), (0.06, "0.060"))

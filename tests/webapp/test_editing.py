@@ -15,7 +15,7 @@ from finlab.hull.mesh_file import MAX_BYTES, MAX_FACES, MeshReport, read_mesh, s
 from finlab.layout import load_layout
 from finlab.layout.body import Hull
 from finlab.layout.layout import MAX_ACTUATORS
-from tests.webapp.hands import move_fin, turn_fin
+from tests.webapp.stand_in import move_fin, turn_fin
 from webapp.markup.score_card import warnings
 from webapp.session import Session, layout_edits
 from webapp.session.files import reshaped_hull, stored_hull

@@ -17,8 +17,7 @@ import viser
 from finlab.assets import shipped_layouts
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
-from tests.webapp.silent_client import SilentClient
-from tests.webapp.stand_in import load_stand_in
+from tests.webapp.stand_in import SilentClient, load_stand_in
 from webapp.panels.frame import View
 from webapp.session import Display, Session
 from webapp.session.looking import DRAWERS

@@ -1,15 +1,23 @@
-"""A page that sends what no honest page would: nothing breaks, nothing of it gets into the session."""
+"""Pages and files that no honest page would send: nothing breaks, and each is opened or refused in time."""
 
 import asyncio
+import base64
 import math
+import time
 import types
+import zlib
+from collections.abc import Callable
+from functools import partial
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 import viser
 
+from finlab.errors import FinlabError
 from tests.webapp.test_app import app, on_loop, server, until, view
 from webapp.panels.frame import View
+from webapp.tasks.designs import Opening
 
 __all__ = ["app", "server", "view"]
 
@@ -88,3 +96,79 @@ def test_a_fault_of_ours_is_told_and_the_page_goes_on(
     on_loop(server, lambda: view.do(lambda: view.session.set_target(0, 0.3)))
     until(lambda: not view.busy)
     assert view.shown is not None and view.shown.target[0] == 0.3
+
+
+__all__ = ["app", "server", "view"]
+
+
+def link(text: str) -> str:
+    """A design link that unpacks to a text."""
+    return "y" + base64.urlsafe_b64encode(zlib.compress(text.encode(), 9)).decode().rstrip("=")
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["a: " + "1:" * 400_000 + "1", "[" * 100_000, "&a [*a]", "x: 1\n" * 300_000, "a: " + "9" * 900_000],
+    ids=["base sixty", "deep", "circle", "repeated", "number"],
+)
+def test_hostile_links_leave_the_page_quick(server: viser.ViserServer, view: View, text: str) -> None:
+    before = view.session.state.layout
+    on_loop(server, lambda: view.do(partial(view.designs.open_link, link(text))))
+    slowest, end = 0.0, time.monotonic() + 30.0
+    while not view.client.notes and time.monotonic() < end:
+        begin = time.monotonic()
+        on_loop(server, lambda: None)
+        slowest = max(slowest, time.monotonic() - begin)
+        time.sleep(0.01)
+    assert len(view.client.notes) == 1 and view.client.notes[0].startswith("Not possible: ")
+    assert view.session.state.layout == before and slowest < 1.0
+
+
+def test_what_waits_gives_way_to_a_newer_one_of_its_kind(server: viser.ViserServer, view: View) -> None:
+    found: list[int] = []
+
+    def ask() -> None:
+        view.do(lambda: view.reading.make(partial(time.sleep, 0.05), lambda _: found.append(0), "open"))
+        for count in range(1, 9):
+            view.do(lambda count=count: view.reading.make(lambda: count, found.append, "save"))
+
+    on_loop(server, ask)
+    until(lambda: found == [0, 8])
+    assert view.client.notes == []
+
+
+class Taken:
+    """What came to whom."""
+
+    def __init__(self) -> None:
+        """Two takers."""
+        self.files: list[tuple[str, str, bytes]] = []
+        interface = SimpleNamespace(queue_message=lambda message: None)
+        gui: Any = SimpleNamespace(_websock_interface=interface)
+        self.heard: dict[str, Callable[[str, str], object]] = {}
+        presses: Any = SimpleNamespace(on=lambda kind, act: self.heard.update({kind: act}))
+        self.opening = Opening(gui, presses)
+        self.opening.add(".csv,.txt", self._taker("fin"))
+        self.opening.add(".yaml,.zip", self._taker("design"))
+
+    def _taker(self, who: str) -> Callable[[str, bytes], object]:
+        return lambda name, content: self.files.append((who, name, content))
+
+
+def test_each_file_goes_to_whom_it_is_for() -> None:
+    taken = Taken()
+    for name, content in (("A.YAML", b"a"), ("cell.csv", b"A,f,phi,Fx\n")):
+        taken.opening.open(name, content)
+    assert [who for who, *_ in taken.files] == ["design", "fin"]
+    assert taken.opening.suffixes == ".csv,.txt,.yaml,.zip"
+
+
+@pytest.mark.parametrize("name", ["notes.docx", "robot", ".yaml", "robot.yaml.exe", ""])
+def test_what_cannot_be_opened_is_told_with_what_can(name: str) -> None:
+    with pytest.raises(FinlabError, match=r"cannot be opened; expected a design \(YAML, JSON, ZIP\)"):
+        Taken().opening.open(name, b"")
+
+
+def test_several_files_at_once_are_refused() -> None:
+    with pytest.raises(FinlabError, match="one ZIP archive"):
+        Taken().heard["dropped"]("", "")

@@ -9,7 +9,7 @@ import pytest
 from finlab.assets import shipped_layouts
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
-from tests.webapp.hands import move_fin, turn_fin
+from tests.webapp.stand_in import move_fin, turn_fin
 from webapp.markup.answer import wrench_bars
 from webapp.session import Session
 
