@@ -7,12 +7,7 @@ from markupsafe import Markup
 
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.evaluate import REACHED
-from webapp.markup.words import (
-    authority_sentence,
-    listed,
-    three_digits,
-    unlearned_sentence,
-)
+from webapp.markup.words import authority_sentence, listed, three_digits, unlearned_sentence
 from webapp.session.state import AXIS_UNITS, AXIS_WORDS, State
 from webapp.session.targets import axis_reach
 from webapp.theme import DELIVERED, MISSING, NEARLY, UNLEARNED, Rgb
@@ -43,13 +38,8 @@ class Verdict(Enum):
     OUT_OF_REACH = "Out of reach"
     """No command of what works gives it."""
 
-    @property
-    def color(self) -> Rgb:
-        """Of everything that shows it."""
-        return _COLORS[self]
 
-
-_COLORS = {
+COLORS: dict[Verdict, Rgb] = {
     Verdict.EXACT: DELIVERED,
     Verdict.APPROXIMATE: NEARLY,
     Verdict.UNLEARNED: UNLEARNED,

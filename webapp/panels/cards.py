@@ -28,9 +28,9 @@ SWITCHES = {
 """Field of `Display`, label and hint of each switch."""
 
 
-def card(written: Callable[..., str], page: Page) -> None:
-    """What `written` makes of the facts."""
-    page.add_html(written)
+def card(written: Callable[..., str]) -> Callable[[Page], object]:
+    """A panel of what `written` makes of the facts."""
+    return lambda page: page.add_html(written)
 
 
 def robot_name(layout: Layout, saved: Layout) -> str:

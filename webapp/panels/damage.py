@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Sequence
-from functools import partial, wraps
+from functools import wraps
 from typing import Any
 
 import numpy as np
@@ -102,7 +102,9 @@ def add_damage(page: Page) -> None:
     least = 100 * STRENGTH_RANGE[0]
     for kind, (label, hint) in shares.items():
         slider = gui.add_slider(label, least, 100.0, 5.0, 100.0, hint=hint, visible=False)
-        page.bind_number(slider, partial(_as_share, damage, kind), _of(kind, 1.0, 100.0), digits=1)
+        page.bind_number(
+            slider, lambda part, kind=kind: damage(kind, part / 100.0), _of(kind, 1.0, 100.0), digits=1
+        )
         board.show(slider, visible=_may(kind))
     held = {
         "stuck": ("Stuck", "It no longer turns from where it is.", jam),
@@ -131,10 +133,6 @@ def add_damage(page: Page) -> None:
 
 def _part(selected: str | None, layout: Layout) -> Actuator:
     return part_of(layout, selected or layout.names[0])
-
-
-def _as_share(damage: Callable[[str, float], None], kind: str, percent: float) -> None:
-    damage(kind, percent / 100.0)
 
 
 def _may(kind: str) -> Callable[[str | None, Layout], bool]:

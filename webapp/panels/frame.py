@@ -31,11 +31,10 @@ _VARIABLES = (
     f"--fl-near: {css(NEARLY)}; --fl-reach: {css(REACH)}; }} "
     f"[data-mantine-color-scheme=dark] {{ --fl-reach: {css(REACH_DARK)}; }}"
 )
-SHEETS = ("style.css", "frame.css", "narrow.css", "compact.css")
 STYLE = html(
     "<style>{}{}</style>",
     _VARIABLES,
-    (Markup(files("webapp.markup").joinpath(name).read_text("utf-8")) for name in SHEETS),
+    (Markup(files("webapp.markup").joinpath(name).read_text("utf-8")) for name in ("style.css", "frame.css")),
 )
 LOW = ":root { --tall: 92px; }"
 TALL = ":root { --fl-usual: 344px; }"

@@ -1,7 +1,6 @@
 """Which panel stands where: the one table of the frame. A panel is built by a function of the page."""
 
 from collections.abc import Callable
-from functools import partial
 from typing import NamedTuple
 
 from webapp.page import Page
@@ -40,18 +39,18 @@ class Place(NamedTuple):
 
 
 PLACES = (
-    Place(TOP, TASKS, "Robot", partial(card, robot_name)),
+    Place(TOP, TASKS, "Robot", card(robot_name)),
     Place(TOP, TASKS, "File", add_file),
     Place(TOP, TASKS, "History", add_history),
-    Place(TOP, TASKS, "Tasks", partial(card, tasks)),
+    Place(TOP, TASKS, "Tasks", card(tasks)),
     Place(TOP, TASKS, "Answers", add_answering),
-    Place(LEFT, TASKS, "Guide", partial(card, guide_card), about="guide"),
+    Place(LEFT, TASKS, "Guide", card(guide_card), about="guide"),
     Place(LEFT, (DESIGN,), "Actuators", add_actuator_list),
     Place(LEFT, (DESIGN,), "Designs", add_designs),
     Place(RIGHT, (DESIGN,), "Actuator", add_actuator, about="actuators"),
     Place(RIGHT, (DESIGN,), "Body", add_body, about="robot"),
     Place(RIGHT, (DESIGN,), "Hull", add_hull, folded=True, about="robot"),
-    Place(RIGHT, (DESIGN,), "Check", partial(card, check)),
+    Place(RIGHT, (DESIGN,), "Check", card(check)),
     Place(DRAWER, (DESIGN,), "Reach", add_reach),
     Place(DRAWER, (DESIGN,), "Improve", add_improving),
     Place(LEFT, (ALLOCATE,), "Actuators", add_commands),
@@ -65,6 +64,6 @@ PLACES = (
     Place(RIGHT, (SIMULATE,), "Figures", add_figures),
     Place(DRAWER, (SIMULATE,), "Swim over time", add_timeline),
     Place(RIGHT, (EXPORT,), "Files", add_files),
-    Place(VIEW, TASKS, "Camera", partial(card, camera)),
+    Place(VIEW, TASKS, "Camera", card(camera)),
     Place(VIEW, TASKS, "Display", add_switches, folded=True),
 )

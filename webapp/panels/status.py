@@ -9,7 +9,7 @@ from finlab.allocation.allocation import Allocation
 from finlab.allocation.policy import AXES
 from webapp.handles import put
 from webapp.markup.html import html
-from webapp.markup.verdict import WORKING, verdict_of, verdict_sentence
+from webapp.markup.verdict import COLORS, WORKING, verdict_of, verdict_sentence
 from webapp.markup.words import error_digits, parts_word, three_digits
 from webapp.page import Page
 from webapp.scene.stage import arrow_size
@@ -152,7 +152,7 @@ def corner(
 
 
 def _figures(allocation: Allocation, least: bool, in_reach: bool, refined: str) -> list[str]:
-    color, verdict = verdict_of(allocation, in_reach).color, verdict_sentence(allocation, in_reach)
+    color, verdict = COLORS[verdict_of(allocation, in_reach)], verdict_sentence(allocation, in_reach)
     if refined:
         color, verdict = DEAD, refined
     pill = "pill long" if len(verdict) > LONG else "pill"

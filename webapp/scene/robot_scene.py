@@ -6,7 +6,6 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-import viser
 
 from finlab.allocation.allocation import Allocation
 from finlab.analysis import Improvement
@@ -53,7 +52,8 @@ class RobotScene:
         self.root = scene.add_frame("/robot", show_axes=False)
         self._stage = Stage(scene, hull_of(session.state.layout))
         self._wrench = WrenchNodes(scene)
-        self._offered = Offered(scene)
+        ghost: dict[str, Any] = {"opacity": 0.6, "visible": False, "cast_shadow": False}
+        self._offered = Shape(scene, "/robot/proposed", LIGHT.glass, **ghost)
         self._attainable = AttainableNodes(scene)
         self._direction = DirectionHandle(self._client, self._turn)
         self._fins: list[ActuatorNode] = []
@@ -61,16 +61,9 @@ class RobotScene:
         self._moves: list[Motion] = []
         self._size = view_size(session.state.layout)
         self._flaps = ""
-        for act in (
-            self._show_stage,
-            self._place,
-            self._push,
-            self._flap,
-            self._show_wrench,
-            self._show_sets,
-            self._offer,
-        ):
-            board.act(act)
+        shows = (self._show_stage, self._place, self._push, self._flap, self._show_wrench, self._show_sets)
+        for show in (*shows, self._offer):
+            board.act(show)
         self.look_from("3D")
 
     def hide(self) -> None:
@@ -80,7 +73,7 @@ class RobotScene:
     def show(self, swimmer: Swimmer | None) -> None:
         """A robot that does not swim stands on a floor of its own."""
         put(self.root, visible=True)
-        self._stage.show_floor(swimmer is None)
+        put(self._stage.floor, visible=swimmer is None)
         if swimmer is None:
             put(self.root, position=np.zeros(3), wxyz=np.array([1.0, 0.0, 0.0, 0.0]))
 
@@ -221,9 +214,14 @@ class RobotScene:
         self._attainable.refresh(shown, np.array(target), arrow_size(drawn))
 
     def _offer(self, better: Improvement | None, layout: Layout, swims: bool) -> None:
-        self._offered.show(
-            better.layout if better is not None and better.improved and not swims else None, layout
-        )
+        """The actuators that a search would put elsewhere, where it would put them."""
+        other = better.layout if better is not None and better.improved and not swims else None
+        now = {part.name: (part.position, part.frame) for part in layout.actuators}
+        parts = () if other is None or other.name != layout.name else other.actuators
+        moved = tuple(part for part in parts if now.get(part.name) != (part.position, part.frame))
+        put(self._offered.node, visible=bool(moved))
+        if moved:
+            self._offered.show(moved_parts, moved, part_size(layout))
 
     def _clicked(self, index: int, also: bool) -> None:
         select = self._session.select_also if also else self._session.select
@@ -247,23 +245,6 @@ class RobotScene:
             self._do(partial(session.point, name, (x, y, z), held=True))
         if phase == "end":
             session.history.end_merge()
-
-
-class Offered:
-    """The actuators that a search would put elsewhere, where it would put them."""
-
-    def __init__(self, scene: viser.SceneApi) -> None:
-        ghost: dict[str, Any] = {"opacity": 0.6, "visible": False, "cast_shadow": False}
-        self._shape = Shape(scene, "/robot/proposed", LIGHT.glass, **ghost)
-
-    def show(self, other: Layout | None, layout: Layout) -> None:
-        """Show what of a better version of a layout stands elsewhere now; None hides the node."""
-        now = {part.name: (part.position, part.frame) for part in layout.actuators}
-        parts = () if other is None or other.name != layout.name else other.actuators
-        moved = tuple(part for part in parts if now.get(part.name) != (part.position, part.frame))
-        put(self._shape.node, visible=bool(moved))
-        if moved:
-            self._shape.show(moved_parts, moved, part_size(layout))
 
 
 def _named(part: Actuator) -> str:

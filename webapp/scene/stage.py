@@ -77,7 +77,7 @@ class Stage:
             "/robot/axes", axes_length=0.09, axes_radius=0.004, origin_radius=0.009, origin_color=(40, 40, 40)
         )
         fade: dict[str, Any] = {"fade_distance": 5.0, "fade_strength": 1.6, "shadow_opacity": 0.22}
-        self._grid = add_floor(scene, "/floor", 6.0, 0.1, 0.5, **fade)
+        self.floor = add_floor(scene, "/floor", 6.0, 0.1, 0.5, **fade)
 
     def refresh(self, hull: Surface, dark: bool, shadows: bool, net: bool, glass: bool, size: float) -> None:
         """Show another hull, theme or quality; a hull of glass, or a mere net, lets one look inside. Axes and
@@ -89,18 +89,14 @@ class Stage:
             self._hull = hull
             self._body.become(hull.mesh)
             self._bow.become(_bow(hull))
-        for node in (self._axes, self._grid):
+        for node in (self._axes, self.floor):
             put(node, scale=size)
-        put(self._grid, position=np.array([0.0, 0.0, hull.center[2] - hull.half[2] - BELOW * size]))
+        put(self.floor, position=np.array([0.0, 0.0, hull.center[2] - hull.half[2] - BELOW * size]))
         if self._look != (dark, shadows):
             self._look = dark, shadows
             self._scene.configure_default_lights(cast_shadow=shadows)
             self._paint(look(dark))
-            paint_floor(self._grid, dark)
-
-    def show_floor(self, visible: bool) -> None:
-        """Show the floor, or leave it to others."""
-        put(self._grid, visible=visible)
+            paint_floor(self.floor, dark)
 
     def _paint(self, colors: Look) -> None:
         fade = np.linspace(0, 1, 64)[:, None, None]
