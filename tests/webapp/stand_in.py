@@ -1,5 +1,8 @@
-"""Stand-ins: an allocator without a trained network, a page that takes everything, a hand in the 3D view."""
+"""Stand-ins: an allocator without a trained network, a silent page, an event loop at hand, a user's hand."""
 
+import asyncio
+import functools
+from collections.abc import Callable, Coroutine
 from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any
@@ -19,6 +22,10 @@ from finlab.layout import Layout
 from finlab.networks.trained import TrainedWeights
 from finlab.physics import Plant
 from webapp.session import Session
+from webapp.tasks.background import EventLoop
+from webapp.tasks.context import Context
+from webapp.tasks.reading import Reading
+from webapp.tasks.solver import Solver
 
 N_REFINED = 4
 Array = NDArray[np.float64]
@@ -128,3 +135,71 @@ def turn_fin(session: Session, name: str, angle: float) -> None:
     """Select a fin and turn it to an angle [rad]."""
     session.select(name)
     session.turn_selected(angle)
+
+
+class AtOnce(EventLoop):
+    """Runs everything where it is posted from; its timers ring by hand."""
+
+    def __init__(self) -> None:
+        """Nothing is waiting."""
+        self.ring: Callable[[], object] = lambda: None
+
+    def post(self, act: Callable[[], object]) -> None:
+        """Run it now."""
+        act()
+
+    def later(self, seconds: float, act: Callable[[], object]) -> Any:
+        """Keep it until somebody rings."""
+        self.ring = act
+        return type("Timer", (), {"cancel": lambda _: None})()
+
+
+def raised(error: Exception) -> None:
+    """In place of a page that tells of faults."""
+    raise error
+
+
+def running() -> EventLoop:
+    """The loop that runs, as a page uses it."""
+    return EventLoop(asyncio.get_running_loop(), raised)
+
+
+class ReadAtOnce(Reading):
+    """Reads and makes everything where it is asked to."""
+
+    def __init__(self, do: Callable[[Callable[[], object]], Any]) -> None:
+        """`do` carries out what comes of it."""
+        self._do = do
+
+    def read(self, read: Any, use: Callable[[Any], object], prepare: Any = None) -> None:
+        """Read it now."""
+        self._do(lambda: use(read()))
+
+    def make(self, work: Any, use: Callable[[Any], object], kind: str = "") -> None:
+        """Make it now."""
+        self._do(lambda: use(work()))
+
+
+def page_of(worker: Any, session: Any = None, **options: Any) -> Context:
+    """A page that does all its work on one worker, with the stand-in allocator unless told otherwise."""
+    workers: Any = SimpleNamespace(answers=worker, swims=worker, searches=worker, fits=worker)
+    silent: dict[str, Any] = {
+        "client": None,
+        "solver": Solver(load=load_stand_in),
+        "loop": AtOnce(),
+        "do": lambda act: act(),
+        "reading": ReadAtOnce(options.get("do", lambda act: act())),
+        "changed": lambda: None,
+        "notify": lambda title, text, calm=False: None,
+    }
+    return Context(session=session, workers=workers, **{**silent, **options})
+
+
+def in_loop(test: Callable[..., Coroutine[Any, Any, None]]) -> Callable[..., None]:
+    """A test that runs in an event loop of its own."""
+
+    @functools.wraps(test)
+    def run(*arguments: Any, **named: Any) -> None:
+        asyncio.run(test(*arguments, **named))
+
+    return run

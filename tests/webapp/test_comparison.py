@@ -16,8 +16,7 @@ from finlab.allocation.allocation import Allocation
 from finlab.assets import shipped_checkpoints, shipped_layouts
 from finlab.errors import FinlabError
 from finlab.layout import Layout, load_layout
-from tests.webapp.loops import AtOnce, page_of
-from tests.webapp.stand_in import StandIn, load_stand_in
+from tests.webapp.stand_in import AtOnce, StandIn, load_stand_in, page_of
 from webapp.markup.mode_plot import mode_plot
 from webapp.markup.words import source_words, three_digits
 from webapp.panels.files_tab import command_line

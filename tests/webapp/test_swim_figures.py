@@ -14,7 +14,7 @@ from finlab.errors import FinlabError
 from finlab.evaluation.experiments.hard_days import HARD_DAYS
 from finlab.layout import Layout, load_layout
 from finlab.sim import FinFault, make_trajectory
-from tests.webapp.loops import page_of
+from tests.webapp.stand_in import page_of
 from tests.webapp.test_swimming import SHORT, now, until
 from webapp.markup.swim_card import pace_words, swim_card
 from webapp.markup.words import righting_sentences

@@ -103,7 +103,7 @@ def add_damage(page: Page) -> None:
     for kind, (label, hint) in shares.items():
         slider = gui.add_slider(label, least, 100.0, 5.0, 100.0, hint=hint, visible=False)
         page.bind_number(
-            slider, lambda part, kind=kind: damage(kind, part / 100.0), _of(kind, 1.0, 100.0), digits=1
+            slider, lambda left, kind=kind: damage(kind, left / 100.0), _of(kind, 1.0, 100.0), digits=1
         )
         board.show(slider, visible=_may(kind))
     held = {

@@ -7,14 +7,25 @@ from webapp.page import Page
 from webapp.panels.actuator_inspector import add_actuator
 from webapp.panels.actuator_list import add_actuator_list
 from webapp.panels.body_inspector import add_body
-from webapp.panels.cards import add_answer, add_switches, camera, card, check, guide_card, robot_name, tasks
+from webapp.panels.cards import (
+    add_answer,
+    add_answering,
+    add_file,
+    add_history,
+    add_switches,
+    camera,
+    card,
+    check,
+    guide_card,
+    robot_name,
+    tasks,
+)
 from webapp.panels.damage import add_damage
 from webapp.panels.files_tab import add_designs, add_files
 from webapp.panels.hull_panel import add_hull
 from webapp.panels.limits_tab import add_improving, add_reach
 from webapp.panels.modes_tab import add_candidates, add_comparison
 from webapp.panels.swim_tab import add_figures, add_run, add_scenario, add_timeline
-from webapp.panels.top_bar import add_answering, add_file, add_history
 from webapp.panels.wrench_tab import add_commands, add_target
 from webapp.session.looking import TASKS
 
