@@ -1,4 +1,4 @@
-"""Meshes are closed and face outwards; reserved hues stay apart; marks on sliders do not lie on each other."""
+"""Meshes are closed and face outwards; reserved hues stay apart; marks of sliders do not overlap."""
 
 import math
 import re

@@ -16,13 +16,10 @@ WORKING = "Working …"
 """What stands in place of a verdict while the present question has no answer."""
 SPOKEN = 0.05
 """Share of the largest miss, each axis over its scale, from which another axis is spoken of, too."""
-
 PROVED = 1e-4
 """Share of its watts that an answer may lie above the bound and count as proved least."""
 LEAST_WATTS = 1e-3
 """Bound [W] that shares are taken of where it is smaller, or nothing."""
-
-
 AT_REST = "(flow)"
 """How a note ends that the panel beside the speed tells in its own words."""
 

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Sequence
-from functools import wraps
+from functools import partial, wraps
 from typing import Any
 
 import numpy as np
@@ -82,6 +82,9 @@ def add_damage(page: Page) -> None:
     def damage(kind: str, value: Any) -> None:
         session.damage(part().name, kind, value)
 
+    def leave(kind: str, percent: float) -> None:
+        damage(kind, percent / 100.0)
+
     def jam(stuck: bool) -> None:
         angle = at_now()[2 if isinstance(part(), Fin) else 0]
         damage("stuck", math.remainder(float(angle), math.tau) if stuck else None)
@@ -102,9 +105,7 @@ def add_damage(page: Page) -> None:
     least = 100 * STRENGTH_RANGE[0]
     for kind, (label, hint) in shares.items():
         slider = gui.add_slider(label, least, 100.0, 5.0, 100.0, hint=hint, visible=False)
-        page.bind_number(
-            slider, lambda left, kind=kind: damage(kind, left / 100.0), _of(kind, 1.0, 100.0), digits=1
-        )
+        page.bind_number(slider, partial(leave, kind), _of(kind, 1.0, 100.0), digits=1)
         board.show(slider, visible=_may(kind))
     held = {
         "stuck": ("Stuck", "It no longer turns from where it is.", jam),

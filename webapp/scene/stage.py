@@ -35,15 +35,6 @@ def aim_camera(client: viser.ClientHandle, place: Array, target: Array) -> None:
         client.camera.look_at = target
 
 
-def light_up(scene: viser.SceneApi) -> None:
-    """Light from above, and a little from the water below.
-
-    Viser's default, surfaces that mirror a picture of a hall, takes twice the time without a graphics card.
-    """
-    scene.configure_environment_map(None)
-    scene.add_light_hemisphere("/light", sky_color=SKY, ground_color=DEEP, intensity=BRIGHT)
-
-
 def add_floor(
     scene: viser.SceneApi, name: str, size: float, cell: float, section: float, **options: Any
 ) -> viser.GridHandle:
@@ -69,7 +60,9 @@ class Stage:
         self._scene = scene
         self._hull = hull
         self._look: tuple[bool, bool] | None = None
-        light_up(scene)
+        # Surfaces that mirror a picture, viser's default, take twice the time without a graphics card.
+        scene.configure_environment_map(None)
+        scene.add_light_hemisphere("/light", sky_color=SKY, ground_color=DEEP, intensity=BRIGHT)
         mesh, bow = hull.mesh, _bow(hull)
         self._body = Shape(scene, "/robot/hull", LIGHT.hull, mesh, side="double")
         self._bow = Shape(scene, "/robot/hull/bow", LIGHT.glass, bow, side="double", cast_shadow=False)
