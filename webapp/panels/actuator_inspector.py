@@ -97,7 +97,7 @@ def add_actuator(page: Page) -> None:
             session.rename(session.selected, name)
 
     page.add_html(_headline)
-    with gui.add_folder(None) as whole:
+    with gui.add_folder(None) as full:
         page.bind(gui.add_text("Name", ""), rename, lambda selected: selected or "")
         with gui.add_folder("Place"):
             _add_place(page)
@@ -109,7 +109,7 @@ def add_actuator(page: Page) -> None:
             for box in (*FIN_LAWS, *LAW):
                 _add_box(page, box)
             add_fit(page)
-    page.board.show(whole, visible=lambda selected: selected is not None)
+    page.board.show(full, visible=lambda selected: selected is not None)
 
 
 def _add_place(page: Page) -> None:

@@ -89,7 +89,7 @@ def add_fit(page: Page) -> None:
     page.add_html(of_part(drawn_curves))
     page.opening.add(CSV, upload)
     about = "A fin: noisy rows of A, f, phi, Fx, Fy, Fz, or a force table. A thruster: PWM, force and power."
-    with gui.add_folder(None) as whole:  # viser cannot hide a button for files
+    with gui.add_folder(None) as full:  # viser cannot hide a button for files
         button = page.add_upload(
             "Fit from measurements (CSV)",
             upload,
@@ -98,7 +98,7 @@ def add_fit(page: Page) -> None:
             hint=f"{about} Up to {MAX_BYTES // 1_000_000} MB.",
         )
     board.show(button, disabled=lambda selected, fitting: selected is None or fitting is not None)
-    board.show(whole, visible=of_part(lambda part: not isinstance(part, Rudder)))
+    board.show(full, visible=of_part(lambda part: not isinstance(part, Rudder)))
     bar = gui.add_progress_bar(100.0, animated=True, visible=False)
     hint = "The actuator stays as it is."
     cancel = page.add_button("Cancel", fitting.forget, icon=viser.Icon.X, visible=False, hint=hint)
@@ -173,11 +173,11 @@ class Curves(NamedTuple):
 def drawn_curves(part: Actuator) -> str:
     """Plots of one actuator; nothing where its table cannot be read, which is reported elsewhere."""
     try:
-        found = curves(part)
+        result = curves(part)
     except DataError:
         return ""
     plots = []
-    for across, x, up, lines in found:
+    for across, x, up, lines in result:
         plot = Plot(exact_axis(across, x), positive(up, np.append(1e-6, [y for _, y in lines])), HEIGHT)
         parts = [plot.curve(x, y, color) for (_, y), color in zip(lines, COLORS, strict=False)]
         named = zip(lines, COLORS, strict=False)

@@ -49,12 +49,12 @@ def add_body(page: Page) -> None:
     session, gui = page.session, page.gui
 
     def put_in(key: str, first: int, values: tuple[Any, ...]) -> None:
-        whole = list(_whole(_body(session.state.layout), key))
-        whole[first : first + 3] = values
-        known = [value for value in whole if isfinite(value)]
+        full = list(_whole(_body(session.state.layout), key))
+        full[first : first + 3] = values
+        known = [value for value in full if isfinite(value)]
         # They are typed box by box; of inertias none may be zero.
         rest = max(known, default=0.0) if key == "inertia_kgm2" else 0.0
-        session.set_dynamics(key, tuple(value if isfinite(value) else rest for value in whole))
+        session.set_dynamics(key, tuple(value if isfinite(value) else rest for value in full))
 
     def forget() -> None:
         text = "Nothing is said of mass, inertia, damping and buoyancy from then on; undo brings it back."
@@ -88,8 +88,8 @@ def _body(layout: Layout) -> Body:
 
 
 def _whole(body: Body, key: str) -> tuple[float, ...]:
-    given: tuple[float, ...] | None = getattr(body, key)
-    return given or (nan,) * 3 * len(PARTS[key])
+    known: tuple[float, ...] | None = getattr(body, key)
+    return known or (nan,) * 3 * len(PARTS[key])
 
 
 def _facts(layout: Layout) -> str:

@@ -62,8 +62,8 @@ def tasks(task: str) -> str:
 
 def check(able: Layout, failed: tuple[str, ...], layout: Layout, flow: Flow | None) -> str:
     """What can be said of a layout at once: its axes, what a failure costs, what looks like a mistake."""
-    told = (*warnings(layout), *righting_sentences(layout))
-    return check_card(quick_check(able, failed, flow), layout.n - len(failed) > 1, told)
+    remarks = (*warnings(layout), *righting_sentences(layout))
+    return check_card(quick_check(able, failed, flow), layout.n - len(failed) > 1, remarks)
 
 
 def add_answer(page: Page) -> None:
@@ -74,8 +74,8 @@ def add_answer(page: Page) -> None:
 
 
 def _bars(shown: Allocation | None, target: tuple[float, ...], layout: Layout, busy: bool) -> str:
-    asked = shown.target if shown is not None and busy else np.where(layout.commanded, target, np.nan)
-    return wrench_bars(asked, None if shown is None else shown.wrench)
+    demanded = shown.target if shown is not None and busy else np.where(layout.commanded, target, np.nan)
+    return wrench_bars(demanded, None if shown is None else shown.wrench)
 
 
 def _said(shown: Allocation | None, state: State, busy: bool, searching: bool, step: int | None) -> str:

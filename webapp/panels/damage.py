@@ -151,11 +151,11 @@ def _is(kind: str) -> Callable[[str | None, Layout, Health | None], bool]:
     return lambda selected, layout, health: _part(selected, layout).name in dict(getattr(health, kind, ()))
 
 
-def _of(kind: str, whole: Any, unit: Any) -> Callable[[str | None, Layout, Health | None], Any]:
+def _of(kind: str, full: Any, unit: Any) -> Callable[[str | None, Layout, Health | None], Any]:
     """What is known of it, in units for people; `whole` where it has no such fault."""
 
     def value(selected: str | None, layout: Layout, health: Health | None) -> Any:
-        known = dict(getattr(health, kind, ())).get(_part(selected, layout).name, whole)
+        known = dict(getattr(health, kind, ())).get(_part(selected, layout).name, full)
         scaled = np.multiply(known, unit)
         return tuple(scaled.tolist()) if scaled.ndim else float(scaled)
 

@@ -102,8 +102,8 @@ def _origin_words(layout: Layout, method: str, best: Allocation | None, in_reach
     if method == "paper":
         said = LEARNED
     elif layout.is_of_fins:
-        beside = BESIDE.get(method, f" The answer, number 1, is that of method {method}.")
-        said = PROPOSED + beside
+        aside = BESIDE.get(method, f" The answer, number 1, is that of method {method}.")
+        said = PROPOSED + aside
         if best is not None and not in_reach:
             said = BEYOND.format(best.policy.kind)
         elif best is not None and not np.nan_to_num(best.target).any():
@@ -145,8 +145,8 @@ def mode_table(modes: Modes, mode: int) -> str:
         "<th title='largest share of a range of amplitude or frequency that is used'>used</th></tr>"
     )
     left = modes.count - len(modes.shown)
-    told = f"{left} more are known; they come after these."
-    more = html("<div class='said dim'>{}</div>", told) if left > 0 else ""
+    remark = f"{left} more are known; they come after these."
+    more = html("<div class='said dim'>{}</div>", remark) if left > 0 else ""
     return html("<div class='fl'><table class='modes'>{}{}</table>{}</div>", header, rows, more)
 
 

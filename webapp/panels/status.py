@@ -92,8 +92,8 @@ def set_rows(findings: Findings | None, size: float) -> str:
         return ""
     rows = [_key(_patch(css(REACH, 0.6)), "in reach")]
     if findings.whole is not None:
-        asked = findings.question
-        word = "with all" if asked.failed else "before"
+        question = findings.question
+        word = "with all" if question.failed else "before"
         rows.append(_key(_patch(css(DEAD, 0.45)), word))
     ball = html("<svg width='44' height='12'><circle cx='22' cy='6' r='5' fill='{}'/></svg>", css(ASKED))
     unit = "N" if findings.now.kind == "force" else "N m"

@@ -27,8 +27,8 @@ def blade() -> Mesh:
     width = 0.5 * SPAN * (0.66 + 0.36 * along**1.3) * ends
     body = revolved(along, width, (0.0075 * (1 - along) ** 0.8 + 0.0012) * ends, sides=32)
     back, side, up = body.vertices.T
-    whole = convex_hull(np.stack([ROOT + SPAN / 2 + side, 0.012 - CHORD * back, up], axis=-1))
-    return Mesh(np.asarray(whole.vertices), np.asarray(whole.faces, dtype=np.int32))
+    solid = convex_hull(np.stack([ROOT + SPAN / 2 + side, 0.012 - CHORD * back, up], axis=-1))
+    return Mesh(np.asarray(solid.vertices), np.asarray(solid.faces, dtype=np.int32))
 
 
 def shaft() -> Mesh:
@@ -62,8 +62,8 @@ def foil(slenderness: float) -> Mesh:
                 side * thick * chord / slenderness,
             ]
             points.append(np.stack(section, axis=-1))
-    whole = convex_hull(np.concatenate(points))
-    return Mesh(np.asarray(whole.vertices), np.asarray(whole.faces, dtype=np.int32))
+    solid = convex_hull(np.concatenate(points))
+    return Mesh(np.asarray(solid.vertices), np.asarray(solid.faces, dtype=np.int32))
 
 
 def stock() -> Mesh:

@@ -136,9 +136,9 @@ class RobotScene:
         edited = selected if task == "Design" and not swims else None
         stuck = () if health is None or swims else dict(health.stuck)
         for i, part in enumerate(drawn.actuators):
-            told = "" if swims or part.name in failed else damage_words(health, part.name)
+            remark = "" if swims or part.name in failed else damage_words(health, part.name)
             named = part.name if swims else _named(part)  # one that swims is elsewhere
-            words = (str(i + 1), named if part.name in selection else "", told)
+            words = (str(i + 1), named if part.name in selection else "", remark)
             label = " ".join([word for word in words if word])
             moved, pinned = part.name == edited, part.name in stuck
             self._fins[i].place(part, hull, sizes, moved, label, pinned, i == dragged)
@@ -184,10 +184,10 @@ class RobotScene:
     ) -> None:
         """The page moves the fins (`frames.js`): it is told the commands of all, and how fast."""
         speed, still = (SPEED, display.frozen) if moment is None else (swim.speed, paused or moment.done)
-        told = json.dumps([self._moves, speed, still])[1:-1]
-        if told != self._flaps:
-            self._flaps = told
-            run_script(self._client.gui, f"finlabFrames.flap({told});")
+        moves = json.dumps([self._moves, speed, still])[1:-1]
+        if moves != self._flaps:
+            self._flaps = moves
+            run_script(self._client.gui, f"finlabFrames.flap({moves});")
 
     def _show_wrench(
         self,
@@ -197,15 +197,15 @@ class RobotScene:
         scale: Scale,
         moment: Moment | None,
     ) -> None:
-        asked, given, missing = np.array(target), np.zeros(6), np.zeros(6)
+        demanded, delivered, missing = np.array(target), np.zeros(6), np.zeros(6)
         if moment is not None:
-            asked, given = moment.asked * FORCES_ONLY, moment.delivered * FORCES_ONLY
+            demanded, delivered = moment.asked * FORCES_ONLY, moment.delivered * FORCES_ONLY
         elif shown is not None:
-            given, missing = shown.wrench, missing_part(shown)
+            delivered, missing = shown.wrench, missing_part(shown)
         hull = hull_of(drawn)
         top = hull.center[2] + hull.half[2]
         lengths = LENGTH / scale.newtons, HALF_TURN / scale.torque
-        self._wrench.refresh(asked, given, missing, top, *lengths, arrow_size(drawn))
+        self._wrench.refresh(demanded, delivered, missing, top, *lengths, arrow_size(drawn))
 
     def _show_sets(
         self, found: Findings | None, display: Display, target: tuple[float, ...], task: str, drawn: Layout
