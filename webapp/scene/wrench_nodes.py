@@ -75,7 +75,7 @@ def fitting(
 def swim_scale(swimmer: Swimmer, before: Scale) -> Scale:
     """The scale of a swim, which only grows, so that its arrows compare; `before` is the last one."""
     moment = swimmer.shown
-    sizes = [np.linalg.norm(v, axis=-1).max() for v in (moment.force, moment.asked[:3], moment.got[:3])]
+    sizes = [np.linalg.norm(v, axis=-1).max() for v in (moment.force, moment.asked[:3], moment.delivered[:3])]
     fits = (step for step in NEWTONS if LENGTH * max(sizes) / step <= LONGEST)
     return Scale(max(next(fits, NEWTONS[-1]), before.newtons), 1.0, False)
 
