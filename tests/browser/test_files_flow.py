@@ -13,6 +13,7 @@ from finlab.files.plain_values import yaml_text
 from finlab.layout import FinModelSpec, layout_to_dict, load_layout
 from finlab.layout.force_table_file import write_table
 from finlab.physics import make_law
+from tests.fit.cell import columns_of, commands, measured, soft, write
 
 CARRIED = """files => {
   const carried = new DataTransfer();
@@ -23,7 +24,7 @@ CARRIED = """files => {
 EVIL = "<img src=x onerror=window.pwned=1><script>window.pwned=2"
 
 
-def measured(folder: Path) -> tuple[dict[str, Any], bytes]:
+def measured_robot(folder: Path) -> tuple[dict[str, Any], bytes]:
     """A robot whose first fin is a table, and that table."""
     grid = [[0.05, 0.3, 0.6], [0.1, 1.0, 2.1], [-3.0, -1.5, 0.0, 1.5]]
     write_table(folder / "soft.csv", make_law(FinModelSpec("soft")), *grid)  # type: ignore[arg-type]
@@ -47,7 +48,7 @@ def test_what_is_dropped_is_opened(page: Any, tmp_path: Path) -> None:
     state, session = page.session.state, page.session
     drop(page, ".fl-status", {"notes.docx": b"Dear all"})
     page.until(lambda: any("'notes.docx' cannot be opened" in text for text in page.notes()))
-    values, table = measured(tmp_path)
+    values, table = measured_robot(tmp_path)
     drop(page, "canvas[data-engine]", {"cell.csv": table})
     page.until(lambda: any("no actuator is selected" in text for text in page.notes()))
     assert session.state == state
@@ -74,7 +75,7 @@ def test_files_are_saved_and_opened_or_refused(page: Any, tmp_path: Path) -> Non
     page.upload("Open", tmp_path / "broken.yaml")
     page.until(lambda: any("broken.yaml" in note and "version" in note for note in page.notes()))
     assert page.session.state.layout.names[0] == "bow", "nothing is lost"
-    values, _ = measured(tmp_path)
+    values, _ = measured_robot(tmp_path)
     with zipfile.ZipFile(tmp_path / "robot.zip", "w") as archive:
         archive.writestr("robot.yaml", yaml_text(values))
         archive.write(tmp_path / "soft.csv", "tables/soft.csv")
@@ -116,3 +117,46 @@ def test_what_is_exported(page: Any, tmp_path: Path) -> None:
     assert bundle.read_bytes() == (tmp_path / "ucat.zip").read_bytes()
     state = page.session.state
     assert finlab.Allocator.from_bundle(bundle).allocate(state.target).err_norm < 1e-3
+
+
+def test_a_noisy_file_becomes_a_fin(page: Any, tmp_path: Path) -> None:
+    command, session = commands(120), page.session
+    cell = write(tmp_path / "cell.csv", columns_of(command, measured(soft(k=4.0, d=0.1), command)))
+    page.tab("Design")
+    page.key("n")
+    before = session.state
+    page.until(lambda: "drag" in page.page.locator(".fl:has-text('stiff blade')").first.inner_text())
+    page.upload("Fit from measurements (CSV)", cell)
+    page.until(lambda: session.state.layout.fins[0].model.type == "table" and not page.view.busy)
+    page.page.get_by_text("May be trusted within what was measured.").wait_for()
+    page.page.get_by_text("table, fitted to 120 samples").wait_for()
+    assert page.view.shown.layout.fins[0].model.type == "table" and page.view.shown.err_norm < 1e-3
+    page.press("On all like it")
+    page.until(lambda: [fin.model.type for fin in session.state.layout.fins] == ["table"] * 4)
+    page.page.get_by_text("Exact by the model, expected within").first.wait_for()
+
+    page.press("Share")
+    page.until(lambda: any("share the ZIP" in note for note in page.notes()))
+
+    page.download("Save", tmp_path / "robot.zip")
+    page.press("Undo")
+    page.press("Undo")
+    page.until(lambda: session.state == before)
+    page.upload("Open", tmp_path / "robot.zip")
+    page.until(lambda: [fin.model.type for fin in session.state.layout.fins] == ["table"] * 4)
+
+
+def test_a_wrong_file_is_told_where_and_changes_nothing(page: Any, tmp_path: Path) -> None:
+    page.key("n")
+    page.tab("Design")
+    before = page.session.state
+    (tmp_path / "cell.csv").write_text("A,f,phi,Fx,Fy,Fz\n0.3,1.0,0.0,0,oops,0\n")
+    page.upload("Fit from measurements (CSV)", tmp_path / "cell.csv")
+    sentence = "cell.csv: line 2, column Fy, holds 'oops', which is not a number"
+    page.until(lambda: any(sentence in note for note in page.notes()))
+    page.page.locator(".fl .missing", has_text=sentence).wait_for()
+    with (tmp_path / "huge.csv").open("wb") as file:
+        file.truncate(160_000_000)  # sparse: it takes no room
+    page.upload("Fit from measurements (CSV)", tmp_path / "huge.csv")
+    page.until(lambda: any("huge.csv: has 160,000,000 bytes" in note for note in page.notes()))
+    assert page.session.state == before and not page.view.jobs.fitting.busy

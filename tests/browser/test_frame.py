@@ -171,3 +171,14 @@ def test_only_what_changes_is_drawn(page: Any) -> None:
     page.until(lambda: page.page.evaluate(blade) != still and drawn() > before)
     page.key("p")
     page.until(lambda: page.page.evaluate(blade) == pytest.approx(still, abs=1e-6))
+
+
+def test_what_is_typed_counts_with_enter(page: Any) -> None:
+    session = page.session
+    page.type("Fx [N]", "0.55")
+    page.until(lambda: session.state.target[0] == 0.55)
+    page.key("n")
+    page.tab("Design")
+    page.type("Position [m]", "0.19", 0)
+    page.until(lambda: session.state.layout.fins[0].position[0] == 0.19)
+    assert page.problems == []

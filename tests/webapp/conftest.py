@@ -6,7 +6,7 @@ import pytest
 
 from finlab.files.worker import prepare
 from finlab.layout import load_layout
-from tests.webapp.loops import page_of
+from tests.webapp.stand_in import page_of
 from webapp.session import Session
 from webapp.tasks.background import Worker
 from webapp.tasks.swimming import Swimming

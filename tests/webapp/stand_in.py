@@ -1,9 +1,15 @@
-"""An allocator that needs no trained network, with candidates and samples as method `mdn` has them."""
+"""Stand-ins: an allocator without a trained network, a silent page, an event loop at hand, a user's hand."""
 
+import asyncio
+import functools
+import time
+from collections.abc import Callable, Coroutine
 from dataclasses import dataclass
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import viser
 from numpy.typing import NDArray
 
 from finlab.allocation.baselines.sqp import Sqp, SqpSettings
@@ -16,6 +22,10 @@ from finlab.errors import AllocationError
 from finlab.layout import Layout
 from finlab.networks.trained import TrainedWeights
 from finlab.physics import Plant
+from webapp.session import Session
+from webapp.tasks.background import EventLoop
+from webapp.tasks.context import Context
+from webapp.tasks.solver import Solver
 
 N_REFINED = 4
 Array = NDArray[np.float64]
@@ -91,3 +101,96 @@ def load_stand_in(method: str = "dual", *, checkpoint: Any = None) -> MethodChoi
     if method in ("dual", "mdn"):
         return MethodChoice(StandIn, StandInSettings())
     return MethodChoice(Sqp, SqpSettings())
+
+
+class SilentClient:
+    """Stands for a browser: the server's own scene and panel, and a camera that takes everything."""
+
+    def __init__(self, server: viser.ViserServer) -> None:
+        self.scene, self.gui, self.atomic = server.scene, server.gui, server.atomic
+        self.camera = type("Camera", (), {})()
+        self.kept: dict[str, str] = {}
+        self.local_storage = SimpleNamespace(set_item=self.kept.__setitem__, get_item=self.kept.get)
+        self.notes: list[str] = []
+        self.files: dict[str, bytes] = {}
+
+    def add_notification(self, title: str, body: str, **_: Any) -> None:
+        """Note what the user would have been told."""
+        self.notes.append(f"{title}: {body}")
+
+    def send_file_download(self, name: str, content: bytes, **_: Any) -> None:
+        """Keep what the user would have saved."""
+        self.files[name] = content
+
+
+def turn_fin(session: Session, name: str, angle: float) -> None:
+    """Select a fin and turn it to an angle [rad]."""
+    session.select(name)
+    session.turn_selected(angle)
+
+
+class AtOnce(EventLoop):
+    """Runs everything where it is posted from; its timers ring by hand."""
+
+    def __init__(self) -> None:
+        """Nothing is waiting."""
+        self.ring: Callable[[], object] = lambda: None
+
+    def post(self, act: Callable[[], object]) -> None:
+        """Run it now."""
+        act()
+
+    def later(self, seconds: float, act: Callable[[], object]) -> Any:
+        """Keep it until somebody rings."""
+        self.ring = act
+        return type("Timer", (), {"cancel": lambda _: None})()
+
+
+def raised(error: Exception) -> None:
+    """In place of a page that tells of faults."""
+    raise error
+
+
+def running() -> EventLoop:
+    """The loop that runs, as a page uses it."""
+    return EventLoop(asyncio.get_running_loop(), raised)
+
+
+class AloneContext(Context):
+    """Makes everything where it is asked to."""
+
+    def make(self, work: Any, use: Callable[[Any], object], kind: Any = "") -> None:
+        """Make it now."""
+        self.do(lambda: use(work()))
+
+
+def page_of(worker: Any, session: Any = None, **options: Any) -> Context:
+    """A page that does all its work on one worker, with the stand-in allocator unless told otherwise."""
+    workers: Any = SimpleNamespace(answers=worker, swims=worker, searches=worker, fits=worker)
+    silent: dict[str, Any] = {
+        "client": None,
+        "solver": Solver(load=load_stand_in),
+        "loop": AtOnce(),
+        "do": lambda act: act(),
+        "changed": lambda: None,
+        "notify": lambda title, text, calm=False: None,
+    }
+    return AloneContext(session=session, workers=workers, **{**silent, **options})
+
+
+def until(condition: Callable[[], bool]) -> None:
+    """Wait for something."""
+    end = time.monotonic() + 60
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.005)
+
+
+def in_loop(test: Callable[..., Coroutine[Any, Any, None]]) -> Callable[..., None]:
+    """A test that runs in an event loop of its own."""
+
+    @functools.wraps(test)
+    def run(*arguments: Any, **named: Any) -> None:
+        asyncio.run(test(*arguments, **named))
+
+    return run

@@ -18,9 +18,7 @@ from viser import _messages
 from finlab.assets import shipped_layouts
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
-from tests.webapp.loops import until
-from tests.webapp.silent_client import SilentClient
-from tests.webapp.stand_in import load_stand_in
+from tests.webapp.stand_in import SilentClient, load_stand_in, until
 from webapp.app import App, SessionStore, _session_keys
 from webapp.panels.frame import View
 from webapp.serving import serve

@@ -1,8 +1,10 @@
 """Methods side by side, what they keep least, and what a network proposes."""
 
+import shutil
 import threading
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -12,13 +14,13 @@ import pytest
 from finlab.allocation import Allocator
 from finlab.allocation.allocation import Allocation
 from finlab.assets import shipped_checkpoints, shipped_layouts
-from finlab.layout import load_layout
-from tests.webapp.loops import AtOnce, page_of
-from tests.webapp.stand_in import StandIn, load_stand_in
+from finlab.errors import FinlabError
+from finlab.layout import Layout, load_layout
+from tests.webapp.stand_in import AtOnce, StandIn, load_stand_in, page_of
 from webapp.markup.mode_plot import mode_plot
 from webapp.markup.words import source_words, three_digits
-from webapp.panels.compare_tab import comparison_table
 from webapp.panels.files_tab import command_line
+from webapp.panels.modes_tab import comparison_table
 from webapp.panels.status import corner
 from webapp.session.state import COMPARED, LEAST, State, compared
 from webapp.session.targets import PRESETS
@@ -147,3 +149,34 @@ def test_every_answer_keeps_least_what_is_asked() -> None:
     assert "least power" in corner(state, "", power, False, None)
     assert "least effort" in corner(state, "", effort, False, None)
     assert "--method mdn" in command_line(replace(state, method="mdn"))
+
+
+TARGET = (1.0, 0.0, 0.5, 0.0, 0.0, 0.1)
+
+
+@pytest.fixture
+def mine(untrained_checkpoint: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    """Name of a network that was trained where the app runs, beside a folder of something else."""
+    shutil.copytree(untrained_checkpoint, tmp_path / "runs" / "mine")
+    (tmp_path / "runs" / "other").mkdir()
+    (tmp_path / "runs" / "other" / "config.json").write_text("{}")
+    monkeypatch.chdir(tmp_path)
+    return str(Path("runs") / "mine")
+
+
+def test_a_trained_network_is_offered_and_answers(mine: str, layout_a: Layout) -> None:
+    solver, state = Solver(), State(layout_a, target=TARGET, method="paper")
+    assert list(solver.networks()) == ["paper", mine] and solver.first_network == "paper"
+    chosen = state.with_setting("network", mine)
+    answers = [solver.solve(s).checkpoint for s in (state, chosen, state.with_setting("network", "paper"))]
+    assert answers == ["paper", "mine", "paper"]
+    assert solver.solve(replace(chosen, method="mdn")).checkpoint == "default"
+    with pytest.raises(FinlabError, match="network: expected one of"):
+        solver.solve(state.with_setting("network", "/etc"))
+
+
+def test_a_network_that_the_app_was_started_with_answers_first(mine: str, layout_a: Layout) -> None:
+    solver = Solver(mine)
+    state = State(layout_a, target=TARGET, method="paper")
+    assert solver.solve(state).checkpoint == "mine" and solver.first_network == mine
+    assert solver.solve(replace(state, method="mdn")).checkpoint == "default"

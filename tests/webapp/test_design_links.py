@@ -18,7 +18,7 @@ from finlab.layout import FinModelSpec, layout_to_dict, load_layout
 from finlab.layout.force_table_file import write_table
 from finlab.layout.load import MAX_BYTES
 from finlab.physics import make_law
-from tests.webapp.loops import page_of
+from tests.webapp.stand_in import page_of
 from webapp.session import Session
 from webapp.session.files import (
     ARCHIVE,

@@ -15,7 +15,7 @@ from finlab.hull.mesh_file import MAX_BYTES, MAX_FACES, MeshReport, read_mesh, s
 from finlab.layout import load_layout
 from finlab.layout.body import Hull
 from finlab.layout.layout import MAX_ACTUATORS
-from tests.webapp.hands import move_fin, turn_fin
+from tests.webapp.stand_in import turn_fin
 from webapp.markup.score_card import warnings
 from webapp.session import Session, layout_edits
 from webapp.session.files import reshaped_hull, stored_hull
@@ -27,7 +27,7 @@ def test_linked_twins_move_together_until_unlinked(session: Session) -> None:
     session.mirror()
     assert session.state.layout.n_fins == 4, "its image stands there already"
     assert session.state.links == (("front_left", "front_right"),) and session.selected == "front_right"
-    move_fin(session, "front_left", (0.2, 0.18, 0.01))
+    session.end_drag("front_left", (0.2, 0.18, 0.01))
     turn_fin(session, "front_left", 0.5)
     twin = session.state.layout.fins[0]
     assert twin.position == (0.2, -0.18, 0.01) and twin.mounting_angle == pytest.approx(-0.5)
@@ -35,7 +35,7 @@ def test_linked_twins_move_together_until_unlinked(session: Session) -> None:
     session.undo()
     assert session.state.layout == load_layout(shipped_layouts()["ucat"])
     session.unlink()
-    move_fin(session, "front_left", (0.1, 0.2, 0.0))
+    session.end_drag("front_left", (0.1, 0.2, 0.0))
     assert session.state.layout.fins[0].position[0] == pytest.approx(0.25753)
     with pytest.raises(FinlabError, match="not linked"):
         session.unlink()

@@ -17,8 +17,7 @@ import viser
 from finlab.assets import shipped_layouts
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
-from tests.webapp.silent_client import SilentClient
-from tests.webapp.stand_in import load_stand_in
+from tests.webapp.stand_in import SilentClient, load_stand_in
 from webapp.panels.frame import View
 from webapp.session import Display, Session
 from webapp.session.looking import DRAWERS
@@ -52,7 +51,7 @@ DRAWN = (
     "webapp.panels.modes_tab.mode_plot",
     "webapp.panels.modes_tab.source_words",
     "webapp.panels.limits_tab.score_table",
-    "webapp.panels.compare_tab.comparison_table",
+    "webapp.panels.modes_tab.comparison_table",
     "webapp.panels.files_tab.command_line",
     "webapp.scene.stage.Stage.refresh",
     "webapp.scene.wrench_nodes.fitting",

@@ -9,7 +9,7 @@ import pytest
 import viser
 
 from finlab.layout import load_layout
-from tests.webapp.silent_client import SilentClient
+from tests.webapp.stand_in import SilentClient
 from tests.webapp.test_app import app, on_loop, server, until, view
 from webapp.app import App
 from webapp.panels.frame import View

@@ -20,7 +20,7 @@ from finlab.layout.force_table_file import DOUBT, table_bytes
 from finlab.layout.thrust_model import PowerTable
 from tests.fit.cell import columns_of, commands, measured, soft, write
 from tests.fit.test_thruster_fit import T200
-from tests.webapp.loops import page_of, until
+from tests.webapp.stand_in import page_of, until
 from webapp.markup.fit_card import fit_card
 from webapp.panels.actuator_model import model_card
 from webapp.session import Session, files

@@ -1,15 +1,29 @@
-"""A page that sends what no honest page would: nothing breaks, nothing of it gets into the session."""
+"""Pages, files and names that no honest page would send: nothing breaks, all is refused or escaped."""
 
 import asyncio
+import base64
 import math
+import re
+import time
 import types
+import zlib
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 import viser
 
+from finlab.errors import FinlabError
+from finlab.layout import load_layout
 from tests.webapp.test_app import app, on_loop, server, until, view
+from webapp.handles import put
+from webapp.markup.html import html
 from webapp.panels.frame import View
+from webapp.session.looking import DRAWERS
+from webapp.tasks.designs import Opening
 
 __all__ = ["app", "server", "view"]
 
@@ -88,3 +102,132 @@ def test_a_fault_of_ours_is_told_and_the_page_goes_on(
     on_loop(server, lambda: view.do(lambda: view.session.set_target(0, 0.3)))
     until(lambda: not view.busy)
     assert view.shown is not None and view.shown.target[0] == 0.3
+
+
+__all__ = ["app", "server", "view"]
+
+
+def link(text: str) -> str:
+    """A design link that unpacks to a text."""
+    return "y" + base64.urlsafe_b64encode(zlib.compress(text.encode(), 9)).decode().rstrip("=")
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["a: " + "1:" * 400_000 + "1", "[" * 100_000, "&a [*a]", "x: 1\n" * 300_000, "a: " + "9" * 900_000],
+    ids=["base sixty", "deep", "circle", "repeated", "number"],
+)
+def test_hostile_links_leave_the_page_quick(server: viser.ViserServer, view: View, text: str) -> None:
+    before = view.session.state.layout
+    on_loop(server, lambda: view.do(partial(view.designs.open_link, link(text))))
+    slowest, end = 0.0, time.monotonic() + 30.0
+    while not view.client.notes and time.monotonic() < end:
+        begin = time.monotonic()
+        on_loop(server, lambda: None)
+        slowest = max(slowest, time.monotonic() - begin)
+        time.sleep(0.01)
+    assert len(view.client.notes) == 1 and view.client.notes[0].startswith("Not possible: ")
+    assert view.session.state.layout == before and slowest < 1.0
+
+
+def test_what_waits_gives_way_to_a_newer_one_of_its_kind(server: viser.ViserServer, view: View) -> None:
+    found: list[int] = []
+
+    def ask() -> None:
+        view.do(lambda: view.context.make(partial(time.sleep, 0.05), lambda _: found.append(0), "open"))
+        for count in range(1, 9):
+            view.do(lambda count=count: view.context.make(lambda: count, found.append, "save"))
+
+    on_loop(server, ask)
+    until(lambda: found == [0, 8])
+    assert view.client.notes == []
+
+
+class Taken:
+    """What came to whom."""
+
+    def __init__(self) -> None:
+        """Two takers."""
+        self.files: list[tuple[str, str, bytes]] = []
+        interface = SimpleNamespace(queue_message=lambda message: None)
+        gui: Any = SimpleNamespace(_websock_interface=interface)
+        self.heard: dict[str, Callable[[str, str], object]] = {}
+        presses: Any = SimpleNamespace(on=lambda kind, act: self.heard.update({kind: act}))
+        self.opening = Opening(gui, presses)
+        self.opening.add(".csv,.txt", self._taker("fin"))
+        self.opening.add(".yaml,.zip", self._taker("design"))
+
+    def _taker(self, who: str) -> Callable[[str, bytes], object]:
+        return lambda name, content: self.files.append((who, name, content))
+
+
+def test_each_file_goes_to_whom_it_is_for() -> None:
+    taken = Taken()
+    for name, content in (("A.YAML", b"a"), ("cell.csv", b"A,f,phi,Fx\n")):
+        taken.opening.open(name, content)
+    assert [who for who, *_ in taken.files] == ["design", "fin"]
+    assert taken.opening.suffixes == ".csv,.txt,.yaml,.zip"
+
+
+@pytest.mark.parametrize("name", ["notes.docx", "robot", ".yaml", "robot.yaml.exe", ""])
+def test_what_cannot_be_opened_is_told_with_what_can(name: str) -> None:
+    with pytest.raises(FinlabError, match=r"cannot be opened; expected a design \(YAML, JSON, ZIP\)"):
+        Taken().opening.open(name, b"")
+
+
+def test_several_files_at_once_are_refused() -> None:
+    with pytest.raises(FinlabError, match="one ZIP archive"):
+        Taken().heard["dropped"]("", "")
+
+
+__all__ = ["app", "server", "view"]
+
+EVIL = "<img src=x onerror=alert(1)>'\"&amp;"
+ESCAPED = re.compile(r"&(lt|amp);")
+
+
+def contents(server: viser.ViserServer) -> list[str]:
+    """All markup on the page."""
+    containers = server.gui._container_handle_from_uuid.values()
+    handles = [handle for container in containers for handle in container._children.values()]
+    return [handle.content for handle in handles if isinstance(handle, viser.GuiHtmlHandle)]
+
+
+def test_what_is_put_into_markup_is_escaped_once() -> None:
+    inner = html("<b title='{}'>{:.1f}</b>", EVIL, 2.345)
+    whole = str(html("<p>{}{}{}</p>", inner, EVIL, [inner, EVIL]))
+    assert whole.count("<b title=") == 2 and "<img" not in whole and "2.3</b>" in whole
+    assert whole.count("&lt;img") == 4 and "&amp;lt;" not in whole
+
+
+def test_text_that_is_not_marked_is_shown_as_text() -> None:
+    handle: Any = type("Handle", (), {"content": ""})()
+    put(handle, content=EVIL)
+    assert handle.content.startswith("&lt;img") and type(handle.content) is str
+    put(handle, content=html("<b>{}</b>", 1))
+    assert handle.content == "<b>1</b>" and type(handle.content) is str
+
+
+def test_no_page_shows_markup_of_ours_as_text(server: viser.ViserServer, view: View) -> None:
+    for task in DRAWERS:
+        on_loop(server, lambda task=task: view.do(lambda: view.session.show_task(task)))
+        on_loop(server, lambda: view.do(lambda: view.session.select("front_left")))
+        until(lambda: not view.busy and not view.jobs.analyst.busy)
+        found = [ESCAPED.finditer(text) for text in contents(server)]
+        wrong = {text.string[max(0, text.start() - 60) : text.end() + 30] for part in found for text in part}
+        assert wrong == set(), task
+
+
+def test_no_page_takes_names_for_markup(server: viser.ViserServer, view: View) -> None:
+    layout = view.session.state.layout.replace_actuator("front_left", name=EVIL[:40])
+    evil = replace(layout, name=EVIL[:40], description=EVIL)
+    for task in DRAWERS:
+        on_loop(server, lambda: view.do(lambda: view.session.open_layout(evil)))
+        on_loop(server, lambda task=task: view.do(lambda: view.session.show_task(task)))
+        for chosen in (EVIL[:40], None):
+            on_loop(server, lambda chosen=chosen: view.do(lambda: view.session.select(chosen)))
+            until(lambda: not view.busy and not view.jobs.analyst.busy)
+            texts = contents(server)
+            assert any("&lt;img" in text for text in texts)
+            assert not any("<img" in text or "&amp;lt;" in text for text in texts)
+    assert load_layout("ucat").names != evil.names

@@ -12,7 +12,7 @@ from finlab.analysis import mirror_pairs
 from finlab.assets import shipped_layouts
 from finlab.errors import FinlabError
 from finlab.layout import Fin, load_layout
-from tests.webapp.loops import page_of, running, until
+from tests.webapp.stand_in import page_of, running, until
 from webapp.markup.score_card import warnings
 from webapp.session import Session
 from webapp.session.search_request import SearchRequest

@@ -9,7 +9,7 @@ import pytest
 from finlab.allocation import Allocation, Allocator
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
-from tests.webapp.hands import turn_fin
+from tests.webapp.stand_in import turn_fin
 from webapp.panels.cards import guide_card
 from webapp.session import Session
 from webapp.session.lessons import LESSONS, TOUR, Stop

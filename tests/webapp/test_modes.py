@@ -11,8 +11,7 @@ from finlab.allocation.modes import find_modes
 from finlab.allocation.solution import Candidates
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
-from tests.webapp.loops import AtOnce, page_of
-from tests.webapp.stand_in import load_stand_in
+from tests.webapp.stand_in import AtOnce, load_stand_in, page_of
 from webapp.markup.mode_plot import LABEL, LEFT, mode_plot
 from webapp.markup.plot import WIDTH
 from webapp.markup.words import error_digits, small, three_digits

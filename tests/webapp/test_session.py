@@ -9,7 +9,7 @@ import pytest
 from finlab.assets import shipped_layouts
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
-from tests.webapp.hands import move_fin, turn_fin
+from tests.webapp.stand_in import turn_fin
 from webapp.markup.answer import wrench_bars
 from webapp.session import Session
 
@@ -83,9 +83,9 @@ def test_bad_settings_change_nothing(session: Session) -> None:
         with pytest.raises(FinlabError):
             session.set_display(key, value)
     with pytest.raises(FinlabError, match="no fin"):
-        move_fin(session, "nobody", (0.0, 0.0, 0.0))
+        session.end_drag("nobody", (0.0, 0.0, 0.0))
     with pytest.raises(FinlabError, match=r"y of"):
-        move_fin(session, session.state.layout.names[0], (0.0, math.nan, 0.0))
+        session.end_drag(session.state.layout.names[0], (0.0, math.nan, 0.0))
     assert session.state == before
 
 
@@ -111,7 +111,7 @@ def test_mirror_duplicate_add_and_selection(session: Session) -> None:
     assert added is not None
     with pytest.raises(FinlabError, match="mirror plane"):
         session.mirror()
-    move_fin(session, added, (-0.1, 0.2, 0.05))
+    session.end_drag(added, (-0.1, 0.2, 0.05))
     turn_fin(session, added, 2.0)
     session.mirror()
     twin = session.state.layout.fins[-1]

@@ -1,25 +1,29 @@
-"""What swims come to, and their logs."""
+"""What swims come to, their logs, and the scenarios that are true and believed in them."""
 
 import io
 from collections.abc import Iterator
 from dataclasses import replace
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
+from finlab.allocation import Allocator
 from finlab.errors import FinlabError
-from finlab.layout import load_layout
-from finlab.sim import make_trajectory
-from tests.webapp.loops import page_of, until
-from tests.webapp.test_swimming import now
+from finlab.evaluation.experiments.hard_days import HARD_DAYS
+from finlab.layout import Layout, load_layout
+from finlab.sim import FinFault, make_trajectory
+from tests.webapp.stand_in import page_of, until
+from tests.webapp.test_swimming import SHORT, now
 from webapp.markup.swim_card import pace_words, swim_card
 from webapp.markup.words import righting_sentences
-from webapp.session.swim_plan import Plan
+from webapp.session.state import State
+from webapp.session.swim_plan import SCENARIOS, Plan, SwimSettings
 from webapp.tasks.background import Worker
 from webapp.tasks.designs import Designs
 from webapp.tasks.moment import POWER, Figures
-from webapp.tasks.swimmer import Swimmer
+from webapp.tasks.swimmer import Swimmer, closed_loop
 from webapp.tasks.swimming import Swimming
 
 UCAT = load_layout("ucat")
@@ -106,3 +110,85 @@ def test_a_swim_that_capsizes_says_so(shelf: Shelf) -> None:
         swimmer.shown = swimmer.moment()
     assert swimmer.log().capsized_s == swimmer.shown.capsized
     assert f"capsized at {swimmer.shown.capsized:.1f} s" in pace_words(shelf.swimming)
+
+
+def chosen(name: str, **then: Any) -> SwimSettings:
+    settings = SwimSettings().with_value("scenario", name)
+    for key, value in then.items():
+        settings = settings.with_value(key, value)
+    return settings
+
+
+@pytest.mark.parametrize("name", list(SCENARIOS))
+def test_every_scenario_plans_what_its_day_says(name: str) -> None:
+    day, settings = SCENARIOS[name], chosen(name)
+    plan = settings.plan(State(UCAT))
+    assert plan.current == day.current and plan.sensors == day.sensors
+    assert plan.path.name == day.trajectory and plan.path.duration_s == day.path().duration_s
+    assert plan.truth == day.truth
+    assert len(plan.losses) == day.lost and len(plan.weak) == (day.weak is not None)
+    assert all(loss.time_s == 0.5 * plan.path.duration_s for loss in plan.losses)
+    assert plan.announced == day.announced
+
+
+def test_days_of_robots_of_their_own_are_left_out() -> None:
+    left = {day.name for day in HARD_DAYS} - set(SCENARIOS)
+    assert {"hexa", "restricted", "fins-mixed", "heavy", "torpedo", "hybrid"} <= left
+
+
+@pytest.mark.parametrize("layout", ["hexa", "pair", "penta"])
+def test_a_fin_is_lost_without_which_an_own_robot_can_be_steered(layout: str) -> None:
+    robot: Layout = load_layout(layout)
+    if layout == "pair":
+        assert len(chosen("lost-one").plan(State(robot)).losses) == 1
+        with pytest.raises(FinlabError, match="lost-two takes 2 of the 2 working fins away"):
+            chosen("lost-two").plan(State(robot))
+        return
+    (loss,) = chosen("lost-in-current").plan(State(robot, failed=(robot.names[0],))).losses
+    assert loss.fin in robot.names[1:]
+
+
+@pytest.mark.parametrize(
+    ("key", "wrong"),
+    [
+        ("scenario", "hexa"),
+    ],
+)
+def test_settings_of_swims_are_checked(key: str, wrong: Any) -> None:
+    with pytest.raises(FinlabError):
+        SwimSettings().with_value(key, wrong)
+
+
+@pytest.fixture
+def swimming() -> Any:
+    worker = Worker()
+    swim = Swimming(page_of(worker))
+    yield swim
+    swim.stop()
+    worker.stop()
+
+
+def test_what_is_true_is_not_what_is_believed(swimming: Swimming) -> None:
+    settings = chosen("weak")
+    plan = settings.plan(State(UCAT, failed=("back_right",), method="analytic"))._replace(path=SHORT)
+    swimming.start(plan)
+    until(lambda: swimming.swimmer is not None)
+    assert swimming.swimmer is not None
+    swim = swimming.swimmer.swim
+    assert swim.layout == UCAT and swim.damage.failed == ("back_right",)
+    (weak,) = plan.weak
+    assert swim.broken[weak] == FinFault(weak, 0.0, "torn", 0.7) and weak not in swim.told
+    assert swim.controller.name == "tracking"
+
+
+@pytest.mark.parametrize("robot", ["bluerov2", "fish", "torpedo", "catamaran"])
+def test_any_robot_has_the_scenarios_that_it_can_swim(robot: str) -> None:
+    layout = load_layout(robot)
+    plan = SwimSettings().with_value("scenario", "offset").plan(State(layout))
+    swimmer = Swimmer(plan, closed_loop(plan, Allocator(layout)))
+    for _ in range(3):
+        swimmer.step()
+    moment = swimmer.moment()
+    assert (
+        moment.figures is not None and moment.figures.mean_w >= 0.0 and moment.motion.shape == (layout.n, 3)
+    )

@@ -19,6 +19,7 @@ from finlab.vehicle.fossen import GRAVITY
 from tests.webapp.stand_in import StandIn
 from webapp.markup.score_card import check_card, score_table, warnings
 from webapp.markup.verdict import (
+    COLORS,
     WORKING,
     Verdict,
     answer_sentence,
@@ -28,7 +29,7 @@ from webapp.markup.verdict import (
     verdict_sentence,
 )
 from webapp.markup.words import authority_sentence, trim_sentence
-from webapp.panels.compare_tab import comparison_table
+from webapp.panels.modes_tab import comparison_table
 from webapp.panels.status import corner
 from webapp.scene.wrench_nodes import LENGTH, LONGEST, NEWTONS, SHORTEST, fitting
 from webapp.session import Session, files
@@ -141,7 +142,7 @@ def test_what_a_method_cannot_is_not_what_the_fins_cannot() -> None:
     assert Solver().reply(state).in_reach
     assert verdict_of(answer, True) is Verdict.APPROXIMATE
     assert verdict_sentence(answer, True) == "Approximate: the robot can, qp does not"
-    assert len({verdict.color for verdict in Verdict}) == len({verdict.value for verdict in Verdict}) == 4
+    assert len(set(COLORS.values())) == len({verdict.value for verdict in Verdict}) == 4
 
 
 def test_robot_without_yaw_says_so() -> None:

@@ -28,17 +28,17 @@ PLAIN_HEADER = Markup(
 )
 
 
-def wrench_bars(asked: ArrayLike, given: ArrayLike | None) -> str:
+def wrench_bars(demanded: ArrayLike, got: ArrayLike | None) -> str:
     """The bars of all six axes.
 
     Args:
-        asked: target wrench (6,) [N, N m]; NaN for an axis that is free.
-        given: delivered wrench (6,), None while there is none.
+        demanded: target wrench (6,) [N, N m]; NaN for an axis that is free.
+        got: delivered wrench (6,), None while there is none.
     """
-    asked = np.asarray(asked, dtype=float)
-    given = None if given is None else np.asarray(given, dtype=float)
-    wanted = np.nan_to_num(asked)
-    values = np.array([wanted, wanted if given is None else given])
+    demanded = np.asarray(demanded, dtype=float)
+    got = None if got is None else np.asarray(got, dtype=float)
+    wanted = np.nan_to_num(demanded)
+    values = np.array([wanted, wanted if got is None else got])
     # One scale for the forces and one for the torques, so that bars compare; it moves in coarse steps only.
     scales = [
         max(nice_limit(np.abs(values[:, part]).max()), least)
@@ -48,12 +48,12 @@ def wrench_bars(asked: ArrayLike, given: ArrayLike | None) -> str:
     for k in range(6):
         scale = scales[k // 3]
         rows.append(html("<span>{} <span class='dim'>{}</span></span>", AXIS_WORDS[k], AXES[k]))
-        free = np.isnan(asked[k])
-        rows.append(_track(None if free else asked[k] / scale, None if given is None else given[k] / scale))
-        rest = None if given is None or free else _value(asked[k] - given[k], k)
+        free = np.isnan(demanded[k])
+        rows.append(_track(None if free else demanded[k] / scale, None if got is None else got[k] / scale))
+        rest = None if got is None or free else _value(demanded[k] - got[k], k)
         kind = "missing" if rest is not None and float(rest.replace("−", "-")) else "dim"
-        delivered = "–" if given is None else _value(given[k], k)
-        wish = "free" if free else _value(asked[k], k)
+        delivered = "–" if got is None else _value(got[k], k)
+        wish = "free" if free else _value(demanded[k], k)
         cells = (("asked", wish), ("given", delivered), (kind, rest or "–"))
         rows += [html("<span class='right {}'>{}</span>", *cell) for cell in cells]
     return html("<div class='fl'><div class='bars'>{}</div></div>", rows)
@@ -74,16 +74,16 @@ def _value(value: float, axis: int) -> str:
     return f"{rounded:+.{digits}f}".replace("-", "−") if rounded else f"{0:.{digits}f}"
 
 
-def _track(asked: float | None, given: float | None) -> str:
+def _track(demanded: float | None, got: float | None) -> str:
     parts: list[str] = [
         Markup("<i style='left:50%;top:0;width:1px;height:14px;background:rgba(128,128,128,.55)'></i>")
     ]
-    if asked is not None:
-        parts.append(_bar(0.0, asked, 1, 5, "var(--fl-asked)"))
-    if given is not None:
-        parts.append(_bar(0.0, given, 8, 5, "var(--fl-delivered)"))
-        if asked is not None and abs(asked - given) > 0.02:
-            parts.append(_bar(given, asked, 8, 5, "var(--fl-missing)"))
+    if demanded is not None:
+        parts.append(_bar(0.0, demanded, 1, 5, "var(--fl-asked)"))
+    if got is not None:
+        parts.append(_bar(0.0, got, 8, 5, "var(--fl-delivered)"))
+        if demanded is not None and abs(demanded - got) > 0.02:
+            parts.append(_bar(got, demanded, 8, 5, "var(--fl-missing)"))
     return html("<div class='track'>{}</div>", parts)
 
 
@@ -119,8 +119,8 @@ def fin_table(
         failed = allocation is not None and not np.isfinite(allocation.command[i, 0])
         kind = " ".join(["dead"] * failed + ["chosen"] * (fin.name == selected))
         first = html("{}<span class='name' title='{}'>{}</span>", swatch(i, failed), fin.name, fin.name)
-        if not failed and (told := damage_words(health, fin.name)):
-            first += html("<div class='missing damage'>{}</div>", told)
+        if not failed and (remark := damage_words(health, fin.name)):
+            first += html("<div class='missing damage'>{}</div>", remark)
         if allocation is None or limits is None:
             cells: str = Markup("<td>–</td>") * 5
         elif failed:
@@ -143,14 +143,14 @@ def _cells(
     at_limit = ["full" if one else "" for one in limits]
     if not isinstance(part, Fin):
         along = command[0] if isinstance(part, Thruster) else force
-        told = part.type if isinstance(part, Thruster) else f"{part.type}, {_degrees(command[0])}°"
-        words = html("<td colspan='3' class='words'>{}</td>", told)
-        given = html(
+        remark = part.type if isinstance(part, Thruster) else f"{part.type}, {_degrees(command[0])}°"
+        words = html("<td colspan='3' class='words'>{}</td>", remark)
+        cell = html(
             "<td class='{}'>{}</td>",
             "full" if limits.any() else "",
             f"{round(along, 2) + 0.0:.2f}".replace("-", "−"),
         )
-        return html("{}{}<td>{}</td>", words, given, meter)
+        return html("{}{}<td>{}</td>", words, cell, meter)
     bounded = "<td class='{}'>{:.1f}</td><td class='{}'>{:.2f}</td>"
     first = html(bounded, at_limit[0], math.degrees(amplitude), at_limit[1], frequency)
     return html("{}<td>{}</td><td>{:.2f}</td><td>{}</td>", first, _degrees(direction), force, meter)

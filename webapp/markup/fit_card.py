@@ -11,11 +11,11 @@ from webapp.tasks.fitting import Fitted
 MOST_NAMED = 8
 
 
-def fit_card(found: Fitted) -> str:
+def fit_card(result: Fitted) -> str:
     """What came of a file that was dropped on an actuator."""
-    name, fit = found.upload.name, found.fit
+    name, fit = result.upload.name, result.fit
     if fit is None:
-        said = html("<b>{} is a finished table.</b> It is on {} as it stands.", name, found.upload.part.name)
+        said = html("<b>{} is a finished table.</b> It is on {} as it stands.", name, result.upload.part.name)
         return html("<div class='fl said'>{}</div>", said)
     if isinstance(fit, ThrusterFit):
         return html(

@@ -88,12 +88,10 @@ def _logarithm(error: Array) -> Array:
 
 
 def _color(end: int, alpha: float) -> str:
-    """Of a sample that ends at a mode, grey for none."""
     return css(DEAD if end < 0 else MODE_COLORS[end], alpha)
 
 
 def _sample_dots(places: Array, ends: list[int], faint: bool) -> str:
-    """Samples (K, 2) [px] as they were proposed."""
     dots = [
         f"<circle cx='{x:.1f}' cy='{y:.1f}' r='{DOT:g}' fill='{_color(end, 0.25 if faint else 0.7)}'/>"
         for (x, y), end in zip(places.tolist(), ends, strict=True)
@@ -112,7 +110,6 @@ def _moving_dots(before: Array, now: Array, ends: list[int]) -> str:
 
 
 def _trails(places: Array, ends: list[int]) -> str:
-    """The ways of samples (steps, K, 2) [px]."""
     if len(places) == 1:
         return Markup()
     kept = places[[*(k for k in TRAIL if k < len(places) - 1), -1]].swapaxes(0, 1).round(1).tolist()

@@ -115,8 +115,8 @@ class Plot(NamedTuple):
 
     def drawn(self, parts: Iterable[str], upright: bool = False) -> str:
         """The whole plot, `parts` over its grid."""
-        whole = "<svg class='plot' viewBox='0 0 {} {}'>{}{}</svg>"
-        return html(whole, self.width, self.height, self.grid(upright), parts)
+        frame = "<svg class='plot' viewBox='0 0 {} {}'>{}{}</svg>"
+        return html(frame, self.width, self.height, self.grid(upright), parts)
 
 
 def positive(word: str, values: Array, most: int = MOST_TICKS) -> Axis:

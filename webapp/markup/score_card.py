@@ -13,7 +13,7 @@ from finlab.layout import Layout
 from webapp.markup.answer import swatch
 from webapp.markup.html import html, row
 from webapp.markup.words import listed, three_digits
-from webapp.scene.meshes.blades import SPAN
+from webapp.scene.actuator_shapes import SPAN
 from webapp.session.state import AXIS_UNITS
 
 FIGURES: dict[str, Callable[[ScoreCard], float | None]] = {

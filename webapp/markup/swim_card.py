@@ -75,7 +75,6 @@ def _figures(figures: Figures | None) -> tuple[tuple[str, str], ...]:
 
 
 def _warnings(swimmer: Swimmer, shown: Moment) -> str:
-    """What should not be overlooked, and what the monitor has found."""
     warning = Markup()
     if swimmer.unknown_fins:
         words = unlearned_sentence(swimmer.layout, swimmer.unknown_fins)

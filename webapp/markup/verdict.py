@@ -21,13 +21,10 @@ WORKING = "Working …"
 """What stands in place of a verdict while the present question has no answer."""
 SPOKEN = 0.05
 """Share of the largest miss, each axis over its scale, from which another axis is spoken of, too."""
-
 PROVED = 1e-4
 """Share of its watts that an answer may lie above the bound and count as proved least."""
 LEAST_WATTS = 1e-3
 """Bound [W] that shares are taken of where it is smaller, or nothing."""
-
-
 AT_REST = "(flow)"
 """How a note ends that the panel beside the speed tells in its own words."""
 
@@ -43,13 +40,8 @@ class Verdict(Enum):
     OUT_OF_REACH = "Out of reach"
     """No command of what works gives it."""
 
-    @property
-    def color(self) -> Rgb:
-        """Of everything that shows it."""
-        return _COLORS[self]
 
-
-_COLORS = {
+COLORS: dict[Verdict, Rgb] = {
     Verdict.EXACT: DELIVERED,
     Verdict.APPROXIMATE: NEARLY,
     Verdict.UNLEARNED: UNLEARNED,
@@ -91,9 +83,9 @@ def rest_sentence(allocation: Allocation) -> str:
     if allocation.reachable:
         return "Nothing is left undone."
     rest, size = allocation.unallocated, np.abs(allocation.unallocated / allocation.scale)
-    told = [k for k in np.argsort(-size) if size[k] >= SPOKEN * size.max()]
-    less = [_amount(rest[k], k) for k in told if rest[k] * allocation.target[k] > 0.0]
-    more = [_amount(rest[k], k) for k in told if rest[k] * allocation.target[k] <= 0.0]
+    spoken = [k for k in np.argsort(-size) if size[k] >= SPOKEN * size.max()]
+    less = [_amount(rest[k], k) for k in spoken if rest[k] * allocation.target[k] > 0.0]
+    more = [_amount(rest[k], k) for k in spoken if rest[k] * allocation.target[k] <= 0.0]
     parts = [f"{listed(less)} {'is' if len(less) == 1 else 'are'} left undone"] if less else []
     parts += [f"{listed(more)} {'comes' if len(more) == 1 else 'come'} along unasked"] if more else []
     return f"{'; '.join(parts)}."
@@ -137,9 +129,9 @@ def answer_sentence(
         sentences.append(rest_sentence(allocation))
         if not allocation.reachable and not allocation.unknown_fins:
             share = round(100 * allocation.share)
-            told = [f"{share} % of what is asked is delivered"] if 0 <= share < 100 else []
-            told += [*allocation.binding, *(() if searching else allocation.notes)]
-            said = "; ".join(note for note in told if not note.endswith(AT_REST))
+            remarks = [f"{share} % of what is asked is delivered"] if 0 <= share < 100 else []
+            remarks += [*allocation.binding, *(() if searching else allocation.notes)]
+            said = "; ".join(note for note in remarks if not note.endswith(AT_REST))
             sentences.append(f"{said[0].upper()}{said[1:]}." if said else "")
         elif allocation.reachable and not searching:
             sentences.append(bound_sentence(allocation))

@@ -62,8 +62,8 @@ def three_digits(value: float | None) -> str:
         return "–"
     if value != 0 and not 1e-3 <= abs(value) < 1e4:
         return small(value)
-    whole = math.floor(math.log10(float(f"{abs(value):.2e}"))) if value else 0
-    return f"{value:.{max(2 - whole, 0)}f}".replace("-", "−")
+    digits = math.floor(math.log10(float(f"{abs(value):.2e}"))) if value else 0
+    return f"{value:.{max(2 - digits, 0)}f}".replace("-", "−")
 
 
 def source_words(sources: Sequence[str]) -> str:

@@ -1,23 +1,23 @@
 """What a layout says of the selected actuators: place, direction, limits, model. An edit counts for all."""
 
 import math
-from collections.abc import Callable
 from functools import partial
 from typing import Any, NamedTuple
 
+import numpy as np
 from markupsafe import Markup
 
 from finlab.layout import Actuator, Azimuth, Fin, Layout
 from finlab.layout.directions import Vector, axis_names, direction, part_of, pointed
 from finlab.layout.fin import MAX_FREQUENCY
-from finlab.layout.thrust_model import PowerLaw
+from finlab.layout.fin_model import FIN_MODELS
 from webapp.markup.answer import swatch
 from webapp.markup.html import html
 from webapp.page import Page
-from webapp.panels.actuator_model import add_model
+from webapp.panels.actuator_model import add_fit, add_model, kind_of, of_part
+from webapp.session.actuator_edits import FORMULAS, LAW_KEYS, words
 from webapp.session.state import number
 
-NOMINAL = Fin("nominal", (0.0, 0.0, 0.0), 0.0)
 SNAPS: dict[str, Vector] = {
     "+x": (1.0, 0.0, 0.0),
     "−x": (-1.0, 0.0, 0.0),
@@ -44,9 +44,15 @@ class Box(NamedTuple):
     """Whether the field is in radians."""
     free: bool = False
     """Whether it may be empty: nothing is said of it then; 0 empties it."""
+    law: str = ""
+    """Type of the model of a fin that it belongs to, if to one."""
+    usual: float = 0.0
+    """What is shown of an actuator without it."""
 
 
-PAIRS = (
+PAIRS = ("amplitude", "frequency", "zero_direction", "force", "arc", "deflection")
+"""Fields that are a least and a greatest number."""
+LIMITS = (
     Box("A [°]", "amplitude", FIN, "Half of the beat: least and most, up to 90.", 5.0, True),
     Box("f [Hz]", "frequency", FIN, f"Least and most, up to {MAX_FREQUENCY:g} Hz."),
     Box("φ [°]", "zero_direction", FIN, "From and to; −180 to 180 is any direction.", 5.0, True),
@@ -54,8 +60,6 @@ PAIRS = (
     Box("Force [N]", "force", PODS, "Least and most; above 0: it cannot stop.", 1.0),
     Box("Arc [°]", "arc", PODS, "Least and greatest angle from zero; −180 to 180 is any.", 5.0, True),
     Box("Deflection [°]", "deflection", RUDDER, "Least and greatest.", 1.0, True),
-)
-NUMBERS = (
     Box("Dead band [N]", "dead_band", (*FIXED, *PODS), "Forces smaller than this, but 0, cannot be held."),
     Box("Turn rate [°/s]", "turn_rate", PODS, "How fast it turns; 0: at once.", 5.0, True, True),
     Box("Rate [N/s]", "rate", (*FIXED, *PODS), "How fast the force changes; 0: at once.", free=True),
@@ -75,14 +79,14 @@ LAW = (
 )
 
 
-def part_shown(selected: str | None, layout: Layout) -> Actuator:
-    """The actuator that was selected last; a nominal fin where none is."""
-    return NOMINAL if selected is None else part_of(layout, selected)
+def _fin_box(law: str, key: str, rule: Any) -> Box:
+    unit = f" [{rule.unit}]".replace("^2", "²").replace("^3", "³") if rule.unit else ""
+    hint = f"{rule.meaning[0].upper()}{rule.meaning[1:]}. Usual: {rule.default:g}."
+    step = (abs(rule.default) or 1.0) / 20
+    return Box(f"{words(key)}{unit}", key, FIN, hint, step, law=law, usual=rule.default)
 
 
-def of_part(value: Callable[[Actuator], Any]) -> Callable[[str | None, Layout], Any]:
-    """What is shown of the actuator that was selected last."""
-    return lambda selected, layout: value(part_shown(selected, layout))
+FIN_LAWS = tuple(_fin_box(law, key, rule) for law in FORMULAS for key, rule in FIN_MODELS[law].items())
 
 
 def add_actuator(page: Page) -> None:
@@ -93,23 +97,20 @@ def add_actuator(page: Page) -> None:
         if session.selected is not None:
             session.rename(session.selected, name)
 
-    def add_law() -> None:
-        for box in LAW:
-            _add_number(page, box)
-
     page.add_html(_headline)
-    with gui.add_folder(None) as whole:
+    with gui.add_folder(None) as full:
         page.bind(gui.add_text("Name", ""), rename, lambda selected: selected or "")
         with gui.add_folder("Place"):
             _add_place(page)
         with gui.add_folder("Limits"):
-            for box in PAIRS:
-                _add_pair(page, box)
-            for box in NUMBERS:
-                _add_number(page, box)
+            for box in LIMITS:
+                _add_box(page, box)
         with gui.add_folder("Model"):
-            add_model(page, part_shown, add_law)
-    page.board.show(whole, visible=lambda selected: selected is not None)
+            add_model(page)
+            for box in (*FIN_LAWS, *LAW):
+                _add_box(page, box)
+            add_fit(page)
+    page.board.show(full, visible=lambda selected: selected is not None)
 
 
 def _add_place(page: Page) -> None:
@@ -165,52 +166,37 @@ def _other(part: Actuator) -> Vector:
     return part.frame[0 if isinstance(part, Azimuth) else 1]
 
 
+def _has(part: Actuator, box: Box) -> bool:
+    law = "power_law" if box.key in LAW_KEYS else box.law
+    return part.type in box.types and law in ("", kind_of(part))
+
+
 def _value(part: Actuator, box: Box) -> Any:
-    """What an actuator has in a box, in its unit; None where nothing is said, or where it has no such box."""
-    holder: Any = part.limits if isinstance(part, Fin) else part
-    if not hasattr(holder, box.key):
-        holder = getattr(part, "model", None)
-    value = getattr(holder, box.key, None) if part.type in box.types else None
-    if value is None or not box.degrees:
-        return value
-    return tuple(map(math.degrees, value)) if isinstance(value, tuple) else math.degrees(value)
+    """What an actuator has in a box, in its unit; what is usual where nothing is said of it."""
+    value = None
+    if _has(part, box):
+        known = part.model.values() if isinstance(part, Fin) and box.law else {}
+        holders = (getattr(part, "limits", part), getattr(part, "model", None))
+        value = known.get(box.key, next((getattr(h, box.key) for h in holders if hasattr(h, box.key)), None))
+    if value is None:
+        return (0.0, 0.0) if box.key in PAIRS else math.nan if box.free else box.usual
+    return np.degrees(value).tolist() if box.degrees else value
 
 
-def _is_there(box: Box) -> Callable[[str | None, Layout], bool]:
-    def there(part: Actuator) -> bool:
-        of_law = box.key in ("forward", "reverse", "exponent")
-        return part.type in box.types and (not of_law or isinstance(getattr(part, "model", None), PowerLaw))
-
-    return of_part(there)
-
-
-def _add_pair(page: Page, box: Box) -> None:
-    def put(ends: tuple[Any, Any]) -> None:
-        checked = (number(end, box.label, -1e6, 1e6) for end in ends)
-        page.session.set_value(box.key, tuple(math.radians(v) if box.degrees else v for v in checked))
-
-    handle = page.gui.add_vector2(box.label, (0.0, 0.0), step=box.step, hint=box.hint, visible=False)
-    page.bind_number(
-        handle, put, of_part(lambda part: _value(part, box) or (0.0, 0.0)), digits=2 + 2 * (not box.degrees)
-    )
-    page.board.show(handle, visible=_is_there(box))
-
-
-def _add_number(page: Page, box: Box) -> None:
-    """A box for a number; one that may be empty is so where nothing is said, and 0 brings that back."""
+def _add_box(page: Page, box: Box) -> None:
+    """A box that may be empty is so where nothing is said, and 0 brings that back."""
+    pair = box.key in PAIRS
 
     def put(value: Any) -> None:
-        checked = number(value, box.label, -1e6, 1e6)
-        said = math.radians(checked) if box.degrees else checked
-        page.session.set_value(box.key, None if box.free and said == 0.0 else said)
+        checked = [number(end, box.label, -1e6, 1e6) for end in (value if pair else (value,))]
+        meant = tuple(math.radians(v) if box.degrees else v for v in checked)
+        page.session.set_value(box.key, meant if pair else None if box.free and not meant[0] else meant[0])
 
-    def shown(part: Actuator) -> float:
-        value = _value(part, box)
-        return value if value is not None else math.nan if box.free else 0.0
-
-    handle = page.gui.add_number(box.label, 0.0, step=box.step, hint=box.hint, visible=False)
-    page.bind_number(handle, put, of_part(shown), digits=2 if box.degrees else 5)
-    page.board.show(handle, visible=_is_there(box))
+    add: Any = page.gui.add_vector2 if pair else page.gui.add_number
+    handle = add(box.label, (0.0, 0.0) if pair else box.usual, step=box.step, hint=box.hint, visible=False)
+    digits = 2 if box.degrees else 4 if pair else 5
+    page.bind_number(handle, put, of_part(lambda part: _value(part, box)), digits)
+    page.board.show(handle, visible=of_part(lambda part: _has(part, box)))
 
 
 def _headline(layout: Layout, selection: tuple[str, ...], selected: str | None) -> str:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import lru_cache, partial
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,7 +12,7 @@ from finlab.actuators.fin.fin_laws import TableLaw
 from finlab.arrays import Array
 from finlab.errors import DataError, FinlabError
 from finlab.layout import Actuator, Fin, Layout, Rudder
-from finlab.layout.fin_model import FIN_MODELS
+from finlab.layout.directions import part_of
 from finlab.layout.force_table_file import DOUBT
 from finlab.layout.thrust_model import PowerTable
 from finlab.physics import make_law, plant_of
@@ -21,7 +21,6 @@ from webapp.markup.plot import Plot, exact_axis, positive
 from webapp.markup.words import degrees
 from webapp.page import Page
 from webapp.session.actuator_edits import FORMULAS
-from webapp.session.actuator_edits import words as key_words
 from webapp.tasks.fitting import MAX_BYTES, Fitted
 from webapp.theme import BLUE, GREEN, ORANGE
 
@@ -40,8 +39,17 @@ SHARES, COLORS = (1.0, 2 / 3, 1 / 3), (ORANGE, GREEN, BLUE)
 """Of the largest amplitude, and the colours of curves."""
 POINTS = 41
 CSV = ".csv,.txt,.xlsx"
+NOMINAL = Fin("nominal", (0.0, 0.0, 0.0), 0.0)
 
-Shown = Callable[[str | None, Layout], Actuator]
+
+def part_shown(selected: str | None, layout: Layout) -> Actuator:
+    """The actuator that was selected last; a nominal fin where none is."""
+    return NOMINAL if selected is None else part_of(layout, selected)
+
+
+def of_part(value: Callable[[Actuator], Any]) -> Callable[[str | None, Layout], Any]:
+    """What is shown of the actuator that was selected last."""
+    return lambda selected, layout: value(part_shown(selected, layout))
 
 
 def kind_of(part: Actuator) -> str:
@@ -49,59 +57,27 @@ def kind_of(part: Actuator) -> str:
     return "foil" if isinstance(part, Rudder) else part.model.type
 
 
-def add_model(page: Page, shown: Shown, add_law: Callable[[], object]) -> None:
-    """Widgets of one folder.
+def add_model(page: Page) -> None:
+    """The choice of a formula, and what is said of it."""
 
-    Args:
-        page: where they stand.
-        shown: the actuator that they are about.
-        add_law: adds the boxes for numbers of those that are no fins.
-    """
-    session, gui, board = page.session, page.gui, page.board
-
-    def kind(selected: str | None, layout: Layout) -> str:
-        return kind_of(shown(selected, layout))
-
-    def options(selected: str | None, layout: Layout) -> tuple[str, ...]:
-        part = shown(selected, layout)
+    def options(part: Actuator) -> tuple[str, ...]:
         formulas = FORMULAS if isinstance(part, Fin) else () if isinstance(part, Rudder) else ("power_law",)
         return formulas if kind_of(part) in formulas else (*formulas, kind_of(part))
 
     def words(selected: str | None, layout: Layout, fitted: Fitted | None) -> str:
-        part = shown(selected, layout)
-        told = fitted is not None and fitted.found["model"] == getattr(part, "model", None)
-        return model_card(part, doubts=not told)
-
-    def add_number(law: str, key: str, rule: Any) -> None:
-        """A box for a number of a fin's model, shown while the fin has that model."""
-
-        def value(selected: str | None, layout: Layout) -> float:
-            part = shown(selected, layout)
-            known = isinstance(part, Fin) and part.model.type == law
-            return float(part.model.values()[key]) if known and isinstance(part, Fin) else rule.default
-
-        unit = f" [{rule.unit}]".replace("^2", "²").replace("^3", "³") if rule.unit else ""
-        hint = f"{rule.meaning[0].upper()}{rule.meaning[1:]}. Usual: {rule.default:g}."
-        label, step = f"{key_words(key)}{unit}", (abs(rule.default) or 1.0) / 20
-        handle = gui.add_number(label, rule.default, step=step, hint=hint, visible=False)
-        page.bind_number(handle, partial(session.set_value, key), value)
-        board.show(handle, visible=lambda selected, layout: kind(selected, layout) == law)
+        part = part_shown(selected, layout)
+        reported = fitted is not None and fitted.found["model"] == getattr(part, "model", None)
+        return model_card(part, doubts=not reported)
 
     about = "The formula that gives force and power; a table comes from a file, below."
-    kinds = board.show(gui.add_dropdown("Model", FORMULAS, hint=about), options=options)
-    board.show(kinds, visible=lambda selected, layout: len(options(selected, layout)) > 1)
-    page.bind(kinds, session.choose_model, kind)
+    kinds = page.board.show(page.gui.add_dropdown("Model", FORMULAS, hint=about), options=of_part(options))
+    page.board.show(kinds, visible=of_part(lambda part: len(options(part)) > 1))
+    page.bind(kinds, page.session.choose_model, of_part(kind_of))
     page.add_html(words)
-    for law in FORMULAS:
-        for key, rule in FIN_MODELS[law].items():
-            add_number(law, key, rule)
-    add_law()
-    page.add_html(lambda selected, layout: drawn_curves(shown(selected, layout)))
-    _add_fit(page, shown)
 
 
-def _add_fit(page: Page, shown: Shown) -> None:
-    """A file for the selected actuator, and what comes of it."""
+def add_fit(page: Page) -> None:
+    """Curves of the model, a file for the selected actuator, and what comes of it."""
     session, gui, board, fitting = page.session, page.gui, page.board, page.jobs.fitting
 
     def upload(name: str, content: bytes) -> None:
@@ -110,9 +86,10 @@ def _add_fit(page: Page, shown: Shown) -> None:
         fitting.start(session.selected, name, content)
         session.show_task("Design")
 
+    page.add_html(of_part(drawn_curves))
     page.opening.add(CSV, upload)
     about = "A fin: noisy rows of A, f, phi, Fx, Fy, Fz, or a force table. A thruster: PWM, force and power."
-    with gui.add_folder(None) as whole:  # viser cannot hide a button for files
+    with gui.add_folder(None) as full:  # viser cannot hide a button for files
         button = page.add_upload(
             "Fit from measurements (CSV)",
             upload,
@@ -121,7 +98,7 @@ def _add_fit(page: Page, shown: Shown) -> None:
             hint=f"{about} Up to {MAX_BYTES // 1_000_000} MB.",
         )
     board.show(button, disabled=lambda selected, fitting: selected is None or fitting is not None)
-    board.show(whole, visible=lambda selected, layout: not isinstance(shown(selected, layout), Rudder))
+    board.show(full, visible=of_part(lambda part: not isinstance(part, Rudder)))
     bar = gui.add_progress_bar(100.0, animated=True, visible=False)
     hint = "The actuator stays as it is."
     cancel = page.add_button("Cancel", fitting.forget, icon=viser.Icon.X, visible=False, hint=hint)
@@ -153,8 +130,7 @@ def model_card(part: Actuator, doubts: bool = True) -> str:
     if not isinstance(part, Fin | Rudder) and isinstance(part.model, PowerTable):
         (first, *_), (last, *_) = part.model.rows[0], part.model.rows[-1]
         said = "<b>table</b> of {} rows, command {:g} to {:g} {}"
-        told = html(said, len(part.model.rows), first, last, part.model.unit)
-        return html("<div class='fl dim'>{}</div>", told)
+        return html(f"<div class='fl dim'>{said}</div>", len(part.model.rows), first, last, part.model.unit)
     said = LAWS[kind_of(part)]
     return html("<div class='fl dim'>{}{}.</div>", said[0].upper(), said[1:])
 
@@ -197,11 +173,11 @@ class Curves(NamedTuple):
 def drawn_curves(part: Actuator) -> str:
     """Plots of one actuator; nothing where its table cannot be read, which is reported elsewhere."""
     try:
-        found = curves(part)
+        result = curves(part)
     except DataError:
         return ""
     plots = []
-    for across, x, up, lines in found:
+    for across, x, up, lines in result:
         plot = Plot(exact_axis(across, x), positive(up, np.append(1e-6, [y for _, y in lines])), HEIGHT)
         parts = [plot.curve(x, y, color) for (_, y), color in zip(lines, COLORS, strict=False)]
         named = zip(lines, COLORS, strict=False)

@@ -19,6 +19,10 @@ KNOWN = {
     "linear_damping": "linear damping",
     "quadratic_damping": "quadratic damping",
 }
+NUMBERS = {
+    "mass_kg": ("Mass [kg]", 0.5, "From the hull: of the water that it displaces."),
+    "buoyancy_n": ("Buoyancy [N]", 1.0, "As much as the robot weighs where nothing is said."),
+}
 PARTS: dict[str, tuple[tuple[str, int, str], ...]] = {
     "inertia_kgm2": (("Inertia [kg m²]", 0, "About x, y, z. From the hull: a solid of one density."),),
     "added_mass": (
@@ -45,16 +49,19 @@ def add_body(page: Page) -> None:
     session, gui = page.session, page.gui
 
     def put_in(key: str, first: int, values: tuple[Any, ...]) -> None:
-        whole = list(_whole(_body(session.state.layout), key))
-        whole[first : first + 3] = values
-        known = [value for value in whole if isfinite(value)]
+        full = list(_whole(_body(session.state.layout), key))
+        full[first : first + 3] = values
+        known = [value for value in full if isfinite(value)]
         # They are typed box by box; of inertias none may be zero.
         rest = max(known, default=0.0) if key == "inertia_kgm2" else 0.0
-        session.set_dynamics(key, tuple(value if isfinite(value) else rest for value in whole))
+        session.set_dynamics(key, tuple(value if isfinite(value) else rest for value in full))
 
     def forget() -> None:
         text = "Nothing is said of mass, inertia, damping and buoyancy from then on; undo brings it back."
         page.ask("Forget the body?", text, {"Forget": session.forget_dynamics})
+
+    def one(key: str) -> Callable[[Layout], float]:
+        return lambda layout: nan if getattr(_body(layout), key) is None else getattr(_body(layout), key)
 
     def three(key: str, first: int) -> Callable[[Layout], tuple[float, ...]]:
         return lambda layout: _whole(_body(layout), key)[first : first + 3]
@@ -67,35 +74,22 @@ def add_body(page: Page) -> None:
     page.add_buttons(
         "From the hull", acts, hint="Of the bare hull: fins, wires and ports come on top; each box says how."
     )
-    page.bind_number(
-        gui.add_number("Mass [kg]", 0.0, step=0.5, hint="From the hull: of the water that it displaces."),
-        partial(session.set_dynamics, "mass_kg"),
-        lambda layout: _said(_body(layout).mass_kg),
-    )
-    about = "As much as the robot weighs where nothing is said."
-    page.bind_number(
-        gui.add_number("Buoyancy [N]", 0.0, step=1.0, hint=about),
-        partial(session.set_dynamics, "buoyancy_n"),
-        lambda layout: _said(_body(layout).buoyancy_n),
-    )
+    for key, (label, step, hint) in NUMBERS.items():
+        box = gui.add_number(label, 0.0, step=step, hint=hint)
+        page.bind_number(box, partial(session.set_dynamics, key), one(key))
     for key, rows in PARTS.items():
         for label, first, hint in rows:
-            box = gui.add_vector3(label, (0.0, 0.0, 0.0), step=0.1, hint=hint)
-            page.bind_number(box, partial(put_in, key, first), three(key, first))
+            boxes = gui.add_vector3(label, (0.0, 0.0, 0.0), step=0.1, hint=hint)
+            page.bind_number(boxes, partial(put_in, key, first), three(key, first))
 
 
 def _body(layout: Layout) -> Body:
     return layout.body or Body()
 
 
-def _said(value: float | None) -> float:
-    """A number for a box; what is not said leaves it empty."""
-    return nan if value is None else value
-
-
 def _whole(body: Body, key: str) -> tuple[float, ...]:
-    given: tuple[float, ...] | None = getattr(body, key)
-    return given or (nan,) * 3 * len(PARTS[key])
+    known: tuple[float, ...] | None = getattr(body, key)
+    return known or (nan,) * 3 * len(PARTS[key])
 
 
 def _facts(layout: Layout) -> str:

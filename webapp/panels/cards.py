@@ -1,24 +1,31 @@
-"""Panels that are nothing but markup: functions of what there is to show."""
+"""The bar above all, cards beside and over the view, and what else is nothing but markup."""
 
 from collections.abc import Callable
 
 import numpy as np
+import viser
 from markupsafe import Markup
 
 from finlab.allocation.allocation import Allocation
+from finlab.allocation.methods import METHODS, method_class
 from finlab.analysis.score_card import quick_check
+from finlab.deploy.design_files import LAYOUTS
+from finlab.exchange import FOREIGN
 from finlab.layout import Layout
+from webapp.handles import add_html
 from webapp.markup.answer import wrench_bars
-from webapp.markup.html import html
+from webapp.markup.html import html, marker
 from webapp.markup.score_card import check_card, warnings
 from webapp.markup.verdict import answer_sentence
 from webapp.markup.words import righting_sentences
 from webapp.page import Page
 from webapp.presses import press
 from webapp.scene.robot_scene import CAMERAS
+from webapp.session.files import MAX_LINK
 from webapp.session.lessons import LESSONS, TOUR, Stop
 from webapp.session.looking import TASKS
-from webapp.session.state import Flow, State
+from webapp.session.state import LEAST, Flow, State, least_of
+from webapp.tasks.designs import KINDS
 
 SWITCHES = {
     "frozen": ("Freeze", "Fins hold still at their zero direction, propellers stand (P)."),
@@ -28,9 +35,9 @@ SWITCHES = {
 """Field of `Display`, label and hint of each switch."""
 
 
-def card(written: Callable[..., str], page: Page) -> None:
-    """What `written` makes of the facts."""
-    page.add_html(written)
+def card(written: Callable[..., str]) -> Callable[[Page], object]:
+    """A panel of what `written` makes of the facts."""
+    return lambda page: page.add_html(written)
 
 
 def robot_name(layout: Layout, saved: Layout) -> str:
@@ -55,8 +62,8 @@ def tasks(task: str) -> str:
 
 def check(able: Layout, failed: tuple[str, ...], layout: Layout, flow: Flow | None) -> str:
     """What can be said of a layout at once: its axes, what a failure costs, what looks like a mistake."""
-    told = (*warnings(layout), *righting_sentences(layout))
-    return check_card(quick_check(able, failed, flow), layout.n - len(failed) > 1, told)
+    remarks = (*warnings(layout), *righting_sentences(layout))
+    return check_card(quick_check(able, failed, flow), layout.n - len(failed) > 1, remarks)
 
 
 def add_answer(page: Page) -> None:
@@ -67,8 +74,8 @@ def add_answer(page: Page) -> None:
 
 
 def _bars(shown: Allocation | None, target: tuple[float, ...], layout: Layout, busy: bool) -> str:
-    asked = shown.target if shown is not None and busy else np.where(layout.commanded, target, np.nan)
-    return wrench_bars(asked, None if shown is None else shown.wrench)
+    demanded = shown.target if shown is not None and busy else np.where(layout.commanded, target, np.nan)
+    return wrench_bars(demanded, None if shown is None else shown.wrench)
 
 
 def _said(shown: Allocation | None, state: State, busy: bool, proving: bool, step: int | None) -> str:
@@ -115,3 +122,90 @@ def add_switches(page: Page) -> None:
     """All of them."""
     for key, (label, hint) in SWITCHES.items():
         page.bind_display(page.gui.add_checkbox(label, False, hint=hint), key)
+
+
+DESIGNS = ",".join((*LAYOUTS, ".zip", *FOREIGN))
+METHOD_WORDS = {
+    "dual": "least watts, exact, any actuator",
+    "mdn": "least effort, a network proposes, made exact",
+    "paper": "the paper's network and learned physics",
+    "qp": "one quadratic problem",
+    "sqp": "a general solver",
+    "px4": "as PX4 does it, thrusters alone",
+    "ardusub": "as ArduSub does it, thrusters alone",
+    "analytic": "the pseudo-inverse",
+    "ipopt": "a general solver, slow",
+}
+COMMANDS = html(
+    "<button title='all commands and their keys (Ctrl+K)' onclick='{}'>Commands</button>",
+    "document.documentElement.dispatchEvent(new KeyboardEvent("
+    '"keydown", { key: "k", code: "KeyK", ctrlKey: true, bubbles: true }))',
+)
+"""A button that opens the list of commands, as Ctrl+K does."""
+
+
+def add_file(page: Page) -> None:
+    """The design as a file: a new one, one that is opened, and this one saved or shared."""
+    designs = page.designs
+    add_html(page.gui, marker("fl-file"))
+    page.add_button("New", designs.new, icon=viser.Icon.FILE_PLUS, hint="One hull with one fin.")
+    page.opening.add(DESIGNS, designs.open)
+    hint = f"{KINDS[0].upper()}{KINDS[1:]}. Files can be dropped on the page as well."
+    button = page.add_upload("Open", page.opening.open, icon=viser.Icon.FOLDER_OPEN, hint=hint)
+    # By the time that this is written, the panels below have said what can be opened.
+    page.board.show(button, mime_type=lambda: page.opening.suffixes)
+    save = "The layout's file; with measured fins or an imported hull a ZIP with theirs."
+    page.add_button("Save", designs.save, icon=viser.Icon.DEVICE_FLOPPY, hint=save)
+    share = f"A link that carries the whole design, up to {MAX_LINK:,} characters."
+    page.add_button("Share", designs.share, icon=viser.Icon.LINK, hint=share)
+
+
+def add_history(page: Page) -> None:
+    """Undo and redo, by name."""
+    session, icon = page.session, viser.Icon
+    back = page.add_button("Undo", session.undo, icon=icon.ARROW_BACK_UP, hint="Ctrl+Z")
+    page.board.show(back, label=lambda undo: f"Undo: {undo}" if undo else "Undo")
+    forth = page.add_button("Redo", session.redo, icon=icon.ARROW_FORWARD_UP, hint="Ctrl+Y or Ctrl+Shift+Z")
+    page.board.show(forth, label=lambda redo: f"Redo: {redo}" if redo else "Redo")
+
+
+def add_answering(page: Page) -> None:
+    """Who answers, what is kept least, and where help is found."""
+    session, gui = page.session, page.gui
+    about = "Watts, proved least by method dual; or the paper's effort, by the network of method mdn."
+    least = page.bind(gui.add_dropdown("Least", tuple(LEAST), hint=about), session.keep_least, least_of)
+    page.board.show(least, visible=lambda layout: layout.is_of_fins)
+    methods = gui.add_dropdown("Method", tuple(METHODS))
+    page.board.show(methods, options=_options)
+    named = {_option(name): name for name in METHODS}
+    page.bind(methods, lambda option: session.set_setting("method", named.get(option, option)), _option)
+    add_html(gui, html("<div class='fl-help'>{}{}{}</div>", _menu(LESSONS), _menu(TOUR), COMMANDS))
+
+
+def _options(layout: Layout) -> tuple[str, ...]:
+    return tuple(_option(name) for name in METHODS if method_class(name).fits(layout))
+
+
+def _option(method: str) -> str:
+    return f"{method}: {METHOD_WORDS[method]}"
+
+
+def _menu(course: tuple[Stop, ...]) -> str:
+    """A button that opens a list of the lessons, or of the tour's stops."""
+    said = {LESSONS: ("Lessons", "Each has a task"), TOUR: ("Tour", f"The app in {len(TOUR)} stops")}
+    word, about = said[course]
+    items = (
+        html(
+            "<button {} popovertarget='fl-{}' popovertargetaction='hide'>{}. {}</button>",
+            press("stop", stop.name),
+            word,
+            place,
+            stop.title,
+        )
+        for place, stop in enumerate(course, 1)
+    )
+    menu = (
+        "<button popovertarget='fl-{}'>{}</button><div popover id='fl-{}' class='fl fl-menu'><b>{}</b>"
+        "<p>{}. Your own work comes back when you close them.</p>{}</div>"
+    )
+    return html(menu, word, word, word, word, about, items)

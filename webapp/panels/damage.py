@@ -82,6 +82,9 @@ def add_damage(page: Page) -> None:
     def damage(kind: str, value: Any) -> None:
         session.damage(part().name, kind, value)
 
+    def leave(kind: str, percent: float) -> None:
+        damage(kind, percent / 100.0)
+
     def jam(stuck: bool) -> None:
         angle = at_now()[2 if isinstance(part(), Fin) else 0]
         damage("stuck", math.remainder(float(angle), math.tau) if stuck else None)
@@ -102,7 +105,7 @@ def add_damage(page: Page) -> None:
     least = 100 * STRENGTH_RANGE[0]
     for kind, (label, hint) in shares.items():
         slider = gui.add_slider(label, least, 100.0, 5.0, 100.0, hint=hint, visible=False)
-        page.bind_number(slider, partial(_as_share, damage, kind), _of(kind, 1.0, 100.0), digits=1)
+        page.bind_number(slider, partial(leave, kind), _of(kind, 1.0, 100.0), digits=1)
         board.show(slider, visible=_may(kind))
     held = {
         "stuck": ("Stuck", "It no longer turns from where it is.", jam),
@@ -133,10 +136,6 @@ def _part(selected: str | None, layout: Layout) -> Actuator:
     return part_of(layout, selected or layout.names[0])
 
 
-def _as_share(damage: Callable[[str, float], None], kind: str, percent: float) -> None:
-    damage(kind, percent / 100.0)
-
-
 def _may(kind: str) -> Callable[[str | None, Layout], bool]:
     """Whether the actuator may have a fault of a kind; the thrust of a table cannot be scaled."""
 
@@ -149,15 +148,14 @@ def _may(kind: str) -> Callable[[str | None, Layout], bool]:
 
 
 def _is(kind: str) -> Callable[[str | None, Layout, Health | None], bool]:
-    """Whether it has it."""
     return lambda selected, layout, health: _part(selected, layout).name in dict(getattr(health, kind, ()))
 
 
-def _of(kind: str, whole: Any, unit: Any) -> Callable[[str | None, Layout, Health | None], Any]:
+def _of(kind: str, full: Any, unit: Any) -> Callable[[str | None, Layout, Health | None], Any]:
     """What is known of it, in units for people; `whole` where it has no such fault."""
 
     def value(selected: str | None, layout: Layout, health: Health | None) -> Any:
-        known = dict(getattr(health, kind, ())).get(_part(selected, layout).name, whole)
+        known = dict(getattr(health, kind, ())).get(_part(selected, layout).name, full)
         scaled = np.multiply(known, unit)
         return tuple(scaled.tolist()) if scaled.ndim else float(scaled)
 

@@ -1,15 +1,16 @@
-"""Export: the bundle and the design as files, what each is for, and commands that take them."""
+"""Designs that are shipped, and files that are made of this one: what each is for, and what takes it."""
 
 import math
 import shlex
 
 import viser
 
+from finlab.layout import Layout
 from finlab.layout.damage import Health
 from webapp.handles import add_html
 from webapp.markup.html import html, marker
 from webapp.page import Page
-from webapp.session.files import bundle_name, design_name, graph_name, has_files
+from webapp.session.files import bundle_name, design_name, graph_name, has_files, shipped, shipped_name
 from webapp.session.state import State
 
 
@@ -83,3 +84,32 @@ def command_line(state: State) -> str:
     if state.policy != "closest":
         words += ["--policy", state.policy]
     return shlex.join(words)
+
+
+def add_designs(page: Page) -> None:
+    """The list of shipped designs, and what is said of this one."""
+
+    def open_layout(name: str) -> None:
+        if name in shipped():
+            page.session.open_layout(shipped()[name])
+
+    layouts = page.gui.add_dropdown("Layout", tuple(shipped()), hint="Shipped layouts to start from.")
+    page.board.show(layouts, options=_options)
+    page.bind(layouts, open_layout, lambda layout, saved: shipped_name(layout) or _own(layout, saved))
+    page.add_html(_described)
+
+
+def _own(layout: Layout, saved: Layout) -> str:
+    return f"{layout.name}, {'yours' if layout == saved else 'edited'}"
+
+
+def _options(layout: Layout, saved: Layout) -> tuple[str, ...]:
+    return tuple(shipped()) if shipped_name(layout) else (*shipped(), _own(layout, saved))
+
+
+def _described(layout: Layout) -> str:
+    first = layout.description.strip().split("\n")[0]
+    known = {shipped_layout.description for shipped_layout in shipped().values()}
+    if shipped_name(layout) is None and layout.description in known:  # which is about another robot
+        first = f"Made from {layout.name}, and changed."
+    return html("<div class='fl dim said'>{}</div>", first)

@@ -31,11 +31,10 @@ _VARIABLES = (
     f"--fl-near: {css(NEARLY)}; --fl-reach: {css(REACH)}; }} "
     f"[data-mantine-color-scheme=dark] {{ --fl-reach: {css(REACH_DARK)}; }}"
 )
-SHEETS = ("style.css", "frame.css", "narrow.css", "compact.css")
 STYLE = html(
     "<style>{}{}</style>",
     _VARIABLES,
-    (Markup(files("webapp.markup").joinpath(name).read_text("utf-8")) for name in SHEETS),
+    (Markup(files("webapp.markup").joinpath(name).read_text("utf-8")) for name in ("style.css", "frame.css")),
 )
 LOW = ":root { --tall: 92px; }"
 TALL = ":root { --fl-usual: 344px; }"
@@ -48,7 +47,6 @@ class Section:
     those of other tasks; from then on they stay."""
 
     def __init__(self, page: Page, place: Place, index: int) -> None:
-        """Build the panel."""
         self.place, self.name, self._page = place, f"at-{index}", page
         self._met = False
         gui = page.gui
@@ -78,7 +76,6 @@ class Section:
         self._page.fault(error)
 
     def _say(self, text: str) -> None:
-        """A sentence in place of the panel, or the panel itself."""
         put(self._sentence, content=text, visible=bool(text))
         put(self._folder, visible=self._met and not text)
 
@@ -87,7 +84,6 @@ class Frame:
     """All regions of one page with their sections."""
 
     def __init__(self, page: Page) -> None:
-        """Build everything."""
         self._page, gui = page, page.gui
         run_file(gui, "places.js")
         add_html(gui, html("{}{}", STYLE, marker("fl-chrome")))
@@ -110,7 +106,7 @@ class Frame:
                     for index, place in enumerate(PLACES)
                     if place.region == region
                 ]
-        for name in ("habits.js", "frames.js", "names.js"):
+        for name in ("habits.js", "frames.js"):
             run_file(gui, name)
 
     def _fail(self, error: Exception | None) -> None:
@@ -120,8 +116,7 @@ class Frame:
     def _arrange(
         self, desk: Desk, selected: str | None, stop: Stop | None, swimmer: Swimmer | None, layout: Layout
     ) -> None:
-        """Which regions are there, and which sections in them; the drawer is low until there are plots in
-        it."""
+        """Write which regions and sections are there; the drawer is low until there are plots in it."""
         about = ("", "robot" if selected is None else "actuators", *["guide"] * (stop is not None))
         there = [section for section in self.sections if section.arrange(desk, about)]
         regions = {section.place.region for section in there}
@@ -154,11 +149,9 @@ class Frame:
         run_script(self._page.gui, f"window.finlabDrops = {drops};")
 
     def _title(self, layout: Layout) -> None:
-        """The browser's tab has the robot's name."""
         run_script(self._page.gui, f"document.title = {json.dumps(layout.name + ' · finlab')};")
 
     def _listen(self) -> None:
-        """Hear of what is pressed in the frame."""
         session, robot = self._page.session, self._page.scenery.robot
         acts: dict[str, Callable[[str], object]] = {
             "task": session.show_task,
@@ -177,7 +170,6 @@ class Frame:
 
 
 def _by_key(act: Callable[[str], object], key: str, _held: str) -> object:
-    """An act that does not ask which keys were held."""
     return act(key)
 
 

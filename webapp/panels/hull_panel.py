@@ -121,7 +121,6 @@ def _drawn(page: Page, hull: Hull) -> Hull:
 
 
 def _described(layout: Layout) -> Hull | None:
-    """The hull as the layout describes it."""
     return None if layout.body is None else layout.body.hull
 
 

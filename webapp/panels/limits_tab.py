@@ -28,7 +28,6 @@ def add_reach(page: Page) -> None:
 
 
 def _findings(found: Findings | None, finding: bool, found_error: str | None) -> str:
-    """The card, and what to know about the drawn set."""
     if found_error is not None:
         return Markup("<div class='fl missing'>This layout cannot be analysed.</div>")
     if found is None:
@@ -53,10 +52,10 @@ def add_improving(page: Page) -> None:
         change(SearchRequest.with_way, way)
 
     def accept() -> None:
-        found = improver.findings
+        result = improver.findings
         improver.forget()
-        if found is not None:
-            session.accept_layout(found.layout)
+        if result is not None:
+            session.accept_layout(result.layout)
 
     goals = gui.add_dropdown("Goal", tuple(GOAL_WORDS), hint="What to raise.")
     page.bind(goals, partial(change, SearchRequest.with_goal), lambda draft: draft.goal)
@@ -109,7 +108,6 @@ def _searched(
     better_error: str | None,
     draft: SearchRequest,
 ) -> str:
-    """How far a search is, or what came of it."""
     text = "Searching …" if improving else ""
     if better_error is not None:
         text = html("<div class='missing'>{}</div>", better_error)
@@ -122,24 +120,24 @@ def _searched(
     return html("<div class='fl'>{}</div>", text)
 
 
-def _before_and_after(found: Improvement) -> str:
-    if not found.improved:
+def _before_and_after(result: Improvement) -> str:
+    if not result.improved:
         return "Nothing better was found within reach."
-    before, after = (three_digits(abs(v)) for v in (found.value_before, found.value_after))
-    goal = next(words for words, name in GOAL_WORDS.items() if name == found.goal)
-    stopped = " The search was stopped early." if found.cancelled else ""
+    before, after = (three_digits(abs(v)) for v in (result.value_before, result.value_after))
+    goal = next(words for words, name in GOAL_WORDS.items() if name == result.goal)
+    stopped = " The search was stopped early." if result.cancelled else ""
     unit = GOAL_UNITS[goal]
-    some = found.goal != "mission_power" and len(found.axes) < len(AXES)
-    of = f" of {listed(found.axes)}, with anything on the others" if some else ""
+    some = result.goal != "mission_power" and len(result.axes) < len(AXES)
+    of = f" of {listed(result.axes)}, with anything on the others" if some else ""
     heading = html(
         "<b>{}{}: {}{} before, {}{} after.</b>{}", goal.capitalize(), of, before, unit, after, unit, stopped
     )
-    if found.goal == "mission_power" and -found.value_before * len(MISSION) >= UNREACHED:
+    if result.goal == "mission_power" and -result.value_before * len(MISSION) >= UNREACHED:
         heading += f" A wrench out of reach counts with {UNREACHED:g} W or more."
-    then = found.card_after.authority.alone
-    lost = [axis for axis in found.card_before.authority.alone if axis not in then]
+    then = result.card_after.authority.alone
+    lost = [axis for axis in result.card_before.authority.alone if axis not in then]
     if lost:
         heading += html(" <span class='missing'>It no longer pushes {} alone.</span>", listed(lost))
-    moved = fins_words([found.layout.index(name) for name in found.moved], found.layout).capitalize()
-    table = score_table(found.layout, found.card_after, found.card_before)
+    moved = fins_words([result.layout.index(name) for name in result.moved], result.layout).capitalize()
+    table = score_table(result.layout, result.card_after, result.card_before)
     return html("{} {} moved; the view shows them as shadows.{}", heading, moved, table)

@@ -1,20 +1,24 @@
-"""Why one wrench has many answers: the modes, and where they come from."""
+"""Several answers to one wrench: its modes and where they come from, and those of other methods."""
 
 from functools import partial
 
 import numpy as np
+import viser
 from markupsafe import Markup
 
 from finlab.allocation.allocation import Allocation
+from finlab.allocation.yardstick import REACHED
 from finlab.layout import Layout
 from finlab.mdn.method import WHOLE
 from webapp.handles import add_html
 from webapp.markup.html import html, marker
 from webapp.markup.mode_plot import mode_plot
-from webapp.markup.words import error_digits, source_words, three_digits
+from webapp.markup.verdict import Verdict, verdict_of
+from webapp.markup.words import error_digits, source_words, three_digits, unlearned_sentence
 from webapp.page import Page
 from webapp.presses import placed, press
-from webapp.session.state import DRAWING, State
+from webapp.session.state import DRAWING, State, least_of
+from webapp.tasks.comparison import Run
 from webapp.tasks.mode_names import Modes
 from webapp.theme import MODE_COLORS, css
 
@@ -67,13 +71,11 @@ def add_candidates(page: Page) -> None:
 
 
 def _temperature(state: State) -> float:
-    """That in force."""
     own = DRAWING.get(state.method, DRAWING["mdn"]).temperature
     return own if state.temperature is None else state.temperature
 
 
 def _player(modes: Modes, step: int | None, playing: bool, loops: bool) -> str:
-    """Buttons, and what is done in the step that is shown."""
     if not modes.steps:
         return ""
     play = ("❚❚", "Pause") if playing else ("▶", "Play")
@@ -100,8 +102,8 @@ def _origin_words(layout: Layout, method: str, best: Allocation | None, in_reach
     if method == "paper":
         said = LEARNED
     elif layout.is_of_fins:
-        beside = BESIDE.get(method, f" The answer, number 1, is that of method {method}.")
-        said = PROPOSED + beside
+        aside = BESIDE.get(method, f" The answer, number 1, is that of method {method}.")
+        said = PROPOSED + aside
         if best is not None and not in_reach:
             said = BEYOND.format(best.policy.kind)
         elif best is not None and not np.nan_to_num(best.target).any():
@@ -143,10 +145,70 @@ def mode_table(modes: Modes, mode: int) -> str:
         "<th title='largest share of a range of amplitude or frequency that is used'>used</th></tr>"
     )
     left = modes.count - len(modes.shown)
-    told = f"{left} more are known; they come after these."
-    more = html("<div class='said dim'>{}</div>", told) if left > 0 else ""
+    remark = f"{left} more are known; they come after these."
+    more = html("<div class='said dim'>{}</div>", remark) if left > 0 else ""
     return html("<div class='fl'><table class='modes'>{}{}</table>{}</div>", header, rows, more)
 
 
 def _swatch(k: int) -> str:
     return html("<span class='swatch mode' style='border-color:{}'>{}</span>", css(MODE_COLORS[k]), k + 1)
+
+
+KINDS = {Verdict.EXACT: "given", Verdict.APPROXIMATE: "near", Verdict.OUT_OF_REACH: "missing"}
+
+
+def add_comparison(page: Page) -> None:
+    """A button and a table."""
+    add_html(page.gui, marker("fl-primary"))
+    run = page.add_button(
+        "Compare the methods",
+        lambda: page.jobs.comparison.start(page.session.state),
+        icon=viser.Icon.SCALE,
+        hint="For the present wrench and failures.",
+    )
+    page.board.show(run, disabled=lambda run: run.running)
+    about = "The answers so far stay."
+    cancel = page.add_button("Cancel", page.jobs.comparison.cancel, icon=viser.Icon.X, hint=about)
+    page.board.show(cancel, visible=lambda run: run.running)
+    add_html(page.gui, marker("fl-column"))
+    page.add_html(lambda run, state: comparison_table(run, run.state not in (None, state)))
+
+
+def comparison_table(run: Run, stale: bool) -> str:
+    """Error, power, effort and time of each method."""
+    if run.state is None:
+        return Markup(
+            "<div class='fl dim'>Several methods on the same wrench: error, power, effort, time side by side."
+            "</div>"
+        )
+    rows = []
+    answers = dict(run.answers)
+    in_reach = any(isinstance(answer, Allocation) and answer.reachable for answer in answers.values())
+    for method in run.methods:
+        answer = answers.get(method)
+        if isinstance(answer, Allocation) and answer.unknown_fins:
+            words = unlearned_sentence(answer.layout, answer.unknown_fins)
+            cells = html("<td colspan='4' class='words missing'>{}</td>", words)
+        elif isinstance(answer, Allocation):
+            figures = (answer.power, answer.effort, answer.solve_ms)
+            kind = KINDS[verdict_of(answer, in_reach)]
+            error = html("<td class='{}'>{}</td>", kind, error_digits(answer.err_norm))
+            cells = error + Markup().join(html("<td>{}</td>", three_digits(value)) for value in figures)
+        else:
+            cells = html("<td colspan='4' class='words dim'>{}</td>", answer or ("…" if run.running else "–"))
+        rows.append(html("<tr><td>{}</td><td>{}</td>{}</tr>", method, least_of(method), cells))
+    header = Markup(
+        "<tr><th>method</th><th>least</th><th>error</th><th>power [W]</th><th>effort</th><th>time [ms]</th>"
+        "</tr>"
+    )
+    said = html(
+        "<div class='said'><span class='given'>Green</span>: exact, an error of at most {}. <span "
+        "class='near'>Ochre</span>: approximate, another method is exact. <span "
+        "class='missing'>Orange</span>: out of reach of all.</div>",
+        REACHED,
+    )
+    note = (
+        Markup("<div class='missing'>The question has changed since; compare again.</div>") if stale else ""
+    )
+    body = Markup().join(rows)
+    return html("<div class='fl'><table class='methods'>{}{}</table>{}{}</div>", header, body, said, note)

@@ -1,24 +1,31 @@
 """Which panel stands where: the one table of the frame. A panel is built by a function of the page."""
 
 from collections.abc import Callable
-from functools import partial
 from typing import NamedTuple
 
 from webapp.page import Page
 from webapp.panels.actuator_inspector import add_actuator
 from webapp.panels.actuator_list import add_actuator_list
 from webapp.panels.body_inspector import add_body
-from webapp.panels.cards import add_answer, add_switches, camera, card, check, guide_card, robot_name, tasks
-from webapp.panels.compare_tab import add_comparison
+from webapp.panels.cards import (
+    add_answer,
+    add_answering,
+    add_file,
+    add_history,
+    add_switches,
+    camera,
+    card,
+    check,
+    guide_card,
+    robot_name,
+    tasks,
+)
 from webapp.panels.damage import add_damage
-from webapp.panels.design_panel import add_designs
-from webapp.panels.files_tab import add_files
+from webapp.panels.files_tab import add_designs, add_files
 from webapp.panels.hull_panel import add_hull
 from webapp.panels.limits_tab import add_improving, add_reach
-from webapp.panels.modes_tab import add_candidates
-from webapp.panels.swim_tab import add_figures, add_run, add_scenario
-from webapp.panels.timeline import add_timeline
-from webapp.panels.top_bar import add_answering, add_file, add_history
+from webapp.panels.modes_tab import add_candidates, add_comparison
+from webapp.panels.swim_tab import add_figures, add_run, add_scenario, add_timeline
 from webapp.panels.wrench_tab import add_commands, add_target
 from webapp.session.looking import TASKS
 
@@ -43,18 +50,18 @@ class Place(NamedTuple):
 
 
 PLACES = (
-    Place(TOP, TASKS, "Robot", partial(card, robot_name)),
+    Place(TOP, TASKS, "Robot", card(robot_name)),
     Place(TOP, TASKS, "File", add_file),
     Place(TOP, TASKS, "History", add_history),
-    Place(TOP, TASKS, "Tasks", partial(card, tasks)),
+    Place(TOP, TASKS, "Tasks", card(tasks)),
     Place(TOP, TASKS, "Answers", add_answering),
-    Place(LEFT, TASKS, "Guide", partial(card, guide_card), about="guide"),
+    Place(LEFT, TASKS, "Guide", card(guide_card), about="guide"),
     Place(LEFT, (DESIGN,), "Actuators", add_actuator_list),
     Place(LEFT, (DESIGN,), "Designs", add_designs),
     Place(RIGHT, (DESIGN,), "Actuator", add_actuator, about="actuators"),
     Place(RIGHT, (DESIGN,), "Body", add_body, about="robot"),
     Place(RIGHT, (DESIGN,), "Hull", add_hull, folded=True, about="robot"),
-    Place(RIGHT, (DESIGN,), "Check", partial(card, check)),
+    Place(RIGHT, (DESIGN,), "Check", card(check)),
     Place(DRAWER, (DESIGN,), "Reach", add_reach),
     Place(DRAWER, (DESIGN,), "Improve", add_improving),
     Place(LEFT, (ALLOCATE,), "Actuators", add_commands),
@@ -68,6 +75,6 @@ PLACES = (
     Place(RIGHT, (SIMULATE,), "Figures", add_figures),
     Place(DRAWER, (SIMULATE,), "Swim over time", add_timeline),
     Place(RIGHT, (EXPORT,), "Files", add_files),
-    Place(VIEW, TASKS, "Camera", partial(card, camera)),
+    Place(VIEW, TASKS, "Camera", card(camera)),
     Place(VIEW, TASKS, "Display", add_switches, folded=True),
 )

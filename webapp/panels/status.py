@@ -9,10 +9,10 @@ from finlab.allocation.allocation import Allocation
 from finlab.allocation.policy import AXES
 from webapp.handles import put
 from webapp.markup.html import html
-from webapp.markup.verdict import WORKING, verdict_of, verdict_sentence
+from webapp.markup.verdict import COLORS, WORKING, verdict_of, verdict_sentence
 from webapp.markup.words import error_digits, parts_word, three_digits
 from webapp.page import Page
-from webapp.scene.proportions import arrow_size
+from webapp.scene.stage import arrow_size
 from webapp.scene.wrench_nodes import Scale, set_scale
 from webapp.session.looking import Display
 from webapp.session.state import AXIS_UNITS, LEAST, State
@@ -92,8 +92,8 @@ def set_rows(findings: Findings | None, size: float) -> str:
         return ""
     rows = [_key(_patch(css(REACH, 0.6)), "in reach")]
     if findings.whole is not None:
-        asked = findings.question
-        word = "with all" if asked.failed else "before"
+        question = findings.question
+        word = "with all" if question.failed else "before"
         rows.append(_key(_patch(css(DEAD, 0.45)), word))
     ball = html("<svg width='44' height='12'><circle cx='22' cy='6' r='5' fill='{}'/></svg>", css(ASKED))
     unit = "N" if findings.now.kind == "force" else "N m"
@@ -152,8 +152,7 @@ def corner(
 
 
 def _figures(allocation: Allocation, least: bool, in_reach: bool, refined: str) -> list[str]:
-    """Error, costs, time and verdict of what is on the robot."""
-    color, verdict = verdict_of(allocation, in_reach).color, verdict_sentence(allocation, in_reach)
+    color, verdict = COLORS[verdict_of(allocation, in_reach)], verdict_sentence(allocation, in_reach)
     if refined:
         color, verdict = DEAD, refined
     pill = "pill long" if len(verdict) > LONG else "pill"

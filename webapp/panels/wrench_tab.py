@@ -104,7 +104,6 @@ def _switch(axis: int, counts: bool) -> str:
 
 
 def _at_rest(layout: Layout, flow: Flow | None) -> str:
-    """Why rudders give nothing."""
     rudders = [part.name for part in layout.actuators if part.type == "rudder"]
     if flow is not None or not rudders:
         return ""
@@ -113,7 +112,6 @@ def _at_rest(layout: Layout, flow: Flow | None) -> str:
 
 
 def _sentence(ranges_error: str | None) -> str:
-    """Why nothing is known of what is in reach."""
     if ranges_error is None:
         return marker("fl-reach-end")
     said = "{}<div class='fl missing'>What is in reach: {}</div>"

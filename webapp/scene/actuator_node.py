@@ -16,8 +16,8 @@ from finlab.hull import Surface
 from finlab.hull.shapes import Mesh
 from finlab.layout import Actuator, Azimuth, Fin, Rudder, Thruster
 from webapp.handles import put
-from webapp.scene.meshes import blades, thrusters
-from webapp.scene.meshes.mesh import NOTHING, force_arrow, joined, tube
+from webapp.scene import actuator_shapes as shapes
+from webapp.scene.arrows import NOTHING, force_arrow, joined, tube
 from webapp.scene.stage import Shape
 from webapp.theme import DEAD, LIGHT, MISSING, fin_color
 
@@ -65,8 +65,8 @@ def motion(part: Actuator, command: Array | None) -> Motion:
 def _moving(kind: type[Actuator], slenderness: float) -> Mesh:
     """What of an actuator turns about its first axis, in its own frame."""
     if issubclass(kind, Rudder):
-        return blades.foil(slenderness)
-    return blades.blade() if issubclass(kind, Fin) else thrusters.duct(int(issubclass(kind, Azimuth)))
+        return shapes.foil(slenderness)
+    return shapes.blade() if issubclass(kind, Fin) else shapes.duct(int(issubclass(kind, Azimuth)))
 
 
 def _mount(kind: type[Actuator], up: bool) -> Mesh:
@@ -74,12 +74,12 @@ def _mount(kind: type[Actuator], up: bool) -> Mesh:
     if issubclass(kind, Thruster):
         return NOTHING
     if issubclass(kind, Azimuth):
-        return thrusters.column(up)
-    return blades.stock() if issubclass(kind, Rudder) else blades.shaft()
+        return shapes.column(up)
+    return shapes.stock() if issubclass(kind, Rudder) else shapes.shaft()
 
 
 def _propeller(along: int) -> Mesh:
-    return NOTHING if along < 0 else thrusters.propeller(along)
+    return NOTHING if along < 0 else shapes.propeller(along)
 
 
 def shape_of(part: Actuator, size: float) -> tuple[float, float]:
@@ -123,7 +123,7 @@ class ActuatorNode:
         self._pin = Shape(scene, f"{parent}/pin", MISSING)
         self._force = Shape(scene, f"{parent}/force", self._color, cast_shadow=False)
         fan: dict[str, Any] = {"opacity": 0.3, "side": "double", "cast_shadow": False}
-        self._fan = Shape(scene, f"{parent}/fan", self._color, blades.sweep(0.1), **fan)
+        self._fan = Shape(scene, f"{parent}/fan", self._color, shapes.sweep(0.1), **fan)
         self._label = scene.add_label(
             f"{name}/label", str(index + 1), anchor="center-center", font_screen_scale=LABEL
         )
@@ -179,9 +179,9 @@ class ActuatorNode:
             put(shape.node, scale=scale)
         put(self._fan.node, scale=size)
         put(self._force.node, scale=arrows)
-        self._pin.show(blades.pin, size)
+        self._pin.show(shapes.pin, size)
         put(self._pin.node, visible=stuck)
-        self._root = np.array([size / arrows * (blades.ROOT + blades.SPAN / 2) * is_fin, 0.0, 0.0])
+        self._root = np.array([size / arrows * (shapes.ROOT + shapes.SPAN / 2) * is_fin, 0.0, 0.0])
         put(self._move, visible=True, active_axes=(moved,) * 3, scale=GIZMO_SIZE * arrows)
         if not owned_by_user:
             put(self._move, position=place)
@@ -190,7 +190,7 @@ class ActuatorNode:
         if is_fin:
             place = place - 0.03 * size * frame[0]
         elif is_pod:
-            column = size * thrusters.COLUMN[-1, 0] * frame[0]
+            column = size * shapes.COLUMN[-1, 0] * frame[0]
             place = place + (column if inward @ frame[0] >= 0.0 else -column)
         self._strut.show(_strut, place, hull, 0.008 * size)
         put(self._strut.node, visible=True)
@@ -203,13 +203,12 @@ class ActuatorNode:
         put(self._fan.node, visible=alive and moves.amplitude > 0.0)
         if alive:
             half = moves.angle / 2
-            self._fan.show(blades.sweep, moves.amplitude)
+            self._fan.show(shapes.sweep, moves.amplitude)
             put(self._fan.node, wxyz=np.array([math.cos(half), math.sin(half), 0.0, 0.0]))
             self._force.show(force_arrow, frame @ arrow, self._root, 0.007)
 
 
 def _strut(end: Array, hull: Surface, radius: float) -> Mesh:
-    """A rod from an end to the hull, nothing where that already lies in it."""
     anchor = hull.anchor(end)
     if np.linalg.norm(anchor - end) < 5e-3:
         return NOTHING

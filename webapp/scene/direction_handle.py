@@ -8,7 +8,7 @@ import viser
 
 from finlab.arrays import Array
 from webapp.handles import put
-from webapp.scene.meshes.mesh import tube
+from webapp.scene.arrows import tube
 from webapp.scene.stage import Shape
 from webapp.theme import LIGHT, Rgb
 
@@ -62,7 +62,6 @@ class DirectionHandle:
             self._turn()
 
     def _turn(self) -> None:
-        """The shortest way from the first axis."""
         x, y, z = self._direction
         wxyz = np.array([1.0 + x, 0.0, -z, y]) if x > -1.0 + 1e-9 else np.array([0.0, 0.0, 1.0, 0.0])
         put(self._root, wxyz=wxyz / np.linalg.norm(wxyz))

@@ -6,7 +6,6 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-import viser
 
 from finlab.allocation.allocation import Allocation
 from finlab.analysis import Improvement
@@ -20,8 +19,7 @@ from webapp.handles import put
 from webapp.markup.words import damage_words, missing_part
 from webapp.scene.actuator_node import ActuatorNode, Motion, motion, moved_parts
 from webapp.scene.direction_handle import DirectionHandle
-from webapp.scene.proportions import arrow_size, part_size, view_size
-from webapp.scene.stage import Shape, Stage, aim_camera
+from webapp.scene.stage import Shape, Stage, aim_camera, arrow_size, part_size, view_size
 from webapp.scene.wrench_nodes import LENGTH, AttainableNodes, Scale, WrenchNodes
 from webapp.session.looking import Display
 from webapp.session.state import chosen
@@ -54,7 +52,8 @@ class RobotScene:
         self.root = scene.add_frame("/robot", show_axes=False)
         self._stage = Stage(scene, hull_of(session.state.layout))
         self._wrench = WrenchNodes(scene)
-        self._offered = Offered(scene)
+        ghost: dict[str, Any] = {"opacity": 0.6, "visible": False, "cast_shadow": False}
+        self._offered = Shape(scene, "/robot/proposed", LIGHT.glass, **ghost)
         self._attainable = AttainableNodes(scene)
         self._direction = DirectionHandle(self._client, self._turn)
         self._fins: list[ActuatorNode] = []
@@ -62,16 +61,9 @@ class RobotScene:
         self._moves: list[Motion] = []
         self._size = view_size(session.state.layout)
         self._flaps = ""
-        for act in (
-            self._show_stage,
-            self._place,
-            self._push,
-            self._flap,
-            self._show_wrench,
-            self._show_sets,
-            self._offer,
-        ):
-            board.act(act)
+        shows = (self._show_stage, self._place, self._push, self._flap, self._show_wrench, self._show_sets)
+        for show in (*shows, self._offer):
+            board.act(show)
         self.look_from("3D")
 
     def hide(self) -> None:
@@ -81,7 +73,7 @@ class RobotScene:
     def show(self, swimmer: Swimmer | None) -> None:
         """A robot that does not swim stands on a floor of its own."""
         put(self.root, visible=True)
-        self._stage.show_floor(swimmer is None)
+        put(self._stage.floor, visible=swimmer is None)
         if swimmer is None:
             put(self.root, position=np.zeros(3), wxyz=np.array([1.0, 0.0, 0.0, 0.0]))
 
@@ -136,7 +128,6 @@ class RobotScene:
         dragged: int | None,
         swims: bool,
     ) -> None:
-        """Actuators where they are, with their numbers and gizmos."""
         hull, sizes = hull_of(drawn), (part_size(drawn), arrow_size(drawn))
         while len(self._fins) < drawn.n:
             self._fins.append(ActuatorNode(self._client.scene, len(self._fins), self._clicked, self._drag))
@@ -145,9 +136,9 @@ class RobotScene:
         edited = selected if task == "Design" and not swims else None
         stuck = () if health is None or swims else dict(health.stuck)
         for i, part in enumerate(drawn.actuators):
-            told = "" if swims or part.name in failed else damage_words(health, part.name)
+            remark = "" if swims or part.name in failed else damage_words(health, part.name)
             named = part.name if swims else _named(part)  # one that swims is elsewhere
-            words = (str(i + 1), named if part.name in selection else "", told)
+            words = (str(i + 1), named if part.name in selection else "", remark)
             label = " ".join([word for word in words if word])
             moved, pinned = part.name == edited, part.name in stuck
             self._fins[i].place(part, hull, sizes, moved, label, pinned, i == dragged)
@@ -166,7 +157,6 @@ class RobotScene:
         scale: Scale,
         moment: Moment | None,
     ) -> None:
-        """What actuators do, and their forces."""
         lost = failed if moment is None else moment.lost
         if moment is not None:
             commands, forces, frames = moment.motion, moment.force, drawn.frames
@@ -194,10 +184,10 @@ class RobotScene:
     ) -> None:
         """The page moves the fins (`frames.js`): it is told the commands of all, and how fast."""
         speed, still = (SPEED, display.frozen) if moment is None else (swim.speed, paused or moment.done)
-        told = json.dumps([self._moves, speed, still])[1:-1]
-        if told != self._flaps:
-            self._flaps = told
-            run_script(self._client.gui, f"finlabFrames.flap({told});")
+        moves = json.dumps([self._moves, speed, still])[1:-1]
+        if moves != self._flaps:
+            self._flaps = moves
+            run_script(self._client.gui, f"finlabFrames.flap({moves});")
 
     def _show_wrench(
         self,
@@ -207,15 +197,15 @@ class RobotScene:
         scale: Scale,
         moment: Moment | None,
     ) -> None:
-        asked, given, missing = np.array(target), np.zeros(6), np.zeros(6)
+        demanded, delivered, missing = np.array(target), np.zeros(6), np.zeros(6)
         if moment is not None:
-            asked, given = moment.asked * FORCES_ONLY, moment.delivered * FORCES_ONLY
+            demanded, delivered = moment.asked * FORCES_ONLY, moment.delivered * FORCES_ONLY
         elif shown is not None:
-            given, missing = shown.wrench, missing_part(shown)
+            delivered, missing = shown.wrench, missing_part(shown)
         hull = hull_of(drawn)
         top = hull.center[2] + hull.half[2]
         lengths = LENGTH / scale.newtons, HALF_TURN / scale.torque
-        self._wrench.refresh(asked, given, missing, top, *lengths, arrow_size(drawn))
+        self._wrench.refresh(demanded, delivered, missing, top, *lengths, arrow_size(drawn))
 
     def _show_sets(
         self, found: Findings | None, display: Display, target: tuple[float, ...], task: str, drawn: Layout
@@ -224,9 +214,14 @@ class RobotScene:
         self._attainable.refresh(shown, np.array(target), arrow_size(drawn))
 
     def _offer(self, better: Improvement | None, layout: Layout, swims: bool) -> None:
-        self._offered.show(
-            better.layout if better is not None and better.improved and not swims else None, layout
-        )
+        """The actuators that a search would put elsewhere, where it would put them."""
+        other = better.layout if better is not None and better.improved and not swims else None
+        now = {part.name: (part.position, part.frame) for part in layout.actuators}
+        parts = () if other is None or other.name != layout.name else other.actuators
+        moved = tuple(part for part in parts if now.get(part.name) != (part.position, part.frame))
+        put(self._offered.node, visible=bool(moved))
+        if moved:
+            self._offered.show(moved_parts, moved, part_size(layout))
 
     def _clicked(self, index: int, also: bool) -> None:
         select = self._session.select_also if also else self._session.select
@@ -252,23 +247,5 @@ class RobotScene:
             session.history.end_merge()
 
 
-class Offered:
-    """The actuators that a search would put elsewhere, where it would put them."""
-
-    def __init__(self, scene: viser.SceneApi) -> None:
-        ghost: dict[str, Any] = {"opacity": 0.6, "visible": False, "cast_shadow": False}
-        self._shape = Shape(scene, "/robot/proposed", LIGHT.glass, **ghost)
-
-    def show(self, other: Layout | None, layout: Layout) -> None:
-        """Show what of a better version of a layout stands elsewhere now; None hides the node."""
-        now = {part.name: (part.position, part.frame) for part in layout.actuators}
-        parts = () if other is None or other.name != layout.name else other.actuators
-        moved = tuple(part for part in parts if now.get(part.name) != (part.position, part.frame))
-        put(self._shape.node, visible=bool(moved))
-        if moved:
-            self._shape.show(moved_parts, moved, part_size(layout))
-
-
 def _named(part: Actuator) -> str:
-    """Name and place of an actuator."""
     return f"{part.name}, {', '.join(f'{value:.3f}' for value in part.position)} m".replace("-", "−")

@@ -1,21 +1,29 @@
-"""What is seen beside the panel: the robot that is designed, or those that swim."""
+"""The view of one page: the robot that is designed, or the one that swims in its water."""
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
+import viser
 
 from finlab.allocation.allocation import Allocation
+from finlab.arrays import Array
+from finlab.hull.shapes import Mesh
 from webapp.board import Board
+from webapp.handles import put
+from webapp.scene.arrows import NOTHING, force_arrow, joined, tube
 from webapp.scene.robot_scene import RobotScene
-from webapp.scene.swim_scene import SwimScene
+from webapp.scene.stage import Shape, add_floor, aim_camera, paint_floor, view_size
 from webapp.scene.wrench_nodes import Scale, fitting_scale, swim_scale
 from webapp.session.lessons import Stop
 from webapp.session.looking import Display
 from webapp.session.swim_plan import SwimSettings
 from webapp.tasks.context import Context
+from webapp.tasks.moment import PLACE, Moment
 from webapp.tasks.swimmer import Swimmer
 from webapp.tasks.swimming import Swimming
-from webapp.theme import BRAND
+from webapp.theme import ASKED, BRAND, DELIVERED, WATER
+from webapp.viser_internals import run_script
 
 FIRST = Scale(1.0, 1.0, False)
 
@@ -102,3 +110,107 @@ class Scenery:
         self.robot.frame()
         if stop.swims:
             self._swimming.start(SwimSettings().plan(session.state))
+
+
+FLOW_S = 6.0
+"""The arrow of the water is as long as its way in this time [s]."""
+BEYOND_M = 0.3
+"""How far it begins beyond the path [m]."""
+DEPTH_BELOW = 0.6
+"""How far the floor is below the deepest point of the way [m]."""
+NO_LINE = np.zeros((1, 2, 3), dtype=np.float32)
+TRAIL_POINTS = 250
+
+
+class SwimScene:
+    """Draws a swim; nothing of it is there while no robot swims."""
+
+    def __init__(self, client: viser.ClientHandle, swimming: Swimming, root: viser.FrameHandle) -> None:
+        """`root` carries the robot."""
+        self._client, self._swimming, self._root = client, swimming, root
+        scene = client.scene
+        self._goal = Shape(scene, "/swim/goal", ASKED, opacity=0.45, visible=False, cast_shadow=False)
+        self._reference = scene.add_icosphere(
+            "/swim/reference", 0.035, color=ASKED, visible=False, cast_shadow=False
+        )
+        fade: dict[str, Any] = {"fade_distance": 14.0, "fade_strength": 1.4, "shadow_opacity": 0.18}
+        self._water = Shape(scene, "/swim/water", WATER, opacity=0.9, visible=False, cast_shadow=False)
+        self._floor = add_floor(scene, "/swim/floor", 14.0, 0.25, 1.0, visible=False, **fade)
+        self._trail = scene.add_line_segments(
+            "/swim/trail", NO_LINE, DELIVERED, thickness=3.5, thickness_units="screen", visible=False
+        )
+        self._shown: Swimmer | None = None
+        self._behind: Moment | None = None
+        self._ahead: Moment | None = None
+        self._clock = 0.0
+
+    def refresh(self, swimmer: Swimmer | None, moment: Moment | None, display: Display) -> None:
+        """Show the newest moment."""
+        for node in (self._goal.node, self._reference, self._floor, self._water.node, self._trail):
+            put(node, visible=swimmer is not None)
+        paint_floor(self._floor, display.dark)
+        if swimmer is None or moment is None:
+            if self._shown is not None:
+                run_script(self._client.gui, "finlabFrames.follow(null);")
+            self._shown = self._ahead = None
+            return
+        if swimmer is not self._shown:
+            self._begin(swimmer)
+        self._behind, self._ahead = self._ahead or moment, moment
+        self._clock = self._behind.time
+        put(self._reference, position=moment.reference)
+        self._draw_water(swimmer)
+        places = moment.record[:, PLACE : PLACE + 3]
+        places = places[:: max(1, len(places) // TRAIL_POINTS)]
+        points = (
+            np.stack([places[:-1], places[1:]], axis=1).astype(np.float32) if len(places) > 1 else NO_LINE
+        )
+        put(self._trail, points=points, colors=np.array(DELIVERED, dtype=np.uint8))
+
+    def _begin(self, swimmer: Swimmer) -> None:
+        """Another swim: its way, the robot at its start, and the camera where all of it can be seen."""
+        self._shown, self._ahead = swimmer, None
+        self._goal.show(_goal, swimmer.path)
+        put(self._floor, position=np.array([0.0, 0.0, swimmer.path[:, 2].min() - DEPTH_BELOW]))
+        start = swimmer.shown.pose
+        self._pose(start)
+        self._look(swimmer.path, start[:3], view_size(swimmer.layout))
+        run_script(self._client.gui, f"finlabFrames.follow({start[:3].tolist()});")
+
+    def _draw_water(self, swimmer: Swimmer) -> None:
+        path, flow = swimmer.path, swimmer.shown.flow
+        place = np.array([path[:, 0].min() - BEYOND_M, path[:, 1].max() + BEYOND_M, path[:, 2].mean()])
+        self._water.show(force_arrow, np.round(FLOW_S * flow, 2), place, 0.03)
+
+    def _look(self, path: Array, start: Array, size: float) -> None:
+        """Show the robot, of a size, and much of the path (N, 3); `frames.js` lets the camera go along."""
+        extent = float(np.linalg.norm(np.ptp(path, axis=0)[:2]))
+        distance = max(0.18 * extent, 0.9 * size)
+        place = start + distance * np.array([-0.6, -0.75, 0.8])
+        aim_camera(self._client, place, start + distance * np.array([0.1, 0.0, -0.05]))
+
+    def _pose(self, pose: Array) -> None:
+        put(self._root, position=pose[:3], wxyz=pose[3:] / np.linalg.norm(pose[3:]))
+
+    def animate(self, elapsed: float) -> None:
+        """Move on by some time on the wall [s], towards the last moment and never beyond it."""
+        swimming, behind, ahead = self._swimming, self._behind, self._ahead
+        if (
+            behind is None
+            or ahead is None
+            or swimming.swimmer is not self._shown
+            or self._clock >= ahead.time
+        ):
+            return
+        self._clock = min(self._clock + elapsed * (swimming.pace.rate or swimming.pace.speed), ahead.time)
+        share = (self._clock - behind.time) / (ahead.time - behind.time)
+        start, end = behind.pose, ahead.pose.copy()
+        if start[3:] @ end[3:] < 0:
+            end[3:] *= -1.0
+        self._pose((1 - share) * start + share * end)
+
+
+def _goal(path: Array) -> Mesh:
+    steps = np.linalg.norm(np.diff(path, axis=0), axis=1)
+    kept = path[np.concatenate([[True], steps > 1e-6])]
+    return joined(tube(kept, 0.006, 8)) if len(kept) > 1 else NOTHING

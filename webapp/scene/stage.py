@@ -1,17 +1,19 @@
-"""The water, the floor, the hull and its axes."""
+"""The water, the floor, the hull and its axes, and how large things are drawn."""
 
 import math
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 import viser
 
 from finlab.arrays import Array
-from finlab.hull import Surface
+from finlab.hull import Surface, hull_of
 from finlab.hull.shapes import STATIONS, Mesh, shape_mesh
+from finlab.layout import Layout
 from webapp.handles import put
-from webapp.scene.meshes.mesh import NOTHING
+from webapp.scene.arrows import NOTHING
 from webapp.theme import LIGHT, Look, Rgb, look
 
 BELOW = 0.22
@@ -30,15 +32,6 @@ def aim_camera(client: viser.ClientHandle, place: Array, target: Array) -> None:
         client.camera.up_direction = (0.0, 0.0, 1.0)
         client.camera.position = place
         client.camera.look_at = target
-
-
-def light_up(scene: viser.SceneApi) -> None:
-    """Light from above, and a little from the water below.
-
-    Viser's default, surfaces that mirror a picture of a hall, takes twice the time without a graphics card.
-    """
-    scene.configure_environment_map(None)
-    scene.add_light_hemisphere("/light", sky_color=SKY, ground_color=DEEP, intensity=BRIGHT)
 
 
 def add_floor(
@@ -66,7 +59,9 @@ class Stage:
         self._scene = scene
         self._hull = hull
         self._look: tuple[bool, bool] | None = None
-        light_up(scene)
+        # Surfaces that mirror a picture, viser's default, take twice the time without a graphics card.
+        scene.configure_environment_map(None)
+        scene.add_light_hemisphere("/light", sky_color=SKY, ground_color=DEEP, intensity=BRIGHT)
         mesh, bow = hull.mesh, _bow(hull)
         self._body = Shape(scene, "/robot/hull", LIGHT.hull, mesh, side="double")
         self._bow = Shape(scene, "/robot/hull/bow", LIGHT.glass, bow, side="double", cast_shadow=False)
@@ -74,7 +69,7 @@ class Stage:
             "/robot/axes", axes_length=0.09, axes_radius=0.004, origin_radius=0.009, origin_color=(40, 40, 40)
         )
         fade: dict[str, Any] = {"fade_distance": 5.0, "fade_strength": 1.6, "shadow_opacity": 0.22}
-        self._grid = add_floor(scene, "/floor", 6.0, 0.1, 0.5, **fade)
+        self.floor = add_floor(scene, "/floor", 6.0, 0.1, 0.5, **fade)
 
     def refresh(self, hull: Surface, dark: bool, shadows: bool, net: bool, glass: bool, size: float) -> None:
         """Show another hull, theme or quality; a hull of glass, or a mere net, lets one look inside. Axes and
@@ -86,18 +81,14 @@ class Stage:
             self._hull = hull
             self._body.become(hull.mesh)
             self._bow.become(_bow(hull))
-        for node in (self._axes, self._grid):
+        for node in (self._axes, self.floor):
             put(node, scale=size)
-        put(self._grid, position=np.array([0.0, 0.0, hull.center[2] - hull.half[2] - BELOW * size]))
+        put(self.floor, position=np.array([0.0, 0.0, hull.center[2] - hull.half[2] - BELOW * size]))
         if self._look != (dark, shadows):
             self._look = dark, shadows
             self._scene.configure_default_lights(cast_shadow=shadows)
             self._paint(look(dark))
-            paint_floor(self._grid, dark)
-
-    def show_floor(self, visible: bool) -> None:
-        """Show the floor, or leave it to others."""
-        put(self._grid, visible=visible)
+            paint_floor(self.floor, dark)
 
     def _paint(self, colors: Look) -> None:
         fade = np.linspace(0, 1, 64)[:, None, None]
@@ -137,9 +128,39 @@ class Shape:
 
 
 def _bow(hull: Surface) -> Mesh:
-    """A dark window over the foremost part of a shape, a little proud of it: it shows which end is the bow. A
-    mesh from a file shows that by itself."""
+    """A dark window over the foremost part of a shape; a mesh from a file shows its bow by itself."""
     if hull.file is not None:
         return NOTHING
     stations = np.concatenate([[BOW], STATIONS[STATIONS > BOW]])
     return shape_mesh(hull.shape, hull.half, hull.center, stations, PROUD)
+
+
+HALF_DIAGONAL, MEAN_SIZE = 0.3455, 0.35
+"""Of the U-CAT's hull: half its diagonal, and the geometric mean of its three sizes [m]."""
+APART = 0.12
+"""Actuators of size 1 that stand so far apart [m] do not touch."""
+STEPS = np.array([0.1, 0.2, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0, 20.0, 50.0])
+"""Lengths of arrows are whole numbers of something that a legend can say."""
+
+
+@lru_cache(maxsize=8)
+def view_size(layout: Layout) -> float:
+    """How far the robot reaches, and hence how far off the camera stands."""
+    hull = hull_of(layout)
+    reach = np.linalg.norm(layout.position - np.array(hull.center), axis=1).max()
+    return max(float(np.linalg.norm(hull.half)), float(reach)) / HALF_DIAGONAL
+
+
+def arrow_size(layout: Layout) -> float:
+    """How much larger arrows and rings are than for a U-CAT: one of `STEPS`."""
+    return float(STEPS[np.argmin(np.abs(np.log(STEPS / view_size(layout))))])
+
+
+@lru_cache(maxsize=8)
+def part_size(layout: Layout) -> float:
+    """Size of the actuators: after the hull, and no larger than there is room between them."""
+    between = layout.position[:, None] - layout.position
+    apart = np.linalg.norm(between, axis=-1)[~np.eye(layout.n, dtype=bool)]
+    by_hull = 2.0 * math.prod(hull_of(layout).half) ** (1 / 3) / MEAN_SIZE
+    room = float(apart.min(initial=np.inf)) / APART
+    return max(min(by_hull, room), 0.15 * by_hull)

@@ -14,7 +14,7 @@ from finlab.arrays import Array
 from finlab.hull.shapes import Mesh
 from webapp.handles import put
 from webapp.markup.words import missing_part
-from webapp.scene.meshes.mesh import LONGEST_TURN, NOTHING, RING_RADIUS, force_arrow, torque_ring, tube
+from webapp.scene.arrows import LONGEST_TURN, NOTHING, RING_RADIUS, force_arrow, torque_ring, tube
 from webapp.scene.stage import Shape
 from webapp.tasks.jobs import Findings
 from webapp.tasks.swimmer import Swimmer
@@ -50,8 +50,8 @@ class Scale(NamedTuple):
 
 def fitting_scale(target: Sequence[float], shown: Allocation | None, now: Scale) -> Scale:
     """The scale for a target (6,) and what is shown of it; `now` as far as that is good enough."""
-    asked = np.array(target)
-    forces, torques = [asked[:3]], [asked[3:]]
+    demanded = np.array(target)
+    forces, torques = [demanded[:3]], [demanded[3:]]
     if shown is not None:
         forces += [shown.wrench[:3], *shown.forces]
         torques += [missing_part(shown)[3:], shown.wrench[3:]]
@@ -101,13 +101,13 @@ class WrenchNodes:
         self._missing = node("missing_force", MISSING, None), node("missing_torque", MISSING, None)
 
     def refresh(
-        self, target: Array, given: Array, missing: Array, top: float, scale: float, turn: float, size: float
+        self, target: Array, got: Array, missing: Array, top: float, scale: float, turn: float, size: float
     ) -> None:
         """Show a target (6,) and what is delivered of it (6,), zero while unknown.
 
         Args:
             target: asked wrench [N, N m].
-            given: delivered wrench.
+            got: delivered wrench [N, N m].
             missing: the part (6,) of the difference that matters enough to be drawn.
             top: height of the hull's top [m].
             scale: length of a force arrow per newton [m/N].
@@ -120,9 +120,9 @@ class WrenchNodes:
         zero = np.zeros(3)
         self._asked[0].show(force_arrow, target[:3] * scale, zero, 0.011)
         self._asked[1].show(torque_ring, target[3:] * turn, zero, 0.0085)
-        self._given[0].show(force_arrow, given[:3] * scale, zero, 0.0065)
-        self._given[1].show(torque_ring, given[3:] * turn, zero, 0.005)
-        self._missing[0].show(force_arrow, missing[:3] * scale, given[:3] * scale, 0.006)
+        self._given[0].show(force_arrow, got[:3] * scale, zero, 0.0065)
+        self._given[1].show(torque_ring, got[3:] * turn, zero, 0.005)
+        self._missing[0].show(force_arrow, missing[:3] * scale, got[:3] * scale, 0.006)
         self._missing[1].show(torque_ring, missing[3:] * turn, zero, 0.005, 1.35 * RING_RADIUS)
 
 
@@ -143,9 +143,9 @@ class AttainableNodes:
     def refresh(self, findings: Findings | None, target: Array, size: float) -> None:
         """Show the sets of findings, nothing for None, as large as `size` says; the ball marks what `target`
         (6,) asks in them."""
-        now, whole = (None, None) if findings is None else (findings.now, findings.whole)
+        now, full = (None, None) if findings is None else (findings.now, findings.whole)
         scale = 1.0 if findings is None else set_scale(findings)
-        for shape, body in ((self._now, now), (self._whole, whole)):
+        for shape, body in ((self._now, now), (self._whole, full)):
             put(shape.node, visible=body is not None, scale=size)
             if body is not None:
                 shape.show(_body, body.vertices * scale, body.faces, body.outline)

@@ -136,7 +136,7 @@ class Opening:
     def __init__(self, gui: viser.GuiApi, presses: Presses) -> None:
         self._takers: dict[str, Take] = {}
         presses.on("dropped", _refuse)
-        run_file(gui, "dropping.js")
+        run_file(gui, "opening.js")
 
     @property
     def suffixes(self) -> str:

@@ -14,7 +14,7 @@ from finlab.errors import FinlabError
 from finlab.hull import hull_of
 from finlab.layout import Fin, Layout
 from finlab.layout.directions import replaced
-from webapp.scene.meshes.blades import CHORD, ROOT, SPAN
+from webapp.scene.actuator_shapes import CHORD, ROOT, SPAN
 from webapp.session.search_request import GOAL_WORDS, SearchRequest
 from webapp.session.state import State
 from webapp.tasks.background import Newest

@@ -1,4 +1,4 @@
-"""Tubes, and the arrows of forces and torques."""
+"""Triangle meshes of tubes, and of the arrows of forces and torques."""
 
 import math
 from functools import cache

@@ -1,8 +1,8 @@
 // A file that is dropped anywhere on the page goes the way of one that is chosen by the Open button. On a row of the
 // list of fins it is for that fin. Several files, or a folder, are refused by the server.
 (() => {
-  if (window.finlabDropping) return;
-  window.finlabDropping = true;
+  if (window.finlabOpening) return;
+  window.finlabOpening = true;
   const page = document.documentElement;
   const isFiles = (event) => [...(event.dataTransfer?.types ?? [])].includes('Files');
   const show = (over) => page.classList.toggle('fl-dropping', over);
@@ -27,4 +27,24 @@
     box.files = files;
     box.dispatchEvent(new Event('change', { bubbles: true }));
   });
+
+  // The design in the address that the page was opened with.
+  function openLinked(hash) {
+    if (!hash.startsWith('#design=')) return;
+    window.finlabPresses.tell('design-link', '', hash.slice(1));
+    history.replaceState(null, '', location.pathname + location.search); // a reload goes on with what was made of it
+  }
+
+  // viser rewrites the address before anything of ours runs; how the page was entered is remembered elsewhere.
+  function enteredWith() {
+    const [entry] = performance.getEntriesByType('navigation');
+    return location.hash || new URL(entry?.name ?? location.href).hash;
+  }
+
+  const begin = () => {
+    if (!window.finlabPresses?.ready()) return setTimeout(begin, 50);
+    openLinked(enteredWith());
+  };
+  window.addEventListener('hashchange', () => openLinked(location.hash));
+  begin();
 })();

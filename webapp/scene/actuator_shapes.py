@@ -1,0 +1,132 @@
+"""Shapes of actuators in their own frame [m]: the shaft of a fin or rudder along x', its blade along -y'.
+
+A fin that points aft pushes forward. A propeller of size 1 moves water along x', or along y' for a pod.
+"""
+
+from functools import cache
+
+import numpy as np
+from trimesh.convex import convex_hull
+
+from finlab.arrays import Array
+from finlab.hull.shapes import Mesh, revolved, triangles
+from webapp.scene.arrows import joined, tube
+
+CHORD = 0.18
+"""Length of the blade from the shaft to its trailing edge [m]."""
+SPAN = 0.10
+"""Width of the blade along the shaft [m]."""
+ROOT = 0.012
+"""Gap between the fin's position and the blade along the shaft [m]."""
+
+
+def blade() -> Mesh:
+    """The blade: thick and narrow at the shaft, thin and wide at the trailing edge."""
+    along = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, 30))
+    ends = np.sqrt(np.clip(1.0 - np.abs(2.0 * along - 1.0) ** 10, 0.0, 1.0))  # round
+    width = 0.5 * SPAN * (0.66 + 0.36 * along**1.3) * ends
+    body = revolved(along, width, (0.0075 * (1 - along) ** 0.8 + 0.0012) * ends, sides=32)
+    back, side, up = body.vertices.T
+    solid = convex_hull(np.stack([ROOT + SPAN / 2 + side, 0.012 - CHORD * back, up], axis=-1))
+    return Mesh(np.asarray(solid.vertices), np.asarray(solid.faces, dtype=np.int32))
+
+
+def shaft() -> Mesh:
+    """The servo's housing at the root and the shaft that carries the blade."""
+    housing = np.array([[-0.045, 0, 0], [-0.041, 0, 0], [-0.006, 0, 0], [-0.002, 0, 0]], dtype=float)
+    rod = np.array([[-0.002, 0, 0], [ROOT + 0.86 * SPAN, 0, 0]], dtype=float)
+    return joined(tube(housing, np.array([0.014, 0.018, 0.018, 0.013]), 20), tube(rod, 0.0055, 12))
+
+
+def sweep(amplitude: float) -> Mesh:
+    """The fan that the blade sweeps: +- `amplitude` [rad] about the shaft, across the blade's middle."""
+    angle = np.linspace(-amplitude, amplitude, 17)
+    arc = np.stack([np.full(17, ROOT + SPAN / 2), -np.cos(angle), -np.sin(angle)], axis=-1)
+    rings = [arc * [1.0, radius, radius] for radius in (0.035, CHORD - 0.004)]
+    k = np.arange(16)
+    return Mesh(np.concatenate(rings), triangles(k, k + 1, k + 17, k + 1, k + 18, k + 17))
+
+
+def foil(slenderness: float) -> Mesh:
+    """A rudder of span 1 along x', its leading edge towards y' and a quarter of its chord ahead of the shaft;
+    `slenderness` is its span over its chord."""
+    along = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, 24))
+    shape = (0.2969, -0.126, -0.3516, 0.2843, -0.1036)  # of a symmetric NACA section with a closed end
+    thick = 5.0 * 0.15 * sum(c * along**p for c, p in zip(shape, (0.5, 1, 2, 3, 4), strict=True))
+    points = []
+    for x, chord in ((-0.5, 1.0), (0.46, 0.82), (0.5, 0.74)):
+        for side in (1.0, -1.0):
+            section = [
+                np.full(24, x),
+                (0.25 - along) * chord / slenderness,
+                side * thick * chord / slenderness,
+            ]
+            points.append(np.stack(section, axis=-1))
+    solid = convex_hull(np.concatenate(points))
+    return Mesh(np.asarray(solid.vertices), np.asarray(solid.faces, dtype=np.int32))
+
+
+def stock() -> Mesh:
+    """The shaft of a rudder of span 1."""
+    return tube(np.array([[-0.6, 0.0, 0.0], [0.54, 0.0, 0.0]]), 0.035, 12)
+
+
+def pin(size: float) -> Mesh:
+    """A nail through what is stuck."""
+    way = size * np.array([[0.0, 0.0, -0.04], [0.0, 0.0, 0.06], [0.0, 0.0, 0.06], [0.0, 0.0, 0.066]])
+    return tube(way, size * np.array([0.004, 0.004, 0.016, 0.016]), 14)
+
+
+RADIUS = 0.046
+"""Of the duct [m]."""
+N_BLADES = 3
+COLUMN: Array = RADIUS * np.array([[1.02, 0.0, 0.0], [1.12, 0.0, 0.0], [1.12, 0.0, 0.0], [2.2, 0.0, 0.0]])
+"""Steps of the column about which a pod turns [m]."""
+
+
+@cache
+def duct(along: int) -> Mesh:
+    """A short ring, a hub, and three struts between them; `along` is 0 for x', 1 for y'."""
+    section = np.linspace(0.0, 2.0 * np.pi, 17)
+    x = 0.5 * np.cos(section)
+    radius = 1.0 - 0.07 * np.sin(section) + 0.06 * x  # a little wider where water comes in
+    turn = np.linspace(0.0, 2.0 * np.pi, 40, endpoint=False)
+    rim = [np.broadcast_to(x[:, None], (17, 40)), *(radius[:, None] * f(turn) for f in (np.cos, np.sin))]
+    k, n = np.meshgrid(np.arange(16), np.arange(40), indexing="ij")
+    a, b = (40 * k + n).ravel(), (40 * k + (n + 1) % 40).ravel()
+    ring = Mesh(np.stack(rim, axis=-1).reshape(-1, 3), triangles(a, b, a + 40, b, b + 40, a + 40))
+    s = np.sin(np.linspace(-np.pi / 2, np.pi / 2, 13))
+    round_ = 0.25 * np.sqrt(1.0 - s**2) + 1e-4
+    hub = revolved(0.62 * s - 0.12, round_, round_, sides=20)
+    spokes = [
+        tube(np.array([[-0.32, 0, 0], [-0.32, np.cos(t), np.sin(t)]]), 0.05, 8) for t in turn[[0, 13, 27]]
+    ]
+    return _along(joined(ring, hub, *spokes), along)
+
+
+@cache
+def propeller(along: int) -> Mesh:
+    """Three twisted blades, ahead of the struts; a node shows both their sides."""
+    radius, share = np.linspace(0.2, 0.9, 9), np.linspace(-0.5, 0.5, 5)
+    pitch = np.arctan(0.42 / radius)[:, None]
+    chord = (0.42 * np.sqrt(np.clip(1.0 - ((radius - 0.55) / 0.62) ** 2, 0.0, 1.0)))[:, None] * share
+    place = np.stack([0.1 + chord * np.sin(pitch), radius[:, None] + 0 * chord, chord * np.cos(pitch)], -1)
+    k, n = (v.ravel() for v in np.meshgrid(np.arange(8), np.arange(4), indexing="ij"))
+    a = 5 * k + n
+    faces = triangles(a, a + 1, a + 5, a + 1, a + 6, a + 5)
+    blades = []
+    for turn in 2.0 * np.pi * np.arange(N_BLADES) / N_BLADES:
+        c, s = np.cos(turn), np.sin(turn)
+        blades.append(Mesh(place.reshape(-1, 3) @ np.array([[1, 0, 0], [0, c, s], [0, -s, c]]), faces))
+    return _along(joined(*blades), along)
+
+
+def column(up: bool) -> Mesh:
+    """What a pod turns about: from its duct towards the hull, on one side or the other."""
+    radius = RADIUS * np.array([0.2, 0.34, 0.24, 0.24])
+    return tube(COLUMN if up else -COLUMN, radius, 16)
+
+
+def _along(mesh: Mesh, along: int) -> Mesh:
+    """A mesh of radius 1 along x', as large as a thruster, along another axis."""
+    return Mesh(RADIUS * np.roll(mesh.vertices, along, axis=1), mesh.faces)
