@@ -15,7 +15,10 @@ from finlab.physics.objective import Name
 
 SLOW = ("ipopt",)
 """Methods that take a tenth of a second per target, each from several starts; they run on a subsample."""
-QUICK = ("dual", "mdn", "paper", "qp", "sqp", "px4", "ardusub", "analytic")
+QUICK = (
+    *("dual", "mdn", "paper", "qp", "sqp", "paper_sqp", "px4", "ardusub"),
+    *("analytic", "fixed_frequency"),
+)
 """Methods that run on every target."""
 NEEDS = {"ipopt": "casadi"}
 """Packages without which a method cannot run."""
