@@ -9,6 +9,7 @@ from finlab.allocation.methods import choose_method
 from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.evaluation.experiment import Experiment
+from finlab.evaluation.plots import temperature_picture
 from finlab.evaluation.progress import progress
 from finlab.evaluation.report.document import Column, Row
 from finlab.evaluation.scoring import paper_sigma
@@ -103,4 +104,5 @@ experiment = Experiment(
     ),
     quick={"layouts": 10, "targets": 1},
     full={"layouts": 60},
+    picture=temperature_picture,
 )

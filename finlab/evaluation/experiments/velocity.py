@@ -20,9 +20,13 @@ SETTLED_S = 10.0
 """After this time the start from rest is over [s]."""
 
 
+BASELINE = "fixed_frequency"
+"""Method that stands for the paper's baseline: the paper does not say whether its own varies the frequency."""
+
+
 def run(
     layout: str = "A",
-    methods: tuple[str, ...] = ("dual", "mdn", "analytic"),
+    methods: tuple[str, ...] = ("dual", "mdn", "analytic", BASELINE),
     runs: int = 5,
     duration: float = 30.0,
     checkpoint: str | None = None,
@@ -46,7 +50,9 @@ def run(
         row = _row(ClosedLoop(robot, method.on(robot), straight(speed, duration), seed=seed + k).run())
         done.setdefault((speed, name), []).append(row)
         done.setdefault((None, name), []).append(row)
-    return mean_rows("speed", done, None)
+    rows = mean_rows("speed", done, None)
+    base = {row["speed"]: row["inertial_w"] for row in rows if row["method"] == BASELINE}
+    return [row | {"over_baseline": row["inertial_w"] / base[row["speed"]]} if base else row for row in rows]
 
 
 def _row(log: RunLog) -> Row:
@@ -62,7 +68,12 @@ def _row(log: RunLog) -> Row:
 
 def _printed(rows: Sequence[Row]) -> list[Row]:
     names = {"ours": "paper's method, printed", "baseline": "paper's baseline, printed"}
-    return [{"method": names[key], **row} for key, row in paper_figures()["velocity"].items()]
+    figures = paper_figures()["velocity"]
+    base = figures["baseline"]["inertial_w"]
+    return [
+        {"method": names[key], "over_baseline": row["inertial_w"] / base, **row}
+        for key, row in figures.items()
+    ]
 
 
 experiment = Experiment(
@@ -77,10 +88,12 @@ experiment = Experiment(
         Column("mae_settled", "after 10 s", "metres", unit="m/s"),
         Column("depth_rmse", "depth RMSE", "metres", unit="m"),
         *POWER,
+        Column("over_baseline", "inertial power over fixed_frequency", "ratio"),
     ),
     run=run,
     note="Runs from rest; rows without a speed are over all speeds. Inertial power is the paper's sum of I "
-    "alpha omega, of its magnitudes. The paper's runs took place in a pool.",
+    "alpha omega, of its magnitudes. The paper's runs took place in a pool; `fixed_frequency` stands for its "
+    "baseline, of which it does not say whether the frequency varies.",
     quick={"runs": 1},
     printed=_printed,
 )

@@ -7,6 +7,7 @@ import numpy as np
 from finlab.errors import DataError
 from finlab.evaluation.experiment import Experiment, paper_figures
 from finlab.evaluation.method_specs import SLOW, installed_methods, load_method_specs
+from finlab.evaluation.plots import fins_picture
 from finlab.evaluation.report.document import Column, Row
 from finlab.evaluation.scoring import Columns, run_method
 from finlab.evaluation.splits import SPLITS, Case, make_split, own_sigma
@@ -41,6 +42,7 @@ def run(
     targets: int = 1000,
     subsample: int = 10,
     checkpoint: str | None = None,
+    by_fins: bool = False,
     seed: int = 0,
 ) -> list[Row]:
     """One row for each split and method.
@@ -56,18 +58,30 @@ def run(
         targets: on each layout.
         subsample: ipopt answers only the first so many of each layout; column n says how many.
         checkpoint: of the learned methods, a shipped name or a folder.
+        by_fins: one more row for each number of fins (or other actuators) that work.
         seed: of all draws.
     """
     sets = _cases(layout, split, layouts, targets, seed)
     usual = ("dual", "paper") if layout is None else installed_methods(layout_and_failed(layout)[0])
     specs = load_method_specs(methods or usual, checkpoint, patient=True)
-    return [
-        {"split": name, "method": method, "n": len(found["layout"]), "scored_by": "plant", **figures(found)}
-        for name, cases in sets.items()
-        for method, spec in specs.items()
-        if len(sets) == 1 or spec.choice.kind.fits(cases[0].layout)
-        for found in [run_method(spec, cases, first=subsample if method in SLOW else None)]
-    ]
+    rows: list[Row] = []
+    for name, cases in sets.items():
+        for method, spec in specs.items():
+            if len(sets) > 1 and not spec.choice.kind.fits(cases[0].layout):
+                continue
+            found, who = run_method(spec, cases, first=subsample if method in SLOW else None), (name, method)
+            rows.append(_row(*who, None, found))
+            count = np.array([case.healthy.n for case in cases])[found["layout"]]
+            for fins in np.unique(count) if by_fins else ():
+                some = {key: values[count == fins] for key, values in found.items()}
+                rows.append(_row(*who, int(fins), some))
+    return rows
+
+
+def _row(split: str, method: str, fins: int | None, found: Columns) -> Row:
+    """Figures of a split, or of its robots of so many fins."""
+    about = {"split": split, "method": method, "fins": fins, "n": len(found["layout"]), "scored_by": "plant"}
+    return about | figures(found)
 
 
 def figures(found: Columns) -> Row:
@@ -76,6 +90,7 @@ def figures(found: Columns) -> Row:
     row: Row = {
         "err_norm_mean": error.mean(),
         "err_norm_median": np.median(error),
+        "err_norm_p05": np.quantile(error, 0.05),
         "err_norm_p95": np.quantile(error, 0.95),
         "err_norm_max": error.max(),
         "err_phys_mean": found["err_phys"].mean(),
@@ -134,6 +149,7 @@ experiment = Experiment(
     columns=(
         Column("split", "split", "code"),
         Column("method", "method", "code"),
+        Column("fins", "fins", "count"),
         Column("n", "targets", "count"),
         Column("err_norm_mean", "mean error", "error", "err_norm_mean_interval"),
         Column("err_norm_median", "median", "error"),
@@ -162,4 +178,6 @@ experiment = Experiment(
         "targets": 8,
     },
     printed=_printed,
+    picture=fins_picture,
+    for_picture={"by_fins": True},
 )
