@@ -87,7 +87,7 @@ def candidates_picture(rows: Sequence[Row]) -> Figure:
         raise DataError("plot: no candidates to draw; take variant ours")
     for name, (color, size, alpha) in marks.items():
         error, effort = np.concatenate([each[name] for each in points]).T
-        about = {"s": size, "color": color, "alpha": alpha, "linewidths": 0}
+        about: dict[str, Any] = {"s": size, "color": color, "alpha": alpha, "linewidths": 0}
         axes.scatter(np.maximum(error, LEAST_ERROR), effort, label=f"{name} ({len(error):,})", **about)
     for k, each in enumerate(points):
         error, effort = np.transpose([each["raw"][0], each["refined"][0]])
@@ -112,7 +112,7 @@ def fins_picture(rows: Sequence[Row]) -> Figure:
         keys = "err_norm_p05", "err_norm_median", "err_norm_p95"
         low, middle, high = np.maximum([[row[key] for key in keys] for row in some], LEAST_ERROR).T
         color = COLORS[methods.index(pair[1]) % len(COLORS)]
-        bars = {"yerr": [middle - low, high - middle], "color": color, "capsize": 3}
+        bars: dict[str, Any] = {"yerr": [middle - low, high - middle], "color": color, "capsize": 3}
         bars["fmt"] = MARKERS[splits.index(pair[0]) % len(MARKERS)]
         axes.errorbar(place, middle, label=f"{pair[1]}, {pair[0]}", markersize=5, **bars)
     axes.set_xticks(range(len(counts)), [str(count) for count in counts])

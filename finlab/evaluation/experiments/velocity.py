@@ -21,7 +21,7 @@ SETTLED_S = 10.0
 
 
 BASELINE = "fixed_frequency"
-"""Method that stands for the paper's baseline: the paper does not say whether its own varies the frequency."""
+"""Method that stands for the paper's baseline, of which it does not say whether the frequency varies."""
 
 
 def run(
