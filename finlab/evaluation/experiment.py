@@ -16,7 +16,6 @@ from types import NoneType
 from typing import Any, get_args, get_type_hints
 
 from finlab.errors import DataError
-from finlab.evaluation.plots import Picture
 from finlab.evaluation.report.document import Block, Column, Row, Table
 
 EXPERIMENTS = (
@@ -53,8 +52,8 @@ class Experiment:
     """Options of the whole report where they differ from the defaults."""
     printed: Callable[[Sequence[Row]], list[Row]] | None = None
     """Figures that the paper prints beside our rows, as rows that stand below them."""
-    picture: Picture | None = None
-    """What `--plot FILE` draws of the rows; no option without one."""
+    picture: Callable[[Sequence[Row]], Any] | None = None
+    """From the rows to the figure of `--plot FILE`; no such option without one."""
     for_picture: Mapping[str, Any] = field(default_factory=dict)
     """Options that give the picture its rows."""
 

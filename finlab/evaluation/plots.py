@@ -27,9 +27,6 @@ MARKERS = "osD^v<>"
 LEAST_ERROR = 1e-12
 """Errors below this one are drawn there: a logarithmic axis has no 0."""
 
-Picture = Callable[[Sequence[Row]], "Figure"]
-"""From the rows of an experiment to its figure."""
-
 
 def check_picture(path: Path | None) -> None:
     """Refuse, before the work, a picture that could not be written after it.
@@ -48,7 +45,7 @@ def check_picture(path: Path | None) -> None:
         raise DataError(f"plot: matplotlib is not installed; run: {install('plot')}") from error
 
 
-def write_picture(picture: Picture, rows: Sequence[Row], path: Path) -> None:
+def write_picture(picture: Callable[[Sequence[Row]], Figure], rows: Sequence[Row], path: Path) -> None:
     """Draw rows into a file, in the format of its ending; see `check_picture`."""
     content = io.BytesIO()
     picture(rows).savefig(content, format=path.suffix[1:].lower(), dpi=DPI, bbox_inches="tight")
