@@ -24,7 +24,7 @@ from finlab.layout.graph_form import (
     edges_of,
 )
 from finlab.layout.wrench_axes import AXES
-from finlab.paper.features import POSITION_SCALE, SCALES
+from finlab.paper.network import POSITION_SCALE, SCALES
 from finlab.whole_file import write_whole
 
 _FORCE = ("force", "N")

@@ -23,13 +23,11 @@ from finlab.allocation.settings import Settings
 from finlab.allocation.solution import Candidates, Solution
 from finlab.arrays import Array
 from finlab.layout import Layout
-from finlab.mdn.answers import NOW, OTHER, Answers, Steps, follow, ranked, refined, traced
+from finlab.mdn.answers import NOW, OTHER, Answers, Steps, effort_robot, follow, ranked, refined, traced
 from finlab.mdn.descent import realize
-from finlab.mdn.features import Seen, see
+from finlab.mdn.features import Proposal, Seen, propose, see
 from finlab.mdn.network import ForceMixture, ForceNetworkConfig
-from finlab.mdn.proposal import Proposal, propose
-from finlab.mdn.robot import effort_robot
-from finlab.networks.threads import single_threaded_products
+from finlab.networks.layers import single_threaded_products
 from finlab.networks.trained import TrainedWeights
 
 USUAL_SHARE = 0.1

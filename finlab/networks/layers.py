@@ -4,7 +4,9 @@ A network is a function of its weights, a mapping from PyTorch's names to arrays
 inputs. On a robot the weights are numpy arrays in single precision and no tensor library is needed.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager, nullcontext
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -104,3 +106,16 @@ def take(x: Values, index: Values, axis: int) -> Values:
 def single_precision(weights: Mapping[str, Any]) -> dict[str, Any]:
     """The weights of a network as numpy arrays in single precision."""
     return {name: np.asarray(value, dtype=np.float32) for name, value in weights.items()}
+
+
+def single_threaded_products() -> Callable[[], AbstractContextManager[object]]:
+    """A context in which numpy's products run on one thread.
+
+    Where threadpoolctl is missing, as on a robot that carries only the runtime, the context does nothing;
+    there OPENBLAS_NUM_THREADS=1 in the environment has the same effect.
+    """
+    try:
+        from threadpoolctl import ThreadpoolController
+    except ImportError:
+        return nullcontext
+    return partial(ThreadpoolController().select(user_api="blas").limit, limits=1)

@@ -13,7 +13,22 @@ from finlab.arrays import Values, library_of
 from finlab.networks import layers
 from finlab.networks.layers import Weights
 from finlab.networks.trained import Shapes, check_sizes, linear_shapes, norm_shapes
-from finlab.paper.features import RAW_SIZE
+
+RAW_SIZE = 10
+"""Number of node features (paper: x_i in R^10)."""
+POSITION_SCALE = 0.3
+"""Positions [m] of order one: the paper's layouts lie within."""
+SCALES = (0.6, 2.1, math.pi)
+"""Amplitude [rad], frequency [Hz] and zero direction [rad] of order one."""
+
+
+def raw_features(position: Values, mounting_angle: Values, lower: Values, upper: Values) -> Values:
+    """The node features (..., n, 10) of fins (..., n, 3), (..., n) with limits (..., n, 3), scaled."""
+    xp = library_of(position)
+    limits = [limit[..., i] / scale for i, scale in enumerate(SCALES) for limit in (lower, upper)]
+    angle = mounting_angle[..., None] / math.pi
+    return xp.concatenate([position / POSITION_SCALE, angle, xp.stack(limits, axis=-1)], axis=-1)
+
 
 LOG_STD_BOUND = 3.0
 """Largest size of the components' log standard deviation (paper, implementation details)."""

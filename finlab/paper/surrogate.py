@@ -18,9 +18,15 @@ from finlab.layout import Layout
 from finlab.layout.arrays import force_effectiveness
 from finlab.networks import layers
 from finlab.networks.layers import Weights
-from finlab.networks.normalization import to_normalized
-from finlab.networks.trained import Shapes, TrainedWeights, check_sizes, check_state, linear_shapes
-from finlab.paper.features import RAW_SIZE, raw_features
+from finlab.networks.trained import (
+    Shapes,
+    TrainedWeights,
+    check_sizes,
+    check_state,
+    linear_shapes,
+    to_normalized,
+)
+from finlab.paper.network import RAW_SIZE, raw_features
 
 FORCE_UNIT = 4.0
 """Force [N] of order one for the perceptron's outputs."""

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from finlab.layout import Fin, FinModelSpec, Layout, Limits
+from finlab.mdn.answers import effort_robot
 from finlab.mdn.descent import EffortProblem, realize
-from finlab.mdn.robot import effort_robot
 from finlab.physics import plant_of
 from finlab.physics.effort import effort_of_shares
 

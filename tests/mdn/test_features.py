@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from finlab.layout import Fin, FinModelSpec, Layout, Limits, random_layout
+from finlab.mdn.answers import effort_robot
 from finlab.mdn.descent import EffortProblem, wrench
 from finlab.mdn.features import SHARES, VECTORS, RobotView, features, robot_view, see
 from finlab.mdn.network import NODE_SIZE
-from finlab.mdn.robot import effort_robot
 from finlab.physics import plant_of
 
 STD = np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.34])

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import torch
 
-from finlab.networks.normalization import to_command, to_normalized
+from finlab.networks.trained import to_command, to_normalized
 
 LOWER = torch.tensor([[0.05, 0.1, -math.pi], [0.1, 0.2, 0.5], [0.3, 0.7, -2.5]], dtype=torch.float64)
 UPPER = torch.tensor([[0.6, 2.1, math.pi], [0.5, 1.0, 2.0], [0.3, 0.7, -2.0]], dtype=torch.float64)

@@ -10,8 +10,7 @@ from torch_geometric.nn import GATv2Conv
 
 from finlab.layout import Fin, Layout, Limits, random_layout
 from finlab.networks.checkpoint import read_checkpoint, resolve_checkpoint
-from finlab.paper.features import RAW_SIZE, raw_features
-from finlab.paper.network import Mixture, NetworkConfig, graph_attention
+from finlab.paper.network import RAW_SIZE, Mixture, NetworkConfig, graph_attention, raw_features
 from finlab.paper.training.modules import AllocatorNetwork
 
 CONFIG = NetworkConfig(width=32, heads=4, transformer_layers=2, feedforward=40, n_components=6)

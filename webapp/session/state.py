@@ -15,7 +15,7 @@ from finlab.layout import Layout
 from finlab.layout.damage import FAULTS, Health
 from finlab.layout.fin import MAX_AMPLITUDE, MAX_FREQUENCY
 from finlab.layout.wrench_axes import axes_in
-from finlab.paper.settings import PaperSettings
+from finlab.paper.pipeline import PaperSettings
 from finlab.physics import plant_of
 from webapp.session.links import Links, kept, linked
 

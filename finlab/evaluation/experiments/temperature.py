@@ -17,7 +17,7 @@ from finlab.evaluation.splits import make_split
 from finlab.evaluation.statistics.bootstrap import mean_interval
 from finlab.layout import Layout
 from finlab.layout.angles import is_full_turn
-from finlab.paper.settings import PaperSettings
+from finlab.paper.pipeline import PaperSettings
 
 PAPER_TEMPERATURE = 0.02
 """The paper's choice."""

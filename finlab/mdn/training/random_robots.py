@@ -12,7 +12,7 @@ from finlab.layout import Fin, FinModelSpec, Layout, Limits
 from finlab.layout.angles import wrapped
 from finlab.layout.random import TRAINING_BOX, random_layout
 from finlab.layout.random_actuators import Numbers, random_fin_model
-from finlab.mdn.robot import EffortRobot
+from finlab.mdn.answers import EffortRobot
 
 FIN_COUNTS = dict(zip(range(2, 13), (1, 2, 8, 9, 9, 8, 8, 7, 7, 7, 7), strict=True))
 """Number of fins -> how often it is drawn; with 2 or 3 there is next to nothing to choose."""

@@ -5,7 +5,7 @@ import pytest
 
 from finlab.allocation.yardstick import yardstick
 from finlab.layout import Layout
-from finlab.mdn.robot import effort_robot
+from finlab.mdn.answers import effort_robot
 from finlab.mdn.training.random_robots import FIN_COUNTS, NUMBERS, random_kinds, random_robot, random_targets
 from finlab.mdn.training.teacher import ways_to_deliver
 from finlab.physics import Plant

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from finlab.mdn.answers import EffortRobot, effort_robot
 from finlab.mdn.descent import realize, wrench
-from finlab.mdn.robot import EffortRobot, effort_robot
 from finlab.mdn.training.random_robots import random_kinds, random_robot, random_targets
 from finlab.mdn.training.teacher import APART, DEAREST, Ways, root_share, shares_of_ways, ways_to_deliver
 from finlab.physics import Plant

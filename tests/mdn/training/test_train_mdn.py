@@ -12,10 +12,8 @@ import torch
 
 from finlab.mdn.network import ForceNetworkConfig
 from finlab.mdn.training import train
-from finlab.mdn.training.answers import Answers, read_answers, write_answers
-from finlab.mdn.training.first_weights import first_weights
-from finlab.mdn.training.recipes import RECIPES
-from finlab.mdn.training.train import losses, train_mdn
+from finlab.mdn.training.teacher import Answers, read_answers, write_answers
+from finlab.mdn.training.train_mdn import RECIPES, first_weights, losses, train_mdn
 from finlab.networks.checkpoint import read_checkpoint, write_checkpoint
 from finlab.networks.trained import TrainedWeights
 from finlab.training import loop

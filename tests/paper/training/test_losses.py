@@ -7,10 +7,9 @@ import pytest
 import torch
 
 from finlab.paper.network import Mixture
-from finlab.paper.training.data import Batch, fresh_batch
-from finlab.paper.training.losses import guidance, imitation, negative_entropy
+from finlab.paper.training.modules import guidance, imitation, negative_entropy
 from finlab.paper.training.recipes import RECIPES
-from finlab.paper.training.samples import DataSettings
+from finlab.paper.training.samples import Batch, DataSettings, fresh_batch
 
 M = 3
 

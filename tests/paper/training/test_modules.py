@@ -5,14 +5,11 @@ import pytest
 import torch
 
 from finlab.layout import Layout, random_layout
-from finlab.networks.normalization import Normalization
-from finlab.networks.trained import TrainedWeights, check_state
-from finlab.paper.features import raw_features
-from finlab.paper.network import NetworkConfig
+from finlab.networks.trained import Normalization, TrainedWeights, check_state
+from finlab.paper.network import NetworkConfig, raw_features
 from finlab.paper.surrogate import LayoutSurrogate, SurrogateConfig
-from finlab.paper.training.data import Batch
 from finlab.paper.training.modules import AllocatorNetwork, Surrogate, features
-from finlab.paper.training.samples import N_FINS
+from finlab.paper.training.samples import N_FINS, Batch
 
 SIZES = NetworkConfig(width=32, heads=4, transformer_layers=2, feedforward=40, n_components=6)
 HIDDEN = SurrogateConfig(hidden=(24, 16))
