@@ -29,9 +29,9 @@ def add_experiments(verbs: SubcommandApp, argv: Sequence[str]) -> None:
     """
     from finlab.evaluation.experiment import EXPERIMENTS, load_experiment
 
-    asked = argv[1] if argv[:1] == ["eval"] and len(argv) > 1 else ""
+    chosen_verb = argv[1] if argv[:1] == ["eval"] and len(argv) > 1 else ""
     for name in EXPERIMENTS:
-        if name == asked or asked.startswith("-"):
+        if name == chosen_verb or chosen_verb.startswith("-"):
             verbs.command(name=name)(verb_of(load_experiment(name)))
         else:
             verbs.command(name=name)(_not_asked)

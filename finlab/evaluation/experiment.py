@@ -143,9 +143,9 @@ def load_experiment(name: str) -> Experiment:
     """The experiment of that name; `DataError` for an unknown one."""
     if name not in EXPERIMENTS:
         raise DataError(f"eval: expected one of {', '.join(EXPERIMENTS)}, got {name!r}")
-    found = import_module(f"finlab.evaluation.experiments.{name}").experiment
-    assert isinstance(found, Experiment)
-    return found
+    value = import_module(f"finlab.evaluation.experiments.{name}").experiment
+    assert isinstance(value, Experiment)
+    return value
 
 
 @cache

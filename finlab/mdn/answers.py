@@ -1,4 +1,4 @@
-"""From proposed forces to exact answers: descent in forces, then Levenberg-Marquardt on commands."""
+"""Exact answers from proposed forces: descent in forces, then Levenberg-Marquardt on commands."""
 
 from dataclasses import replace
 from typing import NamedTuple
@@ -138,14 +138,14 @@ def follow(
     """
     rows, count, n = force.shape
     each = np.repeat(target, count, axis=0)
-    *_, found = descend(robot.forces, each, force.reshape(-1, n).astype(complex), steps.descent)
-    command, effort = realize(robot.forces, found)
-    error = np.linalg.norm(each - wrench(robot.forces, found.force), axis=-1)
+    *_, reached = descend(robot.forces, each, force.reshape(-1, n).astype(complex), steps.descent)
+    command, effort = realize(robot.forces, reached)
+    error = np.linalg.norm(each - wrench(robot.forces, reached.force), axis=-1)
     score = np.where(error > PROMISING, INEXACT * (1.0 + error), effort).reshape(rows, count)
     score[:, :kept] = -1.0
     # Roots of shares of the largest forces: small ones count, too.
-    root = found.unit * np.sqrt(found.size / robot.forces.fins.maximum)
-    chosen = _distinct(score, root.reshape(rows, count, n), keep)
+    root = reached.unit * np.sqrt(reached.size / robot.forces.fins.maximum)
+    chosen, _ = distinct(score, root.reshape(rows, count, n), keep, SAME)
     command = command.reshape(rows, count, n, 3)[np.arange(rows)[:, None], chosen]
     return refined(robot, target, command, chosen, steps)
 
@@ -187,16 +187,17 @@ def ranked(robot: EffortRobot, answers: Answers, bonus: float = 0.0) -> Answers:
     return Answers._make(values[place, order] for values in answers)
 
 
-def _distinct(score: Array, root: AnyArray, keep: int) -> NDArray[np.intp]:
-    """Places (N, keep) of scores (N, K), the least first, those last whose forces (N, K, n), as roots of
-    shares, hardly differ from ones before them: several proposals mostly lead to the same forces."""
-    if score.shape[1] <= keep:
-        return np.asarray(score.argsort(axis=1, kind="stable"))
+def distinct(score: Array, root: AnyArray, keep: int, apart: float) -> tuple[NDArray[np.intp], Array]:
+    """Places (N, P) of scores (N, K), `keep` at most, the least first, and their ranks; those last, ranked
+    behind `LAST`, whose forces (N, K, n), as roots of shares, differ by less than `apart` from ones before
+    them: several proposals mostly lead to the same forces."""
     left, row = score.copy(), np.arange(len(score))
-    chosen = np.empty((len(score), keep), np.intp)
-    for k in range(keep):
+    chosen = np.empty((len(score), min(keep, score.shape[1])), np.intp)
+    rank = np.empty(chosen.shape)
+    for k in range(chosen.shape[1]):
         chosen[:, k] = first = left.argmin(axis=1)
-        again = np.abs(root - root[row, first][:, None]).mean(-1) < SAME
+        rank[:, k] = left[row, first]
+        again = np.abs(root - root[row, first][:, None]).mean(-1) < apart
         left = np.where(again, left + LAST, left)
         left[row, first] = np.inf
-    return chosen
+    return chosen, rank

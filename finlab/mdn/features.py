@@ -1,4 +1,4 @@
-"""What the network of method `mdn` sees of a robot: what each fin can do, and what it is asked for.
+"""Features of a robot and its targets for the network of method `mdn`, and the proposals that follow from it.
 
 The cheapest forces y_i = F_i x_i, F_i the largest force of fin i, solve min sum c_i(x_i) s.t. C x = w, where
 C holds the normalized wrenches of full forces. The same forces solve it when P x = p is asked for instead,
@@ -7,8 +7,7 @@ least shares that give w. Neither knows of sizes, levers or axes any more, so on
 size.
 
 Each fin is described in a frame of its own that turns with the direction of its p_i; planar vectors are
-complex
-numbers, and the 2 x 2 blocks of P are pairs (a, b) with x -> a x + b conj(x). Node features:
+complex numbers, and the 2 x 2 blocks of P are pairs (a, b) with x -> a x + b conj(x). Node features:
 
 =====  ============================================================================================
 index  meaning
@@ -120,23 +119,23 @@ def robot_view(problem: EffortProblem) -> RobotView:
 
 def see(view: RobotView, target: AnyArray) -> Seen:
     """What the network sees of normalized targets (N, 6) on one robot."""
-    asked = target @ view.solver
+    wanted = target @ view.solver
     many = (np.broadcast_to(part, (len(target), *part.shape)) for part in (view.static, *view.blocks))
-    return features(asked, *many)
+    return features(wanted, *many)
 
 
-def features(asked: AnyArray, static: AnyArray, a: AnyArray, b: AnyArray) -> Seen:
+def features(wanted: AnyArray, static: AnyArray, a: AnyArray, b: AnyArray) -> Seen:
     """The features of N targets, each on a robot of its own.
 
     Args:
-        asked: p (N, n), complex.
+        wanted: p (N, n), complex.
         static: as in `RobotView`, (N, n, 20).
         a: first part of the blocks of P (N, n, n), complex.
         b: second part.
     """
-    rows, n = asked.shape
-    size = np.abs(asked)
-    frame = np.where(size > 1e-9, asked, 1.0)
+    rows, n = wanted.shape
+    size = np.abs(wanted)
+    frame = np.where(size > 1e-9, wanted, 1.0)
     frame = frame / np.abs(frame)
     back = frame.conj()
     nodes = np.empty((rows, n, NODE_SIZE), dtype=np.float32)

@@ -51,10 +51,20 @@ def feed_forward(w: Weights, up: str, down: str, x: Values) -> Values:
     return linear(w, down, relu(linear(w, up, x)))
 
 
-def head_scores(attention: Values, hidden: Values) -> Values:
-    """Scores (..., heads) of features (..., heads c) by the attention vectors (heads, c)."""
-    split = hidden.reshape(*hidden.shape[:-1], *attention.shape)
-    return library_of(hidden).einsum("...hc,hc->...h", split, attention)
+def graph_attention(w: Weights, name: str, x: Values, pairs: Values | None = None) -> Values:
+    """A GATv2 layer on complete graphs with self loops: features (B, n, width) of the same; heads are
+    concatenated. Features of pairs (B, n, n, F), where there are any, count in what is scored, and what is
+    scored is then the message, too."""
+    xp, vectors = library_of(x), w[f"{name}.attention"]
+    source, target = (linear(w, f"{name}.{part}", x) for part in ("source", "target"))
+    seen = source[:, None] if pairs is None else linear(w, f"{name}.pair", pairs) + source[:, None]
+    hidden = leaky_relu(seen + target[:, :, None])  # (B, n, n, width)
+    hidden = hidden.reshape(*hidden.shape[:-1], *vectors.shape)
+    weight = softmax(xp.einsum("...hc,hc->...h", hidden, vectors), 2)
+    if pairs is not None:
+        return xp.einsum("bijh,bijhc->bihc", weight, hidden).reshape(x.shape)
+    message = source.reshape(*source.shape[:2], *vectors.shape)
+    return xp.einsum("bijh,bjhc->bihc", weight, message).reshape(source.shape) + w[f"{name}.bias"]
 
 
 def relu(x: Values) -> Values:

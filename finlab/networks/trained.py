@@ -1,4 +1,4 @@
-"""The contents of a checkpoint: weights, the sizes of the networks they belong to, and their history."""
+"""The contents of a checkpoint: weights, sizes and history of networks, and what normalizes their numbers."""
 
 from __future__ import annotations
 

@@ -70,16 +70,16 @@ def run(
             missing = answer.wrench_expected - case.targets
             parts.append(part | {"believed": np.linalg.norm(missing / sigma, axis=-1)})
         points = [candidate_points(method, case, seed) for case in cases[:shown]]
-        found = joined(parts)
+        scores = joined(parts)
         for scored_by, key in (("surrogate", "believed"), ("plant", "err_norm")):
-            error, square = found[key], found[key] ** 2
+            error, square = scores[key], scores[key] ** 2
             rows.append(
                 {
                     "variant": variant,
                     "scored_by": scored_by,
                     "n": len(error),
                     "j_norm_mean": float(square.mean()),
-                    "j_norm_mean_interval": list(mean_interval(square, found["layout"])),
+                    "j_norm_mean_interval": list(mean_interval(square, scores["layout"])),
                     "j_norm_std": float(square.std()),
                     "err_norm_mean": float(error.mean()),
                     "err_norm_median": float(np.median(error)),

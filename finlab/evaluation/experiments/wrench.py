@@ -1,4 +1,4 @@
-"""How far off each method is from wrenches that the robot can deliver."""
+"""Experiment `wrench`: errors of each method on wrenches that the robot can deliver."""
 
 from collections.abc import Sequence
 
@@ -69,40 +69,40 @@ def run(
         for method, spec in specs.items():
             if len(sets) > 1 and not spec.choice.kind.fits(cases[0].layout):
                 continue
-            found, who = run_method(spec, cases, first=subsample if method in SLOW else None), (name, method)
-            rows.append(_row(*who, None, found))
-            count = np.array([case.healthy.n for case in cases])[found["layout"]]
+            scores, who = run_method(spec, cases, first=subsample if method in SLOW else None), (name, method)
+            rows.append(_row(*who, None, scores))
+            count = np.array([case.healthy.n for case in cases])[scores["layout"]]
             for fins in np.unique(count) if by_fins else ():
-                some = {key: values[count == fins] for key, values in found.items()}
+                some = {key: values[count == fins] for key, values in scores.items()}
                 rows.append(_row(*who, int(fins), some))
     return rows
 
 
-def _row(split: str, method: str, fins: int | None, found: Columns) -> Row:
+def _row(split: str, method: str, fins: int | None, scores: Columns) -> Row:
     """Figures of a split, or of its robots of so many fins."""
-    about = {"split": split, "method": method, "fins": fins, "n": len(found["layout"]), "scored_by": "plant"}
-    return about | figures(found)
+    about = {"split": split, "method": method, "fins": fins, "n": len(scores["layout"]), "scored_by": "plant"}
+    return about | figures(scores)
 
 
-def figures(found: Columns) -> Row:
+def figures(scores: Columns) -> Row:
     """Means, quantiles and shares of scores, with their intervals."""
-    error, group = found["err_norm"], found["layout"]
+    error, group = scores["err_norm"], scores["layout"]
     row: Row = {
         "err_norm_mean": error.mean(),
         "err_norm_median": np.median(error),
         "err_norm_p05": np.quantile(error, 0.05),
         "err_norm_p95": np.quantile(error, 0.95),
         "err_norm_max": error.max(),
-        "err_phys_mean": found["err_phys"].mean(),
+        "err_phys_mean": scores["err_phys"].mean(),
         **{f"success_{level}": (error <= level).mean() for level in SUCCESS_LEVELS},
-        "effort_mean": found["effort"].mean(),
-        "power_mean": found["power"].mean(),
-        "solve_ms_p50": np.median(found["solve_ms"]),
-        "solve_ms_p99": np.quantile(found["solve_ms"], 0.99),
+        "effort_mean": scores["effort"].mean(),
+        "power_mean": scores["power"].mean(),
+        "solve_ms_p50": np.median(scores["solve_ms"]),
+        "solve_ms_p99": np.quantile(scores["solve_ms"], 0.99),
     }
     intervals = {
         "err_norm_mean": mean_interval(error, group),
-        "power_mean": mean_interval(found["power"], group),
+        "power_mean": mean_interval(scores["power"], group),
         "success_0.01": share_interval(error <= 0.01, group),
     }
     plain = {key: float(value) for key, value in row.items()}

@@ -104,8 +104,8 @@ def random_targets(rng: np.random.Generator, robot: EffortRobot, count: int) -> 
     command[:quarter, :, :2] = np.where(rests[..., None], plant.lower[:, :2], command[:quarter, :, :2])
     full = robot.forces.effectiveness * np.repeat(robot.view.largest, 2)[:, None]
     axes = rng.random((quarter, 6)).argsort(axis=1) < rng.integers(1, 4, (quarter, 1))
-    asked = axes * rng.choice([-1.0, 1.0], (quarter, 6)) * rng.uniform(0.2, 1.0, (quarter, 6))
-    share = asked @ np.linalg.pinv(full.T @ full, rcond=1e-6) @ full.T
+    wanted = axes * rng.choice([-1.0, 1.0], (quarter, 6)) * rng.uniform(0.2, 1.0, (quarter, 6))
+    share = wanted @ np.linalg.pinv(full.T @ full, rcond=1e-6) @ full.T
     largest = np.hypot(share[:, 0::2], share[:, 1::2]).max(1, keepdims=True)
     share *= rng.uniform(0.03, 0.9, (quarter, 1)) / np.maximum(largest, 1e-9)
     return np.concatenate([robot.commands.wrench(command), share @ full])

@@ -1,4 +1,4 @@
-"""The teacher: descents from many random forces, and the different ways they find to deliver a target."""
+"""The teacher: descents from many random forces, the ways they find to deliver a target, and their files."""
 
 import io
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from torch import Tensor
 from finlab.allocation.yardstick import yardstick
 from finlab.arrays import AnyArray, Array
 from finlab.errors import DataError
-from finlab.mdn.answers import EffortRobot, effort_robot
+from finlab.mdn.answers import LAST, EffortRobot, distinct, effort_robot
 from finlab.mdn.descent import EffortProblem, descend, realize, wrench
 from finlab.mdn.effort_fins import Projected
 from finlab.mdn.features import VECTORS, features
@@ -66,42 +66,28 @@ def ways_to_deliver(rng: np.random.Generator, problem: EffortProblem, target: Ar
     # A start's small forces are as good as at rest, so few or many fins work.
     size = rng.random((rows * STARTS, n)) ** rng.uniform(1.0, 8.0, (rows * STARTS, 1)) * maximum
     start = size * np.exp(1j * rng.uniform(-np.pi, np.pi, size.shape))
-    *_, found = descend(problem, np.repeat(target, STARTS, axis=0), start, STEPS)
-    return _different(*_told(problem, target, found), maximum)
+    *_, reached = descend(problem, np.repeat(target, STARTS, axis=0), start, STEPS)
+    force, cost = _delivered(problem, target, reached)
+    cost = np.where(cost > DEAREST * cost.min(1, keepdims=True), np.inf, cost)
+    chosen, rank = distinct(cost, root_share(force, maximum), MODES, APART)
+    return Ways(force[np.arange(rows)[:, None], chosen], np.where(rank < LAST, rank, np.inf))
 
 
-def _told(problem: EffortProblem, target: Array, found: Projected) -> tuple[AnyArray, Array]:
+def _delivered(problem: EffortProblem, target: Array, reached: Projected) -> tuple[AnyArray, Array]:
     """Forces (N, S, n), complex, and costs (N, S), infinite where the target is missed."""
-    count = len(found.size) // len(target)
-    _, cost = realize(problem, found)
-    missed = np.linalg.norm(np.repeat(target, count, axis=0) - wrench(problem, found.force), axis=1)
+    count = len(reached.size) // len(target)
+    _, cost = realize(problem, reached)
+    missed = np.linalg.norm(np.repeat(target, count, axis=0) - wrench(problem, reached.force), axis=1)
     strength = np.linalg.norm(np.repeat(problem.fins.maximum, 2)[:, None] * problem.effectiveness)
     allowed = EXACT * np.minimum(np.linalg.norm(target, axis=1) + 1e-2 * strength, strength)
     cost = np.where(missed <= np.repeat(allowed, count), cost, np.inf)
-    return found.force.reshape(len(target), count, -1), cost.reshape(len(target), count)
+    return reached.force.reshape(len(target), count, -1), cost.reshape(len(target), count)
 
 
 def root_share(force: AnyArray, largest: Array) -> AnyArray:
     """Forces (..., n), complex, as roots of shares of the largest ones (n,): small ones count, too."""
     share = force / largest
     return np.asarray(share / np.sqrt(np.abs(share) + 1e-12))
-
-
-def _different(force: AnyArray, cost: Array, largest: Array) -> Ways:
-    """The cheapest of each group of answers that are nearly the same."""
-    rows, _, n = force.shape
-    place, cost = np.arange(rows), cost.copy()
-    root = root_share(force, largest)
-    kept, costs = np.zeros((rows, MODES, n), dtype=complex), np.full((rows, MODES), np.inf)
-    limit = DEAREST * cost.min(1)
-    cost[cost > limit[:, None]] = np.inf
-    for k in range(MODES):
-        best = cost.argmin(1)
-        costs[:, k] = cost[place, best]
-        kept[:, k] = force[place, best]
-        near = np.abs(root - root[place, best][:, None]).mean(-1) < APART
-        cost[near] = np.inf
-    return Ways(kept, costs)
 
 
 def shares_of_ways(ways: Ways, sharpness: float) -> Array:
@@ -194,10 +180,10 @@ class Answers:
                 parts.setdefault(n, []).append(arrays)
         self._groups: dict[int, dict[str, AnyArray]] = {}
         for n, some in parts.items():
-            whole = {name: np.concatenate([part[name] for part in some]) for name in some[0]}
-            robot, target = np.nonzero(whole["weight"].sum(-1) > 0.5)
-            flat = {name: whole[name][robot, target] for name in ("asked", "way", "weight")}
-            self._groups[n] = {**whole, **flat, "robot": robot}
+            joined = {name: np.concatenate([part[name] for part in some]) for name in some[0]}
+            robot, target = np.nonzero(joined["weight"].sum(-1) > 0.5)
+            flat = {name: joined[name][robot, target] for name in ("asked", "way", "weight")}
+            self._groups[n] = {**joined, **flat, "robot": robot}
 
     def __len__(self) -> int:
         """Number of targets."""
@@ -211,13 +197,13 @@ class Answers:
         row = rng.integers(len(group["asked"]), size=size)
         robot = group["robot"][row]
         static, (a, b) = group["static"][robot], np.moveaxis(group["blocks"][robot], 1, 0)
-        asked, way, weight = (group[name][row] for name in ("asked", "way", "weight"))
+        wanted, way, weight = (group[name][row] for name in ("asked", "way", "weight"))
         order = rng.random((size, n)).argsort(axis=1)
         static[..., IDS] = np.take_along_axis(static[..., IDS], order[..., None], axis=1)
         mirrored = rng.random(size) < 0.5
-        a, b, asked, way = (_mirrored(values, mirrored) for values in (a, b, asked, way))
+        a, b, wanted, way = (_mirrored(values, mirrored) for values in (a, b, wanted, way))
         static[:, :, MIRRORED] *= np.where(mirrored, -1.0, 1.0)[:, None, None].astype(np.float32)
-        seen = features(asked, static, a, b)
+        seen = features(wanted, static, a, b)
         way = way * seen.frame.conj()[:, None]
         parts = np.stack([way.real, way.imag], axis=-1)
         weight = np.where(weight < LEAST_WEIGHT, 0.0, weight)

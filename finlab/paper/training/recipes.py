@@ -1,5 +1,5 @@
 """Named recipes: `paper` (the printed numbers, our choices elsewhere), `short` (20 minutes on two cores) and
-`smoke` (seconds)."""
+`smoke` (seconds); and the model card of what they make."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field

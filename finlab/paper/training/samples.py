@@ -186,10 +186,10 @@ class DataSet:
             raise DataError(f"{folder}: an unfinished data set; run `finlab data generate` again") from error
         count = -(-self.layouts // DataSettings(commands=self.commands).together)
         parts = [read_part(part_file(folder, k)) for k in range(count)]
-        whole = {name: np.concatenate([part[name] for part in parts]) for name in FIELDS}
-        if whole["wrench"].shape != (self.layouts, self.commands, 6):
+        joined = {name: np.concatenate([part[name] for part in parts]) for name in FIELDS}
+        if joined["wrench"].shape != (self.layouts, self.commands, 6):
             raise DataError(f"{folder}: its parts are not those of its {DATA_FILE}")
-        self._parts = [torch.from_numpy(whole[name]).to(device) for name in FIELDS]
+        self._parts = [torch.from_numpy(joined[name]).to(device) for name in FIELDS]
         self._device, self._epoch = device, -1
         self._order = torch.empty(0)
 
@@ -228,7 +228,7 @@ def fresh_batch(settings: DataSettings) -> Batch:
     """All samples of a data set, in memory alone."""
     robots = [samples_of(settings, k) for k in range(settings.layouts)]
     times = [len(robot["wrench"]) for robot in robots]
-    whole = {name: np.stack([robot[name] for robot in robots]) for name in FIELDS}
-    once = {name: np.repeat(whole[name], times, axis=0) for name in ROBOT}
-    flat = {name: np.concatenate(whole[name]) for name in FIELDS[5:]}
+    joined = {name: np.stack([robot[name] for robot in robots]) for name in FIELDS}
+    once = {name: np.repeat(joined[name], times, axis=0) for name in ROBOT}
+    flat = {name: np.concatenate(joined[name]) for name in FIELDS[5:]}
     return Batch(*(torch.from_numpy(part) for part in (once | flat).values()))
