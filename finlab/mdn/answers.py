@@ -20,6 +20,22 @@ EXACT = 1e-5
 delivered."""
 
 
+PROMISING = 0.02
+"""Normalized error in force space below which a descent has succeeded: refinement removes the rest."""
+SAME = 0.03
+"""Mean difference over the fins, in roots of shares of the largest force, from which ways are two."""
+LAST = 1e12
+"""Added to the rank of a way that is chosen already."""
+NEARLY = 5e-5
+"""Normalized error by which inexact answers may differ and count as equally near."""
+INEXACT = 1e9
+"""Rank of inexact answers, behind every exact one. Efforts reach thousands where an arc of zero directions
+ends near zero, since the effort divides by that end."""
+
+OTHER, NOW = -1, -2
+"""Origins of answers that no network has proposed: other starts, and how the robot moves now."""
+
+
 class EffortRobot(NamedTuple):
     """A robot of n healthy fins, ready for proposals, descent and refinement."""
 
@@ -61,22 +77,6 @@ def effort_robot(plant: Plant, scale: Array) -> EffortRobot:
     return EffortRobot(plant, forces, commands, effort, robot_view(forces))
 
 
-PROMISING = 0.02
-"""Normalized error in force space below which a descent has succeeded: refinement removes the rest."""
-SAME = 0.03
-"""Mean difference over the fins, in roots of shares of the largest force, from which ways are two."""
-LAST = 1e12
-"""Added to the rank of a way that is chosen already."""
-NEARLY = 5e-5
-"""Normalized error by which inexact answers may differ and count as equally near."""
-INEXACT = 1e9
-"""Rank of inexact answers, behind every exact one. Efforts reach thousands where an arc of zero directions
-ends near zero, since the effort divides by that end."""
-
-OTHER, NOW = -1, -2
-"""Origins of answers that no network has proposed: other starts, and how the robot moves now."""
-
-
 class Steps(NamedTuple):
     """How long proposals are followed."""
 
@@ -105,22 +105,9 @@ class Answers(NamedTuple):
     origin: NDArray[np.intp]
     """Number of the proposal that each came from (N, P), or `OTHER` or `NOW`."""
 
-    def rows(self, rows: NDArray[np.bool_]) -> "Answers":
-        """Those to some of the targets."""
-        return Answers._make(values[rows] for values in self)
-
-    def columns(self, places: NDArray[np.intp] | slice) -> "Answers":
-        """Some of the answers to each target."""
-        return Answers._make(values[:, places] for values in self)
-
     def before(self, other: "Answers") -> "Answers":
         """These answers, then others."""
         return Answers._make(np.concatenate(both, axis=1) for both in zip(self, other, strict=True))
-
-    def replace(self, rows: NDArray[np.bool_], by: "Answers") -> None:
-        """Put other answers in the place of those to some targets, in place."""
-        for kept, new in zip(self, by, strict=True):
-            kept[rows] = new
 
 
 def follow(

@@ -84,7 +84,10 @@ class Mdn(Method):
         """See `Method`."""
         target, previous, seed = targets / self.sigma, wanted.get("previous"), wanted.get("seed", 0)
         if len(target) == 1:
-            reached = self._one(policy, target, previous, seed)
+            with self._one_thread():
+                reached = self._found(policy, target, seed)
+                if previous is not None:
+                    reached = self._in_motion(target, reached, previous)
             return Solution(
                 self.robot.commands.feasible(reached.answers.command[:, 0]),
                 candidates=lambda: self._candidates(reached.answers, names_of(reached.proposal)),
@@ -115,19 +118,15 @@ class Mdn(Method):
         """What the network gives for what it sees of some targets."""
         return self.config(self._network, seen.nodes, seen.pairs)
 
-    def _one(self, policy: Policy, target: Array, previous: Array | None, seed: int) -> Found:
-        """What is found for one normalized target (1, 6)."""
-        with self._one_thread():
-            reached = self._found(policy, target, seed)
-            return reached if previous is None else self._in_motion(target, reached, previous)
-
     def _found(self, policy: Policy, target: Array, seed: int) -> Found:
         """What is found for normalized targets (N, 6)."""
         proposal = self.proposals(target, seed)
         answers = follow(self.robot, target, proposal.force, self.settings.n_refined, STEPS)
         missed = answers.error[:, 0] > self.robot.exact
         if missed.any():
-            answers.replace(missed, self._at_last(policy, target[missed], answers.rows(missed)))
+            first = Answers._make(values[missed] for values in answers)
+            for kept, new in zip(answers, self._at_last(policy, target[missed], first), strict=True):
+                kept[missed] = new
         return Found(proposal, answers)
 
     def _at_last(self, policy: Policy, target: Array, answers: Answers) -> Answers:
@@ -163,7 +162,7 @@ class Mdn(Method):
         reached = follow(near, target, force, self.settings.n_refined, STEPS, kept=1)
         reached = reached._replace(origin=np.where(reached.origin == 0, NOW, reached.origin - 1))
         now_first = np.argsort(reached.origin[0] != NOW, kind="stable")
-        reached = ranked(near, reached.columns(now_first), SWITCH_GAIN)
+        reached = ranked(near, Answers._make(values[:, now_first] for values in reached), SWITCH_GAIN)
         if reached.error[0, 0] > near.exact:
             reached = refined(near, target, reached.command, reached.origin, MORE)
         if first.effort[0, 0] < (1.0 - WORTH_LEAVING) * reached.effort[0, 0]:

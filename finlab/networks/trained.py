@@ -13,6 +13,14 @@ from finlab.arrays import AnyArray, Array, Values
 from finlab.errors import CheckpointError
 from finlab.networks.layers import single_precision
 
+State = Mapping[str, AnyArray]
+"""Arrays of a network by PyTorch's names."""
+Shapes = dict[str, tuple[int, ...]]
+
+LARGEST_SIZE = 4096
+LARGEST_WEIGHT = 1e6
+"""Largest magnitude of a weight; training stays below 100, and far beyond this answers would be NaN."""
+
 
 class Normalization(NamedTuple):
     """Mean and standard deviation of the wrench over a data set, each of shape (6,) [N, N m]."""
@@ -43,15 +51,6 @@ def to_command(x: Values, lower: Values, upper: Values) -> Values:
     """Inverse of `to_normalized`; not clamped."""
     half = 0.5 * (upper - lower)
     return lower + half + x * half
-
-
-State = Mapping[str, AnyArray]
-"""Arrays of a network by PyTorch's names."""
-Shapes = dict[str, tuple[int, ...]]
-
-LARGEST_SIZE = 4096
-LARGEST_WEIGHT = 1e6
-"""Largest magnitude of a weight; training stays below 100, and far beyond this answers would be NaN."""
 
 
 class Sizes(Protocol):
