@@ -40,15 +40,10 @@ class EffortRobot(NamedTuple):
     """A robot of n healthy fins, ready for proposals, descent and refinement."""
 
     plant: Plant
-    """The fins' own laws."""
     forces: EffortProblem
-    """For the descent in planar forces."""
     commands: CommandProblem
-    """For the refinement of commands."""
     effort: EffortMeter
-    """What is kept least."""
     view: RobotView
-    """What the network sees."""
     exact: float = EXACT
     """Normalized error up to which an answer is exact."""
 

@@ -49,12 +49,10 @@ STARTS = {OTHER: "another start", NOW: "the way it moves now"}
 
 
 class Found(NamedTuple):
-    """What was found for some targets."""
+    """Proposals of the network for some targets, and what came of them."""
 
     proposal: Proposal
-    """What the network proposed."""
     answers: Answers
-    """What came of it."""
 
 
 def names_of(proposal: Proposal) -> tuple[str, ...]:

@@ -47,18 +47,14 @@ class MdnRecipe:
     """The network of method `mdn`, and what it learns from."""
 
     training: MdnTraining
-    """How it is trained."""
     answers: AnswerSettings = field(default_factory=AnswerSettings)
-    """What it learns from."""
     network: ForceNetworkConfig = field(default_factory=ForceNetworkConfig)
-    """Its sizes."""
 
 
-_MDN = MdnRecipe(MdnTraining(100_000, 256, 2e-3, warmup=200, ema=0.999, seconds=5400.0))
 RECIPES = {
-    "default": _MDN,
+    "default": MdnRecipe(MdnTraining(100_000, 256, 2e-3, warmup=200, ema=0.999, seconds=5400.0)),
     "smoke": MdnRecipe(
-        replace(_MDN.training, steps=30, batch_size=16, warmup=5, ema=0.9, anneal=10),
+        MdnTraining(30, 16, 2e-3, warmup=5, ema=0.9, seconds=5400.0, anneal=10),
         AnswerSettings(files=2, fins=2, robots=6, targets=8),
         ForceNetworkConfig(width=16, heads=2, layers=1, feedforward=16, n_components=4),
     ),
@@ -125,13 +121,8 @@ def train_mdn(
     settings = replace(recipe.training, **{k: v for k, v in training.items() if v is not None})
     # One yardstick of errors for all that is shipped; the network does not depend on it.
     normalization = read_normalization(resolve_checkpoint("paper"))
-    identity: dict[str, Any] = {
-        "preset": preset,
-        "seed": seed,
-        "training": asdict(settings),
-        "answers": asdict(recipe.answers),
-        "network": asdict(recipe.network),
-    }
+    parts: dict[str, Any] = {"training": settings, "answers": recipe.answers, "network": recipe.network}
+    identity = {"preset": preset, "seed": seed, **{name: asdict(part) for name, part in parts.items()}}
 
     def save(network: State, progress: dict[str, Any]) -> None:
         trained = TrainedWeights(out.name, normalization, sizes_for_file(recipe.network), network)
