@@ -48,7 +48,8 @@ def layer_norm(w: Weights, name: str, x: Values) -> Values:
 
 def feed_forward(w: Weights, up: str, down: str, x: Values) -> Values:
     """Two linear layers with a rectifier between them."""
-    return linear(w, down, relu(linear(w, up, x)))
+    hidden = linear(w, up, x)
+    return linear(w, down, np.maximum(hidden, 0) if library_of(x) is np else hidden.relu())
 
 
 def graph_attention(w: Weights, name: str, x: Values, pairs: Values | None = None) -> Values:
@@ -67,11 +68,6 @@ def graph_attention(w: Weights, name: str, x: Values, pairs: Values | None = Non
     return xp.einsum("bijh,bjhc->bihc", weight, message).reshape(source.shape) + w[f"{name}.bias"]
 
 
-def relu(x: Values) -> Values:
-    """max(x, 0)."""
-    return np.maximum(x, 0) if library_of(x) is np else x.relu()
-
-
 def leaky_relu(x: Values) -> Values:
     """x above zero, a fifth of it below."""
     return library_of(x).maximum(x, LEAK * x)
@@ -81,11 +77,6 @@ def elu(x: Values) -> Values:
     """x above zero, exp(x) - 1 below."""
     xp = library_of(x)
     return np.maximum(x, 0) + np.expm1(np.minimum(x, 0)) if xp is np else xp.nn.functional.elu(x)
-
-
-def sigmoid(x: Values) -> Values:
-    """1 / (1 + exp(-x)), by way of a tangent, which never overflows."""
-    return 0.5 * library_of(x).tanh(0.5 * x) + 0.5
 
 
 def softmax(x: Values, axis: int = -1) -> Values:

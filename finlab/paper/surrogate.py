@@ -123,7 +123,7 @@ class LayoutSurrogate:
             + self._fins
         )
         for name in self.config.layers()[1:]:
-            gate = layers.sigmoid(z)
+            gate = 0.5 * np.tanh(0.5 * z) + 0.5  # 1 / (1 + exp(-z)), which never overflows
             silu = z * gate
             if jacobian is not None:
                 jacobian.append(gate + silu * (1.0 - gate))
