@@ -12,7 +12,7 @@ from finlab.allocation.methods import LEARNED, Checkpoint, MethodChoice, checked
 from finlab.allocation.settings import Settings
 from finlab.layout import Layout
 from finlab.networks.checkpoint import read_normalization, resolve_checkpoint
-from finlab.networks.normalization import Normalization
+from finlab.networks.trained import Normalization
 
 
 class AnyRobot:

@@ -23,9 +23,11 @@ METHODS: dict[str, tuple[str, str]] = {
     "paper": ("finlab.paper.pipeline", "Paper"),
     "qp": ("finlab.allocation.baselines.linear", "Qp"),
     "sqp": ("finlab.allocation.baselines.sqp", "Sqp"),
+    "paper_sqp": ("finlab.allocation.baselines.linear", "PaperSqp"),
     "px4": ("finlab.allocation.baselines.autopilots", "Px4"),
     "ardusub": ("finlab.allocation.baselines.autopilots", "ArduSub"),
-    "analytic": ("finlab.allocation.baselines.linear", "Analytic"),
+    "analytic": ("finlab.allocation.baselines.analytic", "Analytic"),
+    "fixed_frequency": ("finlab.allocation.baselines.analytic", "FixedFrequency"),
     "ipopt": ("finlab.allocation.baselines.ipopt", "Ipopt"),
 }
 """Name -> module and class; modules are loaded only when their method is asked for."""

@@ -42,14 +42,19 @@ def verb_of(experiment: Experiment) -> Callable[..., None]:
     """A function whose signature says to the parser which options there are."""
     from finlab.evaluation.document import to_text
     from finlab.evaluation.experiment import begin
+    from finlab.evaluation.plots import check_picture, write_picture
     from finlab.executor import on_cluster
 
     options = experiment.options()
 
     def verb(json: Path | None, cluster: str | None, **typed: Any) -> None:
+        plot = typed.pop("plot", None)
         check_json_file(json)
+        check_picture(plot)
         begin(experiment.name)
         chosen = {name: _parsed(name, options[name], value) for name, value in typed.items()}
+        if plot is not None:
+            chosen |= experiment.for_picture
         rows = []
         with on_cluster(cluster):
             for row in experiment.each_row(**chosen):
@@ -57,12 +62,18 @@ def verb_of(experiment: Experiment) -> Callable[..., None]:
                 if json != STDOUT:  # so that they are there if it is stopped
                     put_json({"rows": rows}, json)
         put_json({"rows": rows}, json, to_text(*experiment.words(), *experiment.results(rows)))
+        if plot is not None and experiment.picture is not None:
+            write_picture(experiment.picture, rows, plot)
 
     shown = {name: _shown(each) for name, each in options.items()}
     rows_file = Annotated[
         JsonFile, arg(help="file for the rows, {'rows': [...]}; the rows alone without one")
     ]
-    for name, kind in (("json", rows_file), ("cluster", Cluster)):
+    files: dict[str, Any] = {"json": rows_file, "cluster": Cluster}
+    if experiment.picture is not None:
+        about = "file for a picture, .png, .svg or .pdf (needs matplotlib, extra plot)"
+        files["plot"] = Annotated[Path | None, arg(metavar="FILE", help=about)]
+    for name, kind in files.items():
         shown[name] = inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=kind)
     arguments = inspect.cleandoc(experiment.run.__doc__ or "").partition("Args:")[2].partition("\n\n")[0]
     verb.__doc__ = f"{experiment.question}\n\nArgs:{arguments}"

@@ -47,7 +47,7 @@ def allocate(
     Args:
         wrench: target in the body frame [N, N m]; nan for an axis that does not count.
         failed: name of a fin that does not work.
-        method: dual, mdn, paper, qp, sqp, px4, ardusub, analytic or ipopt.
+        method: dual, mdn, paper, qp, sqp, paper_sqp, px4, ardusub, analytic, fixed_frequency or ipopt.
         robust: for method dual: watts that an expected error of 1 % of the yardstick is worth.
         checkpoint: trained checkpoint; the shipped one of the method by default.
         policy: for a wrench out of reach: closest, direction (same direction, scaled down) or priority.

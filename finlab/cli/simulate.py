@@ -56,7 +56,7 @@ def simulate(
         monitor: let a FaultMonitor watch the robot and tell the allocator what it finds.
         learn: every minute fit the actuators' strengths and directions to the last four minutes of the swim,
             and allocate with them from then on; for methods that take any shaft, and fins of a law.
-        method: dual, mdn, paper, qp, sqp, px4, ardusub, analytic or ipopt.
+        method: dual, mdn, paper, qp, sqp, paper_sqp, px4, ardusub, analytic, fixed_frequency or ipopt.
         controller: tracking, or of the paper waypoint, or velocity, which holds the path's speed and depth.
         duration: time for a shipped trajectory.
         truth: the robot that really swims, a layout with the same actuators; the one that is believed by

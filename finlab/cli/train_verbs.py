@@ -63,7 +63,7 @@ def mdn(
         steps: most optimizer steps instead of the recipe's.
         resume: go on from the last state in the folder.
     """
-    from finlab.mdn.training.train import train_mdn
+    from finlab.mdn.training.train_mdn import train_mdn
 
     check_positive(minutes=minutes, steps=steps)
     seconds = None if minutes is None else 60.0 * minutes

@@ -18,7 +18,7 @@ from finlab.layout.axes import AXES
 from finlab.layout.file import FORMAT, layout_to_dict
 from finlab.layout.file_form import plain
 from finlab.layout.load import Data, Edge, Graph, Normalization, edges_of
-from finlab.paper.features import POSITION_SCALE, SCALES
+from finlab.paper.network import POSITION_SCALE, SCALES
 from finlab.whole_file import write_whole
 
 _FORCE = ("force", "N")

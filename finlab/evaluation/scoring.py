@@ -59,14 +59,15 @@ def score(case: Case, targets: Array, command: Array, solve_ms: Array, *, number
         number: of the layout in its split.
 
     Returns:
-        Arrays (N,): `layout`, its number; `err_norm`, the norm of what is missing over `sigma_of`, without
-        axes that are free; `err_phys`, the same in N and N m; `effort`, the paper's J_en; `power` [W];
-        `solve_ms`.
+        Arrays (N,): `layout`, its number; `fins`, how many it has; `err_norm`, the norm of what is missing
+        over `sigma_of`, without axes that are free; `err_phys`, the same in N and N m; `effort`, the
+        paper's J_en; `power` [W]; `solve_ms`.
     """
     plant = plant_of(case.layout)
     missing = (plant.wrench(command) - targets) * case.layout.commanded
     return {
         "layout": np.full(len(targets), number, np.int64),
+        "fins": np.full(len(targets), case.healthy.n, np.int64),
         "err_norm": np.linalg.norm(missing / sigma_of(case), axis=-1),
         "err_phys": np.linalg.norm(missing, axis=-1),
         "effort": command_effort(command, plant.upper),

@@ -1,14 +1,24 @@
-"""From proposed forces to exact answers: descent in forces, then Levenberg-Marquardt on commands."""
+"""Exact answers from proposed forces: descent in forces, then Levenberg-Marquardt on commands."""
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.levenberg_marquardt import refine
+from finlab.allocation.dual.rates import Box
+from finlab.allocation.levenberg_marquardt import CommandProblem, refine
 from finlab.arrays import AnyArray, Array
-from finlab.mdn.descent import descend, realize, wrench
-from finlab.mdn.robot import EffortRobot
+from finlab.mdn.descent import EffortProblem, descend, effort_problem, realize, wrench
+from finlab.mdn.effort_fins import EffortFins
+from finlab.mdn.features import RobotView, robot_view
+from finlab.physics.objective import ZERO_DIRECTION, EffortMeter, effort_scale
+from finlab.physics.plant import Plant
+
+EXACT = 1e-5
+"""Normalized error up to which an answer is exact and effort decides: a thousandth of what counts as
+delivered."""
+
 
 PROMISING = 0.02
 """Normalized error in force space below which a descent has succeeded: refinement removes the rest."""
@@ -24,6 +34,42 @@ ends near zero, since the effort divides by that end."""
 
 OTHER, NOW = -1, -2
 """Origins of answers that no network has proposed: other starts, and how the robot moves now."""
+
+
+class EffortRobot(NamedTuple):
+    """A robot of n healthy fins, ready for proposals, descent and refinement."""
+
+    plant: Plant
+    forces: EffortProblem
+    commands: CommandProblem
+    effort: EffortMeter
+    view: RobotView
+    exact: float = EXACT
+    """Normalized error up to which an answer is exact."""
+
+    def within(self, box: Box) -> "EffortRobot":
+        """The same robot, each fin kept within what may follow a previous command."""
+        fins, free, (lower, upper) = self.forces.fins, box.free[:, 2], (box.lower[:, 2], box.upper[:, 2])
+        middle, half = 0.5 * (lower + upper), np.where(free, np.pi, 0.5 * (upper - lower))
+        arcs = replace(fins, middle=middle + fins.deflection(middle), half=half)
+        forces = self.forces._replace(fins=arcs)
+        commands = replace(self.commands, lower=box.lower, upper=box.upper, full_turn=free)
+        return self._replace(forces=forces, commands=commands)
+
+
+def effort_robot(plant: Plant, scale: Array) -> EffortRobot:
+    """Prepare a robot of fins; `scale` (6,) is what wrenches are divided by.
+
+    Raises:
+        DataError: a fin's force table cannot be read.
+    """
+    layout = plant.layout
+    turning = ZERO_DIRECTION / effort_scale(layout.upper)[:, 2] ** 2
+    idle = np.clip(0.0, layout.lower[:, 2], layout.upper[:, 2])
+    fins = EffortFins.of(layout)
+    forces = effort_problem(plant.effectiveness[:, 1:] / scale, fins, turning, idle)
+    effort, commands = EffortMeter(plant.upper), CommandProblem.of(plant, scale)
+    return EffortRobot(plant, forces, commands, effort, robot_view(forces))
 
 
 class Steps(NamedTuple):
@@ -54,22 +100,9 @@ class Answers(NamedTuple):
     origin: NDArray[np.intp]
     """Number of the proposal that each came from (N, P), or `OTHER` or `NOW`."""
 
-    def rows(self, rows: NDArray[np.bool_]) -> "Answers":
-        """Those to some of the targets."""
-        return Answers._make(values[rows] for values in self)
-
-    def columns(self, places: NDArray[np.intp] | slice) -> "Answers":
-        """Some of the answers to each target."""
-        return Answers._make(values[:, places] for values in self)
-
     def before(self, other: "Answers") -> "Answers":
         """These answers, then others."""
         return Answers._make(np.concatenate(both, axis=1) for both in zip(self, other, strict=True))
-
-    def replace(self, rows: NDArray[np.bool_], by: "Answers") -> None:
-        """Put other answers in the place of those to some targets, in place."""
-        for kept, new in zip(self, by, strict=True):
-            kept[rows] = new
 
 
 def follow(
@@ -87,14 +120,14 @@ def follow(
     """
     rows, count, n = force.shape
     each = np.repeat(target, count, axis=0)
-    *_, found = descend(robot.forces, each, force.reshape(-1, n).astype(complex), steps.descent)
-    command, effort = realize(robot.forces, found)
-    error = np.linalg.norm(each - wrench(robot.forces, found.force), axis=-1)
+    *_, reached = descend(robot.forces, each, force.reshape(-1, n).astype(complex), steps.descent)
+    command, effort = realize(robot.forces, reached)
+    error = np.linalg.norm(each - wrench(robot.forces, reached.force), axis=-1)
     score = np.where(error > PROMISING, INEXACT * (1.0 + error), effort).reshape(rows, count)
     score[:, :kept] = -1.0
     # Roots of shares of the largest forces: small ones count, too.
-    root = found.unit * np.sqrt(found.size / robot.forces.fins.maximum)
-    chosen = _distinct(score, root.reshape(rows, count, n), keep)
+    root = reached.unit * np.sqrt(reached.size / robot.forces.fins.maximum)
+    chosen, _ = distinct(score, root.reshape(rows, count, n), keep, SAME)
     command = command.reshape(rows, count, n, 3)[np.arange(rows)[:, None], chosen]
     return refined(robot, target, command, chosen, steps)
 
@@ -136,16 +169,17 @@ def ranked(robot: EffortRobot, answers: Answers, bonus: float = 0.0) -> Answers:
     return Answers._make(values[place, order] for values in answers)
 
 
-def _distinct(score: Array, root: AnyArray, keep: int) -> NDArray[np.intp]:
-    """Places (N, keep) of scores (N, K), the least first, those last whose forces (N, K, n), as roots of
-    shares, hardly differ from ones before them: several proposals mostly lead to the same forces."""
-    if score.shape[1] <= keep:
-        return np.asarray(score.argsort(axis=1, kind="stable"))
+def distinct(score: Array, root: AnyArray, keep: int, apart: float) -> tuple[NDArray[np.intp], Array]:
+    """Places (N, P) of scores (N, K), `keep` at most, the least first, and their ranks; those last, ranked
+    behind `LAST`, whose forces (N, K, n), as roots of shares, differ by less than `apart` from ones before
+    them: several proposals mostly lead to the same forces."""
     left, row = score.copy(), np.arange(len(score))
-    chosen = np.empty((len(score), keep), np.intp)
-    for k in range(keep):
+    chosen = np.empty((len(score), min(keep, score.shape[1])), np.intp)
+    rank = np.empty(chosen.shape)
+    for k in range(chosen.shape[1]):
         chosen[:, k] = first = left.argmin(axis=1)
-        again = np.abs(root - root[row, first][:, None]).mean(-1) < SAME
+        rank[:, k] = left[row, first]
+        again = np.abs(root - root[row, first][:, None]).mean(-1) < apart
         left = np.where(again, left + LAST, left)
         left[row, first] = np.inf
-    return chosen
+    return chosen, rank

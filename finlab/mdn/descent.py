@@ -74,12 +74,12 @@ def descend(problem: EffortProblem, target: Array, force: AnyArray, steps: int) 
     """Follow R forces (R, n) to cheap ones that give normalized targets (R, 6): what fins can give of them,
     then what each of `steps` problems makes of it."""
     fins = problem.fins
-    found = fins.project(force)
-    yield found
+    reached = fins.project(force)
+    yield reached
     cut = np.ones(force.shape)
-    before = found.force
+    before = reached.force
     for step in range(steps):
-        shift, a, b = _respond(problem, found, cut)
+        shift, a, b = _respond(problem, reached, cut)
         missing = target - wrench(problem, shift)
         matrix = np.concatenate([a, b.real, b.imag], axis=1) @ problem.products
         matrix[:, ::7] += LEAST  # the diagonal
@@ -89,9 +89,9 @@ def descend(problem: EffortProblem, target: Array, force: AnyArray, steps: int) 
         if step >= HALF_STEPS:
             answer = 0.5 * (answer + before)
         before = answer
-        found = fins.project(answer)
-        cut = np.minimum(cut * fins.largest * found.gauge / np.maximum(found.wanted, LEAST), 1.0)
-        yield found
+        reached = fins.project(answer)
+        cut = np.minimum(cut * fins.largest * reached.gauge / np.maximum(reached.wanted, LEAST), 1.0)
+        yield reached
 
 
 def wrench(problem: EffortProblem, force: AnyArray) -> Array:
@@ -99,29 +99,29 @@ def wrench(problem: EffortProblem, force: AnyArray) -> Array:
     return np.ascontiguousarray(force).view(float) @ problem.effectiveness
 
 
-def realize(problem: EffortProblem, found: Projected) -> tuple[Array, Array]:
+def realize(problem: EffortProblem, reached: Projected) -> tuple[Array, Array]:
     """Commands (R, n, 3) that give forces with the least effort, and that effort (R,)."""
-    row, direction = problem.fins.lookup(found.size / found.gauge), found.direction
+    row, direction = problem.fins.lookup(reached.size / reached.gauge), reached.direction
     turn = wrapped(direction - problem.fins.deflection(direction))
     command = np.stack([row[..., AMPLITUDE], row[..., FREQUENCY], turn], axis=-1)
     effort = row[..., EFFORT] + problem.direction_cost * turn * turn
     return command, effort.sum(-1)
 
 
-def _respond(problem: EffortProblem, found: Projected, cut: Array) -> tuple[AnyArray, Array, AnyArray]:
+def _respond(problem: EffortProblem, reached: Projected, cut: Array) -> tuple[AnyArray, Array, AnyArray]:
     """How fins answer a pull p, all of it `cut`: shift + a p + b conj(p), three arrays (R, n), by the
     quadratics that touch the efforts at the present forces."""
-    row, direction = problem.fins.lookup(found.size / found.gauge), found.direction
+    row, direction = problem.fins.lookup(reached.size / reached.gauge), reached.direction
     # The same command gives less in weaker directions, so a newton more costs more there.
-    across = np.exp(row[..., MOBILITY]) * found.gauge**2 * cut
+    across = np.exp(row[..., MOBILITY]) * reached.gauge**2 * cut
     softness = 1.0 / row[..., STIFFNESS]
     along = across * softness
     turn = wrapped(direction - problem.fins.deflection(direction))
-    size = np.maximum(found.size, LEAST)
+    size = np.maximum(reached.size, LEAST)
     # Turning towards where that costs nothing: the weaker the force, the less of it does.
     pull = 2.0 * problem.direction_cost * across / size
     held = 1.0 / (1.0 + pull / size)
     across = across * held
-    unit = found.unit
-    shift = (found.size * (1.0 - softness) * cut - 1j * pull * turn * held) * unit
+    unit = reached.unit
+    shift = (reached.size * (1.0 - softness) * cut - 1j * pull * turn * held) * unit
     return shift, 0.5 * (along + across), 0.5 * (along - across) * unit * unit

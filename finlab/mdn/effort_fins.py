@@ -141,8 +141,8 @@ class EffortFins:
     def _around(self, values: Array, direction: Array) -> Array:
         """Of values (n, POINTS), those nearest to directions (..., n)."""
         cell = np.rint(direction * (POINTS / TURN)).astype(np.intp) % POINTS
-        found: Array = values.ravel().take(cell + np.arange(len(values)) * POINTS)
-        return found
+        taken: Array = values.ravel().take(cell + np.arange(len(values)) * POINTS)
+        return taken
 
     def lookup(self, size: Array) -> Array:
         """Rows (R, n, 5) of the tables for forces of sizes (R, n) [N] in the strongest directions."""
@@ -156,9 +156,9 @@ class EffortFins:
         place -= level
         level += self._first
         step = self._steps.take(level, axis=0)
-        found: Array = step[..., 1, :] * place[..., None]
-        found += step[..., 0, :]
-        return found
+        taken: Array = step[..., 1, :] * place[..., None]
+        taken += step[..., 0, :]
+        return taken
 
     def project(self, force: AnyArray) -> Projected:
         """What the fins can do nearest to forces (R, n), complex."""
@@ -191,13 +191,13 @@ def _costs(fin: Fin, stamp: tuple[int, int] | None) -> tuple[Array, Array]:
     # Between grid points the square root of the force is nearly a straight line.
     rising = np.sqrt(np.maximum.accumulate(force, axis=1))
     rising += np.arange(FREQUENCIES) * 1e-13 * np.maximum(rising[:, -1:], 1e-12)  # where it stays, the first
-    found = np.array([np.interp(np.sqrt(size), row, frequency) for row in rising])
-    effort = effort_of_shares(amplitude[:, None] / scale[0], found / scale[1], 0.0)
+    taken = np.array([np.interp(np.sqrt(size), row, frequency) for row in rising])
+    effort = effort_of_shares(amplitude[:, None] / scale[0], taken / scale[1], 0.0)
     effort[np.sqrt(size) > rising[:, -1:] * (1.0 + FLAT) + 1e-15] = np.inf
     best = effort.argmin(axis=0)
     level = np.arange(LEVELS)
     slopes = _slopes(effort[best, level], size)
-    return size, np.stack([amplitude[best], found[best, level], effort[best, level], *slopes], axis=-1)
+    return size, np.stack([amplitude[best], taken[best, level], effort[best, level], *slopes], axis=-1)
 
 
 def _slopes(effort: Array, size: Array) -> tuple[Array, Array]:

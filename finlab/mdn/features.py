@@ -1,4 +1,4 @@
-"""What the network of method `mdn` sees of a robot: what each fin can do, and what it is asked for.
+"""Features of a robot and its targets for the network of method `mdn`, and the proposals that follow from it.
 
 The cheapest forces y_i = F_i x_i, F_i the largest force of fin i, solve min sum c_i(x_i) s.t. C x = w, where
 C holds the normalized wrenches of full forces. The same forces solve it when P x = p is asked for instead,
@@ -7,8 +7,7 @@ least shares that give w. Neither knows of sizes, levers or axes any more, so on
 size.
 
 Each fin is described in a frame of its own that turns with the direction of its p_i; planar vectors are
-complex
-numbers, and the 2 x 2 blocks of P are pairs (a, b) with x -> a x + b conj(x). Node features:
+complex numbers, and the 2 x 2 blocks of P are pairs (a, b) with x -> a x + b conj(x). Node features:
 
 =====  ============================================================================================
 index  meaning
@@ -29,14 +28,16 @@ index  meaning
 Pair features are the block (a, b) of P between two fins, in their frames.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finlab.arrays import AnyArray
 from finlab.mdn.descent import EffortProblem
 from finlab.mdn.effort_fins import EFFORT
-from finlab.mdn.network import NODE_SIZE
+from finlab.mdn.network import NODE_SIZE, ForceMixture
 
 SHARES = (0.02, 0.1, 0.3, 0.6)
 """Shares of the largest force at which a fin's effort is looked up."""
@@ -118,23 +119,23 @@ def robot_view(problem: EffortProblem) -> RobotView:
 
 def see(view: RobotView, target: AnyArray) -> Seen:
     """What the network sees of normalized targets (N, 6) on one robot."""
-    asked = target @ view.solver
+    wanted = target @ view.solver
     many = (np.broadcast_to(part, (len(target), *part.shape)) for part in (view.static, *view.blocks))
-    return features(asked, *many)
+    return features(wanted, *many)
 
 
-def features(asked: AnyArray, static: AnyArray, a: AnyArray, b: AnyArray) -> Seen:
+def features(wanted: AnyArray, static: AnyArray, a: AnyArray, b: AnyArray) -> Seen:
     """The features of N targets, each on a robot of its own.
 
     Args:
-        asked: p (N, n), complex.
+        wanted: p (N, n), complex.
         static: as in `RobotView`, (N, n, 20).
         a: first part of the blocks of P (N, n, n), complex.
         b: second part.
     """
-    rows, n = asked.shape
-    size = np.abs(asked)
-    frame = np.where(size > 1e-9, asked, 1.0)
+    rows, n = wanted.shape
+    size = np.abs(wanted)
+    frame = np.where(size > 1e-9, wanted, 1.0)
     frame = frame / np.abs(frame)
     back = frame.conj()
     nodes = np.empty((rows, n, NODE_SIZE), dtype=np.float32)
@@ -154,3 +155,43 @@ def features(asked: AnyArray, static: AnyArray, a: AnyArray, b: AnyArray) -> See
 
 def _parts(values: AnyArray) -> tuple[AnyArray, AnyArray]:
     return values.real, values.imag
+
+
+class Proposal(NamedTuple):
+    """K proposals for each of N targets, none of them exact yet."""
+
+    force: AnyArray
+    """Planar forces (N, K, n) [N], complex: horizontal, and 1j times vertical."""
+    component: NDArray[np.intp]
+    """Mixture component of each (N, K)."""
+
+
+def propose(
+    mixture: ForceMixture, view: RobotView, seen: Seen, n_candidates: int, temperature: float, seed: int
+) -> Proposal:
+    """K proposals for N targets on one robot, from the network's mixture for what it sees of them.
+
+    The components' means come first, by falling weight. Where K exceeds their number M, the rest are drawn by
+    the components' weights, with variances times the temperature.
+    """
+    weight, mean, std = mixture.complex_parts()
+    rows, m, n = mean.shape
+    place = np.arange(rows)[:, None]
+    component = np.argsort(-weight, axis=1)[:, :n_candidates]
+    root = mean[place, component]
+    if n_candidates > m:
+        rng, more = np.random.default_rng(seed), n_candidates - m
+        uniform = rng.random((rows, more, 1), dtype=np.float32)
+        parts = rng.standard_normal((rows, more, n, 2), dtype=np.float32)
+        cumulative = weight.cumsum(1)
+        others = (uniform * cumulative[:, None, -1:] > cumulative[:, None, :-1]).sum(-1)
+        spread = math.sqrt(temperature) * std[place, others]
+        drawn = mean[place, others] + spread * (parts[..., 0] + 1j * parts[..., 1])
+        component, root = (np.hstack(both) for both in ((component, others), (root, drawn)))
+    return Proposal(shares(root) * (seen.frame * view.largest)[:, None], component)
+
+
+def shares(root: AnyArray) -> AnyArray:
+    """Shares of the largest forces, none above one, from what the mixture gives: their roots."""
+    size = np.abs(root)
+    return np.asarray(root * np.minimum(size, 1.0 / np.maximum(size, 1e-9)))

@@ -22,13 +22,11 @@ from finlab.allocation.solution import Candidates, Solution
 from finlab.allocation.yardstick import costs
 from finlab.arrays import Array
 from finlab.layout import Layout
-from finlab.mdn.answers import NOW, OTHER, Answers, Steps, follow, ranked, refined, traced
+from finlab.mdn.answers import NOW, OTHER, Answers, Steps, effort_robot, follow, ranked, refined, traced
 from finlab.mdn.descent import realize
-from finlab.mdn.features import Seen, see
+from finlab.mdn.features import Proposal, Seen, propose, see
 from finlab.mdn.network import ForceMixture, ForceNetworkConfig
-from finlab.mdn.proposal import Proposal, propose
-from finlab.mdn.robot import effort_robot
-from finlab.networks.threads import single_threaded_products
+from finlab.networks.layers import single_threaded_products
 from finlab.networks.trained import TrainedWeights
 
 USUAL_SHARE = 0.1
@@ -50,12 +48,10 @@ STARTS = {OTHER: "another start", NOW: "the way it moves now"}
 
 
 class Found(NamedTuple):
-    """What was found for some targets."""
+    """Proposals of the network for some targets, and what came of them."""
 
     proposal: Proposal
-    """What the network proposed."""
     answers: Answers
-    """What came of it."""
 
 
 def names_of(proposal: Proposal) -> tuple[str, ...]:
@@ -81,15 +77,18 @@ class Mdn(Method):
         self._network = weights.single_precision
         self._one_thread = single_threaded_products()
 
-    def solve(self, targets: Array, *, policy: Policy, **asked: Any) -> Solution:
+    def solve(self, targets: Array, *, policy: Policy, **wanted: Any) -> Solution:
         """See `Method`."""
-        target, previous, seed = targets / self.sigma, asked.get("previous"), asked.get("seed", 0)
+        target, previous, seed = targets / self.sigma, wanted.get("previous"), wanted.get("seed", 0)
         if len(target) == 1:
-            found = self._one(policy, target, previous, seed)
+            with self._one_thread():
+                reached = self._found(policy, target, seed)
+                if previous is not None:
+                    reached = self._in_motion(target, reached, previous)
             return Solution(
-                self.robot.commands.feasible(found.answers.command[:, 0]),
-                candidates=lambda: self._candidates(found.answers, names_of(found.proposal)),
-                samples=lambda: self._samples(target, found),
+                self.robot.commands.feasible(reached.answers.command[:, 0]),
+                candidates=lambda: self._candidates(reached.answers, names_of(reached.proposal)),
+                samples=lambda: self._samples(target, reached),
             )
         command = np.empty((len(target), self.layout.n, 3))
         with self._one_thread():
@@ -116,19 +115,15 @@ class Mdn(Method):
         """What the network gives for what it sees of some targets."""
         return self.config(self._network, seen.nodes, seen.pairs)
 
-    def _one(self, policy: Policy, target: Array, previous: Array | None, seed: int) -> Found:
-        """What is found for one normalized target (1, 6)."""
-        with self._one_thread():
-            found = self._found(policy, target, seed)
-            return found if previous is None else self._in_motion(target, found, previous)
-
     def _found(self, policy: Policy, target: Array, seed: int) -> Found:
         """What is found for normalized targets (N, 6)."""
         proposal = self.proposals(target, seed)
         answers = follow(self.robot, target, proposal.force, self.settings.n_refined, STEPS)
         missed = answers.error[:, 0] > self.robot.exact
         if missed.any():
-            answers.replace(missed, self._at_last(policy, target[missed], answers.rows(missed)))
+            first = Answers._make(values[missed] for values in answers)
+            for kept, new in zip(answers, self._at_last(policy, target[missed], first), strict=True):
+                kept[missed] = new
         return Found(proposal, answers)
 
     def _at_last(self, policy: Policy, target: Array, answers: Answers) -> Answers:
@@ -138,12 +133,12 @@ class Mdn(Method):
         answers = refined(robot, target, answers.command, answers.origin, MORE)
         missed = answers.error[:, 0] > robot.exact
         if missed.any():
-            asked = target[missed]
-            command = self._default.solve(asked * self.sigma, policy=policy).command
+            wanted = target[missed]
+            command = self._default.solve(wanted * self.sigma, policy=policy).command
             wrench = robot.commands.wrench(command)
-            error = np.linalg.norm(wrench - asked, axis=1)
-            told = (command, wrench, error, robot.effort(command), np.full(len(asked), OTHER))
-            for kept, new in zip(answers, told, strict=True):
+            error = np.linalg.norm(wrench - wanted, axis=1)
+            replaced = (command, wrench, error, robot.effort(command), np.full(len(wanted), OTHER))
+            for kept, new in zip(answers, replaced, strict=True):
                 kept[missed, 0] = new
         return answers
 
@@ -161,18 +156,18 @@ class Mdn(Method):
         near = self.robot.within(rates.box(previous))
         moves = plant.force(plant.feasible(np.where(np.isfinite(previous), previous, plant.lower)))
         force = np.insert(free.proposal.force, 0, moves[:, 1] + 1j * moves[:, 2], axis=1)
-        found = follow(near, target, force, self.settings.n_refined, STEPS, kept=1)
-        found = found._replace(origin=np.where(found.origin == 0, NOW, found.origin - 1))
-        now_first = np.argsort(found.origin[0] != NOW, kind="stable")
-        found = ranked(near, found.columns(now_first), SWITCH_GAIN)
-        if found.error[0, 0] > near.exact:
-            found = refined(near, target, found.command, found.origin, MORE)
-        if first.effort[0, 0] < (1.0 - WORTH_LEAVING) * found.effort[0, 0]:
+        reached = follow(near, target, force, self.settings.n_refined, STEPS, kept=1)
+        reached = reached._replace(origin=np.where(reached.origin == 0, NOW, reached.origin - 1))
+        now_first = np.argsort(reached.origin[0] != NOW, kind="stable")
+        reached = ranked(near, Answers._make(values[:, now_first] for values in reached), SWITCH_GAIN)
+        if reached.error[0, 0] > near.exact:
+            reached = refined(near, target, reached.command, reached.origin, MORE)
+        if first.effort[0, 0] < (1.0 - WORTH_LEAVING) * reached.effort[0, 0]:
             towards = near.commands.feasible(first.command[:, :1])
             other = refined(near, target, towards, first.origin[:, :1], MORE)
-            if other.error[0, 0] <= max(near.exact, found.error[0, 0]):
-                found = other.before(found)
-        return free._replace(answers=found)
+            if other.error[0, 0] <= max(near.exact, reached.error[0, 0]):
+                reached = other.before(reached)
+        return free._replace(answers=reached)
 
     def _candidates(self, answers: Answers, names: tuple[str, ...]) -> Candidates:
         """The refined answers to a single target, and the components they come from."""
@@ -183,11 +178,13 @@ class Mdn(Method):
             command, wrench * self.sigma, USUAL_SHARE * error, *costs(self.layout, command), source
         )
 
-    def _samples(self, target: Array, found: Found) -> Candidates:
+    def _samples(self, target: Array, reached: Found) -> Candidates:
         """The proposals for a single target as the cheapest commands with their forces."""
         robot = self.robot
-        command, _ = realize(robot.forces, robot.forces.fins.project(found.proposal.force[0].astype(complex)))
-        return self._judged(target, command, names_of(found.proposal))
+        command, _ = realize(
+            robot.forces, robot.forces.fins.project(reached.proposal.force[0].astype(complex))
+        )
+        return self._judged(target, command, names_of(reached.proposal))
 
     def _judged(self, target: Array, command: Array, names: tuple[str, ...]) -> Candidates:
         """Commands (K, n, 3) for a normalized target (1, 6), by the fins' own laws."""

@@ -63,7 +63,9 @@ class ForceNetworkConfig:
         """The mixture for fins (B, n, 26) and pairs (B, n, n, 4), with these weights."""
         hidden = layers.linear(w, "enter", nodes)
         for name in (f"layers.{i}" for i in range(self.layers)):
-            hidden = hidden + self._look(w, name, hidden, pairs)
+            seen = layers.layer_norm(w, f"{name}.norm1", hidden)
+            seen = layers.graph_attention(w, f"{name}.look", seen, pairs)
+            hidden = hidden + layers.linear(w, f"{name}.look.out", seen)
             seen = layers.layer_norm(w, f"{name}.norm2", hidden)
             hidden = hidden + layers.feed_forward(w, f"{name}.up", f"{name}.down", seen)
         hidden = layers.layer_norm(w, "norm", hidden)
@@ -71,17 +73,6 @@ class ForceNetworkConfig:
         raw = raw.reshape(*raw.shape[:-1], self.n_components, 3)
         log_std = LOG_STD[0] + LOG_STD[1] * library_of(raw).tanh(raw[..., 2])
         return ForceMixture(layers.linear(w, "weight", hidden.mean(1)), raw[..., :2], log_std)
-
-    def _look(self, w: Weights, name: str, x: Values, pairs: Values) -> Values:
-        """New features (B, n, width) of features (B, n, width) and pairs (B, n, n, 4)."""
-        look, x = f"{name}.look", layers.layer_norm(w, f"{name}.norm1", x)
-        source, target = (layers.linear(w, f"{look}.{part}", x) for part in ("source", "target"))
-        hidden = layers.linear(w, f"{look}.pair", pairs) + source[:, None] + target[:, :, None]
-        hidden = layers.leaky_relu(hidden)  # (B, n, n, width)
-        weight = layers.softmax(layers.head_scores(w[f"{look}.attention"], hidden), 2)
-        split = hidden.reshape(*hidden.shape[:3], self.heads, -1)
-        message = library_of(x).einsum("bijh,bijhc->bihc", weight, split).reshape(x.shape)
-        return layers.linear(w, f"{look}.out", message)
 
 
 class ForceMixture(NamedTuple):

@@ -1,1 +1,1 @@
-"""What trained networks share: their layers, their weights on disk, and the yardsticks of their numbers."""
+"""Layers, weights on disk and normalization of all networks."""

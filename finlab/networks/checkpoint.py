@@ -18,8 +18,7 @@ from finlab.errors import CheckpointError, DataError, LayoutError
 from finlab.files.guarded import decoded, read_file
 from finlab.files.plain_values import parse_json
 from finlab.layout import FinModelSpec
-from finlab.networks.normalization import Normalization
-from finlab.networks.trained import State, TrainedWeights, check_arrays
+from finlab.networks.trained import Normalization, State, TrainedWeights, check_arrays
 from finlab.whole_file import make_folder, write_whole
 
 FORMAT = "finlab-checkpoint"

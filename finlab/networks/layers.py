@@ -4,7 +4,9 @@ A network is a function of its weights, a mapping from PyTorch's names to arrays
 inputs. On a robot the weights are numpy arrays in single precision and no tensor library is needed.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager, nullcontext
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -46,18 +48,24 @@ def layer_norm(w: Weights, name: str, x: Values) -> Values:
 
 def feed_forward(w: Weights, up: str, down: str, x: Values) -> Values:
     """Two linear layers with a rectifier between them."""
-    return linear(w, down, relu(linear(w, up, x)))
+    hidden = linear(w, up, x)
+    return linear(w, down, np.maximum(hidden, 0) if library_of(x) is np else hidden.relu())
 
 
-def head_scores(attention: Values, hidden: Values) -> Values:
-    """Scores (..., heads) of features (..., heads c) by the attention vectors (heads, c)."""
-    split = hidden.reshape(*hidden.shape[:-1], *attention.shape)
-    return library_of(hidden).einsum("...hc,hc->...h", split, attention)
-
-
-def relu(x: Values) -> Values:
-    """max(x, 0)."""
-    return np.maximum(x, 0) if library_of(x) is np else x.relu()
+def graph_attention(w: Weights, name: str, x: Values, pairs: Values | None = None) -> Values:
+    """A GATv2 layer on complete graphs with self loops: features (B, n, width) of the same; heads are
+    concatenated. Features of pairs (B, n, n, F), where there are any, count in what is scored, and what is
+    scored is then the message, too."""
+    xp, vectors = library_of(x), w[f"{name}.attention"]
+    source, target = (linear(w, f"{name}.{part}", x) for part in ("source", "target"))
+    seen = source[:, None] if pairs is None else linear(w, f"{name}.pair", pairs) + source[:, None]
+    hidden = leaky_relu(seen + target[:, :, None])  # (B, n, n, width)
+    hidden = hidden.reshape(*hidden.shape[:-1], *vectors.shape)
+    weight = softmax(xp.einsum("...hc,hc->...h", hidden, vectors), 2)
+    if pairs is not None:
+        return xp.einsum("bijh,bijhc->bihc", weight, hidden).reshape(x.shape)
+    message = source.reshape(*source.shape[:2], *vectors.shape)
+    return xp.einsum("bijh,bjhc->bihc", weight, message).reshape(source.shape) + w[f"{name}.bias"]
 
 
 def leaky_relu(x: Values) -> Values:
@@ -69,11 +77,6 @@ def elu(x: Values) -> Values:
     """x above zero, exp(x) - 1 below."""
     xp = library_of(x)
     return np.maximum(x, 0) + np.expm1(np.minimum(x, 0)) if xp is np else xp.nn.functional.elu(x)
-
-
-def sigmoid(x: Values) -> Values:
-    """1 / (1 + exp(-x)), by way of a tangent, which never overflows."""
-    return 0.5 * library_of(x).tanh(0.5 * x) + 0.5
 
 
 def softmax(x: Values, axis: int = -1) -> Values:
@@ -104,3 +107,16 @@ def take(x: Values, index: Values, axis: int) -> Values:
 def single_precision(weights: Mapping[str, Any]) -> dict[str, Any]:
     """The weights of a network as numpy arrays in single precision."""
     return {name: np.asarray(value, dtype=np.float32) for name, value in weights.items()}
+
+
+def single_threaded_products() -> Callable[[], AbstractContextManager[object]]:
+    """A context in which numpy's products run on one thread.
+
+    Where threadpoolctl is missing, as on a robot that carries only the runtime, the context does nothing;
+    there OPENBLAS_NUM_THREADS=1 in the environment has the same effect.
+    """
+    try:
+        from threadpoolctl import ThreadpoolController
+    except ImportError:
+        return nullcontext
+    return partial(ThreadpoolController().select(user_api="blas").limit, limits=1)

@@ -1,16 +1,17 @@
-"""The contents of a checkpoint: weights, the sizes of the networks they belong to, and their history."""
+"""The contents of a checkpoint: weights, sizes and history of networks, and what normalizes their numbers."""
+
+from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, ClassVar, Protocol, TypeVar
+from typing import Any, ClassVar, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
-from finlab.arrays import AnyArray
+from finlab.arrays import AnyArray, Array, Values
 from finlab.errors import CheckpointError
 from finlab.networks.layers import single_precision
-from finlab.networks.normalization import Normalization
 
 State = Mapping[str, AnyArray]
 """Arrays of a network by PyTorch's names."""
@@ -19,6 +20,37 @@ Shapes = dict[str, tuple[int, ...]]
 LARGEST_SIZE = 4096
 LARGEST_WEIGHT = 1e6
 """Largest magnitude of a weight; training stays below 100, and far beyond this answers would be NaN."""
+
+
+class Normalization(NamedTuple):
+    """Mean and standard deviation of the wrench over a data set, each of shape (6,) [N, N m]."""
+
+    mean: Array
+    std: Array
+    """Per-axis standard deviation; `sigma` in the error measure."""
+
+    @classmethod
+    def parse(cls, values: Any) -> Normalization:
+        """The statistics under the keys `mean` and `std`; a `ValueError` where there are none."""
+        try:
+            mean, std = (np.asarray(values[name], dtype=np.float64) for name in cls._fields)
+        except (KeyError, TypeError, ValueError):
+            mean = std = np.empty(0)
+        if mean.shape != (6,) or std.shape != (6,) or not (np.isfinite(mean).all() and (std > 0.0).all()):
+            raise ValueError("normalization must be six means and six standard deviations above 0")
+        return cls(mean, std)
+
+
+def to_normalized(command: Values, lower: Values, upper: Values) -> Values:
+    """Commands (..., 3) between limits (..., 3) to [-1, 1]; a range of no width maps to 0."""
+    half = 0.5 * (upper - lower)
+    return (command - lower - half) / half.clip(1e-9)
+
+
+def to_command(x: Values, lower: Values, upper: Values) -> Values:
+    """Inverse of `to_normalized`; not clamped."""
+    half = 0.5 * (upper - lower)
+    return lower + half + x * half
 
 
 class Sizes(Protocol):

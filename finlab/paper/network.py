@@ -13,7 +13,22 @@ from finlab.arrays import Values, library_of
 from finlab.networks import layers
 from finlab.networks.layers import Weights
 from finlab.networks.trained import Shapes, check_sizes, linear_shapes, norm_shapes
-from finlab.paper.features import RAW_SIZE
+
+RAW_SIZE = 10
+"""Number of node features (paper: x_i in R^10)."""
+POSITION_SCALE = 0.3
+"""Positions [m] of order one: the paper's layouts lie within."""
+SCALES = (0.6, 2.1, math.pi)
+"""Amplitude [rad], frequency [Hz] and zero direction [rad] of order one."""
+
+
+def raw_features(position: Values, mounting_angle: Values, lower: Values, upper: Values) -> Values:
+    """The node features (..., n, 10) of fins (..., n, 3), (..., n) with limits (..., n, 3), scaled."""
+    xp = library_of(position)
+    limits = [limit[..., i] / scale for i, scale in enumerate(SCALES) for limit in (lower, upper)]
+    angle = mounting_angle[..., None] / math.pi
+    return xp.concatenate([position / POSITION_SCALE, angle, xp.stack(limits, axis=-1)], axis=-1)
+
 
 LOG_STD_BOUND = 3.0
 """Largest size of the components' log standard deviation (paper, implementation details)."""
@@ -71,7 +86,7 @@ class NetworkConfig:
         xp = library_of(x)
         hidden = layers.linear(w, "enter", x)
         for name in self._named("graph", self.graph_layers):
-            hidden = hidden + layers.elu(graph_attention(w, name, self.heads, hidden))
+            hidden = hidden + layers.elu(layers.graph_attention(w, name, hidden))
         wrench = layers.linear(w, "wrench", target)[:, None]
         wrench = xp.broadcast_to(wrench, (*hidden.shape[:-1], wrench.shape[-1]))
         hidden = layers.linear(w, "join", xp.concatenate([hidden, wrench], -1))
@@ -124,18 +139,6 @@ class Mixture(NamedTuple):
         choice = (uniform[..., None] > cumulative).sum(-1)[..., None]
         mean, log_std = (layers.take(part, choice, 2) for part in (self.mean, self.log_std))
         return (mean + library_of(log_std).exp(log_std) * normal).swapaxes(1, 2)
-
-
-def graph_attention(w: Weights, name: str, heads: int, x: Values) -> Values:
-    """A GATv2 layer on complete graphs with self loops: features (B, n, width) of features (B, n, F); heads
-    are concatenated."""
-    source, target = layers.linear(w, f"{name}.source", x), layers.linear(w, f"{name}.target", x)
-    hidden = layers.leaky_relu(source[:, None] + target[:, :, None])  # (B, n, n, width)
-    score = layers.head_scores(w[f"{name}.attention"], hidden)
-    weight = layers.softmax(score, 2)
-    split = source.reshape(*source.shape[:2], heads, -1)
-    seen = library_of(x).einsum("bijh,bjhc->bihc", weight, split)
-    return seen.reshape(source.shape) + w[f"{name}.bias"]
 
 
 def self_attention(w: Weights, name: str, heads: int, x: Values) -> Values:

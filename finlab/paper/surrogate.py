@@ -1,9 +1,8 @@
 """The paper's surrogate: learned fin physics, commands and node features in, a wrench out.
 
 A perceptron gives each fin's force in the body frame, F_i = f([x_i, u_i]); the wrench is the sum of
-(F_i, r_i x F_i), then stretched and shifted by what a descriptor of the whole layout says. The perceptron is
-written once: training differentiates through it, and on one layout (`LayoutSurrogate`) it brings its gradient
-itself, so that the paper's method needs no tensor library.
+(F_i, r_i x F_i), then stretched and shifted by what a descriptor of the whole layout says. Here it answers
+for one layout with its gradient, in numpy; `training/modules.py` trains it.
 """
 
 from collections.abc import Callable
@@ -12,15 +11,20 @@ from itertools import pairwise
 
 import numpy as np
 
-from finlab.arrays import AnyArray, Values, library_of
+from finlab.arrays import AnyArray
 from finlab.errors import CheckpointError
 from finlab.layout import Layout
 from finlab.layout.effectiveness import force_effectiveness
 from finlab.networks import layers
-from finlab.networks.layers import Weights
-from finlab.networks.normalization import to_normalized
-from finlab.networks.trained import Shapes, TrainedWeights, check_sizes, check_state, linear_shapes
-from finlab.paper.features import RAW_SIZE, raw_features
+from finlab.networks.trained import (
+    Shapes,
+    TrainedWeights,
+    check_sizes,
+    check_state,
+    linear_shapes,
+    to_normalized,
+)
+from finlab.paper.network import RAW_SIZE, raw_features
 
 FORCE_UNIT = 4.0
 """Force [N] of order one for the perceptron's outputs."""
@@ -65,40 +69,6 @@ class SurrogateConfig:
         return config
 
 
-def of_fins(w: Weights, features: Values) -> Values:
-    """What the first layer (..., width) adds up of node features (..., 10), which no command changes."""
-    return features @ w["net.0.weight"][:, :RAW_SIZE].T + w["net.0.bias"]
-
-
-def perceptron(
-    config: SurrogateConfig, w: Weights, fins: Values, x: Values, jacobian: list[Values] | None = None
-) -> Values:
-    """Forces (..., 3) [N] in the body frame of commands x (..., 3) in normalized coordinates.
-
-    Args:
-        config: sizes of the surrogate.
-        w: its weights.
-        fins: see `of_fins`.
-        x: commands.
-        jacobian: takes the derivatives of the activations, layer by layer.
-    """
-    z = layers.linear({"command.weight": w["net.0.weight"][:, RAW_SIZE:]}, "command", x) + fins
-    for name in config.layers()[1:]:
-        gate = layers.sigmoid(z)
-        silu = z * gate
-        if jacobian is not None:
-            jacobian.append(gate + silu * (1.0 - gate))
-        z = layers.linear(w, name, silu)
-    return z * FORCE_UNIT
-
-
-def correction(w: Weights, features: Values) -> tuple[Values, Values]:
-    """By how much a layout's wrench is stretched, and what is added to it, (..., 6) each."""
-    described = library_of(features).tanh(layers.linear(w, "descriptor.0", features))
-    both = layers.linear(w, "affine", described.mean(-2))
-    return both[..., :6], both[..., 6:]
-
-
 class LayoutSurrogate:
     """A surrogate on one layout of n fins, with the gradient of its forces; in single precision."""
 
@@ -108,10 +78,11 @@ class LayoutSurrogate:
         self._w = layers.single_precision(weights.surrogate)
         place = layout.position, layout.mounting_angle, layout.lower, layout.upper
         features = raw_features(*place).astype(np.float32)
-        self._fins = of_fins(self._w, features)
+        self._fins = features @ self._w["net.0.weight"][:, :RAW_SIZE].T + self._w["net.0.bias"]
         self._lower, self._upper = (limit.astype(np.float32) for limit in (layout.lower, layout.upper))
         self._half = np.maximum(0.5 * (self._upper - self._lower), np.float32(1e-9))
-        scale, self.bias = correction(self._w, features)
+        described = np.tanh(layers.linear(self._w, "descriptor.0", features)).mean(0)
+        scale, self.bias = np.split(layers.linear(self._w, "affine", described), 2)
         """Wrench (6,) [N, N m] of fins that give no force."""
         effectiveness = force_effectiveness(layout.position, np.zeros_like(layout.mounting_angle))
         self.effectiveness: AnyArray = effectiveness * (1.0 + scale)
@@ -144,9 +115,20 @@ class LayoutSurrogate:
         return np.asarray(wrench.reshape(*command.shape[:-2], 6))
 
     def _forward(self, command: AnyArray, jacobian: list[AnyArray] | None = None) -> AnyArray:
+        """Forces; `jacobian` takes the derivatives of the activations, layer by layer."""
         # Rounded first: where a range has no width, any remainder would be blown up.
         x = to_normalized(command.astype(np.float32), self._lower, self._upper)
-        return np.asarray(perceptron(self.config, self._w, self._fins, x, jacobian))
+        z = (
+            layers.linear({"command.weight": self._w["net.0.weight"][:, RAW_SIZE:]}, "command", x)
+            + self._fins
+        )
+        for name in self.config.layers()[1:]:
+            gate = 0.5 * np.tanh(0.5 * z) + 0.5  # 1 / (1 + exp(-z)), which never overflows
+            silu = z * gate
+            if jacobian is not None:
+                jacobian.append(gate + silu * (1.0 - gate))
+            z = layers.linear(self._w, name, silu)
+        return np.asarray(z * FORCE_UNIT)
 
 
 def blocks_of(rows: int) -> list[slice]:

@@ -1,4 +1,4 @@
-"""Where a training runs: on which device, and as which of several processes that torchrun started."""
+"""Device and processes of a training: those of torchrun, and a pool for the parts of its data."""
 
 import gc
 import os

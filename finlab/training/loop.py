@@ -21,7 +21,6 @@ from tqdm import tqdm
 
 from finlab.errors import DataError
 from finlab.networks.trained import State
-from finlab.training.curves import CURVES_FILE, curves
 from finlab.training.device import Workplace
 from finlab.whole_file import make_folder, sweep_parts, write_whole
 
@@ -29,6 +28,9 @@ LOG_FILE = "log.csv"
 """One row per logged step: step, samples, seconds, learning rate and every loss term."""
 STATE_FILE = "resume.pt"
 """What a run goes on from."""
+CURVES_FILE = "curves.png"
+APART = ("step", "samples", "seconds")
+"""Columns of the log that are no curves."""
 LOG_EVERY = 20
 """Steps after which a row is logged."""
 SAVE_EVERY_S = 15.0
@@ -218,3 +220,26 @@ def _table(rows: list[dict[str, float]]) -> str:
     writer.writeheader()
     writer.writerows({name: f"{value:.8g}" for name, value in row.items()} for row in rows)
     return text.getvalue()
+
+
+def curves(rows: list[dict[str, float]]) -> bytes | None:
+    """A PNG of a log's columns over its steps; None without matplotlib, and of an empty log."""
+    try:
+        from matplotlib.figure import Figure
+    except ImportError:
+        return None
+    names = [name for name in rows[0] if name not in APART] if rows else []
+    if not names:
+        return None
+    figure = Figure(figsize=(8.0, 2.0 * len(names)), layout="constrained")
+    steps = [row["step"] for row in rows]
+    for axes, name in zip(figure.subplots(len(names), sharex=True, squeeze=False)[:, 0], names, strict=True):
+        values = [row[name] for row in rows]
+        axes.plot(steps, values, linewidth=1.0)
+        axes.set_yscale("log" if min(values) > 0.0 else "symlog")
+        axes.set_ylabel(name.replace("_", " "))
+        axes.grid(alpha=0.3)
+    axes.set_xlabel("step")
+    content = io.BytesIO()
+    figure.savefig(content, format="png", dpi=100)
+    return content.getvalue()

@@ -199,7 +199,7 @@ def test_the_time_is_that_of_the_solver_shared_by_its_targets(
     assert method.allocate_batch(ROBOT, np.empty((0, 6))).solve_ms.tolist() == []
 
 
-@pytest.mark.parametrize("method", ["mdn", "paper", "qp", "sqp"])
+@pytest.mark.parametrize("method", ["mdn", "paper", "qp", "sqp", "paper_sqp", "fixed_frequency"])
 def test_a_thruster_is_named_with_its_type(method: str) -> None:
     with pytest.raises(LayoutError, match=f"method {method} works for .* 'lift_left' .* is of type thruster"):
         finlab.Allocator(load_layout("turtle_hybrid"), method)
@@ -212,7 +212,7 @@ def test_the_papers_method_names_the_fin_whose_shaft_it_does_not_know() -> None:
         finlab.Allocator(replace(layout, actuators=(*layout.fins, tail)), "paper")
 
 
-@pytest.mark.parametrize("method", ["mdn", "qp", "sqp", "analytic"])
+@pytest.mark.parametrize("method", ["mdn", "qp", "sqp", "paper_sqp", "analytic", "fixed_frequency"])
 def test_other_methods_take_shafts_in_any_direction(method: str) -> None:
     layout = load_layout("A")
     tail = Fin("tail", (-0.4, 0.0, 0.0), shaft=(0.0, 0.0, 1.0), zero=(1.0, 0.0, 0.0))

@@ -19,7 +19,9 @@ OTHER: dict[str, dict[str, Any]] = {
     "ipopt": {"n_starts": 1},
     "qp": {},
     "sqp": {"objective": "effort", "n_steps": 1},
+    "paper_sqp": {"n_starts": 1, "n_steps": 1},
     "analytic": {},
+    "fixed_frequency": {"frequency": 1.1},
     "px4": {"desaturation": "none"},
     "ardusub": {},
 }

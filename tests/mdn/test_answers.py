@@ -5,9 +5,8 @@ import pytest
 
 from finlab.arrays import Array
 from finlab.layout import FinModelSpec, Layout, random_layout
-from finlab.mdn.answers import Answers, Steps, follow, ranked, refined, traced
+from finlab.mdn.answers import Answers, EffortRobot, Steps, effort_robot, follow, ranked, refined, traced
 from finlab.mdn.descent import descend, wrench
-from finlab.mdn.robot import EffortRobot, effort_robot
 from finlab.physics import plant_of
 
 SCALE = np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.34])

@@ -4,13 +4,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import torch
+from torch.distributions import Categorical, Independent, MixtureSameFamily, Normal
 
+from finlab.assets import checkpoint_path
 from finlab.layout import Fin, FinModelSpec, Layout, Limits, random_layout
-from finlab.mdn.descent import EffortProblem, wrench
+from finlab.mdn.answers import effort_robot
+from finlab.mdn.descent import EffortProblem, realize, wrench
 from finlab.mdn.features import SHARES, VECTORS, RobotView, features, robot_view, see
-from finlab.mdn.network import NODE_SIZE
-from finlab.mdn.robot import effort_robot
+from finlab.mdn.network import NODE_SIZE, PAIR_SIZE, ForceMixture, ForceNetworkConfig
+from finlab.networks.checkpoint import read_checkpoint
 from finlab.physics import plant_of
+from finlab.physics.objective import effort_of_shares
 
 STD = np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.34])
 
@@ -138,3 +143,101 @@ def test_no_target_is_no_trouble(layout: Layout) -> None:
     found = see(robot_view(problem_of(layout)), np.zeros((2, 6)))
     assert np.isfinite(found.nodes).all() and np.isfinite(found.pairs).all()
     np.testing.assert_array_equal(found.frame, 1.0)
+
+
+WEIGHTS = read_checkpoint(checkpoint_path())
+CONFIG = WEIGHTS.network_of(ForceNetworkConfig)
+
+
+def inputs(n: int) -> tuple[np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(n)
+    sizes = (6, n, NODE_SIZE), (6, n, n, PAIR_SIZE)
+    nodes, pairs = (rng.normal(size=size).astype(np.float32) for size in sizes)
+    return nodes, pairs
+
+
+@pytest.mark.parametrize("n", [1, 5, 12])
+def test_numpy_and_torch_agree(n: int) -> None:
+    nodes, pairs = inputs(n)
+    tensors = {name: torch.tensor(value) for name, value in WEIGHTS.network.items()}
+    expected = CONFIG(tensors, torch.tensor(nodes), torch.tensor(pairs))
+    for got, other in zip(CONFIG(WEIGHTS.network, nodes, pairs), expected, strict=True):
+        assert got.dtype == np.float32
+        np.testing.assert_allclose(got, other.numpy(), atol=1e-3, rtol=1e-3)
+
+
+def test_fins_may_come_in_any_order() -> None:
+    nodes, pairs = inputs(5)
+    order = np.array([3, 0, 4, 1, 2])
+    straight = CONFIG(WEIGHTS.network, nodes, pairs)
+    turned = CONFIG(WEIGHTS.network, nodes[:, order], pairs[:, order][:, :, order])
+    np.testing.assert_allclose(turned.logits, straight.logits, atol=1e-3)
+    np.testing.assert_allclose(turned.mean, straight.mean[:, order], atol=1e-3)
+    np.testing.assert_allclose(turned.log_std, straight.log_std[:, order], atol=1e-3)
+
+
+def test_huge_inputs_are_no_warning(recwarn: pytest.WarningsRecorder) -> None:
+    nodes = np.full((2, 3, NODE_SIZE), 1e4, np.float32)
+    pairs = np.full((2, 3, 3, PAIR_SIZE), -1e4, np.float32)
+    assert all(np.isfinite(part).all() for part in CONFIG(WEIGHTS.network, nodes, pairs))
+    assert not recwarn.list
+
+
+def test_likelihood_is_that_of_one_mixture_over_all_fins() -> None:
+    draw = torch.Generator().manual_seed(0)
+    sizes = (5, 4), (5, 3, 4, 2), (5, 3, 4)
+    given = ForceMixture(*(torch.randn(size, generator=draw, dtype=torch.float64) for size in sizes))
+    way = torch.randn(5, 7, 3, 2, generator=draw, dtype=torch.float64)
+    mean = given.mean.transpose(1, 2).flatten(2)
+    std = given.log_std.exp()[..., None].expand(-1, -1, -1, 2).transpose(1, 2).flatten(2)
+    reference = MixtureSameFamily(Categorical(logits=given.logits), Independent(Normal(mean, std), 1))
+    expected = reference.log_prob(way.flatten(2).transpose(0, 1)).T
+    torch.testing.assert_close(given.log_prob(way), expected)
+    # Warm, all components learn from every way; cold, the one that stands for it.
+    assert (given.log_prob(way, 50.0) > given.log_prob(way)).all()
+
+
+ARC = Limits(zero_direction=(-0.6, 1.4))
+UNEVEN = FinModelSpec("soft", (("e", 0.2), ("d", 0.15), ("phi_e", 1.0)))
+KINDS = [
+    (FinModelSpec("drag", ()), Limits()),
+    (FinModelSpec("lighthill", ()), ARC),
+    (UNEVEN, Limits()),
+    (UNEVEN, ARC),
+]
+
+
+def compiled(model: FinModelSpec, limits: Limits) -> tuple[Layout, EffortProblem]:
+    layout = Layout("one", (Fin("a", (0.2, 0.1, 0.0), 0.3, limits, model=model),))
+    return layout, effort_robot(plant_of(layout), np.ones(6)).forces
+
+
+@pytest.mark.parametrize(("model", "limits"), KINDS)
+def test_commands_give_the_forces_with_the_least_effort(model: FinModelSpec, limits: Limits) -> None:
+    layout, problem = compiled(model, limits)
+    fins, plant, rng = problem.fins, plant_of(layout), np.random.default_rng(0)
+    direction = fins.middle + fins.half * rng.uniform(-0.9, 0.9, (40, 1))
+    wanted = rng.uniform(0.05, 0.9, (40, 1)) * fins.gauges(direction) * fins.largest
+    found = fins.project(wanted * np.exp(1j * direction))
+    np.testing.assert_allclose(found.size, wanted, rtol=1e-9)
+    command, effort = realize(problem, found)
+    given = plant.force(command)
+    np.testing.assert_allclose(given[..., 1] + 1j * given[..., 2], found.force, atol=0.01 * fins.maximum[0])
+    # No other amplitude gives that force with less, wherever the frequency allows it.
+    amplitude = np.linspace(*limits.amplitude, 60)[:, None]
+    frequency = np.linspace(*limits.frequency, 400)
+    for (row,), least, (size,) in zip(command, effort, wanted, strict=True):
+        grid = np.stack(np.broadcast_arrays(amplitude, frequency, row[2]), axis=-1)
+        strong = np.linalg.norm(plant.force(grid[..., None, :])[..., 0, 1:], axis=-1) >= 0.999 * size
+        upper = layout.upper[0]
+        every = effort_of_shares(amplitude / upper[0], frequency / upper[1], row[2] / upper[2])
+        assert least <= every[strong].min() * 1.01
+
+
+def test_what_a_fin_cannot_give_becomes_the_nearest_that_it_can() -> None:
+    fins = compiled(FinModelSpec("drag", ()), ARC)[1].fins
+    asked = np.array([2.0 * fins.maximum * np.exp(0.4j), [1.0 * np.exp(2.0j)], [0.0j], [np.exp(-2.9j)]])
+    found = fins.project(asked)
+    np.testing.assert_allclose(found.force[0], fins.maximum * np.exp(0.4j))
+    np.testing.assert_allclose(found.force[1], np.cos(0.6) * np.exp(1.4j))
+    np.testing.assert_allclose(found.size[2:], fins.smallest[[0, 0], None])

@@ -12,9 +12,8 @@ from finlab.assets import checkpoint_path
 from finlab.errors import AllocationError, CheckpointError
 from finlab.layout import FinModelSpec, Layout, load_layout, random_layout
 from finlab.mdn.answers import follow
-from finlab.mdn.features import see
+from finlab.mdn.features import see, shares
 from finlab.mdn.method import STEPS, Mdn
-from finlab.mdn.proposal import shares
 from finlab.networks.checkpoint import read_checkpoint
 from finlab.physics import Plant
 from finlab.physics.objective import command_effort

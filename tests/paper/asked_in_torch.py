@@ -4,8 +4,7 @@ import torch
 
 from finlab.layout import Layout
 from finlab.networks.trained import TrainedWeights
-from finlab.paper.training.data import Batch
-from finlab.paper.training.samples import ROBOT
+from finlab.paper.training.samples import ROBOT, Batch
 from finlab.paper.training.train import surrogate_of
 
 

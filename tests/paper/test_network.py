@@ -10,8 +10,8 @@ from torch_geometric.nn import GATv2Conv
 
 from finlab.layout import Fin, Layout, Limits, random_layout
 from finlab.networks.checkpoint import read_checkpoint, resolve_checkpoint
-from finlab.paper.features import RAW_SIZE, raw_features
-from finlab.paper.network import Mixture, NetworkConfig, graph_attention
+from finlab.networks.layers import graph_attention
+from finlab.paper.network import RAW_SIZE, Mixture, NetworkConfig, raw_features
 from finlab.paper.training.modules import AllocatorNetwork
 
 CONFIG = NetworkConfig(width=32, heads=4, transformer_layers=2, feedforward=40, n_components=6)
@@ -50,7 +50,7 @@ def test_graph_attention_is_that_of_pytorch_geometric(n: int) -> None:
         reference.bias.copy_(weights["graph.0.bias"])
     edges = torch.tensor([(i, j) for i in range(n) for j in range(n) if i != j]).T
     x = torch.randn(3, n, CONFIG.width)
-    found = graph_attention(weights, "graph.0", CONFIG.heads, x)
+    found = graph_attention(weights, "graph.0", x)
     for row in range(3):
         torch.testing.assert_close(found[row], reference(x[row], edges).detach(), atol=1e-4, rtol=1e-4)
 

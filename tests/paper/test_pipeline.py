@@ -12,9 +12,8 @@ from finlab.assets import shipped_layouts
 from finlab.errors import AllocationError, CheckpointError
 from finlab.layout import Fin, Layout, Limits, load_layout
 from finlab.layout.axes import is_full_turn
-from finlab.mdn.training.first_weights import first_weights
-from finlab.networks.normalization import Normalization, to_command, to_normalized
-from finlab.networks.trained import TrainedWeights, sizes_for_file
+from finlab.mdn.training.train_mdn import first_weights
+from finlab.networks.trained import Normalization, TrainedWeights, sizes_for_file, to_command, to_normalized
 from finlab.paper.network import NetworkConfig
 from finlab.paper.pipeline import ADAM_RATE, CHUNK
 from finlab.paper.surrogate import SurrogateConfig

@@ -7,8 +7,7 @@ import torch
 from finlab.errors import CheckpointError
 from finlab.layout import Layout, Limits, random_layout
 from finlab.networks.checkpoint import read_checkpoint, resolve_checkpoint
-from finlab.networks.normalization import Normalization
-from finlab.networks.trained import TrainedWeights
+from finlab.networks.trained import Normalization, TrainedWeights
 from finlab.paper.surrogate import BLOCK, LayoutSurrogate, SurrogateConfig
 from tests.paper.asked_in_torch import wrench_in_torch
 

@@ -131,9 +131,11 @@ METHOD_WORDS = {
     "paper": "the paper's network and learned physics",
     "qp": "one quadratic problem",
     "sqp": "a general solver",
+    "paper_sqp": "the paper's: least error, linearized step by step",
     "px4": "as PX4 does it, thrusters alone",
     "ardusub": "as ArduSub does it, thrusters alone",
     "analytic": "the pseudo-inverse",
+    "fixed_frequency": "U-CAT's own law, one frequency",
     "ipopt": "a general solver, slow",
 }
 COMMANDS = html(

@@ -13,7 +13,7 @@ from finlab.errors import FinlabError
 from finlab.layout import Layout
 from finlab.layout.damage import FAULTS, Health
 from finlab.layout.fin import MAX_AMPLITUDE, MAX_FREQUENCY
-from finlab.paper.settings import PaperSettings
+from finlab.paper.pipeline import PaperSettings
 from finlab.physics import plant_of
 
 AXIS_WORDS = ("surge", "sway", "heave", "roll", "pitch", "yaw")

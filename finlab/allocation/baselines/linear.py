@@ -1,21 +1,34 @@
-"""Methods of one linear map per layout: `qp`, least squares as the paper, `analytic`, the pseudo-inverse."""
+"""Methods `qp` and `paper_sqp`, the paper's optimizers (its section on baseline methods).
 
+Both keep the normalized tracking error J_norm (its Eq. 8) least within the box of each fin's limits, by least
+squares over a linear map of commands to wrenches. `qp` linearizes once per layout, `paper_sqp` again at every
+iterate. Commands are positions between the limits, 0 at the lower and 1 at the upper one.
+"""
+
+from dataclasses import dataclass
 from functools import cached_property
+from time import thread_time
 
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from finlab.allocation.baselines.model_based import ModelBased
+from finlab.allocation.baselines.model_based import SOLVED, ModelBased, TimeLimitedSettings
+from finlab.allocation.settings import number
 from finlab.arrays import Array
 from finlab.physics import Plant
 
 DIFFERENCE_STEP = 1e-4
 """Half width of the central differences, as a share of each command's range."""
+SHORTEST = 1e-9
+"""Step from which on an iterate has settled, as a share of the ranges."""
+SUFFICIENT = 1e-4
+"""Share of the decrease that the linear map predicts, below which a step is halved (Armijo)."""
+HALVINGS = 30
+"""Most halvings of a step."""
 
 
 class LinearMap:
-    """The actuation map of a layout, linearized by central differences at the middle of the limits. Commands
-    are positions between the limits, from 0 to 1."""
+    """The actuation map of a layout, linearized by central differences at the middle of the limits."""
 
     def __init__(self, plant: Plant, sigma: Array) -> None:
         self.reference = (plant.lower + plant.upper) / 2
@@ -47,20 +60,93 @@ class Qp(ModelBased):
         n_free = int(linear.free.sum())
         step = np.zeros((len(targets), linear.free.size))
         if n_free:
-            matrix = np.vstack([linear.matrix, np.eye(n_free)])
-            wanted = np.zeros((len(targets), 6 + n_free))
-            wanted[:, :6] = (targets - linear.wrench) / self.sigma
-            for i, right in enumerate(wanted):
-                step[i, linear.free] = lsq_linear(matrix, right, (-0.5, 0.5), method="bvls").x
+            half = np.full(n_free, 0.5)
+            for i, wanted in enumerate((targets - linear.wrench) / self.sigma):
+                step[i, linear.free] = box_qp(linear.matrix, wanted, 1.0, -half, half)
         return linear.reference + step.reshape(-1, plant.n_fins, 3) * plant.width
 
 
-class Analytic(ModelBased):
-    """Pseudo-inverse of the forces, rows scaled by sigma and columns by each actuator's largest force, which
-    each gives by its cheapest command. What does not fit is clipped, the rest not redistributed."""
+@dataclass(frozen=True)
+class PaperSqpSettings(TimeLimitedSettings):
+    """Settings of method `paper_sqp`; the paper prints none of them."""
 
-    name = "analytic"
-    takes = "any actuator"
+    n_starts: int = number(8, 1, 10_000, "starts per target: the middle of the limits, then random ones")
+    n_steps: int = number(60, 1, 10_000, "most quadratic programs per start")
+    regularization: float = number(1e-4, 0.0, 1e6, "weight of the squared step, as a share of the ranges")
+
+
+class PaperSqp(ModelBased):
+    """The paper's sequential quadratic programming: linearize at the iterate, box QP, line search.
+
+    At the iterate u with the normalized residual r = (target - w(u)) / sigma and the Jacobian J of w / sigma,
+    the step d keeps `||J d - r||^2 + regularization ||d||^2` least with u + d inside the limits; it is halved
+    until J_norm = `||r||^2` falls by enough. Jacobians are those of the fins' own laws, in closed form. What
+    commands cost plays no part. The next start is tried where one ends off the target; the answer is the end
+    with the least error.
+    """
+
+    name = "paper_sqp"
+    settings_class = PaperSqpSettings
+    settings: PaperSqpSettings
 
     def _commands(self, targets: Array, seed: int) -> Array:
-        return self._inverse.command(targets)
+        plant = self.plant
+        random = plant.sample(np.random.default_rng(seed), (self.settings.n_starts - 1,))
+        starts = [0.5 * (plant.lower + plant.upper), *random]
+        answers = np.empty((len(targets), plant.n, 3))
+        for i, target in enumerate(targets):
+            over, least = thread_time() + self.settings.time_limit_s, np.inf
+            for start in starts:
+                command, errors = self.descent(target, start)
+                if errors[-1] < least:
+                    answers[i], least = command, errors[-1]
+                if least <= SOLVED**2 or thread_time() > over:
+                    break
+        return answers
+
+    def descent(self, target: Array, start: Array) -> tuple[Array, list[float]]:
+        """Returns the command (n, 3) to which a start (n, 3) leads for a target (6,) [N, N m], and J_norm of
+        every iterate, the start's first."""
+        plant, width = self.plant, self.plant.width
+        free = width.ravel() > 0.0
+
+        def residual(command: Array) -> Array:
+            return (target - plant.wrench(command)) / self.sigma
+
+        command, missing = start, residual(start)
+        errors = [float(missing @ missing)]
+        for _ in range(self.settings.n_steps if free.any() else 0):
+            jacobian = (plant.linearize(command)[1] / self.sigma[:, None] * width.ravel())[:, free]
+            place = ((command - plant.lower).ravel()[free] / width.ravel()[free]).clip(0.0, 1.0)
+            step = np.zeros(free.size)
+            step[free] = box_qp(jacobian, missing, self.settings.regularization, -place, 1.0 - place)
+            slope, length = -2.0 * float(missing @ (jacobian @ step[free])), 1.0
+            for _ in range(HALVINGS):
+                tried = np.clip(command + length * step.reshape(-1, 3) * width, plant.lower, plant.upper)
+                after = residual(tried)
+                if after @ after <= errors[-1] + SUFFICIENT * length * min(slope, 0.0):
+                    break
+                length *= 0.5
+            else:
+                break
+            command, missing = tried, after
+            errors.append(float(missing @ missing))
+            if errors[-1] <= (0.1 * SOLVED) ** 2 or length * np.abs(step).max() < SHORTEST:
+                break
+        return command, errors
+
+
+def box_qp(matrix: Array, wanted: Array, weight: float, low: Array, high: Array) -> Array:
+    """Returns the x (k,) with the least `||matrix x - wanted||^2 + weight ||x||^2` between `low` and `high`,
+    by SciPy's active-set method.
+
+    Args:
+        matrix: (6, k).
+        wanted: (6,).
+        weight: of the regularization, at least 0.
+        low: lower limits (k,), each below the upper one.
+        high: upper limits (k,).
+    """
+    k = len(low)
+    both = np.vstack([matrix, np.sqrt(weight) * np.eye(k)])
+    return np.asarray(lsq_linear(both, np.concatenate([wanted, np.zeros(k)]), (low, high), method="bvls").x)

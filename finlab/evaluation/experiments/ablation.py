@@ -10,8 +10,9 @@ from finlab.allocation.methods import choose_method
 from finlab.evaluation.document import Column, Row
 from finlab.evaluation.experiment import Experiment, check_names, paper_figures, progress
 from finlab.evaluation.method_specs import MethodSpec
+from finlab.evaluation.plots import candidates_picture
 from finlab.evaluation.scoring import joined, mean_interval, paper_sigma, score
-from finlab.evaluation.splits import make_split
+from finlab.evaluation.splits import Case, make_split
 
 VARIANTS: dict[str, dict[str, Any]] = {
     "mean_only": {"mean_only": True},
@@ -33,6 +34,7 @@ def run(
     targets: int = 100,
     candidates: int = 64,
     checkpoint: str | None = None,
+    shown: int = 0,
     seed: int = 0,
 ) -> list[Row]:
     """Two rows for each variant, scored by the surrogate and by the plant.
@@ -44,6 +46,8 @@ def run(
         targets: on each layout.
         candidates: drawn for each target.
         checkpoint: of method paper, a shipped name or a folder.
+        shown: layouts for whose first target each row has the candidates, raw and refined, as pairs of
+            normalized error by the surrogate and effort (key points, in the JSON alone).
         seed: of all draws; all rows have the same cases and candidates.
     """
     check_names("variants", variants, VARIANTS)
@@ -63,23 +67,38 @@ def run(
             assert answer.wrench_expected is not None
             missing = answer.wrench_expected - case.targets
             parts.append(part | {"believed": np.linalg.norm(missing / sigma, axis=-1)})
-        found = joined(parts)
+        points = [candidate_points(method, case, seed) for case in cases[:shown]]
+        scores = joined(parts)
         for scored_by, key in (("surrogate", "believed"), ("plant", "err_norm")):
-            error, square = found[key], found[key] ** 2
+            error, square = scores[key], scores[key] ** 2
             rows.append(
                 {
                     "variant": variant,
                     "scored_by": scored_by,
                     "n": len(error),
                     "j_norm_mean": float(square.mean()),
-                    "j_norm_mean_interval": list(mean_interval(square, found["layout"])),
+                    "j_norm_mean_interval": list(mean_interval(square, scores["layout"])),
                     "j_norm_std": float(square.std()),
                     "err_norm_mean": float(error.mean()),
                     "err_norm_median": float(np.median(error)),
                     "call_ms": float(np.mean(times[1:])),
+                    **({"points": points} if points and scored_by == "surrogate" else {}),
                 }
             )
     return rows
+
+
+def candidate_points(method: MethodSpec, case: Case, seed: int) -> dict[str, list[list[float]]]:
+    """Normalized error by the surrogate and effort of the candidates for the first target of a case, `raw` as
+    they were drawn and `refined`."""
+    target = case.targets[0]
+    answer = method.on(case.layout).allocate(target, failed=case.failed, seed=seed)
+    points = {}
+    for name, some in (("raw", answer.samples), ("refined", answer.candidates)):
+        assert some is not None
+        error = np.linalg.norm((some.wrench - target) / paper_sigma(), axis=-1)
+        points[name] = np.column_stack([error, some.effort]).tolist()
+    return points
 
 
 def _printed(rows: Sequence[Row]) -> list[Row]:
@@ -118,4 +137,6 @@ experiment = Experiment(
     quick={"layouts": 5, "targets": 4},
     full={"layouts": 40, "targets": 5},
     printed=_printed,
+    picture=candidates_picture,
+    for_picture={"variants": ("ours",), "shown": 20},
 )

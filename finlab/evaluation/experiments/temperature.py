@@ -10,11 +10,12 @@ from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.evaluation.document import Column, Row
 from finlab.evaluation.experiment import Experiment, progress
+from finlab.evaluation.plots import temperature_picture
 from finlab.evaluation.scoring import mean_interval, paper_sigma
 from finlab.evaluation.splits import make_split
 from finlab.layout import Layout
 from finlab.layout.axes import is_full_turn
-from finlab.paper.settings import PaperSettings
+from finlab.paper.pipeline import PaperSettings
 
 PAPER_TEMPERATURE = 0.02
 """The paper's choice."""
@@ -101,4 +102,5 @@ experiment = Experiment(
     ),
     quick={"layouts": 10, "targets": 1},
     full={"layouts": 60},
+    picture=temperature_picture,
 )

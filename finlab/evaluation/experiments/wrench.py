@@ -1,4 +1,4 @@
-"""Errors of each method on wrenches that the robot can deliver."""
+"""Experiment `wrench`: errors of each method on wrenches that the robot can deliver."""
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
@@ -9,6 +9,7 @@ from finlab.errors import DataError
 from finlab.evaluation.document import Column, Row
 from finlab.evaluation.experiment import Experiment, paper_figures
 from finlab.evaluation.method_specs import SLOW, MethodSpec, installed_methods, load_method_specs
+from finlab.evaluation.plots import fins_picture
 from finlab.evaluation.scoring import Columns, joined, mean_interval, run_method, share_interval
 from finlab.evaluation.splits import SPLITS, Case, make_case, make_split, own_sigma
 from finlab.executor import map_parts
@@ -32,6 +33,7 @@ def run(
     targets: int = 1000,
     subsample: int = 10,
     checkpoint: str | None = None,
+    by_fins: bool = False,
     seed: int = 0,
 ) -> list[Row]:
     """One row for each split and method.
@@ -47,6 +49,7 @@ def run(
         targets: on each layout.
         subsample: ipopt answers only the first so many of each layout; column n says how many.
         checkpoint: of the learned methods, a shipped name or a folder.
+        by_fins: one more row for each number of fins (or other actuators) that work.
         seed: of all draws.
     """
     sets = _cases(layout, split, layouts, targets, seed)
@@ -58,9 +61,11 @@ def run(
         able = {each: spec for each, spec in specs.items() if len(sets) == 1 or spec.choice.kind.fits(robot)}
         answered = list(map_parts(partial(_scores, able, subsample), list(enumerate(cases)), name, "layout"))
         for method in able:
-            scored = joined([scores[method] for scores in answered])
-            about = {"split": name, "method": method, "n": len(scored["layout"]), "scored_by": "plant"}
-            rows.append(about | figures(scored))
+            scores = joined([each[method] for each in answered])
+            rows.append(_row(name, method, None, scores))
+            for fins in np.unique(scores["fins"]) if by_fins else ():
+                some = {key: values[scores["fins"] == fins] for key, values in scores.items()}
+                rows.append(_row(name, method, int(fins), some))
     return rows
 
 
@@ -73,24 +78,31 @@ def _scores(
     return {each: run_method(methods[each], made, number=number, first=firsts[each]) for each in methods}
 
 
-def figures(scored: Columns) -> Row:
+def _row(split: str, method: str, fins: int | None, scores: Columns) -> Row:
+    """Figures of a split, or of its robots of so many fins."""
+    about = {"split": split, "method": method, "fins": fins, "n": len(scores["layout"]), "scored_by": "plant"}
+    return about | figures(scores)
+
+
+def figures(scores: Columns) -> Row:
     """Means, quantiles and shares of scores, with their intervals."""
-    error, group = scored["err_norm"], scored["layout"]
+    error, group = scores["err_norm"], scores["layout"]
     row: Row = {
         "err_norm_mean": error.mean(),
         "err_norm_median": np.median(error),
+        "err_norm_p05": np.quantile(error, 0.05),
         "err_norm_p95": np.quantile(error, 0.95),
         "err_norm_max": error.max(),
-        "err_phys_mean": scored["err_phys"].mean(),
+        "err_phys_mean": scores["err_phys"].mean(),
         **{f"success_{level}": (error <= level).mean() for level in SUCCESS_LEVELS},
-        "effort_mean": scored["effort"].mean(),
-        "power_mean": scored["power"].mean(),
-        "solve_ms_p50": np.median(scored["solve_ms"]),
-        "solve_ms_p99": np.quantile(scored["solve_ms"], 0.99),
+        "effort_mean": scores["effort"].mean(),
+        "power_mean": scores["power"].mean(),
+        "solve_ms_p50": np.median(scores["solve_ms"]),
+        "solve_ms_p99": np.quantile(scores["solve_ms"], 0.99),
     }
     intervals = {
         "err_norm_mean": mean_interval(error, group),
-        "power_mean": mean_interval(scored["power"], group),
+        "power_mean": mean_interval(scores["power"], group),
         "success_0.01": share_interval(error <= 0.01, group),
     }
     plain = {key: float(value) for key, value in row.items()}
@@ -139,6 +151,7 @@ experiment = Experiment(
     columns=(
         Column("split", "split", "code"),
         Column("method", "method", "code"),
+        Column("fins", "fins", "count"),
         Column("n", "targets", "count"),
         Column("err_norm_mean", "mean error", "error", "err_norm_mean_interval"),
         Column("err_norm_median", "median", "error"),
@@ -167,4 +180,6 @@ experiment = Experiment(
         "targets": 8,
     },
     printed=_printed,
+    picture=fins_picture,
+    for_picture={"by_fins": True},
 )

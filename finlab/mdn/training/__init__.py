@@ -1,3 +1,3 @@
-"""What the network of method `mdn` learns from: torch."""
+"""Training of the network of method `mdn`, by torch."""
 
 import finlab.training as _  # noqa: F401

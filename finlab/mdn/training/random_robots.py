@@ -11,7 +11,7 @@ from finlab.arrays import Array
 from finlab.layout import Fin, FinModelSpec, Layout, Limits
 from finlab.layout.axes import wrapped
 from finlab.layout.random_layouts import TRAINING_BOX, Numbers, random_fin_model, random_layout
-from finlab.mdn.robot import EffortRobot
+from finlab.mdn.answers import EffortRobot
 
 FIN_COUNTS = dict(zip(range(2, 13), (1, 2, 8, 9, 9, 8, 8, 7, 7, 7, 7), strict=True))
 """Number of fins -> how often it is drawn; with 2 or 3 there is next to nothing to choose."""
@@ -103,8 +103,8 @@ def random_targets(rng: np.random.Generator, robot: EffortRobot, count: int) -> 
     command[:quarter, :, :2] = np.where(rests[..., None], plant.lower[:, :2], command[:quarter, :, :2])
     full = robot.forces.effectiveness * np.repeat(robot.view.largest, 2)[:, None]
     axes = rng.random((quarter, 6)).argsort(axis=1) < rng.integers(1, 4, (quarter, 1))
-    asked = axes * rng.choice([-1.0, 1.0], (quarter, 6)) * rng.uniform(0.2, 1.0, (quarter, 6))
-    share = asked @ np.linalg.pinv(full.T @ full, rcond=1e-6) @ full.T
+    wanted = axes * rng.choice([-1.0, 1.0], (quarter, 6)) * rng.uniform(0.2, 1.0, (quarter, 6))
+    share = wanted @ np.linalg.pinv(full.T @ full, rcond=1e-6) @ full.T
     largest = np.hypot(share[:, 0::2], share[:, 1::2]).max(1, keepdims=True)
     share *= rng.uniform(0.03, 0.9, (quarter, 1)) / np.maximum(largest, 1e-9)
     return np.concatenate([robot.commands.wrench(command), share @ full])

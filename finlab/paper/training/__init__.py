@@ -1,3 +1,3 @@
-"""How the paper's two networks are trained: forward samples, surrogate, allocator. It needs torch."""
+"""Training of the paper's two networks: forward samples, surrogate, allocator; by torch."""
 
 import finlab.training as _  # noqa: F401

@@ -4,6 +4,7 @@ Robots are padded to n fins; `mask` (B, n) is True where there is one. The names
 `NetworkConfig` and `SurrogateConfig`, which answer without PyTorch.
 """
 
+from collections.abc import Callable
 from itertools import pairwise
 
 import torch
@@ -11,11 +12,10 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from finlab.networks.layers import LEAK
-from finlab.networks.normalization import to_normalized
-from finlab.paper.features import RAW_SIZE, raw_features
-from finlab.paper.network import LOG_STD_BOUND, Mixture, NetworkConfig
+from finlab.networks.trained import to_command, to_normalized
+from finlab.paper.network import LOG_STD_BOUND, RAW_SIZE, Mixture, NetworkConfig, raw_features
 from finlab.paper.surrogate import DESCRIPTOR, FORCE_UNIT, SurrogateConfig
-from finlab.paper.training.data import Batch
+from finlab.paper.training.samples import Batch
 
 FIRST_WEIGHT = 2.0
 """Largest first weight of the surrogate's first layer: angles enter as plain numbers whose sines must be
@@ -119,3 +119,40 @@ class Surrogate(nn.Module):
         scale, bias = self.affine(described).to(command.dtype).chunk(2, -1)
         answer: Tensor = wrench * (1.0 + scale) + bias
         return answer
+
+
+WrenchOf = Callable[[Tensor, Batch], Tensor]
+"""Wrenches (B, 6) of commands (B, n, 3) of a batch's robots."""
+
+
+def physics(surrogate: WrenchOf, batch: Batch, std: Tensor) -> Tensor:
+    """L_phys (Eq. 5): squared error of the normalized wrench of the recorded commands."""
+    return ((surrogate(batch.command, batch) - batch.wrench) / std).square().sum(-1)
+
+
+def imitation(mixture: Mixture, batch: Batch) -> Tensor:
+    """L_imit = -log p(u* | G) of the recorded commands."""
+    recorded = to_normalized(batch.command, batch.lower, batch.upper)
+    likelihood: Tensor = mixture.log_prob(recorded[:, None])[:, 0]
+    return -(likelihood * batch.mask).sum(1)
+
+
+def guidance(
+    mixture: Mixture, surrogate: WrenchOf, batch: Batch, std: Tensor, noise: tuple[Tensor, Tensor]
+) -> Tensor:
+    """L_guide (Eq. 6): squared normalized error of one sample of the mixture, by the surrogate.
+
+    `noise` is uniform (B, n, 1) and standard normal (B, n, 1, 3), as `Mixture.sample` takes it.
+    """
+    raw = to_command(mixture.sample(*noise)[:, 0], batch.lower, batch.upper)
+    # The gradient passes the clamp, or samples outside the limits would teach nothing.
+    command = raw + (raw.clamp(batch.lower, batch.upper) - raw).detach()
+    return physics(surrogate, batch._replace(command=command), std)
+
+
+def negative_entropy(mixture: Mixture, mask: Tensor) -> Tensor:
+    """L_ent = sum_k pi_k log pi_k, the mean over fins."""
+    log_weight = mixture.logits.log_softmax(-1)
+    value = (log_weight.exp() * log_weight).sum(-1)
+    mean: Tensor = (value * mask).sum(1) / mask.sum(1)
+    return mean

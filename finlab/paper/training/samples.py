@@ -7,12 +7,14 @@ parts and a `data.json` that says how it was drawn and holds the wrenches' mean 
 import io
 import json
 from dataclasses import asdict, dataclass, replace
-from functools import partial
+from functools import lru_cache, partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 from zipfile import BadZipFile
 
 import numpy as np
+import torch
+from torch import Tensor
 
 from finlab.arrays import AnyArray, Array
 from finlab.errors import DataError
@@ -21,8 +23,9 @@ from finlab.files.guarded import decoded, read_file
 from finlab.files.plain_values import parse_json
 from finlab.layout import FinModelSpec, Layout, random_layout
 from finlab.layout.random_layouts import TRAINING_FINS
-from finlab.networks.normalization import Normalization
+from finlab.networks.trained import Normalization
 from finlab.physics import Plant
+from finlab.training.loop import seeded_generator
 from finlab.whole_file import make_folder, sweep_parts, write_whole
 
 DATA_SEED = 20_000
@@ -153,3 +156,85 @@ def _write_about(folder: Path, settings: DataSettings, normalization: Normalizat
     values = normalization and {name: part.tolist() for name, part in normalization._asdict().items()}
     about = {"format": FORMAT, "version": VERSION, "settings": settings.as_values(), "normalization": values}
     write_whole(folder / DATA_FILE, json.dumps(about, indent=2) + "\n", DataError)
+
+
+class Batch(NamedTuple):
+    """B samples, each a robot padded to n fins, a command and its wrench, float32; padding is all zeros."""
+
+    position: Tensor
+    """(B, n, 3), body frame [m]."""
+    mounting_angle: Tensor
+    """(B, n) [rad]."""
+    lower: Tensor
+    """(B, n, 3) [rad, Hz, rad]."""
+    upper: Tensor
+    """(B, n, 3) [rad, Hz, rad]."""
+    mask: Tensor
+    """(B, n) bool, True where there is a fin."""
+    command: Tensor
+    """(B, n, 3) [rad, Hz, rad], uniform within the limits."""
+    wrench: Tensor
+    """(B, 6) that the command causes [N, N m]."""
+
+
+class DataSet:
+    """A data set in the memory of a device, and its batches."""
+
+    def __init__(self, folder: Path, device: torch.device) -> None:
+        """Read a data set; a `DataError` where it is missing, unfinished or damaged."""
+        said = about(folder)
+        try:
+            self.settings: dict[str, Any] = said["settings"]
+            """As in `data.json`."""
+            self.layouts, self.commands = (int(self.settings[name]) for name in ("layouts", "commands"))
+            self.normalization = Normalization.parse(said["normalization"])
+        except (KeyError, TypeError, ValueError) as error:
+            raise DataError(f"{folder}: an unfinished data set; run `finlab data generate` again") from error
+        count = -(-self.layouts // DataSettings(commands=self.commands).together)
+        parts = [read_part(part_file(folder, k)) for k in range(count)]
+        joined = {name: np.concatenate([part[name] for part in parts]) for name in FIELDS}
+        if joined["wrench"].shape != (self.layouts, self.commands, 6):
+            raise DataError(f"{folder}: its parts are not those of its {DATA_FILE}")
+        self._parts = [torch.from_numpy(joined[name]).to(device) for name in FIELDS]
+        self._device, self._epoch = device, -1
+        self._order = torch.empty(0)
+
+    def batch(self, step: int, size: int, seed: int, one_layout: bool, rows: slice) -> Batch:
+        """The rows of batch number `step`, a function of step and seed.
+
+        Args:
+            step: number of the batch.
+            size: samples of the whole batch.
+            seed: of the order.
+            one_layout: whether they are random commands of a single layout (paper, surrogate pretraining), a
+                new one in each step, or of all, in a new order in each epoch.
+            rows: those of the batch that are answered.
+        """
+        count = self.layouts if one_layout else self.layouts * self.commands
+        if not one_layout and size > count:
+            raise DataError(f"batches of {size} samples need at least as many, the data set has {count}")
+        epoch, place = divmod(step, count if one_layout else count // size)
+        if epoch != self._epoch:
+            draw = seeded_generator(seed, epoch, self._device)
+            self._epoch, self._order = epoch, torch.randperm(count, generator=draw, device=self._device)
+        if one_layout:
+            draw = seeded_generator(seed, 1_000_000 + step, self._device)
+            command = torch.randint(self.commands, (size,), generator=draw, device=self._device)[rows]
+            layout = self._order[place].expand(len(command))
+        else:
+            chosen = self._order[place * size : (place + 1) * size][rows]
+            layout, command = chosen // self.commands, chosen % self.commands
+        *robots, commands, wrench = self._parts
+        mixed = commands[layout, command], wrench[layout, command]
+        return Batch._make([*(part[layout] for part in robots), *mixed])
+
+
+@lru_cache(maxsize=1)
+def fresh_batch(settings: DataSettings) -> Batch:
+    """All samples of a data set, in memory alone."""
+    robots = [samples_of(settings, k) for k in range(settings.layouts)]
+    times = [len(robot["wrench"]) for robot in robots]
+    joined = {name: np.stack([robot[name] for robot in robots]) for name in FIELDS}
+    once = {name: np.repeat(joined[name], times, axis=0) for name in ROBOT}
+    flat = {name: np.concatenate(joined[name]) for name in FIELDS[5:]}
+    return Batch(*(torch.from_numpy(part) for part in (once | flat).values()))

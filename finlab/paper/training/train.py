@@ -14,12 +14,10 @@ from finlab.layout import FinModelSpec
 from finlab.networks.checkpoint import read_checkpoint, resolve_checkpoint, write_checkpoint
 from finlab.networks.trained import State, TrainedWeights, sizes_for_file
 from finlab.paper.surrogate import SurrogateConfig
-from finlab.paper.training import losses
-from finlab.paper.training.card import write_card
-from finlab.paper.training.data import Batch, DataSet, fresh_batch
+from finlab.paper.training import modules
 from finlab.paper.training.modules import AllocatorNetwork, Surrogate, features
-from finlab.paper.training.recipes import PaperLoop, recipe
-from finlab.paper.training.samples import N_FINS, DataSettings, generate
+from finlab.paper.training.recipes import PaperLoop, recipe, write_card
+from finlab.paper.training.samples import N_FINS, Batch, DataSet, DataSettings, fresh_batch, generate
 from finlab.training.device import Workplace, workplace
 from finlab.training.loop import Terms, Training, seeded_generator
 
@@ -88,7 +86,7 @@ def train_surrogate(options: Options) -> TrainedWeights:
         def terms(step: int) -> dict[str, Tensor]:
             batch = bench.batch(step)
             with bench.place.autocast():
-                return {"loss": losses.physics(network, batch, std).mean()}
+                return {"loss": modules.physics(network, batch, std).mean()}
 
         return terms
 
@@ -132,9 +130,9 @@ def train_allocator(options: Options, surrogate: Path) -> TrainedWeights:
             batch = bench.batch(step)
             with bench.place.autocast():
                 mixture = network(features(batch), (batch.wrench - mean) / std, batch.mask)
-                guide = losses.guidance(mixture, frozen, batch, std, bench.noise(step)).mean()
-            imitate = losses.imitation(mixture, batch).mean()
-            entropy = losses.negative_entropy(mixture, batch.mask).mean()
+                guide = modules.guidance(mixture, frozen, batch, std, bench.noise(step)).mean()
+            imitate = modules.imitation(mixture, batch).mean()
+            entropy = modules.negative_entropy(mixture, batch.mask).mean()
             loss = imitate + ramp.beta(step) * guide + ramp.entropy * entropy  # Eq. 7
             return {"loss": loss, "imitation": imitate, "guidance": guide, "entropy": entropy}
 
@@ -194,4 +192,4 @@ def surrogate_error(weights: TrainedWeights) -> float:
     """Mean normalized error of a surrogate's wrench by its fin model, on fresh samples."""
     batch = fresh_batch(replace(JUDGES, fin_model=FinModelSpec.from_values(weights.fin_model)))
     std = torch.tensor(weights.normalization.std, dtype=torch.float32)
-    return float(losses.physics(surrogate_of(weights), batch, std).sqrt().mean())
+    return float(modules.physics(surrogate_of(weights), batch, std).sqrt().mean())

@@ -10,7 +10,7 @@ from finlab.allocation import Allocator, Policy
 from finlab.allocation.yardstick import yardstick
 from finlab.errors import LayoutError
 from finlab.layout import Fin, FinModelSpec, Layout, Limits, random_layout
-from finlab.networks.normalization import Normalization
+from finlab.networks.trained import Normalization
 from finlab.physics import Plant, plant_of
 from tests.any_robot import AnyRobot, normalized_error
 

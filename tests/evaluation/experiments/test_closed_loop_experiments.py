@@ -48,9 +48,12 @@ def test_faults(layout_a: Layout, line: str) -> None:
 
 
 def test_velocity() -> None:
-    rows = load_experiment("velocity").rows(methods=("analytic", "dual"), runs=1, duration=12.0)
+    rows = load_experiment("velocity").rows(methods=("fixed_frequency", "dual"), runs=1, duration=12.0)
     assert [row["speed"] for row in rows] == [0.1, 0.1, 0.15, 0.15, 0.2, 0.2, None, None]
     assert rows[-2]["mae"] == pytest.approx(np.mean([row["mae"] for row in rows[:6:2]]))
+    baseline, dual = rows[-2:]
+    assert baseline["over_baseline"] == 1.0 and dual["over_baseline"] < 0.9
+    assert dual["over_baseline"] == pytest.approx(dual["inertial_w"] / baseline["inertial_w"])
 
 
 @pytest.mark.parametrize(

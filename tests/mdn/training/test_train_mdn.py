@@ -11,11 +11,9 @@ import pytest
 import torch
 
 from finlab.mdn.network import ForceNetworkConfig
-from finlab.mdn.training import train
-from finlab.mdn.training.answers import Answers, read_answers, write_answers
-from finlab.mdn.training.first_weights import first_weights
-from finlab.mdn.training.recipes import RECIPES
-from finlab.mdn.training.train import losses, train_mdn
+from finlab.mdn.training import train_mdn as mdn_training
+from finlab.mdn.training.teacher import Answers, read_answers, write_answers
+from finlab.mdn.training.train_mdn import RECIPES, first_weights, losses, train_mdn
 from finlab.networks.checkpoint import read_checkpoint, write_checkpoint
 from finlab.networks.trained import TrainedWeights
 from finlab.training import loop
@@ -100,7 +98,7 @@ def test_a_run_that_died_ends_with_the_weights_of_one_that_did_not(
         return write_checkpoint(folder, weights)
 
     monkeypatch.setattr(loop, "SAVE_EVERY_S", 0.0)
-    monkeypatch.setattr(train, "write_checkpoint", dying)
+    monkeypatch.setattr(mdn_training, "write_checkpoint", dying)
     with pytest.raises(KeyboardInterrupt):
         train_mdn("smoke", tmp_path / "died", resume=True)
     found = train_mdn("smoke", tmp_path / "died", resume=True)
@@ -111,5 +109,5 @@ def test_a_run_that_died_ends_with_the_weights_of_one_that_did_not(
 
 def test_answers_end_with_half_of_the_time(tmp_path: Path) -> None:
     settings = replace(SMOKE.answers, files=6)
-    assert len(train.answers_in(tmp_path, settings, 0, until=0.0)) == 2
+    assert len(mdn_training.answers_in(tmp_path, settings, 0, until=0.0)) == 2
     assert len(list(tmp_path.iterdir())) == 2

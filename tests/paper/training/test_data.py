@@ -11,8 +11,7 @@ import torch
 from finlab.errors import DataError
 from finlab.layout import Fin, Layout
 from finlab.paper.training import samples as parts_of
-from finlab.paper.training.data import DataSet
-from finlab.paper.training.samples import DataSettings, drawn_part, generate, part_file
+from finlab.paper.training.samples import DataSet, DataSettings, drawn_part, generate, part_file
 from finlab.physics import Plant
 
 SETTINGS = DataSettings(layouts=30, commands=40, seed=3)

@@ -8,7 +8,7 @@ costs: so components come to stand for ways, and the cheapest way's gets the lar
 import math
 import time
 from collections.abc import Callable
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -19,20 +19,75 @@ from torch import Tensor
 
 from finlab.errors import DataError
 from finlab.executor import cores, map_parts
-from finlab.mdn.network import ForceMixture
-from finlab.mdn.training.answers import Answers, Batch, write_answers
-from finlab.mdn.training.first_weights import first_weights
-from finlab.mdn.training.recipes import RECIPES, AnswerSettings, MdnTraining
+from finlab.mdn.network import ForceMixture, ForceNetworkConfig
+from finlab.mdn.training.teacher import Answers, AnswerSettings, Batch, write_answers
 from finlab.networks.checkpoint import (
     read_checkpoint,
     read_normalization,
     resolve_checkpoint,
     write_checkpoint,
 )
-from finlab.networks.trained import State, TrainedWeights, sizes_for_file
+from finlab.networks.trained import Shapes, State, TrainedWeights, sizes_for_file
 from finlab.training.device import Workplace
-from finlab.training.loop import STATE_FILE, Terms, Training
+from finlab.training.loop import STATE_FILE, LoopSettings, Terms, Training
 from finlab.whole_file import make_folder, sweep_parts
+
+
+@dataclass(frozen=True)
+class MdnTraining(LoopSettings):
+    """How the network of method `mdn` is trained: the likelihood of the ways that the teacher has found."""
+
+    anneal: int = 2500
+    """Steps over which components stop sharing what they stand for; at first all of them learn from all."""
+    spread: float = 0.02
+    """Weight of the entropy of the components' mean weights over a batch, so that none is left unused."""
+
+
+@dataclass(frozen=True)
+class MdnRecipe:
+    """The network of method `mdn`, and what it learns from."""
+
+    training: MdnTraining
+    answers: AnswerSettings = field(default_factory=AnswerSettings)
+    network: ForceNetworkConfig = field(default_factory=ForceNetworkConfig)
+
+
+RECIPES = {
+    "default": MdnRecipe(MdnTraining(100_000, 256, 2e-3, warmup=200, ema=0.999, seconds=5400.0)),
+    "smoke": MdnRecipe(
+        MdnTraining(30, 16, 2e-3, warmup=5, ema=0.9, seconds=5400.0, anneal=10),
+        AnswerSettings(files=2, fins=2, robots=6, targets=8),
+        ForceNetworkConfig(width=16, heads=2, layers=1, feedforward=16, n_components=4),
+    ),
+}
+"""Name -> recipe of `finlab train mdn`."""
+
+
+ZERO = ("in_proj_bias", "out_proj.bias")
+"""Ends of the names of arrays that start at zero, as in PyTorch's attention."""
+
+
+def first_weights(shapes: Shapes, seed: int) -> dict[str, Tensor]:
+    """Weights by name, drawn as PyTorch draws those of its own layers (Glorot and Bengio for attention,
+    uniform over one over the root of the inputs for linear layers); they depend on the seed alone."""
+    generator = torch.Generator().manual_seed(seed)
+    drawn = {name: _drawn(name, shape, shapes, generator) for name, shape in shapes.items()}
+    return {name: values.requires_grad_() for name, values in drawn.items()}
+
+
+def _drawn(name: str, shape: tuple[int, ...], shapes: Shapes, generator: torch.Generator) -> Tensor:
+    layer, _, part = name.rpartition(".")
+    weight = shapes.get(f"{layer}.weight", ())
+    if len(weight) == 1:  # a normalization
+        return torch.ones(shape) if part == "weight" else torch.zeros(shape)
+    if name.endswith(ZERO) or (part == "bias" and not weight):
+        return torch.zeros(shape)
+    if part in ("attention", "in_proj_weight"):
+        bound = math.sqrt(6.0 / sum(shape))
+    else:
+        bound = 1.0 / math.sqrt(weight[1])
+    return (2.0 * torch.rand(shape, generator=generator) - 1.0) * bound
+
 
 TRAIN_SEED = 140_000
 """Added to the user's seed."""
@@ -67,13 +122,8 @@ def train_mdn(
     settings = replace(recipe.training, **{k: v for k, v in training.items() if v is not None})
     # One yardstick of errors for all that is shipped; the network does not depend on it.
     normalization = read_normalization(resolve_checkpoint("paper"))
-    identity: dict[str, Any] = {
-        "preset": preset,
-        "seed": seed,
-        "training": asdict(settings),
-        "answers": asdict(recipe.answers),
-        "network": asdict(recipe.network),
-    }
+    parts: dict[str, Any] = {"training": settings, "answers": recipe.answers, "network": recipe.network}
+    identity = {"preset": preset, "seed": seed, **{name: asdict(part) for name, part in parts.items()}}
 
     def save(network: State, progress: dict[str, Any]) -> None:
         trained = TrainedWeights(out.name, normalization, sizes_for_file(recipe.network), network)
