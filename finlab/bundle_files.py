@@ -75,11 +75,8 @@ def archive_around(path: str | os.PathLike[str]) -> str | None:
 
 
 def read_bundle_files(path: str | os.PathLike[str]) -> dict[str, bytes]:
-    """The files of a bundle by name, with checksums that fit.
-
-    Raises:
-        DataError: it cannot be read, is of another version, was changed, or holds what no bundle holds.
-    """
+    """The files of a bundle by name, with checksums that fit. Raises DataError: it cannot be read, is of
+    another version, was changed, or holds what no bundle holds."""
     source = str(path)
     if not os.path.isdir(path):
         content = read_file(source, LARGEST_BUNDLE + 100_000, "a bundle's folder or its zip archive")

@@ -40,7 +40,8 @@ def map_parts(
     """Yields `function(part)` of each part, in order.
 
     Inside `on_cluster` the parts run there, else in `jobs` processes; those still open are dropped when the
-    iteration ends early.
+    iteration ends early. Raises FinlabError: the cluster is gone, or a part ends every worker; and whatever
+    `function` raises.
 
     Args:
         function: of a module, or a `partial` of one, so that it can be sent.
@@ -48,9 +49,6 @@ def map_parts(
         what: title of a bar on a terminal's stderr; no bar without one.
         unit: what the bar counts.
         jobs: most processes; 1 is this one.
-
-    Raises:
-        FinlabError: the cluster is gone, or a part ends every worker; and whatever `function` raises.
     """
     client, count = _client.get(), len(parts)
     jobs = min(jobs, count)

@@ -16,11 +16,8 @@ def write_whole(
 ) -> None:
     """Write a file, replacing an existing one; a kill or a full disk never leaves half of it.
 
-    A link is followed; what is no regular file (`/dev/stdout`) is written to, not replaced.
-
-    Raises:
-        FinlabError: of the kind `error`; the file cannot be written.
-    """
+    A link is followed; what is no regular file (`/dev/stdout`) is written to, not replaced. Raises
+    FinlabError: of the kind `error`; the file cannot be written."""
     file = Path(os.path.realpath(path))
     data = content.encode() if isinstance(content, str) else content
     try:
@@ -33,11 +30,8 @@ def write_whole(
 
 
 def write_together(files: Mapping[Path, bytes], error: type[FinlabError], name: str) -> None:
-    """Write files beside their places, and put them there in order once all are on the disk.
-
-    Raises:
-        FinlabError: of the kind `error`; one cannot be written, and none is there. It calls them `name`.
-    """
+    """Write files beside their places, and put them there in order once all are on the disk. Raises
+    FinlabError: of the kind `error`; one cannot be written, and none is there. It calls them `name`."""
     parts = {file.with_name(f".{file.name}.{os.getpid()}{PART}"): file for file in files}
     try:
         for part, file in parts.items():
@@ -56,11 +50,7 @@ def write_together(files: Mapping[Path, bytes], error: type[FinlabError], name: 
 
 
 def make_folder(path: str | os.PathLike[str]) -> Path:
-    """Make a folder and those above it, unless they are there.
-
-    Raises:
-        DataError: that cannot be.
-    """
+    """Make a folder and those above it, unless they are there. Raises DataError: that cannot be."""
     folder = Path(path)
     try:
         folder.mkdir(parents=True, exist_ok=True)

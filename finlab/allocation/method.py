@@ -45,14 +45,9 @@ class Method(ABC):
     ) -> None:
         """Prepares the method for a layout of healthy actuators and the axes that count, with settings of its
         `settings_class`, the yardstick `scale` (6,) [N, N m] of the whole robot, and trained networks, where
-        it has any.
-
-        Raises:
-            AllocationError: the method cannot work with these settings.
-            CheckpointError: the networks are of another kind.
-            DataError: a fin's force table cannot be read.
-            LayoutError: the robot has an actuator that the method does not take.
-        """
+        it has any. Raises AllocationError: the method cannot work with these settings; CheckpointError: the
+        networks are of another kind; DataError: a fin's force table cannot be read; LayoutError: the robot
+        has an actuator that the method does not take."""
         self.check_robot(layout)
         self.layout, self.settings, self.scale, self.weights = layout, settings, scale, weights
         self.plant = plant_of(layout).counting(layout.commanded)

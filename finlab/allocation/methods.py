@@ -52,11 +52,7 @@ class MethodChoice:
 
 
 def method_class(method: str) -> type[Method]:
-    """The class of a method in `METHODS`.
-
-    Raises:
-        AllocationError: there is no such method.
-    """
+    """The class of a method in `METHODS`. Raises AllocationError: there is no such method."""
     if method not in METHODS:
         raise AllocationError(f"method: expected one of {', '.join(METHODS)}, got {method!r:.60}")
     module, name = METHODS[method]
@@ -65,12 +61,9 @@ def method_class(method: str) -> type[Method]:
 
 
 def choose_method(method: str, checkpoint: Checkpoint = None, **settings: Any) -> MethodChoice:
-    """A method of `METHODS` by name, with its networks and settings.
-
-    Raises:
-        AllocationError: unknown method or setting, or a checkpoint for a method without networks.
-        CheckpointError: missing, corrupt or foreign checkpoint.
-    """
+    """A method of `METHODS` by name, with its networks and settings. Raises AllocationError: unknown method
+    or setting, or a checkpoint for a method without networks; CheckpointError: missing, corrupt or foreign
+    checkpoint."""
     kind = method_class(method)
     if method not in LEARNED:
         if checkpoint is not None:
@@ -85,13 +78,9 @@ def choose_method(method: str, checkpoint: Checkpoint = None, **settings: Any) -
 
 
 def bundled_method(files: Files, source: str) -> MethodChoice:
-    """The method of a bundle with what its files hold.
-
-    Raises:
-        CheckpointError: its networks are damaged, or it has none and this finlab has not those that it names.
-        DataError: the bundle is of another format, has a method that runs on no robot, or settings that no
-            robot should try.
-    """
+    """The method of a bundle with what its files hold. Raises CheckpointError: its networks are damaged, or
+    it has none and this finlab has not those that it names; DataError: the bundle is of another format, has a
+    method that runs on no robot, or settings that no robot should try."""
     place = f"{source}/{ABOUT}"
     document = parse_json(decoded(files[ABOUT], place, "JSON"), place)
     if not isinstance(document, dict) or document.get("format") != FORMAT:
@@ -117,11 +106,8 @@ def bundled_method(files: Files, source: str) -> MethodChoice:
 
 
 def checked_settings(kind: type[Method], settings: dict[str, Any]) -> Settings:
-    """The settings of a method, by name.
-
-    Raises:
-        AllocationError: the method knows no such setting, or cannot work with its value.
-    """
+    """The settings of a method, by name. Raises AllocationError: the method knows no such setting, or cannot
+    work with its value."""
     known = kind.option_names()
     if "objective" in settings and "objective" not in known:
         raise AllocationError(

@@ -42,12 +42,8 @@ class Usable(NamedTuple):
 
 
 def usable(layout: Layout, failed: Sequence[str], health: Health | None = None) -> Usable:
-    """A robot some of whose actuators are lost or damaged.
-
-    Raises:
-        AllocationError: `failed` is no list of names, `health` no `Health`.
-        LayoutError: an unknown actuator, or none left.
-    """
+    """A robot some of whose actuators are lost or damaged. Raises AllocationError: `failed` is no list of
+    names, `health` no `Health`; LayoutError: an unknown actuator, or none left."""
     if health is not None:
         if not isinstance(health, Health):
             raise AllocationError(f"health: expected a Health, got {health!r}; make one with Health.of")
@@ -92,11 +88,8 @@ def check_wrenches(wrench: ArrayLike, *, single: bool, name: str = "wrench") -> 
 
 
 def axes_of(layout: Layout, wrench: Array) -> Axes | None:
-    """The axes of a robot that a wrench (6,) asks for; None where these are all that it commands.
-
-    Raises:
-        CommandError: there is none.
-    """
+    """The axes of a robot that a wrench (6,) asks for; None where these are all that it commands. Raises
+    CommandError: there is none."""
     counts = layout.commanded & ~np.isnan(wrench)
     if (counts == layout.commanded).all():
         return None
@@ -110,11 +103,7 @@ def axes_of(layout: Layout, wrench: Array) -> Axes | None:
 
 def same_axes(layout: Layout, wrenches: Array) -> list[tuple[Axes | None, NDArray[np.intp] | None]]:
     """Groups of wrenches (N, 6) that ask for the same axes: the axes as `axes_of` gives them, and their
-    places; None for all.
-
-    Raises:
-        CommandError: a wrench asks for no axis.
-    """
+    places; None for all. Raises CommandError: a wrench asks for no axis."""
     free = np.isnan(wrenches)
     if not free.any():
         return [(None, None)]

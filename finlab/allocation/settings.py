@@ -53,11 +53,8 @@ def switch(default: bool, meaning: str) -> Any:
 
 @dataclass(frozen=True)
 class Settings:
-    """Settings of a method that has none; base of all others.
-
-    Raises:
-        AllocationError: a value of the wrong kind, or out of its range.
-    """
+    """Settings of a method that has none; base of all others. Raises AllocationError: a value of the wrong
+    kind, or out of its range."""
 
     def __post_init__(self) -> None:
         for each in fields(self):

@@ -19,11 +19,8 @@ def yardstick(layout: Layout) -> Array:
     """The scales (6,) of a robot's wrench: three times F [N], three times T [N m].
 
     F is the root of the sum of squares of the actuators' largest forces, T that of their largest torques
-    about the origin, each actuator alone. A robot that gives nothing has F = 1 N.
-
-    Raises:
-        DataError: a fin's force table cannot be read.
-    """
+    about the origin, each actuator alone. A robot that gives nothing has F = 1 N. Raises DataError: a fin's
+    force table cannot be read."""
     plant = Plant(layout)
     share = np.stack(np.meshgrid(*(np.linspace(0.0, 1.0, count) for count in STEPS), indexing="ij"), -1)
     command = plant.lower + share.reshape(-1, 1, 3) * plant.width

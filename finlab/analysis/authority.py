@@ -97,16 +97,13 @@ def losses(
     flow: ArrayLike | None = None,
 ) -> tuple[Loss, ...]:
     """Returns what the loss of each working actuator, on top of `failed`, would cost; none when only one is
-    left.
+    left. Raises LayoutError: there is no actuator of a name in `failed`.
 
     Args:
         layout: the robot.
         failed: actuators that are lost already.
         before: what the working actuators hold, if that is known.
         flow: velocity (6,) of the body relative to the water [m/s, rad/s], body frame; None at rest.
-
-    Raises:
-        LayoutError: there is no actuator of a name in `failed`.
     """
     held = authority(layout, failed, flow) if before is None else before
     working = [name for name in layout.names if name not in failed]
@@ -155,11 +152,8 @@ def commanded_axes(layout: Layout) -> tuple[str, ...]:
 
 
 def named_axes(names: Sequence[str]) -> tuple[Axis, ...]:
-    """Returns the axes of a wrench, each once, in order, of some of `AXES`.
-
-    Raises:
-        LayoutError: there is none, or one of another name.
-    """
+    """Returns the axes of a wrench, each once, in order, of some of `AXES`. Raises LayoutError: there is
+    none, or one of another name."""
     wrong = [name for name in names if name not in AXES]
     if wrong or not names:
         raise LayoutError(f"axes: expected some of {', '.join(AXES)}, got {', '.join(wrong) or 'none'}")

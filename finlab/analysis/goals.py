@@ -47,7 +47,8 @@ def make_goal(
     axes: Sequence[str] | None = None,
     flow: Array | None = None,
 ) -> Goal:
-    """Returns the measure called `name` for variants of a layout.
+    """Returns the measure called `name` for variants of a layout. Raises LayoutError: unknown goal or axis,
+    or too few actuators for a failure.
 
     Args:
         name: `weakest_direction`: the scaled wrench that is within reach in every direction [N].
@@ -59,9 +60,6 @@ def make_goal(
         axes: those of `AXES` whose directions count; on the others, anything may come. None for all that the
             layout commands.
         flow: velocity (6,) of the body relative to the water; None at rest.
-
-    Raises:
-        LayoutError: unknown goal or axis, or too few actuators for a failure.
     """
     search: dict[str, Any] = {} if fine else QUICK_SEARCH
     named = layout.axes if axes is None else named_axes(axes)
@@ -94,11 +92,8 @@ def _directions(sets: ForceSets) -> Array:
 
 def axes_to_raise(layout: Layout, flow: Array | None = None) -> tuple[str, ...]:
     """Returns the axes that count when none are named: all that the layout commands, or those that it pushes
-    alone now where it has too few actuators to push both ways along all, wherever they go.
-
-    Raises:
-        LayoutError: there are none.
-    """
+    alone now where it has too few actuators to push both ways along all, wherever they go. Raises
+    LayoutError: there are none."""
     sets = force_sets(layout, flow=flow)
     back = 0.0 if sets.back is None else sets.back[0]
     one_way = (sets.half[0] <= 0.5 * np.pi) & ~sets.cornered[0] & (back == 0.0)

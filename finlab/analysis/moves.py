@@ -111,12 +111,8 @@ class Moves:
 
         One that is moved along with its twin needs no bounds of its own. Free coordinates and angles are
         multiples of the steps [m], [rad] of `grid` where these are above zero and the bounds hold one. `flow`
-        as for `force_sets`.
-
-        Raises:
-            LayoutError: an actuator is unknown, none is named, one has no bounds, a pair is not mirrored or
-                shares one with another pair, or nothing is free to move.
-        """
+        as for `force_sets`. Raises LayoutError: an actuator is unknown, none is named, one has no bounds, a
+        pair is not mirrored or shares one with another pair, or nothing is free to move."""
         kind = "fin" if layout.is_of_fins else "actuator"
         if not names:
             raise LayoutError(f"expected at least one {kind} to move, got none")

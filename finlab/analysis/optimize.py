@@ -83,6 +83,8 @@ def optimize_layout(
 
     The same arguments and seed give the same layout. The present layout is among the first candidates, so the
     result is never worse, unless the present one breaks the rule: then the best that keeps it is the result.
+    Raises LayoutError: something about the actuators, bounds, pairs, goal or axes does not fit; it says what;
+    CommandError: `flow` is not six finite numbers, or `mission` not such wrenches.
 
     Args:
         layout: where to start; its limits and models stay.
@@ -102,10 +104,6 @@ def optimize_layout(
         flow: velocity (6,) of the body relative to the water [m/s, rad/s], body frame; None at rest.
         progress: called after each round.
         cancelled: asked after each round, and within long ones; the search stops when it answers True.
-
-    Raises:
-        LayoutError: something about the actuators, bounds, pairs, goal or axes does not fit; it says what.
-        CommandError: `flow` is not six finite numbers, or `mission` not such wrenches.
     """
     bounds, water, start = bounds or {}, check_flow(flow), layout
     if axes is not None:

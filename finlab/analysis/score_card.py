@@ -32,11 +32,7 @@ def least_power(
     flow: ArrayLike | None = None,
 ) -> Array:
     """Returns the least power [W] for each wrench (N, 6) [N, N m]: (N,), NaN where it is out of reach; `flow`
-    as for an allocator.
-
-    Raises:
-        LayoutError: there is no actuator of a name in `failed`.
-    """
+    as for an allocator. Raises LayoutError: there is no actuator of a name in `failed`."""
     wanted = np.asarray(wrenches, dtype=np.float64).reshape(-1, 6)
     if len(set(layout.indices(tuple(failed)))) == layout.n:
         return np.where((wanted == 0.0).all(-1), 0.0, np.nan)
@@ -85,16 +81,13 @@ class ScoreCard:
 
 
 def score_card(layout: Layout, failed: Collection[str] = (), flow: ArrayLike | None = None) -> ScoreCard:
-    """Returns the score card of a layout whose actuators called `failed` push nothing.
+    """Returns the score card of a layout whose actuators called `failed` push nothing. Raises LayoutError:
+    there is no actuator of a name in `failed`; CommandError: `flow` is not six finite numbers.
 
     Args:
         layout: the robot.
         failed: actuators that are lost.
         flow: velocity (6,) of the body relative to the water [m/s, rad/s], body frame; None at rest.
-
-    Raises:
-        LayoutError: there is no actuator of a name in `failed`.
-        CommandError: `flow` is not six finite numbers.
     """
     water = check_flow(flow)
     held = authority(layout, failed, water)
@@ -151,10 +144,7 @@ class QuickCheck(HeldAxes):
 
 def quick_check(layout: Layout, failed: Collection[str] = (), flow: ArrayLike | None = None) -> QuickCheck:
     """Returns what the working actuators hold in a flow as of `score_card`, from singular values alone.
-
-    Raises:
-        LayoutError: there is no actuator of a name in `failed`.
-    """
+    Raises LayoutError: there is no actuator of a name in `failed`."""
     working = [name for name in layout.names if name not in failed]
     single = working if len(working) > 1 else []
     sets = force_sets(layout, failed, check_flow(flow)).tile(1 + len(single))

@@ -61,11 +61,8 @@ def put_json(value: Any, path: Path | None, table: str | None = None) -> None:
 
 def open_robot(text: str, failed: tuple[str, ...] = ()) -> tuple[Layout, tuple[str, ...]]:
     """The layout in a file, or the shipped one of that name, and the names of all actuators that do not work:
-    those that a bundle marks as failed and those named now, each once.
-
-    Raises:
-        LayoutError: neither a readable file nor a shipped layout.
-    """
+    those that a bundle marks as failed and those named now, each once. Raises LayoutError: neither a readable
+    file nor a shipped layout."""
     from finlab.assets import shipped_layouts
     from finlab.files.worker import in_worker
     from finlab.layout.load import layout_and_failed

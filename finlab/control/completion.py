@@ -28,10 +28,7 @@ class Completion:
         self, layout: Layout, failed: Sequence[str], axes: Sequence[str], free: Sequence[str] = ()
     ) -> None:
         """Prepares for the actuators that work, at least one, the wanted and the free axes, by their names.
-
-        Raises:
-            LayoutError: an unknown name, or no actuator is left.
-        """
+        Raises LayoutError: an unknown name, or no actuator is left."""
         scale = np.array([1.0, 1.0, 1.0, 1 / LEVER_M, 1 / LEVER_M, 1 / LEVER_M])
         planar = layout_effectiveness(layout.without(failed) if failed else layout) * scale[:, None]
         chosen = mask_of(axes)

@@ -136,11 +136,8 @@ class FaultMonitor:
     def tell(self, name: str, strength: float = 1.0, stuck: float = math.nan) -> Diagnosis:
         """The state of a fin is known: its strength, and where it is stuck [rad] if it is.
 
-        A fin that is said to be lost is left alone until another state is said: no probe moves it.
-
-        Raises:
-            LayoutError: there is no fin of that name.
-        """
+        A fin that is said to be lost is left alone until another state is said: no probe moves it. Raises
+        LayoutError: there is no fin of that name."""
         fin = self.layout.index(name)
         self._beliefs.believe(fin, strength)
         self._mark(fin, strength, stuck)

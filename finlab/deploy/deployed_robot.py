@@ -54,11 +54,8 @@ class DeployedRobot:
 
     def allocate(self, wrench: ArrayLike, *, failed: Sequence[str] = (), **options: Any) -> Allocation:
         """Commands for one target; arguments and errors as in `finlab.Allocator.allocate`. What the bundle
-        names as failed stays failed, whatever `failed` adds.
-
-        Raises:
-            DataError: the answer is no number, as a broken bundle gives it.
-        """
+        names as failed stays failed, whatever `failed` adds. Raises DataError: the answer is no number, as a
+        broken bundle gives it."""
         lost = (*self.failed, *(name for name in failed if name not in self.failed))
         answer = self.allocator.allocate(wrench, failed=lost, **options)
         works = [name not in lost for name in self.layout.names]
@@ -122,12 +119,8 @@ class Finding(NamedTuple):
 def self_tests(allocator: Allocator, failed: tuple[str, ...]) -> tuple[Case, ...]:
     """Targets that can be reached, wrenches of random commands, with an allocator's answers.
 
-    They depend on the layout and the allocator alone.
-
-    Raises:
-        LayoutError: an unknown failed actuator, or none left.
-        DataError: a fin's force table cannot be read.
-    """
+    They depend on the layout and the allocator alone. Raises LayoutError: an unknown failed actuator, or none
+    left; DataError: a fin's force table cannot be read."""
     layout = allocator.layout
     plant = plant_of(layout.without(failed) if failed else layout)
     cases = []

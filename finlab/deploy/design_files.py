@@ -66,12 +66,9 @@ class Opened(NamedTuple):
 def read_archive(source: str, content: bytes, folder: Path) -> Opened:
     """The layout in a zip archive: a bundle, or a layout file with the tables and the mesh that it names.
 
-    These are kept in folders inside `folder`.
-
-    Raises:
-        LayoutError: it is no such archive, its layout is none, or names a table that is not in it.
-        DataError: a bundle that was changed, or a table that cannot be read.
-    """
+    These are kept in folders inside `folder`. Raises LayoutError: it is no such archive, its layout is none,
+    or names a table that is not in it; DataError: a bundle that was changed, or a table that cannot be
+    read."""
     inside = Path(os.path.abspath(source))
     if unpacked(content, source, {ABOUT: LARGEST[ABOUT]}.get, LARGEST_BUNDLE, LayoutError):
         parts = bundle_files_of(content, source)
@@ -112,6 +109,8 @@ def layout_of(source: str, content: bytes, folder: Path | None = None) -> Layout
 
 def adopted(layout: Layout, parts: Mapping[str, bytes], folder: Path, source: str) -> Opened:
     """A layout from a stranger, and the files that came along kept in a folder; no other file is opened.
+    Raises LayoutError: it names a force table that did not come along; FinlabError: a file cannot be kept, or
+    is no hull.
 
     Args:
         layout: it may name any path.
@@ -119,10 +118,6 @@ def adopted(layout: Layout, parts: Mapping[str, bytes], folder: Path, source: st
             same name does where there is no other, since files that are sent at once have lost their folders.
         folder: where to keep them.
         source: what to call the layout in errors.
-
-    Raises:
-        LayoutError: it names a force table that did not come along.
-        FinlabError: a file cannot be kept, or is no hull.
     """
     by_name = {Path(path).name: path for path in parts}
     actuators, missing = [], []

@@ -83,16 +83,13 @@ def load_method_specs(
     *,
     patient: bool = False,
 ) -> dict[str, MethodSpec]:
-    """Methods by name, in the order of the names.
+    """Methods by name, in the order of the names. Raises AllocationError: an unknown method; DataError: a
+    function that is none.
 
     Args:
         names: of methods; checkpoint and objective as in `load_method_spec`.
         patient: whether methods that stop after a time get `PATIENCE_S` for each target, so that the same
             question has the same answer on a busy machine.
-
-    Raises:
-        AllocationError: an unknown method.
-        DataError: a function that is none.
     """
     specs = [load_method_spec(name, checkpoint, objective) for name in dict.fromkeys(names)]
     if patient:
@@ -103,16 +100,13 @@ def load_method_specs(
 def load_method_spec(
     name: str, checkpoint: str | Path | None = None, objective: Name | None = None
 ) -> MethodSpec:
-    """The method of a specification.
+    """The method of a specification. Raises AllocationError: unknown method; DataError: a function that is
+    none.
 
     Args:
         name: a method, or `file.py:function`, as this module says.
         checkpoint: of learned methods, as for `finlab.Allocator`.
         objective: what the methods that can choose keep least; each one's default where None.
-
-    Raises:
-        AllocationError: unknown method.
-        DataError: a function that is none.
     """
     if ":" in name:
         kind = own_method(name)

@@ -29,11 +29,8 @@ LEAST_ERROR = 1e-12
 
 
 def check_picture(path: Path | None) -> None:
-    """Refuse, before the work, a picture that could not be written after it.
-
-    Raises:
-        DataError: matplotlib is not installed, the folder is missing, or the name has another ending.
-    """
+    """Refuse, before the work, a picture that could not be written after it. Raises DataError: matplotlib is
+    not installed, the folder is missing, or the name has another ending."""
     if path is None:
         return
     if path.suffix.lower() not in FORMATS or path.is_dir() or not path.absolute().parent.is_dir():

@@ -33,7 +33,8 @@ Size = Literal["quick", "full"]
 
 def make_report(out: Path, *, size: Size = "full", seed: int = SEED, names: Sequence[str] = ("all",)) -> Path:
     """Make the report. Page and rows are written after each experiment, so that they are there if it is
-    stopped; each runs on one thread, so that times are of one core.
+    stopped; each runs on one thread, so that times are of one core. Raises DataError: an unknown name, or a
+    file that cannot be written.
 
     Args:
         out: folder for the report, made if need be.
@@ -43,9 +44,6 @@ def make_report(out: Path, *, size: Size = "full", seed: int = SEED, names: Sequ
 
     Returns:
         The page.
-
-    Raises:
-        DataError: an unknown name, or a file that cannot be written.
     """
     if unknown := [name for name in names if name not in (*EXPERIMENTS, "all")]:
         raise DataError(f"sections: expected all or some of {', '.join(EXPERIMENTS)}, got {unknown[0]!r:.60}")

@@ -72,16 +72,13 @@ def make_split(name: str, n_layouts: int, n_targets: int, seed: int) -> list[Cas
     """The test cases of a split.
 
     Layout k and its first targets depend on the split, the seed and k alone, so that a small run is the
-    beginning of a large one.
+    beginning of a large one. Raises DataError: unknown split, or a number out of range.
 
     Args:
         name: one of `SPLITS`.
         n_layouts: how many layouts, at least 1.
         n_targets: targets per layout, at least 1.
         seed: not negative.
-
-    Raises:
-        DataError: unknown split, or a number out of range.
     """
     if name not in SPLITS:
         raise DataError(f"split: expected one of {', '.join(SPLITS)}, got {name!r}")

@@ -50,11 +50,8 @@ class HullSolid:
     @staticmethod
     def of(corners: ArrayLike) -> "HullSolid":
         """The solid in a closed surface of triangles (F, 3, 3) [m], by the divergence theorem: each triangle
-        spans a tetrahedron with the origin, and those that lie outside count negative.
-
-        Raises:
-            FinlabError: the surface encloses nothing.
-        """
+        spans a tetrahedron with the origin, and those that lie outside count negative. Raises FinlabError:
+        the surface encloses nothing."""
         points = np.asarray(corners, dtype=float)
         normal = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0])
         parts = np.einsum("fk,fk->f", points[:, 0], normal) / 6.0
@@ -168,11 +165,7 @@ def water_density(layout: Layout) -> float:
 
 @lru_cache(maxsize=8)
 def solid_of(hull: Surface) -> HullSolid:
-    """The body that a hull encloses, body frame.
-
-    Raises:
-        FinlabError: it encloses nothing.
-    """
+    """The body that a hull encloses, body frame. Raises FinlabError: it encloses nothing."""
     return HullSolid.of(hull.mesh.vertices[hull.mesh.faces])
 
 
@@ -193,11 +186,8 @@ def contradicts(layout: Layout) -> bool:
 
 
 def estimated(layout: Layout) -> Layout:
-    """The layout with what its hull says of the body; a mass that is known stays.
-
-    Raises:
-        FinlabError: the hull encloses nothing.
-    """
+    """The layout with what its hull says of the body; a mass that is known stays. Raises FinlabError: the
+    hull encloses nothing."""
     solid, density, body = solid_of(hull_of(layout)), water_density(layout), layout.body or Body()
     mass = body.mass_kg if body.mass_kg is not None else _rounded(density * solid.volume)
     changed = replace(

@@ -25,11 +25,8 @@ _PARTS = re.compile(rb"(?m)^[ \t]*(?:usemtl|mtllib|o|g|s)(?:[ \t].*)?$")
 
 
 def check_glb(name: str, content: bytes) -> None:
-    """Refuse a GLB whose accessors or instances ask for far more than it holds; what is no GLB passes.
-
-    Raises:
-        FinlabError: the sentence says how much, and calls the file `name`.
-    """
+    """Refuse a GLB whose accessors or instances ask for far more than it holds; what is no GLB passes. Raises
+    FinlabError: the sentence says how much, and calls the file `name`."""
     try:
         length, kind = struct.unpack("<I4s", content[12:20])
         document = json.loads(content[20 : 20 + length]) if kind == b"JSON" else {}
@@ -80,15 +77,13 @@ class MeshReport:
 
 
 def read_mesh(name: str, content: bytes, scale: float) -> tuple[Mesh, MeshReport]:
-    """The mesh in a file: whole scene, in metres, mended, the middle of its box at the origin.
+    """The mesh in a file: whole scene, in metres, mended, the middle of its box at the origin. Raises
+    FinlabError: too large, no closed mesh, or of a size that no hull has; the message names the file.
 
     Args:
         name: the file's name; its suffix gives the format.
         content: what is in it.
         scale: metres per unit.
-
-    Raises:
-        FinlabError: too large, no closed mesh, or of a size that no hull has; the message names the file.
     """
     mesh = _loaded(name, content)
     mended = _mended(mesh)

@@ -46,11 +46,8 @@ class Surface:
     @staticmethod
     @lru_cache(maxsize=8)
     def of_file(path: str, scale: float, center: Three) -> "Surface":
-        """The surface in a mesh file, the middle of its box at `center` [m].
-
-        Raises:
-            FinlabError: the file cannot be read or is no sensible hull.
-        """
+        """The surface in a mesh file, the middle of its box at `center` [m]. Raises FinlabError: the file
+        cannot be read or is no sensible hull."""
         file = Path(path)
         mesh, report = read_mesh(file.name, read_file(file, MAX_BYTES, "a mesh file", FinlabError), scale)
         x, y, z = (float(v) for v in np.ptp(mesh.vertices, axis=0) / 2)

@@ -51,11 +51,8 @@ EXACT = 1e-14
 
 
 def unit_vector(key: str, vector: Vector | None) -> Vector:
-    """Returns a direction with length 1 exactly.
-
-    Raises:
-        LayoutError: it is missing, or its length is not 1 within `ROUNDED`; the message names the key.
-    """
+    """Returns a direction with length 1 exactly. Raises LayoutError: it is missing, or its length is not 1
+    within `ROUNDED`; the message names the key."""
     if vector is None:
         raise LayoutError("required key is missing", key)
     length = math.hypot(*vector)
@@ -69,10 +66,7 @@ def unit_vector(key: str, vector: Vector | None) -> Vector:
 
 def axes_across(first: tuple[str, Vector | None], second: tuple[str, Vector | None]) -> tuple[Vector, Vector]:
     """Returns two directions, each with its key, as unit vectors at a right angle; the first stays as it is.
-
-    Raises:
-        LayoutError: one is missing or no unit vector, or they do not stand across each other.
-    """
+    Raises LayoutError: one is missing or no unit vector, or they do not stand across each other."""
     a, b = unit_vector(*first), unit_vector(*second)
     along = sum(x * y for x, y in zip(a, b, strict=True))
     if abs(along) > ROUNDED:

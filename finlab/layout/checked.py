@@ -20,11 +20,8 @@ Name = Annotated[str, Meta(min_length=1, max_length=64, pattern=r"^\S(.*\S)?$")]
 
 
 class Checked:
-    """Base of frozen dataclasses that are checked on construction, by their annotations.
-
-    Raises:
-        LayoutError: a value is none of its type, or out of bounds; the message names the key, as in a file.
-    """
+    """Base of frozen dataclasses that are checked on construction, by their annotations. Raises LayoutError:
+    a value is none of its type, or out of bounds; the message names the key, as in a file."""
 
     KEYS: ClassVar[Mapping[str, str]] = {}
     """Fields -> their keys in a file, where the two differ."""

@@ -106,11 +106,8 @@ class Health:
         running: Mapping[str, Command] | None = None,
         thrust: Mapping[str, float] | None = None,
     ) -> Health:
-        """Health from dictionaries, by the fins' names.
-
-        Raises:
-            AllocationError: a share out of range, an angle that is no number.
-        """
+        """Health from dictionaries, by the fins' names. Raises AllocationError: a share out of range, an
+        angle that is no number."""
         kinds = (
             checked(kind or {}, dict[str, Any], AllocationError, "health")
             for kind in (weak, stuck, running, thrust)
@@ -122,11 +119,7 @@ class Health:
         cls, weak: Sequence[str], torn: Sequence[str], stuck: Sequence[str], running: Sequence[str]
     ) -> Health | None:
         """Health from texts, angles in degrees: `bow=0.5`, `bow=20`, `bow=0.3,1.0,20`; None where all are
-        whole.
-
-        Raises:
-            AllocationError: a text that says something else.
-        """
+        whole. Raises AllocationError: a text that says something else."""
         if not (weak or torn or stuck or running):
             return None
         kept = _named("running", running, 3).items()
@@ -138,12 +131,9 @@ class Health:
         )
 
     def applied_to(self, layout: Layout) -> Layout:
-        """The layout with the limits that are left.
-
-        Raises:
-            LayoutError: there is no fin of a name, or a fin that is a table is said to have lost thrust.
-            AllocationError: an actuator that is no fin cannot be damaged so.
-        """
+        """The layout with the limits that are left. Raises LayoutError: there is no fin of a name, or a fin
+        that is a table is said to have lost thrust; AllocationError: an actuator that is no fin cannot be
+        damaged so."""
         return _applied(self, layout)
 
 

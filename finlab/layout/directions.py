@@ -102,11 +102,8 @@ def facing(part: Actuator, towards: Vector) -> Actuator:
     """The actuator with its `direction` along a vector of any length.
 
     The other axis turns along as little as can be, but where it has no arc to keep: a fin that turns all
-    round has zero where a mounting angle has it, or ahead. A rudder has its leading edge ahead.
-
-    Raises:
-        FinlabError: the vector has no length.
-    """
+    round has zero where a mounting angle has it, or ahead. A rudder has its leading edge ahead. Raises
+    FinlabError: the vector has no length."""
     length = math.hypot(*towards)
     if not SHORT < length < math.inf:
         raise FinlabError(f"direction of {part.name}: expected a vector with a length, got {towards}")
@@ -126,11 +123,8 @@ def facing(part: Actuator, towards: Vector) -> Actuator:
 
 def turned_about(part: Actuator, towards: Vector) -> Actuator:
     """The actuator turned about its `direction`, with its other axis as near to a vector of any length as
-    stands across it: zero of a fin, the leading edge of a rudder, what an azimuth turns about.
-
-    Raises:
-        FinlabError: the vector points along the direction.
-    """
+    stands across it: zero of a fin, the leading edge of a rudder, what an azimuth turns about. Raises
+    FinlabError: the vector points along the direction."""
     if isinstance(part, Thruster):
         return part
     frame, wanted = np.array(part.frame), np.array(towards, dtype=np.float64)

@@ -66,16 +66,14 @@ ANY_LAYOUT: Any = LAYOUT_OF_FINS | LAYOUT
 def parse_layout(
     data: Any, source: str = "layout", folder: Path | None = None, *, may_open: bool = True
 ) -> Layout:
-    """Returns the layout that plain values (as read from a file) describe.
+    """Returns the layout that plain values (as read from a file) describe. Raises LayoutError: something is
+    missing, unknown or out of range.
 
     Args:
         data: mappings, lists, numbers and text, as in a layout file.
         source: what to call it in error messages.
         folder: where relative paths start; the working directory when None.
         may_open: whether tables of thrust that it names may be opened; those of fins, and meshes, are not.
-
-    Raises:
-        LayoutError: something is missing, unknown or out of range.
     """
     with under(source=source):
         check_version(data, FORMAT, *VERSIONS)
@@ -126,10 +124,7 @@ def layout_to_dict(layout: Layout) -> dict[str, Any]:
 
 def save_layout(layout: Layout, path: str | os.PathLike[str]) -> None:
     """Writes a layout file, JSON if the name ends in `.json`, else YAML; an existing file is replaced whole.
-
-    Raises:
-        LayoutError: the file cannot be written.
-    """
+    Raises LayoutError: the file cannot be written."""
     data = layout_to_dict(layout)
     is_json = Path(path).suffix.lower() == ".json"
     write_whole(path, json.dumps(data, indent=2) + "\n" if is_json else yaml_text(data))

@@ -80,11 +80,8 @@ class Reader:
     """Whether a CSV file of thrust that a part names may be opened."""
 
     def value(self, part: Any) -> Any:
-        """Returns what a part stands for, an instance of a form, a list of them, or a plain value.
-
-        Raises:
-            LayoutError: something does not fit; the message names the key in the part.
-        """
+        """Returns what a part stands for, an instance of a form, a list of them, or a plain value. Raises
+        LayoutError: something does not fit; the message names the key in the part."""
         if isinstance(part, list | tuple):
             items = []
             for i, item in enumerate(part):

@@ -93,19 +93,13 @@ class FinModelSpec:
 
     @classmethod
     def from_values(cls, values: Mapping[str, float | str]) -> "FinModelSpec":
-        """The spec of a mapping with the model's name under `type` and its parameters beside it.
-
-        Raises:
-            LayoutError: unknown model, unknown parameter, or a value that is none.
-        """
+        """The spec of a mapping with the model's name under `type` and its parameters beside it. Raises
+        LayoutError: unknown model, unknown parameter, or a value that is none."""
         return cls(str(values["type"]), tuple((k, v) for k, v in values.items() if k != "type"))
 
     def scaled(self, share: float) -> "FinModelSpec":
-        """The model of a fin that gives a share of the thrust at every command.
-
-        Raises:
-            LayoutError: the fin is a table, whose file would have to be another one.
-        """
+        """The model of a fin that gives a share of the thrust at every command. Raises LayoutError: the fin
+        is a table, whose file would have to be another one."""
         if self.type not in SCALES_THRUST:
             raise LayoutError("the thrust of a table cannot be scaled; name another CSV file", "type")
         name, exponent = SCALES_THRUST[self.type]

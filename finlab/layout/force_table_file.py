@@ -57,13 +57,9 @@ class ForceTable(NamedTuple):
 
 
 def read_force_table(path: str | os.PathLike[str]) -> ForceTable:
-    """Returns the table in a CSV file.
-
-    Raises:
-        DataError: the file is missing, lacks a column, holds something that is not a finite number or whose
-            unit cannot be right, its rows do not fill a grid with at least two points per axis, or it has no
-            thrust or no power to tell of.
-    """
+    """Returns the table in a CSV file. Raises DataError: the file is missing, lacks a column, holds something
+    that is not a finite number or whose unit cannot be right, its rows do not fill a grid with at least two
+    points per axis, or it has no thrust or no power to tell of."""
     source = str(path)
     rows, deviation, lines, notes = _read_rows(table_bytes(path), source)
     _check_units(rows, source)
@@ -99,11 +95,8 @@ def table_text(notes: Iterable[str], header: Sequence[str], rows: Iterable[Any],
 
 
 def table_bytes(path: str | os.PathLike[str]) -> bytes:
-    """Returns the contents of a table's file, which may lie in the zip archive of a bundle.
-
-    Raises:
-        DataError: there is no such file, or it is too large.
-    """
+    """Returns the contents of a table's file, which may lie in the zip archive of a bundle. Raises DataError:
+    there is no such file, or it is too large."""
     archive = archive_around(path)
     if archive is None:
         return read_file(path, MAX_BYTES, "a CSV table of fin forces")

@@ -84,15 +84,13 @@ class Layout(Checked):
         return self.n_fins == self.n
 
     def only(self, what: str, kind: str = "fin", horizontal: bool = False) -> None:
-        """Refuses a robot whose actuators are not all of one type, for what is made for that.
+        """Refuses a robot whose actuators are not all of one type, for what is made for that. Raises
+        LayoutError: the sentence names `what` and the first actuator that it does not take.
 
         Args:
             what: what was asked for, as the sentence begins.
             kind: the type.
             horizontal: whether the fins' shafts have to be horizontal, too, with a mounting angle.
-
-        Raises:
-            LayoutError: the sentence names `what` and the first actuator that it does not take.
         """
         for part in self.actuators:
             if part.type != kind:
@@ -126,11 +124,8 @@ class Layout(Checked):
 
     @cached_property
     def mounting_angle(self) -> Array:
-        """Azimuth of each fin's shaft (n,) [rad]; read-only.
-
-        Raises:
-            LayoutError: an actuator is no fin, or its shaft is not horizontal.
-        """
+        """Azimuth of each fin's shaft (n,) [rad]; read-only. Raises LayoutError: an actuator is no fin, or
+        its shaft is not horizontal."""
         self.only("what asks for mounting angles", horizontal=True)
         return _read_only([fin.mounting_angle or 0.0 for fin in self.fins])
 
@@ -184,11 +179,8 @@ class Layout(Checked):
         return " and ".join(f"{n} {kind}{'s' if n > 1 else ''}" for kind, n in counts.items())
 
     def index(self, name: str) -> int:
-        """Returns the place of the actuator called `name`.
-
-        Raises:
-            LayoutError: there is none; the message lists those there are.
-        """
+        """Returns the place of the actuator called `name`. Raises LayoutError: there is none; the message
+        lists those there are."""
         if name not in self.names:
             what = "fin" if self.is_of_fins else "actuator"
             raise LayoutError(
@@ -201,11 +193,8 @@ class Layout(Checked):
         return tuple(self.index(name) for name in names)
 
     def without(self, names: Iterable[str]) -> "Layout":
-        """Returns the layout that is left when the actuators called `names` are lost.
-
-        Raises:
-            LayoutError: a name is unknown, or none is left.
-        """
+        """Returns the layout that is left when the actuators called `names` are lost. Raises LayoutError: a
+        name is unknown, or none is left."""
         names = [names] if isinstance(names, str) else list(names)
         lost = set(self.indices(names))
         if len(lost) == self.n:

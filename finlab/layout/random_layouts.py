@@ -43,7 +43,8 @@ def random_layout(
     """Returns a random layout with fins `fin_1`, `fin_2`, ...
 
     Positions are uniform in the box and angles in [-pi, pi). With `limits="varied"` every fin gets its own
-    limits as in split `limits`.
+    limits as in split `limits`. Raises DataError: `outside` is not smaller than `box` in any direction, so no
+    such layout exists.
 
     Args:
         rng: source of randomness.
@@ -52,9 +53,6 @@ def random_layout(
         box: largest |x|, |y|, |z| [m].
         limits: see above.
         outside: when given, at least one fin lies outside this smaller box.
-
-    Raises:
-        DataError: `outside` is not smaller than `box` in any direction, so no such layout exists.
     """
     least, most = (n_fins, n_fins) if isinstance(n_fins, int) else n_fins
     extent = np.array(box)

@@ -91,11 +91,8 @@ class PowerTable(Checked):
 
     @classmethod
     def read(cls, path: str | os.PathLike[str], unit: str = "") -> "PowerTable":
-        """Returns the table in a CSV file with the columns `COLUMNS`.
-
-        Raises:
-            LayoutError: the file cannot be read, lacks a column, or its rows are not acceptable.
-        """
+        """Returns the table in a CSV file with the columns `COLUMNS`. Raises LayoutError: the file cannot be
+        read, lacks a column, or its rows are not acceptable."""
         try:
             table = read_table(path, MAX_BYTES, "a table of thrust (CSV)")
             missing = [name for name in COLUMNS if name not in table.header]
@@ -115,11 +112,8 @@ ThrustModel = PowerLaw | PowerTable
 
 
 def check_force(model: ThrustModel, force: tuple[float, float]) -> None:
-    """Refuses limits of the force that a table does not cover.
-
-    Raises:
-        LayoutError: a limit [N] lies beyond the table's rows.
-    """
+    """Refuses limits of the force that a table does not cover. Raises LayoutError: a limit [N] lies beyond
+    the table's rows."""
     if isinstance(model, PowerTable):
         least, most = model.rows[0][1], model.rows[-1][1]
         if not least <= force[0] <= force[1] <= most:

@@ -58,11 +58,8 @@ class EffortRobot(NamedTuple):
 
 
 def effort_robot(plant: Plant, scale: Array) -> EffortRobot:
-    """Prepare a robot of fins; `scale` (6,) is what wrenches are divided by.
-
-    Raises:
-        DataError: a fin's force table cannot be read.
-    """
+    """Prepare a robot of fins; `scale` (6,) is what wrenches are divided by. Raises DataError: a fin's force
+    table cannot be read."""
     layout = plant.layout
     turning = ZERO_DIRECTION / effort_scale(layout.upper)[:, 2] ** 2
     idle = np.clip(0.0, layout.lower[:, 2], layout.upper[:, 2])

@@ -90,11 +90,8 @@ class EffortFins:
 
     @classmethod
     def of(cls, layout: Layout) -> Self:
-        """The fins of a layout.
-
-        Raises:
-            DataError: a fin's force table cannot be read, or gives no thrust within the limits.
-        """
+        """The fins of a layout. Raises DataError: a fin's force table cannot be read, or gives no thrust
+        within the limits."""
         compiled = [fin_table(fin) for fin in layout.fins]
         costs = [_costs(fin, file_stamp(fin.model)) for fin in layout.fins]
         even = all(each.gauge is None for each in compiled)

@@ -40,11 +40,8 @@ def read_checkpoint(folder: Path) -> TrainedWeights:
 
 
 def parse_checkpoint(files: Mapping[str, bytes], source: str, name: str) -> TrainedWeights:
-    """The contents of a checkpoint by those of its files; errors call it `source`.
-
-    Raises:
-        CheckpointError: missing, corrupt, of an unknown version, or made by something else.
-    """
+    """The contents of a checkpoint by those of its files; errors call it `source`. Raises CheckpointError:
+    missing, corrupt, of an unknown version, or made by something else."""
     from safetensors import SafetensorError
     from safetensors.numpy import load
 

@@ -28,11 +28,8 @@ class Plant:
     """The actuators of one layout, each with its own law: commands to wrenches and their derivatives."""
 
     def __init__(self, layout: Layout) -> None:
-        """Prepares the laws of the layout's actuators; `plant_of` keeps plants that were made.
-
-        Raises:
-            DataError: a fin's force table cannot be read.
-        """
+        """Prepares the laws of the layout's actuators; `plant_of` keeps plants that were made. Raises
+        DataError: a fin's force table cannot be read."""
         self.layout, self.n, self.n_fins = layout, layout.n, layout.n_fins
         self.lower, self.upper = layout.lower, layout.upper
         self.width = self.upper - self.lower
@@ -84,7 +81,8 @@ class Plant:
         return met
 
     def wrench(self, command: ArrayLike, *, flow: Array | None = None) -> Array:
-        """Returns the wrench that a command causes.
+        """Returns the wrench that a command causes. Raises CommandError: the shape does not fit the layout,
+        or a value is infinite or partly NaN.
 
         Args:
             command: (..., n, 3), of fins [rad, Hz, rad]; a row of NaN is a failed one and gives no force.
@@ -92,9 +90,6 @@ class Plant:
 
         Returns:
             (..., 6) [N, N m], body frame.
-
-        Raises:
-            CommandError: the shape does not fit the layout, or a value is infinite or partly NaN.
         """
         wrench: Array = wrench_of_forces(self.forces(command, flow=flow), self.effectiveness)
         return wrench
@@ -229,11 +224,8 @@ def _met(law: ActuatorLaw, inflow: Array | None, places: Any) -> tuple[Array, ..
 
 
 def plant_of(layout: Layout) -> Plant:
-    """Returns the plant of a layout, kept from the last time it was asked for.
-
-    Raises:
-        DataError: a fin's force table cannot be read.
-    """
+    """Returns the plant of a layout, kept from the last time it was asked for. Raises DataError: a fin's
+    force table cannot be read."""
     return _made(layout, file_stamps(layout))
 
 

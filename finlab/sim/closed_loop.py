@@ -71,7 +71,8 @@ class ClosedLoop:
         truth: Layout | None = None,
         seed: int = 0,
     ) -> None:
-        """Puts the robot at rest at the start of its task.
+        """Puts the robot at rest at the start of its task. Raises FinlabError: an allocator of another robot,
+        an unknown actuator or kind of failure, a time that is none, or a truth that has other actuators.
 
         Args:
             layout: the robot; what its body does not say is U-CAT's.
@@ -90,10 +91,6 @@ class ClosedLoop:
             truth: the robot that really swims, such as `perturbed(layout, damping=2.0)`, where `layout` is
                 only what allocator, controller and monitor believe of it; it has the same actuators.
             seed: of the sensors' noise and of the allocator.
-
-        Raises:
-            FinlabError: an allocator of another robot, an unknown actuator or kind of failure, a time
-                that is none, or a truth that has other actuators.
         """
         if allocator.layout != layout:
             raise FinlabError(
@@ -194,7 +191,8 @@ class ClosedLoop:
     def fail(
         self, name: str, kind: Kind = "lost", share: float = 0.5, *, announced: bool | None = None
     ) -> None:
-        """Something becomes of an actuator, now.
+        """Something becomes of an actuator, now. Raises LayoutError: there is no actuator of that name, or it
+        is the last that works; FinlabError: the kind or the share is none.
 
         Args:
             name: of the actuator.
@@ -203,10 +201,6 @@ class ClosedLoop:
                 and so does the force of a thruster) or whole.
             share: of the force that a torn actuator gives.
             announced: whether the allocator knows at once; by default as the swim was made.
-
-        Raises:
-            LayoutError: there is no actuator of that name, or it is the last that works.
-            FinlabError: the kind or the share is none.
         """
         fault = FinFault(name, self.time, kind, share).checked()
         index = self.layout.index(name)

@@ -233,7 +233,8 @@ def excitation(
     current: Sequence[float] = (0.0, 0.0, 0.0),
     seed: int = 0,
 ) -> ClosedLoop:
-    """The swim, ready to be run.
+    """The swim, ready to be run. Raises DataError: the duration is too short to tell anything, or longer than
+    five minutes; FinlabError: it has rudders, which give nothing on the spot.
 
     Args:
         layout: the robot.
@@ -242,10 +243,6 @@ def excitation(
         sensors: rates and noise; the defaults of `SensorSettings`.
         current: velocity (3,) of the water in the world [m/s].
         seed: of the excitation and of the sensors' noise.
-
-    Raises:
-        DataError: the duration is too short to tell anything, or longer than five minutes.
-        FinlabError: it has rudders, which give nothing on the spot.
     """
     if any(isinstance(part, Rudder) for part in layout.actuators):
         raise FinlabError(

@@ -33,6 +33,7 @@ def perturbed(
     center: Sequence[float] = (0.0, 0.0, 0.0),
 ) -> Layout:
     """A layout's robot with some numbers changed; what its body does not say is U-CAT's, as in any swim.
+    Raises LayoutError: a factor is not above 0.
 
     Args:
         layout: what is believed.
@@ -43,9 +44,6 @@ def perturbed(
         askew: how far actuators are turned about the vertical [rad], one this way and the next that way.
         center: the true centre of gravity as the layout's frame sees it (3,) [m]; the robot is ballasted to
             lie level all the same, so its centre of buoyancy is where the layout says, seen from there.
-
-    Raises:
-        LayoutError: a factor is not above 0.
     """
     factors = {"damping": damping, "added_mass": added_mass, "inertia": inertia, "buoyancy": buoyancy}
     for name, factor in factors.items():

@@ -40,11 +40,8 @@ NAMES = ("marker", "pressure", "dvl", "imu")
 @dataclass(frozen=True)
 class SensorSettings:
     """The robot's sensors. No figures are published for U-CAT's: these are our choice, of the order of data
-    sheets of such instruments.
-
-    Raises:
-        FinlabError: a rate of none, a negative number, or a share of lost samples of 1 or more.
-    """
+    sheets of such instruments. Raises FinlabError: a rate of none, a negative number, or a share of lost
+    samples of 1 or more."""
 
     marker: Sensor = Sensor(10.0, (0.02,) * 4, (0.01,) * 4, 0.08, 0.02)
     """Camera that sees markers: x, y, z, which controllers do not use [m], heading [rad]."""

@@ -32,12 +32,9 @@ class Trajectory:
     """Positions at times, with straight lines between them."""
 
     def __init__(self, name: str, time: Array, position: Array) -> None:
-        """Takes a name, rising times (N,) [s] from 0 and positions (N, 3) in the world [m].
-
-        Raises:
-            DataError: fewer than two samples, less than a second, times that do not rise from 0, or values
-                that are not finite.
-        """
+        """Takes a name, rising times (N,) [s] from 0 and positions (N, 3) in the world [m]. Raises DataError:
+        fewer than two samples, less than a second, times that do not rise from 0, or values that are not
+        finite."""
         time, position = np.asarray(time, np.float64), np.asarray(position, np.float64)
         if len(time) < 2 or position.shape != (len(time), 3):
             raise DataError(
@@ -166,15 +163,13 @@ SHIPPED: dict[str, Callable[..., Trajectory]] = {
 
 
 def make_trajectory(source: str | Path, duration_s: float | None = None, scale: float = 1.0) -> Trajectory:
-    """A shipped trajectory by name, or one from a file.
+    """A shipped trajectory by name, or one from a file. Raises DataError: unknown name, unreadable file, or a
+    duration that does not fit.
 
     Args:
         source: circle, lissajous, square, dive, station, or a CSV file with the columns t, x, y, z.
         duration_s: time for a shipped one [s]; a file brings its own.
         scale: how many times larger the path is to be, about its start, in the same time.
-
-    Raises:
-        DataError: unknown name, unreadable file, or a duration that does not fit.
     """
     if scale != 1.0:
         if not 0.0 < scale <= MAX_SCALE:
@@ -197,11 +192,8 @@ def make_trajectory(source: str | Path, duration_s: float | None = None, scale: 
 
 
 def read_trajectory(path: Path) -> Trajectory:
-    """Reads a CSV file with a header and the columns t [s], x, y, z [m], in any order.
-
-    Raises:
-        DataError: it cannot be read, lacks a column, or holds something that is no number.
-    """
+    """Reads a CSV file with a header and the columns t [s], x, y, z [m], in any order. Raises DataError: it
+    cannot be read, lacks a column, or holds something that is no number."""
     table = read_table(path, MAX_BYTES, "a CSV file of a path")
     if missing := [name for name in COLUMNS if name not in table.header]:
         raise DataError(f"{path}: column {missing[0]!r} is missing; expected {', '.join(COLUMNS)}")

@@ -55,14 +55,12 @@ class Workplace:
 
 @contextmanager
 def workplace(name: str | None, batch_size: int) -> Iterator[Workplace]:
-    """The workplace of this process.
+    """The workplace of this process. Raises CommandError: there is no such device, or the batch cannot be
+    shared equally.
 
     Args:
         name: a device of torch such as cpu or cuda:1; by default a graphics card where there is one.
         batch_size: samples of a step, which all processes share.
-
-    Raises:
-        CommandError: there is no such device, or the batch cannot be shared equally.
     """
     world, rank = (int(os.environ.get(key, default)) for key, default in (("WORLD_SIZE", 1), ("RANK", 0)))
     if batch_size % world:

@@ -110,11 +110,8 @@ class Training:
         return {name: w.detach().cpu().numpy() for name, w in (self.average or self.weights).items()}
 
     def resume(self) -> None:
-        """Go on from the state in the folder, if there is one.
-
-        Raises:
-            DataError: it belongs to a run with other settings, or cannot be read.
-        """
+        """Go on from the state in the folder, if there is one. Raises DataError: it belongs to a run with
+        other settings, or cannot be read."""
         path = self.folder / STATE_FILE
         if not path.exists():
             return

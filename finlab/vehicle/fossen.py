@@ -119,10 +119,7 @@ def complete_body(layout: Layout) -> Body:
 
 def dynamics_of(body: Body) -> Dynamics[tuple[float, ...], float]:
     """The numbers of a body in the equations of motion; what it does not say is zero, buoyancy the weight.
-
-    Raises:
-        LayoutError: the body has no mass or no inertia.
-    """
+    Raises LayoutError: the body has no mass or no inertia."""
     if body.mass_kg is None or body.inertia_kgm2 is None:
         raise LayoutError("a vehicle needs a body with mass_kg and inertia_kgm2")
     zeros = (0.0,) * 6

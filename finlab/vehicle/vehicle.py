@@ -32,10 +32,7 @@ class Vehicle:
 
     def __init__(self, body: Body, current: Sequence[float] = (0.0, 0.0, 0.0)) -> None:
         """Takes a body and the water's velocity (3,) in the world [m/s]; what the body does not say is zero.
-
-        Raises:
-            LayoutError: the body has no mass or no inertia.
-        """
+        Raises LayoutError: the body has no mass or no inertia."""
         self.current = tuple(float(value) for value in current)
         """Velocity of the water (3,) in the world [m/s]."""
         if len(self.current) != 3 or not all(map(math.isfinite, self.current)):
@@ -56,10 +53,7 @@ class Vehicle:
 
         One for a robot as robots are; more where damping, Munk's moments or its own turning change the motion
         (6,) [m/s, rad/s] within `dt`, as of a light body that water holds fast, or of one that tumbles.
-
-        Raises:
-            LayoutError: even `MOST_STEPS` would not do.
-        """
+        Raises LayoutError: even `MOST_STEPS` would not do."""
         cx, cy, cz = self.current
         stream = abs(cx) + abs(cy) + abs(cz)
         if dt * (self._rate_at_rest + self._rate_by_speed * (max(map(abs, motion)) + stream)) <= LONGEST:
@@ -109,10 +103,7 @@ class Vehicle:
 
     def step(self, state: Array, wrench: Sequence[float], dt: float) -> Array:
         """The state (13,) after `dt` [s] under a wrench that the body carries along: Runge-Kutta, order 4.
-
-        Raises:
-            LayoutError: the body moves too fast to be simulated.
-        """
+        Raises LayoutError: the body moves too fast to be simulated."""
         y: list[float] = state.tolist()
         n_steps = self.n_steps(y[7:], dt)
         for _ in range(n_steps):

@@ -189,11 +189,8 @@ def drawn_curves(part: Actuator) -> str:
 @lru_cache(maxsize=64)
 def curves(part: Actuator) -> Sequence[Curves]:
     """Force and power of an actuator over its command: of a fin for three amplitudes, in the middle of its
-    zero directions; of a rudder for water that comes from ahead at 1 m/s.
-
-    Raises:
-        DataError: its table cannot be read.
-    """
+    zero directions; of a rudder for water that comes from ahead at 1 m/s. Raises DataError: its table cannot
+    be read."""
     plant = plant_of(Layout("one", (part,)))
     if isinstance(part, Fin):
         across = np.linspace(*part.limits.frequency, POINTS)

@@ -120,11 +120,7 @@ class Swimming:
             self._submit(0)
 
     def log(self) -> RunLog:
-        """The swim so far.
-
-        Raises:
-            FinlabError: nothing has been swum yet.
-        """
+        """The swim so far. Raises FinlabError: nothing has been swum yet."""
         if self.swimmer is None or self.time == 0.0:
             raise FinlabError("nothing has been swum yet; press Start")
         return self.swimmer.log()

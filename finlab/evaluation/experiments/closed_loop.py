@@ -58,11 +58,8 @@ def follow_row(log: RunLog) -> Row:
 
 
 def first_lost(layout: Layout, count: int) -> tuple[str, ...]:
-    """The first `count` actuators in order without which the others still give surge, heave and yaw.
-
-    Raises:
-        DataError: none such are there.
-    """
+    """The first `count` actuators in order without which the others still give surge, heave and yaw. Raises
+    DataError: none such are there."""
     for names in combinations(layout.names, count):
         if count == 0 or (count < layout.n and steers(layout, names)):
             return names

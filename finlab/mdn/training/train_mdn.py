@@ -103,7 +103,8 @@ def train_mdn(
     preset: str, out: Path, *, seed: int = 0, resume: bool = False, **training: Any
 ) -> TrainedWeights:
     """Write the answers that are missing in `out/answers`, train a preset's network on them, and write a
-    checkpoint, once a minute and at the end.
+    checkpoint, once a minute and at the end. Raises DataError: an unknown preset, or a file that cannot be
+    written.
 
     Args:
         preset: one of `RECIPES`.
@@ -111,9 +112,6 @@ def train_mdn(
         seed: of the answers and of the first weights.
         resume: go on from the state in `out`.
         training: fields of `MdnTraining`, in place of the recipe's where they are not None.
-
-    Raises:
-        DataError: an unknown preset, or a file that cannot be written.
     """
     started = time.monotonic()
     if preset not in RECIPES:

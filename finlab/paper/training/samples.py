@@ -69,11 +69,8 @@ class DataSettings:
 
 
 def generate(folder: Path, settings: DataSettings) -> None:
-    """Write a data set, its parts drawn by `map_parts` on all cores; parts that are there stay.
-
-    Raises:
-        DataError: the folder holds a set that was drawn otherwise, or a file cannot be written.
-    """
+    """Write a data set, its parts drawn by `map_parts` on all cores; parts that are there stay. Raises
+    DataError: the folder holds a set that was drawn otherwise, or a file cannot be written."""
     make_folder(folder)
     sweep_parts(folder)
     if (folder / DATA_FILE).exists() and about(folder)["settings"] != settings.as_values():

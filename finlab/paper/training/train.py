@@ -72,12 +72,9 @@ class Bench:
 
 
 def train_surrogate(options: Options) -> TrainedWeights:
-    """Train a preset's surrogate and write a checkpoint folder without an allocator network.
-
-    Raises:
-        DataError: an unknown preset, data or a state that do not fit, or a file that cannot be written.
-        CommandError: there is no such device.
-    """
+    """Train a preset's surrogate and write a checkpoint folder without an allocator network. Raises
+    DataError: an unknown preset, data or a state that do not fit, or a file that cannot be written;
+    CommandError: there is no such device."""
     made = recipe(options.preset)
 
     def terms_of(network: nn.Module, bench: Bench) -> Terms:
@@ -107,12 +104,8 @@ def train_surrogate(options: Options) -> TrainedWeights:
 def train_allocator(options: Options, surrogate: Path) -> TrainedWeights:
     """Train a preset's network, guided by the surrogate of a checkpoint, and write a whole checkpoint folder.
 
-    Without other data that in the surrogate's folder is learned from, if there is any.
-
-    Raises:
-        CheckpointError: the checkpoint holds no surrogate.
-        DataError, CommandError: as in `train_surrogate`.
-    """
+    Without other data that in the surrogate's folder is learned from, if there is any. Raises
+    CheckpointError: the checkpoint holds no surrogate. DataError, CommandError: as in `train_surrogate`."""
     made, base = recipe(options.preset), read_checkpoint(resolve_checkpoint(surrogate))
     settings = made.allocator_training
     surrogate_of(base)  # reports what is missing before data are made
