@@ -3,6 +3,10 @@
 Any object with the shape of `Controller` plugs into `finlab.sim.ClosedLoop`.
 """
 
+from finlab.control.body_frame import CONTROLLERS as CONTROLLERS
+from finlab.control.body_frame import VelocityController as VelocityController
+from finlab.control.body_frame import WaypointController as WaypointController
+from finlab.control.body_frame import make_controller as make_controller
 from finlab.control.completion import Completion as Completion
 from finlab.control.fault_monitor import Diagnosis as Diagnosis
 from finlab.control.fault_monitor import FaultMonitor as FaultMonitor

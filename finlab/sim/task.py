@@ -146,7 +146,7 @@ def dive(duration_s: float = 60.0) -> Trajectory:
     return Trajectory("dive", time, np.stack([6.0 * share, np.zeros_like(share), -depth], axis=-1))
 
 
-def straight(speed: float, duration_s: float) -> Trajectory:
+def straight(duration_s: float = 60.0, speed: float = 0.15) -> Trajectory:
     """Straight ahead at 1 m depth, from rest to a speed [m/s]."""
     time, share = _eased(duration_s)
     far = speed * (duration_s - 0.5 * RAMP_S)
@@ -160,7 +160,7 @@ def station(duration_s: float = 60.0, depth_m: float = 1.0, name: str = "station
 
 
 SHIPPED: dict[str, Callable[..., Trajectory]] = {
-    make.__name__: make for make in (circle, lissajous, square, dive, station)
+    make.__name__: make for make in (circle, lissajous, square, dive, straight, station)
 }
 """Trajectories by name; each takes its duration [s]."""
 

@@ -1,0 +1,246 @@
+"""The paper's two body-frame controllers: waypoints, and speed with depth by PID.
+
+Y. Hamamatsu, M. Kruusmaa, A. Ristolainen, "Layout-independent actuation allocator for fin-actuated marine
+robots", section 3, whose formulas stand in its text without numbers; each docstring names its subsection.
+The paper prints no gains. Ours follow from the robot's model and from how late its actuators are, by one rule
+for all robots (`waypoint_gains`, `velocity_gains`), and were not tuned on a path.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from finlab.arrays import Array
+from finlab.control.completion import Completion
+from finlab.control.measurement import Controller, Measurement, Setpoint
+from finlab.control.observer import AXES, MotionObserver, strongest_wrench
+from finlab.control.tracking_controller import BEHIND_S, LARGEST, TrackingController
+from finlab.errors import FinlabError
+from finlab.layout import Layout
+from finlab.layout.angles import wrapped
+from finlab.vehicle.actuator_motion import following_delay
+
+SLOW, TURN, SPEED = 0.4, 0.75, 0.6
+"""Bandwidths of position and depth, of the heading and of the speed, times the delay."""
+DAMPING = 0.7
+"""Damping ratio of position, depth and heading."""
+CRUISE = 0.15
+"""Speed at which the water's drag counts [m/s]; the middle one of the paper's."""
+NEAR_M = 0.15
+"""Within this distance of a waypoint the heading counts in proportion to it: above it there is none."""
+FILTER_S = 0.3
+"""Time constant of the filters of the measured speed and of derivatives [s]."""
+
+
+@dataclass(frozen=True)
+class WaypointGains:
+    """Of `WaypointController`."""
+
+    lead_s: float
+    """How far ahead of now the waypoint runs on its path [s]; at `CRUISE` drag and lead cancel."""
+    surge: float
+    """k_d [N/m]."""
+    heave: float
+    """k_z [N/m]."""
+    yaw: float
+    """k_psi [N m/rad]."""
+    heave_damping: float
+    """Against the speed of climbing [N s/m]; 0 as printed."""
+    yaw_damping: float
+    """Against the yaw rate [N m s/rad]; 0 as printed."""
+    max_wrench: tuple[float, ...]
+    """Largest wrench (6,) [N, N m]."""
+
+
+@dataclass(frozen=True)
+class PidGains:
+    """Of one loop: force [N] per error, per its integral [s] and per its rate."""
+
+    proportional: float
+    integral: float
+    derivative: float
+    most: float
+    """Largest force [N]."""
+
+
+@dataclass(frozen=True)
+class VelocityGains:
+    """Of `VelocityController`."""
+
+    surge: PidGains
+    """Of the speed [N s/m]."""
+    depth: PidGains
+    """Of the depth [N/m]."""
+    yaw_damping: float
+    """Against the yaw rate [N m s/rad]."""
+    max_yaw: float
+    """Largest torque about z [N m]."""
+
+
+def _model(layout: Layout, period_s: float) -> tuple[float, Array, Array, Array]:
+    """Inverse of the delay of actuators and sensors [1/s]; of surge, sway, heave and yaw the inertia (4,),
+    the drag per speed at `CRUISE` (4,), and the largest wrench (6,) that is asked for."""
+    observer = MotionObserver(layout, period_s)
+    drag = observer.inertia * observer.slowed_by(np.full(4, CRUISE)) / CRUISE
+    return 1.0 / (following_delay(layout) + BEHIND_S), observer.inertia, drag, LARGEST * strongest_wrench(layout)
+
+
+def waypoint_gains(layout: Layout) -> WaypointGains:
+    """The gains for one robot: heave and heading are damped oscillators of `SLOW` and `TURN`; the lead is
+    that of the damped heave, and surge balances the drag with it."""
+    pace, inertia, drag, most = _model(layout, WaypointController.period_s)
+    slow, turn = SLOW * pace, TURN * pace
+    lead = 2.0 * DAMPING / slow
+    return WaypointGains(
+        lead_s=lead,
+        surge=float(drag[0]) / lead,
+        heave=float(inertia[2]) * slow**2,
+        yaw=float(inertia[3]) * turn**2,
+        heave_damping=max(2.0 * DAMPING * slow * float(inertia[2]) - float(drag[2]), 0.0),
+        yaw_damping=max(2.0 * DAMPING * turn * float(inertia[3]) - float(drag[3]), 0.0),
+        max_wrench=tuple(most.tolist()),
+    )
+
+
+def velocity_gains(layout: Layout) -> VelocityGains:
+    """The gains for one robot, by poles: speed a damped oscillator of `SPEED`, whose derivative gain adds a
+    tenth of the mass; depth one of `SLOW` with a third pole, of its integral, at half of that."""
+    pace, inertia, drag, most = _model(layout, VelocityController.period_s)
+    slow, fast = SLOW * pace, SPEED * pace
+    mass = 1.1 * float(inertia[0])
+    surge = max(2.0 * DAMPING * fast * mass - float(drag[0]), 0.0), fast**2 * mass
+    a, b, heavy = 2.0 * DAMPING * slow, 0.5 * slow, float(inertia[2])
+    depth = heavy * (slow**2 + a * b), heavy * slow**2 * b, max(heavy * (a + b) - float(drag[2]), 0.0)
+    return VelocityGains(
+        surge=PidGains(*surge, 0.1 * float(inertia[0]), float(most[0])),
+        depth=PidGains(*depth, float(most[2])),
+        yaw_damping=float(inertia[3]) * TURN * pace,
+        max_yaw=float(most[5]),
+    )
+
+
+class WaypointController:
+    """Heads for a waypoint (section 3, "Trajectory tracking controller").
+
+    Of the error (dx, dy, dz) and the wrapped yaw error e towards the waypoint,
+    Fx = k_d hypot(dx, dy) max(0, cos e), Fz = k_z dz, Tz = k_psi e. To this the gains may add damping of
+    climb and yaw rate. The waypoint runs `lead_s` ahead on the path; odometry is `MotionObserver`'s.
+    """
+
+    name = "waypoint"
+    axes: tuple[str, ...] = ("Fx", "Fz", "Tz")
+    free: tuple[str, ...] = ("Fy",)
+    period_s = 0.1
+
+    def __init__(self, layout: Layout, gains: WaypointGains | None = None) -> None:
+        """Takes the robot and gains; by default those of `waypoint_gains`."""
+        self.layout, self.gains = layout, waypoint_gains(layout) if gains is None else gains
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the pose."""
+        self._observer = MotionObserver(self.layout, self.period_s)
+
+    def wrench(self, measurement: Measurement, setpoint: Setpoint, given: Array) -> Array:
+        """Returns the wrench (6,) towards the waypoint [N, N m]; `given` is that of the actuators so far."""
+        g, now = self.gains, self._observer.step(measurement, given)
+        ahead = setpoint.velocity * g.lead_s + setpoint.acceleration * (0.5 * g.lead_s**2)
+        dx, dy, dz = (setpoint.position + ahead - now.position).tolist()
+        distance = math.hypot(dx, dy)
+        e = float(wrapped(math.atan2(dy, dx) - now.yaw)) * min(1.0, distance / NEAR_M)
+        surge = g.surge * distance * max(0.0, math.cos(e))
+        heave = g.heave * dz - g.heave_damping * float(now.world_velocity[2])
+        yaw = g.yaw * e - g.yaw_damping * now.yaw_rate
+        return _within(np.array([surge, 0.0, heave, 0.0, 0.0, yaw]), np.array(g.max_wrench))
+
+
+class Pid:
+    """A PID loop in discrete time that does not wind up: its integral rests while the force is bounded and
+    the error would push further."""
+
+    def __init__(self, gains: PidGains, period_s: float) -> None:
+        """Takes gains and the time between calls [s]."""
+        self.gains, self._dt = gains, period_s
+        self._share = 1.0 - math.exp(-period_s / FILTER_S)
+        self.integral, self._rate = 0.0, 0.0
+        """What the integral gives [N], and the filtered rate of the error."""
+        self._last: float | None = None
+
+    def step(self, error: float) -> float:
+        """Takes an error and returns the force [N]."""
+        g = self.gains
+        rate = 0.0 if self._last is None else (error - self._last) / self._dt
+        self._rate, self._last = self._rate + self._share * (rate - self._rate), error
+        wanted = g.proportional * error + self.integral + g.derivative * self._rate
+        force = min(max(wanted, -g.most), g.most)
+        if force == wanted or error * wanted < 0.0:
+            self.integral += g.integral * error * self._dt
+        return force
+
+
+class VelocityController:
+    """Keeps a speed and a depth (section 3, "Velocity controller").
+
+    Fx by PID of the speed, DVL's after a low-pass filter; Fz by PID of the depth, from the pressure;
+    Tz = -k_r r against the IMU's yaw rate; all within bounds. It takes speed and depth of the path, not its
+    course: the robot goes where its nose points.
+    """
+
+    name = "velocity"
+    axes: tuple[str, ...] = ("Fx", "Fz", "Tz")
+    free: tuple[str, ...] = ("Fy",)
+    period_s = 0.1
+
+    def __init__(self, layout: Layout, gains: VelocityGains | None = None) -> None:
+        """Takes the robot and gains; by default those of `velocity_gains`."""
+        self.layout, self.gains = layout, velocity_gains(layout) if gains is None else gains
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget speed and integrals."""
+        self.surge, self.depth = (
+            Pid(gains, self.period_s) for gains in (self.gains.surge, self.gains.depth)
+        )
+        self._speed: float | None = None
+
+    def wrench(self, measurement: Measurement, setpoint: Setpoint, given: Array) -> Array:
+        """Returns the wrench (6,) that keeps speed and depth [N, N m]."""
+        seen, share = float(measurement.velocity[0]), 1.0 - math.exp(-self.period_s / FILTER_S)
+        self._speed = seen if self._speed is None else self._speed + share * (seen - self._speed)
+        g, wrench = self.gains, np.zeros(6)
+        wrench[0] = self.surge.step(setpoint.surge - self._speed)
+        wrench[2] = self.depth.step(float(setpoint.position[2]) + measurement.depth)
+        wrench[5] = min(max(-g.yaw_damping * float(measurement.rates[2]), -g.max_yaw), g.max_yaw)
+        return wrench
+
+
+def _within(wrench: Array, most: Array) -> Array:
+    """A wrench (6,) within bounds (6,): safety saturation."""
+    return wrench.clip(-most, most)
+
+
+CONTROLLERS: dict[str, Callable[[Layout], Controller]] = {
+    "tracking": TrackingController,
+    "waypoint": WaypointController,
+    "velocity": VelocityController,
+}
+"""Name -> what makes the controller of a robot; the default first."""
+
+
+def make_controller(name: str, layout: Layout) -> Controller:
+    """The controller of that name for a robot.
+
+    Raises:
+        FinlabError: no such controller, or the robot cannot give the axes that it commands.
+    """
+    if name not in CONTROLLERS:
+        raise FinlabError(f"controller: expected one of {', '.join(CONTROLLERS)}, got {name!r:.60}")
+    controller = CONTROLLERS[name](layout)
+    if name != "tracking" and not Completion(layout, (), controller.axes).controllable:
+        raise FinlabError(
+            f"controller: {name} commands {', '.join(controller.axes)}, which {layout.name!r:.60} cannot give "
+            "independently; take tracking"
+        )
+    return controller
