@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from tyro.conf import Positional, arg
@@ -28,9 +29,9 @@ def add_experiments(verbs: SubcommandApp, argv: Sequence[str]) -> None:
     """
     from finlab.evaluation.experiment import EXPERIMENTS, load_experiment
 
-    asked = argv[1] if argv[:1] == ["eval"] and len(argv) > 1 else ""
+    chosen_verb = argv[1] if argv[:1] == ["eval"] and len(argv) > 1 else ""
     for name in EXPERIMENTS:
-        if name == asked or asked.startswith("-"):
+        if name == chosen_verb or chosen_verb.startswith("-"):
             verbs.command(name=name)(verb_of(load_experiment(name)))
         else:
             verbs.command(name=name)(_not_asked)
@@ -42,26 +43,39 @@ def _not_asked() -> None:
 
 def verb_of(experiment: Experiment) -> Callable[..., None]:
     """A function whose signature says to the parser which options there are."""
+    from finlab.evaluation.plots import check_picture, write_picture
     from finlab.evaluation.progress import begin
     from finlab.evaluation.report.document import to_text
 
     options = experiment.options()
 
-    def verb(**given: Any) -> None:
-        json = given.pop("json")
+    def verb(**typed: Any) -> None:
+        json, plot = typed.pop("json"), typed.pop("plot", None)
         check_json_file(json)
+        check_picture(plot)
         begin(experiment.name)
-        chosen = {name: _parsed(name, options[name], value) for name, value in given.items()}
+        chosen = {name: _parsed(name, options[name], value) for name, value in typed.items()}
+        if plot is not None:
+            chosen |= experiment.for_picture
         rows = []
         for row in experiment.each_row(**chosen):
             rows.append(row)
             if json != STDOUT:  # so that they are there if it is stopped
                 put_json({"rows": rows}, json)
         put_json({"rows": rows}, json, to_text(*experiment.words(), *experiment.results(rows)))
+        if plot is not None and experiment.picture is not None:
+            write_picture(experiment.picture, rows, plot)
 
     shown = {name: _shown(each) for name, each in options.items()}
-    told = Annotated[JsonFile, arg(help="file for the rows, {'rows': [...]}; the rows alone without one")]
-    shown["json"] = inspect.Parameter("json", inspect.Parameter.KEYWORD_ONLY, default=None, annotation=told)
+    rows_file = Annotated[
+        JsonFile, arg(help="file for the rows, {'rows': [...]}; the rows alone without one")
+    ]
+    files: dict[str, Any] = {"json": rows_file}
+    if experiment.picture is not None:
+        about = "file for a picture, .png, .svg or .pdf (needs matplotlib, extra plot)"
+        files["plot"] = Annotated[Path | None, arg(metavar="FILE", help=about)]
+    for name, kind in files.items():
+        shown[name] = inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=kind)
     arguments = inspect.cleandoc(experiment.run.__doc__ or "").partition("Args:")[2].partition("\n\n")[0]
     verb.__doc__ = f"{experiment.question}\n\nArgs:{arguments}"
     verb.__signature__ = inspect.Signature(list(shown.values()))  # type: ignore[attr-defined]

@@ -20,4 +20,5 @@ from finlab.control.observer import MotionObserver as MotionObserver
 from finlab.control.tracking_controller import TrackingController as TrackingController
 from finlab.control.tracking_controller import TrackingGains as TrackingGains
 from finlab.control.tracking_controller import gains_for as gains_for
+from finlab.control.tracking_controller import steerable_loss as steerable_loss
 from finlab.control.tracking_controller import steers as steers

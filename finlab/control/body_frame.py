@@ -15,7 +15,7 @@ import numpy as np
 from finlab.arrays import Array
 from finlab.control.completion import Completion
 from finlab.control.measurement import Controller, Measurement, Setpoint
-from finlab.control.observer import AXES, MotionObserver, strongest_wrench
+from finlab.control.observer import MotionObserver, strongest_wrench
 from finlab.control.tracking_controller import BEHIND_S, LARGEST, TrackingController
 from finlab.errors import FinlabError
 from finlab.layout import Layout
@@ -84,7 +84,12 @@ def _model(layout: Layout, period_s: float) -> tuple[float, Array, Array, Array]
     the drag per speed at `CRUISE` (4,), and the largest wrench (6,) that is asked for."""
     observer = MotionObserver(layout, period_s)
     drag = observer.inertia * observer.slowed_by(np.full(4, CRUISE)) / CRUISE
-    return 1.0 / (following_delay(layout) + BEHIND_S), observer.inertia, drag, LARGEST * strongest_wrench(layout)
+    return (
+        1.0 / (following_delay(layout) + BEHIND_S),
+        observer.inertia,
+        drag,
+        LARGEST * strongest_wrench(layout),
+    )
 
 
 def waypoint_gains(layout: Layout) -> WaypointGains:
@@ -200,9 +205,7 @@ class VelocityController:
 
     def reset(self) -> None:
         """Forget speed and integrals."""
-        self.surge, self.depth = (
-            Pid(gains, self.period_s) for gains in (self.gains.surge, self.gains.depth)
-        )
+        self.surge, self.depth = (Pid(gains, self.period_s) for gains in (self.gains.surge, self.gains.depth))
         self._speed: float | None = None
 
     def wrench(self, measurement: Measurement, setpoint: Setpoint, given: Array) -> Array:
@@ -240,7 +243,7 @@ def make_controller(name: str, layout: Layout) -> Controller:
     controller = CONTROLLERS[name](layout)
     if name != "tracking" and not Completion(layout, (), controller.axes).controllable:
         raise FinlabError(
-            f"controller: {name} commands {', '.join(controller.axes)}, which {layout.name!r:.60} cannot give "
-            "independently; take tracking"
+            f"controller: {name} commands {', '.join(controller.axes)}, which {layout.name!r:.60} cannot "
+            "give independently; take tracking"
         )
     return controller

@@ -10,6 +10,7 @@ one number, how late the actuators are (`gains_for`).
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 
@@ -105,6 +106,13 @@ def axes_of(layout: Layout) -> tuple[str, ...]:
 def steers(layout: Layout, failed: Sequence[str] = ()) -> bool:
     """Whether what works of a robot can give the axes that are commanded independently, in small."""
     return Completion(layout, failed, axes_of(layout)).controllable
+
+
+def steerable_loss(layout: Layout, count: int, failed: Sequence[str] = ()) -> tuple[str, ...] | None:
+    """The first actuators, so many besides those that failed, without which a robot can still be steered."""
+    working = [name for name in layout.names if name not in failed]
+    ways = combinations(working, count) if count < len(working) else ()
+    return next((way for way in ways if not count or steers(layout, (*failed, *way))), None)
 
 
 class TrackingController:

@@ -52,6 +52,10 @@ class Experiment:
     """Options of the whole report where they differ from the defaults."""
     printed: Callable[[Sequence[Row]], list[Row]] | None = None
     """Figures that the paper prints beside our rows, as rows that stand below them."""
+    picture: Callable[[Sequence[Row]], Any] | None = None
+    """From the rows to the figure of `--plot FILE`; no such option without one."""
+    for_picture: Mapping[str, Any] = field(default_factory=dict)
+    """Options that give the picture its rows."""
 
     def options(self) -> dict[str, inspect.Parameter]:
         """The parameters of `run`, with their types resolved."""
@@ -139,9 +143,9 @@ def load_experiment(name: str) -> Experiment:
     """The experiment of that name; `DataError` for an unknown one."""
     if name not in EXPERIMENTS:
         raise DataError(f"eval: expected one of {', '.join(EXPERIMENTS)}, got {name!r}")
-    found = import_module(f"finlab.evaluation.experiments.{name}").experiment
-    assert isinstance(found, Experiment)
-    return found
+    value = import_module(f"finlab.evaluation.experiments.{name}").experiment
+    assert isinstance(value, Experiment)
+    return value
 
 
 @cache

@@ -11,8 +11,10 @@ from typing import Any
 import numpy as np
 
 from finlab.arrays import Array
+from finlab.control import steerable_loss
 from finlab.errors import DataError
 from finlab.evaluation.report.document import Column, Row
+from finlab.layout import Layout
 from finlab.sim import RunLog
 
 RTE_DELTA_S = 5.0
@@ -75,13 +77,18 @@ def over_seeds(rows: Sequence[Row]) -> Row:
     return means
 
 
-def mean_rows(key: str, done: Mapping[tuple[Any, str], Sequence[Row]], last: Any) -> list[Row]:
-    """One row for each value under `key` and method, of the rows of its runs; the value `last` at the end."""
-    order = sorted(done, key=lambda pair: pair[0] == last)
+def mean_rows(keys: Sequence[str], done: Mapping[tuple[Any, ...], Sequence[Row]]) -> list[Row]:
+    """One row for each case, a value for each key, of the rows of its runs."""
     return [
-        {key: value, "method": name, "runs": len(done[value, name]), **over_seeds(done[value, name])}
-        for value, name in order
+        {**dict(zip(keys, case, strict=True)), "runs": len(rows), **over_seeds(rows)}
+        for case, rows in done.items()
     ]
+
+
+def losses_of(layout: Layout, most: int) -> dict[int, tuple[str, ...] | None]:
+    """For 0 to `most` fins the first that may be lost so that the robot can be steered; None where all of
+    them are needed."""
+    return {count: steerable_loss(layout, count) for count in range(min(most, layout.n - 1) + 1)}
 
 
 POWER = (

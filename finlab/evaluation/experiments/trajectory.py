@@ -1,67 +1,133 @@
-"""Several layouts follow a trajectory with one controller and one checkpoint, as in the paper."""
+"""Several layouts, whole and with fins lost, follow a trajectory by the paper's controller and by ours."""
 
 from collections.abc import Sequence
 from itertools import product
+from typing import TYPE_CHECKING
 
-from finlab.evaluation.experiment import Experiment, paper_figures
-from finlab.evaluation.experiments.closed_loop import ABOUT_ERRORS, ERRORS, POWER, follow_row, mean_rows
+import numpy as np
+
+from finlab.arrays import Array
+from finlab.control import CONTROLLERS, make_controller
+from finlab.evaluation.experiment import Experiment, check_names, paper_figures
+from finlab.evaluation.experiments.closed_loop import (
+    ABOUT_ERRORS,
+    ERRORS,
+    POWER,
+    follow_row,
+    losses_of,
+    mean_rows,
+)
 from finlab.evaluation.method_specs import load_method_specs
 from finlab.evaluation.progress import progress
 from finlab.evaluation.report.document import Column, Row
 from finlab.layout import load_layout
-from finlab.sim import ClosedLoop, make_trajectory
+from finlab.sim import ClosedLoop, RunLog, make_trajectory
+from finlab.sim.plot import paths_picture
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+PATH_EVERY = 5
+"""Ticks between the points of a path that a row has."""
 
 
 def run(
     layouts: tuple[str, ...] = ("A", "B", "C", "D"),
     trajectory: str = "lissajous",
     methods: tuple[str, ...] = ("dual", "paper"),
-    runs: int = 3,
+    controllers: tuple[str, ...] = ("tracking", "waypoint"),
+    lost: int = 2,
+    runs: int = 1,
     checkpoint: str | None = None,
+    paths: bool = False,
     seed: int = 0,
 ) -> list[Row]:
-    """One row for each layout and method, and one for each method over all layouts.
+    """One row for each layout, number of lost fins, controller and method, and one over all layouts.
 
     Args:
         layouts: names or files.
-        trajectory: circle, lissajous, square, dive, station, or a CSV file with the columns t, x, y, z.
+        trajectory: circle, lissajous, square, dive, straight, station, or a CSV file with t, x, y, z.
         methods: names as in eval wrench.
+        controllers: tracking, waypoint (the paper's), velocity (the paper's, which keeps no course).
+        lost: most fins that are lost, announced from the start; 1 or 2 where the rest can be steered.
         runs: of each, with other noise.
         checkpoint: of the learned methods, a shipped name or a folder.
+        paths: whether rows have the first run's path (in the JSON alone).
         seed: of the first run's noise.
     """
+    check_names("controllers", controllers, CONTROLLERS)
     robots, path = [load_layout(name) for name in layouts], make_trajectory(trajectory)
     specs = load_method_specs(methods, checkpoint)
-    done: dict[tuple[str, str], list[Row]] = {}
-    for robot, (name, method), k in progress(list(product(robots, specs.items(), range(runs))), "swim"):
-        row = follow_row(ClosedLoop(robot, method.on(robot), path, seed=seed + k).run())
-        done.setdefault((robot.name, name), []).append(row)
-        done.setdefault(("all", name), []).append(row)
-    return mean_rows("layout", done, "all")
+    cases = [(robot, *loss) for robot in robots for loss in losses_of(robot, lost).items()]
+    done: dict[tuple[str, int, str, str], list[Row]] = {}
+    shown: dict[tuple[str, int, str, str], Row] = {}
+    every: dict[tuple[str, int, str, str], list[Row]] = {}
+    swims = product((case for case in cases if case[2] is not None), controllers, specs, range(runs))
+    for (robot, count, fins), controller, name, k in progress(list(swims), "swim"):
+        law, failures = make_controller(controller, robot), [(fin, 0.0) for fin in fins or ()]
+        log = ClosedLoop(robot, specs[name].on(robot), path, law, failures=failures, seed=seed + k).run()
+        row = follow_row(log)
+        case = robot.name, count, controller, name
+        done.setdefault(case, []).append(row)
+        every.setdefault(("all", *case[1:]), []).append(row)
+        if paths:
+            shown.setdefault(case, _path(log))
+    keys = "layout", "lost", "controller", "method"
+    rows = [row | shown.get(case, {}) for row, case in zip(mean_rows(keys, done), done, strict=True)]
+    hopeless: list[Row] = [
+        {"layout": robot.name, "lost": count, "method": "cannot be steered"}
+        for robot, count, fins in cases
+        if fins is None
+    ]
+    return [*rows, *hopeless, *mean_rows(keys, dict(sorted(every.items(), key=lambda each: each[0][1])))]
+
+
+def _path(log: RunLog) -> Row:
+    """Times [s], and where the robot was and should have been [m]."""
+    columns = {"t": log.time, "position": log.position, "reference": log.reference}
+    return {"path": {name: np.round(each[::PATH_EVERY], 4).tolist() for name, each in columns.items()}}
+
+
+def _picture(rows: Sequence[Row]) -> "Figure":
+    """The paths of all rows that have one, a column for each layout."""
+    swims: dict[str, tuple[Array, Array, dict[str, tuple[Array, Array]]]] = {}
+    for row in [row for row in rows if "path" in row]:
+        time, position, reference = (np.array(row["path"][key]) for key in ("t", "position", "reference"))
+        paths = swims.setdefault(row["layout"], (time, reference, {}))[2]
+        paths[f"{row['controller']} by {row['method']}, {row['lost']} lost"] = time, position
+    return paths_picture(swims)
 
 
 def _printed(rows: Sequence[Row]) -> list[Row]:
-    table, swum = paper_figures()["trajectory"], {row["layout"] for row in rows}
-    return [
-        {"layout": name, "method": "paper's method, printed", **row}
-        for name, row in table.items()
-        if name in swum
+    figures, swum = paper_figures(), {row["layout"] for row in rows}
+    about = {"controller": "waypoint", "method": "paper's method, printed"}
+    healthy = [{"layout": name, "lost": 0} | about | row for name, row in figures["trajectory"].items()]
+    pool = [
+        {"layout": "in the pool", "lost": count} | about | table["ours"]
+        for count, table in enumerate(figures["fault_tolerance"].values())
     ]
+    return [row for row in healthy if row["layout"] in swum] + pool
 
 
 experiment = Experiment(
     name="trajectory",
-    question="How closely do the paper's layouts follow a path, with one controller for all?",
+    question="How closely do the paper's layouts follow a path, whole and with fins lost, by its waypoint "
+    "controller and by ours?",
     columns=(
         Column("layout", "layout"),
+        Column("lost", "fins lost", "count"),
+        Column("controller", "controller", "code"),
         Column("method", "method", "code"),
         Column("runs", "runs", "count"),
         *ERRORS,
         *POWER,
     ),
     run=run,
-    note=f"{ABOUT_ERRORS} The paper's runs took place in another simulator, on paths that it does not print.",
-    quick={"layouts": ("A", "C"), "methods": ("dual",), "runs": 1},
-    full={"runs": 2},
+    note=f"{ABOUT_ERRORS} The paper's runs on A to D took place in another simulator, those with lost fins "
+    "in a pool, on paths that it does not print. Lost are the first fins without which a robot can be "
+    "steered.",
+    quick={"layouts": ("A", "C"), "methods": ("dual",), "lost": 1},
     printed=_printed,
+    picture=_picture,
+    for_picture={"paths": True},
 )

@@ -1,13 +1,14 @@
-"""A robot keeps a speed and a depth, for power and error of the speed, as in the paper."""
+"""Robots, whole and with fins lost, keep a speed and a depth by the paper's PID controller and by ours."""
 
 from collections.abc import Sequence
 from itertools import product
 
 import numpy as np
 
+from finlab.control import CONTROLLERS, make_controller
 from finlab.errors import DataError
-from finlab.evaluation.experiment import Experiment, paper_figures
-from finlab.evaluation.experiments.closed_loop import POWER, depth_error, mean_rows, power_row
+from finlab.evaluation.experiment import Experiment, check_names, paper_figures
+from finlab.evaluation.experiments.closed_loop import POWER, depth_error, losses_of, mean_rows, power_row
 from finlab.evaluation.method_specs import load_method_specs
 from finlab.evaluation.progress import progress
 from finlab.evaluation.report.document import Column, Row
@@ -16,23 +17,29 @@ from finlab.sim import ClosedLoop, RunLog, straight
 
 SPEEDS = (0.10, 0.15, 0.20)
 """The paper's speeds [m/s]."""
+KEYS = ("layout", "lost", "speed", "controller", "method")
+"""What a row is of."""
 SETTLED_S = 10.0
 """After this time the start from rest is over [s]."""
 
 
 def run(
-    layout: str = "A",
+    layouts: tuple[str, ...] = ("A", "B", "C", "D"),
     methods: tuple[str, ...] = ("dual", "mdn", "analytic"),
-    runs: int = 5,
+    controllers: tuple[str, ...] = ("tracking", "velocity"),
+    lost: int = 2,
+    runs: int = 1,
     duration: float = 30.0,
     checkpoint: str | None = None,
     seed: int = 0,
 ) -> list[Row]:
-    """One row for each speed and method, and one for each method over all speeds.
+    """One row for each layout, number of lost fins, speed, controller and method, and one over all speeds.
 
     Args:
-        layout: a layout file or shipped name.
+        layouts: names or files.
         methods: names as in eval wrench.
+        controllers: tracking, velocity (the paper's), waypoint (the paper's of paths).
+        lost: most fins that are lost, announced from the start; 1 or 2 where the rest can be steered.
         runs: of each, with other noise.
         duration: of a run [s].
         checkpoint: of the learned methods, a shipped name or a folder.
@@ -40,13 +47,24 @@ def run(
     """
     if not SETTLED_S < duration <= 3600.0:
         raise DataError(f"duration: expected more than {SETTLED_S:g} s and at most 3600 s, got {duration:g}")
-    robot, specs = load_layout(layout), load_method_specs(methods, checkpoint)
-    done: dict[tuple[float | None, str], list[Row]] = {}
-    for speed, (name, method), k in progress(list(product(SPEEDS, specs.items(), range(runs))), "swim"):
-        row = _row(ClosedLoop(robot, method.on(robot), straight(speed, duration), seed=seed + k).run())
-        done.setdefault((speed, name), []).append(row)
-        done.setdefault((None, name), []).append(row)
-    return mean_rows("speed", done, None)
+    check_names("controllers", controllers, CONTROLLERS)
+    robots, specs = [load_layout(name) for name in layouts], load_method_specs(methods, checkpoint)
+    cases = [
+        (robot, count, fins)
+        for robot in robots
+        for count, fins in losses_of(robot, lost).items()
+        if fins is not None
+    ]
+    done: dict[tuple[str, int, float | None, str, str], list[Row]] = {}
+    swims = product(cases, SPEEDS, controllers, specs, range(runs))
+    for (robot, count, fins), speed, controller, name, k in progress(list(swims), "swim"):
+        law, failures = make_controller(controller, robot), [(fin, 0.0) for fin in fins]
+        allocator, path = specs[name].on(robot), straight(duration, speed)
+        row = _row(ClosedLoop(robot, allocator, path, law, failures=failures, seed=seed + k).run())
+        for shown in (speed, None):
+            done.setdefault((robot.name, count, shown, controller, name), []).append(row)
+    order = sorted(done, key=lambda case: (case[:2], case[2] is None))
+    return mean_rows(KEYS, {case: done[case] for case in order})
 
 
 def _row(log: RunLog) -> Row:
@@ -62,14 +80,18 @@ def _row(log: RunLog) -> Row:
 
 def _printed(rows: Sequence[Row]) -> list[Row]:
     names = {"ours": "paper's method, printed", "baseline": "paper's baseline, printed"}
-    return [{"method": names[key], **row} for key, row in paper_figures()["velocity"].items()]
+    about = {"layout": "in the pool", "lost": 0, "controller": "velocity"}
+    return [{**about, "method": names[key], **row} for key, row in paper_figures()["velocity"].items()]
 
 
 experiment = Experiment(
     name="velocity",
     question="What power does it take to keep a speed and a depth, and how well are they kept?",
     columns=(
+        Column("layout", "layout"),
+        Column("lost", "fins lost", "count"),
         Column("speed", "speed", "ratio", unit="m/s"),
+        Column("controller", "controller", "code"),
         Column("method", "method", "code"),
         Column("runs", "runs", "count"),
         Column("mae", "MAE of the speed", "metres", unit="m/s"),
@@ -81,6 +103,7 @@ experiment = Experiment(
     run=run,
     note="Runs from rest; rows without a speed are over all speeds. Inertial power is the paper's sum of I "
     "alpha omega, of its magnitudes. The paper's runs took place in a pool.",
-    quick={"runs": 1},
+    quick={"layouts": ("A",), "lost": 0},
+    full={"layouts": ("A",), "lost": 0, "runs": 5},
     printed=_printed,
 )
