@@ -16,7 +16,7 @@ from finlab.arrays import Array
 from finlab.control.completion import Completion
 from finlab.control.measurement import Controller, Measurement, Setpoint
 from finlab.control.observer import MotionObserver, strongest_wrench
-from finlab.control.tracking_controller import BEHIND_S, LARGEST, TrackingController
+from finlab.control.tracking_controller import BEHIND_S, LARGEST, TrackingController, axes_of
 from finlab.errors import FinlabError
 from finlab.layout import Layout
 from finlab.layout.angles import wrapped
@@ -46,6 +46,8 @@ class WaypointGains:
     """k_z [N/m]."""
     yaw: float
     """k_psi [N m/rad]."""
+    surge_damping: float
+    """Against the speed ahead [N s/m]; 0 as printed."""
     heave_damping: float
     """Against the speed of climbing [N s/m]; 0 as printed."""
     yaw_damping: float
@@ -93,17 +95,20 @@ def _model(layout: Layout, period_s: float) -> tuple[float, Array, Array, Array]
 
 
 def waypoint_gains(layout: Layout) -> WaypointGains:
-    """The gains for one robot: heave and heading are damped oscillators of `SLOW` and `TURN`; the lead is
-    that of the damped heave, and surge balances the drag with it."""
+    """The gains for one robot: surge and heave are damped oscillators of `SLOW`, or quicker where the drag
+    alone damps more, and the heading one of `TURN`. The lead makes up for the damping: no steady lag."""
     pace, inertia, drag, most = _model(layout, WaypointController.period_s)
     slow, turn = SLOW * pace, TURN * pace
     lead = 2.0 * DAMPING / slow
+    spring = np.maximum(inertia * slow**2, drag / lead)
+    damping = spring * lead - drag
     return WaypointGains(
         lead_s=lead,
-        surge=float(drag[0]) / lead,
-        heave=float(inertia[2]) * slow**2,
+        surge=float(spring[0]),
+        heave=float(spring[2]),
         yaw=float(inertia[3]) * turn**2,
-        heave_damping=max(2.0 * DAMPING * slow * float(inertia[2]) - float(drag[2]), 0.0),
+        surge_damping=float(damping[0]),
+        heave_damping=float(damping[2]),
         yaw_damping=max(2.0 * DAMPING * turn * float(inertia[3]) - float(drag[3]), 0.0),
         max_wrench=tuple(most.tolist()),
     )
@@ -131,16 +136,15 @@ class WaypointController:
 
     Of the error (dx, dy, dz) and the wrapped yaw error e towards the waypoint,
     Fx = k_d hypot(dx, dy) max(0, cos e), Fz = k_z dz, Tz = k_psi e. To this the gains may add damping of
-    climb and yaw rate. The waypoint runs `lead_s` ahead on the path; odometry is `MotionObserver`'s.
+    speed, climb and yaw rate. The waypoint runs `lead_s` ahead on the path; odometry is `MotionObserver`'s.
     """
 
     name = "waypoint"
-    axes: tuple[str, ...] = ("Fx", "Fz", "Tz")
-    free: tuple[str, ...] = ("Fy",)
     period_s = 0.1
 
     def __init__(self, layout: Layout, gains: WaypointGains | None = None) -> None:
-        """Takes the robot and gains; by default those of `waypoint_gains`."""
+        """Takes the robot and gains; by default those of `waypoint_gains`. Errors as `make_controller`."""
+        self.axes, self.free = _axes(layout, self.name)
         self.layout, self.gains = layout, waypoint_gains(layout) if gains is None else gains
         self.reset()
 
@@ -155,10 +159,12 @@ class WaypointController:
         dx, dy, dz = (setpoint.position + ahead - now.position).tolist()
         distance = math.hypot(dx, dy)
         e = float(wrapped(math.atan2(dy, dx) - now.yaw)) * min(1.0, distance / NEAR_M)
-        surge = g.surge * distance * max(0.0, math.cos(e))
+        surge = g.surge * distance * max(0.0, math.cos(e)) - g.surge_damping * float(now.velocity[0])
         heave = g.heave * dz - g.heave_damping * float(now.world_velocity[2])
         yaw = g.yaw * e - g.yaw_damping * now.yaw_rate
-        return _within(np.array([surge, 0.0, heave, 0.0, 0.0, yaw]), np.array(g.max_wrench))
+        most = np.array(g.max_wrench)
+        wrench: Array = np.array([surge, 0.0, heave, 0.0, 0.0, yaw]).clip(-most, most)
+        return wrench
 
 
 class Pid:
@@ -194,12 +200,11 @@ class VelocityController:
     """
 
     name = "velocity"
-    axes: tuple[str, ...] = ("Fx", "Fz", "Tz")
-    free: tuple[str, ...] = ("Fy",)
     period_s = 0.1
 
     def __init__(self, layout: Layout, gains: VelocityGains | None = None) -> None:
-        """Takes the robot and gains; by default those of `velocity_gains`."""
+        """Takes the robot and gains; by default those of `velocity_gains`. Errors as `make_controller`."""
+        self.axes, self.free = _axes(layout, self.name)
         self.layout, self.gains = layout, velocity_gains(layout) if gains is None else gains
         self.reset()
 
@@ -219,9 +224,20 @@ class VelocityController:
         return wrench
 
 
-def _within(wrench: Array, most: Array) -> Array:
-    """A wrench (6,) within bounds (6,): safety saturation."""
-    return wrench.clip(-most, most)
+def _axes(layout: Layout, name: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Axes that are commanded, of surge, heave and yaw what the robot can give, and those that are free.
+
+    Raises:
+        FinlabError: it cannot surge and turn, or dives by its pitch alone.
+    """
+    able = axes_of(layout)
+    axes = tuple(axis for axis in ("Fx", "Fz", "Tz") if axis in able)
+    if "Ty" in able or not Completion(layout, (), axes).controllable:
+        raise FinlabError(
+            f"controller: {name} commands Fx, Fz and Tz, which {layout.name!r:.60} cannot give "
+            "independently; take tracking"
+        )
+    return axes, () if "Fy" in able else ("Fy",)
 
 
 CONTROLLERS: dict[str, Callable[[Layout], Controller]] = {
@@ -240,10 +256,4 @@ def make_controller(name: str, layout: Layout) -> Controller:
     """
     if name not in CONTROLLERS:
         raise FinlabError(f"controller: expected one of {', '.join(CONTROLLERS)}, got {name!r:.60}")
-    controller = CONTROLLERS[name](layout)
-    if name != "tracking" and not Completion(layout, (), controller.axes).controllable:
-        raise FinlabError(
-            f"controller: {name} commands {', '.join(controller.axes)}, which {layout.name!r:.60} cannot "
-            "give independently; take tracking"
-        )
-    return controller
+    return CONTROLLERS[name](layout)

@@ -45,6 +45,12 @@ def depth_error(position: Array, reference: Array) -> float:
     return float(np.sqrt(np.square(position[:, 2] - reference[:, 2]).mean()))
 
 
+def speed_error(log: RunLog) -> Array:
+    """Size of the error of the speed ahead at each tick (N,) [m/s]."""
+    error: Array = np.abs(log.motion[:, 0] - log.reference_surge)
+    return error
+
+
 def follow_row(log: RunLog) -> Row:
     """Errors of one run along a trajectory [m], power [W] and time; a run that is shorter than the piece of
     the relative error counts as one piece."""

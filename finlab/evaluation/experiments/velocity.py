@@ -3,12 +3,17 @@
 from collections.abc import Sequence
 from itertools import product
 
-import numpy as np
-
 from finlab.control import CONTROLLERS, make_controller
 from finlab.errors import DataError
 from finlab.evaluation.experiment import Experiment, check_names, paper_figures
-from finlab.evaluation.experiments.closed_loop import POWER, depth_error, losses_of, mean_rows, power_row
+from finlab.evaluation.experiments.closed_loop import (
+    POWER,
+    depth_error,
+    losses_of,
+    mean_rows,
+    power_row,
+    speed_error,
+)
 from finlab.evaluation.method_specs import load_method_specs
 from finlab.evaluation.progress import progress
 from finlab.evaluation.report.document import Column, Row
@@ -69,7 +74,7 @@ def run(
 
 def _row(log: RunLog) -> Row:
     """Errors of one run [m/s, m] and power [W]."""
-    error = np.abs(log.motion[:, 0] - log.reference_surge)
+    error = speed_error(log)
     return {
         "mae": float(error.mean()),
         "mae_settled": float(error[log.time >= SETTLED_S].mean()),
